@@ -1,0 +1,58 @@
+// The baked model: everything that NAME.palpate.hdf holds.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/packed.h"
+#include "meshes/material.h"
+#include "meshes/mesh.h"
+#include "meshes/quality.h"
+
+namespace palpate {
+
+/// Which rows and columns of Xi are kept (theory.md section 2). All are exact; nodes outside carry no force.
+enum class Scope : std::uint8_t {
+  surface,  ///< free nodes on the surface
+  layers,   ///< those and the free interior nodes within `layers` elements of the surface
+  full,     ///< all free nodes
+};
+
+/// One file that the model was made from, so that a stale model can be noticed.
+struct SourceFile {
+  std::string role;         ///< "model" for model.toml, "geometry" for the mesh, surface or image
+  std::string path;         ///< relative to the folder of the baked file, '/' separated
+  std::int64_t bytes = 0;   ///< size when it was read
+  std::string checksum;     ///< XXH3-128 of its bytes, 32 hexadecimal digits
+};
+
+/// A force on every stored dof and the displacement that it must give: lets anyone check a file without the model.
+struct Probe {
+  std::vector<double> force;         ///< [n] on the stored dofs [N]
+  std::vector<double> displacement;  ///< [n] of the stored dofs [m], by a sparse solve with K
+};
+
+/// Everything baked. Constant once loaded; shared by all threads.
+/// A stored dof is 3 k + axis for stored node k; `stored_nodes[k]` is its mesh node.
+struct Model {
+  std::string name;        ///< from model.toml
+  std::string generator;   ///< program and version that wrote it
+  std::string model_toml;  ///< text of the description, byte for byte
+  Mesh mesh;
+  std::vector<Triangle> surface_triangles;  ///< [F] mesh node numbers, outward
+  Material material;
+  std::vector<std::uint8_t> fixed;  ///< [N] 1 where the node is clamped
+  std::vector<Index> stored_nodes;  ///< [n/3] mesh node of each stored node, in the elimination order of the factor
+  Scope scope = Scope::layers;
+  Index layers = 1;  ///< element layers below the surface that are kept (scope layers); 0 otherwise
+  QualityReport quality;
+  std::vector<SourceFile> sources;
+  std::vector<Probe> probes;
+  PackedGreens greens;       ///< Xi of the stored dofs [m/N]
+  std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
+
+  [[nodiscard]] std::int64_t stored_dofs() const noexcept { return 3 * static_cast<std::int64_t>(stored_nodes.size()); }
+};
+
+}  // namespace palpate

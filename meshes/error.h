@@ -1,0 +1,35 @@
+// The one exception type of the offline and load-time code.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace palpate {
+
+/// What a person is told when something cannot be done: one sentence, its place, and a way out.
+/// Thrown offline and at load, never in the tick; caught once in each `main`, which prints
+/// `error: WHERE: WHAT` and `hint: HINT` and exits with `ExitCode::input_error` unless told otherwise.
+class Error : public std::runtime_error {
+ public:
+  /// `what` says what is wrong (with the numbers), `where` names the file, field or line, `hint` says what to do.
+  Error(const std::string& what, std::string where, std::string hint)
+      : std::runtime_error(what), where_(std::move(where)), hint_(std::move(hint)) {}
+
+  [[nodiscard]] const std::string& where() const noexcept { return where_; }
+  [[nodiscard]] const std::string& hint() const noexcept { return hint_; }
+
+ private:
+  std::string where_;
+  std::string hint_;
+};
+
+/// Exit statuses of both programs (documented in the README).
+enum ExitCode : int {
+  exit_ok = 0,
+  exit_input_error = 1,    ///< bad input, bad file, not enough disk or memory: nothing was changed
+  exit_usage = 2,          ///< unknown or missing command-line argument
+  exit_not_verified = 3,   ///< `verify` found a difference
+  exit_interrupted = 130,  ///< Ctrl-C or SIGTERM: temporary files were removed
+};
+
+}  // namespace palpate
