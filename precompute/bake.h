@@ -1,0 +1,31 @@
+// From a description to NAME.palpate.hdf.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "precompute/assembly.h"
+#include "precompute/description.h"
+
+namespace palpate {
+
+struct BakeOptions {
+  std::filesystem::path output;
+  int jobs = 1;          ///< threads
+  bool dry_run = false;  ///< stop after the plan is printed
+};
+
+/// How a bake ended.
+enum class BakeResult : std::uint8_t { done, planned, interrupted };
+
+/// Free nodes whose rows and columns of Xi are kept (theory.md section 2). Returns a mark for each dof of K.
+std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& stiffness, Scope scope, Index layers);
+
+/// Runs the whole precomputation: mesh, K, factor, columns, file. Prints progress to standard error. When `interrupted` becomes
+/// true it stops at the next block of columns and removes what it wrote. Throws Error for bad input, and with the numbers
+/// when memory or disk will not do.
+BakeResult bake(const Description& description, const BakeOptions& options, const std::atomic<bool>& interrupted);
+
+}  // namespace palpate

@@ -1,0 +1,43 @@
+// Sparse Cholesky factor of a stiffness matrix, by CHOLMOD.
+#pragma once
+
+#include <cholmod.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "precompute/assembly.h"
+
+namespace palpate {
+
+/// P K P^T = L L^T, supernodal, ordered by METIS on the graph of the nodes, so that the dofs of a node stay together.
+/// The constructor analyses (no numbers yet: enough to plan and to estimate), `factorize` computes.
+class Factor {
+ public:
+  /// K: lower triangle with complete 3x3 blocks, as assemble_stiffness leaves it. Keeps a reference to it.
+  explicit Factor(const SparseMatrix& K);
+  ~Factor();
+  Factor(const Factor&) = delete;
+  Factor& operator=(const Factor&) = delete;
+
+  /// Numeric factorisation. Throws Error when K is not positive definite or memory is short.
+  void factorize();
+
+  /// x = K^-1 b for `columns` right-hand sides, column-major [n, columns], by plain cholmod_solve.
+  [[nodiscard]] std::vector<double> solve(std::span<const double> b, std::int64_t columns = 1) const;
+
+  [[nodiscard]] std::int64_t order() const noexcept { return K_.rows(); }      ///< n
+  [[nodiscard]] std::int64_t entries() const noexcept;                         ///< stored entries of L
+  [[nodiscard]] std::span<const std::int64_t> permutation() const noexcept;    ///< dof of K at each position of L
+  [[nodiscard]] const cholmod_factor& supernodal() const noexcept { return *factor_; }
+  [[nodiscard]] cholmod_common& common() const noexcept { return common_; }
+
+ private:
+  const SparseMatrix& K_;
+  mutable cholmod_common common_{};  // CHOLMOD takes its settings and workspace by pointer even to solve
+  cholmod_factor* factor_ = nullptr;
+};
+
+}  // namespace palpate

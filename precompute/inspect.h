@@ -1,0 +1,13 @@
+// `palpate-precompute inspect`: what is in a file.
+#pragma once
+
+#include <string>
+
+#include "formats/model.h"
+
+namespace palpate {
+
+/// A page of text about a loaded model: sizes, material, scope, mesh quality with histogram, sources.
+std::string inspect(const Model& model);
+
+}  // namespace palpate

@@ -1,0 +1,80 @@
+#include <cblas.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include "meshes/error.h"
+#include "precompute/plan.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t max_block_columns = 192;
+constexpr std::int64_t max_block_bytes = 512LL << 20;
+
+/// Multiply-adds a second of one thread in products shaped as the sweeps are.
+double measured_flops_per_second() {
+  constexpr int m = 192, n = 128, k = 24;
+  const std::vector<double> A(m * k, 1.0), B(k * n, 1.0);
+  std::vector<double> C(m * n, 0.0);
+  const auto start = std::chrono::steady_clock::now();
+  double spent = 0.0, flops = 0.0;
+  while (spent < 0.05) {
+    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, n, k, 1.0, A.data(), m, B.data(), k, 0.0, C.data(), m);
+    flops += 2.0 * m * n * k;
+    spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  return flops / spent;
+}
+
+/// Columns a block: as wide as pays, but one block's right-hand sides stay below max_block_bytes.
+std::int64_t choose_block_columns(std::int64_t free_dofs) {
+  const std::int64_t fits = max_block_bytes / (free_dofs * static_cast<std::int64_t>(sizeof(double)));
+  return std::clamp<std::int64_t>(fits / 24 * 24, 24, max_block_columns);
+}
+
+}  // namespace
+
+std::int64_t available_memory() {
+  std::ifstream meminfo("/proc/meminfo");
+  std::string key, unit;
+  std::int64_t kibibytes = 0;
+  while (meminfo >> key >> kibibytes) {
+    std::getline(meminfo, unit);
+    if (key == "MemAvailable:") return kibibytes * 1024;
+  }
+  return INT64_MAX;
+}
+
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision, int jobs) {
+  Plan plan;
+  plan.nodes = static_cast<std::int64_t>(mesh.nodes.size());
+  plan.elements = static_cast<std::int64_t>(mesh.tets.size());
+  plan.free_dofs = factor.order();
+  plan.stored_dofs = solver.order();
+  plan.factor_entries = factor.entries();
+  plan.file_bytes = packed_size(plan.stored_dofs) * bytes_per_scalar(precision);
+  plan.block_columns = choose_block_columns(plan.free_dofs);
+  plan.memory_bytes =
+      plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) + jobs * solver.workspace_bytes(plan.block_columns);
+  for (std::int64_t first = 0; first < plan.stored_dofs; first += plan.block_columns) {
+    plan.flops += solver.flops(first, std::min(plan.block_columns, plan.stored_dofs - first));
+  }
+  plan.seconds = plan.flops / (measured_flops_per_second() * jobs);
+  return plan;
+}
+
+void check_memory(const Plan& plan) {
+  const std::int64_t available = available_memory();
+  if (plan.memory_bytes <= available) return;
+  throw Error(fmt::format("{:.2f} GB of memory are needed, {:.2f} GB are free: {:.2f} GB for the factor ({} entries) and the rest "
+                          "for blocks of {} columns",
+                          static_cast<double>(plan.memory_bytes) / 1e9, static_cast<double>(available) / 1e9,
+                          static_cast<double>(plan.factor_entries) * 8e-9, plan.factor_entries, plan.block_columns),
+              "memory", "Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading.");
+}
+
+}  // namespace palpate

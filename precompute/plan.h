@@ -1,0 +1,33 @@
+// What a precomputation will take, before it is begun.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "formats/packed.h"
+#include "precompute/greens.h"
+
+namespace palpate {
+
+/// Known after meshing and symbolic analysis.
+struct Plan {
+  std::int64_t nodes = 0, elements = 0;
+  std::int64_t free_dofs = 0;       ///< order of K
+  std::int64_t stored_dofs = 0;     ///< order n of the stored block of Xi
+  std::int64_t factor_entries = 0;  ///< stored entries of L
+  std::int64_t file_bytes = 0;      ///< of the packed matrix, the bulk of the file
+  std::int64_t memory_bytes = 0;    ///< largest demand: factor and workspaces of all jobs
+  std::int64_t block_columns = 0;   ///< right-hand sides solved at a time; the same for any number of jobs
+  double flops = 0.0;               ///< of the column solves
+  double seconds = 0.0;             ///< estimate of the column solves with all jobs, from a measured rate
+};
+
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision, int jobs);
+
+/// Throws Error with the numbers when the plan needs more memory than is free.
+void check_memory(const Plan& plan);
+
+/// MemAvailable of /proc/meminfo [bytes].
+std::int64_t available_memory();
+
+}  // namespace palpate
