@@ -3,6 +3,7 @@
 #include <cblas.h>
 #include <fmt/format.h>
 
+#include <atomic>
 #include <exception>
 #include <mutex>
 #include <random>
@@ -14,6 +15,7 @@
 #include "precompute/body.h"
 #include "precompute/factor.h"
 #include "precompute/greens.h"
+#include "precompute/interrupt.h"
 #include "precompute/plan.h"
 #include "precompute/progress.h"
 
@@ -80,7 +82,7 @@ std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int6
 
 /// Computes all blocks of columns that the file does not have yet, `jobs` at a time. False when interrupted.
 bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
-                   const std::atomic<bool>& interrupted) {
+                   const InterruptGuard& interrupt) {
   const std::int64_t blocks = (plan.stored_dofs + plan.block_columns - 1) / plan.block_columns;
   std::atomic<std::int64_t> next{0};
   std::atomic<bool> failed{false};
@@ -93,7 +95,7 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
     GreensSolver::Workspace workspace;
     std::vector<double> packed;
     try {
-      for (std::int64_t block = next++; block < blocks && !failed && !interrupted; block = next++) {
+      for (std::int64_t block = next++; block < blocks && !failed && !interrupt.requested(); block = next++) {
         const std::int64_t first = block * plan.block_columns;
         const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
         const bool have = writer.has_columns(first, count);
@@ -118,7 +120,7 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
     work();
   }
   if (failure) std::rethrow_exception(failure);
-  if (interrupted) return false;
+  if (interrupt.requested()) return false;
   if (reused > 0) progress.line(fmt::format("{} of {} columns were kept from an earlier, unfinished run", reused, plan.stored_dofs));
   return true;
 }
@@ -136,7 +138,7 @@ std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& st
   return marks;
 }
 
-BakeResult bake(const Description& description, const BakeOptions& options, const std::atomic<bool>& interrupted) {
+BakeResult bake(const Description& description, const BakeOptions& options) {
   Progress progress;
   MeshedBody body = mesh_body(description, [&](const std::string& text) { progress.line(text); });
   for (const std::string& note : body.notes) progress.line("note: " + note);
@@ -154,8 +156,9 @@ BakeResult bake(const Description& description, const BakeOptions& options, cons
   progress.line("K factorised");
   openblas_set_num_threads(1);  // the blocks are the parallel work
   const Model model = describe_model(description, options, std::move(body), stiffness, solver);
+  const InterruptGuard interrupt;
   ModelWriter writer(options.output, model, description.precision);
-  if (!solve_columns(solver, plan, options.jobs, writer, progress, interrupted)) {
+  if (!solve_columns(solver, plan, options.jobs, writer, progress, interrupt)) {
     writer.discard();
     progress.line("interrupted: nothing was written");
     return BakeResult::interrupted;

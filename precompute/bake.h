@@ -1,7 +1,6 @@
 // From a description to NAME.palpate.hdf.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
@@ -23,9 +22,9 @@ enum class BakeResult : std::uint8_t { done, planned, interrupted };
 /// Free nodes whose rows and columns of Xi are kept (theory.md section 2). Returns a mark for each dof of K.
 std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& stiffness, Scope scope, Index layers);
 
-/// Runs the whole precomputation: mesh, K, factor, columns, file. Prints progress to standard error. When `interrupted` becomes
-/// true it stops at the next block of columns and removes what it wrote. Throws Error for bad input, and with the numbers
-/// when memory or disk will not do.
-BakeResult bake(const Description& description, const BakeOptions& options, const std::atomic<bool>& interrupted);
+/// Runs the whole precomputation: mesh, K, factor, columns, file. Prints progress to standard error. On Ctrl-C or SIGTERM it
+/// stops at the next block of columns and removes what it wrote. Throws Error for bad input, and with the numbers when
+/// memory or disk will not do.
+BakeResult bake(const Description& description, const BakeOptions& options);
 
 }  // namespace palpate

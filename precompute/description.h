@@ -1,4 +1,4 @@
-// model.toml: what a person writes to describe a body. Keys are documented in the README.
+// model.toml: what a person writes to describe a body. Keys are documented in meshes/models/README.md.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +18,8 @@ struct SurfaceGeometry {
   std::filesystem::path file;
 };
 
-/// Labelled image (INR and what else CGAL's image reader takes). Every non-zero label is body unless `labels` lists those that are.
+/// Labelled image (INR and what else CGAL's image reader takes). Every non-zero label is body unless `labels`
+/// lists those that are.
 struct ImageGeometry {
   std::filesystem::path file;
   std::vector<int> labels;  ///< empty: all non-zero ones
@@ -29,16 +30,19 @@ struct VolumeGeometry {
   std::filesystem::path file;
 };
 
-using Geometry = std::variant<SurfaceGeometry, ImageGeometry, VolumeGeometry, BoxShape, CylinderShape, SphereShape>;
+using Geometry =
+    std::variant<SurfaceGeometry, ImageGeometry, VolumeGeometry, BoxShape, CylinderShape, SphereShape>;
 
 /// How the volume is meshed. Lengths in metres after scaling.
 struct MeshOptions {
-  std::optional<double> edge_length;  ///< target edge length at the surface [m]; surfaces: kept as they are without it
-  bool remesh = false;                ///< surfaces: isotropic remeshing to edge_length before meshing
-  double grading = 0.5;               ///< growth of the target edge length per length below the surface [-]; 0 is uniform
-  double radius_edge = 2.0;           ///< bound on circumradius / shortest edge
-  double min_dihedral = 0.0;          ///< bound asked of the mesher [degree] (TetGen) 
-  double facet_distance = 0.0;        ///< images: surface approximation error [m]; 0 is a default from the voxel size
+  std::optional<double>
+      edge_length;       ///< target edge length at the surface [m]; surfaces: kept as they are without it
+  bool remesh = false;   ///< surfaces: isotropic remeshing to edge_length before meshing
+  double grading = 0.5;  ///< growth of the target edge length per length below the surface [-]; 0 is uniform
+  double radius_edge = 2.0;   ///< bound on circumradius / shortest edge
+  double min_dihedral = 0.0;  ///< bound asked of the mesher [degree] (TetGen)
+  double facet_distance =
+      0.0;  ///< images: surface approximation error [m]; 0 is a default from the voxel size
 };
 
 /// The whole model.toml, checked.
@@ -56,8 +60,8 @@ struct Description {
   Precision precision = Precision::single_precision;
 };
 
-/// Reads and checks model.toml. Relative files are taken from its folder. Throws Error with file, line and column; an unknown key names the
-/// nearest known one.
+/// Reads and checks model.toml. Relative files are taken from its folder. Throws Error with file, line and
+/// column; an unknown key names the nearest known one.
 Description read_description(const std::filesystem::path& file);
 
 }  // namespace palpate

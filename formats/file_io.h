@@ -1,0 +1,70 @@
+// Files below HDF5: positioned reads and writes, mappings, free space, durable renames (POSIX).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace palpate {
+
+/// An open file; closed when it goes.
+class FileDescriptor {
+ public:
+  FileDescriptor() = default;
+  FileDescriptor(int fd, std::filesystem::path path) : fd_(fd), path_(std::move(path)) {}
+  FileDescriptor(FileDescriptor&& other) noexcept;
+  FileDescriptor& operator=(FileDescriptor&& other) noexcept;
+  ~FileDescriptor() { close(); }
+
+  [[nodiscard]] int get() const noexcept { return fd_; }
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  void close() noexcept;
+
+ private:
+  int fd_ = -1;
+  std::filesystem::path path_;
+};
+
+enum class OpenMode : std::uint8_t {
+  read,          ///< must exist
+  write,         ///< must exist; reads too
+  read_append,   ///< made when missing; reads anywhere, writes at the end
+};
+
+/// Throws Error with the system's reason.
+FileDescriptor open_file(const std::filesystem::path& path, OpenMode mode);
+
+/// [byte]
+std::int64_t file_size(const FileDescriptor& file);
+
+/// Reads up to `into.size()` bytes at `offset`; returns how many, 0 at the end of the file. Throws Error.
+std::size_t read_some(const FileDescriptor& file, std::span<std::byte> into, std::int64_t offset);
+
+/// Reads exactly `into.size()` bytes at `offset`. Throws Error when the file ends before.
+void read_exactly(const FileDescriptor& file, std::span<std::byte> into, std::int64_t offset);
+
+/// Throws Error with the system's reason (full disk, ...).
+void write_exactly(const FileDescriptor& file, std::span<const std::byte> bytes, std::int64_t offset);
+
+/// Adds a line to a file opened with read_append. Throws Error.
+void append_text(const FileDescriptor& file, const std::string& text);
+
+/// Maps bytes [offset, offset + bytes) read-only; the mapping lives as long as the pointer. `bytes` > 0 and inside the file.
+std::shared_ptr<const void> map_file(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
+
+/// Throws Error (needed, free) unless `needed` bytes fit beside `path`; what a file at `path` occupies counts as free.
+void check_free_space(const std::filesystem::path& path, std::int64_t needed);
+
+/// Takes the disk space of [offset, offset + bytes) now, where the file system can. Throws Error when it is full.
+void reserve_space(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
+
+/// Flushes `from` to the disk, then renames it. Throws Error.
+void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// "liver.palpate.hdf" + ".partial"
+std::filesystem::path with_suffix(const std::filesystem::path& path, const char* suffix);
+
+}  // namespace palpate

@@ -1,0 +1,300 @@
+#include "formats/hdf5.h"
+
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "meshes/error.h"
+
+namespace palpate::hdf5 {
+namespace {
+
+constexpr hsize_t alignment = 4096;  // a page
+constexpr std::size_t longest_text = 4096;
+constexpr std::size_t highest_rank = 4;
+
+const char* const altered_hint = "Copy the file again, or precompute it again.";
+
+/// The deepest reason that the library gives for its last failure.
+std::string reason() {
+  std::string text;
+  const auto first = [](unsigned, const H5E_error2_t* error, void* data) -> herr_t {
+    if (error->desc != nullptr) *static_cast<std::string*>(data) = error->desc;
+    return 1;
+  };
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, first, &text);
+  return text.empty() ? "no reason given" : text;
+}
+
+Id access_properties(std::int64_t align_from) {
+  Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_fapl_sec2(access.get());
+  H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
+  // 1.10's format has a checksum in every piece of metadata; the older ones have none.
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
+  if (align_from > 0) H5Pset_alignment(access.get(), static_cast<hsize_t>(align_from), alignment);
+  return access;
+}
+
+Id text_type(std::size_t length, H5T_cset_t characters) {
+  Id type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.get(), length > 0 ? length : 1);
+  H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+  H5Tset_cset(type.get(), characters);
+  return type;
+}
+
+bool is_ascii(const std::string& text) {
+  for (const char c : text)
+    if (static_cast<unsigned char>(c) > 127) return false;
+  return true;
+}
+
+Id open_existing(const std::filesystem::path& path, unsigned mode) {
+  const Id access = access_properties(0);
+  return {H5Fopen(path.c_str(), mode, access.get()), H5Fclose};
+}
+
+std::string text_of(std::span<const std::int64_t> dims) {
+  std::string text;
+  for (const std::int64_t dim : dims) text += (text.empty() ? "" : " x ") + std::to_string(dim);
+  return text.empty() ? "a scalar" : text;
+}
+
+}  // namespace
+
+Id::Id(Id&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
+
+Id& Id::operator=(Id&& other) noexcept {
+  close();
+  id_ = std::exchange(other.id_, H5I_INVALID_HID);
+  close_ = other.close_;
+  return *this;
+}
+
+Id::~Id() { close(); }
+
+bool Id::close() noexcept { return id_ < 0 || close_(std::exchange(id_, H5I_INVALID_HID)) >= 0; }
+
+template <>
+ElementType element_type<std::uint8_t>() {
+  return {"uint8", 1, H5T_STD_U8LE};
+}
+template <>
+ElementType element_type<std::uint32_t>() {
+  return {"uint32", 4, H5T_STD_U32LE};
+}
+template <>
+ElementType element_type<std::int32_t>() {
+  return {"int32", 4, H5T_STD_I32LE};
+}
+template <>
+ElementType element_type<std::int64_t>() {
+  return {"int64", 8, H5T_STD_I64LE};
+}
+template <>
+ElementType element_type<float>() {
+  return {"float32", 4, H5T_IEEE_F32LE};
+}
+template <>
+ElementType element_type<double>() {
+  return {"float64", 8, H5T_IEEE_F64LE};
+}
+
+Id timeless(hid_t kind) {
+  Id properties(H5Pcreate(kind), H5Pclose);
+  H5Pset_obj_track_times(properties.get(), false);
+  return properties;
+}
+
+void File::fail(const std::string& doing) const {
+  throw Error("cannot " + doing + ": " + reason(), path_.string(), "Check the disk and the folder's permissions.");
+}
+
+File File::create(const std::filesystem::path& path, std::int64_t align_from) {
+  const Id access = access_properties(align_from);
+  const Id creation = timeless(H5P_FILE_CREATE);
+  File file(Id(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose), path);
+  if (!file.file_.valid()) file.fail("make the file");
+  return file;
+}
+
+File File::open_to_read(const std::filesystem::path& path) {
+  File file(open_existing(path, H5F_ACC_RDONLY), path);
+  if (!file.file_.valid())
+    throw Error("is not a readable HDF5 file: " + reason(), path.string(), altered_hint);
+  return file;
+}
+
+File File::open_to_change(const std::filesystem::path& path) {
+  File file(open_existing(path, H5F_ACC_RDWR), path);
+  if (!file.file_.valid()) file.fail("open the file");
+  return file;
+}
+
+bool File::has(const std::string& object) const {
+  for (std::size_t end = object.find('/', 1);; end = object.find('/', end + 1)) {
+    const std::string part = object.substr(0, end);
+    H5L_info_t link = {};
+    if (H5Lexists(id(), part.c_str(), H5P_DEFAULT) <= 0) return false;
+    if (H5Lget_info(id(), part.c_str(), &link, H5P_DEFAULT) < 0 || link.type != H5L_TYPE_HARD) return false;
+    if (end == std::string::npos) return true;
+  }
+}
+
+void File::make_group(const std::string& group) {
+  if (group.empty() || has(group)) return;
+  make_group(group.substr(0, group.rfind('/')));
+  const Id creation = timeless(H5P_GROUP_CREATE);
+  const Id made(H5Gcreate2(id(), group.c_str(), H5P_DEFAULT, creation.get(), H5P_DEFAULT), H5Gclose);
+  if (!made.valid()) fail("make the group " + group);
+}
+
+void File::make_link(const std::string& link, const std::string& target) {
+  if (H5Lcreate_soft(target.c_str(), id(), link.c_str(), H5P_DEFAULT, H5P_DEFAULT) < 0) fail("make the link " + link);
+}
+
+void File::write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims,
+                 const void* data) {
+  make_group(dataset.substr(0, dataset.rfind('/')));
+  const std::vector<hsize_t> sizes(dims.begin(), dims.end());
+  const Id space(H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose);
+  const Id creation = timeless(H5P_DATASET_CREATE);
+  H5Pset_layout(creation.get(), H5D_CONTIGUOUS);
+  H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
+  H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
+  const Id made(
+      H5Dcreate2(id(), dataset.c_str(), type.id, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT), H5Dclose);
+  if (!made.valid()) fail("make " + dataset);
+  if (data != nullptr && H5Dwrite(made.get(), type.id, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
+    fail("write " + dataset);
+}
+
+void File::write_attribute(const std::string& object, const std::string& name, const std::string& text) {
+  if (text.size() > longest_text)
+    throw Error(name + " is " + std::to_string(text.size()) + " bytes long, at most " +
+                    std::to_string(longest_text) + " fit",
+                path_.string(), "Use a shorter text.");
+  const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);
+  const Id type = text_type(text.size(), is_ascii(text) ? H5T_CSET_ASCII : H5T_CSET_UTF8);
+  const Id space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Id made(H5Acreate2(holder.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  if (!made.valid() || H5Awrite(made.get(), type.get(), text.c_str()) < 0)
+    fail("write the attribute " + name + " of " + object);
+}
+
+void File::write_attribute(const std::string& object, const std::string& name, std::span<const std::int64_t> values) {
+  const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);
+  const hsize_t count = values.size();
+  const Id space(count == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &count, nullptr), H5Sclose);
+  const Id made(H5Acreate2(holder.get(), name.c_str(), H5T_STD_I64LE, space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                H5Aclose);
+  if (!made.valid() || H5Awrite(made.get(), H5T_NATIVE_INT64, values.data()) < 0)
+    fail("write the attribute " + name + " of " + object);
+}
+
+Id File::open_dataset(const std::string& dataset) const {
+  if (!has(dataset)) throw Error(dataset + " is missing", path_.string(), altered_hint);
+  Id opened(H5Dopen2(id(), dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!opened.valid()) throw Error(dataset + " is not a readable dataset", path_.string(), altered_hint);
+  return opened;
+}
+
+std::string File::type_name(const std::string& dataset) const {
+  const Id opened = open_dataset(dataset);
+  const Id type(H5Dget_type(opened.get()), H5Tclose);
+  const std::array known = {element_type<std::uint8_t>(), element_type<std::uint32_t>(), element_type<std::int32_t>(),
+                            element_type<std::int64_t>(), element_type<float>(),         element_type<double>()};
+  for (const ElementType& candidate : known)
+    if (H5Tequal(type.get(), candidate.id) > 0) return candidate.name;
+  return "another type";
+}
+
+Stored File::locate(const std::string& dataset, const ElementType& type, std::size_t rank) const {
+  const auto refuse = [&](const std::string& what) { throw Error(dataset + " " + what, path_.string(), altered_hint); };
+  const Id opened = open_dataset(dataset);
+
+  const std::string stored_type = type_name(dataset);
+  if (stored_type != type.name) refuse("holds " + stored_type + ", " + type.name + " is expected");
+
+  const Id creation(H5Dget_create_plist(opened.get()), H5Pclose);
+  if (H5Pget_layout(creation.get()) != H5D_CONTIGUOUS || H5Pget_external_count(creation.get()) != 0)
+    refuse("is not stored in one piece");
+
+  const Id space(H5Dget_space(opened.get()), H5Sclose);
+  const int stored_rank = H5Sget_simple_extent_ndims(space.get());
+  if (H5Sget_simple_extent_type(space.get()) != H5S_SIMPLE || stored_rank != static_cast<int>(rank))
+    refuse("has " + std::to_string(stored_rank) + " dimensions, " + std::to_string(rank) + " are expected");
+
+  std::array<hsize_t, highest_rank> sizes = {};
+  H5Sget_simple_extent_dims(space.get(), sizes.data(), nullptr);
+  Stored stored;
+  stored.bytes = static_cast<std::int64_t>(type.bytes);
+  hsize_t file_bytes = 0;
+  H5Fget_filesize(id(), &file_bytes);
+  for (std::size_t i = 0; i < rank; ++i) {
+    stored.dims.push_back(static_cast<std::int64_t>(sizes[i]));
+    if (sizes[i] > static_cast<hsize_t>(std::numeric_limits<std::int64_t>::max()) ||
+        __builtin_mul_overflow(stored.bytes, stored.dims.back(), &stored.bytes))
+      refuse("has impossible sizes: " + text_of(stored.dims));
+  }
+  if (stored.bytes == 0) return stored;
+
+  const haddr_t offset = H5Dget_offset(opened.get());
+  if (offset == HADDR_UNDEF || offset > file_bytes || static_cast<hsize_t>(stored.bytes) > file_bytes - offset)
+    refuse("(" + text_of(stored.dims) + ") needs " + std::to_string(stored.bytes) + " bytes, more than the file holds (" +
+           std::to_string(file_bytes) + "): the file is truncated");
+  stored.offset = static_cast<std::int64_t>(offset);
+  return stored;
+}
+
+Id File::open_attribute(const std::string& object, const std::string& name) const {
+  if (object != "/" && !has(object)) return {};
+  const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);
+  if (!holder.valid() || H5Aexists(holder.get(), name.c_str()) <= 0) return {};
+  return {H5Aopen(holder.get(), name.c_str(), H5P_DEFAULT), H5Aclose};
+}
+
+std::optional<std::string> File::text_attribute(const std::string& object, const std::string& name) const {
+  const Id attribute = open_attribute(object, name);
+  if (!attribute.valid()) return {};
+  const Id type(H5Aget_type(attribute.get()), H5Tclose);
+  const Id space(H5Aget_space(attribute.get()), H5Sclose);
+  if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) != 0) return {};
+  if (H5Sget_simple_extent_npoints(space.get()) != 1 || H5Tget_size(type.get()) > longest_text) return {};
+  std::string text(H5Tget_size(type.get()), '\0');
+  if (H5Aread(attribute.get(), type.get(), text.data()) < 0) return {};
+  return text.substr(0, text.find('\0'));
+}
+
+std::optional<std::vector<std::int64_t>> File::integer_attribute(const std::string& object, const std::string& name,
+                                                                 std::size_t count) const {
+  const Id attribute = open_attribute(object, name);
+  if (!attribute.valid()) return {};
+  const Id type(H5Aget_type(attribute.get()), H5Tclose);
+  const Id space(H5Aget_space(attribute.get()), H5Sclose);
+  if (H5Tget_class(type.get()) != H5T_INTEGER) return {};
+  if (H5Sget_simple_extent_npoints(space.get()) != static_cast<hssize_t>(count)) return {};
+  std::vector<std::int64_t> values(count);
+  if (H5Aread(attribute.get(), H5T_NATIVE_INT64, values.data()) < 0) return {};
+  return values;
+}
+
+int File::descriptor() const {
+  void* handle = nullptr;
+  if (H5Fget_vfd_handle(id(), H5P_DEFAULT, &handle) < 0 || handle == nullptr) fail("reach the file");
+  return *static_cast<int*>(handle);
+}
+
+void File::close() {
+  if (!file_.close()) fail("write the file");
+}
+
+Quiet::Quiet() {
+  H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+Quiet::~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+
+}  // namespace palpate::hdf5

@@ -1,0 +1,118 @@
+// A thin layer over the HDF5 C library: identifiers that close themselves, failures as Error, no error printing.
+#pragma once
+
+#include <hdf5.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace palpate::hdf5 {
+
+/// Owns an HDF5 identifier.
+class Id {
+ public:
+  using Close = herr_t (*)(hid_t);
+  Id() = default;
+  Id(hid_t id, Close close) noexcept : id_(id), close_(close) {}
+  Id(Id&& other) noexcept;
+  Id& operator=(Id&& other) noexcept;
+  ~Id();
+
+  [[nodiscard]] hid_t get() const noexcept { return id_; }
+  [[nodiscard]] bool valid() const noexcept { return id_ >= 0; }
+  bool close() noexcept;  ///< false when the library failed, e.g. while it wrote what it still held
+
+ private:
+  hid_t id_ = H5I_INVALID_HID;
+  Close close_ = nullptr;
+};
+
+/// A scalar type as it lies in the file (little-endian).
+struct ElementType {
+  const char* name;   ///< "float64"
+  std::size_t bytes;  ///< of one element
+  hid_t id;
+};
+
+/// For std::uint8_t, std::uint32_t, std::int32_t, std::int64_t, float and double.
+template <class T>
+ElementType element_type();
+
+/// Where a dataset lies in the file.
+struct Stored {
+  std::vector<std::int64_t> dims;
+  std::int64_t offset = 0;  ///< of its first byte
+  std::int64_t bytes = 0;
+};
+
+/// An HDF5 file. Objects carry no times, so equal calls make equal files. All throw Error (where = the file; fields are named).
+class File {
+ public:
+  /// A new file (an old one is emptied). Objects of at least `align_from` bytes start at multiples of 4096 bytes.
+  static File create(const std::filesystem::path& path, std::int64_t align_from);
+  static File open_to_read(const std::filesystem::path& path);
+  static File open_to_change(const std::filesystem::path& path);
+
+  [[nodiscard]] hid_t id() const noexcept { return file_.get(); }
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  [[nodiscard]] bool has(const std::string& object) const;  ///< a dataset or group of the file itself, not behind a link
+
+  void make_group(const std::string& group);  ///< with its parents; nothing where it exists
+  void make_link(const std::string& link, const std::string& target);  ///< soft link
+
+  /// Contiguous dataset; makes its group. `data` null: only the space is reserved.
+  void write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims, const void* data);
+  void write_attribute(const std::string& object, const std::string& name, const std::string& text);
+  void write_attribute(const std::string& object, const std::string& name, std::span<const std::int64_t> values);
+
+  /// Finds a dataset and proves that it has this type and rank, lies in one piece, and inside the file.
+  [[nodiscard]] Stored locate(const std::string& dataset, const ElementType& type, std::size_t rank) const;
+
+  /// Name of a dataset's element type ("float64"), "another type" where it is none of ours.
+  [[nodiscard]] std::string type_name(const std::string& dataset) const;
+
+  /// Value of a fixed-length text attribute; nothing where it is missing or of another kind.
+  [[nodiscard]] std::optional<std::string> text_attribute(const std::string& object, const std::string& name) const;
+  /// `count` values of an integer attribute; nothing where it is missing or of another kind.
+  [[nodiscard]] std::optional<std::vector<std::int64_t>> integer_attribute(const std::string& object,
+                                                                           const std::string& name,
+                                                                           std::size_t count) const;
+
+  /// POSIX descriptor of the open file; the library keeps it.
+  [[nodiscard]] int descriptor() const;
+
+  /// Writes everything out. Throws Error when that fails (full disk); the destructor would not say.
+  void close();
+
+ private:
+  File(Id file, std::filesystem::path path) : file_(std::move(file)), path_(std::move(path)) {}
+  [[nodiscard]] Id open_dataset(const std::string& dataset) const;
+  [[nodiscard]] Id open_attribute(const std::string& object, const std::string& name) const;
+  [[noreturn]] void fail(const std::string& doing) const;
+
+  Id file_;
+  std::filesystem::path path_;
+};
+
+/// Object creation properties without times, for kinds such as H5P_DATASET_CREATE.
+Id timeless(hid_t kind);
+
+/// Stops the library from printing its error stack while this lives.
+class Quiet {
+ public:
+  Quiet();
+  ~Quiet();
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+
+ private:
+  H5E_auto2_t print_ = nullptr;
+  void* data_ = nullptr;
+};
+
+}  // namespace palpate::hdf5

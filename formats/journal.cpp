@@ -1,0 +1,104 @@
+#include "formats/journal.h"
+
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <string_view>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::string_view first_line = "palpate-progress 1";
+
+/// The words of a line.
+std::vector<std::string_view> words(std::string_view line) {
+  std::vector<std::string_view> result;
+  while (!line.empty()) {
+    const std::size_t end = std::min(line.find(' '), line.size());
+    result.push_back(line.substr(0, end));
+    line.remove_prefix(std::min(end + 1, line.size()));
+  }
+  return result;
+}
+
+bool to_number(std::string_view text, std::int64_t& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && value >= 0;
+}
+
+/// Complete lines only: what follows the last line end was cut off.
+std::vector<std::string_view> lines(std::string_view text) {
+  std::vector<std::string_view> result;
+  for (std::size_t end = text.find('\n'); end != std::string_view::npos; end = text.find('\n')) {
+    result.push_back(text.substr(0, end));
+    text.remove_prefix(end + 1);
+  }
+  return result;
+}
+
+/// False when the file was deleted or replaced between opening and locking it.
+bool is_still_there(const FileDescriptor& file) {
+  struct stat opened = {};
+  struct stat named = {};
+  return ::fstat(file.get(), &opened) == 0 && ::stat(file.path().c_str(), &named) == 0 && opened.st_ino == named.st_ino;
+}
+
+}  // namespace
+
+Journal::Journal(std::filesystem::path path) {
+  do {
+    file_ = open_file(path, OpenMode::read_append);
+    if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0)
+      throw Error("another palpate-precompute is writing this file", path.string(),
+                  "Wait for it, or choose another place with --output.");
+  } while (!is_still_there(file_));
+}
+
+std::optional<JournalContents> Journal::read() const {
+  std::string text(static_cast<std::size_t>(file_size(file_)), '\0');
+  read_exactly(file_, std::as_writable_bytes(std::span(text)), 0);
+  const std::vector<std::string_view> all = lines(text);
+  if (all.size() < 2 || all[0] != first_line) return {};
+
+  JournalContents contents;
+  JournalFrame& frame = contents.frame;
+  const auto frame_words = words(all[1]);
+  if (frame_words.size() != 5 || frame_words[0] != "model" || !to_number(frame_words[2], frame.greens_at) ||
+      !to_number(frame_words[3], frame.file_bytes))
+    return {};
+  frame.key = frame_words[1];
+  frame.checksum = frame_words[4];
+
+  for (std::size_t i = 2; i < all.size(); ++i) {
+    const auto w = words(all[i]);
+    JournalRange range;
+    if (w.size() != 4 || w[0] != "columns" || !to_number(w[1], range.first) || !to_number(w[2], range.count)) break;
+    range.checksum = w[3];
+    contents.ranges.push_back(std::move(range));
+  }
+  return contents;
+}
+
+void Journal::start(const JournalFrame& frame) {
+  empty();
+  append_text(file_, std::string(first_line) + "\nmodel " + frame.key + ' ' + std::to_string(frame.greens_at) + ' ' +
+                         std::to_string(frame.file_bytes) + ' ' + frame.checksum + '\n');
+}
+
+void Journal::empty() {
+  if (::ftruncate(file_.get(), 0) != 0)
+    throw Error("cannot be emptied", file_.path().string(), "Delete this file.");
+}
+
+void Journal::add(const JournalRange& range) {
+  append_text(file_, "columns " + std::to_string(range.first) + ' ' + std::to_string(range.count) + ' ' +
+                         range.checksum + '\n');
+}
+
+void Journal::remove() noexcept { ::unlink(file_.path().c_str()); }
+
+}  // namespace palpate

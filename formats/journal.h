@@ -1,0 +1,52 @@
+// Which columns of a half-written model are done: PATH.progress, a text file that a killed run leaves behind.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/file_io.h"
+
+namespace palpate {
+
+/// The part of PATH.partial that is finished before the columns arrive.
+struct JournalFrame {
+  std::string key;             ///< of the model that is being written
+  std::int64_t greens_at = 0;  ///< first byte of the Green's functions
+  std::int64_t file_bytes = 0;
+  std::string checksum;        ///< of all bytes but the Green's functions
+};
+
+/// Columns [first, first + count) and the checksum of their bytes.
+struct JournalRange {
+  std::int64_t first = 0;
+  std::int64_t count = 0;
+  std::string checksum;
+};
+
+struct JournalContents {
+  JournalFrame frame;
+  std::vector<JournalRange> ranges;
+};
+
+/// An open journal, held by one process at a time.
+class Journal {
+ public:
+  /// Opens or makes it. Throws Error when another process holds it.
+  explicit Journal(std::filesystem::path path);
+
+  /// What a killed run left; nothing when there is no complete frame. A line that was cut off by the kill ends the list.
+  [[nodiscard]] std::optional<JournalContents> read() const;
+
+  void start(const JournalFrame& frame);   ///< empties it and writes the frame
+  void empty();                            ///< forgets everything
+  void add(const JournalRange& range);     ///< one line, in one write
+  void remove() noexcept;                  ///< deletes the file
+
+ private:
+  FileDescriptor file_;
+};
+
+}  // namespace palpate

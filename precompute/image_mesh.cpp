@@ -1,0 +1,217 @@
+#include "precompute/image_mesh.h"
+
+#define CGAL_USE_ZLIB 1  // .inr.gz
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Image_3.h>
+#include <CGAL/Labeled_mesh_domain_3.h>
+#include <CGAL/Mesh_complex_3_in_triangulation_3.h>
+#include <CGAL/Mesh_criteria_3.h>
+#include <CGAL/Mesh_triangulation_3.h>
+#include <CGAL/Random.h>
+#include <CGAL/make_mesh_3.h>
+
+#include <cstring>
+#include <map>
+#include <set>
+#include <span>
+#include <unordered_map>
+
+#include "meshes/error.h"
+#include "precompute/child_process.h"
+#include "precompute/voxel_body.h"
+
+namespace palpate {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using Domain = CGAL::Labeled_mesh_domain_3<Kernel>;
+using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
+using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
+using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
+namespace parameters = CGAL::parameters;
+
+constexpr std::chrono::seconds read_time_limit{600};
+constexpr double facet_angle =
+    25.0;  // [degree] bound on the surface triangles' angles that Mesh_3 can promise
+constexpr double wanted_dihedral = 12.0;  // [degree] sliver removal stops here
+constexpr double relative_error = 1e-4;   // of the body's size: where the boundary is found
+
+enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
+
+struct ImageHeader {
+  std::array<Index, 3> size{};
+  std::array<double, 3> spacing{};
+  std::array<double, 3> origin{};
+};
+
+/// Reads the image and sends its header and its voxels as labels.
+ChildResult read_labels(const std::string& file) {
+  CGAL::Image_3 image;
+  if (!image.read(file) || image.size() == 0) {
+    return {not_an_image, {}};
+  }
+  if (image.image()->vdim != 1) {
+    return {not_scalar, {}};
+  }
+  ImageHeader header;
+  header.size = {static_cast<Index>(image.xdim()), static_cast<Index>(image.ydim()),
+                 static_cast<Index>(image.zdim())};
+  header.spacing = {image.vx(), image.vy(), image.vz()};
+  header.origin = {static_cast<double>(image.tx()), static_cast<double>(image.ty()),
+                   static_cast<double>(image.tz())};
+  std::vector<std::int32_t> labels;
+  labels.reserve(image.size());
+  for (std::size_t k = 0; k < image.zdim(); ++k) {
+    for (std::size_t j = 0; j < image.ydim(); ++j) {
+      for (std::size_t i = 0; i < image.xdim(); ++i) {
+        labels.push_back(static_cast<std::int32_t>(std::lround(image.value(i, j, k))));
+      }
+    }
+  }
+  ChildResult result;
+  append_bytes(result.bytes, std::span<const ImageHeader>(&header, 1));
+  append_bytes(result.bytes, std::span<const std::int32_t>(labels));
+  return result;
+}
+
+void check_header(const ImageHeader& header, const std::string& where) {
+  for (const double spacing : header.spacing) {
+    if (!std::isfinite(spacing) || spacing <= 0.0) {
+      throw Error("the voxel size of the image is " + std::to_string(spacing), where,
+                  "write a positive VX, VY and VZ");
+    }
+  }
+}
+
+/// Marks the voxels that carry one of the labels (all but 0 where none are listed).
+VoxelBody select(const Bytes& bytes, const std::vector<int>& wanted, const std::string& where) {
+  ImageHeader header;
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  check_header(header, where);
+  VoxelBody body;
+  body.size = header.size;
+  body.spacing = Vec3(header.spacing[0], header.spacing[1], header.spacing[2]);
+  body.origin = Vec3(header.origin[0], header.origin[1], header.origin[2]);
+  std::vector<std::int32_t> labels((bytes.size() - sizeof(header)) / sizeof(std::int32_t));
+  std::memcpy(labels.data(), bytes.data() + sizeof(header), labels.size() * sizeof(std::int32_t));
+
+  std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
+  body.inside.reserve(labels.size());
+  for (const std::int32_t label : labels) {
+    const auto [entry, is_new] = selected.try_emplace(label, 0);
+    if (is_new) {
+      entry->second =
+          wanted.empty() ? label != 0 : std::find(wanted.begin(), wanted.end(), label) != wanted.end();
+    }
+    body.inside.push_back(entry->second);
+  }
+  std::string occurring;
+  for (const auto& [label, is_body] : selected) {
+    occurring += (occurring.empty() ? "" : ", ") + std::to_string(label);
+  }
+  for (const int label : wanted) {
+    if (!selected.contains(label)) {
+      throw Error("no voxel of the image has label " + std::to_string(label), where,
+                  "its labels are " + occurring);
+    }
+  }
+  if (wanted.empty() && selected.size() == 1 && selected.contains(0)) {
+    throw Error("the image is empty: all its voxels are 0", where, "give a segmented image");
+  }
+  return body;
+}
+
+VoxelBody read_body(const ImageGeometry& image, std::vector<std::string>& notes) {
+  const std::string where = image.file.string();
+  if (!std::filesystem::is_regular_file(image.file)) {
+    throw Error("there is no such image file", where, "check image = \"...\" in [geometry]");
+  }
+  // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
+  const ChildResult read =
+      run_in_child("the image reader", where, read_time_limit, [&] { return read_labels(where); });
+  if (read.status != read_ok) {
+    throw Error(
+        read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
+        where, "use a complete INR file (.inr, .inr.gz) with one label a voxel");
+  }
+  VoxelBody body = crop(select(read.bytes, image.labels, where), 2);
+  keep_one_part(body, where, notes);
+  return body;
+}
+
+Vec3 as_vector(const Point& p) {
+  return {p.x(), p.y(), p.z()};
+}
+
+/// Bound on the circumradius of tetrahedra for Mesh_3: that of the regular one with the target edge length.
+struct CellSize {
+  using FT = Kernel::FT;
+  const DistanceField* distance;
+  double surface_edge;
+  double grading;
+
+  template <typename AnyIndex>
+  FT operator()(const Point& p, int /*dimension*/, const AnyIndex& /*index*/) const {
+    const double depth = std::max(0.0, (*distance)(as_vector(p)));
+    return std::sqrt(3.0 / 8.0) * (surface_edge + grading * depth);
+  }
+};
+
+CGAL::Bbox_3 bounding_box(const VoxelBody& body) {
+  const Vec3 low = body.origin;
+  const Vec3 high =
+      low + Vec3(body.size[0] - 1, body.size[1] - 1, body.size[2] - 1).cwiseProduct(body.spacing);
+  return {low[0], low[1], low[2], high[0], high[1], high[2]};
+}
+
+Complex make_complex(const VoxelBody& body, const MeshOptions& options) {
+  const DistanceField distance(body);
+  CGAL::get_default_random() = CGAL::Random(0);
+  const Domain domain = Domain::create_implicit_mesh_domain(
+      [&](const Point& p) { return -distance(as_vector(p)); }, bounding_box(body),
+      parameters::relative_error_bound = relative_error);
+  const CellSize cell_size{&distance, *options.edge_length, options.grading};
+  const double facet_distance =
+      options.facet_distance > 0.0 ? options.facet_distance : body.spacing.maxCoeff();
+  const Criteria criteria(
+      parameters::facet_angle = facet_angle, parameters::facet_size = *options.edge_length,
+      parameters::facet_distance = facet_distance, parameters::cell_radius_edge_ratio = options.radius_edge,
+      parameters::cell_size = cell_size);
+  return CGAL::make_mesh_3<Complex>(domain, criteria, parameters::manifold(),
+                                    parameters::perturb(parameters::sliver_bound = wanted_dihedral),
+                                    parameters::exude(parameters::sliver_bound = wanted_dihedral));
+}
+
+Mesh export_mesh(const Complex& complex) {
+  Mesh mesh;
+  std::unordered_map<Complex::Vertex_handle, Index> number;
+  for (auto cell = complex.cells_in_complex_begin(); cell != complex.cells_in_complex_end(); ++cell) {
+    Tet tet{};
+    for (int i = 0; i < 4; ++i) {
+      const auto [entry, is_new] = number.try_emplace(cell->vertex(i), static_cast<Index>(mesh.nodes.size()));
+      if (is_new) {
+        const auto& p = cell->vertex(i)->point();
+        mesh.nodes.emplace_back(p.x(), p.y(), p.z());
+      }
+      tet[static_cast<std::size_t>(i)] = entry->second;
+    }
+    mesh.tets.push_back(tet);
+  }
+  mesh.regions.assign(mesh.tets.size(), 0);
+  return mesh;
+}
+
+}  // namespace
+
+Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vector<std::string>& notes) {
+  const VoxelBody body = read_body(image, notes);
+  Mesh mesh = export_mesh(make_complex(body, options));
+  if (mesh.tets.empty()) {
+    throw Error("no tetrahedron fits into the image's body", image.file.string(),
+                "use a smaller edge_length in [mesh]");
+  }
+  return mesh;
+}
+
+}  // namespace palpate

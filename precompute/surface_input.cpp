@@ -1,0 +1,350 @@
+#include "precompute/surface_input.h"
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/IO/polygon_soup_io.h>
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
+#include <CGAL/Polygon_mesh_processing/detect_features.h>
+#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/remesh.h>
+#include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/shape_predicates.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
+#include <CGAL/Surface_mesh.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <numeric>
+#include <sstream>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+namespace PMP = CGAL::Polygon_mesh_processing;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using SurfaceMesh = CGAL::Surface_mesh<Point>;
+using Face = SurfaceMesh::Face_index;
+using Polygon = std::vector<std::size_t>;
+
+constexpr double sharp_edge_degrees = 60.0;
+constexpr int remesh_iterations = 5;
+
+/// Polygons that share points by number, as a file gives them.
+struct Soup {
+  std::vector<Point> points;
+  std::vector<Polygon> polygons;
+};
+
+std::string shown(const Point& p) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << "(" << p.x() << ", " << p.y() << ", " << p.z() << ")";
+  return text.str();
+}
+
+Soup read_soup(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) {
+    throw Error("there is no such surface file", file.string(), "check surface = \"...\" in [geometry]");
+  }
+  Soup soup;
+  bool read = false;
+  try {
+    read = CGAL::IO::read_polygon_soup(file.string(), soup.points, soup.polygons,
+                                       CGAL::parameters::verbose(false));
+  } catch (const std::exception&) {
+    read = false;
+  }
+  if (!read || soup.polygons.empty()) {
+    throw Error("cannot read a surface from this file", file.string(),
+                "it must be a complete .off, .obj, .stl or .ply with triangles or polygons");
+  }
+  for (const Point& p : soup.points) {
+    if (!CGAL::is_finite(p.x()) || !CGAL::is_finite(p.y()) || !CGAL::is_finite(p.z())) {
+      throw Error("a coordinate is not a finite number", file.string(), "export the surface again");
+    }
+  }
+  return soup;
+}
+
+using Edge = std::pair<std::size_t, std::size_t>;
+
+/// How many polygons meet in each edge.
+std::map<Edge, int> count_edges(const Soup& soup) {
+  std::map<Edge, int> count;
+  for (const Polygon& polygon : soup.polygons) {
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      ++count[std::minmax(polygon[i], polygon[(i + 1) % polygon.size()])];
+    }
+  }
+  return count;
+}
+
+/// Number of connected groups of open edges.
+std::size_t count_holes(const std::vector<Edge>& open_edges, std::size_t points) {
+  std::vector<std::size_t> group(points);
+  std::iota(group.begin(), group.end(), std::size_t{0});
+  const auto root = [&](std::size_t i) {
+    while (group[i] != i) {
+      i = group[i] = group[group[i]];
+    }
+    return i;
+  };
+  for (const auto& [a, b] : open_edges) {
+    group[root(a)] = root(b);
+  }
+  std::vector<std::size_t> roots;
+  for (const auto& edge : open_edges) {
+    roots.push_back(root(edge.first));
+  }
+  std::sort(roots.begin(), roots.end());
+  return static_cast<std::size_t>(std::unique(roots.begin(), roots.end()) - roots.begin());
+}
+
+void check_edges(const Soup& soup, const std::string& where) {
+  std::vector<Edge> open_edges;
+  for (const auto& [edge, count] : count_edges(soup)) {
+    const std::string place =
+        "from " + shown(soup.points[edge.first]) + " to " + shown(soup.points[edge.second]) + " (file units)";
+    if (count > 2) {
+      throw Error(
+          "the surface is not manifold: " + std::to_string(count) + " triangles meet in the edge " + place,
+          where, "remove inner walls and doubled triangles in a mesh editor");
+    }
+    if (count == 1) {
+      open_edges.push_back(edge);
+    }
+  }
+  if (open_edges.empty()) {
+    return;
+  }
+  const auto& [a, b] = open_edges.front();
+  throw Error("the surface is open: " + std::to_string(count_holes(open_edges, soup.points.size())) +
+                  " hole(s), " + std::to_string(open_edges.size()) + " open edges, the first from " +
+                  shown(soup.points[a]) + " to " + shown(soup.points[b]) + " (file units)",
+              where, "close the holes in a mesh editor (\"fill holes\")");
+}
+
+/// Merges points at the same place and drops what collapses to less than a triangle.
+void weld(Soup& soup) {
+  PMP::merge_duplicate_points_in_polygon_soup(soup.points, soup.polygons);
+  for (Polygon& polygon : soup.polygons) {
+    polygon.erase(std::unique(polygon.begin(), polygon.end()), polygon.end());
+    while (polygon.size() > 1 && polygon.front() == polygon.back()) {
+      polygon.pop_back();
+    }
+  }
+  std::erase_if(soup.polygons, [](const Polygon& polygon) { return polygon.size() < 3; });
+  PMP::remove_isolated_points_in_polygon_soup(soup.points, soup.polygons);
+}
+
+/// Orients all polygons alike.
+SurfaceMesh connect(Soup& soup, const std::string& where, std::vector<std::string>& notes) {
+  const std::size_t points = soup.points.size();
+  const std::vector<Polygon> as_given = soup.polygons;
+  PMP::orient_polygon_soup(soup.points, soup.polygons);
+  if (soup.points.size() > points) {
+    throw Error("the surface is not manifold: parts of it touch in the point " + shown(soup.points[points]) +
+                    " (file units), or it is one-sided there",
+                where, "separate the parts in a mesh editor");
+  }
+  std::size_t turned = 0;
+  for (std::size_t i = 0; i < as_given.size(); ++i) {
+    turned += as_given[i] == soup.polygons[i] ? 0 : 1;
+  }
+  if (turned != 0 && turned != as_given.size()) {
+    notes.push_back(std::to_string(turned) + " of " + std::to_string(as_given.size()) +
+                    " polygons of the surface were turned to agree with their neighbours");
+  }
+  SurfaceMesh mesh;
+  PMP::polygon_soup_to_polygon_mesh(soup.points, soup.polygons, mesh);
+  PMP::triangulate_faces(mesh);
+  return mesh;
+}
+
+const Point& first_corner(const SurfaceMesh& mesh, Face face) {
+  return mesh.point(target(halfedge(face, mesh), mesh));
+}
+
+void check_triangles(const SurfaceMesh& mesh, const std::string& where) {
+  for (const Face face : mesh.faces()) {
+    if (PMP::is_degenerate_triangle_face(face, mesh)) {
+      throw Error("a triangle at " + shown(first_corner(mesh, face)) + " (file units) has no area", where,
+                  "remove degenerate triangles in a mesh editor");
+    }
+  }
+}
+
+void check_one_part(SurfaceMesh& mesh, const std::string& where) {
+  auto part = mesh.add_property_map<Face, std::size_t>("f:part").first;
+  const std::size_t parts = PMP::connected_components(mesh, part);
+  if (parts == 1) {
+    return;
+  }
+  std::string places;
+  for (std::size_t i = 0; i < std::min<std::size_t>(parts, 3); ++i) {
+    const auto face =
+        std::find_if(mesh.faces().begin(), mesh.faces().end(), [&](Face f) { return part[f] == i; });
+    places += (i == 0 ? " at " : ", ") + shown(first_corner(mesh, *face));
+  }
+  throw Error("the surface has " + std::to_string(parts) + " disconnected parts," + places + " (file units)",
+              where, "a body is one closed shell: keep one part, or join them");
+}
+
+void orient_outwards(SurfaceMesh& mesh, std::vector<std::string>& notes) {
+  if (!PMP::is_outward_oriented(mesh)) {
+    PMP::reverse_face_orientations(mesh);
+    notes.emplace_back("the surface was oriented inwards and has been turned");
+  }
+}
+
+using FacePair = std::pair<Face, Face>;
+
+std::filesystem::path write_bad_faces(const SurfaceMesh& mesh, const std::vector<FacePair>& pairs,
+                                      const std::string& stem) {
+  std::vector<Face> faces;
+  for (const auto& [a, b] : pairs) {
+    faces.insert(faces.end(), {a, b});
+  }
+  std::sort(faces.begin(), faces.end());
+  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+
+  const std::filesystem::path file = stem + ".bad-faces.off";
+  const std::filesystem::path partial = file.string() + ".partial";
+  {
+    std::ofstream out(partial);
+    out.imbue(std::locale::classic());
+    out.precision(17);
+    out << "OFF\n" << 3 * faces.size() << " " << faces.size() << " 0\n";
+    for (const Face face : faces) {
+      for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
+        const Point& p = mesh.point(vertex);
+        out << p.x() << " " << p.y() << " " << p.z() << "\n";
+      }
+    }
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      out << "3 " << 3 * i << " " << 3 * i + 1 << " " << 3 * i + 2 << "\n";
+    }
+    if (!out.flush()) {
+      return {};
+    }
+  }
+  std::filesystem::rename(partial, file);
+  return file;
+}
+
+Point center(const SurfaceMesh& mesh, Face face) {
+  const auto h = mesh.halfedge(face);
+  return CGAL::centroid(mesh.point(mesh.source(h)), mesh.point(mesh.target(h)),
+                        mesh.point(mesh.target(mesh.next(h))));
+}
+
+void check_self_intersections(const SurfaceMesh& mesh, const std::filesystem::path& file,
+                              const std::string& after) {
+  std::vector<FacePair> pairs;
+  PMP::self_intersections(mesh, std::back_inserter(pairs));
+  if (pairs.empty()) {
+    return;
+  }
+  std::sort(pairs.begin(), pairs.end());
+  const std::filesystem::path bad_faces = write_bad_faces(mesh, pairs, file.stem().string());
+  throw Error("the surface intersects itself" + after + ": " + std::to_string(pairs.size()) +
+                  " pair(s) of triangles, the first near " + shown(center(mesh, pairs.front().first)) +
+                  " (file units)",
+              file.string(),
+              bad_faces.empty()
+                  ? "repair it in a mesh editor"
+                  : "repair it in a mesh editor; the triangles were written to " + bad_faces.string());
+}
+
+void remesh(SurfaceMesh& mesh, double edge_length) {
+  auto sharp = mesh.add_property_map<SurfaceMesh::Edge_index, bool>("e:sharp", false).first;
+  PMP::detect_sharp_edges(mesh, sharp_edge_degrees, sharp);
+  PMP::isotropic_remeshing(
+      mesh.faces(), edge_length, mesh,
+      CGAL::parameters::number_of_iterations(remesh_iterations).edge_is_constrained_map(sharp));
+  mesh.collect_garbage();
+}
+
+TriangleSurface export_surface(const SurfaceMesh& mesh) {
+  TriangleSurface surface;
+  surface.nodes.reserve(mesh.number_of_vertices());
+  for (const auto vertex : mesh.vertices()) {
+    const Point& p = mesh.point(vertex);
+    surface.nodes.emplace_back(p.x(), p.y(), p.z());
+  }
+  surface.triangles.reserve(mesh.number_of_faces());
+  for (const Face face : mesh.faces()) {
+    Triangle triangle{};
+    std::size_t corner = 0;
+    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
+      triangle[corner++] = static_cast<Index>(static_cast<std::size_t>(vertex));
+    }
+    surface.triangles.push_back(triangle);
+  }
+  return surface;
+}
+
+}  // namespace
+
+TriangleSurface read_surface(const std::filesystem::path& file, std::optional<double> remesh_edge_length,
+                             std::vector<std::string>& notes) {
+  const std::string where = file.string();
+  Soup soup = read_soup(file);
+  weld(soup);
+  check_edges(soup, where);
+  SurfaceMesh mesh = connect(soup, where, notes);
+  check_triangles(mesh, where);
+  check_one_part(mesh, where);
+  orient_outwards(mesh, notes);
+  check_self_intersections(mesh, file, "");
+  if (remesh_edge_length) {
+    remesh(mesh, *remesh_edge_length);
+    check_triangles(mesh, where);
+    check_self_intersections(mesh, file, " after remeshing");
+  }
+  return export_surface(mesh);
+}
+
+double mean_edge_length(const TriangleSurface& surface) {
+  double sum = 0.0;
+  for (const Triangle& t : surface.triangles) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto from = static_cast<std::size_t>(t[i]), to = static_cast<std::size_t>(t[(i + 1) % 3]);
+      sum += (surface.nodes[from] - surface.nodes[to]).norm();
+    }
+  }
+  return sum / (3.0 * static_cast<double>(surface.triangles.size()));
+}
+
+std::function<double(const Vec3&)> distance_to(const TriangleSurface& surface) {
+  struct Triangles {
+    std::vector<Kernel::Triangle_3> list;
+    using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Kernel::Triangle_3>::const_iterator>;
+    CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree;
+  };
+  const auto triangles = std::make_shared<Triangles>();
+  const auto point = [&](Index node) {
+    const Vec3& x = surface.nodes[static_cast<std::size_t>(node)];
+    return Point(x[0], x[1], x[2]);
+  };
+  for (const Triangle& t : surface.triangles) {
+    triangles->list.emplace_back(point(t[0]), point(t[1]), point(t[2]));
+  }
+  triangles->tree.insert(triangles->list.begin(), triangles->list.end());
+  triangles->tree.accelerate_distance_queries();
+  return [triangles](const Vec3& x) {
+    return std::sqrt(CGAL::to_double(triangles->tree.squared_distance(Point(x[0], x[1], x[2]))));
+  };
+}
+
+}  // namespace palpate

@@ -1,0 +1,124 @@
+#include "precompute/tetgen_mesh.h"
+
+#define TETLIBRARY  // as the library was compiled: errors are thrown, not exit()
+#include <tetgen.h>
+
+#include <cmath>
+#include <cstring>
+#include <span>
+
+#include "meshes/error.h"
+#include "precompute/child_process.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::chrono::seconds tetgen_time_limit{3600};
+
+/// What TetGen's callback looks at; it has no user argument. Set in the child only.
+const std::function<double(const Vec3&)>* target_edge = nullptr;
+
+/// Says that a tetrahedron is larger than the regular one of the target edge length at its centroid.
+bool too_large(REAL* a, REAL* b, REAL* c, REAL* d, REAL* /*unused*/, REAL /*unused*/) {
+  const Eigen::Map<const Vec3> xa(a), xb(b), xc(c), xd(d);
+  const double volume = std::abs((xb - xa).cross(xc - xa).dot(xd - xa)) / 6.0;
+  const double h = (*target_edge)((xa + xb + xc + xd) / 4.0);
+  return volume > h * h * h / (6.0 * std::sqrt(2.0));
+}
+
+void copy_surface(const TriangleSurface& surface, tetgenio& io) {
+  io.numberofpoints = static_cast<int>(surface.nodes.size());
+  io.pointlist = new REAL[3 * surface.nodes.size()];
+  for (std::size_t i = 0; i < surface.nodes.size(); ++i) {
+    Eigen::Map<Vec3>(io.pointlist + 3 * i) = surface.nodes[i];
+  }
+  io.numberoffacets = static_cast<int>(surface.triangles.size());
+  io.facetlist = new tetgenio::facet[surface.triangles.size()];
+  for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
+    tetgenio::facet& facet = io.facetlist[i];
+    tetgenio::init(&facet);
+    facet.numberofpolygons = 1;
+    facet.polygonlist = new tetgenio::polygon[1];
+    facet.polygonlist[0].numberofvertices = 3;
+    facet.polygonlist[0].vertexlist = new int[3];
+    std::copy(surface.triangles[i].begin(), surface.triangles[i].end(), facet.polygonlist[0].vertexlist);
+  }
+}
+
+/// Status 0: number of nodes, coordinates, corners. Otherwise TetGen's error code.
+ChildResult tetrahedralise(const TriangleSurface& surface, const MeshOptions& options,
+                           const std::function<double(const Vec3&)>& edge_at) {
+  tetgenio in, out;
+  copy_surface(surface, in);
+  target_edge = &edge_at;
+  in.tetunsuitable = too_large;
+
+  tetgenbehavior behavior;
+  std::string switches = "pYqQ";  // the bounds are set below: as text they would be read by the locale
+  behavior.parse_commandline(switches.data());
+  behavior.minratio = options.radius_edge;
+  behavior.mindihedral = options.min_dihedral;
+  ChildResult result;
+  try {
+    ::tetrahedralize(&behavior, &in, &out);
+  } catch (int code) {
+    result.status = code;
+    return result;
+  }
+  append_bytes(result.bytes, std::span<const int>(&out.numberofpoints, 1));
+  append_bytes(result.bytes,
+               std::span<const REAL>(out.pointlist, 3 * static_cast<std::size_t>(out.numberofpoints)));
+  append_bytes(result.bytes, std::span<const int>(out.tetrahedronlist,
+                                                  4 * static_cast<std::size_t>(out.numberoftetrahedra)));
+  return result;
+}
+
+Mesh unpack(const Bytes& bytes) {
+  int nodes = 0;
+  std::memcpy(&nodes, bytes.data(), sizeof(nodes));
+  const std::byte* at = bytes.data() + sizeof(nodes);
+  Mesh mesh;
+  mesh.nodes.resize(static_cast<std::size_t>(nodes));
+  std::memcpy(static_cast<void*>(mesh.nodes.data()), at, mesh.nodes.size() * sizeof(Vec3));
+  at += mesh.nodes.size() * sizeof(Vec3);
+  mesh.tets.resize(static_cast<std::size_t>(bytes.data() + bytes.size() - at) / sizeof(Tet));
+  std::memcpy(mesh.tets.data(), at, mesh.tets.size() * sizeof(Tet));
+  mesh.regions.assign(mesh.tets.size(), 0);
+  return mesh;
+}
+
+std::string meaning(int code) {
+  switch (code) {
+    case 1:
+      return "it ran out of memory";
+    case 3:
+      return "the surface intersects itself";
+    case 4:
+      return "the surface has features that are too small";
+    case 5:
+      return "two facets lie too close together";
+    case 10:
+      return "it does not accept the surface";
+    default:
+      return "internal error";
+  }
+}
+
+}  // namespace
+
+Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, const std::string& where) {
+  const double surface_edge = options.edge_length.value_or(mean_edge_length(surface));
+  const auto distance = distance_to(surface);
+  const std::function<double(const Vec3&)> edge_at = [&](const Vec3& x) {
+    return options.grading == 0.0 ? surface_edge : surface_edge + options.grading * distance(x);
+  };
+  const ChildResult result = run_in_child("TetGen", where, tetgen_time_limit,
+                                          [&] { return tetrahedralise(surface, options, edge_at); });
+  if (result.status != 0) {
+    throw Error("TetGen stopped with code " + std::to_string(result.status) + ": " + meaning(result.status),
+                where, "repair the surface, or give edge_length and remesh = true in [mesh]");
+  }
+  return unpack(result.bytes);
+}
+
+}  // namespace palpate

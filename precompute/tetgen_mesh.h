@@ -1,0 +1,18 @@
+// Tetrahedra inside a closed surface, by TetGen.
+#pragma once
+
+#include <functional>
+
+#include "meshes/mesh.h"
+#include "precompute/description.h"
+#include "precompute/surface_input.h"
+
+namespace palpate {
+
+/// Meshes the inside of a closed surface with Hang Si's TetGen, in a child process. The surface is kept as it
+/// is; the target edge length at depth d below it is h_s + grading d, h_s the edge_length or else the mean
+/// edge of the surface. Lengths of `options` and of the surface are in the same unit. Throws Error (where =
+/// `where`) when TetGen refuses, crashes or does not end.
+Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, const std::string& where);
+
+}  // namespace palpate

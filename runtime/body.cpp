@@ -1,0 +1,96 @@
+#include "runtime/body.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t search_block = 64;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+void check_sizes(const Model& model) {
+  const std::size_t nodes = model.mesh.nodes.size();
+  const auto in_mesh = [nodes](Index node) { return node >= 0 && static_cast<std::size_t>(node) < nodes; };
+  if (model.greens.order() != model.stored_dofs() ||
+      !std::all_of(model.stored_nodes.begin(), model.stored_nodes.end(), in_mesh)) {
+    throw Error("the Green's functions of " + std::to_string(model.greens.order()) +
+                    " dofs do not belong to the " + std::to_string(model.stored_nodes.size()) +
+                    " stored nodes of a mesh of " + std::to_string(nodes),
+                model.name, "precompute the model again");
+  }
+}
+
+Greens take_greens(Model& model, const GreensOptions& options) {
+  check_sizes(model);
+  return Greens(std::exchange(model.greens, {}), options);
+}
+
+}  // namespace
+
+Body::Body(Model model, const GreensOptions& options)
+    : model_(std::move(model)), greens_(take_greens(model_, options)) {
+  const std::vector<Vec3>& nodes = model_.mesh.nodes;
+  stored_of_mesh_.assign(nodes.size(), -1);
+  for (std::size_t k = 0; k < model_.stored_nodes.size(); ++k) {
+    stored_of_mesh_[static_cast<std::size_t>(model_.stored_nodes[k])] = static_cast<Index>(k);
+  }
+
+  std::vector<bool> on_surface(nodes.size(), false);
+  for (const Triangle& triangle : model_.surface_triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto a = static_cast<std::size_t>(triangle[k]);
+      const auto b = static_cast<std::size_t>(triangle[(k + 1) % 3]);
+      on_surface[a] = true;
+      longest_surface_edge_ = std::max(longest_surface_edge_, (nodes[a] - nodes[b]).norm());
+    }
+  }
+  for (std::size_t node = 0; node < nodes.size(); ++node) {
+    if (!on_surface[node] || stored_of_mesh_[node] < 0) continue;
+    surface_.push_back(stored_of_mesh_[node]);
+    x_.push_back(nodes[node].x());
+    y_.push_back(nodes[node].y());
+    z_.push_back(nodes[node].z());
+  }
+  if (surface_.empty()) {
+    throw Error("no node of the surface is free to move, so nothing can be touched", model_.name,
+                "fix a smaller region of the body and precompute the model again");
+  }
+  const std::size_t padded = (surface_.size() + search_block - 1) / search_block * search_block;
+  for (std::vector<double>* coordinate : {&x_, &y_, &z_}) coordinate->resize(padded, infinity);
+}
+
+NearestNode Body::nearest_surface_node(const Vec3& point) const noexcept {
+  const auto squared_distance = [&](std::size_t i) {
+    const double dx = x_[i] - point.x();
+    const double dy = y_[i] - point.y();
+    const double dz = z_[i] - point.z();
+    return dx * dx + dy * dy + dz * dz;
+  };
+
+  double nearest = infinity;
+  std::size_t nearest_block = 0;
+  for (std::size_t block = 0; block < x_.size(); block += search_block) {
+    double in_block = infinity;
+#pragma omp simd reduction(min : in_block)
+    for (std::size_t i = block; i < block + search_block; ++i)
+      in_block = std::min(in_block, squared_distance(i));
+    if (in_block < nearest) {
+      nearest = in_block;
+      nearest_block = block;
+    }
+  }
+
+  std::size_t best = nearest_block;
+  for (std::size_t i = best; i < std::min(nearest_block + search_block, surface_.size()); ++i) {
+    if (squared_distance(i) < squared_distance(best)) best = i;
+  }
+  return {surface_[best], std::sqrt(squared_distance(best))};
+}
+
+}  // namespace palpate

@@ -1,0 +1,60 @@
+// A loaded body, ready to be touched.
+#pragma once
+
+#include <vector>
+
+#include "formats/model.h"
+#include "runtime/greens.h"
+
+namespace palpate {
+
+/// The free surface node that is nearest to a point.
+struct NearestNode {
+  Index node;       ///< stored node
+  double distance;  ///< [m]
+};
+
+/// The constant side of a tick: the Model, its Green's functions as the tick wants them, and look-ups. Shared
+/// by threads.
+class Body {
+ public:
+  /// Takes the model over and unfolds its Green's functions. Throws Error when no free surface node is
+  /// stored, as then nothing can be touched, or when the sizes of the model's parts do not fit together.
+  explicit Body(Model model, const GreensOptions& options = {});
+
+  /// Everything baked, except `greens`, which greens() has taken over.
+  [[nodiscard]] const Model& model() const noexcept { return model_; }
+  [[nodiscard]] const Greens& greens() const noexcept { return greens_; }
+
+  /// Stored node of a mesh node, -1 when it is fixed or not kept.
+  [[nodiscard]] Index stored_node(Index mesh_node) const noexcept {
+    return stored_of_mesh_[static_cast<std::size_t>(mesh_node)];
+  }
+  /// Mesh node of a stored node.
+  [[nodiscard]] Index mesh_node(Index stored) const noexcept {
+    return model_.stored_nodes[static_cast<std::size_t>(stored)];
+  }
+  /// Undeformed position of a stored node [m].
+  [[nodiscard]] const Vec3& position(Index stored) const noexcept {
+    return model_.mesh.nodes[static_cast<std::size_t>(mesh_node(stored))];
+  }
+
+  /// Stored nodes on the surface, in the order of their mesh nodes.
+  [[nodiscard]] const std::vector<Index>& free_surface_nodes() const noexcept { return surface_; }
+
+  /// The free surface node whose undeformed position is nearest to `point` [m], which must be finite.
+  [[nodiscard]] NearestNode nearest_surface_node(const Vec3& point) const noexcept;
+
+  /// Longest edge of the surface [m]: no point of the surface is farther than that from a surface node.
+  [[nodiscard]] double longest_surface_edge() const noexcept { return longest_surface_edge_; }
+
+ private:
+  Model model_;
+  Greens greens_;
+  std::vector<Index> stored_of_mesh_;  // [N]
+  std::vector<Index> surface_;         // [S]
+  std::vector<double> x_, y_, z_;      // [S, padded to whole blocks with infinity] positions for the search
+  double longest_surface_edge_ = 0.0;
+};
+
+}  // namespace palpate

@@ -1,0 +1,57 @@
+// The capacitance matrix of the held nodes, by its Cholesky factor.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "meshes/mesh.h"
+
+namespace palpate {
+
+/// Why a node could not be added.
+enum class CapacitanceStatus : std::uint8_t {
+  ok,
+  full,                   ///< `max_nodes` are held already
+  not_positive_definite,  ///< the new node does not move independently of the held ones (held twice), or
+                          ///< entries are not finite
+};
+
+/// C = E^T Xi E [m/N] of m held nodes (theory.md section 3; James & Pai 2001), kept as its Cholesky factor L,
+/// C = L L^T, which grows and shrinks with the nodes in O(m^2) and is never computed afresh. All memory is
+/// taken at construction; copies keep the capacity.
+class CapacitanceMatrix {
+ public:
+  /// Room for `max_nodes` nodes, at least one.
+  explicit CapacitanceMatrix(Index max_nodes = 256);
+
+  [[nodiscard]] Index nodes() const noexcept { return nodes_; }  ///< m
+  [[nodiscard]] Index max_nodes() const noexcept { return static_cast<Index>(capacity_ / 3); }
+
+  /// Appends a node: `blocks` is its block row of C, the m blocks at the held nodes and then its own, 3 x
+  /// 3(m+1) row-major (as Greens::gather leaves it). Unchanged unless ok.
+  [[nodiscard]] CapacitanceStatus add(std::span<const double> blocks) noexcept;
+
+  /// Drops the node at position k, 0 <= k < m; the later ones move up by one.
+  void remove(Index k) noexcept;
+
+  /// Drops all nodes.
+  void clear() noexcept { nodes_ = 0; }
+
+  /// Solves C f = u in place: `x` [3m] is u [m] before and f [N] after.
+  void solve(std::span<double> x) const noexcept;
+
+  /// Entry (i, j), i >= j, of L.
+  [[nodiscard]] double factor(std::int64_t i, std::int64_t j) const noexcept { return column(j)[i - j]; }
+
+ private:
+  [[nodiscard]] double* column(std::int64_t j) noexcept;
+  [[nodiscard]] const double* column(std::int64_t j) const noexcept;
+
+  std::int64_t capacity_;  // dofs
+  Index nodes_ = 0;
+  std::vector<double> L_;     // lower packed for the order `capacity_`: column j starts at its diagonal
+  std::vector<double> rows_;  // [3 x capacity_] the rows that come (add) or the columns that go (remove)
+};
+
+}  // namespace palpate

@@ -1,0 +1,226 @@
+#include "runtime/greens.h"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t cache_line = 64;
+constexpr std::int64_t huge_page = std::int64_t{1} << 21;
+constexpr std::int64_t tile = 64;  // scalars: two tiles of doubles fit into the first-level cache
+constexpr std::int64_t u_chunk =
+    2048;  // doubles of u that stay in the first-level cache while all rows pass by
+constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is fetched
+
+/// Half of the memory that the kernel thinks can be had without swapping [bytes]; 0 when it does not say.
+std::int64_t half_of_available_memory() {
+  std::ifstream meminfo("/proc/meminfo");
+  std::string key;
+  std::int64_t kilobytes = 0;
+  while (meminfo >> key >> kilobytes) {
+    if (key == "MemAvailable:") return kilobytes * 1024 / 2;
+    meminfo.ignore(64, '\n');
+  }
+  return 0;
+}
+
+/// Whole cache lines a row, and an odd number of them, so that equal columns of neighbouring rows do not fall
+/// into one cache set.
+std::int64_t padded_row(std::int64_t order, std::int64_t scalar_bytes) {
+  const std::int64_t lines = (order * scalar_bytes + cache_line - 1) / cache_line;
+  return (lines | 1) * cache_line / scalar_bytes;
+}
+
+/// Zeroed memory on huge pages where the kernel gives them: the tick touches few bytes on each of many rows.
+/// Null when there is none.
+std::shared_ptr<void> map_memory(std::int64_t bytes) {
+  const auto size = static_cast<std::size_t>((bytes + 2 * huge_page - 1) / huge_page * huge_page);
+  void* base =
+      mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (base == MAP_FAILED) return nullptr;
+  madvise(base, size, MADV_HUGEPAGE);
+  const auto address = reinterpret_cast<std::uintptr_t>(base);
+  const std::uintptr_t aligned = (address + huge_page - 1) / huge_page * huge_page;
+  const std::shared_ptr<void> mapping(base, [size](void* p) { munmap(p, size); });
+  return {mapping, static_cast<std::byte*>(base) + (aligned - address)};
+}
+
+/// Copies the columns [first, last) of the packed lower triangle to both triangles of the square, tile by
+/// tile.
+template <class T>
+void unfold_columns(std::span<const T> packed, std::int64_t order, T* square, std::int64_t stride,
+                    std::int64_t first, std::int64_t last) {
+  for (std::int64_t row = first; row < order; row += tile) {
+    const std::int64_t row_end = std::min(row + tile, order);
+    for (std::int64_t j = first; j < last; ++j) {
+      const std::int64_t begin = std::max(row, j);
+      const T* column = packed.data() + packed_index(begin, j, order);
+      std::memcpy(square + j * stride + begin, column, static_cast<std::size_t>(row_end - begin) * sizeof(T));
+    }
+    for (std::int64_t i = row; i < row_end; ++i) {
+      T* lower = square + i * stride;
+      for (std::int64_t j = first; j < std::min(last, i); ++j) lower[j] = square[j * stride + i];
+    }
+  }
+}
+
+template <class T>
+void unfold(std::span<const T> packed, std::int64_t order, T* square, std::int64_t stride, int jobs) {
+  std::atomic<std::int64_t> next = 0;
+  const auto work = [&] {
+    for (std::int64_t j = next.fetch_add(tile); j < order; j = next.fetch_add(tile)) {
+      unfold_columns(packed, order, square, stride, j, std::min(j + tile, order));
+    }
+  };
+  std::vector<std::jthread> helpers;
+  for (int k = 1; k < jobs; ++k) helpers.emplace_back(work);
+  work();
+}
+
+template <class T>
+void gather_from_square(const T* square, std::int64_t stride, Index row, std::span<const Index> columns,
+                        double* blocks) noexcept {
+  const auto width = 3 * columns.size();
+  for (std::int64_t axis = 0; axis < 3; ++axis) {
+    const T* xi = square + (3 * std::int64_t{row} + axis) * stride;
+    double* out = blocks + static_cast<std::size_t>(axis) * width;
+    for (const Index column : columns) {
+      for (std::int64_t k = 0; k < 3; ++k) *out++ = static_cast<double>(xi[3 * std::int64_t{column} + k]);
+    }
+  }
+}
+
+/// u += f0 row0 + f1 row1 + f2 row2 over `count` entries; meanwhile the same part of the next node's rows is
+/// called into the cache.
+template <class T>
+void add_three_rows(const T* __restrict row0, const T* __restrict row1, const T* __restrict row2, double f0,
+                    double f1, double f2, double* __restrict u, std::int64_t count) noexcept {
+  constexpr std::int64_t step = cache_line / static_cast<std::int64_t>(sizeof(T));
+  constexpr std::int64_t ahead = ahead_bytes / static_cast<std::int64_t>(sizeof(T));
+  std::int64_t i = 0;
+  for (; i + step <= count; i += step) {
+    __builtin_prefetch(row0 + i + ahead);
+    __builtin_prefetch(row1 + i + ahead);
+    __builtin_prefetch(row2 + i + ahead);
+#pragma omp simd
+    for (std::int64_t k = i; k < i + step; ++k) {
+      u[k] += f0 * static_cast<double>(row0[k]) + f1 * static_cast<double>(row1[k]) +
+              f2 * static_cast<double>(row2[k]);
+    }
+  }
+  for (; i < count; ++i) {
+    u[i] += f0 * static_cast<double>(row0[i]) + f1 * static_cast<double>(row1[i]) +
+            f2 * static_cast<double>(row2[i]);
+  }
+}
+
+template <class T>
+void displacement_from_square(const T* square, std::int64_t stride, std::span<const Index> nodes,
+                              const double* f, std::span<double> u) noexcept {
+  const auto order = static_cast<std::int64_t>(u.size());
+  for (std::int64_t begin = 0; begin < order; begin += u_chunk) {
+    const std::int64_t count = std::min(u_chunk, order - begin);
+    double* chunk = u.data() + begin;
+    std::fill_n(chunk, count, 0.0);
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const T* rows = square + 3 * std::int64_t{nodes[k]} * stride + begin;
+      add_three_rows(rows, rows + stride, rows + 2 * stride, f[3 * k], f[3 * k + 1], f[3 * k + 2], chunk,
+                     count);
+    }
+  }
+}
+
+template <class T>
+void displacement_from_packed(std::span<const T> packed, std::span<const Index> nodes, const double* f,
+                              std::span<double> u) noexcept {
+  const auto order = static_cast<std::int64_t>(u.size());
+  std::fill(u.begin(), u.end(), 0.0);
+  for (std::size_t k = 0; k < 3 * nodes.size(); ++k) {
+    const std::int64_t dof = 3 * std::int64_t{nodes[k / 3]} + static_cast<std::int64_t>(k % 3);
+    const T* entry = packed.data() + dof;
+    for (std::int64_t j = 0; j < dof; ++j) {
+      u[static_cast<std::size_t>(j)] += f[k] * static_cast<double>(*entry);
+      entry += order - j - 1;
+    }
+    const T* column = packed.data() + packed_column(dof, order);
+    double* below = u.data() + dof;
+    for (std::int64_t i = 0; i < order - dof; ++i) below[i] += f[k] * static_cast<double>(column[i]);
+  }
+}
+
+}  // namespace
+
+Greens::Greens(PackedGreens packed, const GreensOptions& options)
+    : packed_(std::move(packed)), order_(packed_.order()), precision_(packed_.precision()) {
+  if (order_ <= 0 || order_ % 3 != 0) {
+    throw Error("the Green's functions have " + std::to_string(order_) +
+                    " dofs, which is not three for each of some nodes",
+                "Green's functions", "precompute the model again");
+  }
+  const std::int64_t scalar_bytes = bytes_per_scalar(precision_);
+  stride_ = padded_row(order_, scalar_bytes);
+  const std::int64_t bytes = order_ * stride_ * scalar_bytes;
+  const std::int64_t limit =
+      options.max_square_bytes < 0 ? half_of_available_memory() : options.max_square_bytes;
+  const std::shared_ptr<void> square = bytes <= limit ? map_memory(bytes) : nullptr;
+  if (square == nullptr) return;
+
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int jobs = options.jobs > 0 ? options.jobs : processors;
+  if (precision_ == Precision::single_precision) {
+    unfold(packed_.as<float>(), order_, static_cast<float*>(square.get()), stride_, jobs);
+  } else {
+    unfold(packed_.as<double>(), order_, static_cast<double*>(square.get()), stride_, jobs);
+  }
+  square_ = square;
+  packed_ = {};
+}
+
+Mat3 Greens::block(Index row, Index column) const noexcept {
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> xi;
+  gather(row, {&column, 1}, {xi.data(), 9});
+  return xi;
+}
+
+void Greens::gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
+  if (!unfolded()) {
+    double* out = blocks.data();
+    for (std::int64_t axis = 0; axis < 3; ++axis) {
+      for (const Index column : columns) {
+        for (std::int64_t k = 0; k < 3; ++k)
+          *out++ = packed_(3 * std::int64_t{row} + axis, 3 * std::int64_t{column} + k);
+      }
+    }
+  } else if (precision_ == Precision::single_precision) {
+    gather_from_square(static_cast<const float*>(square_.get()), stride_, row, columns, blocks.data());
+  } else {
+    gather_from_square(static_cast<const double*>(square_.get()), stride_, row, columns, blocks.data());
+  }
+}
+
+void Greens::displacement(std::span<const Index> nodes, std::span<const double> f,
+                          std::span<double> u) const noexcept {
+  const bool single = precision_ == Precision::single_precision;
+  if (unfolded() && single) {
+    displacement_from_square(static_cast<const float*>(square_.get()), stride_, nodes, f.data(), u);
+  } else if (unfolded()) {
+    displacement_from_square(static_cast<const double*>(square_.get()), stride_, nodes, f.data(), u);
+  } else if (single) {
+    displacement_from_packed(packed_.as<float>(), nodes, f.data(), u);
+  } else {
+    displacement_from_packed(packed_.as<double>(), nodes, f.data(), u);
+  }
+}
+
+}  // namespace palpate

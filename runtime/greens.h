@@ -1,0 +1,56 @@
+// The Green's functions as the tick reads them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "formats/packed.h"
+#include "meshes/mesh.h"
+
+namespace palpate {
+
+/// How `Greens` is laid out in memory.
+struct GreensOptions {
+  int jobs = 0;  ///< threads that unfold; 0: one for each processor
+  std::int64_t max_square_bytes =
+      -1;  ///< most that the full square may take; -1: half of the memory that is available
+};
+
+/// The Green's function matrix Xi = K^-1 [m/N] of the stored dofs, unfolded from packed storage into a full
+/// square when memory allows: what a tick needs of a node is then three rows, contiguous in memory (Xi is
+/// symmetric), where a packed column jumps through the whole array. Nodes are stored nodes
+/// (Model::stored_nodes); dof 3 k + axis. All arithmetic is in double. Const once built: any number of
+/// threads may use it.
+class Greens {
+ public:
+  explicit Greens(PackedGreens packed, const GreensOptions& options = {});
+
+  [[nodiscard]] std::int64_t order() const noexcept { return order_; }  ///< n, number of stored dofs
+  [[nodiscard]] Index nodes() const noexcept { return static_cast<Index>(order_ / 3); }
+  [[nodiscard]] Precision precision() const noexcept { return precision_; }
+  [[nodiscard]] bool unfolded() const noexcept {
+    return square_ != nullptr;
+  }  ///< false: used packed, much slower
+
+  /// Xi at (row, column) [m/N]: displacement of node `row` by unit forces on node `column`.
+  [[nodiscard]] Mat3 block(Index row, Index column) const noexcept;
+
+  /// The block row of the capacitance matrix C = E^T Xi E (theory.md section 3) that belongs to `row`: its
+  /// blocks at `columns` one beside the other, `blocks` is 3 x 3m, row-major, for m columns.
+  void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
+
+  /// u = Xi E f (theory.md section 3): displacement u [n] of all stored dofs [m] by the forces f [3m] on m
+  /// nodes [N].
+  void displacement(std::span<const Index> nodes, std::span<const double> f,
+                    std::span<double> u) const noexcept;
+
+ private:
+  PackedGreens packed_;                 // empty when unfolded: the square has taken its place
+  std::shared_ptr<const void> square_;  // [n x stride_] rows of the stored scalar
+  std::int64_t order_ = 0;
+  std::int64_t stride_ = 0;  // scalars from one row of the square to the next
+  Precision precision_ = Precision::double_precision;
+};
+
+}  // namespace palpate

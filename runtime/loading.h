@@ -1,0 +1,14 @@
+// From a file to a body that can be touched, with a word on models that are out of date.
+#pragma once
+
+#include <filesystem>
+
+#include "runtime/body.h"
+
+namespace palpate {
+
+/// Loads `file` and prints a warning for each source that is no longer what it was. With `model_toml` (else
+/// empty) the file must have been made from exactly that description. Throws Error.
+Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml);
+
+}  // namespace palpate

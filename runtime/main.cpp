@@ -1,0 +1,182 @@
+// palpate-runtime: touches a precomputed body.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "meshes/error.h"
+#include "runtime/numbers.h"
+#include "runtime/play.h"
+#include "runtime/probe.h"
+
+namespace {
+
+using namespace palpate;
+
+/// The arguments as they were written.
+struct Arguments {
+  std::string file;
+  std::string model_toml;
+  std::vector<std::string> at;
+  std::vector<std::string> node;
+  std::vector<std::string> displace;
+  bool json = false;
+  std::string field;
+  std::string device;
+  bool fast = false;
+  std::string record;
+  std::string report;
+  std::string reach;
+};
+
+void add_file(CLI::App& command, Arguments& arguments) {
+  command.add_option("FILE", arguments.file, "baked model, NAME.palpate.hdf")->required();
+  command
+      .add_option("--model", arguments.model_toml, "fail unless FILE was made from exactly this model.toml")
+      ->type_name("FILE");
+}
+
+CLI::Option* add_repeatable(CLI::App& command, const std::string& name, std::vector<std::string>& values,
+                            const std::string& type, const std::string& help) {
+  return command.add_option(name, values, help)->type_name(type)->allow_extra_args(false);
+}
+
+CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
+  CLI::App* probe = app.add_subcommand("probe", "displace nodes and print the forces that this takes");
+  add_file(*probe, arguments);
+  add_repeatable(*probe, "--at", arguments.at, "X,Y,Z",
+                 "the free surface node nearest to this place [m]; repeatable");
+  add_repeatable(*probe, "--node", arguments.node, "N", "the node with this number in the mesh; repeatable");
+  add_repeatable(*probe, "--displace", arguments.displace, "DX,DY,DZ",
+                 "its displacement [m]; one for each --at and --node, in their order")
+      ->required();
+  probe->add_flag("--json", arguments.json, "print JSON");
+  probe->add_option("--field", arguments.field, "write the displacement of all stored nodes")
+      ->type_name("OUT.csv|OUT.vtu");
+  probe->footer(
+      "Forces are those on the body, in newtons; the hand feels the opposite.\n"
+      "Example: palpate-runtime probe liver.palpate.hdf --at 0.1,0.05,0.12 --displace 0,0,-0.005 --field "
+      "liver.vtu");
+  return probe;
+}
+
+CLI::App* add_play(CLI::App& app, Arguments& arguments) {
+  CLI::App* play = app.add_subcommand("play", "run the 1 kHz loop with a tool and report on it");
+  add_file(*play, arguments);
+  play->add_option("--device", arguments.device,
+                   "the tool: a CSV with the columns t,x,y,z[,grab] (s, m, 0 or 1)")
+      ->type_name("script:TOUCH.csv")
+      ->required();
+  play->add_flag("--fast", arguments.fast,
+                 "do not wait for the clock: deterministic, equal runs leave equal recordings");
+  play->add_option("--record", arguments.record, "write every tick to this HDF5 file")->type_name("OUT.h5");
+  play->add_option("--report", arguments.report, "write the JSON report here and not to the standard output")
+      ->type_name("OUT.json");
+  play->add_option("--reach", arguments.reach,
+                   "how far from the tool a surface node may be to be taken hold of; else the longest edge "
+                   "of the surface")
+      ->type_name("METRES");
+  play->footer(
+      "While grab is set the tool holds the surface node that was nearest to it and moves it along.\n"
+      "Example: palpate-runtime play liver.palpate.hdf --device script:touch.csv --record touch.h5");
+  return play;
+}
+
+Vec3 vector_argument(const std::string& option, const std::string& text) {
+  const std::optional<Vec3> vector = parse_vector(text);
+  if (!vector) throw CLI::ValidationError(option, "'" + text + "' is not three finite numbers X,Y,Z");
+  return *vector;
+}
+
+/// Pairs the places with the displacements in the order in which they were written.
+std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& arguments) {
+  std::vector<ProbePlace> places;
+  auto at = arguments.at.begin();
+  auto node = arguments.node.begin();
+  for (const CLI::Option* option : probe.parse_order()) {
+    if (option->get_name() == "--at") {
+      places.push_back({.at = vector_argument("--at", *at++), .node = {}});
+    } else if (option->get_name() == "--node") {
+      places.push_back({.at = {}, .node = parse_node(*node)});
+      if (!places.back().node)
+        throw CLI::ValidationError("--node", "'" + *node + "' is not the number of a node");
+      ++node;
+    }
+  }
+  if (places.empty()) throw CLI::RequiredError("--at or --node");
+  if (places.size() != arguments.displace.size()) {
+    throw CLI::ValidationError("--displace", fmt::format("{} displacements are given for {} places",
+                                                         arguments.displace.size(), places.size()));
+  }
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    places[k].displacement = vector_argument("--displace", arguments.displace[k]);
+  }
+  return places;
+}
+
+PlayOptions read_play(const Arguments& arguments) {
+  const std::string scripted = "script:";
+  if (!arguments.device.starts_with(scripted) || arguments.device.size() == scripted.size()) {
+    throw CLI::ValidationError("--device",
+                               "'" + arguments.device + "' is not script:FILE.csv, the only device so far");
+  }
+  PlayOptions options{.file = arguments.file,
+                      .model_toml = arguments.model_toml,
+                      .script = arguments.device.substr(scripted.size()),
+                      .fast = arguments.fast,
+                      .record = arguments.record,
+                      .report = arguments.report,
+                      .reach = {}};
+  if (!arguments.reach.empty()) {
+    options.reach = parse_number(arguments.reach);
+    if (!options.reach || *options.reach <= 0.0) {
+      throw CLI::ValidationError("--reach", "'" + arguments.reach + "' is not a positive number of metres");
+    }
+  }
+  return options;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Touches a precomputed body and answers with finite-element forces.", "palpate-runtime");
+  app.set_version_flag("--version", "palpate-runtime " PALPATE_VERSION);
+  app.require_subcommand(1);
+  app.footer(
+      "Exit status: 0 done, 1 bad input or file, 2 wrong arguments, 130 interrupted.\n"
+      "palpate-runtime probe --help and palpate-runtime play --help tell more.");
+  Arguments arguments;
+  const CLI::App* probe_command = add_probe(app, arguments);
+  const CLI::App* play_command = add_play(app, arguments);
+  try {
+    app.parse(argc, argv);
+    if (play_command->parsed()) return play(read_play(arguments));
+    return probe({.file = arguments.file,
+                  .model_toml = arguments.model_toml,
+                  .places = read_places(*probe_command, arguments),
+                  .json = arguments.json,
+                  .field = arguments.field});
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    fmt::print(stderr, "error: {}\nhint: see palpate-runtime --help\n", error.what());
+    return exit_usage;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const palpate::Error& error) {
+    fmt::print(stderr, "error: {}: {}\nhint: {}\n", error.where(), error.what(), error.hint());
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr,
+               "error: there is not enough memory\nhint: close other programs, or precompute with fewer "
+               "surface nodes\n");
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "error: {}\nhint: this should not happen; please report it\n", error.what());
+  }
+  return palpate::exit_input_error;
+}

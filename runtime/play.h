@@ -1,0 +1,24 @@
+// palpate-runtime play: the loop, its recording and its report.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace palpate {
+
+struct PlayOptions {
+  std::filesystem::path file;        ///< baked model
+  std::filesystem::path model_toml;  ///< that it must have been made from; empty: not asked
+  std::filesystem::path script;      ///< CSV
+  bool fast = false;
+  std::filesystem::path record;  ///< empty: nothing is recorded
+  std::filesystem::path report;  ///< JSON; empty: on the standard output
+  std::optional<double> reach;   ///< [m]; else the longest edge of the surface
+};
+
+/// Runs the script to its end or to SIGINT or SIGTERM, either of which leaves a complete recording and
+/// report. Returns the exit code; throws Error.
+int play(const PlayOptions& options);
+
+}  // namespace palpate

@@ -1,0 +1,38 @@
+// A scripted tool: a CSV file in place of a hand.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "runtime/step.h"
+
+namespace palpate {
+
+/// Plays rows of t, x, y, z [, grab] (seconds, metres, 0 or 1). Between rows the tool moves in straight
+/// lines, and the grab button is that of the row before; without a grab column it is always set.
+class ScriptDevice {
+ public:
+  /// Reads `file`. Throws Error naming file and line.
+  static ScriptDevice read(const std::filesystem::path& file);
+
+  /// Reads `text`; `name` stands for the file in messages.
+  static ScriptDevice parse(std::string_view text, const std::string& name);
+
+  /// The pose at time t [s]: before the first row the tool is at its place without grabbing, after the last
+  /// it stays.
+  [[nodiscard]] ToolPose pose(double t) const noexcept;
+
+  /// Time of the last row [s].
+  [[nodiscard]] double end_time() const noexcept { return rows_.back().t; }
+
+ private:
+  struct Row {
+    double t;
+    Vec3 position;
+    bool grab;
+  };
+  std::vector<Row> rows_;  // at least one, ascending in t
+};
+
+}  // namespace palpate

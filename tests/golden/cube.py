@@ -1,0 +1,58 @@
+"""The cube's Green's functions by NumPy alone: a second route past everything that Palpate does."""
+
+import itertools
+
+import numpy as np
+
+
+def kuhn_cube(cells):
+    """Nodes [N, 3], x fastest, and tetrahedra [E, 4] of the unit cube with six Kuhn tetrahedra a cell."""
+    ticks = np.arange(cells + 1) / cells
+    nodes = np.array([(x, y, z) for z in ticks for y in ticks for x in ticks])
+    stride = (1, cells + 1, (cells + 1) ** 2)
+    tets = []
+    for k, j, i in itertools.product(range(cells), repeat=3):
+        corner = i * stride[0] + j * stride[1] + k * stride[2]
+        for path in itertools.permutations(stride):
+            tets.append(np.cumsum((corner, *path)))
+    return nodes, np.array(tets)
+
+
+def stiffness(nodes, tets, youngs_modulus, poissons_ratio):
+    """Dense K of all dofs, from the coefficients of the linear shape functions."""
+    lame = youngs_modulus * poissons_ratio / ((1 + poissons_ratio) * (1 - 2 * poissons_ratio))
+    shear = youngs_modulus / (2 * (1 + poissons_ratio))
+    K = np.zeros((3 * len(nodes),) * 2)
+    for tet in tets:
+        coordinates = np.column_stack([np.ones(4), nodes[tet]])
+        volume = abs(np.linalg.det(coordinates)) / 6
+        gradients = np.linalg.inv(coordinates)[1:].T  # row a: grad N_a
+        for (p, a), (q, b) in itertools.product(enumerate(tet), repeat=2):
+            outer = np.outer(gradients[p], gradients[q])
+            block = lame * outer + shear * outer.T + shear * np.trace(outer) * np.eye(3)
+            K[3 * a:3 * a + 3, 3 * b:3 * b + 3] += volume * block
+    return K
+
+
+def greens(cells, youngs_modulus=1.0, poissons_ratio=0.3):
+    """Xi of the free dofs (z > 0) in mesh node order, and the free nodes."""
+    nodes, tets = kuhn_cube(cells)
+    free = np.flatnonzero(nodes[:, 2] > 0)
+    dofs = (3 * free[:, None] + np.arange(3)).ravel()
+    K = stiffness(nodes, tets, youngs_modulus, poissons_ratio)
+    return np.linalg.inv(K[np.ix_(dofs, dofs)]), free
+
+
+def stored_greens(file):
+    """Xi of a .palpate.hdf, full matrix in mesh node order, and the stored nodes."""
+    import h5py
+    with h5py.File(file) as hdf:
+        stored = hdf["dofs/stored_nodes"][:]
+        packed = hdf["greens/packed"][:].astype(float)
+    order = 3 * len(stored)
+    Xi = np.zeros((order, order))
+    Xi.T[np.triu_indices(order)] = packed  # lower triangle column by column
+    Xi = np.tril(Xi) + np.tril(Xi, -1).T
+    by_node = np.argsort(stored)
+    dofs = (3 * by_node[:, None] + np.arange(3)).ravel()
+    return Xi[np.ix_(dofs, dofs)], stored[by_node]

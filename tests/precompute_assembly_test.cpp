@@ -1,0 +1,137 @@
+// K against what elasticity says of it.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <random>
+
+#include "meshes/generate.h"
+#include "meshes/surface.h"
+#include "precompute/assembly.h"
+#include "precompute/factor.h"
+
+namespace palpate {
+namespace {
+
+constexpr Material rubber{1.0e5, 0.4, 1000.0};
+
+/// A box whose interior nodes are moved at random by up to 15 % of a cell.
+Mesh distorted_box(int cells) {
+  Mesh mesh = generate(BoxShape{Vec3::Zero(), Vec3(0.3, 0.2, 0.25), {cells, cells, cells}});
+  std::vector<std::uint8_t> on_surface(mesh.nodes.size(), 0);
+  for (const Index node : extract_surface(mesh).nodes) on_surface[static_cast<std::size_t>(node)] = 1;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> shift(-0.15 * 0.2 / cells, 0.15 * 0.2 / cells);
+  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
+    if (!on_surface[node]) mesh.nodes[node] += Vec3(shift(random), shift(random), shift(random));
+  }
+  return mesh;
+}
+
+Eigen::MatrixXd dense(const SparseMatrix& lower) { return Eigen::MatrixXd(lower).selfadjointView<Eigen::Lower>(); }
+
+TEST(Assembly, RigidMotionsTakeNoForce) {
+  const Mesh mesh = distorted_box(3);
+  const Eigen::MatrixXd K = dense(assemble_stiffness(mesh, rubber, std::vector<std::uint8_t>(mesh.nodes.size(), 0)).K);
+  Eigen::MatrixXd rigid(K.rows(), 6);
+  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
+    const auto row = static_cast<Eigen::Index>(3 * node);
+    const Vec3& x = mesh.nodes[node];
+    rigid.block<3, 3>(row, 0).setIdentity();
+    rigid.block<3, 3>(row, 3) << 0, x.z(), -x.y(), -x.z(), 0, x.x(), x.y(), -x.x(), 0;
+  }
+  EXPECT_LT((K * rigid).lpNorm<Eigen::Infinity>(), 1e-12 * K.lpNorm<Eigen::Infinity>());
+  const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(K, Eigen::EigenvaluesOnly).eigenvalues();
+  EXPECT_LT(std::abs(eigenvalues[5]), 1e-10 * eigenvalues[eigenvalues.size() - 1]);
+  EXPECT_GT(eigenvalues[6], 1e-5 * eigenvalues[eigenvalues.size() - 1]);
+}
+
+TEST(Assembly, ClampingThreeNodesMakesItPositiveDefinite) {
+  const Mesh mesh = distorted_box(2);
+  std::vector<std::uint8_t> fixed(mesh.nodes.size(), 0);
+  fixed[0] = fixed[1] = fixed[3] = 1;
+  const Eigen::MatrixXd K = dense(assemble_stiffness(mesh, rubber, fixed).K);
+  EXPECT_EQ(K.rows(), static_cast<Eigen::Index>(3 * (mesh.nodes.size() - 3)));
+  EXPECT_EQ(Eigen::LLT<Eigen::MatrixXd>(K).info(), Eigen::Success);
+}
+
+TEST(Assembly, PatchTestLinearFieldIsReproduced) {
+  const Mesh mesh = distorted_box(4);
+  Mat3 gradient;
+  gradient << 1e-3, 2e-3, -5e-4, 4e-4, -2e-3, 1e-3, 3e-4, -6e-4, 1.5e-3;
+  const std::vector<std::uint8_t> none(mesh.nodes.size(), 0);
+  std::vector<std::uint8_t> boundary = none;
+  for (const Index node : extract_surface(mesh).nodes) boundary[static_cast<std::size_t>(node)] = 1;
+
+  // K_aa u_a = -K_ab u_b with the linear field on the boundary b gives the linear field inside.
+  const Eigen::MatrixXd K = dense(assemble_stiffness(mesh, rubber, none).K);
+  const Stiffness inner = assemble_stiffness(mesh, rubber, boundary);
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(K.rows());
+  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
+    if (boundary[node]) u.segment<3>(static_cast<Eigen::Index>(3 * node)) = gradient * mesh.nodes[node];
+  }
+  const Eigen::VectorXd f = K * u;
+  std::vector<double> rhs;
+  for (const Index node : inner.free_nodes) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) rhs.push_back(-f[3 * node + axis]);
+  }
+  Factor factor(inner.K);
+  factor.factorize();
+  const std::vector<double> inside = factor.solve(rhs);
+  for (std::size_t a = 0; a < inner.free_nodes.size(); ++a) {
+    const Vec3 exact = gradient * mesh.nodes[static_cast<std::size_t>(inner.free_nodes[a])];
+    const Vec3 found(inside[3 * a], inside[3 * a + 1], inside[3 * a + 2]);
+    EXPECT_LT((found - exact).norm(), 1e-13) << "free node " << a;
+  }
+}
+
+/// Tip deflection of a cantilever (clamped at x = 0) under a unit shear force spread over the tip as the parabolic shear
+/// stress of Saint-Venant.
+double cantilever_deflection(int cells_high, const Vec3& size, const Material& material) {
+  const int along = cells_high * static_cast<int>(std::lround(size.x() / size.z()));
+  const Mesh mesh = generate(BoxShape{Vec3::Zero(), size, {along, cells_high, cells_high}});
+  std::vector<std::uint8_t> fixed(mesh.nodes.size(), 0);
+  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) fixed[node] = mesh.nodes[node].x() < 1e-9;
+  const Stiffness stiffness = assemble_stiffness(mesh, material, fixed);
+  std::vector<double> f(static_cast<std::size_t>(stiffness.K.rows()), 0.0);
+  const auto on_tip = [&](Index node) { return mesh.nodes[static_cast<std::size_t>(node)].x() > size.x() - 1e-9; };
+  double total = 0.0;
+  for (const Triangle& t : extract_surface(mesh).triangles) {
+    if (!on_tip(t[0]) || !on_tip(t[1]) || !on_tip(t[2])) continue;
+    const Vec3 &a = mesh.nodes[static_cast<std::size_t>(t[0])], &b = mesh.nodes[static_cast<std::size_t>(t[1])],
+               &c = mesh.nodes[static_cast<std::size_t>(t[2])];
+    const double area = 0.5 * (b - a).cross(c - a).norm();
+    for (const Index node : t) {
+      const double eta = 2.0 * mesh.nodes[static_cast<std::size_t>(node)].z() / size.z() - 1.0;
+      const double force = area / 3.0 * (1.0 - eta * eta);
+      f[static_cast<std::size_t>(3 * stiffness.free_of_node[static_cast<std::size_t>(node)] + 2)] += force;
+      total += force;
+    }
+  }
+  for (double& force : f) force /= total;
+  Factor factor(stiffness.K);
+  factor.factorize();
+  const std::vector<double> u = factor.solve(f);
+  double work = 0.0;  // of the unit force: the mean deflection in the sense of energy
+  for (std::size_t dof = 0; dof < f.size(); ++dof) work += f[dof] * u[dof];
+  return work;
+}
+
+// Timoshenko: w = P L^3 / (3 E I) + P L / (kappa G A), kappa = 5/6 for a rectangle at nu = 0, where Saint-Venant's solution has
+// no Poisson effect at the clamp. Linear tetrahedra converge from below with order 2 in the energy.
+TEST(Assembly, CantileverConvergesToTimoshenko) {
+  const Vec3 size(0.8, 0.1, 0.1);
+  const Material material{1.0e6, 0.0, 1000.0};
+  const double I = size.y() * std::pow(size.z(), 3) / 12.0, A = size.y() * size.z(), G = material.youngs_modulus / 2.0;
+  const double timoshenko = std::pow(size.x(), 3) / (3.0 * material.youngs_modulus * I) + size.x() / (5.0 / 6.0 * G * A);
+  const double w2 = cantilever_deflection(2, size, material), w4 = cantilever_deflection(4, size, material),
+               w8 = cantilever_deflection(8, size, material);
+  const double order = std::log2((w4 - w2) / (w8 - w4));
+  const double limit = w8 + (w8 - w4) / (std::pow(2.0, order) - 1.0);
+  EXPECT_LT(w2, w4);
+  EXPECT_LT(w8, timoshenko);
+  EXPECT_NEAR(order, 2.0, 0.35);
+  EXPECT_NEAR(limit / timoshenko, 1.0, 0.01);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,197 @@
+"""palpate-precompute as a person meets it: what it writes, what it refuses, what is left when it is stopped."""
+
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+from programs import MODELS, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
+
+
+class Bake(ProgramTest):
+    def test_same_input_gives_the_same_bytes_with_any_number_of_jobs(self):
+        one = self.bake(cube_toml(6), "--jobs", "1", name="one.toml").read_bytes()
+        (self.folder / "one.palpate.hdf").unlink()
+        two = self.bake(cube_toml(6), "--jobs", "2", name="one.toml").read_bytes()
+        self.assertEqual(one, two)
+
+    def test_dry_run_says_the_numbers_and_writes_nothing(self):
+        model = self.write("model.toml", cube_toml(6))
+        result = run(PRECOMPUTE, model, "--dry-run", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        # 343 nodes, 49 clamped; 218 on the surface, 49 of them clamped; 507 * 508 / 2 * 8 bytes = 1.03 MB.
+        for piece in ("343 nodes", "1296 elements", "882 free dofs", "507 stored dofs", "1.0 MB", "about"):
+            self.assertIn(piece, result.stderr)
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
+
+    def test_inspect_and_verify(self):
+        file = self.bake(cube_toml(6, scope="layers"))
+        inspected = run(PRECOMPUTE, "inspect", file)
+        self.assertEqual(inspected.returncode, 0)
+        for piece in ("343 nodes (49 fixed)", "E = 1 Pa", "surface + 1 layer", "double precision", "dihedral", "model.toml"):
+            self.assertIn(piece, inspected.stdout)
+        verified = run(PRECOMPUTE, "verify", file)
+        self.assertEqual(verified.returncode, 0, verified.stdout)
+        for check in ("checksums", "probes", "energy", "columns", "residual"):
+            self.assertIn(check, verified.stdout)
+
+    def test_all_scopes_and_precisions_verify(self):
+        for scope in ("surface", "layers", "full"):
+            for precision in ("single", "double"):
+                file = self.bake(cube_toml(5, scope, precision), name=f"{scope}-{precision}.toml")
+                result = run(PRECOMPUTE, "verify", file)
+                self.assertEqual(result.returncode, 0, result.stdout)
+
+    def test_more_memory_than_there_is(self):
+        model = self.write("model.toml", cube_toml(24))
+        result = run(PRECOMPUTE, model, "--jobs", "1024", cwd=self.folder)
+        self.assert_refused(result, "GB of memory are needed", "are free", "--jobs")
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
+
+    def test_full_disk(self):
+        model = self.write("model.toml", cube_toml(10))
+
+        def limit_file_size():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20))
+
+        result = run(PRECOMPUTE, model, cwd=self.folder, preexec_fn=limit_file_size)
+        self.assert_refused(result, "palpate.hdf")
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
+
+    def test_usage(self):
+        self.assertEqual(run(PRECOMPUTE, cwd=self.folder).returncode, 2)
+        self.assertEqual(run(PRECOMPUTE, "--bogus", cwd=self.folder).returncode, 2)
+        self.assertEqual(run(PRECOMPUTE, "--help", cwd=self.folder).returncode, 0)
+        self.assertIn("palpate-precompute", run(PRECOMPUTE, "--version").stdout)
+
+    def test_missing_model_and_output_folder(self):
+        self.assert_refused(run(PRECOMPUTE, self.folder / "none.toml"), "none.toml")
+        model = self.write("model.toml", cube_toml(2))
+        self.assert_refused(run(PRECOMPUTE, model, "-o", self.folder / "no" / "x.palpate.hdf"), "x.palpate.hdf")
+
+
+class Stopped(ProgramTest):
+    def start_and_wait_for_columns(self, model, output):
+        """A running bake that has written some columns but not all."""
+        process = subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.DEVNULL)
+        journal = output.with_name(output.name + ".progress")
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline and process.poll() is None:
+            if journal.exists() and len(journal.read_text().splitlines()) >= 3:
+                return process
+            time.sleep(0.002)
+        self.fail("the run ended before it could be stopped")
+
+    def test_killed_run_is_resumed_and_gives_the_same_file(self):
+        model = self.write("model.toml", cube_toml(18))
+        output = self.folder / "killed.palpate.hdf"
+        process = self.start_and_wait_for_columns(model, output)
+        process.kill()
+        process.wait()
+        self.assertFalse(output.exists())
+        result = run(PRECOMPUTE, model, "-o", output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"[1-9]\d* of \d+ columns were kept")
+        straight = self.folder / "straight.palpate.hdf"
+        self.assertEqual(run(PRECOMPUTE, model, "-o", straight).returncode, 0)
+        self.assertEqual(output.read_bytes(), straight.read_bytes())
+        self.assertEqual(sorted(p.name for p in self.folder.iterdir()),
+                         ["killed.palpate.hdf", "model.toml", "straight.palpate.hdf"])
+
+    def test_interrupt_leaves_nothing_half_written_and_the_old_file_whole(self):
+        old = self.bake(cube_toml(3))
+        before = old.read_bytes()
+        model = self.write("model.toml", cube_toml(18))
+        for stop in (signal.SIGINT, signal.SIGTERM):
+            process = self.start_and_wait_for_columns(model, old)
+            process.send_signal(stop)
+            self.assertEqual(process.wait(), 130)
+            self.assertEqual(sorted(p.name for p in self.folder.iterdir()), ["model.palpate.hdf", "model.toml"])
+            self.assertEqual(old.read_bytes(), before)
+
+
+class Stale(ProgramTest):
+    def test_changed_model_is_noticed(self):
+        file = self.bake(cube_toml(3))
+        model = self.folder / "model.toml"
+        model.write_text(model.read_text().replace("youngs_modulus = 1.0", "youngs_modulus = 2.0"))
+        verified = run(PRECOMPUTE, "verify", file)
+        self.assertEqual(verified.returncode, 3)
+        self.assertIn("STALE", verified.stdout)
+        probed = run(RUNTIME, "probe", file, "--at", "0.5,0.5,1", "--displace", "0,0,1")
+        self.assertIn("model.toml", probed.stderr)
+        self.assertIn("precompute", probed.stderr)
+
+    def test_changed_mesh_is_noticed(self):
+        self.write("tet.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n5\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1 1 1 0\n"
+                   "Tetrahedra\n2\n1 2 3 4 1\n2 3 4 5 1\nEnd\n")
+        text = cube_toml(1).replace("box = { origin = [0, 0, 0], size = [1, 1, 1], cells = [1, 1, 1] }", 'volume = "tet.mesh"')
+        file = self.bake(text)
+        self.assertEqual(run(PRECOMPUTE, "verify", file).returncode, 0)
+        mesh = self.folder / "tet.mesh"
+        mesh.write_text(mesh.read_text().replace("1 1 1 0", "1 1 1.5 0"))
+        verified = run(PRECOMPUTE, "verify", file)
+        self.assertEqual(verified.returncode, 3)
+        self.assertIn("tet.mesh", verified.stdout)
+
+    def test_altered_and_truncated_files_are_refused(self):
+        file = self.bake(cube_toml(4))
+        good = file.read_bytes()
+        middle = bytearray(good)
+        middle[len(good) // 2] ^= 0x10
+        for bad, piece in ((bytes(middle), "altered"), (good[: len(good) // 2], ""), (b"", ""), (b"hello", "")):
+            file.write_bytes(bad)
+            self.assert_refused(run(PRECOMPUTE, "verify", file), file.name, piece)
+            self.assert_refused(run(RUNTIME, "probe", file, "--node", "1", "--displace", "0,0,1"), file.name, piece)
+
+
+class BadDescriptions(ProgramTest):
+    def refuse(self, text, *pieces):
+        model = self.write("model.toml", text)
+        result = run(PRECOMPUTE, model, cwd=self.folder)
+        self.assert_refused(result, *pieces)
+        self.assertEqual(list(self.folder.glob("*.palpate.hdf*")), [])
+
+    def test_unknown_key_names_the_nearest(self):
+        self.refuse(cube_toml(2).replace("poissons_ratio", "poisons_ratio"), "poisons_ratio", "poissons_ratio", "model.toml")
+
+    def test_material_out_of_range(self):
+        self.refuse(cube_toml(2).replace("youngs_modulus = 1.0", "youngs_modulus = 0"), "youngs_modulus")
+        self.refuse(cube_toml(2).replace("poissons_ratio = 0.3", "poissons_ratio = 0.5"), "poissons_ratio")
+        self.refuse(cube_toml(2).replace("density = 1000", "density = nan"), "density")
+
+    def test_nothing_fixed(self):
+        text = cube_toml(2)
+        self.refuse(text[: text.index("[[fixed]]")] + text[text.index("[storage]"):], "fixed")
+
+    def test_empty_selection(self):
+        self.refuse(cube_toml(2).replace("point = [0, 0, 0]", "point = [0, 0, -5]"), "fixed")
+
+    def test_rigid_motion_left(self):
+        self.refuse(cube_toml(2).replace("half_space = { point = [0, 0, 0], normal = [0, 0, -1] }", "nodes = [0, 1]"), "rotat")
+
+    def test_everything_fixed(self):
+        self.refuse(cube_toml(2).replace("normal = [0, 0, -1]", "normal = [0, 0, 1]"), "fixed")
+
+    def test_wrong_scale_is_a_warning(self):
+        model = self.write("model.toml", cube_toml(2).replace("size = [1, 1, 1]", "size = [100, 100, 100]"))
+        result = run(PRECOMPUTE, model, cwd=self.folder)
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("scale", result.stderr)
+
+
+class Models(ProgramTest):
+    def test_sample_models_that_need_no_download(self):
+        for name in ("cube", "beam", "sphere"):
+            shutil.copytree(MODELS / name, self.folder / name)
+            result = run(PRECOMPUTE, self.folder / name / "model.toml", cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(run(PRECOMPUTE, "verify", self.folder / f"{name}.palpate.hdf").returncode, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
