@@ -1,5 +1,6 @@
 #include "formats/checksum.h"
 
+#define XXH_STATIC_LINKING_ONLY  // a state on the stack
 #include <xxhash.h>
 
 #include <algorithm>
@@ -15,7 +16,7 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t digest_bytes = sizeof(XXH128_canonical_t);
-constexpr std::size_t block_bytes = std::size_t{64} << 10;  // stays in the second-level cache between two looks
+constexpr std::size_t block_bytes = 65536;  // stays in the second-level cache between two looks
 
 std::string hexadecimal(const XXH128_canonical_t& digest) {
   constexpr std::string_view digit = "0123456789abcdef";
@@ -52,7 +53,9 @@ std::string checksum(std::span<const std::byte> bytes) {
   return hexadecimal(canonical(XXH3_128bits(bytes.data(), bytes.size())));
 }
 
-std::string checksum(std::string_view text) { return checksum(std::as_bytes(std::span(text))); }
+std::string checksum(std::string_view text) {
+  return checksum(std::as_bytes(std::span(text)));
+}
 
 std::string checksum_file(const std::filesystem::path& file) {
   const FileDescriptor descriptor = open_file(file, OpenMode::read);
@@ -75,9 +78,13 @@ void RunningChecksum::update(std::span<const std::byte> bytes) {
   XXH3_128bits_update(state_.get(), bytes.data(), bytes.size());
 }
 
-std::string RunningChecksum::digits() const { return hexadecimal(canonical(XXH3_128bits_digest(state_.get()))); }
+std::string RunningChecksum::digits() const {
+  return hexadecimal(canonical(XXH3_128bits_digest(state_.get())));
+}
 
-void RunningChecksum::Free::operator()(XXH3_state_s* state) const noexcept { XXH3_freeState(state); }
+void RunningChecksum::Free::operator()(XXH3_state_s* state) const noexcept {
+  XXH3_freeState(state);
+}
 
 void ChunkedChecksum::append(std::span<const std::byte> bytes, const Inspect& inspect) {
   const std::size_t chunks = (bytes.size() + chunk - 1) / chunk;

@@ -1,4 +1,5 @@
-// XXH3-128 checksums: at memory speed, so that every load can afford the check. They find accidents, not attackers.
+// XXH3-128 checksums: at memory speed, so that every load can afford the check. They find accidents, not
+// attackers.
 #pragma once
 
 #include <cstddef>
@@ -38,13 +39,14 @@ class RunningChecksum {
   std::unique_ptr<XXH3_state_s, Free> state_;
 };
 
-/// Checksum of a large array, computed by all processors. Up to `chunk` bytes it is `checksum`; beyond that the
-/// `checksum` of the 16-byte big-endian digests of the chunks, one after the other.
+/// Checksum of a large array, computed by all processors. Up to `chunk` bytes it is `checksum`; beyond that
+/// the `checksum` of the 16-byte big-endian digests of the chunks, one after the other.
 class ChunkedChecksum {
  public:
   static constexpr std::size_t chunk = std::size_t{16} << 20;  ///< [byte]
 
-  /// Looks at a block while it is in the cache; called by several threads at once. Blocks start at multiples of 64 KiB.
+  /// Looks at a block while it is in the cache; called by several threads at once. Blocks start at multiples
+  /// of 64 KiB.
   using Inspect = std::function<void(std::size_t first_byte, std::span<const std::byte> block)>;
 
   /// Every call but the last brings a multiple of `chunk` bytes.

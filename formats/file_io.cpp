@@ -15,18 +15,24 @@
 namespace palpate {
 namespace {
 
-std::string reason(int error) { return std::generic_category().message(error); }
+std::string reason(int error) {
+  return std::generic_category().message(error);
+}
 
 const char* hint_for(int error) {
   switch (error) {
-    case ENOENT: return "Check the path.";
+    case ENOENT:
+      return "Check the path.";
     case EACCES:
     case EPERM:
-    case EROFS: return "Check the permissions of the file and its folder.";
+    case EROFS:
+      return "Check the permissions of the file and its folder.";
     case ENOSPC:
     case EDQUOT:
-    case EFBIG: return "Free some disk space or choose another place with --output.";
-    default: return "Check the disk and the folder.";
+    case EFBIG:
+      return "Free some disk space or choose another place with --output.";
+    default:
+      return "Check the disk and the folder.";
   }
 }
 
@@ -40,14 +46,19 @@ std::filesystem::path folder_of(const std::filesystem::path& path) {
 
 int flags_of(OpenMode mode) {
   switch (mode) {
-    case OpenMode::read: return O_RDONLY | O_CLOEXEC;
-    case OpenMode::write: return O_RDWR | O_CLOEXEC;
-    case OpenMode::read_append: break;
+    case OpenMode::read:
+      return O_RDONLY | O_CLOEXEC;
+    case OpenMode::write:
+      return O_RDWR | O_CLOEXEC;
+    case OpenMode::read_append:
+      break;
   }
   return O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC;
 }
 
-std::int64_t megabytes(std::int64_t bytes) { return (bytes + 999'999) / 1'000'000; }
+std::int64_t megabytes(std::int64_t bytes) {
+  return (bytes + 999'999) / 1'000'000;
+}
 
 }  // namespace
 

@@ -29,9 +29,9 @@ class FileDescriptor {
 };
 
 enum class OpenMode : std::uint8_t {
-  read,          ///< must exist
-  write,         ///< must exist; reads too
-  read_append,   ///< made when missing; reads anywhere, writes at the end
+  read,         ///< must exist
+  write,        ///< must exist; reads too
+  read_append,  ///< made when missing; reads anywhere, writes at the end
 };
 
 /// Throws Error with the system's reason.
@@ -52,13 +52,16 @@ void write_exactly(const FileDescriptor& file, std::span<const std::byte> bytes,
 /// Adds a line to a file opened with read_append. Throws Error.
 void append_text(const FileDescriptor& file, const std::string& text);
 
-/// Maps bytes [offset, offset + bytes) read-only; the mapping lives as long as the pointer. `bytes` > 0 and inside the file.
+/// Maps bytes [offset, offset + bytes) read-only; the mapping lives as long as the pointer. `bytes` > 0 and
+/// inside the file.
 std::shared_ptr<const void> map_file(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
 
-/// Throws Error (needed, free) unless `needed` bytes fit beside `path`; what a file at `path` occupies counts as free.
+/// Throws Error (needed, free) unless `needed` bytes fit beside `path`; what a file at `path` occupies counts
+/// as free.
 void check_free_space(const std::filesystem::path& path, std::int64_t needed);
 
-/// Takes the disk space of [offset, offset + bytes) now, where the file system can. Throws Error when it is full.
+/// Takes the disk space of [offset, offset + bytes) now, where the file system can. Throws Error when it is
+/// full.
 void reserve_space(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
 
 /// Flushes `from` to the disk, then renames it. Throws Error.

@@ -32,6 +32,9 @@ Id access_properties(std::int64_t align_from) {
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   // 1.10's format has a checksum in every piece of metadata; the older ones have none.
   H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
+  // Finished files never change and half-written ones are locked by their journal; HDF5's own lock fails on
+  // some network disks.
+  H5Pset_file_locking(access.get(), false, true);
   if (align_from > 0) H5Pset_alignment(access.get(), static_cast<hsize_t>(align_from), alignment);
   return access;
 }
@@ -63,18 +66,22 @@ std::string text_of(std::span<const std::int64_t> dims) {
 
 }  // namespace
 
-Id::Id(Id&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
+Id::Id(Id&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), closer_(other.closer_) {}
 
 Id& Id::operator=(Id&& other) noexcept {
   close();
   id_ = std::exchange(other.id_, H5I_INVALID_HID);
-  close_ = other.close_;
+  closer_ = other.closer_;
   return *this;
 }
 
-Id::~Id() { close(); }
+Id::~Id() {
+  close();
+}
 
-bool Id::close() noexcept { return id_ < 0 || close_(std::exchange(id_, H5I_INVALID_HID)) >= 0; }
+bool Id::close() noexcept {
+  return id_ < 0 || closer_(std::exchange(id_, H5I_INVALID_HID)) >= 0;
+}
 
 template <>
 ElementType element_type<std::uint8_t>() {
@@ -108,7 +115,8 @@ Id timeless(hid_t kind) {
 }
 
 void File::fail(const std::string& doing) const {
-  throw Error("cannot " + doing + ": " + reason(), path_.string(), "Check the disk and the folder's permissions.");
+  throw Error("cannot " + doing + ": " + reason(), path_.string(),
+              "Check the disk and the folder's permissions.");
 }
 
 File File::create(const std::filesystem::path& path, std::int64_t align_from) {
@@ -151,7 +159,8 @@ void File::make_group(const std::string& group) {
 }
 
 void File::make_link(const std::string& link, const std::string& target) {
-  if (H5Lcreate_soft(target.c_str(), id(), link.c_str(), H5P_DEFAULT, H5P_DEFAULT) < 0) fail("make the link " + link);
+  if (H5Lcreate_soft(target.c_str(), id(), link.c_str(), H5P_DEFAULT, H5P_DEFAULT) < 0)
+    fail("make the link " + link);
 }
 
 void File::write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims,
@@ -164,7 +173,8 @@ void File::write(const std::string& dataset, const ElementType& type, std::span<
   H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
   H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
   const Id made(
-      H5Dcreate2(id(), dataset.c_str(), type.id, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT), H5Dclose);
+      H5Dcreate2(id(), dataset.c_str(), type.id, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+      H5Dclose);
   if (!made.valid()) fail("make " + dataset);
   if (data != nullptr && H5Dwrite(made.get(), type.id, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
     fail("write " + dataset);
@@ -178,12 +188,14 @@ void File::write_attribute(const std::string& object, const std::string& name, c
   const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);
   const Id type = text_type(text.size(), is_ascii(text) ? H5T_CSET_ASCII : H5T_CSET_UTF8);
   const Id space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Id made(H5Acreate2(holder.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  const Id made(H5Acreate2(holder.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                H5Aclose);
   if (!made.valid() || H5Awrite(made.get(), type.get(), text.c_str()) < 0)
     fail("write the attribute " + name + " of " + object);
 }
 
-void File::write_attribute(const std::string& object, const std::string& name, std::span<const std::int64_t> values) {
+void File::write_attribute(const std::string& object, const std::string& name,
+                           std::span<const std::int64_t> values) {
   const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);
   const hsize_t count = values.size();
   const Id space(count == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &count, nullptr), H5Sclose);
@@ -203,15 +215,18 @@ Id File::open_dataset(const std::string& dataset) const {
 std::string File::type_name(const std::string& dataset) const {
   const Id opened = open_dataset(dataset);
   const Id type(H5Dget_type(opened.get()), H5Tclose);
-  const std::array known = {element_type<std::uint8_t>(), element_type<std::uint32_t>(), element_type<std::int32_t>(),
-                            element_type<std::int64_t>(), element_type<float>(),         element_type<double>()};
+  const std::array known = {element_type<std::uint8_t>(), element_type<std::uint32_t>(),
+                            element_type<std::int32_t>(), element_type<std::int64_t>(),
+                            element_type<float>(),        element_type<double>()};
   for (const ElementType& candidate : known)
     if (H5Tequal(type.get(), candidate.id) > 0) return candidate.name;
   return "another type";
 }
 
 Stored File::locate(const std::string& dataset, const ElementType& type, std::size_t rank) const {
-  const auto refuse = [&](const std::string& what) { throw Error(dataset + " " + what, path_.string(), altered_hint); };
+  const auto refuse = [&](const std::string& what) {
+    throw Error(dataset + " " + what, path_.string(), altered_hint);
+  };
   const Id opened = open_dataset(dataset);
 
   const std::string stored_type = type_name(dataset);
@@ -241,9 +256,10 @@ Stored File::locate(const std::string& dataset, const ElementType& type, std::si
   if (stored.bytes == 0) return stored;
 
   const haddr_t offset = H5Dget_offset(opened.get());
-  if (offset == HADDR_UNDEF || offset > file_bytes || static_cast<hsize_t>(stored.bytes) > file_bytes - offset)
-    refuse("(" + text_of(stored.dims) + ") needs " + std::to_string(stored.bytes) + " bytes, more than the file holds (" +
-           std::to_string(file_bytes) + "): the file is truncated");
+  if (offset == HADDR_UNDEF || offset > file_bytes ||
+      static_cast<hsize_t>(stored.bytes) > file_bytes - offset)
+    refuse("(" + text_of(stored.dims) + ") needs " + std::to_string(stored.bytes) +
+           " bytes, more than the file holds (" + std::to_string(file_bytes) + "): the file is truncated");
   stored.offset = static_cast<std::int64_t>(offset);
   return stored;
 }
@@ -267,7 +283,8 @@ std::optional<std::string> File::text_attribute(const std::string& object, const
   return text.substr(0, text.find('\0'));
 }
 
-std::optional<std::vector<std::int64_t>> File::integer_attribute(const std::string& object, const std::string& name,
+std::optional<std::vector<std::int64_t>> File::integer_attribute(const std::string& object,
+                                                                 const std::string& name,
                                                                  std::size_t count) const {
   const Id attribute = open_attribute(object, name);
   if (!attribute.valid()) return {};
@@ -280,12 +297,6 @@ std::optional<std::vector<std::int64_t>> File::integer_attribute(const std::stri
   return values;
 }
 
-int File::descriptor() const {
-  void* handle = nullptr;
-  if (H5Fget_vfd_handle(id(), H5P_DEFAULT, &handle) < 0 || handle == nullptr) fail("reach the file");
-  return *static_cast<int*>(handle);
-}
-
 void File::close() {
   if (!file_.close()) fail("write the file");
 }
@@ -295,6 +306,8 @@ Quiet::Quiet() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
-Quiet::~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+Quiet::~Quiet() {
+  H5Eset_auto2(H5E_DEFAULT, print_, data_);
+}
 
 }  // namespace palpate::hdf5

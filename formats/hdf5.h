@@ -1,4 +1,5 @@
-// A thin layer over the HDF5 C library: identifiers that close themselves, failures as Error, no error printing.
+// A thin layer over the HDF5 C library: identifiers that close themselves, failures as Error, no error
+// printing.
 #pragma once
 
 #include <hdf5.h>
@@ -16,9 +17,9 @@ namespace palpate::hdf5 {
 /// Owns an HDF5 identifier.
 class Id {
  public:
-  using Close = herr_t (*)(hid_t);
+  using Closer = herr_t (*)(hid_t);
   Id() = default;
-  Id(hid_t id, Close close) noexcept : id_(id), close_(close) {}
+  Id(hid_t id, Closer closer) noexcept : id_(id), closer_(closer) {}
   Id(Id&& other) noexcept;
   Id& operator=(Id&& other) noexcept;
   ~Id();
@@ -29,7 +30,7 @@ class Id {
 
  private:
   hid_t id_ = H5I_INVALID_HID;
-  Close close_ = nullptr;
+  Closer closer_ = nullptr;
 };
 
 /// A scalar type as it lies in the file (little-endian).
@@ -50,25 +51,30 @@ struct Stored {
   std::int64_t bytes = 0;
 };
 
-/// An HDF5 file. Objects carry no times, so equal calls make equal files. All throw Error (where = the file; fields are named).
+/// An HDF5 file. Objects carry no times, so equal calls make equal files. All throw Error (where = the file;
+/// fields are named).
 class File {
  public:
-  /// A new file (an old one is emptied). Objects of at least `align_from` bytes start at multiples of 4096 bytes.
-  static File create(const std::filesystem::path& path, std::int64_t align_from);
+  /// A new file (an old one is emptied). Objects of at least `align_from` bytes (0: none) start at multiples
+  /// of 4096 bytes.
+  static File create(const std::filesystem::path& path, std::int64_t align_from = 0);
   static File open_to_read(const std::filesystem::path& path);
   static File open_to_change(const std::filesystem::path& path);
 
   [[nodiscard]] hid_t id() const noexcept { return file_.get(); }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  [[nodiscard]] bool has(const std::string& object) const;  ///< a dataset or group of the file itself, not behind a link
+  [[nodiscard]] bool has(
+      const std::string& object) const;  ///< a dataset or group of the file itself, not behind a link
 
   void make_group(const std::string& group);  ///< with its parents; nothing where it exists
   void make_link(const std::string& link, const std::string& target);  ///< soft link
 
   /// Contiguous dataset; makes its group. `data` null: only the space is reserved.
-  void write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims, const void* data);
+  void write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims,
+             const void* data);
   void write_attribute(const std::string& object, const std::string& name, const std::string& text);
-  void write_attribute(const std::string& object, const std::string& name, std::span<const std::int64_t> values);
+  void write_attribute(const std::string& object, const std::string& name,
+                       std::span<const std::int64_t> values);
 
   /// Finds a dataset and proves that it has this type and rank, lies in one piece, and inside the file.
   [[nodiscard]] Stored locate(const std::string& dataset, const ElementType& type, std::size_t rank) const;
@@ -77,14 +83,12 @@ class File {
   [[nodiscard]] std::string type_name(const std::string& dataset) const;
 
   /// Value of a fixed-length text attribute; nothing where it is missing or of another kind.
-  [[nodiscard]] std::optional<std::string> text_attribute(const std::string& object, const std::string& name) const;
+  [[nodiscard]] std::optional<std::string> text_attribute(const std::string& object,
+                                                          const std::string& name) const;
   /// `count` values of an integer attribute; nothing where it is missing or of another kind.
   [[nodiscard]] std::optional<std::vector<std::int64_t>> integer_attribute(const std::string& object,
                                                                            const std::string& name,
                                                                            std::size_t count) const;
-
-  /// POSIX descriptor of the open file; the library keeps it.
-  [[nodiscard]] int descriptor() const;
 
   /// Writes everything out. Throws Error when that fails (full disk); the destructor would not say.
   void close();

@@ -4,6 +4,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <string_view>
 
@@ -40,11 +42,17 @@ std::vector<std::string_view> lines(std::string_view text) {
   return result;
 }
 
+std::string line_of(const JournalRange& range) {
+  return "columns " + std::to_string(range.first) + ' ' + std::to_string(range.count) + ' ' + range.checksum +
+         '\n';
+}
+
 /// False when the file was deleted or replaced between opening and locking it.
 bool is_still_there(const FileDescriptor& file) {
   struct stat opened = {};
   struct stat named = {};
-  return ::fstat(file.get(), &opened) == 0 && ::stat(file.path().c_str(), &named) == 0 && opened.st_ino == named.st_ino;
+  return ::fstat(file.get(), &opened) == 0 && ::stat(file.path().c_str(), &named) == 0 &&
+         opened.st_ino == named.st_ino;
 }
 
 }  // namespace
@@ -52,7 +60,7 @@ bool is_still_there(const FileDescriptor& file) {
 Journal::Journal(std::filesystem::path path) {
   do {
     file_ = open_file(path, OpenMode::read_append);
-    if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0)
+    if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
       throw Error("another palpate-precompute is writing this file", path.string(),
                   "Wait for it, or choose another place with --output.");
   } while (!is_still_there(file_));
@@ -76,17 +84,22 @@ std::optional<JournalContents> Journal::read() const {
   for (std::size_t i = 2; i < all.size(); ++i) {
     const auto w = words(all[i]);
     JournalRange range;
-    if (w.size() != 4 || w[0] != "columns" || !to_number(w[1], range.first) || !to_number(w[2], range.count)) break;
+    if (w.size() != 4 || w[0] != "columns" || !to_number(w[1], range.first) || !to_number(w[2], range.count))
+      break;
     range.checksum = w[3];
     contents.ranges.push_back(std::move(range));
   }
   return contents;
 }
 
-void Journal::start(const JournalFrame& frame) {
+void Journal::write(const JournalContents& contents) {
+  const JournalFrame& frame = contents.frame;
+  std::string text = std::string(first_line) + "\nmodel " + frame.key + ' ' +
+                     std::to_string(frame.greens_at) + ' ' + std::to_string(frame.file_bytes) + ' ' +
+                     frame.checksum + '\n';
+  for (const JournalRange& range : contents.ranges) text += line_of(range);
   empty();
-  append_text(file_, std::string(first_line) + "\nmodel " + frame.key + ' ' + std::to_string(frame.greens_at) + ' ' +
-                         std::to_string(frame.file_bytes) + ' ' + frame.checksum + '\n');
+  append_text(file_, text);
 }
 
 void Journal::empty() {
@@ -95,10 +108,11 @@ void Journal::empty() {
 }
 
 void Journal::add(const JournalRange& range) {
-  append_text(file_, "columns " + std::to_string(range.first) + ' ' + std::to_string(range.count) + ' ' +
-                         range.checksum + '\n');
+  append_text(file_, line_of(range));
 }
 
-void Journal::remove() noexcept { ::unlink(file_.path().c_str()); }
+void Journal::remove() noexcept {
+  ::unlink(file_.path().c_str());
+}
 
 }  // namespace palpate

@@ -16,7 +16,7 @@ struct JournalFrame {
   std::string key;             ///< of the model that is being written
   std::int64_t greens_at = 0;  ///< first byte of the Green's functions
   std::int64_t file_bytes = 0;
-  std::string checksum;        ///< of all bytes but the Green's functions
+  std::string checksum;  ///< of all bytes but the Green's functions
 };
 
 /// Columns [first, first + count) and the checksum of their bytes.
@@ -37,13 +37,14 @@ class Journal {
   /// Opens or makes it. Throws Error when another process holds it.
   explicit Journal(std::filesystem::path path);
 
-  /// What a killed run left; nothing when there is no complete frame. A line that was cut off by the kill ends the list.
+  /// What a killed run left; nothing when there is no complete frame. A line that was cut off by the kill
+  /// ends the list.
   [[nodiscard]] std::optional<JournalContents> read() const;
 
-  void start(const JournalFrame& frame);   ///< empties it and writes the frame
-  void empty();                            ///< forgets everything
-  void add(const JournalRange& range);     ///< one line, in one write
-  void remove() noexcept;                  ///< deletes the file
+  void write(const JournalContents& contents);  ///< in place of what it held
+  void empty();                                 ///< forgets everything
+  void add(const JournalRange& range);          ///< one more line, in one write
+  void remove() noexcept;                       ///< deletes the file
 
  private:
   FileDescriptor file_;

@@ -21,13 +21,14 @@ enum class Scope : std::uint8_t {
 
 /// One file that the model was made from, so that a stale model can be noticed.
 struct SourceFile {
-  std::string role;         ///< "model" for model.toml, "geometry" for the mesh, surface or image
-  std::string path;         ///< relative to the folder of the baked file, '/' separated
-  std::int64_t bytes = 0;   ///< size when it was read
-  std::string checksum;     ///< XXH3-128 of its bytes, 32 hexadecimal digits
+  std::string role;        ///< "model" for model.toml, "geometry" for the mesh, surface or image
+  std::string path;        ///< relative to the folder of the baked file, '/' separated
+  std::int64_t bytes = 0;  ///< size when it was read
+  std::string checksum;    ///< XXH3-128 of its bytes, 32 hexadecimal digits
 };
 
-/// A force on every stored dof and the displacement that it must give: lets anyone check a file without the model.
+/// A force on every stored dof and the displacement that it must give: lets anyone check a file without the
+/// model.
 struct Probe {
   std::vector<double> force;         ///< [n] on the stored dofs [N]
   std::vector<double> displacement;  ///< [n] of the stored dofs [m], by a sparse solve with K
@@ -43,7 +44,8 @@ struct Model {
   std::vector<Triangle> surface_triangles;  ///< [F] mesh node numbers, outward
   Material material;
   std::vector<std::uint8_t> fixed;  ///< [N] 1 where the node is clamped
-  std::vector<Index> stored_nodes;  ///< [n/3] mesh node of each stored node, in the elimination order of the factor
+  std::vector<Index>
+      stored_nodes;  ///< [n/3] mesh node of each stored node, in the elimination order of the factor
   Scope scope = Scope::layers;
   Index layers = 1;  ///< element layers below the surface that are kept (scope layers); 0 otherwise
   QualityReport quality;
@@ -52,7 +54,9 @@ struct Model {
   PackedGreens greens;       ///< Xi of the stored dofs [m/N]
   std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
 
-  [[nodiscard]] std::int64_t stored_dofs() const noexcept { return 3 * static_cast<std::int64_t>(stored_nodes.size()); }
+  [[nodiscard]] std::int64_t stored_dofs() const noexcept {
+    return 3 * static_cast<std::int64_t>(stored_nodes.size());
+  }
 };
 
 }  // namespace palpate

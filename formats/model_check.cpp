@@ -14,9 +14,12 @@ std::int64_t smallest(Count count) {
   switch (count) {
     case Count::one:
     case Count::elements:
-    case Count::stored_nodes: return 1;
-    case Count::nodes: return 4;
-    default: return 0;
+    case Count::stored_nodes:
+      return 1;
+    case Count::nodes:
+      return 4;
+    default:
+      return 0;
   }
 }
 
@@ -55,8 +58,9 @@ void Counts::set(Count count, std::int64_t value, const char* told_by) {
   if (value < smallest(count))
     refuse(where_, std::string(told_by) + " has " + std::to_string(value) + " entries, at least " +
                        std::to_string(smallest(count)) + " are needed");
-  if (counts_index_numbers(count) && value > std::numeric_limits<Index>::max() / 4)
-    refuse(where_, std::string(told_by) + " has " + std::to_string(value) + " entries, more than can be numbered");
+  if (counts_index_numbers(count) && value > std::numeric_limits<Index>::max() / 8)
+    refuse(where_,
+           std::string(told_by) + " has " + std::to_string(value) + " entries, more than can be numbered");
   values_[static_cast<std::size_t>(count)] = value;
   told_by_[static_cast<std::size_t>(count)] = told_by;
 }
@@ -71,15 +75,17 @@ std::vector<std::int64_t> Counts::sizes(const std::vector<Extent>& shape) const 
   return result;
 }
 
-void Counts::match(const char* path, const std::vector<Extent>& shape, const std::vector<std::int64_t>& dims) {
+void Counts::match(const char* path, const std::vector<Extent>& shape,
+                   const std::vector<std::int64_t>& dims) {
   for (std::size_t i = 0; i < shape.size(); ++i) {
     const Extent& extent = shape[i];
     const auto which = static_cast<std::size_t>(extent.count);
     if (values_[which] == unknown) set(extent.count, (dims[i] - extent.plus) / extent.factor, path);
     if (dims[i] == size(extent)) continue;
-    const std::string teller = told_by_[which] == nullptr ? "" : std::string(" by ") + told_by_[which];
-    refuse(where_, std::string(path) + " has size " + std::to_string(dims[i]) + ", " + std::to_string(size(extent)) +
-                       " is expected" + teller);
+    const bool by_another = told_by_[which] != nullptr && told_by_[which] != std::string(path);
+    const std::string teller = by_another ? std::string(" by ") + told_by_[which] : "";
+    refuse(where_, std::string(path) + " has size " + std::to_string(dims[i]) + ", " +
+                       std::to_string(size(extent)) + " is expected" + teller);
   }
 }
 

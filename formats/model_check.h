@@ -30,7 +30,8 @@ class Counts {
   /// All sizes of a field.
   [[nodiscard]] std::vector<std::int64_t> sizes(const std::vector<Extent>& shape) const;
 
-  /// Takes a field's sizes: the first field that has a count sets it, the others must agree. Throws Error (both fields and sizes).
+  /// Takes a field's sizes: the first field that has a count sets it, the others must agree. Throws Error
+  /// (both fields and sizes).
   void match(const char* path, const std::vector<Extent>& shape, const std::vector<std::int64_t>& dims);
 
   [[nodiscard]] const std::string& where() const noexcept { return where_; }
@@ -41,7 +42,8 @@ class Counts {
   std::array<const char*, number_of_counts> told_by_ = {};
 };
 
-/// Proves that a field has as many values as its shape asks for, and that each is finite and in its range. Throws Error.
+/// Proves that a field has as many values as its shape asks for, and that each is finite and in its range.
+/// Throws Error.
 template <class T>
 void check_values(const Field<T>& field, const std::vector<T>& values, const Counts& counts) {
   std::int64_t expected = 1;
@@ -53,16 +55,19 @@ void check_values(const Field<T>& field, const std::vector<T>& values, const Cou
   for (std::size_t i = 0; i < values.size(); ++i) {
     if constexpr (std::is_floating_point_v<T>) {
       if (!std::isfinite(values[i]))
-        refuse(counts.where(), std::string(field.path) + " holds a value that is not finite (entry " + std::to_string(i) + ")");
+        refuse(counts.where(), std::string(field.path) + " holds a value that is not finite (entry " +
+                                   std::to_string(i) + ")");
     } else if (below > 0 && (std::int64_t{values[i]} < 0 || std::int64_t{values[i]} >= below)) {
       refuse(counts.where(), std::string(field.path) + " holds " + std::to_string(values[i]) + " (entry " +
-                                 std::to_string(i) + "), only 0 to " + std::to_string(below - 1) + " are possible");
+                                 std::to_string(i) + "), only 0 to " + std::to_string(below - 1) +
+                                 " are possible");
     }
   }
 }
 
-/// Proves what involves several fields: elements with positive volume, triangles with three corners, stored nodes that are free and
-/// named once, a valid material. Values are in their ranges already. Throws Error (where = `where`) naming the field.
+/// Proves what involves several fields: elements with positive volume, triangles with three corners, stored
+/// nodes that are free and named once, a valid material. Values are in their ranges already. Throws Error
+/// (where = `where`) naming the field.
 void check_model(const Model& model, const std::string& where);
 
 }  // namespace palpate

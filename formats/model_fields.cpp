@@ -26,9 +26,13 @@ bool is_checksum(std::string_view text) {
 
 }  // namespace
 
-std::string text_of(Scope scope) { return scopes.at(static_cast<std::size_t>(scope)); }
+std::string text_of(Scope scope) {
+  return scopes.at(static_cast<std::size_t>(scope));
+}
 
-std::string text_of(Precision precision) { return precisions.at(static_cast<std::size_t>(precision)); }
+std::string text_of(Precision precision) {
+  return precisions.at(static_cast<std::size_t>(precision));
+}
 
 Scope scope_from(const std::string& text) {
   for (const Scope scope : {Scope::surface, Scope::layers, Scope::full})
@@ -50,10 +54,17 @@ std::vector<std::int64_t> offsets_of(const Model& model) {
 
 std::vector<double> quality_summary(const Model& model) {
   const QualityReport& q = model.quality;
-  return {q.min_dihedral,   q.max_dihedral,     q.min_radius_ratio,
-          q.mean_radius_ratio, q.min_edge,      q.max_edge,
-          q.volume,         static_cast<double>(q.worst_element),
-          q.worst_centroid.x(), q.worst_centroid.y(), q.worst_centroid.z()};
+  return {q.min_dihedral,
+          q.max_dihedral,
+          q.min_radius_ratio,
+          q.mean_radius_ratio,
+          q.min_edge,
+          q.max_edge,
+          q.volume,
+          static_cast<double>(q.worst_element),
+          q.worst_centroid.x(),
+          q.worst_centroid.y(),
+          q.worst_centroid.z()};
 }
 
 void put_quality_summary(Model& model, const std::vector<double>& values) {
@@ -75,7 +86,8 @@ void put_quality_summary(Model& model, const std::vector<double>& values) {
 std::vector<std::uint8_t> sources_text(const Model& model) {
   std::string text;
   for (const SourceFile& source : model.sources)
-    text += source.role + ' ' + std::to_string(source.bytes) + ' ' + source.checksum + ' ' + source.path + '\n';
+    text +=
+        source.role + ' ' + std::to_string(source.bytes) + ' ' + source.checksum + ' ' + source.path + '\n';
   return {text.begin(), text.end()};
 }
 

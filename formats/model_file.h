@@ -16,16 +16,18 @@ namespace palpate {
 inline constexpr int format_major = 1;  ///< another major version is refused: "precompute it again"
 inline constexpr int format_minor = 0;  ///< newer minor versions are read, what they add is ignored
 
-/// Streams a model to disk. Everything but Green's functions and probes is written by the constructor to PATH.partial, with
-/// the space of the packed matrix reserved (contiguous, page-aligned); columns then arrive in any order from any
-/// thread; `finish` adds probes, checksums and content hash and renames PATH.partial to PATH. Which columns are done is
-/// journalled (with their checksums) in PATH.progress, so a killed run is continued by constructing the writer again with an equal model.
-/// An existing PATH is untouched until the rename.
+/// Streams a model to disk. Everything but Green's functions and probes is written by the constructor to
+/// PATH.partial, with the space of the packed matrix reserved (contiguous, page-aligned); columns then arrive
+/// in any order from any thread; `finish` adds probes, checksums and content hash and renames PATH.partial to
+/// PATH. Which columns are done is journalled (with their checksums) in PATH.progress, so a killed run is
+/// continued by constructing the writer again with an equal model. An existing PATH is untouched until the
+/// rename.
 class ModelWriter {
  public:
-  /// `model.greens` and `model.probes` are ignored. Continues PATH.partial when its journal has the same key (a hash of
-  /// all fields but Green's functions and probes, and of format and precision) and each journalled range still has its checksum.
-  /// Throws Error when the file cannot be created or the disk cannot hold it (with the numbers).
+  /// `model.greens` and `model.probes` are ignored. Continues PATH.partial when its journal has the same key
+  /// (a hash of all fields but Green's functions and probes, and of format and precision) and each journalled
+  /// range still has its checksum. Throws Error when the file cannot be created or the disk cannot hold it
+  /// (with the numbers).
   ModelWriter(std::filesystem::path path, const Model& model, Precision precision);
   ~ModelWriter();
   ModelWriter(const ModelWriter&) = delete;
@@ -34,8 +36,9 @@ class ModelWriter {
   /// Whether columns [first, first + count) were written by an earlier, killed run.
   [[nodiscard]] bool has_columns(std::int64_t first, std::int64_t count) const;
 
-  /// Stores columns [first, first + count) of the lower triangle: `packed` holds their entries one column after the other,
-  /// column j from its diagonal down. Converts to the stored precision. Thread-safe for disjoint ranges.
+  /// Stores columns [first, first + count) of the lower triangle: `packed` holds their entries one column
+  /// after the other, column j from its diagonal down. Converts to the stored precision. Thread-safe for
+  /// disjoint ranges.
   void write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed);
 
   /// Adds the probes, seals and renames. All columns must have been written.
@@ -49,12 +52,12 @@ class ModelWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Loads a file: maps the Green's functions, reads the rest, and proves every size, range, index, finite value and checksum once.
-/// Throws Error naming the field that is wrong.
+/// Loads a file: maps the Green's functions, reads the rest, and proves every size, range, index, finite
+/// value and checksum once. Throws Error naming the field that is wrong.
 Model load_model(const std::filesystem::path& path);
 
-/// The sources of a loaded model that are no longer what they were: a sentence for each ("model.toml changed since …",
-/// "… is gone"). `model_path` is the baked file; empty when nothing is stale.
+/// The sources of a loaded model that are no longer what they were: a sentence for each ("model.toml changed
+/// since …", "… is gone"). `model_path` is the baked file; empty when nothing is stale.
 std::vector<std::string> stale_sources(const Model& model, const std::filesystem::path& model_path);
 
 /// A SourceFile entry for `file`, its path relative to the folder of `model_path`.

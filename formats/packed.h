@@ -11,21 +11,28 @@ namespace palpate {
 /// Stored scalar of the Green's functions. All arithmetic is done in double.
 enum class Precision : std::uint8_t { single_precision, double_precision };
 
-constexpr std::int64_t bytes_per_scalar(Precision p) { return p == Precision::single_precision ? 4 : 8; }
+constexpr std::int64_t bytes_per_scalar(Precision p) {
+  return p == Precision::single_precision ? 4 : 8;
+}
 
 /// Number of stored entries of a symmetric matrix of the given order.
-constexpr std::int64_t packed_size(std::int64_t order) { return order * (order + 1) / 2; }
+constexpr std::int64_t packed_size(std::int64_t order) {
+  return order * (order + 1) / 2;
+}
 
-/// Position of entry (i, j), i >= j, in the column-major lower triangle (LAPACK `uplo = 'L'`, as dpptri leaves it).
+/// Position of entry (i, j), i >= j, in the column-major lower triangle (LAPACK `uplo = 'L'`, as dpptri
+/// leaves it).
 constexpr std::int64_t packed_index(std::int64_t i, std::int64_t j, std::int64_t order) {
   return i + j * (2 * order - j - 1) / 2;
 }
 
 /// First stored entry of column j (its diagonal); column j holds order - j entries.
-constexpr std::int64_t packed_column(std::int64_t j, std::int64_t order) { return packed_index(j, j, order); }
+constexpr std::int64_t packed_column(std::int64_t j, std::int64_t order) {
+  return packed_index(j, j, order);
+}
 
-/// The block of the Green's function matrix Xi = K^-1 [m/N] for the stored dofs. Read-only; usually a mapping of the
-/// file. Copies share the data.
+/// The block of the Green's function matrix Xi = K^-1 [m/N] for the stored dofs. Read-only; usually a mapping
+/// of the file. Copies share the data.
 class PackedGreens {
  public:
   PackedGreens() = default;

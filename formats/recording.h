@@ -6,26 +6,29 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace palpate {
 
 /// What is kept of one tick.
 struct TickRecord {
-  double time = 0.0;               ///< since the start of the run [s]
-  double tool_position[3] = {};    ///< [m]
-  double force[3] = {};            ///< on the body [N]; the hand feels the opposite
-  double displacement[3] = {};     ///< of the held node [m]; zero while nothing is held
-  std::int64_t node = -1;          ///< held mesh node, -1 for none
-  std::uint32_t status = 0;        ///< StepStatus bits
-  std::uint32_t compute_ns = 0;    ///< time that `step` took; 0 in a run without waiting, so that two such runs are equal
-  std::uint8_t grab = 0;           ///< grab button
+  double time = 0.0;             ///< since the start of the run [s]
+  double tool_position[3] = {};  ///< [m]
+  double force[3] = {};          ///< on the body [N]; the hand feels the opposite
+  double displacement[3] = {};   ///< of the held node [m]; zero while nothing is held
+  std::int64_t node = -1;        ///< held mesh node, -1 for none
+  std::uint32_t status = 0;      ///< StepStatus bits
+  std::uint32_t compute_ns =
+      0;  ///< time that `step` took; 0 in a run without waiting, so that two such runs are equal
+  std::uint8_t grab = 0;  ///< grab button
 };
 
-/// Writes a session to HDF5 (`/ticks/time`, `/ticks/tool_position`, ... one extendible dataset a field), under a
-/// temporary name until `finish`. Not for the tick: a recorder thread calls it.
+/// Writes a session to HDF5 (`/ticks/time`, `/ticks/tool_position`, ... one extendible dataset a field),
+/// under a temporary name until `finish`. Not for the tick: a recorder thread calls it.
 class RecordingWriter {
  public:
-  /// `model_path` and `content_hash` of the model are kept as attributes, with the program's version. Throws Error when PATH cannot be made.
+  /// `model_path` and `content_hash` of the model are kept as attributes, with the program's version. Throws
+  /// Error when PATH cannot be made.
   RecordingWriter(std::filesystem::path path, const std::string& model_path, const std::string& content_hash);
   ~RecordingWriter();  ///< without `finish`, removes the temporary file
   RecordingWriter(const RecordingWriter&) = delete;
@@ -38,5 +41,15 @@ class RecordingWriter {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// A recorded session.
+struct Recording {
+  std::string model_path;
+  std::string content_hash;  ///< of the model
+  std::vector<TickRecord> ticks;
+};
+
+/// Reads a recording back. Throws Error when it is not one or is damaged.
+Recording read_recording(const std::filesystem::path& path);
 
 }  // namespace palpate

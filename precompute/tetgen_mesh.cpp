@@ -3,6 +3,7 @@
 #define TETLIBRARY  // as the library was compiled: errors are thrown, not exit()
 #include <tetgen.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstring>
 #include <span>

@@ -1,0 +1,234 @@
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+#include "formats/checksum.h"
+#include "formats/content_hash.h"
+#include "formats/file_io.h"
+#include "formats/hdf5.h"
+#include "formats/model_check.h"
+#include "formats/model_fields.h"
+#include "formats/model_file.h"
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr const char* precompute_again = "Precompute it again: palpate-precompute model.toml.";
+
+std::uint64_t little_endian(std::span<const unsigned char> bytes) {
+  std::uint64_t value = 0;
+  for (std::size_t i = bytes.size(); i-- > 0;) value = (value << 8U) | bytes[i];
+  return value;
+}
+
+/// Looks at HDF5's superblock before HDF5 does: says what is not a file of ours, and what is cut off. Version
+/// 3 has checksums in all of its metadata; files of older versions, which other programs write, are not
+/// handed to the library.
+void check_superblock(const FileDescriptor& file) {
+  constexpr std::array<unsigned char, 12> start = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n', 3, 8, 8, 0};
+  constexpr std::size_t signature_bytes = 8, end_at = 28, superblock_bytes = 48;
+  const std::string where = file.path().string();
+  const std::int64_t size = file_size(file);
+  if (size == 0) throw Error("the file is empty", where, precompute_again);
+
+  std::array<unsigned char, superblock_bytes> superblock = {};
+  const std::size_t got = read_some(file, std::as_writable_bytes(std::span(superblock)), 0);
+  if (std::memcmp(superblock.data(), start.data(), std::min(got, signature_bytes)) != 0)
+    throw Error("is not a Palpate file", where,
+                "Give a NAME.palpate.hdf that palpate-precompute has written.");
+  if (got < superblock_bytes)
+    throw Error("the file is truncated: it ends after " + std::to_string(size) + " bytes", where,
+                precompute_again);
+  if (std::memcmp(superblock.data(), start.data(), start.size()) != 0)
+    throw Error("is an HDF5 file, but not a Palpate file", where,
+                "Give a NAME.palpate.hdf that palpate-precompute has written.");
+  const std::uint64_t end = little_endian(std::span(superblock).subspan(end_at, 8));
+  if (end > static_cast<std::uint64_t>(size))
+    throw Error(
+        "the file is truncated: it has " + std::to_string(size) + " of " + std::to_string(end) + " bytes",
+        where, "Copy the file again, or precompute it again.");
+}
+
+/// Proves that this is our format in a version that we read.
+std::vector<std::int64_t> read_version(const hdf5::File& file) {
+  const std::string where = file.path().string();
+  if (file.text_attribute("/", "format") != "palpate")
+    throw Error("is an HDF5 file, but not a Palpate file", where,
+                "Give a NAME.palpate.hdf that palpate-precompute has written.");
+  const auto version = file.integer_attribute("/", "version", 2);
+  if (!version) refuse(where, "the attribute version is missing");
+  if ((*version)[0] != format_major)
+    throw Error("the file has format version " + std::to_string((*version)[0]) + "." +
+                    std::to_string((*version)[1]) + ", this program reads version " +
+                    std::to_string(format_major) + ".x",
+                where, "Precompute it again with this program's palpate-precompute.");
+  if ((*version)[1] < 0) refuse(where, "the attribute version is negative");
+  return *version;
+}
+
+class Reader {
+ public:
+  explicit Reader(const hdf5::File& file, const FileDescriptor& bytes)
+      : file_(file), bytes_(bytes), where_(file.path().string()), counts_(where_) {}
+
+  Model read();
+
+ private:
+  template <class T>
+  void read_attribute(const Attribute<T>& attribute);
+  template <class T>
+  void read_field(const Field<T>& field);
+  void map_greens();
+  void check_content(const std::vector<std::int64_t>& version);
+  void check_stored_checksum(const std::string& path, const std::string& found);
+  template <class T>
+  ChunkedChecksum::Inspect first_not_finite(std::atomic<std::size_t>& first) const;
+
+  const hdf5::File& file_;
+  const FileDescriptor& bytes_;
+  std::string where_;
+  Counts counts_;
+  FileHeader header_;
+  ContentHash content_;
+  Model model_;
+};
+
+Model Reader::read() {
+  const std::vector<std::int64_t> version = read_version(file_);
+  for_each_attribute([this](const auto& attribute) { read_attribute(attribute); });
+  for_each_field([this](const auto& field) { read_field(field); });
+  check_model(model_, where_);
+  map_greens();
+  check_content(version);
+  return std::move(model_);
+}
+
+template <class T>
+void Reader::read_attribute(const Attribute<T>& attribute) {
+  const std::string name = std::string("the attribute ") + attribute.name;
+  std::optional<T> value;
+  if constexpr (std::is_same_v<T, std::string>) {
+    value = file_.text_attribute("/", attribute.name);
+  } else if (const auto values = file_.integer_attribute("/", attribute.name, 1)) {
+    value = values->front();
+  }
+  if (!value) refuse(where_, name + " is missing");
+  if (attribute.put == nullptr) {
+    if (*value != attribute.take(model_, header_)) refuse(where_, name + " has an unknown value");
+    return;
+  }
+  try {
+    attribute.put(model_, header_, *value);
+  } catch (const Unreadable& wrong) {
+    refuse(where_, name + " " + wrong.what);
+  }
+}
+
+template <class T>
+void Reader::read_field(const Field<T>& field) {
+  const hdf5::Stored stored = file_.locate(field.path, hdf5::element_type<T>(), field.shape.size());
+  counts_.match(field.path, field.shape, stored.dims);
+
+  std::vector<T> values(static_cast<std::size_t>(stored.bytes) / sizeof(T));
+  read_exactly(bytes_, std::as_writable_bytes(std::span(values)), stored.offset);
+  ChunkedChecksum found;
+  found.append(std::as_bytes(std::span(values)));
+  check_stored_checksum(field.path, found.digits());
+  check_values(field, values, counts_);
+  if (field.put == nullptr) {
+    const std::vector<T> expected = field.take(model_);
+    const auto differs = std::mismatch(values.begin(), values.end(), expected.begin()).first - values.begin();
+    if (static_cast<std::size_t>(differs) < values.size())
+      refuse(where_, std::string(field.path) + " holds " +
+                         std::to_string(values[static_cast<std::size_t>(differs)]) + " (entry " +
+                         std::to_string(differs) + "), " +
+                         std::to_string(expected[static_cast<std::size_t>(differs)]) + " is expected");
+    return;
+  }
+  try {
+    field.put(model_, values);
+  } catch (const Unreadable& wrong) {
+    refuse(where_, std::string(field.path) + " " + wrong.what);
+  }
+}
+
+void Reader::check_stored_checksum(const std::string& path, const std::string& found) {
+  const auto stored = file_.text_attribute(path, "xxh3");
+  if (!stored) refuse(where_, path + " has no checksum");
+  if (*stored != found) refuse(where_, path + " was altered: its checksum is " + found + ", not " + *stored);
+  content_.add_dataset(path, found);
+}
+
+template <class T>
+ChunkedChecksum::Inspect Reader::first_not_finite(std::atomic<std::size_t>& first) const {
+  using Bits = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
+  constexpr Bits exponent = sizeof(T) == 4 ? Bits{0x7f800000U} : static_cast<Bits>(0x7ff0000000000000U);
+  return [&first](std::size_t at, std::span<const std::byte> block) {
+    const auto* values = static_cast<const Bits*>(static_cast<const void*>(block.data()));
+    const std::size_t count = block.size() / sizeof(Bits);
+    unsigned found = 0;
+    for (std::size_t i = 0; i < count; ++i)
+      found |= static_cast<unsigned>((values[i] & exponent) == exponent);
+    if (found == 0) return;
+    const auto* bad = std::find_if(values, values + count, [](Bits v) { return (v & exponent) == exponent; });
+    const std::size_t entry = at / sizeof(Bits) + static_cast<std::size_t>(bad - values);
+    for (std::size_t seen = first; entry < seen && !first.compare_exchange_weak(seen, entry);) {
+    }
+  };
+}
+
+void Reader::map_greens() {
+  const std::int64_t order = model_.stored_dofs();
+  const bool single = header_.precision == Precision::single_precision;
+  const hdf5::Stored stored =
+      file_.locate(greens_path, single ? hdf5::element_type<float>() : hdf5::element_type<double>(), 1);
+  if (stored.dims[0] != packed_size(order))
+    refuse(where_, std::string(greens_path) + " has " + std::to_string(stored.dims[0]) + " entries, " +
+                       std::to_string(packed_size(order)) + " are expected by /dofs/stored_nodes");
+  if (stored.offset % bytes_per_scalar(header_.precision) != 0)
+    refuse(where_, std::string(greens_path) + " does not start at a multiple of its scalar's size");
+
+  const std::shared_ptr<const void> mapped = map_file(bytes_, stored.offset, stored.bytes);
+  model_.greens = PackedGreens(mapped, order, header_.precision);
+
+  constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+  std::atomic<std::size_t> bad{none};
+  ChunkedChecksum found;
+  found.append({static_cast<const std::byte*>(mapped.get()), static_cast<std::size_t>(stored.bytes)},
+               single ? first_not_finite<float>(bad) : first_not_finite<double>(bad));
+  check_stored_checksum(greens_path, found.digits());
+  if (bad != none)
+    refuse(where_, std::string(greens_path) + " holds a value that is not finite (entry " +
+                       std::to_string(bad) + ")");
+  for (std::int64_t i = 0; i < order; ++i)
+    if (!(model_.greens(i, i) > 0.0))
+      refuse(where_, std::string(greens_path) + ": diagonal entry " + std::to_string(i) + " is not positive");
+}
+
+/// Every dataset agrees with its own checksum by now; what is left are the attributes.
+void Reader::check_content(const std::vector<std::int64_t>& version) {
+  const auto stored = file_.text_attribute("/", "content_hash");
+  if (!stored) refuse(where_, "the attribute content_hash is missing: the file was not finished");
+  model_.content_hash = *stored;
+  if (version[1] > format_minor) return;  // its hash covers fields that are not known here
+  add_attributes(content_, model_, header_, version);
+  if (content_.digits() != *stored)
+    refuse(where_, "an attribute of the file or a checksum was altered: content_hash is " + *stored +
+                       ", not " + content_.digits());
+}
+
+}  // namespace
+
+Model load_model(const std::filesystem::path& path) {
+  const FileDescriptor bytes = open_file(path, OpenMode::read);
+  check_superblock(bytes);
+  const hdf5::Quiet quiet;
+  const hdf5::File file = hdf5::File::open_to_read(path);
+  return Reader(file, bytes).read();
+}
+
+}  // namespace palpate

@@ -1,0 +1,55 @@
+#include "formats/checksum.h"
+#include "formats/model_file.h"
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+std::filesystem::path folder_of(const std::filesystem::path& file) {
+  return std::filesystem::absolute(file).parent_path();
+}
+
+/// What became of a source; empty when it is as it was.
+std::string change_of(const SourceFile& source, const std::filesystem::path& file, const std::string& baked) {
+  const std::string name = source.path + " (" + source.role + ")";
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error))
+    return name + " is gone since " + baked + " was precomputed";
+  const std::uintmax_t bytes = std::filesystem::file_size(file, error);
+  if (error) return name + " cannot be read: " + error.message();
+  if (bytes != static_cast<std::uintmax_t>(source.bytes))
+    return name + " changed since " + baked + " was precomputed: it had " + std::to_string(source.bytes) +
+           " bytes, now it has " + std::to_string(bytes);
+  try {
+    if (checksum_file(file) == source.checksum) return {};
+  } catch (const Error& unreadable) {
+    return name + " cannot be compared: " + unreadable.what();
+  }
+  return name + " changed since " + baked + " was precomputed (same size, other contents)";
+}
+
+}  // namespace
+
+std::vector<std::string> stale_sources(const Model& model, const std::filesystem::path& model_path) {
+  std::vector<std::string> changes;
+  for (const SourceFile& source : model.sources) {
+    std::string change =
+        change_of(source, folder_of(model_path) / source.path, model_path.filename().string());
+    if (!change.empty()) changes.push_back(std::move(change));
+  }
+  return changes;
+}
+
+SourceFile describe_source(const std::string& role, const std::filesystem::path& file,
+                           const std::filesystem::path& model_path) {
+  SourceFile source;
+  source.role = role;
+  source.checksum = checksum_file(file);
+  source.bytes = static_cast<std::int64_t>(std::filesystem::file_size(file));
+  source.path = std::filesystem::proximate(file, folder_of(model_path)).generic_string();
+  if (source.path.find('\n') != std::string::npos)
+    throw Error("has a line end in its name", file.string(), "Rename the file.");
+  return source;
+}
+
+}  // namespace palpate
