@@ -2,6 +2,7 @@
 
 #include <array>
 #include <limits>
+#include <string_view>
 #include <utility>
 
 #include "meshes/error.h"
@@ -15,7 +16,7 @@ constexpr std::size_t highest_rank = 4;
 
 const char* const altered_hint = "Copy the file again, or precompute it again.";
 
-/// The deepest reason that the library gives for its last failure.
+/// The deepest reason that the library gives for its last failure; the system's own words where it has any.
 std::string reason() {
   std::string text;
   const auto first = [](unsigned, const H5E_error2_t* error, void* data) -> herr_t {
@@ -23,6 +24,9 @@ std::string reason() {
     return 1;
   };
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, first, &text);
+  constexpr std::string_view before = "error message = '";
+  if (const std::size_t at = text.find(before); at != std::string::npos)
+    text = text.substr(at + before.size(), text.find('\'', at + before.size()) - at - before.size());
   return text.empty() ? "no reason given" : text;
 }
 

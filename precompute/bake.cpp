@@ -18,6 +18,7 @@
 #include "precompute/interrupt.h"
 #include "precompute/plan.h"
 #include "precompute/progress.h"
+#include "precompute/scope.h"
 
 namespace palpate {
 namespace {
@@ -126,17 +127,6 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
 }
 
 }  // namespace
-
-std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& stiffness, Scope scope, Index layers) {
-  const Index deepest = scope == Scope::full ? std::numeric_limits<Index>::max() : scope == Scope::layers ? layers : 0;
-  const std::vector<Index> layer = layers_below_surface(mesh, extract_surface(mesh));
-  std::vector<std::uint8_t> marks;
-  marks.reserve(3 * stiffness.free_nodes.size());
-  for (const Index node : stiffness.free_nodes) {
-    marks.insert(marks.end(), 3, layer[static_cast<std::size_t>(node)] <= deepest ? 1 : 0);
-  }
-  return marks;
-}
 
 BakeResult bake(const Description& description, const BakeOptions& options) {
   Progress progress;

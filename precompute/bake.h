@@ -3,9 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <vector>
 
-#include "precompute/assembly.h"
 #include "precompute/description.h"
 
 namespace palpate {
@@ -18,9 +16,6 @@ struct BakeOptions {
 
 /// How a bake ended.
 enum class BakeResult : std::uint8_t { done, planned, interrupted };
-
-/// Free nodes whose rows and columns of Xi are kept (theory.md section 2). Returns a mark for each dof of K.
-std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& stiffness, Scope scope, Index layers);
 
 /// Runs the whole precomputation: mesh, K, factor, columns, file. Prints progress to standard error. On Ctrl-C or SIGTERM it
 /// stops at the next block of columns and removes what it wrote. Throws Error for bad input, and with the numbers when

@@ -70,6 +70,9 @@ bool write_all(int file, const void* data, std::size_t size) {
   const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
   dup2(nowhere, STDOUT_FILENO);
   dup2(nowhere, STDERR_FILENO);
+  if (chdir("/proc/self") != 0) {
+    _exit(EXIT_FAILURE);
+  }
   try {
     const ChildResult result = work();
     const bool sent = write_all(pipe, &result.status, sizeof(result.status)) &&
@@ -183,6 +186,29 @@ ChildResult run_in_child(const std::string& name, const std::string& where, std:
   std::memcpy(&result.status, bytes.data(), sizeof(result.status));
   result.bytes.assign(bytes.begin() + sizeof(result.status), bytes.end());
   return result;
+}
+
+Bytes pack(const Mesh& mesh) {
+  Bytes bytes;
+  const std::size_t nodes = mesh.nodes.size();
+  append_bytes(bytes, std::span<const std::size_t>(&nodes, 1));
+  append_bytes(bytes, std::span<const Vec3>(mesh.nodes));
+  append_bytes(bytes, std::span<const Tet>(mesh.tets));
+  return bytes;
+}
+
+Mesh unpack_mesh(const Bytes& bytes) {
+  std::size_t nodes = 0;
+  std::memcpy(&nodes, bytes.data(), sizeof(nodes));
+  const std::byte* at = bytes.data() + sizeof(nodes);
+  Mesh mesh;
+  mesh.nodes.resize(nodes);
+  std::memcpy(static_cast<void*>(mesh.nodes.data()), at, nodes * sizeof(Vec3));
+  at += nodes * sizeof(Vec3);
+  mesh.tets.resize(static_cast<std::size_t>(bytes.data() + bytes.size() - at) / sizeof(Tet));
+  std::memcpy(mesh.tets.data(), at, mesh.tets.size() * sizeof(Tet));
+  mesh.regions.assign(mesh.tets.size(), 0);
+  return mesh;
 }
 
 }  // namespace palpate

@@ -1,12 +1,15 @@
 // Work that may crash, in a process of its own.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <functional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "meshes/mesh.h"
 
 namespace palpate {
 
@@ -27,11 +30,16 @@ struct ChildResult {
 ChildResult run_in_child(const std::string& name, const std::string& where, std::chrono::seconds limit,
                          const std::function<ChildResult()>& work);
 
+/// A mesh's nodes and elements as bytes, and back (regions are 0).
+Bytes pack(const Mesh& mesh);
+Mesh unpack_mesh(const Bytes& bytes);
+
 /// Appends the bytes of `values`.
 template <typename T>
 void append_bytes(Bytes& bytes, std::span<const T> values) {
-  const auto raw = std::as_bytes(values);
-  bytes.insert(bytes.end(), raw.begin(), raw.end());
+  const std::size_t before = bytes.size();
+  bytes.resize(before + values.size_bytes());
+  std::copy_n(reinterpret_cast<const std::byte*>(values.data()), values.size_bytes(), bytes.data() + before);
 }
 
 }  // namespace palpate

@@ -32,10 +32,13 @@ using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 namespace parameters = CGAL::parameters;
 
 constexpr std::chrono::seconds read_time_limit{600};
+constexpr std::chrono::seconds mesh_time_limit{3600};
 constexpr double facet_angle =
     25.0;  // [degree] bound on the surface triangles' angles that Mesh_3 can promise
 constexpr double wanted_dihedral = 12.0;  // [degree] sliver removal stops here
-constexpr double relative_error = 1e-4;   // of the body's size: where the boundary is found
+const double facet_size_per_edge = getenv("FS") ? atof(getenv("FS")) : 1.2;
+const double radius_per_edge = getenv("CS") ? atof(getenv("CS")) : 0.73;
+constexpr double relative_error = 1e-4;  // of the body's size: where the boundary is found
 
 enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
 
@@ -128,8 +131,9 @@ VoxelBody read_body(const ImageGeometry& image, std::vector<std::string>& notes)
     throw Error("there is no such image file", where, "check image = \"...\" in [geometry]");
   }
   // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
+  const std::string path = std::filesystem::absolute(image.file).string();
   const ChildResult read =
-      run_in_child("the image reader", where, read_time_limit, [&] { return read_labels(where); });
+      run_in_child("the image reader", where, read_time_limit, [&] { return read_labels(path); });
   if (read.status != read_ok) {
     throw Error(
         read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
@@ -144,7 +148,7 @@ Vec3 as_vector(const Point& p) {
   return {p.x(), p.y(), p.z()};
 }
 
-/// Bound on the circumradius of tetrahedra for Mesh_3: that of the regular one with the target edge length.
+/// Bound on the circumradius of tetrahedra.
 struct CellSize {
   using FT = Kernel::FT;
   const DistanceField* distance;
@@ -154,7 +158,7 @@ struct CellSize {
   template <typename AnyIndex>
   FT operator()(const Point& p, int /*dimension*/, const AnyIndex& /*index*/) const {
     const double depth = std::max(0.0, (*distance)(as_vector(p)));
-    return std::sqrt(3.0 / 8.0) * (surface_edge + grading * depth);
+    return radius_per_edge * (surface_edge + grading * depth);
   }
 };
 
@@ -174,10 +178,11 @@ Complex make_complex(const VoxelBody& body, const MeshOptions& options) {
   const CellSize cell_size{&distance, *options.edge_length, options.grading};
   const double facet_distance =
       options.facet_distance > 0.0 ? options.facet_distance : body.spacing.maxCoeff();
-  const Criteria criteria(
-      parameters::facet_angle = facet_angle, parameters::facet_size = *options.edge_length,
-      parameters::facet_distance = facet_distance, parameters::cell_radius_edge_ratio = options.radius_edge,
-      parameters::cell_size = cell_size);
+  const Criteria criteria(parameters::facet_angle = facet_angle,
+                          parameters::facet_size = facet_size_per_edge * *options.edge_length,
+                          parameters::facet_distance = facet_distance,
+                          parameters::cell_radius_edge_ratio = options.radius_edge,
+                          parameters::cell_size = cell_size);
   return CGAL::make_mesh_3<Complex>(domain, criteria, parameters::manifold(),
                                     parameters::perturb(parameters::sliver_bound = wanted_dihedral),
                                     parameters::exude(parameters::sliver_bound = wanted_dihedral));
@@ -206,7 +211,10 @@ Mesh export_mesh(const Complex& complex) {
 
 Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vector<std::string>& notes) {
   const VoxelBody body = read_body(image, notes);
-  Mesh mesh = export_mesh(make_complex(body, options));
+  const ChildResult result = run_in_child("CGAL's mesher", image.file.string(), mesh_time_limit, [&] {
+    return ChildResult{0, pack(export_mesh(make_complex(body, options)))};
+  });
+  Mesh mesh = unpack_mesh(result.bytes);
   if (mesh.tets.empty()) {
     throw Error("no tetrahedron fits into the image's body", image.file.string(),
                 "use a smaller edge_length in [mesh]");

@@ -5,8 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <cstring>
-#include <span>
+#include <cstddef>
 
 #include "meshes/error.h"
 #include "precompute/child_process.h"
@@ -46,7 +45,19 @@ void copy_surface(const TriangleSurface& surface, tetgenio& io) {
   }
 }
 
-/// Status 0: number of nodes, coordinates, corners. Otherwise TetGen's error code.
+Mesh copy_mesh(const tetgenio& io) {
+  Mesh mesh;
+  for (int i = 0; i < io.numberofpoints; ++i) {
+    mesh.nodes.emplace_back(Eigen::Map<const Vec3>(io.pointlist + std::ptrdiff_t{3} * i));
+  }
+  for (int i = 0; i < io.numberoftetrahedra; ++i) {
+    const int* corners = io.tetrahedronlist + std::ptrdiff_t{4} * i;
+    mesh.tets.push_back({corners[0], corners[1], corners[2], corners[3]});
+  }
+  return mesh;
+}
+
+/// Status 0: the mesh. Otherwise TetGen's error code.
 ChildResult tetrahedralise(const TriangleSurface& surface, const MeshOptions& options,
                            const std::function<double(const Vec3&)>& edge_at) {
   tetgenio in, out;
@@ -66,26 +77,8 @@ ChildResult tetrahedralise(const TriangleSurface& surface, const MeshOptions& op
     result.status = code;
     return result;
   }
-  append_bytes(result.bytes, std::span<const int>(&out.numberofpoints, 1));
-  append_bytes(result.bytes,
-               std::span<const REAL>(out.pointlist, 3 * static_cast<std::size_t>(out.numberofpoints)));
-  append_bytes(result.bytes, std::span<const int>(out.tetrahedronlist,
-                                                  4 * static_cast<std::size_t>(out.numberoftetrahedra)));
+  result.bytes = pack(copy_mesh(out));
   return result;
-}
-
-Mesh unpack(const Bytes& bytes) {
-  int nodes = 0;
-  std::memcpy(&nodes, bytes.data(), sizeof(nodes));
-  const std::byte* at = bytes.data() + sizeof(nodes);
-  Mesh mesh;
-  mesh.nodes.resize(static_cast<std::size_t>(nodes));
-  std::memcpy(static_cast<void*>(mesh.nodes.data()), at, mesh.nodes.size() * sizeof(Vec3));
-  at += mesh.nodes.size() * sizeof(Vec3);
-  mesh.tets.resize(static_cast<std::size_t>(bytes.data() + bytes.size() - at) / sizeof(Tet));
-  std::memcpy(mesh.tets.data(), at, mesh.tets.size() * sizeof(Tet));
-  mesh.regions.assign(mesh.tets.size(), 0);
-  return mesh;
 }
 
 std::string meaning(int code) {
@@ -119,7 +112,7 @@ Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, co
     throw Error("TetGen stopped with code " + std::to_string(result.status) + ": " + meaning(result.status),
                 where, "repair the surface, or give edge_length and remesh = true in [mesh]");
   }
-  return unpack(result.bytes);
+  return unpack_mesh(result.bytes);
 }
 
 }  // namespace palpate

@@ -34,7 +34,8 @@ VoxelBody crop(const VoxelBody& body, Index margin);
 /// is left. Needs an empty rim, as crop leaves it.
 void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::string>& notes);
 
-/// Signed distance to the body's boundary, positive inside, linear between voxel centres.
+/// Signed distance to the body's boundary, positive inside, smoothed over neighbouring voxels, linear between
+/// voxel centres.
 class DistanceField {
  public:
   /// Exact Euclidean distances between voxel centres (Felzenszwalb and Huttenlocher, Distance transforms of

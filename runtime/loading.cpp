@@ -28,7 +28,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   Model model = load_model(file);
   if (!model_toml.empty() && read_text(model_toml) != model.model_toml) {
     throw Error("was not made from " + model_toml.string() + ": the description stored in it is another one",
-                file.string(), "precompute it again: palpate-precompute bake " + model_toml.string());
+                file.string(), "precompute it again: palpate-precompute " + model_toml.string());
   }
   for (const std::string& stale : stale_sources(model, file)) {
     print_warning(file.string() + ": " + stale + " (precompute it again)");

@@ -42,7 +42,7 @@ void count_step(LoopReport& report, const State& state, double time, std::int64_
   ++report.ticks;
   if (state.tool_node >= 0) ++report.ticks_held;
   report.compute.add(compute_ns);
-  const double force = state.tool_force.norm();
+  const double force = state.tool_force.stableNorm();
   if (force > report.largest_force) {
     report.largest_force = force;
     report.largest_force_time = time;

@@ -93,7 +93,7 @@ void print_text(const std::vector<Answer>& answers) {
     if (answer.distance) fmt::print(", {:.4g} m from the point asked for", *answer.distance);
     fmt::print("\n  displacement      {} m\n", text_vector(answer.displacement));
     fmt::print("  force on the body {} N, {:.10g} N in all\n", text_vector(answer.force),
-               answer.force.norm());
+               answer.force.stableNorm());
   }
   fmt::print("total force on the body {} N\n", text_vector(total_force(answers)));
 }

@@ -116,21 +116,26 @@ double cantilever_deflection(int cells_high, const Vec3& size, const Material& m
   return work;
 }
 
-// Timoshenko: w = P L^3 / (3 E I) + P L / (kappa G A), kappa = 5/6 for a rectangle at nu = 0, where Saint-Venant's solution has
-// no Poisson effect at the clamp. Linear tetrahedra converge from below with order 2 in the energy.
+/// Order of convergence seen on three meshes, each twice as fine as the one before.
+double observed_order(double coarse, double middle, double fine) { return std::log2((middle - coarse) / (fine - middle)); }
+
+// Timoshenko: w = P L^3 / (3 E I) + P L / (kappa G A), kappa = 5/6 for a rectangle at nu = 0, where Saint-Venant's solution has no
+// Poisson effect at the clamp. Linear tetrahedra are too stiff in bending and converge from below; the order in the energy rises
+// to 2 as the layers over the height come to resolve the bending stress (1.14, 1.71, 1.86 with 8, 16, 24 of them).
 TEST(Assembly, CantileverConvergesToTimoshenko) {
-  const Vec3 size(0.8, 0.1, 0.1);
+  const Vec3 size(0.4, 0.1, 0.1);
   const Material material{1.0e6, 0.0, 1000.0};
   const double I = size.y() * std::pow(size.z(), 3) / 12.0, A = size.y() * size.z(), G = material.youngs_modulus / 2.0;
   const double timoshenko = std::pow(size.x(), 3) / (3.0 * material.youngs_modulus * I) + size.x() / (5.0 / 6.0 * G * A);
   const double w2 = cantilever_deflection(2, size, material), w4 = cantilever_deflection(4, size, material),
-               w8 = cantilever_deflection(8, size, material);
-  const double order = std::log2((w4 - w2) / (w8 - w4));
-  const double limit = w8 + (w8 - w4) / (std::pow(2.0, order) - 1.0);
+               w8 = cantilever_deflection(8, size, material), w16 = cantilever_deflection(16, size, material);
   EXPECT_LT(w2, w4);
-  EXPECT_LT(w8, timoshenko);
-  EXPECT_NEAR(order, 2.0, 0.35);
-  EXPECT_NEAR(limit / timoshenko, 1.0, 0.01);
+  EXPECT_LT(w16, timoshenko);
+  const double order = observed_order(w4, w8, w16);
+  EXPECT_GT(order, observed_order(w2, w4, w8));
+  EXPECT_NEAR(order, 1.7, 0.05);
+  const double limit = w16 + (w16 - w8) / 3.0;  // Richardson with the final order 2
+  EXPECT_NEAR(limit / timoshenko, 1.0, 0.003);
 }
 
 }  // namespace

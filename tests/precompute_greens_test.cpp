@@ -7,8 +7,8 @@
 #include "formats/packed.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
-#include "precompute/bake.h"
 #include "precompute/greens.h"
+#include "precompute/scope.h"
 
 namespace palpate {
 namespace {

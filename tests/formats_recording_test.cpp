@@ -1,0 +1,84 @@
+#include <gtest/gtest.h>
+
+#include "formats/recording.h"
+#include "tests/formats_sample.h"
+
+namespace palpate::test {
+namespace {
+
+std::vector<TickRecord> some_ticks(std::size_t count) {
+  std::vector<TickRecord> ticks(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto x = static_cast<double>(i);
+    ticks[i] = {.time = 1e-3 * x,
+                .tool_position = {x, 2 * x, 3 * x},
+                .force = {-x, 0.5 * x, 1},
+                .displacement = {1e-3 * x, 0, -1e-3 * x},
+                .node = static_cast<std::int64_t>(i % 5) - 1,
+                .status = static_cast<std::uint32_t>(i % 3),
+                .compute_ns = static_cast<std::uint32_t>(4'000'000'000U - i),
+                .grab = static_cast<std::uint8_t>(i % 2)};
+  }
+  return ticks;
+}
+
+bool same(const TickRecord& a, const TickRecord& b) {
+  return a.time == b.time && std::equal(a.tool_position, a.tool_position + 3, b.tool_position) &&
+         std::equal(a.force, a.force + 3, b.force) &&
+         std::equal(a.displacement, a.displacement + 3, b.displacement) && a.node == b.node &&
+         a.status == b.status && a.compute_ns == b.compute_ns && a.grab == b.grab;
+}
+
+void record(const std::filesystem::path& path, std::span<const TickRecord> ticks, std::size_t at_once) {
+  RecordingWriter writer(path, "liver.palpate.hdf", "00ff");
+  for (std::size_t at = 0; at < ticks.size(); at += at_once)
+    writer.append(ticks.subspan(at, std::min(at_once, ticks.size() - at)));
+  writer.finish();
+}
+
+class Lengths : public testing::TestWithParam<std::size_t> {};
+
+TEST_P(Lengths, AreReadBack) {
+  const Folder folder;
+  const auto ticks = some_ticks(GetParam());
+  record(folder / "a.h5", ticks, 1000);
+  const Recording read = read_recording(folder / "a.h5");
+  EXPECT_EQ(read.model_path, "liver.palpate.hdf");
+  EXPECT_EQ(read.content_hash, "00ff");
+  ASSERT_EQ(read.ticks.size(), ticks.size());
+  for (std::size_t i = 0; i < ticks.size(); ++i) ASSERT_TRUE(same(read.ticks[i], ticks[i])) << i;
+}
+
+INSTANTIATE_TEST_SUITE_P(Recording, Lengths, testing::Values(0, 1, 4095, 4096, 4097, 30000));
+
+TEST(Recording, EqualTicksMakeEqualFiles) {
+  const Folder folder;
+  const auto ticks = some_ticks(9000);
+  record(folder / "a.h5", ticks, 1);
+  record(folder / "b.h5", ticks, 9000);
+  EXPECT_EQ(read_bytes(folder / "a.h5"), read_bytes(folder / "b.h5"));
+}
+
+TEST(Recording, IsThereOnlyWhenFinished) {
+  const Folder folder;
+  {
+    RecordingWriter writer(folder / "a.h5", "m", "h");
+    writer.append(some_ticks(5000));
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(Recording, BadPathsAndOtherFilesAreRefused) {
+  const Folder folder;
+  EXPECT_NE(refusal([&] { RecordingWriter(folder / "none" / "a.h5", "m", "h"); }).find("No such file"),
+            std::string::npos);
+  write_sample(folder / "a.palpate.hdf");
+  EXPECT_NE(refusal([&] { read_recording(folder / "a.palpate.hdf"); }).find("is not a recording"),
+            std::string::npos);
+  write_bytes(folder / "text", "text");
+  EXPECT_NE(refusal([&] { read_recording(folder / "text"); }), "");
+}
+
+}  // namespace
+}  // namespace palpate::test

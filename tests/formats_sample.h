@@ -1,0 +1,50 @@
+// A small model with made-up Green's functions, for tests of the file.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "formats/model.h"
+#include "formats/model_file.h"
+
+namespace palpate::test {
+
+/// Box of 2 x 2 x 2 cells, clamped at its lowest nodes, all free nodes stored (54 dofs), two sources, two
+/// probes.
+Model sample_model();
+
+/// Entry (i, j) of its Green's functions: symmetric, positive on the diagonal, no two neighbours equal.
+double sample_entry(std::int64_t i, std::int64_t j);
+
+/// Columns [first, first + count) of the lower triangle, as write_columns takes them.
+std::vector<double> sample_columns(std::int64_t first, std::int64_t count, std::int64_t order);
+
+/// Writes the whole of `sample_model` and returns what was written.
+Model write_sample(const std::filesystem::path& path, Precision precision = Precision::double_precision);
+
+/// An empty folder that goes when the test ends.
+class Folder {
+ public:
+  Folder();
+  ~Folder();
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string read_bytes(const std::filesystem::path& path);
+void write_bytes(const std::filesystem::path& path, const std::string& bytes);
+
+/// "WHERE | WHAT | HINT" of the Error that `run` throws; empty when it throws none.
+std::string refusal(const std::function<void()>& run);
+
+/// Which part of two models differs, empty when they are equal (entries of the Green's functions bit by bit).
+std::string difference(const Model& a, const Model& b);
+
+}  // namespace palpate::test

@@ -1,0 +1,157 @@
+// Speed of the precomputation: columns of Xi against a plain cholmod_solve2, and whole bakes.
+//
+//   precompute_bench [--benchmark_filter=...]
+//
+// The liver needs meshes/models/liver/liver.inr.gz (scripts/demo and scripts/test put it there).
+#include <benchmark/benchmark.h>
+#include <cblas.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <map>
+
+#include "meshes/surface.h"
+#include "precompute/bake.h"
+#include "precompute/body.h"
+#include "precompute/greens.h"
+#include "precompute/scope.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t block_columns = 192;
+
+std::filesystem::path model_toml(const std::string& name) {
+  return std::filesystem::path(PALPATE_SOURCE_DIR) / "meshes" / "models" / name / "model.toml";
+}
+
+template <class F>
+double seconds(F f) {
+  const auto start = std::chrono::steady_clock::now();
+  f();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+/// A factorised body with its solver.
+struct Prepared {
+  MeshedBody body;
+  Stiffness stiffness;
+  Factor factor;
+  GreensSolver solver;
+
+  Prepared(MeshedBody meshed, const Material& material)
+      : body(std::move(meshed)),
+        stiffness(assemble_stiffness(body.mesh, material, body.fixed)),
+        factor(stiffness.K),
+        solver(factor, stored_dof_marks(body.mesh, stiffness, Scope::surface, 0)) {
+    factor.factorize();
+  }
+};
+
+/// The liver with the given edge length at its surface [m]; kept for the next benchmark of the run.
+const Prepared& liver(double edge_length) {
+  static std::map<double, std::unique_ptr<Prepared>> kept;
+  std::unique_ptr<Prepared>& prepared = kept[edge_length];
+  if (!prepared) {
+    Description description = read_description(model_toml("liver"));
+    description.mesh.edge_length = edge_length;
+    prepared = std::make_unique<Prepared>(mesh_body(description, [](const std::string&) {}), description.material);
+  }
+  return *prepared;
+}
+
+/// Reference: cholmod_solve2 with kept workspace on 192 right-hand sides, all rows computed.
+class PlainSolve {
+ public:
+  explicit PlainSolve(const Prepared& prepared)
+      : factor_(prepared.factor), dofs_(prepared.solver.stored_dofs()), rhs_(static_cast<std::size_t>(factor_.order() * block_columns)) {}
+  ~PlainSolve() {
+    cholmod_common& common = factor_.common();
+    cholmod_l_free_dense(&x_, &common);
+    cholmod_l_free_dense(&y_, &common);
+    cholmod_l_free_dense(&e_, &common);
+  }
+  PlainSolve(const PlainSolve&) = delete;
+  PlainSolve& operator=(const PlainSolve&) = delete;
+
+  void operator()(std::int64_t first) {
+    std::fill(rhs_.begin(), rhs_.end(), 0.0);
+    for (std::int64_t c = 0; c < block_columns; ++c) {
+      rhs_[static_cast<std::size_t>(c * factor_.order() + dofs_[static_cast<std::size_t>(first + c)])] = 1.0;
+    }
+    cholmod_dense b{};
+    b.nrow = b.d = static_cast<std::size_t>(factor_.order());
+    b.ncol = block_columns;
+    b.nzmax = rhs_.size();
+    b.x = rhs_.data();
+    b.xtype = CHOLMOD_REAL;
+    b.dtype = CHOLMOD_DOUBLE;
+    auto* L = const_cast<cholmod_factor*>(&factor_.supernodal());  // cholmod_solve2 reads it only
+    cholmod_l_solve2(CHOLMOD_A, L, &b, nullptr, &x_, nullptr, &y_, &e_, &factor_.common());
+  }
+
+ private:
+  const Factor& factor_;
+  std::vector<std::int64_t> dofs_;
+  std::vector<double> rhs_;
+  cholmod_dense *x_ = nullptr, *y_ = nullptr, *e_ = nullptr;
+};
+
+/// Blocks spread evenly over all columns, ours and the reference in turn, one BLAS thread, one job.
+void liver_columns(benchmark::State& state, double edge_length, int samples) {
+  const Prepared& prepared = liver(edge_length);
+  openblas_set_num_threads(1);
+  const std::int64_t n = prepared.solver.order(), blocks = n / block_columns;
+  GreensSolver::Workspace workspace;
+  std::vector<double> packed, ours, plain;
+  PlainSolve solve(prepared);
+  solve(0);
+  double spent = 0.0;
+  for (auto _ : state) {
+    for (int sample = 0; sample < samples; ++sample) {
+      const std::int64_t first = (2 * sample + 1) * blocks / (2 * samples) * block_columns;
+      ours.push_back(seconds([&] { prepared.solver.columns(first, block_columns, workspace, packed); }) / block_columns);
+      plain.push_back(seconds([&] { solve(first); }) / block_columns);
+      spent += ours.back();
+    }
+  }
+  const double mean = spent / static_cast<double>(ours.size());
+  state.counters["surface_nodes"] = static_cast<double>(prepared.body.surface.nodes.size());
+  state.counters["nodes"] = static_cast<double>(prepared.body.mesh.nodes.size());
+  state.counters["factor_entries"] = static_cast<double>(prepared.factor.entries());
+  state.counters["columns"] = static_cast<double>(n);
+  state.counters["ms_per_column"] = 1e3 * mean;
+  state.counters["ms_cholmod_solve2"] = 1e3 * median(plain);
+  state.counters["times_faster"] = median(plain) / mean;
+}
+
+/// A whole bake, file included, with all processors.
+void whole_bake(benchmark::State& state, const std::string& name) {
+  const Description description = read_description(model_toml(name));
+  BakeOptions options;
+  options.output = std::filesystem::temp_directory_path() / (name + "-bench.palpate.hdf");
+  options.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  for (auto _ : state) bake(description, options);
+  state.counters["file_MB"] = static_cast<double>(std::filesystem::file_size(options.output)) * 1e-6;
+  state.counters["jobs"] = options.jobs;
+  std::filesystem::remove(options.output);
+}
+
+BENCHMARK_CAPTURE(whole_bake, beam15, "beam15")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(whole_bake, beam24, "beam24")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(liver_columns, as_in_model_toml, read_description(model_toml("liver")).mesh.edge_length.value(), 16)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(liver_columns, about_20000_surface_nodes, 0.0032, 6)->Iterations(1)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace palpate
+
+BENCHMARK_MAIN();

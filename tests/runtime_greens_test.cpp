@@ -1,0 +1,110 @@
+// The square, the packed and a plain matrix must say the same.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "meshes/error.h"
+#include "runtime/greens.h"
+#include "tests/runtime_model.h"
+
+namespace palpate {
+namespace {
+
+struct Case {
+  Eigen::Index order;
+  Precision precision;
+  bool square;
+  int jobs;
+};
+
+class GreensLayouts : public testing::TestWithParam<Case> {
+ protected:
+  Eigen::MatrixXd xi_ = test::random_definite(GetParam().order, 3);
+  Greens greens_{
+      test::pack(xi_, GetParam().precision),
+      {.jobs = GetParam().jobs, .max_square_bytes = GetParam().square ? std::int64_t{1} << 32 : 0}};
+  // Rounding to the stored precision, relative to the largest entry.
+  double tolerance_ =
+      xi_.cwiseAbs().maxCoeff() * (GetParam().precision == Precision::single_precision ? 6e-8 : 0.0);
+};
+
+TEST_P(GreensLayouts, StoreWhatTheyWereGiven) {
+  EXPECT_EQ(greens_.unfolded(), GetParam().square);
+  EXPECT_EQ(greens_.order(), GetParam().order);
+  const Index step = greens_.nodes() > 100 ? 37 : 1;
+  for (Index a = 0; a < greens_.nodes(); a += step) {
+    for (Index b = 0; b < greens_.nodes(); ++b) {
+      const Mat3 expected = xi_.block<3, 3>(3 * Eigen::Index{a}, 3 * Eigen::Index{b});
+      ASSERT_LE((greens_.block(a, b) - expected).cwiseAbs().maxCoeff(), tolerance_) << a << ", " << b;
+    }
+  }
+}
+
+TEST_P(GreensLayouts, GatherPutsBlocksBesideEachOther) {
+  const Index last = greens_.nodes() - 1;
+  const std::vector<Index> columns = {last, 0, last / 2};
+  Eigen::Matrix<double, 3, 9, Eigen::RowMajor> gathered;
+  greens_.gather(last / 3, columns, {gathered.data(), 27});
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    EXPECT_EQ((gathered.block<3, 3>(0, static_cast<Eigen::Index>(3 * k))),
+              greens_.block(last / 3, columns[k]));
+  }
+}
+
+TEST_P(GreensLayouts, DisplacementIsTheProduct) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> force(-1.0, 1.0);
+  std::vector<Index> nodes;
+  for (Index node = 0; node < greens_.nodes(); node += std::max(1, greens_.nodes() / 7))
+    nodes.push_back(node);
+  std::vector<double> f(3 * nodes.size());
+  for (double& value : f) value = force(random);
+
+  Eigen::VectorXd expected = Eigen::VectorXd::Zero(xi_.rows());
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    expected += xi_.middleCols<3>(3 * Eigen::Index{nodes[k]}) * Eigen::Map<const Vec3>(f.data() + 3 * k);
+  }
+  Eigen::VectorXd u = Eigen::VectorXd::Constant(xi_.rows(), 1e30);
+  greens_.displacement(nodes, f, {u.data(), static_cast<std::size_t>(u.size())});
+  const double scale = xi_.cwiseAbs().maxCoeff() * static_cast<double>(f.size());
+  EXPECT_LE((u - expected).cwiseAbs().maxCoeff(), tolerance_ * static_cast<double>(f.size()) + 1e-15 * scale);
+
+  greens_.displacement({}, {}, {u.data(), static_cast<std::size_t>(u.size())});
+  EXPECT_EQ(u, Eigen::VectorXd::Zero(xi_.rows()));
+}
+
+// Orders at and beside the bounds of tiles (64), cache lines and chunks of u (2048).
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const Eigen::Index order : {3, 63, 66, 129, 192, 2049}) {
+    for (const Precision precision : {Precision::single_precision, Precision::double_precision}) {
+      all.push_back({order, precision, false, 1});
+      all.push_back({order, precision, true, order > 100 ? 3 : 1});
+    }
+  }
+  return all;
+}
+
+std::string case_name(const testing::TestParamInfo<Case>& info) {
+  return std::to_string(info.param.order) +
+         (info.param.precision == Precision::single_precision ? "_single" : "_double") +
+         (info.param.square ? "_square" : "_packed");
+}
+
+INSTANTIATE_TEST_SUITE_P(All, GreensLayouts, testing::ValuesIn(cases()), case_name);
+
+TEST(Greens, RefusesAnOrderThatIsNotThreeANode) {
+  try {
+    const Greens greens(test::pack(test::random_definite(4, 1), Precision::double_precision));
+    FAIL() << "four dofs were taken";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("4 dofs"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Greens, IsUnfoldedByDefaultWhenItIsSmall) {
+  EXPECT_TRUE(Greens(test::pack(test::random_definite(30, 1), Precision::single_precision)).unfolded());
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,139 @@
+// The tick takes no memory and makes no system call. A program of its own, as it replaces malloc.
+#include <gtest/gtest.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <vector>
+
+#include "runtime/step.h"
+#include "tests/runtime_model.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define PALPATE_OWN_MALLOC 0  // sanitizers have their own
+#else
+#define PALPATE_OWN_MALLOC 1
+#endif
+
+namespace {
+thread_local bool counting = false;
+thread_local long heap_calls = 0;
+
+void count_call() noexcept {
+  if (counting) ++heap_calls;
+}
+}  // namespace
+
+#if PALPATE_OWN_MALLOC
+// operator new and delete of libstdc++ come here too.
+extern "C" {
+void* __libc_malloc(std::size_t size);  // NOLINT(bugprone-reserved-identifier): glibc's names
+void* __libc_calloc(std::size_t count, std::size_t size);        // NOLINT(bugprone-reserved-identifier)
+void* __libc_realloc(void* p, std::size_t size);                 // NOLINT(bugprone-reserved-identifier)
+void* __libc_memalign(std::size_t alignment, std::size_t size);  // NOLINT(bugprone-reserved-identifier)
+void __libc_free(void* p);                                       // NOLINT(bugprone-reserved-identifier)
+
+void* malloc(std::size_t size) {
+  count_call();
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) {
+  count_call();
+  return __libc_calloc(count, size);
+}
+void* realloc(void* p, std::size_t size) {
+  count_call();
+  return __libc_realloc(p, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  count_call();
+  return __libc_memalign(alignment, size);
+}
+void free(void* p) {
+  if (p != nullptr) count_call();
+  __libc_free(p);
+}
+}
+#endif
+
+namespace palpate {
+namespace {
+
+/// Ticks that grab, move, miss, let go and send nonsense, beside nodes that are held and dropped.
+void exercise(const Body& body, State& state, Eigen::VectorXd& u, const std::vector<ToolPose>& poses) {
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const auto node = static_cast<Index>(k % 30);
+    if (k % 3 == 0) hold(body, state, node);
+    if (k % 7 == 0) release(state, node);
+    if (k % 100 == 99) release_all(state);
+    prescribe(state, node, Vec3(0.0, 0.0, 0.001));
+    step(body, state, poses[k]);
+    if (k % 10 == 0) surface_displacement(body, state, {u.data(), static_cast<std::size_t>(u.size())});
+  }
+}
+
+class Tick : public testing::Test {
+ protected:
+  void SetUp() override {
+    for (int k = 0; k < 1000; ++k) {
+      ToolPose tool;
+      tool.position = Vec3(0.001 * (k % 50), 0.5, k % 200 < 20 ? 9.0 : 1.0);
+      if (k % 333 == 0) tool.position.x() = std::numeric_limits<double>::quiet_NaN();
+      tool.grab = k % 40 > 10;
+      poses_.push_back(tool);
+    }
+  }
+
+  Body body_{test::box_model(4, Scope::surface, Precision::single_precision)};
+  State state_{{.reach = 0.3, .max_nodes = 24}};
+  Eigen::VectorXd u_{body_.greens().order()};
+  std::vector<ToolPose> poses_;
+};
+
+TEST_F(Tick, MakesNoHeapCall) {
+#if !PALPATE_OWN_MALLOC
+  GTEST_SKIP() << "a sanitizer has taken malloc";
+#else
+  counting = true;
+  { const std::vector<int> proof(100); }
+  counting = false;
+  ASSERT_EQ(heap_calls, 2) << "the counter does not count";
+
+  heap_calls = 0;
+  counting = true;
+  exercise(body_, state_, u_, poses_);
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+  EXPECT_EQ(state_.ticks, 1000);
+#endif
+}
+
+// In a process that the kernel kills at the first system call but write and exit.
+TEST_F(Tick, MakesNoSystemCall) {
+#if !PALPATE_OWN_MALLOC
+  GTEST_SKIP() << "sanitizers make system calls";
+#else
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+    exercise(body_, state_, u_, poses_);
+    syscall(SYS_exit, state_.ticks == 1000 ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no seccomp here";
+  EXPECT_FALSE(WIFSIGNALED(status)) << "signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+#endif
+}
+
+static_assert(noexcept(step(std::declval<const Body&>(), std::declval<State&>(),
+                            std::declval<const ToolPose&>())));
+
+}  // namespace
+}  // namespace palpate

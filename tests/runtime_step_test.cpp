@@ -1,0 +1,268 @@
+// The tick against a direct solve, and what it does with tools that misbehave.
+#include <gtest/gtest.h>
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "meshes/error.h"
+#include "runtime/step.h"
+#include "tests/runtime_model.h"
+
+namespace palpate {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// The same static problem by elimination of the prescribed dofs in the sparse K: no Green's function
+/// anywhere.
+struct DirectSolution {
+  Eigen::VectorXd u;  // [3N] displacement of all nodes
+  Eigen::VectorXd f;  // [3N] force on all nodes
+};
+
+DirectSolution solve_directly(const Model& model, const std::vector<Index>& nodes,
+                              const Eigen::VectorXd& displacement) {
+  const Eigen::MatrixXd K = test::assemble_stiffness(model.mesh, model.material);
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(K.rows());
+  std::vector<bool> known(static_cast<std::size_t>(K.rows()), false);
+  for (std::size_t dof = 0; dof < known.size(); ++dof) known[dof] = model.fixed[dof / 3] != 0;
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t dof = 3 * static_cast<std::size_t>(nodes[k]) + axis;
+      known[dof] = true;
+      u[static_cast<Eigen::Index>(dof)] = displacement[static_cast<Eigen::Index>(3 * k + axis)];
+    }
+  }
+  std::vector<Eigen::Index> free;
+  for (std::size_t dof = 0; dof < known.size(); ++dof) {
+    if (!known[dof]) free.push_back(static_cast<Eigen::Index>(dof));
+  }
+  const Eigen::SparseMatrix<double> K_ff = Eigen::MatrixXd(K(free, free)).sparseView();
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(K_ff);
+  const Eigen::VectorXd load = K * u;
+  u(free) = factor.solve(Eigen::VectorXd(-load(free)));
+  return {u, K * u};
+}
+
+class DirectSolve : public testing::TestWithParam<Index> {};
+
+// The bound, 1e-9 of the largest value, for forces and for the displacement of all stored nodes.
+TEST_P(DirectSolve, GivesTheForcesAndDisplacementsOfTheCapacitanceMatrixAlgorithm) {
+  const Model model = test::box_model(5, Scope::full, Precision::double_precision);
+  const Body body{Model(model)};
+  State state({.max_nodes = 40});
+  std::mt19937 random(9);
+  std::vector<Index> candidates = body.free_surface_nodes();
+  std::shuffle(candidates.begin(), candidates.end(), random);
+  std::vector<Index> mesh_nodes;
+  Eigen::VectorXd displacement(3 * Eigen::Index{GetParam()});
+  std::uniform_real_distribution<double> entry(-0.01, 0.01);
+  for (double& value : displacement) value = entry(random);
+  for (Index k = 0; k < GetParam(); ++k) {
+    const Index node = candidates[static_cast<std::size_t>(k)];
+    mesh_nodes.push_back(body.mesh_node(node));
+    ASSERT_EQ(hold(body, state, node), StepStatus::ok);
+    ASSERT_EQ(prescribe(state, node, displacement.segment<3>(3 * Eigen::Index{k})), StepStatus::ok);
+  }
+  ASSERT_EQ(solve(state), StepStatus::ok);
+  Eigen::VectorXd u(body.greens().order());
+  surface_displacement(body, state, {u.data(), static_cast<std::size_t>(u.size())});
+
+  const DirectSolution direct = solve_directly(model, mesh_nodes, displacement);
+  const double force_scale = direct.f.cwiseAbs().maxCoeff();
+  const double displacement_scale = direct.u.cwiseAbs().maxCoeff();
+  for (std::size_t k = 0; k < mesh_nodes.size(); ++k) {
+    const Vec3 f = Eigen::Map<const Vec3>(state.forces().data() + 3 * k);
+    EXPECT_LE((f - direct.f.segment<3>(3 * Eigen::Index{mesh_nodes[k]})).norm(), 1e-9 * force_scale);
+  }
+  for (Index stored = 0; stored < body.greens().nodes(); ++stored) {
+    const Vec3 expected = direct.u.segment<3>(3 * Eigen::Index{body.mesh_node(stored)});
+    EXPECT_LE((u.segment<3>(3 * Eigen::Index{stored}) - expected).norm(), 1e-9 * displacement_scale);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Nodes, DirectSolve, testing::Values(1, 5, 40));
+
+/// A cube and a tool above the middle of its top.
+class Touch : public testing::Test {
+ protected:
+  Body body_{test::box_model(4, Scope::surface, Precision::double_precision)};
+  State state_{{.reach = 0.1, .max_nodes = 4}};
+  Index top_ = body_.nearest_surface_node(Vec3(0.5, 0.5, 1.0)).node;
+  Vec3 start_ = Vec3(0.52, 0.5, 1.03);
+
+  static ToolPose pose(const Vec3& position, bool grab) {
+    ToolPose tool;
+    tool.position = position;
+    tool.grab = grab;
+    return tool;
+  }
+};
+
+TEST_F(Touch, GrabDoesNotKickAndTheNodeFollowsTheTool) {
+  EXPECT_EQ(step(body_, state_, pose(start_, false)), StepStatus::ok);
+  EXPECT_EQ(state_.tool_node, -1);
+  EXPECT_EQ(step(body_, state_, pose(start_, true)), StepStatus::ok);
+  EXPECT_EQ(state_.tool_node, top_);
+  EXPECT_EQ(state_.tool_force, Vec3::Zero());
+
+  const Vec3 motion(0.001, -0.002, -0.01);
+  EXPECT_EQ(step(body_, state_, pose(start_ + motion, true)), StepStatus::ok);
+  EXPECT_LT((state_.tool_node_displacement - motion).norm(), 1e-15);
+  const Vec3 expected = body_.greens().block(top_, top_).inverse() * motion;
+  EXPECT_LT((state_.tool_force - expected).norm(), 1e-12 * expected.norm());
+  EXPECT_LT(state_.tool_force.z(), 0.0) << "the tool pushes the body down";
+}
+
+TEST_F(Touch, KeepsTheNodeWhereverItPullsUntilReleased) {
+  step(body_, state_, pose(start_, true));
+  step(body_, state_, pose(start_ + Vec3(0.0, 0.0, 5.0), true));
+  EXPECT_EQ(state_.tool_node, top_);
+  EXPECT_EQ(step(body_, state_, pose(start_, false)), StepStatus::ok);
+  EXPECT_EQ(state_.tool_node, -1);
+  EXPECT_EQ(state_.nodes(), 0);
+  EXPECT_EQ(state_.tool_force, Vec3::Zero());
+  EXPECT_EQ(state_.tool_node_displacement, Vec3::Zero());
+}
+
+TEST_F(Touch, TakesHoldOnceItComesWithinReach) {
+  const Vec3 far(0.5, 0.5, 1.2);
+  EXPECT_EQ(step(body_, state_, pose(far, true)), StepStatus::nothing_in_reach);
+  EXPECT_EQ(state_.tool_node, -1);
+  EXPECT_EQ(step(body_, state_, pose(Vec3::Constant(1e300), true)), StepStatus::nothing_in_reach);
+  EXPECT_EQ(step(body_, state_, pose(start_, true)), StepStatus::ok);
+  EXPECT_EQ(state_.tool_node, top_);
+}
+
+TEST_F(Touch, HoldsTheLastValidResultWhenThePoseIsNotFinite) {
+  step(body_, state_, pose(start_, true));
+  step(body_, state_, pose(start_ - Vec3(0.0, 0.0, 0.01), true));
+  const Vec3 force = state_.tool_force;
+  const Vec3 displacement = state_.tool_node_displacement;
+  ToolPose turned = pose(start_, true);
+  turned.orientation.w() = nan;
+  for (const ToolPose& tool : {pose(Vec3(nan, 0.0, 0.0), true), pose(Vec3(0.0, nan, 0.0), false),
+                               pose(Vec3(0.0, 0.0, std::numeric_limits<double>::infinity()), true), turned}) {
+    EXPECT_EQ(step(body_, state_, tool), StepStatus::pose_not_finite);
+    EXPECT_EQ(state_.tool_force, force);
+    EXPECT_EQ(state_.tool_node_displacement, displacement);
+    EXPECT_EQ(state_.tool_node, top_);
+  }
+  EXPECT_EQ(step(body_, state_, pose(start_, true)), StepStatus::ok);
+  EXPECT_LT(state_.tool_force.norm(), 1e-14);
+}
+
+// So stiff a body that its force passes the largest number.
+TEST_F(Touch, NeverGivesAForceThatIsNotFinite) {
+  Model stiff = test::box_model(4, Scope::surface, Precision::double_precision);
+  stiff.greens =
+      test::pack(1e-6 * test::random_definite(stiff.stored_dofs(), 1) / 1e3, Precision::double_precision);
+  const Body body(std::move(stiff));
+  step(body, state_, pose(start_, true));
+  step(body, state_, pose(start_ - Vec3(0.0, 0.0, 0.01), true));
+  const Vec3 force = state_.tool_force;
+  const Vec3 displacement = state_.tool_node_displacement;
+  EXPECT_EQ(step(body, state_, pose(Vec3::Constant(-1.7e308), true)), StepStatus::result_not_finite);
+  EXPECT_EQ(state_.tool_force, force);
+  EXPECT_EQ(state_.tool_node_displacement, displacement);
+}
+
+TEST_F(Touch, HeldNodesStayWhereTheyAreWhenTheToolComesAndGoes) {
+  const Index corner = body_.nearest_surface_node(Vec3(1.0, 1.0, 1.0)).node;
+  ASSERT_EQ(hold(body_, state_, corner), StepStatus::ok);
+  ASSERT_EQ(prescribe(state_, corner, Vec3(0.0, 0.0, -0.02)), StepStatus::ok);
+  ASSERT_EQ(solve(state_), StepStatus::ok);
+  const Vec3 alone = Eigen::Map<const Vec3>(state_.forces().data());
+
+  // The grabbed node is held where the corner has pulled it to: no force, and the corner's stays as it was.
+  ASSERT_EQ(step(body_, state_, pose(start_, true)), StepStatus::ok);
+  EXPECT_GT(state_.tool_node_displacement.norm(), 1e-5);
+  EXPECT_LT(state_.tool_force.norm(), 1e-13 * alone.norm());
+  EXPECT_LT((Eigen::Map<const Vec3>(state_.forces().data()) - alone).norm(), 1e-13 * alone.norm());
+
+  ASSERT_EQ(step(body_, state_, pose(start_ + Vec3(0.0, 0.01, 0.0), true)), StepStatus::ok);
+  EXPECT_GT(state_.tool_force.norm(), 1e-5);
+  ASSERT_EQ(step(body_, state_, pose(start_, false)), StepStatus::ok);
+  ASSERT_EQ(state_.nodes(), 1);
+  EXPECT_LT((Eigen::Map<const Vec3>(state_.forces().data()) - alone).norm(), 1e-12 * alone.norm());
+}
+
+TEST_F(Touch, SaysWhatCannotBeHeld) {
+  EXPECT_EQ(hold(body_, state_, -1), StepStatus::no_such_node);
+  EXPECT_EQ(hold(body_, state_, body_.greens().nodes()), StepStatus::no_such_node);
+  EXPECT_EQ(release(state_, 3), StepStatus::no_such_node);
+  EXPECT_EQ(prescribe(state_, 3, Vec3::Zero()), StepStatus::no_such_node);
+  for (Index node = 0; node < 4; ++node)
+    ASSERT_EQ(hold(body_, state_, node == top_ ? 4 : node), StepStatus::ok);
+  EXPECT_EQ(hold(body_, state_, 5), StepStatus::capacity_full);
+  EXPECT_EQ(step(body_, state_, pose(start_, true)), StepStatus::capacity_full);
+  EXPECT_EQ(state_.tool_node, -1);
+  EXPECT_EQ(hold(body_, state_, 0 == top_ ? 4 : 0), StepStatus::ok) << "held already";
+  EXPECT_EQ(state_.nodes(), 4);
+}
+
+TEST_F(Touch, TheToolForgetsANodeThatSomebodyElseReleased) {
+  step(body_, state_, pose(start_, true));
+  ASSERT_EQ(release(state_, top_), StepStatus::ok);
+  EXPECT_EQ(step(body_, state_, pose(start_, false)), StepStatus::ok);
+  step(body_, state_, pose(start_, true));
+  release_all(state_);
+  EXPECT_EQ(state_.nodes(), 0);
+  EXPECT_EQ(step(body_, state_, pose(start_, false)), StepStatus::ok);
+}
+
+bool same_bits(const Vec3& a, const Vec3& b) {
+  return std::memcmp(a.data(), b.data(), sizeof(double) * 3) == 0;
+}
+
+// Copies are whole: a copy taken in the middle, with nodes held, goes the same way to the last bit.
+TEST_F(Touch, CopiesReplayBitwise) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> move(-0.05, 0.05);
+  std::vector<ToolPose> poses;
+  for (int k = 0; k < 200; ++k) {
+    poses.push_back(pose(start_ + Vec3(move(random), move(random), move(random)), k % 50 > 5));
+  }
+  hold(body_, state_, body_.nearest_surface_node(Vec3(1.0, 1.0, 1.0)).node);
+  for (int k = 0; k < 20; ++k) step(body_, state_, poses[static_cast<std::size_t>(k)]);
+  State copy = state_;
+  for (const ToolPose& tool : poses) {
+    ASSERT_EQ(step(body_, state_, tool), step(body_, copy, tool));
+    ASSERT_TRUE(same_bits(state_.tool_force, copy.tool_force));
+    ASSERT_TRUE(same_bits(state_.tool_node_displacement, copy.tool_node_displacement));
+    ASSERT_EQ(state_.tool_node, copy.tool_node);
+  }
+}
+
+TEST(Precision, SingleDiffersFromDoubleByItsRounding) {
+  const Body exact(test::box_model(4, Scope::surface, Precision::double_precision));
+  const Body rounded(test::box_model(4, Scope::surface, Precision::single_precision));
+  Eigen::VectorXd forces[2];
+  for (const bool single : {false, true}) {
+    const Body& body = single ? rounded : exact;
+    State state({.max_nodes = 8});
+    for (Index node = 0; node < 8; ++node) {
+      ASSERT_EQ(hold(body, state, 5 * node), StepStatus::ok);
+      prescribe(state, 5 * node, Vec3(0.0, 0.0, 0.001 * node));
+    }
+    ASSERT_EQ(solve(state), StepStatus::ok);
+    forces[single ? 1 : 0] = Eigen::Map<const Eigen::VectorXd>(state.forces().data(), 24);
+  }
+  const double difference = (forces[0] - forces[1]).norm() / forces[0].norm();
+  EXPECT_LT(difference, 1e-5);  // 2^-24 times the condition number of C, about 20
+  EXPECT_GT(difference, 1e-12) << "both were stored in the same precision";
+}
+
+TEST(State, RefusesNonsense) {
+  EXPECT_THROW(State({.reach = 0.0}), Error);
+  EXPECT_THROW(State({.reach = nan}), Error);
+  EXPECT_THROW(State({.max_nodes = 0}), Error);
+  EXPECT_THROW(State({.max_nodes = -3}), Error);
+}
+
+}  // namespace
+}  // namespace palpate
