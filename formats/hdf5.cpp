@@ -14,6 +14,9 @@ constexpr hsize_t alignment = 4096;  // a page
 constexpr std::size_t longest_text = 4096;
 constexpr std::size_t highest_rank = 4;
 
+/// We close every file ourselves; the library's own exit handler crashes after a close that failed (full disk).
+[[maybe_unused]] const herr_t no_exit_handler = H5dont_atexit();
+
 const char* const altered_hint = "Copy the file again, or precompute it again.";
 
 /// The deepest reason that the library gives for its last failure; the system's own words where it has any.
@@ -64,7 +67,7 @@ Id open_existing(const std::filesystem::path& path, unsigned mode) {
 
 std::string text_of(std::span<const std::int64_t> dims) {
   std::string text;
-  for (const std::int64_t dim : dims) text += (text.empty() ? "" : " x ") + std::to_string(dim);
+  for (const std::int64_t dim : dims) text.append(text.empty() ? "" : " x ").append(std::to_string(dim));
   return text.empty() ? "a scalar" : text;
 }
 

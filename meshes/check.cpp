@@ -13,13 +13,17 @@
 namespace palpate {
 namespace {
 
-std::string text(const Vec3& x) { return fmt::format("({:.4g}, {:.4g}, {:.4g})", x.x(), x.y(), x.z()); }
+std::string text(const Vec3& x) {
+  return fmt::format("({:.4g}, {:.4g}, {:.4g})", x.x(), x.y(), x.z());
+}
 
 void check_numbers(const Mesh& mesh, const std::string& where) {
-  if (mesh.tets.empty()) throw Error("the mesh has no tetrahedra", where, "Save the volume elements, not only the surface.");
+  if (mesh.tets.empty())
+    throw Error("the mesh has no tetrahedra", where, "Save the volume elements, not only the surface.");
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
     if (mesh.nodes[node].allFinite()) continue;
-    throw Error(fmt::format("node {} has a coordinate that is not a finite number", node), where, "Repair or remake the mesh.");
+    throw Error(fmt::format("node {} has a coordinate that is not a finite number", node), where,
+                "Repair or remake the mesh.");
   }
   for (std::size_t element = 0; element < mesh.tets.size(); ++element) {
     for (const Index node : mesh.tets[element]) {
@@ -58,8 +62,8 @@ std::size_t orient_elements(Mesh& mesh, const std::string& where) {
   if (inverted == 0) return 0;
   if (inverted < mesh.tets.size()) {
     const Vec3 centre = tet4::corners(mesh, mesh.tets[an_inverted_one]).rowwise().mean();
-    throw Error(fmt::format("{} of {} elements are inverted, e.g. element {} near {}", inverted, mesh.tets.size(),
-                            an_inverted_one, text(centre)),
+    throw Error(fmt::format("{} of {} elements are inverted, e.g. element {} near {}", inverted,
+                            mesh.tets.size(), an_inverted_one, text(centre)),
                 where, "The mesh is folded there; remake it.");
   }
   for (Tet& tet : mesh.tets) std::swap(tet[2], tet[3]);
@@ -81,7 +85,8 @@ std::size_t remove_unused_nodes(Mesh& mesh) {
     for (Index& node : tet) node = number[static_cast<std::size_t>(node)];
   }
   std::erase_if(mesh.tagged_boundary, [&](const TaggedTriangle& facet) {
-    return std::any_of(facet.nodes.begin(), facet.nodes.end(), [&](Index node) { return number[static_cast<std::size_t>(node)] < 0; });
+    return std::any_of(facet.nodes.begin(), facet.nodes.end(),
+                       [&](Index node) { return number[static_cast<std::size_t>(node)] < 0; });
   });
   for (TaggedTriangle& facet : mesh.tagged_boundary) {
     for (Index& node : facet.nodes) node = number[static_cast<std::size_t>(node)];
@@ -98,7 +103,8 @@ void check_connected(const Mesh& mesh, const std::string& where) {
   faces.reserve(4 * mesh.tets.size());
   for (std::size_t element = 0; element < mesh.tets.size(); ++element) {
     const Tet& t = mesh.tets[element];
-    for (Triangle face : {Triangle{t[1], t[2], t[3]}, Triangle{t[0], t[2], t[3]}, Triangle{t[0], t[1], t[3]}, Triangle{t[0], t[1], t[2]}}) {
+    for (Triangle face : {Triangle{t[1], t[2], t[3]}, Triangle{t[0], t[2], t[3]}, Triangle{t[0], t[1], t[3]},
+                          Triangle{t[0], t[1], t[2]}}) {
       std::sort(face.begin(), face.end());
       faces.emplace_back(face, element);
     }
@@ -109,7 +115,8 @@ void check_connected(const Mesh& mesh, const std::string& where) {
     parent[find_root(parent, faces[i].second)] = find_root(parent, faces[i - 1].second);
   }
   std::map<std::size_t, std::size_t> part_sizes;  // by the element that stands for the part
-  for (std::size_t element = 0; element < mesh.tets.size(); ++element) ++part_sizes[find_root(parent, element)];
+  for (std::size_t element = 0; element < mesh.tets.size(); ++element)
+    ++part_sizes[find_root(parent, element)];
   if (part_sizes.size() == 1) return;
   std::string parts;
   for (const auto& [root, size] : part_sizes) {
@@ -131,7 +138,8 @@ void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const 
   if (static_cast<std::size_t>(count) == mesh.nodes.size()) {
     throw Error("every node is fixed: nothing is left to move", where, "Make the [[fixed]] regions smaller.");
   }
-  // The body can still turn about a line when all fixed nodes are on it: look at the fixed nodes' spread about their mean.
+  // The body can still turn about a line when all fixed nodes are on it: look at the fixed nodes' spread
+  // about their mean.
   Vec3 mean = Vec3::Zero();
   for (std::size_t node = 0; node < fixed.size(); ++node) {
     if (fixed[node]) mean += mesh.nodes[node] / static_cast<double>(count);
@@ -146,13 +154,18 @@ void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const 
   const double small = 1e-12 * size * size;  // squared distances: 1e-6 of the body's size
   if (axes.eigenvalues()[1] > small) return;
   if (axes.eigenvalues()[2] <= small) {
-    throw Error(fmt::format("a rigid motion is left: only one point, {} m, is fixed, and the body can rotate about it", text(mean)),
-                where, hint);
+    throw Error(
+        fmt::format(
+            "a rigid motion is left: only one point, {} m, is fixed, and the body can rotate about it",
+            text(mean)),
+        where, hint);
   }
-  throw Error(fmt::format("a rigid motion is left: all fixed nodes are on the line through {} m along {}, and the body can "
-                          "rotate about it",
-                          text(mean), text(axes.eigenvectors().col(2))),
-              where, hint);
+  throw Error(
+      fmt::format(
+          "a rigid motion is left: all fixed nodes are on the line through {} m along {}, and the body can "
+          "rotate about it",
+          text(mean), text(axes.eigenvectors().col(2))),
+      where, hint);
 }
 
 std::string scale_warning(const Mesh& mesh) {
@@ -160,7 +173,8 @@ std::string scale_warning(const Mesh& mesh) {
   for (const Vec3& x : mesh.nodes) box.extend(x);
   const double size = box.sizes().maxCoeff();
   if (size <= 10.0 && size >= 1e-3) return {};
-  return fmt::format("the body is {:.3g} m long; is geometry.scale (metres per unit of the file) right?", size);
+  return fmt::format("the body is {:.3g} m long; is geometry.scale (metres per unit of the file) right?",
+                     size);
 }
 
 }  // namespace palpate

@@ -9,22 +9,25 @@
 
 namespace palpate {
 
-/// Reverses elements that are negatively oriented and returns how many there were (mesh files disagree on the sign).
-/// Throws Error (where = `where`) for a mesh without elements, node numbers out of range, a coordinate that is not finite,
-/// an element with zero volume (number, coordinates), or where some elements are inverted and others not.
+/// Reverses elements that are negatively oriented and returns how many there were (mesh files disagree on the
+/// sign). Throws Error (where = `where`) for a mesh without elements, node numbers out of range, a coordinate
+/// that is not finite, an element with zero volume (number, coordinates), or where some elements are inverted
+/// and others not.
 std::size_t orient_elements(Mesh& mesh, const std::string& where);
 
 /// Removes nodes that no element uses, renumbering the rest in order; returns how many there were.
 std::size_t remove_unused_nodes(Mesh& mesh);
 
-/// Throws Error when the elements are not one connected part (through shared faces): says how many parts, their sizes and a point in each.
+/// Throws Error when the elements are not one connected part (through shared faces): says how many parts,
+/// their sizes and a point in each.
 void check_connected(const Mesh& mesh, const std::string& where);
 
-/// Throws Error when no node is fixed, or the fixed nodes leave a rigid motion of the body (fewer than three that are not on one
-/// line): names the motion that is left. Also when every node is fixed.
+/// Throws Error when no node is fixed, or the fixed nodes leave a rigid motion of the body (fewer than three
+/// that are not on one line): names the motion that is left. Also when every node is fixed.
 void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const std::string& where);
 
-/// A warning when the body is larger than 10 m or smaller than 1 mm (probably a missing unit scale), else empty.
+/// A warning when the body is larger than 10 m or smaller than 1 mm (probably a missing unit scale), else
+/// empty.
 std::string scale_warning(const Mesh& mesh);
 
 }  // namespace palpate

@@ -11,7 +11,8 @@ namespace palpate {
 /// `error: WHERE: WHAT` and `hint: HINT` and exits with `ExitCode::input_error` unless told otherwise.
 class Error : public std::runtime_error {
  public:
-  /// `what` says what is wrong (with the numbers), `where` names the file, field or line, `hint` says what to do.
+  /// `what` says what is wrong (with the numbers), `where` names the file, field or line, `hint` says what to
+  /// do.
   Error(const std::string& what, std::string where, std::string hint)
       : std::runtime_error(what), where_(std::move(where)), hint_(std::move(hint)) {}
 

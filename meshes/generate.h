@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// Box [origin, origin + size] of cells[0] x cells[1] x cells[2] cells, six Kuhn tetrahedra each (Freudenthal), nodes
-/// numbered x fastest.
+/// Box [origin, origin + size] of cells[0] x cells[1] x cells[2] cells, six Kuhn tetrahedra each
+/// (Freudenthal), nodes numbered x fastest.
 struct BoxShape {
   Vec3 origin = Vec3::Zero();
   Vec3 size = Vec3::Ones();

@@ -22,7 +22,8 @@ Matrix6 elasticity_matrix(const Material& material) {
 void check_material(const Material& material, const std::string& where) {
   const double E = material.youngs_modulus, nu = material.poissons_ratio, rho = material.density;
   if (!(std::isfinite(E) && E > 0.0)) {
-    throw Error(fmt::format("youngs_modulus must be positive, not {}", E), where, "Give Young's modulus in pascal, e.g. 5000.");
+    throw Error(fmt::format("youngs_modulus must be positive, not {}", E), where,
+                "Give Young's modulus in pascal, e.g. 5000.");
   }
   if (!(nu > -1.0 && nu < 0.5)) {
     throw Error(fmt::format("poissons_ratio must be between -1 and 0.5 (both excluded), not {}", nu), where,

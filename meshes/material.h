@@ -15,7 +15,8 @@ struct Material {
   double density = 1000.0;      ///< [kg/m^3]
 };
 
-/// D of sigma = D epsilon for engineering strain [xx yy zz xy yz zx] with shear gamma = 2 epsilon (theory.md section 1).
+/// D of sigma = D epsilon for engineering strain [xx yy zz xy yz zx] with shear gamma = 2 epsilon (theory.md
+/// section 1).
 Matrix6 elasticity_matrix(const Material& material);
 
 /// Throws Error (where = `where`) unless the constants are finite and in the valid ranges.

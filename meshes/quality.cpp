@@ -11,7 +11,8 @@
 namespace palpate {
 namespace {
 
-constexpr std::array<std::array<Eigen::Index, 2>, 6> edges = {{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
+constexpr std::array<std::array<Eigen::Index, 2>, 6> edges = {
+    {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
 
 /// Angles between faces [degree]; the gradients of the shape functions are the faces' inward normals.
 std::array<double, 6> dihedral_angles(const tet4::Gradients& g) {
@@ -27,7 +28,8 @@ std::array<double, 6> dihedral_angles(const tet4::Gradients& g) {
 double radius_ratio(const tet4::Corners& x, const tet4::Gradients& g, double volume) {
   const double inradius = 1.0 / g.rowwise().norm().sum();
   const auto length = [&](Eigen::Index i, Eigen::Index j) { return (x.col(i) - x.col(j)).norm(); };
-  const double p = length(0, 1) * length(2, 3), q = length(0, 2) * length(1, 3), r = length(0, 3) * length(1, 2);
+  const double p = length(0, 1) * length(2, 3), q = length(0, 2) * length(1, 3),
+               r = length(0, 3) * length(1, 2);
   const double heron = (p + q + r) * (-p + q + r) * (p - q + r) * (p + q - r);
   const double circumradius = std::sqrt(std::max(heron, 0.0)) / (24.0 * volume);
   return 3.0 * inradius / circumradius;
@@ -45,7 +47,8 @@ QualityReport measure_quality(const Mesh& mesh) {
     for (const double angle : dihedral_angles(g)) {
       report.min_dihedral = std::min(report.min_dihedral, angle);
       report.max_dihedral = std::max(report.max_dihedral, angle);
-      ++report.dihedral_histogram[static_cast<std::size_t>(std::clamp(angle / 10.0, 0.0, QualityReport::bins - 1.0))];
+      ++report.dihedral_histogram[static_cast<std::size_t>(
+          std::clamp(angle / 10.0, 0.0, QualityReport::bins - 1.0))];
     }
     for (const auto& edge : edges) {
       const double length = (x.col(edge[0]) - x.col(edge[1])).norm();

@@ -55,8 +55,9 @@ struct Select {
     Marks marks(mesh.nodes.size(), 0);
     for (const Index node : s.nodes) {
       if (node < 0 || static_cast<std::size_t>(node) >= mesh.nodes.size()) {
-        throw Error(fmt::format("node {} does not exist: the mesh has nodes 0 to {}", node, mesh.nodes.size() - 1), where,
-                    "Node numbers count from 0 in the order of the mesh.");
+        throw Error(
+            fmt::format("node {} does not exist: the mesh has nodes 0 to {}", node, mesh.nodes.size() - 1),
+            where, "Node numbers count from 0 in the order of the mesh.");
       }
       marks[static_cast<std::size_t>(node)] = 1;
     }
@@ -72,8 +73,9 @@ struct Select {
     }
     if (!tags.contains(s.tag)) {
       throw Error(fmt::format("no boundary facet has the tag {}", s.tag), where,
-                  tags.empty() ? "The mesh file has no tagged boundary facets; select by box, half_space or sphere."
-                               : fmt::format("The mesh has the tags {}.", fmt::join(tags, ", ")));
+                  tags.empty()
+                      ? "The mesh file has no tagged boundary facets; select by box, half_space or sphere."
+                      : fmt::format("The mesh has the tags {}.", fmt::join(tags, ", ")));
     }
     return marks;
   }
@@ -81,14 +83,15 @@ struct Select {
 
 }  // namespace
 
-std::vector<std::uint8_t> select_nodes(const Mesh& mesh, const Selection& selection, const std::string& where) {
+std::vector<std::uint8_t> select_nodes(const Mesh& mesh, const Selection& selection,
+                                       const std::string& where) {
   const Select select{mesh, where};
   Marks marks = std::visit(select, selection);
   if (std::find(marks.begin(), marks.end(), 1) == marks.end()) {
     const Vec3 low = select.box.min(), high = select.box.max();
     throw Error("the selection holds no node", where,
-                fmt::format("The body reaches from ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m.", low.x(), low.y(),
-                            low.z(), high.x(), high.y(), high.z()));
+                fmt::format("The body reaches from ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m.",
+                            low.x(), low.y(), low.z(), high.x(), high.y(), high.z()));
   }
   return marks;
 }

@@ -35,10 +35,13 @@ struct SelectLowest {
   double fraction;
 };
 
-using Selection = std::variant<SelectBox, SelectHalfSpace, SelectSphere, SelectNodes, SelectTag, SelectLowest>;
+using Selection =
+    std::variant<SelectBox, SelectHalfSpace, SelectSphere, SelectNodes, SelectTag, SelectLowest>;
 
-/// Marks the selected nodes [N] (1 = selected). Distances are compared with a tolerance of 1e-9 of the body's size.
-/// Throws Error (where = `where`) when nothing is selected, a node number is out of range or a tag is unknown (names those that exist).
-std::vector<std::uint8_t> select_nodes(const Mesh& mesh, const Selection& selection, const std::string& where);
+/// Marks the selected nodes [N] (1 = selected). Distances are compared with a tolerance of 1e-9 of the body's
+/// size. Throws Error (where = `where`) when nothing is selected, a node number is out of range or a tag is
+/// unknown (names those that exist).
+std::vector<std::uint8_t> select_nodes(const Mesh& mesh, const Selection& selection,
+                                       const std::string& where);
 
 }  // namespace palpate

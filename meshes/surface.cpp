@@ -11,10 +11,11 @@ namespace palpate {
 namespace {
 
 /// The face opposite each corner, outward for a positively oriented element.
-constexpr std::array<std::array<std::size_t, 3>, 4> outward_faces = {{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+constexpr std::array<std::array<std::size_t, 3>, 4> outward_faces = {
+    {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
 
 struct Face {
-  Triangle sorted;   // the same for both elements that share it
+  Triangle sorted;  // the same for both elements that share it
   Triangle outward;
 };
 
@@ -37,7 +38,8 @@ std::vector<Face> all_faces(const Mesh& mesh) {
 Surface extract_surface(const Mesh& mesh) {
   std::vector<Face> faces = all_faces(mesh);
   // Stable, so that the triangles keep the order of the elements.
-  std::stable_sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.sorted < b.sorted; });
+  std::stable_sort(faces.begin(), faces.end(),
+                   [](const Face& a, const Face& b) { return a.sorted < b.sorted; });
   Surface surface;
   for (auto face = faces.begin(); face != faces.end();) {
     const auto end = std::find_if(face, faces.end(), [&](const Face& f) { return f.sorted != face->sorted; });
@@ -63,7 +65,8 @@ std::vector<Index> layers_below_surface(const Mesh& mesh, const Surface& surface
   for (Index depth = 0; changed; ++depth) {
     changed = false;
     for (const Tet& tet : mesh.tets) {
-      const bool touches = std::any_of(tet.begin(), tet.end(), [&](Index node) { return layer[static_cast<std::size_t>(node)] == depth; });
+      const bool touches = std::any_of(
+          tet.begin(), tet.end(), [&](Index node) { return layer[static_cast<std::size_t>(node)] == depth; });
       if (!touches) continue;
       for (const Index node : tet) {
         Index& l = layer[static_cast<std::size_t>(node)];

@@ -11,11 +11,12 @@ struct Surface {
   std::vector<Index> nodes;         ///< [S] mesh node numbers on the boundary, ascending
 };
 
-/// Extracts the boundary. Expects positively oriented elements; throws Error where more than two elements share a face.
+/// Extracts the boundary. Expects positively oriented elements; throws Error where more than two elements
+/// share a face.
 Surface extract_surface(const Mesh& mesh);
 
-/// For each mesh node, the smallest number of elements between it and the surface: 0 on the surface, 1 for nodes
-/// that share an element with a surface node, and so on. [N]
+/// For each mesh node, the smallest number of elements between it and the surface: 0 on the surface, 1 for
+/// nodes that share an element with a surface node, and so on. [N]
 std::vector<Index> layers_below_surface(const Mesh& mesh, const Surface& surface);
 
 }  // namespace palpate

@@ -6,17 +6,22 @@ namespace palpate::tet4 {
 namespace {
 
 /// Columns are the edges from corner 0: dx/dxi of the linear map from the unit tetrahedron.
-Mat3 jacobian(const Corners& x) { return x.rightCols<3>().colwise() - x.col(0); }
+Mat3 jacobian(const Corners& x) {
+  return x.rightCols<3>().colwise() - x.col(0);
+}
 
 }  // namespace
 
 Corners corners(const Mesh& mesh, const Tet& tet) {
   Corners x;
-  for (std::size_t i = 0; i < 4; ++i) x.col(static_cast<Eigen::Index>(i)) = mesh.nodes[static_cast<std::size_t>(tet[i])];
+  for (std::size_t i = 0; i < 4; ++i)
+    x.col(static_cast<Eigen::Index>(i)) = mesh.nodes[static_cast<std::size_t>(tet[i])];
   return x;
 }
 
-double volume(const Corners& x) { return jacobian(x).determinant() / 6.0; }
+double volume(const Corners& x) {
+  return jacobian(x).determinant() / 6.0;
+}
 
 Gradients gradients(const Corners& x) {
   Gradients g;

@@ -1,4 +1,5 @@
-// Linear tetrahedron: constant strain, one quadrature point (Fagerholt, isoparametric tetrahedra; theory.md section 1).
+// Linear tetrahedron: constant strain, one quadrature point (Fagerholt, isoparametric tetrahedra; theory.md
+// section 1).
 #pragma once
 
 #include <Eigen/Core>
@@ -8,8 +9,8 @@
 
 namespace palpate::tet4 {
 
-using Corners = Eigen::Matrix<double, 3, 4>;     ///< columns are the corner positions [m]
-using Gradients = Eigen::Matrix<double, 4, 3>;   ///< row i is grad N_i [1/m]
+using Corners = Eigen::Matrix<double, 3, 4>;        ///< columns are the corner positions [m]
+using Gradients = Eigen::Matrix<double, 4, 3>;      ///< row i is grad N_i [1/m]
 using StrainMatrix = Eigen::Matrix<double, 6, 12>;  ///< B
 using Stiffness = Eigen::Matrix<double, 12, 12>;    ///< K_e [N/m], node-major dofs
 

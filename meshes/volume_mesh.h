@@ -7,8 +7,8 @@
 
 namespace palpate {
 
-/// Reads Gmsh .msh (2.2 and 4.1 ASCII), Medit .mesh, TetGen .node/.ele (either name, or the stem) or legacy VTK .vtk (ASCII), by the file's
-/// extension. Coordinates as in the file. Throws Error naming file and line.
+/// Reads Gmsh .msh (2.2 and 4.1 ASCII), Medit .mesh, TetGen .node/.ele (either name, or the stem) or legacy
+/// VTK .vtk (ASCII), by the file's extension. Coordinates as in the file. Throws Error naming file and line.
 Mesh read_volume_mesh(const std::filesystem::path& file);
 
 }  // namespace palpate

@@ -17,8 +17,8 @@ struct NodalField {
   std::span<const double> values;
 };
 
-/// Writes tetrahedra (`triangles` empty) or a triangle surface (`tets` empty) with nodal fields as ASCII-free appended raw .vtu;
-/// under a temporary name, then renamed. Throws Error when the file cannot be written.
+/// Writes tetrahedra (`triangles` empty) or a triangle surface (`tets` empty) with nodal fields as ASCII-free
+/// appended raw .vtu; under a temporary name, then renamed. Throws Error when the file cannot be written.
 void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, std::span<const Tet> tets,
                std::span<const Triangle> triangles, std::span<const NodalField> fields);
 

@@ -28,7 +28,7 @@ constexpr int probe_count = 4;
 void print_plan(const Plan& plan, const Description& description, const BakeOptions& options, Progress& progress) {
   progress.line(fmt::format("{} nodes, {} elements, {} free dofs, {} stored dofs", plan.nodes, plan.elements,
                             plan.free_dofs, plan.stored_dofs));
-  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision", plan.factor_entries * 1e-6,
+  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision", static_cast<double>(plan.factor_entries) * 1e-6,
                             static_cast<double>(plan.file_bytes) * 1e-6,
                             description.precision == Precision::single_precision ? "single" : "double"));
   progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {:.1f} s with {} job{}",

@@ -35,10 +35,10 @@ constexpr std::chrono::seconds read_time_limit{600};
 constexpr std::chrono::seconds mesh_time_limit{3600};
 constexpr double facet_angle =
     25.0;  // [degree] bound on the surface triangles' angles that Mesh_3 can promise
-constexpr double wanted_dihedral = 12.0;  // [degree] sliver removal stops here
-const double facet_size_per_edge = getenv("FS") ? atof(getenv("FS")) : 1.2;
-const double radius_per_edge = getenv("CS") ? atof(getenv("CS")) : 0.73;
-constexpr double relative_error = 1e-4;  // of the body's size: where the boundary is found
+constexpr double wanted_dihedral = 12.0;     // [degree] sliver removal stops here
+constexpr double facet_size_per_edge = 1.2;  // measured on organs: the mean edge is then the one asked for,
+constexpr double radius_per_edge = 0.73;     // on the surface and, without grading, inside
+constexpr double relative_error = 1e-4;      // of the body's size: where the boundary is found
 
 enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
 

@@ -291,7 +291,7 @@ const Edit edits[] = {
 };
 
 INSTANTIATE_TEST_SUITE_P(Files, Hostile, testing::ValuesIn(edits),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& edit) { return std::string(edit.param.name); });
 
 TEST(AlteredFile, EveryDatasetIsNamed) {
   const auto datasets = checked_datasets(good_file());

@@ -52,7 +52,7 @@ std::string attribute_text(hid_t attribute) {
   std::vector<std::int64_t> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space.get())));
   H5Aread(attribute, H5T_NATIVE_INT64, values.data());
   std::string text;
-  for (const std::int64_t value : values) text += (text.empty() ? "" : " ") + std::to_string(value);
+  for (const std::int64_t value : values) text.append(text.empty() ? "" : " ").append(std::to_string(value));
   return text;
 }
 
@@ -69,7 +69,7 @@ std::string dataset_checksum(hid_t dataset) {
 
 herr_t collect(hid_t, const char* name, const H5O_info_t* info, void* data) {
   if (info->type == H5O_TYPE_DATASET)
-    static_cast<std::vector<std::string>*>(data)->push_back("/" + std::string(name));
+    static_cast<std::vector<std::string>*>(data)->push_back('/' + std::string(name));
   return 0;
 }
 
@@ -116,8 +116,10 @@ void replace(const std::filesystem::path& path, const std::string& dataset, hid_
   const Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
   if (chunked) H5Pset_chunk(creation.get(), static_cast<int>(dims.size()), dims.data());
+  const Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+  H5Pset_create_intermediate_group(links.get(), 1);
   const Id made(
-      H5Dcreate2(file.get(), dataset.c_str(), type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+      H5Dcreate2(file.get(), dataset.c_str(), type, space.get(), links.get(), creation.get(), H5P_DEFAULT),
       H5Dclose);
   if (!made.valid()) throw std::runtime_error("cannot replace " + dataset);
   if (bytes != nullptr) H5Dwrite(made.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes);

@@ -11,6 +11,8 @@
 #include <chrono>
 #include <filesystem>
 #include <map>
+#include <memory>
+#include <thread>
 
 #include "meshes/surface.h"
 #include "precompute/bake.h"

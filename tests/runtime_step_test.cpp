@@ -44,7 +44,8 @@ DirectSolution solve_directly(const Model& model, const std::vector<Index>& node
   const Eigen::SparseMatrix<double> K_ff = Eigen::MatrixXd(K(free, free)).sparseView();
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(K_ff);
   const Eigen::VectorXd load = K * u;
-  u(free) = factor.solve(Eigen::VectorXd(-load(free)));
+  const Eigen::VectorXd u_free = factor.solve(Eigen::VectorXd(-load(free)));
+  u(free) = u_free;
   return {u, K * u};
 }
 

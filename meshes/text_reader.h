@@ -1,0 +1,58 @@
+// Words and numbers of a text file, independent of the locale, with the line for error messages.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "meshes/mesh.h"
+
+namespace palpate {
+
+/// Reads a text file word by word. Every function that reads throws Error (where = "file:line") when what is
+/// there is not what was asked for; `what` says in the message what that was, e.g. "a node number".
+class TextReader {
+ public:
+  /// Text from `comment` to the end of its line is skipped ('\0': there are no comments).
+  /// Throws Error when the file cannot be read or holds nothing.
+  explicit TextReader(std::filesystem::path file, char comment = '\0');
+
+  /// No word is left.
+  [[nodiscard]] bool at_end();
+  /// The next word, which stays next; empty at the end.
+  [[nodiscard]] std::string_view peek();
+  std::string_view word(const char* what);
+  void expect(std::string_view word);
+  std::int64_t integer(const char* what);
+  /// A whole number in [low, high].
+  std::int64_t integer(const char* what, std::int64_t low, std::int64_t high);
+  /// A number of things, each of which takes at least `words` words of what is left of the file.
+  std::int64_t count(const char* what, std::int64_t words);
+  /// A region or boundary tag.
+  Index tag();
+  /// A finite number.
+  double number(const char* what);
+  Vec3 point();
+  void skip_words(std::int64_t count, const char* what);
+
+  /// What is left of the line, without its end.
+  std::string_view rest_of_line();
+
+  /// Throws Error about the word read last.
+  [[noreturn]] void fail(const std::string& what, const std::string& hint) const;
+  [[noreturn]] void fail(const std::string& what) const;
+
+ private:
+  void skip_space();
+  [[noreturn]] void fail_on(std::string_view word, const char* what) const;
+
+  std::filesystem::path file_;
+  std::string text_;
+  char comment_;
+  std::size_t position_ = 0;
+  std::int64_t line_ = 1;       // of position_
+  std::int64_t word_line_ = 1;  // of the word read last
+};
+
+}  // namespace palpate

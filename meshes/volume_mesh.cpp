@@ -1,0 +1,43 @@
+#include "meshes/volume_mesh.h"
+
+#include <fmt/format.h>
+
+#include "meshes/error.h"
+#include "meshes/volume_mesh_readers.h"
+
+namespace palpate {
+namespace {
+
+std::filesystem::path with_ending(std::filesystem::path stem, const char* ending) {
+  return stem += ending;
+}
+
+}  // namespace
+
+Mesh read_volume_mesh(const std::filesystem::path& file) {
+  const std::string extension = file.extension().string();
+  if (extension == ".msh") return read_gmsh(file);
+  if (extension == ".mesh") return read_medit(file);
+  if (extension == ".vtk") return read_vtk_legacy(file);
+  if (extension == ".node" || extension == ".ele")
+    return read_tetgen(std::filesystem::path(file).replace_extension());
+  if (std::filesystem::exists(with_ending(file, ".node"))) return read_tetgen(file);
+  throw Error(fmt::format("the extension '{}' is not one of a volume mesh that can be read", extension),
+              file.string(),
+              "Known are .msh (Gmsh 2.2 or 4.1), .mesh (Medit), .node and .ele (TetGen), .vtk (legacy), all "
+              "as text.");
+}
+
+void check_not_empty(const Mesh& mesh, const TextReader& reader) {
+  if (mesh.nodes.empty()) reader.fail("the file has no nodes");
+  if (mesh.tets.empty()) {
+    reader.fail("the file has no tetrahedra", "Save the volume elements, not only the surface.");
+  }
+}
+
+void fail_not_tet4(const TextReader& reader, const std::string& kind) {
+  reader.fail(fmt::format("the file has {}; only linear tetrahedra (four nodes) are read", kind),
+              "Mesh the body with tetrahedra of first order.");
+}
+
+}  // namespace palpate

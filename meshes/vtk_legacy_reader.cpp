@@ -1,0 +1,157 @@
+// Legacy VTK unstructured grids (ASCII), both layouts of CELLS: counted lists (up to 4.x) and OFFSETS with
+// CONNECTIVITY (5.x). Format: VTK User's Guide, "VTK File Formats".
+#include <fmt/format.h>
+
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <string>
+
+#include "meshes/volume_mesh_readers.h"
+
+namespace palpate {
+namespace {
+
+enum CellType : std::int64_t {
+  vertex = 1,
+  poly_vertex = 2,
+  line = 3,
+  poly_line = 4,
+  triangle = 5,
+  tetra = 10
+};
+
+/// Node lists of all cells, whatever their type.
+struct Cells {
+  std::vector<Index> nodes;
+  std::vector<std::size_t> offsets = {0};  // [cells + 1] into nodes
+};
+
+void read_header(TextReader& reader) {
+  if (!reader.rest_of_line().starts_with("# vtk DataFile Version")) {
+    reader.fail("the first line is not '# vtk DataFile Version ...'", "Give a legacy VTK file (.vtk).");
+  }
+  reader.rest_of_line();  // title
+  const std::string encoding(reader.word("ASCII"));
+  if (encoding == "BINARY") reader.fail("the file is binary; only text is read", "Save it as ASCII.");
+  if (encoding != "ASCII") reader.fail("the third line is neither ASCII nor BINARY");
+}
+
+std::vector<Vec3> read_points(TextReader& reader) {
+  std::vector<Vec3> points(static_cast<std::size_t>(reader.count("the number of points", 3)));
+  reader.word("the type of the coordinates");
+  for (Vec3& x : points) x = reader.point();
+  return points;
+}
+
+Index read_node(TextReader& reader, std::size_t points) {
+  return static_cast<Index>(reader.integer("a node number", 0, static_cast<std::int64_t>(points) - 1));
+}
+
+Cells read_counted_lists(TextReader& reader, std::int64_t cell_count, std::size_t points) {
+  Cells cells;
+  for (std::int64_t cell = 0; cell < cell_count; ++cell) {
+    const std::int64_t corners = reader.count("the number of nodes of a cell", 1);
+    for (std::int64_t i = 0; i < corners; ++i) cells.nodes.push_back(read_node(reader, points));
+    cells.offsets.push_back(cells.nodes.size());
+  }
+  return cells;
+}
+
+Cells read_offsets_and_connectivity(TextReader& reader, std::int64_t offset_count, std::int64_t size,
+                                    std::size_t points) {
+  Cells cells;
+  reader.expect("OFFSETS");
+  reader.word("the type of the offsets");
+  for (std::int64_t i = 0; i < offset_count; ++i) {
+    const auto before = static_cast<std::int64_t>(cells.offsets.back());
+    const std::int64_t offset = reader.integer("an offset", i == 0 ? 0 : before, i == 0 ? 0 : size);
+    if (i > 0) cells.offsets.push_back(static_cast<std::size_t>(offset));
+  }
+  reader.expect("CONNECTIVITY");
+  reader.word("the type of the connectivity");
+  for (std::int64_t i = 0; i < size; ++i) cells.nodes.push_back(read_node(reader, points));
+  return cells;
+}
+
+Cells read_cells(TextReader& reader, std::size_t points) {
+  const std::int64_t count = reader.count("the number of cells", 1),
+                     size = reader.count("the size of the cell list", 1);
+  if (reader.peek() == "OFFSETS") return read_offsets_and_connectivity(reader, count, size, points);
+  return read_counted_lists(reader, count, points);
+}
+
+/// Takes the tetrahedra among the cells while reading their types.
+void read_types(TextReader& reader, const Cells& cells, Mesh& mesh) {
+  const std::int64_t count = reader.count("the number of cell types", 1);
+  if (count != static_cast<std::int64_t>(cells.offsets.size()) - 1) {
+    reader.fail(fmt::format("there are {} cell types for {} cells", count, cells.offsets.size() - 1));
+  }
+  for (std::size_t cell = 0; cell + 1 < cells.offsets.size(); ++cell) {
+    const std::int64_t type = reader.integer("a cell type");
+    if (type >= vertex && type <= triangle) continue;
+    if (type != tetra) fail_not_tet4(reader, fmt::format("cells of type {}", type));
+    const std::size_t first = cells.offsets[cell];
+    if (cells.offsets[cell + 1] - first != 4) {
+      reader.fail(fmt::format("cell {} is a tetrahedron of {} nodes", cell, cells.offsets[cell + 1] - first));
+    }
+    mesh.tets.push_back(
+        {cells.nodes[first], cells.nodes[first + 1], cells.nodes[first + 2], cells.nodes[first + 3]});
+  }
+}
+
+/// Arrays that belong to the whole file (time, cycle).
+void skip_field(TextReader& reader) {
+  reader.word("the field's name");
+  const std::int64_t arrays = reader.count("the number of arrays", 1);
+  for (std::int64_t i = 0; i < arrays; ++i) {
+    reader.word("an array's name");
+    const std::int64_t components = reader.count("the number of components", 1);
+    const std::int64_t tuples = reader.count("the number of tuples", components);
+    reader.word("an array's type");
+    reader.skip_words(components * tuples, "a field value");
+  }
+}
+
+/// METADATA ends with an empty line.
+void skip_metadata(TextReader& reader) {
+  reader.rest_of_line();
+  while (!reader.rest_of_line().empty()) {
+  }
+}
+
+}  // namespace
+
+Mesh read_vtk_legacy(const std::filesystem::path& file) {
+  TextReader reader(file);
+  read_header(reader);
+  reader.expect("DATASET");
+  if (const std::string kind(reader.word("UNSTRUCTURED_GRID")); kind != "UNSTRUCTURED_GRID") {
+    reader.fail("the file holds a " + kind + ", not an UNSTRUCTURED_GRID",
+                "Save the volume mesh as unstructured grid.");
+  }
+  Mesh mesh;
+  std::optional<Cells> cells;
+  while (!reader.at_end() && reader.peek() != "POINT_DATA" && reader.peek() != "CELL_DATA") {
+    const std::string keyword(reader.word("a keyword"));
+    if (keyword == "POINTS") {
+      mesh.nodes = read_points(reader);
+    } else if (keyword == "CELLS") {
+      cells = read_cells(reader, mesh.nodes.size());
+    } else if (keyword == "CELL_TYPES") {
+      if (!cells) reader.fail("CELL_TYPES stands before CELLS");
+      read_types(reader, *cells, mesh);
+    } else if (keyword == "FIELD") {
+      skip_field(reader);
+    } else if (keyword == "METADATA") {
+      skip_metadata(reader);
+    } else {
+      reader.fail("'" + keyword.substr(0, 40) + "' stands where POINTS, CELLS or CELL_TYPES should be");
+    }
+  }
+  check_not_empty(mesh, reader);
+  mesh.regions.assign(mesh.tets.size(), 0);
+  return mesh;
+}
+
+}  // namespace palpate

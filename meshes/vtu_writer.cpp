@@ -1,0 +1,126 @@
+#include "meshes/vtu_writer.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cstring>
+#include <fstream>
+#include <numeric>
+#include <system_error>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "the raw numbers are written as they are in memory");
+
+/// The XML head and the raw data that it points into.
+class Document {
+ public:
+  template <class Number>
+  void add_array(const char* type, const std::string& name, int components, std::span<const Number> values) {
+    xml_ += fmt::format(
+        "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" offset=\"{}\"/>\n",
+        type, name, components, raw_.size());
+    const std::uint64_t bytes = values.size_bytes();
+    append(&bytes, sizeof bytes);
+    append(values.data(), bytes);
+  }
+  void add(const std::string& xml) { xml_ += xml; }
+
+  void write(std::ostream& stream) const {
+    stream << xml_ << "<AppendedData encoding=\"raw\">\n_";
+    stream.write(raw_.data(), static_cast<std::streamsize>(raw_.size()));
+    stream << "\n</AppendedData>\n</VTKFile>\n";
+  }
+
+ private:
+  void append(const void* data, std::size_t bytes) {
+    if (bytes > 0) raw_.append(static_cast<const char*>(data), bytes);
+  }
+
+  std::string xml_;
+  std::string raw_;
+};
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
+    }
+  }
+  return result;
+}
+
+template <std::size_t N>
+void add_cells(Document& document, std::span<const std::array<Index, N>> cells, std::uint8_t vtk_type) {
+  std::vector<std::int64_t> offsets(cells.size());
+  for (std::size_t i = 0; i < cells.size(); ++i) offsets[i] = static_cast<std::int64_t>(N * (i + 1));
+  const std::vector<std::uint8_t> types(cells.size(), vtk_type);
+  document.add("<Cells>\n");
+  document.add_array<Index>("Int32", "connectivity", 1,
+                            {cells.empty() ? nullptr : cells.data()->data(), N * cells.size()});
+  document.add_array<std::int64_t>("Int64", "offsets", 1, offsets);
+  document.add_array<std::uint8_t>("UInt8", "types", 1, types);
+  document.add("</Cells>\n");
+}
+
+Document make_document(std::span<const Vec3> nodes, std::span<const Tet> tets,
+                       std::span<const Triangle> triangles, std::span<const NodalField> fields) {
+  Document document;
+  document.add(
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n");
+  document.add(fmt::format("<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
+                           nodes.size(), tets.size() + triangles.size()));
+  document.add("<PointData>\n");
+  for (const NodalField& field : fields) {
+    document.add_array<double>("Float64", escaped(field.name), field.components, field.values);
+  }
+  document.add("</PointData>\n<Points>\n");
+  document.add_array<double>("Float64", "Points", 3,
+                             {nodes.empty() ? nullptr : nodes.data()->data(), 3 * nodes.size()});
+  document.add("</Points>\n");
+  if (tets.empty()) {
+    add_cells<3>(document, triangles, 5);
+  } else {
+    add_cells<4>(document, tets, 10);
+  }
+  document.add("</Piece>\n</UnstructuredGrid>\n");
+  return document;
+}
+
+}  // namespace
+
+void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, std::span<const Tet> tets,
+               std::span<const Triangle> triangles, std::span<const NodalField> fields) {
+  const Document document = make_document(nodes, tets, triangles, fields);
+  std::filesystem::path partial = file;
+  partial += ".partial";
+  std::ofstream stream(partial, std::ios::binary);
+  document.write(stream);
+  stream.close();
+  std::error_code problem;
+  if (stream) std::filesystem::rename(partial, file, problem);
+  if (stream && !problem) return;
+  const std::string reason = problem ? problem.message() : std::strerror(errno);
+  std::filesystem::remove(partial, problem);
+  throw Error("cannot write the file: " + reason, file.string(),
+              "Check the folder, your right to write there and the free space.");
+}
+
+}  // namespace palpate
