@@ -147,7 +147,7 @@ int read_format(TextReader& reader) {
   reader.expect("$MeshFormat");
   const std::string version(reader.word("the format's version"));
   if (version != "2.2" && version != "2.1" && version != "2" && version != "4.1") {
-    reader.fail("the Gmsh format's version is " + version.substr(0, 40) + ", but only 2.2 and 4.1 are read",
+    reader.fail(fmt::format("the Gmsh format's version is {:.40}, but only 2.2 and 4.1 are read", version),
                 "Write it again: gmsh -save -format msh41 -o new.msh old.msh");
   }
   if (reader.integer("the file type", 0, 1) == 1) {
@@ -171,12 +171,12 @@ Mesh read_gmsh(const std::filesystem::path& file) {
   GmshMesh gmsh;
   while (!reader.at_end()) {
     const std::string name(reader.word("a section"));
-    if (name.front() != '$') reader.fail("'" + name.substr(0, 40) + "' stands where a section should begin");
-    const std::string end = "$End" + name.substr(1);
+    if (name.front() != '$') reader.fail_on(name, "a section");
+    const std::string end = fmt::format("$End{}", name.substr(1));
     if (name == "$Nodes") {
-      version == 4 ? read_nodes_4(reader, gmsh) : read_nodes_2(reader, gmsh);
+      (version == 4 ? read_nodes_4 : read_nodes_2)(reader, gmsh);
     } else if (name == "$Elements") {
-      version == 4 ? read_elements_4(reader, gmsh) : read_elements_2(reader, gmsh);
+      (version == 4 ? read_elements_4 : read_elements_2)(reader, gmsh);
     } else if (name == "$Entities" && version == 4) {
       read_entities(reader, gmsh);
     } else {

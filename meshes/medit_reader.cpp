@@ -69,7 +69,7 @@ Mesh read_medit(const std::filesystem::path& file) {
     } else if (std::isalpha(static_cast<unsigned char>(keyword.front())) != 0) {
       skip_section(reader);
     } else {
-      reader.fail("'" + keyword.substr(0, 40) + "' stands where a keyword should be");
+      reader.fail_on(keyword, "a keyword");
     }
   }
   check_not_empty(mesh, reader);

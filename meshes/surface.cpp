@@ -19,6 +19,13 @@ struct Face {
   Triangle outward;
 };
 
+constexpr const char* remove_overlap = "Remove the elements that overlap or stand twice in the mesh.";
+
+/// The same three nodes, in the same sense of rotation.
+bool same_sense(const Triangle& a, const Triangle& b) {
+  return a == b || a == Triangle{b[1], b[2], b[0]} || a == Triangle{b[2], b[0], b[1]};
+}
+
 std::vector<Face> all_faces(const Mesh& mesh) {
   std::vector<Face> faces;
   faces.reserve(4 * mesh.tets.size());
@@ -37,16 +44,20 @@ std::vector<Face> all_faces(const Mesh& mesh) {
 
 Surface extract_surface(const Mesh& mesh) {
   std::vector<Face> faces = all_faces(mesh);
-  // Stable, so that the triangles keep the order of the elements.
-  std::stable_sort(faces.begin(), faces.end(),
-                   [](const Face& a, const Face& b) { return a.sorted < b.sorted; });
+  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.sorted < b.sorted; });
   Surface surface;
   for (auto face = faces.begin(); face != faces.end();) {
     const auto end = std::find_if(face, faces.end(), [&](const Face& f) { return f.sorted != face->sorted; });
     if (end - face > 2) {
       throw Error(fmt::format("{} elements share the face of nodes {}, {}, {}", end - face, face->sorted[0],
                               face->sorted[1], face->sorted[2]),
-                  "mesh", "Remove the elements that overlap or stand twice in the mesh.");
+                  "mesh", remove_overlap);
+    }
+    if (end - face == 2 && same_sense(face[0].outward, face[1].outward)) {
+      throw Error(
+          fmt::format("two elements overlap: they are on the same side of the face of nodes {}, {}, {}",
+                      face->sorted[0], face->sorted[1], face->sorted[2]),
+          "mesh", remove_overlap);
     }
     if (end - face == 1) surface.triangles.push_back(face->outward);
     face = end;

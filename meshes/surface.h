@@ -12,7 +12,7 @@ struct Surface {
 };
 
 /// Extracts the boundary. Expects positively oriented elements; throws Error where more than two elements
-/// share a face.
+/// share a face, or two are on the same side of it.
 Surface extract_surface(const Mesh& mesh);
 
 /// For each mesh node, the smallest number of elements between it and the surface: 0 on the surface, 1 for

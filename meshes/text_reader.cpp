@@ -127,8 +127,8 @@ std::int64_t TextReader::count(const char* what, std::int64_t words) {
 }
 
 Index TextReader::tag() {
-  using Limits = std::numeric_limits<Index>;
-  return static_cast<Index>(integer("a tag", Limits::min(), Limits::max()));
+  constexpr Index limit = std::numeric_limits<Index>::max();
+  return static_cast<Index>(integer("a tag", -limit, limit));
 }
 
 double TextReader::number(const char* what) {
@@ -170,8 +170,8 @@ void TextReader::fail(const std::string& what) const {
   fail(what, remake);
 }
 
-void TextReader::fail_on(std::string_view word, const char* what) const {
-  fail(fmt::format("'{}' stands where {} should be", shown(word), what));
+void TextReader::fail_on(std::string_view found, const char* what) const {
+  fail(fmt::format("'{}' stands where {} should be", shown(found), what));
 }
 
 }  // namespace palpate

@@ -42,10 +42,11 @@ class TextReader {
   /// Throws Error about the word read last.
   [[noreturn]] void fail(const std::string& what, const std::string& hint) const;
   [[noreturn]] void fail(const std::string& what) const;
+  /// Throws Error: `found` stands where `what` should be.
+  [[noreturn]] void fail_on(std::string_view found, const char* what) const;
 
  private:
   void skip_space();
-  [[noreturn]] void fail_on(std::string_view word, const char* what) const;
 
   std::filesystem::path file_;
   std::string text_;

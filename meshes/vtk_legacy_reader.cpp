@@ -2,8 +2,6 @@
 // CONNECTIVITY (5.x). Format: VTK User's Guide, "VTK File Formats".
 #include <fmt/format.h>
 
-#include <limits>
-#include <numeric>
 #include <optional>
 #include <string>
 
@@ -63,10 +61,10 @@ Cells read_offsets_and_connectivity(TextReader& reader, std::int64_t offset_coun
   Cells cells;
   reader.expect("OFFSETS");
   reader.word("the type of the offsets");
-  for (std::int64_t i = 0; i < offset_count; ++i) {
+  reader.integer("the first offset", 0, 0);
+  for (std::int64_t i = 1; i < offset_count; ++i) {
     const auto before = static_cast<std::int64_t>(cells.offsets.back());
-    const std::int64_t offset = reader.integer("an offset", i == 0 ? 0 : before, i == 0 ? 0 : size);
-    if (i > 0) cells.offsets.push_back(static_cast<std::size_t>(offset));
+    cells.offsets.push_back(static_cast<std::size_t>(reader.integer("an offset", before, size)));
   }
   reader.expect("CONNECTIVITY");
   reader.word("the type of the connectivity");
@@ -127,7 +125,7 @@ Mesh read_vtk_legacy(const std::filesystem::path& file) {
   read_header(reader);
   reader.expect("DATASET");
   if (const std::string kind(reader.word("UNSTRUCTURED_GRID")); kind != "UNSTRUCTURED_GRID") {
-    reader.fail("the file holds a " + kind + ", not an UNSTRUCTURED_GRID",
+    reader.fail(fmt::format("the file holds a {:.40}, not an UNSTRUCTURED_GRID", kind),
                 "Save the volume mesh as unstructured grid.");
   }
   Mesh mesh;
@@ -146,7 +144,7 @@ Mesh read_vtk_legacy(const std::filesystem::path& file) {
     } else if (keyword == "METADATA") {
       skip_metadata(reader);
     } else {
-      reader.fail("'" + keyword.substr(0, 40) + "' stands where POINTS, CELLS or CELL_TYPES should be");
+      reader.fail_on(keyword, "POINTS, CELLS or CELL_TYPES");
     }
   }
   check_not_empty(mesh, reader);

@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <cstring>
+#include <cerrno>
 #include <fstream>
-#include <numeric>
 #include <system_error>
 
 #include "meshes/error.h"
@@ -117,7 +116,7 @@ void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, s
   std::error_code problem;
   if (stream) std::filesystem::rename(partial, file, problem);
   if (stream && !problem) return;
-  const std::string reason = problem ? problem.message() : std::strerror(errno);
+  const std::string reason = problem ? problem.message() : std::system_category().message(errno);
   std::filesystem::remove(partial, problem);
   throw Error("cannot write the file: " + reason, file.string(),
               "Check the folder, your right to write there and the free space.");

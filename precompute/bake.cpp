@@ -134,7 +134,7 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   for (const std::string& note : body.notes) progress.line("note: " + note);
 
   const Stiffness stiffness = assemble_stiffness(body.mesh, description.material, body.fixed);
-  openblas_set_num_threads(options.jobs);
+  openblas_set_num_threads(1);  // the blocks of columns are the parallel work, and the bytes do not depend on the jobs
   Factor factor(stiffness.K);
   const GreensSolver solver(factor, stored_dof_marks(body.mesh, stiffness, description.scope, description.layers));
   const Plan plan = make_plan(body.mesh, factor, solver, description.precision, options.jobs);
@@ -144,7 +144,6 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
 
   factor.factorize();
   progress.line("K factorised");
-  openblas_set_num_threads(1);  // the blocks are the parallel work
   const Model model = describe_model(description, options, std::move(body), stiffness, solver);
   const InterruptGuard interrupt;
   ModelWriter writer(options.output, model, description.precision);

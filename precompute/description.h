@@ -35,14 +35,13 @@ using Geometry =
 
 /// How the volume is meshed. Lengths in metres after scaling.
 struct MeshOptions {
-  std::optional<double>
-      edge_length;       ///< target edge length at the surface [m]; surfaces: kept as they are without it
+  /// Target at the surface [m]. Required for images and with remesh; otherwise the mean edge of the surface.
+  std::optional<double> edge_length;
   bool remesh = false;   ///< surfaces: isotropic remeshing to edge_length before meshing
   double grading = 0.5;  ///< growth of the target edge length per length below the surface [-]; 0 is uniform
-  double radius_edge = 2.0;   ///< bound on circumradius / shortest edge
-  double min_dihedral = 0.0;  ///< bound asked of the mesher [degree] (TetGen)
-  double facet_distance =
-      0.0;  ///< images: surface approximation error [m]; 0 is a default from the voxel size
+  double radius_edge = 2.0;     ///< bound on circumradius / shortest edge [-]
+  double min_dihedral = 10.0;   ///< surfaces: bound asked of TetGen [degree]
+  double facet_distance = 0.0;  ///< images: surface approximation error [m]; 0 is the largest side of a voxel
 };
 
 /// The whole model.toml, checked.

@@ -6,6 +6,11 @@
 #include <cstdio>
 
 namespace palpate {
+namespace {
+
+constexpr double seconds_between_lines = 5.0;  // where lines cannot be rewritten
+
+}  // namespace
 
 Progress::Progress() : start_(Clock::now()), step_start_(start_), terminal_(isatty(STDERR_FILENO) != 0) {}
 
@@ -22,11 +27,13 @@ void Progress::step(const std::string& name, double share) {
     step_name_ = name;
     step_start_ = Clock::now();
     last_percent_ = -1;
+    next_line_ = seconds_between_lines;
   }
   const int percent = static_cast<int>(100.0 * share);
-  if (percent == last_percent_ || (!terminal_ && percent / 10 == last_percent_ / 10 && last_percent_ >= 0)) return;
-  last_percent_ = percent;
   const double spent = std::chrono::duration<double>(Clock::now() - step_start_).count();
+  if (percent == last_percent_ || (!terminal_ && percent < 100 && spent < next_line_)) return;
+  last_percent_ = percent;
+  next_line_ = spent + seconds_between_lines;
   const std::string left = share > 0.0 ? fmt::format(", {:.0f} s left", spent * (1.0 - share) / share) : "";
   const std::string text = fmt::format("{}: {} %{}", name, percent, left);
   if (!terminal_) {

@@ -6,7 +6,7 @@
 
 namespace palpate {
 
-/// Progress on standard error: a line that is rewritten on a terminal, a line every ten per cent elsewhere.
+/// Progress on standard error: a line that is rewritten on a terminal, a line every few seconds elsewhere.
 class Progress {
  public:
   Progress();
@@ -24,6 +24,7 @@ class Progress {
   Clock::time_point start_, step_start_;
   std::string step_name_;
   int last_percent_ = -1;
+  double next_line_ = 0.0;
   bool terminal_;
   bool open_line_ = false;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "meshes/error.h"
@@ -238,9 +239,14 @@ void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::s
   }
 }
 
-DistanceField::DistanceField(const VoxelBody& body) : grid_(body), distance_(distance_to(body, 0)) {
+std::vector<float> signed_distances(const VoxelBody& body) {
+  std::vector<float> distance = distance_to(body, 0);
   const std::vector<float> outside = distance_to(body, 1);
-  std::transform(distance_.begin(), distance_.end(), outside.begin(), distance_.begin(), std::minus<>());
+  std::transform(distance.begin(), distance.end(), outside.begin(), distance.begin(), std::minus<>());
+  return distance;
+}
+
+DistanceField::DistanceField(const VoxelBody& body) : grid_(body), distance_(signed_distances(body)) {
   grid_.inside.clear();
   smooth(grid_, distance_);  // voxels that touch along an edge would make the zero set cross itself
 }

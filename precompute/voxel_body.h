@@ -34,13 +34,15 @@ VoxelBody crop(const VoxelBody& body, Index margin);
 /// is left. Needs an empty rim, as crop leaves it.
 void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::string>& notes);
 
-/// Signed distance to the body's boundary, positive inside, smoothed over neighbouring voxels, linear between
-/// voxel centres.
+/// Exact Euclidean distances between voxel centres, with sign: for voxels of body that to the nearest empty
+/// one, for empty ones minus that to the nearest voxel of body (Felzenszwalb and Huttenlocher, Distance
+/// transforms of sampled functions, 2012).
+std::vector<float> signed_distances(const VoxelBody& body);
+
+/// Distance below the body's boundary, negative outside: signed_distances smoothed over neighbouring voxels,
+/// linear between voxel centres.
 class DistanceField {
  public:
-  /// Exact Euclidean distances between voxel centres (Felzenszwalb and Huttenlocher, Distance transforms of
-  /// sampled functions, 2012): inside, that to the nearest empty voxel, outside, minus that to the nearest
-  /// voxel of body.
   explicit DistanceField(const VoxelBody& body);
 
   /// At a point in the image's length unit; beyond the grid, the value at its rim.

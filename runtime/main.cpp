@@ -33,7 +33,7 @@ struct Arguments {
 };
 
 void add_file(CLI::App& command, Arguments& arguments) {
-  command.add_option("FILE", arguments.file, "baked model, NAME.palpate.hdf")->required();
+  command.add_option("FILE", arguments.file, "baked model, NAME.palpate.hdf")->required()->type_name("");
   command
       .add_option("--model", arguments.model_toml, "fail unless FILE was made from exactly this model.toml")
       ->type_name("FILE");
@@ -51,7 +51,7 @@ CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
                  "the free surface node nearest to this place [m]; repeatable");
   add_repeatable(*probe, "--node", arguments.node, "N", "the node with this number in the mesh; repeatable");
   add_repeatable(*probe, "--displace", arguments.displace, "DX,DY,DZ",
-                 "its displacement [m]; one for each --at and --node, in their order")
+                 "its displacement [m]; one for each --at and --node, in the same order")
       ->required();
   probe->add_flag("--json", arguments.json, "print JSON");
   probe->add_option("--field", arguments.field, "write the displacement of all stored nodes")
@@ -159,7 +159,9 @@ int run(int argc, char** argv) {
                   .field = arguments.field});
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "error: {}\nhint: see palpate-runtime --help\n", error.what());
+    const std::string command =
+        app.get_subcommands().empty() ? "" : app.get_subcommands().front()->get_name() + " ";
+    fmt::print(stderr, "error: {}\nhint: see palpate-runtime {}--help\n", error.what(), command);
     return exit_usage;
   }
 }

@@ -100,6 +100,19 @@ const Edit edits[] = {
        replace(p, "/mesh/nodes", H5T_IEEE_F64LE, {0, 3});
      },
      {"/mesh/nodes has 0 entries, at least 4"}},
+    {"HugeSize",
+     [](const Path& p) {
+       replace(p, "/mesh/nodes", H5T_IEEE_F64LE, {1 << 27, 3});
+     },
+     {"/mesh/nodes", "needs 3221225472 bytes, more than the file holds"}},
+    {"ImpossibleSize",
+     [](const Path& p) { replace(p, "/model_toml", H5T_STD_U8LE, {(hsize_t{1} << 62)}); },
+     {"/model_toml", "more than the file holds"}},
+    {"TooManyNodes",
+     [](const Path& p) {
+       replace(p, "/mesh/nodes", H5T_IEEE_F64LE, {hsize_t{1} << 40, 3});
+     },
+     {"/mesh/nodes", "more than the file holds"}},
     {"TooShort",
      [](const Path& p) { replace(p, "/dofs/fixed", H5T_STD_U8LE, {26}); },
      {"/dofs/fixed has size 26, 27 is expected by /mesh/nodes"}},

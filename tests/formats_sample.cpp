@@ -37,12 +37,13 @@ bool same_quality(const QualityReport& a, const QualityReport& b) {
 
 }  // namespace
 
-Model sample_model() {
+Model sample_model(int cells) {
   Model model;
   model.name = "sample";
   model.generator = "formats_test 0";
   model.model_toml = "name = \"sample\"\n# Länge in m\n";
-  model.mesh = generate(BoxShape{.origin = Vec3(0.1, 0.2, 0.3), .size = Vec3(1, 2, 3), .cells = {2, 2, 2}});
+  model.mesh = generate(
+      BoxShape{.origin = Vec3(0.1, 0.2, 0.3), .size = Vec3(1, 2, 3), .cells = {cells, cells, cells}});
   for (std::size_t e = 0; e < model.mesh.regions.size(); ++e)
     model.mesh.regions[e] = static_cast<Index>(e % 3) - 1;
   model.surface_triangles = extract_surface(model.mesh).triangles;
@@ -59,10 +60,10 @@ Model sample_model() {
   model.quality.min_edge = 0.7;
   model.quality.max_edge = 1.8;
   model.quality.volume = 6.0;
-  model.quality.worst_element = 7;
+  model.quality.worst_element = static_cast<Index>(model.mesh.tets.size()) - 1;
   model.quality.worst_centroid = Vec3(0.5, 1, 2);
   for (std::size_t i = 0; i < model.quality.dihedral_histogram.size(); ++i)
-    model.quality.dihedral_histogram[i] = static_cast<std::int64_t>(3 * i);
+    model.quality.dihedral_histogram[i] = static_cast<std::int64_t>(i);
   model.sources = {{"model", "model.toml", 12, "00112233445566778899aabbccddeeff"},
                    {"geometry", "../with space/box.off", 345, "ffeeddccbbaa99887766554433221100"}};
   const auto n = static_cast<std::size_t>(model.stored_dofs());
@@ -89,12 +90,12 @@ std::vector<double> sample_columns(std::int64_t first, std::int64_t count, std::
   return packed;
 }
 
-Model write_sample(const std::filesystem::path& path, Precision precision) {
-  Model model = sample_model();
-  const std::int64_t n = model.stored_dofs();
+Model write_sample(const std::filesystem::path& path, Precision precision, int cells) {
+  Model model = sample_model(cells);
+  const std::int64_t n = model.stored_dofs(), middle = n / 3;
   ModelWriter writer(path, model, precision);
-  writer.write_columns(20, n - 20, sample_columns(20, n - 20, n));
-  writer.write_columns(0, 20, sample_columns(0, 20, n));
+  writer.write_columns(middle, n - middle, sample_columns(middle, n - middle, n));
+  writer.write_columns(0, middle, sample_columns(0, middle, n));
   writer.finish(model.probes);
   return model;
 }

@@ -22,7 +22,8 @@ double sample_entry(std::int64_t i, std::int64_t j);
 std::vector<double> sample_columns(std::int64_t first, std::int64_t count, std::int64_t order);
 
 /// Writes the whole of `sample_model` and returns what was written.
-Model write_sample(const std::filesystem::path& path, Precision precision = Precision::double_precision);
+Model write_sample(const std::filesystem::path& path, Precision precision = Precision::double_precision,
+                   int cells = 2);
 
 /// An empty folder that goes when the test ends.
 class Folder {

@@ -26,7 +26,7 @@ bool set_entry(const std::filesystem::path& path, const std::string& dataset, st
 }
 
 /// Puts a dataset of zeros (or of `bytes`) with this type and shape in the place of another; `chunked` stores
-/// it in pieces.
+/// it in pieces. More than a million entries are claimed and not stored.
 void replace(const std::filesystem::path& path, const std::string& dataset, hid_t type,
              const std::vector<hsize_t>& dims, const void* bytes = nullptr, bool chunked = false);
 

@@ -1,7 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
 
+#include "meshes/error.h"
 #include "runtime/loop.h"
 #include "tests/runtime_model.h"
 
@@ -55,6 +60,45 @@ TEST_F(Loop, StopsWhenAsked) {
       run_loop(body_, state_, ScriptDevice::parse(press, "press.csv"), nullptr, false, stop_);
   EXPECT_TRUE(report.interrupted);
   EXPECT_EQ(report.ticks, 0);
+}
+
+std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+// 70 s: more ticks than the recorder's ring holds.
+TEST_F(Loop, FastRunsLeaveTheSameRecordingToTheLastBit) {
+  const ScriptDevice device = ScriptDevice::parse("t,x,y,z\n0,0.5,0.5,1\n70,0.5,0.4,0.9\n", "long.csv");
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / "palpate_runtime_recordings";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directory(folder);
+  for (const char* name : {"one.h5", "two.h5"}) {
+    State state({.reach = 0.01, .max_nodes = 1});
+    Recorder recorder(folder / name, "box.palpate.hdf", "0123");
+    EXPECT_EQ(run_loop(body_, state, device, &recorder, true, stop_).ticks, 70001);
+    recorder.finish();
+    EXPECT_EQ(recorder.dropped(), 0);
+  }
+  const std::string one = bytes_of(folder / "one.h5");
+  EXPECT_GT(one.size(), 70001U * 90U);
+  EXPECT_TRUE(one == bytes_of(folder / "two.h5"));
+  { const Recorder abandoned(folder / "three.h5", "box.palpate.hdf", "0123"); }
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    files += entry.is_regular_file() ? 1 : 0;
+  EXPECT_EQ(files, 2U) << "something half-written was left";
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Recorder, SaysWhereItCannotWrite) {
+  try {
+    const Recorder recorder("no/such/folder/out.h5", "box.palpate.hdf", "0123");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.where().find("out.h5"), std::string::npos) << error.where();
+  }
 }
 
 TEST(CountTicks, CountsTheLastRow) {

@@ -1,0 +1,144 @@
+// libFuzzer target: whatever lies in a file, load_model either throws Error or returns a model that the tick
+// can trust.
+#include <fuzzer/FuzzedDataProvider.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <set>
+
+#include "formats/hdf5.h"
+#include "formats/model_file.h"
+#include "meshes/error.h"
+#include "tests/formats_sample.h"
+#include "tests/formats_tamper.h"
+#include "tests/fuzz/fuzz_input.h"
+
+namespace palpate::test {
+namespace {
+
+struct Good {
+  Folder folder;
+  std::filesystem::path path = folder / "x.palpate.hdf";
+  std::string bytes;
+  std::vector<std::string> datasets;
+  std::vector<std::string> attributes = {"format",    "version", "units", "dimension", "scalar",
+                                         "generator", "name",    "scope", "layers",    "new"};
+  Good() {
+    write_sample(path, Precision::double_precision, 1);
+    bytes = read_bytes(path);
+    datasets = checked_datasets(path);
+    datasets.emplace_back("/mesh/new");
+  }
+};
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+bool is_node(const Model& model, Index node) {
+  return node >= 0 && static_cast<std::size_t>(node) < model.mesh.nodes.size();
+}
+
+/// What the runtime takes for granted.
+void use(const Model& model) {
+  require(model.fixed.size() == model.mesh.nodes.size() &&
+          model.mesh.regions.size() == model.mesh.tets.size());
+  for (const Vec3& x : model.mesh.nodes) require(x.allFinite());
+  for (const Tet& tet : model.mesh.tets)
+    for (const Index node : tet) require(is_node(model, node));
+  for (const Triangle& triangle : model.surface_triangles)
+    for (const Index node : triangle) require(is_node(model, node));
+  std::set<Index> stored;
+  for (const Index node : model.stored_nodes)
+    require(is_node(model, node) && model.fixed[static_cast<std::size_t>(node)] == 0 &&
+            stored.insert(node).second);
+  require(!stored.empty() && model.greens.order() == model.stored_dofs());
+  for (std::int64_t i = 0; i < model.greens.order(); ++i) {
+    require(model.greens(i, i) > 0);
+    for (std::int64_t j = 0; j <= i; ++j) require(std::isfinite(model.greens(i, j)));
+  }
+  for (const Probe& probe : model.probes)
+    require(static_cast<std::int64_t>(probe.force.size()) == model.stored_dofs() &&
+            probe.displacement.size() == probe.force.size());
+}
+
+/// Sizes near those of the file, and some that nobody can hold.
+std::vector<hsize_t> some_dims(FuzzedDataProvider& choose) {
+  std::vector<hsize_t> dims(choose.ConsumeIntegralInRange<std::size_t>(0, 5));
+  for (hsize_t& dim : dims)
+    dim = choose.ConsumeBool() ? choose.ConsumeIntegralInRange<hsize_t>(0, 100)
+                               : choose.ConsumeIntegral<std::uint32_t>();
+  return dims;
+}
+
+void edit(const Good& good, FuzzedDataProvider& choose) {
+  const auto dataset = [&] {
+    return good.datasets[choose.ConsumeIntegralInRange<std::size_t>(0, good.datasets.size() - 1)];
+  };
+  const auto attribute = [&] {
+    return good.attributes[choose.ConsumeIntegralInRange<std::size_t>(0, good.attributes.size() - 1)];
+  };
+  switch (choose.ConsumeIntegralInRange<int>(0, 9)) {
+    case 0:
+      remove_object(good.path, dataset());
+      break;
+    case 1: {
+      const hid_t types[] = {H5T_STD_U8LE,   H5T_STD_I32LE,  H5T_STD_I64LE,
+                             H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_IEEE_F64BE};
+      const auto type = types[choose.ConsumeIntegralInRange<std::size_t>(0, std::size(types) - 1)];
+      const std::string name = dataset();
+      replace(good.path, name, type, some_dims(choose));
+      break;
+    }
+    case 2:
+      replace_by_soft_link(good.path, dataset(), dataset());
+      break;
+    case 3:
+      set_text(good.path, attribute(), choose.ConsumeRandomLengthString(40));
+      break;
+    case 4: {
+      std::vector<std::int64_t> values(choose.ConsumeIntegralInRange<std::size_t>(1, 3));
+      for (std::int64_t& value : values) value = choose.ConsumeIntegral<std::int64_t>();
+      set_integers(good.path, attribute(), values);
+      break;
+    }
+    case 5:
+      remove_attribute(good.path, "/", attribute());
+      break;
+    default: {
+      const std::string name = dataset();
+      const auto at = choose.ConsumeIntegralInRange<std::uint64_t>(0, 4096);
+      const auto bytes = choose.ConsumeBytes<std::uint8_t>(choose.ConsumeIntegralInRange<std::size_t>(1, 8));
+      set_bytes(good.path, name, at, bytes.data(), bytes.size());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::test
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace palpate;
+  using namespace palpate::test;
+  static const Good good;
+  if (size == 0) return 0;
+  const hdf5::Quiet quiet;
+  if (data[0] == raw_file) {
+    write_bytes(good.path, std::string(data + 1, data + size));
+  } else {
+    write_bytes(good.path, good.bytes);
+    FuzzedDataProvider choose(data + 1, size - 1);
+    try {
+      for (int edits = 0; edits < 6 && choose.remaining_bytes() > 0; ++edits) edit(good, choose);
+      reseal(good.path);
+    } catch (const std::runtime_error&) {
+      return 0;  // HDF5 itself does not make such a file
+    }
+  }
+  try {
+    use(load_model(good.path));
+  } catch (const Error& error) {
+    require(!std::string(error.what()).empty() && !error.where().empty() && !error.hint().empty());
+  }
+  return 0;
+}

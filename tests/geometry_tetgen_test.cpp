@@ -1,0 +1,184 @@
+// TetGen in its child process.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cerrno>
+#include <csignal>
+#include <stdexcept>
+
+#include "meshes/check.h"
+#include "meshes/surface.h"
+#include "precompute/child_process.h"
+#include "precompute/tetgen_mesh.h"
+#include "tests/geometry_shapes.h"
+
+namespace palpate {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::at;
+using testing::ball;
+using testing::error_of;
+using testing::expect_mentions;
+using testing::volume;
+
+std::string child_error(const std::function<ChildResult()>& work, std::chrono::seconds limit = 20s) {
+  const std::string text = error_of([&] { run_in_child("TetGen", "organ.off", limit, work); });
+  EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1) << "a child was left";
+  EXPECT_EQ(errno, ECHILD);
+  return text;
+}
+
+TEST(ChildProcess, HandsBackALargeResult) {
+  Bytes bytes(3'000'001);
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    bytes[i] = static_cast<std::byte>(i * 2654435761U >> 13);
+  }
+  const ChildResult result = run_in_child("test", "here", 20s, [&] { return ChildResult{7, bytes}; });
+  EXPECT_EQ(result.status, 7);
+  EXPECT_EQ(result.bytes, bytes);
+}
+
+TEST(ChildProcess, CrashIsAnError) {
+  expect_mentions(child_error([]() -> ChildResult { std::abort(); }),
+                  {"organ.off: TetGen crashed (signal 6"});
+  expect_mentions(child_error([]() -> ChildResult {
+                    raise(SIGKILL);
+                    return {};
+                  }),
+                  {"TetGen crashed (signal 9", "memory"});
+}
+
+TEST(ChildProcess, ExitIsAnError) {
+  expect_mentions(child_error([]() -> ChildResult { _exit(0); }), {"TetGen gave up (exit status 0)"});
+  expect_mentions(child_error([]() -> ChildResult { _exit(3); }), {"exit status 3"});
+}
+
+TEST(ChildProcess, ExceptionIsAnError) {
+  expect_mentions(child_error([]() -> ChildResult { throw std::runtime_error("flat facet 12"); }),
+                  {"flat facet 12"});
+  expect_mentions(child_error([]() -> ChildResult { throw 3; }), {"TetGen failed"});
+}
+
+TEST(ChildProcess, EndlessWorkIsKilled) {
+  expect_mentions(child_error(
+                      []() -> ChildResult {
+                        for (;;) {
+                          pause();
+                        }
+                      },
+                      1s),
+                  {"did not finish within 1 s"});
+}
+
+TEST(ChildProcess, TerminatedChildIsAnInterruption) {
+  expect_mentions(child_error([]() -> ChildResult {
+                    raise(SIGINT);
+                    return {};
+                  }),
+                  {"interrupted"});
+}
+
+TEST(ChildProcess, ASignalToTheParentKillsTheChild) {
+  const pid_t parent = getpid();
+  struct sigaction handler {
+  }, before{};
+  handler.sa_handler = [](int) {};  // as a program that notes Ctrl-C and goes on
+  handler.sa_flags = SA_RESTART;
+  sigaction(SIGUSR1, &handler, &before);
+  const std::string text = child_error([parent]() -> ChildResult {
+    usleep(100'000);
+    kill(parent, SIGUSR1);
+    for (;;) {
+      pause();
+    }
+  });
+  sigaction(SIGUSR1, &before, nullptr);
+  expect_mentions(text, {"interrupted"});
+}
+
+TEST(ChildProcess, CannotLeaveFiles) {
+  const ChildResult result = run_in_child("test", "here", 20s, [] {
+    std::ofstream dump("dump-of-a-library");
+    return ChildResult{dump ? 1 : 0, {}};
+  });
+  EXPECT_EQ(result.status, 0);
+}
+
+TEST(ChildProcess, MeshSurvivesPacking) {
+  const Mesh mesh{{{1, 2, 3}, {4, 5, 6}}, {{0, 1, 0, 1}, {1, 0, 1, 0}}, {0, 0}, {}};
+  const Mesh back = unpack_mesh(pack(mesh));
+  EXPECT_EQ(back.nodes, mesh.nodes);
+  EXPECT_EQ(back.tets, mesh.tets);
+  EXPECT_EQ(back.regions, mesh.regions);
+}
+
+/// Mean length of the elements' edges whose middle is at most (inside) or at least (otherwise) `radius` from
+/// the origin.
+double mean_edge(const Mesh& mesh, double radius, bool inside) {
+  double sum = 0.0;
+  int count = 0;
+  for (const Tet& tet : mesh.tets) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        const Vec3 &a = mesh.nodes[at(tet[i])], &b = mesh.nodes[at(tet[j])];
+        if (((a + b).norm() / 2.0 <= radius) == inside) {
+          sum += (a - b).norm();
+          ++count;
+        }
+      }
+    }
+  }
+  return sum / count;
+}
+
+TEST(TetGen, FillsTheSurfaceAndKeepsIt) {
+  for (const TriangleSurface& surface :
+       {testing::tetrahedron(), testing::cube(), testing::fine_cube(2), ball(3)}) {
+    Mesh mesh = mesh_surface(surface, {}, "surface");
+    EXPECT_NEAR(volume(mesh), volume(surface), 1e-12);
+    orient_elements(mesh, "surface");
+    check_connected(mesh, "surface");
+    const Surface boundary = extract_surface(mesh);
+    EXPECT_EQ(boundary.triangles.size(), surface.triangles.size());
+    EXPECT_EQ(boundary.nodes.size(), surface.nodes.size());
+    for (std::size_t i = 0; i < surface.nodes.size(); ++i) {
+      EXPECT_EQ(mesh.nodes[i], surface.nodes[i]);
+    }
+  }
+}
+
+TEST(TetGen, GradesTheInterior) {
+  const TriangleSurface surface = ball(4);  // mean edge 0.066
+  const double h = mean_edge_length(surface);
+  MeshOptions options;
+  const Mesh graded = mesh_surface(surface, options, "ball");
+  options.grading = 0.0;
+  const Mesh uniform = mesh_surface(surface, options, "ball");
+
+  EXPECT_NEAR(mean_edge(uniform, 0.7, true), h, 0.15 * h);
+  EXPECT_GT(mean_edge(graded, 0.4, true), 2.0 * h);  // the target at depth 0.7 is h + 0.35, that is 6 h
+  EXPECT_LT(graded.tets.size(), uniform.tets.size() / 2);
+}
+
+TEST(TetGen, EdgeLengthIsTheTargetInside) {
+  MeshOptions options;
+  options.grading = 0.0;
+  options.edge_length = 0.1;
+  const Mesh mesh = mesh_surface(testing::fine_cube(3), options, "cube");
+  EXPECT_NEAR(mean_edge(mesh, 10.0, true), 0.1, 0.025);
+}
+
+TEST(TetGen, SelfIntersectionIsRefused) {
+  TriangleSurface surface = testing::fine_cube(1);
+  for (Vec3& x : surface.nodes) {
+    if (x == Vec3(0.5, 0.5, 1.0)) {
+      x[2] = -1.0;
+    }
+  }
+  expect_mentions(error_of([&] { mesh_surface(surface, {}, "bad.off"); }),
+                  {"bad.off", "TetGen stopped with code 3", "intersects itself"});
+}
+
+}  // namespace
+}  // namespace palpate

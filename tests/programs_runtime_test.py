@@ -1,0 +1,210 @@
+"""palpate-runtime as a person meets it: probe, play, and what they refuse."""
+
+import json
+import signal
+import subprocess
+import time
+import unittest
+
+import h5py
+import numpy
+import vtk
+
+from programs import RUNTIME, ProgramTest, cube_toml, run
+
+TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
+
+
+class Probe(ProgramTest):
+    def test_text_and_json_say_the_same(self):
+        file = self.bake(cube_toml(4))
+        question = ("--at", "0.51,0.5,1.02", "--displace", "0.01,0,-0.1")
+        answer = self.probe(file, *question)
+        (node,) = answer["nodes"]
+        self.assertEqual(node["position"], [0.5, 0.5, 1.0])
+        self.assertEqual(node["node"], 2 + 5 * 2 + 25 * 4)  # x fastest
+        self.assertAlmostEqual(node["distance"], 0.0005 ** 0.5)
+        self.assertEqual(node["displacement"], [0.01, 0, -0.1])
+        self.assertEqual(answer["total_force"], node["force"])
+        text = run(RUNTIME, "probe", file, *question).stdout
+        self.assertIn(f"node {node['node']} at (0.5, 0.5, 1) m", text)
+        for force in node["force"]:
+            self.assertIn(f"{force:.10g}", text)
+
+    def test_nodes_keep_the_order_in_which_they_were_given(self):
+        file = self.bake(cube_toml(4))
+        corner, middle = 124, 112
+        answer = self.probe(file, "--node", corner, "--at", "0.5,0.5,1", "--displace", "-0.01,0,0", "--displace", "0,0,-0.1",
+                            "--at", "0,0,1", "--displace", "0,0,0")
+        self.assertEqual([node["node"] for node in answer["nodes"]], [corner, middle, 100])
+        self.assertEqual([node["displacement"] for node in answer["nodes"]], [[-0.01, 0, 0], [0, 0, -0.1], [0, 0, 0]])
+        total = numpy.sum([node["force"] for node in answer["nodes"]], axis=0)
+        numpy.testing.assert_allclose(answer["total_force"], total)
+
+    def test_fields(self):
+        for scope, nodes, cells in (("surface", 98, 192), ("full", 125, 384)):
+            file = self.bake(cube_toml(4, scope=scope), name=f"{scope}.toml")
+            csv, vtu = self.folder / "out.csv", self.folder / "out.vtu"
+            for field in (csv, vtu):
+                self.probe(file, "--at", "0.5,0.5,1", "--displace", "0.01,0.02,-0.1", "--field", field)
+
+            rows = numpy.genfromtxt(csv, delimiter=",", names=True)
+            self.assertEqual(rows.dtype.names, ("node", "x", "y", "z", "ux", "uy", "uz"))
+            self.assertEqual(len(rows), 73 if scope == "surface" else 100)
+            held = rows[rows["node"] == 112][0]
+            numpy.testing.assert_allclose([held["ux"], held["uy"], held["uz"]], [0.01, 0.02, -0.1], atol=1e-14)
+
+            reader = vtk.vtkXMLUnstructuredGridReader()
+            reader.SetFileName(str(vtu))
+            reader.Update()
+            grid = reader.GetOutput()
+            self.assertEqual((grid.GetNumberOfPoints(), grid.GetNumberOfCells()), (nodes, cells))
+            u = grid.GetPointData().GetArray("displacement")
+            by_position = {tuple(numpy.round([row["x"], row["y"], row["z"]], 6)): [row["ux"], row["uy"], row["uz"]] for row in rows}
+            for point in range(nodes):
+                expected = by_position.get(tuple(numpy.round(grid.GetPoint(point), 6)), [0, 0, 0])  # clamped
+                numpy.testing.assert_allclose(u.GetTuple(point), expected, atol=1e-14)
+
+    def test_places_that_cannot_be_asked(self):
+        file = self.bake(cube_toml(4))
+        move = ("--displace", "0,0,-0.1")
+        self.assert_refused(run(RUNTIME, "probe", file, "--node", "0", *move), "node 0 is fixed", "fixed regions")
+        inside = 2 + 5 * 2 + 25 * 2
+        self.assert_refused(run(RUNTIME, "probe", file, "--node", inside, *move), f"node {inside}", "inside", "scope")
+        self.assert_refused(run(RUNTIME, "probe", file, "--node", "125", *move), "node 125", "0 to 124")
+        self.assert_refused(run(RUNTIME, "probe", file, "--node", "112", *move, "--at", "0.5,0.5,1", *move), "node 112", "twice")
+        self.assert_refused(run(RUNTIME, "probe", file, "--node", "112", *move, "--field", self.folder / "out.png"), "out.png", ".vtu")
+        self.assert_refused(run(RUNTIME, "probe", file, "--node", "112", *move, "--field", self.folder / "no" / "out.csv"), "out.csv")
+        self.assert_refused(run(RUNTIME, "probe", self.folder / "none.palpate.hdf", "--node", "1", *move), "none.palpate.hdf")
+
+    def test_model_that_is_not_the_one_asked_for(self):
+        file = self.bake(cube_toml(3))
+        question = ("probe", file, "--at", "0.5,0.5,1", "--displace", "0,0,-0.1", "--model")
+        self.assertEqual(run(RUNTIME, *question, self.folder / "model.toml").returncode, 0)
+        other = self.write("other.toml", cube_toml(3) + "\n")
+        self.assert_refused(run(RUNTIME, *question, other), file.name, "other.toml", "precompute it again")
+        self.assert_refused(run(RUNTIME, *question, self.folder / "none.toml"), "none.toml")
+
+
+class Play(ProgramTest):
+    def play(self, *arguments):
+        return run(RUNTIME, "play", *arguments, cwd=self.folder)
+
+    def test_fast_runs_are_equal_to_the_last_bit(self):
+        file = self.bake(cube_toml(4))
+        script = self.write("touch.csv", TOUCH)
+        for name in ("one.h5", "two.h5"):
+            result = self.play(file, "--device", f"script:{script}", "--fast", "--record", name)
+            self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual((self.folder / "one.h5").read_bytes(), (self.folder / "two.h5").read_bytes())
+
+        report = json.loads(result.stdout)
+        self.assertEqual(report["ticks"], 301)
+        self.assertEqual(report["dropped_ticks"], 0)
+        self.assertAlmostEqual(report["largest_force_time_s"], 0.2)
+        with h5py.File(self.folder / "one.h5") as recording:
+            ticks = recording["ticks"]
+            self.assertEqual(len(ticks["time"]), 301)
+            force = numpy.linalg.norm(ticks["force"], axis=1)
+            self.assertAlmostEqual(force.max(), report["largest_force_N"])
+            # The node is at the middle of the top, it moves by what the tool has moved since the grab, and the force is that of a probe.
+            self.assertEqual(set(ticks["node"][:]), {-1, 112})
+            moved = ticks["displacement"][200]
+            answer = self.probe(file, "--node", "112", "--displace", ",".join(map(repr, moved.tolist())))
+            numpy.testing.assert_allclose(ticks["force"][200], answer["nodes"][0]["force"], rtol=1e-12)
+            self.assertEqual(ticks["compute_ns"][:].max(), 0)
+
+    def test_real_time_run_with_report_and_reach(self):
+        file = self.bake(cube_toml(4))
+        script = self.write("touch.csv", TOUCH)
+        start = time.monotonic()
+        result = self.play(file, "--device", f"script:{script}", "--report", "report.json", "--reach", "0.01", "--record", "out.h5")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertGreaterEqual(time.monotonic() - start, 0.3)
+        self.assertEqual(result.stdout, "")
+        report = json.loads((self.folder / "report.json").read_text())
+        self.assertEqual((report["ticks"], report["fast"], report["reach_m"]), (301, False, 0.01))
+        self.assertGreater(report["compute_ns"]["median"], 0)
+        self.assertGreater(report["status_ticks"]["nothing_in_reach"], 50)
+        for piece in ("301 ticks", "deadline misses", "median", "99.9 %", "largest force", "nothing_in_reach"):
+            self.assertIn(piece, result.stderr)
+
+    def test_interrupt_finishes_the_recording(self):
+        file = self.bake(cube_toml(4))
+        script = self.write("long.csv", "t,x,y,z\n0,0.5,0.5,1\n600,0.5,0.5,0.9\n")
+        for stop in (signal.SIGINT, signal.SIGTERM):
+            process = subprocess.Popen([RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.h5"],
+                                       cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            time.sleep(1.0)
+            process.send_signal(stop)
+            output, messages = process.communicate(timeout=60)
+            self.assertEqual(process.returncode, 130, messages)
+            report = json.loads(output)
+            self.assertTrue(report["interrupted"])
+            with h5py.File(self.folder / "out.h5") as recording:
+                self.assertEqual(len(recording["ticks/time"]), report["ticks"])
+            self.assertEqual(sorted(p.name for p in self.folder.iterdir()), ["long.csv", "model.palpate.hdf", "model.toml", "out.h5"])
+
+    def test_stale_model_is_told(self):
+        file = self.bake(cube_toml(3))
+        script = self.write("touch.csv", TOUCH)
+        self.assertNotIn("warning", self.play(file, "--device", f"script:{script}", "--fast").stderr)
+        self.write("model.toml", cube_toml(3).replace("youngs_modulus = 1.0", "youngs_modulus = 2.0"))
+        result = self.play(file, "--device", f"script:{script}", "--fast")
+        self.assertEqual(result.returncode, 0)
+        self.assertRegex(result.stderr, r"warning: .*model\.toml.*precompute")
+
+    def test_bad_scripts_are_refused_before_anything_is_written(self):
+        file = self.bake(cube_toml(3))
+        script = self.write("bad.csv", "t,x,y,z\n0,0,0,zero\n")
+        for device, piece in ((script, "bad.csv:2"), (self.folder / "none.csv", "none.csv")):
+            self.assert_refused(self.play(file, "--device", f"script:{device}", "--record", "out.h5"), piece)
+        self.assertFalse((self.folder / "out.h5").exists())
+
+    def test_recording_that_cannot_be_written(self):
+        file = self.bake(cube_toml(3))
+        script = self.write("touch.csv", TOUCH)
+        result = self.play(file, "--device", f"script:{script}", "--fast", "--record", "no/out.h5")
+        self.assert_refused(result, "out.h5")
+
+    def test_a_tool_that_never_holds_is_told(self):
+        file = self.bake(cube_toml(3))
+        script = self.write("away.csv", "t,x,y,z\n0,9,9,9\n0.1,9,9,9\n")
+        result = self.play(file, "--device", f"script:{script}", "--fast")
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("never held", result.stderr)
+
+
+class Usage(ProgramTest):
+    def assert_usage(self, piece, *arguments):
+        result = run(RUNTIME, *arguments)
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertRegex(result.stderr, r"^error: .*\nhint: .*--help\n$")
+        self.assertIn(piece, result.stderr)
+
+    def test_help_and_version(self):
+        for arguments in (("--help",), ("probe", "--help"), ("play", "--help")):
+            result = run(RUNTIME, *arguments)
+            self.assertEqual(result.returncode, 0)
+            self.assertIn("palpate-runtime", result.stdout)
+        self.assertRegex(run(RUNTIME, "--version").stdout, r"^palpate-runtime \d+\.\d+\.\d+\n$")
+
+    def test_wrong_arguments(self):
+        place = ("--at", "0,0,1", "--displace", "0,0,1")
+        self.assert_usage("subcommand")
+        self.assert_usage("bogus", "bogus")
+        self.assert_usage("FILE", "probe", *place)
+        self.assert_usage("--bogus", "probe", "x.palpate.hdf", *place, "--bogus")
+        self.assert_usage("--at or --node", "probe", "x.palpate.hdf", "--displace", "0,0,1")
+        self.assert_usage("--displace", "probe", "x.palpate.hdf", "--at", "0,0,1")
+        self.assert_usage("1 displacements are given for 2 places", "probe", "x.palpate.hdf", *place, "--node", "3")
+        self.assert_usage("'0,0'", "probe", "x.palpate.hdf", "--at", "0,0", "--displace", "0,0,1")
+        self.assert_usage("'0,0,nan'", "probe", "x.palpate.hdf", "--at", "0,0,1", "--displace", "0,0,nan")
+        self.assert_usage("'-1'", "probe", "x.palpate.hdf", "--node", "-1", "--displace", "0,0,1")
+        self.assert_usage("'mouse'", "play", "x.palpate.hdf", "--device", "mouse")
+        self.assert_usage("'inf'", "play", "x.palpate.hdf", "--device", "script:a.csv", "--reach", "inf")
+        self.assert_usage("'-1'", "play", "x.palpate.hdf", "--device", "script:a.csv", "--reach", "-1")
+
+
+if __name__ == "__main__":
+    unittest.main()
