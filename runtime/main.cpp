@@ -142,7 +142,7 @@ PlayOptions read_play(const Arguments& arguments) {
 int run(int argc, char** argv) {
   CLI::App app("Touches a precomputed body and answers with finite-element forces.", "palpate-runtime");
   app.set_version_flag("--version", "palpate-runtime " PALPATE_VERSION);
-  app.require_subcommand(1);
+  app.require_subcommand(0, 1);
   app.footer(
       "Exit status: 0 done, 1 bad input or file, 2 wrong arguments, 130 interrupted.\n"
       "palpate-runtime probe --help and palpate-runtime play --help tell more.");
@@ -151,6 +151,7 @@ int run(int argc, char** argv) {
   const CLI::App* play_command = add_play(app, arguments);
   try {
     app.parse(argc, argv);
+    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe or play");
     if (play_command->parsed()) return play(read_play(arguments));
     return probe({.file = arguments.file,
                   .model_toml = arguments.model_toml,

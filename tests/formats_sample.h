@@ -11,9 +11,9 @@
 
 namespace palpate::test {
 
-/// Box of 2 x 2 x 2 cells, clamped at its lowest nodes, all free nodes stored (54 dofs), two sources, two
-/// probes.
-Model sample_model();
+/// Box of `cells` cells along each axis, clamped at its lowest nodes, all free nodes stored (54 dofs for 2
+/// cells), two sources, two probes.
+Model sample_model(int cells = 2);
 
 /// Entry (i, j) of its Green's functions: symmetric, positive on the diagonal, no two neighbours equal.
 double sample_entry(std::int64_t i, std::int64_t j);

@@ -1,10 +1,12 @@
 // Readers of volume meshes: the same two tetrahedra in every format, and each of them spoiled.
 #include <gtest/gtest.h>
 
-#include <clocale>
+#include <iterator>
+#include <locale>
 #include <regex>
 
 #include "meshes/volume_mesh.h"
+#include "meshes/vtu_writer.h"
 #include "tests/meshes_files.h"
 
 namespace palpate {
@@ -211,16 +213,23 @@ TEST(VolumeMesh, TetgenCountsFromZeroToo) {
       false, false);
 }
 
+/// 1.234,5: what a German desktop sets.
+struct DecimalComma : std::numpunct<char> {
+  [[nodiscard]] char do_decimal_point() const override { return ','; }
+  [[nodiscard]] char do_thousands_sep() const override { return '.'; }
+  [[nodiscard]] std::string do_grouping() const override { return "\3"; }
+};
+
 TEST(VolumeMesh, NumbersDoNotDependOnTheLocale) {
-  const std::string before = std::setlocale(LC_ALL, nullptr);
-  bool comma = false;  // a locale with a decimal comma, where the machine has one
-  for (const char* name : {"de_DE.UTF-8", "fr_FR.UTF-8", "de_DE", "fr_FR"})
-    comma = comma || std::setlocale(LC_ALL, name);
-  if (!comma) GTEST_SKIP() << "no locale with a decimal comma is installed";
   const test::ScratchFolder folder;
+  const std::locale before = std::locale::global(std::locale(std::locale::classic(), new DecimalComma));
   const Mesh mesh = read_volume_mesh(folder.write("a.msh", gmsh2));
-  std::setlocale(LC_ALL, before.c_str());
+  write_vtu(folder.path() / "a.vtu", std::vector<Vec3>(1234, Vec3::Zero()), mesh.tets, {}, {});
+  std::locale::global(before);
   EXPECT_EQ(mesh.nodes[1].x(), 1.5);
+  std::ifstream vtu(folder.path() / "a.vtu", std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(vtu), {});
+  EXPECT_TRUE(contains(text, "NumberOfPoints=\"1234\""));
 }
 
 /// One replacement in a good file, the line where it is noticed and what the message must hold.
@@ -250,16 +259,16 @@ TEST(VolumeMesh, SpoiledFilesAreRefusedWithTheirLine) {
       {"a.msh", &gmsh2, "1 9 40 3\n", "1 9 40 77\n", 21, "node 77 does not exist"},
       {"a.msh", &gmsh2, "5 4 2 8 1 9 40 3 4", "5 5 2 8 1 9 40 3 4 1 9 40 3", 22, "only linear tetrahedra"},
       {"a.msh", &gmsh2, "5 4 2 8 1", "5 11 2 8 1", 22, "type 11"},
-      {"a.msh", &gmsh2, "$EndElements\n", "", 22, "$EndElements"},
-      {"a.msh", &gmsh2, "$EndPhysicalNames", "$EndOther", 23, "$EndPhysicalNames"},
+      {"a.msh", &gmsh2, "$EndElements\n", "", 23, "$EndElements"},
+      {"a.msh", &gmsh2, "$EndPhysicalNames", "$EndOther", 24, "$EndPhysicalNames"},
       {"a.msh", &gmsh2, "4 4 2 7 1 1 9 40 3\n5 4 2 8 1 9 40 3 4", "4 15 2 0 1 1\n5 15 2 0 1 3", 23,
        "no tetrahedra"},
       // Gmsh 4.1
-      {"b.msh", &gmsh4, "2 5 1 40", "2 6 1 40", 24, "5 nodes, not 6"},
-      {"b.msh", &gmsh4, "4 4 1 5", "4 3 1 5", 35, "4 elements, not 3"},
-      {"b.msh", &gmsh4, "5 9 40 3 4", "5 9 40 3 400", 35, "node 400 does not exist"},
-      {"b.msh", &gmsh4, "3 2 4 1\n", "3 2 11 1\n", 34, "type 11"},
-      {"b.msh", &gmsh4, "2 1 2 1\n3 1 40 9", "4 1 2 1\n3 1 40 9", 30, "4, which is not in 0 to 3"},
+      {"b.msh", &gmsh4, "2 5 1 40", "2 6 1 40", 25, "5 nodes, not 6"},
+      {"b.msh", &gmsh4, "4 4 1 5", "4 3 1 5", 36, "4 elements, not 3"},
+      {"b.msh", &gmsh4, "5 9 40 3 4", "5 9 40 3 400", 36, "node 400 does not exist"},
+      {"b.msh", &gmsh4, "3 2 4 1\n", "3 2 11 1\n", 35, "type 11"},
+      {"b.msh", &gmsh4, "2 1 2 1\n3 1 40 9", "4 1 2 1\n3 1 40 9", 31, "4, which is not in 0 to 3"},
       {"b.msh", &gmsh4, "1 1 1 1 7 1 1\n", "1 1 1 2147483648 7 1 1\n", 9, "2147483648"},
       // Medit
       {"a.mesh", &medit, "Dimension\n3", "Dimension\n2", 3, "not three-dimensional"},
@@ -272,7 +281,7 @@ TEST(VolumeMesh, SpoiledFilesAreRefusedWithTheirLine) {
       {"a.mesh", &medit, "1 3 2 5", "1 3 x 5", 17, "'x'"},
       {"a.mesh", &medit, "Tetrahedra", "Hexahedra", 24, "only linear tetrahedra"},
       {"a.mesh", &medit, "Tetrahedra\n2\n1 2 3 4 7\n2 3 4 5 8\n", "", 23, "no tetrahedra"},
-      {"a.mesh", &medit, "2 3 4 5 8\nEnd\n", "2 3", 26, "file ends where"},
+      {"a.mesh", &medit, "2 3 4 5 8\nEnd\n", "2 3 4 5\n\n\n\n", 30, "file ends where"},
       // VTK
       {"a.vtk", &vtk, "# vtk DataFile", "# not DataFile", 1, "vtk DataFile Version"},
       {"a.vtk", &vtk, "ASCII", "TEXT", 3, "neither ASCII nor BINARY"},
@@ -290,7 +299,7 @@ TEST(VolumeMesh, SpoiledFilesAreRefusedWithTheirLine) {
       {"b.vtk", &vtk5, "0 4 8", "0 9 8", 16, "9, which is not in 0 to 8"},
       {"b.vtk", &vtk5, "3 1 2 3 4\n", "3 1 2 3 8\n", 18, "8, which is not in 0 to 4"},
       {"b.vtk", &vtk5, "0 4 8", "0 3 8", 20, "tetrahedron of 3 nodes"},
-      {"b.vtk", &vtk5, "METADATA\nINFORMATION 0\n\n", "METADATA\n", 20, "no tetrahedra"},
+      {"b.vtk", &vtk5, "METADATA\nINFORMATION 0\n\n", "METADATA\n", 19, "no tetrahedra"},
   };
   const test::ScratchFolder folder;
   for (const Spoiled& bad : cases) {
@@ -314,7 +323,7 @@ TEST(VolumeMesh, SpoiledTetgenFilesAreRefusedWithTheirLine) {
     const char* says;
   } cases[] = {
       {&node, "5  3  1  1", "5  2  1  1", "a.node:2", "not three-dimensional"},
-      {&node, "5  3  1  1", "6  3  1  1", "a.node:7", "file ends"},
+      {&node, "5  3  1  1", "6  3  1  1", "a.node:8", "file ends"},
       {&node, "5  3  1  1", "0  3  1  1", "a.node:2", "no nodes"},
       {&node, "1  0 0 0", "2  0 0 0", "a.node:3", "first node number is 2"},
       {&node, "3  0 1 0", "4  0 1 0", "a.node:5", "next node number is 4"},

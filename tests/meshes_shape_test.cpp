@@ -1,6 +1,8 @@
 // Generated bodies, their surfaces and their quality.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>

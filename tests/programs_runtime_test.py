@@ -189,9 +189,18 @@ class Usage(ProgramTest):
             self.assertIn("palpate-runtime", result.stdout)
         self.assertRegex(run(RUNTIME, "--version").stdout, r"^palpate-runtime \d+\.\d+\.\d+\n$")
 
+    def test_links_nothing_of_gpl_or_agpl(self):
+        libraries = subprocess.run(["ldd", RUNTIME], text=True, capture_output=True, check=True).stdout
+        self.assertIn("libhdf5", libraries)
+        for name in ("cholmod", "libamd", "colamd", "metis", "libtet", "CGAL", "libgmp", "libmpfr"):
+            self.assertNotIn(name, libraries)
+        program = RUNTIME.read_bytes()
+        for symbol in (b"cholmod_", b"tetgenio", b"N4CGAL"):
+            self.assertNotIn(symbol, program)
+
     def test_wrong_arguments(self):
         place = ("--at", "0,0,1", "--displace", "0,0,1")
-        self.assert_usage("subcommand")
+        self.assert_usage("probe or play")
         self.assert_usage("bogus", "bogus")
         self.assert_usage("FILE", "probe", *place)
         self.assert_usage("--bogus", "probe", "x.palpate.hdf", *place, "--bogus")
