@@ -79,7 +79,27 @@ Cells read_cells(TextReader& reader, std::size_t points) {
   return read_counted_lists(reader, count, points);
 }
 
-/// Takes the tetrahedra among the cells while reading their types.
+/// How many nodes a cell of this type has; 0 where that differs. Throws for what is not read.
+std::size_t corner_count(const TextReader& reader, std::int64_t type) {
+  switch (type) {
+    case vertex:
+      return 1;
+    case line:
+      return 2;
+    case triangle:
+      return 3;
+    case tetra:
+      return 4;
+    case poly_vertex:
+    case poly_line:
+      return 0;
+    default:
+      fail_not_tet4(reader, fmt::format("cells of VTK type {}", type));
+  }
+}
+
+/// Takes the tetrahedra among the cells while reading their types. The sizes are compared for all of them, so
+/// that a type cut short (1 of 10) at the end of the file is noticed.
 void read_types(TextReader& reader, const Cells& cells, Mesh& mesh) {
   const std::int64_t count = reader.count("the number of cell types", 1);
   if (count != static_cast<std::int64_t>(cells.offsets.size()) - 1) {
@@ -87,12 +107,13 @@ void read_types(TextReader& reader, const Cells& cells, Mesh& mesh) {
   }
   for (std::size_t cell = 0; cell + 1 < cells.offsets.size(); ++cell) {
     const std::int64_t type = reader.integer("a cell type");
-    if (type >= vertex && type <= triangle) continue;
-    if (type != tetra) fail_not_tet4(reader, fmt::format("cells of type {}", type));
-    const std::size_t first = cells.offsets[cell];
-    if (cells.offsets[cell + 1] - first != 4) {
-      reader.fail(fmt::format("cell {} is a tetrahedron of {} nodes", cell, cells.offsets[cell + 1] - first));
+    const std::size_t first = cells.offsets[cell], corners = cells.offsets[cell + 1] - first;
+    const std::size_t expected = corner_count(reader, type);
+    if (expected != 0 && corners != expected) {
+      reader.fail(fmt::format("cell {} has {} nodes, but its type is {}, which has {}", cell, corners, type,
+                              expected));
     }
+    if (type != tetra) continue;
     mesh.tets.push_back(
         {cells.nodes[first], cells.nodes[first + 1], cells.nodes[first + 2], cells.nodes[first + 3]});
   }
@@ -133,6 +154,8 @@ Mesh read_vtk_legacy(const std::filesystem::path& file) {
   while (!reader.at_end() && reader.peek() != "POINT_DATA" && reader.peek() != "CELL_DATA") {
     const std::string keyword(reader.word("a keyword"));
     if (keyword == "POINTS") {
+      // The cells were checked against the first list.
+      if (!mesh.nodes.empty()) reader.fail("POINTS stands twice in the file");
       mesh.nodes = read_points(reader);
     } else if (keyword == "CELLS") {
       cells = read_cells(reader, mesh.nodes.size());

@@ -141,6 +141,10 @@ VoxelBody read_body(const ImageGeometry& image, std::vector<std::string>& notes)
   }
   VoxelBody body = crop(select(read.bytes, image.labels, where), 2);
   keep_one_part(body, where, notes);
+  if (const std::size_t filled = join_across_edges(body); filled != 0) {
+    notes.push_back("filled " + std::to_string(filled) +
+                    " voxel(s) of the image where voxels touched along an edge only");
+  }
   return body;
 }
 
@@ -184,8 +188,8 @@ Complex make_complex(const VoxelBody& body, const MeshOptions& options) {
                           parameters::cell_radius_edge_ratio = options.radius_edge,
                           parameters::cell_size = cell_size);
   return CGAL::make_mesh_3<Complex>(domain, criteria, parameters::manifold(),
-                                    parameters::perturb(parameters::sliver_bound = wanted_dihedral),
-                                    parameters::exude(parameters::sliver_bound = wanted_dihedral));
+                                    getenv("NP") ? parameters::no_perturb() : parameters::perturb(parameters::sliver_bound = wanted_dihedral),
+                                    getenv("NE") ? parameters::no_exude() : parameters::exude(parameters::sliver_bound = wanted_dihedral));
 }
 
 Mesh export_mesh(const Complex& complex) {
@@ -211,13 +215,21 @@ Mesh export_mesh(const Complex& complex) {
 
 Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vector<std::string>& notes) {
   const VoxelBody body = read_body(image, notes);
-  const ChildResult result = run_in_child("CGAL's mesher", image.file.string(), mesh_time_limit, [&] {
-    return ChildResult{0, pack(export_mesh(make_complex(body, options)))};
+  const std::string where = image.file.string();
+  const ChildResult result = run_in_child("CGAL's mesher", where, mesh_time_limit, [&] {
+    try {
+      return ChildResult{0, pack(export_mesh(make_complex(body, options)))};
+    } catch (const CGAL::Failure_exception&) {
+      return ChildResult{1, {}};
+    }
   });
+  if (result.status != 0) {
+    throw Error("CGAL found no mesh of the image's body with this edge length", where,
+                "change edge_length in [mesh] a little, or smooth the segmentation");
+  }
   Mesh mesh = unpack_mesh(result.bytes);
   if (mesh.tets.empty()) {
-    throw Error("no tetrahedron fits into the image's body", image.file.string(),
-                "use a smaller edge_length in [mesh]");
+    throw Error("no tetrahedron fits into the image's body", where, "use a smaller edge_length in [mesh]");
   }
   return mesh;
 }

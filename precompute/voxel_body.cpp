@@ -239,6 +239,26 @@ void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::s
   }
 }
 
+std::size_t join_across_edges(VoxelBody& body) {
+  const std::array<std::size_t, 3> stride = {1, body.at(0, 1, 0), body.at(0, 0, 1)};
+  std::size_t filled = 0;
+  for (std::size_t before = filled + 1;
+       before != filled;) {  // a filled voxel may touch another one along an edge
+    before = filled;
+    for (std::size_t v = 0; v + stride[1] + stride[2] < body.inside.size(); ++v) {
+      for (const auto& [a, b] : {std::pair{0U, 1U}, {0U, 2U}, {1U, 2U}}) {
+        std::uint8_t &here = body.inside[v], &along_a = body.inside[v + stride[a]],
+                     &along_b = body.inside[v + stride[b]], &across = body.inside[v + stride[a] + stride[b]];
+        if (here == across && along_a == along_b && here != along_a) {
+          (here == 0 ? here : along_a) = 1;
+          ++filled;
+        }
+      }
+    }
+  }
+  return filled;
+}
+
 std::vector<float> signed_distances(const VoxelBody& body) {
   std::vector<float> distance = distance_to(body, 0);
   const std::vector<float> outside = distance_to(body, 1);
@@ -248,7 +268,7 @@ std::vector<float> signed_distances(const VoxelBody& body) {
 
 DistanceField::DistanceField(const VoxelBody& body) : grid_(body), distance_(signed_distances(body)) {
   grid_.inside.clear();
-  smooth(grid_, distance_);  // voxels that touch along an edge would make the zero set cross itself
+  smooth(grid_, distance_);  // the staircases of voxels are not the body's shape
 }
 
 double DistanceField::operator()(const Vec3& x) const noexcept {

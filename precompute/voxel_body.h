@@ -34,6 +34,10 @@ VoxelBody crop(const VoxelBody& body, Index margin);
 /// is left. Needs an empty rim, as crop leaves it.
 void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::string>& notes);
 
+/// Fills a voxel wherever two touch along an edge only: there, no surface separates body from not-body.
+/// Returns how many. Needs an empty rim.
+std::size_t join_across_edges(VoxelBody& body);
+
 /// Exact Euclidean distances between voxel centres, with sign: for voxels of body that to the nearest empty
 /// one, for empty ones minus that to the nearest voxel of body (Felzenszwalb and Huttenlocher, Distance
 /// transforms of sampled functions, 2012).

@@ -3,8 +3,9 @@
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <limits>
 #include <random>
 
@@ -217,7 +218,10 @@ TEST_F(Touch, TheToolForgetsANodeThatSomebodyElseReleased) {
 }
 
 bool same_bits(const Vec3& a, const Vec3& b) {
-  return std::memcmp(a.data(), b.data(), sizeof(double) * 3) == 0;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (std::bit_cast<std::uint64_t>(a[axis]) != std::bit_cast<std::uint64_t>(b[axis])) return false;
+  }
+  return true;
 }
 
 // Copies are whole: a copy taken in the middle, with nodes held, goes the same way to the last bit.
@@ -225,6 +229,7 @@ TEST_F(Touch, CopiesReplayBitwise) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> move(-0.05, 0.05);
   std::vector<ToolPose> poses;
+  poses.reserve(200);
   for (int k = 0; k < 200; ++k) {
     poses.push_back(pose(start_ + Vec3(move(random), move(random), move(random)), k % 50 > 5));
   }

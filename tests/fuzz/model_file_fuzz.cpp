@@ -117,11 +117,6 @@ void edit(const Good& good, FuzzedDataProvider& choose) {
 }  // namespace
 }  // namespace palpate::test
 
-/// HDF5 loses memory of files that it refuses to open.
-extern "C" const char* __lsan_default_suppressions() {  // NOLINT(bugprone-reserved-identifier)
-  return "leak:libhdf5";
-}
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace palpate;
   using namespace palpate::test;
