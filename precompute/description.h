@@ -1,4 +1,4 @@
-// model.toml: what a person writes to describe a body. Keys are documented in meshes/models/README.md.
+// model.toml: what a person writes to describe a body. Keys are documented in the README.
 #pragma once
 
 #include <filesystem>
