@@ -1,13 +1,12 @@
 #include "formats/checksum.h"
 
-#define XXH_STATIC_LINKING_ONLY  // a state on the stack
+#define XXH_INLINE_ALL  // compiled for our vector unit: the shared library knows only SSE2
 #include <xxhash.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstring>
-#include <new>
 #include <thread>
 
 #include "formats/file_io.h"
@@ -69,21 +68,22 @@ std::string checksum_file(const std::filesystem::path& file) {
   }
 }
 
-RunningChecksum::RunningChecksum() : state_(XXH3_createState()) {
-  if (!state_) throw std::bad_alloc();
-  XXH3_128bits_reset(state_.get());
+struct RunningChecksum::State {
+  alignas(64) XXH3_state_t hash;
+};
+
+RunningChecksum::RunningChecksum() : state_(std::make_unique<State>()) {
+  XXH3_128bits_reset(&state_->hash);
 }
 
+RunningChecksum::~RunningChecksum() = default;
+
 void RunningChecksum::update(std::span<const std::byte> bytes) {
-  XXH3_128bits_update(state_.get(), bytes.data(), bytes.size());
+  XXH3_128bits_update(&state_->hash, bytes.data(), bytes.size());
 }
 
 std::string RunningChecksum::digits() const {
-  return hexadecimal(canonical(XXH3_128bits_digest(state_.get())));
-}
-
-void RunningChecksum::Free::operator()(XXH3_state_s* state) const noexcept {
-  XXH3_freeState(state);
+  return hexadecimal(canonical(XXH3_128bits_digest(&state_->hash)));
 }
 
 void ChunkedChecksum::append(std::span<const std::byte> bytes, const Inspect& inspect) {

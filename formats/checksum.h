@@ -12,8 +12,6 @@
 #include <string_view>
 #include <vector>
 
-struct XXH3_state_s;
-
 namespace palpate {
 
 /// 32 hexadecimal digits.
@@ -29,14 +27,13 @@ std::string checksum_file(const std::filesystem::path& file);
 class RunningChecksum {
  public:
   RunningChecksum();
+  ~RunningChecksum();
   void update(std::span<const std::byte> bytes);
   [[nodiscard]] std::string digits() const;  ///< 32 hexadecimal digits of all bytes so far
 
  private:
-  struct Free {
-    void operator()(XXH3_state_s* state) const noexcept;
-  };
-  std::unique_ptr<XXH3_state_s, Free> state_;
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 /// Checksum of a large array, computed by all processors. Up to `chunk` bytes it is `checksum`; beyond that

@@ -14,7 +14,8 @@ constexpr hsize_t alignment = 4096;  // a page
 constexpr std::size_t longest_text = 4096;
 constexpr std::size_t highest_rank = 4;
 
-/// We close every file ourselves; the library's own exit handler crashes after a close that failed (full disk).
+/// We close every file ourselves; the library's own exit handler crashes after a close that failed (full
+/// disk).
 [[maybe_unused]] const herr_t no_exit_handler = H5dont_atexit();
 
 const char* const altered_hint = "Copy the file again, or precompute it again.";

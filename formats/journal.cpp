@@ -57,7 +57,7 @@ bool is_still_there(const FileDescriptor& file) {
 
 }  // namespace
 
-Journal::Journal(std::filesystem::path path) {
+Journal::Journal(const std::filesystem::path& path) {
   do {
     file_ = open_file(path, OpenMode::read_append);
     if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)

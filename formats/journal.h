@@ -35,7 +35,7 @@ struct JournalContents {
 class Journal {
  public:
   /// Opens or makes it. Throws Error when another process holds it.
-  explicit Journal(std::filesystem::path path);
+  explicit Journal(const std::filesystem::path& path);
 
   /// What a killed run left; nothing when there is no complete frame. A line that was cut off by the kill
   /// ends the list.

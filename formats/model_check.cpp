@@ -71,6 +71,7 @@ std::int64_t Counts::size(const Extent& extent) const {
 
 std::vector<std::int64_t> Counts::sizes(const std::vector<Extent>& shape) const {
   std::vector<std::int64_t> result;
+  result.reserve(shape.size());
   for (const Extent& extent : shape) result.push_back(size(extent));
   return result;
 }

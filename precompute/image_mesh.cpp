@@ -78,20 +78,10 @@ ChildResult read_labels(const std::string& file) {
   return result;
 }
 
-void check_header(const ImageHeader& header, const std::string& where) {
-  for (const double spacing : header.spacing) {
-    if (!std::isfinite(spacing) || spacing <= 0.0) {
-      throw Error("the voxel size of the image is " + std::to_string(spacing), where,
-                  "write a positive VX, VY and VZ");
-    }
-  }
-}
-
 /// Marks the voxels that carry one of the labels (all but 0 where none are listed).
 VoxelBody select(const Bytes& bytes, const std::vector<int>& wanted, const std::string& where) {
   ImageHeader header;
   std::memcpy(&header, bytes.data(), sizeof(header));
-  check_header(header, where);
   VoxelBody body;
   body.size = header.size;
   body.spacing = Vec3(header.spacing[0], header.spacing[1], header.spacing[2]);
@@ -137,7 +127,7 @@ VoxelBody read_body(const ImageGeometry& image, std::vector<std::string>& notes)
   if (read.status != read_ok) {
     throw Error(
         read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
-        where, "use a complete INR file (.inr, .inr.gz) with one label a voxel");
+        where, "use a complete INR file (.inr, .inr.gz) with one label a voxel and positive VX, VY, VZ");
   }
   VoxelBody body = crop(select(read.bytes, image.labels, where), 2);
   keep_one_part(body, where, notes);
@@ -187,9 +177,12 @@ Complex make_complex(const VoxelBody& body, const MeshOptions& options) {
                           parameters::facet_distance = facet_distance,
                           parameters::cell_radius_edge_ratio = options.radius_edge,
                           parameters::cell_size = cell_size);
-  return CGAL::make_mesh_3<Complex>(domain, criteria, parameters::manifold(),
-                                    getenv("NP") ? parameters::no_perturb() : parameters::perturb(parameters::sliver_bound = wanted_dihedral),
-                                    getenv("NE") ? parameters::no_exude() : parameters::exude(parameters::sliver_bound = wanted_dihedral));
+  // time limit 0 is none; left out, it is the time that refinement took, which gives another mesh every run
+  const auto perturb =
+      parameters::perturb(parameters::time_limit = 0.0, parameters::sliver_bound = wanted_dihedral);
+  const auto exude =
+      parameters::exude(parameters::time_limit = 0.0, parameters::sliver_bound = wanted_dihedral);
+  return CGAL::make_mesh_3<Complex>(domain, criteria, parameters::manifold(), perturb, exude);
 }
 
 Mesh export_mesh(const Complex& complex) {

@@ -10,6 +10,13 @@
 #include "meshes/error.h"
 #include "precompute/child_process.h"
 
+/// Takes the place of TetGen's own function of this name: that of 1.5.0 frees its memory, throws, and frees
+/// it again, so that every error becomes a crash.
+[[noreturn]] void stop_tetgen(tetgenmesh* mesh, int code) __asm__("_Z15terminatetetgenP10tetgenmeshi");
+void stop_tetgen(tetgenmesh* /*mesh*/, int code) {
+  throw code;
+}
+
 namespace palpate {
 namespace {
 
@@ -112,7 +119,11 @@ Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, co
     throw Error("TetGen stopped with code " + std::to_string(result.status) + ": " + meaning(result.status),
                 where, "repair the surface, or give edge_length and remesh = true in [mesh]");
   }
-  return unpack_mesh(result.bytes);
+  Mesh mesh = unpack_mesh(result.bytes);
+  if (mesh.tets.empty()) {
+    throw Error("TetGen found no inside of the surface", where, "close the surface's holes");
+  }
+  return mesh;
 }
 
 }  // namespace palpate

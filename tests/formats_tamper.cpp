@@ -175,7 +175,7 @@ void reseal(const std::filesystem::path& path) {
     if (H5Aexists(dataset.get(), "xxh3") <= 0) continue;
     const std::string digits = dataset_checksum(dataset.get());
     put_text(dataset.get(), "xxh3", digits);
-    lines.push_back("dataset " + name + ' ' + digits + '\n');
+    lines.push_back(std::string("dataset ").append(name).append(" ").append(digits).append("\n"));
   }
   const Id root(H5Gopen2(file.get(), "/", H5P_DEFAULT), H5Gclose);
   H5O_info_t info = {};
@@ -186,7 +186,11 @@ void reseal(const std::filesystem::path& path) {
     std::string name(200, '\0');
     name.resize(static_cast<std::size_t>(H5Aget_name(attribute.get(), name.size(), name.data())));
     if (name != "content_hash")
-      lines.push_back("attribute " + name + ' ' + attribute_text(attribute.get()) + '\n');
+      lines.push_back(std::string("attribute ")
+                          .append(name)
+                          .append(" ")
+                          .append(attribute_text(attribute.get()))
+                          .append("\n"));
   }
   std::sort(lines.begin(), lines.end());
   std::string text;

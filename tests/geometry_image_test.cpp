@@ -152,7 +152,7 @@ TEST_F(ImageMesh, BadImages) {
   expect_mentions(error(ball_image(), {2, 77}), {"no voxel", "label 77", "0, 2, 5"});
   TestImage no_spacing({4, 4, 4}, {1, 0, 1});
   no_spacing(1, 1, 1) = 1;
-  expect_mentions(error(no_spacing, {}), {"voxel size"});
+  expect_mentions(error(no_spacing, {}), {"not a readable image", "positive VX, VY, VZ"});
   TestImage two({30, 10, 10}, {1, 1, 1});
   for (int i = 0; i < 8; ++i) {
     two(2 + i, 5, 5) = 1;
@@ -167,11 +167,14 @@ TEST_F(ImageMesh, UnreadableFiles) {
   };
   expect_mentions(error("none.inr"), {"none.inr", "no such image"});
   const std::string whole = ball_image().inr();
+  std::string several = whole;
+  several.replace(several.find("VDIM=1"), 6, "VDIM=2");
+  folder_.write("several.inr", several);
   folder_.write("text.inr", "this is no image\n");
   folder_.write("empty.inr", "");
   folder_.write("header.inr", whole.substr(0, 120));
   folder_.write("cut.inr", whole.substr(0, whole.size() / 2));
-  for (const std::string name : {"text.inr", "empty.inr", "header.inr", "cut.inr"}) {
+  for (const std::string name : {"several.inr", "text.inr", "empty.inr", "header.inr", "cut.inr"}) {
     expect_mentions(error(name), {name, "image"});
   }
 }

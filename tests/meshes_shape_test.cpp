@@ -71,10 +71,23 @@ TEST(Box, PlaceSizeAndSurface) {
   EXPECT_LT((mesh.nodes.back() - Vec3(-0.7, 2.2, 1.2)).norm(), 1e-15);
   const Surface surface = extract_surface(mesh);
   EXPECT_EQ(surface.triangles.size(), 4u * (3u * 2u + 2u * 5u + 3u * 5u));
-  EXPECT_EQ(surface.nodes.size(), mesh.nodes.size() - 2u * 1u * 4u);
+  EXPECT_EQ(surface.nodes.size(), mesh.nodes.size() - 8);  // 2 x 1 x 4 inside
   EXPECT_TRUE(std::is_sorted(surface.nodes.begin(), surface.nodes.end()));
   EXPECT_TRUE(is_closed(surface));
   EXPECT_NEAR(enclosed_volume(mesh, surface), 0.3 * 0.2 * 0.7, 1e-14);
+}
+
+TEST(Surface, AllFourFacesOfATetrahedronLookOutwards) {
+  Mesh mesh;
+  mesh.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh.tets = {{0, 1, 2, 3}};
+  const Surface surface = extract_surface(mesh);
+  ASSERT_EQ(surface.triangles.size(), 4u);
+  const Vec3 centroid = Vec3::Constant(0.25);
+  for (const Triangle& t : surface.triangles) {
+    const Vec3 &a = node_of(mesh, t[0]), &b = node_of(mesh, t[1]), &c = node_of(mesh, t[2]);
+    EXPECT_GT((b - a).cross(c - a).dot(a - centroid), 0.0);
+  }
 }
 
 TEST(Surface, LayersCountElementsFromTheSurface) {
