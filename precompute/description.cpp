@@ -156,7 +156,7 @@ class Section {
   }
 
   [[nodiscard]] Vec3 positive_vector(std::string_view key) const {
-    const Vec3 value = vector(key);
+    Vec3 value = vector(key);
     if (!(value.minCoeff() > 0.0)) {
       fail(key, name_of(key) + " must be greater than 0 in each direction", "give three positive numbers");
     }
@@ -284,7 +284,7 @@ void check_cells(const Section& shape, std::string_view key, double cells) {
 }
 
 BoxShape read_box_shape(const Section& box) {
-  const BoxShape shape{box.vector("origin", Vec3::Zero()), box.positive_vector("size"), box.counts("cells")};
+  BoxShape shape{box.vector("origin", Vec3::Zero()), box.positive_vector("size"), box.counts("cells")};
   check_cells(box, "cells", double{1} * shape.cells[0] * shape.cells[1] * shape.cells[2]);
   return shape;
 }
@@ -412,7 +412,7 @@ Material read_material(const Section& material) {
 }
 
 SelectBox read_select_box(const Section& box) {
-  const SelectBox result{box.vector("min"), box.vector("max")};
+  SelectBox result{box.vector("min"), box.vector("max")};
   if ((result.min.array() > result.max.array()).any()) {
     box.fail("min", box.name_of("min") + " is greater than max", "exchange them where min > max");
   }
@@ -420,7 +420,7 @@ SelectBox read_select_box(const Section& box) {
 }
 
 SelectHalfSpace read_half_space(const Section& half_space) {
-  const SelectHalfSpace result{half_space.vector("point"), half_space.vector("normal")};
+  SelectHalfSpace result{half_space.vector("point"), half_space.vector("normal")};
   if (result.normal.isZero(0.0)) {
     half_space.fail("normal", half_space.name_of("normal") + " is the zero vector",
                     "the half space is where (x - point) . normal >= 0");

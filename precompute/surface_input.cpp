@@ -22,6 +22,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <set>
 #include <sstream>
 
 #include "meshes/error.h"
@@ -102,12 +103,11 @@ std::size_t count_holes(const std::vector<Edge>& open_edges, std::size_t points)
   for (const auto& [a, b] : open_edges) {
     group[root(a)] = root(b);
   }
-  std::vector<std::size_t> roots;
+  std::set<std::size_t> holes;
   for (const auto& edge : open_edges) {
-    roots.push_back(root(edge.first));
+    holes.insert(root(edge.first));
   }
-  std::sort(roots.begin(), roots.end());
-  return static_cast<std::size_t>(std::unique(roots.begin(), roots.end()) - roots.begin());
+  return holes.size();
 }
 
 void check_edges(const Soup& soup, const std::string& where) {
@@ -218,7 +218,7 @@ std::filesystem::path write_bad_faces(const SurfaceMesh& mesh, const std::vector
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
 
-  const std::filesystem::path file = stem + ".bad-faces.off";
+  std::filesystem::path file = stem + ".bad-faces.off";
   const std::filesystem::path partial = file.string() + ".partial";
   {
     std::ofstream out(partial);
