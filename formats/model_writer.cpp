@@ -93,7 +93,7 @@ std::string checksum_around(const FileDescriptor& file, std::int64_t gap_begin, 
 struct ModelWriter::Impl {
   Impl(std::filesystem::path to, const Model& model, Precision precision);
 
-  void examine(const Model& model);
+  [[nodiscard]] JournalFrame examine(const Model& model);
   bool resume();
   void start(const Model& model);
   void write_body(const Model& model);
@@ -110,8 +110,8 @@ struct ModelWriter::Impl {
   Counts counts;
   ContentHash content;
   std::int64_t order;
-  Journal journal;
   JournalFrame frame;
+  Journal journal;
   FileDescriptor data;
   mutable std::mutex mutex;  // guards `done` and the journal
   std::vector<bool> done;    // [n] columns
@@ -123,19 +123,21 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
       header{precision},
       counts(Counts::of(model, path.string())),
       order(model.stored_dofs()),
+      frame(examine(model)),
       journal(with_suffix(path, ".progress")),
       done(static_cast<std::size_t>(order), false) {
+  if (resume()) return;
   try {
-    examine(model);
-    if (!resume()) start(model);
+    start(model);
   } catch (...) {
     discard();
     throw;
   }
 }
 
-/// Proves that a reader will take the model, and makes the key.
-void ModelWriter::Impl::examine(const Model& model) {
+/// Proves that a reader will take the model; gives the key and an upper bound of the file's size. Before
+/// anything on the disk is touched, so that a mistake does not cost an earlier run's columns.
+JournalFrame ModelWriter::Impl::examine(const Model& model) {
   add_attributes(content, model, header, version);
   std::int64_t bytes = 0;
   for_each_body_field([&](const auto& field) {
@@ -145,8 +147,10 @@ void ModelWriter::Impl::examine(const Model& model) {
     bytes += static_cast<std::int64_t>(bytes_of(values).size());
   });
   check_model(model, path.string());
-  frame.key = content.digits();
-  frame.file_bytes = bytes + packed_size(order) * bytes_per_scalar(header.precision) + metadata_allowance;
+  JournalFrame expected;
+  expected.key = content.digits();
+  expected.file_bytes = bytes + packed_size(order) * bytes_per_scalar(header.precision) + metadata_allowance;
+  return expected;
 }
 
 /// Takes up what a killed run left; false when that is not the same model or was altered.

@@ -90,6 +90,7 @@ struct RecordingWriter::Impl {
   }
 
   void write_waiting() {
+    const hdf5::Quiet quiet;
     for_each_tick_field([this]<class Member>(const char* name, int components, Member TickRecord::*member) {
       std::vector<Scalar<Member>> values(waiting.size() * static_cast<std::size_t>(components));
       for (std::size_t i = 0; i < waiting.size(); ++i)
@@ -101,7 +102,6 @@ struct RecordingWriter::Impl {
     waiting.clear();
   }
 
-  hdf5::Quiet quiet;
   std::filesystem::path path, partial;
   hdf5::File file;
   std::vector<TickRecord> waiting;
@@ -110,8 +110,17 @@ struct RecordingWriter::Impl {
 };
 
 RecordingWriter::RecordingWriter(std::filesystem::path path, const std::string& model_path,
-                                 const std::string& content_hash)
-    : impl_(std::make_unique<Impl>(std::move(path), model_path, content_hash)) {}
+                                 const std::string& content_hash) {
+  const hdf5::Quiet quiet;
+  const std::filesystem::path partial = with_suffix(path, ".partial");
+  try {
+    impl_ = std::make_unique<Impl>(std::move(path), model_path, content_hash);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(partial, ignored);
+    throw;
+  }
+}
 
 RecordingWriter::~RecordingWriter() {
   if (impl_->finished) return;
@@ -128,6 +137,7 @@ void RecordingWriter::append(std::span<const TickRecord> ticks) {
 
 void RecordingWriter::finish() {
   if (!impl_->waiting.empty()) impl_->write_waiting();
+  const hdf5::Quiet quiet;
   impl_->file.close();
   rename_durably(impl_->partial, impl_->path);
   impl_->finished = true;

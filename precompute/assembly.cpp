@@ -28,7 +28,8 @@ void for_each_free_edge(const Mesh& mesh, const std::vector<Index>& free_of_node
   }
 }
 
-UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>& free_of_node, std::size_t nodes) {
+UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>& free_of_node,
+                                      std::size_t nodes) {
   std::vector<std::int64_t> start(nodes + 1, 0);
   for_each_free_edge(mesh, free_of_node, [&](Index a, Index) { ++start[static_cast<std::size_t>(a) + 1]; });
   for (std::size_t a = 0; a < nodes; ++a) start[a + 1] += start[a];
@@ -49,8 +50,8 @@ UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>
   return unique;
 }
 
-/// The lower triangle's pattern with zero values: in column 3 a + i the rows 3 a + i .. 3 a + 2, then three rows for each
-/// higher neighbour.
+/// The lower triangle's pattern with zero values: in column 3 a + i the rows 3 a + i .. 3 a + 2, then three
+/// rows for each higher neighbour.
 SparseMatrix make_pattern(const UpperNeighbours& upper) {
   const auto nodes = static_cast<std::int64_t>(upper.start.size()) - 1;
   SparseMatrix K(3 * nodes, 3 * nodes);
@@ -62,7 +63,8 @@ SparseMatrix make_pattern(const UpperNeighbours& upper) {
       K.outerIndexPtr()[3 * a + i] = entry;
       for (std::int64_t row = 3 * a + i; row < 3 * a + 3; ++row) K.innerIndexPtr()[entry++] = row;
       for (std::int64_t k = upper.start[node]; k < upper.start[node + 1]; ++k) {
-        for (std::int64_t j = 0; j < 3; ++j) K.innerIndexPtr()[entry++] = 3 * upper.node[static_cast<std::size_t>(k)] + j;
+        for (std::int64_t j = 0; j < 3; ++j)
+          K.innerIndexPtr()[entry++] = 3 * upper.node[static_cast<std::size_t>(k)] + j;
       }
     }
   }
@@ -73,7 +75,8 @@ SparseMatrix make_pattern(const UpperNeighbours& upper) {
 
 }  // namespace
 
-Stiffness assemble_stiffness(const Mesh& mesh, const Material& material, const std::vector<std::uint8_t>& fixed) {
+Stiffness assemble_stiffness(const Mesh& mesh, const Material& material,
+                             const std::vector<std::uint8_t>& fixed) {
   Stiffness result;
   result.free_of_node.assign(mesh.nodes.size(), -1);
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {

@@ -25,15 +25,17 @@ namespace {
 
 constexpr int probe_count = 4;
 
-void print_plan(const Plan& plan, const Description& description, const BakeOptions& options, Progress& progress) {
+void print_plan(const Plan& plan, const Description& description, const BakeOptions& options,
+                Progress& progress) {
   progress.line(fmt::format("{} nodes, {} elements, {} free dofs, {} stored dofs", plan.nodes, plan.elements,
                             plan.free_dofs, plan.stored_dofs));
-  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision", static_cast<double>(plan.factor_entries) * 1e-6,
+  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision",
+                            static_cast<double>(plan.factor_entries) * 1e-6,
                             static_cast<double>(plan.file_bytes) * 1e-6,
                             description.precision == Precision::single_precision ? "single" : "double"));
   progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {:.1f} s with {} job{}",
-                            static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9, plan.seconds, options.jobs,
-                            options.jobs == 1 ? "" : "s"));
+                            static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9, plan.seconds,
+                            options.jobs, options.jobs == 1 ? "" : "s"));
 }
 
 /// Everything that the file holds but Green's functions and probes. The columns' order comes from the factor.
@@ -64,7 +66,8 @@ Model describe_model(const Description& description, const BakeOptions& options,
   return model;
 }
 
-/// Random forces on all stored dofs, in [-1, 1) N, and their displacements by a plain solve: a second route past the columns.
+/// Random forces on all stored dofs, in [-1, 1) N, and their displacements by a plain solve: a second route
+/// past the columns.
 std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int64_t>& stored_dofs) {
   std::mt19937_64 random(20240229);
   std::vector<Probe> probes(probe_count);
@@ -82,8 +85,8 @@ std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int6
 }
 
 /// Computes all blocks of columns that the file does not have yet, `jobs` at a time. False when interrupted.
-bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
-                   const InterruptGuard& interrupt) {
+bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, ModelWriter& writer,
+                   Progress& progress, const InterruptGuard& interrupt) {
   const std::int64_t blocks = (plan.stored_dofs + plan.block_columns - 1) / plan.block_columns;
   std::atomic<std::int64_t> next{0};
   std::atomic<bool> failed{false};
@@ -122,7 +125,9 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
   }
   if (failure) std::rethrow_exception(failure);
   if (interrupt.requested()) return false;
-  if (reused > 0) progress.line(fmt::format("{} of {} columns were kept from an earlier, unfinished run", reused, plan.stored_dofs));
+  if (reused > 0)
+    progress.line(
+        fmt::format("{} of {} columns were kept from an earlier, unfinished run", reused, plan.stored_dofs));
   return true;
 }
 
@@ -134,9 +139,11 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   for (const std::string& note : body.notes) progress.line("note: " + note);
 
   const Stiffness stiffness = assemble_stiffness(body.mesh, description.material, body.fixed);
-  openblas_set_num_threads(1);  // the blocks of columns are the parallel work, and the bytes do not depend on the jobs
+  openblas_set_num_threads(
+      1);  // the blocks of columns are the parallel work, and the bytes do not depend on the jobs
   Factor factor(stiffness.K);
-  const GreensSolver solver(factor, stored_dof_marks(body.mesh, stiffness, description.scope, description.layers));
+  const GreensSolver solver(factor,
+                            stored_dof_marks(body.mesh, stiffness, description.scope, description.layers));
   const Plan plan = make_plan(body.mesh, factor, solver, description.precision, options.jobs);
   print_plan(plan, description, options, progress);
   check_memory(plan);

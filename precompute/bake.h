@@ -17,9 +17,9 @@ struct BakeOptions {
 /// How a bake ended.
 enum class BakeResult : std::uint8_t { done, planned, interrupted };
 
-/// Runs the whole precomputation: mesh, K, factor, columns, file. Prints progress to standard error. On Ctrl-C or SIGTERM it
-/// stops at the next block of columns and removes what it wrote. Throws Error for bad input, and with the numbers when
-/// memory or disk will not do.
+/// Runs the whole precomputation: mesh, K, factor, columns, file. Prints progress to standard error. On
+/// Ctrl-C or SIGTERM it stops at the next block of columns and removes what it wrote. Throws Error for bad
+/// input, and with the numbers when memory or disk will not do.
 BakeResult bake(const Description& description, const BakeOptions& options);
 
 }  // namespace palpate

@@ -41,7 +41,8 @@ SparseMatrix node_graph(const SparseMatrix& K) {
 Error out_of_memory(const cholmod_common& common) {
   return {fmt::format("CHOLMOD ran out of memory (status {}, {:.2f} GB in use)", common.status,
                       static_cast<double>(common.memory_inuse) / 1e9),
-          "factorisation of K", "Use a coarser mesh (mesh.edge_length) or a stronger grading, or a machine with more memory."};
+          "factorisation of K",
+          "Use a coarser mesh (mesh.edge_length) or a stronger grading, or a machine with more memory."};
 }
 
 }  // namespace
@@ -84,9 +85,10 @@ void Factor::factorize() {
   cholmod_sparse K_view = view(K_, CHOLMOD_REAL);
   cholmod_l_factorize(&K_view, factor_, &common_);
   if (common_.status == CHOLMOD_NOT_POSDEF) {
-    throw Error(fmt::format("K is not positive definite (column {} of {})", factor_->minor, factor_->n),
-                "factorisation of K",
-                "Fix at least three nodes that are not on one line, and look at the worst element of the mesh.");
+    throw Error(
+        fmt::format("K is not positive definite (column {} of {})", factor_->minor, factor_->n),
+        "factorisation of K",
+        "Fix at least three nodes that are not on one line, and look at the worst element of the mesh.");
   }
   if (common_.status < CHOLMOD_OK) throw out_of_memory(common_);
 }
@@ -108,7 +110,9 @@ std::vector<double> Factor::solve(std::span<const double> b, std::int64_t column
   return result;
 }
 
-std::int64_t Factor::entries() const noexcept { return static_cast<std::int64_t>(factor_->xsize); }
+std::int64_t Factor::entries() const noexcept {
+  return static_cast<std::int64_t>(factor_->xsize);
+}
 
 std::span<const std::int64_t> Factor::permutation() const noexcept {
   return {static_cast<const std::int64_t*>(factor_->Perm), factor_->n};

@@ -12,8 +12,8 @@
 
 namespace palpate {
 
-/// P K P^T = L L^T, supernodal, ordered by METIS on the graph of the nodes, so that the dofs of a node stay together.
-/// The constructor analyses (no numbers yet: enough to plan and to estimate), `factorize` computes.
+/// P K P^T = L L^T, supernodal, ordered by METIS on the graph of the nodes, so that the dofs of a node stay
+/// together. The constructor analyses (no numbers yet: enough to plan and to estimate), `factorize` computes.
 class Factor {
  public:
   /// K: lower triangle with complete 3x3 blocks, as assemble_stiffness leaves it. Keeps a reference to it.
@@ -28,9 +28,10 @@ class Factor {
   /// x = K^-1 b for `columns` right-hand sides, column-major [n, columns], by plain cholmod_solve.
   [[nodiscard]] std::vector<double> solve(std::span<const double> b, std::int64_t columns = 1) const;
 
-  [[nodiscard]] std::int64_t order() const noexcept { return K_.rows(); }      ///< n
-  [[nodiscard]] std::int64_t entries() const noexcept;                         ///< stored entries of L
-  [[nodiscard]] std::span<const std::int64_t> permutation() const noexcept;    ///< dof of K at each position of L
+  [[nodiscard]] std::int64_t order() const noexcept { return K_.rows(); }  ///< n
+  [[nodiscard]] std::int64_t entries() const noexcept;                     ///< stored entries of L
+  [[nodiscard]] std::span<const std::int64_t> permutation()
+      const noexcept;  ///< dof of K at each position of L
   [[nodiscard]] const cholmod_factor& supernodal() const noexcept { return *factor_; }
   [[nodiscard]] cholmod_common& common() const noexcept { return common_; }
 

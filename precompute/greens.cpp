@@ -7,9 +7,15 @@
 namespace palpate {
 namespace {
 
-const std::int64_t* row_positions(const cholmod_factor& L) { return static_cast<const std::int64_t*>(L.s); }
-const double* values(const cholmod_factor& L) { return static_cast<const double*>(L.x); }
-blasint blas(std::int64_t i) { return static_cast<blasint>(i); }
+const std::int64_t* row_positions(const cholmod_factor& L) {
+  return static_cast<const std::int64_t*>(L.s);
+}
+const double* values(const cholmod_factor& L) {
+  return static_cast<const double*>(L.x);
+}
+blasint blas(std::int64_t i) {
+  return static_cast<blasint>(i);
+}
 
 /// How many of the ascending positions are before `end`.
 std::int64_t count_before(std::span<const std::int64_t> positions, std::int64_t end) {
@@ -41,7 +47,8 @@ GreensSolver::GreensSolver(const Factor& factor, const std::vector<std::uint8_t>
     const std::int64_t stored_before = count_before(positions_, node.end());
     node.last_stored = stored_before > 0 ? positions_[static_cast<std::size_t>(stored_before - 1)] : -1;
     max_below_ = std::max(max_below_, node.below);
-    std::fill(supernode_of_.begin() + node.first, supernode_of_.begin() + node.end(), static_cast<std::int64_t>(s));
+    std::fill(supernode_of_.begin() + node.first, supernode_of_.begin() + node.end(),
+              static_cast<std::int64_t>(s));
   }
   for (Supernode& node : supernodes_) {  // children come before parents
     node.parent = node.below > 0
@@ -80,12 +87,13 @@ bool GreensSolver::needed(const Supernode& s, std::int64_t first_position) const
 }
 
 double GreensSolver::flops(std::int64_t first, std::int64_t count) const {
-  const std::span<const std::int64_t> block = std::span(positions_).subspan(static_cast<std::size_t>(first),
-                                                                           static_cast<std::size_t>(count));
+  const std::span<const std::int64_t> block =
+      std::span(positions_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
   std::vector<std::uint8_t> on_path;
   mark_paths(block, on_path);
   double total = 0.0;
-  for (auto s = static_cast<std::size_t>(supernode_of_[static_cast<std::size_t>(block.front())]); s < supernodes_.size(); ++s) {
+  for (auto s = static_cast<std::size_t>(supernode_of_[static_cast<std::size_t>(block.front())]);
+       s < supernodes_.size(); ++s) {
     const Supernode& node = supernodes_[s];
     const auto active = static_cast<double>(count_before(block, node.end()));
     const double sweep = active * static_cast<double>(node.columns * (node.columns + 2 * node.below));
@@ -94,17 +102,19 @@ double GreensSolver::flops(std::int64_t first, std::int64_t count) const {
   return total;
 }
 
-// X_s := L_ss^-1 X_s, then X_below -= L_bs X_s. BLAS sees the transposes: a row of X is a column of a column-major matrix.
-void GreensSolver::forward(const Supernode& s, std::int64_t active, std::int64_t width, Workspace& workspace) const {
+// X_s := L_ss^-1 X_s, then X_below -= L_bs X_s. BLAS sees the transposes: a row of X is a column of a
+// column-major matrix.
+void GreensSolver::forward(const Supernode& s, std::int64_t active, std::int64_t width,
+                           Workspace& workspace) const {
   const std::int64_t ld = s.columns + s.below;
   const double* L = values(factor_.supernodal()) + s.values;
   double* X = workspace.X_.data() + s.first * width;
-  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, blas(active), blas(s.columns), 1.0, L,
-              blas(ld), X, blas(width));
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, blas(active), blas(s.columns),
+              1.0, L, blas(ld), X, blas(width));
   if (s.below == 0) return;
   double* update = workspace.below_.data();
-  cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, blas(active), blas(s.below), blas(s.columns), 1.0, X, blas(width),
-              L + s.columns, blas(ld), 0.0, update, blas(active));
+  cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, blas(active), blas(s.below), blas(s.columns), 1.0, X,
+              blas(width), L + s.columns, blas(ld), 0.0, update, blas(active));
   const std::int64_t* rows = row_positions(factor_.supernodal()) + s.rows + s.columns;
   for (std::int64_t r = 0; r < s.below; ++r) {
     double* target = workspace.X_.data() + rows[r] * width;
@@ -121,15 +131,16 @@ void GreensSolver::backward(const Supernode& s, bool on_path, std::int64_t activ
   double* X = workspace.X_.data() + s.first * width;
   const std::int64_t* rows = row_positions(factor_.supernodal()) + s.rows + s.columns;
   double* below = workspace.below_.data();
-  for (std::int64_t r = 0; r < s.below; ++r) std::copy_n(workspace.X_.data() + rows[r] * width, active, below + r * active);
+  for (std::int64_t r = 0; r < s.below; ++r)
+    std::copy_n(workspace.X_.data() + rows[r] * width, active, below + r * active);
   if (s.below > 0) {
-    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, blas(active), blas(s.columns), blas(s.below), -1.0, below,
-                blas(active), L + s.columns, blas(ld), on_path ? 1.0 : 0.0, X, blas(width));
+    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, blas(active), blas(s.columns), blas(s.below), -1.0,
+                below, blas(active), L + s.columns, blas(ld), on_path ? 1.0 : 0.0, X, blas(width));
   } else if (!on_path) {  // the root of another part of the body: clamped nodes can cut K in two
     std::fill_n(X, s.columns * width, 0.0);
   }
-  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, blas(active), blas(s.columns), 1.0, L,
-              blas(ld), X, blas(width));
+  cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasNoTrans, CblasNonUnit, blas(active),
+              blas(s.columns), 1.0, L, blas(ld), X, blas(width));
 }
 
 void GreensSolver::columns(std::int64_t first, std::int64_t count, Workspace& workspace,
@@ -166,7 +177,8 @@ void GreensSolver::columns(std::int64_t first, std::int64_t count, Workspace& wo
 
   const std::int64_t n = order();
   packed.resize(static_cast<std::size_t>(count * (n - first) - count * (count - 1) / 2));
-  constexpr std::int64_t tile = 16;  // rows of X that are spread over the columns at a time: each column gets a cache line
+  constexpr std::int64_t tile =
+      16;  // rows of X that are spread over the columns at a time: each column gets a cache line
   for (std::int64_t row = first; row < n; row += tile) {
     const std::int64_t row_end = std::min(row + tile, n);
     for (std::int64_t c = 0; c < count; ++c) {

@@ -9,22 +9,24 @@
 
 namespace palpate {
 
-/// Computes blocks of columns of the lower triangle of Xi restricted to the stored dofs, which are numbered by their
-/// position in the elimination order. For a block whose first column is at position p
+/// Computes blocks of columns of the lower triangle of Xi restricted to the stored dofs, which are numbered
+/// by their position in the elimination order. For a block whose first column is at position p
 ///
-///   forward   L Y = E   visits only the supernodes on the elimination-tree paths from the block's dofs to the root,
-///   backward  L^T X = Y visits only supernodes at or after p (rows above the diagonal are another block's columns) that
+///   forward   L Y = E   visits only the supernodes on the elimination-tree paths from the block's dofs to
+///   the root, backward  L^T X = Y visits only supernodes at or after p (rows above the diagonal are another
+///   block's columns) that
 ///                       hold a stored dof or have one below them,
 ///
-/// and in both, supernode s works only on the columns whose position is not after it. Right-hand sides are contiguous a dof,
-/// so that gathering the rows of a supernode copies whole cache lines. Const: any number of threads may compute blocks.
+/// and in both, supernode s works only on the columns whose position is not after it. Right-hand sides are
+/// contiguous a dof, so that gathering the rows of a supernode copies whole cache lines. Const: any number of
+/// threads may compute blocks.
 class GreensSolver {
  public:
   /// Scratch of one thread.
   class Workspace {
     friend class GreensSolver;
-    std::vector<double> X_;          // [n, width] row-major: row p is the dof at position p of the factor
-    std::vector<double> below_;      // [rows below the largest supernode, width]
+    std::vector<double> X_;              // [n, width] row-major: row p is the dof at position p of the factor
+    std::vector<double> below_;          // [rows below the largest supernode, width]
     std::vector<std::uint8_t> on_path_;  // [supernodes]
   };
 
@@ -38,9 +40,10 @@ class GreensSolver {
   /// Dof of K of each stored dof, in the order of the columns.
   [[nodiscard]] std::vector<std::int64_t> stored_dofs() const;
 
-  /// Columns [first, first + count) of the lower triangle, one after the other, each from its diagonal down, to `packed`
-  /// (resized).
-  void columns(std::int64_t first, std::int64_t count, Workspace& workspace, std::vector<double>& packed) const;
+  /// Columns [first, first + count) of the lower triangle, one after the other, each from its diagonal down,
+  /// to `packed` (resized).
+  void columns(std::int64_t first, std::int64_t count, Workspace& workspace,
+               std::vector<double>& packed) const;
 
   /// Multiplications and additions that `columns(first, count)` takes.
   [[nodiscard]] double flops(std::int64_t first, std::int64_t count) const;
@@ -64,7 +67,8 @@ class GreensSolver {
   void mark_paths(std::span<const std::int64_t> block, std::vector<std::uint8_t>& on_path) const;
   [[nodiscard]] bool needed(const Supernode& s, std::int64_t first_position) const noexcept;
   void forward(const Supernode& s, std::int64_t active, std::int64_t width, Workspace& workspace) const;
-  void backward(const Supernode& s, bool on_path, std::int64_t active, std::int64_t width, Workspace& workspace) const;
+  void backward(const Supernode& s, bool on_path, std::int64_t active, std::int64_t width,
+                Workspace& workspace) const;
 
   const Factor& factor_;
   std::vector<Supernode> supernodes_;

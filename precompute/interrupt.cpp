@@ -22,6 +22,8 @@ InterruptGuard::~InterruptGuard() {
   sigaction(SIGTERM, &old_terminate_, nullptr);
 }
 
-bool InterruptGuard::requested() const noexcept { return signalled; }
+bool InterruptGuard::requested() const noexcept {
+  return signalled;
+}
 
 }  // namespace palpate

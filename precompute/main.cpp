@@ -28,14 +28,17 @@ int run_verify(const std::string& file) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Meshes a body, assembles its stiffness and stores the Green's functions that palpate-runtime feels with."};
+  CLI::App app{
+      "Meshes a body, assembles its stiffness and stores the Green's functions that palpate-runtime feels "
+      "with."};
   app.set_version_flag("--version", "palpate-precompute " PALPATE_VERSION);
   app.footer(
       "Examples:\n"
       "  palpate-precompute meshes/models/cube/model.toml\n"
       "  palpate-precompute inspect cube.palpate.hdf\n"
       "  palpate-precompute verify cube.palpate.hdf\n"
-      "Exit status: 0 done, 1 bad input or no room (nothing was changed), 2 usage, 3 not verified, 130 interrupted.");
+      "Exit status: 0 done, 1 bad input or no room (nothing was changed), 2 usage, 3 not verified, 130 "
+      "interrupted.");
   app.require_subcommand(0, 1);
 
   std::string model, file;
@@ -47,7 +50,8 @@ int main(int argc, char** argv) {
   app.add_flag("--dry-run", options.dry_run, "say what it would take (dofs, bytes, time) and stop");
   CLI::App* inspect_command = app.add_subcommand("inspect", "print what is in a file");
   CLI::App* verify_command = app.add_subcommand(
-      "verify", "check a file: checksums, probes, sampled columns against K, and whether its sources have changed");
+      "verify",
+      "check a file: checksums, probes, sampled columns against K, and whether its sources have changed");
   for (CLI::App* command : {inspect_command, verify_command}) {
     command->add_option("file", file, "NAME.palpate.hdf")->required();
   }
@@ -68,11 +72,17 @@ int main(int argc, char** argv) {
     }
     return verify_command->parsed() ? run_verify(file) : run_bake(model, options);
   } catch (const palpate::Error& error) {
-    std::fprintf(stderr, "error: %s: %s\nhint: %s\n", error.where().c_str(), error.what(), error.hint().c_str());
+    std::fprintf(stderr, "error: %s: %s\nhint: %s\n", error.where().c_str(), error.what(),
+                 error.hint().c_str());
   } catch (const std::bad_alloc&) {
-    std::fputs("error: memory: no more memory could be had\nhint: Try --dry-run, and fewer --jobs or a coarser mesh.\n", stderr);
+    std::fputs(
+        "error: memory: no more memory could be had\nhint: Try --dry-run, and fewer --jobs or a coarser "
+        "mesh.\n",
+        stderr);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "error: palpate-precompute: %s\nhint: This is a defect of Palpate; please report it.\n", error.what());
+    std::fprintf(stderr,
+                 "error: palpate-precompute: %s\nhint: This is a defect of Palpate; please report it.\n",
+                 error.what());
   }
   return palpate::exit_input_error;
 }

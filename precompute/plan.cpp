@@ -1,13 +1,13 @@
+#include "precompute/plan.h"
+
 #include <cblas.h>
 #include <fmt/format.h>
 
 #include <chrono>
-#include <fstream>
-#include <string>
-#include <thread>
+#include <vector>
 
+#include "formats/memory.h"
 #include "meshes/error.h"
-#include "precompute/plan.h"
 
 namespace palpate {
 namespace {
@@ -23,7 +23,8 @@ double measured_flops_per_second() {
   const auto start = std::chrono::steady_clock::now();
   double spent = 0.0, flops = 0.0;
   while (spent < 0.05) {
-    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, n, k, 1.0, A.data(), m, B.data(), k, 0.0, C.data(), m);
+    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, m, n, k, 1.0, A.data(), m, B.data(), k, 0.0,
+                C.data(), m);
     flops += 2.0 * m * n * k;
     spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
@@ -38,18 +39,8 @@ std::int64_t choose_block_columns(std::int64_t free_dofs) {
 
 }  // namespace
 
-std::int64_t available_memory() {
-  std::ifstream meminfo("/proc/meminfo");
-  std::string key, unit;
-  std::int64_t kibibytes = 0;
-  while (meminfo >> key >> kibibytes) {
-    std::getline(meminfo, unit);
-    if (key == "MemAvailable:") return kibibytes * 1024;
-  }
-  return INT64_MAX;
-}
-
-Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision, int jobs) {
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision,
+               int jobs) {
   Plan plan;
   plan.nodes = static_cast<std::int64_t>(mesh.nodes.size());
   plan.elements = static_cast<std::int64_t>(mesh.tets.size());
@@ -58,8 +49,8 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
   plan.factor_entries = factor.entries();
   plan.file_bytes = packed_size(plan.stored_dofs) * bytes_per_scalar(precision);
   plan.block_columns = choose_block_columns(plan.free_dofs);
-  plan.memory_bytes =
-      plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) + jobs * solver.workspace_bytes(plan.block_columns);
+  plan.memory_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) +
+                      jobs * solver.workspace_bytes(plan.block_columns);
   for (std::int64_t first = 0; first < plan.stored_dofs; first += plan.block_columns) {
     plan.flops += solver.flops(first, std::min(plan.block_columns, plan.stored_dofs - first));
   }
@@ -69,12 +60,14 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
 
 void check_memory(const Plan& plan) {
   const std::int64_t available = available_memory();
-  if (plan.memory_bytes <= available) return;
-  throw Error(fmt::format("{:.2f} GB of memory are needed, {:.2f} GB are free: {:.2f} GB for the factor ({} entries) and the rest "
-                          "for blocks of {} columns",
-                          static_cast<double>(plan.memory_bytes) / 1e9, static_cast<double>(available) / 1e9,
-                          static_cast<double>(plan.factor_entries) * 8e-9, plan.factor_entries, plan.block_columns),
-              "memory", "Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading.");
+  if (available == 0 || plan.memory_bytes <= available) return;  // 0: the kernel does not say
+  throw Error(
+      fmt::format("{:.2f} GB of memory are needed, {:.2f} GB are free: {:.2f} GB for the factor ({} entries) "
+                  "and the rest "
+                  "for blocks of {} columns",
+                  static_cast<double>(plan.memory_bytes) / 1e9, static_cast<double>(available) / 1e9,
+                  static_cast<double>(plan.factor_entries) * 8e-9, plan.factor_entries, plan.block_columns),
+      "memory", "Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading.");
 }
 
 }  // namespace palpate

@@ -22,12 +22,10 @@ struct Plan {
   double seconds = 0.0;             ///< estimate of the column solves with all jobs, from a measured rate
 };
 
-Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision, int jobs);
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision,
+               int jobs);
 
 /// Throws Error with the numbers when the plan needs more memory than is free.
 void check_memory(const Plan& plan);
-
-/// MemAvailable of /proc/meminfo [bytes].
-std::int64_t available_memory();
 
 }  // namespace palpate

@@ -14,7 +14,9 @@ constexpr double seconds_between_lines = 5.0;  // where lines cannot be rewritte
 
 Progress::Progress() : start_(Clock::now()), step_start_(start_), terminal_(isatty(STDERR_FILENO) != 0) {}
 
-double Progress::seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+double Progress::seconds() const {
+  return std::chrono::duration<double>(Clock::now() - start_).count();
+}
 
 void Progress::line(const std::string& text) {
   if (open_line_) std::fputc('\n', stderr);

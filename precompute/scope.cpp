@@ -6,8 +6,11 @@
 
 namespace palpate {
 
-std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& stiffness, Scope scope, Index layers) {
-  const Index deepest = scope == Scope::full ? std::numeric_limits<Index>::max() : scope == Scope::layers ? layers : 0;
+std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& stiffness, Scope scope,
+                                           Index layers) {
+  const Index deepest = scope == Scope::full     ? std::numeric_limits<Index>::max()
+                        : scope == Scope::layers ? layers
+                                                 : 0;
   const std::vector<Index> layer = layers_below_surface(mesh, extract_surface(mesh));
   std::vector<std::uint8_t> marks;
   marks.reserve(3 * stiffness.free_nodes.size());

@@ -10,6 +10,7 @@
 namespace palpate {
 
 /// A mark for each dof of K: 1 where its row and column of Xi are kept (theory.md section 2).
-std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& stiffness, Scope scope, Index layers);
+std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Stiffness& stiffness, Scope scope,
+                                           Index layers);
 
 }  // namespace palpate

@@ -51,10 +51,12 @@ struct Bounds {
         residual(precision == Precision::single_precision ? 1e-6 : 1e-12) {}
 };
 
-/// K split by stored (b) and other (a) free dofs, to condense a stored column exactly: u_a = -K_aa^-1 K_ab u_b.
+/// K split by stored (b) and other (a) free dofs, to condense a stored column exactly: u_a = -K_aa^-1 K_ab
+/// u_b.
 class Condensation {
  public:
-  Condensation(const SparseMatrix& K, const std::vector<std::int64_t>& stored_dofs) : K_(K), is_stored_(static_cast<std::size_t>(K.rows()), 0) {
+  Condensation(const SparseMatrix& K, const std::vector<std::int64_t>& stored_dofs)
+      : K_(K), is_stored_(static_cast<std::size_t>(K.rows()), 0) {
     for (const std::int64_t dof : stored_dofs) is_stored_[static_cast<std::size_t>(dof)] = 1;
     std::vector<std::int64_t> number(is_stored_.size(), -1);
     for (std::size_t dof = 0; dof < is_stored_.size(); ++dof) {
@@ -66,7 +68,8 @@ class Condensation {
     std::vector<Eigen::Triplet<double, std::int64_t>> entries;
     for (std::int64_t j = 0; j < K.cols(); ++j) {
       for (SparseMatrix::InnerIterator entry(K, j); entry; ++entry) {
-        const std::int64_t row = number[static_cast<std::size_t>(entry.row())], column = number[static_cast<std::size_t>(j)];
+        const std::int64_t row = number[static_cast<std::size_t>(entry.row())],
+                           column = number[static_cast<std::size_t>(j)];
         if (row >= 0 && column >= 0) entries.emplace_back(row, column, entry.value());
       }
     }
@@ -153,7 +156,8 @@ std::vector<Check> check_columns(const Model& model, const Bounds& bounds, int s
 }  // namespace
 
 bool VerifyReport::passed() const noexcept {
-  return stale.empty() && std::all_of(checks.begin(), checks.end(), [](const Check& c) { return c.passed(); });
+  return stale.empty() &&
+         std::all_of(checks.begin(), checks.end(), [](const Check& c) { return c.passed(); });
 }
 
 VerifyReport verify(const Model& model, const std::filesystem::path& file, int samples) {

@@ -26,9 +26,12 @@ struct VerifyReport {
 /// Checks a loaded model (loading has proved sizes, ranges and checksums):
 /// - probes: Xi f = u for each stored pair, every entry of Xi taking part; error |Xi f - u|_max / |u|_max;
 /// - energy: f^T Xi f > 0 and equal to f^T u;
-/// - columns: `samples` columns, both triangles, against K x = e solved anew from the stored mesh: |Xi e - x|_max / |x|_max. A
-///   matrix that is not symmetric to rounding fails here, because the rows above the diagonal come from other columns' solves;
-/// - residual: for the same columns, K u - e with the nodes that are not stored condensed (theory.md section 2), as normwise backward error
+/// - columns: `samples` columns, both triangles, against K x = e solved anew from the stored mesh: |Xi e -
+/// x|_max / |x|_max. A
+///   matrix that is not symmetric to rounding fails here, because the rows above the diagonal come from other
+///   columns' solves;
+/// - residual: for the same columns, K u - e with the nodes that are not stored condensed (theory.md section
+/// 2), as normwise backward error
 ///   |K u - e|_max / (|K|_inf |u|_max + 1).
 VerifyReport verify(const Model& model, const std::filesystem::path& file, int samples = 12);
 

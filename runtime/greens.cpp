@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
-#include <fstream>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "formats/memory.h"
 #include "meshes/error.h"
 
 namespace palpate {
@@ -22,18 +22,6 @@ constexpr std::int64_t tile = 64;  // scalars: two tiles of doubles fit into the
 constexpr std::int64_t u_chunk =
     2048;  // doubles of u that stay in the first-level cache while all rows pass by
 constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is fetched
-
-/// Half of the memory that the kernel thinks can be had without swapping [bytes]; 0 when it does not say.
-std::int64_t half_of_available_memory() {
-  std::ifstream meminfo("/proc/meminfo");
-  std::string key;
-  std::int64_t kilobytes = 0;
-  while (meminfo >> key >> kilobytes) {
-    if (key == "MemAvailable:") return kilobytes * 1024 / 2;
-    meminfo.ignore(64, '\n');
-  }
-  return 0;
-}
 
 /// Whole cache lines a row, and an odd number of them, so that equal columns of neighbouring rows do not fall
 /// into one cache set.
@@ -171,8 +159,7 @@ Greens::Greens(PackedGreens packed, const GreensOptions& options)
   const std::int64_t scalar_bytes = bytes_per_scalar(precision_);
   stride_ = padded_row(order_, scalar_bytes);
   const std::int64_t bytes = order_ * stride_ * scalar_bytes;
-  const std::int64_t limit =
-      options.max_square_bytes < 0 ? half_of_available_memory() : options.max_square_bytes;
+  const std::int64_t limit = options.max_square_bytes < 0 ? available_memory() / 2 : options.max_square_bytes;
   const std::shared_ptr<void> square = bytes <= limit ? map_memory(bytes) : nullptr;
   if (square == nullptr) return;
 

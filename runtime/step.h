@@ -16,9 +16,9 @@ namespace palpate {
 
 /// Where the tool is.
 struct ToolPose {
-  Vec3 position = Vec3::Zero();  ///< tip [m]
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  bool grab = false;  ///< the tool wants to hold
+  Vec3 position = Vec3::Zero();  ///< tip [m]
+  bool grab = false;             ///< the tool wants to hold
 };
 
 /// What a tick or a call could not do; bits, none set when all is well.

@@ -232,6 +232,18 @@ TEST(ModelFile, AlteredColumnsAreDroppedAndTheOthersKept) {
   EXPECT_TRUE(writer.has_columns(30, 5));
 }
 
+TEST(ModelFile, AMistakeDoesNotCostAnEarlierRunsColumns) {
+  const Folder folder;
+  Model wrong = sample_model();
+  wrong.material.poissons_ratio = 0.7;
+  EXPECT_NE(refusal([&] {
+              after_kill(folder, wrong, Precision::double_precision, [] {});
+            }).find("/material/isotropic"),
+            std::string::npos);
+  const ModelWriter writer(folder / "a.palpate.hdf", sample_model(), Precision::double_precision);
+  EXPECT_TRUE(writer.has_columns(0, 10));
+}
+
 TEST(ModelFile, AnAlteredFrameStartsAnew) {
   const Folder folder;
   const auto writer = after_kill(folder, sample_model(), Precision::double_precision,

@@ -69,6 +69,13 @@ TEST(Recording, IsThereOnlyWhenFinished) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
+TEST(Recording, ThatCannotBeStartedLeavesNothing) {
+  const Folder folder;
+  const std::string text = refusal([&] { RecordingWriter(folder / "a.h5", std::string(5000, 'm'), "h"); });
+  EXPECT_NE(text.find("model is 5000 bytes long"), std::string::npos) << text;
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
 TEST(Recording, BadPathsAndOtherFilesAreRefused) {
   const Folder folder;
   EXPECT_NE(refusal([&] { RecordingWriter(folder / "none" / "a.h5", "m", "h"); }).find("No such file"),

@@ -43,7 +43,7 @@ TEST(Models, AllAreReadable) {
 
 struct Sample {
   std::string name;
-  std::size_t nodes, tets, fixed;
+  int nodes, tets, fixed;
   double volume, tolerance;
 };
 
@@ -56,9 +56,9 @@ TEST(Models, GeneratedOnesHaveTheirSizes) {
   };
   for (const Sample& sample : samples) {
     const MeshedBody body = body_of(models / sample.name / "model.toml");
-    EXPECT_EQ(body.mesh.nodes.size(), sample.nodes) << sample.name;
-    EXPECT_EQ(body.mesh.tets.size(), sample.tets) << sample.name;
-    EXPECT_EQ(count_fixed(body), sample.fixed) << sample.name;
+    EXPECT_EQ(body.mesh.nodes.size(), testing::at(sample.nodes)) << sample.name;
+    EXPECT_EQ(body.mesh.tets.size(), testing::at(sample.tets)) << sample.name;
+    EXPECT_EQ(count_fixed(body), testing::at(sample.fixed)) << sample.name;
     EXPECT_NEAR(volume(body.mesh), sample.volume, sample.tolerance) << sample.name;
     EXPECT_TRUE(body.notes.empty()) << sample.name;
   }

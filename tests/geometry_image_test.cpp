@@ -25,11 +25,12 @@ struct TestImage {
   std::vector<unsigned char> labels;
 
   TestImage(std::array<int, 3> n, const Vec3& h) : size(n), spacing(h) {
-    labels.assign(static_cast<std::size_t>(n[0] * n[1] * n[2]), 0);
+    labels.assign(testing::at(n[0]) * testing::at(n[1]) * testing::at(n[2]), 0);
   }
 
   unsigned char& operator()(int i, int j, int k) {
-    return labels[static_cast<std::size_t>(i + size[0] * (j + size[1] * k))];
+    return labels[testing::at(i) +
+                  testing::at(size[0]) * (testing::at(j) + testing::at(size[1]) * testing::at(k))];
   }
 
   [[nodiscard]] std::string inr() const {

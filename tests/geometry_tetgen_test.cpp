@@ -23,7 +23,7 @@ using testing::expect_mentions;
 using testing::volume;
 
 std::string child_error(const std::function<ChildResult()>& work, std::chrono::seconds limit = 20s) {
-  const std::string text = error_of([&] { run_in_child("TetGen", "organ.off", limit, work); });
+  std::string text = error_of([&] { run_in_child("TetGen", "organ.off", limit, work); });
   EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1) << "a child was left";
   EXPECT_EQ(errno, ECHILD);
   return text;

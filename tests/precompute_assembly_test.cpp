@@ -27,11 +27,14 @@ Mesh distorted_box(int cells) {
   return mesh;
 }
 
-Eigen::MatrixXd dense(const SparseMatrix& lower) { return Eigen::MatrixXd(lower).selfadjointView<Eigen::Lower>(); }
+Eigen::MatrixXd dense(const SparseMatrix& lower) {
+  return Eigen::MatrixXd(lower).selfadjointView<Eigen::Lower>();
+}
 
 TEST(Assembly, RigidMotionsTakeNoForce) {
   const Mesh mesh = distorted_box(3);
-  const Eigen::MatrixXd K = dense(assemble_stiffness(mesh, rubber, std::vector<std::uint8_t>(mesh.nodes.size(), 0)).K);
+  const Eigen::MatrixXd K =
+      dense(assemble_stiffness(mesh, rubber, std::vector<std::uint8_t>(mesh.nodes.size(), 0)).K);
   Eigen::MatrixXd rigid(K.rows(), 6);
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
     const auto row = static_cast<Eigen::Index>(3 * node);
@@ -40,7 +43,8 @@ TEST(Assembly, RigidMotionsTakeNoForce) {
     rigid.block<3, 3>(row, 3) << 0, x.z(), -x.y(), -x.z(), 0, x.x(), x.y(), -x.x(), 0;
   }
   EXPECT_LT((K * rigid).lpNorm<Eigen::Infinity>(), 1e-12 * K.lpNorm<Eigen::Infinity>());
-  const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(K, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(K, Eigen::EigenvaluesOnly).eigenvalues();
   EXPECT_LT(std::abs(eigenvalues[5]), 1e-10 * eigenvalues[eigenvalues.size() - 1]);
   EXPECT_GT(eigenvalues[6], 1e-5 * eigenvalues[eigenvalues.size() - 1]);
 }
@@ -84,8 +88,8 @@ TEST(Assembly, PatchTestLinearFieldIsReproduced) {
   }
 }
 
-/// Tip deflection of a cantilever (clamped at x = 0) under a unit shear force spread over the tip as the parabolic shear
-/// stress of Saint-Venant.
+/// Tip deflection of a cantilever (clamped at x = 0) under a unit shear force spread over the tip as the
+/// parabolic shear stress of Saint-Venant.
 double cantilever_deflection(int cells_high, const Vec3& size, const Material& material) {
   const int along = cells_high * static_cast<int>(std::lround(size.x() / size.z()));
   const Mesh mesh = generate(BoxShape{Vec3::Zero(), size, {along, cells_high, cells_high}});
@@ -93,11 +97,14 @@ double cantilever_deflection(int cells_high, const Vec3& size, const Material& m
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) fixed[node] = mesh.nodes[node].x() < 1e-9;
   const Stiffness stiffness = assemble_stiffness(mesh, material, fixed);
   std::vector<double> f(static_cast<std::size_t>(stiffness.K.rows()), 0.0);
-  const auto on_tip = [&](Index node) { return mesh.nodes[static_cast<std::size_t>(node)].x() > size.x() - 1e-9; };
+  const auto on_tip = [&](Index node) {
+    return mesh.nodes[static_cast<std::size_t>(node)].x() > size.x() - 1e-9;
+  };
   double total = 0.0;
   for (const Triangle& t : extract_surface(mesh).triangles) {
     if (!on_tip(t[0]) || !on_tip(t[1]) || !on_tip(t[2])) continue;
-    const Vec3 &a = mesh.nodes[static_cast<std::size_t>(t[0])], &b = mesh.nodes[static_cast<std::size_t>(t[1])],
+    const Vec3 &a = mesh.nodes[static_cast<std::size_t>(t[0])],
+               &b = mesh.nodes[static_cast<std::size_t>(t[1])],
                &c = mesh.nodes[static_cast<std::size_t>(t[2])];
     const double area = 0.5 * (b - a).cross(c - a).norm();
     for (const Index node : t) {
@@ -117,16 +124,21 @@ double cantilever_deflection(int cells_high, const Vec3& size, const Material& m
 }
 
 /// Order of convergence seen on three meshes, each twice as fine as the one before.
-double observed_order(double coarse, double middle, double fine) { return std::log2((middle - coarse) / (fine - middle)); }
+double observed_order(double coarse, double middle, double fine) {
+  return std::log2((middle - coarse) / (fine - middle));
+}
 
-// Timoshenko: w = P L^3 / (3 E I) + P L / (kappa G A), kappa = 5/6 for a rectangle at nu = 0, where Saint-Venant's solution has no
-// Poisson effect at the clamp. Linear tetrahedra are too stiff in bending and converge from below; the order in the energy rises
-// to 2 as the layers over the height come to resolve the bending stress (1.14, 1.71, 1.86 with 8, 16, 24 of them).
+// Timoshenko: w = P L^3 / (3 E I) + P L / (kappa G A), kappa = 5/6 for a rectangle at nu = 0, where
+// Saint-Venant's solution has no Poisson effect at the clamp. Linear tetrahedra are too stiff in bending and
+// converge from below; the order in the energy rises to 2 as the layers over the height come to resolve the
+// bending stress (1.14, 1.71, 1.86 with 8, 16, 24 of them).
 TEST(Assembly, CantileverConvergesToTimoshenko) {
   const Vec3 size(0.4, 0.1, 0.1);
   const Material material{1.0e6, 0.0, 1000.0};
-  const double I = size.y() * std::pow(size.z(), 3) / 12.0, A = size.y() * size.z(), G = material.youngs_modulus / 2.0;
-  const double timoshenko = std::pow(size.x(), 3) / (3.0 * material.youngs_modulus * I) + size.x() / (5.0 / 6.0 * G * A);
+  const double I = size.y() * std::pow(size.z(), 3) / 12.0, A = size.y() * size.z(),
+               G = material.youngs_modulus / 2.0;
+  const double timoshenko =
+      std::pow(size.x(), 3) / (3.0 * material.youngs_modulus * I) + size.x() / (5.0 / 6.0 * G * A);
   const double w2 = cantilever_deflection(2, size, material), w4 = cantilever_deflection(4, size, material),
                w8 = cantilever_deflection(8, size, material), w16 = cantilever_deflection(16, size, material);
   EXPECT_LT(w2, w4);

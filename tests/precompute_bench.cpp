@@ -38,7 +38,8 @@ double seconds(F f) {
 }
 
 double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
   return values[values.size() / 2];
 }
 
@@ -65,7 +66,8 @@ const Prepared& liver(double edge_length) {
   if (!prepared) {
     Description description = read_description(model_toml("liver"));
     description.mesh.edge_length = edge_length;
-    prepared = std::make_unique<Prepared>(mesh_body(description, [](const std::string&) {}), description.material);
+    prepared =
+        std::make_unique<Prepared>(mesh_body(description, [](const std::string&) {}), description.material);
   }
   return *prepared;
 }
@@ -74,7 +76,9 @@ const Prepared& liver(double edge_length) {
 class PlainSolve {
  public:
   explicit PlainSolve(const Prepared& prepared)
-      : factor_(prepared.factor), dofs_(prepared.solver.stored_dofs()), rhs_(static_cast<std::size_t>(factor_.order() * block_columns)) {}
+      : factor_(prepared.factor),
+        dofs_(prepared.solver.stored_dofs()),
+        rhs_(static_cast<std::size_t>(factor_.order() * block_columns)) {}
   ~PlainSolve() {
     cholmod_common& common = factor_.common();
     cholmod_l_free_dense(&x_, &common);
@@ -120,7 +124,8 @@ void liver_columns(benchmark::State& state, double edge_length, int samples) {
   for (auto _ : state) {
     for (int sample = 0; sample < samples; ++sample) {
       const std::int64_t first = (2 * sample + 1) * blocks / (2 * samples) * block_columns;
-      ours.push_back(seconds([&] { prepared.solver.columns(first, block_columns, workspace, packed); }) / block_columns);
+      ours.push_back(seconds([&] { prepared.solver.columns(first, block_columns, workspace, packed); }) /
+                     block_columns);
       plain.push_back(seconds([&] { solve(first); }) / block_columns);
       spent += ours.back();
     }
@@ -135,8 +140,8 @@ void liver_columns(benchmark::State& state, double edge_length, int samples) {
   state.counters["times_faster"] = median(plain) / mean;
 }
 
-/// What a tick of the runtime would cost without Green's functions: a new node's three columns by a solve with the factor, then the
-/// 3 x 3 system. The whole displacement comes with it.
+/// What a tick of the runtime would cost without Green's functions: a new node's three columns by a solve
+/// with the factor, then the 3 x 3 system. The whole displacement comes with it.
 void tick_by_sparse_solve(benchmark::State& state) {
   const Prepared& prepared = liver(read_description(model_toml("liver")).mesh.edge_length.value());
   openblas_set_num_threads(1);
@@ -147,7 +152,8 @@ void tick_by_sparse_solve(benchmark::State& state) {
   for (auto _ : state) {
     node = (node + 3 * 997) % dofs.size();  // a multiple of 3, as dofs.size() is
     std::fill(rhs.begin(), rhs.end(), 0.0);
-    for (std::int64_t axis = 0; axis < 3; ++axis) rhs[static_cast<std::size_t>(axis * n + dofs[node] + axis)] = 1.0;
+    for (std::int64_t axis = 0; axis < 3; ++axis)
+      rhs[static_cast<std::size_t>(axis * n + dofs[node] + axis)] = 1.0;
     const std::vector<double> Xi = prepared.factor.solve(rhs, 3);
     const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>> columns(Xi.data(), n, 3);
     const Vec3 f = columns.middleRows<3>(dofs[node]).llt().solve(Vec3(0.0, 0.0, 1e-3));
@@ -170,10 +176,13 @@ void whole_bake(benchmark::State& state, const std::string& name) {
 BENCHMARK_CAPTURE(whole_bake, beam15, "beam15")->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(whole_bake, beam24, "beam24")->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(tick_by_sparse_solve)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(liver_columns, as_in_model_toml, read_description(model_toml("liver")).mesh.edge_length.value(), 16)
+BENCHMARK_CAPTURE(liver_columns, as_in_model_toml,
+                  read_description(model_toml("liver")).mesh.edge_length.value(), 16)
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(liver_columns, about_20000_surface_nodes, 0.0032, 6)->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(liver_columns, about_20000_surface_nodes, 0.0032, 6)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace palpate

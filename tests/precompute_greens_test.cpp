@@ -28,7 +28,8 @@ struct Body {
 };
 
 Body clamped_block() {
-  return Body(BoxShape{Vec3::Zero(), Vec3(0.1, 0.08, 0.06), {6, 5, 4}}, [](const Vec3& x) { return x.z() < 1e-9; });
+  return Body(BoxShape{Vec3::Zero(), Vec3(0.1, 0.08, 0.06), {6, 5, 4}},
+              [](const Vec3& x) { return x.z() < 1e-9; });
 }
 
 /// Xi of the stored dofs by blocks of `width` columns, as a full matrix in the solver's order.
@@ -66,7 +67,8 @@ void expect_inverse(const Body& body, Scope scope, Index layers, std::int64_t wi
   Factor factor(body.stiffness.K);
   const GreensSolver solver(factor, stored_dof_marks(body.mesh, body.stiffness, scope, layers));
   factor.factorize();
-  const Eigen::MatrixXd Xi = greens(solver, width), reference = dense_inverse(body.stiffness.K, solver.stored_dofs());
+  const Eigen::MatrixXd Xi = greens(solver, width),
+                        reference = dense_inverse(body.stiffness.K, solver.stored_dofs());
   EXPECT_LT((Xi - reference).lpNorm<Eigen::Infinity>(), 1e-11 * reference.lpNorm<Eigen::Infinity>())
       << "scope " << static_cast<int>(scope) << ", " << layers << " layers, blocks of " << width;
 }
@@ -106,7 +108,8 @@ TEST(Greens, SurfaceScopeEqualsFullScope) {
   for (std::size_t i = 0; i < surface_dofs.size(); ++i) {
     for (std::size_t j = 0; j < surface_dofs.size(); ++j) {
       const double difference = Xi_surface(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) -
-                                Xi_full(place[static_cast<std::size_t>(surface_dofs[i])], place[static_cast<std::size_t>(surface_dofs[j])]);
+                                Xi_full(place[static_cast<std::size_t>(surface_dofs[i])],
+                                        place[static_cast<std::size_t>(surface_dofs[j])]);
       largest = std::max(largest, std::abs(difference));
     }
   }
