@@ -1,6 +1,8 @@
 // Writing, continuing and reading NAME.palpate.hdf.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <fstream>
@@ -187,6 +189,37 @@ TEST(ModelFile, AKilledRunIsContinued) {
   writer.write_columns(35, n - 35, sample_columns(35, n - 35, n));
   writer.finish(model.probes);
   EXPECT_EQ(read_bytes(folder / "a.palpate.hdf"), read_bytes(folder / "straight.palpate.hdf"));
+}
+
+TEST(ModelFile, AKillAtAnyMomentLosesNothing) {
+  const Folder folder;
+  write_sample(folder / "straight.palpate.hdf");
+  const std::string straight = read_bytes(folder / "straight.palpate.hdf");
+  const std::filesystem::path path = folder / "a.palpate.hdf";
+  const Model model = sample_model();
+  const std::int64_t n = model.stored_dofs();
+  const auto write = [&] {
+    ModelWriter writer(path, model, Precision::double_precision);
+    for (std::int64_t j = 0; j < n; ++j)
+      if (!writer.has_columns(j, 1)) writer.write_columns(j, 1, sample_columns(j, 1, n));
+    writer.finish(model.probes);
+  };
+  for (useconds_t delay = 0; delay < 6000; delay += 150) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      write();
+      ::_exit(0);
+    }
+    ::usleep(delay);
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    if (!std::filesystem::exists(path)) continue;
+    EXPECT_EQ(read_bytes(path), straight) << delay;
+    if (delay % 300 == 0) std::filesystem::remove(path);
+  }
+  write();
+  EXPECT_EQ(read_bytes(path), straight);
+  EXPECT_EQ(files_in(folder), (Names{"a.palpate.hdf", "straight.palpate.hdf"}));
 }
 
 /// Leaves a killed run with columns [0, 10) and [30, 35) done and lets `harm` do something to its files.

@@ -102,6 +102,23 @@ class Stopped(ProgramTest):
         self.assertEqual(sorted(p.name for p in self.folder.iterdir()),
                          ["killed.palpate.hdf", "model.toml", "straight.palpate.hdf"])
 
+    def test_killed_at_any_moment_again_and_again(self):
+        model = self.write("model.toml", cube_toml(12, scope="full"))
+        straight, output = self.folder / "straight.palpate.hdf", self.folder / "killed.palpate.hdf"
+        start = time.monotonic()
+        self.assertEqual(run(PRECOMPUTE, model, "-o", straight).returncode, 0)
+        whole = time.monotonic() - start
+        for attempt in range(1, 13):
+            process = subprocess.Popen([PRECOMPUTE, model, "-o", output], stderr=subprocess.DEVNULL)
+            time.sleep(whole * attempt / 12)
+            process.kill()
+            if process.wait() == 0:
+                break
+            self.assertFalse(output.exists())
+        self.assertEqual(run(PRECOMPUTE, model, "-o", output).returncode, 0)
+        self.assertEqual(output.read_bytes(), straight.read_bytes())
+        self.assertEqual(len(list(self.folder.iterdir())), 3)
+
     def test_interrupt_leaves_nothing_half_written_and_the_old_file_whole(self):
         old = self.bake(cube_toml(3))
         before = old.read_bytes()
