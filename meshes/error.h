@@ -7,8 +7,8 @@
 namespace palpate {
 
 /// What a person is told when something cannot be done: one sentence, its place, and a way out.
-/// Thrown offline and at load, never in the tick; caught once in each `main`, which prints
-/// `error: WHERE: WHAT` and `hint: HINT` and exits with `ExitCode::input_error` unless told otherwise.
+/// Thrown offline and at load, never in the tick; caught once in each `main`, which prints `to_text` and
+/// exits with `exit_input_error`.
 class Error : public std::runtime_error {
  public:
   /// `what` says what is wrong (with the numbers), `where` names the file, field or line, `hint` says what to
@@ -23,6 +23,9 @@ class Error : public std::runtime_error {
   std::string where_;
   std::string hint_;
 };
+
+/// The two lines that a person sees: `error: WHERE: WHAT` and `hint: HINT`, the hint as a sentence.
+std::string to_text(const Error& error);
 
 /// Exit statuses of both programs (documented in the README).
 enum ExitCode : int {

@@ -72,8 +72,7 @@ int main(int argc, char** argv) {
     }
     return verify_command->parsed() ? run_verify(file) : run_bake(model, options);
   } catch (const palpate::Error& error) {
-    std::fprintf(stderr, "error: %s: %s\nhint: %s\n", error.where().c_str(), error.what(),
-                 error.hint().c_str());
+    std::fputs(palpate::to_text(error).c_str(), stderr);
   } catch (const std::bad_alloc&) {
     std::fputs(
         "error: memory: no more memory could be had\nhint: Try --dry-run, and fewer --jobs or a coarser "

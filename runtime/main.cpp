@@ -162,7 +162,7 @@ int run(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const std::string command =
         app.get_subcommands().empty() ? "" : app.get_subcommands().front()->get_name() + " ";
-    fmt::print(stderr, "error: {}\nhint: see palpate-runtime {}--help\n", error.what(), command);
+    fmt::print(stderr, "error: {}\nhint: See palpate-runtime {}--help\n", error.what(), command);
     return exit_usage;
   }
 }
@@ -173,13 +173,13 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {
-    fmt::print(stderr, "error: {}: {}\nhint: {}\n", error.where(), error.what(), error.hint());
+    std::fputs(palpate::to_text(error).c_str(), stderr);
   } catch (const std::bad_alloc&) {
     fmt::print(stderr,
-               "error: there is not enough memory\nhint: close other programs, or precompute with fewer "
+               "error: there is not enough memory\nhint: Close other programs, or precompute with fewer "
                "surface nodes\n");
   } catch (const std::exception& error) {
-    fmt::print(stderr, "error: {}\nhint: this should not happen; please report it\n", error.what());
+    fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n", error.what());
   }
   return palpate::exit_input_error;
 }

@@ -139,9 +139,13 @@ class Stale(ProgramTest):
         verified = run(PRECOMPUTE, "verify", file)
         self.assertEqual(verified.returncode, 3)
         self.assertIn("STALE", verified.stdout)
-        probed = run(RUNTIME, "probe", file, "--at", "0.5,0.5,1", "--displace", "0,0,1")
-        self.assertIn("model.toml", probed.stderr)
-        self.assertIn("precompute", probed.stderr)
+        touch = self.write("touch.csv", "t,x,y,z,grab\n0,0.5,0.5,1,1\n0.01,0.5,0.5,0.9,1\n")
+        for arguments in (("probe", file, "--at", "0.5,0.5,1", "--displace", "0,0,1"),
+                          ("play", file, "--device", f"script:{touch}", "--fast")):
+            answer = run(RUNTIME, *arguments)
+            self.assertEqual(answer.returncode, 0, answer.stderr)
+            self.assertIn("model.toml", answer.stderr)
+            self.assertIn("precompute", answer.stderr)
 
     def test_changed_mesh_is_noticed(self):
         self.write("tet.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n5\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1 1 1 0\n"
