@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -203,10 +204,10 @@ Mesh unpack_mesh(const Bytes& bytes) {
   const std::byte* at = bytes.data() + sizeof(nodes);
   Mesh mesh;
   mesh.nodes.resize(nodes);
-  std::memcpy(static_cast<void*>(mesh.nodes.data()), at, nodes * sizeof(Vec3));
+  std::copy_n(at, nodes * sizeof(Vec3), reinterpret_cast<std::byte*>(mesh.nodes.data()));
   at += nodes * sizeof(Vec3);
   mesh.tets.resize(static_cast<std::size_t>(bytes.data() + bytes.size() - at) / sizeof(Tet));
-  std::memcpy(mesh.tets.data(), at, mesh.tets.size() * sizeof(Tet));
+  std::copy_n(at, mesh.tets.size() * sizeof(Tet), reinterpret_cast<std::byte*>(mesh.tets.data()));
   mesh.regions.assign(mesh.tets.size(), 0);
   return mesh;
 }
