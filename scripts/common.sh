@@ -2,6 +2,7 @@
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 jobs=$(nproc)
+cd "$root"
 
 say() { printf '\n== %s\n' "$*"; }
 
@@ -37,7 +38,7 @@ build() {
   local preset=$1
   shift
   say "building ($preset)"
-  cmake --preset "$preset" -S "$root" >/dev/null
+  cmake --preset "$preset" >/dev/null
   cmake --build "$root/build/$preset" --parallel "$jobs" ${1:+--target "$@"}
 }
 
