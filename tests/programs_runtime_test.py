@@ -83,7 +83,7 @@ class Probe(ProgramTest):
         question = ("probe", file, "--at", "0.5,0.5,1", "--displace", "0,0,-0.1", "--model")
         self.assertEqual(run(RUNTIME, *question, self.folder / "model.toml").returncode, 0)
         other = self.write("other.toml", cube_toml(3) + "\n")
-        self.assert_refused(run(RUNTIME, *question, other), file.name, "other.toml", "precompute it again")
+        self.assert_refused(run(RUNTIME, *question, other), file.name, "other.toml", "Precompute it again")
         self.assert_refused(run(RUNTIME, *question, self.folder / "none.toml"), "none.toml")
 
 
