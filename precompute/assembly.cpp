@@ -64,7 +64,7 @@ SparseMatrix make_pattern(const UpperNeighbours& upper) {
       for (std::int64_t row = 3 * a + i; row < 3 * a + 3; ++row) K.innerIndexPtr()[entry++] = row;
       for (std::int64_t k = upper.start[node]; k < upper.start[node + 1]; ++k) {
         for (std::int64_t j = 0; j < 3; ++j)
-          K.innerIndexPtr()[entry++] = 3 * upper.node[static_cast<std::size_t>(k)] + j;
+          K.innerIndexPtr()[entry++] = std::int64_t{3} * upper.node[static_cast<std::size_t>(k)] + j;
       }
     }
   }
@@ -101,7 +101,7 @@ Stiffness assemble_stiffness(const Mesh& mesh, const Material& material,
         const auto last = upper.node.begin() + upper.start[static_cast<std::size_t>(a) + 1];
         const std::int64_t k = std::lower_bound(first, last, b) - first;
         for (Eigen::Index i = 0; i < 3; ++i) {
-          double* column = result.K.valuePtr() + result.K.outerIndexPtr()[3 * a + i];
+          double* column = result.K.valuePtr() + result.K.outerIndexPtr()[std::int64_t{3} * a + i];
           if (a == b) {
             for (Eigen::Index j = i; j < 3; ++j) column[j - i] += block(j, i);
           } else {

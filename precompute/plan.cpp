@@ -20,8 +20,8 @@ constexpr double sweep_efficiency =
 /// Multiply-adds a second of one thread in products shaped as the sweeps are.
 double measured_flops_per_second() {
   constexpr int m = 192, n = 128, k = 24;
-  const std::vector<double> A(m * k, 1.0), B(k * n, 1.0);
-  std::vector<double> C(m * n, 0.0);
+  const std::vector<double> A(std::size_t{m} * k, 1.0), B(std::size_t{k} * n, 1.0);
+  std::vector<double> C(std::size_t{m} * n, 0.0);
   const auto start = std::chrono::steady_clock::now();
   double spent = 0.0, flops = 0.0;
   while (spent < 0.05) {

@@ -117,7 +117,7 @@ std::vector<Check> check_columns(const Model& model, const Bounds& bounds, int s
   std::vector<std::int64_t> stored_dofs;  // dof of K of each stored dof
   for (const Index node : model.stored_nodes) {
     for (std::int64_t axis = 0; axis < 3; ++axis) {
-      stored_dofs.push_back(3 * stiffness.free_of_node[static_cast<std::size_t>(node)] + axis);
+      stored_dofs.push_back(std::int64_t{3} * stiffness.free_of_node[static_cast<std::size_t>(node)] + axis);
     }
   }
   const Condensation condensation(stiffness.K, stored_dofs);

@@ -76,7 +76,7 @@ TEST(Assembly, PatchTestLinearFieldIsReproduced) {
   const Eigen::VectorXd f = K * u;
   std::vector<double> rhs;
   for (const Index node : inner.free_nodes) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) rhs.push_back(-f[3 * node + axis]);
+    for (Eigen::Index axis = 0; axis < 3; ++axis) rhs.push_back(-f[Eigen::Index{3} * node + axis]);
   }
   Factor factor(inner.K);
   factor.factorize();
@@ -110,7 +110,7 @@ double cantilever_deflection(int cells_high, const Vec3& size, const Material& m
     for (const Index node : t) {
       const double eta = 2.0 * mesh.nodes[static_cast<std::size_t>(node)].z() / size.z() - 1.0;
       const double force = area / 3.0 * (1.0 - eta * eta);
-      f[static_cast<std::size_t>(3 * stiffness.free_of_node[static_cast<std::size_t>(node)] + 2)] += force;
+      f[3 * static_cast<std::size_t>(stiffness.free_of_node[static_cast<std::size_t>(node)]) + 2] += force;
       total += force;
     }
   }
