@@ -8,10 +8,11 @@
 
 namespace palpate {
 
+/// What is asked of a bake besides the description.
 struct BakeOptions {
-  std::filesystem::path output;
-  int jobs = 1;          ///< threads
-  bool dry_run = false;  ///< stop after the plan is printed
+  std::filesystem::path output;  ///< file to write
+  int jobs = 1;                  ///< threads
+  bool dry_run = false;          ///< stop after the plan is printed
 };
 
 /// How a bake ended.
