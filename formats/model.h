@@ -35,17 +35,25 @@ struct Probe {
 };
 
 /// Everything baked. Constant once loaded; shared by all threads.
-/// A stored dof is 3 k + axis for stored node k; `stored_nodes[k]` is its mesh node.
+/// With d = dimension(), a stored dof is d k + axis for stored node k; `stored_nodes[k]` is its mesh node.
+/// Only nodes that are free along every axis are stored.
 struct Model {
   std::string name;        ///< from model.toml
   std::string generator;   ///< program and version that wrote it
   std::string model_toml;  ///< text of the description, byte for byte
   Mesh mesh;
-  std::vector<Triangle> surface_triangles;  ///< [F] mesh node numbers, outward
-  Material material;
-  std::vector<std::uint8_t> fixed;  ///< [N] 1 where the node is clamped
+  std::vector<Index> surface;  ///< [F * d] mesh node numbers of triangles (in the plane, of lines), outward:
+                               ///< see surface_simplices
+  Analysis analysis = Analysis::solid;
+  double thickness = 1.0;                    ///< in the plane [m]; 1 in space
+  std::vector<Material> materials;           ///< [M] at least one
+  std::vector<Index> material_of_element{};  ///< [E] which of them each element is made of
+  std::vector<std::uint8_t> fixed;           ///< [N] bit `axis` is set where the node is held along it
+  std::vector<Vec3> rest_force;              ///< [N] nodal force of the loads [N]: they act all the time
+  std::vector<Vec3> rest_displacement;  ///< [N] u0 [m]: K u0 = rest_force, held dofs as prescribed. What is
+                                        ///< seen is node + u0 + u; contact displaces relative to u0
   std::vector<Index>
-      stored_nodes;  ///< [n/3] mesh node of each stored node, in the elimination order of the factor
+      stored_nodes;  ///< [n/d] mesh node of each stored node, in the elimination order of the factor
   Scope scope = Scope::layers;
   Index layers = 1;  ///< element layers below the surface that are kept (scope layers); 0 otherwise
   QualityReport quality;
@@ -54,8 +62,10 @@ struct Model {
   PackedGreens greens;       ///< Xi of the stored dofs [m/N]
   std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
 
+  /// d, dofs a node: 2 in the plane, 3 in space.
+  [[nodiscard]] int dimension() const noexcept { return mesh.dimension(); }
   [[nodiscard]] std::int64_t stored_dofs() const noexcept {
-    return 3 * static_cast<std::int64_t>(stored_nodes.size());
+    return dimension() * static_cast<std::int64_t>(stored_nodes.size());
   }
 };
 

@@ -22,8 +22,8 @@ std::size_t remove_unused_nodes(Mesh& mesh);
 /// their sizes and a point in each.
 void check_connected(const Mesh& mesh, const std::string& where);
 
-/// Throws Error when no node is fixed, or the fixed nodes leave a rigid motion of the body (fewer than three
-/// that are not on one line): names the motion that is left. Also when every node is fixed.
+/// Throws Error when no node is held, or the held dofs leave a rigid motion of the body: names the motion
+/// that is left. Also when every dof is held. `fixed` [N]: bit `axis` is set where the node is held along it.
 void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const std::string& where);
 
 /// A warning when the body is larger than 10 m or smaller than 1 mm (probably a missing unit scale), else

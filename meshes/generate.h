@@ -7,12 +7,18 @@
 
 namespace palpate {
 
-/// Box [origin, origin + size] of cells[0] x cells[1] x cells[2] cells, six Kuhn tetrahedra each
-/// (Freudenthal), nodes numbered x fastest.
+/// Box [origin, origin + size] of cells[0] x cells[1] x cells[2] cells, nodes numbered x fastest.
 struct BoxShape {
   Vec3 origin = Vec3::Zero();
   Vec3 size = Vec3::Ones();
   std::array<int, 3> cells = {1, 1, 1};
+};
+
+/// Rectangle in the plane, nodes numbered x fastest.
+struct RectangleShape {
+  Vec3 origin = Vec3::Zero();
+  Vec3 size = {1.0, 1.0, 0.0};
+  std::array<int, 2> cells = {1, 1};
 };
 
 /// Cylinder along z from z = 0 to `height`, centred on the z axis.
@@ -29,8 +35,16 @@ struct SphereShape {
   int cells_across = 4;  ///< cells over the diameter, even
 };
 
-Mesh generate(const BoxShape& shape);
+/// `element`: tet4 (six Kuhn tetrahedra a cell, Freudenthal) or hex8.
+Mesh generate(const BoxShape& shape, ElementType element = ElementType::tet4);
+/// `element`: quad4, or tri3 (each cell cut along its rising diagonal).
+Mesh generate(const RectangleShape& shape, ElementType element = ElementType::quad4);
 Mesh generate(const CylinderShape& shape);  ///< a square grid bent to the circle, Kuhn tetrahedra
 Mesh generate(const SphereShape& shape);    ///< a cubic grid bent to the sphere, Kuhn tetrahedra
+
+/// The same body with elements of another kind: tet4 to tet10 by a new node in the middle of each edge
+/// (numbered after the old ones; straight edges), tet10 to tet4 by dropping those; its own kind unchanged.
+/// The tagged facets follow. Throws Error (where = `where`) for any other pair: says which kind the mesh has.
+Mesh with_elements(Mesh mesh, ElementType element, const std::string& where);
 
 }  // namespace palpate

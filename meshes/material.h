@@ -1,23 +1,41 @@
-// Isotropic linear elasticity.
+// Isotropic linear elasticity, in space and in the plane.
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstdint>
 #include <string>
 
 namespace palpate {
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
+/// How strain and stress are tied together.
+enum class Analysis : std::uint8_t {
+  solid,         ///< three dimensions
+  plane_stress,  ///< thin sheet: no stress across it
+  plane_strain,  ///< slice of a long body: no strain along it
+};
+
+/// D [6 x 6], in the plane [3 x 3].
+using ElasticityMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+/// Stress [xx yy zz xy yz zx], in the plane [xx yy xy] [Pa].
+using StressVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
 /// Isotropic material. Valid for E > 0, -1 < nu < 1/2, density > 0.
 struct Material {
   double youngs_modulus = 0.0;  ///< E [Pa]
   double poissons_ratio = 0.0;  ///< nu [-]
   double density = 1000.0;      ///< [kg/m^3]
+  /// eps_0 [xx yy zz xy yz zx], engineering shear: the strain of the material where it is free of stress
+  /// (swelling, thermal expansion).
+  std::array<double, 6> initial_strain{};
 };
 
-/// D of sigma = D epsilon for engineering strain [xx yy zz xy yz zx] with shear gamma = 2 epsilon (theory.md
-/// section 1).
-Matrix6 elasticity_matrix(const Material& material);
+/// D of sigma = D (epsilon - eps_0) for engineering strain, shear gamma = 2 epsilon (theory.md section 1).
+ElasticityMatrix elasticity_matrix(const Material& material, Analysis analysis = Analysis::solid);
+
+/// D eps_0: the stress that would be needed to keep the initial strain away. In plane strain eps_0,zz counts
+/// through Poisson's ratio; in plane stress it is free.
+StressVector initial_stress(const Material& material, Analysis analysis = Analysis::solid);
 
 /// Throws Error (where = `where`) unless the constants are finite and in the valid ranges.
 void check_material(const Material& material, const std::string& where);

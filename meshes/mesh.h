@@ -4,8 +4,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
+
+#include "meshes/element_type.h"
 
 namespace palpate {
 
@@ -17,19 +20,33 @@ using Index =
 using Tet = std::array<Index, 4>;       ///< node numbers, positively oriented: det[x1-x0, x2-x0, x3-x0] > 0
 using Triangle = std::array<Index, 3>;  ///< node numbers, counter-clockwise seen from outside the body
 
-/// Boundary facet that carries a tag in its mesh file (Gmsh physical surface, Medit reference, TetGen
-/// marker).
-struct TaggedTriangle {
-  Triangle nodes;
-  Index tag;
-};
-
-/// Tetrahedral volume mesh, coordinates in metres.
+/// Mesh of elements of one kind, coordinates in metres. A plane mesh (tri3, quad4) lies in z = 0.
 struct Mesh {
-  std::vector<Vec3> nodes;     ///< [N] positions [m]
-  std::vector<Tet> tets;       ///< [E] linear tetrahedra (tet4)
-  std::vector<Index> regions;  ///< [E] region tag of each element; 0 where the source has none
-  std::vector<TaggedTriangle> tagged_boundary{};  ///< facets with a boundary tag, possibly none
+  ElementType element = ElementType::tet4;
+  std::vector<Vec3> nodes;          ///< [N] positions [m]
+  std::vector<Index> connectivity;  ///< [E * nodes an element] node numbers, positively oriented
+  std::vector<Index> regions;       ///< [E] region tag of each element; 0 where the source has none
+
+  /// Boundary facets that carry a tag in their mesh file (Gmsh physical group, Medit reference, TetGen
+  /// marker), possibly none: [T * nodes a facet] node numbers in any sense, and [T] tags.
+  std::vector<Index> tagged_facets{};
+  std::vector<Index> facet_tags{};
+
+  /// 2 or 3: of the space that the body moves in, and so dofs a node.
+  [[nodiscard]] int dimension() const noexcept { return traits(element).dimension; }
+  [[nodiscard]] Index elements() const noexcept {
+    return static_cast<Index>(connectivity.size() / static_cast<std::size_t>(traits(element).nodes));
+  }
+  /// Node numbers of element e.
+  [[nodiscard]] std::span<const Index> element_nodes(Index e) const noexcept {
+    const auto width = static_cast<std::size_t>(traits(element).nodes);
+    return {connectivity.data() + width * static_cast<std::size_t>(e), width};
+  }
+  /// Node numbers of tagged facet t.
+  [[nodiscard]] std::span<const Index> tagged_facet(Index t) const noexcept {
+    const auto width = static_cast<std::size_t>(traits(traits(element).facet).nodes);
+    return {tagged_facets.data() + width * static_cast<std::size_t>(t), width};
+  }
 };
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// Shape quality of a tetrahedral mesh.
+// Shape quality of a mesh.
 #pragma once
 
 #include <array>
@@ -8,20 +8,22 @@
 
 namespace palpate {
 
-/// Summary kept in the file and printed by `palpate-precompute inspect`.
+/// Summary kept in the file and printed by `palpate-precompute inspect`. Angles are dihedral angles between
+/// faces (in the plane: corner angles). Shape is the radius ratio d r_in / R_circum of simplices (tet10: of
+/// its corners), the smallest scaled Jacobian of the corners of quad4 and hex8: 1 is best, 0 is flat.
 struct QualityReport {
-  static constexpr int bins = 18;  ///< dihedral angle histogram, 10 degrees each
+  static constexpr int bins = 18;  ///< angle histogram, 10 degrees each
 
-  double min_dihedral = 0.0;           ///< [degree], over all six angles of all elements
-  double max_dihedral = 0.0;           ///< [degree]
-  double min_radius_ratio = 0.0;       ///< 3 r_in / R_circum: 1 for the regular tetrahedron, 0 for a flat one
-  double mean_radius_ratio = 0.0;      ///< [-]
-  double min_edge = 0.0;               ///< [m]
-  double max_edge = 0.0;               ///< [m]
-  double volume = 0.0;                 ///< of the whole body [m^3]
-  Index worst_element = 0;             ///< the element with the smallest radius ratio
-  Vec3 worst_centroid = Vec3::Zero();  ///< where it is [m]
-  std::array<std::int64_t, bins> dihedral_histogram{};  ///< number of angles in each bin
+  double min_angle = 0.0;                            ///< [degree], over all angles of all elements
+  double max_angle = 0.0;                            ///< [degree]
+  double min_shape = 0.0;                            ///< [-]
+  double mean_shape = 0.0;                           ///< [-]
+  double min_edge = 0.0;                             ///< [m]
+  double max_edge = 0.0;                             ///< [m]
+  double volume = 0.0;                               ///< of the whole body [m^3]; in the plane its area [m^2]
+  Index worst_element = 0;                           ///< the element with the smallest shape
+  Vec3 worst_centroid = Vec3::Zero();                ///< where it is [m]
+  std::array<std::int64_t, bins> angle_histogram{};  ///< number of angles in each bin
 };
 
 QualityReport measure_quality(const Mesh& mesh);

@@ -44,4 +44,9 @@ using Selection =
 std::vector<std::uint8_t> select_nodes(const Mesh& mesh, const Selection& selection,
                                        const std::string& where);
 
+/// Marks the elements whose centroid (of the corners) the selection holds [E]. Boxes, half spaces, spheres
+/// and lowest parts only; throws Error for lists of nodes and for tags, and when nothing is selected.
+std::vector<std::uint8_t> select_elements(const Mesh& mesh, const Selection& selection,
+                                          const std::string& where);
+
 }  // namespace palpate

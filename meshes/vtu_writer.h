@@ -17,9 +17,10 @@ struct NodalField {
   std::span<const double> values;
 };
 
-/// Writes tetrahedra (`triangles` empty) or a triangle surface (`tets` empty) with nodal fields as ASCII-free
-/// appended raw .vtu; under a temporary name, then renamed. Throws Error when the file cannot be written.
-void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, std::span<const Tet> tets,
-               std::span<const Triangle> triangles, std::span<const NodalField> fields);
+/// Writes elements of one kind (`connectivity`: [E * nodes an element] node numbers) with nodal fields as
+/// ASCII-free appended raw .vtu; under a temporary name, then renamed. Throws Error when the file cannot be
+/// written.
+void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, ElementType element,
+               std::span<const Index> connectivity, std::span<const NodalField> fields);
 
 }  // namespace palpate

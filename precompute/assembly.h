@@ -3,25 +3,40 @@
 
 #include <Eigen/SparseCore>
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "meshes/material.h"
-#include "meshes/mesh.h"
+#include "formats/model.h"
 
 namespace palpate {
 
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int64_t>;
 
-/// K of the free nodes: clamped dofs are removed. Free dof 3 a + axis belongs to free node a.
+/// K of the free dofs, and what couples them to the held ones. A dof of the mesh is d node + axis.
 struct Stiffness {
-  std::vector<Index> free_nodes;    ///< [n/3] mesh node of each free node, ascending
-  std::vector<Index> free_of_node;  ///< [N] free node of each mesh node, -1 where it is clamped
-  SparseMatrix K;  ///< [n, n] lower triangle [N/m]; the 3x3 block of each pair of neighbours is complete
+  std::vector<std::int64_t> free_dofs;    ///< [n] dof of the mesh of each free dof, ascending
+  std::vector<std::int64_t> free_of_dof;  ///< [d N] free dof of each dof of the mesh, -1 where it is held
+  std::vector<std::int64_t> node_start;   ///< [free nodes + 1] first free dof of each node that has one
+  SparseMatrix K;  ///< [n, n] lower triangle [N/m]; the block of each pair of neighbour nodes is complete
+  std::vector<double> held_force;  ///< [n] K_fc u_c: force that the prescribed displacements of the held dofs
+                                   ///< would need on the free ones [N]
 };
 
-/// K = sum over elements of V B^T D B (theory.md section 1), for one material.
-/// `fixed` [N] marks clamped nodes; at least one node must be free.
-Stiffness assemble_stiffness(const Mesh& mesh, const Material& material,
-                             const std::vector<std::uint8_t>& fixed);
+/// What K is assembled from. `prescribed` [N] may be empty: all held dofs stay at zero.
+struct ElasticBody {
+  const Mesh& mesh;
+  Analysis analysis;
+  double thickness;
+  std::span<const Material> materials;
+  std::span<const Index> material_of_element;
+  std::span<const std::uint8_t> fixed;
+  std::span<const Vec3> prescribed;
+};
+
+/// The parts of a baked model.
+ElasticBody elastic_body(const Model& model);
+
+/// K = sum over elements of the integral of t B^T D B (theory.md section 1). At least one dof must be free.
+Stiffness assemble_stiffness(const ElasticBody& body);
 
 }  // namespace palpate

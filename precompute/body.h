@@ -12,12 +12,14 @@
 
 namespace palpate {
 
-/// A meshed body ready for assembly: positively oriented, connected, in metres, held against every rigid
-/// motion.
+/// A meshed body ready for assembly: positively oriented, connected, in metres, every element with a
+/// material, held against every rigid motion.
 struct MeshedBody {
   Mesh mesh;
   Surface surface;
-  std::vector<std::uint8_t> fixed;  ///< [N] 1 where clamped
+  std::vector<Index> material_of_element;  ///< [E] number in Description::materials
+  std::vector<std::uint8_t> fixed;         ///< [N] bit `axis` is set where held along it
+  std::vector<Vec3> prescribed;            ///< [N] displacement along the held axes [m]; zero along others
   std::vector<std::string>
       notes;  ///< what a person should know: repairs, dropped voxels, warnings about the scale
 };

@@ -19,30 +19,90 @@ struct SurfaceGeometry {
 };
 
 /// Labelled image (INR and what else CGAL's image reader takes). Every non-zero label is body unless `labels`
-/// lists those that are.
+/// lists those that are. With `regions` the elements keep their label as region and the mesh follows the
+/// interfaces between labels.
 struct ImageGeometry {
   std::filesystem::path file;
   std::vector<int> labels;  ///< empty: all non-zero ones
+  bool regions = false;     ///< labels are materials: some [[material]] has regions
 };
 
-/// Tetrahedral mesh made elsewhere (.msh, .mesh, .node/.ele, .vtk).
+/// Mesh made elsewhere (.msh, .mesh, .node/.ele, .vtk).
 struct VolumeGeometry {
   std::filesystem::path file;
 };
 
-using Geometry =
-    std::variant<SurfaceGeometry, ImageGeometry, VolumeGeometry, BoxShape, CylinderShape, SphereShape>;
+/// Polygon in the plane [geometry units]: the outer line and holes, in either sense, not closed twice.
+struct PolygonGeometry {
+  std::vector<Vec3> points;
+  std::vector<std::vector<Vec3>> holes;
+};
 
-/// How the volume is meshed. Lengths in metres after scaling.
+/// Black-and-white picture (PNG, PBM): the pixels that are not black are the body (Sito). A pixel is a square
+/// of one geometry unit; x to the right, y up, the lower left corner of the picture at the origin.
+struct PictureGeometry {
+  std::filesystem::path file;
+};
+
+using Geometry = std::variant<SurfaceGeometry, ImageGeometry, VolumeGeometry, PolygonGeometry,
+                              PictureGeometry, RectangleShape, BoxShape, CylinderShape, SphereShape>;
+
+enum class Mesher : std::uint8_t { tetgen, cgal };
+
+/// How the body is meshed. Lengths in metres after scaling.
 struct MeshOptions {
-  /// Target at the surface [m]. Required for images and with remesh; otherwise the mean edge of the surface.
+  /// Kind of the elements; empty: the natural one of the geometry (tet4; quad4 for rectangles; tri3 for
+  /// polygons and pictures; what the file has).
+  std::optional<ElementType> element;
+  Mesher mesher = Mesher::tetgen;  ///< surfaces and images; images: cgal unless told otherwise
+  /// Target at the boundary [m]. Required for images, polygons, pictures and with remesh; otherwise the mean
+  /// edge of the surface.
   std::optional<double> edge_length;
   bool remesh = false;   ///< surfaces: isotropic remeshing to edge_length before meshing
-  double grading = 0.5;  ///< growth of the target edge length per length below the surface [-]; 0 is uniform
-  double radius_edge = 2.0;     ///< bound on circumradius / shortest edge [-]
-  double min_dihedral = 10.0;   ///< surfaces: bound asked of TetGen [degree]
-  double facet_distance = 0.0;  ///< images: surface approximation error [m]; 0 is the largest side of a voxel
+  double grading = 0.5;  ///< growth of the target edge length per length below the boundary [-]; 0 is uniform
+  double radius_edge = 2.0;     ///< bound on circumradius / shortest edge [-]; not for plane meshes
+  double min_dihedral = 10.0;   ///< tetgen: bound asked of TetGen [degree]
+  double facet_distance = 0.0;  ///< cgal: boundary approximation error [m]; 0: images, the largest side of a
+                                ///< voxel; surfaces, a twentieth of edge_length
+  double feature_angle =
+      60.0;             ///< cgal on surfaces: edges whose faces turn by more are kept [degree]; 180: none
+  bool odt = false;     ///< cgal: global optimisation by optimal Delaunay triangulation
+  bool lloyd = false;   ///< cgal: global optimisation by centroidal Voronoi (and of plane meshes)
+  bool perturb = true;  ///< cgal: sliver perturbation, after odt or lloyd
+  bool exude = true;    ///< cgal: sliver exudation, last
 };
+
+/// Nodes held along some axes, at a prescribed displacement.
+struct Fixing {
+  Selection where;
+  std::uint8_t axes = 7;             ///< bit `axis` is set where held
+  Vec3 displacement = Vec3::Zero();  ///< along the held axes [m]
+};
+
+/// A material and the elements that are made of it: those of its regions, those that its selection holds, or
+/// (neither given) those that no other material claims.
+struct MaterialPart {
+  Material material;
+  std::vector<Index> regions;
+  std::optional<Selection> where;
+};
+
+/// Force on each of some nodes [N].
+struct NodalForce {
+  Vec3 force;
+  Selection where;
+};
+/// Force per area [N/m^2] on the boundary facets all of whose nodes are selected; in the plane it acts over
+/// the thickness.
+struct Traction {
+  Vec3 traction;
+  Selection where;
+};
+/// Body force: acceleration [m/s^2] times each material's density.
+struct Gravity {
+  Vec3 acceleration;
+};
+using Load = std::variant<NodalForce, Traction, Gravity>;
 
 /// The whole model.toml, checked.
 struct Description {
@@ -52,8 +112,11 @@ struct Description {
   Geometry geometry;
   double scale = 1.0;  ///< metres per length unit of the geometry
   MeshOptions mesh;
-  Material material;
-  std::vector<Selection> fixed;  ///< union of these is clamped
+  Analysis analysis = Analysis::solid;
+  double thickness = 1.0;  ///< in the plane [m]
+  std::vector<MaterialPart> materials;
+  std::vector<Fixing> fixed;
+  std::vector<Load> loads;
   Scope scope = Scope::layers;
   Index layers = 1;
   Precision precision = Precision::single_precision;
