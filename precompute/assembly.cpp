@@ -1,12 +1,30 @@
 #include "precompute/assembly.h"
 
 #include <algorithm>
-#include <array>
 
-#include "meshes/tet4.h"
+#include "meshes/element.h"
 
 namespace palpate {
 namespace {
+
+using Rows = std::vector<std::int64_t>;
+
+/// Numbers the free dofs, those of a node together.
+void number_dofs(const ElasticBody& body, Stiffness& result) {
+  const int d = body.mesh.dimension();
+  result.free_of_dof.assign(static_cast<std::size_t>(d) * body.mesh.nodes.size(), -1);
+  for (std::size_t node = 0; node < body.mesh.nodes.size(); ++node) {
+    const std::size_t before = result.free_dofs.size();
+    for (int axis = 0; axis < d; ++axis) {
+      if ((body.fixed[node] >> axis & 1) != 0) continue;
+      const std::size_t dof = static_cast<std::size_t>(d) * node + static_cast<std::size_t>(axis);
+      result.free_of_dof[dof] = static_cast<std::int64_t>(result.free_dofs.size());
+      result.free_dofs.push_back(static_cast<std::int64_t>(dof));
+    }
+    if (result.free_dofs.size() > before) result.node_start.push_back(static_cast<std::int64_t>(before));
+  }
+  result.node_start.push_back(static_cast<std::int64_t>(result.free_dofs.size()));
+}
 
 /// For each free node the free nodes with a higher number that share an element with it, ascending.
 struct UpperNeighbours {
@@ -14,28 +32,39 @@ struct UpperNeighbours {
   std::vector<Index> node;
 };
 
-/// Calls f(a, b) with free nodes a < b for the six edges of each element that join two free nodes.
+/// Free node of each mesh node, -1 where every dof is held.
+std::vector<Index> free_nodes(const ElasticBody& body, const Stiffness& stiffness) {
+  std::vector<Index> result(body.mesh.nodes.size(), -1);
+  for (std::size_t a = 0; a + 1 < stiffness.node_start.size(); ++a) {
+    const std::int64_t dof = stiffness.free_dofs[static_cast<std::size_t>(stiffness.node_start[a])];
+    result[static_cast<std::size_t>(dof / body.mesh.dimension())] = static_cast<Index>(a);
+  }
+  return result;
+}
+
+/// Calls f(a, b) with free nodes a < b for every two free nodes of each element.
 template <class F>
-void for_each_free_edge(const Mesh& mesh, const std::vector<Index>& free_of_node, F f) {
-  for (const Tet& tet : mesh.tets) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      for (std::size_t j = i + 1; j < 4; ++j) {
-        const Index a = free_of_node[static_cast<std::size_t>(tet[i])];
-        const Index b = free_of_node[static_cast<std::size_t>(tet[j])];
+void for_each_free_pair(const Mesh& mesh, const std::vector<Index>& free_node, F f) {
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    const std::span<const Index> nodes = mesh.element_nodes(e);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const Index a = free_node[static_cast<std::size_t>(nodes[i])];
+      for (std::size_t j = i + 1; j < nodes.size(); ++j) {
+        const Index b = free_node[static_cast<std::size_t>(nodes[j])];
         if (a >= 0 && b >= 0) f(std::min(a, b), std::max(a, b));
       }
     }
   }
 }
 
-UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>& free_of_node,
+UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>& free_node,
                                       std::size_t nodes) {
   std::vector<std::int64_t> start(nodes + 1, 0);
-  for_each_free_edge(mesh, free_of_node, [&](Index a, Index) { ++start[static_cast<std::size_t>(a) + 1]; });
+  for_each_free_pair(mesh, free_node, [&](Index a, Index) { ++start[static_cast<std::size_t>(a) + 1]; });
   for (std::size_t a = 0; a < nodes; ++a) start[a + 1] += start[a];
   std::vector<Index> node(static_cast<std::size_t>(start[nodes]));
   std::vector<std::int64_t> next(start.begin(), start.end() - 1);
-  for_each_free_edge(mesh, free_of_node, [&](Index a, Index b) {
+  for_each_free_pair(mesh, free_node, [&](Index a, Index b) {
     node[static_cast<std::size_t>(next[static_cast<std::size_t>(a)]++)] = b;
   });
 
@@ -50,66 +79,83 @@ UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>
   return unique;
 }
 
-/// The lower triangle's pattern with zero values: in column 3 a + i the rows 3 a + i .. 3 a + 2, then three
-/// rows for each higher neighbour.
-SparseMatrix make_pattern(const UpperNeighbours& upper) {
-  const auto nodes = static_cast<std::int64_t>(upper.start.size()) - 1;
-  SparseMatrix K(3 * nodes, 3 * nodes);
-  K.resizeNonZeros(6 * nodes + 9 * static_cast<std::int64_t>(upper.node.size()));
-  std::int64_t entry = 0;
-  for (std::int64_t a = 0; a < nodes; ++a) {
-    const auto node = static_cast<std::size_t>(a);
-    for (std::int64_t i = 0; i < 3; ++i) {
-      K.outerIndexPtr()[3 * a + i] = entry;
-      for (std::int64_t row = 3 * a + i; row < 3 * a + 3; ++row) K.innerIndexPtr()[entry++] = row;
-      for (std::int64_t k = upper.start[node]; k < upper.start[node + 1]; ++k) {
-        for (std::int64_t j = 0; j < 3; ++j)
-          K.innerIndexPtr()[entry++] = std::int64_t{3} * upper.node[static_cast<std::size_t>(k)] + j;
+/// The lower triangle's pattern with zero values: in a column, the later dofs of its own node, then all dofs
+/// of the higher neighbours.
+SparseMatrix make_pattern(const UpperNeighbours& upper, const std::vector<std::int64_t>& node_start) {
+  Rows columns{0}, rows;
+  for (std::size_t a = 0; a + 1 < node_start.size(); ++a) {
+    for (std::int64_t column = node_start[a]; column < node_start[a + 1]; ++column) {
+      for (std::int64_t row = column; row < node_start[a + 1]; ++row) rows.push_back(row);
+      for (std::int64_t k = upper.start[a]; k < upper.start[a + 1]; ++k) {
+        const auto b = static_cast<std::size_t>(upper.node[static_cast<std::size_t>(k)]);
+        for (std::int64_t row = node_start[b]; row < node_start[b + 1]; ++row) rows.push_back(row);
+      }
+      columns.push_back(static_cast<std::int64_t>(rows.size()));
+    }
+  }
+  SparseMatrix K(node_start.back(), node_start.back());
+  K.resizeNonZeros(static_cast<std::int64_t>(rows.size()));
+  std::copy(columns.begin(), columns.end(), K.outerIndexPtr());
+  std::copy(rows.begin(), rows.end(), K.innerIndexPtr());
+  std::fill_n(K.valuePtr(), K.nonZeros(), 0.0);
+  return K;
+}
+
+/// Adds K_e: entries between free dofs to K, those between free and held dofs times the prescribed
+/// displacement to the held force.
+void scatter(const ElasticBody& body, std::span<const Index> nodes, const ElementMatrix& Ke,
+             Stiffness& result) {
+  const int d = body.mesh.dimension();
+  std::array<std::int64_t, 3 * max_element_nodes> free{};
+  std::array<double, 3 * max_element_nodes> prescribed{};
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (int axis = 0; axis < d; ++axis) {
+      const std::size_t local = static_cast<std::size_t>(d) * i + static_cast<std::size_t>(axis);
+      const std::int64_t dof = std::int64_t{d} * nodes[i] + axis;
+      free[local] = result.free_of_dof[static_cast<std::size_t>(dof)];
+      prescribed[local] =
+          body.prescribed.empty() ? 0.0 : body.prescribed[static_cast<std::size_t>(nodes[i])][axis];
+    }
+  }
+  for (Eigen::Index j = 0; j < Ke.cols(); ++j) {
+    const std::int64_t column = free[static_cast<std::size_t>(j)];
+    if (column < 0) continue;
+    const std::int64_t* first = result.K.innerIndexPtr() + result.K.outerIndexPtr()[column];
+    const std::int64_t* last = result.K.innerIndexPtr() + result.K.outerIndexPtr()[column + 1];
+    for (Eigen::Index i = 0; i < Ke.rows(); ++i) {
+      const std::int64_t row = free[static_cast<std::size_t>(i)];
+      if (row < 0) {
+        result.held_force[static_cast<std::size_t>(column)] +=
+            Ke(i, j) * prescribed[static_cast<std::size_t>(i)];
+      } else if (row >= column) {
+        result.K.valuePtr()[std::lower_bound(first, last, row) - result.K.innerIndexPtr()] += Ke(i, j);
       }
     }
   }
-  K.outerIndexPtr()[3 * nodes] = entry;
-  std::fill_n(K.valuePtr(), entry, 0.0);
-  return K;
 }
 
 }  // namespace
 
-Stiffness assemble_stiffness(const Mesh& mesh, const Material& material,
-                             const std::vector<std::uint8_t>& fixed) {
-  Stiffness result;
-  result.free_of_node.assign(mesh.nodes.size(), -1);
-  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
-    if (fixed[node]) continue;
-    result.free_of_node[node] = static_cast<Index>(result.free_nodes.size());
-    result.free_nodes.push_back(static_cast<Index>(node));
-  }
-  const UpperNeighbours upper = find_upper_neighbours(mesh, result.free_of_node, result.free_nodes.size());
-  result.K = make_pattern(upper);
+ElasticBody elastic_body(const Model& model) {
+  return {model.mesh,  model.analysis,         model.thickness, model.materials, model.material_of_element,
+          model.fixed, model.rest_displacement};
+}
 
-  const Matrix6 D = elasticity_matrix(material);
-  for (const Tet& tet : mesh.tets) {
-    const tet4::Stiffness Ke = tet4::stiffness(tet4::corners(mesh, tet), D);
-    for (std::size_t p = 0; p < 4; ++p) {
-      const Index a = result.free_of_node[static_cast<std::size_t>(tet[p])];
-      if (a < 0) continue;
-      for (std::size_t q = 0; q < 4; ++q) {
-        const Index b = result.free_of_node[static_cast<std::size_t>(tet[q])];
-        if (b < a) continue;
-        const auto block = Ke.block<3, 3>(static_cast<Eigen::Index>(3 * q), static_cast<Eigen::Index>(3 * p));
-        const auto first = upper.node.begin() + upper.start[static_cast<std::size_t>(a)];
-        const auto last = upper.node.begin() + upper.start[static_cast<std::size_t>(a) + 1];
-        const std::int64_t k = std::lower_bound(first, last, b) - first;
-        for (Eigen::Index i = 0; i < 3; ++i) {
-          double* column = result.K.valuePtr() + result.K.outerIndexPtr()[std::int64_t{3} * a + i];
-          if (a == b) {
-            for (Eigen::Index j = i; j < 3; ++j) column[j - i] += block(j, i);
-          } else {
-            for (Eigen::Index j = 0; j < 3; ++j) column[(3 - i) + 3 * k + j] += block(j, i);
-          }
-        }
-      }
-    }
+Stiffness assemble_stiffness(const ElasticBody& body) {
+  Stiffness result;
+  number_dofs(body, result);
+  result.held_force.assign(result.free_dofs.size(), 0.0);
+  const UpperNeighbours upper =
+      find_upper_neighbours(body.mesh, free_nodes(body, result), result.node_start.size() - 1);
+  result.K = make_pattern(upper, result.node_start);
+
+  std::vector<ElasticityMatrix> D;
+  for (const Material& material : body.materials) D.push_back(elasticity_matrix(material, body.analysis));
+  for (Index e = 0; e < body.mesh.elements(); ++e) {
+    const auto material = static_cast<std::size_t>(body.material_of_element[static_cast<std::size_t>(e)]);
+    const ElementMatrix Ke =
+        element_stiffness(body.mesh.element, element_nodes(body.mesh, e), D[material], body.thickness);
+    scatter(body, body.mesh.element_nodes(e), Ke, result);
   }
   return result;
 }

@@ -16,6 +16,7 @@
 #include "precompute/factor.h"
 #include "precompute/greens.h"
 #include "precompute/interrupt.h"
+#include "precompute/loads.h"
 #include "precompute/plan.h"
 #include "precompute/progress.h"
 #include "precompute/scope.h"
@@ -25,10 +26,16 @@ namespace {
 
 constexpr int probe_count = 4;
 
-void print_plan(const Plan& plan, const Description& description, const BakeOptions& options,
-                Progress& progress) {
-  progress.line(fmt::format("{} nodes, {} elements, {} free dofs, {} stored dofs", plan.nodes, plan.elements,
-                            plan.free_dofs, plan.stored_dofs));
+void print_plan(const Plan& plan, const Model& model, const Description& description,
+                const BakeOptions& options, Progress& progress) {
+  const QualityReport& quality = model.quality;
+  progress.line(fmt::format("{} nodes, {} elements ({}), {} free dofs, {} stored dofs", plan.nodes,
+                            plan.elements, traits(model.mesh.element).name, plan.free_dofs,
+                            plan.stored_dofs));
+  progress.line(
+      fmt::format("angles {:.1f} to {:.1f} degrees, worst shape {:.3f} at ({:.4g}, {:.4g}, {:.4g}) m",
+                  quality.min_angle, quality.max_angle, quality.min_shape, quality.worst_centroid.x(),
+                  quality.worst_centroid.y(), quality.worst_centroid.z()));
   progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision",
                             static_cast<double>(plan.factor_entries) * 1e-6,
                             static_cast<double>(plan.file_bytes) * 1e-6,
@@ -38,15 +45,32 @@ void print_plan(const Plan& plan, const Description& description, const BakeOpti
                             options.jobs, options.jobs == 1 ? "" : "s"));
 }
 
-/// Everything that the file holds but Green's functions and probes. The columns' order comes from the factor.
-Model describe_model(const Description& description, const BakeOptions& options, MeshedBody body,
-                     const Stiffness& stiffness, const GreensSolver& solver) {
+/// Mesh node of each stored node, in the order of the columns, which comes from the factor.
+std::vector<Index> stored_nodes(const GreensSolver& solver, const Stiffness& stiffness, int dimension) {
+  const std::vector<std::int64_t> columns = solver.stored_dofs();
+  std::vector<Index> nodes;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const std::int64_t dof = stiffness.free_dofs[static_cast<std::size_t>(columns[k])];
+    const auto axis = static_cast<std::int64_t>(k % static_cast<std::size_t>(dimension));
+    if (axis == 0) nodes.push_back(static_cast<Index>(dof / dimension));
+    if (dof != std::int64_t{dimension} * nodes.back() + axis) {
+      throw std::logic_error("the elimination order has separated the dofs of a node");
+    }
+  }
+  return nodes;
+}
+
+/// Everything that the file holds but Green's functions, probes and the rest state.
+Model describe_model(const Description& description, const BakeOptions& options, MeshedBody body) {
   Model model;
   model.name = description.name;
   model.generator = "palpate-precompute " PALPATE_VERSION;
   model.model_toml = description.text;
-  model.surface_triangles = std::move(body.surface.triangles);
-  model.material = description.material;
+  model.surface = surface_simplices(body.surface);
+  model.analysis = description.analysis;
+  model.thickness = description.thickness;
+  for (const MaterialPart& part : description.materials) model.materials.push_back(part.material);
+  model.material_of_element = std::move(body.material_of_element);
   model.fixed = std::move(body.fixed);
   model.scope = description.scope;
   model.layers = description.scope == Scope::layers ? description.layers : 0;
@@ -55,13 +79,6 @@ Model describe_model(const Description& description, const BakeOptions& options,
   model.sources.push_back(describe_source("model", description.file, options.output));
   for (const auto& file : input_files(description)) {
     model.sources.push_back(describe_source("geometry", file, options.output));
-  }
-  const std::vector<std::int64_t> dofs = solver.stored_dofs();
-  for (std::size_t k = 0; k < dofs.size(); k += 3) {
-    if (dofs[k] % 3 != 0 || dofs[k + 1] != dofs[k] + 1 || dofs[k + 2] != dofs[k] + 2) {
-      throw std::logic_error("the elimination order has separated the dofs of a node");
-    }
-    model.stored_nodes.push_back(stiffness.free_nodes[static_cast<std::size_t>(dofs[k] / 3)]);
   }
   return model;
 }
@@ -138,20 +155,32 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   MeshedBody body = mesh_body(description, [&](const std::string& text) { progress.line(text); });
   for (const std::string& note : body.notes) progress.line("note: " + note);
 
-  const Stiffness stiffness = assemble_stiffness(body.mesh, description.material, body.fixed);
+  const std::vector<Vec3> loads = nodal_loads(description, body);
+  const std::vector<Vec3> prescribed = body.prescribed;
+  const Surface surface = body.surface;
+  Model model = describe_model(description, options, std::move(body));
+  ElasticBody elastic = elastic_body(model);
+  elastic.prescribed = prescribed;
+  const Stiffness stiffness = assemble_stiffness(elastic);
   openblas_set_num_threads(
       1);  // the blocks of columns are the parallel work, and the bytes do not depend on the jobs
-  Factor factor(stiffness.K);
-  const GreensSolver solver(factor,
-                            stored_dof_marks(body.mesh, stiffness, description.scope, description.layers));
-  const Plan plan = make_plan(body.mesh, factor, solver, description.precision, options.jobs);
-  print_plan(plan, description, options, progress);
+  Factor factor(stiffness.K, stiffness.node_start);
+  const GreensSolver solver(
+      factor, stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers));
+  if (solver.order() == 0) {
+    throw Error("no node of the boundary is free along every axis, so nothing can be touched",
+                description.file.string(), "Hold a smaller part of the body in [[fixed]].");
+  }
+  const Plan plan = make_plan(model.mesh, factor, solver, description.precision, options.jobs);
+  print_plan(plan, model, description, options, progress);
   check_memory(plan);
   if (options.dry_run) return BakeResult::planned;
 
   factor.factorize();
   progress.line("K factorised");
-  const Model model = describe_model(description, options, std::move(body), stiffness, solver);
+  model.stored_nodes = stored_nodes(solver, stiffness, model.dimension());
+  model.rest_force = loads;
+  model.rest_displacement = rest_displacement(factor, stiffness, loads, prescribed, model.dimension());
   const InterruptGuard interrupt;
   ModelWriter writer(options.output, model, description.precision);
   if (!solve_columns(solver, plan, options.jobs, writer, progress, interrupt)) {

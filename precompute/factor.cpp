@@ -25,15 +25,20 @@ cholmod_sparse view(const SparseMatrix& A, int values) {
 }
 
 /// Lower pattern of the node graph: the first dof of every node stands for it.
-SparseMatrix node_graph(const SparseMatrix& K) {
-  SparseMatrix graph(K.rows() / 3, K.cols() / 3);
+SparseMatrix node_graph(const SparseMatrix& K, std::span<const std::int64_t> node_start) {
+  const auto nodes = static_cast<std::int64_t>(node_start.size()) - 1;
+  std::vector<std::int64_t> node_of_first(static_cast<std::size_t>(K.rows()), -1);
+  for (std::int64_t a = 0; a < nodes; ++a) {
+    node_of_first[static_cast<std::size_t>(node_start[static_cast<std::size_t>(a)])] = a;
+  }
   std::vector<Eigen::Triplet<double, std::int64_t>> edges;
-  edges.reserve(static_cast<std::size_t>(K.nonZeros() / 9 + graph.cols()));
-  for (std::int64_t a = 0; a < graph.cols(); ++a) {
-    for (SparseMatrix::InnerIterator entry(K, 3 * a); entry; ++entry) {
-      if (entry.row() % 3 == 0) edges.emplace_back(entry.row() / 3, a, 1.0);
+  for (std::int64_t a = 0; a < nodes; ++a) {
+    for (SparseMatrix::InnerIterator entry(K, node_start[static_cast<std::size_t>(a)]); entry; ++entry) {
+      const std::int64_t b = node_of_first[static_cast<std::size_t>(entry.row())];
+      if (b >= 0) edges.emplace_back(b, a, 1.0);
     }
   }
+  SparseMatrix graph(nodes, nodes);
   graph.setFromTriplets(edges.begin(), edges.end());
   return graph;
 }
@@ -47,7 +52,7 @@ Error out_of_memory(const cholmod_common& common) {
 
 }  // namespace
 
-Factor::Factor(const SparseMatrix& K) : K_(K) {
+Factor::Factor(const SparseMatrix& K, std::span<const std::int64_t> node_start) : K_(K) {
   cholmod_l_start(&common_);
   common_.print = 0;
   common_.supernodal = CHOLMOD_SUPERNODAL;
@@ -55,15 +60,16 @@ Factor::Factor(const SparseMatrix& K) : K_(K) {
   common_.method[0].ordering = CHOLMOD_GIVEN;
   common_.postorder = 1;
 
-  const SparseMatrix graph = node_graph(K);
+  const SparseMatrix graph = node_graph(K, node_start);
   cholmod_sparse graph_view = view(graph, CHOLMOD_PATTERN);
   std::vector<std::int64_t> node_order(static_cast<std::size_t>(graph.cols()));
   bool ok = cholmod_l_metis(&graph_view, nullptr, 0, 1, node_order.data(), &common_) != 0;
   if (ok) {
     std::vector<std::int64_t> dof_order;
-    dof_order.reserve(3 * node_order.size());
+    dof_order.reserve(static_cast<std::size_t>(K.rows()));
     for (const std::int64_t node : node_order) {
-      for (std::int64_t axis = 0; axis < 3; ++axis) dof_order.push_back(3 * node + axis);
+      const auto a = static_cast<std::size_t>(node);
+      for (std::int64_t dof = node_start[a]; dof < node_start[a + 1]; ++dof) dof_order.push_back(dof);
     }
     cholmod_sparse K_view = view(K, CHOLMOD_REAL);
     factor_ = cholmod_l_analyze_p(&K_view, dof_order.data(), nullptr, 0, &common_);
@@ -85,10 +91,9 @@ void Factor::factorize() {
   cholmod_sparse K_view = view(K_, CHOLMOD_REAL);
   cholmod_l_factorize(&K_view, factor_, &common_);
   if (common_.status == CHOLMOD_NOT_POSDEF) {
-    throw Error(
-        fmt::format("K is not positive definite (column {} of {})", factor_->minor, factor_->n),
-        "factorisation of K",
-        "Fix at least three nodes that are not on one line, and look at the worst element of the mesh.");
+    throw Error(fmt::format("K is not positive definite (column {} of {})", factor_->minor, factor_->n),
+                "factorisation of K",
+                "Hold the body against every rigid motion, and look at the worst element of the mesh.");
   }
   if (common_.status < CHOLMOD_OK) throw out_of_memory(common_);
 }

@@ -16,8 +16,9 @@ namespace palpate {
 /// together. The constructor analyses (no numbers yet: enough to plan and to estimate), `factorize` computes.
 class Factor {
  public:
-  /// K: lower triangle with complete 3x3 blocks, as assemble_stiffness leaves it. Keeps a reference to it.
-  explicit Factor(const SparseMatrix& K);
+  /// K: lower triangle with complete blocks of nodes, as assemble_stiffness leaves it; node a has the dofs
+  /// node_start[a] .. node_start[a + 1] - 1. Keeps a reference to K.
+  Factor(const SparseMatrix& K, std::span<const std::int64_t> node_start);
   ~Factor();
   Factor(const Factor&) = delete;
   Factor& operator=(const Factor&) = delete;

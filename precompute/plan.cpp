@@ -45,7 +45,7 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
                int jobs) {
   Plan plan;
   plan.nodes = static_cast<std::int64_t>(mesh.nodes.size());
-  plan.elements = static_cast<std::int64_t>(mesh.tets.size());
+  plan.elements = mesh.elements();
   plan.free_dofs = factor.order();
   plan.stored_dofs = solver.order();
   plan.factor_entries = factor.entries();
