@@ -1,6 +1,7 @@
 #include "precompute/inspect.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -20,11 +21,10 @@ std::string scope_text(const Model& model) {
 }
 
 std::string histogram_text(const QualityReport& quality) {
-  const std::int64_t most =
-      *std::max_element(quality.dihedral_histogram.begin(), quality.dihedral_histogram.end());
+  const std::int64_t most = *std::max_element(quality.angle_histogram.begin(), quality.angle_histogram.end());
   std::string text;
-  for (std::size_t bin = 0; bin < quality.dihedral_histogram.size(); ++bin) {
-    const std::int64_t count = quality.dihedral_histogram[bin];
+  for (std::size_t bin = 0; bin < quality.angle_histogram.size(); ++bin) {
+    const std::int64_t count = quality.angle_histogram[bin];
     const auto bar = static_cast<std::size_t>(most > 0 ? 40 * count / most : 0);
     text +=
         fmt::format("    {:3}-{:3} deg {:9}  {}\n", 10 * bin, 10 * (bin + 1), count, std::string(bar, '#'));
@@ -32,20 +32,68 @@ std::string histogram_text(const QualityReport& quality) {
   return text;
 }
 
+std::string analysis_text(const Model& model) {
+  switch (model.analysis) {
+    case Analysis::solid:
+      return "solid";
+    case Analysis::plane_stress:
+      return fmt::format("plane stress, thickness {:g} m", model.thickness);
+    case Analysis::plane_strain:
+      return fmt::format("plane strain, thickness {:g} m", model.thickness);
+  }
+  return "unknown";
+}
+
+/// One line a material.
+std::string materials_text(const Model& model) {
+  std::vector<std::int64_t> elements(model.materials.size(), 0);
+  for (const Index material : model.material_of_element) ++elements[static_cast<std::size_t>(material)];
+  std::string text;
+  for (std::size_t m = 0; m < model.materials.size(); ++m) {
+    const Material& material = model.materials[m];
+    text +=
+        fmt::format("  material {:<8} E = {:g} Pa, nu = {:g}, density = {:g} kg/m^3, {} elements\n", m + 1,
+                    material.youngs_modulus, material.poissons_ratio, material.density, elements[m]);
+    const auto& strain = material.initial_strain;
+    if (std::any_of(strain.begin(), strain.end(), [](double e) { return e != 0.0; })) {
+      text += fmt::format("    initial strain  {:g}\n", fmt::join(strain, ", "));
+    }
+  }
+  return text;
+}
+
+/// The largest displacement at rest and the force that the loads put on the body in all.
+std::string rest_text(const Model& model) {
+  Vec3 total = Vec3::Zero();
+  double largest = 0.0;
+  for (std::size_t node = 0; node < model.mesh.nodes.size(); ++node) {
+    total += model.rest_force[node];
+    largest = std::max(largest, model.rest_displacement[node].norm());
+  }
+  if (largest == 0.0) return "  rest state        undeformed\n";
+  return fmt::format("  rest state        moved by up to {:.4g} m; loads ({:.4g}, {:.4g}, {:.4g}) N in all\n",
+                     largest, total.x(), total.y(), total.z());
+}
+
 }  // namespace
 
 std::string inspect(const Model& model) {
   const QualityReport& q = model.quality;
   const bool single = model.greens.precision() == Precision::single_precision;
-  const auto fixed = std::count(model.fixed.begin(), model.fixed.end(), 1);
+  const bool plane = model.dimension() == 2;
+  const auto held =
+      std::count_if(model.fixed.begin(), model.fixed.end(), [](auto mask) { return mask != 0; });
   std::string text;
   text += fmt::format("{}, written by {}\n", model.name, model.generator);
   text += fmt::format("  content hash      {}\n", model.content_hash);
-  text += fmt::format(
-      "  mesh              {} nodes ({} fixed), {} tetrahedra, {} surface triangles, volume {:.4g} m^3\n",
-      model.mesh.nodes.size(), fixed, model.mesh.tets.size(), model.surface_triangles.size(), q.volume);
-  text += fmt::format("  material          E = {:g} Pa, nu = {:g}, density = {:g} kg/m^3\n",
-                      model.material.youngs_modulus, model.material.poissons_ratio, model.material.density);
+  text +=
+      fmt::format("  mesh              {} nodes ({} held), {} {} elements, {} surface {}, {} {:.4g} {}\n",
+                  model.mesh.nodes.size(), held, model.mesh.elements(), traits(model.mesh.element).name,
+                  model.surface.size() / static_cast<std::size_t>(model.dimension()),
+                  plane ? "lines" : "triangles", plane ? "area" : "volume", q.volume, plane ? "m^2" : "m^3");
+  text += fmt::format("  analysis          {}\n", analysis_text(model));
+  text += materials_text(model);
+  text += rest_text(model);
   text += fmt::format(
       "  Green's functions {}: {} nodes, {} dofs, {} precision, {:.1f} MB packed\n", scope_text(model),
       model.stored_nodes.size(), model.stored_dofs(), single ? "single" : "double",
@@ -53,12 +101,13 @@ std::string inspect(const Model& model) {
           1e-6);
   text += fmt::format("  probes            {}\n", model.probes.size());
   text += fmt::format("  edges             {:.4g} to {:.4g} m\n", q.min_edge, q.max_edge);
-  text += fmt::format("  dihedral angles   {:.2f} to {:.2f} deg\n", q.min_dihedral, q.max_dihedral);
-  text +=
-      fmt::format("  radius ratio      worst {:.4f} (element {} at {:.4g}, {:.4g}, {:.4g} m), mean {:.3f}\n",
-                  q.min_radius_ratio, q.worst_element, q.worst_centroid.x(), q.worst_centroid.y(),
-                  q.worst_centroid.z(), q.mean_radius_ratio);
-  text += "  dihedral angles of all elements\n" + histogram_text(q);
+  text += fmt::format("  {:17} {:.2f} to {:.2f} deg\n", plane ? "corner angles" : "dihedral angles",
+                      q.min_angle, q.max_angle);
+  const bool simplices = traits(model.mesh.element).corners == model.dimension() + 1;
+  text += fmt::format("  {:17} worst {:.4f} (element {} at {:.4g}, {:.4g}, {:.4g} m), mean {:.3f}\n",
+                      simplices ? "radius ratio" : "scaled Jacobian", q.min_shape, q.worst_element,
+                      q.worst_centroid.x(), q.worst_centroid.y(), q.worst_centroid.z(), q.mean_shape);
+  text += "  angles of all elements\n" + histogram_text(q);
   text += "  made from\n";
   for (const SourceFile& source : model.sources) {
     text +=

@@ -2,17 +2,22 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <random>
 
+#include "meshes/element.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
 #include "precompute/assembly.h"
 #include "precompute/factor.h"
+#include "tests/precompute_case.h"
 
 namespace palpate {
 namespace {
 
-constexpr Material rubber{1.0e5, 0.4, 1000.0};
+using test::ElasticCase;
+
+const Material rubber{1.0e5, 0.4, 1000.0};
 
 /// A box whose interior nodes are moved at random by up to 15 % of a cell.
 Mesh distorted_box(int cells) {
@@ -33,8 +38,7 @@ Eigen::MatrixXd dense(const SparseMatrix& lower) {
 
 TEST(Assembly, RigidMotionsTakeNoForce) {
   const Mesh mesh = distorted_box(3);
-  const Eigen::MatrixXd K =
-      dense(assemble_stiffness(mesh, rubber, std::vector<std::uint8_t>(mesh.nodes.size(), 0)).K);
+  const Eigen::MatrixXd K = dense(assemble_stiffness(ElasticCase(mesh, rubber).body()).K);
   Eigen::MatrixXd rigid(K.rows(), 6);
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
     const auto row = static_cast<Eigen::Index>(3 * node);
@@ -50,41 +54,37 @@ TEST(Assembly, RigidMotionsTakeNoForce) {
 }
 
 TEST(Assembly, ClampingThreeNodesMakesItPositiveDefinite) {
-  const Mesh mesh = distorted_box(2);
-  std::vector<std::uint8_t> fixed(mesh.nodes.size(), 0);
-  fixed[0] = fixed[1] = fixed[3] = 1;
-  const Eigen::MatrixXd K = dense(assemble_stiffness(mesh, rubber, fixed).K);
-  EXPECT_EQ(K.rows(), static_cast<Eigen::Index>(3 * (mesh.nodes.size() - 3)));
+  ElasticCase box(distorted_box(2), rubber);
+  box.fixed[0] = box.fixed[1] = box.fixed[3] = 7;
+  const Eigen::MatrixXd K = dense(assemble_stiffness(box.body()).K);
+  EXPECT_EQ(K.rows(), static_cast<Eigen::Index>(3 * (box.mesh.nodes.size() - 3)));
   EXPECT_EQ(Eigen::LLT<Eigen::MatrixXd>(K).info(), Eigen::Success);
 }
 
-TEST(Assembly, PatchTestLinearFieldIsReproduced) {
-  const Mesh mesh = distorted_box(4);
-  Mat3 gradient;
-  gradient << 1e-3, 2e-3, -5e-4, 4e-4, -2e-3, 1e-3, 3e-4, -6e-4, 1.5e-3;
-  const std::vector<std::uint8_t> none(mesh.nodes.size(), 0);
-  std::vector<std::uint8_t> boundary = none;
-  for (const Index node : extract_surface(mesh).nodes) boundary[static_cast<std::size_t>(node)] = 1;
-
-  // K_aa u_a = -K_ab u_b with the linear field on the boundary b gives the linear field inside.
-  const Eigen::MatrixXd K = dense(assemble_stiffness(mesh, rubber, none).K);
-  const Stiffness inner = assemble_stiffness(mesh, rubber, boundary);
-  Eigen::VectorXd u = Eigen::VectorXd::Zero(K.rows());
-  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
-    if (boundary[node]) u.segment<3>(static_cast<Eigen::Index>(3 * node)) = gradient * mesh.nodes[node];
-  }
-  const Eigen::VectorXd f = K * u;
-  std::vector<double> rhs;
-  for (const Index node : inner.free_nodes) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) rhs.push_back(-f[Eigen::Index{3} * node + axis]);
-  }
-  Factor factor(inner.K);
-  factor.factorize();
-  const std::vector<double> inside = factor.solve(rhs);
-  for (std::size_t a = 0; a < inner.free_nodes.size(); ++a) {
-    const Vec3 exact = gradient * mesh.nodes[static_cast<std::size_t>(inner.free_nodes[a])];
-    const Vec3 found(inside[3 * a], inside[3 * a + 1], inside[3 * a + 2]);
-    EXPECT_LT((found - exact).norm(), 1e-13) << "free node " << a;
+// Dofs held along some axes only: what is left is K without their rows and columns, and the held force is K
+// times the prescribed displacements.
+TEST(Assembly, PartlyHeldNodesAreLeftOutDofByDof) {
+  ElasticCase box(distorted_box(2), rubber);
+  const Eigen::MatrixXd full = dense(assemble_stiffness(box.body()).K);
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(full.rows());
+  box.fixed[0] = 7;
+  box.fixed[5] = 2;
+  box.fixed[9] = 5;
+  box.prescribed[5] = Vec3(0.0, 3e-3, 0.0);
+  box.prescribed[9] = Vec3(-2e-3, 0.0, 1e-3);
+  u[16] = 3e-3;
+  u[27] = -2e-3;
+  u[29] = 1e-3;
+  const Stiffness part = assemble_stiffness(box.body());
+  const Eigen::VectorXd force = full * u;
+  const Eigen::MatrixXd K = dense(part.K);
+  ASSERT_EQ(K.rows(), full.rows() - 6);
+  for (std::size_t i = 0; i < part.free_dofs.size(); ++i) {
+    EXPECT_NEAR(part.held_force[i], force[part.free_dofs[i]], 1e-12 * force.lpNorm<Eigen::Infinity>());
+    for (std::size_t j = 0; j < part.free_dofs.size(); ++j) {
+      ASSERT_EQ(K(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)),
+                full(part.free_dofs[i], part.free_dofs[j]));
+    }
   }
 }
 
@@ -93,29 +93,28 @@ TEST(Assembly, PatchTestLinearFieldIsReproduced) {
 double cantilever_deflection(int cells_high, const Vec3& size, const Material& material) {
   const int along = cells_high * static_cast<int>(std::lround(size.x() / size.z()));
   const Mesh mesh = generate(BoxShape{Vec3::Zero(), size, {along, cells_high, cells_high}});
-  std::vector<std::uint8_t> fixed(mesh.nodes.size(), 0);
-  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) fixed[node] = mesh.nodes[node].x() < 1e-9;
-  const Stiffness stiffness = assemble_stiffness(mesh, material, fixed);
+  const Stiffness stiffness = assemble_stiffness(
+      ElasticCase(mesh, material).hold([](const Vec3& x) { return x.x() < 1e-9; }, 7).body());
   std::vector<double> f(static_cast<std::size_t>(stiffness.K.rows()), 0.0);
   const auto on_tip = [&](Index node) {
     return mesh.nodes[static_cast<std::size_t>(node)].x() > size.x() - 1e-9;
   };
   double total = 0.0;
-  for (const Triangle& t : extract_surface(mesh).triangles) {
-    if (!on_tip(t[0]) || !on_tip(t[1]) || !on_tip(t[2])) continue;
-    const Vec3 &a = mesh.nodes[static_cast<std::size_t>(t[0])],
-               &b = mesh.nodes[static_cast<std::size_t>(t[1])],
-               &c = mesh.nodes[static_cast<std::size_t>(t[2])];
-    const double area = 0.5 * (b - a).cross(c - a).norm();
-    for (const Index node : t) {
-      const double eta = 2.0 * mesh.nodes[static_cast<std::size_t>(node)].z() / size.z() - 1.0;
-      const double force = area / 3.0 * (1.0 - eta * eta);
-      f[3 * static_cast<std::size_t>(stiffness.free_of_node[static_cast<std::size_t>(node)]) + 2] += force;
+  const Surface surface = extract_surface(mesh);
+  for (Index facet = 0; facet < surface.count(); ++facet) {
+    const std::span<const Index> nodes = surface.facet_nodes(facet);
+    if (!std::all_of(nodes.begin(), nodes.end(), on_tip)) continue;
+    const ShapeValues areas = facet_shape_integrals(surface.facet, positions(mesh, nodes), 1.0);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const auto node = static_cast<std::size_t>(nodes[i]);
+      const double eta = 2.0 * mesh.nodes[node].z() / size.z() - 1.0;
+      const double force = areas[static_cast<Eigen::Index>(i)] * (1.0 - eta * eta);
+      f[static_cast<std::size_t>(stiffness.free_of_dof[3 * node + 2])] += force;
       total += force;
     }
   }
   for (double& force : f) force /= total;
-  Factor factor(stiffness.K);
+  Factor factor(stiffness.K, stiffness.node_start);
   factor.factorize();
   const std::vector<double> u = factor.solve(f);
   double work = 0.0;  // of the unit force: the mean deflection in the sense of energy

@@ -9,27 +9,38 @@
 #include "meshes/surface.h"
 #include "precompute/greens.h"
 #include "precompute/scope.h"
+#include "tests/precompute_case.h"
 
 namespace palpate {
 namespace {
 
-constexpr Material soft{1.0e4, 0.45, 1000.0};
+const Material soft{1.0e4, 0.45, 1000.0};
 
 struct Body {
-  Mesh mesh;
+  test::ElasticCase elastic;
   Stiffness stiffness;
+  Surface surface;
 
-  template <class IsFixed>
-  Body(const BoxShape& shape, IsFixed is_fixed) : mesh(generate(shape)) {
-    std::vector<std::uint8_t> fixed;
-    for (const Vec3& x : mesh.nodes) fixed.push_back(is_fixed(x) ? 1 : 0);
-    stiffness = assemble_stiffness(mesh, soft, fixed);
+  explicit Body(test::ElasticCase of)
+      : elastic(std::move(of)),
+        stiffness(assemble_stiffness(elastic.body())),
+        surface(extract_surface(elastic.mesh)) {}
+
+  [[nodiscard]] std::vector<std::uint8_t> marks(Scope scope, Index layers) const {
+    return stored_dof_marks(elastic.mesh, surface, stiffness, scope, layers);
   }
 };
 
+bool at_bottom(const Vec3& x) {
+  return x.z() < 1e-9;
+}
+
+Mesh block_mesh(ElementType element = ElementType::tet4) {
+  return generate(BoxShape{Vec3::Zero(), Vec3(0.1, 0.08, 0.06), {6, 5, 4}}, element);
+}
+
 Body clamped_block() {
-  return Body(BoxShape{Vec3::Zero(), Vec3(0.1, 0.08, 0.06), {6, 5, 4}},
-              [](const Vec3& x) { return x.z() < 1e-9; });
+  return Body(test::ElasticCase(block_mesh(), soft).hold(at_bottom, 7));
 }
 
 /// Xi of the stored dofs by blocks of `width` columns, as a full matrix in the solver's order.
@@ -64,8 +75,8 @@ Eigen::MatrixXd dense_inverse(const SparseMatrix& K, const std::vector<std::int6
 }
 
 void expect_inverse(const Body& body, Scope scope, Index layers, std::int64_t width) {
-  Factor factor(body.stiffness.K);
-  const GreensSolver solver(factor, stored_dof_marks(body.mesh, body.stiffness, scope, layers));
+  Factor factor(body.stiffness.K, body.stiffness.node_start);
+  const GreensSolver solver(factor, body.marks(scope, layers));
   factor.factorize();
   const Eigen::MatrixXd Xi = greens(solver, width),
                         reference = dense_inverse(body.stiffness.K, solver.stored_dofs());
@@ -82,10 +93,40 @@ TEST(Greens, EqualTheDenseInverseForEveryScopeAndBlockWidth) {
   }
 }
 
+TEST(Greens, EqualTheDenseInverseForOtherElementsInThePlaneAndOnRollers) {
+  const auto at_left = [](const Vec3& x) { return x.x() < 1e-9; };
+  expect_inverse(Body(test::ElasticCase(block_mesh(ElementType::hex8), soft).hold(at_bottom, 7)),
+                 Scope::surface, 0, 96);
+  const Mesh tets = generate(BoxShape{Vec3::Zero(), Vec3(0.1, 0.08, 0.06), {3, 2, 2}});
+  expect_inverse(
+      Body(test::ElasticCase(with_elements(tets, ElementType::tet10, "test"), soft).hold(at_bottom, 7)),
+      Scope::layers, 1, 96);
+  expect_inverse(Body(test::ElasticCase(block_mesh(), soft).hold(at_bottom, 4).hold(at_left, 3)),
+                 Scope::surface, 0, 96);
+  for (const ElementType element : {ElementType::quad4, ElementType::tri3}) {
+    const Mesh plate = generate(RectangleShape{Vec3::Zero(), Vec3(1.0, 1.0, 0.0), {9, 8}}, element);
+    const Body body(test::ElasticCase(plate, soft).hold([](const Vec3& x) { return x.y() < 1e-9; }, 3));
+    expect_inverse(body, Scope::surface, 0, 24);
+    expect_inverse(body, Scope::full, 0, 24);
+  }
+}
+
+TEST(Greens, NodesHeldAlongAnAxisAreNotStored) {
+  const Body body(test::ElasticCase(block_mesh(), soft)
+                      .hold(at_bottom, 4)
+                      .hold([](const Vec3& x) { return x.x() < 1e-9; }, 3));
+  const std::vector<std::uint8_t> marks = body.marks(Scope::full, 0);
+  for (std::size_t k = 0; k < marks.size(); ++k) {
+    const auto node = static_cast<std::size_t>(body.stiffness.free_dofs[k] / 3);
+    EXPECT_EQ(marks[k] != 0, body.elastic.fixed[node] == 0) << "node " << node;
+  }
+}
+
 // A clamped slice cuts K into two parts that share no dof: the elimination tree is a forest.
 TEST(Greens, BodyCutInTwoByAClampedSlice) {
-  const Body body(BoxShape{Vec3::Zero(), Vec3(0.1, 0.05, 0.05), {6, 3, 3}},
-                  [](const Vec3& x) { return std::abs(x.x() - 0.05) < 1e-9; });
+  const Mesh mesh = generate(BoxShape{Vec3::Zero(), Vec3(0.1, 0.05, 0.05), {6, 3, 3}});
+  const Body body(
+      test::ElasticCase(mesh, soft).hold([](const Vec3& x) { return std::abs(x.x() - 0.05) < 1e-9; }, 7));
   expect_inverse(body, Scope::surface, 0, 24);
   expect_inverse(body, Scope::full, 0, 24);
 }
@@ -93,10 +134,10 @@ TEST(Greens, BodyCutInTwoByAClampedSlice) {
 // Condensation (Fagerholt 3.49-3.51) is exact: what surface scope keeps is a block of what full scope keeps.
 TEST(Greens, SurfaceScopeEqualsFullScope) {
   const Body body = clamped_block();
-  Factor factor(body.stiffness.K);
+  Factor factor(body.stiffness.K, body.stiffness.node_start);
   factor.factorize();
-  const GreensSolver surface(factor, stored_dof_marks(body.mesh, body.stiffness, Scope::surface, 0));
-  const GreensSolver full(factor, stored_dof_marks(body.mesh, body.stiffness, Scope::full, 0));
+  const GreensSolver surface(factor, body.marks(Scope::surface, 0));
+  const GreensSolver full(factor, body.marks(Scope::full, 0));
   const Eigen::MatrixXd Xi_surface = greens(surface, 48), Xi_full = greens(full, 48);
   const std::vector<std::int64_t> surface_dofs = surface.stored_dofs(), full_dofs = full.stored_dofs();
   ASSERT_LT(surface_dofs.size(), full_dofs.size());
@@ -118,8 +159,8 @@ TEST(Greens, SurfaceScopeEqualsFullScope) {
 
 TEST(Greens, DofsOfANodeStayTogether) {
   const Body body = clamped_block();
-  Factor factor(body.stiffness.K);
-  const GreensSolver solver(factor, stored_dof_marks(body.mesh, body.stiffness, Scope::surface, 0));
+  Factor factor(body.stiffness.K, body.stiffness.node_start);
+  const GreensSolver solver(factor, body.marks(Scope::surface, 0));
   const std::vector<std::int64_t> dofs = solver.stored_dofs();
   for (std::size_t k = 0; k < dofs.size(); k += 3) {
     EXPECT_EQ(dofs[k] % 3, 0);
