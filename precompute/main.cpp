@@ -7,6 +7,7 @@
 #include "formats/model_file.h"
 #include "meshes/error.h"
 #include "precompute/bake.h"
+#include "precompute/compare.h"
 #include "precompute/inspect.h"
 #include "precompute/verify.h"
 
@@ -25,6 +26,13 @@ int run_verify(const std::string& file) {
   return report.passed() ? palpate::exit_ok : palpate::exit_not_verified;
 }
 
+int run_compare(const std::string& a, const std::string& b, const palpate::CompareOptions& options) {
+  const palpate::Comparison comparison =
+      palpate::compare(palpate::load_model(a), palpate::load_model(b), options);
+  std::fputs(palpate::to_text(comparison).c_str(), stdout);
+  return palpate::exit_ok;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -37,6 +45,7 @@ int main(int argc, char** argv) {
       "  palpate-precompute meshes/models/cube/model.toml\n"
       "  palpate-precompute inspect cube.palpate.hdf\n"
       "  palpate-precompute verify cube.palpate.hdf\n"
+      "  palpate-precompute compare coarse.palpate.hdf fine.palpate.hdf\n"
       "Exit status: 0 done, 1 bad input or no room (nothing was changed), 2 usage, 3 not verified, 130 "
       "interrupted.");
   app.require_subcommand(0, 1);
@@ -56,10 +65,25 @@ int main(int argc, char** argv) {
     command->add_option("file", file, "NAME.palpate.hdf")->required();
   }
 
+  CLI::App* compare_command = app.add_subcommand(
+      "compare",
+      "press the same finger tip on two files of one body and print how force and displacement differ");
+  std::string file_b;
+  palpate::CompareOptions compare_options;
+  compare_command->add_option("A", file, "NAME.palpate.hdf")->required();
+  compare_command->add_option("B", file_b, "NAME.palpate.hdf")->required();
+  compare_command->add_option("--touches", compare_options.touches, "places, spread over the boundary")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000));
+  compare_command
+      ->add_option("--radius", compare_options.radius,
+                   "of the finger tip [m]; 0 is a single node; default: three mean edges of the coarser file")
+      ->check(CLI::NonNegativeNumber);
+
   try {
     app.parse(argc, argv);
     if (app.get_subcommands().empty() && model_option->count() == 0) {
-      throw CLI::RequiredError("model.toml, `inspect FILE` or `verify FILE`");
+      throw CLI::RequiredError("model.toml, `inspect FILE`, `verify FILE` or `compare A B`");
     }
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? palpate::exit_ok : palpate::exit_usage;
@@ -70,6 +94,7 @@ int main(int argc, char** argv) {
       std::fputs(palpate::inspect(palpate::load_model(file)).c_str(), stdout);
       return palpate::exit_ok;
     }
+    if (compare_command->parsed()) return run_compare(file, file_b, compare_options);
     return verify_command->parsed() ? run_verify(file) : run_bake(model, options);
   } catch (const palpate::Error& error) {
     std::fputs(palpate::to_text(error).c_str(), stderr);
