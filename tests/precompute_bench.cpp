@@ -50,11 +50,17 @@ struct Prepared {
   Factor factor;
   GreensSolver solver;
 
-  Prepared(MeshedBody meshed, const Material& material)
+  Prepared(MeshedBody meshed, const Description& description)
       : body(std::move(meshed)),
-        stiffness(assemble_stiffness(body.mesh, material, body.fixed)),
-        factor(stiffness.K),
-        solver(factor, stored_dof_marks(body.mesh, stiffness, Scope::surface, 0)) {
+        stiffness(assemble_stiffness({body.mesh,
+                                      description.analysis,
+                                      description.thickness,
+                                      {&description.materials.at(0).material, 1},
+                                      body.material_of_element,
+                                      body.fixed,
+                                      body.prescribed})),
+        factor(stiffness.K, stiffness.node_start),
+        solver(factor, stored_dof_marks(body.mesh, body.surface, stiffness, Scope::surface, 0)) {
     factor.factorize();
   }
 };
@@ -66,8 +72,7 @@ const Prepared& liver(double edge_length) {
   if (!prepared) {
     Description description = read_description(model_toml("liver"));
     description.mesh.edge_length = edge_length;
-    prepared =
-        std::make_unique<Prepared>(mesh_body(description, [](const std::string&) {}), description.material);
+    prepared = std::make_unique<Prepared>(mesh_body(description, [](const std::string&) {}), description);
   }
   return *prepared;
 }
