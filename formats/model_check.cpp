@@ -2,8 +2,8 @@
 
 #include <limits>
 
+#include "meshes/element.h"
 #include "meshes/error.h"
-#include "meshes/tet4.h"
 
 namespace palpate {
 namespace {
@@ -14,18 +14,51 @@ std::int64_t smallest(Count count) {
   switch (count) {
     case Count::one:
     case Count::elements:
+    case Count::materials:
     case Count::stored_nodes:
       return 1;
     case Count::nodes:
-      return 4;
+      return 3;
     default:
       return 0;
   }
 }
 
 bool counts_index_numbers(Count count) {
-  return count == Count::nodes || count == Count::elements || count == Count::triangles ||
-         count == Count::stored_nodes;
+  return count == Count::nodes || count == Count::elements || count == Count::simplices ||
+         count == Count::materials || count == Count::stored_nodes;
+}
+
+void check_plane(const std::vector<Vec3>& rows, const std::string& path, const std::string& where) {
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    if (rows[i].z() != 0.0)
+      refuse(where, path + ": row " + std::to_string(i) + " has z = " + std::to_string(rows[i].z()) +
+                        ", in the plane it is 0");
+}
+
+void check_elements(const Mesh& mesh, const std::string& where) {
+  for (Index e = 0; e < mesh.elements(); ++e)
+    if (!(smallest_determinant(mesh.element, element_nodes(mesh, e)) > 0.0))
+      refuse(where, "/mesh/connectivity: element " + std::to_string(e) + " is inverted or flat");
+}
+
+void check_surface(const Model& model, const std::string& where) {
+  const auto corners = static_cast<std::size_t>(model.dimension());
+  for (std::size_t at = 0; at < model.surface.size(); at += corners)
+    for (std::size_t i = at; i < at + corners; ++i)
+      for (std::size_t j = at; j < i; ++j)
+        if (model.surface[i] == model.surface[j])
+          refuse(where, "/mesh/surface: row " + std::to_string(at / corners) + " has the same node twice");
+}
+
+void check_stored_nodes(const Model& model, const std::string& where) {
+  std::vector<bool> stored(model.mesh.nodes.size(), false);
+  for (const Index node : model.stored_nodes) {
+    const auto i = static_cast<std::size_t>(node);
+    if (model.fixed[i] != 0) refuse(where, "/dofs/stored_nodes: node " + std::to_string(node) + " is fixed");
+    if (stored[i]) refuse(where, "/dofs/stored_nodes: node " + std::to_string(node) + " is there twice");
+    stored[i] = true;
+  }
 }
 
 }  // namespace
@@ -45,8 +78,9 @@ Counts Counts::of(const Model& model, std::string where) {
     counts.set(count, static_cast<std::int64_t>(value), path);
   };
   set(Count::nodes, model.mesh.nodes.size(), "/mesh/nodes");
-  set(Count::elements, model.mesh.tets.size(), "/mesh/connectivity");
-  set(Count::triangles, model.surface_triangles.size(), "/mesh/surface_triangles");
+  set(Count::elements, static_cast<std::size_t>(model.mesh.elements()), "/mesh/connectivity");
+  set(Count::simplices, model.surface.size() / static_cast<std::size_t>(model.dimension()), "/mesh/surface");
+  set(Count::materials, model.materials.size(), "/material/isotropic");
   set(Count::stored_nodes, model.stored_nodes.size(), "/dofs/stored_nodes");
   set(Count::probes, model.probes.size(), "/probes/forces");
   set(Count::bytes_of_text, model.model_toml.size(), "/model_toml");
@@ -91,25 +125,23 @@ void Counts::match(const char* path, const std::vector<Extent>& shape,
 }
 
 void check_model(const Model& model, const std::string& where) {
-  check_material(model.material, where + ": /material/isotropic");
-
-  for (std::size_t e = 0; e < model.mesh.tets.size(); ++e)
-    if (!(tet4::volume(tet4::corners(model.mesh, model.mesh.tets[e])) > 0.0))
-      refuse(where, "/mesh/connectivity: element " + std::to_string(e) + " does not have a positive volume");
-
-  for (std::size_t f = 0; f < model.surface_triangles.size(); ++f) {
-    const Triangle& t = model.surface_triangles[f];
-    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0])
-      refuse(where, "/mesh/surface_triangles: triangle " + std::to_string(f) + " has the same node twice");
+  const bool solid = model.dimension() == 3;
+  if ((model.analysis == Analysis::solid) != solid)
+    refuse(where, "the attribute analysis is " + text_of(model.analysis) + ", but " +
+                      text_of(model.mesh.element) + " elements are " + (solid ? "in space" : "in the plane"));
+  if (!(model.thickness > 0.0) || (solid && model.thickness != 1.0))
+    refuse(where, "/material/thickness is " + std::to_string(model.thickness) +
+                      (solid ? ", in space it is 1" : ", not positive"));
+  for (std::size_t m = 0; m < model.materials.size(); ++m)
+    check_material(model.materials[m], where + ": /material/isotropic, row " + std::to_string(m));
+  if (!solid) {
+    check_plane(model.mesh.nodes, "/mesh/nodes", where);
+    check_plane(model.rest_force, "/rest/force", where);
+    check_plane(model.rest_displacement, "/rest/displacement", where);
   }
-
-  std::vector<bool> stored(model.mesh.nodes.size(), false);
-  for (const Index node : model.stored_nodes) {
-    const auto i = static_cast<std::size_t>(node);
-    if (model.fixed[i] != 0) refuse(where, "/dofs/stored_nodes: node " + std::to_string(node) + " is fixed");
-    if (stored[i]) refuse(where, "/dofs/stored_nodes: node " + std::to_string(node) + " is there twice");
-    stored[i] = true;
-  }
+  check_elements(model.mesh, where);
+  check_surface(model, where);
+  check_stored_nodes(model, where);
 }
 
 }  // namespace palpate

@@ -65,9 +65,10 @@ void check_values(const Field<T>& field, const std::vector<T>& values, const Cou
   }
 }
 
-/// Proves what involves several fields: elements with positive volume, triangles with three corners, stored
-/// nodes that are free and named once, a valid material. Values are in their ranges already. Throws Error
-/// (where = `where`) naming the field.
+/// Proves what involves several fields: an analysis that fits the elements, valid materials and thickness, a
+/// plane body in z = 0, elements that are nowhere inverted, surface simplices with distinct corners, stored
+/// nodes that are free along every axis and named once. Sizes are right and values in their ranges already.
+/// Throws Error (where = `where`) naming the field.
 void check_model(const Model& model, const std::string& where);
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 // that is added here is stored, loaded, checked and hashed.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -15,13 +16,14 @@ enum class Count : std::uint8_t {
   one,
   nodes,
   elements,
-  triangles,
+  simplices,
+  materials,
   stored_nodes,
   probes,
   bytes_of_text,
   bytes_of_sources
 };
-inline constexpr std::size_t number_of_counts = 8;
+inline constexpr std::size_t number_of_counts = 9;
 
 /// One dimension of a field: factor * count + plus.
 struct Extent {
@@ -60,47 +62,44 @@ struct Unreadable {
   std::string what;
 };
 
+std::string text_of(ElementType element);
+std::string text_of(Analysis analysis);
 std::string text_of(Scope scope);
 std::string text_of(Precision precision);
 
-// Conversions between rows (Vec3, Tet, ...) and the flat arrays of the file.
-template <class T, class Row>
-std::vector<T> flat(const std::vector<Row>& rows) {
-  std::vector<T> values;
-  values.reserve(rows.size() * (sizeof(Row) / sizeof(rows[0][0])));
-  for (const Row& row : rows)
-    for (const auto value : row) values.push_back(static_cast<T>(value));
-  return values;
-}
-
-template <class Row, class T>
-std::vector<Row> rows(const std::vector<T>& values) {
-  using Scalar = std::remove_cvref_t<decltype(std::declval<Row&>()[0])>;
-  constexpr std::size_t width = sizeof(Row) / sizeof(Scalar);
-  std::vector<Row> result(values.size() / width);
-  auto value = values.begin();
-  for (Row& row : result)
-    for (auto& entry : row) entry = static_cast<Scalar>(*value++);
-  return result;
-}
-
 // The longer conversions of the table.
+std::vector<double> flat(const std::vector<Vec3>& rows);
+std::vector<Vec3> rows(const std::vector<double>& values);
 std::vector<std::int64_t> offsets_of(const Model& model);
+std::vector<double> constants_of(const Model& model);
+void put_constants(Model& model, const std::vector<double>& values);
+std::vector<double> initial_strains_of(const Model& model);
+void put_initial_strains(Model& model, const std::vector<double>& values);
 std::vector<double> quality_summary(const Model& model);
 void put_quality_summary(Model& model, const std::vector<double>& values);
 std::vector<std::uint8_t> sources_text(const Model& model);
 void put_sources_text(Model& model, const std::vector<std::uint8_t>& text);
+void expect_dimension(const Model& model, std::int64_t dimension);
+ElementType element_from(const std::string& text);
+Analysis analysis_from(const std::string& text);
 Scope scope_from(const std::string& text);
 Precision precision_from(const std::string& text);
 
-/// Root attributes beside `format`, `version` and `content_hash`.
+/// Root attributes beside `format`, `version` and `content_hash`; the element kind comes before what it
+/// decides.
 template <class Visitor>
 void for_each_attribute(Visitor&& visit) {
   using Text = std::string;
   using Integer = std::int64_t;
   visit(Attribute<Text>{"units", [](const Model&, const FileHeader&) { return Text("m, N, Pa, kg, s"); },
                         nullptr});
-  visit(Attribute<Integer>{"dimension", [](const Model&, const FileHeader&) { return Integer{3}; }, nullptr});
+  visit(Attribute<Text>{"element", [](const Model& m, const FileHeader&) { return text_of(m.mesh.element); },
+                        [](Model& m, FileHeader&, const Text& t) { m.mesh.element = element_from(t); }});
+  visit(Attribute<Integer>{"dimension",
+                           [](const Model& m, const FileHeader&) { return Integer{m.dimension()}; },
+                           [](Model& m, FileHeader&, const Integer& i) { expect_dimension(m, i); }});
+  visit(Attribute<Text>{"analysis", [](const Model& m, const FileHeader&) { return text_of(m.analysis); },
+                        [](Model& m, FileHeader&, const Text& t) { m.analysis = analysis_from(t); }});
   visit(Attribute<Text>{"scalar", [](const Model&, const FileHeader& h) { return text_of(h.precision); },
                         [](Model&, FileHeader& h, const Text& t) { h.precision = precision_from(t); }});
   visit(Attribute<Text>{"generator", [](const Model& m, const FileHeader&) { return m.generator; },
@@ -116,67 +115,84 @@ void for_each_attribute(Visitor&& visit) {
                            }});
 }
 
-/// Datasets that are known before the Green's functions; a field's counts and limits are set by those above
-/// it.
+/// Datasets that are known before the Green's functions, of a body made of `element`; a field's counts and
+/// limits are set by those above it.
 template <class Visitor>
-void for_each_body_field(Visitor&& visit) {
+void for_each_body_field(ElementType element, Visitor&& visit) {
   using Bytes = std::vector<std::uint8_t>;
   using Int32s = std::vector<std::int32_t>;
   using Int64s = std::vector<std::int64_t>;
   using Doubles = std::vector<double>;
-  constexpr Extent nodes = {Count::nodes}, elements = {Count::elements}, three = {Count::one, 3, 0};
+  const ElementTraits& kind = traits(element);
+  const Extent nodes = {Count::nodes}, elements = {Count::elements}, materials = {Count::materials},
+               three = {Count::one, 3, 0}, d = {Count::one, kind.dimension, 0};
 
   visit(Field<double>{"/mesh/nodes",
                       {nodes, three},
-                      [](const Model& m) { return flat<double>(m.mesh.nodes); },
-                      [](Model& m, const Doubles& v) { m.mesh.nodes = rows<Vec3>(v); }});
-  visit(Field<std::int64_t>{"/mesh/connectivity",
-                            {{Count::elements, 4, 0}},
-                            [](const Model& m) { return flat<std::int64_t>(m.mesh.tets); },
-                            [](Model& m, const Int64s& v) { m.mesh.tets = rows<Tet>(v); },
-                            nodes});
+                      [](const Model& m) { return flat(m.mesh.nodes); },
+                      [](Model& m, const Doubles& v) { m.mesh.nodes = rows(v); }});
+  visit(Field<std::int64_t>{
+      "/mesh/connectivity",
+      {{Count::elements, kind.nodes, 0}},
+      [](const Model& m) { return Int64s(m.mesh.connectivity.begin(), m.mesh.connectivity.end()); },
+      [](Model& m, const Int64s& v) { m.mesh.connectivity.assign(v.begin(), v.end()); },
+      nodes});
   visit(Field<std::int64_t>{"/mesh/offsets", {{Count::elements, 1, 1}}, offsets_of, nullptr});
   visit(Field<std::uint8_t>{"/mesh/types",
                             {elements},
-                            [](const Model& m) { return Bytes(m.mesh.tets.size(), 10); },  // VTK_TETRA
+                            [](const Model& m) {
+                              return Bytes(static_cast<std::size_t>(m.mesh.elements()),
+                                           traits(m.mesh.element).vtk);
+                            },
                             nullptr});
   visit(Field<std::int32_t>{"/mesh/regions",
                             {elements},
                             [](const Model& m) { return m.mesh.regions; },
                             [](Model& m, const Int32s& v) { m.mesh.regions = v; }});
-  visit(Field<std::int32_t>{"/mesh/surface_triangles",
-                            {{Count::triangles}, three},
-                            [](const Model& m) { return flat<std::int32_t>(m.surface_triangles); },
-                            [](Model& m, const Int32s& v) { m.surface_triangles = rows<Triangle>(v); },
+  visit(Field<std::int32_t>{"/mesh/surface",
+                            {{Count::simplices}, d},
+                            [](const Model& m) { return m.surface; },
+                            [](Model& m, const Int32s& v) { m.surface = v; },
                             nodes});
   visit(Field<std::uint8_t>{"/dofs/fixed",
                             {nodes},
                             [](const Model& m) { return m.fixed; },
                             [](Model& m, const Bytes& v) { m.fixed = v; },
-                            {Count::one, 2, 0}});
+                            {Count::one, std::int64_t{1} << kind.dimension, 0}});
   visit(Field<std::int32_t>{"/dofs/stored_nodes",
                             {{Count::stored_nodes}},
                             [](const Model& m) { return m.stored_nodes; },
                             [](Model& m, const Int32s& v) { m.stored_nodes = v; },
                             nodes});
+  visit(Field<double>{"/material/isotropic", {materials, three}, constants_of, put_constants});
   visit(Field<double>{
-      "/material/isotropic",
-      {{Count::one}, three},
-      [](const Model& m) {
-        return Doubles{m.material.youngs_modulus, m.material.poissons_ratio, m.material.density};
-      },
-      [](Model& m, const Doubles& v) {
-        m.material = {v[0], v[1], v[2]};
-      }});
+      "/material/initial_strain", {materials, {Count::one, 6, 0}}, initial_strains_of, put_initial_strains});
+  visit(Field<std::int32_t>{"/material/of_element",
+                            {elements},
+                            [](const Model& m) { return m.material_of_element; },
+                            [](Model& m, const Int32s& v) { m.material_of_element = v; },
+                            materials});
+  visit(Field<double>{"/material/thickness",
+                      {{Count::one}},
+                      [](const Model& m) { return Doubles{m.thickness}; },
+                      [](Model& m, const Doubles& v) { m.thickness = v[0]; }});
+  visit(Field<double>{"/rest/force",
+                      {nodes, three},
+                      [](const Model& m) { return flat(m.rest_force); },
+                      [](Model& m, const Doubles& v) { m.rest_force = rows(v); }});
+  visit(Field<double>{"/rest/displacement",
+                      {nodes, three},
+                      [](const Model& m) { return flat(m.rest_displacement); },
+                      [](Model& m, const Doubles& v) { m.rest_displacement = rows(v); }});
   visit(Field<double>{"/quality/summary", {{Count::one, 11, 0}}, quality_summary, put_quality_summary});
   visit(Field<std::int64_t>{
-      "/quality/dihedral_histogram",
+      "/quality/angle_histogram",
       {{Count::one, QualityReport::bins, 0}},
       [](const Model& m) {
-        return Int64s(m.quality.dihedral_histogram.begin(), m.quality.dihedral_histogram.end());
+        return Int64s(m.quality.angle_histogram.begin(), m.quality.angle_histogram.end());
       },
-      [](Model& m, const Int64s& v) { std::copy(v.begin(), v.end(), m.quality.dihedral_histogram.begin()); },
-      {Count::elements, 6, 1}});
+      [](Model& m, const Int64s& v) { std::copy(v.begin(), v.end(), m.quality.angle_histogram.begin()); },
+      {Count::elements, kind.edges, 1}});  // every kind has as many angles as edges
   visit(Field<std::uint8_t>{"/model_toml",
                             {{Count::bytes_of_text}},
                             [](const Model& m) { return Bytes(m.model_toml.begin(), m.model_toml.end()); },
@@ -190,22 +206,21 @@ void for_each_body_field(Visitor&& visit) {
       {{Count::one}},
       [](const Model& m) { return Int64s{static_cast<std::int64_t>(m.mesh.nodes.size())}; },
       nullptr});
-  visit(Field<std::int64_t>{
-      "/VTKHDF/NumberOfCells",
-      {{Count::one}},
-      [](const Model& m) { return Int64s{static_cast<std::int64_t>(m.mesh.tets.size())}; },
-      nullptr});
+  visit(Field<std::int64_t>{"/VTKHDF/NumberOfCells",
+                            {{Count::one}},
+                            [](const Model& m) { return Int64s{std::int64_t{m.mesh.elements()}}; },
+                            nullptr});
   visit(Field<std::int64_t>{
       "/VTKHDF/NumberOfConnectivityIds",
       {{Count::one}},
-      [](const Model& m) { return Int64s{4 * static_cast<std::int64_t>(m.mesh.tets.size())}; },
+      [](const Model& m) { return Int64s{static_cast<std::int64_t>(m.mesh.connectivity.size())}; },
       nullptr});
 }
 
 /// Datasets that are added last.
 template <class Visitor>
-void for_each_probe_field(Visitor&& visit) {
-  const std::vector<Extent> shape = {{Count::probes}, {Count::stored_nodes, 3, 0}};
+void for_each_probe_field(ElementType element, Visitor&& visit) {
+  const std::vector<Extent> shape = {{Count::probes}, {Count::stored_nodes, traits(element).dimension, 0}};
   visit(Field<double>{"/probes/forces", shape,
                       [](const Model& m) {
                         std::vector<double> all;
@@ -235,9 +250,9 @@ void for_each_probe_field(Visitor&& visit) {
 
 /// Every dataset but the Green's functions, which are mapped and not copied.
 template <class Visitor>
-void for_each_field(Visitor&& visit) {
-  for_each_body_field(visit);
-  for_each_probe_field(visit);
+void for_each_field(ElementType element, Visitor&& visit) {
+  for_each_body_field(element, visit);
+  for_each_probe_field(element, visit);
 }
 
 inline constexpr const char* greens_path = "/greens/packed";

@@ -100,7 +100,7 @@ class Reader {
 Model Reader::read() {
   const std::vector<std::int64_t> version = read_version(file_);
   for_each_attribute([this](const auto& attribute) { read_attribute(attribute); });
-  for_each_field([this](const auto& field) { read_field(field); });
+  for_each_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
   check_model(model_, where_);
   map_greens();
   check_content(version);

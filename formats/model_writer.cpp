@@ -67,7 +67,9 @@ void write_vtk_view(hdf5::File& file) {
   file.make_link("/VTKHDF/Offsets", "/mesh/offsets");
   file.make_link("/VTKHDF/Types", "/mesh/types");
   file.make_link("/VTKHDF/PointData/fixed", "/dofs/fixed");
+  file.make_link("/VTKHDF/PointData/rest_displacement", "/rest/displacement");
   file.make_link("/VTKHDF/CellData/region", "/mesh/regions");
+  file.make_link("/VTKHDF/CellData/material", "/material/of_element");
 }
 
 /// Checksum of the bytes [from, to) and what a running one had before.
@@ -109,6 +111,7 @@ struct ModelWriter::Impl {
   FileHeader header;
   Counts counts;
   ContentHash content;
+  ElementType element;
   std::int64_t order;
   JournalFrame frame;
   Journal journal;
@@ -122,6 +125,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
       partial(with_suffix(path, ".partial")),
       header{precision},
       counts(Counts::of(model, path.string())),
+      element(model.mesh.element),
       order(model.stored_dofs()),
       frame(examine(model)),
       journal(with_suffix(path, ".progress")),
@@ -140,7 +144,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
 JournalFrame ModelWriter::Impl::examine(const Model& model) {
   add_attributes(content, model, header, version);
   std::int64_t bytes = 0;
-  for_each_body_field([&](const auto& field) {
+  for_each_body_field(model.mesh.element, [&](const auto& field) {
     const auto values = field.take(model);
     check_values(field, values, counts);
     content.add_dataset(field.path, checksum_of(values));
@@ -200,7 +204,8 @@ void ModelWriter::Impl::write_body(const Model& model) {
 
   hdf5::File file = hdf5::File::create(partial, entries * bytes_per_scalar(header.precision));
   write_attributes(file, model, header);
-  for_each_body_field([&](const auto& field) { write_field(file, field, model, counts); });
+  for_each_body_field(model.mesh.element,
+                      [&](const auto& field) { write_field(file, field, model, counts); });
   write_vtk_view(file);
   file.write(greens_path, scalar, std::array{entries}, nullptr);
   frame.greens_at = file.locate(greens_path, scalar, 1).offset;
@@ -252,6 +257,7 @@ std::string ModelWriter::Impl::greens_checksum() const {
 
 void ModelWriter::Impl::seal(const std::vector<Probe>& probes) {
   Model extra;
+  extra.mesh.element = element;
   extra.probes = probes;
   counts.set(Count::probes, static_cast<std::int64_t>(probes.size()), "/probes/forces");
   for (const Probe& probe : probes)
@@ -264,7 +270,7 @@ void ModelWriter::Impl::seal(const std::vector<Probe>& probes) {
   const hdf5::Quiet quiet;
   hdf5::File file = hdf5::File::open_to_change(partial);
   file.write_attribute(greens_path, "xxh3", greens);
-  for_each_probe_field([&](const auto& field) {
+  for_each_probe_field(element, [&](const auto& field) {
     const auto values = field.take(extra);
     check_values(field, values, counts);
     content.add_dataset(field.path, checksum_of(values));

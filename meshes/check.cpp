@@ -7,116 +7,234 @@
 #include <map>
 #include <numeric>
 
+#include "meshes/element.h"
 #include "meshes/error.h"
-#include "meshes/tet4.h"
+#include "meshes/topology.h"
 
 namespace palpate {
 namespace {
 
-std::string text(const Vec3& x) {
+std::string text(const Vec3& x, int dimension) {
+  if (dimension == 2) return fmt::format("({:.4g}, {:.4g})", x.x(), x.y());
   return fmt::format("({:.4g}, {:.4g}, {:.4g})", x.x(), x.y(), x.z());
 }
 
+/// Mean of the corners.
+Vec3 centre_of(const Mesh& mesh, Index e) {
+  return element_nodes(mesh, e).topRows(traits(mesh.element).corners).colwise().mean().transpose();
+}
+
 void check_numbers(const Mesh& mesh, const std::string& where) {
-  if (mesh.tets.empty())
-    throw Error("the mesh has no tetrahedra", where, "Save the volume elements, not only the surface.");
+  if (mesh.connectivity.empty()) {
+    throw Error("the mesh has no elements", where, "Save the elements of the body, not only its boundary.");
+  }
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
     if (mesh.nodes[node].allFinite()) continue;
     throw Error(fmt::format("node {} has a coordinate that is not a finite number", node), where,
                 "Repair or remake the mesh.");
   }
-  for (std::size_t element = 0; element < mesh.tets.size(); ++element) {
-    for (const Index node : mesh.tets[element]) {
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    for (const Index node : mesh.element_nodes(e)) {
       if (node >= 0 && static_cast<std::size_t>(node) < mesh.nodes.size()) continue;
-      throw Error(fmt::format("element {} uses node {}, but there are only nodes 0 to {}", element, node,
+      throw Error(fmt::format("element {} uses node {}, but there are only nodes 0 to {}", e, node,
                               static_cast<std::int64_t>(mesh.nodes.size()) - 1),
                   where, "Repair or remake the mesh.");
     }
   }
 }
 
-/// Root of a node or element in a union-find forest, with path halving.
+/// Volumes that are smaller count as zero.
+double smallest_volume(const ElementNodes& x, int dimension) {
+  const double longest = (x.rowwise() - x.row(0)).rowwise().norm().maxCoeff();
+  return 1e-12 * std::pow(longest, dimension);
+}
+
+/// How many elements have negative volume. Throws where one has none, or where only some are negative.
+std::size_t count_inverted(const Mesh& mesh, const std::string& where) {
+  const int d = mesh.dimension();
+  Index inverted = 0, an_inverted_one = 0;
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    const ElementNodes x = element_nodes(mesh, e);
+    const double volume = element_volume(mesh.element, x);
+    if (std::abs(volume) <= smallest_volume(x, d)) {
+      throw Error(fmt::format("element {} near {} has zero {}", e, text(centre_of(mesh, e), d),
+                              d == 3 ? "volume" : "area"),
+                  where, "Remove it or remake the mesh with a quality bound.");
+    }
+    if (volume > 0.0) continue;
+    ++inverted;
+    an_inverted_one = e;
+  }
+  if (inverted != 0 && inverted != mesh.elements()) {
+    throw Error(fmt::format("{} of {} elements are inverted, e.g. element {} near {}", inverted,
+                            mesh.elements(), an_inverted_one, text(centre_of(mesh, an_inverted_one), d)),
+                where, "The mesh is folded there; remake it.");
+  }
+  return static_cast<std::size_t>(inverted);
+}
+
+void reverse_elements(Mesh& mesh) {
+  const std::span<const std::uint8_t> order = reversed_nodes(mesh.element);
+  std::vector<Index> reversed;
+  reversed.reserve(mesh.connectivity.size());
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    for (const std::uint8_t i : order) reversed.push_back(mesh.element_nodes(e)[i]);
+  }
+  mesh.connectivity = std::move(reversed);
+}
+
+/// A positive volume does not keep quad4, tet10 and hex8 from folding over at a corner.
+void check_not_folded(const Mesh& mesh, const std::string& where) {
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    const ElementNodes x = element_nodes(mesh, e);
+    if (smallest_determinant(mesh.element, x) > smallest_volume(x, mesh.dimension())) continue;
+    throw Error(fmt::format("element {} near {} is folded or flat at a corner", e,
+                            text(centre_of(mesh, e), mesh.dimension())),
+                where,
+                traits(mesh.element).nodes > traits(mesh.element).corners
+                    ? "The middles of its edges are too far out or in the wrong order; remake the mesh."
+                    : "All its angles must be less than 180 degrees; remake the mesh.");
+  }
+}
+
+/// Root of an element in a union-find forest, with path halving.
 std::size_t find_root(std::vector<std::size_t>& parent, std::size_t i) {
   while (parent[i] != i) i = parent[i] = parent[parent[i]];
   return i;
+}
+
+using Motion = Eigen::Matrix<double, 6, 1>;  // u(x) = t + w x (x - centre) / size, [t w]
+
+/// The rigid motions of a body, about the mean of its held nodes and scaled by its size.
+struct RigidMotions {
+  const Mesh& mesh;
+  const std::vector<std::uint8_t>& fixed;
+  Vec3 centre = Vec3::Zero();
+  double size = 0.0;
+  std::vector<Eigen::Index> possible;  // which of the six there are: in the plane two slide and one turns
+
+  RigidMotions(const Mesh& body, const std::vector<std::uint8_t>& held) : mesh(body), fixed(held) {
+    possible = mesh.dimension() == 3 ? std::vector<Eigen::Index>{0, 1, 2, 3, 4, 5}
+                                     : std::vector<Eigen::Index>{0, 1, 5};
+    const auto count = std::count_if(fixed.begin(), fixed.end(), [](std::uint8_t mask) { return mask != 0; });
+    for (std::size_t node = 0; node < fixed.size(); ++node) {
+      if (fixed[node] != 0) centre += mesh.nodes[node] / static_cast<double>(count);
+    }
+    for (const Vec3& x : mesh.nodes) size = std::max(size, (x - centre).norm());
+  }
+
+  /// How far each motion moves each held dof. [held dofs, motions]
+  [[nodiscard]] Eigen::MatrixXd at_held_dofs() const {
+    std::vector<Motion> rows;
+    for (std::size_t node = 0; node < fixed.size(); ++node) {
+      for (int axis = 0; axis < mesh.dimension(); ++axis) {
+        if ((fixed[node] >> axis & 1) == 0) continue;
+        const Vec3 direction = Vec3::Unit(axis), r = (mesh.nodes[node] - centre) / size;
+        Motion row;
+        row << direction, r.cross(direction);
+        rows.push_back(row);
+      }
+    }
+    Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()),
+                           static_cast<Eigen::Index>(possible.size()));
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+      matrix.row(i) = rows[static_cast<std::size_t>(i)](possible);
+    return matrix;
+  }
+
+  /// A basis of the motions that move no held dof: the null space by singular value decomposition. [6,
+  /// motions left]
+  [[nodiscard]] Eigen::MatrixXd left_over() const {
+    constexpr double negligible = 1e-9;
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(at_held_dofs(), Eigen::ComputeFullV);
+    const Eigen::VectorXd& values = svd.singularValues();  // descending
+    const auto rank = (values.array() > negligible * values[0]).count();
+    const auto motions = static_cast<Eigen::Index>(possible.size());
+    Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(6, motions - rank);
+    for (Eigen::Index i = 0; i < motions; ++i) {
+      basis.row(possible[static_cast<std::size_t>(i)]) = svd.matrixV().row(i).tail(motions - rank);
+    }
+    return basis;
+  }
+};
+
+/// Rounding that would only clutter a message.
+Vec3 rounded(const Vec3& x, double size) {
+  return (x.array().abs() < 1e-9 * size).select(Vec3::Zero(), x);
+}
+
+/// A motion that turns, about a coordinate axis where there is one.
+Motion a_turning_motion(const Eigen::MatrixXd& left) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::MatrixXd turning = left.bottomRows(3);
+    const Eigen::VectorXd combination = turning.colPivHouseholderQr().solve(Vec3::Unit(axis));
+    if ((turning * combination - Vec3::Unit(axis)).norm() < 1e-6) return left * combination;
+  }
+  return left.col(left.cols() - 1);
+}
+
+/// "turn about the axis through (0, 0, 0) m along (0, 0, 1)"
+std::string turning_text(const RigidMotions& motions, const Eigen::MatrixXd& left) {
+  const Motion motion = a_turning_motion(left);
+  const Vec3 t = motion.head(3), w = motion.tail(3);
+  const Vec3 point = rounded(motions.centre + motions.size * w.cross(t) / w.squaredNorm(), motions.size);
+  if (motions.mesh.dimension() == 2) return fmt::format("turn about the point {} m", text(point, 2));
+  const bool about_a_point = left.cols() == 3 && left.topRows(3).norm() < 1e-6;
+  if (about_a_point) return fmt::format("turn about the point {} m in every direction", text(point, 3));
+  const bool screws = std::abs(t.dot(w)) > 1e-6 * w.squaredNorm();
+  return fmt::format("{} about the axis through {} m along {}", screws ? "move like a screw" : "turn",
+                     text(point, 3), text(rounded(w.normalized(), 1.0), 3));
 }
 
 }  // namespace
 
 std::size_t orient_elements(Mesh& mesh, const std::string& where) {
   check_numbers(mesh, where);
-  std::size_t inverted = 0, an_inverted_one = 0;
-  for (std::size_t element = 0; element < mesh.tets.size(); ++element) {
-    const tet4::Corners x = tet4::corners(mesh, mesh.tets[element]);
-    double longest = 0.0;
-    for (Eigen::Index i = 1; i < 4; ++i) longest = std::max(longest, (x.col(i) - x.col(0)).norm());
-    const double volume = tet4::volume(x);
-    if (std::abs(volume) <= 1e-12 * longest * longest * longest) {
-      throw Error(fmt::format("element {} near {} has zero volume", element, text(x.rowwise().mean())), where,
-                  "Remove it or remake the mesh with a quality bound.");
-    }
-    if (volume > 0.0) continue;
-    ++inverted;
-    an_inverted_one = element;
-  }
-  if (inverted == 0) return 0;
-  if (inverted < mesh.tets.size()) {
-    const Vec3 centre = tet4::corners(mesh, mesh.tets[an_inverted_one]).rowwise().mean();
-    throw Error(fmt::format("{} of {} elements are inverted, e.g. element {} near {}", inverted,
-                            mesh.tets.size(), an_inverted_one, text(centre)),
-                where, "The mesh is folded there; remake it.");
-  }
-  for (Tet& tet : mesh.tets) std::swap(tet[2], tet[3]);
+  const std::size_t inverted = count_inverted(mesh, where);
+  if (inverted != 0) reverse_elements(mesh);
+  check_not_folded(mesh, where);
   return inverted;
 }
 
 std::size_t remove_unused_nodes(Mesh& mesh) {
-  std::vector<Index> number(mesh.nodes.size(), -1);
-  for (const Tet& tet : mesh.tets) {
-    for (const Index node : tet) number[static_cast<std::size_t>(node)] = 0;
-  }
+  constexpr Index unused = -1;
+  std::vector<Index> number(mesh.nodes.size(), unused);
+  for (const Index node : mesh.connectivity) number[static_cast<std::size_t>(node)] = 0;
   std::vector<Vec3> used;
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
-    if (number[node] < 0) continue;
+    if (number[node] == unused) continue;
     number[node] = static_cast<Index>(used.size());
     used.push_back(mesh.nodes[node]);
   }
-  for (Tet& tet : mesh.tets) {
-    for (Index& node : tet) node = number[static_cast<std::size_t>(node)];
+  const auto renumber = [&](Index& node) { node = number[static_cast<std::size_t>(node)]; };
+  std::for_each(mesh.connectivity.begin(), mesh.connectivity.end(), renumber);
+  std::for_each(mesh.tagged_facets.begin(), mesh.tagged_facets.end(), renumber);
+  std::vector<Index> facets, tags;
+  for (std::size_t t = 0; t < mesh.facet_tags.size(); ++t) {
+    const std::span<const Index> facet = mesh.tagged_facet(static_cast<Index>(t));
+    if (std::find(facet.begin(), facet.end(), unused) != facet.end()) continue;
+    facets.insert(facets.end(), facet.begin(), facet.end());
+    tags.push_back(mesh.facet_tags[t]);
   }
-  std::erase_if(mesh.tagged_boundary, [&](const TaggedTriangle& facet) {
-    return std::any_of(facet.nodes.begin(), facet.nodes.end(),
-                       [&](Index node) { return number[static_cast<std::size_t>(node)] < 0; });
-  });
-  for (TaggedTriangle& facet : mesh.tagged_boundary) {
-    for (Index& node : facet.nodes) node = number[static_cast<std::size_t>(node)];
-  }
+  mesh.tagged_facets = std::move(facets);
+  mesh.facet_tags = std::move(tags);
   const std::size_t removed = mesh.nodes.size() - used.size();
   mesh.nodes = std::move(used);
   return removed;
 }
 
 void check_connected(const Mesh& mesh, const std::string& where) {
-  std::vector<std::size_t> parent(mesh.tets.size());
+  const auto elements = static_cast<std::size_t>(mesh.elements());
+  std::vector<std::size_t> parent(elements);
   std::iota(parent.begin(), parent.end(), std::size_t{0});
-  std::vector<std::pair<Triangle, std::size_t>> faces;
-  faces.reserve(4 * mesh.tets.size());
-  for (std::size_t element = 0; element < mesh.tets.size(); ++element) {
-    const Tet& t = mesh.tets[element];
-    for (Triangle face : {Triangle{t[1], t[2], t[3]}, Triangle{t[0], t[2], t[3]}, Triangle{t[0], t[1], t[3]},
-                          Triangle{t[0], t[1], t[2]}}) {
-      std::sort(face.begin(), face.end());
-      faces.emplace_back(face, element);
-    }
-  }
-  std::sort(faces.begin(), faces.end());
-  for (std::size_t i = 1; i < faces.size(); ++i) {
-    if (faces[i].first != faces[i - 1].first) continue;
-    parent[find_root(parent, faces[i].second)] = find_root(parent, faces[i - 1].second);
+  const std::vector<ElementSide> sides = sorted_sides(mesh);
+  for (std::size_t i = 1; i < sides.size(); ++i) {
+    if (sides[i].corners != sides[i - 1].corners) continue;
+    parent[find_root(parent, static_cast<std::size_t>(sides[i].element))] =
+        find_root(parent, static_cast<std::size_t>(sides[i - 1].element));
   }
   std::map<std::size_t, std::size_t> part_sizes;  // by the element that stands for the part
-  for (std::size_t element = 0; element < mesh.tets.size(); ++element)
-    ++part_sizes[find_root(parent, element)];
+  for (std::size_t e = 0; e < elements; ++e) ++part_sizes[find_root(parent, e)];
   if (part_sizes.size() == 1) return;
   std::string parts;
   for (const auto& [root, size] : part_sizes) {
@@ -124,48 +242,45 @@ void check_connected(const Mesh& mesh, const std::string& where) {
       parts += ", ...";
       break;
     }
-    const Vec3 centre = tet4::corners(mesh, mesh.tets[root]).rowwise().mean();
-    parts += fmt::format("{}{} elements at {}", parts.empty() ? "" : ", ", size, text(centre));
+    parts += fmt::format("{}{} elements at {}", parts.empty() ? "" : ", ", size,
+                         text(centre_of(mesh, static_cast<Index>(root)), mesh.dimension()));
   }
-  throw Error(fmt::format("the body is in {} disconnected parts: {}", part_sizes.size(), parts), where,
-              "Keep one part, or join them by shared faces.");
+  throw Error(
+      fmt::format("the body is in {} disconnected parts: {}", part_sizes.size(), parts), where,
+      fmt::format("Keep one part, or join them by shared {}.", mesh.dimension() == 3 ? "faces" : "sides"));
 }
 
 void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const std::string& where) {
-  const auto count = std::count(fixed.begin(), fixed.end(), 1);
-  const std::string hint = "Add a [[fixed]] region that holds at least three nodes that are not on one line.";
-  if (count == 0) throw Error("nothing is fixed: the body can move freely", where, hint);
-  if (static_cast<std::size_t>(count) == mesh.nodes.size()) {
+  const int d = mesh.dimension();
+  const unsigned every_axis = d == 3 ? 7 : 3;
+  unsigned any = 0, all = every_axis;
+  for (const std::uint8_t mask : fixed) {
+    any |= mask & every_axis;
+    all &= mask;
+  }
+  if (any == 0) {
+    throw Error("nothing is fixed: the body can move freely", where,
+                "Add a [[fixed]] region that holds a part of the body.");
+  }
+  if (all == every_axis) {
     throw Error("every node is fixed: nothing is left to move", where, "Make the [[fixed]] regions smaller.");
   }
-  // The body can still turn about a line when all fixed nodes are on it: look at the fixed nodes' spread
-  // about their mean.
-  Vec3 mean = Vec3::Zero();
-  for (std::size_t node = 0; node < fixed.size(); ++node) {
-    if (fixed[node]) mean += mesh.nodes[node] / static_cast<double>(count);
+  const RigidMotions motions(mesh, fixed);
+  const Eigen::MatrixXd left = motions.left_over();
+  if (left.cols() == 0) return;
+  const std::string begin = left.cols() == 1
+                                ? "a rigid motion is left: the body can still "
+                                : fmt::format("{} rigid motions are left: the body can still ", left.cols());
+  if (any != every_axis) {  // a body slides along the axes along which no node is held
+    std::string axes;
+    for (int axis = 0; axis < d; ++axis) {
+      if ((any >> axis & 1) == 0) axes += fmt::format("{}{}", axes.empty() ? "" : " and ", "xyz"[axis]);
+    }
+    throw Error(fmt::format("{}slide along {}", begin, axes), where,
+                fmt::format("Hold some nodes along {} too, in this [[fixed]] region or another.", axes));
   }
-  Mat3 spread = Mat3::Zero();
-  for (std::size_t node = 0; node < fixed.size(); ++node) {
-    if (fixed[node]) spread += (mesh.nodes[node] - mean) * (mesh.nodes[node] - mean).transpose();
-  }
-  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);
-  double size = 0.0;
-  for (const Vec3& x : mesh.nodes) size = std::max(size, (x - mean).norm());
-  const double small = 1e-12 * size * size;  // squared distances: 1e-6 of the body's size
-  if (axes.eigenvalues()[1] > small) return;
-  if (axes.eigenvalues()[2] <= small) {
-    throw Error(
-        fmt::format(
-            "a rigid motion is left: only one point, {} m, is fixed, and the body can rotate about it",
-            text(mean)),
-        where, hint);
-  }
-  throw Error(
-      fmt::format(
-          "a rigid motion is left: all fixed nodes are on the line through {} m along {}, and the body can "
-          "rotate about it",
-          text(mean), text(axes.eigenvectors().col(2))),
-      where, hint);
+  throw Error(begin + turning_text(motions, left), where,
+              "Add a [[fixed]] region, or an axis to one, that holds nodes elsewhere against it.");
 }
 
 std::string scale_warning(const Mesh& mesh) {

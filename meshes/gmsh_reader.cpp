@@ -11,11 +11,25 @@
 namespace palpate {
 namespace {
 
-enum ElementType : std::int64_t { line = 1, triangle = 2, tetrahedron = 4, point = 15 };
+/// Gmsh's numbers of the elements that are read, and its order of nodes.
+const FileElement* find_element(std::int64_t type) {
+  static const std::map<std::int64_t, FileElement> elements = {
+      {1, {ElementType::line2}},
+      {2, {ElementType::tri3}},
+      {3, {ElementType::quad4}},
+      {4, {ElementType::tet4}},
+      {5, {ElementType::hex8}},
+      {9, {ElementType::tri6}},
+      {11, {ElementType::tet10, {0, 1, 2, 3, 4, 5, 6, 7, 9, 8}}}};
+  const auto found = elements.find(type);
+  return found == elements.end() ? nullptr : &found->second;
+}
+
+enum SkippedType : std::int64_t { quadratic_line = 8, point = 15 };
 
 /// What is gathered while the sections go by.
 struct GmshMesh {
-  Mesh mesh;
+  MeshFile mesh;
   std::unordered_map<std::int64_t, Index> node_of_tag;                        // node tags have gaps
   std::map<std::pair<std::int64_t, std::int64_t>, Index> physical_of_entity;  // 4.1: (dimension, entity tag)
 };
@@ -27,36 +41,31 @@ void add_node(TextReader& reader, GmshMesh& gmsh, std::int64_t tag, const Vec3& 
   gmsh.mesh.nodes.push_back(x);
 }
 
-template <std::size_t N>
-std::array<Index, N> read_nodes_by_tag(TextReader& reader, const GmshMesh& gmsh) {
-  std::array<Index, N> nodes{};
-  for (Index& node : nodes) {
-    const std::int64_t tag = reader.integer("a node number");
-    const auto found = gmsh.node_of_tag.find(tag);
-    if (found == gmsh.node_of_tag.end()) reader.fail(fmt::format("node {} does not exist", tag));
-    node = found->second;
-  }
-  return nodes;
+Index read_node_by_tag(TextReader& reader, const GmshMesh& gmsh) {
+  const std::int64_t tag = reader.integer("a node number");
+  const auto found = gmsh.node_of_tag.find(tag);
+  if (found == gmsh.node_of_tag.end()) reader.fail(fmt::format("node {} does not exist", tag));
+  return found->second;
 }
 
-/// Throws for what is neither a tetrahedron nor something to pass over.
+/// Throws for what is neither read nor something to pass over.
 void check_type(const TextReader& reader, std::int64_t type) {
-  if (type != line && type != triangle && type != tetrahedron && type != point) {
-    fail_not_tet4(reader, fmt::format("elements of Gmsh type {}", type));
+  if (find_element(type) == nullptr && type != quadratic_line && type != point) {
+    fail_unknown_element(reader, fmt::format("elements of Gmsh type {}", type));
   }
 }
 
 /// The node list of an element of a type that check_type let through.
 void read_element(TextReader& reader, GmshMesh& gmsh, std::int64_t type, Index physical) {
-  if (type == tetrahedron) {
-    gmsh.mesh.tets.push_back(read_nodes_by_tag<4>(reader, gmsh));
-    gmsh.mesh.regions.push_back(physical);
-  } else if (type == triangle) {
-    const Triangle nodes = read_nodes_by_tag<3>(reader, gmsh);
-    if (physical != 0) gmsh.mesh.tagged_boundary.push_back({nodes, physical});
-  } else {
-    reader.skip_words(type == line ? 2 : 1, "a node number");
+  const FileElement* element = find_element(type);
+  if (element == nullptr) {
+    reader.skip_words(type == point ? 1 : 3, "a node number");
+    return;
   }
+  std::array<Index, max_element_nodes> nodes{};
+  const std::span<Index> used(nodes.data(), static_cast<std::size_t>(traits(element->type).nodes));
+  for (Index& node : used) node = read_node_by_tag(reader, gmsh);
+  gmsh.mesh.add(*element, used, physical);
 }
 
 void read_nodes_2(TextReader& reader, GmshMesh& gmsh) {
@@ -184,8 +193,7 @@ Mesh read_gmsh(const std::filesystem::path& file) {
     }
     reader.expect(end);
   }
-  check_not_empty(gmsh.mesh, reader);
-  return std::move(gmsh.mesh);
+  return to_body(std::move(gmsh.mesh), reader);
 }
 
 }  // namespace palpate

@@ -9,8 +9,9 @@
 namespace palpate {
 
 /// Summary kept in the file and printed by `palpate-precompute inspect`. Angles are dihedral angles between
-/// faces (in the plane: corner angles). Shape is the radius ratio d r_in / R_circum of simplices (tet10: of
-/// its corners), the smallest scaled Jacobian of the corners of quad4 and hex8: 1 is best, 0 is flat.
+/// faces (in the plane: corner angles; hex8: at each edge the mean of both ends, as faces may be warped).
+/// Shape is the radius ratio d r_in / R_circum of simplices (tet10: of its corners), the smallest scaled
+/// Jacobian of the corners of quad4 and hex8: 1 is best, 0 is flat.
 struct QualityReport {
   static constexpr int bins = 18;  ///< angle histogram, 10 degrees each
 

@@ -1,4 +1,4 @@
-// Geometric selections of nodes.
+// Geometric selections of nodes and elements.
 #pragma once
 
 #include <variant>

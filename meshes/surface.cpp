@@ -1,71 +1,86 @@
 #include "meshes/surface.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
 
 #include "meshes/error.h"
+#include "meshes/topology.h"
 
 namespace palpate {
 namespace {
 
-/// The face opposite each corner, outward for a positively oriented element.
-constexpr std::array<std::array<std::size_t, 3>, 4> outward_faces = {
-    {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
-
-struct Face {
-  Triangle sorted;  // the same for both elements that share it
-  Triangle outward;
-};
-
 constexpr const char* remove_overlap = "Remove the elements that overlap or stand twice in the mesh.";
 
-/// The same three nodes, in the same sense of rotation.
-bool same_sense(const Triangle& a, const Triangle& b) {
-  return a == b || a == Triangle{b[1], b[2], b[0]} || a == Triangle{b[2], b[0], b[1]};
+/// "face of nodes 3, 7, 9"
+std::string text(const Mesh& mesh, const ElementSide& side) {
+  const auto corners = static_cast<std::ptrdiff_t>(traits(traits(mesh.element).facet).corners);
+  return fmt::format("{} of nodes {}", mesh.dimension() == 3 ? "face" : "side",
+                     fmt::join(side.corners.begin(), side.corners.begin() + corners, ", "));
 }
 
-std::vector<Face> all_faces(const Mesh& mesh) {
-  std::vector<Face> faces;
-  faces.reserve(4 * mesh.tets.size());
-  for (const Tet& tet : mesh.tets) {
-    for (const auto& corner : outward_faces) {
-      const Triangle outward = {tet[corner[0]], tet[corner[1]], tet[corner[2]]};
-      Triangle sorted = outward;
-      std::sort(sorted.begin(), sorted.end());
-      faces.push_back({sorted, outward});
-    }
+/// Two elements that share the corners of a side must see it from both sides, and share its middles too.
+void check_pair(const Mesh& mesh, const ElementSide& one, const ElementSide& other) {
+  std::vector<Index> a = side_nodes(mesh, one), b = side_nodes(mesh, other);
+  const auto corners = static_cast<std::ptrdiff_t>(traits(traits(mesh.element).facet).corners);
+  const auto a_middles = a.begin() + corners, b_middles = b.begin() + corners;
+  std::reverse(b.begin(), b_middles);
+  if (corners > 2) std::rotate(b.begin(), std::find(b.begin(), b_middles, a.front()), b_middles);
+  if (!std::equal(a.begin(), a_middles, b.begin())) {
+    throw Error(fmt::format("two elements overlap: they are on the same side of the {}", text(mesh, one)),
+                "mesh", remove_overlap);
   }
-  return faces;
+  std::sort(a_middles, a.end());
+  std::sort(b_middles, b.end());
+  if (a != b) {
+    throw Error(fmt::format("two elements share the {} but not the middles of its edges", text(mesh, one)),
+                "mesh", "Join the nodes that are at the same place.");
+  }
 }
 
 }  // namespace
 
 Surface extract_surface(const Mesh& mesh) {
-  std::vector<Face> faces = all_faces(mesh);
-  std::sort(faces.begin(), faces.end(), [](const Face& a, const Face& b) { return a.sorted < b.sorted; });
+  const std::vector<ElementSide> sides = sorted_sides(mesh);
   Surface surface;
-  for (auto face = faces.begin(); face != faces.end();) {
-    const auto end = std::find_if(face, faces.end(), [&](const Face& f) { return f.sorted != face->sorted; });
-    if (end - face > 2) {
-      throw Error(fmt::format("{} elements share the face of nodes {}, {}, {}", end - face, face->sorted[0],
-                              face->sorted[1], face->sorted[2]),
-                  "mesh", remove_overlap);
+  surface.facet = traits(mesh.element).facet;
+  for (auto side = sides.begin(); side != sides.end();) {
+    const auto end =
+        std::find_if(side, sides.end(), [&](const ElementSide& s) { return s.corners != side->corners; });
+    if (end - side > 2) {
+      throw Error(fmt::format("{} elements share the {}", end - side, text(mesh, *side)), "mesh",
+                  remove_overlap);
     }
-    if (end - face == 2 && same_sense(face[0].outward, face[1].outward)) {
-      throw Error(
-          fmt::format("two elements overlap: they are on the same side of the face of nodes {}, {}, {}",
-                      face->sorted[0], face->sorted[1], face->sorted[2]),
-          "mesh", remove_overlap);
+    if (end - side == 2) check_pair(mesh, side[0], side[1]);
+    if (end - side == 1) {
+      const std::vector<Index> nodes = side_nodes(mesh, *side);
+      surface.facets.insert(surface.facets.end(), nodes.begin(), nodes.end());
     }
-    if (end - face == 1) surface.triangles.push_back(face->outward);
-    face = end;
+    side = end;
   }
-  for (const Triangle& t : surface.triangles) surface.nodes.insert(surface.nodes.end(), t.begin(), t.end());
+  surface.nodes = surface.facets;
   std::sort(surface.nodes.begin(), surface.nodes.end());
   surface.nodes.erase(std::unique(surface.nodes.begin(), surface.nodes.end()), surface.nodes.end());
   return surface;
+}
+
+std::vector<Index> surface_simplices(const Surface& surface) {
+  using Cut = std::array<std::size_t, 3>;
+  static constexpr std::array<Cut, 2> quad_cuts = {{{0, 1, 2}, {0, 2, 3}}};
+  static constexpr std::array<Cut, 4> tri6_cuts = {{{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}}};
+  if (surface.facet == ElementType::line2 || surface.facet == ElementType::tri3) return surface.facets;
+  const std::span<const Cut> cuts =
+      surface.facet == ElementType::quad4 ? std::span<const Cut>(quad_cuts) : std::span<const Cut>(tri6_cuts);
+  std::vector<Index> triangles;
+  triangles.reserve(3 * cuts.size() * static_cast<std::size_t>(surface.count()));
+  for (Index f = 0; f < surface.count(); ++f) {
+    for (const Cut& cut : cuts) {
+      for (const std::size_t node : cut) triangles.push_back(surface.facet_nodes(f)[node]);
+    }
+  }
+  return triangles;
 }
 
 std::vector<Index> layers_below_surface(const Mesh& mesh, const Surface& surface) {
@@ -75,11 +90,13 @@ std::vector<Index> layers_below_surface(const Mesh& mesh, const Surface& surface
   bool changed = true;
   for (Index depth = 0; changed; ++depth) {
     changed = false;
-    for (const Tet& tet : mesh.tets) {
-      const bool touches = std::any_of(
-          tet.begin(), tet.end(), [&](Index node) { return layer[static_cast<std::size_t>(node)] == depth; });
+    for (Index e = 0; e < mesh.elements(); ++e) {
+      const std::span<const Index> nodes = mesh.element_nodes(e);
+      const bool touches = std::any_of(nodes.begin(), nodes.end(), [&](Index node) {
+        return layer[static_cast<std::size_t>(node)] == depth;
+      });
       if (!touches) continue;
-      for (const Index node : tet) {
+      for (const Index node : nodes) {
         Index& l = layer[static_cast<std::size_t>(node)];
         if (l != unreached) continue;
         l = depth + 1;

@@ -1,4 +1,6 @@
 // TetGen .node, .ele and .face. Format: Si, TetGen manual 1.5, section 5.
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 
@@ -22,7 +24,7 @@ Index read_region(TextReader& reader) {
 }
 
 /// Reads the nodes and returns the number of the first, 0 or 1.
-std::int64_t read_nodes(const std::filesystem::path& file, Mesh& mesh) {
+std::int64_t read_nodes(const std::filesystem::path& file, MeshFile& mesh) {
   TextReader reader(file, '#');
   const std::int64_t count = reader.count("the number of nodes", 4);
   if (reader.integer("the dimension") != 3)
@@ -40,43 +42,48 @@ std::int64_t read_nodes(const std::filesystem::path& file, Mesh& mesh) {
   return first;
 }
 
-void read_elements(const std::filesystem::path& file, std::int64_t first, Mesh& mesh) {
-  TextReader reader(file, '#');
-  const std::int64_t count = reader.count("the number of tetrahedra", 5);
-  if (reader.integer("the number of nodes of an element") != 4) {
-    fail_not_tet4(reader, "elements of second order");
-  }
-  const bool has_region = reader.integer("the number of region attributes", 0, 1) == 1;
-  for (std::int64_t i = 0; i < count; ++i) {
-    reader.integer("an element number");
-    mesh.tets.push_back(read_corners<4>(reader, mesh, first));
-    mesh.regions.push_back(has_region ? read_region(reader) : 0);
-  }
-  check_not_empty(mesh, reader);
-}
-
-void read_faces(const std::filesystem::path& file, std::int64_t first, Mesh& mesh) {
+/// Faces with a marker. Those of second order list middles too, opposite to the corners; to_body finds them.
+void read_faces(const std::filesystem::path& file, std::int64_t first, MeshFile& mesh) {
+  constexpr FileElement triangle = {ElementType::tri3};
   TextReader reader(file, '#');
   const std::int64_t count = reader.count("the number of faces", 4);
   if (reader.integer("whether faces have markers", 0, 1) == 0) return;
   for (std::int64_t i = 0; i < count; ++i) {
     reader.integer("a face number");
-    const Triangle nodes = read_corners<3>(reader, mesh, first);
-    const Index tag = reader.tag();
-    if (tag != 0) mesh.tagged_boundary.push_back({nodes, tag});
-    reader.rest_of_line();  // with TetGen -nn the elements beside the face
+    read_element(reader, mesh, triangle, first, [&] {
+      // What stands there: three middles or none, the marker, and with TetGen -nn the two elements beside it.
+      if (reader.words_on_line() > 3) reader.skip_words(3, "a node number");
+      return reader.tag();
+    });
+    reader.rest_of_line();
   }
+}
+
+/// Elements of first order, or of second order with TetGen's middles 23 03 01 12 13 02.
+Mesh read_elements(const std::filesystem::path& file, std::int64_t first, MeshFile mesh) {
+  constexpr FileElement linear = {ElementType::tet4};
+  constexpr FileElement quadratic = {ElementType::tet10, {0, 1, 2, 3, 6, 7, 9, 5, 8, 4}};
+  TextReader reader(file, '#');
+  const std::int64_t count = reader.count("the number of tetrahedra", 5);
+  const std::int64_t nodes = reader.integer("the number of nodes of an element");
+  if (nodes != 4 && nodes != 10) fail_unknown_element(reader, fmt::format("elements of {} nodes", nodes));
+  const bool has_region = reader.integer("the number of region attributes", 0, 1) == 1;
+  for (std::int64_t i = 0; i < count; ++i) {
+    reader.integer("an element number");
+    read_element(reader, mesh, nodes == 10 ? quadratic : linear, first,
+                 [&] { return has_region ? read_region(reader) : 0; });
+  }
+  return to_body(std::move(mesh), reader);
 }
 
 }  // namespace
 
 Mesh read_tetgen(const std::filesystem::path& stem) {
-  Mesh mesh;
+  MeshFile mesh;
   const std::int64_t first = read_nodes(with_ending(stem, ".node"), mesh);
-  read_elements(with_ending(stem, ".ele"), first, mesh);
   const std::filesystem::path faces = with_ending(stem, ".face");
   if (std::filesystem::exists(faces)) read_faces(faces, first, mesh);
-  return mesh;
+  return read_elements(with_ending(stem, ".ele"), first, std::move(mesh));
 }
 
 }  // namespace palpate

@@ -144,8 +144,24 @@ Vec3 TextReader::point() {
   return {x, y, z};
 }
 
+Vec3 TextReader::plane_point() {
+  const double x = number("a coordinate"), y = number("a coordinate");
+  return {x, y, 0.0};
+}
+
 void TextReader::skip_words(std::int64_t count, const char* what) {
   for (std::int64_t i = 0; i < count; ++i) word(what);
+}
+
+std::int64_t TextReader::words_on_line() const {
+  std::int64_t words = 0;
+  bool in_word = false;
+  for (std::size_t i = position_; i < text_.size() && text_[i] != '\n' && text_[i] != comment_; ++i) {
+    const bool is_space = space.find(text_[i]) != std::string_view::npos;
+    if (!is_space && !in_word) ++words;
+    in_word = !is_space;
+  }
+  return words;
 }
 
 std::string_view TextReader::rest_of_line() {

@@ -34,8 +34,11 @@ class TextReader {
   /// A finite number.
   double number(const char* what);
   Vec3 point();
+  Vec3 plane_point();  ///< two coordinates, z = 0
   void skip_words(std::int64_t count, const char* what);
 
+  /// How many words are left on the line; they stay next.
+  [[nodiscard]] std::int64_t words_on_line() const;
   /// What is left of the line, without its end.
   std::string_view rest_of_line();
 

@@ -28,16 +28,4 @@ Mesh read_volume_mesh(const std::filesystem::path& file) {
               "as text.");
 }
 
-void check_not_empty(const Mesh& mesh, const TextReader& reader) {
-  if (mesh.nodes.empty()) reader.fail("the file has no nodes");
-  if (mesh.tets.empty()) {
-    reader.fail("the file has no tetrahedra", "Save the volume elements, not only the surface.");
-  }
-}
-
-void fail_not_tet4(const TextReader& reader, const std::string& kind) {
-  reader.fail(fmt::format("the file has {}; only linear tetrahedra (four nodes) are read", kind),
-              "Mesh the body with tetrahedra of first order.");
-}
-
 }  // namespace palpate

@@ -1,4 +1,4 @@
-// Tetrahedral meshes made elsewhere.
+// Meshes made elsewhere.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,8 @@
 namespace palpate {
 
 /// Reads Gmsh .msh (2.2 and 4.1 ASCII), Medit .mesh, TetGen .node/.ele (either name, or the stem) or legacy
-/// VTK .vtk (ASCII), by the file's extension. Coordinates as in the file. Throws Error naming file and line.
+/// VTK .vtk (ASCII), by the file's extension: tet4, tet10 or hex8 elements, or a plane mesh of tri3 or quad4
+/// (same z everywhere, moved to z = 0). Coordinates as in the file. Throws Error naming file and line.
 Mesh read_volume_mesh(const std::filesystem::path& file);
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 // CONNECTIVITY (5.x). Format: VTK User's Guide, "VTK File Formats".
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 #include <string>
 
@@ -10,14 +11,7 @@
 namespace palpate {
 namespace {
 
-enum CellType : std::int64_t {
-  vertex = 1,
-  poly_vertex = 2,
-  line = 3,
-  poly_line = 4,
-  triangle = 5,
-  tetra = 10
-};
+enum SkippedType : std::int64_t { vertex = 1, poly_vertex = 2, poly_line = 4, quadratic_edge = 21 };
 
 /// Node lists of all cells, whatever their type.
 struct Cells {
@@ -79,43 +73,47 @@ Cells read_cells(TextReader& reader, std::size_t points) {
   return read_counted_lists(reader, count, points);
 }
 
+/// The kind of element that a cell is, if any.
+const ElementTraits* find_element(std::int64_t type) {
+  const auto* const found = std::find_if(element_traits.begin(), element_traits.end(),
+                                         [&](const ElementTraits& t) { return t.vtk == type; });
+  return found == element_traits.end() ? nullptr : found;
+}
+
 /// How many nodes a cell of this type has; 0 where that differs. Throws for what is not read.
-std::size_t corner_count(const TextReader& reader, std::int64_t type) {
+std::size_t node_count(const TextReader& reader, std::int64_t type) {
+  if (const ElementTraits* element = find_element(type)) return static_cast<std::size_t>(element->nodes);
   switch (type) {
     case vertex:
       return 1;
-    case line:
-      return 2;
-    case triangle:
+    case quadratic_edge:
       return 3;
-    case tetra:
-      return 4;
     case poly_vertex:
     case poly_line:
       return 0;
     default:
-      fail_not_tet4(reader, fmt::format("cells of VTK type {}", type));
+      fail_unknown_element(reader, fmt::format("cells of VTK type {}", type));
   }
 }
 
-/// Takes the tetrahedra among the cells while reading their types. The sizes are compared for all of them, so
+/// Takes the elements among the cells while reading their types. The sizes are compared for all of them, so
 /// that a type cut short (1 of 10) at the end of the file is noticed.
-void read_types(TextReader& reader, const Cells& cells, Mesh& mesh) {
+void read_types(TextReader& reader, const Cells& cells, MeshFile& mesh) {
   const std::int64_t count = reader.count("the number of cell types", 1);
   if (count != static_cast<std::int64_t>(cells.offsets.size()) - 1) {
     reader.fail(fmt::format("there are {} cell types for {} cells", count, cells.offsets.size() - 1));
   }
   for (std::size_t cell = 0; cell + 1 < cells.offsets.size(); ++cell) {
     const std::int64_t type = reader.integer("a cell type");
-    const std::size_t first = cells.offsets[cell], corners = cells.offsets[cell + 1] - first;
-    const std::size_t expected = corner_count(reader, type);
-    if (expected != 0 && corners != expected) {
-      reader.fail(fmt::format("cell {} has {} nodes, but its type is {}, which has {}", cell, corners, type,
-                              expected));
+    const std::size_t first = cells.offsets[cell], nodes = cells.offsets[cell + 1] - first;
+    const std::size_t expected = node_count(reader, type);
+    if (expected != 0 && nodes != expected) {
+      reader.fail(
+          fmt::format("cell {} has {} nodes, but its type is {}, which has {}", cell, nodes, type, expected));
     }
-    if (type != tetra) continue;
-    mesh.tets.push_back(
-        {cells.nodes[first], cells.nodes[first + 1], cells.nodes[first + 2], cells.nodes[first + 3]});
+    if (const ElementTraits* element = find_element(type)) {
+      mesh.add({element->type}, {cells.nodes.data() + first, nodes}, 0);
+    }
   }
 }
 
@@ -149,7 +147,7 @@ Mesh read_vtk_legacy(const std::filesystem::path& file) {
     reader.fail(fmt::format("the file holds a {:.40}, not an UNSTRUCTURED_GRID", kind),
                 "Save the volume mesh as unstructured grid.");
   }
-  Mesh mesh;
+  MeshFile mesh;
   std::optional<Cells> cells;
   while (!reader.at_end() && reader.peek() != "POINT_DATA" && reader.peek() != "CELL_DATA") {
     const std::string keyword(reader.word("a keyword"));
@@ -170,9 +168,7 @@ Mesh read_vtk_legacy(const std::filesystem::path& file) {
       reader.fail_on(keyword, "POINTS, CELLS or CELL_TYPES");
     }
   }
-  check_not_empty(mesh, reader);
-  mesh.regions.assign(mesh.tets.size(), 0);
-  return mesh;
+  return to_body(std::move(mesh), reader);
 }
 
 }  // namespace palpate

@@ -64,28 +64,28 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-template <std::size_t N>
-void add_cells(Document& document, std::span<const std::array<Index, N>> cells, std::uint8_t vtk_type) {
-  std::vector<std::int64_t> offsets(cells.size());
-  for (std::size_t i = 0; i < cells.size(); ++i) offsets[i] = static_cast<std::int64_t>(N * (i + 1));
-  const std::vector<std::uint8_t> types(cells.size(), vtk_type);
+void add_cells(Document& document, ElementType element, std::span<const Index> connectivity) {
+  const auto width = static_cast<std::size_t>(traits(element).nodes), cells = connectivity.size() / width;
+  std::vector<std::int64_t> offsets(cells);
+  for (std::size_t i = 0; i < cells; ++i) offsets[i] = static_cast<std::int64_t>(width * (i + 1));
+  const std::vector<std::uint8_t> types(cells, traits(element).vtk);
   document.add("<Cells>\n");
-  document.add_array<Index>("Int32", "connectivity", 1,
-                            {cells.empty() ? nullptr : cells.data()->data(), N * cells.size()});
+  document.add_array<Index>("Int32", "connectivity", 1, connectivity);
   document.add_array<std::int64_t>("Int64", "offsets", 1, offsets);
   document.add_array<std::uint8_t>("UInt8", "types", 1, types);
   document.add("</Cells>\n");
 }
 
-Document make_document(std::span<const Vec3> nodes, std::span<const Tet> tets,
-                       std::span<const Triangle> triangles, std::span<const NodalField> fields) {
+Document make_document(std::span<const Vec3> nodes, ElementType element, std::span<const Index> connectivity,
+                       std::span<const NodalField> fields) {
   Document document;
   document.add(
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
       "header_type=\"UInt64\">\n");
   document.add(fmt::format("<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
-                           nodes.size(), tets.size() + triangles.size()));
+                           nodes.size(),
+                           connectivity.size() / static_cast<std::size_t>(traits(element).nodes)));
   document.add("<PointData>\n");
   for (const NodalField& field : fields) {
     document.add_array<double>("Float64", escaped(field.name), field.components, field.values);
@@ -94,20 +94,16 @@ Document make_document(std::span<const Vec3> nodes, std::span<const Tet> tets,
   document.add_array<double>("Float64", "Points", 3,
                              {nodes.empty() ? nullptr : nodes.data()->data(), 3 * nodes.size()});
   document.add("</Points>\n");
-  if (tets.empty()) {
-    add_cells<3>(document, triangles, 5);
-  } else {
-    add_cells<4>(document, tets, 10);
-  }
+  add_cells(document, element, connectivity);
   document.add("</Piece>\n</UnstructuredGrid>\n");
   return document;
 }
 
 }  // namespace
 
-void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, std::span<const Tet> tets,
-               std::span<const Triangle> triangles, std::span<const NodalField> fields) {
-  const Document document = make_document(nodes, tets, triangles, fields);
+void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, ElementType element,
+               std::span<const Index> connectivity, std::span<const NodalField> fields) {
+  const Document document = make_document(nodes, element, connectivity, fields);
   std::filesystem::path partial = file;
   partial += ".partial";
   std::ofstream stream(partial, std::ios::binary);

@@ -1,10 +1,14 @@
 #include "precompute/body.h"
 
-#include <type_traits>
-
 #include "meshes/check.h"
+#include "meshes/error.h"
 #include "meshes/volume_mesh.h"
+#include "precompute/cgal_surface_mesh.h"
+#include "precompute/held_nodes.h"
 #include "precompute/image_mesh.h"
+#include "precompute/material_parts.h"
+#include "precompute/picture.h"
+#include "precompute/plane_mesh.h"
 #include "precompute/surface_input.h"
 #include "precompute/tetgen_mesh.h"
 
@@ -20,40 +24,59 @@ MeshOptions in_file_units(MeshOptions options, double scale) {
   return options;
 }
 
-/// Turns each kind of geometry into tetrahedra, in the geometry's own unit.
-class Mesher {
- public:
-  Mesher(const MeshOptions& options, const ProgressText& progress, std::vector<std::string>& notes)
-      : options_(options), progress_(progress), notes_(notes) {}
+/// Meshes each kind of geometry, in the geometry's own unit.
+struct MeshGeometry {
+  const MeshOptions& options;
+  const std::string& where;
+  const ProgressText& progress;
+  std::vector<std::string>& notes;
+
+  [[nodiscard]] const char* mesher() const { return options.mesher == Mesher::cgal ? "CGAL" : "TetGen"; }
 
   Mesh operator()(const SurfaceGeometry& surface) const {
-    progress_("reading the surface " + surface.file.filename().string());
-    const auto remesh_to = options_.remesh ? options_.edge_length : std::nullopt;
-    const TriangleSurface triangles = read_surface(surface.file, remesh_to, notes_);
-    progress_("meshing with TetGen");
-    return mesh_surface(triangles, options_, surface.file.string());
+    progress("reading the surface " + surface.file.filename().string());
+    const auto remesh_to = options.remesh ? options.edge_length : std::nullopt;
+    const TriangleSurface triangles = read_surface(surface.file, remesh_to, notes);
+    progress(std::string("meshing with ") + mesher());
+    return options.mesher == Mesher::cgal ? mesh_surface_with_cgal(triangles, options, where)
+                                          : mesh_surface(triangles, options, where);
   }
 
   Mesh operator()(const ImageGeometry& image) const {
-    progress_("meshing the image " + image.file.filename().string() + " with CGAL");
-    return mesh_image(image, options_, notes_);
+    progress("meshing the image " + image.file.filename().string() + " with " + mesher());
+    return mesh_image(image, options, notes);
   }
 
   Mesh operator()(const VolumeGeometry& volume) const {
-    progress_("reading the mesh " + volume.file.filename().string());
+    progress("reading the mesh " + volume.file.filename().string());
     return read_volume_mesh(volume.file);
+  }
+
+  Mesh operator()(const PolygonGeometry& polygon) const {
+    progress("meshing the polygon with CGAL");
+    return mesh_polygon(polygon, options, where, notes);
+  }
+
+  Mesh operator()(const PictureGeometry& picture) const {
+    progress("meshing the picture " + picture.file.filename().string() + " with CGAL");
+    return mesh_picture(picture, options, notes);
+  }
+
+  Mesh operator()(const RectangleShape& rectangle) const {
+    progress("generating the mesh");
+    return generate(rectangle, options.element.value_or(ElementType::quad4));
+  }
+
+  Mesh operator()(const BoxShape& box) const {
+    progress("generating the mesh");
+    return generate(box, options.element == ElementType::hex8 ? ElementType::hex8 : ElementType::tet4);
   }
 
   template <typename Shape>
   Mesh operator()(const Shape& shape) const {
-    progress_("generating the mesh");
+    progress("generating the mesh");
     return generate(shape);
   }
-
- private:
-  const MeshOptions& options_;
-  const ProgressText& progress_;
-  std::vector<std::string>& notes_;
 };
 
 std::filesystem::path geometry_file(const Geometry& geometry) {
@@ -68,41 +91,51 @@ std::filesystem::path geometry_file(const Geometry& geometry) {
       geometry);
 }
 
-/// Union of the selections. [N]
-std::vector<std::uint8_t> select_fixed(const Mesh& mesh, const Description& description) {
-  std::vector<std::uint8_t> fixed(mesh.nodes.size(), 0);
-  for (std::size_t s = 0; s < description.fixed.size(); ++s) {
-    const std::string where = description.file.string() + ": [[fixed]] number " + std::to_string(s + 1);
-    const std::vector<std::uint8_t> selected = select_nodes(mesh, description.fixed[s], where);
-    for (std::size_t i = 0; i < fixed.size(); ++i) {
-      fixed[i] |= selected[i];
-    }
+/// Only a volume file can disagree: the dimension of the others is known from their kind.
+void check_dimension(const Mesh& mesh, const Description& description, const std::string& where) {
+  const std::string element = traits(mesh.element).name;
+  if (mesh.dimension() == 2 && description.analysis == Analysis::solid) {
+    throw Error("the mesh lies in the plane (" + element + "), but model.toml has no plane", where,
+                R"(add plane = "stress" (a thin sheet) or plane = "strain" (a slice of a long body) to )" +
+                    description.file.string());
   }
-  return fixed;
+  if (mesh.dimension() == 3 && description.analysis != Analysis::solid) {
+    throw Error("the mesh is in space (" + element + "), but model.toml has plane", where,
+                "remove plane from " + description.file.string());
+  }
 }
 
 }  // namespace
 
 MeshedBody mesh_body(const Description& description, const ProgressText& progress) {
   MeshedBody body;
+  const std::string toml = description.file.string();
+  const std::filesystem::path file = geometry_file(description.geometry);
+  const std::string where = file.empty() ? toml : file.string();
   const MeshOptions options = in_file_units(description.mesh, description.scale);
-  body.mesh = std::visit(Mesher(options, progress, body.notes), description.geometry);
+  body.mesh = std::visit(MeshGeometry{options, where, progress, body.notes}, description.geometry);
   for (Vec3& x : body.mesh.nodes) {
     x *= description.scale;
   }
 
   progress("checking the mesh");
-  const std::filesystem::path file = geometry_file(description.geometry);
-  const std::string where = file.empty() ? description.file.string() : file.string();
+  check_dimension(body.mesh, description, where);
   orient_elements(body.mesh, where);
+  if (options.element) {
+    body.mesh = with_elements(std::move(body.mesh), *options.element, where);
+  }
   if (const std::size_t unused = remove_unused_nodes(body.mesh); unused != 0) {
     body.notes.push_back("removed " + std::to_string(unused) +
                          " nodes that no element uses; node numbers count the remaining ones");
   }
   check_connected(body.mesh, where);
   body.surface = extract_surface(body.mesh);
-  body.fixed = select_fixed(body.mesh, description);
-  check_held(body.mesh, body.fixed, description.file.string());
+
+  body.material_of_element = materials_of_elements(body.mesh, description.materials, toml);
+  HeldNodes held = hold_nodes(body.mesh, description.fixed, toml);
+  body.fixed = std::move(held.axes);
+  body.prescribed = std::move(held.displacement);
+  check_held(body.mesh, body.fixed, toml);
   if (const std::string warning = scale_warning(body.mesh); !warning.empty()) {
     body.notes.push_back(warning);
   }

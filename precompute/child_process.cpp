@@ -189,26 +189,47 @@ ChildResult run_in_child(const std::string& name, const std::string& where, std:
   return result;
 }
 
+namespace {
+
+template <typename T>
+void append_array(Bytes& bytes, const std::vector<T>& values) {
+  const std::size_t size = values.size();
+  append_bytes(bytes, std::span<const std::size_t>(&size, 1));
+  append_bytes(bytes, std::span<const T>(values));
+}
+
+/// Takes an array from the front of `bytes`.
+template <typename T>
+void take_array(std::span<const std::byte>& bytes, std::vector<T>& values) {
+  std::size_t size = 0;
+  std::memcpy(&size, bytes.data(), sizeof(size));
+  bytes = bytes.subspan(sizeof(size));
+  values.resize(size);
+  std::copy_n(bytes.data(), size * sizeof(T), reinterpret_cast<std::byte*>(values.data()));
+  bytes = bytes.subspan(size * sizeof(T));
+}
+
+}  // namespace
+
 Bytes pack(const Mesh& mesh) {
-  Bytes bytes;
-  const std::size_t nodes = mesh.nodes.size();
-  append_bytes(bytes, std::span<const std::size_t>(&nodes, 1));
-  append_bytes(bytes, std::span<const Vec3>(mesh.nodes));
-  append_bytes(bytes, std::span<const Tet>(mesh.tets));
+  Bytes bytes = {static_cast<std::byte>(mesh.element)};
+  append_array(bytes, mesh.nodes);
+  append_array(bytes, mesh.connectivity);
+  append_array(bytes, mesh.regions);
+  append_array(bytes, mesh.tagged_facets);
+  append_array(bytes, mesh.facet_tags);
   return bytes;
 }
 
 Mesh unpack_mesh(const Bytes& bytes) {
-  std::size_t nodes = 0;
-  std::memcpy(&nodes, bytes.data(), sizeof(nodes));
-  const std::byte* at = bytes.data() + sizeof(nodes);
   Mesh mesh;
-  mesh.nodes.resize(nodes);
-  std::copy_n(at, nodes * sizeof(Vec3), reinterpret_cast<std::byte*>(mesh.nodes.data()));
-  at += nodes * sizeof(Vec3);
-  mesh.tets.resize(static_cast<std::size_t>(bytes.data() + bytes.size() - at) / sizeof(Tet));
-  std::copy_n(at, mesh.tets.size() * sizeof(Tet), reinterpret_cast<std::byte*>(mesh.tets.data()));
-  mesh.regions.assign(mesh.tets.size(), 0);
+  mesh.element = static_cast<ElementType>(bytes.at(0));
+  std::span<const std::byte> rest = std::span(bytes).subspan(1);
+  take_array(rest, mesh.nodes);
+  take_array(rest, mesh.connectivity);
+  take_array(rest, mesh.regions);
+  take_array(rest, mesh.tagged_facets);
+  take_array(rest, mesh.facet_tags);
   return mesh;
 }
 

@@ -30,7 +30,7 @@ struct ChildResult {
 ChildResult run_in_child(const std::string& name, const std::string& where, std::chrono::seconds limit,
                          const std::function<ChildResult()>& work);
 
-/// A mesh's nodes and elements as bytes, and back (regions are 0).
+/// A mesh as bytes, and back.
 Bytes pack(const Mesh& mesh);
 Mesh unpack_mesh(const Bytes& bytes);
 

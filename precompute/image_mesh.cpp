@@ -1,24 +1,25 @@
 #include "precompute/image_mesh.h"
 
-#define CGAL_USE_ZLIB 1  // .inr.gz
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Image_3.h>
 #include <CGAL/Labeled_mesh_domain_3.h>
 #include <CGAL/Mesh_complex_3_in_triangulation_3.h>
 #include <CGAL/Mesh_criteria_3.h>
 #include <CGAL/Mesh_triangulation_3.h>
 #include <CGAL/Random.h>
 #include <CGAL/make_mesh_3.h>
+#include <fmt/format.h>
 
-#include <cstring>
+#include <array>
 #include <map>
-#include <set>
-#include <span>
-#include <unordered_map>
 
+#include "meshes/element.h"
 #include "meshes/error.h"
 #include "precompute/child_process.h"
-#include "precompute/voxel_body.h"
+#include "precompute/distance_field.h"
+#include "precompute/labelled_image.h"
+#include "precompute/mesh3.h"
+#include "precompute/region_points.h"
+#include "precompute/tetgen_mesh.h"
 
 namespace palpate {
 namespace {
@@ -31,187 +32,140 @@ using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 namespace parameters = CGAL::parameters;
 
-constexpr std::chrono::seconds read_time_limit{600};
-constexpr std::chrono::seconds mesh_time_limit{3600};
-constexpr double facet_angle =
-    25.0;  // [degree] bound on the surface triangles' angles that Mesh_3 can promise
-constexpr double wanted_dihedral = 12.0;     // [degree] sliver removal stops here
-constexpr double facet_size_per_edge = 1.2;  // measured on organs: the mean edge is then the one asked for,
-constexpr double radius_per_edge = 0.73;     // on the surface and, without grading, inside
-constexpr double relative_error = 1e-4;      // of the body's size: where the boundary is found
-
-enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
-
-struct ImageHeader {
-  std::array<Index, 3> size{};
-  std::array<double, 3> spacing{};
-  std::array<double, 3> origin{};
-};
-
-/// Reads the image and sends its header and its voxels as labels.
-ChildResult read_labels(const std::string& file) {
-  CGAL::Image_3 image;
-  if (!image.read(file) || image.size() == 0) {
-    return {not_an_image, {}};
-  }
-  if (image.image()->vdim != 1) {
-    return {not_scalar, {}};
-  }
-  ImageHeader header;
-  header.size = {static_cast<Index>(image.xdim()), static_cast<Index>(image.ydim()),
-                 static_cast<Index>(image.zdim())};
-  header.spacing = {image.vx(), image.vy(), image.vz()};
-  header.origin = {static_cast<double>(image.tx()), static_cast<double>(image.ty()),
-                   static_cast<double>(image.tz())};
-  std::vector<std::int32_t> labels;
-  labels.reserve(image.size());
-  for (std::size_t k = 0; k < image.zdim(); ++k) {
-    for (std::size_t j = 0; j < image.ydim(); ++j) {
-      for (std::size_t i = 0; i < image.xdim(); ++i) {
-        labels.push_back(static_cast<std::int32_t>(std::lround(image.value(i, j, k))));
-      }
-    }
-  }
-  ChildResult result;
-  append_bytes(result.bytes, std::span<const ImageHeader>(&header, 1));
-  append_bytes(result.bytes, std::span<const std::int32_t>(labels));
-  return result;
-}
-
-/// Marks the voxels that carry one of the labels (all but 0 where none are listed).
-VoxelBody select(const Bytes& bytes, const std::vector<int>& wanted, const std::string& where) {
-  ImageHeader header;
-  std::memcpy(&header, bytes.data(), sizeof(header));
-  VoxelBody body;
-  body.size = header.size;
-  body.spacing = Vec3(header.spacing[0], header.spacing[1], header.spacing[2]);
-  body.origin = Vec3(header.origin[0], header.origin[1], header.origin[2]);
-  std::vector<std::int32_t> labels((bytes.size() - sizeof(header)) / sizeof(std::int32_t));
-  std::memcpy(labels.data(), bytes.data() + sizeof(header), labels.size() * sizeof(std::int32_t));
-
-  std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
-  body.inside.reserve(labels.size());
-  for (const std::int32_t label : labels) {
-    const auto [entry, is_new] = selected.try_emplace(label, 0);
-    if (is_new) {
-      entry->second =
-          wanted.empty() ? label != 0 : std::find(wanted.begin(), wanted.end(), label) != wanted.end();
-    }
-    body.inside.push_back(entry->second);
-  }
-  std::string occurring;
-  for (const auto& [label, is_body] : selected) {
-    occurring += (occurring.empty() ? "" : ", ") + std::to_string(label);
-  }
-  for (const int label : wanted) {
-    if (!selected.contains(label)) {
-      throw Error("no voxel of the image has label " + std::to_string(label), where,
-                  "its labels are " + occurring);
-    }
-  }
-  if (wanted.empty() && selected.size() == 1 && selected.contains(0)) {
-    throw Error("the image is empty: all its voxels are 0", where, "give a segmented image");
-  }
-  return body;
-}
-
-VoxelBody read_body(const ImageGeometry& image, std::vector<std::string>& notes) {
-  const std::string where = image.file.string();
-  if (!std::filesystem::is_regular_file(image.file)) {
-    throw Error("there is no such image file", where, "check image = \"...\" in [geometry]");
-  }
-  // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
-  const std::string path = std::filesystem::absolute(image.file).string();
-  const ChildResult read =
-      run_in_child("the image reader", where, read_time_limit, [&] { return read_labels(path); });
-  if (read.status != read_ok) {
-    throw Error(
-        read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
-        where, "use a complete INR file (.inr, .inr.gz) with one label a voxel and positive VX, VY, VZ");
-  }
-  VoxelBody body = crop(select(read.bytes, image.labels, where), 2);
-  keep_one_part(body, where, notes);
-  if (const std::size_t filled = join_across_edges(body); filled != 0) {
-    notes.push_back("filled " + std::to_string(filled) +
-                    " voxel(s) of the image where voxels touched along an edge only");
-  }
-  return body;
-}
+constexpr double relative_error = 1e-4;  // of the body's size: where boundary and interfaces are found
+constexpr double seed_spacing = 1.5;     // [edge_length] between the first points on interfaces
 
 Vec3 as_vector(const Point& p) {
   return {p.x(), p.y(), p.z()};
 }
 
+Point as_point(const Vec3& x) {
+  return {x[0], x[1], x[2]};
+}
+
 /// Bound on the circumradius of tetrahedra.
 struct CellSize {
   using FT = Kernel::FT;
-  const DistanceField* distance;
+  const LabelField* field;
   double surface_edge;
   double grading;
 
   template <typename AnyIndex>
   FT operator()(const Point& p, int /*dimension*/, const AnyIndex& /*index*/) const {
-    const double depth = std::max(0.0, (*distance)(as_vector(p)));
-    return radius_per_edge * (surface_edge + grading * depth);
+    return mesh3::radius_per_edge * (surface_edge + grading * (*field)(as_vector(p)).depth);
   }
 };
 
-CGAL::Bbox_3 bounding_box(const VoxelBody& body) {
-  const Vec3 low = body.origin;
-  const Vec3 high =
-      low + Vec3(body.size[0] - 1, body.size[1] - 1, body.size[2] - 1).cwiseProduct(body.spacing);
+CGAL::Bbox_3 bounding_box(const VoxelGrid& grid) {
+  const Vec3 low = grid.origin, high = grid.center(grid.voxels() - 1);
   return {low[0], low[1], low[2], high[0], high[1], high[2]};
 }
 
-Complex make_complex(const VoxelBody& body, const MeshOptions& options) {
-  const DistanceField distance(body);
+Domain make_domain(const VoxelGrid& grid, const LabelField& field) {
   CGAL::get_default_random() = CGAL::Random(0);
-  const Domain domain = Domain::create_implicit_mesh_domain(
-      [&](const Point& p) { return -distance(as_vector(p)); }, bounding_box(body),
-      parameters::relative_error_bound = relative_error);
-  const CellSize cell_size{&distance, *options.edge_length, options.grading};
+  return Domain(
+      parameters::function = [&field](const Point& p) { return field(as_vector(p)).number; },
+      parameters::bounding_object = bounding_box(grid), parameters::relative_error_bound = relative_error);
+}
+
+/// Points that keep a distance from each other.
+class SparsePoints {
+ public:
+  explicit SparsePoints(double spacing) : spacing_(spacing) {}
+
+  /// Takes x if no other one is near.
+  bool add(const Vec3& x) {
+    const Eigen::Vector3i cell = (x / spacing_).array().floor().cast<int>();
+    for (int n = 0; n < 27; ++n) {
+      const auto near = points_.find(key(cell + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
+      if (near != points_.end() && (near->second - x).norm() < spacing_) {
+        return false;
+      }
+    }
+    return points_.emplace(key(cell), x).second;
+  }
+
+ private:
+  static std::array<int, 3> key(const Eigen::Vector3i& cell) { return {cell[0], cell[1], cell[2]}; }
+
+  double spacing_;
+  std::map<std::array<int, 3>, Vec3> points_;
+};
+
+void insert(Complex& complex, const Point& point, const Domain::Index& index) {
+  const Complex::Vertex_handle vertex = complex.triangulation().insert(Triangulation::Point(point));
+  complex.set_dimension(vertex, 2);  // it is on a surface
+  complex.set_index(vertex, index);
+}
+
+/// Puts the first points on the boundary.
+void seed_boundary(Complex& complex, const Domain& domain) {
+  std::vector<std::pair<Point, Domain::Index>> seeds;
+  domain.construct_initial_points_object()(std::back_inserter(seeds));
+  for (const auto& [point, index] : seeds) {
+    insert(complex, point, index);
+  }
+}
+
+/// Puts points on the interfaces between labels: refinement by itself finds what is large compared with the
+/// elements, but not every thin vessel.
+void seed_interfaces(Complex& complex, const Domain& domain, const VoxelBody& body, double spacing) {
+  SparsePoints seeds(spacing);
+  const std::array<std::size_t, 3> stride = {1, body.at(0, 1, 0), body.at(0, 0, 1)};
+  for (std::size_t v = 0; v + stride[2] < body.labels.size(); ++v) {
+    for (const std::size_t step : stride) {
+      if (body.labels[v] == body.labels[v + step] || body.inside[v] == 0 || body.inside[v + step] == 0) {
+        continue;
+      }
+      const Kernel::Segment_3 between(as_point(body.center(v)), as_point(body.center(v + step)));
+      if (!domain.do_intersect_surface_object()(between)) {
+        continue;  // smoothed away
+      }
+      const auto [point, index, dimension] = domain.construct_intersection_object()(between);
+      if (seeds.add(as_vector(point))) {
+        insert(complex, point, index);
+      }
+    }
+  }
+}
+
+/// Delaunay refinement of the surfaces, and unless it is `hollow` of the inside.
+Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& field,
+               const MeshOptions& options, bool hollow) {
   const double facet_distance =
       options.facet_distance > 0.0 ? options.facet_distance : body.spacing.maxCoeff();
-  const Criteria criteria(parameters::facet_angle = facet_angle,
-                          parameters::facet_size = facet_size_per_edge * *options.edge_length,
-                          parameters::facet_distance = facet_distance,
-                          parameters::cell_radius_edge_ratio = options.radius_edge,
-                          parameters::cell_size = cell_size);
-  // time limit 0 is none; left out, it is the time that refinement took, which gives another mesh every run
-  const auto perturb =
-      parameters::perturb(parameters::time_limit = 0.0, parameters::sliver_bound = wanted_dihedral);
-  const auto exude =
-      parameters::exude(parameters::time_limit = 0.0, parameters::sliver_bound = wanted_dihedral);
-  return CGAL::make_mesh_3<Complex>(domain, criteria, parameters::manifold(), perturb, exude);
-}
+  const Criteria::Facet_criteria facets(mesh3::facet_angle, mesh3::facet_size_per_edge * *options.edge_length,
+                                        facet_distance);
+  const CellSize cell_size{&field, *options.edge_length, options.grading};
+  const Criteria::Cell_criteria cells =
+      hollow ? Criteria::Cell_criteria(0.0, 0.0) : Criteria::Cell_criteria(options.radius_edge, cell_size);
 
-Mesh export_mesh(const Complex& complex) {
-  Mesh mesh;
-  std::unordered_map<Complex::Vertex_handle, Index> number;
-  for (auto cell = complex.cells_in_complex_begin(); cell != complex.cells_in_complex_end(); ++cell) {
-    Tet tet{};
-    for (int i = 0; i < 4; ++i) {
-      const auto [entry, is_new] = number.try_emplace(cell->vertex(i), static_cast<Index>(mesh.nodes.size()));
-      if (is_new) {
-        const auto& p = cell->vertex(i)->point();
-        mesh.nodes.emplace_back(p.x(), p.y(), p.z());
-      }
-      tet[static_cast<std::size_t>(i)] = entry->second;
-    }
-    mesh.tets.push_back(tet);
+  Complex complex;
+  seed_boundary(complex, domain);
+  const bool one_label = field.labels().size() == 1;
+  if (!one_label) {
+    seed_interfaces(complex, domain, body, seed_spacing * *options.edge_length);
   }
-  mesh.regions.assign(mesh.tets.size(), 0);
-  return mesh;
+  // three labels may meet in an edge, so that only a single one has manifold surfaces
+  CGAL::refine_mesh_3(complex, domain, Criteria(facets, cells), parameters::no_reset_c3t3(),
+                      one_label ? parameters::manifold() : parameters::non_manifold(),
+                      parameters::no_perturb(), parameters::no_exude());
+  return complex;
 }
 
-}  // namespace
-
-Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vector<std::string>& notes) {
-  const VoxelBody body = read_body(image, notes);
-  const std::string where = image.file.string();
-  const ChildResult result = run_in_child("CGAL's mesher", where, mesh_time_limit, [&] {
+/// Meshes with Mesh_3, `hollow` for the surfaces alone, in a child process.
+Mesh run_mesh3(const VoxelBody& body, const LabelField& field, const MeshOptions& options,
+               const std::string& where, bool hollow) {
+  const ChildResult result = run_in_child("CGAL's mesher", where, mesh3::time_limit, [&] {
     try {
-      return ChildResult{0, pack(export_mesh(make_complex(body, options)))};
+      const Domain domain = make_domain(body, field);
+      Complex complex = refine(domain, body, field, options, hollow);
+      if (!hollow) {
+        mesh3::optimise(complex, domain, options);
+      }
+      return ChildResult{0, pack(mesh3::export_mesh(complex, [&](int number) {
+                           return field.labels()[static_cast<std::size_t>(number) - 1];
+                         }))};
     } catch (const CGAL::Failure_exception&) {
       return ChildResult{1, {}};
     }
@@ -221,8 +175,54 @@ Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vec
                 "change edge_length in [mesh] a little, or smooth the segmentation");
   }
   Mesh mesh = unpack_mesh(result.bytes);
-  if (mesh.tets.empty()) {
+  if (mesh.connectivity.empty()) {
     throw Error("no tetrahedron fits into the image's body", where, "use a smaller edge_length in [mesh]");
+  }
+  return mesh;
+}
+
+Mesh fill_with_tetgen(const Mesh& hollow, const MeshOptions& options, const std::string& where) {
+  TriangleSurface walls{hollow.nodes, {}};
+  for (Index t = 0; t < static_cast<Index>(hollow.facet_tags.size()); ++t) {
+    const auto corners = hollow.tagged_facet(t);
+    walls.triangles.push_back({corners[0], corners[1], corners[2]});
+  }
+  return mesh_regions(walls, region_points(hollow), options, where);
+}
+
+/// What became of each label.
+void report_volumes(const Mesh& mesh, const VoxelBody& body, std::vector<std::string>& notes) {
+  std::map<Index, std::array<double, 2>> volumes;
+  for (const Index label : body.labels) {
+    if (label != VoxelBody::no_label) {
+      volumes[label][0] += body.spacing.prod();
+    }
+  }
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    volumes[mesh.regions[static_cast<std::size_t>(e)]][1] +=
+        std::abs(element_volume(mesh.element, element_nodes(mesh, e)));
+  }
+  for (const auto& [label, volume] : volumes) {
+    notes.push_back(fmt::format("label {}: volume {:.4g} in the image, {:.4g} in the mesh ({:+.1f} %)", label,
+                                volume[0], volume[1], 100.0 * (volume[1] / volume[0] - 1.0)));
+  }
+}
+
+}  // namespace
+
+Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vector<std::string>& notes) {
+  const std::string where = image.file.string();
+  const VoxelBody body = read_labelled_image(image, *options.edge_length, notes);
+  const LabelField field(body);
+  const bool by_tetgen = options.mesher == Mesher::tetgen;
+  Mesh mesh = run_mesh3(body, field, options, where, by_tetgen);
+  if (by_tetgen) {
+    mesh = fill_with_tetgen(mesh, options, where);
+  }
+  mesh.tagged_facets.clear();
+  mesh.facet_tags.clear();
+  if (image.regions) {
+    report_volumes(mesh, body, notes);
   }
   return mesh;
 }

@@ -52,6 +52,17 @@ void copy_surface(const TriangleSurface& surface, tetgenio& io) {
   }
 }
 
+void copy_regions(const std::vector<RegionPoint>& points, tetgenio& io) {
+  io.numberofregions = static_cast<int>(points.size());
+  io.regionlist = new REAL[5 * points.size()];
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    REAL* region = io.regionlist + 5 * i;
+    std::copy_n(points[i].x.data(), 3, region);
+    region[3] = static_cast<REAL>(points[i].region);
+    region[4] = -1.0;  // no bound on volumes
+  }
+}
+
 Mesh copy_mesh(const tetgenio& io) {
   Mesh mesh;
   for (int i = 0; i < io.numberofpoints; ++i) {
@@ -59,21 +70,29 @@ Mesh copy_mesh(const tetgenio& io) {
   }
   for (int i = 0; i < io.numberoftetrahedra; ++i) {
     const int* corners = io.tetrahedronlist + std::ptrdiff_t{4} * i;
-    mesh.tets.push_back({corners[0], corners[1], corners[2], corners[3]});
+    mesh.connectivity.insert(mesh.connectivity.end(), corners, corners + 4);
+    mesh.regions.push_back(
+        io.numberoftetrahedronattributes == 0
+            ? 0
+            : static_cast<Index>(
+                  io.tetrahedronattributelist[std::ptrdiff_t{io.numberoftetrahedronattributes} * i]));
   }
   return mesh;
 }
 
 /// Status 0: the mesh. Otherwise TetGen's error code.
-ChildResult tetrahedralise(const TriangleSurface& surface, const MeshOptions& options,
-                           const std::function<double(const Vec3&)>& edge_at) {
+ChildResult tetrahedralise(const TriangleSurface& surface, const std::vector<RegionPoint>& points,
+                           const MeshOptions& options, const std::function<double(const Vec3&)>& edge_at) {
   tetgenio in, out;
   copy_surface(surface, in);
+  copy_regions(points, in);
   target_edge = &edge_at;
   in.tetunsuitable = too_large;
 
   tetgenbehavior behavior;
-  std::string switches = "pYqQ";  // the bounds are set below: as text they would be read by the locale
+  std::string switches = points.empty()
+                             ? "pYqQ"
+                             : "pYqAQ";  // the bounds are set below: as text they would be read by the locale
   behavior.parse_commandline(switches.data());
   behavior.minratio = options.radius_edge;
   behavior.mindihedral = options.min_dihedral;
@@ -108,19 +127,26 @@ std::string meaning(int code) {
 }  // namespace
 
 Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, const std::string& where) {
-  const double surface_edge = options.edge_length.value_or(mean_edge_length(surface));
-  const auto distance = distance_to(surface);
+  return mesh_regions(surface, {}, options, where);
+}
+
+Mesh mesh_regions(const TriangleSurface& walls, const std::vector<RegionPoint>& points,
+                  const MeshOptions& options, const std::string& where) {
+  const double surface_edge = options.edge_length.value_or(mean_edge_length(walls));
+  const auto distance = distance_to(walls);
   const std::function<double(const Vec3&)> edge_at = [&](const Vec3& x) {
     return options.grading == 0.0 ? surface_edge : surface_edge + options.grading * distance(x);
   };
   const ChildResult result = run_in_child("TetGen", where, tetgen_time_limit,
-                                          [&] { return tetrahedralise(surface, options, edge_at); });
+                                          [&] { return tetrahedralise(walls, points, options, edge_at); });
   if (result.status != 0) {
     throw Error("TetGen stopped with code " + std::to_string(result.status) + ": " + meaning(result.status),
-                where, "repair the surface, or give edge_length and remesh = true in [mesh]");
+                where,
+                "repair or remesh the surface (edge_length and remesh = true in [mesh]); of an image, change "
+                "edge_length");
   }
   Mesh mesh = unpack_mesh(result.bytes);
-  if (mesh.tets.empty()) {
+  if (mesh.connectivity.empty()) {
     throw Error("TetGen found no inside of the surface", where, "close the surface's holes");
   }
   return mesh;

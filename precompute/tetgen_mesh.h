@@ -1,10 +1,12 @@
 // Tetrahedra inside a closed surface, by TetGen.
 #pragma once
 
-#include <functional>
+#include <string>
+#include <vector>
 
 #include "meshes/mesh.h"
 #include "precompute/description.h"
+#include "precompute/region_points.h"
 #include "precompute/surface_input.h"
 
 namespace palpate {
@@ -14,5 +16,10 @@ namespace palpate {
 /// edge of the surface. Lengths of `options` and of the surface are in the same unit. Throws Error (where =
 /// `where`) when TetGen refuses, crashes or does not end.
 Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, const std::string& where);
+
+/// The same for a surface with inner walls: elements get the region of the point that no wall separates from
+/// them. Each part between walls needs one point.
+Mesh mesh_regions(const TriangleSurface& walls, const std::vector<RegionPoint>& points,
+                  const MeshOptions& options, const std::string& where);
 
 }  // namespace palpate

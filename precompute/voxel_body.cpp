@@ -1,9 +1,10 @@
 #include "precompute/voxel_body.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cmath>
-#include <functional>
-#include <limits>
+#include <map>
+#include <queue>
 
 #include "meshes/error.h"
 
@@ -12,159 +13,127 @@ namespace {
 
 constexpr double small_part = 0.01;  // of the largest part
 
-std::size_t voxel_count(const std::array<Index, 3>& size) {
-  return static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) *
-         static_cast<std::size_t>(size[2]);
-}
-
-/// A group of voxels that are connected through faces and are all body or all empty.
+/// A group of voxels that are connected through faces and have the same value.
+template <typename Value>
 struct Part {
-  std::uint8_t inside;
+  Value value;
   std::size_t voxels;
   std::size_t first;  ///< one of them
 };
 
-/// Numbers the parts; `part_of` gets each voxel's.
-std::vector<Part> find_parts(const VoxelBody& body, std::vector<Index>& part_of) {
-  std::vector<Part> parts;
-  part_of.assign(body.inside.size(), -1);
-  std::vector<std::array<Index, 3>> front;
-  for (Index k = 0; k < body.size[2]; ++k) {
-    for (Index j = 0; j < body.size[1]; ++j) {
-      for (Index i = 0; i < body.size[0]; ++i) {
-        if (part_of[body.at(i, j, k)] >= 0) {
-          continue;
-        }
-        const auto number = static_cast<Index>(parts.size());
-        Part part{body.inside[body.at(i, j, k)], 0, body.at(i, j, k)};
-        part_of[part.first] = number;
-        front.push_back({i, j, k});
-        while (!front.empty()) {
-          const std::array<Index, 3> voxel = front.back();
-          front.pop_back();
-          ++part.voxels;
-          for (std::size_t axis = 0; axis < 3; ++axis) {
-            for (const Index step : {-1, 1}) {
-              std::array<Index, 3> next = voxel;
-              next[axis] += step;
-              if (next[axis] < 0 || next[axis] >= body.size[axis]) {
-                continue;
-              }
-              const std::size_t at = body.at(next[0], next[1], next[2]);
-              if (part_of[at] < 0 && body.inside[at] == part.inside) {
-                part_of[at] = number;
-                front.push_back(next);
-              }
-            }
-          }
-        }
-        parts.push_back(part);
-      }
+/// Calls work(neighbour) for the voxels that share a face with `voxel`.
+template <typename Work>
+void for_neighbours(const VoxelGrid& grid, std::size_t voxel, const Work& work) {
+  std::size_t stride = 1;
+  for (const Index length : grid.size) {
+    const auto n = static_cast<std::size_t>(length);
+    const std::size_t position = voxel / stride % n;
+    if (position > 0) {
+      work(voxel - stride);
     }
+    if (position + 1 < n) {
+      work(voxel + stride);
+    }
+    stride *= n;
+  }
+}
+
+/// Numbers the parts; `part_of` gets each voxel's.
+template <typename Value>
+std::vector<Part<Value>> find_parts(const VoxelGrid& grid, const std::vector<Value>& values,
+                                    std::vector<Index>& part_of) {
+  std::vector<Part<Value>> parts;
+  part_of.assign(values.size(), -1);
+  std::vector<std::size_t> front;
+  for (std::size_t v = 0; v < values.size(); ++v) {
+    if (part_of[v] >= 0) {
+      continue;
+    }
+    const auto number = static_cast<Index>(parts.size());
+    Part<Value> part{values[v], 0, v};
+    part_of[v] = number;
+    front.push_back(v);
+    while (!front.empty()) {
+      const std::size_t voxel = front.back();
+      front.pop_back();
+      ++part.voxels;
+      for_neighbours(grid, voxel, [&](std::size_t next) {
+        if (part_of[next] < 0 && values[next] == part.value) {
+          part_of[next] = number;
+          front.push_back(next);
+        }
+      });
+    }
+    parts.push_back(part);
   }
   return parts;
 }
 
-std::string shown(const VoxelBody& body, std::size_t voxel) {
-  const auto nx = static_cast<std::size_t>(body.size[0]), ny = static_cast<std::size_t>(body.size[1]);
-  const std::array<std::size_t, 3> at = {voxel % nx, voxel / nx % ny, voxel / (nx * ny)};
-  std::string text = "(";
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<Eigen::Index>(axis);
-    text += (axis == 0 ? "" : ", ") +
-            std::to_string(body.origin[a] + static_cast<double>(at[axis]) * body.spacing[a]);
-  }
-  return text + ")";
+std::string shown(const VoxelGrid& grid, std::size_t voxel) {
+  const Vec3 x = grid.center(voxel);
+  return fmt::format("({:f}, {:f}, {:f})", x[0], x[1], x[2]);
 }
 
-/// Replaces f by min_q f(q) + (spacing (p - q))^2 along one line: the lower envelope of parabolas.
-class LineTransform {
- public:
-  LineTransform(Index length, double spacing)
-      : spacing2_(spacing * spacing),
-        f_(static_cast<std::size_t>(length)),
-        apex_(f_.size()),
-        from_(f_.size() + 1) {}
-
-  /// Line of the given length with `stride` between its entries.
-  void operator()(float* line, std::size_t stride) {
-    const std::size_t n = f_.size();
-    for (std::size_t p = 0; p < n; ++p) {
-      f_[p] = static_cast<double>(line[p * stride]);
-    }
-    std::size_t last = 0;
-    apex_[0] = 0;
-    from_[0] = -std::numeric_limits<double>::infinity();
-    for (std::size_t q = 1; q < n; ++q) {
-      double s = crossing(apex_[last], q);
-      while (s <= from_[last]) {
-        s = crossing(apex_[--last], q);
-      }
-      apex_[++last] = q;
-      from_[last] = s;
-    }
-    from_[last + 1] = std::numeric_limits<double>::infinity();
-    std::size_t active = 0;
-    for (std::size_t p = 0; p < n; ++p) {
-      while (from_[active + 1] < static_cast<double>(p)) {
-        ++active;
-      }
-      const double away = static_cast<double>(p) - static_cast<double>(apex_[active]);
-      line[p * stride] = static_cast<float>(f_[apex_[active]] + spacing2_ * away * away);
+/// Takes the label from parts that are smaller than `smallest`, never from the largest; returns how many
+/// voxels of how many parts of each label.
+std::map<Index, std::array<std::size_t, 2>> unlabel_specks(VoxelBody& body, std::size_t smallest) {
+  std::vector<Index> part_of;
+  const auto parts = find_parts(body, body.labels, part_of);
+  std::size_t largest = 0;
+  for (const auto& part : parts) {
+    largest = part.value == VoxelBody::no_label ? largest : std::max(largest, part.voxels);
+  }
+  const std::size_t limit = std::min(smallest, largest);
+  std::map<Index, std::array<std::size_t, 2>> specks;
+  for (const auto& part : parts) {
+    if (part.value != VoxelBody::no_label && part.voxels < limit) {
+      specks[part.value][0] += part.voxels;
+      ++specks[part.value][1];
     }
   }
-
- private:
-  /// Where the parabola with apex b takes over from that with apex a < b.
-  [[nodiscard]] double crossing(std::size_t a, std::size_t b) const {
-    const auto x = static_cast<double>(a), y = static_cast<double>(b);
-    return (f_[b] - f_[a] + spacing2_ * (y * y - x * x)) / (2.0 * spacing2_ * (y - x));
-  }
-
-  double spacing2_;
-  std::vector<double> f_;
-  std::vector<std::size_t> apex_;
-  std::vector<double> from_;
-};
-
-/// Distance of each voxel centre to the nearest one with inside == `to`. [voxels]
-std::vector<float> distance_to(const VoxelBody& grid, std::uint8_t to) {
-  constexpr float far = 1e12F;  // finite: the parabolas of untouched lines must stay comparable
-  std::vector<float> d2(grid.inside.size());
-  std::transform(grid.inside.begin(), grid.inside.end(), d2.begin(),
-                 [&](std::uint8_t v) { return v == to ? 0.0F : far; });
-  std::size_t stride = 1;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto n = static_cast<std::size_t>(grid.size[axis]);
-    LineTransform transform(grid.size[axis], grid.spacing[static_cast<Eigen::Index>(axis)]);
-    for (std::size_t line = 0; line < d2.size() / n; ++line) {
-      transform(d2.data() + line / stride * stride * n + line % stride, stride);
+  for (std::size_t v = 0; v < body.labels.size(); ++v) {
+    if (parts[static_cast<std::size_t>(part_of[v])].voxels < limit) {
+      body.labels[v] = VoxelBody::no_label;
     }
-    stride *= n;
   }
-  std::transform(d2.begin(), d2.end(), d2.begin(), [](float v) { return std::sqrt(v); });
-  return d2;
+  return specks;
 }
 
-/// Binomial filter (1/4, 1/2, 1/4) along each axis; the rim stays.
-void smooth(const VoxelBody& grid, std::vector<float>& values) {
-  std::size_t stride = 1;
-  for (const Index length : grid.size) {
-    const auto n = static_cast<std::size_t>(length);
-    for (std::size_t line = 0; line < values.size() / n; ++line) {
-      float* v = values.data() + line / stride * stride * n + line % stride;
-      float before = v[0];
-      for (std::size_t p = 1; p + 1 < n; ++p) {
-        const float here = v[p * stride];
-        v[p * stride] = 0.25F * (before + 2.0F * here + v[(p + 1) * stride]);
-        before = here;
-      }
+/// Spreads the labels, one layer of voxels after the other, over the body's voxels that have none.
+void spread_labels(VoxelBody& body) {
+  std::queue<std::size_t> front;
+  const auto lacks_label = [&](std::size_t v) {
+    return body.inside[v] != 0 && body.labels[v] == VoxelBody::no_label;
+  };
+  for (std::size_t v = 0; v < body.labels.size(); ++v) {
+    bool borders = false;
+    if (body.labels[v] != VoxelBody::no_label) {
+      for_neighbours(body, v, [&](std::size_t next) { borders = borders || lacks_label(next); });
     }
-    stride *= n;
+    if (borders) {
+      front.push(v);
+    }
+  }
+  while (!front.empty()) {
+    const std::size_t from = front.front();
+    front.pop();
+    for_neighbours(body, from, [&](std::size_t next) {
+      if (lacks_label(next)) {
+        body.labels[next] = body.labels[from];
+        front.push(next);
+      }
+    });
   }
 }
 
 }  // namespace
+
+Vec3 VoxelGrid::center(std::size_t voxel) const noexcept {
+  const auto nx = static_cast<std::size_t>(size[0]), ny = static_cast<std::size_t>(size[1]);
+  const Vec3 step(static_cast<double>(voxel % nx), static_cast<double>(voxel / nx % ny),
+                  static_cast<double>(voxel / (nx * ny)));
+  return origin + step.cwiseProduct(spacing);
+}
 
 VoxelBody crop(const VoxelBody& body, Index margin) {
   std::array<Index, 3> low = body.size, high = {-1, -1, -1};
@@ -185,12 +154,17 @@ VoxelBody crop(const VoxelBody& body, Index margin) {
     result.size[axis] = high[axis] - low[axis] + 1 + 2 * margin;
     result.origin[a] = body.origin[a] + body.spacing[a] * static_cast<double>(low[axis] - margin);
   }
-  result.inside.assign(voxel_count(result.size), 0);
+  result.inside.assign(result.voxels(), 0);
+  result.labels.assign(body.labels.empty() ? 0 : result.voxels(), VoxelBody::no_label);
   for (Index k = low[2]; k <= high[2]; ++k) {
     for (Index j = low[1]; j <= high[1]; ++j) {
       for (Index i = low[0]; i <= high[0]; ++i) {
-        result.inside[result.at(i - low[0] + margin, j - low[1] + margin, k - low[2] + margin)] =
-            body.inside[body.at(i, j, k)];
+        const std::size_t from = body.at(i, j, k),
+                          to = result.at(i - low[0] + margin, j - low[1] + margin, k - low[2] + margin);
+        result.inside[to] = body.inside[from];
+        if (!body.labels.empty()) {
+          result.labels[to] = body.labels[from];
+        }
       }
     }
   }
@@ -199,9 +173,9 @@ VoxelBody crop(const VoxelBody& body, Index margin) {
 
 void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::string>& notes) {
   std::vector<Index> part_of;
-  const std::vector<Part> parts = find_parts(body, part_of);
-  const auto largest = std::max_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
-    return (a.inside != 0 ? a.voxels : 0) < (b.inside != 0 ? b.voxels : 0);
+  const auto parts = find_parts(body, body.inside, part_of);
+  const auto largest = std::max_element(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
+    return (a.value != 0 ? a.voxels : 0) < (b.value != 0 ? b.voxels : 0);
   });
   const double limit = small_part * static_cast<double>(largest->voxels);
   const Index outside = part_of[0];
@@ -209,9 +183,9 @@ void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::s
   std::vector<std::uint8_t> turned(parts.size(), 0);
   std::array<std::size_t, 2> turned_parts{}, turned_voxels{};
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    const Part& part = parts[p];
+    const Part<std::uint8_t>& part = parts[p];
     const bool is_small = static_cast<double>(part.voxels) < limit;
-    if (part.inside != 0 && &part != &*largest && !is_small) {
+    if (part.value != 0 && &part != &*largest && !is_small) {
       throw Error("the image holds disconnected parts: one of " + std::to_string(largest->voxels) +
                       " voxels at " + shown(body, largest->first) + " and one of " +
                       std::to_string(part.voxels) + " at " + shown(body, part.first) + " (image units)",
@@ -219,8 +193,8 @@ void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::s
     }
     if (is_small && static_cast<Index>(p) != outside) {
       turned[p] = 1;
-      ++turned_parts[part.inside];
-      turned_voxels[part.inside] += part.voxels;
+      ++turned_parts[part.value];
+      turned_voxels[part.value] += part.voxels;
     }
   }
   for (std::size_t v = 0; v < body.inside.size(); ++v) {
@@ -259,35 +233,18 @@ std::size_t join_across_edges(VoxelBody& body) {
   return filled;
 }
 
-std::vector<float> signed_distances(const VoxelBody& body) {
-  std::vector<float> distance = distance_to(body, 0);
-  const std::vector<float> outside = distance_to(body, 1);
-  std::transform(distance.begin(), distance.end(), outside.begin(), distance.begin(), std::minus<>());
-  return distance;
-}
-
-DistanceField::DistanceField(const VoxelBody& body) : grid_(body), distance_(signed_distances(body)) {
-  grid_.inside.clear();
-  smooth(grid_, distance_);  // the staircases of voxels are not the body's shape
-}
-
-double DistanceField::operator()(const Vec3& x) const noexcept {
-  std::array<Index, 3> cell{};
-  Vec3 t;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<Eigen::Index>(axis);
-    const double last = static_cast<double>(grid_.size[axis] - 1);
-    const double position = std::clamp((x[a] - grid_.origin[a]) / grid_.spacing[a], 0.0, last);
-    cell[axis] = std::min(static_cast<Index>(position), grid_.size[axis] - 2);
-    t[a] = position - static_cast<double>(cell[axis]);
+void complete_labels(VoxelBody& body, std::size_t smallest, std::vector<std::string>& notes) {
+  for (std::size_t v = 0; v < body.labels.size(); ++v) {
+    if (body.inside[v] == 0) {
+      body.labels[v] = VoxelBody::no_label;
+    }
   }
-  const auto row = [&](Index j, Index k) {
-    const std::size_t at = grid_.at(cell[0], cell[1] + j, cell[2] + k);
-    return (1.0 - t[0]) * static_cast<double>(distance_[at]) + t[0] * static_cast<double>(distance_[at + 1]);
-  };
-  const double front = (1.0 - t[1]) * row(0, 0) + t[1] * row(1, 0);
-  const double back = (1.0 - t[1]) * row(0, 1) + t[1] * row(1, 1);
-  return (1.0 - t[2]) * front + t[2] * back;
+  for (const auto& [label, count] : unlabel_specks(body, smallest)) {
+    notes.push_back(fmt::format(
+        "{} voxel(s) of label {} in {} part(s) smaller than an element went to the labels around them",
+        count[0], label, count[1]));
+  }
+  spread_labels(body);
 }
 
 }  // namespace palpate

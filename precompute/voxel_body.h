@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -10,19 +11,28 @@
 
 namespace palpate {
 
-/// Which voxels of a regular grid are body; voxel (i, j, k) has its centre at origin + (i, j, k) * spacing, x
-/// fastest.
-struct VoxelBody {
+/// Regular grid; voxel (i, j, k) has its centre at origin + (i, j, k) * spacing, x fastest. Lengths are in
+/// the image's unit.
+struct VoxelGrid {
   std::array<Index, 3> size{};
-  Vec3 spacing = Vec3::Ones();  ///< length units of the image
+  Vec3 spacing = Vec3::Ones();
   Vec3 origin = Vec3::Zero();
-  std::vector<std::uint8_t> inside;  ///< 1 where body
 
   [[nodiscard]] std::size_t at(Index i, Index j, Index k) const noexcept {
     const auto x = static_cast<std::size_t>(i), y = static_cast<std::size_t>(j),
                z = static_cast<std::size_t>(k);
     return x + static_cast<std::size_t>(size[0]) * (y + static_cast<std::size_t>(size[1]) * z);
   }
+  [[nodiscard]] std::size_t voxels() const noexcept { return at(0, 0, size[2]); }
+  [[nodiscard]] Vec3 center(std::size_t voxel) const noexcept;
+};
+
+/// Which voxels are body, and of which label.
+struct VoxelBody : VoxelGrid {
+  static constexpr Index no_label = std::numeric_limits<Index>::min();
+
+  std::vector<std::uint8_t> inside;  ///< [voxels] 1 where body
+  std::vector<Index> labels;  ///< [voxels] of the body, no_label elsewhere; empty: labels do not matter
 };
 
 /// The same voxels on the smallest grid that holds them and `margin` empty voxels on every side. Needs one
@@ -38,23 +48,9 @@ void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::s
 /// Returns how many. Needs an empty rim.
 std::size_t join_across_edges(VoxelBody& body);
 
-/// Exact Euclidean distances between voxel centres, with sign: for voxels of body that to the nearest empty
-/// one, for empty ones minus that to the nearest voxel of body (Felzenszwalb and Huttenlocher, Distance
-/// transforms of sampled functions, 2012).
-std::vector<float> signed_distances(const VoxelBody& body);
-
-/// Distance below the body's boundary, negative outside: signed_distances smoothed over neighbouring voxels,
-/// linear between voxel centres.
-class DistanceField {
- public:
-  explicit DistanceField(const VoxelBody& body);
-
-  /// At a point in the image's length unit; beyond the grid, the value at its rim.
-  [[nodiscard]] double operator()(const Vec3& x) const noexcept;
-
- private:
-  VoxelBody grid_;
-  std::vector<float> distance_;
-};
+/// Gives every voxel of the body a label, after its voxels have changed: parts of a label of fewer than
+/// `smallest` voxels, told in `notes`, and filled voxels take the label of what is around them. Needs a
+/// labelled body in one part.
+void complete_labels(VoxelBody& body, std::size_t smallest, std::vector<std::string>& notes);
 
 }  // namespace palpate

@@ -24,38 +24,45 @@ void check_sizes(const Model& model) {
                     " stored nodes of a mesh of " + std::to_string(nodes),
                 model.name, "precompute the model again");
   }
+  if (model.rest_displacement.size() != nodes) {
+    throw Error("the rest displacement of " + std::to_string(model.rest_displacement.size()) +
+                    " nodes does not belong to a mesh of " + std::to_string(nodes),
+                model.name, "precompute the model again");
+  }
 }
 
 Greens take_greens(Model& model, const GreensOptions& options) {
   check_sizes(model);
-  return Greens(std::exchange(model.greens, {}), options);
+  return Greens(std::exchange(model.greens, {}), model.dimension(), options);
 }
 
 }  // namespace
 
 Body::Body(Model model, const GreensOptions& options)
     : model_(std::move(model)), greens_(take_greens(model_, options)) {
-  const std::vector<Vec3>& nodes = model_.mesh.nodes;
-  stored_of_mesh_.assign(nodes.size(), -1);
+  std::vector<Vec3> rest = model_.mesh.nodes;
+  for (std::size_t node = 0; node < rest.size(); ++node) rest[node] += model_.rest_displacement[node];
+  stored_of_mesh_.assign(rest.size(), -1);
   for (std::size_t k = 0; k < model_.stored_nodes.size(); ++k) {
     stored_of_mesh_[static_cast<std::size_t>(model_.stored_nodes[k])] = static_cast<Index>(k);
   }
 
-  std::vector<bool> on_surface(nodes.size(), false);
-  for (const Triangle& triangle : model_.surface_triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto a = static_cast<std::size_t>(triangle[k]);
-      const auto b = static_cast<std::size_t>(triangle[(k + 1) % 3]);
+  std::vector<bool> on_surface(rest.size(), false);
+  const auto corners = static_cast<std::size_t>(dimension());
+  for (std::size_t simplex = 0; simplex < model_.surface.size(); simplex += corners) {
+    for (std::size_t k = 0; k < corners; ++k) {
+      const auto a = static_cast<std::size_t>(model_.surface[simplex + k]);
+      const auto b = static_cast<std::size_t>(model_.surface[simplex + (k + 1) % corners]);
       on_surface[a] = true;
-      longest_surface_edge_ = std::max(longest_surface_edge_, (nodes[a] - nodes[b]).norm());
+      longest_surface_edge_ = std::max(longest_surface_edge_, (rest[a] - rest[b]).norm());
     }
   }
-  for (std::size_t node = 0; node < nodes.size(); ++node) {
+  for (std::size_t node = 0; node < rest.size(); ++node) {
     if (!on_surface[node] || stored_of_mesh_[node] < 0) continue;
     surface_.push_back(stored_of_mesh_[node]);
-    x_.push_back(nodes[node].x());
-    y_.push_back(nodes[node].y());
-    z_.push_back(nodes[node].z());
+    x_.push_back(rest[node].x());
+    y_.push_back(rest[node].y());
+    z_.push_back(rest[node].z());
   }
   if (surface_.empty()) {
     throw Error("no node of the surface is free to move, so nothing can be touched", model_.name,
@@ -66,10 +73,11 @@ Body::Body(Model model, const GreensOptions& options)
 }
 
 NearestNode Body::nearest_surface_node(const Vec3& point) const noexcept {
+  const double z = dimension() == 3 ? point.z() : 0.0;
   const auto squared_distance = [&](std::size_t i) {
     const double dx = x_[i] - point.x();
     const double dy = y_[i] - point.y();
-    const double dz = z_[i] - point.z();
+    const double dz = z_[i] - z;
     return dx * dx + dy * dy + dz * dz;
   };
 

@@ -14,8 +14,9 @@ struct NearestNode {
   double distance;  ///< [m]
 };
 
-/// The constant side of a tick: the Model, its Green's functions as the tick wants them, and look-ups. Shared
-/// by threads.
+/// The constant side of a tick: the Model, its Green's functions as the tick wants them, and look-ups. The
+/// body rests in the displacement u0 that its loads give it; what a tool does comes on top. Shared by
+/// threads.
 class Body {
  public:
   /// Takes the model over and unfolds its Green's functions. Throws Error when no free surface node is
@@ -26,7 +27,10 @@ class Body {
   [[nodiscard]] const Model& model() const noexcept { return model_; }
   [[nodiscard]] const Greens& greens() const noexcept { return greens_; }
 
-  /// Stored node of a mesh node, -1 when it is fixed or not kept.
+  /// d, dofs a node: 2 in the plane, 3 in space.
+  [[nodiscard]] int dimension() const noexcept { return greens_.dimension(); }
+
+  /// Stored node of a mesh node, -1 when it is held along an axis or not kept.
   [[nodiscard]] Index stored_node(Index mesh_node) const noexcept {
     return stored_of_mesh_[static_cast<std::size_t>(mesh_node)];
   }
@@ -34,18 +38,21 @@ class Body {
   [[nodiscard]] Index mesh_node(Index stored) const noexcept {
     return model_.stored_nodes[static_cast<std::size_t>(stored)];
   }
-  /// Undeformed position of a stored node [m].
-  [[nodiscard]] const Vec3& position(Index stored) const noexcept {
-    return model_.mesh.nodes[static_cast<std::size_t>(mesh_node(stored))];
+  /// Position of a stored node as the body rests under its loads, without a tool: node + u0 [m].
+  [[nodiscard]] Vec3 rest_position(Index stored) const noexcept {
+    const auto node = static_cast<std::size_t>(mesh_node(stored));
+    return model_.mesh.nodes[node] + model_.rest_displacement[node];
   }
 
   /// Stored nodes on the surface, in the order of their mesh nodes.
   [[nodiscard]] const std::vector<Index>& free_surface_nodes() const noexcept { return surface_; }
 
-  /// The free surface node whose undeformed position is nearest to `point` [m], which must be finite.
+  /// The free surface node whose rest position is nearest to `point` [m], which must be finite. In the plane
+  /// the point's z is ignored.
   [[nodiscard]] NearestNode nearest_surface_node(const Vec3& point) const noexcept;
 
-  /// Longest edge of the surface [m]: no point of the surface is farther than that from a surface node.
+  /// Longest edge of the surface at rest [m]: no point of the surface is farther than that from a surface
+  /// node.
   [[nodiscard]] double longest_surface_edge() const noexcept { return longest_surface_edge_; }
 
  private:
@@ -53,7 +60,7 @@ class Body {
   Greens greens_;
   std::vector<Index> stored_of_mesh_;  // [N]
   std::vector<Index> surface_;         // [S]
-  std::vector<double> x_, y_, z_;      // [S, padded to whole blocks with infinity] positions for the search
+  std::vector<double> x_, y_, z_;      // [S, padded to whole blocks with infinity] rest positions
   double longest_surface_edge_ = 0.0;
 };
 

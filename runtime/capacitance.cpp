@@ -13,7 +13,15 @@ namespace {
 /// Smallest pivot, relative to the diagonal of C, that is taken for more than rounding.
 constexpr double pivot_tolerance = 1e-10;
 
-/// y -= L2 x for the part of L below a 3x3 diagonal block: three columns of L, one right-hand side.
+/// y -= L x for the part of L below a diagonal block: two or three columns of L, one right-hand side.
+void subtract_columns(const double* __restrict L0, const double* __restrict L1, const double* x,
+                      double* __restrict y, std::int64_t count) noexcept {
+  const double x0 = x[0];
+  const double x1 = x[1];
+#pragma omp simd
+  for (std::int64_t i = 0; i < count; ++i) y[i] -= L0[i] * x0 + L1[i] * x1;
+}
+
 void subtract_columns(const double* __restrict L0, const double* __restrict L1, const double* __restrict L2,
                       const double* x, double* __restrict y, std::int64_t count) noexcept {
   const double x0 = x[0];
@@ -45,13 +53,14 @@ void rotate_in(double* __restrict L, double* __restrict w, std::int64_t count) n
 
 }  // namespace
 
-CapacitanceMatrix::CapacitanceMatrix(Index max_nodes) : capacity_(3 * std::int64_t{max_nodes}) {
+CapacitanceMatrix::CapacitanceMatrix(int dimension, Index max_nodes)
+    : dimension_(dimension), max_nodes_(max_nodes), capacity_(std::int64_t{dimension} * max_nodes) {
   if (max_nodes < 1) {
     throw Error("room for " + std::to_string(max_nodes) + " held nodes was asked for", "CapacitanceMatrix",
                 "ask for room for at least one");
   }
   L_.resize(static_cast<std::size_t>(packed_size(capacity_)));
-  rows_.resize(static_cast<std::size_t>(3 * capacity_));
+  rows_.resize(static_cast<std::size_t>(dimension_ * capacity_));
 }
 
 double* CapacitanceMatrix::column(std::int64_t j) noexcept {
@@ -61,28 +70,39 @@ const double* CapacitanceMatrix::column(std::int64_t j) const noexcept {
   return L_.data() + packed_column(j, capacity_);
 }
 
-CapacitanceStatus CapacitanceMatrix::add(std::span<const double> blocks) noexcept {
-  const std::int64_t m = 3 * std::int64_t{nodes_};
-  if (m == capacity_) return CapacitanceStatus::full;
+/// One node of the forward substitution L y = b: solves for the D entries of y from j on and takes them out
+/// of the later ones, of `rows` in all.
+template <int D>
+void CapacitanceMatrix::eliminate(std::int64_t j, double* y, std::int64_t rows) const noexcept {
+  const double* L0 = column(j);
+  const double* L1 = column(j + 1);
+  y += j;
+  const std::int64_t below = rows - j - D;
+  y[0] /= L0[0];
+  y[1] = (y[1] - L0[1] * y[0]) / L1[0];
+  if constexpr (D == 2) {
+    subtract_columns(L0 + 2, L1 + 1, y, y + 2, below);
+  } else {
+    const double* L2 = column(j + 2);
+    y[2] = (y[2] - L0[2] * y[0] - L1[1] * y[1]) / L2[0];
+    subtract_columns(L0 + 3, L1 + 2, L2 + 1, y, y + 3, below);
+  }
+}
+
+template <int D>
+CapacitanceStatus CapacitanceMatrix::add_node(std::span<const double> blocks) noexcept {
+  const std::int64_t m = D * std::int64_t{nodes_};
 
   // New rows of L: [Y S] with L Y^T = C_old,new and S S^T = C_new,new - Y Y^T.
-  double* Y[3];
-  for (std::int64_t p = 0; p < 3; ++p) {
+  double* Y[D];
+  for (std::int64_t p = 0; p < D; ++p) {
     Y[p] = rows_.data() + p * capacity_;
-    std::copy_n(blocks.data() + p * (m + 3), m + 3, Y[p]);
+    std::copy_n(blocks.data() + p * (m + D), m + D, Y[p]);
   }
-  for (std::int64_t j = 0; j < m; j += 3) {
-    const double* L0 = column(j);
-    const double* L1 = column(j + 1);
-    const double* L2 = column(j + 2);
-    for (double* y : Y) {
-      y[j] /= L0[0];
-      y[j + 1] = (y[j + 1] - L0[1] * y[j]) / L1[0];
-      y[j + 2] = (y[j + 2] - L0[2] * y[j] - L1[1] * y[j + 1]) / L2[0];
-      subtract_columns(L0 + 3, L1 + 2, L2 + 1, y + j, y + j + 3, m - j - 3);
-    }
+  for (std::int64_t j = 0; j < m; j += D) {
+    for (double* y : Y) eliminate<D>(j, y, m);
   }
-  for (std::int64_t p = 0; p < 3; ++p) {
+  for (std::int64_t p = 0; p < D; ++p) {
     for (std::int64_t q = 0; q <= p; ++q) {
       const double rest = Y[p][m + q] - dot(Y[p], Y[q], m + q);
       if (q < p) {
@@ -95,32 +115,33 @@ CapacitanceStatus CapacitanceMatrix::add(std::span<const double> blocks) noexcep
     }
   }
 
-  for (std::int64_t j = 0; j < m + 3; ++j) {
+  for (std::int64_t j = 0; j < m + D; ++j) {
     double* below = column(j) - j;
-    for (std::int64_t p = std::max<std::int64_t>(0, j - m); p < 3; ++p) below[m + p] = Y[p][j];
+    for (std::int64_t p = std::max<std::int64_t>(0, j - m); p < D; ++p) below[m + p] = Y[p][j];
   }
   ++nodes_;
   return CapacitanceStatus::ok;
 }
 
-void CapacitanceMatrix::remove(Index k) noexcept {
-  const std::int64_t m = 3 * std::int64_t{nodes_};
-  const std::int64_t gone = 3 * std::int64_t{k};
-  const std::int64_t rest = m - gone - 3;
+template <int D>
+void CapacitanceMatrix::remove_node(Index k) noexcept {
+  const std::int64_t m = D * std::int64_t{nodes_};
+  const std::int64_t gone = D * std::int64_t{k};
+  const std::int64_t rest = m - gone - D;
 
   // What the dropped columns carried of the later rows, W, must go into these rows' own factor: L' L'^T = L
   // L^T + W W^T.
-  double* W[3];
-  for (std::int64_t p = 0; p < 3; ++p) {
+  double* W[D];
+  for (std::int64_t p = 0; p < D; ++p) {
     W[p] = rows_.data() + p * capacity_;
-    std::copy_n(column(gone + p) + 3 - p, rest, W[p]);
+    std::copy_n(column(gone + p) + D - p, rest, W[p]);
   }
   for (std::int64_t j = 0; j < gone; ++j) {
     double* below = column(j) + gone - j;
-    std::copy(below + 3, below + 3 + rest, below);
+    std::copy(below + D, below + D + rest, below);
   }
   for (std::int64_t j = 0; j < rest; ++j) {
-    const double* from = column(gone + 3 + j);
+    const double* from = column(gone + D + j);
     double* to = column(gone + j);
     std::copy(from, from + rest - j, to);
     for (double* w : W) rotate_in(to, w + j, rest - j);
@@ -128,17 +149,19 @@ void CapacitanceMatrix::remove(Index k) noexcept {
   --nodes_;
 }
 
+CapacitanceStatus CapacitanceMatrix::add(std::span<const double> blocks) noexcept {
+  if (nodes_ == max_nodes_) return CapacitanceStatus::full;
+  return dimension_ == 2 ? add_node<2>(blocks) : add_node<3>(blocks);
+}
+
+void CapacitanceMatrix::remove(Index k) noexcept {
+  dimension_ == 2 ? remove_node<2>(k) : remove_node<3>(k);
+}
+
 void CapacitanceMatrix::solve(std::span<double> x) const noexcept {
-  const std::int64_t m = 3 * std::int64_t{nodes_};
-  for (std::int64_t j = 0; j < m; j += 3) {
-    const double* L0 = column(j);
-    const double* L1 = column(j + 1);
-    const double* L2 = column(j + 2);
-    double* y = x.data() + j;
-    y[0] /= L0[0];
-    y[1] = (y[1] - L0[1] * y[0]) / L1[0];
-    y[2] = (y[2] - L0[2] * y[0] - L1[1] * y[1]) / L2[0];
-    subtract_columns(L0 + 3, L1 + 2, L2 + 1, y, y + 3, m - j - 3);
+  const std::int64_t m = std::int64_t{dimension_} * nodes_;
+  for (std::int64_t j = 0; j < m; j += dimension_) {
+    dimension_ == 2 ? eliminate<2>(j, x.data(), m) : eliminate<3>(j, x.data(), m);
   }
   for (std::int64_t j = m; j-- > 0;) {
     const double* L = column(j);

@@ -18,18 +18,19 @@ enum class CapacitanceStatus : std::uint8_t {
 };
 
 /// C = E^T Xi E [m/N] of m held nodes (theory.md section 3; James & Pai 2001), kept as its Cholesky factor L,
-/// C = L L^T, which grows and shrinks with the nodes in O(m^2) and is never computed afresh. All memory is
-/// taken at construction; copies keep the capacity.
+/// C = L L^T, which grows and shrinks with the nodes in O(m^2) and is never computed afresh. A node has
+/// d = dimension() dofs. All memory is taken at construction; copies keep the capacity.
 class CapacitanceMatrix {
  public:
-  /// Room for `max_nodes` nodes, at least one.
-  explicit CapacitanceMatrix(Index max_nodes = 256);
+  /// `dimension`: dofs a node, 2 or 3. Room for `max_nodes` nodes; throws Error unless at least one.
+  CapacitanceMatrix(int dimension, Index max_nodes);
 
-  [[nodiscard]] Index nodes() const noexcept { return nodes_; }  ///< m
-  [[nodiscard]] Index max_nodes() const noexcept { return static_cast<Index>(capacity_ / 3); }
+  [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d
+  [[nodiscard]] Index nodes() const noexcept { return nodes_; }        ///< m
+  [[nodiscard]] Index max_nodes() const noexcept { return max_nodes_; }
 
-  /// Appends a node: `blocks` is its block row of C, the m blocks at the held nodes and then its own, 3 x
-  /// 3(m+1) row-major (as Greens::gather leaves it). Unchanged unless ok.
+  /// Appends a node: `blocks` is its block row of C, the m blocks at the held nodes and then its own, d x
+  /// d(m+1) row-major (as Greens::gather leaves it). Unchanged unless ok.
   [[nodiscard]] CapacitanceStatus add(std::span<const double> blocks) noexcept;
 
   /// Drops the node at position k, 0 <= k < m; the later ones move up by one.
@@ -38,7 +39,7 @@ class CapacitanceMatrix {
   /// Drops all nodes.
   void clear() noexcept { nodes_ = 0; }
 
-  /// Solves C f = u in place: `x` [3m] is u [m] before and f [N] after.
+  /// Solves C f = u in place: `x` [dm] is u [m] before and f [N] after.
   void solve(std::span<double> x) const noexcept;
 
   /// Entry (i, j), i >= j, of L.
@@ -48,10 +49,20 @@ class CapacitanceMatrix {
   [[nodiscard]] double* column(std::int64_t j) noexcept;
   [[nodiscard]] const double* column(std::int64_t j) const noexcept;
 
-  std::int64_t capacity_;  // dofs
+  // The algorithms for D = d dofs a node, a constant for the compiler.
+  template <int D>
+  CapacitanceStatus add_node(std::span<const double> blocks) noexcept;
+  template <int D>
+  void remove_node(Index k) noexcept;
+  template <int D>
+  void eliminate(std::int64_t j, double* y, std::int64_t rows) const noexcept;
+
+  int dimension_;
+  Index max_nodes_;
   Index nodes_ = 0;
+  std::int64_t capacity_;     // dofs
   std::vector<double> L_;     // lower packed for the order `capacity_`: column j starts at its diagonal
-  std::vector<double> rows_;  // [3 x capacity_] the rows that come (add) or the columns that go (remove)
+  std::vector<double> rows_;  // [d x capacity_] the rows that come (add) or the columns that go (remove)
 };
 
 }  // namespace palpate

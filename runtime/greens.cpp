@@ -76,24 +76,52 @@ void unfold(std::span<const T> packed, std::int64_t order, T* square, std::int64
   work();
 }
 
-template <class T>
+template <int D, class T>
 void gather_from_square(const T* square, std::int64_t stride, Index row, std::span<const Index> columns,
                         double* blocks) noexcept {
-  const auto width = 3 * columns.size();
-  for (std::int64_t axis = 0; axis < 3; ++axis) {
-    const T* xi = square + (3 * std::int64_t{row} + axis) * stride;
+  const auto width = D * columns.size();
+  for (std::int64_t axis = 0; axis < D; ++axis) {
+    const T* xi = square + (D * std::int64_t{row} + axis) * stride;
     double* out = blocks + static_cast<std::size_t>(axis) * width;
     for (const Index column : columns) {
-      for (std::int64_t k = 0; k < 3; ++k) *out++ = static_cast<double>(xi[3 * std::int64_t{column} + k]);
+      for (std::int64_t k = 0; k < D; ++k) *out++ = static_cast<double>(xi[D * std::int64_t{column} + k]);
     }
   }
 }
 
-/// u += f0 row0 + f1 row1 + f2 row2 over `count` entries; meanwhile the same part of the next node's rows is
-/// called into the cache.
+void gather_from_packed(const PackedGreens& packed, int dimension, Index row, std::span<const Index> columns,
+                        double* blocks) noexcept {
+  const std::int64_t d = dimension;
+  for (std::int64_t axis = 0; axis < d; ++axis) {
+    for (const Index column : columns) {
+      for (std::int64_t k = 0; k < d; ++k) *blocks++ = packed(d * row + axis, d * column + k);
+    }
+  }
+}
+
+/// u += f0 row0 + f1 row1 over `count` entries; meanwhile the same part of the next node's rows is called
+/// into the cache.
 template <class T>
-void add_three_rows(const T* __restrict row0, const T* __restrict row1, const T* __restrict row2, double f0,
-                    double f1, double f2, double* __restrict u, std::int64_t count) noexcept {
+void add_rows(const T* __restrict row0, const T* __restrict row1, double f0, double f1, double* __restrict u,
+              std::int64_t count) noexcept {
+  constexpr std::int64_t step = cache_line / static_cast<std::int64_t>(sizeof(T));
+  constexpr std::int64_t ahead = ahead_bytes / static_cast<std::int64_t>(sizeof(T));
+  std::int64_t i = 0;
+  for (; i + step <= count; i += step) {
+    __builtin_prefetch(row0 + i + ahead);
+    __builtin_prefetch(row1 + i + ahead);
+#pragma omp simd
+    for (std::int64_t k = i; k < i + step; ++k) {
+      u[k] += f0 * static_cast<double>(row0[k]) + f1 * static_cast<double>(row1[k]);
+    }
+  }
+  for (; i < count; ++i) u[i] += f0 * static_cast<double>(row0[i]) + f1 * static_cast<double>(row1[i]);
+}
+
+/// The same with the three rows of a node in space.
+template <class T>
+void add_rows(const T* __restrict row0, const T* __restrict row1, const T* __restrict row2, double f0,
+              double f1, double f2, double* __restrict u, std::int64_t count) noexcept {
   constexpr std::int64_t step = cache_line / static_cast<std::int64_t>(sizeof(T));
   constexpr std::int64_t ahead = ahead_bytes / static_cast<std::int64_t>(sizeof(T));
   std::int64_t i = 0;
@@ -113,7 +141,7 @@ void add_three_rows(const T* __restrict row0, const T* __restrict row1, const T*
   }
 }
 
-template <class T>
+template <int D, class T>
 void displacement_from_square(const T* square, std::int64_t stride, std::span<const Index> nodes,
                               const double* f, std::span<double> u) noexcept {
   const auto order = static_cast<std::int64_t>(u.size());
@@ -122,20 +150,25 @@ void displacement_from_square(const T* square, std::int64_t stride, std::span<co
     double* chunk = u.data() + begin;
     std::fill_n(chunk, count, 0.0);
     for (std::size_t k = 0; k < nodes.size(); ++k) {
-      const T* rows = square + 3 * std::int64_t{nodes[k]} * stride + begin;
-      add_three_rows(rows, rows + stride, rows + 2 * stride, f[3 * k], f[3 * k + 1], f[3 * k + 2], chunk,
-                     count);
+      const T* rows = square + D * std::int64_t{nodes[k]} * stride + begin;
+      const double* force = f + D * k;
+      if constexpr (D == 2) {
+        add_rows(rows, rows + stride, force[0], force[1], chunk, count);
+      } else {
+        add_rows(rows, rows + stride, rows + 2 * stride, force[0], force[1], force[2], chunk, count);
+      }
     }
   }
 }
 
 template <class T>
-void displacement_from_packed(std::span<const T> packed, std::span<const Index> nodes, const double* f,
-                              std::span<double> u) noexcept {
+void displacement_from_packed(std::span<const T> packed, int dimension, std::span<const Index> nodes,
+                              const double* f, std::span<double> u) noexcept {
   const auto order = static_cast<std::int64_t>(u.size());
+  const auto d = static_cast<std::size_t>(dimension);
   std::fill(u.begin(), u.end(), 0.0);
-  for (std::size_t k = 0; k < 3 * nodes.size(); ++k) {
-    const std::int64_t dof = 3 * std::int64_t{nodes[k / 3]} + static_cast<std::int64_t>(k % 3);
+  for (std::size_t k = 0; k < d * nodes.size(); ++k) {
+    const std::int64_t dof = std::int64_t{dimension} * nodes[k / d] + static_cast<std::int64_t>(k % d);
     const T* entry = packed.data() + dof;
     for (std::int64_t j = 0; j < dof; ++j) {
       u[static_cast<std::size_t>(j)] += f[k] * static_cast<double>(*entry);
@@ -147,13 +180,27 @@ void displacement_from_packed(std::span<const T> packed, std::span<const Index> 
   }
 }
 
+/// Calls f with the scalars for what they are.
+template <class F>
+void with_scalars(const void* scalars, Precision precision, const F& f) noexcept {
+  if (precision == Precision::single_precision) {
+    f(static_cast<const float*>(scalars));
+  } else {
+    f(static_cast<const double*>(scalars));
+  }
+}
+
 }  // namespace
 
-Greens::Greens(PackedGreens packed, const GreensOptions& options)
-    : packed_(std::move(packed)), order_(packed_.order()), precision_(packed_.precision()) {
-  if (order_ <= 0 || order_ % 3 != 0) {
-    throw Error("the Green's functions have " + std::to_string(order_) +
-                    " dofs, which is not three for each of some nodes",
+Greens::Greens(PackedGreens packed, int dimension, const GreensOptions& options)
+    : packed_(std::move(packed)),
+      order_(packed_.order()),
+      dimension_(dimension),
+      nodes_(static_cast<Index>(order_ / dimension)),
+      precision_(packed_.precision()) {
+  if (order_ <= 0 || order_ % dimension != 0) {
+    throw Error("the Green's functions have " + std::to_string(order_) + " dofs, which is not " +
+                    std::to_string(dimension) + " for each of some nodes",
                 "Green's functions", "precompute the model again");
   }
   const std::int64_t scalar_bytes = bytes_per_scalar(precision_);
@@ -174,40 +221,41 @@ Greens::Greens(PackedGreens packed, const GreensOptions& options)
   packed_ = {};
 }
 
-Mat3 Greens::block(Index row, Index column) const noexcept {
-  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> xi;
-  gather(row, {&column, 1}, {xi.data(), 9});
+Eigen::MatrixXd Greens::block(Index row, Index column) const {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> xi(dimension_, dimension_);
+  gather(row, {&column, 1}, {xi.data(), static_cast<std::size_t>(xi.size())});
   return xi;
 }
 
 void Greens::gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
   if (!unfolded()) {
-    double* out = blocks.data();
-    for (std::int64_t axis = 0; axis < 3; ++axis) {
-      for (const Index column : columns) {
-        for (std::int64_t k = 0; k < 3; ++k)
-          *out++ = packed_(3 * std::int64_t{row} + axis, 3 * std::int64_t{column} + k);
-      }
-    }
-  } else if (precision_ == Precision::single_precision) {
-    gather_from_square(static_cast<const float*>(square_.get()), stride_, row, columns, blocks.data());
-  } else {
-    gather_from_square(static_cast<const double*>(square_.get()), stride_, row, columns, blocks.data());
+    gather_from_packed(packed_, dimension_, row, columns, blocks.data());
+    return;
   }
+  with_scalars(square_.get(), precision_, [&](const auto* square) {
+    if (dimension_ == 2) {
+      gather_from_square<2>(square, stride_, row, columns, blocks.data());
+    } else {
+      gather_from_square<3>(square, stride_, row, columns, blocks.data());
+    }
+  });
 }
 
 void Greens::displacement(std::span<const Index> nodes, std::span<const double> f,
                           std::span<double> u) const noexcept {
-  const bool single = precision_ == Precision::single_precision;
-  if (unfolded() && single) {
-    displacement_from_square(static_cast<const float*>(square_.get()), stride_, nodes, f.data(), u);
-  } else if (unfolded()) {
-    displacement_from_square(static_cast<const double*>(square_.get()), stride_, nodes, f.data(), u);
-  } else if (single) {
-    displacement_from_packed(packed_.as<float>(), nodes, f.data(), u);
-  } else {
-    displacement_from_packed(packed_.as<double>(), nodes, f.data(), u);
+  if (!unfolded()) {
+    with_scalars(packed_.data(), precision_, [&]<class T>(const T*) {
+      displacement_from_packed(packed_.as<T>(), dimension_, nodes, f.data(), u);
+    });
+    return;
   }
+  with_scalars(square_.get(), precision_, [&](const auto* square) {
+    if (dimension_ == 2) {
+      displacement_from_square<2>(square, stride_, nodes, f.data(), u);
+    } else {
+      displacement_from_square<3>(square, stride_, nodes, f.data(), u);
+    }
+  });
 }
 
 }  // namespace palpate

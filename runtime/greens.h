@@ -1,6 +1,7 @@
 // The Green's functions as the tick reads them.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -18,29 +19,32 @@ struct GreensOptions {
 };
 
 /// The Green's function matrix Xi = K^-1 [m/N] of the stored dofs, unfolded from packed storage into a full
-/// square when memory allows: what a tick needs of a node is then three rows, contiguous in memory (Xi is
+/// square when memory allows: what a tick needs of a node is then d rows, contiguous in memory (Xi is
 /// symmetric), where a packed column jumps through the whole array. Nodes are stored nodes
-/// (Model::stored_nodes); dof 3 k + axis. All arithmetic is in double. Const once built: any number of
-/// threads may use it.
+/// (Model::stored_nodes); dof d k + axis, d = dimension(). All arithmetic is in double. Const once built: any
+/// number of threads may use it.
 class Greens {
  public:
-  explicit Greens(PackedGreens packed, const GreensOptions& options = {});
+  /// `dimension`: dofs a node, 2 or 3. Throws Error when the order is not that many for each of some nodes.
+  Greens(PackedGreens packed, int dimension, const GreensOptions& options = {});
 
   [[nodiscard]] std::int64_t order() const noexcept { return order_; }  ///< n, number of stored dofs
-  [[nodiscard]] Index nodes() const noexcept { return static_cast<Index>(order_ / 3); }
+  [[nodiscard]] int dimension() const noexcept { return dimension_; }   ///< d, dofs a node
+  [[nodiscard]] Index nodes() const noexcept { return nodes_; }
   [[nodiscard]] Precision precision() const noexcept { return precision_; }
   [[nodiscard]] bool unfolded() const noexcept {
     return square_ != nullptr;
   }  ///< false: used packed, much slower
 
-  /// Xi at (row, column) [m/N]: displacement of node `row` by unit forces on node `column`.
-  [[nodiscard]] Mat3 block(Index row, Index column) const noexcept;
+  /// Xi at (row, column) [d, d] [m/N]: displacement of node `row` by unit forces on node `column`. Not for the
+  /// tick: takes memory.
+  [[nodiscard]] Eigen::MatrixXd block(Index row, Index column) const;
 
   /// The block row of the capacitance matrix C = E^T Xi E (theory.md section 3) that belongs to `row`: its
-  /// blocks at `columns` one beside the other, `blocks` is 3 x 3m, row-major, for m columns.
+  /// blocks at `columns` one beside the other, `blocks` is d x dm, row-major, for m columns.
   void gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
 
-  /// u = Xi E f (theory.md section 3): displacement u [n] of all stored dofs [m] by the forces f [3m] on m
+  /// u = Xi E f (theory.md section 3): displacement u [n] of all stored dofs [m] by the forces f [dm] on m
   /// nodes [N].
   void displacement(std::span<const Index> nodes, std::span<const double> f,
                     std::span<double> u) const noexcept;
@@ -50,6 +54,8 @@ class Greens {
   std::shared_ptr<const void> square_;  // [n x stride_] rows of the stored scalar
   std::int64_t order_ = 0;
   std::int64_t stride_ = 0;  // scalars from one row of the square to the next
+  int dimension_ = 3;
+  Index nodes_ = 0;
   Precision precision_ = Precision::double_precision;
 };
 

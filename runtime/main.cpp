@@ -48,16 +48,21 @@ CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
   CLI::App* probe = app.add_subcommand("probe", "displace nodes and print the forces that this takes");
   add_file(*probe, arguments);
   add_repeatable(*probe, "--at", arguments.at, "X,Y,Z",
-                 "the free surface node nearest to this place [m]; repeatable");
+                 "the free surface node that rests nearest to this place [m]; repeatable");
   add_repeatable(*probe, "--node", arguments.node, "N", "the node with this number in the mesh; repeatable");
   add_repeatable(*probe, "--displace", arguments.displace, "DX,DY,DZ",
                  "its displacement [m]; one for each --at and --node, in the same order")
       ->required();
   probe->add_flag("--json", arguments.json, "print JSON");
-  probe->add_option("--field", arguments.field, "write the displacement of all stored nodes")
+  probe
+      ->add_option(
+          "--field", arguments.field,
+          "write the displacement at rest and by the probe: a table of the stored nodes, or a grid for "
+          "ParaView")
       ->type_name("OUT.csv|OUT.vtu");
   probe->footer(
-      "Forces are those on the body, in newtons; the hand feels the opposite.\n"
+      "Forces are those on the body, in newtons; the hand feels the opposite. Displacements are relative to\n"
+      "the body as it rests under its loads. For a body in the plane give X,Y and DX,DY.\n"
       "Example: palpate-runtime probe liver.palpate.hdf --at 0.1,0.05,0.12 --displace 0,0,-0.005 --field "
       "liver.vtu");
   return probe;
@@ -80,14 +85,17 @@ CLI::App* add_play(CLI::App& app, Arguments& arguments) {
                    "of the surface")
       ->type_name("METRES");
   play->footer(
-      "While grab is set the tool holds the surface node that was nearest to it and moves it along.\n"
+      "While grab is set the tool holds the surface node that was nearest to it and moves it along. On a "
+      "body in\n"
+      "the plane z is ignored.\n"
       "Example: palpate-runtime play liver.palpate.hdf --device script:touch.csv --record touch.h5");
   return play;
 }
 
-Vec3 vector_argument(const std::string& option, const std::string& text) {
-  const std::optional<Vec3> vector = parse_vector(text);
-  if (!vector) throw CLI::ValidationError(option, "'" + text + "' is not three finite numbers X,Y,Z");
+std::vector<double> vector_argument(const std::string& option, const std::string& text) {
+  const std::optional<std::vector<double>> vector = parse_vector(text);
+  if (!vector)
+    throw CLI::ValidationError(option, "'" + text + "' is not finite numbers X,Y,Z (in the plane X,Y)");
   return *vector;
 }
 
@@ -98,9 +106,9 @@ std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& argu
   auto node = arguments.node.begin();
   for (const CLI::Option* option : probe.parse_order()) {
     if (option->get_name() == "--at") {
-      places.push_back({.at = vector_argument("--at", *at++), .node = {}});
+      places.push_back({.at = vector_argument("--at", *at++), .node = {}, .displacement = {}});
     } else if (option->get_name() == "--node") {
-      places.push_back({.at = {}, .node = parse_node(*node)});
+      places.push_back({.at = {}, .node = parse_node(*node), .displacement = {}});
       if (!places.back().node)
         throw CLI::ValidationError("--node", "'" + *node + "' is not the number of a node");
       ++node;

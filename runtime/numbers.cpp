@@ -31,14 +31,14 @@ std::optional<double> parse_number(std::string_view text) {
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
-std::optional<Vec3> parse_vector(std::string_view text) {
+std::optional<std::vector<double>> parse_vector(std::string_view text) {
   const std::vector<std::string_view> parts = split_commas(text);
-  if (parts.size() != 3) return std::nullopt;
-  Vec3 vector;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::optional<double> value = parse_number(parts[k]);
+  if (parts.size() != 2 && parts.size() != 3) return std::nullopt;
+  std::vector<double> vector;
+  for (const std::string_view part : parts) {
+    const std::optional<double> value = parse_number(part);
     if (!value) return std::nullopt;
-    vector[static_cast<Eigen::Index>(k)] = *value;
+    vector.push_back(*value);
   }
   return vector;
 }

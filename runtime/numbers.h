@@ -12,8 +12,8 @@ namespace palpate {
 /// A finite number and nothing else but spaces round it, or nothing.
 std::optional<double> parse_number(std::string_view text);
 
-/// "x,y,z", three finite numbers, or nothing.
-std::optional<Vec3> parse_vector(std::string_view text);
+/// "x,y" or "x,y,z": two or three finite numbers, or nothing.
+std::optional<std::vector<double>> parse_vector(std::string_view text);
 
 /// The whole number from 0 on that a node is named by, or nothing.
 std::optional<Index> parse_node(std::string_view text);

@@ -106,7 +106,7 @@ int play(const PlayOptions& options) {
   print_loaded(body, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
 
   const double reach = options.reach.value_or(body.longest_surface_edge());
-  State state({.reach = reach, .max_nodes = 1});
+  State state(body, {.reach = reach, .max_nodes = 1});
   std::optional<Recorder> recorder;
   if (!options.record.empty())
     recorder.emplace(options.record, options.file.string(), body.model().content_hash);

@@ -1,6 +1,7 @@
 #include "runtime/probe.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <span>
@@ -9,6 +10,7 @@
 #include "meshes/error.h"
 #include "meshes/vtu_writer.h"
 #include "runtime/loading.h"
+#include "runtime/node_vectors.h"
 #include "runtime/output.h"
 #include "runtime/step.h"
 
@@ -18,11 +20,37 @@ namespace {
 /// What is told of one node.
 struct Answer {
   Index node;                      // of the mesh
-  Vec3 position;                   // undeformed [m]
+  Vec3 position;                   // at rest [m]
   std::optional<double> distance;  // from the point asked for [m]
-  Vec3 displacement;               // [m]
+  Vec3 displacement;               // relative to rest [m]
   Vec3 force;                      // on the body [N]
 };
+
+/// A vector as it was written, in the space that the body moves in.
+Vec3 vector_of(const std::vector<double>& numbers, const Body& body, const std::string& option,
+               const std::string& where) {
+  const bool has_z = numbers.size() == 3;
+  if (body.dimension() == 3 && !has_z) {
+    throw Error(
+        fmt::format("{} {} has two numbers and the body is in space", option, fmt::join(numbers, ",")), where,
+        "give three numbers, x,y,z in metres");
+  }
+  if (body.dimension() == 2 && has_z && numbers[2] != 0.0) {
+    throw Error(
+        fmt::format("{} {} leaves the plane z = 0 that the body is in", option, fmt::join(numbers, ",")),
+        where, "give two numbers, x,y in metres");
+  }
+  return {numbers[0], numbers[1], has_z ? numbers[2] : 0.0};
+}
+
+/// "x and z": the axes whose bits are set.
+std::string axes_text(unsigned axes) {
+  std::vector<std::string> names;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    if ((axes >> axis & 1U) != 0) names.emplace_back(1, "xyz"[axis]);
+  }
+  return fmt::format("{}", fmt::join(names, " and "));
+}
 
 /// The stored node that is meant by a node of the mesh.
 Index stored_node_of(const Body& body, Index node, const std::string& where) {
@@ -34,9 +62,17 @@ Index stored_node_of(const Body& body, Index node, const std::string& where) {
   }
   const Index stored = body.stored_node(node);
   if (stored >= 0) return stored;
-  if (model.fixed[static_cast<std::size_t>(node)] != 0) {
+  const unsigned all_axes = (1U << model.dimension()) - 1U;
+  const unsigned held = model.fixed[static_cast<std::size_t>(node)] & all_axes;
+  if (held == all_axes) {
     throw Error(fmt::format("node {} is fixed and cannot be displaced", node), where,
                 "give a node outside the fixed regions");
+  }
+  if (held != 0) {
+    throw Error(fmt::format("node {} is held along {}, and only nodes that are free along every axis can be "
+                            "displaced",
+                            node, axes_text(held)),
+                where, "give a node outside the fixed regions");
   }
   throw Error(fmt::format("node {} is inside the body and its Green's functions were not kept", node), where,
               "give a surface node, or precompute with storage scope \"full\" or more layers");
@@ -46,10 +82,11 @@ std::vector<Answer> ask(const Body& body, State& state, const ProbeOptions& opti
   const std::string where = options.file.string();
   std::vector<Answer> answers;
   for (const ProbePlace& place : options.places) {
+    const Vec3 displacement = vector_of(place.displacement, body, "--displace", where);
     std::optional<double> distance;
     Index stored = -1;
     if (place.at) {
-      const NearestNode nearest = body.nearest_surface_node(*place.at);
+      const NearestNode nearest = body.nearest_surface_node(vector_of(*place.at, body, "--at", where));
       stored = nearest.node;
       distance = nearest.distance;
     } else {
@@ -61,19 +98,19 @@ std::vector<Answer> ask(const Body& body, State& state, const ProbeOptions& opti
                   "give each node one displacement; places closer than the mesh is fine share a node");
     }
     if (hold(body, state, stored) != StepStatus::ok ||
-        prescribe(state, stored, place.displacement) != StepStatus::ok) {
+        prescribe(state, stored, displacement) != StepStatus::ok) {
       throw Error(
           fmt::format("node {} does not move independently of the others in the stored Green's functions",
                       node),
           where, "check the file with palpate-precompute verify");
     }
-    answers.push_back({node, body.position(stored), distance, place.displacement, Vec3::Zero()});
+    answers.push_back({node, body.rest_position(stored), distance, displacement, Vec3::Zero()});
   }
   if (solve(state) != StepStatus::ok) {
     throw Error("the forces are too large for a number", where, "give displacements in metres");
   }
   for (std::size_t k = 0; k < answers.size(); ++k)
-    answers[k].force = Eigen::Map<const Vec3>(state.forces().data() + 3 * k);
+    answers[k].force = vector_at(state.forces(), state.dimension(), static_cast<Index>(k));
   return answers;
 }
 
@@ -111,47 +148,69 @@ void print_json(const std::vector<Answer>& answers, const ProbeOptions& options)
   fmt::print("\n  ],\n  \"total_force\": {}\n}}\n", json_vector(total_force(answers)));
 }
 
+/// A row a stored node: its place in the mesh, u0 and u.
 void write_csv(const std::filesystem::path& file, const Body& body, std::span<const double> u) {
-  std::string csv = "node,x,y,z,ux,uy,uz\n";
+  const Model& model = body.model();
+  std::string csv = "node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n";
   for (Index stored = 0; stored < body.greens().nodes(); ++stored) {
-    const Vec3& x = body.position(stored);
-    const double* v = u.data() + 3 * std::ptrdiff_t{stored};
-    csv +=
-        fmt::format("{},{},{},{},{},{},{}\n", body.mesh_node(stored), x.x(), x.y(), x.z(), v[0], v[1], v[2]);
+    const Index node = body.mesh_node(stored);
+    const Vec3& x = model.mesh.nodes[static_cast<std::size_t>(node)];
+    const Vec3& u0 = model.rest_displacement[static_cast<std::size_t>(node)];
+    const Vec3 v = vector_at(u, body.dimension(), stored);
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", node, x.x(), x.y(), x.z(), u0.x(), u0.y(), u0.z(),
+                       v.x(), v.y(), v.z());
   }
   write_text_file(file, csv);
 }
 
-/// The whole mesh where all of it was stored, else its surface. Nodes that are not stored there are fixed:
-/// they do not move.
+/// Elements of one kind.
+struct Cells {
+  ElementType element;
+  std::vector<Index> connectivity;
+};
+
+/// The whole mesh where every node of it is stored or held, else its surface.
+Cells shown_cells(const Body& body) {
+  const Model& model = body.model();
+  bool whole = true;
+  for (std::size_t node = 0; node < model.mesh.nodes.size(); ++node) {
+    whole = whole && (body.stored_node(static_cast<Index>(node)) >= 0 || model.fixed[node] != 0);
+  }
+  if (whole) return {model.mesh.element, model.mesh.connectivity};
+  return {body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, model.surface};
+}
+
+/// Drops the nodes that no cell has: returns the mesh node of each that is left.
+std::vector<Index> keep_used_nodes(Cells& cells, std::size_t mesh_nodes) {
+  std::vector<Index> number(mesh_nodes, -1);
+  for (const Index node : cells.connectivity) number[static_cast<std::size_t>(node)] = 0;
+  std::vector<Index> kept;
+  for (std::size_t node = 0; node < mesh_nodes; ++node) {
+    if (number[node] < 0) continue;
+    number[node] = static_cast<Index>(kept.size());
+    kept.push_back(static_cast<Index>(node));
+  }
+  for (Index& node : cells.connectivity) node = number[static_cast<std::size_t>(node)];
+  return kept;
+}
+
+/// A grid of the undeformed body with u0 and u0 + u, which is what is seen. Nodes that are held along an axis
+/// are shown at rest.
 void write_grid(const std::filesystem::path& file, const Body& body, std::span<const double> u) {
   const Model& model = body.model();
-  const bool full = model.scope == Scope::full;
-  std::vector<bool> shown(model.mesh.nodes.size(), full);
-  for (const Triangle& triangle : model.surface_triangles) {
-    for (const Index node : triangle) shown[static_cast<std::size_t>(node)] = true;
-  }
-
-  std::vector<Index> number(model.mesh.nodes.size(), -1);
+  Cells cells = shown_cells(body);
   std::vector<Vec3> nodes;
-  std::vector<double> displacement;
-  for (std::size_t node = 0; node < shown.size(); ++node) {
-    if (!shown[node]) continue;
-    number[node] = static_cast<Index>(nodes.size());
-    nodes.push_back(model.mesh.nodes[node]);
-    const Index stored = body.stored_node(static_cast<Index>(node));
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      displacement.push_back(stored < 0 ? 0.0 : u[3 * static_cast<std::size_t>(stored) + axis]);
-    }
+  std::vector<double> rest, total;
+  for (const Index node : keep_used_nodes(cells, model.mesh.nodes.size())) {
+    nodes.push_back(model.mesh.nodes[static_cast<std::size_t>(node)]);
+    const Vec3& u0 = model.rest_displacement[static_cast<std::size_t>(node)];
+    const Index stored = body.stored_node(node);
+    const Vec3 seen = stored < 0 ? u0 : Vec3(u0 + vector_at(u, body.dimension(), stored));
+    rest.insert(rest.end(), u0.begin(), u0.end());
+    total.insert(total.end(), seen.begin(), seen.end());
   }
-  std::vector<Triangle> triangles;
-  if (!full) triangles = model.surface_triangles;
-  for (Triangle& triangle : triangles) {
-    for (Index& node : triangle) node = number[static_cast<std::size_t>(node)];
-  }
-  const NodalField field{"displacement", 3, displacement};
-  write_vtu(file, nodes, full ? std::span<const Tet>(model.mesh.tets) : std::span<const Tet>(), triangles,
-            {&field, 1});
+  const std::vector<NodalField> fields = {{"displacement", 3, total}, {"rest_displacement", 3, rest}};
+  write_vtu(file, nodes, cells.element, cells.connectivity, fields);
 }
 
 }  // namespace
@@ -163,7 +222,7 @@ int probe(const ProbeOptions& options) {
                 "name the field by what it should be, e.g. out.vtu");
   }
   const Body body = load_body(options.file, options.model_toml);
-  State state({.max_nodes = static_cast<Index>(options.places.size())});
+  State state(body, {.max_nodes = static_cast<Index>(options.places.size())});
   const std::vector<Answer> answers = ask(body, state, options);
 
   if (!options.field.empty()) {

@@ -9,11 +9,11 @@
 
 namespace palpate {
 
-/// A node and the displacement prescribed there.
+/// A node and the displacement prescribed there. Vectors are as they were written, with two numbers or three.
 struct ProbePlace {
-  std::optional<Vec3> at;            ///< [m]: the nearest free surface node is meant
-  std::optional<Index> node;         ///< mesh node; exactly one of the two is given
-  Vec3 displacement = Vec3::Zero();  ///< [m]
+  std::optional<std::vector<double>> at;  ///< [m]: the free surface node that rests nearest is meant
+  std::optional<Index> node;              ///< mesh node; exactly one of the two is given
+  std::vector<double> displacement;       ///< [m] relative to rest
 };
 
 struct ProbeOptions {
@@ -21,11 +21,12 @@ struct ProbeOptions {
   std::filesystem::path model_toml;  ///< that it must have been made from; empty: not asked
   std::vector<ProbePlace> places;
   bool json = false;
-  std::filesystem::path field;  ///< .csv or .vtu for the whole displacement; empty: none
+  std::filesystem::path field;  ///< .csv or .vtu for the whole displacement, at rest and by the probe; empty:
+                                ///< none
 };
 
 /// Prints the forces that hold the nodes displaced, and writes the field. Returns the exit code; throws
-/// Error.
+/// Error, also for vectors that have not as many numbers as the body has dimensions.
 int probe(const ProbeOptions& options);
 
 }  // namespace palpate

@@ -5,11 +5,10 @@
 #include <string>
 
 #include "meshes/error.h"
+#include "runtime/node_vectors.h"
 
 namespace palpate {
 namespace {
-
-using VectorMap = Eigen::Map<Vec3>;
 
 bool is_finite(const ToolPose& tool) noexcept {
   return tool.position.allFinite() && tool.orientation.coeffs().allFinite();
@@ -19,8 +18,8 @@ bool all_finite(std::span<const double> values) noexcept {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
-VectorMap vector_at(std::vector<double>& values, Index k) noexcept {
-  return VectorMap(values.data() + 3 * std::ptrdiff_t{k});
+std::size_t dofs(int dimension, Index nodes) noexcept {
+  return static_cast<std::size_t>(dimension) * static_cast<std::size_t>(nodes);
 }
 
 /// Closes the gap of the entries of one node: those of the later nodes move up.
@@ -38,7 +37,7 @@ StepStatus take_hold(const Body& body, State& state, const Vec3& tool_position) 
   state.tool_node = nearest.node;
   state.tool_position_at_grab = tool_position;
   state.node_displacement_at_grab =
-      vector_at(state.prescribed_displacement, held_position(state, nearest.node));
+      vector_at(state.prescribed_displacement, state.dimension(), held_position(state, nearest.node));
   return StepStatus::ok;
 }
 
@@ -49,29 +48,32 @@ StepStatus let_go(State& state) noexcept {
 
 /// Moves the held node with the tool; where that overflows, everything stays as it was.
 StepStatus follow(State& state, const Vec3& tool_position) noexcept {
-  VectorMap displacement = vector_at(state.prescribed_displacement, held_position(state, state.tool_node));
-  const Vec3 before = displacement;
-  displacement = state.node_displacement_at_grab + (tool_position - state.tool_position_at_grab);
+  const int d = state.dimension();
+  const Index k = held_position(state, state.tool_node);
+  const Vec3 before = vector_at(state.prescribed_displacement, d, k);
+  set_vector(state.prescribed_displacement, d, k,
+             state.node_displacement_at_grab + (tool_position - state.tool_position_at_grab));
   const StepStatus status = solve(state);
-  if (has(status, StepStatus::result_not_finite)) displacement = before;
+  if (has(status, StepStatus::result_not_finite)) set_vector(state.prescribed_displacement, d, k, before);
   return status;
 }
 
 void show_tool(State& state) noexcept {
+  const int d = state.dimension();
   const Index k = held_position(state, state.tool_node);
-  state.tool_force = k < 0 ? Vec3::Zero() : Vec3(vector_at(state.force, k));
-  state.tool_node_displacement = k < 0 ? Vec3::Zero() : Vec3(vector_at(state.prescribed_displacement, k));
+  state.tool_force = k < 0 ? Vec3::Zero() : vector_at(state.force, d, k);
+  state.tool_node_displacement = k < 0 ? Vec3::Zero() : vector_at(state.prescribed_displacement, d, k);
 }
 
 }  // namespace
 
-State::State(const StateOptions& options)
+State::State(const Body& body, const StateOptions& options)
     : reach(options.reach),
-      capacitance(options.max_nodes),
+      capacitance(body.dimension(), options.max_nodes),
       held_nodes(static_cast<std::size_t>(options.max_nodes), -1),
-      prescribed_displacement(3 * static_cast<std::size_t>(options.max_nodes)),
-      force(3 * static_cast<std::size_t>(options.max_nodes)),
-      work(9 * static_cast<std::size_t>(options.max_nodes)) {
+      prescribed_displacement(dofs(body.dimension(), options.max_nodes)),
+      force(dofs(body.dimension(), options.max_nodes)),
+      work(static_cast<std::size_t>(body.dimension()) * dofs(body.dimension(), options.max_nodes)) {
   if (!std::isfinite(reach) || reach <= 0.0) {
     throw Error("the reach of the tool is " + std::to_string(reach) + " m", "State",
                 "give a positive length in metres");
@@ -82,10 +84,10 @@ std::span<const Index> State::held() const noexcept {
   return {held_nodes.data(), static_cast<std::size_t>(nodes())};
 }
 std::span<const double> State::prescribed() const noexcept {
-  return {prescribed_displacement.data(), 3 * static_cast<std::size_t>(nodes())};
+  return {prescribed_displacement.data(), dofs(dimension(), nodes())};
 }
 std::span<const double> State::forces() const noexcept {
-  return {force.data(), 3 * static_cast<std::size_t>(nodes())};
+  return {force.data(), dofs(dimension(), nodes())};
 }
 
 StepStatus step(const Body& body, State& state, const ToolPose& tool) noexcept {
@@ -107,19 +109,20 @@ StepStatus hold(const Body& body, State& state, Index node) noexcept {
   if (k == state.capacitance.max_nodes()) return StepStatus::capacity_full;
 
   state.held_nodes[static_cast<std::size_t>(k)] = node;
-  const auto width = 3 * static_cast<std::size_t>(k + 1);
-  const std::span<double> blocks(state.work.data(), 3 * width);
+  const auto d = static_cast<std::size_t>(state.dimension());
+  const std::size_t width = d * static_cast<std::size_t>(k + 1);
+  const std::span<double> blocks(state.work.data(), d * width);
   body.greens().gather(node, {state.held_nodes.data(), static_cast<std::size_t>(k + 1)}, blocks);
 
   Vec3 displacement = Vec3::Zero();
-  for (std::size_t axis = 0; axis < 3; ++axis) {
+  for (std::size_t axis = 0; axis < d; ++axis) {
     const auto row = static_cast<Eigen::Index>(axis);
-    for (std::size_t j = 0; j < width - 3; ++j)
+    for (std::size_t j = 0; j < width - d; ++j)
       displacement[row] += blocks[axis * width + j] * state.force[j];
   }
   if (state.capacitance.add(blocks) != CapacitanceStatus::ok) return StepStatus::not_positive_definite;
-  vector_at(state.prescribed_displacement, k) = displacement;
-  vector_at(state.force, k).setZero();
+  set_vector(state.prescribed_displacement, state.dimension(), k, displacement);
+  set_vector(state.force, state.dimension(), k, Vec3::Zero());
   return StepStatus::ok;
 }
 
@@ -128,8 +131,8 @@ StepStatus release(State& state, Index node) noexcept {
   if (k < 0) return StepStatus::no_such_node;
   const Index nodes = state.nodes();
   erase_entries(state.held_nodes, k, nodes, 1);
-  erase_entries(state.prescribed_displacement, k, nodes, 3);
-  erase_entries(state.force, k, nodes, 3);
+  erase_entries(state.prescribed_displacement, k, nodes, state.dimension());
+  erase_entries(state.force, k, nodes, state.dimension());
   state.capacitance.remove(k);
   if (node == state.tool_node) state.tool_node = -1;
   return StepStatus::ok;
@@ -144,12 +147,12 @@ void release_all(State& state) noexcept {
 StepStatus prescribe(State& state, Index node, const Vec3& displacement) noexcept {
   const Index k = held_position(state, node);
   if (k < 0) return StepStatus::no_such_node;
-  vector_at(state.prescribed_displacement, k) = displacement;
+  set_vector(state.prescribed_displacement, state.dimension(), k, displacement);
   return StepStatus::ok;
 }
 
 StepStatus solve(State& state) noexcept {
-  const std::span<double> f(state.work.data(), 3 * static_cast<std::size_t>(state.nodes()));
+  const std::span<double> f(state.work.data(), dofs(state.dimension(), state.nodes()));
   std::copy_n(state.prescribed_displacement.begin(), f.size(), f.begin());
   state.capacitance.solve(f);
   if (!all_finite(f)) return StepStatus::result_not_finite;

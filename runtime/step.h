@@ -14,7 +14,7 @@
 
 namespace palpate {
 
-/// Where the tool is.
+/// Where the tool is. On a body in the plane its z is ignored.
 struct ToolPose {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
   Vec3 position = Vec3::Zero();  ///< tip [m]
@@ -54,25 +54,28 @@ struct StateOptions {
   Index max_nodes = 256;  ///< most nodes that can be held at once
 };
 
-/// Everything that a tick changes. Copies are complete and independent, so that reset, record and replay are
-/// copies. All memory is taken here: copying allocates, a tick does not. Vectors are sized for `max_nodes`;
-/// only the first nodes() entries count.
+/// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
+/// replay are copies. All memory is taken here: copying allocates, a tick does not. Vectors are sized for
+/// `max_nodes`; only the first nodes() entries count. Displacements are those by contact, relative to rest;
+/// d numbers a node, d = dimension(), where they are not vectors in space (z = 0 in the plane).
 struct State {
-  /// Throws Error for a reach that is not finite and positive, or without room for a node.
-  explicit State(const StateOptions& options = {});
+  /// Of a body at rest. Throws Error for a reach that is not finite and positive, or without room for a node.
+  explicit State(const Body& body, const StateOptions& options = {});
 
+  [[nodiscard]] int dimension() const noexcept { return capacitance.dimension(); }  ///< d, dofs a node
   [[nodiscard]] Index nodes() const noexcept { return capacitance.nodes(); }  ///< m, number of held nodes
   [[nodiscard]] std::span<const Index> held()
       const noexcept;  ///< [m] stored nodes, in the order they were taken
-  [[nodiscard]] std::span<const double> prescribed() const noexcept;  ///< [3m] their displacement [m]
-  [[nodiscard]] std::span<const double> forces() const noexcept;      ///< [3m] forces on the body there [N]
+  [[nodiscard]] std::span<const double> prescribed() const noexcept;  ///< [dm] their displacement [m]
+  [[nodiscard]] std::span<const double> forces() const noexcept;      ///< [dm] forces on the body there [N]
 
   double reach;  ///< [m]
   CapacitanceMatrix capacitance;
   std::vector<Index> held_nodes;
   std::vector<double> prescribed_displacement;
   std::vector<double> force;
-  std::vector<double> work;  ///< [9 max_nodes] a block row of C, or the force before it is known to be finite
+  std::vector<double>
+      work;  ///< [d d max_nodes] a block row of C, or the force before it is known to be finite
 
   Index tool_node = -1;                           ///< stored node that the tool holds, -1 for none
   Vec3 tool_position_at_grab = Vec3::Zero();      ///< [m]
@@ -98,7 +101,8 @@ StepStatus release(State& state, Index node) noexcept;
 /// Lets go of all nodes.
 void release_all(State& state) noexcept;
 
-/// Prescribes the displacement [m] of a held node. Forces are out of date until `solve`.
+/// Prescribes the displacement [m] of a held node, relative to rest; z is ignored in the plane. Forces are
+/// out of date until `solve`.
 StepStatus prescribe(State& state, Index node, const Vec3& displacement) noexcept;
 
 /// f = C^-1 u: the forces on the body that give the held nodes their prescribed displacement (theory.md
@@ -108,8 +112,8 @@ StepStatus solve(State& state) noexcept;
 /// Position of a stored node among the held ones, -1 when it is not held.
 Index held_position(const State& state, Index node) noexcept;
 
-/// u = Xi E f: displacement u [n] of all stored nodes [m] under the present forces (theory.md section 3). For
-/// the eye; not needed by a tick.
+/// u = Xi E f: displacement u [n] of all stored nodes [m] by the present forces, relative to rest (theory.md
+/// section 3). What is seen is node + u0 + u. For the eye; not needed by a tick.
 void surface_displacement(const Body& body, const State& state, std::span<double> u) noexcept;
 
 }  // namespace palpate

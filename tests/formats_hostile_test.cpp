@@ -26,6 +26,16 @@ const Path& good_file() {
   return path;
 }
 
+/// Four quads in the plane.
+const Path& good_plane_file() {
+  static const Folder folder;
+  static const Path path = [] {
+    write_sample(folder / "plane.palpate.hdf", Precision::double_precision, ElementType::quad4);
+    return folder / "plane.palpate.hdf";
+  }();
+  return path;
+}
+
 /// An edit whose checksums are made right again, and what the refusal must say.
 struct Edit {
   const char* name;
@@ -37,18 +47,26 @@ void PrintTo(const Edit& edit, std::ostream* out) {
   *out << edit.name;
 }
 
-class Hostile : public testing::TestWithParam<Edit> {};
-
-TEST_P(Hostile, IsRefusedByName) {
+void expect_refused(const Path& good, const Edit& edit) {
   const Folder folder;
   const Path path = folder / "x.palpate.hdf";
-  std::filesystem::copy_file(good_file(), path);
-  GetParam().apply(path);
+  std::filesystem::copy_file(good, path);
+  edit.apply(path);
   reseal(path);
   const std::string text = refusal([&] { load_model(path); });
   ASSERT_NE(text, "");
-  for (const std::string& words : GetParam().says) EXPECT_NE(text.find(words), std::string::npos) << text;
+  for (const std::string& words : edit.says) EXPECT_NE(text.find(words), std::string::npos) << text;
   EXPECT_NE(text.find("x.palpate.hdf"), std::string::npos) << text;
+}
+
+class Hostile : public testing::TestWithParam<Edit> {};
+TEST_P(Hostile, IsRefusedByName) {
+  expect_refused(good_file(), GetParam());
+}
+
+class HostilePlane : public testing::TestWithParam<Edit> {};
+TEST_P(HostilePlane, IsRefusedByName) {
+  expect_refused(good_plane_file(), GetParam());
 }
 
 const Edit edits[] = {
@@ -99,7 +117,7 @@ const Edit edits[] = {
      [](const Path& p) {
        replace(p, "/mesh/nodes", H5T_IEEE_F64LE, {0, 3});
      },
-     {"/mesh/nodes has 0 entries, at least 4"}},
+     {"/mesh/nodes has 0 entries, at least 3"}},
     {"HugeSize",
      [](const Path& p) {
        replace(p, "/mesh/nodes", H5T_IEEE_F64LE, {1 << 27, 3});
@@ -182,24 +200,24 @@ const Edit edits[] = {
        set_entry(p, "/mesh/connectivity", 0, std::int64_t{1});
        set_entry(p, "/mesh/connectivity", 1, std::int64_t{0});
      },
-     {"/mesh/connectivity: element 0 does not have a positive volume"}},
+     {"/mesh/connectivity: element 0 is inverted or flat"}},
     {"FlatElement",
      [](const Path& p) {
        for (std::uint64_t i = 20; i < 24; ++i) set_entry(p, "/mesh/connectivity", i, std::int64_t{1});
      },
-     {"/mesh/connectivity: element 5 does not have a positive volume"}},
-    {"TriangleOutOfRange",
-     [](const Path& p) { set_entry(p, "/mesh/surface_triangles", 4, std::int32_t{1000}); },
-     {"/mesh/surface_triangles holds 1000 (entry 4)"}},
-    {"TriangleWithOneNodeTwice",
+     {"/mesh/connectivity: element 5 is inverted or flat"}},
+    {"SurfaceNodeOutOfRange",
+     [](const Path& p) { set_entry(p, "/mesh/surface", 4, std::int32_t{1000}); },
+     {"/mesh/surface holds 1000 (entry 4), only 0 to 26"}},
+    {"SurfaceTriangleWithOneNodeTwice",
      [](const Path& p) {
-       set_entry(p, "/mesh/surface_triangles", 3, std::int32_t{2});
-       set_entry(p, "/mesh/surface_triangles", 5, std::int32_t{2});
+       set_entry(p, "/mesh/surface", 3, std::int32_t{2});
+       set_entry(p, "/mesh/surface", 5, std::int32_t{2});
      },
-     {"/mesh/surface_triangles: triangle 1"}},
-    {"FixedIsNotAFlag",
-     [](const Path& p) { set_entry(p, "/dofs/fixed", 26, std::uint8_t{2}); },
-     {"/dofs/fixed holds 2 (entry 26), only 0 to 1"}},
+     {"/mesh/surface: row 1 has the same node twice"}},
+    {"FixedMaskTooLarge",
+     [](const Path& p) { set_entry(p, "/dofs/fixed", 26, std::uint8_t{8}); },
+     {"/dofs/fixed holds 8 (entry 26), only 0 to 7"}},
     {"StoredNodeOutOfRange",
      [](const Path& p) { set_entry(p, "/dofs/stored_nodes", 0, std::int32_t{27}); },
      {"/dofs/stored_nodes holds 27"}},
@@ -209,6 +227,9 @@ const Edit edits[] = {
     {"StoredNodeFixed",
      [](const Path& p) { set_entry(p, "/dofs/stored_nodes", 0, std::int32_t{1}); },
      {"/dofs/stored_nodes: node 1 is fixed"}},
+    {"StoredNodeFixedAlongOneAxis",
+     [](const Path& p) { set_entry(p, "/dofs/fixed", 20, std::uint8_t{4}); },
+     {"/dofs/stored_nodes: node 20 is fixed"}},
     {"NegativeYoungsModulus",
      [](const Path& p) { set_entry(p, "/material/isotropic", 0, -1.0); },
      {"/material/isotropic"}},
@@ -218,6 +239,60 @@ const Edit edits[] = {
     {"NanDensity",
      [](const Path& p) { set_entry(p, "/material/isotropic", 2, nan); },
      {"/material/isotropic"}},
+    {"SecondMaterialIncompressible",
+     [](const Path& p) { set_entry(p, "/material/isotropic", 4, 0.5); },
+     {"/material/isotropic, row 1", "poissons_ratio"}},
+    {"InfiniteInitialStrain",
+     [](const Path& p) { set_entry(p, "/material/initial_strain", 7, infinity); },
+     {"/material/initial_strain holds a value that is not finite (entry 7)"}},
+    {"NoMaterials",
+     [](const Path& p) {
+       replace(p, "/material/isotropic", H5T_IEEE_F64LE, {0, 3});
+     },
+     {"/material/isotropic has 0 entries, at least 1"}},
+    {"ManyMaterials",
+     [](const Path& p) {
+       replace(p, "/material/isotropic", H5T_IEEE_F64LE, {hsize_t{1} << 40, 3});
+     },
+     {"/material/isotropic", "more than the file holds"}},
+    {"FewerInitialStrains",
+     [](const Path& p) {
+       replace(p, "/material/initial_strain", H5T_IEEE_F64LE, {1, 6});
+     },
+     {"/material/initial_strain has size 1, 2 is expected by /material/isotropic"}},
+    {"InitialStrainOfThreeComponents",
+     [](const Path& p) {
+       replace(p, "/material/initial_strain", H5T_IEEE_F64LE, {2, 3});
+     },
+     {"/material/initial_strain has size 3, 6 is expected"}},
+    {"MaterialOfElementOutOfRange",
+     [](const Path& p) { set_entry(p, "/material/of_element", 47, std::int32_t{2}); },
+     {"/material/of_element holds 2 (entry 47), only 0 to 1"}},
+    {"MaterialOfElementNegative",
+     [](const Path& p) { set_entry(p, "/material/of_element", 0, std::int32_t{-1}); },
+     {"/material/of_element holds -1 (entry 0)"}},
+    {"FewerMaterialsOfElements",
+     [](const Path& p) { replace(p, "/material/of_element", H5T_STD_I32LE, {47}); },
+     {"/material/of_element has size 47, 48 is expected by /mesh/connectivity"}},
+    {"ThicknessInSpace",
+     [](const Path& p) { set_entry(p, "/material/thickness", 0, 2.0); },
+     {"/material/thickness is 2.0", "in space it is 1"}},
+    {"NanRestForce",
+     [](const Path& p) { set_entry(p, "/rest/force", 80, nan); },
+     {"/rest/force holds a value that is not finite (entry 80)"}},
+    {"NanRestDisplacement",
+     [](const Path& p) { set_entry(p, "/rest/displacement", 2, nan); },
+     {"/rest/displacement holds a value that is not finite (entry 2)"}},
+    {"FewerRestForces",
+     [](const Path& p) {
+       replace(p, "/rest/force", H5T_IEEE_F64LE, {26, 3});
+     },
+     {"/rest/force has size 26, 27 is expected by /mesh/nodes"}},
+    {"RestDisplacementOfTwoComponents",
+     [](const Path& p) {
+       replace(p, "/rest/displacement", H5T_IEEE_F64LE, {27, 2});
+     },
+     {"/rest/displacement has size 2, 3 is expected"}},
     {"WorstElementOutOfRange",
      [](const Path& p) { set_entry(p, "/quality/summary", 7, 48.0); },
      {"/quality/summary"}},
@@ -225,8 +300,11 @@ const Edit edits[] = {
      [](const Path& p) { set_entry(p, "/quality/summary", 7, 1e300); },
      {"/quality/summary"}},
     {"NegativeHistogram",
-     [](const Path& p) { set_entry(p, "/quality/dihedral_histogram", 2, std::int64_t{-1}); },
-     {"/quality/dihedral_histogram holds -1"}},
+     [](const Path& p) { set_entry(p, "/quality/angle_histogram", 2, std::int64_t{-1}); },
+     {"/quality/angle_histogram holds -1"}},
+    {"MoreAnglesThanThereAre",
+     [](const Path& p) { set_entry(p, "/quality/angle_histogram", 2, std::int64_t{48 * 6 + 1}); },
+     {"/quality/angle_histogram holds 289 (entry 2), only 0 to 288"}},
     {"NanProbe",
      [](const Path& p) { set_entry(p, "/probes/displacements", 100, nan); },
      {"/probes/displacements holds a value that is not finite (entry 100)"}},
@@ -260,24 +338,24 @@ const Edit edits[] = {
     {"NoFormat", [](const Path& p) { remove_attribute(p, "/", "format"); }, {"not a Palpate file"}},
     {"NewerMajor",
      [](const Path& p) {
-       set_integers(p, "version", {2, 1});
+       set_integers(p, "version", {3, 1});
      },
-     {"format version 2.1", "reads version 1.x", "Precompute it again"}},
+     {"format version 3.1", "reads version 2.x", "Precompute it again"}},
     {"OlderMajor",
      [](const Path& p) {
-       set_integers(p, "version", {0, 9});
+       set_integers(p, "version", {1, 0});
      },
-     {"format version 0.9", "reads version 1.x", "Precompute it again"}},
+     {"format version 1.0", "reads version 2.x", "Precompute it again"}},
     {"NegativeMinor",
      [](const Path& p) {
-       set_integers(p, "version", {1, -1});
+       set_integers(p, "version", {2, -1});
      },
      {"version is negative"}},
     {"NoVersion",
      [](const Path& p) { remove_attribute(p, "/", "version"); },
      {"attribute version is missing"}},
     {"VersionOfOneNumber",
-     [](const Path& p) { set_integers(p, "version", {1}); },
+     [](const Path& p) { set_integers(p, "version", {2}); },
      {"attribute version is missing"}},
     {"NoName", [](const Path& p) { remove_attribute(p, "/", "name"); }, {"attribute name is missing"}},
     {"NumberAsName", [](const Path& p) { set_integers(p, "name", {1}); }, {"attribute name is missing"}},
@@ -289,7 +367,34 @@ const Edit edits[] = {
      {"attribute units has an unknown value"}},
     {"OtherDimension",
      [](const Path& p) { set_integers(p, "dimension", {2}); },
-     {"attribute dimension has an unknown value"}},
+     {"attribute dimension is 2, that of tet4 elements is 3"}},
+    {"NoElement",
+     [](const Path& p) { remove_attribute(p, "/", "element"); },
+     {"attribute element is missing"}},
+    {"UnknownElement",
+     [](const Path& p) { set_text(p, "element", "wedge6"); },
+     {"attribute element is 'wedge6', not tri3, quad4, tet4, tet10 or hex8"}},
+    {"ElementOfTheBoundary",
+     [](const Path& p) { set_text(p, "element", "tri6"); },
+     {"attribute element is 'tri6'"}},
+    {"ElementOfAnotherDimension",
+     [](const Path& p) { set_text(p, "element", "quad4"); },
+     {"attribute dimension is 3, that of quad4 elements is 2"}},
+    {"ElementOfThePlane",
+     [](const Path& p) {
+       set_text(p, "element", "quad4");
+       set_integers(p, "dimension", {2});
+     },
+     {"/mesh/types holds 10 (entry 0), 9 is expected"}},
+    {"ElementOfMoreNodes",
+     [](const Path& p) { set_text(p, "element", "hex8"); },
+     {"/mesh/offsets has size 49, 25 is expected by /mesh/connectivity"}},
+    {"UnknownAnalysis",
+     [](const Path& p) { set_text(p, "analysis", "shell"); },
+     {"attribute analysis is 'shell', not solid, plane_stress or plane_strain"}},
+    {"PlaneAnalysisInSpace",
+     [](const Path& p) { set_text(p, "analysis", "plane_strain"); },
+     {"attribute analysis is plane_strain, but tet4 elements are in space"}},
     {"OtherScalar",
      [](const Path& p) { set_text(p, "scalar", "float16"); },
      {"attribute scalar is 'float16'"}},
@@ -306,9 +411,69 @@ const Edit edits[] = {
 INSTANTIATE_TEST_SUITE_P(Files, Hostile, testing::ValuesIn(edits),
                          [](const auto& edit) { return std::string(edit.param.name); });
 
+const Edit plane_edits[] = {
+    {"SolidAnalysis",
+     [](const Path& p) { set_text(p, "analysis", "solid"); },
+     {"attribute analysis is solid, but quad4 elements are in the plane"}},
+    {"NodeOutOfThePlane",
+     [](const Path& p) { set_entry(p, "/mesh/nodes", 14, 0.25); },
+     {"/mesh/nodes: row 4 has z = 0.25"}},
+    {"RestForceOutOfThePlane",
+     [](const Path& p) { set_entry(p, "/rest/force", 2, 0.5); },
+     {"/rest/force: row 0 has z = 0.5"}},
+    {"RestDisplacementOutOfThePlane",
+     [](const Path& p) { set_entry(p, "/rest/displacement", 26, -0.5); },
+     {"/rest/displacement: row 8 has z = -0.5"}},
+    {"FixedMaskTooLarge",
+     [](const Path& p) { set_entry(p, "/dofs/fixed", 0, std::uint8_t{4}); },
+     {"/dofs/fixed holds 4 (entry 0), only 0 to 3"}},
+    {"SurfaceOfTriangles",
+     [](const Path& p) {
+       replace(p, "/mesh/surface", H5T_STD_I32LE, {8, 3});
+     },
+     {"/mesh/surface has size 3, 2 is expected"}},
+    {"SurfaceLineToItself",
+     [](const Path& p) {
+       set_entry(p, "/mesh/surface", 4, std::int32_t{2});
+       set_entry(p, "/mesh/surface", 5, std::int32_t{2});
+     },
+     {"/mesh/surface: row 2 has the same node twice"}},
+    {"TriangleInPlaceOfQuad",
+     [](const Path& p) { set_entry(p, "/mesh/types", 1, std::uint8_t{5}); },
+     {"/mesh/types holds 5 (entry 1), 9 is expected"}},
+    {"ElementOfFewerNodes",
+     [](const Path& p) { set_text(p, "element", "tri3"); },
+     {"/mesh/connectivity has size 16, 15 is expected"}},
+    {"FlatElement",
+     [](const Path& p) {
+       for (std::uint64_t i = 4; i < 8; ++i) set_entry(p, "/mesh/connectivity", i, std::int64_t(i % 2));
+     },
+     {"/mesh/connectivity: element 1 is inverted or flat"}},
+    {"InvertedElement",
+     [](const Path& p) {
+       set_entry(p, "/mesh/connectivity", 0, std::int64_t{3});
+       set_entry(p, "/mesh/connectivity", 3, std::int64_t{0});
+     },
+     {"/mesh/connectivity: element 0 is inverted or flat"}},
+    {"NoThickness",
+     [](const Path& p) { set_entry(p, "/material/thickness", 0, 0.0); },
+     {"/material/thickness is 0.0", "not positive"}},
+    {"ThreeForcesANode",
+     [](const Path& p) {
+       replace(p, "/probes/forces", H5T_IEEE_F64LE, {2, 18});
+     },
+     {"/probes/forces has size 18, 12 is expected by /dofs/stored_nodes"}},
+    {"GreensOfThreeDofsANode",
+     [](const Path& p) { replace(p, "/greens/packed", H5T_IEEE_F64LE, {171}); },
+     {"/greens/packed has 171 entries, 78 are expected"}},
+};
+
+INSTANTIATE_TEST_SUITE_P(Files, HostilePlane, testing::ValuesIn(plane_edits),
+                         [](const auto& edit) { return std::string(edit.param.name); });
+
 TEST(AlteredFile, EveryDatasetIsNamed) {
   const auto datasets = checked_datasets(good_file());
-  EXPECT_EQ(datasets.size(), 19U);
+  EXPECT_EQ(datasets.size(), 24U);
   for (const std::string& dataset : datasets) {
     const Folder folder;
     std::filesystem::copy_file(good_file(), folder / "x.hdf");
@@ -331,7 +496,7 @@ TEST(AlteredFile, AttributesAreNoticed) {
 TEST(NewerMinorVersion, IsReadAndWhatItAddsIsIgnored) {
   const Folder folder;
   std::filesystem::copy_file(good_file(), folder / "x.hdf");
-  set_integers(folder / "x.hdf", "version", {1, 7});
+  set_integers(folder / "x.hdf", "version", {2, 7});
   replace(folder / "x.hdf", "/mesh/colours", H5T_STD_U8LE, {27});
   reseal(folder / "x.hdf");
   EXPECT_EQ(difference(load_model(good_file()), load_model(folder / "x.hdf")), "");

@@ -86,6 +86,22 @@ TEST_P(BothPrecisions, EqualModelsMakeEqualFilesInAnyOrderOfColumns) {
   EXPECT_EQ(read_bytes(folder / "a.palpate.hdf"), read_bytes(folder / "b.palpate.hdf"));
 }
 
+class EveryElement : public testing::TestWithParam<ElementType> {};
+
+TEST_P(EveryElement, WhatIsWrittenIsRead) {
+  const Folder folder;
+  const Model written = write_sample(folder / "a.palpate.hdf", Precision::double_precision, GetParam());
+  Model read = load_model(folder / "a.palpate.hdf");
+  EXPECT_EQ(read.mesh.element, GetParam());
+  ASSERT_EQ(read.greens.order(), traits(GetParam()).dimension * std::ssize(written.stored_nodes));
+  EXPECT_EQ(read.greens(3, 1), sample_entry(3, 1));
+  read.greens = {};
+  EXPECT_EQ(difference(written, read), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(ModelFile, EveryElement, testing::ValuesIn(body_elements),
+                         [](const auto& element) { return std::string(traits(element.param).name); });
+
 INSTANTIATE_TEST_SUITE_P(ModelFile, BothPrecisions,
                          Values(Precision::single_precision, Precision::double_precision));
 
@@ -245,7 +261,7 @@ void flip(const std::filesystem::path& path, std::size_t byte) {
 TEST(ModelFile, AnotherModelStartsAnew) {
   const Folder folder;
   Model other = sample_model();
-  other.material.youngs_modulus *= 2;
+  other.materials[1].youngs_modulus *= 2;
   EXPECT_FALSE(after_kill(folder, other, Precision::double_precision, [] {}).has_columns(0, 1));
 }
 
@@ -268,7 +284,7 @@ TEST(ModelFile, AlteredColumnsAreDroppedAndTheOthersKept) {
 TEST(ModelFile, AMistakeDoesNotCostAnEarlierRunsColumns) {
   const Folder folder;
   Model wrong = sample_model();
-  wrong.material.poissons_ratio = 0.7;
+  wrong.materials[0].poissons_ratio = 0.7;
   EXPECT_NE(refusal([&] {
               after_kill(folder, wrong, Precision::double_precision, [] {});
             }).find("/material/isotropic"),
@@ -333,6 +349,18 @@ TEST(ModelFile, WhatAReaderWouldRefuseIsNotWritten) {
   EXPECT_NE(refusal([&] {
               ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision);
             }).find("/dofs/fixed"),
+            std::string::npos);
+  model = sample_model();
+  model.mesh.connectivity.pop_back();
+  EXPECT_NE(refusal([&] {
+              ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision);
+            }).find("/mesh/connectivity has 191 values"),
+            std::string::npos);
+  model = sample_model(ElementType::quad4);
+  model.analysis = Analysis::solid;
+  EXPECT_NE(refusal([&] {
+              ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision);
+            }).find("analysis"),
             std::string::npos);
   EXPECT_EQ(files_in(folder), Names{});
 }
@@ -412,6 +440,8 @@ TEST(FullDisk, IsToldBeforehandWithTheNumbers) {
   // A body of a million free nodes in one element asks for 36 TB.
   model.mesh.nodes.resize(1'000'027, Vec3::Zero());
   model.fixed.resize(model.mesh.nodes.size(), 0);
+  model.rest_force.resize(model.mesh.nodes.size(), Vec3::Zero());
+  model.rest_displacement.resize(model.mesh.nodes.size(), Vec3::Zero());
   for (Index i = 27; i < 1'000'027; ++i) model.stored_nodes.push_back(i);
   const std::string text =
       refusal([&] { ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision); });

@@ -34,42 +34,69 @@ bool same_greens(const PackedGreens& a, const PackedGreens& b) {
 }
 
 bool same_quality(const QualityReport& a, const QualityReport& b) {
-  return a.min_dihedral == b.min_dihedral && a.max_dihedral == b.max_dihedral &&
-         a.min_radius_ratio == b.min_radius_ratio && a.mean_radius_ratio == b.mean_radius_ratio &&
-         a.min_edge == b.min_edge && a.max_edge == b.max_edge && a.volume == b.volume &&
-         a.worst_element == b.worst_element && a.worst_centroid == b.worst_centroid &&
-         a.dihedral_histogram == b.dihedral_histogram;
+  return a.min_angle == b.min_angle && a.max_angle == b.max_angle && a.min_shape == b.min_shape &&
+         a.mean_shape == b.mean_shape && a.min_edge == b.min_edge && a.max_edge == b.max_edge &&
+         a.volume == b.volume && a.worst_element == b.worst_element && a.worst_centroid == b.worst_centroid &&
+         a.angle_histogram == b.angle_histogram;
+}
+
+bool same_material(const Material& a, const Material& b) {
+  return a.youngs_modulus == b.youngs_modulus && a.poissons_ratio == b.poissons_ratio &&
+         a.density == b.density && a.initial_strain == b.initial_strain;
+}
+
+Mesh sample_mesh(ElementType element, int cells) {
+  const Vec3 origin(0.1, 0.2, 0.3), size(1, 2, 3);
+  if (traits(element).dimension == 2)
+    return generate(RectangleShape{.origin = {0.1, 0.2, 0.0}, .size = {1, 2, 0}, .cells = {cells, cells}},
+                    element);
+  const BoxShape box{.origin = origin, .size = size, .cells = {cells, cells, cells}};
+  if (element == ElementType::hex8) return generate(box, element);
+  return with_elements(generate(box), element, "sample");
 }
 
 }  // namespace
 
-Model sample_model(int cells) {
+Model sample_model(ElementType element, int cells) {
   Model model;
   model.name = "sample";
   model.generator = "formats_test 0";
   model.model_toml = "name = \"sample\"\n# Länge in m\n";
-  model.mesh = generate(
-      BoxShape{.origin = Vec3(0.1, 0.2, 0.3), .size = Vec3(1, 2, 3), .cells = {cells, cells, cells}});
-  for (std::size_t e = 0; e < model.mesh.regions.size(); ++e)
+  model.mesh = sample_mesh(element, cells);
+  const int d = model.dimension();
+  for (std::size_t e = 0; e < model.mesh.regions.size(); ++e) {
     model.mesh.regions[e] = static_cast<Index>(e % 3) - 1;
-  model.surface_triangles = extract_surface(model.mesh).triangles;
-  model.material = {5000.0, 0.49, 1060.0};
-  for (const Vec3& x : model.mesh.nodes) model.fixed.push_back(x.z() < 0.31 ? 1 : 0);
+    model.material_of_element.push_back(static_cast<Index>(e % 2));
+  }
+  model.surface = surface_simplices(extract_surface(model.mesh));
+  if (d == 2) {
+    model.analysis = element == ElementType::quad4 ? Analysis::plane_stress : Analysis::plane_strain;
+    model.thickness = 0.02;
+  }
+  model.materials = {{5000.0, 0.49, 1060.0, {}}, {2e4, 0.3, 1100.0, {1e-3, 2e-3, 3e-3, -1e-3, -2e-3, -3e-3}}};
+  const double bottom = model.mesh.nodes.front()[d - 1];
+  for (std::size_t i = 0; i < model.mesh.nodes.size(); ++i) {
+    const Vec3& x = model.mesh.nodes[i];
+    const std::size_t masks = (std::size_t{1} << d) - 1;
+    model.fixed.push_back(static_cast<std::uint8_t>(x[d - 1] < bottom + 0.01 ? masks - i % masks : 0));
+    model.rest_force.emplace_back(x.y(), -x.x(), d == 3 ? 0.5 : 0.0);
+    model.rest_displacement.emplace_back(1e-3 * x.x(), 2e-3 * x.y(), d == 3 ? 3e-3 * x.z() : 0.0);
+  }
   for (std::size_t i = model.fixed.size(); i-- > 0;)
     if (model.fixed[i] == 0) model.stored_nodes.push_back(static_cast<Index>(i));
   model.scope = Scope::full;
   model.layers = 0;
-  model.quality.min_dihedral = 45.0;
-  model.quality.max_dihedral = 90.5;
-  model.quality.min_radius_ratio = 0.5;
-  model.quality.mean_radius_ratio = 0.6;
+  model.quality.min_angle = 45.0;
+  model.quality.max_angle = 90.5;
+  model.quality.min_shape = 0.5;
+  model.quality.mean_shape = 0.6;
   model.quality.min_edge = 0.7;
   model.quality.max_edge = 1.8;
   model.quality.volume = 6.0;
-  model.quality.worst_element = static_cast<Index>(model.mesh.tets.size()) - 1;
+  model.quality.worst_element = model.mesh.elements() - 1;
   model.quality.worst_centroid = Vec3(0.5, 1, 2);
-  for (std::size_t i = 0; i < model.quality.dihedral_histogram.size(); ++i)
-    model.quality.dihedral_histogram[i] = static_cast<std::int64_t>(i);
+  for (std::size_t i = 0; i < model.quality.angle_histogram.size(); ++i)
+    model.quality.angle_histogram[i] = static_cast<std::int64_t>(i % 4);
   model.sources = {{"model", "model.toml", 12, "00112233445566778899aabbccddeeff"},
                    {"geometry", "../with space/box.off", 345, "ffeeddccbbaa99887766554433221100"}};
   const auto n = static_cast<std::size_t>(model.stored_dofs());
@@ -96,8 +123,8 @@ std::vector<double> sample_columns(std::int64_t first, std::int64_t count, std::
   return packed;
 }
 
-Model write_sample(const std::filesystem::path& path, Precision precision, int cells) {
-  Model model = sample_model(cells);
+Model write_sample(const std::filesystem::path& path, Precision precision, ElementType element, int cells) {
+  Model model = sample_model(element, cells);
   const std::int64_t n = model.stored_dofs(), middle = n / 3;
   ModelWriter writer(path, model, precision);
   writer.write_columns(middle, n - middle, sample_columns(middle, n - middle, n));
@@ -141,13 +168,16 @@ std::string difference(const Model& a, const Model& b) {
   if (a.generator != b.generator) return "generator";
   if (a.model_toml != b.model_toml) return "model_toml";
   if (!same(a.mesh.nodes, b.mesh.nodes, equal)) return "nodes";
-  if (a.mesh.tets != b.mesh.tets) return "tets";
+  if (a.mesh.element != b.mesh.element) return "element";
+  if (a.mesh.connectivity != b.mesh.connectivity) return "connectivity";
   if (a.mesh.regions != b.mesh.regions) return "regions";
-  if (a.surface_triangles != b.surface_triangles) return "surface_triangles";
-  if (a.material.youngs_modulus != b.material.youngs_modulus ||
-      a.material.poissons_ratio != b.material.poissons_ratio || a.material.density != b.material.density)
-    return "material";
+  if (a.surface != b.surface) return "surface";
+  if (a.analysis != b.analysis || a.thickness != b.thickness) return "analysis";
+  if (!same(a.materials, b.materials, same_material)) return "materials";
+  if (a.material_of_element != b.material_of_element) return "material_of_element";
   if (a.fixed != b.fixed) return "fixed";
+  if (!same(a.rest_force, b.rest_force, equal)) return "rest_force";
+  if (!same(a.rest_displacement, b.rest_displacement, equal)) return "rest_displacement";
   if (a.stored_nodes != b.stored_nodes) return "stored_nodes";
   if (a.scope != b.scope || a.layers != b.layers) return "scope";
   if (!same_quality(a.quality, b.quality)) return "quality";

@@ -11,9 +11,9 @@
 
 namespace palpate::test {
 
-/// Box of `cells` cells along each axis, clamped at its lowest nodes, all free nodes stored (54 dofs for 2
-/// cells), two sources, two probes.
-Model sample_model(int cells = 2);
+/// Box, in the plane rectangle, of `cells` cells along each axis, its lowest nodes held along some axis, all
+/// other nodes stored (54 dofs for 2 cells of tet4), two materials, loads, two sources, two probes.
+Model sample_model(ElementType element = ElementType::tet4, int cells = 2);
 
 /// Entry (i, j) of its Green's functions: symmetric, positive on the diagonal, no two neighbours equal.
 double sample_entry(std::int64_t i, std::int64_t j);
@@ -23,7 +23,7 @@ std::vector<double> sample_columns(std::int64_t first, std::int64_t count, std::
 
 /// Writes the whole of `sample_model` and returns what was written.
 Model write_sample(const std::filesystem::path& path, Precision precision = Precision::double_precision,
-                   int cells = 2);
+                   ElementType element = ElementType::tet4, int cells = 2);
 
 /// An empty folder that goes when the test ends.
 class Folder {

@@ -1,5 +1,5 @@
-// Writes files for the tests in Python: formats_sample_file FOLDER makes FOLDER/single.palpate.hdf,
-// FOLDER/double.palpate.hdf and FOLDER/recording.h5.
+// Writes files for the tests in Python: formats_sample_file FOLDER makes FOLDER/ELEMENT.palpate.hdf of every
+// kind of element, FOLDER/single.palpate.hdf (tet4 in single precision) and FOLDER/recording.h5.
 #include <array>
 #include <iostream>
 
@@ -13,8 +13,10 @@ int main(int count, char** arguments) {
   try {
     std::filesystem::create_directories(folder);
     palpate::test::write_sample(folder / "single.palpate.hdf", palpate::Precision::single_precision);
-    palpate::test::write_sample(folder / "double.palpate.hdf", palpate::Precision::double_precision);
-    palpate::RecordingWriter recording(folder / "recording.h5", "double.palpate.hdf", "00ff");
+    for (const palpate::ElementType element : palpate::body_elements)
+      palpate::test::write_sample(folder / (std::string(palpate::traits(element).name) + ".palpate.hdf"),
+                                  palpate::Precision::double_precision, element);
+    palpate::RecordingWriter recording(folder / "recording.h5", "tet4.palpate.hdf", "00ff");
     for (int i = 0; i < 5000; ++i) {
       const double x = i;
       recording.append(std::array{palpate::TickRecord{.time = 1e-3 * x,

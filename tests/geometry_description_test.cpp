@@ -13,6 +13,8 @@ using testing::TempFolder;
 
 const std::string material = "[material]\nyoungs_modulus = 1e4\npoissons_ratio = 0.3\n";
 const std::string fixed = "[[fixed]]\nlowest = {axis = \"z\", percent = 5}\n";
+const std::string fixed_y = "[[fixed]]\nlowest = {axis = \"y\", percent = 5}\n";
+const std::string rectangle = "[geometry]\nrectangle = {size = [1, 2], cells = [2, 3]}\n";
 const std::string box = "[geometry]\nbox = {size = [1, 2, 3], cells = [2, 3, 4]}\n";
 
 Description read(const TempFolder& folder, const std::string& text) {
@@ -30,11 +32,21 @@ TEST(Description, ReadsDefaults) {
   EXPECT_EQ(shape.origin, Vec3(0, 0, 0));
   EXPECT_EQ(shape.size, Vec3(1, 2, 3));
   EXPECT_EQ(shape.cells, (std::array<int, 3>{2, 3, 4}));
-  EXPECT_EQ(d.material.youngs_modulus, 1e4);
-  EXPECT_EQ(d.material.density, 1000.0);
+  EXPECT_EQ(d.analysis, Analysis::solid);
+  EXPECT_EQ(d.thickness, 1.0);
+  EXPECT_FALSE(d.mesh.element);
+  ASSERT_EQ(d.materials.size(), 1U);
+  EXPECT_EQ(d.materials[0].material.youngs_modulus, 1e4);
+  EXPECT_EQ(d.materials[0].material.density, 1000.0);
+  EXPECT_EQ(d.materials[0].material.initial_strain, (std::array<double, 6>{}));
+  EXPECT_TRUE(d.materials[0].regions.empty());
+  EXPECT_FALSE(d.materials[0].where);
   ASSERT_EQ(d.fixed.size(), 1U);
-  EXPECT_EQ(std::get<SelectLowest>(d.fixed[0]).axis, 2);
-  EXPECT_DOUBLE_EQ(std::get<SelectLowest>(d.fixed[0]).fraction, 0.05);
+  EXPECT_EQ(std::get<SelectLowest>(d.fixed[0].where).axis, 2);
+  EXPECT_DOUBLE_EQ(std::get<SelectLowest>(d.fixed[0].where).fraction, 0.05);
+  EXPECT_EQ(d.fixed[0].axes, 7);
+  EXPECT_EQ(d.fixed[0].displacement, Vec3(0, 0, 0));
+  EXPECT_TRUE(d.loads.empty());
   EXPECT_EQ(d.scope, Scope::layers);
   EXPECT_EQ(d.layers, 1);
   EXPECT_EQ(d.precision, Precision::single_precision);
@@ -49,7 +61,9 @@ image = "sub/../scan.inr.gz"
 labels = [255, 127]
 scale = 0.001
 [mesh]
+element = "tet10"
 mesher = "cgal"
+optimize = ["exude", "odt"]
 edge_length = 0.005
 grading = 0
 radius_edge = 3
@@ -58,16 +72,27 @@ facet_distance = 0.001
 youngs_modulus = 5000
 poissons_ratio = -0.25
 density = 1060
+initial_strain = [1, 2, 3, 4, 5, 6]
 [[fixed]]
 box = {min = [0, 1, 2], max = [3, 4, 5]}
 [[fixed]]
 half_space = {point = [1, 2, 3], normal = [0, 0, -1]}
+axes = "zx"
+displacement = [0.5, 0, -0.25]
 [[fixed]]
 sphere = {center = [1, 1, 1], radius = 0.5}
 [[fixed]]
 nodes = [0, 7]
 [[fixed]]
 tag = 3
+[[load]]
+nodal_force = [1, 2, 3]
+nodes = [4]
+[[load]]
+traction = [0, 0, -100]
+lowest = {axis = "y", percent = 50}
+[[load]]
+gravity = [0, 0, -9.81]
 [storage]
 scope = "surface"
 precision = "double"
@@ -75,19 +100,34 @@ precision = "double"
   const ImageGeometry& image = std::get<ImageGeometry>(d.geometry);
   EXPECT_EQ(image.file, folder.path() / "scan.inr.gz");
   EXPECT_EQ(image.labels, (std::vector<int>{255, 127}));
+  EXPECT_FALSE(image.regions);
   EXPECT_EQ(d.scale, 0.001);
+  EXPECT_EQ(d.mesh.element, ElementType::tet10);
+  EXPECT_EQ(d.mesh.mesher, Mesher::cgal);
+  EXPECT_TRUE(d.mesh.odt && d.mesh.exude);
+  EXPECT_FALSE(d.mesh.lloyd || d.mesh.perturb);
   EXPECT_EQ(d.mesh.edge_length, 0.005);
   EXPECT_EQ(d.mesh.grading, 0.0);
   EXPECT_EQ(d.mesh.radius_edge, 3.0);
   EXPECT_EQ(d.mesh.facet_distance, 0.001);
-  EXPECT_EQ(d.material.poissons_ratio, -0.25);
-  EXPECT_EQ(d.material.density, 1060.0);
+  const Material& made_of = d.materials.at(0).material;
+  EXPECT_EQ(made_of.poissons_ratio, -0.25);
+  EXPECT_EQ(made_of.density, 1060.0);
+  EXPECT_EQ(made_of.initial_strain, (std::array<double, 6>{1, 2, 3, 4, 5, 6}));
   ASSERT_EQ(d.fixed.size(), 5U);
-  EXPECT_EQ(std::get<SelectBox>(d.fixed[0]).max, Vec3(3, 4, 5));
-  EXPECT_EQ(std::get<SelectHalfSpace>(d.fixed[1]).normal, Vec3(0, 0, -1));
-  EXPECT_EQ(std::get<SelectSphere>(d.fixed[2]).radius, 0.5);
-  EXPECT_EQ(std::get<SelectNodes>(d.fixed[3]).nodes, (std::vector<Index>{0, 7}));
-  EXPECT_EQ(std::get<SelectTag>(d.fixed[4]).tag, 3);
+  EXPECT_EQ(std::get<SelectBox>(d.fixed[0].where).max, Vec3(3, 4, 5));
+  EXPECT_EQ(std::get<SelectHalfSpace>(d.fixed[1].where).normal, Vec3(0, 0, -1));
+  EXPECT_EQ(std::get<SelectSphere>(d.fixed[2].where).radius, 0.5);
+  EXPECT_EQ(std::get<SelectNodes>(d.fixed[3].where).nodes, (std::vector<Index>{0, 7}));
+  EXPECT_EQ(std::get<SelectTag>(d.fixed[4].where).tag, 3);
+  EXPECT_EQ(d.fixed[1].axes, 0b101);
+  EXPECT_EQ(d.fixed[1].displacement, Vec3(0.5, 0, -0.25));
+  ASSERT_EQ(d.loads.size(), 3U);
+  EXPECT_EQ(std::get<NodalForce>(d.loads[0]).force, Vec3(1, 2, 3));
+  EXPECT_EQ(std::get<SelectNodes>(std::get<NodalForce>(d.loads[0]).where).nodes, std::vector<Index>{4});
+  EXPECT_EQ(std::get<Traction>(d.loads[1]).traction, Vec3(0, 0, -100));
+  EXPECT_EQ(std::get<SelectLowest>(std::get<Traction>(d.loads[1]).where).axis, 1);
+  EXPECT_EQ(std::get<Gravity>(d.loads[2]).acceleration, Vec3(0, 0, -9.81));
   EXPECT_EQ(d.scope, Scope::surface);
   EXPECT_EQ(d.layers, 0);
   EXPECT_EQ(d.precision, Precision::double_precision);
@@ -109,6 +149,119 @@ TEST(Description, ReadsTheOtherGeometries) {
   EXPECT_EQ(cylinder.radius + cylinder.height + cylinder.cells_across + cylinder.cells_along, 12.0);
   const auto sphere = std::get<SphereShape>(geometry("sphere = {radius = 3, cells_across = 6}").geometry);
   EXPECT_EQ(sphere.radius + sphere.cells_across, 9.0);
+}
+
+TEST(Description, ReadsThePlane) {
+  const TempFolder folder;
+  const auto plane = [&](const std::string& top, const std::string& geometry) {
+    return read(folder, "name = \"p\"\n" + top + "\n[geometry]\n" + geometry + "\n" + material + fixed_y);
+  };
+  const Description plate = plane("plane = \"strain\"\nthickness = 0.02",
+                                  "rectangle = {origin = [1, 2], size = [3, 4], cells = [5, 6]}");
+  EXPECT_EQ(plate.analysis, Analysis::plane_strain);
+  EXPECT_EQ(plate.thickness, 0.02);
+  const auto& shape = std::get<RectangleShape>(plate.geometry);
+  EXPECT_EQ(shape.origin, Vec3(1, 2, 0));
+  EXPECT_EQ(shape.size, Vec3(3, 4, 0));
+  EXPECT_EQ(shape.cells, (std::array<int, 2>{5, 6}));
+  EXPECT_EQ(plate.fixed.at(0).axes, 3);
+  EXPECT_EQ(std::get<SelectLowest>(plate.fixed[0].where).axis, 1);
+
+  const Description frame = plane("plane = \"stress\"",
+                                  "polygon = {points = [[0, 0], [9, 0], [0, 9]], "
+                                  "holes = [[[1, 1], [2, 1], [1, 2]], [[3, 3], [4, 3], [3, 4.5]]]}\n"
+                                  "[mesh]\nedge_length = 1\noptimize = [\"lloyd\"]");
+  EXPECT_EQ(frame.analysis, Analysis::plane_stress);
+  EXPECT_EQ(frame.thickness, 1.0);
+  const auto& polygon = std::get<PolygonGeometry>(frame.geometry);
+  EXPECT_EQ(polygon.points, (std::vector<Vec3>{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}}));
+  ASSERT_EQ(polygon.holes.size(), 2U);
+  EXPECT_EQ(polygon.holes[1].at(2), Vec3(3, 4.5, 0));
+  EXPECT_TRUE(frame.mesh.lloyd);
+  EXPECT_FALSE(frame.mesh.odt || frame.mesh.perturb || frame.mesh.exude);
+
+  const Description picture =
+      plane("plane = \"stress\"", "picture = \"body.png\"\nscale = 0.001\n[mesh]\nedge_length = 1");
+  EXPECT_EQ(std::get<PictureGeometry>(picture.geometry).file, folder.path() / "body.png");
+  EXPECT_FALSE(picture.mesh.lloyd);
+  EXPECT_TRUE(
+      std::holds_alternative<VolumeGeometry>(plane("plane = \"stress\"", "volume = \"plate.msh\"").geometry));
+}
+
+TEST(Description, ReadsVectorsOfThePlane) {
+  const TempFolder folder;
+  const Description d = read(folder, "name = \"p\"\nplane = \"stress\"\n" + rectangle + material +
+                                         "initial_strain = [1, 2, 3, 4]\n" + R"(
+[[fixed]]
+box = {min = [0, 1], max = [2, 3]}
+axes = "y"
+displacement = [0, 0.5]
+[[fixed]]
+half_space = {point = [1, 2], normal = [0, 1]}
+[[fixed]]
+sphere = {center = [3, 4], radius = 5}
+[[load]]
+gravity = [0, -9.81]
+)");
+  EXPECT_EQ(d.materials.at(0).material.initial_strain, (std::array<double, 6>{1, 2, 3, 4, 0, 0}));
+  EXPECT_EQ(std::get<SelectBox>(d.fixed.at(0).where).max, Vec3(2, 3, 0));
+  EXPECT_EQ(d.fixed[0].axes, 2);
+  EXPECT_EQ(d.fixed[0].displacement, Vec3(0, 0.5, 0));
+  EXPECT_EQ(std::get<SelectHalfSpace>(d.fixed.at(1).where).normal, Vec3(0, 1, 0));
+  EXPECT_EQ(std::get<SelectSphere>(d.fixed.at(2).where).center, Vec3(3, 4, 0));
+  EXPECT_EQ(std::get<Gravity>(d.loads.at(0)).acceleration, Vec3(0, -9.81, 0));
+}
+
+TEST(Description, ReadsMaterials) {
+  const TempFolder folder;
+  const Description d = read(folder, R"(
+name = "nodule"
+geometry.image = "scan.inr"
+mesh.edge_length = 1
+[[material]]
+youngs_modulus = 1
+poissons_ratio = 0.1
+regions = [127, 85]
+[[material]]
+youngs_modulus = 2
+poissons_ratio = 0.2
+sphere = {center = [0, 0, 1], radius = 2}
+[[material]]
+youngs_modulus = 3
+poissons_ratio = 0.3
+)" + fixed);
+  ASSERT_EQ(d.materials.size(), 3U);
+  EXPECT_EQ(d.materials[0].regions, (std::vector<Index>{127, 85}));
+  EXPECT_EQ(d.materials[1].material.youngs_modulus, 2.0);
+  EXPECT_EQ(std::get<SelectSphere>(d.materials[1].where.value()).radius, 2.0);
+  EXPECT_TRUE(d.materials[2].regions.empty() && !d.materials[2].where);
+  EXPECT_TRUE(std::get<ImageGeometry>(d.geometry).regions);
+}
+
+TEST(Description, ReadsElementsAndMeshers) {
+  const TempFolder folder;
+  const auto options = [&](const std::string& geometry, const std::string& mesh) {
+    return read(folder,
+                "name = \"e\"\n[geometry]\n" + geometry + "\n[mesh]\n" + mesh + "\n" + material + fixed)
+        .mesh;
+  };
+  const std::string surface = "surface = \"a.off\"", image = "image = \"a.inr\"";
+  EXPECT_EQ(options(surface, "").mesher, Mesher::tetgen);
+  const MeshOptions cgal = options(surface, "mesher = \"cgal\"\nfeature_angle = 30\nfacet_distance = 2");
+  EXPECT_EQ(cgal.mesher, Mesher::cgal);
+  EXPECT_EQ(cgal.feature_angle, 30.0);
+  EXPECT_EQ(cgal.facet_distance, 2.0);
+  EXPECT_TRUE(cgal.perturb && cgal.exude);
+  EXPECT_FALSE(cgal.odt || cgal.lloyd);
+  const MeshOptions plain = options(surface, "mesher = \"cgal\"\noptimize = []");
+  EXPECT_FALSE(plain.odt || plain.lloyd || plain.perturb || plain.exude);
+  EXPECT_EQ(options(image, "edge_length = 1").mesher, Mesher::cgal);
+  EXPECT_EQ(options(image, "edge_length = 1\nmesher = \"tetgen\"\nmin_dihedral = 5").mesher, Mesher::tetgen);
+  EXPECT_EQ(options("box = {size = [1, 1, 1], cells = [1, 1, 1]}", "element = \"hex8\"").element,
+            ElementType::hex8);
+  EXPECT_EQ(options("sphere = {radius = 1, cells_across = 2}", "element = \"tet10\"").element,
+            ElementType::tet10);
+  EXPECT_EQ(options("volume = \"a.msh\"", "element = \"tet4\"").element, ElementType::tet4);
 }
 
 struct BadCase {
@@ -138,6 +291,23 @@ std::string with_storage(const std::string& lines) {
 }
 std::string with_image_mesh(const std::string& lines) {
   return with_geometry("image = \"i.inr\"\n[mesh]\n" + lines);
+}
+std::string with_surface_mesh(const std::string& lines) {
+  return with_geometry("surface = \"a.off\"\n[mesh]\n" + lines);
+}
+/// Line 4 is the geometry.
+std::string in_plane(const std::string& geometry, const std::string& fixing = fixed_y) {
+  return "name = \"a\"\nplane = \"stress\"\n[geometry]\n" + geometry + "\n" + material + fixing;
+}
+std::string in_plate(const std::string& fixing) {
+  return in_plane("rectangle = {size = [1, 2], cells = [2, 3]}", fixing);
+}
+std::string with_materials(const std::string& first, const std::string& second) {
+  const std::string entry = "[[material]]\nyoungs_modulus = 1\npoissons_ratio = 0.3\n";
+  return "name = \"a\"\n" + box + entry + first + "\n" + entry + second + "\n" + fixed;
+}
+std::string with_load(const std::string& lines) {
+  return "name = \"a\"\n" + box + material + fixed + "[[load]]\n" + lines + "\n";
 }
 
 const BadCase bad_cases[] = {
@@ -194,9 +364,103 @@ const BadCase bad_cases[] = {
     {"DistanceOfSurface",
      with_geometry("surface = \"a.off\"\n[mesh]\nfacet_distance = 1"),
      {"facet_distance does not apply", "surface"}},
-    {"WrongMesher",
-     with_image_mesh("edge_length = 1\nmesher = \"tetgen\""),
-     {"model.toml:6:", "tetgen", "use mesher = \"cgal\""}},
+    {"UnknownMesher",
+     with_image_mesh("edge_length = 1\nmesher = \"netgen\""),
+     {"model.toml:6:10", "netgen", "\"cgal\" or \"tetgen\""}},
+    {"MesherOfBox",
+     with_geometry("box = {size = [1, 1, 1], cells = [1, 1, 1]}\n[mesh]\nmesher = \"cgal\""),
+     {"model.toml:5:10", "mesher does not apply", "box"}},
+    {"OptimizeOfTetgen",
+     with_surface_mesh("optimize = [\"odt\"]"),
+     {"model.toml:5:12", "optimize does not apply", "mesher \"tetgen\"", "set mesher = \"cgal\""}},
+    {"RemeshOfCgal",
+     with_surface_mesh("mesher = \"cgal\"\nremesh = true"),
+     {"model.toml:6:10", "remesh does not apply", "mesher \"cgal\"", "set mesher = \"tetgen\""}},
+    {"FeaturesOfImage",
+     with_image_mesh("edge_length = 1\nfeature_angle = 60"),
+     {"feature_angle does not apply", "image"}},
+    {"FeatureAngleTooLarge",
+     with_surface_mesh("mesher = \"cgal\"\nfeature_angle = 200"),
+     {"feature_angle must be from 0 to 180, not 200"}},
+    {"UnknownOptimization",
+     with_image_mesh("edge_length = 1\noptimize = [\"exude\", \"loyd\"]"),
+     {"model.toml:6:22", "\"loyd\"", "\"lloyd\" of odt, lloyd, perturb, exude"}},
+    {"OptimizeIsText",
+     with_image_mesh("edge_length = 1\noptimize = \"odt\""),
+     {"model.toml:6:12", "optimize must be [a list of texts]"}},
+    {"OdtAndLloyd",
+     with_image_mesh("edge_length = 1\noptimize = [\"lloyd\", \"odt\"]"),
+     {"model.toml:6:12", "both \"odt\" and \"lloyd\""}},
+    {"ElementUnknown",
+     with_image_mesh("element = \"tet5\""),
+     {"model.toml:5:11", "tet5", "\"tet4\" or \"tet10\""}},
+    {"ElementOfImage",
+     with_image_mesh("element = \"hex8\""),
+     {"model.toml:5:11", "hex8", "image", "\"tet4\" or \"tet10\""}},
+    {"ElementOfBox",
+     with_geometry("box = {size = [1, 1, 1], cells = [1, 1, 1]}\n[mesh]\nelement = \"quad4\""),
+     {"quad4", "box", "\"tet4\", \"tet10\" or \"hex8\""}},
+    {"ElementIsFacet",
+     with_geometry("volume = \"a.msh\"\n[mesh]\nelement = \"tri6\""),
+     {"tri6", "volume", "\"tri3\""}},
+    {"PlaneMissing",
+     "name = \"a\"\n" + rectangle + material + fixed_y,
+     {"plane is missing", "rectangle", "\"strain\""}},
+    {"PlaneOfBox",
+     "name = \"a\"\nplane = \"stress\"\n" + box + material + fixed,
+     {"model.toml:2:9", "box", "in space"}},
+    {"PlaneUnknown",
+     "name = \"a\"\nplane = \"sterss\"\n" + rectangle + material + fixed_y,
+     {"model.toml:2:9", "\"sterss\"", "\"stress\" or \"strain\""}},
+    {"ThicknessOfBox",
+     "name = \"a\"\nthickness = 1\n" + box + material + fixed,
+     {"model.toml:2:13", "thickness", "in space"}},
+    {"ThicknessZero",
+     "name = \"a\"\nplane = \"stress\"\nthickness = 0\n" + rectangle + material + fixed_y,
+     {"model.toml:3:13", "thickness must be greater than 0"}},
+    {"RectangleInSpace",
+     in_plane("rectangle = {size = [1, 1, 1], cells = [1, 1]}"),
+     {"model.toml:4:21", "size must be [two numbers]"}},
+    {"RectangleCellsZero",
+     in_plane("rectangle = {size = [1, 1], cells = [0, 1]}"),
+     {"cells must be at least 1, not 0"}},
+    {"RectangleSizeZero",
+     in_plane("rectangle = {size = [1, 0], cells = [1, 1]}"),
+     {"size must be greater than 0"}},
+    {"PolygonOfTwo",
+     in_plane("polygon = {points = [[0, 0], [1, 1]]}"),
+     {"model.toml:4:21", "at least three points"}},
+    {"PolygonInSpace",
+     in_plane("polygon = {points = [[0, 0], [1, 1], [0, 1, 0]]}"),
+     {"model.toml:4:38", "points [x, y]"}},
+    {"PolygonOfTexts",
+     in_plane("polygon = {points = [[0, 0], [1, 1], [0, \"1\"]]}"),
+     {"model.toml:4:42", "points must be a number"}},
+    {"HolesAreNotNested",
+     in_plane("polygon = {points = [[0, 0], [1, 1], [0, 1]], holes = [[0, 0], [1, 1], [0, 1]]}"),
+     {"holes must be a list of at least three points"}},
+    {"PolygonWithoutEdge",
+     in_plane("polygon = {points = [[0, 0], [1, 1], [0, 1]]}"),
+     {"model.toml", "no edge_length"}},
+    {"PictureWithoutEdge", in_plane("picture = \"a.png\""), {"no edge_length"}},
+    {"PictureOfQuads",
+     in_plane("picture = \"a.png\"\n[mesh]\nedge_length = 1\nelement = \"quad4\""),
+     {"model.toml:7:11", "quad4", "picture", "use \"tri3\""}},
+    {"OdtInThePlane",
+     in_plane("picture = \"a.png\"\n[mesh]\nedge_length = 1\noptimize = [\"odt\"]"),
+     {"model.toml:7:13", "\"odt\"", "\"lloyd\" only"}},
+    {"RadiusEdgeInThePlane",
+     in_plane("picture = \"a.png\"\n[mesh]\nedge_length = 1\nradius_edge = 2"),
+     {"radius_edge does not apply", "picture", "grading"}},
+    {"SelectionOfThree",
+     in_plate("[[fixed]]\nbox = {min = [0, 0, 0], max = [1, 1, 1]}"),
+     {"model.toml:9:14", "[[fixed]] box min must be [two numbers]"}},
+    {"LowestZInThePlane",
+     in_plate("[[fixed]]\nlowest = {axis = \"z\", percent = 5}"),
+     {"model.toml:9:18", "\"z\"", "\"x\" or \"y\""}},
+    {"AxesInThePlane",
+     in_plate("[[fixed]]\nnodes = [1]\naxes = \"z\""),
+     {"model.toml:10:8", "axes is \"z\"", "\"xy\""}},
     {"ImageWithoutEdge", with_image_mesh("grading = 1"), {"model.toml", "no edge_length"}},
     {"RemeshWithoutEdge", with_geometry("surface = \"a.off\"\n[mesh]\nremesh = true"), {"no edge_length"}},
     {"RemeshIsText",
@@ -228,11 +492,67 @@ const BadCase bad_cases[] = {
     {"DensityZero",
      with_material("youngs_modulus = 1\npoissons_ratio = 0\ndensity = 0"),
      {"density must be greater than 0"}},
+    {"InitialStrainOfThree",
+     with_material("youngs_modulus = 1\npoissons_ratio = 0\ninitial_strain = [0, 0, 0]"),
+     {"model.toml:7:18", "initial_strain must be [six numbers]"}},
+    {"InitialStrainInThePlane",
+     in_plate("initial_strain = [0, 0, 0]\n" + fixed_y),
+     {"model.toml:8:18", "initial_strain must be [four numbers]"}},
+    {"NoMaterial", "name = \"a\"\n" + box + fixed, {"material is missing"}},
+    {"MaterialsEmpty",
+     "name = \"a\"\nmaterial = []\n" + box + fixed,
+     {"model.toml:2:12", "at least one table", "[[material]]"}},
+    {"MaterialIsNumber",
+     "name = \"a\"\nmaterial = [1]\n" + box + fixed,
+     {"model.toml:2:13", "must be a table"}},
+    {"TwoRests",
+     with_materials("", ""),
+     {"model.toml:8:1", "[[material]] number 2 is for the rest", "number 1", "regions"}},
+    {"TwoClaims",
+     with_materials("regions = [1]\nlowest = {axis = \"z\", percent = 5}", ""),
+     {"model.toml:8:10", "[[material]] has both regions and lowest"}},
+    {"NoRegions", with_materials("regions = []", ""), {"model.toml:7:11", "regions is empty"}},
+    {"MaterialByTag",
+     with_materials("tag = 1", ""),
+     {"model.toml:7:1", "\"tag\"", "regions, box, half_space"}},
+    {"SecondMaterialIncompressible",
+     "name = \"a\"\n" + box + "[[material]]\nyoungs_modulus = 1\npoissons_ratio = 0.3\nregions = [1]\n" +
+         "[[material]]\nyoungs_modulus = 1\npoissons_ratio = 0.5\n" + fixed,
+     {"model.toml:10:18", "between -1 and 1/2"}},
     {"NotFixed", with_fixed(""), {"no region is fixed", "[[fixed]]"}},
-    {"FixedEmpty", "name = \"a\"\nfixed = []\n" + box + material, {"model.toml:2:", "at least one region"}},
-    {"FixedSaysNothing", with_fixed("[[fixed]]"), {"[[fixed]] says nothing", "half_space"}},
+    {"FixedEmpty", "name = \"a\"\nfixed = []\n" + box + material, {"model.toml:2:", "at least one table"}},
+    {"FixedSaysNothing", with_fixed("[[fixed]]"), {"[[fixed]] has none of box", "half_space"}},
     {"FixedTwoKinds", with_fixed("[[fixed]]\ntag = 1\nnodes = [1]"), {"both nodes and tag"}},
     {"FixedUnknown", with_fixed("[[fixed]]\nplane = 1"), {"model.toml:8:1", "\"plane\""}},
+    {"FixedIsTable",
+     with_fixed("[fixed]\nnodes = [1]"),
+     {"model.toml:7:1", "list of at least one table", "[[fixed]]"}},
+    {"AxesUnknown",
+     with_fixed("[[fixed]]\nnodes = [1]\naxes = \"xw\""),
+     {"model.toml:9:8", "\"xw\"", "\"xyz\""}},
+    {"AxesEmpty", with_fixed("[[fixed]]\nnodes = [1]\naxes = \"\""), {"axes is \"\""}},
+    {"MovedAlongFreeAxis",
+     with_fixed("[[fixed]]\nnodes = [1]\naxes = \"xz\"\ndisplacement = [0, 0.1, 0]"),
+     {"model.toml:10:16", "along y is 0.1", "axes \"xz\"", "add y"}},
+    {"MovedInThePlane",
+     in_plate("[[fixed]]\nnodes = [1]\ndisplacement = [0, 0.1, 0]"),
+     {"model.toml:10:16", "displacement must be [two numbers]"}},
+    {"LoadSaysNothing", with_load(""), {"model.toml:9:1", "none of nodal_force, traction, gravity"}},
+    {"LoadOfTwoKinds",
+     with_load("traction = [1, 0, 0]\ngravity = [1, 0, 0]"),
+     {"model.toml:11:11", "both traction and gravity"}},
+    {"LoadUnknown", with_load("pressure = 1"), {"model.toml:10:1", "\"pressure\""}},
+    {"LoadNowhere", with_load("nodal_force = [1, 0, 0]"), {"model.toml:9:1", "none of box", "lowest"}},
+    {"LoadTwice",
+     with_load("traction = [1, 0, 0]\ntag = 1\nnodes = [1]"),
+     {"model.toml:11:7", "both nodes and tag"}},
+    {"GravitySomewhere",
+     with_load("gravity = [0, 0, -9.81]\ntag = 1"),
+     {"model.toml:11:7", "gravity acts on the whole body", "remove tag"}},
+    {"GravityIsNumber", with_load("gravity = 9.81"), {"model.toml:10:11", "gravity must be [three numbers]"}},
+    {"LoadIsTable",
+     "name = \"a\"\n" + box + material + fixed + "[load]\ngravity = [0, 0, 1]\n",
+     {"model.toml:9:1", "list of at least one table", "[[load]]"}},
     {"BoxReversed",
      with_fixed("[[fixed]]\nbox = {min = [0, 0, 1], max = [1, 1, 0]}"),
      {"min is greater than max"}},

@@ -161,17 +161,18 @@ CELL_TYPES 2
 10 10
 )";
 
+const std::vector<Index> two_tetrahedra = {0, 1, 2, 3, 1, 2, 3, 4};
+
 void expect_two_tetrahedra(const Mesh& mesh, bool has_regions, bool has_tags) {
   ASSERT_EQ(mesh.nodes.size(), 5u);
   EXPECT_EQ(mesh.nodes[1], Vec3(1.5, 0, 0));
   EXPECT_EQ(mesh.nodes[2], Vec3(0, 1, 0));
   EXPECT_EQ(mesh.nodes[4], Vec3(1, 1, 1));
-  EXPECT_EQ(mesh.tets, (std::vector<Tet>{{0, 1, 2, 3}, {1, 2, 3, 4}}));
+  EXPECT_EQ(mesh.element, ElementType::tet4);
+  EXPECT_EQ(mesh.connectivity, two_tetrahedra);
   EXPECT_EQ(mesh.regions, has_regions ? (std::vector<Index>{7, 8}) : (std::vector<Index>{0, 0}));
-  ASSERT_EQ(mesh.tagged_boundary.size(), has_tags ? 1u : 0u);
-  if (!has_tags) return;
-  EXPECT_EQ(mesh.tagged_boundary[0].nodes, (Triangle{0, 2, 1}));
-  EXPECT_EQ(mesh.tagged_boundary[0].tag, 5);
+  EXPECT_EQ(mesh.tagged_facets, has_tags ? (std::vector<Index>{0, 2, 1}) : std::vector<Index>{});
+  EXPECT_EQ(mesh.facet_tags, has_tags ? std::vector<Index>{5} : std::vector<Index>{});
 }
 
 std::string with_windows_line_ends(const std::string& text) {
@@ -224,7 +225,8 @@ TEST(VolumeMesh, NumbersDoNotDependOnTheLocale) {
   const test::ScratchFolder folder;
   const std::locale before = std::locale::global(std::locale(std::locale::classic(), new DecimalComma));
   const Mesh mesh = read_volume_mesh(folder.write("a.msh", gmsh2));
-  write_vtu(folder.path() / "a.vtu", std::vector<Vec3>(1234, Vec3::Zero()), mesh.tets, {}, {});
+  write_vtu(folder.path() / "a.vtu", std::vector<Vec3>(1234, Vec3::Zero()), mesh.element, mesh.connectivity,
+            {});
   std::locale::global(before);
   EXPECT_EQ(mesh.nodes[1].x(), 1.5);
   std::ifstream vtu(folder.path() / "a.vtu", std::ios::binary);
@@ -257,21 +259,26 @@ TEST(VolumeMesh, SpoiledFilesAreRefusedWithTheirLine) {
       {"a.msh", &gmsh2, "$Nodes\n5", "$Nodes\n99999999999999999999", 9, "'99999999999999999999'"},
       {"a.msh", &gmsh2, "$Nodes\n5", "$Nodes\n-5", 9, "-5"},
       {"a.msh", &gmsh2, "1 9 40 3\n", "1 9 40 77\n", 21, "node 77 does not exist"},
-      {"a.msh", &gmsh2, "5 4 2 8 1 9 40 3 4", "5 5 2 8 1 9 40 3 4 1 9 40 3", 22, "only linear tetrahedra"},
-      {"a.msh", &gmsh2, "5 4 2 8 1", "5 11 2 8 1", 22, "type 11"},
+      {"a.msh", &gmsh2, "5 4 2 8 1 9 40 3 4", "5 5 2 8 1 9 40 3 4 1 9 40 3", 23, "1 tet4 and 1 hex8"},
+      {"a.msh", &gmsh2, "5 4 2 8 1", "5 6 2 8 1", 22, "type 6"},
+      {"a.msh", &gmsh2, "5 4 2 8 1 9 40 3 4", "5 11 2 8 1 9 40 3 4", 23, "where a node number"},
       {"a.msh", &gmsh2, "$EndElements\n", "", 23, "$EndElements"},
       {"a.msh", &gmsh2, "$EndPhysicalNames", "$EndOther", 24, "$EndPhysicalNames"},
       {"a.msh", &gmsh2, "4 4 2 7 1 1 9 40 3\n5 4 2 8 1 9 40 3 4", "4 15 2 0 1 1\n5 15 2 0 1 3", 23,
-       "no tetrahedra"},
+       "surface of 1 tri3"},
+      {"a.msh", &gmsh2, "3 2 2 5 1 1 40 9\n4 4 2 7 1 1 9 40 3\n5 4 2 8 1 9 40 3 4",
+       "3 15 2 0 1 1\n4 15 2 0 1 1\n5 15 2 0 1 3", 23, "no elements that a body"},
+      {"a.msh", &gmsh2, "3 2 2 5 1 1 40 9", "3 3 2 5 1 1 40 9 3", 23, "1 quad4 facets"},
       // Gmsh 4.1
       {"b.msh", &gmsh4, "2 5 1 40", "2 6 1 40", 25, "5 nodes, not 6"},
       {"b.msh", &gmsh4, "4 4 1 5", "4 3 1 5", 36, "4 elements, not 3"},
       {"b.msh", &gmsh4, "5 9 40 3 4", "5 9 40 3 400", 36, "node 400 does not exist"},
-      {"b.msh", &gmsh4, "3 2 4 1\n", "3 2 11 1\n", 35, "type 11"},
+      {"b.msh", &gmsh4, "3 2 4 1\n", "3 2 7 1\n", 35, "type 7"},
       {"b.msh", &gmsh4, "2 1 2 1\n3 1 40 9", "4 1 2 1\n3 1 40 9", 31, "4, which is not in 0 to 3"},
       {"b.msh", &gmsh4, "1 1 1 1 7 1 1\n", "1 1 1 2147483648 7 1 1\n", 9, "2147483648"},
       // Medit
-      {"a.mesh", &medit, "Dimension\n3", "Dimension\n2", 3, "not three-dimensional"},
+      {"a.mesh", &medit, "Dimension\n3", "Dimension\n4", 3, "4, which is not in 2 to 3"},
+      {"a.mesh", &medit, "Dimension\n3", "Dimension\n2", 9, "where a keyword"},
       {"a.mesh", &medit, "MeshVersionFormatted", "OFF", 1, "'OFF'"},
       {"a.mesh", &medit, "1.5 0 0 1", "1.5 0 inf 1", 8, "finite"},
       {"a.mesh", &medit, "Vertices\n5", "Vertices\n4", 11, "where a keyword"},
@@ -279,8 +286,11 @@ TEST(VolumeMesh, SpoiledFilesAreRefusedWithTheirLine) {
       {"a.mesh", &medit, "2 3 4 5 8", "2 3 4 6 8", 26, "6, which is not in 1 to 5"},
       {"a.mesh", &medit, "2 3 4 5 8", "2 3 4 0 8", 26, "0, which is not in 1 to 5"},
       {"a.mesh", &medit, "1 3 2 5", "1 3 x 5", 17, "'x'"},
-      {"a.mesh", &medit, "Tetrahedra", "Hexahedra", 24, "only linear tetrahedra"},
-      {"a.mesh", &medit, "Tetrahedra\n2\n1 2 3 4 7\n2 3 4 5 8\n", "", 23, "no tetrahedra"},
+      {"a.mesh", &medit, "Tetrahedra", "TetrahedraP2", 24, "TetrahedraP2, which are not read"},
+      {"a.mesh", &medit, "Tetrahedra\n2\n1 2 3 4 7\n",
+       "Tetrahedra\n1\n1 2 3 4 7\nHexahedra\n1\n1 2 3 4 5 1 2 3 0\nPrisms 1\n", 28, "Prisms"},
+      {"a.mesh", &medit, "End\n", "Hexahedra\n1\n1 2 3 4 5 1 2 3 0\n", 29, "2 tet4 and 1 hex8"},
+      {"a.mesh", &medit, "Tetrahedra\n2\n1 2 3 4 7\n2 3 4 5 8\n", "", 23, "surface of 2 tri3"},
       {"a.mesh", &medit, "2 3 4 5 8\nEnd\n", "2 3 4 5\n\n\n\n", 30, "file ends where"},
       // VTK
       {"a.vtk", &vtk, "# vtk DataFile", "# not DataFile", 1, "vtk DataFile Version"},
@@ -291,7 +301,8 @@ TEST(VolumeMesh, SpoiledFilesAreRefusedWithTheirLine) {
       {"a.vtk", &vtk, "4 1 2 3 4", "4 1 2 3 -1", 11, "-1, which is not in 0 to 4"},
       {"a.vtk", &vtk, "CELL_TYPES 3\n10\n5", "CELL_TYPES 3\n10\n10", 14,
        "cell 1 has 3 nodes, but its type is 10"},
-      {"a.vtk", &vtk, "CELL_TYPES 3\n10\n5", "CELL_TYPES 3\n24\n5", 13, "type 24"},
+      {"a.vtk", &vtk, "CELL_TYPES 3\n10\n5", "CELL_TYPES 3\n13\n5", 13, "type 13"},
+      {"a.vtk", &vtk, "CELL_TYPES 3\n10\n5", "CELL_TYPES 3\n24\n5", 13, "its type is 24, which has 10"},
       {"a.vtk", &vtk, "CELL_TYPES 3", "CELL_TYPES 2", 12, "2 cell types for 3 cells"},
       {"a.vtk", &vtk, "POINTS 5", "POINTS 6", 8, "'CELLS' stands where a coordinate"},
       {"a.vtk", &vtk, "CELL_TYPES 3", "POINTS 1 double\n0 0 0\nCELL_TYPES 3", 12, "POINTS stands twice"},
@@ -300,7 +311,7 @@ TEST(VolumeMesh, SpoiledFilesAreRefusedWithTheirLine) {
       {"b.vtk", &vtk5, "0 4 8", "0 9 8", 16, "9, which is not in 0 to 8"},
       {"b.vtk", &vtk5, "3 1 2 3 4\n", "3 1 2 3 8\n", 18, "8, which is not in 0 to 4"},
       {"b.vtk", &vtk5, "0 4 8", "0 3 8", 20, "cell 0 has 3 nodes"},
-      {"b.vtk", &vtk5, "METADATA\nINFORMATION 0\n\n", "METADATA\n", 19, "no tetrahedra"},
+      {"b.vtk", &vtk5, "METADATA\nINFORMATION 0\n\n", "METADATA\n", 19, "no elements"},
   };
   const test::ScratchFolder folder;
   for (const Spoiled& bad : cases) {
@@ -329,9 +340,10 @@ TEST(VolumeMesh, SpoiledTetgenFilesAreRefusedWithTheirLine) {
       {&node, "1  0 0 0", "2  0 0 0", "a.node:3", "first node number is 2"},
       {&node, "3  0 1 0", "4  0 1 0", "a.node:5", "next node number is 4"},
       {&node, "3  0 1 0", "3  0 inf 0", "a.node:5", "finite"},
-      {&ele, "2  4  1", "2  10  1", "a.ele:1", "only linear tetrahedra"},
+      {&ele, "2  4  1", "2  8  1", "a.ele:1", "elements of 8 nodes"},
+      {&ele, "2  4  1", "2  10  1", "a.ele:2", "8.0"},
       {&ele, "2  4  1", "3  4  1", "a.ele:5", "file ends"},
-      {&ele, "2  4  1", "0  4  1", "a.ele:1", "no tetrahedra"},
+      {&ele, "2  4  1", "0  4  1", "a.ele:1", "surface of 1 tri3"},
       {&ele, "1 2 3 4", "1 2 3 6", "a.ele:2", "6, which is not in 1 to 5"},
       {&ele, "8.0", "8.5", "a.ele:3", "not a whole number"},
       {&face, "1 3 2", "1 3 0", "a.face:2", "0, which is not in 1 to 5"},
@@ -366,7 +378,7 @@ TEST(VolumeMesh, FilesCutShortAnywhereAreNeverMisread) {
       try {
         const Mesh mesh = read_volume_mesh(file);
         EXPECT_EQ(mesh.nodes.size(), 5u) << name << " cut to " << length;
-        EXPECT_EQ(mesh.tets, (std::vector<Tet>{{0, 1, 2, 3}, {1, 2, 3, 4}})) << name << " cut to " << length;
+        EXPECT_EQ(mesh.connectivity, two_tetrahedra) << name << " cut to " << length;
       } catch (const Error& error) {
         ++refused;
         EXPECT_TRUE(contains(error.where(), name)) << error.where();

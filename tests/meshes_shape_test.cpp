@@ -1,4 +1,4 @@
-// Generated bodies, their surfaces and their quality.
+// Generated bodies, and the same bodies in other kinds of elements.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -6,13 +6,13 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
+#include <set>
 
 #include "meshes/check.h"
-#include "meshes/generate.h"
+#include "meshes/element.h"
 #include "meshes/quality.h"
 #include "meshes/surface.h"
-#include "meshes/tet4.h"
+#include "tests/meshes_bodies.h"
 #include "tests/meshes_files.h"
 
 namespace palpate {
@@ -21,31 +21,25 @@ namespace {
 using std::numbers::pi;
 using test::contains;
 using test::error_of;
+using test::node_of;
 
-const Vec3& node_of(const Mesh& mesh, Index node) {
-  return mesh.nodes[static_cast<std::size_t>(node)];
-}
-
-/// Volume inside the surface by the divergence theorem.
-double enclosed_volume(const Mesh& mesh, const Surface& surface) {
+double volume_of(const Mesh& mesh) {
   double volume = 0.0;
-  for (const Triangle& t : surface.triangles) {
-    volume += node_of(mesh, t[0]).dot(node_of(mesh, t[1]).cross(node_of(mesh, t[2]))) / 6.0;
-  }
+  for (Index e = 0; e < mesh.elements(); ++e) volume += element_volume(mesh.element, element_nodes(mesh, e));
   return volume;
 }
 
-/// Every edge of a closed oriented surface is passed once in each direction.
-bool is_closed(const Surface& surface) {
-  std::map<std::pair<Index, Index>, int> passes;
-  for (const Triangle& t : surface.triangles) {
-    for (std::size_t i = 0; i < 3; ++i) ++passes[{t[i], t[(i + 1) % 3]}];
+TEST(Shapes, EveryKindFillsTheBlockWithPositiveElements) {
+  for (const ElementType type : body_elements) {
+    SCOPED_TRACE(traits(type).name);
+    const Mesh mesh = test::block(type);
+    EXPECT_EQ(mesh.element, type);
+    EXPECT_EQ(mesh.regions, std::vector<Index>(static_cast<std::size_t>(mesh.elements()), 0));
+    EXPECT_NEAR(volume_of(mesh), test::block_volume(type), 1e-15);
+    for (Index e = 0; e < mesh.elements(); ++e) {
+      EXPECT_GT(smallest_determinant(type, element_nodes(mesh, e)), 0.0);
+    }
   }
-  for (const auto& [edge, count] : passes) {
-    const auto back = passes.find({edge.second, edge.first});
-    if (count != 1 || back == passes.end() || back->second != 1) return false;
-  }
-  return true;
 }
 
 TEST(Box, OneCellIsSixTetrahedraAlongTheDiagonal) {
@@ -54,63 +48,49 @@ TEST(Box, OneCellIsSixTetrahedraAlongTheDiagonal) {
   for (int node = 0; node < 8; ++node) {  // x fastest, then y, then z
     EXPECT_EQ(node_of(mesh, node), Vec3(node & 1, (node >> 1) & 1, node >> 2));
   }
-  ASSERT_EQ(mesh.tets.size(), 6u);
-  for (const Tet& tet : mesh.tets) {
+  ASSERT_EQ(mesh.elements(), 6);
+  for (Index e = 0; e < 6; ++e) {
+    const auto tet = mesh.element_nodes(e);
     EXPECT_EQ(std::count(tet.begin(), tet.end(), 0), 1);
     EXPECT_EQ(std::count(tet.begin(), tet.end(), 7), 1);
-    EXPECT_NEAR(tet4::volume(tet4::corners(mesh, tet)), 1.0 / 6.0, 1e-15);
+    EXPECT_NEAR(element_volume(ElementType::tet4, element_nodes(mesh, e)), 1.0 / 6.0, 1e-15);
   }
 }
 
-TEST(Box, PlaceSizeAndSurface) {
-  const Mesh mesh = generate(BoxShape{Vec3(-1, 2, 0.5), Vec3(0.3, 0.2, 0.7), {3, 2, 5}});
-  EXPECT_EQ(mesh.nodes.size(), 4u * 3u * 6u);
-  EXPECT_EQ(mesh.tets.size(), 6u * 3u * 2u * 5u);
-  EXPECT_EQ(mesh.regions.size(), mesh.tets.size());
-  EXPECT_LT((mesh.nodes.front() - Vec3(-1, 2, 0.5)).norm(), 1e-15);
-  EXPECT_LT((mesh.nodes.back() - Vec3(-0.7, 2.2, 1.2)).norm(), 1e-15);
-  const Surface surface = extract_surface(mesh);
-  EXPECT_EQ(surface.triangles.size(), 4u * (3u * 2u + 2u * 5u + 3u * 5u));
-  EXPECT_EQ(surface.nodes.size(), mesh.nodes.size() - 8);  // 2 x 1 x 4 inside
-  EXPECT_TRUE(std::is_sorted(surface.nodes.begin(), surface.nodes.end()));
-  EXPECT_TRUE(is_closed(surface));
-  EXPECT_NEAR(enclosed_volume(mesh, surface), 0.3 * 0.2 * 0.7, 1e-14);
+TEST(Box, OneHexahedronHasItsCornersInVtksOrder) {
+  const Mesh mesh = generate(BoxShape{}, ElementType::hex8);
+  EXPECT_EQ(mesh.connectivity, (std::vector<Index>{0, 1, 3, 2, 4, 5, 7, 6}));
 }
 
-TEST(Surface, AllFourFacesOfATetrahedronLookOutwards) {
-  Mesh mesh;
-  mesh.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  mesh.tets = {{0, 1, 2, 3}};
-  const Surface surface = extract_surface(mesh);
-  ASSERT_EQ(surface.triangles.size(), 4u);
-  const Vec3 centroid = Vec3::Constant(0.25);
-  for (const Triangle& t : surface.triangles) {
-    const Vec3 &a = node_of(mesh, t[0]), &b = node_of(mesh, t[1]), &c = node_of(mesh, t[2]);
-    EXPECT_GT((b - a).cross(c - a).dot(a - centroid), 0.0);
+TEST(Box, PlaceSizeAndNumbers) {
+  for (const ElementType type : {ElementType::tet4, ElementType::hex8}) {
+    const Mesh mesh = generate(BoxShape{Vec3(-1, 2, 0.5), Vec3(0.3, 0.2, 0.7), {3, 2, 5}}, type);
+    EXPECT_EQ(mesh.nodes.size(), 4u * 3u * 6u);
+    EXPECT_EQ(mesh.elements(), (type == ElementType::hex8 ? 1 : 6) * 3 * 2 * 5);
+    EXPECT_LT((mesh.nodes.front() - Vec3(-1, 2, 0.5)).norm(), 1e-15);
+    EXPECT_LT((mesh.nodes.back() - Vec3(-0.7, 2.2, 1.2)).norm(), 1e-15);
   }
 }
 
-TEST(Surface, LayersCountElementsFromTheSurface) {
-  const int m = 6;
-  const Mesh mesh = generate(BoxShape{Vec3::Zero(), Vec3::Constant(m), {m, m, m}});
-  const std::vector<Index> layers = layers_below_surface(mesh, extract_surface(mesh));
-  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
-    const Vec3& x = mesh.nodes[node];
-    EXPECT_EQ(layers[node], std::lround(std::min(x.minCoeff(), m - x.maxCoeff())));
-  }
+TEST(Rectangle, PlaceSizeAndRisingDiagonals) {
+  const RectangleShape shape{Vec3(-1, 2, 7), Vec3(0.3, 0.2, 9), {3, 2}};
+  const Mesh quads = generate(shape), triangles = generate(shape, ElementType::tri3);
+  EXPECT_EQ(quads.nodes, triangles.nodes);
+  ASSERT_EQ(quads.nodes.size(), 12u);
+  EXPECT_EQ(quads.nodes.front(), Vec3(-1, 2, 0));
+  EXPECT_LT((quads.nodes.back() - Vec3(-0.7, 2.2, 0)).norm(), 1e-15);
+  EXPECT_LT((quads.nodes[5] - Vec3(-0.9, 2.1, 0)).norm(), 1e-15);  // x fastest
+  ASSERT_EQ(quads.elements(), 6);
+  const auto first = quads.element_nodes(0);
+  EXPECT_EQ(std::vector<Index>(first.begin(), first.end()), (std::vector<Index>{0, 1, 5, 4}));
+  ASSERT_EQ(triangles.elements(), 12);
+  EXPECT_EQ(std::vector<Index>(triangles.connectivity.begin(), triangles.connectivity.begin() + 6),
+            (std::vector<Index>{0, 1, 5, 0, 5, 4}));
 }
 
-TEST(Surface, OverlappingElementsAreRefused) {
-  Mesh mesh;
-  mesh.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, -1}, {0, 0, 2}};
-  mesh.tets = {{0, 1, 2, 3}, {0, 2, 1, 4}};
-  EXPECT_EQ(extract_surface(mesh).triangles.size(), 6u);
-  mesh.tets.push_back({0, 1, 2, 5});
-  const Error three = error_of([&] { extract_surface(mesh); });
-  EXPECT_TRUE(contains(three.what(), "3 elements share the face of nodes 0, 1, 2")) << three.what();
-  mesh.tets = {{0, 1, 2, 3}, {0, 1, 2, 5}};
-  const Error overlap = error_of([&] { extract_surface(mesh); });
-  EXPECT_TRUE(contains(overlap.what(), "same side of the face of nodes 0, 1, 2")) << overlap.what();
+TEST(Shapes, KindsThatAShapeIsNotMadeOfAreRefused) {
+  EXPECT_TRUE(contains(error_of([] { generate(BoxShape{}, ElementType::tri3); }).what(), "tri3"));
+  EXPECT_TRUE(contains(error_of([] { generate(RectangleShape{}, ElementType::hex8); }).what(), "hex8"));
 }
 
 TEST(Cylinder, IsThePrismOverARegularPolygon) {
@@ -118,12 +98,8 @@ TEST(Cylinder, IsThePrismOverARegularPolygon) {
   const Mesh mesh = generate(shape);
   const double corners = 4.0 * shape.cells_across;
   const double volume = 0.5 * corners * std::sin(2 * pi / corners) * 0.05 * 0.05 * 0.2;
-  EXPECT_NEAR(measure_quality(mesh).volume, volume, 1e-12 * volume);
-  const Surface surface = extract_surface(mesh);
-  EXPECT_EQ(surface.triangles.size(),
-            std::size_t{2 * 32 * 5 + 2 * 2 * 64});  // any more would be a gap inside
-  EXPECT_TRUE(is_closed(surface));
-  EXPECT_NEAR(enclosed_volume(mesh, surface), volume, 1e-12 * volume);
+  EXPECT_NEAR(volume_of(mesh), volume, 1e-12 * volume);
+  EXPECT_EQ(extract_surface(mesh).count(), 2 * 32 * 5 + 2 * 2 * 64);  // any more would be a gap inside
   for (const Vec3& x : mesh.nodes) {
     EXPECT_LE(x.head<2>().norm(), 0.05 * (1 + 1e-14));
     EXPECT_GE(x.z(), 0.0);
@@ -137,10 +113,9 @@ TEST(Sphere, NodesAreOnItAndTheVolumeConvergesAtSecondOrder) {
   for (const int cells : {4, 8, 16}) {
     const Mesh mesh = generate(SphereShape{radius, cells});
     const Surface surface = extract_surface(mesh);
-    EXPECT_EQ(surface.triangles.size(), static_cast<std::size_t>(12 * cells * cells));
-    EXPECT_TRUE(is_closed(surface));
+    EXPECT_EQ(surface.count(), 12 * cells * cells);
     for (const Index node : surface.nodes) EXPECT_NEAR(node_of(mesh, node).norm(), radius, 1e-15);
-    const double error = exact - measure_quality(mesh).volume;
+    const double error = exact - volume_of(mesh);
     EXPECT_GT(error, 0.0);
     if (last_error > 0.0) {
       EXPECT_NEAR(last_error / error, 4.0, 0.2);
@@ -150,58 +125,103 @@ TEST(Sphere, NodesAreOnItAndTheVolumeConvergesAtSecondOrder) {
 }
 
 /// Angles stay away from 0 and 180 degrees however fine the grid is.
-TEST(Shapes, ElementsAreWellShapedAtEveryRefinement) {
+TEST(Shapes, BentElementsAreWellShapedAtEveryRefinement) {
   for (const int cells : {2, 4, 8, 16}) {
     Mesh cylinder = generate(CylinderShape{1.0, 2.0, cells, cells}),
          sphere = generate(SphereShape{1.0, cells});
     EXPECT_EQ(orient_elements(cylinder, ""), 0u);
     EXPECT_EQ(orient_elements(sphere, ""), 0u);
-    const QualityReport c = measure_quality(cylinder), s = measure_quality(sphere);
-    EXPECT_GT(c.min_dihedral, 28.0);
-    EXPECT_LT(c.max_dihedral, 122.0);
-    EXPECT_GT(c.min_radius_ratio, 0.6);
-    EXPECT_GT(s.min_dihedral, 28.0);
-    EXPECT_LT(s.max_dihedral, 122.0);
-    EXPECT_GT(s.min_radius_ratio, 0.6);
+    for (const Mesh* mesh : {&cylinder, &sphere}) {
+      const QualityReport report = measure_quality(*mesh);
+      EXPECT_GT(report.min_angle, 28.0);
+      EXPECT_LT(report.max_angle, 122.0);
+      EXPECT_GT(report.min_shape, 0.6);
+    }
   }
 }
 
-TEST(Quality, RegularTetrahedron) {
-  Mesh mesh;
-  mesh.nodes = {{0, 0, 0}, {0, 1, 1}, {1, 0, 1}, {1, 1, 0}};
-  mesh.tets = {{0, 1, 2, 3}};
-  if (tet4::volume(tet4::corners(mesh, mesh.tets[0])) < 0) std::swap(mesh.tets[0][2], mesh.tets[0][3]);
-  const QualityReport report = measure_quality(mesh);
-  const double angle = std::acos(1.0 / 3.0) * 180.0 / pi;  // 70.5288 degrees
-  EXPECT_NEAR(report.min_dihedral, angle, 1e-12);
-  EXPECT_NEAR(report.max_dihedral, angle, 1e-12);
-  EXPECT_NEAR(report.min_radius_ratio, 1.0, 1e-14);
-  EXPECT_NEAR(report.mean_radius_ratio, 1.0, 1e-14);
-  EXPECT_NEAR(report.min_edge, std::numbers::sqrt2, 1e-15);
-  EXPECT_NEAR(report.volume, 1.0 / 3.0, 1e-15);
-  EXPECT_EQ(report.dihedral_histogram[7], 6);
+Mesh tagged_box() {
+  Mesh mesh = generate(BoxShape{Vec3::Zero(), Vec3(3, 2, 4), {3, 2, 4}});
+  mesh.tagged_facets = {0, 1, 5, 0, 5, 4};  // on z = 0
+  mesh.facet_tags = {7, 8};
+  mesh.regions[3] = 5;
+  return mesh;
 }
 
-TEST(Quality, KuhnTetrahedronAndWorstElement) {
-  Mesh mesh = generate(BoxShape{Vec3::Zero(), Vec3(2, 1, 1), {2, 1, 1}});
-  const QualityReport report = measure_quality(mesh);
-  // Kuhn's tetrahedron: angles 45, 45, 60, 90, 90, 90; r_in = 1/(2 + 2 sqrt 2), R = sqrt(3)/2.
-  EXPECT_NEAR(report.min_dihedral, 45.0, 1e-12);
-  EXPECT_NEAR(report.max_dihedral, 90.0, 1e-12);
-  EXPECT_NEAR(report.min_radius_ratio, 3.0 / (2.0 + 2.0 * std::numbers::sqrt2) / (std::sqrt(3.0) / 2.0),
-              1e-14);
-  EXPECT_NEAR(report.min_edge, 1.0, 1e-15);
-  EXPECT_NEAR(report.max_edge, std::sqrt(3.0), 1e-15);
-  EXPECT_EQ(
-      std::accumulate(report.dihedral_histogram.begin(), report.dihedral_histogram.end(), std::int64_t{0}),
-      6 * 12);
-  // Node 11, the corner (2, 1, 1), is pulled far out: the elements there become the worst.
-  mesh.nodes.back() = Vec3(2, 1, 9);
-  const QualityReport pulled = measure_quality(mesh);
-  const Tet& worst = mesh.tets[static_cast<std::size_t>(pulled.worst_element)];
-  EXPECT_EQ(std::count(worst.begin(), worst.end(), 11), 1);
-  EXPECT_LT((tet4::corners(mesh, worst).rowwise().mean() - pulled.worst_centroid).norm(), 1e-15);
-  EXPECT_LT(pulled.min_radius_ratio, report.min_radius_ratio);
+/// The middles of Kuhn's edges are the points of the grid of half the spacing.
+TEST(WithElements, SecondOrderAddsOneNodeInTheMiddleOfEachEdge) {
+  const Mesh linear = tagged_box(), quadratic = with_elements(linear, ElementType::tet10, "");
+  EXPECT_EQ(quadratic.element, ElementType::tet10);
+  EXPECT_EQ(quadratic.elements(), linear.elements());
+  EXPECT_EQ(quadratic.regions, linear.regions);
+  ASSERT_EQ(quadratic.nodes.size(), 7u * 5u * 9u);
+  EXPECT_TRUE(std::equal(linear.nodes.begin(), linear.nodes.end(), quadratic.nodes.begin()));
+  std::set<std::array<long, 3>> places;
+  for (const Vec3& x : quadratic.nodes) {
+    places.insert({std::lround(2 * x.x()), std::lround(2 * x.y()), std::lround(2 * x.z())});
+    EXPECT_EQ(Vec3((2.0 * x).array().round() - 2.0 * x.array()), Vec3::Zero());
+  }
+  EXPECT_EQ(places.size(), quadratic.nodes.size());
+  const int edges[6][2] = {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}};  // VTK's order
+  for (Index e = 0; e < quadratic.elements(); ++e) {
+    const ElementNodes x = element_nodes(quadratic, e);
+    EXPECT_EQ(x.topRows(4), element_nodes(linear, e));
+    for (int i = 0; i < 6; ++i) EXPECT_EQ(x.row(4 + i), (x.row(edges[i][0]) + x.row(edges[i][1])) / 2);
+  }
+}
+
+TEST(WithElements, TaggedFacetsFollow) {
+  const Mesh quadratic = with_elements(tagged_box(), ElementType::tet10, "");
+  EXPECT_EQ(quadratic.facet_tags, (std::vector<Index>{7, 8}));
+  ASSERT_EQ(quadratic.tagged_facets.size(), 12u);
+  for (Index t = 0; t < 2; ++t) {
+    const auto facet = quadratic.tagged_facet(t);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(node_of(quadratic, facet[3 + i]),
+                Vec3((node_of(quadratic, facet[i]) + node_of(quadratic, facet[(i + 1) % 3])) / 2));
+    }
+  }
+  EXPECT_EQ(quadratic.tagged_facet(0)[2], 5);
+}
+
+TEST(WithElements, BackToFirstOrderIsTheSameMesh) {
+  const Mesh before = tagged_box();
+  Mesh quadratic = with_elements(before, ElementType::tet10, "");
+  // As files may have it: middles between the corners. The last node is a middle, the first a corner.
+  const auto last = static_cast<Index>(quadratic.nodes.size()) - 1;
+  std::swap(quadratic.nodes.front(), quadratic.nodes.back());
+  for (auto* list : {&quadratic.connectivity, &quadratic.tagged_facets}) {
+    for (Index& node : *list) node = node == 0 ? last : node == last ? 0 : node;
+  }
+  const Mesh after = with_elements(quadratic, ElementType::tet4, "");
+  EXPECT_EQ(after.element, ElementType::tet4);
+  ASSERT_EQ(after.nodes.size(), before.nodes.size());
+  EXPECT_EQ(after.regions, before.regions);
+  EXPECT_EQ(after.facet_tags, before.facet_tags);
+  for (std::size_t i = 0; i < before.connectivity.size(); ++i) {
+    EXPECT_EQ(node_of(after, after.connectivity[i]), node_of(before, before.connectivity[i]));
+  }
+  for (std::size_t i = 0; i < before.tagged_facets.size(); ++i) {
+    EXPECT_EQ(node_of(after, after.tagged_facets[i]), node_of(before, before.tagged_facets[i]));
+  }
+}
+
+TEST(WithElements, ItsOwnKindIsLeftAsItIsAndOtherPairsAreRefused) {
+  for (const ElementType has : body_elements) {
+    const Mesh mesh = test::block(has);
+    for (const ElementType wanted : body_elements) {
+      const bool tets = traits(has).corners == 4 && traits(wanted).corners == 4 &&
+                        traits(has).dimension == 3 && traits(wanted).dimension == 3;
+      if (has == wanted) {
+        EXPECT_EQ(with_elements(mesh, wanted, "").connectivity, mesh.connectivity);
+      } else if (!tets) {
+        const Error error = error_of([&] { with_elements(mesh, wanted, "model.toml"); });
+        EXPECT_TRUE(contains(error.what(), traits(has).name)) << error.what();
+        EXPECT_TRUE(contains(error.what(), traits(wanted).name)) << error.what();
+        EXPECT_EQ(error.where(), "model.toml");
+      }
+    }
+  }
 }
 
 }  // namespace

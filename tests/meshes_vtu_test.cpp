@@ -1,13 +1,16 @@
-// .vtu files as VTK itself reads them, and legacy .vtk files as VTK itself writes them.
+// .vtu files as VTK itself reads them, legacy .vtk files as VTK itself writes them, and quality as VTK
+// measures it.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <random>
 #include <sstream>
 
-#include "meshes/generate.h"
+#include "meshes/quality.h"
 #include "meshes/surface.h"
 #include "meshes/volume_mesh.h"
 #include "meshes/vtu_writer.h"
+#include "tests/meshes_bodies.h"
 #include "tests/meshes_files.h"
 
 namespace palpate {
@@ -31,53 +34,25 @@ std::string run_python(const test::ScratchFolder& folder, const std::string& pro
 
 TEST(Vtu, VtkReadsBackWhatWasWritten) {
   const test::ScratchFolder folder;
-  const Mesh mesh = generate(BoxShape{Vec3(1, 2, 3), Vec3(1, 0.5, 0.1), {2, 1, 1}});
+  const Mesh mesh = test::block(ElementType::tet4);
   std::vector<double> displacement(3 * mesh.nodes.size()), depth(mesh.nodes.size());
   for (std::size_t i = 0; i < displacement.size(); ++i) displacement[i] = 1.0 / static_cast<double>(i + 3);
   for (std::size_t i = 0; i < depth.size(); ++i) depth[i] = -static_cast<double>(i);
   const NodalField fields[] = {{"displacement", 3, displacement}, {"depth <m>", 1, depth}};
-  write_vtu(folder.path() / "volume.vtu", mesh.nodes, mesh.tets, {}, fields);
-  const Surface surface = extract_surface(mesh);
-  write_vtu(folder.path() / "surface.vtu", mesh.nodes, {}, surface.triangles, {});
+  write_vtu(folder.path() / "fields.vtu", mesh.nodes, mesh.element, mesh.connectivity, fields);
 
   std::istringstream output(run_python(folder, R"(
 import vtk
-for name in "volume.vtu", "surface.vtu":
-    reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName(name); reader.Update()
-    grid = reader.GetOutput()
-    print(grid.GetNumberOfPoints(), grid.GetNumberOfCells(), grid.GetPointData().GetNumberOfArrays())
-    for i in range(grid.GetNumberOfPoints()): print(*map(repr, grid.GetPoint(i)))
-    for c in range(grid.GetNumberOfCells()):
-        cell = grid.GetCell(c)
-        print(cell.GetCellType(), *[cell.GetPointId(i) for i in range(cell.GetNumberOfPoints())])
-    for name in "displacement", "depth <m>":
-        array = grid.GetPointData().GetArray(name)
-        if array:
-            for i in range(array.GetNumberOfTuples()): print(*map(repr, array.GetTuple(i)))
+reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName("fields.vtu"); reader.Update()
+data = reader.GetOutput().GetPointData()
+print(data.GetNumberOfArrays())
+for name in "displacement", "depth <m>":
+    array = data.GetArray(name)
+    for i in range(array.GetNumberOfTuples()): print(*map(repr, array.GetTuple(i)))
 )"));
-  const auto expect_grid = [&](const auto& cells, int type, std::size_t arrays) {
-    std::size_t node_count = 0, cell_count = 0, array_count = 0;
-    output >> node_count >> cell_count >> array_count;
-    ASSERT_EQ(node_count, mesh.nodes.size());
-    ASSERT_EQ(cell_count, cells.size());
-    ASSERT_EQ(array_count, arrays);
-    for (const Vec3& x : mesh.nodes) {
-      Vec3 read;
-      output >> read.x() >> read.y() >> read.z();
-      EXPECT_EQ(read, x);
-    }
-    for (const auto& cell : cells) {
-      int read_type = 0;
-      output >> read_type;
-      EXPECT_EQ(read_type, type);
-      for (const Index node : cell) {
-        Index read = -1;
-        output >> read;
-        EXPECT_EQ(read, node);
-      }
-    }
-  };
-  expect_grid(mesh.tets, 10, 2);
+  std::size_t arrays = 0;
+  output >> arrays;
+  ASSERT_EQ(arrays, 2u);
   for (const auto* field : {&displacement, &depth}) {
     for (const double value : *field) {
       double read = 0.0;
@@ -85,23 +60,121 @@ for name in "volume.vtu", "surface.vtu":
       EXPECT_EQ(read, value);
     }
   }
-  expect_grid(surface.triangles, 5, 0);
+  EXPECT_TRUE(output.good());
+}
+
+/// Bodies of every kind and their boundaries; VTK also says which nodes are on each edge of a cell.
+TEST(Vtu, VtkReadsEveryKind) {
+  const test::ScratchFolder folder;
+  struct Grid {
+    std::vector<Vec3> nodes;
+    ElementType type;
+    std::vector<Index> connectivity;
+  };
+  std::vector<Grid> grids;
+  for (const ElementType type : body_elements) {
+    const Mesh mesh = test::block(type);
+    const Surface surface = extract_surface(mesh);
+    grids.push_back({mesh.nodes, type, mesh.connectivity});
+    grids.push_back({mesh.nodes, surface.facet, surface.facets});
+  }
+  for (std::size_t g = 0; g < grids.size(); ++g) {
+    write_vtu(folder.path() / (std::to_string(g) + ".vtu"), grids[g].nodes, grids[g].type,
+              grids[g].connectivity, {});
+  }
+  std::istringstream output(run_python(folder, R"(
+import vtk
+for g in range(10):
+    reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName("%d.vtu" % g); reader.Update()
+    grid = reader.GetOutput()
+    print(grid.GetNumberOfPoints(), grid.GetNumberOfCells())
+    for i in range(grid.GetNumberOfPoints()): print(*map(repr, grid.GetPoint(i)))
+    for c in range(grid.GetNumberOfCells()):
+        cell = grid.GetCell(c)
+        print(cell.GetCellType(), *[cell.GetPointId(i) for i in range(cell.GetNumberOfPoints())])
+        for e in range(cell.GetNumberOfEdges()):
+            edge = cell.GetEdge(e)
+            if edge.GetNumberOfPoints() < 3: continue
+            a, b, middle = [grid.GetPoint(edge.GetPointId(i)) for i in range(3)]
+            assert all(abs(a[k] + b[k] - 2 * middle[k]) < 1e-15 for k in range(3))
+)"));
+  for (const Grid& grid : grids) {
+    SCOPED_TRACE(traits(grid.type).name);
+    const auto width = static_cast<std::size_t>(traits(grid.type).nodes);
+    std::size_t node_count = 0, cell_count = 0;
+    output >> node_count >> cell_count;
+    ASSERT_EQ(node_count, grid.nodes.size());
+    ASSERT_EQ(cell_count, grid.connectivity.size() / width);
+    for (const Vec3& x : grid.nodes) {
+      Vec3 read;
+      output >> read.x() >> read.y() >> read.z();
+      EXPECT_EQ(read, x);
+    }
+    for (std::size_t i = 0; i < grid.connectivity.size(); ++i) {
+      int type = traits(grid.type).vtk;
+      Index read = -1;
+      if (i % width == 0) output >> type;
+      EXPECT_EQ(type, traits(grid.type).vtk);
+      output >> read;
+      EXPECT_EQ(read, grid.connectivity[i]);
+    }
+  }
+  EXPECT_TRUE(output.good());
+}
+
+/// Verdict's measures, which VTK carries; its radius ratios are the inverse of ours.
+TEST(Vtu, QualityIsWhatVtkMeasures) {
+  const test::ScratchFolder folder;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> shift(-0.02, 0.02);
+  std::vector<QualityReport> reports;
+  for (const ElementType type :
+       {ElementType::tri3, ElementType::quad4, ElementType::tet4, ElementType::hex8}) {
+    Mesh mesh = test::block(type);
+    for (Vec3& x : mesh.nodes) {
+      for (int axis = 0; axis < mesh.dimension(); ++axis) x[axis] += shift(random);
+    }
+    reports.push_back(measure_quality(mesh));
+    write_vtu(folder.path() / (std::string(traits(type).name) + ".vtu"), mesh.nodes, type, mesh.connectivity,
+              {});
+  }
+  std::istringstream output(run_python(folder, R"(
+import vtk
+quality = vtk.vtkMeshQuality
+for name, measure in (("tri3", quality.TriangleRadiusRatio), ("quad4", quality.QuadScaledJacobian),
+                      ("tet4", quality.TetRadiusRatio), ("hex8", quality.HexScaledJacobian)):
+    reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName(name + ".vtu"); reader.Update()
+    grid = reader.GetOutput()
+    cells = [grid.GetCell(c) for c in range(grid.GetNumberOfCells())]
+    values = [measure(cell) for cell in cells]
+    if name in ("tri3", "tet4"): values = [1 / value for value in values]
+    print(repr(min(values)), values.index(min(values)), repr(sum(values) / len(values)))
+)"));
+  for (const QualityReport& report : reports) {
+    double smallest = 0.0, mean = 0.0;
+    Index worst = -1;
+    output >> smallest >> worst >> mean;
+    EXPECT_NEAR(report.min_shape, smallest, 1e-12);
+    EXPECT_EQ(report.worst_element, worst);
+    EXPECT_NEAR(report.mean_shape, mean, 1e-12);
+  }
   EXPECT_TRUE(output.good());
 }
 
 TEST(Vtu, NothingIsLeftBehindWhenItCannotBeWritten) {
   const test::ScratchFolder folder;
   const Mesh mesh = generate(BoxShape{});
-  const Error error =
-      error_of([&] { write_vtu(folder.path() / "none" / "a.vtu", mesh.nodes, mesh.tets, {}, {}); });
+  const Error error = error_of(
+      [&] { write_vtu(folder.path() / "none" / "a.vtu", mesh.nodes, mesh.element, mesh.connectivity, {}); });
   EXPECT_TRUE(contains(error.what(), "No such file")) << error.what();
   EXPECT_TRUE(contains(error.where(), "a.vtu"));
   std::filesystem::create_directory(folder.path() / "b.vtu");  // cannot be replaced by a file
-  EXPECT_THROW(write_vtu(folder.path() / "b.vtu", mesh.nodes, mesh.tets, {}, {}), Error);
+  EXPECT_THROW(write_vtu(folder.path() / "b.vtu", mesh.nodes, mesh.element, mesh.connectivity, {}), Error);
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "b.vtu.partial"));
   if (std::filesystem::exists("/dev/full")) {
     std::filesystem::create_symlink("/dev/full", folder.path() / "c.vtu.partial");
-    const Error full = error_of([&] { write_vtu(folder.path() / "c.vtu", mesh.nodes, mesh.tets, {}, {}); });
+    const Error full = error_of(
+        [&] { write_vtu(folder.path() / "c.vtu", mesh.nodes, mesh.element, mesh.connectivity, {}); });
     EXPECT_TRUE(contains(full.what(), "No space left")) << full.what();
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "c.vtu"));
   }
@@ -109,15 +182,20 @@ TEST(Vtu, NothingIsLeftBehindWhenItCannotBeWritten) {
 
 TEST(VtkLegacy, FilesThatVtkWritesInBothLayoutsAreRead) {
   const test::ScratchFolder folder;
-  const Mesh mesh = generate(BoxShape{Vec3(1, 2, 3), Vec3(1, 0.5, 0.1), {2, 1, 1}});
-  write_vtu(folder.path() / "mesh.vtu", mesh.nodes, mesh.tets, {}, {});
-  run_python(folder, R"(
+  for (const ElementType type : body_elements) {
+    SCOPED_TRACE(traits(type).name);
+    const Mesh mesh = test::block(type);
+    write_vtu(folder.path() / "mesh.vtu", mesh.nodes, type, mesh.connectivity, {});
+    run_python(folder, R"(
 import vtk
 reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName("mesh.vtu"); reader.Update()
 grid = reader.GetOutput()
-triangle = vtk.vtkIdList()
-for node in 0, 1, 3: triangle.InsertNextId(node)
-grid.InsertNextCell(5, triangle)
+def add(cell_type, *nodes):
+    ids = vtk.vtkIdList()
+    for node in nodes: ids.InsertNextId(node)
+    grid.InsertNextCell(cell_type, ids)
+add(1, 0); add(3, 0, 1); add(2, 0, 3, 1); add(21, 0, 1, 2)
+if grid.GetCell(0).GetCellDimension() == 3: add(5, 0, 1, 3); add(22, 0, 1, 3, 5, 6, 7); add(9, 0, 1, 3, 2)
 data = vtk.vtkDoubleArray(); data.SetName("time"); data.InsertNextValue(0.5); grid.GetFieldData().AddArray(data)
 data = vtk.vtkDoubleArray(); data.SetName("speed"); data.SetNumberOfTuples(grid.GetNumberOfPoints()); data.Fill(2); grid.GetPointData().AddArray(data)
 for version in 42, 51:
@@ -125,13 +203,16 @@ for version in 42, 51:
     writer.SetFileVersion(version); writer.SetFileTypeToASCII(); writer.SetFileName("ascii%d.vtk" % version); writer.Write()
 writer.SetFileTypeToBinary(); writer.SetFileName("binary.vtk"); writer.Write()
 )");
-  for (const char* name : {"ascii42.vtk", "ascii51.vtk"}) {
-    const Mesh read = read_volume_mesh(folder.path() / name);
-    EXPECT_EQ(read.tets, mesh.tets);
-    EXPECT_EQ(read.regions, std::vector<Index>(mesh.tets.size(), 0));
-    ASSERT_EQ(read.nodes.size(), mesh.nodes.size());
-    for (std::size_t i = 0; i < read.nodes.size(); ++i)
-      EXPECT_LT((read.nodes[i] - mesh.nodes[i]).norm(), 1e-4);
+    for (const char* name : {"ascii42.vtk", "ascii51.vtk"}) {
+      const Mesh read = read_volume_mesh(folder.path() / name);
+      EXPECT_EQ(read.element, type);
+      EXPECT_EQ(read.connectivity, mesh.connectivity);
+      EXPECT_EQ(read.regions, std::vector<Index>(static_cast<std::size_t>(mesh.elements()), 0));
+      EXPECT_TRUE(read.tagged_facets.empty());
+      ASSERT_EQ(read.nodes.size(), mesh.nodes.size());
+      for (std::size_t i = 0; i < read.nodes.size(); ++i)
+        EXPECT_LT((read.nodes[i] - mesh.nodes[i]).norm(), 1e-6);
+    }
   }
   const Error binary = error_of([&] { read_volume_mesh(folder.path() / "binary.vtk"); });
   EXPECT_TRUE(contains(binary.what(), "binary"));

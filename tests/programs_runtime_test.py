@@ -14,6 +14,69 @@ import vtk
 from programs import RUNTIME, ProgramTest, cube_toml, run
 
 TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
+FIELD_COLUMNS = ("node", "x", "y", "z", "u0x", "u0y", "u0z", "ux", "uy", "uz")
+
+
+def square_toml(element="quad4", scope="full", name="square"):
+    """The unit square of 4 x 4 cells in plane stress, clamped at y = 0, E = 1, nu = 0.3."""
+    return f"""name = "{name}"
+plane = "stress"
+thickness = 1.0
+[geometry]
+rectangle = {{ size = [1, 1], cells = [4, 4] }}
+[mesh]
+element = "{element}"
+[material]
+youngs_modulus = 1.0
+poissons_ratio = 0.3
+[[fixed]]
+lowest = {{ axis = "y", percent = 1 }}
+[storage]
+scope = "{scope}"
+precision = "double"
+"""
+
+
+def rollers_toml(plane, stress, scope="surface", name="rollers"):
+    """A unit square or cube of 4 cells an edge, each side at x, y (, z) = 0 held along its normal, the opposite of the last one pulled
+    by `stress`: a patch test, u0 = stress / E (-nu x, -nu y, z), in the plane stress / E (-nu x, y)."""
+    axes = "xy" if plane else "xyz"
+    numbers = lambda axis, value: str([value if a == axis else 0 for a in axes])
+    sides = "".join(f"""[[fixed]]
+half_space = {{ point = {numbers("x", 0)}, normal = {numbers(axis, -1)} }}
+axes = "{axis}"
+""" for axis in axes)
+    up = axes[-1]
+    load = f"""[[load]]
+traction = {numbers(up, stress)}
+half_space = {{ point = {numbers(up, 1)}, normal = {numbers(up, 1)} }}
+""" if stress else ""
+    shape = "rectangle = { size = [1, 1], cells = [4, 4] }" if plane else "box = { size = [1, 1, 1], cells = [4, 4, 4] }"
+    return f"""name = "{name}"
+{'plane = "stress"' if plane else ""}
+[geometry]
+{shape}
+[material]
+youngs_modulus = 1.0
+poissons_ratio = 0.3
+{sides}{load}
+[storage]
+scope = "{scope}"
+precision = "double"
+"""
+
+
+def patch_u0(plane, stress, x):
+    """The closed form of rollers_toml."""
+    strain = numpy.array([-0.3, 1.0, 0.0] if plane else [-0.3, -0.3, 1.0]) * stress
+    return strain * x
+
+
+def read_grid(file):
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(file))
+    reader.Update()
+    return reader.GetOutput()
 
 
 class Probe(ProgramTest):
@@ -50,21 +113,19 @@ class Probe(ProgramTest):
                 self.probe(file, "--at", "0.5,0.5,1", "--displace", "0.01,0.02,-0.1", "--field", field)
 
             rows = numpy.genfromtxt(csv, delimiter=",", names=True)
-            self.assertEqual(rows.dtype.names, ("node", "x", "y", "z", "ux", "uy", "uz"))
+            self.assertEqual(rows.dtype.names, FIELD_COLUMNS)
             self.assertEqual(len(rows), 73 if scope == "surface" else 100)
             held = rows[rows["node"] == 112][0]
             numpy.testing.assert_allclose([held["ux"], held["uy"], held["uz"]], [0.01, 0.02, -0.1], atol=1e-14)
 
-            reader = vtk.vtkXMLUnstructuredGridReader()
-            reader.SetFileName(str(vtu))
-            reader.Update()
-            grid = reader.GetOutput()
+            grid = read_grid(vtu)
             self.assertEqual((grid.GetNumberOfPoints(), grid.GetNumberOfCells()), (nodes, cells))
             u = grid.GetPointData().GetArray("displacement")
             by_position = {tuple(numpy.round([row["x"], row["y"], row["z"]], 6)): [row["ux"], row["uy"], row["uz"]] for row in rows}
             for point in range(nodes):
                 expected = by_position.get(tuple(numpy.round(grid.GetPoint(point), 6)), [0, 0, 0])  # clamped
                 numpy.testing.assert_allclose(u.GetTuple(point), expected, atol=1e-14)
+                self.assertEqual(grid.GetPointData().GetArray("rest_displacement").GetTuple(point), (0, 0, 0))
 
     def test_places_that_cannot_be_asked(self):
         file = self.bake(cube_toml(4))
@@ -85,6 +146,141 @@ class Probe(ProgramTest):
         other = self.write("other.toml", cube_toml(3) + "\n")
         self.assert_refused(run(RUNTIME, *question, other), file.name, "other.toml", "Precompute it again")
         self.assert_refused(run(RUNTIME, *question, self.folder / "none.toml"), "none.toml")
+
+
+class Plane(ProgramTest):
+    MIDDLE = 2 + 5 * 4  # of the upper edge, nodes numbered x fastest
+
+    def test_two_numbers_a_vector(self):
+        for element in ("quad4", "tri3"):
+            file = self.bake(square_toml(element), name=f"{element}.toml")
+            answer = self.probe(file, "--at", "0.51,1.02", "--displace", "0.01,-0.1")
+            (node,) = answer["nodes"]
+            self.assertEqual((node["node"], node["position"]), (self.MIDDLE, [0.5, 1.0, 0.0]))
+            self.assertAlmostEqual(node["distance"], 0.0005 ** 0.5)
+            self.assertEqual(node["displacement"], [0.01, -0.1, 0.0])
+            self.assertLess(node["force"][1], -0.01)
+            self.assertEqual(node["force"][2], 0)
+            # A third number is taken if it says nothing; two prescribed nodes change their forces in step (linear).
+            self.assertEqual(self.probe(file, "--at", "0.51,1.02,0", "--displace", "0.01,-0.1,0"), answer)
+            twice = self.probe(file, "--node", self.MIDDLE, "--displace", "0.02,-0.2")
+            numpy.testing.assert_allclose(twice["total_force"], 2 * numpy.array(answer["total_force"]), rtol=1e-12)
+
+    def test_vectors_that_are_not_of_the_body(self):
+        square, cube = self.bake(square_toml(), name="square.toml"), self.bake(cube_toml(2), name="cube.toml")
+        for file, at, displace, pieces in (
+                (square, "0.5,1,0.25", "0,-0.1", ("--at 0.5,1,0.25", "plane", "two numbers")),
+                (square, "0.5,1", "0,0,-0.1", ("--displace 0,0,-0.1", "plane", "two numbers")),
+                (cube, "0.5,1", "0,0,-0.1", ("--at 0.5,1", "in space", "three numbers")),
+                (cube, "0.5,0.5,1", "0,-0.1", ("--displace 0,-0.1", "in space", "three numbers"))):
+            self.assert_refused(run(RUNTIME, "probe", file, "--at", at, "--displace", displace), file.name, *pieces)
+        self.assert_refused(run(RUNTIME, "probe", square, "--node", "2", "--displace", "0,1"), "node 2 is fixed")
+
+    def test_fields_are_the_square_or_its_boundary(self):
+        for scope, kind, cells, points in (("full", vtk.VTK_QUAD, 16, 25), ("surface", vtk.VTK_LINE, 16, 16)):
+            file = self.bake(square_toml(scope=scope), name=f"{scope}.toml")
+            csv, vtu = self.folder / "out.csv", self.folder / "out.vtu"
+            for field in (csv, vtu):
+                self.probe(file, "--at", "0.5,1", "--displace", "0.02,-0.1", "--field", field)
+            rows = numpy.genfromtxt(csv, delimiter=",", names=True)
+            self.assertEqual(len(rows), 20 if scope == "full" else 11)
+            held = rows[rows["node"] == self.MIDDLE][0]
+            numpy.testing.assert_allclose([held[name] for name in ("x", "y", "z", "ux", "uy", "uz")], [0.5, 1, 0, 0.02, -0.1, 0], atol=1e-14)
+            numpy.testing.assert_array_equal([rows["z"], rows["uz"], rows["u0y"]], numpy.zeros((3, len(rows))))
+
+            grid = read_grid(vtu)
+            self.assertEqual((grid.GetNumberOfPoints(), grid.GetNumberOfCells()), (points, cells))
+            self.assertEqual({grid.GetCellType(c) for c in range(cells)}, {kind})
+            u = grid.GetPointData().GetArray("displacement")
+            top = grid.FindPoint(0.5, 1, 0)
+            numpy.testing.assert_allclose(u.GetTuple(top), [0.02, -0.1, 0], atol=1e-14)
+            self.assertEqual(u.GetTuple(grid.FindPoint(0.5, 0, 0)), (0, 0, 0))
+
+    def test_play_ignores_z(self):
+        file = self.bake(square_toml(scope="surface"))
+        script = self.write("touch.csv", "t,x,y,z\n0,0.5,1,0.5\n0.1,0.5,0.9,0.7\n")
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with h5py.File(self.folder / "out.h5") as recording:
+            ticks = recording["ticks"]
+            self.assertEqual(set(ticks["node"][:]), {self.MIDDLE})
+            numpy.testing.assert_allclose(ticks["displacement"][-1], [0, -0.1, 0], atol=1e-15)
+            numpy.testing.assert_array_equal(ticks["force"][:, 2], 0)
+            answer = self.probe(file, "--node", self.MIDDLE, "--displace", "0,-0.1")
+            numpy.testing.assert_allclose(ticks["force"][-1], answer["total_force"], rtol=1e-12)
+
+
+class Rest(ProgramTest):
+    """Loads displace the body; what a tool does is relative to that."""
+
+    STRESS = 0.2
+
+    def check(self, plane):
+        loaded = self.bake(rollers_toml(plane, self.STRESS), name="loaded.toml")
+        unloaded = self.bake(rollers_toml(plane, 0), name="unloaded.toml")
+        corner = 24 if plane else 124  # the last node, at (1, 1) or (1, 1, 1)
+        x = numpy.array([1.0, 1.0, 0.0 if plane else 1.0])
+        rest = x + patch_u0(plane, self.STRESS, x)
+        vector = lambda v: ",".join(repr(float(c)) for c in v[:2 if plane else 3])
+        push = numpy.array([0.01, -0.03, 0.0 if plane else -0.02])
+
+        at_rest = self.probe(loaded, "--at", vector(rest), "--displace", vector(push))["nodes"][0]
+        self.assertEqual(at_rest["node"], corner)
+        numpy.testing.assert_allclose(at_rest["position"], rest, atol=1e-12)
+        self.assertLess(at_rest["distance"], 1e-12)
+        numpy.testing.assert_array_equal(at_rest["displacement"], push)
+        without = self.probe(unloaded, "--node", corner, "--displace", vector(push))["nodes"][0]
+        numpy.testing.assert_array_equal(without["position"], x)
+        numpy.testing.assert_allclose(at_rest["force"], without["force"], rtol=1e-11, atol=1e-13)
+
+        csv, vtu = self.folder / "out.csv", self.folder / "out.vtu"
+        for field in (csv, vtu):
+            self.probe(loaded, "--node", corner, "--displace", vector(push), "--field", field)
+        rows = numpy.genfromtxt(csv, delimiter=",", names=True)
+        columns = {name: numpy.column_stack([rows[c] for c in name.split()]) for name in ("x y z", "u0x u0y u0z", "ux uy uz")}
+        numpy.testing.assert_allclose(columns["u0x u0y u0z"], patch_u0(plane, self.STRESS, columns["x y z"]), atol=1e-12)
+        contact = {int(row["node"]): u for row, u in zip(rows, columns["ux uy uz"])}
+        numpy.testing.assert_allclose(contact[corner], push, atol=1e-14)
+
+        grid = read_grid(vtu)
+        points = numpy.array([grid.GetPoint(p) for p in range(grid.GetNumberOfPoints())])
+        u0 = patch_u0(plane, self.STRESS, points)
+        arrays = {name: numpy.array([grid.GetPointData().GetArray(name).GetTuple(p) for p in range(len(points))])
+                  for name in ("displacement", "rest_displacement")}
+        numpy.testing.assert_allclose(arrays["rest_displacement"], u0, atol=1e-12)
+        moved = arrays["displacement"] - u0
+        node = numpy.rint(points @ [4, 20, 0 if plane else 100]).astype(int)  # x fastest
+        self.assertEqual(len(points), 16 if plane else 98)
+        numpy.testing.assert_allclose(moved, [contact.get(n, numpy.zeros(3)) for n in node], atol=1e-12)
+        held = ~numpy.isin(node, list(contact))
+        numpy.testing.assert_array_equal(held, numpy.any(points[:, :2 if plane else 3] == 0, axis=1))
+
+    def test_in_the_plane(self):
+        self.check(plane=True)
+
+    def test_in_space(self):
+        self.check(plane=False)
+
+    def test_nodes_held_along_some_axes_say_which(self):
+        square = self.bake(rollers_toml(True, self.STRESS), name="square.toml")
+        cube = self.bake(rollers_toml(False, 0), name="cube.toml")
+        for file, node, displace, pieces in ((square, 2, "0,1", ("node 2 is held along y", "every axis")),
+                                             (square, 0, "0,1", ("node 0 is fixed",)),
+                                             (cube, 1, "0,0,1", ("node 1 is held along y and z",)),
+                                             (cube, 50, "0,0,1", ("node 50 is held along x and y",))):
+            self.assert_refused(run(RUNTIME, "probe", file, "--node", node, "--displace", displace), *pieces)
+
+    def test_the_tool_takes_hold_where_the_body_rests(self):
+        file = self.bake(rollers_toml(True, 0.5))
+        # Point (1, 1) rests at (0.85, 1.5).
+        script = self.write("touch.csv", "t,x,y,z\n0,0.85,1.5,0\n0.1,0.85,1.45,0\n")
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", "--reach", "0.001",
+                     cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with h5py.File(self.folder / "out.h5") as recording:
+            self.assertEqual(set(recording["ticks/node"][:]), {24})
+            self.assertLess(numpy.linalg.norm(recording["ticks/force"][0]), 1e-12)
+            numpy.testing.assert_allclose(recording["ticks/displacement"][-1], [0, -0.05, 0], atol=1e-12)
 
 
 class Play(ProgramTest):
@@ -211,7 +407,8 @@ class Usage(ProgramTest):
         self.assert_usage("--at or --node", "probe", "x.palpate.hdf", "--displace", "0,0,1")
         self.assert_usage("--displace", "probe", "x.palpate.hdf", "--at", "0,0,1")
         self.assert_usage("1 displacements are given for 2 places", "probe", "x.palpate.hdf", *place, "--node", "3")
-        self.assert_usage("'0,0'", "probe", "x.palpate.hdf", "--at", "0,0", "--displace", "0,0,1")
+        self.assert_usage("'0'", "probe", "x.palpate.hdf", "--at", "0", "--displace", "0,0,1")
+        self.assert_usage("'0,0,0,1'", "probe", "x.palpate.hdf", "--at", "0,0,1", "--displace", "0,0,0,1")
         self.assert_usage("'0,0,nan'", "probe", "x.palpate.hdf", "--at", "0,0,1", "--displace", "0,0,nan")
         self.assert_usage("'-1'", "probe", "x.palpate.hdf", "--node", "-1", "--displace", "0,0,1")
         self.assert_usage("'mouse'", "play", "x.palpate.hdf", "--device", "mouse")

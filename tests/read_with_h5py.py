@@ -12,29 +12,66 @@ def expect(condition, what):
         sys.exit(f"not as documented: {what}")
 
 
-def check_model(path, scalar):
+# dimension, nodes an element, VTK's number, (nodes, elements, surface simplices, stored nodes) of the sample
+KINDS = {
+    "tri3": (2, 3, 5, (9, 8, 8, 6)),
+    "quad4": (2, 4, 9, (9, 4, 8, 6)),
+    "tet4": (3, 4, 10, (27, 48, 48, 18)),
+    "tet10": (3, 10, 24, (125, 48, 192, 100)),
+    "hex8": (3, 8, 12, (27, 8, 48, 18)),
+}
+
+
+def measure(element, nodes, cells):
+    """Volume (in the plane, area) of the body, from the corners alone."""
+    if element in ("quad4", "tri3"):
+        x, y = np.moveaxis(nodes[cells][..., :2], -1, 0)
+        return 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum()  # shoelace
+    corners = [0, 1, 3, 4] if element == "hex8" else [0, 1, 2, 3]  # the sample's cells are boxes
+    edges = nodes[cells[:, corners[1:]]] - nodes[cells[:, corners[:1]]]
+    return np.linalg.det(edges).sum() / (1 if element == "hex8" else 6)
+
+
+def check_model(path, element, scalar):
+    dimension, width, vtk, counts = KINDS[element]
     with h5py.File(path) as file:
         attributes = file.attrs
         expect(attributes["format"] == b"palpate", "format")
-        expect(list(attributes["version"]) == [1, 0], "version")
+        expect(list(attributes["version"]) == [2, 0], "version")
         expect(attributes["units"] == b"m, N, Pa, kg, s", "units")
         expect(attributes["scalar"].decode() == scalar, "scalar")
-        expect(attributes["dimension"] == 3, "dimension")
+        expect(attributes["element"].decode() == element and attributes["dimension"] == dimension, "element")
+        analysis = {"tri3": b"plane_strain", "quad4": b"plane_stress"}.get(element, b"solid")
+        expect(attributes["analysis"] == analysis, "analysis")
         expect(attributes["scope"] == b"full" and attributes["layers"] == 0, "scope")
         expect(len(attributes["content_hash"]) == 32, "content_hash")
 
         nodes = file["/mesh/nodes"][:]
-        tets = file["/mesh/connectivity"][:].reshape(-1, 4)
-        expect(nodes.shape == (27, 3) and tets.shape == (48, 4), "mesh")
-        edges = nodes[tets[:, 1:]] - nodes[tets[:, :1]]
-        expect(np.isclose(np.linalg.det(edges).sum() / 6, 1 * 2 * 3), "volume of the box")
-        expect((np.diff(file["/mesh/offsets"]) == 4).all() and (file["/mesh/types"][:] == 10).all(), "cells")
+        cells = file["/mesh/connectivity"][:].reshape(-1, width)
+        surface = file["/mesh/surface"][:]
+        stored = file["/dofs/stored_nodes"][:]
+        expect((len(nodes), len(cells), len(surface), len(stored)) == counts, "counts")
+        expect(nodes.shape[1] == 3 and surface.shape[1] == dimension, "widths")
+        expect(np.isclose(measure(element, nodes, cells), 1 * 2 * (3 if dimension == 3 else 1)), "volume")
+        expect(np.isclose(enclosed(nodes, surface), 1 * 2 * (3 if dimension == 3 else 1)), "surface")
+        expect((np.diff(file["/mesh/offsets"]) == width).all() and (file["/mesh/types"][:] == vtk).all(), "cells")
         expect(file["/model_toml"][:].tobytes().decode() == 'name = "sample"\n# Länge in m\n', "model_toml")
         expect(file["/provenance/sources"][:].tobytes().count(b"\n") == 2, "sources")
 
-        stored = file["/dofs/stored_nodes"][:]
-        expect(not file["/dofs/fixed"][:][stored].any() and len(stored) == 18, "stored nodes")
-        n = 3 * len(stored)
+        isotropic, strain = file["/material/isotropic"][:], file["/material/initial_strain"][:]
+        expect(np.array_equal(isotropic, [[5000, 0.49, 1060], [2e4, 0.3, 1100]]), "materials")
+        expect(np.array_equal(strain, [[0] * 6, [1e-3, 2e-3, 3e-3, -1e-3, -2e-3, -3e-3]]), "initial strain")
+        expect(np.array_equal(file["/material/of_element"], np.arange(len(cells)) % 2), "material of element")
+        expect(file["/material/thickness"][0] == (0.02 if dimension == 2 else 1), "thickness")
+        factors = [1e-3, 2e-3, 3e-3 if dimension == 3 else 0]
+        expect(np.allclose(file["/rest/displacement"], nodes * factors, rtol=1e-15), "rest displacement")
+        expect(np.array_equal(file["/rest/force"][:, :2], nodes[:, [1, 0]] * [1, -1]), "rest force")
+
+        fixed = file["/dofs/fixed"][:]
+        held = nodes[:, dimension - 1] == nodes[:, dimension - 1].min()
+        expect(np.array_equal(fixed > 0, held) and fixed.max() == 2**dimension - 1, "fixed")
+        expect(np.array_equal(np.sort(stored), np.flatnonzero(~held)), "stored nodes")
+        n = dimension * len(stored)
         packed = file["/greens/packed"]
         expect(packed.dtype.name == scalar and packed.shape == (n * (n + 1) // 2,), "greens")
         xi = np.zeros((n, n))
@@ -44,12 +81,20 @@ def check_model(path, scalar):
         expect(np.isclose(xi[7, 3], 1e-3 / (1 + 7 + 1.1 * 3)), "an entry of the Green's functions")
         expect(packed.id.get_offset() % 4096 == 0, "page alignment")
         expect(file["/probes/forces"].shape == file["/probes/displacements"].shape == (2, n), "probes")
-        print(f"{path.name}: {len(nodes)} nodes, {len(tets)} elements, {n} stored dofs")
+        print(f"{path.name}: {len(nodes)} nodes, {len(cells)} {element} elements, {n} stored dofs")
+
+
+def enclosed(nodes, surface):
+    """Volume inside triangles that look outwards; in the plane, area inside lines with the body on their left."""
+    x = nodes[surface]
+    if surface.shape[1] == 2:
+        return 0.5 * (x[:, 0, 0] * x[:, 1, 1] - x[:, 0, 1] * x[:, 1, 0]).sum()
+    return np.linalg.det(x).sum() / 6
 
 
 def check_recording(path):
     with h5py.File(path) as file:
-        expect(file.attrs["format"] == b"palpate-recording" and file.attrs["model"] == b"double.palpate.hdf", "recording")
+        expect(file.attrs["format"] == b"palpate-recording" and file.attrs["model"] == b"tet4.palpate.hdf", "recording")
         ticks = file["/ticks"]
         expect(np.array_equal(ticks["time"], 1e-3 * np.arange(5000)), "time")
         expect(np.array_equal(ticks["tool_position"][:, 1], 2.0 * np.arange(5000)), "tool_position")
@@ -59,6 +104,7 @@ def check_recording(path):
 
 
 folder = pathlib.Path(sys.argv[1])
-check_model(folder / "single.palpate.hdf", "float32")
-check_model(folder / "double.palpate.hdf", "float64")
+check_model(folder / "single.palpate.hdf", "tet4", "float32")
+for kind in KINDS:
+    check_model(folder / f"{kind}.palpate.hdf", kind, "float64")
 check_recording(folder / "recording.h5")

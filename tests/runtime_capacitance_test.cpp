@@ -18,12 +18,13 @@ namespace {
 /// C and its nodes, grown and shrunk together.
 class Capacitance {
  public:
-  Capacitance(const Greens& xi, Index max_nodes) : xi_(&xi), C_(max_nodes) {}
+  Capacitance(const Greens& xi, Index max_nodes) : xi_(&xi), C_(xi.dimension(), max_nodes) {}
 
   CapacitanceStatus add(Index node) {
     std::vector<Index> columns = nodes_;
     columns.push_back(node);
-    std::vector<double> blocks(9 * columns.size());
+    std::vector<double> blocks(static_cast<std::size_t>(xi_->dimension() * xi_->dimension()) *
+                               columns.size());
     xi_->gather(node, columns, blocks);
     const CapacitanceStatus status = C_.add(blocks);
     if (status == CapacitanceStatus::ok) nodes_ = columns;
@@ -37,10 +38,11 @@ class Capacitance {
 
   [[nodiscard]] Eigen::MatrixXd fresh() const {
     const auto m = static_cast<Eigen::Index>(nodes_.size());
-    Eigen::MatrixXd C(3 * m, 3 * m);
+    const Eigen::Index d = xi_->dimension();
+    Eigen::MatrixXd C(d * m, d * m);
     for (Eigen::Index a = 0; a < m; ++a) {
       for (Eigen::Index b = 0; b < m; ++b) {
-        C.block<3, 3>(3 * a, 3 * b) =
+        C.block(d * a, d * b, d, d) =
             xi_->block(nodes_[static_cast<std::size_t>(a)], nodes_[static_cast<std::size_t>(b)]);
       }
     }
@@ -64,30 +66,35 @@ class Capacitance {
   std::vector<Index> nodes_;
 };
 
-Greens random_greens(Eigen::Index nodes) {
-  return Greens(test::pack(test::random_definite(3 * nodes, 5), Precision::double_precision));
+Greens random_greens(int dimension, Eigen::Index nodes) {
+  return Greens(test::pack(test::random_definite(dimension * nodes, 5), Precision::double_precision),
+                dimension);
 }
 
-TEST(CapacitanceMatrix, FactorIsThatOfAFreshFactorisation) {
-  const Greens xi = random_greens(60);
+/// With two and with three dofs a node.
+class CapacitanceMatrices : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Dimension, CapacitanceMatrices, testing::Values(2, 3));
+
+TEST_P(CapacitanceMatrices, FactorIsThatOfAFreshFactorisation) {
+  const Greens xi = random_greens(GetParam(), 60);
   Capacitance capacitance(xi, 60);
   for (Index node = 59; node >= 0; --node) ASSERT_EQ(capacitance.add(node), CapacitanceStatus::ok);
   EXPECT_EQ(capacitance.C_.nodes(), 60);
   EXPECT_LT(capacitance.error(), 1e-13);
 }
 
-TEST(CapacitanceMatrix, SolveInvertsC) {
-  const Greens xi = random_greens(45);
+TEST_P(CapacitanceMatrices, SolveInvertsC) {
+  const Greens xi = random_greens(GetParam(), 45);
   Capacitance capacitance(xi, 64);
   for (Index node = 0; node < 45; ++node) ASSERT_EQ(capacitance.add(node), CapacitanceStatus::ok);
-  const Eigen::VectorXd u = Eigen::VectorXd::LinSpaced(135, -1.0, 2.0);
+  const Eigen::VectorXd u = Eigen::VectorXd::LinSpaced(GetParam() * 45, -1.0, 2.0);
   Eigen::VectorXd f = u;
-  capacitance.C_.solve({f.data(), 135});
+  capacitance.C_.solve({f.data(), static_cast<std::size_t>(f.size())});
   EXPECT_LT((capacitance.fresh() * f - u).norm(), 1e-12 * u.norm());
 }
 
-TEST(CapacitanceMatrix, RemovesFirstMiddleAndLast) {
-  const Greens xi = random_greens(20);
+TEST_P(CapacitanceMatrices, RemovesFirstMiddleAndLast) {
+  const Greens xi = random_greens(GetParam(), 20);
   for (const Index k : {0, 9, 19}) {
     Capacitance capacitance(xi, 20);
     for (Index node = 0; node < 20; ++node) ASSERT_EQ(capacitance.add(node), CapacitanceStatus::ok);
@@ -97,9 +104,10 @@ TEST(CapacitanceMatrix, RemovesFirstMiddleAndLast) {
 }
 
 // The Green's functions of a real body, much worse conditioned than random matrices, through 1000 changes.
-TEST(CapacitanceMatrix, AgreesAfterAThousandRandomAdditionsAndRemovals) {
-  const Model model = test::box_model(5, Scope::surface, Precision::double_precision);
-  const Greens xi(model.greens);
+TEST_P(CapacitanceMatrices, AgreesAfterAThousandRandomAdditionsAndRemovals) {
+  const Model model =
+      test::unit_model(GetParam(), GetParam() == 3 ? 5 : 20, Scope::surface, Precision::double_precision);
+  const Greens xi(model.greens, model.dimension());
   Capacitance capacitance(xi, 48);
   std::mt19937 random(2);
   const auto draw = [&random](Index below) {
@@ -125,8 +133,10 @@ TEST(CapacitanceMatrix, AgreesAfterAThousandRandomAdditionsAndRemovals) {
 }
 
 RC_GTEST_PROP(CapacitanceMatrix, AnySequenceOfChangesKeepsTheFactor,
-              (const std::vector<std::uint8_t>& changes)) {
-  static const Greens xi = random_greens(12);
+              (bool in_space, const std::vector<std::uint8_t>& changes)) {
+  static const Greens plane = random_greens(2, 12);
+  static const Greens space = random_greens(3, 12);
+  const Greens& xi = in_space ? space : plane;
   Capacitance capacitance(xi, 12);
   for (const std::uint8_t change : changes) {
     const Index node = change % 12;
@@ -140,12 +150,13 @@ RC_GTEST_PROP(CapacitanceMatrix, AnySequenceOfChangesKeepsTheFactor,
   RC_ASSERT(capacitance.error() < 1e-12);
 }
 
-TEST(CapacitanceMatrix, RefusesWhatDoesNotFitAndStaysAsItWas) {
-  const Greens xi = random_greens(5);
+TEST_P(CapacitanceMatrices, RefusesWhatDoesNotFitAndStaysAsItWas) {
+  const Greens xi = random_greens(GetParam(), 5);
   Capacitance capacitance(xi, 3);
   ASSERT_EQ(capacitance.add(0), CapacitanceStatus::ok);
   EXPECT_EQ(capacitance.add(0), CapacitanceStatus::not_positive_definite) << "a node held twice";
-  const std::vector<double> nonsense(18, std::numeric_limits<double>::quiet_NaN());
+  const auto entries = static_cast<std::size_t>(2 * GetParam() * GetParam());
+  const std::vector<double> nonsense(entries, std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(capacitance.C_.add(nonsense), CapacitanceStatus::not_positive_definite);
   ASSERT_EQ(capacitance.add(1), CapacitanceStatus::ok);
   ASSERT_EQ(capacitance.add(2), CapacitanceStatus::ok);
@@ -155,7 +166,8 @@ TEST(CapacitanceMatrix, RefusesWhatDoesNotFitAndStaysAsItWas) {
 }
 
 TEST(CapacitanceMatrix, RefusesToBeBuiltWithoutRoom) {
-  EXPECT_THROW(CapacitanceMatrix(0), Error);
+  EXPECT_THROW(CapacitanceMatrix(3, 0), Error);
+  EXPECT_THROW(CapacitanceMatrix(2, -1), Error);
 }
 
 }  // namespace

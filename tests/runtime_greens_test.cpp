@@ -11,6 +11,7 @@ namespace palpate {
 namespace {
 
 struct Case {
+  int dimension;
   Eigen::Index order;
   Precision precision;
   bool square;
@@ -22,7 +23,9 @@ class GreensLayouts : public testing::TestWithParam<Case> {
   Eigen::MatrixXd xi_ = test::random_definite(GetParam().order, 3);
   Greens greens_{
       test::pack(xi_, GetParam().precision),
+      GetParam().dimension,
       {.jobs = GetParam().jobs, .max_square_bytes = GetParam().square ? std::int64_t{1} << 32 : 0}};
+  Eigen::Index d_ = GetParam().dimension;
   // Rounding to the stored precision, relative to the largest entry.
   double tolerance_ =
       xi_.cwiseAbs().maxCoeff() * (GetParam().precision == Precision::single_precision ? 6e-8 : 0.0);
@@ -31,10 +34,11 @@ class GreensLayouts : public testing::TestWithParam<Case> {
 TEST_P(GreensLayouts, StoreWhatTheyWereGiven) {
   EXPECT_EQ(greens_.unfolded(), GetParam().square);
   EXPECT_EQ(greens_.order(), GetParam().order);
+  EXPECT_EQ(greens_.nodes(), GetParam().order / GetParam().dimension);
   const Index step = greens_.nodes() > 100 ? 37 : 1;
   for (Index a = 0; a < greens_.nodes(); a += step) {
     for (Index b = 0; b < greens_.nodes(); ++b) {
-      const Mat3 expected = xi_.block<3, 3>(3 * Eigen::Index{a}, 3 * Eigen::Index{b});
+      const Eigen::MatrixXd expected = xi_.block(d_ * a, d_ * b, d_, d_);
       ASSERT_LE((greens_.block(a, b) - expected).cwiseAbs().maxCoeff(), tolerance_) << a << ", " << b;
     }
   }
@@ -43,10 +47,10 @@ TEST_P(GreensLayouts, StoreWhatTheyWereGiven) {
 TEST_P(GreensLayouts, GatherPutsBlocksBesideEachOther) {
   const Index last = greens_.nodes() - 1;
   const std::vector<Index> columns = {last, 0, last / 2};
-  Eigen::Matrix<double, 3, 9, Eigen::RowMajor> gathered;
-  greens_.gather(last / 3, columns, {gathered.data(), 27});
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> gathered(d_, 3 * d_);
+  greens_.gather(last / 3, columns, {gathered.data(), static_cast<std::size_t>(gathered.size())});
   for (std::size_t k = 0; k < columns.size(); ++k) {
-    EXPECT_EQ((gathered.block<3, 3>(0, static_cast<Eigen::Index>(3 * k))),
+    EXPECT_EQ(gathered.middleCols(d_ * static_cast<Eigen::Index>(k), d_),
               greens_.block(last / 3, columns[k]));
   }
 }
@@ -57,12 +61,13 @@ TEST_P(GreensLayouts, DisplacementIsTheProduct) {
   std::vector<Index> nodes;
   for (Index node = 0; node < greens_.nodes(); node += std::max(1, greens_.nodes() / 7))
     nodes.push_back(node);
-  std::vector<double> f(3 * nodes.size());
+  std::vector<double> f(static_cast<std::size_t>(d_) * nodes.size());
   for (double& value : f) value = force(random);
 
   Eigen::VectorXd expected = Eigen::VectorXd::Zero(xi_.rows());
   for (std::size_t k = 0; k < nodes.size(); ++k) {
-    expected += xi_.middleCols<3>(3 * Eigen::Index{nodes[k]}) * Eigen::Map<const Vec3>(f.data() + 3 * k);
+    expected += xi_.middleCols(d_ * nodes[k], d_) *
+                Eigen::Map<const Eigen::VectorXd>(f.data() + static_cast<std::size_t>(d_) * k, d_);
   }
   Eigen::VectorXd u = Eigen::VectorXd::Constant(xi_.rows(), 1e30);
   greens_.displacement(nodes, f, {u.data(), static_cast<std::size_t>(u.size())});
@@ -76,34 +81,40 @@ TEST_P(GreensLayouts, DisplacementIsTheProduct) {
 // Orders at and beside the bounds of tiles (64), cache lines and chunks of u (2048).
 std::vector<Case> cases() {
   std::vector<Case> all;
-  for (const Eigen::Index order : {3, 63, 66, 129, 192, 2049}) {
+  const auto add = [&all](int dimension, Eigen::Index order) {
     for (const Precision precision : {Precision::single_precision, Precision::double_precision}) {
-      all.push_back({order, precision, false, 1});
-      all.push_back({order, precision, true, order > 100 ? 3 : 1});
+      all.push_back({dimension, order, precision, false, 1});
+      all.push_back({dimension, order, precision, true, order > 100 ? 3 : 1});
     }
-  }
+  };
+  for (const Eigen::Index order : {2, 62, 66, 130, 192, 2050}) add(2, order);
+  for (const Eigen::Index order : {3, 63, 66, 129, 192, 2049}) add(3, order);
   return all;
 }
 
 std::string case_name(const testing::TestParamInfo<Case>& info) {
-  return std::to_string(info.param.order) +
+  return std::to_string(info.param.dimension) + "d_" + std::to_string(info.param.order) +
          (info.param.precision == Precision::single_precision ? "_single" : "_double") +
          (info.param.square ? "_square" : "_packed");
 }
 
 INSTANTIATE_TEST_SUITE_P(All, GreensLayouts, testing::ValuesIn(cases()), case_name);
 
-TEST(Greens, RefusesAnOrderThatIsNotThreeANode) {
-  try {
-    const Greens greens(test::pack(test::random_definite(4, 1), Precision::double_precision));
-    FAIL() << "four dofs were taken";
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("4 dofs"), std::string::npos) << error.what();
+TEST(Greens, RefusesAnOrderThatIsNotThatOfSomeNodes) {
+  for (const int dimension : {2, 3}) {
+    try {
+      const Greens greens(test::pack(test::random_definite(7, 1), Precision::double_precision), dimension);
+      FAIL() << "seven dofs were taken";
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("7 dofs, which is not " + std::to_string(dimension)),
+                std::string::npos)
+          << error.what();
+    }
   }
 }
 
 TEST(Greens, IsUnfoldedByDefaultWhenItIsSmall) {
-  EXPECT_TRUE(Greens(test::pack(test::random_definite(30, 1), Precision::single_precision)).unfolded());
+  EXPECT_TRUE(Greens(test::pack(test::random_definite(30, 1), Precision::single_precision), 3).unfolded());
 }
 
 }  // namespace

@@ -70,31 +70,34 @@ void exercise(const Body& body, State& state, Eigen::VectorXd& u, const std::vec
     if (k % 3 == 0) hold(body, state, node);
     if (k % 7 == 0) release(state, node);
     if (k % 100 == 99) release_all(state);
-    prescribe(state, node, Vec3(0.0, 0.0, 0.001));
+    prescribe(state, node, Vec3(0.0, 0.001, 0.001));
     step(body, state, poses[k]);
     if (k % 10 == 0) surface_displacement(body, state, {u.data(), static_cast<std::size_t>(u.size())});
   }
 }
 
-class Tick : public testing::Test {
+class Tick : public testing::TestWithParam<int> {
  protected:
   void SetUp() override {
     for (int k = 0; k < 1000; ++k) {
       ToolPose tool;
-      tool.position = Vec3(0.001 * (k % 50), 0.5, k % 200 < 20 ? 9.0 : 1.0);
+      tool.position = test::upright(GetParam(), 0.001 * (k % 50), 0.5, k % 200 < 20 ? 9.0 : 1.0);
       if (k % 333 == 0) tool.position.x() = std::numeric_limits<double>::quiet_NaN();
       tool.grab = k % 40 > 10;
       poses_.push_back(tool);
     }
   }
 
-  Body body_{test::box_model(4, Scope::surface, Precision::single_precision)};
-  State state_{{.reach = 0.3, .max_nodes = 24}};
+  Body body_{
+      test::unit_model(GetParam(), GetParam() == 3 ? 4 : 20, Scope::surface, Precision::single_precision)};
+  State state_{body_, {.reach = 0.3, .max_nodes = 24}};
   Eigen::VectorXd u_{body_.greens().order()};
   std::vector<ToolPose> poses_;
 };
 
-TEST_F(Tick, MakesNoHeapCall) {
+INSTANTIATE_TEST_SUITE_P(Dimension, Tick, testing::Values(2, 3));
+
+TEST_P(Tick, MakesNoHeapCall) {
 #if PALPATE_OWN_MALLOC
   counting = true;
   { const std::vector<int> proof(100); }
@@ -113,7 +116,7 @@ TEST_F(Tick, MakesNoHeapCall) {
 }
 
 // In a process that the kernel kills at the first system call but write and exit.
-TEST_F(Tick, MakesNoSystemCall) {
+TEST_P(Tick, MakesNoSystemCall) {
 #if !PALPATE_OWN_MALLOC
   GTEST_SKIP() << "sanitizers make system calls";
 #else

@@ -18,8 +18,8 @@ const char* const press =
 
 class Loop : public testing::Test {
  protected:
-  Body body_{test::box_model(4, Scope::surface, Precision::double_precision)};
-  State state_{{.reach = 0.012, .max_nodes = 1}};
+  Body body_{test::unit_model(3, 4, Scope::surface, Precision::double_precision)};
+  State state_{body_, {.reach = 0.012, .max_nodes = 1}};
   std::atomic<bool> stop_ = false;
 };
 
@@ -75,7 +75,7 @@ TEST_F(Loop, FastRunsLeaveTheSameRecordingToTheLastBit) {
   std::filesystem::remove_all(folder);
   std::filesystem::create_directory(folder);
   for (const char* name : {"one.h5", "two.h5"}) {
-    State state({.reach = 0.01, .max_nodes = 1});
+    State state(body_, {.reach = 0.01, .max_nodes = 1});
     Recorder recorder(folder / name, "box.palpate.hdf", "0123");
     EXPECT_EQ(run_loop(body_, state, device, &recorder, true, stop_).ticks, 70001);
     recorder.finish();
@@ -90,6 +90,24 @@ TEST_F(Loop, FastRunsLeaveTheSameRecordingToTheLastBit) {
     files += entry.is_regular_file() ? 1 : 0;
   EXPECT_EQ(files, 2U) << "something half-written was left";
   std::filesystem::remove_all(folder);
+}
+
+TEST(PlaneLoop, IgnoresTheScriptsZ) {
+  const Body body(test::unit_model(2, 4, Scope::surface, Precision::double_precision));
+  const std::atomic<bool> stop = false;
+  double largest[2] = {};
+  for (const int z : {0, 5}) {
+    State state(body, {.reach = 0.1});
+    const std::string rows = "t,x,y,z\n0,0.5,1,0\n0.1,0.5,0.95," + std::to_string(z) + "\n";
+    const LoopReport report =
+        run_loop(body, state, ScriptDevice::parse(rows, "plane.csv"), nullptr, true, stop);
+    EXPECT_EQ(report.ticks_held, 101);
+    largest[z == 0 ? 0 : 1] = report.largest_force;
+  }
+  const Index top = body.nearest_surface_node(Vec3(0.5, 1.0, 0.0)).node;
+  const Eigen::VectorXd f = body.greens().block(top, top).inverse() * Eigen::Vector2d(0.0, -0.05);
+  EXPECT_NEAR(largest[0], f.norm(), 1e-13);
+  EXPECT_EQ(largest[0], largest[1]);
 }
 
 TEST(Recorder, SaysWhereItCannotWrite) {

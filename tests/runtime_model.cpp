@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <memory>
 #include <random>
+#include <span>
 #include <vector>
 
+#include "meshes/element.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
-#include "meshes/tet4.h"
 
 namespace palpate::test {
 namespace {
@@ -23,23 +24,35 @@ PackedGreens pack_as(const Eigen::MatrixXd& matrix, Precision precision) {
   return {std::shared_ptr<const void>(packed, packed->data()), matrix.rows(), precision};
 }
 
-std::vector<Eigen::Index> dofs_of(const std::vector<Index>& nodes) {
+std::vector<Eigen::Index> dofs_of(int dimension, std::span<const Index> nodes) {
   std::vector<Eigen::Index> dofs;
   for (const Index node : nodes) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) dofs.push_back(3 * Eigen::Index{node} + axis);
+    for (Eigen::Index axis = 0; axis < dimension; ++axis)
+      dofs.push_back(dimension * Eigen::Index{node} + axis);
   }
   return dofs;
 }
 
+Mesh unit_mesh(ElementType element, int cells) {
+  if (traits(element).dimension == 2) return generate(RectangleShape{.cells = {cells, cells}}, element);
+  return generate(BoxShape{.cells = {cells, cells, cells}}, element);
+}
+
+double height(const Model& model, std::size_t node) {
+  return model.mesh.nodes[node][model.dimension() - 1];
+}
+
 }  // namespace
 
-Eigen::MatrixXd assemble_stiffness(const Mesh& mesh, const Material& material) {
-  const auto order = static_cast<Eigen::Index>(3 * mesh.nodes.size());
-  const Matrix6 D = elasticity_matrix(material);
+Eigen::MatrixXd assemble_stiffness(const Model& model) {
+  const auto order = static_cast<Eigen::Index>(model.mesh.nodes.size()) * model.dimension();
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(order, order);
-  for (const Tet& tet : mesh.tets) {
-    const std::vector<Eigen::Index> dofs = dofs_of({tet.begin(), tet.end()});
-    K(dofs, dofs) += tet4::stiffness(tet4::corners(mesh, tet), D);
+  for (Index e = 0; e < model.mesh.elements(); ++e) {
+    const std::vector<Eigen::Index> dofs = dofs_of(model.dimension(), model.mesh.element_nodes(e));
+    const auto material = static_cast<std::size_t>(model.material_of_element[static_cast<std::size_t>(e)]);
+    K(dofs, dofs) +=
+        element_stiffness(model.mesh.element, element_nodes(model.mesh, e),
+                          elasticity_matrix(model.materials[material], model.analysis), model.thickness);
   }
   return K;
 }
@@ -60,21 +73,25 @@ Eigen::MatrixXd random_definite(Eigen::Index order, unsigned seed) {
   return A;
 }
 
-Model box_model(int cells, Scope scope, Precision precision) {
+Model unit_model(ElementType element, int cells, Scope scope, Precision precision) {
   Model model;
   model.name = "box";
-  model.mesh =
-      generate(BoxShape{.origin = Vec3::Zero(), .size = Vec3::Ones(), .cells = {cells, cells, cells}});
-  model.material = {.youngs_modulus = 1.0, .poissons_ratio = 0.3, .density = 1000.0};
+  model.mesh = unit_mesh(element, cells);
+  const int d = model.dimension();
+  model.analysis = d == 3 ? Analysis::solid : Analysis::plane_stress;
+  model.materials = {{.youngs_modulus = 1.0, .poissons_ratio = 0.3, .density = 1000.0}};
+  model.material_of_element.assign(static_cast<std::size_t>(model.mesh.elements()), 0);
   model.scope = scope;
   model.layers = 0;
   const Surface surface = extract_surface(model.mesh);
-  model.surface_triangles = surface.triangles;
+  model.surface = surface_simplices(surface);
+  model.rest_force.assign(model.mesh.nodes.size(), Vec3::Zero());
+  model.rest_displacement.assign(model.mesh.nodes.size(), Vec3::Zero());
 
   std::vector<Index> free;
   for (Index node = 0; node < static_cast<Index>(model.mesh.nodes.size()); ++node) {
-    const bool clamped = model.mesh.nodes[static_cast<std::size_t>(node)].z() < 1e-12;
-    model.fixed.push_back(clamped ? 1 : 0);
+    const bool clamped = height(model, static_cast<std::size_t>(node)) < 1e-12;
+    model.fixed.push_back(clamped ? static_cast<std::uint8_t>((1U << d) - 1U) : 0);
     if (clamped) continue;
     free.push_back(node);
     if (scope == Scope::full || std::binary_search(surface.nodes.begin(), surface.nodes.end(), node)) {
@@ -83,17 +100,36 @@ Model box_model(int cells, Scope scope, Precision precision) {
   }
   std::shuffle(model.stored_nodes.begin(), model.stored_nodes.end(), std::mt19937(7));
 
-  const std::vector<Eigen::Index> free_dofs = dofs_of(free);
-  const Eigen::MatrixXd K = assemble_stiffness(model.mesh, model.material)(free_dofs, free_dofs);
+  const std::vector<Eigen::Index> free_dofs = dofs_of(d, free);
+  const Eigen::MatrixXd K = assemble_stiffness(model)(free_dofs, free_dofs);
   const Eigen::MatrixXd Xi = K.llt().solve(Eigen::MatrixXd::Identity(K.rows(), K.cols()));
   std::vector<Index> position(model.mesh.nodes.size(), -1);
   for (std::size_t k = 0; k < free.size(); ++k)
     position[static_cast<std::size_t>(free[k])] = static_cast<Index>(k);
   std::vector<Index> kept;
   for (const Index node : model.stored_nodes) kept.push_back(position[static_cast<std::size_t>(node)]);
-  const std::vector<Eigen::Index> kept_dofs = dofs_of(kept);
+  const std::vector<Eigen::Index> kept_dofs = dofs_of(d, kept);
   model.greens = pack(Xi(kept_dofs, kept_dofs), precision);
   return model;
+}
+
+Model unit_model(int dimension, int cells, Scope scope, Precision precision) {
+  return unit_model(dimension == 2 ? ElementType::quad4 : ElementType::tet4, cells, scope, precision);
+}
+
+Vec3 upright(int dimension, double x, double y, double z) {
+  return dimension == 2 ? Vec3(x, z, 0.0) : Vec3(x, y, z);
+}
+
+Vec3 top_middle(int dimension) {
+  return upright(dimension, 0.5, 0.5, 1.0);
+}
+
+void set_rest(Model& model, double size) {
+  for (std::size_t node = 0; node < model.mesh.nodes.size(); ++node) {
+    const double h = height(model, node);
+    model.rest_displacement[node] = size * h * upright(model.dimension(), 0.5, -0.25, -h);
+  }
 }
 
 }  // namespace palpate::test

@@ -3,14 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "formats/model.h"
 
 namespace palpate::test {
 
-/// K [3N x 3N] of all nodes, dense, without boundary conditions [N/m].
-Eigen::MatrixXd assemble_stiffness(const Mesh& mesh, const Material& material);
+/// K [dN x dN] of all nodes, dense, without boundary conditions [N/m].
+Eigen::MatrixXd assemble_stiffness(const Model& model);
 
 /// The lower triangle of a symmetric matrix.
 PackedGreens pack(const Eigen::MatrixXd& matrix, Precision precision);
@@ -18,7 +17,20 @@ PackedGreens pack(const Eigen::MatrixXd& matrix, Precision precision);
 /// A symmetric positive definite matrix with a dominant diagonal, the same for the same seed.
 Eigen::MatrixXd random_definite(Eigen::Index order, unsigned seed);
 
-/// The unit cube of cells^3 cells, E = 1 Pa, nu = 0.3, clamped at z = 0; stored nodes in a scrambled order.
-Model box_model(int cells, Scope scope, Precision precision);
+/// The unit cube of cells^3 cells (tet4) or the unit square of cells^2 (quad4 or tri3, plane stress), E = 1
+/// Pa, nu = 0.3, clamped at the bottom (z = 0, in the plane y = 0), without loads; stored nodes in a
+/// scrambled order.
+Model unit_model(ElementType element, int cells, Scope scope, Precision precision);
+
+/// That of tet4 or, with two dimensions, of quad4.
+Model unit_model(int dimension, int cells, Scope scope, Precision precision);
+
+/// (x, y, z) in space, (x, z) in the plane: z is the height over the clamped side.
+Vec3 upright(int dimension, double x, double y, double z);
+/// The middle of the side opposite to the clamped one.
+Vec3 top_middle(int dimension);
+
+/// Gives the model a rest displacement as a load would: smooth, zero at the clamped side, `size` [m] large.
+void set_rest(Model& model, double size);
 
 }  // namespace palpate::test

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "meshes/error.h"
 #include "runtime/numbers.h"
@@ -20,9 +21,10 @@ TEST(Numbers, AreReadWholeAndFinite) {
   }
 }
 
-TEST(Numbers, VectorsHaveThreeParts) {
-  EXPECT_EQ(parse_vector("1, -2,.5"), Vec3(1.0, -2.0, 0.5));
-  for (const char* text : {"1,2", "1,2,3,4", "1,2,", "1,2,nan", "1 2 3", ""})
+TEST(Numbers, VectorsHaveTwoOrThreeParts) {
+  EXPECT_EQ(parse_vector("1, -2,.5"), (std::vector<double>{1.0, -2.0, 0.5}));
+  EXPECT_EQ(parse_vector("1e-3,2"), (std::vector<double>{0.001, 2.0}));
+  for (const char* text : {"1", "1,2,3,4", "1,2,", "1,2,nan", "1 2 3", ""})
     EXPECT_FALSE(parse_vector(text)) << text;
 }
 

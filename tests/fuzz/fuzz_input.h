@@ -6,7 +6,8 @@
 namespace palpate::test {
 
 inline constexpr std::uint8_t raw_file = 0;  ///< the rest is a file
-inline constexpr std::uint8_t some_edits =
-    1;  ///< the rest chooses edits of a good file, whose checksums are then made right again
+/// The rest chooses edits of a good file, whose checksums are then made right again.
+inline constexpr std::uint8_t some_edits = 1;
+inline constexpr std::uint8_t some_plane_edits = 2;  ///< the same of a file of quads in the plane
 
 }  // namespace palpate::test

@@ -11,18 +11,19 @@ int main(int count, char** arguments) {
   std::filesystem::create_directories(folder);
   const test::Folder temporary;
   const std::string raw(1, static_cast<char>(test::raw_file));
-  const std::string edits(1, static_cast<char>(test::some_edits));
 
-  test::write_sample(temporary / "single", Precision::single_precision, 1);
-  test::write_sample(temporary / "double", Precision::double_precision, 1);
+  test::write_sample(temporary / "single", Precision::single_precision, ElementType::tet4, 1);
+  test::write_sample(temporary / "double", Precision::double_precision, ElementType::tet4, 1);
+  test::write_sample(temporary / "plane", Precision::double_precision, ElementType::quad4, 1);
   const std::string whole = test::read_bytes(temporary / "double");
   test::write_bytes(folder / "single", raw + test::read_bytes(temporary / "single"));
   test::write_bytes(folder / "double", raw + whole);
+  test::write_bytes(folder / "plane", raw + test::read_bytes(temporary / "plane"));
   test::write_bytes(folder / "cut", raw + whole.substr(0, whole.size() / 2));
 
   std::mt19937 random(1);
   for (int seed = 0; seed < 30; ++seed) {
-    std::string bytes = edits;
+    std::string bytes(1, static_cast<char>(seed % 3 == 0 ? test::some_plane_edits : test::some_edits));
     for (int i = 0; i < 40; ++i) bytes += static_cast<char>(random() & 255U);
     test::write_bytes(folder / ("edits" + std::to_string(seed)), bytes);
   }

@@ -2,6 +2,7 @@
 // can trust.
 #include <fuzzer/FuzzedDataProvider.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <set>
@@ -21,10 +22,10 @@ struct Good {
   std::filesystem::path path = folder / "x.palpate.hdf";
   std::string bytes;
   std::vector<std::string> datasets;
-  std::vector<std::string> attributes = {"format",    "version", "units", "dimension", "scalar",
-                                         "generator", "name",    "scope", "layers",    "new"};
-  Good() {
-    write_sample(path, Precision::double_precision, 1);
+  std::vector<std::string> attributes = {"format", "version",   "units", "element", "dimension", "analysis",
+                                         "scalar", "generator", "name",  "scope",   "layers",    "new"};
+  explicit Good(ElementType element) {
+    write_sample(path, Precision::double_precision, element, 1);
     bytes = read_bytes(path);
     datasets = checked_datasets(path);
     datasets.emplace_back("/mesh/new");
@@ -35,23 +36,42 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-bool is_node(const Model& model, Index node) {
-  return node >= 0 && static_cast<std::size_t>(node) < model.mesh.nodes.size();
+/// All values in [0, below).
+bool indices(const std::vector<Index>& values, std::size_t below) {
+  return std::all_of(values.begin(), values.end(),
+                     [below](Index i) { return i >= 0 && static_cast<std::size_t>(i) < below; });
+}
+
+bool finite(const std::vector<Vec3>& rows, const Model& model) {
+  return rows.size() == model.mesh.nodes.size() &&
+         std::all_of(rows.begin(), rows.end(), [&model](const Vec3& row) {
+           return row.allFinite() && (model.dimension() == 3 || row.z() == 0.0);
+         });
 }
 
 /// What the runtime takes for granted.
 void use(const Model& model) {
-  require(model.fixed.size() == model.mesh.nodes.size() &&
-          model.mesh.regions.size() == model.mesh.tets.size());
-  for (const Vec3& x : model.mesh.nodes) require(x.allFinite());
-  for (const Tet& tet : model.mesh.tets)
-    for (const Index node : tet) require(is_node(model, node));
-  for (const Triangle& triangle : model.surface_triangles)
-    for (const Index node : triangle) require(is_node(model, node));
+  const std::size_t nodes = model.mesh.nodes.size();
+  const auto elements = static_cast<std::size_t>(model.mesh.elements());
+  const auto d = static_cast<std::size_t>(model.dimension());
+  require((d == 2 || d == 3) && (model.analysis == Analysis::solid) == (d == 3));
+  require(model.fixed.size() == nodes && model.mesh.regions.size() == elements && elements > 0);
+  require(finite(model.mesh.nodes, model) && finite(model.rest_force, model) &&
+          finite(model.rest_displacement, model));
+  require(model.mesh.connectivity.size() ==
+          elements * static_cast<std::size_t>(traits(model.mesh.element).nodes));
+  require(indices(model.mesh.connectivity, nodes) && indices(model.surface, nodes) &&
+          model.surface.size() % d == 0);
+  require(model.material_of_element.size() == elements &&
+          indices(model.material_of_element, model.materials.size()));
+  for (const Material& m : model.materials)
+    require(m.youngs_modulus > 0 && m.poissons_ratio < 0.5 && m.density > 0);
+  require(model.thickness > 0 && std::isfinite(model.thickness));
+  for (const std::uint8_t mask : model.fixed) require(mask < (1U << d));
+  require(indices(model.stored_nodes, nodes));
   std::set<Index> stored;
   for (const Index node : model.stored_nodes)
-    require(is_node(model, node) && model.fixed[static_cast<std::size_t>(node)] == 0 &&
-            stored.insert(node).second);
+    require(model.fixed[static_cast<std::size_t>(node)] == 0 && stored.insert(node).second);
   require(!stored.empty() && model.greens.order() == model.stored_dofs());
   for (std::int64_t i = 0; i < model.greens.order(); ++i) {
     require(model.greens(i, i) > 0);
@@ -120,8 +140,9 @@ void edit(const Good& good, FuzzedDataProvider& choose) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace palpate;
   using namespace palpate::test;
-  static const Good good;
+  static const Good solid(ElementType::tet4), plane(ElementType::quad4);
   if (size == 0) return 0;
+  const Good& good = data[0] == some_plane_edits ? plane : solid;
   const hdf5::Quiet quiet;
   if (data[0] == raw_file) {
     write_bytes(good.path, std::string(data + 1, data + size));

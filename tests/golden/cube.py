@@ -41,18 +41,3 @@ def greens(cells, youngs_modulus=1.0, poissons_ratio=0.3):
     dofs = (3 * free[:, None] + np.arange(3)).ravel()
     K = stiffness(nodes, tets, youngs_modulus, poissons_ratio)
     return np.linalg.inv(K[np.ix_(dofs, dofs)]), free
-
-
-def stored_greens(file):
-    """Xi of a .palpate.hdf, full matrix in mesh node order, and the stored nodes."""
-    import h5py
-    with h5py.File(file) as hdf:
-        stored = hdf["dofs/stored_nodes"][:]
-        packed = hdf["greens/packed"][:].astype(float)
-    order = 3 * len(stored)
-    Xi = np.zeros((order, order))
-    Xi.T[np.triu_indices(order)] = packed  # lower triangle column by column
-    Xi = np.tril(Xi) + np.tril(Xi, -1).T
-    by_node = np.argsort(stored)
-    dofs = (3 * by_node[:, None] + np.arange(3)).ravel()
-    return Xi[np.ix_(dofs, dofs)], stored[by_node]

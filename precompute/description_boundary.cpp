@@ -1,0 +1,97 @@
+#include "precompute/description_parts.h"
+
+namespace palpate {
+namespace {
+
+/// Bit `axis` is set for each letter.
+std::uint8_t read_axes(const Section& entry, int dimension) {
+  const std::string letters = dimension == 3 ? "xyz" : "xy";
+  if (!entry.has("axes")) {
+    return dimension == 3 ? 7 : 3;
+  }
+  const std::string axes = entry.text("axes");
+  std::uint8_t bits = 0;
+  for (const char letter : axes) {
+    const std::size_t axis = letters.find(letter);
+    if (axis == std::string::npos) {
+      bits = 0;
+      break;
+    }
+    bits = static_cast<std::uint8_t>(bits | 1U << axis);
+  }
+  if (bits == 0) {
+    entry.fail("axes", entry.name_of("axes") + " is \"" + axes + "\"",
+               "use some of the letters of \"" + letters + "\", such as \"x\"");
+  }
+  return bits;
+}
+
+Fixing read_fixing(const Section& entry, int dimension) {
+  Fixing fixing{read_selection(entry, entry.only_one_of(selection_kinds), dimension),
+                read_axes(entry, dimension), entry.vector("displacement", dimension, Vec3::Zero())};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double u = fixing.displacement[axis];
+    if (u != 0.0 && (fixing.axes >> axis & 1) == 0) {
+      const std::string letter(1, static_cast<char>('x' + axis));
+      entry.fail("displacement",
+                 entry.name_of("displacement") + " along " + letter + " is " + shown(u) + ", but axes \"" +
+                     entry.text("axes") + "\" does not hold " + letter,
+                 "add " + letter + " to axes, or make that component 0");
+    }
+  }
+  return fixing;
+}
+
+Load read_load(const Section& entry, int dimension) {
+  const std::string_view kind = entry.only_one_of({"nodal_force", "traction", "gravity"});
+  const Vec3 value = entry.vector(kind, dimension);
+  if (kind == "gravity") {
+    if (const std::string_view where = entry.at_most_one_of(selection_kinds); !where.empty()) {
+      entry.fail(where, "[[load]] gravity acts on the whole body and takes no " + std::string(where),
+                 "remove " + std::string(where));
+    }
+    return Gravity{value};
+  }
+  const Selection where = read_selection(entry, entry.only_one_of(selection_kinds), dimension);
+  if (kind == "traction") {
+    return Traction{value, where};
+  }
+  return NodalForce{value, where};
+}
+
+Keys with_selections(Keys keys) {
+  keys.insert(keys.end(), selection_kinds.begin(), selection_kinds.end());
+  return keys;
+}
+
+}  // namespace
+
+std::vector<Fixing> read_fixed(const Section& root, int dimension) {
+  const std::string hint = dimension == 3
+                               ? "add for example\n[[fixed]]\nlowest = {axis = \"z\", percent = 5}"
+                               : "add for example\n[[fixed]]\nlowest = {axis = \"y\", percent = 5}";
+  if (!root.has("fixed")) {
+    root.fail("fixed", "no region is fixed: the body would fly away at the first touch", hint);
+  }
+  std::vector<Fixing> result;
+  for (const Section& entry : root.sections("fixed", with_selections({"axes", "displacement"}), hint)) {
+    result.push_back(read_fixing(entry, dimension));
+  }
+  return result;
+}
+
+std::vector<Load> read_loads(const Section& root, int dimension) {
+  std::vector<Load> result;
+  if (!root.has("load")) {
+    return result;
+  }
+  const Keys keys = with_selections({"nodal_force", "traction", "gravity"});
+  const std::string hint = "write for example\n[[load]]\ngravity = " +
+                           std::string(dimension == 3 ? "[0, 0, -9.81]" : "[0, -9.81]");
+  for (const Section& entry : root.sections("load", keys, hint)) {
+    result.push_back(read_load(entry, dimension));
+  }
+  return result;
+}
+
+}  // namespace palpate

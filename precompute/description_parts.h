@@ -1,0 +1,36 @@
+// The parts of model.toml, each read from its table. All throw Error with line and column.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "precompute/description.h"
+#include "precompute/toml_section.h"
+
+namespace palpate {
+
+/// The keys of [geometry] that say what it is: one of them is given.
+extern const Keys geometry_kinds;
+/// Those that lie in the plane. A volume file can be either.
+bool is_plane(std::string_view geometry_kind);
+
+/// [geometry]; `kind` is the one of geometry_kinds that it has.
+Geometry read_geometry(const Section& geometry, std::string_view kind, const std::filesystem::path& folder);
+
+extern const Keys mesh_keys;
+/// [mesh], for a kind of geometry.
+MeshOptions read_mesh_options(const Section& mesh, std::string_view geometry_kind);
+
+extern const Keys selection_kinds;
+/// The selection that an entry gives under `kind`.
+Selection read_selection(const Section& entry, std::string_view kind, int dimension);
+
+/// [material] or every [[material]].
+std::vector<MaterialPart> read_materials(const Section& root, int dimension);
+/// Every [[fixed]]: at least one.
+std::vector<Fixing> read_fixed(const Section& root, int dimension);
+/// Every [[load]], possibly none.
+std::vector<Load> read_loads(const Section& root, int dimension);
+
+}  // namespace palpate

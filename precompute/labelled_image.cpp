@@ -1,0 +1,133 @@
+#include "precompute/labelled_image.h"
+
+#define CGAL_USE_ZLIB 1  // .inr.gz
+#include <CGAL/Image_3.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <span>
+
+#include "meshes/error.h"
+#include "precompute/child_process.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::chrono::seconds read_time_limit{600};
+
+enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
+
+struct ImageHeader {
+  std::array<Index, 3> size{};
+  std::array<double, 3> spacing{};
+  std::array<double, 3> origin{};
+};
+
+/// Reads the image and sends its header and its voxels as labels.
+ChildResult read_labels(const std::string& file) {
+  CGAL::Image_3 image;
+  if (!image.read(file) || image.size() == 0) {
+    return {not_an_image, {}};
+  }
+  if (image.image()->vdim != 1) {
+    return {not_scalar, {}};
+  }
+  ImageHeader header;
+  header.size = {static_cast<Index>(image.xdim()), static_cast<Index>(image.ydim()),
+                 static_cast<Index>(image.zdim())};
+  header.spacing = {image.vx(), image.vy(), image.vz()};
+  header.origin = {static_cast<double>(image.tx()), static_cast<double>(image.ty()),
+                   static_cast<double>(image.tz())};
+  std::vector<std::int32_t> labels;
+  labels.reserve(image.size());
+  for (std::size_t k = 0; k < image.zdim(); ++k) {
+    for (std::size_t j = 0; j < image.ydim(); ++j) {
+      for (std::size_t i = 0; i < image.xdim(); ++i) {
+        labels.push_back(static_cast<std::int32_t>(std::lround(image.value(i, j, k))));
+      }
+    }
+  }
+  ChildResult result;
+  append_bytes(result.bytes, std::span<const ImageHeader>(&header, 1));
+  append_bytes(result.bytes, std::span<const std::int32_t>(labels));
+  return result;
+}
+
+/// Marks the voxels that carry one of the labels (all but 0 where none are listed).
+VoxelBody select(const Bytes& bytes, const ImageGeometry& image) {
+  const std::string where = image.file.string();
+  const std::vector<int>& wanted = image.labels;
+  ImageHeader header;
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  VoxelBody body;
+  body.size = header.size;
+  body.spacing = Vec3(header.spacing[0], header.spacing[1], header.spacing[2]);
+  body.origin = Vec3(header.origin[0], header.origin[1], header.origin[2]);
+  std::vector<std::int32_t> labels((bytes.size() - sizeof(header)) / sizeof(std::int32_t));
+  std::memcpy(labels.data(), bytes.data() + sizeof(header), labels.size() * sizeof(std::int32_t));
+
+  std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
+  body.inside.reserve(labels.size());
+  for (const std::int32_t label : labels) {
+    const auto [entry, is_new] = selected.try_emplace(label, 0);
+    if (is_new) {
+      entry->second =
+          wanted.empty() ? label != 0 : std::find(wanted.begin(), wanted.end(), label) != wanted.end();
+    }
+    body.inside.push_back(entry->second);
+  }
+  if (image.regions) {
+    body.labels = std::move(labels);
+    for (std::size_t v = 0; v < body.labels.size(); ++v) {
+      body.labels[v] = body.inside[v] != 0 ? body.labels[v] : VoxelBody::no_label;
+    }
+  }
+  std::string occurring;
+  for (const auto& [label, is_body] : selected) {
+    occurring += (occurring.empty() ? "" : ", ") + std::to_string(label);
+  }
+  for (const int label : wanted) {
+    if (!selected.contains(label)) {
+      throw Error("no voxel of the image has label " + std::to_string(label), where,
+                  "its labels are " + occurring);
+    }
+  }
+  if (wanted.empty() && selected.size() == 1 && selected.contains(0)) {
+    throw Error("the image is empty: all its voxels are 0", where, "give a segmented image");
+  }
+  return body;
+}
+
+}  // namespace
+
+VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
+                              std::vector<std::string>& notes) {
+  const std::string where = image.file.string();
+  if (!std::filesystem::is_regular_file(image.file)) {
+    throw Error("there is no such image file", where, "check image = \"...\" in [geometry]");
+  }
+  // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
+  const std::string path = std::filesystem::absolute(image.file).string();
+  const ChildResult read =
+      run_in_child("the image reader", where, read_time_limit, [&] { return read_labels(path); });
+  if (read.status != read_ok) {
+    throw Error(
+        read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
+        where, "use a complete INR file (.inr, .inr.gz) with one label a voxel and positive VX, VY, VZ");
+  }
+  VoxelBody body = crop(select(read.bytes, image), 2);
+  keep_one_part(body, where, notes);
+  if (const std::size_t filled = join_across_edges(body); filled != 0) {
+    notes.push_back("filled " + std::to_string(filled) +
+                    " voxel(s) of the image where voxels touched along an edge only");
+  }
+  if (image.regions) {
+    const double element = std::pow(edge_length, 3) / (6.0 * std::sqrt(2.0));
+    complete_labels(body, static_cast<std::size_t>(element / body.spacing.prod()), notes);
+  }
+  return body;
+}
+
+}  // namespace palpate
