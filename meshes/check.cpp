@@ -43,6 +43,12 @@ void check_numbers(const Mesh& mesh, const std::string& where) {
   }
 }
 
+std::string remake_hint(const Mesh& mesh) {
+  return traits(mesh.element).nodes > traits(mesh.element).corners
+             ? "The middles of its edges are too far out or in the wrong order; remake the mesh."
+             : "Remake the mesh with a bound on the quality of its elements.";
+}
+
 /// Volumes that are smaller count as zero.
 double smallest_volume(const ElementNodes& x, int dimension) {
   const double longest = (x.rowwise() - x.row(0)).rowwise().norm().maxCoeff();
@@ -59,7 +65,7 @@ std::size_t count_inverted(const Mesh& mesh, const std::string& where) {
     if (std::abs(volume) <= smallest_volume(x, d)) {
       throw Error(fmt::format("element {} near {} has zero {}", e, text(centre_of(mesh, e), d),
                               d == 3 ? "volume" : "area"),
-                  where, "Remove it or remake the mesh with a quality bound.");
+                  where, remake_hint(mesh));
     }
     if (volume > 0.0) continue;
     ++inverted;
@@ -90,10 +96,7 @@ void check_not_folded(const Mesh& mesh, const std::string& where) {
     if (smallest_determinant(mesh.element, x) > smallest_volume(x, mesh.dimension())) continue;
     throw Error(fmt::format("element {} near {} is folded or flat at a corner", e,
                             text(centre_of(mesh, e), mesh.dimension())),
-                where,
-                traits(mesh.element).nodes > traits(mesh.element).corners
-                    ? "The middles of its edges are too far out or in the wrong order; remake the mesh."
-                    : "All its angles must be less than 180 degrees; remake the mesh.");
+                where, remake_hint(mesh));
   }
 }
 

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "precompute/description_parts.h"
 
 namespace palpate {
@@ -32,11 +34,11 @@ Fixing read_fixing(const Section& entry, int dimension) {
   for (int axis = 0; axis < 3; ++axis) {
     const double u = fixing.displacement[axis];
     if (u != 0.0 && (fixing.axes >> axis & 1) == 0) {
-      const std::string letter(1, static_cast<char>('x' + axis));
+      const char letter = "xyz"[axis];
       entry.fail("displacement",
-                 entry.name_of("displacement") + " along " + letter + " is " + shown(u) + ", but axes \"" +
-                     entry.text("axes") + "\" does not hold " + letter,
-                 "add " + letter + " to axes, or make that component 0");
+                 fmt::format("[[fixed]] displacement along {} is {}, but axes \"{}\" does not hold {}",
+                             letter, u, entry.text("axes"), letter),
+                 fmt::format("add {} to axes, or make that component 0", letter));
     }
   }
   return fixing;

@@ -16,9 +16,10 @@
 #include "meshes/error.h"
 #include "precompute/child_process.h"
 #include "precompute/distance_field.h"
+#include "precompute/interface_crossings.h"
 #include "precompute/labelled_image.h"
 #include "precompute/mesh3.h"
-#include "precompute/region_points.h"
+#include "precompute/mesh_parts.h"
 #include "precompute/tetgen_mesh.h"
 
 namespace palpate {
@@ -33,7 +34,7 @@ using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 namespace parameters = CGAL::parameters;
 
 constexpr double relative_error = 1e-4;  // of the body's size: where boundary and interfaces are found
-constexpr double seed_spacing = 1.5;     // [edge_length] between the first points on interfaces
+constexpr double seed_spacing = 1.5;     // [edge_length] largest between the first points on interfaces
 
 Vec3 as_vector(const Point& p) {
   return {p.x(), p.y(), p.z()};
@@ -68,30 +69,6 @@ Domain make_domain(const VoxelGrid& grid, const LabelField& field) {
       parameters::bounding_object = bounding_box(grid), parameters::relative_error_bound = relative_error);
 }
 
-/// Points that keep a distance from each other.
-class SparsePoints {
- public:
-  explicit SparsePoints(double spacing) : spacing_(spacing) {}
-
-  /// Takes x if no other one is near.
-  bool add(const Vec3& x) {
-    const Eigen::Vector3i cell = (x / spacing_).array().floor().cast<int>();
-    for (int n = 0; n < 27; ++n) {
-      const auto near = points_.find(key(cell + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)));
-      if (near != points_.end() && (near->second - x).norm() < spacing_) {
-        return false;
-      }
-    }
-    return points_.emplace(key(cell), x).second;
-  }
-
- private:
-  static std::array<int, 3> key(const Eigen::Vector3i& cell) { return {cell[0], cell[1], cell[2]}; }
-
-  double spacing_;
-  std::map<std::array<int, 3>, Vec3> points_;
-};
-
 void insert(Complex& complex, const Point& point, const Domain::Index& index) {
   const Complex::Vertex_handle vertex = complex.triangulation().insert(Triangulation::Point(point));
   complex.set_dimension(vertex, 2);  // it is on a surface
@@ -108,24 +85,13 @@ void seed_boundary(Complex& complex, const Domain& domain) {
 }
 
 /// Puts points on the interfaces between labels: refinement by itself finds what is large compared with the
-/// elements, but not every thin vessel.
-void seed_interfaces(Complex& complex, const Domain& domain, const VoxelBody& body, double spacing) {
-  SparsePoints seeds(spacing);
-  const std::array<std::size_t, 3> stride = {1, body.at(0, 1, 0), body.at(0, 0, 1)};
-  for (std::size_t v = 0; v + stride[2] < body.labels.size(); ++v) {
-    for (const std::size_t step : stride) {
-      if (body.labels[v] == body.labels[v + step] || body.inside[v] == 0 || body.inside[v + step] == 0) {
-        continue;
-      }
-      const Kernel::Segment_3 between(as_point(body.center(v)), as_point(body.center(v + step)));
-      if (!domain.do_intersect_surface_object()(between)) {
-        continue;  // smoothed away
-      }
-      const auto [point, index, dimension] = domain.construct_intersection_object()(between);
-      if (seeds.add(as_vector(point))) {
-        insert(complex, point, index);
-      }
-    }
+/// elements, but not every vessel.
+void seed_interfaces(Complex& complex, const Domain& domain, const VoxelBody& body, const LabelField& field,
+                     double edge_length) {
+  for (const auto& [from, to] : interface_crossings(body, field, seed_spacing * edge_length)) {
+    const auto [point, index, dimension] =
+        domain.construct_intersection_object()(Kernel::Segment_3(as_point(from), as_point(to)));
+    insert(complex, point, index);
   }
 }
 
@@ -144,7 +110,7 @@ Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& fi
   seed_boundary(complex, domain);
   const bool one_label = field.labels().size() == 1;
   if (!one_label) {
-    seed_interfaces(complex, domain, body, seed_spacing * *options.edge_length);
+    seed_interfaces(complex, domain, body, field, *options.edge_length);
   }
   // three labels may meet in an edge, so that only a single one has manifold surfaces
   CGAL::refine_mesh_3(complex, domain, Criteria(facets, cells), parameters::no_reset_c3t3(),
@@ -221,6 +187,10 @@ Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vec
   }
   mesh.tagged_facets.clear();
   mesh.facet_tags.clear();
+  if (const Index crumbs = remove_crumbs(mesh); crumbs != 0) {
+    notes.push_back(
+        fmt::format("removed {} element(s) that hung on the body by an edge or a corner", crumbs));
+  }
   if (image.regions) {
     report_volumes(mesh, body, notes);
   }

@@ -24,40 +24,58 @@ using Triangulation = CGAL::Constrained_triangulation_plus_2<CGAL::Constrained_D
                                          CGAL::Constrained_triangulation_face_base_2<Kernel>>,
     CGAL::Exact_predicates_tag>>;
 
-constexpr std::size_t corner_run = 3;   // pixels; shorter runs are steps of a slanted line
-constexpr double step_tolerance = 0.6;  // pixels: a step of one pixel leaves the middle of its line by 0.5
+constexpr double corner_run = 3.0;      // pixels; shorter runs are steps of a slanted line
+constexpr double step_tolerance = 0.5;  // pixels
 constexpr double tolerance_per_edge = 0.05;
 
-/// A line through the middles of the pixel sides, which turns its staircases into slanted lines, and through
-/// the corners between long runs, which are meant.
-std::vector<Point> without_steps(const std::vector<LatticePoint>& outline) {
-  const std::size_t n = outline.size();
-  const auto is_corner = [&](std::size_t p) {
-    return outline[(p + n - 1) % n][0] != outline[(p + 1) % n][0] &&
-           outline[(p + n - 1) % n][1] != outline[(p + 1) % n][1];
+/// Straight piece of an outline.
+struct Run {
+  Vec3 from, to;
+  bool turns_left;  ///< at `from`
+
+  [[nodiscard]] double length() const { return (to - from).norm(); }
+};
+
+std::vector<Run> runs_of(const std::vector<LatticePoint>& outline) {
+  const auto at = [&](std::size_t p) {
+    const LatticePoint& corner = outline[p % outline.size()];
+    return Vec3(corner[0], corner[1], 0.0);
   };
-  std::vector<std::size_t> corners;
-  for (std::size_t p = 0; p < n; ++p) {
-    if (is_corner(p)) {
-      corners.push_back(p);
+  std::vector<Run> runs;
+  for (std::size_t p = 0; p < outline.size(); ++p) {
+    const Vec3 in = at(p) - at(p + outline.size() - 1), out = at(p + 1) - at(p);
+    const double turn = in[0] * out[1] - in[1] * out[0];
+    if (turn != 0.0) {
+      runs.push_back({at(p), {}, turn > 0.0});
     }
   }
-  const auto run_after = [&](std::size_t c) {
-    return (corners[(c + 1) % corners.size()] + n - corners[c]) % n;
-  };
-  const auto middle_after = [&](std::size_t p) {
-    const LatticePoint &a = outline[p % n], &b = outline[(p + 1) % n];
-    return Point(0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]));
-  };
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    runs[r].to = runs[(r + 1) % runs.size()].from;
+  }
+  return runs;
+}
+
+/// A line that turns the staircases of an outline into slanted lines: through the middle of each step, half a
+/// pixel inside the ends of the runs at its extremes, and through the corners that are meant: those between
+/// long runs or without steps beside them.
+std::vector<Point> without_steps(const std::vector<LatticePoint>& outline) {
+  const std::vector<Run> runs = runs_of(outline);
+  const auto run_at = [&](std::size_t r) -> const Run& { return runs[r % runs.size()]; };
+  const auto is_step = [&](std::size_t r) { return run_at(r).turns_left != run_at(r + 1).turns_left; };
   std::vector<Point> line;
-  for (std::size_t c = 0; c < corners.size(); ++c) {
-    const std::size_t p = corners[c], run = run_after(c);
-    if (run >= corner_run && run_after((c + corners.size() - 1) % corners.size()) >= corner_run) {
-      line.emplace_back(outline[p][0], outline[p][1]);
+  const auto add = [&](const Vec3& x) { line.emplace_back(x[0], x[1]); };
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const Run& run = runs[r];
+    const std::size_t before = r + runs.size() - 1;
+    if (std::min(run.length(), run_at(before).length()) >= corner_run || (!is_step(r) && !is_step(before))) {
+      add(run.from);
     }
-    line.push_back(middle_after(p));
-    if (run > 1) {
-      line.push_back(middle_after(p + run - 1));
+    if (is_step(r) || run.length() == 1.0) {
+      add((run.from + run.to) / 2.0);
+    } else {
+      const Vec3 half_a_pixel = (run.to - run.from) / (2.0 * run.length());
+      add(run.from + half_a_pixel);
+      add(run.to - half_a_pixel);
     }
   }
   return line;

@@ -6,7 +6,9 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstddef>
+#include <set>
 
+#include "meshes/check.h"
 #include "meshes/error.h"
 #include "precompute/child_process.h"
 
@@ -63,20 +65,25 @@ void copy_regions(const std::vector<RegionPoint>& points, tetgenio& io) {
   }
 }
 
-Mesh copy_mesh(const tetgenio& io) {
+Mesh copy_mesh(const tetgenio& io, const std::vector<RegionPoint>& points) {
   Mesh mesh;
   for (int i = 0; i < io.numberofpoints; ++i) {
     mesh.nodes.emplace_back(Eigen::Map<const Vec3>(io.pointlist + std::ptrdiff_t{3} * i));
   }
+  std::set<Index> wanted;
+  for (const RegionPoint& point : points) {
+    wanted.insert(point.region);
+  }
   for (int i = 0; i < io.numberoftetrahedra; ++i) {
+    const Index region = points.empty() ? 0 : static_cast<Index>(io.tetrahedronattributelist[i]);
+    if (!points.empty() && !wanted.contains(region)) {
+      continue;  // TetGen numbers the parts without a point beyond the points' regions
+    }
     const int* corners = io.tetrahedronlist + std::ptrdiff_t{4} * i;
     mesh.connectivity.insert(mesh.connectivity.end(), corners, corners + 4);
-    mesh.regions.push_back(
-        io.numberoftetrahedronattributes == 0
-            ? 0
-            : static_cast<Index>(
-                  io.tetrahedronattributelist[std::ptrdiff_t{io.numberoftetrahedronattributes} * i]));
+    mesh.regions.push_back(region);
   }
+  remove_unused_nodes(mesh);
   return mesh;
 }
 
@@ -103,7 +110,7 @@ ChildResult tetrahedralise(const TriangleSurface& surface, const std::vector<Reg
     result.status = code;
     return result;
   }
-  result.bytes = pack(copy_mesh(out));
+  result.bytes = pack(copy_mesh(out, points));
   return result;
 }
 

@@ -6,7 +6,7 @@
 
 #include "meshes/mesh.h"
 #include "precompute/description.h"
-#include "precompute/region_points.h"
+#include "precompute/mesh_parts.h"
 #include "precompute/surface_input.h"
 
 namespace palpate {
@@ -17,8 +17,8 @@ namespace palpate {
 /// `where`) when TetGen refuses, crashes or does not end.
 Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, const std::string& where);
 
-/// The same for a surface with inner walls: elements get the region of the point that no wall separates from
-/// them. Each part between walls needs one point.
+/// The same for walls that enclose several parts, which may share walls: the elements of a part get the
+/// region of the point in it; a part without a point is left empty.
 Mesh mesh_regions(const TriangleSurface& walls, const std::vector<RegionPoint>& points,
                   const MeshOptions& options, const std::string& where);
 

@@ -118,13 +118,23 @@ inline double volume(const TriangleSurface& s) {
   return sum;
 }
 
-/// Sum of the elements' volumes, whatever their sign.
+/// Corner i of tetrahedron e.
+inline const Vec3& corner(const Mesh& mesh, Index e, std::size_t i) {
+  return mesh.nodes[at(mesh.element_nodes(e)[i])];
+}
+
+/// Volume of tetrahedron e, whatever its sign.
+inline double volume(const Mesh& mesh, Index e) {
+  const Vec3 &x = corner(mesh, e, 0), p = corner(mesh, e, 1) - x, q = corner(mesh, e, 2) - x,
+             r = corner(mesh, e, 3) - x;
+  return std::abs(p.cross(q).dot(r)) / 6.0;
+}
+
+/// Sum of the tetrahedra's volumes.
 inline double volume(const Mesh& mesh) {
   double sum = 0.0;
-  for (const auto& [a, b, c, d] : mesh.tets) {
-    const Vec3 &x = mesh.nodes[at(a)], p = mesh.nodes[at(b)] - x, q = mesh.nodes[at(c)] - x,
-               r = mesh.nodes[at(d)] - x;
-    sum += std::abs(p.cross(q).dot(r)) / 6.0;
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    sum += volume(mesh, e);
   }
   return sum;
 }

@@ -106,11 +106,15 @@ TEST(ChildProcess, CannotLeaveFiles) {
 }
 
 TEST(ChildProcess, MeshSurvivesPacking) {
-  const Mesh mesh{{{1, 2, 3}, {4, 5, 6}}, {{0, 1, 0, 1}, {1, 0, 1, 0}}, {0, 0}, {}};
+  const Mesh mesh{ElementType::tet4, {{1, 2, 3}, {4, 5, 6}},      {0, 1, 0, 1, 1, 0, 1, 0},
+                  {7, -2},           {0, 1, 1, 1, 0, 0, 0, 0, 1}, {3, 4, 5}};
   const Mesh back = unpack_mesh(pack(mesh));
+  EXPECT_EQ(back.element, mesh.element);
   EXPECT_EQ(back.nodes, mesh.nodes);
-  EXPECT_EQ(back.tets, mesh.tets);
+  EXPECT_EQ(back.connectivity, mesh.connectivity);
   EXPECT_EQ(back.regions, mesh.regions);
+  EXPECT_EQ(back.tagged_facets, mesh.tagged_facets);
+  EXPECT_EQ(back.facet_tags, mesh.facet_tags);
 }
 
 /// Mean length of the elements' edges whose middle is at most (inside) or at least (otherwise) `radius` from
@@ -118,10 +122,10 @@ TEST(ChildProcess, MeshSurvivesPacking) {
 double mean_edge(const Mesh& mesh, double radius, bool inside) {
   double sum = 0.0;
   int count = 0;
-  for (const Tet& tet : mesh.tets) {
+  for (Index e = 0; e < mesh.elements(); ++e) {
     for (std::size_t i = 0; i < 4; ++i) {
       for (std::size_t j = 0; j < i; ++j) {
-        const Vec3 &a = mesh.nodes[at(tet[i])], &b = mesh.nodes[at(tet[j])];
+        const Vec3 &a = testing::corner(mesh, e, i), &b = testing::corner(mesh, e, j);
         if (((a + b).norm() / 2.0 <= radius) == inside) {
           sum += (a - b).norm();
           ++count;
@@ -140,7 +144,7 @@ TEST(TetGen, FillsTheSurfaceAndKeepsIt) {
     orient_elements(mesh, "surface");
     check_connected(mesh, "surface");
     const Surface boundary = extract_surface(mesh);
-    EXPECT_EQ(boundary.triangles.size(), surface.triangles.size());
+    EXPECT_EQ(at(boundary.count()), surface.triangles.size());
     EXPECT_EQ(boundary.nodes.size(), surface.nodes.size());
     for (std::size_t i = 0; i < surface.nodes.size(); ++i) {
       EXPECT_EQ(mesh.nodes[i], surface.nodes[i]);
@@ -158,7 +162,7 @@ TEST(TetGen, GradesTheInterior) {
 
   EXPECT_NEAR(mean_edge(uniform, 0.7, true), h, 0.15 * h);
   EXPECT_GT(mean_edge(graded, 0.4, true), 2.0 * h);  // the target at depth 0.7 is h + 0.35, that is 6 h
-  EXPECT_LT(graded.tets.size(), uniform.tets.size() / 2);
+  EXPECT_LT(graded.elements(), uniform.elements() / 2);
 }
 
 TEST(TetGen, EdgeLengthIsTheTargetInside) {
@@ -167,6 +171,23 @@ TEST(TetGen, EdgeLengthIsTheTargetInside) {
   options.edge_length = 0.1;
   const Mesh mesh = mesh_surface(testing::fine_cube(3), options, "cube");
   EXPECT_NEAR(mean_edge(mesh, 10.0, true), 0.1, 0.025);
+}
+
+TEST(TetGen, PartsTakeTheRegionsOfTheirPoints) {
+  TriangleSurface walls = testing::joined(testing::fine_cube(1, 4.0), testing::cube(), {1.5, 1.5, 1.5});
+  const std::vector<RegionPoint> points = {{{0.5, 0.5, 0.5}, 127}, {{2, 2, 2}, -3}};
+  const Mesh both = mesh_regions(walls, points, {}, "boxes");
+  double inner = 0.0;
+  for (Index e = 0; e < both.elements(); ++e) {
+    ASSERT_TRUE(both.regions[at(e)] == 127 || both.regions[at(e)] == -3);
+    inner += both.regions[at(e)] == -3 ? volume(both, e) : 0.0;
+  }
+  EXPECT_NEAR(inner, 1.0, 1e-12);
+  EXPECT_NEAR(volume(both), 64.0, 1e-12);
+
+  const Mesh hollow = mesh_regions(walls, {points[0]}, {}, "boxes");  // no point: left empty
+  EXPECT_NEAR(volume(hollow), 63.0, 1e-12);
+  EXPECT_EQ(std::count(hollow.regions.begin(), hollow.regions.end(), 127), hollow.elements());
 }
 
 TEST(TetGen, SelfIntersectionIsRefused) {

@@ -145,8 +145,7 @@ for name, measure in (("tri3", quality.TriangleRadiusRatio), ("quad4", quality.Q
                       ("tet4", quality.TetRadiusRatio), ("hex8", quality.HexScaledJacobian)):
     reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName(name + ".vtu"); reader.Update()
     grid = reader.GetOutput()
-    cells = [grid.GetCell(c) for c in range(grid.GetNumberOfCells())]
-    values = [measure(cell) for cell in cells]
+    values = [measure(grid.GetCell(c)) for c in range(grid.GetNumberOfCells())]
     if name in ("tri3", "tet4"): values = [1 / value for value in values]
     print(repr(min(values)), values.index(min(values)), repr(sum(values) / len(values)))
 )"));
@@ -183,28 +182,35 @@ TEST(Vtu, NothingIsLeftBehindWhenItCannotBeWritten) {
 TEST(VtkLegacy, FilesThatVtkWritesInBothLayoutsAreRead) {
   const test::ScratchFolder folder;
   for (const ElementType type : body_elements) {
-    SCOPED_TRACE(traits(type).name);
     const Mesh mesh = test::block(type);
-    write_vtu(folder.path() / "mesh.vtu", mesh.nodes, type, mesh.connectivity, {});
-    run_python(folder, R"(
+    write_vtu(folder.path() / (std::string(traits(type).name) + ".vtu"), mesh.nodes, type, mesh.connectivity,
+              {});
+  }
+  run_python(folder, R"(
 import vtk
-reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName("mesh.vtu"); reader.Update()
-grid = reader.GetOutput()
-def add(cell_type, *nodes):
+def add(grid, cell_type, *nodes):
     ids = vtk.vtkIdList()
     for node in nodes: ids.InsertNextId(node)
     grid.InsertNextCell(cell_type, ids)
-add(1, 0); add(3, 0, 1); add(2, 0, 3, 1); add(21, 0, 1, 2)
-if grid.GetCell(0).GetCellDimension() == 3: add(5, 0, 1, 3); add(22, 0, 1, 3, 5, 6, 7); add(9, 0, 1, 3, 2)
-data = vtk.vtkDoubleArray(); data.SetName("time"); data.InsertNextValue(0.5); grid.GetFieldData().AddArray(data)
-data = vtk.vtkDoubleArray(); data.SetName("speed"); data.SetNumberOfTuples(grid.GetNumberOfPoints()); data.Fill(2); grid.GetPointData().AddArray(data)
-for version in 42, 51:
-    writer = vtk.vtkUnstructuredGridWriter(); writer.SetInputData(grid)
-    writer.SetFileVersion(version); writer.SetFileTypeToASCII(); writer.SetFileName("ascii%d.vtk" % version); writer.Write()
-writer.SetFileTypeToBinary(); writer.SetFileName("binary.vtk"); writer.Write()
+for name in "tri3", "quad4", "tet4", "tet10", "hex8":
+    reader = vtk.vtkXMLUnstructuredGridReader(); reader.SetFileName(name + ".vtu"); reader.Update()
+    grid = reader.GetOutput()
+    add(grid, 1, 0); add(grid, 3, 0, 1); add(grid, 2, 0, 3, 1); add(grid, 21, 0, 1, 2)
+    if grid.GetCell(0).GetCellDimension() == 3:
+        add(grid, 5, 0, 1, 3); add(grid, 22, 0, 1, 3, 5, 6, 7); add(grid, 9, 0, 1, 3, 2)
+    data = vtk.vtkDoubleArray(); data.SetName("time"); data.InsertNextValue(0.5); grid.GetFieldData().AddArray(data)
+    data = vtk.vtkDoubleArray(); data.SetName("speed"); data.SetNumberOfTuples(grid.GetNumberOfPoints()); data.Fill(2); grid.GetPointData().AddArray(data)
+    for version in 42, 51:
+        writer = vtk.vtkUnstructuredGridWriter(); writer.SetInputData(grid); writer.SetFileTypeToASCII()
+        writer.SetFileVersion(version); writer.SetFileName("%s_%d.vtk" % (name, version)); writer.Write()
+    writer.SetFileTypeToBinary(); writer.SetFileName("binary.vtk"); writer.Write()
 )");
-    for (const char* name : {"ascii42.vtk", "ascii51.vtk"}) {
-      const Mesh read = read_volume_mesh(folder.path() / name);
+  for (const ElementType type : body_elements) {
+    const Mesh mesh = test::block(type);
+    for (const char* version : {"42", "51"}) {
+      SCOPED_TRACE(std::string(traits(type).name) + " " + version);
+      const Mesh read =
+          read_volume_mesh(folder.path() / (std::string(traits(type).name) + "_" + version + ".vtk"));
       EXPECT_EQ(read.element, type);
       EXPECT_EQ(read.connectivity, mesh.connectivity);
       EXPECT_EQ(read.regions, std::vector<Index>(static_cast<std::size_t>(mesh.elements()), 0));

@@ -18,8 +18,8 @@ using test::Kind;
 
 const Material tissue{3.0e4, 0.3, 1000.0};
 
-class EveryKind : public testing::TestWithParam<Kind> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, EveryKind, testing::ValuesIn(test::all_kinds), test::name_of);
+class AssembledKind : public testing::TestWithParam<Kind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, AssembledKind, testing::ValuesIn(test::all_kinds), test::name_of);
 
 /// A body all of whose boundary is held at exact(x).
 template <class Exact>
@@ -68,7 +68,7 @@ Vec3 interpolate(const ElementNodes& values, const ShapeValues& N) {
 
 // --- patch test ---
 
-TEST_P(EveryKind, PatchTestOnADistortedMesh) {
+TEST_P(AssembledKind, PatchTestOnADistortedMesh) {
   const Kind kind = GetParam();
   const int d = kind.dimension();
   const Vec3 size(0.3, 0.2, 0.25);
@@ -163,7 +163,8 @@ double lambda_of(const Material& m, Analysis analysis) {
 /// Calls f(x, N, dV, element nodes) at the points of a rule of high order in every element.
 template <class F>
 void integrate(const Mesh& mesh, F f) {
-  const std::vector<QuadraturePoint> rule = test::gauss_rule(mesh.element, 4);
+  const std::vector<QuadraturePoint> rule =
+      test::gauss_rule(mesh.element, mesh.element == ElementType::tet10 ? 4 : 3);
   for (Index e = 0; e < mesh.elements(); ++e) {
     const ElementNodes nodes = element_nodes(mesh, e);
     for (const QuadraturePoint& q : rule) {
@@ -206,7 +207,7 @@ double manufactured_error(const Kind& kind, int n) {
   return std::sqrt(squared);
 }
 
-TEST_P(EveryKind, ConvergesWithTheOrderOfItsShapeFunctions) {
+TEST_P(AssembledKind, ConvergesWithTheOrderOfItsShapeFunctions) {
   const bool quadratic = GetParam().element == ElementType::tet10;
   const int finest = GetParam().dimension() == 2 ? 64 : quadratic ? 8 : 16;
   const double coarse = manufactured_error(GetParam(), finest / 4),
@@ -215,8 +216,6 @@ TEST_P(EveryKind, ConvergesWithTheOrderOfItsShapeFunctions) {
   RecordProperty("order", std::to_string(std::log2(middle / fine)));
   EXPECT_NEAR(std::log2(middle / fine), quadratic ? 3.0 : 2.0, 0.15);
   EXPECT_NEAR(std::log2(coarse / middle), quadratic ? 3.0 : 2.0, 0.4);
-  std::printf("%g %g %g orders %g %g\n", coarse, middle, fine, std::log2(coarse / middle),
-              std::log2(middle / fine));
 }
 
 }  // namespace

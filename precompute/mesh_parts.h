@@ -1,4 +1,4 @@
-// Where the regions of a mesh are.
+// Connected parts of a mesh.
 #pragma once
 
 #include <vector>
@@ -16,5 +16,9 @@ struct RegionPoint {
 /// One point in each part of each region (elements connected through sides): the middle of its largest
 /// element.
 std::vector<RegionPoint> region_points(const Mesh& mesh);
+
+/// Removes parts of less than 1 % of the largest one's elements, which hang on it by an edge or a corner at
+/// most, and the nodes that only they have. Returns the number of removed elements.
+Index remove_crumbs(Mesh& mesh);
 
 }  // namespace palpate
