@@ -32,6 +32,7 @@ std::vector<ElementType> kinds_of_dimension(const MeshFile& file, int dimension)
 /// "12 tet4 and 3 hex8"
 std::string counts(const MeshFile& file, const std::vector<ElementType>& kinds) {
   std::vector<std::string> parts;
+  parts.reserve(kinds.size());
   for (const ElementType kind : kinds) {
     parts.push_back(
         fmt::format("{} {}", file.elements[static_cast<std::size_t>(kind)].tags.size(), traits(kind).name));

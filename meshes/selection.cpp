@@ -115,7 +115,7 @@ std::vector<Vec3> centroids(const Mesh& mesh) {
 void check_not_empty(const Marks& marks, const char* kind, const Eigen::AlignedBox3d& box,
                      const std::string& where) {
   if (std::find(marks.begin(), marks.end(), 1) != marks.end()) return;
-  const Vec3 low = box.min(), high = box.max();
+  const Vec3 &low = box.min(), &high = box.max();
   throw Error(fmt::format("the selection holds no {}", kind), where,
               fmt::format("The body reaches from ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m.",
                           low.x(), low.y(), low.z(), high.x(), high.y(), high.z()));

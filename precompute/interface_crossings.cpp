@@ -39,7 +39,7 @@ class SparsePoints {
 };
 
 /// Half the thickness of a label at a voxel on its border: the depth that is reached by going to the deepest
-/// neighbour as long as this leads inwards, at most `limit`.
+/// of the 26 neighbours as long as this leads inwards, at most `limit`. Needs an empty rim.
 double half_thickness(const VoxelBody& body, const LabelField& field, std::size_t voxel, double limit) {
   const LabelField::Place start = field(body.center(voxel));
   double depth = start.depth;
@@ -47,13 +47,15 @@ double half_thickness(const VoxelBody& body, const LabelField& field, std::size_
   do {
     std::size_t deepest = voxel;
     double most = depth;
-    for_neighbours(body, voxel, [&](std::size_t next) {
+    for (std::size_t n = 0; n < 27; ++n) {
+      const std::size_t next =
+          voxel + (n % 3) + (n / 3 % 3) * body.at(0, 1, 0) + (n / 9) * body.at(0, 0, 1) - body.at(1, 1, 1);
       const LabelField::Place place = field(body.center(next));
       if (place.number == start.number && place.depth > most) {
         most = place.depth;
         deepest = next;
       }
-    });
+    }
     inwards = most - depth > least_slope * (body.center(deepest) - body.center(voxel)).norm();
     voxel = deepest;
     depth = most;

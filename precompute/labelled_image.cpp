@@ -16,6 +16,7 @@ namespace palpate {
 namespace {
 
 constexpr std::chrono::seconds read_time_limit{600};
+constexpr std::size_t smallest_speck = 8;  // [voxels] less would be smoothed away
 
 enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
 
@@ -125,7 +126,8 @@ VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
   }
   if (image.regions) {
     const double element = std::pow(edge_length, 3) / (6.0 * std::sqrt(2.0));
-    complete_labels(body, static_cast<std::size_t>(element / body.spacing.prod()), notes);
+    complete_labels(body, std::max(static_cast<std::size_t>(element / body.spacing.prod()), smallest_speck),
+                    notes);
   }
   return body;
 }

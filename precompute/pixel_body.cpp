@@ -189,13 +189,13 @@ void keep_one_body(PixelBody& body, const std::string& where, std::vector<std::s
 
 std::vector<std::vector<LatticePoint>> trace_outlines(const PixelBody& body) {
   constexpr std::array<LatticePoint, 4> step = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
-  constexpr std::int8_t none = -1;
+  constexpr std::uint8_t none = 4;
   const auto at = [&](const LatticePoint& p) {
     return static_cast<std::size_t>(p[0]) +
            static_cast<std::size_t>(body.width + 1) * static_cast<std::size_t>(p[1]);
   };
   // the step that leaves each corner of pixels with the body on its left: one at most, as no corner touches
-  std::vector<std::int8_t> onward(at({0, body.height + 1}), none);
+  std::vector<std::uint8_t> onward(at({0, body.height + 1}), none);
   for (Index j = 0; j < body.height; ++j) {
     for (Index i = 0; i < body.width; ++i) {
       if (!body.is_body(i, j)) {
@@ -216,7 +216,7 @@ std::vector<std::vector<LatticePoint>> trace_outlines(const PixelBody& body) {
       lines.emplace_back();
       for (LatticePoint p = {x, y}; onward[at(p)] != none;) {
         lines.back().push_back(p);
-        const LatticePoint& d = step[static_cast<std::size_t>(std::exchange(onward[at(p)], none))];
+        const LatticePoint& d = step[std::exchange(onward[at(p)], none)];
         p = {p[0] + d[0], p[1] + d[1]};
       }
     }

@@ -37,7 +37,7 @@ class NumberedVertex : public Base {
  public:
   using Has_timestamp = CGAL::Tag_true;
   template <typename DataStructure>
-  struct Rebind_TDS {  // NOLINT(readability-identifier-naming): CGAL's name
+  struct Rebind_TDS {
     using Other = NumberedVertex<typename Base::template Rebind_TDS<DataStructure>::Other>;
   };
   using Base::Base;

@@ -21,6 +21,23 @@ struct Part {
   std::size_t first;  ///< one of them
 };
 
+/// Calls work(neighbour) for the voxels that share a face with `voxel`.
+template <typename Work>
+void for_neighbours(const VoxelGrid& grid, std::size_t voxel, const Work& work) {
+  std::size_t stride = 1;
+  for (const Index length : grid.size) {
+    const auto n = static_cast<std::size_t>(length);
+    const std::size_t position = voxel / stride % n;
+    if (position > 0) {
+      work(voxel - stride);
+    }
+    if (position + 1 < n) {
+      work(voxel + stride);
+    }
+    stride *= n;
+  }
+}
+
 /// Numbers the parts; `part_of` gets each voxel's.
 template <typename Value>
 std::vector<Part<Value>> find_parts(const VoxelGrid& grid, const std::vector<Value>& values,
@@ -224,7 +241,7 @@ void complete_labels(VoxelBody& body, std::size_t smallest, std::vector<std::str
   }
   for (const auto& [label, count] : unlabel_specks(body, smallest)) {
     notes.push_back(fmt::format(
-        "{} voxel(s) of label {} in {} part(s) smaller than an element went to the labels around them",
+        "{} voxel(s) of label {}, in {} part(s) too small for an element, went to the labels around them",
         count[0], label, count[1]));
   }
   spread_labels(body);

@@ -27,23 +27,6 @@ struct VoxelGrid {
   [[nodiscard]] Vec3 center(std::size_t voxel) const noexcept;
 };
 
-/// Calls work(neighbour) for the voxels that share a face with `voxel`.
-template <typename Work>
-void for_neighbours(const VoxelGrid& grid, std::size_t voxel, const Work& work) {
-  std::size_t stride = 1;
-  for (const Index length : grid.size) {
-    const auto n = static_cast<std::size_t>(length);
-    const std::size_t position = voxel / stride % n;
-    if (position > 0) {
-      work(voxel - stride);
-    }
-    if (position + 1 < n) {
-      work(voxel + stride);
-    }
-    stride *= n;
-  }
-}
-
 /// Which voxels are body, and of which label.
 struct VoxelBody : VoxelGrid {
   static constexpr Index no_label = std::numeric_limits<Index>::min();

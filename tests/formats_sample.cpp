@@ -46,13 +46,12 @@ bool same_material(const Material& a, const Material& b) {
 }
 
 Mesh sample_mesh(ElementType element, int cells) {
-  const Vec3 origin(0.1, 0.2, 0.3), size(1, 2, 3);
   if (traits(element).dimension == 2)
     return generate(RectangleShape{.origin = {0.1, 0.2, 0.0}, .size = {1, 2, 0}, .cells = {cells, cells}},
                     element);
-  const BoxShape box{.origin = origin, .size = size, .cells = {cells, cells, cells}};
-  if (element == ElementType::hex8) return generate(box, element);
-  return with_elements(generate(box), element, "sample");
+  const BoxShape box{.origin = {0.1, 0.2, 0.3}, .size = {1, 2, 3}, .cells = {cells, cells, cells}};
+  return element == ElementType::hex8 ? generate(box, element)
+                                      : with_elements(generate(box), element, "sample");
 }
 
 }  // namespace

@@ -122,7 +122,7 @@ TEST_F(ImageMesh, SelectedLabelsAreTheBody) {
 }
 
 TEST_F(ImageMesh, SameInputSameMesh) {
-  MeshOptions options = edges(6.0);
+  MeshOptions options = edges(9.0);
   options.odt = options.lloyd = true;
   for (const Mesher mesher : {Mesher::cgal, Mesher::tetgen}) {
     options.mesher = mesher;
@@ -166,7 +166,8 @@ TEST_F(ImageMesh, OptimisationImprovesElements) {
 }
 
 TEST_F(ImageMesh, TetGenFillsTheSameSurface) {
-  Mesh ball = mesh(ball_image(), edges(4.0, Mesher::tetgen));
+  MeshOptions options = edges(3.0, Mesher::tetgen);
+  Mesh ball = mesh(ball_image(), options);
   EXPECT_NEAR(volume(ball), ball_volume(ball_radius), 0.04 * ball_volume(ball_radius));
   orient_elements(ball, "ball");
   check_connected(ball, "ball");
@@ -192,9 +193,10 @@ TEST_F(ImageMesh, LabelsAreRegions) {
     image(30, 30, 20) = 84;  // strays
     image(31, 30, 20) = 84;
     notes_.clear();
-    Mesh ball = regions(image, edges(4.0, mesher));
+    MeshOptions options = edges(3.0, mesher);
+    Mesh ball = regions(image, options);
     ASSERT_EQ(notes_.size(), 3U);
-    expect_mentions(notes_[0], {"2 voxel(s) of label 84 in 1 part(s)"});
+    expect_mentions(notes_[0], {"2 voxel(s) of label 84, in 1 part(s)"});
     expect_mentions(notes_[1], {"label 2: volume ", "in the image", "in the mesh (-"});
     expect_mentions(notes_[2], {"label 5: volume "});
     EXPECT_NEAR(region_volume(ball, 2), inner, 0.05 * inner);
@@ -235,7 +237,9 @@ TEST_F(ImageMesh, SmallPartsOfALabelSurvive) {
     }
   }
   for (const Mesher mesher : {Mesher::cgal, Mesher::tetgen}) {
-    const Mesh organ = regions(image, edges(8.0, mesher));  // much longer than the vessel is thick
+    MeshOptions options = edges(8.0, mesher);  // much longer than the vessel is thick
+    options.perturb = false;                   // it would take long to find little
+    const Mesh organ = regions(image, options);
     double of_nodule = 0.0;
     for (Index e = 0; e < organ.elements(); ++e) {
       if (organ.regions[testing::at(e)] == 2 && (testing::corner(organ, e, 0) - nodule).norm() < 6.0) {
@@ -435,10 +439,10 @@ TEST(VoxelBody, CompletesLabels) {
   EXPECT_EQ(labels_along(body),
             (std::vector<Index>{none, 7, 7, 7, 7, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, none, none}));
   ASSERT_EQ(notes.size(), 4U);  // of label 5, the two beyond the cavity; of label 7, the last two
-  expect_mentions(notes[0], {"2 voxel(s) of label 5 in 1 part(s)"});
-  expect_mentions(notes[1], {"2 voxel(s) of label 7 in 1 part(s)"});
-  expect_mentions(notes[2], {"1 voxel(s) of label 9 in 1 part(s)"});
-  expect_mentions(notes[3], {"2 voxel(s) of label 84 in 1 part(s)"});
+  expect_mentions(notes[0], {"2 voxel(s) of label 5, in 1 part(s)"});
+  expect_mentions(notes[1], {"2 voxel(s) of label 7, in 1 part(s)"});
+  expect_mentions(notes[2], {"1 voxel(s) of label 9, in 1 part(s)"});
+  expect_mentions(notes[3], {"2 voxel(s) of label 84, in 1 part(s)"});
 
   VoxelBody small = row({none, 1, 2, 2, none});
   complete_labels(small, 1000, notes);  // the largest part stays

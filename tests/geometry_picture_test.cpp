@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <random>
+#include <ranges>
 
 #include "precompute/picture.h"
 #include "precompute/picture_reader.h"
@@ -56,8 +57,8 @@ Bytes drawing(int width, int height, const std::function<bool(double, double)>& 
 /// Rows from the top, '#' where body.
 PixelBody art(const std::vector<std::string>& rows) {
   PixelBody body{static_cast<Index>(rows[0].size()), static_cast<Index>(rows.size()), {}};
-  for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
-    for (const char c : *row) {
+  for (const std::string& row : rows | std::views::reverse) {
+    for (const char c : row) {
       body.inside.push_back(c == '#' ? 1 : 0);
     }
   }
@@ -77,6 +78,7 @@ std::vector<std::string> notes_of(PixelBody& body) {
 
 double signed_area(const std::vector<LatticePoint>& line) {
   std::vector<Vec3> points;
+  points.reserve(line.size());
   for (const LatticePoint& p : line) {
     points.emplace_back(p[0], p[1], 0.0);
   }

@@ -55,6 +55,7 @@ inline double smallest_angle(const std::vector<Vec3>& corners) {
 /// Smallest angle of each triangle [degree].
 inline std::vector<double> smallest_angles(const Mesh& mesh) {
   std::vector<double> angles;
+  angles.reserve(static_cast<std::size_t>(mesh.elements()));
   for (Index e = 0; e < mesh.elements(); ++e) {
     angles.push_back(smallest_angle(triangle(mesh, e)));
   }
