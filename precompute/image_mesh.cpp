@@ -100,7 +100,8 @@ Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& fi
                const MeshOptions& options, bool hollow) {
   const double facet_distance =
       options.facet_distance > 0.0 ? options.facet_distance : body.spacing.maxCoeff();
-  const Criteria::Facet_criteria facets(mesh3::facet_angle, mesh3::facet_size_per_edge * *options.edge_length,
+  const double size_per_edge = hollow ? mesh3::hollow_facet_size_per_edge : mesh3::facet_size_per_edge;
+  const Criteria::Facet_criteria facets(mesh3::facet_angle, size_per_edge * *options.edge_length,
                                         facet_distance);
   const CellSize cell_size{&field, *options.edge_length, options.grading};
   const Criteria::Cell_criteria cells =

@@ -6,6 +6,7 @@
 #include <CGAL/odt_optimize_mesh_3.h>
 #include <CGAL/perturb_mesh_3.h>
 
+#include <chrono>
 #include <unordered_map>
 
 #include "meshes/mesh.h"
@@ -13,12 +14,17 @@
 
 namespace palpate::mesh3 {
 
-constexpr double facet_angle =
-    25.0;  // [degree] bound on the surface triangles' angles that Mesh_3 can promise
-constexpr double wanted_dihedral = 12.0;     // [degree] sliver removal stops here
-constexpr double facet_size_per_edge = 1.2;  // measured on organs: the mean edge is then the one asked for,
-constexpr double radius_per_edge = 0.73;     // on the surface and, without grading, inside
-constexpr int most_iterations = 50;          // of a global optimisation; most converge earlier
+/// Bound on the surface triangles' angles that Mesh_3 can promise [degree].
+constexpr double facet_angle = 25.0;
+/// Sliver removal stops here [degree].
+constexpr double wanted_dihedral = 12.0;
+/// Bounds on circumradii; with these, measured on organs, the mean edge is the one asked for on the surface
+/// and, without grading, inside. A hollow mesh has no cells that make its facets smaller.
+constexpr double facet_size_per_edge = 1.2;
+constexpr double hollow_facet_size_per_edge = 0.77;
+constexpr double radius_per_edge = 0.73;
+/// Of a global optimisation; most converge earlier.
+constexpr int most_iterations = 50;
 constexpr std::chrono::seconds time_limit{3600};
 
 /// Moves the nodes of a refined complex for better elements, as far as the options ask for it. CGAL's own

@@ -4,7 +4,6 @@
 
 #include <functional>
 #include <random>
-#include <ranges>
 
 #include "precompute/picture.h"
 #include "precompute/picture_reader.h"
@@ -55,9 +54,10 @@ Bytes drawing(int width, int height, const std::function<bool(double, double)>& 
 }
 
 /// Rows from the top, '#' where body.
-PixelBody art(const std::vector<std::string>& rows) {
+PixelBody art(std::vector<std::string> rows) {
   PixelBody body{static_cast<Index>(rows[0].size()), static_cast<Index>(rows.size()), {}};
-  for (const std::string& row : rows | std::views::reverse) {
+  std::reverse(rows.begin(), rows.end());
+  for (const std::string& row : rows) {
     for (const char c : row) {
       body.inside.push_back(c == '#' ? 1 : 0);
     }
@@ -114,6 +114,12 @@ TEST_F(Picture, WhiteIsARectangle) {
     EXPECT_NEAR(length, 10.0, 1e-9);
   }
   EXPECT_TRUE(notes_.empty());
+}
+
+TEST_F(Picture, CornersStay) {
+  const Mesh angle = mesh(drawing(50, 40, [](double x, double y) { return x < 20 || y < 15; }), 5.0);
+  EXPECT_NEAR(area(angle), 50.0 * 15.0 + 20.0 * 25.0, 1e-9);
+  EXPECT_NE(std::find(angle.nodes.begin(), angle.nodes.end(), Vec3(20, 15, 0)), angle.nodes.end());
 }
 
 TEST_F(Picture, UpIsUp) {

@@ -65,11 +65,11 @@ struct Loaded {
     return *this;
   }
 
-  /// Elements whose centroid has x[axis] > place are of a second material.
-  Loaded& beyond(int axis, double place, const Material& material) {
+  /// Elements whose centroid is beyond this x are of a second material.
+  Loaded& beyond(double x, const Material& material) {
     description.materials.push_back({material, {}, {}});
     for (Index e = 0; e < body.mesh.elements(); ++e) {
-      if (element_nodes(body.mesh, e).col(axis).mean() > place) {
+      if (element_nodes(body.mesh, e).col(0).mean() > x) {
         body.material_of_element[static_cast<std::size_t>(e)] = 1;
       }
     }
@@ -336,7 +336,7 @@ TEST_P(LoadedKind, TwoMaterialsInSeries) {
   constexpr double pull = 250.0, g = 9.81;
   const double middle = size.x() / 2.0;
   Loaded model(GetParam(), test::block(GetParam().element, size, {4, 3, 3}), soft);
-  model.beyond(0, middle, stiff).hold_on_rollers();
+  model.beyond(middle, stiff).hold_on_rollers();
   model.description.loads = {Traction{{pull, 0, 0}, face(0, size.x())}};
   model.solve();
   EXPECT_LT(model.error([&](const Vec3& x) {
@@ -346,9 +346,27 @@ TEST_P(LoadedKind, TwoMaterialsInSeries) {
 
   model.description.loads = {Gravity{{0, -g, 0}}};
   model.solve();
-  const double weight = (900.0 + 1300.0) / 2.0 * g * size.x() * model.area(0);
+  const double half_volume = middle * model.area(0), weight = (900.0 + 1300.0) * g * half_volume,
+               moment = (900.0 * 0.5 + 1300.0 * 1.5) * middle * g * half_volume;
   EXPECT_NEAR(model.total_load().y(), -weight, 1e-12 * weight);
   EXPECT_NEAR(model.reaction(1), weight, 1e-10 * weight);
+  double found = 0.0;
+  for (std::size_t node = 0; node < model.loads.size(); ++node) {
+    found -= model.body.mesh.nodes[node].x() * model.loads[node].y();
+  }
+  EXPECT_NEAR(found, moment, 1e-12 * moment);
+}
+
+TEST_P(LoadedKind, OneOfTwoMaterialsSwellsAlongTheBar) {
+  const Material dry{E, 0.0, 900.0};
+  Material wet{8.0 * E, 0.0, 1300.0};
+  wet.initial_strain[0] = 0.02;
+  const double middle = size.x() / 2.0;
+  Loaded model(GetParam(), test::block(GetParam().element, size, {4, 3, 3}), dry);
+  model.beyond(middle, wet).hold_on_rollers();
+  model.solve();
+  EXPECT_LT(model.error([&](const Vec3& x) { return Vec3(0.02 * std::max(x.x() - middle, 0.0), 0, 0); }),
+            1e-11);
 }
 
 // --- all together ---

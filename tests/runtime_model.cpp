@@ -88,10 +88,11 @@ Model unit_model(ElementType element, int cells, Scope scope, Precision precisio
   model.rest_force.assign(model.mesh.nodes.size(), Vec3::Zero());
   model.rest_displacement.assign(model.mesh.nodes.size(), Vec3::Zero());
 
+  const auto all_axes = static_cast<std::uint8_t>((1U << d) - 1U);
   std::vector<Index> free;
   for (Index node = 0; node < static_cast<Index>(model.mesh.nodes.size()); ++node) {
     const bool clamped = height(model, static_cast<std::size_t>(node)) < 1e-12;
-    model.fixed.push_back(clamped ? static_cast<std::uint8_t>((1U << d) - 1U) : 0);
+    model.fixed.push_back(clamped ? all_axes : std::uint8_t{0});
     if (clamped) continue;
     free.push_back(node);
     if (scope == Scope::full || std::binary_search(surface.nodes.begin(), surface.nodes.end(), node)) {
