@@ -57,10 +57,9 @@ using Line = std::vector<Point>;  // closed
 
 constexpr std::chrono::seconds time_limit{3600};
 constexpr std::size_t max_nodes = 2'000'000;
-constexpr double wanted_angle = 20.0;  // [degree] refinement ends for bounds up to 20.7 (Shewchuk)
-static double radius_per_edge =
-    getenv("RPE") ? atof(getenv("RPE")) : 0.73;  // measured: the mean edge is then the one asked for
-static int lloyd_iterations = getenv("IT") ? atoi(getenv("IT")) : 100;
+constexpr double wanted_angle = 20.0;     // [degree] refinement ends for bounds up to 20.7 (Shewchuk)
+constexpr double radius_per_edge = 0.73;  // measured: the mean edge is then the one asked for
+constexpr int lloyd_iterations = 20;      // with many more, graded meshes drift away from their sizes
 
 enum MeshStatus : int { meshed = 0, no_mesh = 1, too_many_nodes = 2 };
 

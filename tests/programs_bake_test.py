@@ -31,11 +31,11 @@ class Bake(ProgramTest):
         file = self.bake(cube_toml(6, scope="layers"))
         inspected = run(PRECOMPUTE, "inspect", file)
         self.assertEqual(inspected.returncode, 0)
-        for piece in ("343 nodes (49 fixed)", "E = 1 Pa", "surface + 1 layer", "double precision", "dihedral", "model.toml"):
+        for piece in ("343 nodes (49 held)", "E = 1 Pa", "surface + 1 layer", "double precision", "dihedral", "model.toml"):
             self.assertIn(piece, inspected.stdout)
         verified = run(PRECOMPUTE, "verify", file)
         self.assertEqual(verified.returncode, 0, verified.stdout)
-        for check in ("checksums", "probes", "energy", "columns", "residual"):
+        for check in ("checksums", "probes", "energy", "columns", "residual", "rest state"):
             self.assertIn(check, verified.stdout)
 
     def test_all_scopes_and_precisions_verify(self):
@@ -193,7 +193,7 @@ class BadDescriptions(ProgramTest):
         self.refuse(cube_toml(2).replace("point = [0, 0, 0]", "point = [0, 0, -5]"), "fixed")
 
     def test_rigid_motion_left(self):
-        self.refuse(cube_toml(2).replace("half_space = { point = [0, 0, 0], normal = [0, 0, -1] }", "nodes = [0, 1]"), "rotat")
+        self.refuse(cube_toml(2).replace("half_space = { point = [0, 0, 0], normal = [0, 0, -1] }", "nodes = [0, 1]"), "turn about the axis")
 
     def test_everything_fixed(self):
         self.refuse(cube_toml(2).replace("normal = [0, 0, -1]", "normal = [0, 0, 1]"), "fixed")
