@@ -133,8 +133,8 @@ TEST(PlaneMesh, LloydWidensTheAngles) {
 }
 
 TEST(PlaneMesh, LloydKeepsTheBoundOnAngles) {
-  const PolygonGeometry disc = {circle(1.0, 200), {}};  // by itself it goes down to 10 degrees here
-  EXPECT_GT(least(smallest_angles(mesh_quietly(disc, options(0.02, 1.0, true)))), 20.0);
+  const PolygonGeometry disc = {circle(1.0, 200), {}};  // by itself it goes down to 17 degrees here
+  EXPECT_GT(least(smallest_angles(mesh_quietly(disc, options(0.03, 1.0, true)))), 20.0);
 }
 
 TEST(PlaneMesh, SharpCornersAreTold) {

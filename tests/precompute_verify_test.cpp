@@ -1,0 +1,91 @@
+// verify must find each part of a file that is not what K says. The loader's checksums are not in the way
+// here: the model is spoilt in memory.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "formats/model_file.h"
+#include "precompute/bake.h"
+#include "precompute/verify.h"
+
+namespace palpate {
+namespace {
+
+constexpr const char* loaded_block = R"(name = "block"
+[geometry]
+box = {size = [0.1, 0.1, 0.1], cells = [3, 3, 3]}
+[material]
+youngs_modulus = 5000
+poissons_ratio = 0.4
+[[fixed]]
+lowest = {axis = "z", percent = 1}
+[[fixed]]
+half_space = {point = [0, 0, 0.1], normal = [0, 0, 1]}
+axes = "x"
+displacement = [0.002, 0, 0]
+[[load]]
+gravity = [0, 0, -9.81]
+[storage]
+scope = "surface"
+precision = "double"
+)";
+
+class Verify : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::filesystem::create_directories(folder_);
+    std::ofstream(folder_ / "model.toml") << loaded_block;
+    testing::internal::CaptureStderr();
+    bake(read_description(folder_ / "model.toml"), {.output = file_, .jobs = 1, .dry_run = false});
+    testing::internal::GetCapturedStderr();
+    model_ = load_model(file_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  /// Names of the checks that fail.
+  [[nodiscard]] std::vector<std::string> failures() const {
+    std::vector<std::string> names;
+    for (const Check& check : verify(model_, file_).checks) {
+      if (!check.passed()) names.push_back(check.name);
+    }
+    return names;
+  }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("palpate-verify-" + std::to_string(getpid()));
+  const std::filesystem::path file_ = folder_ / "block.palpate.hdf";
+  Model model_;
+};
+
+TEST_F(Verify, PassesWhatWasBaked) {
+  EXPECT_EQ(failures(), std::vector<std::string>());
+}
+
+TEST_F(Verify, FindsARestStateThatDoesNotCarryItsLoads) {
+  for (Vec3& u : model_.rest_displacement) u.z() *= 1.0 + 1e-6;
+  EXPECT_EQ(failures(), std::vector<std::string>{"rest state"});
+}
+
+TEST_F(Verify, FindsAnotherPrescribedDisplacement) {
+  for (std::size_t node = 0; node < model_.fixed.size(); ++node) {
+    if (model_.fixed[node] == 1) model_.rest_displacement[node].x() = 0.0021;
+  }
+  EXPECT_EQ(failures(), std::vector<std::string>{"rest state"});
+}
+
+TEST_F(Verify, FindsAnotherLoad) {
+  model_.rest_force.back() += Vec3(0.0, 0.0, 1e-4);
+  EXPECT_EQ(failures(), std::vector<std::string>{"rest state"});
+}
+
+TEST_F(Verify, FindsAnotherMaterial) {
+  model_.materials[0].youngs_modulus *= 1.0 + 1e-6;
+  const std::vector<std::string> found = failures();
+  EXPECT_NE(std::find(found.begin(), found.end(), "columns"), found.end());
+}
+
+}  // namespace
+}  // namespace palpate
