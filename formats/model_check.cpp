@@ -52,10 +52,12 @@ void check_surface(const Model& model, const std::string& where) {
 }
 
 void check_stored_nodes(const Model& model, const std::string& where) {
+  const int all_axes = (1 << model.dimension()) - 1;
   std::vector<bool> stored(model.mesh.nodes.size(), false);
   for (const Index node : model.stored_nodes) {
     const auto i = static_cast<std::size_t>(node);
-    if (model.fixed[i] != 0) refuse(where, "/dofs/stored_nodes: node " + std::to_string(node) + " is fixed");
+    if (model.fixed[i] == all_axes)
+      refuse(where, "/dofs/stored_nodes: node " + std::to_string(node) + " is fixed");
     if (stored[i]) refuse(where, "/dofs/stored_nodes: node " + std::to_string(node) + " is there twice");
     stored[i] = true;
   }

@@ -3,6 +3,7 @@
 #include <cblas.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <exception>
 #include <mutex>
@@ -48,12 +49,14 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
 /// Mesh node of each stored node, in the order of the columns, which comes from the factor.
 std::vector<Index> stored_nodes(const GreensSolver& solver, const Stiffness& stiffness, int dimension) {
   const std::vector<std::int64_t> columns = solver.stored_dofs();
-  std::vector<Index> nodes;
+  const auto d = static_cast<std::size_t>(dimension);
+  std::vector<Index> nodes(columns.size() / d, -1);
   for (std::size_t k = 0; k < columns.size(); ++k) {
+    if (columns[k] < 0) continue;
     const std::int64_t dof = stiffness.free_dofs[static_cast<std::size_t>(columns[k])];
-    const auto axis = static_cast<std::int64_t>(k % static_cast<std::size_t>(dimension));
-    if (axis == 0) nodes.push_back(static_cast<Index>(dof / dimension));
-    if (dof != std::int64_t{dimension} * nodes.back() + axis) {
+    Index& node = nodes[k / d];
+    if (node < 0) node = static_cast<Index>(dof / dimension);
+    if (dof != std::int64_t{dimension} * node + static_cast<std::int64_t>(k % d)) {
       throw std::logic_error("the elimination order has separated the dofs of a node");
     }
   }
@@ -83,8 +86,8 @@ Model describe_model(const Description& description, const BakeOptions& options,
   return model;
 }
 
-/// Random forces on all stored dofs, in [-1, 1) N, and their displacements by a plain solve: a second route
-/// past the columns.
+/// Random forces on all stored dofs, in [-1, 1) N (those on held ones move nothing), and their displacements
+/// by a plain solve: a second route past the columns.
 std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int64_t>& stored_dofs) {
   std::mt19937_64 random(20240229);
   std::vector<Probe> probes(probe_count);
@@ -92,11 +95,13 @@ std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int6
     std::vector<double> f(static_cast<std::size_t>(factor.order()), 0.0);
     for (const std::int64_t dof : stored_dofs) {
       const double force = static_cast<double>(random() >> 11) * 0x1p-52 - 1.0;
-      f[static_cast<std::size_t>(dof)] = force;
+      if (dof >= 0) f[static_cast<std::size_t>(dof)] = force;
       probe.force.push_back(force);
     }
     const std::vector<double> u = factor.solve(f);
-    for (const std::int64_t dof : stored_dofs) probe.displacement.push_back(u[static_cast<std::size_t>(dof)]);
+    for (const std::int64_t dof : stored_dofs) {
+      probe.displacement.push_back(dof < 0 ? 0.0 : u[static_cast<std::size_t>(dof)]);
+    }
   }
   return probes;
 }
@@ -166,8 +171,10 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
       1);  // the blocks of columns are the parallel work, and the bytes do not depend on the jobs
   Factor factor(stiffness.K, stiffness.node_start);
   const GreensSolver solver(
-      factor, stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers));
-  if (solver.order() == 0) {
+      factor, stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers),
+      stiffness.free_dofs, model.dimension());
+  if (std::none_of(surface.nodes.begin(), surface.nodes.end(),
+                   [&](Index node) { return model.fixed[static_cast<std::size_t>(node)] == 0; })) {
     throw Error("no node of the boundary is free along every axis, so nothing can be touched",
                 description.file.string(), "Hold a smaller part of the body in [[fixed]].");
   }

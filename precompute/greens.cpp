@@ -24,11 +24,24 @@ std::int64_t count_before(std::span<const std::int64_t> positions, std::int64_t 
 
 }  // namespace
 
-GreensSolver::GreensSolver(const Factor& factor, const std::vector<std::uint8_t>& stored) : factor_(factor) {
+GreensSolver::GreensSolver(const Factor& factor, const std::vector<std::uint8_t>& stored,
+                           std::span<const std::int64_t> mesh_dofs, int d)
+    : factor_(factor) {
   const std::span<const std::int64_t> permutation = factor.permutation();
+  std::int64_t last_node = -1;
   for (std::size_t p = 0; p < permutation.size(); ++p) {
-    if (stored[static_cast<std::size_t>(permutation[p])]) positions_.push_back(static_cast<std::int64_t>(p));
+    const auto dof = static_cast<std::size_t>(permutation[p]);
+    if (!stored[dof]) continue;
+    if (const std::int64_t node = mesh_dofs[dof] / d; node != last_node) {
+      place_.resize(place_.size() + static_cast<std::size_t>(d), -1);
+      last_node = node;
+    }
+    place_[place_.size() - static_cast<std::size_t>(d - mesh_dofs[dof] % d)] =
+        static_cast<std::int64_t>(positions_.size());
+    positions_.push_back(static_cast<std::int64_t>(p));
   }
+  free_before_.push_back(0);
+  for (const std::int64_t place : place_) free_before_.push_back(free_before_.back() + (place < 0 ? 0 : 1));
 
   const cholmod_factor& L = factor.supernodal();
   const auto* super = static_cast<const std::int64_t*>(L.super);
@@ -62,9 +75,21 @@ GreensSolver::GreensSolver(const Factor& factor, const std::vector<std::uint8_t>
 
 std::vector<std::int64_t> GreensSolver::stored_dofs() const {
   std::vector<std::int64_t> dofs;
-  dofs.reserve(positions_.size());
-  for (const std::int64_t p : positions_) dofs.push_back(factor_.permutation()[static_cast<std::size_t>(p)]);
+  dofs.reserve(place_.size());
+  for (const std::int64_t place : place_) {
+    dofs.push_back(
+        place < 0
+            ? -1
+            : factor_.permutation()[static_cast<std::size_t>(positions_[static_cast<std::size_t>(place)])]);
+  }
   return dofs;
+}
+
+std::span<const std::int64_t> GreensSolver::free_positions(std::int64_t first, std::int64_t count) const {
+  const std::int64_t begin = free_before_[static_cast<std::size_t>(first)];
+  const std::int64_t end = free_before_[static_cast<std::size_t>(first + count)];
+  return std::span(positions_)
+      .subspan(static_cast<std::size_t>(begin), static_cast<std::size_t>(end - begin));
 }
 
 std::int64_t GreensSolver::workspace_bytes(std::int64_t width) const {
@@ -87,8 +112,8 @@ bool GreensSolver::needed(const Supernode& s, std::int64_t first_position) const
 }
 
 double GreensSolver::flops(std::int64_t first, std::int64_t count) const {
-  const std::span<const std::int64_t> block =
-      std::span(positions_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
+  const std::span<const std::int64_t> block = free_positions(first, count);
+  if (block.empty()) return 0.0;
   std::vector<std::uint8_t> on_path;
   mark_paths(block, on_path);
   double total = 0.0;
@@ -145,9 +170,11 @@ void GreensSolver::backward(const Supernode& s, bool on_path, std::int64_t activ
 
 void GreensSolver::columns(std::int64_t first, std::int64_t count, Workspace& workspace,
                            std::vector<double>& packed) const {
-  const std::span<const std::int64_t> stored(positions_);
-  const auto block = stored.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
-  const std::int64_t width = count;
+  const std::int64_t n = order();
+  packed.assign(static_cast<std::size_t>(count * (n - first) - count * (count - 1) / 2), 0.0);
+  const std::span<const std::int64_t> block = free_positions(first, count);
+  if (block.empty()) return;
+  const auto width = static_cast<std::int64_t>(block.size());
   workspace.X_.resize(static_cast<std::size_t>(factor_.order() * width));
   workspace.below_.resize(static_cast<std::size_t>(max_below_ * width));
   mark_paths(block, workspace.on_path_);
@@ -159,7 +186,7 @@ void GreensSolver::columns(std::int64_t first, std::int64_t count, Workspace& wo
     const Supernode& node = supernodes_[static_cast<std::size_t>(s)];
     std::fill_n(workspace.X_.begin() + node.first * width, node.columns * width, 0.0);
   }
-  for (std::int64_t c = 0; c < count; ++c) {
+  for (std::int64_t c = 0; c < width; ++c) {
     workspace.X_[static_cast<std::size_t>(block[static_cast<std::size_t>(c)] * width + c)] = 1.0;
   }
 
@@ -175,17 +202,20 @@ void GreensSolver::columns(std::int64_t first, std::int64_t count, Workspace& wo
     backward(node, on_path, count_before(block, node.end()), width, workspace);
   }
 
-  const std::int64_t n = order();
-  packed.resize(static_cast<std::size_t>(count * (n - first) - count * (count - 1) / 2));
   constexpr std::int64_t tile =
       16;  // rows of X that are spread over the columns at a time: each column gets a cache line
+  const std::int64_t first_free = free_before_[static_cast<std::size_t>(first)];
   for (std::int64_t row = first; row < n; row += tile) {
     const std::int64_t row_end = std::min(row + tile, n);
     for (std::int64_t c = 0; c < count; ++c) {
+      const std::int64_t right_hand_side = place_[static_cast<std::size_t>(first + c)] - first_free;
+      if (right_hand_side < 0) continue;
       double* column = packed.data() + c * (n - first) - c * (c - 1) / 2;  // holds rows first + c .. n - 1
       for (std::int64_t r = std::max(row, first + c); r < row_end; ++r) {
-        column[r - first - c] =
-            workspace.X_[static_cast<std::size_t>(stored[static_cast<std::size_t>(r)] * width + c)];
+        const std::int64_t place = place_[static_cast<std::size_t>(r)];
+        if (place < 0) continue;
+        const std::int64_t position = positions_[static_cast<std::size_t>(place)];
+        column[r - first - c] = workspace.X_[static_cast<std::size_t>(position * width + right_hand_side)];
       }
     }
   }

@@ -31,13 +31,16 @@ class GreensSolver {
   };
 
   /// `factor` may be only analysed as long as nothing but the sizes and costs are asked for.
-  /// `stored` [n] marks the dofs of K whose rows and columns are wanted.
-  GreensSolver(const Factor& factor, const std::vector<std::uint8_t>& stored);
+  /// `stored` [n] marks the dofs of K whose rows and columns are wanted, those of a node together;
+  /// `mesh_dofs` [n] are their dofs of the mesh, `d` node + axis. Nodes are stored whole: an axis that a node
+  /// is held along has no dof in K, and its row and column are zero.
+  GreensSolver(const Factor& factor, const std::vector<std::uint8_t>& stored,
+               std::span<const std::int64_t> mesh_dofs, int d);
 
-  /// Number of stored dofs.
-  [[nodiscard]] std::int64_t order() const noexcept { return static_cast<std::int64_t>(positions_.size()); }
+  /// Number of stored dofs, held ones of stored nodes among them.
+  [[nodiscard]] std::int64_t order() const noexcept { return static_cast<std::int64_t>(place_.size()); }
 
-  /// Dof of K of each stored dof, in the order of the columns.
+  /// Dof of K of each stored dof, in the order of the columns; -1 where it is held.
   [[nodiscard]] std::vector<std::int64_t> stored_dofs() const;
 
   /// Columns [first, first + count) of the lower triangle, one after the other, each from its diagonal down,
@@ -64,6 +67,8 @@ class GreensSolver {
     [[nodiscard]] std::int64_t end() const noexcept { return first + columns; }
   };
 
+  /// Of the stored dofs [first, first + count), those that are free: a range of positions_.
+  [[nodiscard]] std::span<const std::int64_t> free_positions(std::int64_t first, std::int64_t count) const;
   void mark_paths(std::span<const std::int64_t> block, std::vector<std::uint8_t>& on_path) const;
   [[nodiscard]] bool needed(const Supernode& s, std::int64_t first_position) const noexcept;
   void forward(const Supernode& s, std::int64_t active, std::int64_t width, Workspace& workspace) const;
@@ -73,7 +78,9 @@ class GreensSolver {
   const Factor& factor_;
   std::vector<Supernode> supernodes_;
   std::vector<std::int64_t> supernode_of_;  // [n] supernode of each position
-  std::vector<std::int64_t> positions_;     // [stored dofs] ascending positions in the factor
+  std::vector<std::int64_t> positions_;     // ascending positions in the factor of the free stored dofs
+  std::vector<std::int64_t> place_;         // [order] where a stored dof is in positions_, -1 where held
+  std::vector<std::int64_t> free_before_;   // [order + 1] how many of the stored dofs before it are free
   std::int64_t max_below_ = 0;
 };
 

@@ -16,7 +16,7 @@ std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Surface& surf
   for (std::size_t a = 0; a + 1 < stiffness.node_start.size(); ++a) {
     const std::int64_t first = stiffness.node_start[a], end = stiffness.node_start[a + 1];
     const std::int64_t node = stiffness.free_dofs[static_cast<std::size_t>(first)] / d;
-    const bool kept = end - first == d && layer[static_cast<std::size_t>(node)] <= deepest;
+    const bool kept = layer[static_cast<std::size_t>(node)] <= deepest;
     std::fill(marks.begin() + first, marks.begin() + end, kept ? 1 : 0);
   }
   return marks;

@@ -10,8 +10,7 @@
 
 namespace palpate {
 
-/// A mark for each dof of K: 1 where its row and column of Xi are kept (theory.md section 2). Nodes that are
-/// held along some axis are not kept: a tool cannot displace them freely.
+/// A mark for each dof of K: 1 where its row and column of Xi are kept (theory.md section 2).
 std::vector<std::uint8_t> stored_dof_marks(const Mesh& mesh, const Surface& surface,
                                            const Stiffness& stiffness, Scope scope, Index layers);
 

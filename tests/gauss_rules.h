@@ -22,6 +22,7 @@ inline std::vector<std::pair<double, double>> gauss_legendre(int n) {
   for (int k = 1; k < n; ++k) jacobi(k, k - 1) = k / std::sqrt(4.0 * k * k - 1.0);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(jacobi);
   std::vector<std::pair<double, double>> rule;
+  rule.reserve(static_cast<std::size_t>(n));
   for (int k = 0; k < n; ++k) {
     rule.emplace_back((1.0 + solver.eigenvalues()[k]) / 2.0, std::pow(solver.eigenvectors()(0, k), 2));
   }

@@ -60,7 +60,8 @@ struct Prepared {
                                       body.fixed,
                                       body.prescribed})),
         factor(stiffness.K, stiffness.node_start),
-        solver(factor, stored_dof_marks(body.mesh, body.surface, stiffness, Scope::surface, 0)) {
+        solver(factor, stored_dof_marks(body.mesh, body.surface, stiffness, Scope::surface, 0),
+               stiffness.free_dofs, 3) {
     factor.factorize();
   }
 };

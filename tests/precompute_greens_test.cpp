@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 
 #include "formats/model.h"
 #include "formats/packed.h"
@@ -68,7 +69,9 @@ Eigen::MatrixXd dense_inverse(const SparseMatrix& K, const std::vector<std::int6
   Eigen::MatrixXd block(static_cast<Eigen::Index>(dofs.size()), static_cast<Eigen::Index>(dofs.size()));
   for (std::size_t i = 0; i < dofs.size(); ++i) {
     for (std::size_t j = 0; j < dofs.size(); ++j) {
-      block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = inverse(dofs[i], dofs[j]);
+      const bool held = dofs[i] < 0 || dofs[j] < 0;
+      block(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+          held ? 0.0 : inverse(dofs[i], dofs[j]);
     }
   }
   return block;
@@ -76,7 +79,8 @@ Eigen::MatrixXd dense_inverse(const SparseMatrix& K, const std::vector<std::int6
 
 void expect_inverse(const Body& body, Scope scope, Index layers, std::int64_t width) {
   Factor factor(body.stiffness.K, body.stiffness.node_start);
-  const GreensSolver solver(factor, body.marks(scope, layers));
+  const GreensSolver solver(factor, body.marks(scope, layers), body.stiffness.free_dofs,
+                            body.elastic.mesh.dimension());
   factor.factorize();
   const Eigen::MatrixXd Xi = greens(solver, width),
                         reference = dense_inverse(body.stiffness.K, solver.stored_dofs());
@@ -111,14 +115,27 @@ TEST(Greens, EqualTheDenseInverseForOtherElementsInThePlaneAndOnRollers) {
   }
 }
 
-TEST(Greens, NodesHeldAlongAnAxisAreNotStored) {
+TEST(Greens, NodesHeldAlongAnAxisAreStoredWholeWithZeros) {
   const Body body(test::ElasticCase(block_mesh(), soft)
                       .hold(at_bottom, 4)
                       .hold([](const Vec3& x) { return x.x() < 1e-9; }, 3));
-  const std::vector<std::uint8_t> marks = body.marks(Scope::full, 0);
-  for (std::size_t k = 0; k < marks.size(); ++k) {
-    const auto node = static_cast<std::size_t>(body.stiffness.free_dofs[k] / 3);
-    EXPECT_EQ(marks[k] != 0, body.elastic.fixed[node] == 0) << "node " << node;
+  Factor factor(body.stiffness.K, body.stiffness.node_start);
+  const GreensSolver solver(factor, body.marks(Scope::full, 0), body.stiffness.free_dofs, 3);
+  const std::vector<std::int64_t> dofs = solver.stored_dofs();
+  const auto whole = std::count_if(body.elastic.fixed.begin(), body.elastic.fixed.end(),
+                                   [](std::uint8_t mask) { return mask != 7; });
+  ASSERT_EQ(solver.order(), 3 * whole);
+  for (std::size_t k = 0; k < dofs.size(); k += 3) {
+    const std::int64_t some = std::max({dofs[k], dofs[k + 1], dofs[k + 2]});
+    const std::int64_t node = body.stiffness.free_dofs[static_cast<std::size_t>(some)] / 3;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const bool held = (body.elastic.fixed[static_cast<std::size_t>(node)] >> axis & 1) != 0;
+      EXPECT_EQ(dofs[k + axis] < 0, held) << "node " << node << ", axis " << axis;
+      if (!held) {
+        EXPECT_EQ(body.stiffness.free_dofs[static_cast<std::size_t>(dofs[k + axis])],
+                  3 * node + static_cast<std::int64_t>(axis));
+      }
+    }
   }
 }
 
@@ -136,8 +153,8 @@ TEST(Greens, SurfaceScopeEqualsFullScope) {
   const Body body = clamped_block();
   Factor factor(body.stiffness.K, body.stiffness.node_start);
   factor.factorize();
-  const GreensSolver surface(factor, body.marks(Scope::surface, 0));
-  const GreensSolver full(factor, body.marks(Scope::full, 0));
+  const GreensSolver surface(factor, body.marks(Scope::surface, 0), body.stiffness.free_dofs, 3);
+  const GreensSolver full(factor, body.marks(Scope::full, 0), body.stiffness.free_dofs, 3);
   const Eigen::MatrixXd Xi_surface = greens(surface, 48), Xi_full = greens(full, 48);
   const std::vector<std::int64_t> surface_dofs = surface.stored_dofs(), full_dofs = full.stored_dofs();
   ASSERT_LT(surface_dofs.size(), full_dofs.size());
@@ -160,7 +177,7 @@ TEST(Greens, SurfaceScopeEqualsFullScope) {
 TEST(Greens, DofsOfANodeStayTogether) {
   const Body body = clamped_block();
   Factor factor(body.stiffness.K, body.stiffness.node_start);
-  const GreensSolver solver(factor, body.marks(Scope::surface, 0));
+  const GreensSolver solver(factor, body.marks(Scope::surface, 0), body.stiffness.free_dofs, 3);
   const std::vector<std::int64_t> dofs = solver.stored_dofs();
   for (std::size_t k = 0; k < dofs.size(); k += 3) {
     EXPECT_EQ(dofs[k] % 3, 0);

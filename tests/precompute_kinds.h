@@ -26,9 +26,10 @@ inline const std::vector<Kind> all_kinds = {
     {ElementType::hex8, Analysis::solid}};
 
 inline std::string name_of(const testing::TestParamInfo<Kind>& info) {
-  const std::string element = traits(info.param.element).name;
-  if (info.param.analysis == Analysis::solid) return element;
-  return element + (info.param.analysis == Analysis::plane_stress ? "_plane_stress" : "_plane_strain");
+  std::string name = traits(info.param.element).name;
+  if (info.param.analysis == Analysis::plane_stress) name += "_plane_stress";
+  if (info.param.analysis == Analysis::plane_strain) name += "_plane_strain";
+  return name;
 }
 
 /// Block [0, size] of cells of the kind; in the plane the rectangle of the first two sides. move(x) says

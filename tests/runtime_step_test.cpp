@@ -235,6 +235,32 @@ TEST_P(Touch, HeldNodesStayWhereTheyAreWhenTheToolComesAndGoes) {
   EXPECT_LT((first_force() - alone).norm(), 1e-12 * alone.norm());
 }
 
+// Prescribed in another order than taken, and one of the middle let go: each node keeps its own numbers.
+TEST_P(Touch, NodesKeepTheirOwnNumbers) {
+  const auto motion = [](Index node) { return at(0.001 * (node + 1), 0.002, -0.003 * (node + 1)); };
+  for (const Index node : {0, 1, 2, 3}) ASSERT_EQ(hold(body_, state_, node), StepStatus::ok);
+  for (const Index node : {2, 0, 3, 1}) ASSERT_EQ(prescribe(state_, node, motion(node)), StepStatus::ok);
+  ASSERT_EQ(solve(state_), StepStatus::ok);
+  for (const Index k : {0, 1, 2, 3}) EXPECT_EQ(vector_at(state_.prescribed(), GetParam(), k), motion(k));
+  std::vector<double> forces(state_.forces().begin(), state_.forces().end());
+
+  ASSERT_EQ(release(state_, 1), StepStatus::ok);
+  forces.erase(forces.begin() + GetParam(), forces.begin() + 2 * GetParam());
+  EXPECT_EQ(std::vector<double>(state_.forces().begin(), state_.forces().end()), forces);
+  ASSERT_EQ(solve(state_), StepStatus::ok);
+  State fresh(body_, {.max_nodes = 3});
+  for (const Index node : {0, 2, 3}) {
+    ASSERT_EQ(hold(body_, fresh, node), StepStatus::ok);
+    ASSERT_EQ(prescribe(fresh, node, motion(node)), StepStatus::ok);
+  }
+  ASSERT_EQ(solve(fresh), StepStatus::ok);
+  for (const Index k : {0, 1, 2}) {
+    EXPECT_EQ(vector_at(state_.prescribed(), GetParam(), k), vector_at(fresh.prescribed(), GetParam(), k));
+    const Vec3 expected = vector_at(fresh.forces(), GetParam(), k);
+    EXPECT_LT((vector_at(state_.forces(), GetParam(), k) - expected).norm(), 1e-12 * expected.norm());
+  }
+}
+
 TEST_P(Touch, SaysWhatCannotBeHeld) {
   EXPECT_EQ(hold(body_, state_, -1), StepStatus::no_such_node);
   EXPECT_EQ(hold(body_, state_, body_.greens().nodes()), StepStatus::no_such_node);
