@@ -204,9 +204,14 @@ void Reader::map_greens() {
   if (bad != none)
     refuse(where_, std::string(greens_path) + " holds a value that is not finite (entry " +
                        std::to_string(bad) + ")");
-  for (std::int64_t i = 0; i < order; ++i)
-    if (!(model_.greens(i, i) > 0.0))
-      refuse(where_, std::string(greens_path) + ": diagonal entry " + std::to_string(i) + " is not positive");
+  for (std::int64_t i = 0; i < order; ++i) {
+    const Index node = model_.stored_nodes[static_cast<std::size_t>(i / model_.dimension())];
+    const bool held = (model_.fixed[static_cast<std::size_t>(node)] >> i % model_.dimension() & 1) != 0;
+    const double entry = model_.greens(i, i);
+    if (held ? entry != 0.0 : !(entry > 0.0))
+      refuse(where_, std::string(greens_path) + ": diagonal entry " + std::to_string(i) + " is not " +
+                         (held ? "zero, though its dof is held" : "positive"));
+  }
 }
 
 /// Every dataset agrees with its own checksum by now; what is left are the attributes.

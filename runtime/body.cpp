@@ -58,7 +58,7 @@ Body::Body(Model model, const GreensOptions& options)
     }
   }
   for (std::size_t node = 0; node < rest.size(); ++node) {
-    if (!on_surface[node] || stored_of_mesh_[node] < 0) continue;
+    if (!on_surface[node] || stored_of_mesh_[node] < 0 || model_.fixed[node] != 0) continue;
     surface_.push_back(stored_of_mesh_[node]);
     x_.push_back(rest[node].x());
     y_.push_back(rest[node].y());

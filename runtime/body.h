@@ -44,7 +44,7 @@ class Body {
     return model_.mesh.nodes[node] + model_.rest_displacement[node];
   }
 
-  /// Stored nodes on the surface, in the order of their mesh nodes.
+  /// Stored nodes on the surface that are free along every axis, in the order of their mesh nodes.
   [[nodiscard]] const std::vector<Index>& free_surface_nodes() const noexcept { return surface_; }
 
   /// The free surface node whose rest position is nearest to `point` [m], which must be finite. In the plane

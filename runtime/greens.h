@@ -36,8 +36,8 @@ class Greens {
     return square_ != nullptr;
   }  ///< false: used packed, much slower
 
-  /// Xi at (row, column) [d, d] [m/N]: displacement of node `row` by unit forces on node `column`. Not for the
-  /// tick: takes memory.
+  /// Xi at (row, column) [d, d] [m/N]: displacement of node `row` by unit forces on node `column`. Not for
+  /// the tick: takes memory.
   [[nodiscard]] Eigen::MatrixXd block(Index row, Index column) const;
 
   /// The block row of the capacitance matrix C = E^T Xi E (theory.md section 3) that belongs to `row`: its

@@ -60,10 +60,10 @@ Index stored_node_of(const Body& body, Index node, const std::string& where) {
         fmt::format("node {} does not exist: the mesh has nodes 0 to {}", node, model.mesh.nodes.size() - 1),
         where, "give a node of the mesh, or a place with --at");
   }
-  const Index stored = body.stored_node(node);
-  if (stored >= 0) return stored;
   const unsigned all_axes = (1U << model.dimension()) - 1U;
   const unsigned held = model.fixed[static_cast<std::size_t>(node)] & all_axes;
+  const Index stored = body.stored_node(node);
+  if (stored >= 0 && held == 0) return stored;
   if (held == all_axes) {
     throw Error(fmt::format("node {} is fixed and cannot be displaced", node), where,
                 "give a node outside the fixed regions");
