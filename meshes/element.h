@@ -32,8 +32,8 @@ ShapeValues shape_functions(ElementType type, const Vec3& xi);
 /// dN_i/dxi_k at xi. [nodes, reference dimension]
 ShapeGradients reference_gradients(ElementType type, const Vec3& xi);
 
-/// Gauss points that integrate B^T D B exactly on straight-edged elements (tri3, tet4: 1; tet10: 4; quad4: 2
-/// x 2; hex8: 2 x 2 x 2) and N exactly on facets (line2: 2; tri6: 3).
+/// Gauss points that integrate B^T D B exactly on straight-edged simplices (tri3, tet4: 1; tet10: 4) and
+/// affine quad4 (2 x 2) and hex8 (2 x 2 x 2), and N exactly on flat facets (line2: 2; tri6: 3).
 std::span<const QuadraturePoint> quadrature(ElementType type);
 
 /// Reference coordinates of the nodes.

@@ -36,9 +36,11 @@ double read_thickness(const Section& root, Analysis analysis) {
   return root.positive("thickness", 1.0);
 }
 
-Scope read_scope(const Section& storage) {
+/// In the plane the inside is cheap and is looked at: without scope and layers, all of it is kept.
+Scope read_scope(const Section& storage, int dimension) {
+  const std::string usual = dimension == 2 && !storage.has("layers") ? "full" : "layers";
   const std::string scope =
-      storage.has("scope") ? storage.choice("scope", {"surface", "layers", "full"}) : "layers";
+      storage.has("scope") ? storage.choice("scope", {"surface", "layers", "full"}) : usual;
   if (scope == "surface") {
     return Scope::surface;
   }
@@ -136,7 +138,7 @@ Description read_description(const std::filesystem::path& path) {
   keep_regions(result.geometry, result.materials);
   result.fixed = read_fixed(root, dimension);
   result.loads = read_loads(root, dimension);
-  result.scope = read_scope(storage);
+  result.scope = read_scope(storage, dimension);
   result.layers = read_layers(storage, result.scope);
   result.precision = read_precision(storage);
   return result;

@@ -164,6 +164,7 @@ TEST(Description, ReadsThePlane) {
   EXPECT_EQ(shape.origin, Vec3(1, 2, 0));
   EXPECT_EQ(shape.size, Vec3(3, 4, 0));
   EXPECT_EQ(shape.cells, (std::array<int, 2>{5, 6}));
+  EXPECT_EQ(plate.scope, Scope::full);  // unless told otherwise
   EXPECT_EQ(plate.fixed.at(0).axes, 3);
   EXPECT_EQ(std::get<SelectLowest>(plate.fixed[0].where).axis, 1);
 
