@@ -252,8 +252,12 @@ class Rest(ProgramTest):
         node = numpy.rint(points @ [4, 20, 0 if plane else 100]).astype(int)  # x fastest
         self.assertEqual(len(points), 16 if plane else 98)
         numpy.testing.assert_allclose(moved, [contact.get(n, numpy.zeros(3)) for n in node], atol=1e-12)
-        held = ~numpy.isin(node, list(contact))
-        numpy.testing.assert_array_equal(held, numpy.any(points[:, :2 if plane else 3] == 0, axis=1))
+        on_rollers = points[:, :2 if plane else 3] == 0  # along each axis
+        numpy.testing.assert_array_equal(~numpy.isin(node, list(contact)), on_rollers.all(axis=1))
+        for axis in range(2 if plane else 3):
+            numpy.testing.assert_array_equal(arrays["displacement"][on_rollers[:, axis], axis], u0[on_rollers[:, axis], axis])
+            rolling = on_rollers[:, axis] & (on_rollers.sum(axis=1) == 1)
+            self.assertGreater(numpy.abs(moved[rolling]).max(), 1e-4)
 
     def test_in_the_plane(self):
         self.check(plane=True)
