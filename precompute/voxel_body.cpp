@@ -129,10 +129,14 @@ void spread_labels(VoxelBody& body) {
 }  // namespace
 
 Vec3 VoxelGrid::center(std::size_t voxel) const noexcept {
-  const auto nx = static_cast<std::size_t>(size[0]), ny = static_cast<std::size_t>(size[1]);
-  const Vec3 step(static_cast<double>(voxel % nx), static_cast<double>(voxel / nx % ny),
-                  static_cast<double>(voxel / (nx * ny)));
-  return origin + step.cwiseProduct(spacing);
+  Vec3 x = origin;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<std::size_t>(size[axis]);
+    const auto a = static_cast<Eigen::Index>(axis);
+    x[a] += static_cast<double>(voxel % n) * spacing[a];
+    voxel /= n;
+  }
+  return x;
 }
 
 VoxelBody crop(const VoxelBody& body, Index margin) {

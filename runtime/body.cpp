@@ -24,11 +24,14 @@ void check_sizes(const Model& model) {
                     " stored nodes of a mesh of " + std::to_string(nodes),
                 model.name, "precompute the model again");
   }
-  if (model.rest_displacement.size() != nodes) {
-    throw Error("the rest displacement of " + std::to_string(model.rest_displacement.size()) +
-                    " nodes does not belong to a mesh of " + std::to_string(nodes),
+  const auto check_nodal = [&](const char* what, std::size_t size) {
+    if (size == nodes) return;
+    throw Error(std::string(what) + " of " + std::to_string(size) + " nodes does not belong to a mesh of " +
+                    std::to_string(nodes),
                 model.name, "precompute the model again");
-  }
+  };
+  check_nodal("the rest displacement", model.rest_displacement.size());
+  check_nodal("the list of held axes", model.fixed.size());
 }
 
 Greens take_greens(Model& model, const GreensOptions& options) {

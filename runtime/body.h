@@ -30,7 +30,7 @@ class Body {
   /// d, dofs a node: 2 in the plane, 3 in space.
   [[nodiscard]] int dimension() const noexcept { return greens_.dimension(); }
 
-  /// Stored node of a mesh node, -1 when it is held along an axis or not kept.
+  /// Stored node of a mesh node, -1 when it is held along every axis or not kept.
   [[nodiscard]] Index stored_node(Index mesh_node) const noexcept {
     return stored_of_mesh_[static_cast<std::size_t>(mesh_node)];
   }

@@ -194,8 +194,8 @@ std::vector<Index> keep_used_nodes(Cells& cells, std::size_t mesh_nodes) {
   return kept;
 }
 
-/// A grid of the undeformed body with u0 and u0 + u, which is what is seen. Nodes that are held along an axis
-/// are shown at rest.
+/// A grid of the undeformed body with u0 and u0 + u, which is what is seen. Nodes that are not stored are
+/// held along every axis and shown at rest.
 void write_grid(const std::filesystem::path& file, const Body& body, std::span<const double> u) {
   const Model& model = body.model();
   Cells cells = shown_cells(body);

@@ -127,6 +127,15 @@ TEST_P(Bodies, RefuseThePartsOfAnotherBody) {
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("rest displacement"), std::string::npos) << error.what();
   }
+
+  model = good;
+  model.fixed.pop_back();
+  try {
+    const Body body(std::move(model));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("held axes"), std::string::npos) << error.what();
+  }
 }
 
 }  // namespace
