@@ -36,8 +36,7 @@ struct Probe {
 
 /// Everything baked. Constant once loaded; shared by all threads.
 /// With d = dimension(), a stored dof is d k + axis for stored node k; `stored_nodes[k]` is its mesh node.
-/// A node
-/// that is held along some axes only is stored whole: rows and columns of its held dofs are zero.
+/// A node that is held along some axes only is stored whole: rows and columns of its held dofs are zero.
 struct Model {
   std::string name;        ///< from model.toml
   std::string generator;   ///< program and version that wrote it
