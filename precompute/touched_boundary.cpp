@@ -73,7 +73,7 @@ TouchedBoundary::TouchedBoundary(const Model& model)
   for (std::size_t node = 0; node < normals_.size(); ++node) {
     if (areas_[node] == 0.0) continue;
     normals_[node].normalize();
-    if (stored_of_node_[node] >= 0) free_nodes_.push_back(static_cast<Index>(node));
+    if (stored_of_node_[node] >= 0 && model.fixed[node] == 0) free_nodes_.push_back(static_cast<Index>(node));
   }
 }
 
@@ -86,17 +86,20 @@ Tip TouchedBoundary::tip(const Vec3& place, double radius) const {
   Tip tip;
   double total = 0.0, least = std::numeric_limits<double>::infinity();
   Index nearest = -1;
-  for (const Index node : free_nodes_) {
-    const auto i = static_cast<std::size_t>(node);
-    const double r2 = (model_.mesh.nodes[i] - place).squaredNorm();
-    if (r2 < least) {
+  for (std::size_t node = 0; node < areas_.size(); ++node) {
+    if (areas_[node] == 0.0) continue;
+    const Index stored = stored_of_node_[node];
+    const double r2 = (model_.mesh.nodes[node] - place).squaredNorm();
+    if (stored >= 0 && model_.fixed[node] == 0 && r2 < least) {
       least = r2;
-      nearest = stored_of_node_[i];
+      nearest = stored;
     }
     if (!(r2 < radius * radius)) continue;
-    tip.stored.push_back(stored_of_node_[i]);
-    tip.share.push_back(areas_[i] * (1.0 - r2 / (radius * radius)));
-    total += tip.share.back();
+    const double share = areas_[node] * (1.0 - r2 / (radius * radius));
+    total += share;
+    if (stored < 0) continue;
+    tip.stored.push_back(stored);
+    tip.share.push_back(share);
   }
   if (tip.stored.empty()) return {{nearest}, {1.0}};
   for (double& share : tip.share) share /= total;

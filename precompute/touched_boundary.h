@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// Share of a force on each of some stored nodes; the shares add up to 1.
+/// Share of a force on each of some stored nodes; what is missing to 1 is on fixed nodes, which do not move.
 struct Tip {
   std::vector<Index> stored;
   std::vector<double> share;
