@@ -1,6 +1,7 @@
 """palpate-precompute as a person meets it: what it writes, what it refuses, what is left when it is stopped."""
 
 import os
+import re
 import resource
 import shutil
 import signal
@@ -207,11 +208,28 @@ class BadDescriptions(ProgramTest):
 
 class Models(ProgramTest):
     def test_sample_models_that_need_no_download(self):
-        for name in ("cube", "beam", "sphere"):
+        for name in ("cube", "beam", "sphere", "plate"):
             shutil.copytree(MODELS / name, self.folder / name)
             result = run(PRECOMPUTE, self.folder / name / "model.toml", cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertEqual(run(PRECOMPUTE, "verify", self.folder / f"{name}.palpate.hdf").returncode, 0)
+
+    def test_the_nodule_is_made_of_two_materials(self):
+        planned = run(PRECOMPUTE, MODELS / "nodule" / "model.toml", "--dry-run", cwd=self.folder)
+        self.assertEqual(planned.returncode, 0, planned.stderr)
+        self.assertIn("12288 elements (hex8)", planned.stderr)
+
+    def test_the_liver_keeps_its_labels(self):
+        image = MODELS / "liver" / "liver.inr.gz"
+        if not image.exists():
+            self.skipTest("scripts/demo fetches the liver's image")
+        planned = run(PRECOMPUTE, MODELS / "liver_inclusions" / "model.toml", "--dry-run", cwd=self.folder)
+        self.assertEqual(planned.returncode, 0, planned.stderr)
+        changes = {int(label): float(change) for label, change in
+                   re.findall(r"label (\d+): volume .* \(([-+0-9.]+) %\)", planned.stderr)}
+        self.assertEqual(set(changes), {85, 127, 255})
+        self.assertLess(max(map(abs, changes.values())), 10.0)  # measured: -6.1 (85, the smallest), -1.1, -0.5
+        self.assertIn("label 84", planned.stderr)
 
 
 if __name__ == "__main__":
