@@ -145,7 +145,7 @@ ShapeValues shape_functions(ElementType type, const Vec3& xi) {
     }
     return N;
   }
-  const ShapeValues L = barycentric(t.dimension, xi);
+  ShapeValues L = barycentric(t.dimension, xi);
   if (t.nodes == t.corners) return L;
   for (int i = 0; i < t.corners; ++i) N[i] = L[i] * (2.0 * L[i] - 1.0);
   int node = t.corners;
@@ -171,7 +171,7 @@ ShapeGradients reference_gradients(ElementType type, const Vec3& xi) {
     }
     return g;
   }
-  const ShapeGradients dL = barycentric_gradients(t.dimension);
+  ShapeGradients dL = barycentric_gradients(t.dimension);
   if (t.nodes == t.corners) return dL;
   const ShapeValues L = barycentric(t.dimension, xi);
   for (int i = 0; i < t.corners; ++i) g.row(i) = (4.0 * L[i] - 1.0) * dL.row(i);

@@ -8,6 +8,7 @@ namespace palpate {
 namespace {
 
 using Rows = std::vector<std::int64_t>;
+constexpr std::size_t max_element_dofs = std::size_t{3} * max_element_nodes;
 
 /// Numbers the free dofs, those of a node together.
 void number_dofs(const ElasticBody& body, Stiffness& result) {
@@ -106,8 +107,8 @@ SparseMatrix make_pattern(const UpperNeighbours& upper, const std::vector<std::i
 void scatter(const ElasticBody& body, std::span<const Index> nodes, const ElementMatrix& Ke,
              Stiffness& result) {
   const int d = body.mesh.dimension();
-  std::array<std::int64_t, 3 * max_element_nodes> free{};
-  std::array<double, 3 * max_element_nodes> prescribed{};
+  std::array<std::int64_t, max_element_dofs> free{};
+  std::array<double, max_element_dofs> prescribed{};
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (int axis = 0; axis < d; ++axis) {
       const std::size_t local = static_cast<std::size_t>(d) * i + static_cast<std::size_t>(axis);

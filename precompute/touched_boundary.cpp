@@ -27,9 +27,9 @@ Vec3 nearest_on_line(const Vec3& a, const Vec3& b, const Vec3& p) {
 Vec3 nearest_on_triangle(const std::array<Vec3, 3>& x, const Vec3& p) {
   const Vec3 normal = (x[1] - x[0]).cross(x[2] - x[0]);
   const double area = normal.squaredNorm();
-  const Vec3 weights((x[2] - x[1]).cross(p - x[1]).dot(normal) / area,
-                     (x[0] - x[2]).cross(p - x[2]).dot(normal) / area,
-                     (x[1] - x[0]).cross(p - x[0]).dot(normal) / area);
+  Vec3 weights((x[2] - x[1]).cross(p - x[1]).dot(normal) / area,
+               (x[0] - x[2]).cross(p - x[2]).dot(normal) / area,
+               (x[1] - x[0]).cross(p - x[0]).dot(normal) / area);
   if (weights.minCoeff() >= 0.0) return weights;
   Vec3 best = Vec3::Zero();
   double least = std::numeric_limits<double>::infinity();
