@@ -17,7 +17,6 @@ using Mat3 = Eigen::Matrix3d;
 using Index =
     std::int32_t;  ///< node, element and facet numbers; counts of bytes and matrix entries are std::int64_t
 
-using Tet = std::array<Index, 4>;       ///< node numbers, positively oriented: det[x1-x0, x2-x0, x3-x0] > 0
 using Triangle = std::array<Index, 3>;  ///< node numbers, counter-clockwise seen from outside the body
 
 /// Mesh of elements of one kind, coordinates in metres. A plane mesh (tri3, quad4) lies in z = 0.

@@ -7,7 +7,6 @@
 namespace palpate {
 namespace {
 
-using Rows = std::vector<std::int64_t>;
 constexpr std::size_t max_element_dofs = std::size_t{3} * max_element_nodes;
 
 /// Numbers the free dofs, those of a node together.
@@ -83,7 +82,7 @@ UpperNeighbours find_upper_neighbours(const Mesh& mesh, const std::vector<Index>
 /// The lower triangle's pattern with zero values: in a column, the later dofs of its own node, then all dofs
 /// of the higher neighbours.
 SparseMatrix make_pattern(const UpperNeighbours& upper, const std::vector<std::int64_t>& node_start) {
-  Rows columns{0}, rows;
+  std::vector<std::int64_t> columns{0}, rows;
   for (std::size_t a = 0; a + 1 < node_start.size(); ++a) {
     for (std::int64_t column = node_start[a]; column < node_start[a + 1]; ++column) {
       for (std::int64_t row = column; row < node_start[a + 1]; ++row) rows.push_back(row);
