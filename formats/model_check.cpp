@@ -36,6 +36,16 @@ void check_plane(const std::vector<Vec3>& rows, const std::string& path, const s
                         ", in the plane it is 0");
 }
 
+void check_materials(const Model& model, const std::string& where) {
+  for (std::size_t m = 0; m < model.materials.size(); ++m) {
+    const std::string row = ", row " + std::to_string(m);
+    if (model.materials[m].friction < 0.0)
+      refuse(where, "/material/friction" + row + " is " + std::to_string(model.materials[m].friction) +
+                        ", negative");
+    check_material(model.materials[m], where + ": /material/isotropic" + row);
+  }
+}
+
 void check_elements(const Mesh& mesh, const std::string& where) {
   for (Index e = 0; e < mesh.elements(); ++e)
     if (!(smallest_determinant(mesh.element, element_nodes(mesh, e)) > 0.0))
@@ -134,8 +144,7 @@ void check_model(const Model& model, const std::string& where) {
   if (!(model.thickness > 0.0) || (solid && model.thickness != 1.0))
     refuse(where, "/material/thickness is " + std::to_string(model.thickness) +
                       (solid ? ", in space it is 1" : ", not positive"));
-  for (std::size_t m = 0; m < model.materials.size(); ++m)
-    check_material(model.materials[m], where + ": /material/isotropic, row " + std::to_string(m));
+  check_materials(model, where);
   if (!solid) {
     check_plane(model.mesh.nodes, "/mesh/nodes", where);
     check_plane(model.rest_force, "/rest/force", where);

@@ -110,6 +110,17 @@ void put_constants(Model& model, const std::vector<double>& values) {
   }
 }
 
+std::vector<double> frictions_of(const Model& model) {
+  std::vector<double> values;
+  for (const Material& m : model.materials) values.push_back(m.friction);
+  return values;
+}
+
+void put_frictions(Model& model, const std::vector<double>& values) {
+  auto value = values.begin();
+  for (Material& m : model.materials) m.friction = *value++;
+}
+
 std::vector<double> initial_strains_of(const Model& model) {
   std::vector<double> values;
   for (const Material& m : model.materials)

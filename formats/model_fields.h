@@ -73,6 +73,8 @@ std::vector<Vec3> rows(const std::vector<double>& values);
 std::vector<std::int64_t> offsets_of(const Model& model);
 std::vector<double> constants_of(const Model& model);
 void put_constants(Model& model, const std::vector<double>& values);
+std::vector<double> frictions_of(const Model& model);
+void put_frictions(Model& model, const std::vector<double>& values);
 std::vector<double> initial_strains_of(const Model& model);
 void put_initial_strains(Model& model, const std::vector<double>& values);
 std::vector<double> quality_summary(const Model& model);
@@ -165,6 +167,7 @@ void for_each_body_field(ElementType element, Visitor&& visit) {
                             [](Model& m, const Int32s& v) { m.stored_nodes = v; },
                             nodes});
   visit(Field<double>{"/material/isotropic", {materials, three}, constants_of, put_constants});
+  visit(Field<double>{"/material/friction", {materials}, frictions_of, put_frictions});
   visit(Field<double>{
       "/material/initial_strain", {materials, {Count::one, 6, 0}}, initial_strains_of, put_initial_strains});
   visit(Field<std::int32_t>{"/material/of_element",

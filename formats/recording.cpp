@@ -11,17 +11,21 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t ticks_at_once = 4096;  // rows of a chunk; written together
-constexpr std::array<std::int64_t, 2> version = {1, 0};
+constexpr std::array<std::int64_t, 2> version = {2, 0};
 constexpr const char* format_name = "palpate-recording";
 
 /// One dataset a field of TickRecord: path, number of components, member.
 template <class Visitor>
 void for_each_tick_field(Visitor&& visit) {
   visit("/ticks/time", 1, &TickRecord::time);
+  visit("/ticks/device_position", 3, &TickRecord::device_position);
+  visit("/ticks/device_orientation", 4, &TickRecord::device_orientation);
   visit("/ticks/tool_position", 3, &TickRecord::tool_position);
+  visit("/ticks/tool_orientation", 4, &TickRecord::tool_orientation);
   visit("/ticks/force", 3, &TickRecord::force);
-  visit("/ticks/displacement", 3, &TickRecord::displacement);
-  visit("/ticks/node", 1, &TickRecord::node);
+  visit("/ticks/torque", 3, &TickRecord::torque);
+  visit("/ticks/contacts", 1, &TickRecord::contacts);
+  visit("/ticks/stiffness", 6, &TickRecord::stiffness);
   visit("/ticks/status", 1, &TickRecord::status);
   visit("/ticks/compute_ns", 1, &TickRecord::compute_ns);
   visit("/ticks/grab", 1, &TickRecord::grab);
@@ -79,7 +83,7 @@ struct RecordingWriter::Impl {
     file.write_attribute("/", "format", std::string(format_name));
     file.write_attribute("/", "version", version);
     file.write_attribute("/", "generator", std::string("palpate " PALPATE_VERSION));
-    file.write_attribute("/", "units", std::string("s, m, N; compute_ns in ns"));
+    file.write_attribute("/", "units", std::string("s, m, N, N m, N/m; compute_ns in ns"));
     file.write_attribute("/", "model", model_path);
     file.write_attribute("/", "content_hash", content_hash);
     file.make_group("/ticks");
@@ -150,7 +154,7 @@ Recording read_recording(const std::filesystem::path& path) {
   if (file.text_attribute("/", "format") != format_name)
     throw Error("is not a recording", path.string(), hint);
   if (const auto v = file.integer_attribute("/", "version", 2); !v || (*v)[0] != version[0])
-    throw Error("is a recording of another version", path.string(), hint);
+    throw Error("is a recording of another version", path.string(), "Record the session again.");
 
   Recording recording;
   recording.model_path = file.text_attribute("/", "model").value_or("");

@@ -12,12 +12,17 @@ namespace palpate {
 
 /// What is kept of one tick.
 struct TickRecord {
-  double time = 0.0;             ///< since the start of the run [s]
-  double tool_position[3] = {};  ///< [m]
-  double force[3] = {};          ///< on the body [N]; the hand feels the opposite
-  double displacement[3] = {};   ///< of the held node [m]; zero while nothing is held
-  std::int64_t node = -1;        ///< held mesh node, -1 for none
-  std::uint32_t status = 0;      ///< StepStatus bits
+  double time = 0.0;                            ///< since the start of the run [s]
+  double device_position[3] = {};               ///< where the device wanted the tool [m]
+  double device_orientation[4] = {1, 0, 0, 0};  ///< w, x, y, z
+  double tool_position[3] = {};               ///< where the tool itself was, which the body keeps outside [m]
+  double tool_orientation[4] = {1, 0, 0, 0};  ///< w, x, y, z
+  double force[3] = {};       ///< the opposite of what the hand feels [N]: that on the body, but where it is
+                              ///< limited or handed over
+  double torque[3] = {};      ///< on the body about the tool's origin [N m]
+  std::int32_t contacts = 0;  ///< closed contact points
+  double stiffness[6] = {};   ///< that the hand feels, xx, yy, zz, xy, yz, zx [N/m]
+  std::uint32_t status = 0;   ///< StepStatus bits
   std::uint32_t compute_ns =
       0;  ///< time that `step` took; 0 in a run without waiting, so that two such runs are equal
   std::uint8_t grab = 0;  ///< grab button

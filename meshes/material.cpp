@@ -55,6 +55,10 @@ void check_material(const Material& material, const std::string& where) {
   if (!(std::isfinite(rho) && rho > 0.0)) {
     throw Error(fmt::format("density must be positive, not {}", rho), where, "Give it in kg/m^3, e.g. 1060.");
   }
+  if (!(std::isfinite(material.friction) && material.friction >= 0.0)) {
+    throw Error(fmt::format("friction must be 0 or more, not {}", material.friction), where,
+                "Give Coulomb's coefficient, e.g. 0.2 for wet tissue.");
+  }
   for (const double strain : material.initial_strain) {
     if (!std::isfinite(strain)) throw Error("initial_strain is not finite", where, "Give six numbers.");
   }

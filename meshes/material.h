@@ -20,11 +20,12 @@ using ElasticityMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0
 /// Stress [xx yy zz xy yz zx], in the plane [xx yy xy] [Pa].
 using StressVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
-/// Isotropic material. Valid for E > 0, -1 < nu < 1/2, density > 0.
+/// Isotropic material. Valid for E > 0, -1 < nu < 1/2, density > 0, friction >= 0.
 struct Material {
   double youngs_modulus = 0.0;  ///< E [Pa]
   double poissons_ratio = 0.0;  ///< nu [-]
   double density = 1000.0;      ///< [kg/m^3]
+  double friction = 0.0;        ///< Coulomb's coefficient between its surface and a tool [-], >= 0
   /// eps_0 [xx yy zz xy yz zx], engineering shear: the strain of the material where it is free of stress
   /// (swelling, thermal expansion).
   std::array<double, 6> initial_strain{};

@@ -24,6 +24,12 @@ MaterialPart read_material(const Section& material, int dimension) {
                       shown(part.material.poissons_ratio),
                   "nearly incompressible tissue is 0.45 to 0.49");
   }
+  part.material.friction = material.number("friction", part.material.friction);
+  if (part.material.friction < 0.0) {
+    material.fail("friction",
+                  material.name_of("friction") + " must be 0 or more, not " + shown(part.material.friction),
+                  "give Coulomb's coefficient, e.g. 0.2 for wet tissue");
+  }
   if (material.has("initial_strain")) {
     part.material.initial_strain = read_initial_strain(material, dimension);
   }
@@ -43,7 +49,7 @@ bool is_rest(const MaterialPart& part) {
 }  // namespace
 
 std::vector<MaterialPart> read_materials(const Section& root, int dimension) {
-  Keys keys = {"youngs_modulus", "poissons_ratio", "density", "initial_strain"};
+  Keys keys = {"youngs_modulus", "poissons_ratio", "density", "friction", "initial_strain"};
   keys.insert(keys.end(), claim_kinds.begin(), claim_kinds.end());
   if (root.is_table("material") || !root.has("material")) {
     return {read_material(root.section("material", keys), dimension)};

@@ -51,9 +51,10 @@ std::string materials_text(const Model& model) {
   std::string text;
   for (std::size_t m = 0; m < model.materials.size(); ++m) {
     const Material& material = model.materials[m];
-    text +=
-        fmt::format("  material {:<8} E = {:g} Pa, nu = {:g}, density = {:g} kg/m^3, {} elements\n", m + 1,
-                    material.youngs_modulus, material.poissons_ratio, material.density, elements[m]);
+    text += fmt::format(
+        "  material {:<8} E = {:g} Pa, nu = {:g}, density = {:g} kg/m^3, friction = {:g}, {} elements\n",
+        m + 1, material.youngs_modulus, material.poissons_ratio, material.density, material.friction,
+        elements[m]);
     const auto& strain = material.initial_strain;
     if (std::any_of(strain.begin(), strain.end(), [](double e) { return e != 0.0; })) {
       text += fmt::format("    initial strain  {:g}\n", fmt::join(strain, ", "));

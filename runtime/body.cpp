@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "meshes/error.h"
+#include "runtime/surface_numbering.h"
 
 namespace palpate {
 namespace {
@@ -32,6 +33,16 @@ void check_sizes(const Model& model) {
   };
   check_nodal("the rest displacement", model.rest_displacement.size());
   check_nodal("the list of held axes", model.fixed.size());
+  const auto of_a_material = [&model](Index m) {
+    return m >= 0 && static_cast<std::size_t>(m) < model.materials.size();
+  };
+  if (std::ssize(model.material_of_element) != model.mesh.elements() ||
+      !std::all_of(model.material_of_element.begin(), model.material_of_element.end(), of_a_material)) {
+    throw Error("the materials of " + std::to_string(model.material_of_element.size()) +
+                    " elements do not belong to a mesh of " + std::to_string(model.mesh.elements()) +
+                    " elements and " + std::to_string(model.materials.size()) + " materials",
+                model.name, "precompute the model again");
+  }
 }
 
 Greens take_greens(Model& model, const GreensOptions& options) {
@@ -50,18 +61,18 @@ Body::Body(Model model, const GreensOptions& options)
     stored_of_mesh_[static_cast<std::size_t>(model_.stored_nodes[k])] = static_cast<Index>(k);
   }
 
-  std::vector<bool> on_surface(rest.size(), false);
-  const auto corners = static_cast<std::size_t>(dimension());
-  for (std::size_t simplex = 0; simplex < model_.surface.size(); simplex += corners) {
-    for (std::size_t k = 0; k < corners; ++k) {
-      const auto a = static_cast<std::size_t>(model_.surface[simplex + k]);
-      const auto b = static_cast<std::size_t>(model_.surface[simplex + (k + 1) % corners]);
-      on_surface[a] = true;
-      longest_surface_edge_ = std::max(longest_surface_edge_, (rest[a] - rest[b]).norm());
-    }
-  }
-  for (std::size_t node = 0; node < rest.size(); ++node) {
-    if (!on_surface[node] || stored_of_mesh_[node] < 0 || model_.fixed[node] != 0) continue;
+  SurfaceNumbering numbering = number_surface(model_.surface, rest.size());
+  surface_mesh_nodes_ = std::move(numbering.mesh_nodes);
+  surface_node_of_stored_.assign(model_.stored_nodes.size(), -1);
+  simplices_ = std::move(numbering.simplices);
+  for (const Index mesh_node : surface_mesh_nodes_) {
+    const auto node = static_cast<std::size_t>(mesh_node);
+    surface_stored_nodes_.push_back(stored_of_mesh_[node]);
+    if (stored_of_mesh_[node] >= 0)
+      surface_node_of_stored_[static_cast<std::size_t>(stored_of_mesh_[node])] =
+          static_cast<Index>(surface_rest_.size());
+    surface_rest_.push_back(rest[node]);
+    if (stored_of_mesh_[node] < 0 || model_.fixed[node] != 0) continue;
     surface_.push_back(stored_of_mesh_[node]);
     x_.push_back(rest[node].x());
     y_.push_back(rest[node].y());
@@ -71,8 +82,28 @@ Body::Body(Model model, const GreensOptions& options)
     throw Error("no node of the surface is free to move, so nothing can be touched", model_.name,
                 "fix a smaller region of the body and precompute the model again");
   }
+  for (const Index element : surface_elements(model_)) {
+    const Index material = model_.material_of_element[static_cast<std::size_t>(element)];
+    surface_friction_.push_back(model_.materials[static_cast<std::size_t>(material)].friction);
+  }
+  measure_edges();
   const std::size_t padded = (surface_.size() + search_block - 1) / search_block * search_block;
   for (std::vector<double>* coordinate : {&x_, &y_, &z_}) coordinate->resize(padded, infinity);
+}
+
+void Body::measure_edges() {
+  const auto corners = static_cast<std::size_t>(dimension());
+  double sum = 0.0;
+  for (std::size_t simplex = 0; simplex < simplices_.size(); simplex += corners) {
+    for (std::size_t k = 0; k < corners; ++k) {
+      const auto a = static_cast<std::size_t>(simplices_[simplex + k]);
+      const auto b = static_cast<std::size_t>(simplices_[simplex + (k + 1) % corners]);
+      const double length = (surface_rest_[a] - surface_rest_[b]).norm();
+      longest_surface_edge_ = std::max(longest_surface_edge_, length);
+      sum += length;  // a closed surface has each edge as often
+    }
+  }
+  mean_surface_edge_ = sum / static_cast<double>(simplices_.size());
 }
 
 NearestNode Body::nearest_surface_node(const Vec3& point) const noexcept {

@@ -1,6 +1,7 @@
 // A loaded body, ready to be touched.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "formats/model.h"
@@ -54,14 +55,41 @@ class Body {
   /// Longest edge of the surface at rest [m]: no point of the surface is farther than that from a surface
   /// node.
   [[nodiscard]] double longest_surface_edge() const noexcept { return longest_surface_edge_; }
+  /// Mean length of the edges of the surface at rest [m].
+  [[nodiscard]] double mean_surface_edge() const noexcept { return mean_surface_edge_; }
+
+  /// The surface that a tool meets, with its own numbering of the nodes on it, held ones too:
+  /// [F * d] surface nodes of its simplices (triangles, in the plane lines), outward as in Model::surface.
+  [[nodiscard]] std::span<const Index> simplices() const noexcept { return simplices_; }
+  /// [S] mesh node of each surface node, ascending.
+  [[nodiscard]] std::span<const Index> surface_mesh_nodes() const noexcept { return surface_mesh_nodes_; }
+  /// [S] stored node of each surface node, -1 for those that are held along every axis.
+  [[nodiscard]] std::span<const Index> surface_stored_nodes() const noexcept { return surface_stored_nodes_; }
+  /// Surface node of a stored node, -1 when it is inside the body.
+  [[nodiscard]] Index surface_node_of_stored(Index stored) const noexcept {
+    return surface_node_of_stored_[static_cast<std::size_t>(stored)];
+  }
+  /// [S] where each rests [m].
+  [[nodiscard]] std::span<const Vec3> surface_rest_positions() const noexcept { return surface_rest_; }
+  /// [F] Coulomb's coefficient of each simplex: that of the material of its element.
+  [[nodiscard]] std::span<const double> surface_friction() const noexcept { return surface_friction_; }
 
  private:
+  void measure_edges();
+
   Model model_;
   Greens greens_;
   std::vector<Index> stored_of_mesh_;  // [N]
-  std::vector<Index> surface_;         // [S]
-  std::vector<double> x_, y_, z_;      // [S, padded to whole blocks with infinity] rest positions
+  std::vector<Index> surface_;         // free surface nodes
+  std::vector<double> x_, y_, z_;      // [those, padded to whole blocks with infinity] rest positions
   double longest_surface_edge_ = 0.0;
+  double mean_surface_edge_ = 0.0;
+  std::vector<Index> simplices_;               // [F * d]
+  std::vector<Index> surface_mesh_nodes_;      // [S]
+  std::vector<Index> surface_stored_nodes_;    // [S]
+  std::vector<Index> surface_node_of_stored_;  // [stored]
+  std::vector<Vec3> surface_rest_;             // [S]
+  std::vector<double> surface_friction_;       // [F]
 };
 
 }  // namespace palpate

@@ -1,8 +1,10 @@
 #include "runtime/capacitance.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <type_traits>
 
 #include "formats/packed.h"
 #include "meshes/error.h"
@@ -10,25 +12,29 @@
 namespace palpate {
 namespace {
 
-/// Smallest pivot, relative to the diagonal of C, that is taken for more than rounding.
-constexpr double pivot_tolerance = 1e-10;
-
-/// y -= L x for the part of L below a diagonal block: two or three columns of L, one right-hand side.
-void subtract_columns(const double* __restrict L0, const double* __restrict L1, const double* x,
-                      double* __restrict y, std::int64_t count) noexcept {
-  const double x0 = x[0];
-  const double x1 = x[1];
-#pragma omp simd
-  for (std::int64_t i = 0; i < count; ++i) y[i] -= L0[i] * x0 + L1[i] * x1;
+/// Calls f with the dofs a node, a constant for the compiler.
+template <class F>
+auto with_dimension(int dimension, const F& f) noexcept {
+  switch (dimension) {
+    case 1:
+      return f(std::integral_constant<int, 1>());
+    case 2:
+      return f(std::integral_constant<int, 2>());
+    default:
+      return f(std::integral_constant<int, 3>());
+  }
 }
 
-void subtract_columns(const double* __restrict L0, const double* __restrict L1, const double* __restrict L2,
-                      const double* x, double* __restrict y, std::int64_t count) noexcept {
-  const double x0 = x[0];
-  const double x1 = x[1];
-  const double x2 = x[2];
+/// y -= L x for the part of L below a diagonal block: the D columns of a node, one right-hand side.
+template <int D>
+void subtract_columns(const std::array<const double*, D>& L, const std::array<double, D>& x,
+                      double* __restrict y, std::int64_t count) noexcept {
 #pragma omp simd
-  for (std::int64_t i = 0; i < count; ++i) y[i] -= L0[i] * x0 + L1[i] * x1 + L2[i] * x2;
+  for (std::int64_t i = 0; i < count; ++i) {
+    double sum = 0.0;
+    for (std::size_t p = 0; p < D; ++p) sum += L[p][i] * x[p];
+    y[i] -= sum;
+  }
 }
 
 double dot(const double* __restrict a, const double* __restrict b, std::int64_t count) noexcept {
@@ -55,6 +61,10 @@ void rotate_in(double* __restrict L, double* __restrict w, std::int64_t count) n
 
 CapacitanceMatrix::CapacitanceMatrix(int dimension, Index max_nodes)
     : dimension_(dimension), max_nodes_(max_nodes), capacity_(std::int64_t{dimension} * max_nodes) {
+  if (dimension < 1 || dimension > 3) {
+    throw Error("nodes of " + std::to_string(dimension) + " dofs were asked for", "CapacitanceMatrix",
+                "ask for 1, 2 or 3 dofs a node");
+  }
   if (max_nodes < 1) {
     throw Error("room for " + std::to_string(max_nodes) + " held nodes was asked for", "CapacitanceMatrix",
                 "ask for room for at least one");
@@ -74,19 +84,18 @@ const double* CapacitanceMatrix::column(std::int64_t j) const noexcept {
 /// of the later ones, of `rows` in all.
 template <int D>
 void CapacitanceMatrix::eliminate(std::int64_t j, double* y, std::int64_t rows) const noexcept {
-  const double* L0 = column(j);
-  const double* L1 = column(j + 1);
   y += j;
-  const std::int64_t below = rows - j - D;
-  y[0] /= L0[0];
-  y[1] = (y[1] - L0[1] * y[0]) / L1[0];
-  if constexpr (D == 2) {
-    subtract_columns(L0 + 2, L1 + 1, y, y + 2, below);
-  } else {
-    const double* L2 = column(j + 2);
-    y[2] = (y[2] - L0[2] * y[0] - L1[1] * y[1]) / L2[0];
-    subtract_columns(L0 + 3, L1 + 2, L2 + 1, y, y + 3, below);
+  std::array<const double*, D> L;  // column j + p from row j on
+  for (std::int64_t p = 0; p < D; ++p) L[p] = column(j + p) - p;
+  std::array<double, D> x;
+  for (std::size_t p = 0; p < D; ++p) {
+    x[p] = y[p];
+    for (std::size_t q = 0; q < p; ++q) x[p] -= L[q][p] * x[q];
+    x[p] /= L[p][p];
+    y[p] = x[p];
   }
+  for (const double*& below : L) below += D;
+  subtract_columns<D>(L, x, y + D, rows - j - D);
 }
 
 template <int D>
@@ -151,18 +160,18 @@ void CapacitanceMatrix::remove_node(Index k) noexcept {
 
 CapacitanceStatus CapacitanceMatrix::add(std::span<const double> blocks) noexcept {
   if (nodes_ == max_nodes_) return CapacitanceStatus::full;
-  return dimension_ == 2 ? add_node<2>(blocks) : add_node<3>(blocks);
+  return with_dimension(dimension_, [&](auto d) { return add_node<d>(blocks); });
 }
 
 void CapacitanceMatrix::remove(Index k) noexcept {
-  dimension_ == 2 ? remove_node<2>(k) : remove_node<3>(k);
+  with_dimension(dimension_, [&](auto d) { remove_node<d>(k); });
 }
 
 void CapacitanceMatrix::solve(std::span<double> x) const noexcept {
   const std::int64_t m = std::int64_t{dimension_} * nodes_;
-  for (std::int64_t j = 0; j < m; j += dimension_) {
-    dimension_ == 2 ? eliminate<2>(j, x.data(), m) : eliminate<3>(j, x.data(), m);
-  }
+  with_dimension(dimension_, [&](auto d) {
+    for (std::int64_t j = 0; j < m; j += d) eliminate<d>(j, x.data(), m);
+  });
   for (std::int64_t j = m; j-- > 0;) {
     const double* L = column(j);
     double* y = x.data() + j;

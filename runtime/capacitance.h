@@ -1,4 +1,4 @@
-// The capacitance matrix of the held nodes, by its Cholesky factor.
+// The capacitance matrix of a contact, by its Cholesky factor.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,21 @@ namespace palpate {
 enum class CapacitanceStatus : std::uint8_t {
   ok,
   full,                   ///< `max_nodes` are held already
-  not_positive_definite,  ///< the new node does not move independently of the held ones (held twice), or
-                          ///< entries are not finite
+  not_positive_definite,  ///< the new node does not move independently of the held ones (held twice: a pivot
+                          ///< within CapacitanceMatrix::pivot_tolerance), or entries are not finite
 };
 
 /// C = E^T Xi E [m/N] of m held nodes (theory.md section 3; James & Pai 2001), kept as its Cholesky factor L,
 /// C = L L^T, which grows and shrinks with the nodes in O(m^2) and is never computed afresh. A node has
-/// d = dimension() dofs. All memory is taken at construction; copies keep the capacity.
+/// d = dimension() dofs; 1: single rows, e.g. the normals of frictionless contacts. All memory is taken at
+/// construction; copies keep the capacity.
 class CapacitanceMatrix {
  public:
-  /// `dimension`: dofs a node, 2 or 3. Room for `max_nodes` nodes; throws Error unless at least one.
+  /// Smallest pivot, relative to the diagonal of C, that is taken for more than rounding.
+  static constexpr double pivot_tolerance = 1e-10;
+
+  /// `dimension`: dofs a node, 1 to 3. Room for `max_nodes` nodes. Throws Error for another dimension, or
+  /// without room for a node.
   CapacitanceMatrix(int dimension, Index max_nodes);
 
   [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d

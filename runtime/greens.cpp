@@ -3,6 +3,7 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstring>
 #include <string>
@@ -99,84 +100,67 @@ void gather_from_packed(const PackedGreens& packed, int dimension, Index row, st
   }
 }
 
-/// u += f0 row0 + f1 row1 over `count` entries; meanwhile the same part of the next node's rows is called
+/// u += f^T rows over `count` entries of the D rows of a node; meanwhile what comes later in them is called
 /// into the cache.
-template <class T>
-void add_rows(const T* __restrict row0, const T* __restrict row1, double f0, double f1, double* __restrict u,
+template <int D, class T>
+void add_rows(const T* rows, std::int64_t stride, const double* f, double* __restrict u,
               std::int64_t count) noexcept {
   constexpr std::int64_t step = cache_line / static_cast<std::int64_t>(sizeof(T));
   constexpr std::int64_t ahead = ahead_bytes / static_cast<std::int64_t>(sizeof(T));
+  std::array<const T*, D> row;
+  std::array<double, D> force;
+  for (std::size_t p = 0; p < D; ++p) {
+    row[p] = rows + static_cast<std::int64_t>(p) * stride;
+    force[p] = f[p];
+  }
+  const auto add = [&](std::int64_t i) {
+    double sum = 0.0;
+    for (std::size_t p = 0; p < D; ++p) sum += force[p] * static_cast<double>(row[p][i]);
+    u[i] += sum;
+  };
   std::int64_t i = 0;
   for (; i + step <= count; i += step) {
-    __builtin_prefetch(row0 + i + ahead);
-    __builtin_prefetch(row1 + i + ahead);
+    for (const T* xi : row) __builtin_prefetch(xi + i + ahead);
 #pragma omp simd
-    for (std::int64_t k = i; k < i + step; ++k) {
-      u[k] += f0 * static_cast<double>(row0[k]) + f1 * static_cast<double>(row1[k]);
-    }
+    for (std::int64_t k = i; k < i + step; ++k) add(k);
   }
-  for (; i < count; ++i) u[i] += f0 * static_cast<double>(row0[i]) + f1 * static_cast<double>(row1[i]);
+  for (; i < count; ++i) add(i);
 }
 
-/// The same with the three rows of a node in space.
-template <class T>
-void add_rows(const T* __restrict row0, const T* __restrict row1, const T* __restrict row2, double f0,
-              double f1, double f2, double* __restrict u, std::int64_t count) noexcept {
-  constexpr std::int64_t step = cache_line / static_cast<std::int64_t>(sizeof(T));
-  constexpr std::int64_t ahead = ahead_bytes / static_cast<std::int64_t>(sizeof(T));
-  std::int64_t i = 0;
-  for (; i + step <= count; i += step) {
-    __builtin_prefetch(row0 + i + ahead);
-    __builtin_prefetch(row1 + i + ahead);
-    __builtin_prefetch(row2 + i + ahead);
-#pragma omp simd
-    for (std::int64_t k = i; k < i + step; ++k) {
-      u[k] += f0 * static_cast<double>(row0[k]) + f1 * static_cast<double>(row1[k]) +
-              f2 * static_cast<double>(row2[k]);
-    }
-  }
-  for (; i < count; ++i) {
-    u[i] += f0 * static_cast<double>(row0[i]) + f1 * static_cast<double>(row1[i]) +
-            f2 * static_cast<double>(row2[i]);
-  }
-}
-
+/// u = Xi E f from row `first` on.
 template <int D, class T>
 void displacement_from_square(const T* square, std::int64_t stride, std::span<const Index> nodes,
-                              const double* f, std::span<double> u) noexcept {
-  const auto order = static_cast<std::int64_t>(u.size());
-  for (std::int64_t begin = 0; begin < order; begin += u_chunk) {
-    const std::int64_t count = std::min(u_chunk, order - begin);
+                              const double* f, std::int64_t first, std::span<double> u) noexcept {
+  const auto size = static_cast<std::int64_t>(u.size());
+  for (std::int64_t begin = 0; begin < size; begin += u_chunk) {
+    const std::int64_t count = std::min(u_chunk, size - begin);
     double* chunk = u.data() + begin;
     std::fill_n(chunk, count, 0.0);
     for (std::size_t k = 0; k < nodes.size(); ++k) {
-      const T* rows = square + D * std::int64_t{nodes[k]} * stride + begin;
-      const double* force = f + D * k;
-      if constexpr (D == 2) {
-        add_rows(rows, rows + stride, force[0], force[1], chunk, count);
-      } else {
-        add_rows(rows, rows + stride, rows + 2 * stride, force[0], force[1], force[2], chunk, count);
-      }
+      const T* rows = square + D * std::int64_t{nodes[k]} * stride + first + begin;
+      add_rows<D>(rows, stride, f + D * k, chunk, count);
     }
   }
 }
 
+/// u = Xi E f from row `first` on.
 template <class T>
-void displacement_from_packed(std::span<const T> packed, int dimension, std::span<const Index> nodes,
-                              const double* f, std::span<double> u) noexcept {
-  const auto order = static_cast<std::int64_t>(u.size());
+void displacement_from_packed(std::span<const T> packed, std::int64_t order, int dimension,
+                              std::span<const Index> nodes, const double* f, std::int64_t first,
+                              std::span<double> u) noexcept {
+  const std::int64_t last = first + static_cast<std::int64_t>(u.size());
   const auto d = static_cast<std::size_t>(dimension);
   std::fill(u.begin(), u.end(), 0.0);
   for (std::size_t k = 0; k < d * nodes.size(); ++k) {
     const std::int64_t dof = std::int64_t{dimension} * nodes[k / d] + static_cast<std::int64_t>(k % d);
-    const T* entry = packed.data() + dof;
-    for (std::int64_t j = 0; j < dof; ++j) {
-      u[static_cast<std::size_t>(j)] += f[k] * static_cast<double>(*entry);
-      entry += order - j - 1;
+    double* out = u.data();
+    for (std::int64_t j = first; j < std::min(dof, last); ++j) {
+      const auto entry = static_cast<std::size_t>(packed_index(dof, j, order));
+      *out++ += f[k] * static_cast<double>(packed[entry]);
     }
-    const T* column = packed.data() + packed_column(dof, order);
-    double* below = u.data() + dof;
-    for (std::int64_t i = 0; i < order - dof; ++i) below[i] += f[k] * static_cast<double>(column[i]);
+    const std::int64_t begin = std::max(dof, first);
+    const T* column = packed.data() + packed_index(begin, dof, order);
+    for (std::int64_t i = 0; i < last - begin; ++i) out[i] += f[k] * static_cast<double>(column[i]);
   }
 }
 
@@ -243,17 +227,23 @@ void Greens::gather(Index row, std::span<const Index> columns, std::span<double>
 
 void Greens::displacement(std::span<const Index> nodes, std::span<const double> f,
                           std::span<double> u) const noexcept {
+  displacement(nodes, f, 0, u);
+}
+
+void Greens::displacement(std::span<const Index> nodes, std::span<const double> f, Index first_node,
+                          std::span<double> u) const noexcept {
+  const std::int64_t first = std::int64_t{dimension_} * first_node;
   if (!unfolded()) {
     with_scalars(packed_.data(), precision_, [&]<class T>(const T*) {
-      displacement_from_packed(packed_.as<T>(), dimension_, nodes, f.data(), u);
+      displacement_from_packed(packed_.as<T>(), order_, dimension_, nodes, f.data(), first, u);
     });
     return;
   }
   with_scalars(square_.get(), precision_, [&](const auto* square) {
     if (dimension_ == 2) {
-      displacement_from_square<2>(square, stride_, nodes, f.data(), u);
+      displacement_from_square<2>(square, stride_, nodes, f.data(), first, u);
     } else {
-      displacement_from_square<3>(square, stride_, nodes, f.data(), u);
+      displacement_from_square<3>(square, stride_, nodes, f.data(), first, u);
     }
   });
 }

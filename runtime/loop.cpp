@@ -1,6 +1,7 @@
 #include "runtime/loop.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <ctime>
 
@@ -22,31 +23,59 @@ void sleep_until(std::int64_t due) noexcept {
   clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
 }
 
-TickRecord make_record(const Body& body, const State& state, const ToolPose& tool, double time,
+void set(double (&vector)[3], const Vec3& value) noexcept {
+  std::copy_n(value.data(), 3, vector);
+}
+
+void set(double (&wxyz)[4], const Eigen::Quaterniond& value) noexcept {
+  const std::array<double, 4> numbers = {value.w(), value.x(), value.y(), value.z()};
+  std::copy(numbers.begin(), numbers.end(), wxyz);
+}
+
+void set(double (&symmetric)[6], const Eigen::Matrix3d& value) noexcept {
+  const std::array<double, 6> numbers = {value(0, 0), value(1, 1), value(2, 2),
+                                         value(0, 1), value(1, 2), value(2, 0)};
+  std::copy(numbers.begin(), numbers.end(), symmetric);
+}
+
+TickRecord make_record(const State& state, const ToolPose& device, double time,
                        std::int64_t compute_ns) noexcept {
+  const ToolState& tool = state.tools.front();
   TickRecord record;
   record.time = time;
-  record.node = state.tool_node < 0 ? -1 : body.mesh_node(state.tool_node);
-  for (int axis = 0; axis < 3; ++axis) {
-    record.tool_position[axis] = tool.position[axis];
-    record.force[axis] = state.tool_force[axis];
-    record.displacement[axis] = state.tool_node_displacement[axis];
-  }
+  set(record.device_position, device.position);
+  set(record.device_orientation, device.orientation);
+  set(record.tool_position, tool.pose.position);
+  set(record.tool_orientation, tool.pose.orientation);
+  set(record.force, -tool.wrench.force);
+  set(record.torque, -tool.wrench.torque);
+  set(record.stiffness, tool.local.stiffness);
+  record.contacts = tool.contacts;
   record.status = static_cast<std::uint32_t>(state.status);
   record.compute_ns = static_cast<std::uint32_t>(std::min<std::int64_t>(compute_ns, UINT32_MAX));
-  record.grab = tool.grab ? 1 : 0;
+  record.grab = device.grab ? 1 : 0;
   return record;
 }
 
-void count_step(LoopReport& report, const State& state, double time, std::int64_t compute_ns) noexcept {
+void note_largest(double value, double time, double& largest, double& largest_time) noexcept {
+  if (!(value > largest)) return;
+  largest = value;
+  largest_time = time;
+}
+
+/// `force_before`: on the hand in the tick before [N].
+void count_step(LoopReport& report, const State& state, const Vec3& force_before, double time,
+                std::int64_t compute_ns) noexcept {
+  const ToolState& tool = state.tools.front();
+  if (report.ticks_begun_inside == report.ticks && has(state.status, StepStatus::inside_body))
+    ++report.ticks_begun_inside;
   ++report.ticks;
-  if (state.tool_node >= 0) ++report.ticks_held;
+  if (tool.contacts > 0) ++report.ticks_in_contact;
+  report.most_contacts = std::max(report.most_contacts, tool.contacts);
   report.compute.add(compute_ns);
-  const double force = state.tool_force.stableNorm();
-  if (force > report.largest_force) {
-    report.largest_force = force;
-    report.largest_force_time = time;
-  }
+  const Vec3& force = tool.wrench.force;
+  note_largest(force.stableNorm(), time, report.largest_force, report.largest_force_time);
+  note_largest((force - force_before).stableNorm(), time, report.largest_jump, report.largest_jump_time);
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     if (has(state.status, status_names[k].first)) ++report.status_ticks[k];
   }
@@ -73,15 +102,16 @@ LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, 
     }
 
     const double time = static_cast<double>(tick) / ticks_per_second;
-    const ToolPose tool = device.pose(time);
+    const ToolPose pose = device.pose(time);
+    const Vec3 force_before = state.tools.front().wrench.force;
     const std::int64_t begin = now();
-    step(body, state, tool);
+    step(body, state, pose);
     const std::int64_t end = now();
 
     if (!fast && end > due + period) ++report.deadline_misses;
-    count_step(report, state, time, end - begin);
-    if (recorder != nullptr && fast) recorder->push_waiting(make_record(body, state, tool, time, 0));
-    if (recorder != nullptr && !fast) recorder->push(make_record(body, state, tool, time, end - begin));
+    count_step(report, state, force_before, time, end - begin);
+    if (recorder != nullptr && fast) recorder->push_waiting(make_record(state, pose, time, 0));
+    if (recorder != nullptr && !fast) recorder->push(make_record(state, pose, time, end - begin));
   }
   report.interrupted = stop;
   return report;

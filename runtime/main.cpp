@@ -2,9 +2,12 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "meshes/error.h"
@@ -26,10 +29,17 @@ struct Arguments {
   bool json = false;
   std::string field;
   std::string device;
+  std::string tool = "point";
+  std::optional<std::string> friction;
+  std::optional<std::string> coupling;
+  std::optional<std::string> coupling_torsion;
+  std::optional<std::string> max_force;
+  std::optional<std::string> reach;
+  std::optional<std::string> max_contacts;
   bool fast = false;
   std::string record;
   std::string report;
-  std::string reach;
+  std::string contacts;
 };
 
 void add_file(CLI::App& command, Arguments& arguments) {
@@ -68,27 +78,58 @@ CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
   return probe;
 }
 
+void add_tool(CLI::App& play, Arguments& arguments) {
+  play.add_option("--tool", arguments.tool, "its shape [m]; else a point")
+      ->type_name("point|sphere:RADIUS|capsule:RADIUS,LENGTH");
+  play.add_option("--friction", arguments.friction, "Coulomb's coefficient, in place of the materials'")
+      ->type_name("MU");
+  play.add_option("--coupling", arguments.coupling,
+                  "stiffness of the spring between the device and the tool; else the tool is where the "
+                  "device is")
+      ->type_name("N_PER_M");
+  play.add_option("--coupling-torsion", arguments.coupling_torsion,
+                  "stiffness of that spring against turning; else the tool is turned as the device is")
+      ->type_name("NM_PER_RAD");
+  play.add_option("--max-force", arguments.max_force, "the largest force that the hand is given")
+      ->type_name("N");
+  play.add_option("--reach", arguments.reach,
+                  "how far from its origin a grab that touches nothing takes hold of the surface; else the "
+                  "longest edge of the surface")
+      ->type_name("METRES");
+  play.add_option("--max-contacts", arguments.max_contacts,
+                  "most contact points; where there are more, the deepest are kept; else 32")
+      ->type_name("N");
+}
+
 CLI::App* add_play(CLI::App& app, Arguments& arguments) {
   CLI::App* play = app.add_subcommand("play", "run the 1 kHz loop with a tool and report on it");
   add_file(*play, arguments);
   play->add_option("--device", arguments.device,
-                   "the tool: a CSV with the columns t,x,y,z[,grab] (s, m, 0 or 1)")
+                   "the hand: a CSV with the columns t,x,y,z[,qw,qx,qy,qz][,grab] (s, m, quaternion, 0 or 1)")
       ->type_name("script:TOUCH.csv")
       ->required();
+  add_tool(*play, arguments);
   play->add_flag("--fast", arguments.fast,
                  "do not wait for the clock: deterministic, equal runs leave equal recordings");
   play->add_option("--record", arguments.record, "write every tick to this HDF5 file")->type_name("OUT.h5");
   play->add_option("--report", arguments.report, "write the JSON report here and not to the standard output")
       ->type_name("OUT.json");
-  play->add_option("--reach", arguments.reach,
-                   "how far from the tool a surface node may be to be taken hold of; else the longest edge "
-                   "of the surface")
-      ->type_name("METRES");
+  play->add_option("--contacts", arguments.contacts, "write the contact points after the last tick")
+      ->type_name("OUT.csv");
   play->footer(
-      "While grab is set the tool holds the surface node that was nearest to it and moves it along. On a "
-      "body in\n"
-      "the plane z is ignored.\n"
-      "Example: palpate-runtime play liver.palpate.hdf --device script:touch.csv --record touch.h5");
+      "The tool pushes what it touches and slides along it; while grab is set it holds what it touched, or "
+      "the\n"
+      "nearest surface within --reach, and carries it along. It must begin outside of the body. Lengths are "
+      "metres.\n"
+      "A capsule reaches from the tool's origin along its own z axis (in the plane y). On a body in the "
+      "plane "
+      "z is ignored.\n"
+      "Examples:\n"
+      "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool sphere:0.005 --record "
+      "touch.h5\n"
+      "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool capsule:0.008,0.03 "
+      "--friction 0.5 \\\n"
+      "      --coupling 800 --max-force 7.5 --fast --contacts contacts.csv");
   return play;
 }
 
@@ -108,7 +149,7 @@ std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& argu
     if (option->get_name() == "--at") {
       places.push_back({.at = vector_argument("--at", *at++), .node = {}, .displacement = {}});
     } else if (option->get_name() == "--node") {
-      places.push_back({.at = {}, .node = parse_node(*node), .displacement = {}});
+      places.push_back({.at = {}, .node = parse_index(*node), .displacement = {}});
       if (!places.back().node)
         throw CLI::ValidationError("--node", "'" + *node + "' is not the number of a node");
       ++node;
@@ -125,26 +166,81 @@ std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& argu
   return places;
 }
 
+/// "point", "sphere:RADIUS" or "capsule:RADIUS,LENGTH".
+Tool read_shape(const std::string& text) {
+  Tool tool;
+  if (text == "point") return tool;
+  const std::string_view rest = std::string_view(text).substr(std::min(text.find(':') + 1, text.size()));
+  const std::vector<std::string_view> sizes = split_commas(rest);
+  const bool sphere = text.starts_with("sphere:") && sizes.size() == 1;
+  const bool capsule = text.starts_with("capsule:") && sizes.size() == 2;
+  if (!sphere && !capsule) {
+    throw CLI::ValidationError(
+        "--tool", "'" + text + "' is none of point, sphere:RADIUS and capsule:RADIUS,LENGTH (metres)");
+  }
+  const auto size = [&](std::string_view number) {
+    const std::optional<double> metres = parse_number(number);
+    if (metres && *metres > 0.0) return *metres;
+    throw CLI::ValidationError("--tool",
+                               fmt::format("'{}' of '{}' is not a positive number of metres", number, text));
+  };
+  tool.radius = size(sizes[0]);
+  if (capsule) tool.length = size(sizes[1]);
+  return tool;
+}
+
+/// The positive number that an option was given, nothing where it was not given.
+std::optional<double> positive_argument(const std::string& option, const std::optional<std::string>& text,
+                                        const std::string& unit) {
+  if (!text) return std::nullopt;
+  const std::optional<double> number = parse_number(*text);
+  if (!number || *number <= 0.0)
+    throw CLI::ValidationError(option, "'" + *text + "' is not a positive number of " + unit);
+  return number;
+}
+
+Tool read_tool(const Arguments& arguments) {
+  Tool tool = read_shape(arguments.tool);
+  if (arguments.friction) {
+    tool.friction = parse_number(*arguments.friction);
+    if (!tool.friction || *tool.friction < 0.0)
+      throw CLI::ValidationError("--friction", "'" + *arguments.friction + "' is not a number from 0 on");
+  }
+  tool.coupling_stiffness =
+      positive_argument("--coupling", arguments.coupling, "N/m").value_or(tool.coupling_stiffness);
+  tool.coupling_torsion = positive_argument("--coupling-torsion", arguments.coupling_torsion, "N m/rad")
+                              .value_or(tool.coupling_torsion);
+  tool.max_force = positive_argument("--max-force", arguments.max_force, "newtons").value_or(tool.max_force);
+  return tool;
+}
+
+Index read_max_contacts(const std::optional<std::string>& text) {
+  constexpr Index most = 1000;  // a factor of so many fits into a gigabyte
+  if (!text) return StateOptions{}.max_contacts;
+  const std::optional<Index> count = parse_index(*text);
+  if (!count || *count < 1 || *count > most) {
+    throw CLI::ValidationError("--max-contacts",
+                               fmt::format("'{}' is not a whole number from 1 to {}", *text, most));
+  }
+  return *count;
+}
+
 PlayOptions read_play(const Arguments& arguments) {
   const std::string scripted = "script:";
   if (!arguments.device.starts_with(scripted) || arguments.device.size() == scripted.size()) {
     throw CLI::ValidationError("--device",
                                "'" + arguments.device + "' is not script:FILE.csv, the only device so far");
   }
-  PlayOptions options{.file = arguments.file,
-                      .model_toml = arguments.model_toml,
-                      .script = arguments.device.substr(scripted.size()),
-                      .fast = arguments.fast,
-                      .record = arguments.record,
-                      .report = arguments.report,
-                      .reach = {}};
-  if (!arguments.reach.empty()) {
-    options.reach = parse_number(arguments.reach);
-    if (!options.reach || *options.reach <= 0.0) {
-      throw CLI::ValidationError("--reach", "'" + arguments.reach + "' is not a positive number of metres");
-    }
-  }
-  return options;
+  return {.file = arguments.file,
+          .model_toml = arguments.model_toml,
+          .script = arguments.device.substr(scripted.size()),
+          .tool = read_tool(arguments),
+          .reach = positive_argument("--reach", arguments.reach, "metres"),
+          .max_contacts = read_max_contacts(arguments.max_contacts),
+          .fast = arguments.fast,
+          .record = arguments.record,
+          .report = arguments.report,
+          .contacts = arguments.contacts};
 }
 
 int run(int argc, char** argv) {

@@ -43,9 +43,9 @@ std::optional<std::vector<double>> parse_vector(std::string_view text) {
   return vector;
 }
 
-std::optional<Index> parse_node(std::string_view text) {
-  const std::optional<Index> node = parse_whole<Index>(text);
-  return node && *node >= 0 ? node : std::nullopt;
+std::optional<Index> parse_index(std::string_view text) {
+  const std::optional<Index> index = parse_whole<Index>(text);
+  return index && *index >= 0 ? index : std::nullopt;
 }
 
 std::vector<std::string_view> split_commas(std::string_view text) {

@@ -15,8 +15,8 @@ std::optional<double> parse_number(std::string_view text);
 /// "x,y" or "x,y,z": two or three finite numbers, or nothing.
 std::optional<std::vector<double>> parse_vector(std::string_view text);
 
-/// The whole number from 0 on that a node is named by, or nothing.
-std::optional<Index> parse_node(std::string_view text);
+/// A whole number from 0 on, or nothing.
+std::optional<Index> parse_index(std::string_view text);
 
 /// The parts of `text` between commas, without spaces round them.
 std::vector<std::string_view> split_commas(std::string_view text);

@@ -2,10 +2,13 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/Geometry>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <span>
 
 #include "meshes/error.h"
 #include "runtime/loading.h"
@@ -42,8 +45,8 @@ double microseconds(std::int64_t nanoseconds) {
 }
 
 void print_report(const LoopReport& report, const PlayOptions& options, std::int64_t dropped) {
-  fmt::print(stderr, "{} ticks{}, {} of them holding a node", report.ticks,
-             report.interrupted ? " until interrupted" : "", report.ticks_held);
+  fmt::print(stderr, "{} ticks{}, {} of them in contact, at most {} contact points", report.ticks,
+             report.interrupted ? " until interrupted" : "", report.ticks_in_contact, report.most_contacts);
   if (!options.fast) {
     fmt::print(stderr, "; {} deadline misses, at most {:.1f} us late", report.deadline_misses,
                microseconds(report.worst_lateness));
@@ -51,20 +54,56 @@ void print_report(const LoopReport& report, const PlayOptions& options, std::int
   fmt::print(stderr, "\nstep: median {:.2f} us, 99.9 % {:.2f} us, worst {:.2f} us\n",
              microseconds(report.compute.percentile(0.5)), microseconds(report.compute.percentile(0.999)),
              microseconds(report.compute.worst()));
-  fmt::print(stderr, "largest force {:.6g} N at {:.3f} s\n", report.largest_force, report.largest_force_time);
+  fmt::print(stderr, "largest force {:.6g} N at {:.3f} s, largest jump between ticks {:.6g} N at {:.3f} s\n",
+             report.largest_force, report.largest_force_time, report.largest_jump, report.largest_jump_time);
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     if (report.status_ticks[k] > 0)
       fmt::print(stderr, "{}: {} ticks\n", status_names[k].second, report.status_ticks[k]);
   }
   if (!options.record.empty())
     fmt::print(stderr, "recording {}: {} ticks dropped\n", options.record.string(), dropped);
-  if (report.ticks_held == 0)
-    print_warning(
-        "the tool never held a node: check the script's positions and grab, or give a larger --reach");
 }
 
-std::string json_report(const LoopReport& report, const PlayOptions& options, const Body& body, double reach,
-                        std::int64_t dropped) {
+std::string box_text(const Body& body) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& position : body.surface_rest_positions()) box.extend(position);
+  const Vec3 low = box.min();
+  const Vec3 high = box.max();
+  return fmt::format("({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m", low.x(), low.y(), low.z(),
+                     high.x(), high.y(), high.z());
+}
+
+/// What a script gets wrong so that nothing is felt.
+void warn_of_script(const LoopReport& report, const Body& body) {
+  const std::string place = "the body rests in " + box_text(body);
+  if (report.ticks_begun_inside > 0) {
+    const bool all = report.ticks_begun_inside == report.ticks;
+    const double seconds = static_cast<double>(report.ticks_begun_inside) / ticks_per_second;
+    print_warning(fmt::format("the tool began inside the body and felt nothing {}: start outside ({})",
+                              all ? "at all" : fmt::format("until it was out at {} s", seconds), place));
+  } else if (report.ticks_in_contact == 0) {
+    print_warning(fmt::format(
+        "the tool never touched the body: check the script's positions, which are metres, and the "
+        "tool's size ({})",
+        place));
+  }
+}
+
+/// JSON knows no infinity.
+std::string json_number(double value) {
+  return std::isfinite(value) ? fmt::format("{}", value) : "null";
+}
+
+std::string json_tool(const Tool& tool) {
+  return fmt::format(
+      "{{\"radius_m\": {}, \"length_m\": {}, \"reach_m\": {}, \"friction\": {}, \"coupling_N_per_m\": {}, "
+      "\"coupling_torsion_Nm_per_rad\": {}, \"max_force_N\": {}}}",
+      tool.radius, tool.length, tool.reach, tool.friction ? json_number(*tool.friction) : "null",
+      json_number(tool.coupling_stiffness), json_number(tool.coupling_torsion), json_number(tool.max_force));
+}
+
+std::string json_report(const LoopReport& report, const PlayOptions& options, const Body& body,
+                        const Tool& tool, std::int64_t dropped) {
   std::string status;
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, report.status_ticks[k]);
@@ -72,9 +111,11 @@ std::string json_report(const LoopReport& report, const PlayOptions& options, co
   std::string json = "{\n";
   json += fmt::format("  \"file\": {},\n  \"model\": {},\n", json_string(options.file.string()),
                       json_string(body.model().name));
-  json += fmt::format("  \"fast\": {},\n  \"interrupted\": {},\n  \"reach_m\": {},\n", options.fast,
-                      report.interrupted, reach);
-  json += fmt::format("  \"ticks\": {},\n  \"ticks_held\": {},\n", report.ticks, report.ticks_held);
+  json += fmt::format("  \"fast\": {},\n  \"interrupted\": {},\n  \"tool\": {},\n", options.fast,
+                      report.interrupted, json_tool(tool));
+  json += fmt::format("  \"ticks\": {},\n  \"ticks_in_contact\": {},\n  \"ticks_begun_inside\": {},\n",
+                      report.ticks, report.ticks_in_contact, report.ticks_begun_inside);
+  json += fmt::format("  \"most_contacts\": {},\n", report.most_contacts);
   json += fmt::format("  \"deadline_misses\": {},\n  \"worst_lateness_ns\": {},\n", report.deadline_misses,
                       report.worst_lateness);
   json +=
@@ -82,11 +123,57 @@ std::string json_report(const LoopReport& report, const PlayOptions& options, co
                   report.compute.percentile(0.5), report.compute.percentile(0.999), report.compute.worst());
   json += fmt::format("  \"largest_force_N\": {},\n  \"largest_force_time_s\": {},\n", report.largest_force,
                       report.largest_force_time);
+  json += fmt::format("  \"largest_jump_N\": {},\n  \"largest_jump_time_s\": {},\n", report.largest_jump,
+                      report.largest_jump_time);
   json += fmt::format("  \"status_ticks\": {{{}}},\n", status);
   if (!options.record.empty())
     json += fmt::format("  \"recording\": {},\n", json_string(options.record.string()));
   json += fmt::format("  \"dropped_ticks\": {}\n}}\n", dropped);
   return json;
+}
+
+/// Where the surface is now at a contact.
+Vec3 surface_position(const State& state, const ContactPoint& contact) {
+  Vec3 position = Vec3::Zero();
+  for (std::size_t k = 0; k < contact.nodes.size(); ++k) {
+    if (contact.nodes[k] >= 0) position += contact.weights[k] * state.tree.position(contact.nodes[k]);
+  }
+  return position;
+}
+
+/// Of a simplex as it is now.
+Vec3 outward_normal(const Body& body, const State& state, Index simplex) {
+  const auto d = static_cast<std::size_t>(body.dimension());
+  const std::span<const Index> nodes = body.simplices().subspan(d * static_cast<std::size_t>(simplex), d);
+  const Vec3 a = state.tree.position(nodes[0]);
+  const Vec3 ab = state.tree.position(nodes[1]) - a;
+  if (d == 2) return Vec3(ab.y(), -ab.x(), 0.0).normalized();
+  return ab.cross(state.tree.position(nodes[2]) - a).normalized();
+}
+
+/// The gap that the tick left, to first order: the contact's normal row of r = b + W lambda.
+double gap_after(const ContactProblem& problem, Index contact) {
+  const Index normal = problem.first_row(contact);
+  double gap = problem.b[static_cast<std::size_t>(normal)];
+  for (Index j = 0; j < problem.rows; ++j)
+    gap += problem.w(normal, j) * problem.lambda[static_cast<std::size_t>(j)];
+  return gap;
+}
+
+/// The contact points after the last tick.
+std::string contact_table(const Body& body, const State& state) {
+  std::string table = "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held\n";
+  const std::span<const ContactPoint> contacts = state.contacts();
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const ContactPoint& contact = contacts[k];
+    const Vec3 x = surface_position(state, contact);
+    const Vec3 n = contact.held ? outward_normal(body, state, contact.simplex) : Vec3(contact.frame.col(0));
+    const Vec3 f = Vec3::Zero() - contact.force;
+    const double gap = contact.held ? 0.0 : gap_after(state.problem, static_cast<Index>(k));
+    table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), n.x(), n.y(), n.z(),
+                         f.x(), f.y(), f.z(), gap, contact.simplex, contact.held ? 1 : 0);
+  }
+  return table;
 }
 
 /// The loop with the rights it needs, which the recorder's thread, started before, does not inherit.
@@ -105,8 +192,9 @@ int play(const PlayOptions& options) {
   const Body body = load_body(options.file, options.model_toml);
   print_loaded(body, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
 
-  const double reach = options.reach.value_or(body.longest_surface_edge());
-  State state(body, {.reach = reach, .max_nodes = 1});
+  Tool tool = options.tool;
+  tool.reach = options.reach.value_or(body.longest_surface_edge());
+  State state(body, {.tools = {tool}, .max_contacts = options.max_contacts});
   std::optional<Recorder> recorder;
   if (!options.record.empty())
     recorder.emplace(options.record, options.file.string(), body.model().content_hash);
@@ -117,7 +205,9 @@ int play(const PlayOptions& options) {
 
   const std::int64_t dropped = recorder ? recorder->dropped() : 0;
   print_report(report, options, dropped);
-  const std::string json = json_report(report, options, body, reach, dropped);
+  warn_of_script(report, body);
+  if (!options.contacts.empty()) write_text_file(options.contacts, contact_table(body, state));
+  const std::string json = json_report(report, options, body, tool, dropped);
   if (options.report.empty()) {
     fmt::print("{}", json);
   } else {

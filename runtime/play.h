@@ -5,20 +5,25 @@
 #include <optional>
 #include <string>
 
+#include "runtime/step.h"
+
 namespace palpate {
 
 struct PlayOptions {
   std::filesystem::path file;        ///< baked model
   std::filesystem::path model_toml;  ///< that it must have been made from; empty: not asked
   std::filesystem::path script;      ///< CSV
+  Tool tool;                         ///< but for its reach
+  std::optional<double> reach;       ///< [m]; else the longest edge of the surface
+  Index max_contacts = StateOptions{}.max_contacts;
   bool fast = false;
-  std::filesystem::path record;  ///< empty: nothing is recorded
-  std::filesystem::path report;  ///< JSON; empty: on the standard output
-  std::optional<double> reach;   ///< [m]; else the longest edge of the surface
+  std::filesystem::path record;    ///< empty: nothing is recorded
+  std::filesystem::path report;    ///< JSON; empty: on the standard output
+  std::filesystem::path contacts;  ///< CSV of the contact points after the last tick; empty: none
 };
 
-/// Runs the script to its end or to SIGINT or SIGTERM, either of which leaves a complete recording and
-/// report. Returns the exit code; throws Error.
+/// Runs the script to its end or to SIGINT or SIGTERM, either of which leaves a complete recording, report
+/// and table of contacts. Returns the exit code; throws Error.
 int play(const PlayOptions& options);
 
 }  // namespace palpate

@@ -9,10 +9,10 @@
 
 #include "meshes/error.h"
 #include "meshes/vtu_writer.h"
+#include "runtime/held_nodes.h"
 #include "runtime/loading.h"
 #include "runtime/node_vectors.h"
 #include "runtime/output.h"
-#include "runtime/step.h"
 
 namespace palpate {
 namespace {
@@ -78,7 +78,7 @@ Index stored_node_of(const Body& body, Index node, const std::string& where) {
               "give a surface node, or precompute with storage scope \"full\" or more layers");
 }
 
-std::vector<Answer> ask(const Body& body, State& state, const ProbeOptions& options) {
+std::vector<Answer> ask(const Body& body, HeldNodes& contact, const ProbeOptions& options) {
   const std::string where = options.file.string();
   std::vector<Answer> answers;
   for (const ProbePlace& place : options.places) {
@@ -93,12 +93,12 @@ std::vector<Answer> ask(const Body& body, State& state, const ProbeOptions& opti
       stored = stored_node_of(body, place.node.value(), where);
     }
     const Index node = body.mesh_node(stored);
-    if (held_position(state, stored) >= 0) {
+    if (contact.position_of(stored) >= 0) {
       throw Error(fmt::format("node {} is asked for twice", node), where,
                   "give each node one displacement; places closer than the mesh is fine share a node");
     }
-    if (hold(body, state, stored) != StepStatus::ok ||
-        prescribe(state, stored, displacement) != StepStatus::ok) {
+    if (contact.hold(body, stored) != StepStatus::ok ||
+        contact.prescribe(stored, displacement) != StepStatus::ok) {
       throw Error(
           fmt::format("node {} does not move independently of the others in the stored Green's functions",
                       node),
@@ -106,11 +106,11 @@ std::vector<Answer> ask(const Body& body, State& state, const ProbeOptions& opti
     }
     answers.push_back({node, body.rest_position(stored), distance, displacement, Vec3::Zero()});
   }
-  if (solve(state) != StepStatus::ok) {
+  if (contact.solve() != StepStatus::ok) {
     throw Error("the forces are too large for a number", where, "give displacements in metres");
   }
   for (std::size_t k = 0; k < answers.size(); ++k)
-    answers[k].force = vector_at(state.forces(), state.dimension(), static_cast<Index>(k));
+    answers[k].force = vector_at(contact.forces(), contact.dimension(), static_cast<Index>(k));
   return answers;
 }
 
@@ -222,12 +222,12 @@ int probe(const ProbeOptions& options) {
                 "name the field by what it should be, e.g. out.vtu");
   }
   const Body body = load_body(options.file, options.model_toml);
-  State state(body, {.max_nodes = static_cast<Index>(options.places.size())});
-  const std::vector<Answer> answers = ask(body, state, options);
+  HeldNodes contact(body, static_cast<Index>(options.places.size()));
+  const std::vector<Answer> answers = ask(body, contact, options);
 
   if (!options.field.empty()) {
     std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
-    surface_displacement(body, state, u);
+    contact.displace(body, u);
     if (extension == ".csv") {
       write_csv(options.field, body, u);
     } else {

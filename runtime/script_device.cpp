@@ -1,12 +1,13 @@
 #include "runtime/script_device.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <span>
 #include <string>
-#include <utility>
 
 #include "meshes/error.h"
 #include "runtime/numbers.h"
@@ -15,7 +16,15 @@ namespace palpate {
 namespace {
 
 constexpr double longest_script = 24.0 * 3600.0;  // s
-const std::string header_hint = "write the columns t,x,y,z or t,x,y,z,grab (seconds, metres, 0 or 1)";
+const std::string header_hint =
+    "write the columns t,x,y,z[,qw,qx,qy,qz][,grab] (seconds, metres, a quaternion, 0 or 1)";
+
+/// The columns of a script: t, x, y, z and those that may follow.
+struct Columns {
+  bool orientation = false;
+  bool grab = false;
+  std::size_t count = 0;
+};
 
 /// Takes the next line off the front of `text`.
 std::string_view next_line(std::string_view& text) {
@@ -29,14 +38,52 @@ bool is_blank(std::string_view line) {
   return line.find_first_not_of(" \t\r") == std::string_view::npos;
 }
 
-/// Number of columns that the header promises.
-std::size_t read_header(std::string_view line, const std::string& where) {
+Columns read_header(std::string_view line, const std::string& where) {
   const std::vector<std::string_view> names = split_commas(line);
-  const std::vector<std::string_view> expected = {"t", "x", "y", "z", "grab"};
-  const bool known =
-      (names.size() == 4 || names.size() == 5) && std::equal(names.begin(), names.end(), expected.begin());
-  if (!known) throw Error("is not a header of a script", where, header_hint);
-  return names.size();
+  for (const bool orientation : {false, true}) {
+    for (const bool grab : {false, true}) {
+      std::vector<std::string_view> expected = {"t", "x", "y", "z"};
+      if (orientation) expected.insert(expected.end(), {"qw", "qx", "qy", "qz"});
+      if (grab) expected.emplace_back("grab");
+      if (names == expected) return {orientation, grab, names.size()};
+    }
+  }
+  throw Error("is not a header of a script", where, header_hint);
+}
+
+std::vector<double> read_numbers(const std::vector<std::string_view>& fields, const std::string& where) {
+  std::vector<double> numbers;
+  for (const std::string_view field : fields) {
+    const std::optional<double> number = parse_number(field);
+    if (!number) throw Error("'" + std::string(field) + "' is not a finite number", where, header_hint);
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
+/// The rotation by a quaternion w, x, y, z of any length but 0.
+Eigen::Quaterniond read_orientation(std::span<const double, 4> q, const std::string& where) {
+  Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
+  const double largest = orientation.coeffs().cwiseAbs().maxCoeff();
+  if (largest == 0.0) {
+    throw Error("the quaternion is zero, which is no orientation", where,
+                "write 1,0,0,0 for a tool that is not turned");
+  }
+  orientation.coeffs() /= largest;
+  return orientation.normalized();
+}
+
+ToolPose read_pose(std::span<const double> values, const Columns& columns, const std::string& where) {
+  ToolPose pose;
+  pose.position = Vec3(values[1], values[2], values[3]);
+  if (columns.orientation) pose.orientation = read_orientation(values.subspan<4, 4>(), where);
+  if (columns.grab) {
+    const double grab = values.back();
+    if (grab != 0.0 && grab != 1.0)
+      throw Error(fmt::format("grab is {}", grab), where, "write 1 while the tool holds, else 0");
+    pose.grab = grab == 1.0;
+  }
+  return pose;
 }
 
 }  // namespace
@@ -54,28 +101,23 @@ ScriptDevice ScriptDevice::parse(std::string_view text, const std::string& name)
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
 
   ScriptDevice device;
-  std::size_t columns = 0;
+  Columns columns;
   for (int line_number = 1; !text.empty(); ++line_number) {
     const std::string_view line = next_line(text);
     const std::string where = name + ":" + std::to_string(line_number);
     if (is_blank(line)) continue;
-    if (columns == 0) {
+    if (columns.count == 0) {
       columns = read_header(line, where);
       continue;
     }
 
     const std::vector<std::string_view> fields = split_commas(line);
-    if (fields.size() != columns) {
-      throw Error(
-          "has " + std::to_string(fields.size()) + " fields where the header has " + std::to_string(columns),
-          where, "give each row a value for each column");
+    if (fields.size() != columns.count) {
+      throw Error("has " + std::to_string(fields.size()) + " fields where the header has " +
+                      std::to_string(columns.count),
+                  where, "give each row a value for each column");
     }
-    std::vector<double> values;
-    for (const std::string_view field : fields) {
-      const std::optional<double> value = parse_number(field);
-      if (!value) throw Error("'" + std::string(field) + "' is not a finite number", where, header_hint);
-      values.push_back(*value);
-    }
+    const std::vector<double> values = read_numbers(fields, where);
     const double t = values[0];
     const double before = device.rows_.empty() ? 0.0 : device.rows_.back().t;
     if (t < before || (t == before && !device.rows_.empty())) {
@@ -86,10 +128,7 @@ ScriptDevice ScriptDevice::parse(std::string_view text, const std::string& name)
       throw Error("the time " + std::string(fields[0]) + " s is more than a day", where,
                   "give times in seconds");
     }
-    if (columns == 5 && values[4] != 0.0 && values[4] != 1.0) {
-      throw Error("grab is '" + std::string(fields[4]) + "'", where, "write 1 while the tool holds, else 0");
-    }
-    device.rows_.push_back({t, Vec3(values[1], values[2], values[3]), columns == 4 || values[4] == 1.0});
+    device.rows_.push_back({t, read_pose(values, columns, where)});
   }
   if (device.rows_.empty()) throw Error("has no rows", name, header_hint);
   return device;
@@ -98,16 +137,17 @@ ScriptDevice ScriptDevice::parse(std::string_view text, const std::string& name)
 ToolPose ScriptDevice::pose(double t) const noexcept {
   const auto after = std::upper_bound(rows_.begin(), rows_.end(), t,
                                       [](double time, const Row& row) { return time < row.t; });
-  ToolPose pose;
   if (after == rows_.begin()) {
-    pose.position = rows_.front().position;
+    ToolPose pose = rows_.front().pose;
+    pose.grab = false;
     return pose;
   }
   const Row& row = *(after - 1);
-  pose.position = row.position;
-  pose.grab = row.grab;
+  ToolPose pose = row.pose;
   if (after != rows_.end()) {
-    pose.position += (t - row.t) / (after->t - row.t) * (after->position - row.position);
+    const double share = (t - row.t) / (after->t - row.t);
+    pose.position += share * (after->pose.position - row.pose.position);
+    pose.orientation = row.pose.orientation.slerp(share, after->pose.orientation);
   }
   return pose;
 }

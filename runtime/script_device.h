@@ -2,15 +2,18 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 #include <vector>
 
-#include "runtime/step.h"
+#include "runtime/tool.h"
 
 namespace palpate {
 
-/// Plays rows of t, x, y, z [, grab] (seconds, metres, 0 or 1). Between rows the tool moves in straight
-/// lines, and the grab button is that of the row before; without a grab column it is always set.
+/// Plays rows of t, x, y, z [, qw, qx, qy, qz] [, grab] (seconds, metres, a quaternion of any length but 0, 0
+/// or 1). Between rows the tool moves in straight lines and turns about a fixed axis at constant speed
+/// (slerp, the shorter way), and the grab button is that of the row before. Without the quaternion the tool
+/// is not turned; without grab it never is set.
 class ScriptDevice {
  public:
   /// Reads `file`. Throws Error naming file and line.
@@ -29,8 +32,7 @@ class ScriptDevice {
  private:
   struct Row {
     double t;
-    Vec3 position;
-    bool grab;
+    ToolPose pose;
   };
   std::vector<Row> rows_;  // at least one, ascending in t
 };

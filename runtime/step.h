@@ -1,119 +1,105 @@
-// One tick: tool in, force and displacement out.
+// One tick: tools in, wrenches out.
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
+#include "runtime/active_set.h"
+#include "runtime/assemble_contact.h"
 #include "runtime/body.h"
-#include "runtime/capacitance.h"
+#include "runtime/cone_solver.h"
+#include "runtime/contact_detection.h"
+#include "runtime/contact_point.h"
+#include "runtime/contact_problem.h"
+#include "runtime/local_model.h"
+#include "runtime/near_field.h"
+#include "runtime/status.h"
+#include "runtime/surface_tree.h"
+#include "runtime/tool.h"
 
 namespace palpate {
 
-/// Where the tool is. On a body in the plane its z is ignored.
-struct ToolPose {
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  Vec3 position = Vec3::Zero();  ///< tip [m]
-  bool grab = false;             ///< the tool wants to hold
+/// One tool.
+struct ToolState {
+  Tool tool;
+  ToolPose
+      pose;  ///< of the tool itself, which the body keeps outside; of the device: with the coupling's stretch
+  ToolPose device;   ///< the device pose that the tick used: the last finite one, approached at bounded speed
+  Wrench contact_wrench;  ///< of the contacts on the tool, about its origin
+  Wrench wrench;     ///< on the hand, about the tool's origin: what the device is to display
+  LocalModel local;  ///< of wrench.force
+  Index contacts = 0;    ///< closed contact points
+  bool placed = false;   ///< has had a pose
+  bool engaged = false;  ///< false until it has been clear of the body once: nothing is felt before
+  bool holding = false;  ///< a grab holds the surface
+  Vec3 last_device_position = Vec3::Zero();  ///< of the tick before [m]
+  double felt = 0.0;                         ///< the force of late [N]
+  double margin = 0.0;  ///< how far the surface may be from the tool and still be met in this tick [m]
+  StepStatus status = StepStatus::ok;  ///< of the last tick
 };
-
-/// What a tick or a call could not do; bits, none set when all is well.
-enum class StepStatus : std::uint32_t {
-  ok = 0,
-  nothing_in_reach = 1U << 0,       ///< grab is set, and no free surface node is within reach
-  capacity_full = 1U << 1,          ///< as many nodes are held as there is room for
-  not_positive_definite = 1U << 2,  ///< the node cannot be held beside those that are
-  pose_not_finite = 1U << 3,        ///< the pose was ignored: the last valid result stands
-  result_not_finite = 1U << 4,      ///< the force overflowed: the last valid result stands
-  no_such_node = 1U << 5,           ///< not a stored node, or not a held one
-};
-
-constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
-  return static_cast<StepStatus>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
-}
-constexpr bool has(StepStatus status, StepStatus bit) noexcept {
-  return (static_cast<std::uint32_t>(status) & static_cast<std::uint32_t>(bit)) != 0;
-}
-
-/// The bits and their names, for reports.
-inline constexpr std::array<std::pair<StepStatus, const char*>, 6> status_names = {{
-    {StepStatus::nothing_in_reach, "nothing_in_reach"},
-    {StepStatus::capacity_full, "capacity_full"},
-    {StepStatus::not_positive_definite, "not_positive_definite"},
-    {StepStatus::pose_not_finite, "pose_not_finite"},
-    {StepStatus::result_not_finite, "result_not_finite"},
-    {StepStatus::no_such_node, "no_such_node"},
-}};
 
 struct StateOptions {
-  double reach = 0.01;    ///< farthest node that the tool takes hold of [m]
-  Index max_nodes = 256;  ///< most nodes that can be held at once
+  std::vector<Tool> tools = {Tool{}};
+  Index max_contacts = 32;  ///< contact points of all tools together; beyond, the deepest are kept
 };
 
 /// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
-/// replay are copies. All memory is taken here: copying allocates, a tick does not. Vectors are sized for
-/// `max_nodes`; only the first nodes() entries count. Displacements are those by contact, relative to rest;
-/// d numbers a node, d = dimension(), where they are not vectors in space (z = 0 in the plane).
+/// replay are copies. All memory is taken here: copying allocates, a tick does not.
 struct State {
-  /// Of a body at rest. Throws Error for a reach that is not finite and positive, or without room for a node.
+  /// Of a body at rest that no tool touches. Throws Error for tools without sense (a size or stiffness that
+  /// is negative or not a number), none, or no room for contacts.
   explicit State(const Body& body, const StateOptions& options = {});
 
-  [[nodiscard]] int dimension() const noexcept { return capacitance.dimension(); }  ///< d, dofs a node
-  [[nodiscard]] Index nodes() const noexcept { return capacitance.nodes(); }  ///< m, number of held nodes
-  [[nodiscard]] std::span<const Index> held()
-      const noexcept;  ///< [m] stored nodes, in the order they were taken
-  [[nodiscard]] std::span<const double> prescribed() const noexcept;  ///< [dm] their displacement [m]
-  [[nodiscard]] std::span<const double> forces() const noexcept;      ///< [dm] forces on the body there [N]
+  /// Contact points of the last tick, closed ones with their force.
+  [[nodiscard]] std::span<const ContactPoint> contacts() const noexcept {
+    return {contact_points.data(), static_cast<std::size_t>(contact_count)};
+  }
 
-  double reach;  ///< [m]
-  CapacitanceMatrix capacitance;
-  std::vector<Index> held_nodes;
-  std::vector<double> prescribed_displacement;
-  std::vector<double> force;
-  std::vector<double>
-      work;  ///< [d d max_nodes] a block row of C, or the force before it is known to be finite
+  std::vector<ToolState> tools;
+  std::vector<ContactPoint> contact_points;  ///< [max_contacts] held ones first
+  Index contact_count = 0;
+  Index held_count = 0;  ///< of contact_points, by grabs
+  Index max_contacts;
+  StepStatus status = StepStatus::ok;  ///< of the last tick, all tools
+  std::int64_t ticks = 0;              ///< taken so far
 
-  Index tool_node = -1;                           ///< stored node that the tool holds, -1 for none
-  Vec3 tool_position_at_grab = Vec3::Zero();      ///< [m]
-  Vec3 node_displacement_at_grab = Vec3::Zero();  ///< [m]
-  Vec3 tool_force = Vec3::Zero();  ///< on the body at the tool's node [N]; the hand feels the opposite
-  Vec3 tool_node_displacement = Vec3::Zero();  ///< of the tool's node [m]; zero while it holds nothing
-  StepStatus status = StepStatus::ok;          ///< of the last tick
-  std::int64_t ticks = 0;                      ///< taken so far
+  NearField near;
+  SurfaceTree tree;
+  ContactProblem problem;
+  ActiveSet active_set;
+  ConeSolver cone_solver;
+  std::vector<ContactRow> rows;      ///< [problem.rows]
+  std::vector<double> row_response;  // [d near nodes] displacement by one row's force
+  double rigid_compliance;           ///< of what is rigid, so that rigid on rigid has an answer [m/N]
+
+  // Scratch of a tick.
+  std::size_t most_simplices;            // that a tool may look at
+  std::vector<Index> found;              // [F] simplices near a tool
+  std::vector<double> found_distance;    // [F]
+  std::vector<TouchingPair> pairs;       // [most_simplices]
+  std::vector<ContactPoint> candidates;  // before the deepest are chosen
+  Index candidate_count = 0;
+  std::vector<ContactPoint> last_contacts;  // [max_contacts] of the tick before
+  Index last_count = 0;
+  std::vector<double> row_change;        // [rows] for the local model
+  std::vector<double> force_change;      // [rows]
+  std::vector<double> far_displacement;  // [d * slice]
+  Index next_far_node = 0;               // stored node from which the far field is renewed next
 };
 
-/// One tick. While `grab` is set the tool holds the free surface node that was nearest to it, within reach,
-/// when it first could: the node is displaced by what the tool has moved since, so that nothing jumps at the
-/// grab. The forces are those of the capacitance matrix algorithm, f = C^-1 u (theory.md section 3). Nodes
-/// held by `hold` stay held. No heap, lock, system call or exception; never a force that is not finite.
-StepStatus step(const Body& body, State& state, const ToolPose& tool) noexcept;
+/// One tick for each tool's pose (as many as the state has tools). The tool is pushed out of the deformed
+/// surface, exactly: gaps >= 0, normal forces >= 0, one of them zero, with Coulomb friction where the surface
+/// has it, over the compliance of the body and of the coupling together. No heap, lock, system call or
+/// exception; never a force that is not finite.
+StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses) noexcept;
 
-/// Takes hold of a stored node where it is now, so that no force changes. A node that is held stays so (ok).
-StepStatus hold(const Body& body, State& state, Index node) noexcept;
+/// That of a state with one tool.
+StepStatus step(const Body& body, State& state, const ToolPose& pose) noexcept;
 
-/// Lets go of a stored node. The other forces are out of date until `solve`.
-StepStatus release(State& state, Index node) noexcept;
-
-/// Lets go of all nodes.
-void release_all(State& state) noexcept;
-
-/// Prescribes the displacement [m] of a held node, relative to rest; z is ignored in the plane. Forces are
-/// out of date until `solve`.
-StepStatus prescribe(State& state, Index node, const Vec3& displacement) noexcept;
-
-/// f = C^-1 u: the forces on the body that give the held nodes their prescribed displacement (theory.md
-/// section 3).
-StepStatus solve(State& state) noexcept;
-
-/// Position of a stored node among the held ones, -1 when it is not held.
-Index held_position(const State& state, Index node) noexcept;
-
-/// u = Xi E f: displacement u [n] of all stored nodes [m] by the present forces, relative to rest (theory.md
-/// section 3). What is seen is node + u0 + u. For the eye; not needed by a tick.
+/// u = Xi E f: displacement u [n] of all stored nodes [m] by the present contact forces, relative to rest
+/// (theory.md section 3). What is seen is node + u0 + u. For the eye; not needed by a tick.
 void surface_displacement(const Body& body, const State& state, std::span<double> u) noexcept;
 
 }  // namespace palpate

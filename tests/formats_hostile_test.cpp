@@ -242,6 +242,21 @@ const Edit edits[] = {
     {"SecondMaterialIncompressible",
      [](const Path& p) { set_entry(p, "/material/isotropic", 4, 0.5); },
      {"/material/isotropic, row 1", "poissons_ratio"}},
+    {"NegativeFriction",
+     [](const Path& p) { set_entry(p, "/material/friction", 1, -0.5); },
+     {"/material/friction, row 1 is -0.5", "negative"}},
+    {"NanFriction",
+     [](const Path& p) { set_entry(p, "/material/friction", 0, nan); },
+     {"/material/friction holds a value that is not finite (entry 0)"}},
+    {"InfiniteFriction",
+     [](const Path& p) { set_entry(p, "/material/friction", 1, infinity); },
+     {"/material/friction holds a value that is not finite (entry 1)"}},
+    {"NoFriction",
+     [](const Path& p) { remove_object(p, "/material/friction"); },
+     {"/material/friction is missing"}},
+    {"FewerFrictions",
+     [](const Path& p) { replace(p, "/material/friction", H5T_IEEE_F64LE, {1}); },
+     {"/material/friction has size 1, 2 is expected by /material/isotropic"}},
     {"InfiniteInitialStrain",
      [](const Path& p) { set_entry(p, "/material/initial_strain", 7, infinity); },
      {"/material/initial_strain holds a value that is not finite (entry 7)"}},
@@ -338,24 +353,24 @@ const Edit edits[] = {
     {"NoFormat", [](const Path& p) { remove_attribute(p, "/", "format"); }, {"not a Palpate file"}},
     {"NewerMajor",
      [](const Path& p) {
-       set_integers(p, "version", {3, 1});
+       set_integers(p, "version", {4, 1});
      },
-     {"format version 3.1", "reads version 2.x", "Precompute it again"}},
+     {"format version 4.1", "reads version 3.x", "Precompute it again"}},
     {"OlderMajor",
      [](const Path& p) {
-       set_integers(p, "version", {1, 0});
+       set_integers(p, "version", {2, 0});
      },
-     {"format version 1.0", "reads version 2.x", "Precompute it again"}},
+     {"format version 2.0", "reads version 3.x", "Precompute it again"}},
     {"NegativeMinor",
      [](const Path& p) {
-       set_integers(p, "version", {2, -1});
+       set_integers(p, "version", {3, -1});
      },
      {"version is negative"}},
     {"NoVersion",
      [](const Path& p) { remove_attribute(p, "/", "version"); },
      {"attribute version is missing"}},
     {"VersionOfOneNumber",
-     [](const Path& p) { set_integers(p, "version", {2}); },
+     [](const Path& p) { set_integers(p, "version", {3}); },
      {"attribute version is missing"}},
     {"NoName", [](const Path& p) { remove_attribute(p, "/", "name"); }, {"attribute name is missing"}},
     {"NumberAsName", [](const Path& p) { set_integers(p, "name", {1}); }, {"attribute name is missing"}},
@@ -473,7 +488,7 @@ INSTANTIATE_TEST_SUITE_P(Files, HostilePlane, testing::ValuesIn(plane_edits),
 
 TEST(AlteredFile, EveryDatasetIsNamed) {
   const auto datasets = checked_datasets(good_file());
-  EXPECT_EQ(datasets.size(), 24U);
+  EXPECT_EQ(datasets.size(), 25U);
   for (const std::string& dataset : datasets) {
     const Folder folder;
     std::filesystem::copy_file(good_file(), folder / "x.hdf");
@@ -496,7 +511,7 @@ TEST(AlteredFile, AttributesAreNoticed) {
 TEST(NewerMinorVersion, IsReadAndWhatItAddsIsIgnored) {
   const Folder folder;
   std::filesystem::copy_file(good_file(), folder / "x.hdf");
-  set_integers(folder / "x.hdf", "version", {2, 7});
+  set_integers(folder / "x.hdf", "version", {3, 7});
   replace(folder / "x.hdf", "/mesh/colours", H5T_STD_U8LE, {27});
   reseal(folder / "x.hdf");
   EXPECT_EQ(difference(load_model(good_file()), load_model(folder / "x.hdf")), "");

@@ -265,6 +265,13 @@ TEST(ModelFile, AnotherModelStartsAnew) {
   EXPECT_FALSE(after_kill(folder, other, Precision::double_precision, [] {}).has_columns(0, 1));
 }
 
+TEST(ModelFile, AnotherFrictionStartsAnew) {
+  const Folder folder;
+  Model other = sample_model();
+  other.materials[1].friction = 0.125;
+  EXPECT_FALSE(after_kill(folder, other, Precision::double_precision, [] {}).has_columns(0, 1));
+}
+
 TEST(ModelFile, AnotherPrecisionStartsAnew) {
   const Folder folder;
   EXPECT_FALSE(after_kill(folder, sample_model(), Precision::single_precision, [] {}).has_columns(0, 1));
@@ -361,6 +368,12 @@ TEST(ModelFile, WhatAReaderWouldRefuseIsNotWritten) {
   EXPECT_NE(refusal([&] {
               ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision);
             }).find("analysis"),
+            std::string::npos);
+  model = sample_model();
+  model.materials[1].friction = -0.5;
+  EXPECT_NE(refusal([&] {
+              ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision);
+            }).find("/material/friction, row 1 is -0.5"),
             std::string::npos);
   EXPECT_EQ(files_in(folder), Names{});
 }

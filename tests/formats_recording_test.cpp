@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "formats/recording.h"
 #include "tests/formats_sample.h"
+#include "tests/formats_tamper.h"
 
 namespace palpate::test {
 namespace {
@@ -11,10 +14,14 @@ std::vector<TickRecord> some_ticks(std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     const auto x = static_cast<double>(i);
     ticks[i] = {.time = 1e-3 * x,
+                .device_position = {x + 1, x + 2, x + 3},
+                .device_orientation = {0.5, -0.5, 0.5 * x, 1},
                 .tool_position = {x, 2 * x, 3 * x},
+                .tool_orientation = {1, 0, -x, 0.25},
                 .force = {-x, 0.5 * x, 1},
-                .displacement = {1e-3 * x, 0, -1e-3 * x},
-                .node = static_cast<std::int64_t>(i % 5) - 1,
+                .torque = {1e-3 * x, 0, -1e-3 * x},
+                .contacts = static_cast<std::int32_t>(i % 5),
+                .stiffness = {x, 2 * x, 3 * x, -4 * x, 5 * x, 6 * x},
                 .status = static_cast<std::uint32_t>(i % 3),
                 .compute_ns = static_cast<std::uint32_t>(4'000'000'000U - i),
                 .grab = static_cast<std::uint8_t>(i % 2)};
@@ -23,10 +30,13 @@ std::vector<TickRecord> some_ticks(std::size_t count) {
 }
 
 bool same(const TickRecord& a, const TickRecord& b) {
-  return a.time == b.time && std::equal(a.tool_position, a.tool_position + 3, b.tool_position) &&
-         std::equal(a.force, a.force + 3, b.force) &&
-         std::equal(a.displacement, a.displacement + 3, b.displacement) && a.node == b.node &&
-         a.status == b.status && a.compute_ns == b.compute_ns && a.grab == b.grab;
+  return a.time == b.time && std::ranges::equal(a.device_position, b.device_position) &&
+         std::ranges::equal(a.device_orientation, b.device_orientation) &&
+         std::ranges::equal(a.tool_position, b.tool_position) &&
+         std::ranges::equal(a.tool_orientation, b.tool_orientation) && std::ranges::equal(a.force, b.force) &&
+         std::ranges::equal(a.torque, b.torque) && a.contacts == b.contacts &&
+         std::ranges::equal(a.stiffness, b.stiffness) && a.status == b.status &&
+         a.compute_ns == b.compute_ns && a.grab == b.grab;
 }
 
 void record(const std::filesystem::path& path, std::span<const TickRecord> ticks, std::size_t at_once) {
@@ -74,6 +84,18 @@ TEST(Recording, ThatCannotBeStartedLeavesNothing) {
   const std::string text = refusal([&] { RecordingWriter(folder / "a.h5", std::string(5000, 'm'), "h"); });
   EXPECT_NE(text.find("model is 5000 bytes long"), std::string::npos) << text;
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {
+  const Folder folder;
+  record(folder / "a.h5", some_ticks(3), 3);
+  set_integers(folder / "a.h5", "version", {2, 7});
+  EXPECT_EQ(read_recording(folder / "a.h5").ticks.size(), 3U);
+  for (const std::int64_t major : {1, 3}) {
+    set_integers(folder / "a.h5", "version", {major, 0});
+    const std::string text = refusal([&] { read_recording(folder / "a.h5"); });
+    EXPECT_NE(text.find("another version | Record the session again"), std::string::npos) << text;
+  }
 }
 
 TEST(Recording, BadPathsAndOtherFilesAreRefused) {

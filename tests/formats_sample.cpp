@@ -42,7 +42,7 @@ bool same_quality(const QualityReport& a, const QualityReport& b) {
 
 bool same_material(const Material& a, const Material& b) {
   return a.youngs_modulus == b.youngs_modulus && a.poissons_ratio == b.poissons_ratio &&
-         a.density == b.density && a.initial_strain == b.initial_strain;
+         a.density == b.density && a.friction == b.friction && a.initial_strain == b.initial_strain;
 }
 
 Mesh sample_mesh(ElementType element, int cells) {
@@ -72,7 +72,8 @@ Model sample_model(ElementType element, int cells) {
     model.analysis = element == ElementType::quad4 ? Analysis::plane_stress : Analysis::plane_strain;
     model.thickness = 0.02;
   }
-  model.materials = {{5000.0, 0.49, 1060.0, {}}, {2e4, 0.3, 1100.0, {1e-3, 2e-3, 3e-3, -1e-3, -2e-3, -3e-3}}};
+  model.materials = {{5000.0, 0.49, 1060.0, 0.25, {}},
+                     {2e4, 0.3, 1100.0, 0.5, {1e-3, 2e-3, 3e-3, -1e-3, -2e-3, -3e-3}}};
   const double bottom = model.mesh.nodes.front()[d - 1];
   for (std::size_t i = 0; i < model.mesh.nodes.size(); ++i) {
     const Vec3& x = model.mesh.nodes[i];

@@ -22,7 +22,8 @@ int main(int count, char** arguments) {
       recording.append(std::array{palpate::TickRecord{.time = 1e-3 * x,
                                                       .tool_position = {x, 2 * x, 3 * x},
                                                       .force = {-x, 0, 1},
-                                                      .node = i % 5 - 1,
+                                                      .contacts = i % 5,
+                                                      .stiffness = {1, 2, 3, 4, 5, x},
                                                       .grab = 1}});
     }
     recording.finish();

@@ -38,6 +38,7 @@ TEST(Description, ReadsDefaults) {
   ASSERT_EQ(d.materials.size(), 1U);
   EXPECT_EQ(d.materials[0].material.youngs_modulus, 1e4);
   EXPECT_EQ(d.materials[0].material.density, 1000.0);
+  EXPECT_EQ(d.materials[0].material.friction, 0.0);
   EXPECT_EQ(d.materials[0].material.initial_strain, (std::array<double, 6>{}));
   EXPECT_TRUE(d.materials[0].regions.empty());
   EXPECT_FALSE(d.materials[0].where);
@@ -72,6 +73,7 @@ facet_distance = 0.001
 youngs_modulus = 5000
 poissons_ratio = -0.25
 density = 1060
+friction = 0.125
 initial_strain = [1, 2, 3, 4, 5, 6]
 [[fixed]]
 box = {min = [0, 1, 2], max = [3, 4, 5]}
@@ -113,6 +115,7 @@ precision = "double"
   const Material& made_of = d.materials.at(0).material;
   EXPECT_EQ(made_of.poissons_ratio, -0.25);
   EXPECT_EQ(made_of.density, 1060.0);
+  EXPECT_EQ(made_of.friction, 0.125);
   EXPECT_EQ(made_of.initial_strain, (std::array<double, 6>{1, 2, 3, 4, 5, 6}));
   ASSERT_EQ(d.fixed.size(), 5U);
   EXPECT_EQ(std::get<SelectBox>(d.fixed[0].where).max, Vec3(3, 4, 5));
@@ -226,6 +229,7 @@ regions = [127, 85]
 [[material]]
 youngs_modulus = 2
 poissons_ratio = 0.2
+friction = 0.5
 sphere = {center = [0, 0, 1], radius = 2}
 [[material]]
 youngs_modulus = 3
@@ -234,6 +238,8 @@ poissons_ratio = 0.3
   ASSERT_EQ(d.materials.size(), 3U);
   EXPECT_EQ(d.materials[0].regions, (std::vector<Index>{127, 85}));
   EXPECT_EQ(d.materials[1].material.youngs_modulus, 2.0);
+  EXPECT_EQ(d.materials[0].material.friction, 0.0);
+  EXPECT_EQ(d.materials[1].material.friction, 0.5);
   EXPECT_EQ(std::get<SelectSphere>(d.materials[1].where.value()).radius, 2.0);
   EXPECT_TRUE(d.materials[2].regions.empty() && !d.materials[2].where);
   EXPECT_TRUE(std::get<ImageGeometry>(d.geometry).regions);
@@ -490,6 +496,15 @@ const BadCase bad_cases[] = {
      with_material("youngs_modulus = 1\npoissons_ratio = 0.5"),
      {"model.toml:6:", "between -1 and 1/2", "0.5"}},
     {"PoissonMinusOne", with_material("youngs_modulus = 1\npoissons_ratio = -1"), {"between -1 and 1/2"}},
+    {"FrictionNegative",
+     with_material("youngs_modulus = 1\npoissons_ratio = 0\nfriction = -0.1"),
+     {"model.toml:7:12", "[material] friction must be 0 or more, not -0.1"}},
+    {"FrictionInf",
+     with_material("youngs_modulus = 1\npoissons_ratio = 0\nfriction = inf"),
+     {"friction is not a finite"}},
+    {"SecondFrictionNegative",
+     with_materials("regions = [1]", "friction = -2"),
+     {"friction must be 0 or more, not -2"}},
     {"DensityZero",
      with_material("youngs_modulus = 1\npoissons_ratio = 0\ndensity = 0"),
      {"density must be greater than 0"}},

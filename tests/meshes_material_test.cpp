@@ -91,7 +91,10 @@ TEST(Material, ConstantsOutsideTheirRangesAreRefused) {
                {{1e3, 0.3, 0.0}, "density"},
                {{1e3, 0.3, nan}, "density"},
                {{1e3, 0.3, inf}, "density"},
-               {{1e3, 0.3, 1e3, {0, 0, 0, nan, 0, 0}}, "initial_strain"}};
+               {{1e3, 0.3, 1e3, -0.25}, "friction must be 0 or more, not -0.25"},
+               {{1e3, 0.3, 1e3, nan}, "friction"},
+               {{1e3, 0.3, 1e3, inf}, "friction"},
+               {{1e3, 0.3, 1e3, 0.0, {0, 0, 0, nan, 0, 0}}, "initial_strain"}};
   for (const auto& bad : cases) {
     const Error error = error_of([&] { check_material(bad.material, "model.toml:7"); });
     EXPECT_TRUE(contains(error.what(), bad.names)) << error.what();
@@ -100,6 +103,7 @@ TEST(Material, ConstantsOutsideTheirRangesAreRefused) {
   }
   EXPECT_NO_THROW(check_material({1e3, 0.4999, 1e3}, ""));
   EXPECT_NO_THROW(check_material({1e3, -0.9, 1e3}, ""));
+  EXPECT_NO_THROW(check_material({1e3, 0.3, 1e3, 1.5}, ""));
 }
 
 }  // namespace

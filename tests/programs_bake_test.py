@@ -39,6 +39,14 @@ class Bake(ProgramTest):
         for check in ("checksums", "probes", "energy", "columns", "residual", "rest state"):
             self.assertIn(check, verified.stdout)
 
+    def test_inspect_shows_the_friction_of_each_material(self):
+        upper = "[[material]]\nyoungs_modulus = 2\npoissons_ratio = 0.4\nfriction = 0.25\n" \
+                "half_space = {point = [0, 0, 0.5], normal = [0, 0, 1]}\n"
+        file = self.bake(cube_toml(2).replace("[material]", upper + "[[material]]"))
+        inspected = run(PRECOMPUTE, "inspect", file).stdout
+        self.assertRegex(inspected, "E = 2 Pa.* friction = 0.25, 24 elements")
+        self.assertRegex(inspected, "E = 1 Pa.* friction = 0, 24 elements")
+
     def test_all_scopes_and_precisions_verify(self):
         for scope in ("surface", "layers", "full"):
             for precision in ("single", "double"):

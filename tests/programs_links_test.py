@@ -1,12 +1,13 @@
-"""palpate-runtime links nothing of GPL or AGPL (README, Licence)."""
+"""palpate-runtime and libpalpate.so link nothing of GPL or AGPL (README, Licence)."""
 
 import re
 import subprocess
 import unittest
 
-from programs import RUNTIME
+from programs import BINARY, RUNTIME
 
-# What palpate-runtime itself asks the linker for, with the licence of each.
+LINKED = (RUNTIME, BINARY / "runtime" / "libpalpate.so")
+# What they themselves ask the linker for, with the licence of each.
 ALLOWED = {
     "libc.so": "LGPL-2.1", "libm.so": "LGPL-2.1", "libstdc++.so": "GPL-3 with runtime exception",
     "libgcc_s.so": "GPL-3 with runtime exception", "ld-linux-x86-64.so": "LGPL-2.1", "libpthread.so": "LGPL-2.1",
@@ -26,16 +27,20 @@ def names(lines):
 
 class Links(unittest.TestCase):
     def test_direct_libraries_are_known_and_free_of_gpl(self):
-        listing = subprocess.run(["readelf", "-d", RUNTIME], capture_output=True, text=True, check=True).stdout
-        needed = names(re.findall(r"\(NEEDED\).*\[(.*)\]", listing))
-        self.assertIn("libhdf5_serial.so", needed)
-        self.assertEqual([name for name in needed if name not in ALLOWED], [])
+        for file in LINKED:
+            listing = subprocess.run(["readelf", "-d", file], capture_output=True, text=True, check=True).stdout
+            needed = names(re.findall(r"\(NEEDED\).*\[(.*)\]", listing))
+            with self.subTest(file=file.name):
+                self.assertIn("libhdf5_serial.so", needed)
+                self.assertEqual([name for name in needed if name not in ALLOWED], [])
 
     def test_nothing_forbidden_is_loaded(self):
-        listing = subprocess.run(["ldd", RUNTIME], capture_output=True, text=True, check=True).stdout
-        loaded = names(line.split()[0].split("/")[-1] for line in listing.splitlines())
-        self.assertIn("libc.so", loaded)
-        self.assertEqual([name for name in loaded if name.startswith(FORBIDDEN)], [])
+        for file in LINKED:
+            listing = subprocess.run(["ldd", file], capture_output=True, text=True, check=True).stdout
+            loaded = names(line.split()[0].split("/")[-1] for line in listing.splitlines())
+            with self.subTest(file=file.name):
+                self.assertIn("libc.so", loaded)
+                self.assertEqual([name for name in loaded if name.startswith(FORBIDDEN)], [])
 
 
 if __name__ == "__main__":

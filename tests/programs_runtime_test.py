@@ -14,6 +14,7 @@ import vtk
 from programs import RUNTIME, ProgramTest, cube_toml, run
 
 TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
+HANDING_OVER = 1 << 10  # runtime/status.h
 FIELD_COLUMNS = ("node", "x", "y", "z", "u0x", "u0y", "u0z", "ux", "uy", "uz")
 
 
@@ -198,16 +199,16 @@ class Plane(ProgramTest):
 
     def test_play_ignores_z(self):
         file = self.bake(square_toml(scope="surface"))
-        script = self.write("touch.csv", "t,x,y,z\n0,0.5,1,0.5\n0.1,0.5,0.9,0.7\n")
+        script = self.write("touch.csv", "t,x,y,z,grab\n0,0.5,1,0.5,1\n0.1,0.5,0.9,0.7,1\n")
         result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         with h5py.File(self.folder / "out.h5") as recording:
             ticks = recording["ticks"]
-            self.assertEqual(set(ticks["node"][:]), {self.MIDDLE})
-            numpy.testing.assert_allclose(ticks["displacement"][-1], [0, -0.1, 0], atol=1e-15)
+            numpy.testing.assert_allclose(ticks["device_position"][-1], [0.5, 0.9, 0.7])
+            numpy.testing.assert_array_equal(ticks["tool_position"][:, 2], 0)
             numpy.testing.assert_array_equal(ticks["force"][:, 2], 0)
             answer = self.probe(file, "--node", self.MIDDLE, "--displace", "0,-0.1")
-            numpy.testing.assert_allclose(ticks["force"][-1], answer["total_force"], rtol=1e-12)
+            numpy.testing.assert_allclose(ticks["force"][-1], answer["total_force"], rtol=1e-7, atol=1e-9)
 
 
 class Rest(ProgramTest):
@@ -276,15 +277,15 @@ class Rest(ProgramTest):
 
     def test_the_tool_takes_hold_where_the_body_rests(self):
         file = self.bake(rollers_toml(True, 0.5))
-        # Point (1, 1) rests at (0.85, 1.5).
-        script = self.write("touch.csv", "t,x,y,z\n0,0.85,1.5,0\n0.1,0.85,1.45,0\n")
+        # Point (1, 1), node 24, rests at (0.85, 1.5).
+        script = self.write("touch.csv", "t,x,y,z,grab\n0,0.85,1.5,0,1\n0.1,0.85,1.45,0,1\n")
         result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", "--reach", "0.001",
                      cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         with h5py.File(self.folder / "out.h5") as recording:
-            self.assertEqual(set(recording["ticks/node"][:]), {24})
             self.assertLess(numpy.linalg.norm(recording["ticks/force"][0]), 1e-12)
-            numpy.testing.assert_allclose(recording["ticks/displacement"][-1], [0, -0.05, 0], atol=1e-12)
+            answer = self.probe(file, "--node", 24, "--displace", "0,-0.05")
+            numpy.testing.assert_allclose(recording["ticks/force"][-1], answer["total_force"], rtol=1e-7, atol=1e-9)
 
 
 class Play(ProgramTest):
@@ -308,11 +309,15 @@ class Play(ProgramTest):
             self.assertEqual(len(ticks["time"]), 301)
             force = numpy.linalg.norm(ticks["force"], axis=1)
             self.assertAlmostEqual(force.max(), report["largest_force_N"])
-            # The node is at the middle of the top, it moves by what the tool has moved since the grab, and the force is that of a probe.
-            self.assertEqual(set(ticks["node"][:]), {-1, 112})
-            moved = ticks["displacement"][200]
+            jumps = numpy.linalg.norm(numpy.diff(ticks["force"], axis=0), axis=1)
+            self.assertAlmostEqual(jumps.max(), report["largest_jump_N"])
+            self.assertEqual(numpy.argmax(jumps) + 1, round(1000 * report["largest_jump_time_s"]))
+            self.assertEqual(report["ticks_in_contact"], numpy.count_nonzero(ticks["contacts"]))
+            self.assertEqual((report["most_contacts"], report["ticks_begun_inside"]), (1, 0))
+            # The tool holds the node at the middle of the top, the nearest of the surface: the force is that of a probe.
+            moved = ticks["device_position"][200] - ticks["device_position"][0]
             answer = self.probe(file, "--node", "112", "--displace", ",".join(map(repr, moved.tolist())))
-            numpy.testing.assert_allclose(ticks["force"][200], answer["nodes"][0]["force"], rtol=1e-12)
+            numpy.testing.assert_allclose(ticks["force"][200], answer["nodes"][0]["force"], rtol=1e-7, atol=1e-9)
             self.assertEqual(ticks["compute_ns"][:].max(), 0)
 
     def test_real_time_run_with_report_and_reach(self):
@@ -324,10 +329,11 @@ class Play(ProgramTest):
         self.assertGreaterEqual(time.monotonic() - start, 0.3)
         self.assertEqual(result.stdout, "")
         report = json.loads((self.folder / "report.json").read_text())
-        self.assertEqual((report["ticks"], report["fast"], report["reach_m"]), (301, False, 0.01))
+        self.assertEqual((report["ticks"], report["fast"], report["tool"]["reach_m"]), (301, False, 0.01))
         self.assertGreater(report["compute_ns"]["median"], 0)
         self.assertGreater(report["status_ticks"]["nothing_in_reach"], 50)
-        for piece in ("301 ticks", "deadline misses", "median", "99.9 %", "largest force", "nothing_in_reach"):
+        for piece in ("301 ticks", "in contact", "deadline misses", "median", "99.9 %", "largest force", "largest jump",
+                      "nothing_in_reach"):
             self.assertIn(piece, result.stderr)
 
     def test_interrupt_finishes_the_recording(self):
@@ -368,12 +374,132 @@ class Play(ProgramTest):
         result = self.play(file, "--device", f"script:{script}", "--fast", "--record", "no/out.h5")
         self.assert_refused(result, "out.h5")
 
-    def test_a_tool_that_never_holds_is_told(self):
+    def test_scripts_that_feel_nothing_are_told_why(self):
         file = self.bake(cube_toml(3))
-        script = self.write("away.csv", "t,x,y,z\n0,9,9,9\n0.1,9,9,9\n")
-        result = self.play(file, "--device", f"script:{script}", "--fast")
-        self.assertEqual(result.returncode, 0)
-        self.assertIn("never held", result.stderr)
+        for rows, warning in (("0,9,9,9\n0.1,9,9,9\n", r"never touched .*metres.*\(0, 0, 0\) to \(1, 1, 1\) m"),
+                              ("0,0.5,0.5,0.5\n0.1,0.5,0.5,0.4\n", "began inside the body and felt nothing at all: start outside"),
+                              ("0,0.52,0.5,0.9515\n0.1,0.52,0.5,1.0515\n0.2,0.52,0.5,0.9\n",
+                               "began inside the body and felt nothing until it was out at 0.049 s: start outside")):
+            script = self.write("touch.csv", "t,x,y,z\n" + rows)
+            result = self.play(file, "--device", f"script:{script}", "--fast")
+            self.assertEqual(result.returncode, 0)
+            warnings = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
+            self.assertEqual(len(warnings), 1, result.stderr)
+            self.assertRegex(warnings[0], warning)
+            self.assertEqual(json.loads(result.stdout)["ticks_in_contact"] > 0, "until" in warning)
+
+
+class Tools(ProgramTest):
+    """What the tool's options do, by what is recorded."""
+
+    # A sphere or capsule comes down on the top, presses and is dragged.
+    PRESS = "t,x,y,z\n0,0.4,0.45,1.4\n0.2,0.4,0.45,1.12\n0.4,0.5,0.5,1.12\n"
+
+    def play(self, file, script, *arguments):
+        script = self.write("script.csv", script)
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", "--contacts", "out.csv",
+                     *arguments, cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with h5py.File(self.folder / "out.h5") as recording:
+            ticks = {name: values[:] for name, values in recording["ticks"].items()}
+        contacts = numpy.atleast_1d(numpy.genfromtxt(self.folder / "out.csv", delimiter=",", names=True))
+        return json.loads(result.stdout), ticks, contacts
+
+    @staticmethod
+    def vectors(contacts, prefix):
+        return numpy.column_stack([contacts[prefix + axis] for axis in "xyz"])
+
+    def test_a_sphere_is_pushed_out_where_it_touches(self):
+        file = self.bake(cube_toml(6))
+        report, ticks, contacts = self.play(file, self.PRESS, "--tool", "sphere:0.2")
+        self.assertEqual((report["tool"]["radius_m"], report["tool"]["length_m"]), (0.2, 0))
+        self.assertGreater(report["most_contacts"], 1)
+        x, n, f = (self.vectors(contacts, prefix) for prefix in ("", "n", "f"))
+        numpy.testing.assert_allclose(f.sum(axis=0), ticks["force"][-1], rtol=1e-12)
+        closed = numpy.linalg.norm(f, axis=1) > 0
+        self.assertEqual(closed.sum(), ticks["contacts"][-1])
+        self.assertFalse(contacts["held"].any())
+        # Without friction the body is pushed straight in, at places on the sphere; nothing else is in it, to second order of a tick's motion.
+        numpy.testing.assert_allclose(f, (f * n).sum(axis=1)[:, None] * n, atol=1e-12)
+        self.assertTrue(((f * n).sum(axis=1)[closed] < 0).all())
+        distance = numpy.linalg.norm(x - ticks["tool_position"][-1], axis=1)
+        numpy.testing.assert_allclose(distance[closed], 0.2, atol=1e-3)
+        self.assertGreater(distance.min(), 0.199)
+        numpy.testing.assert_allclose(contacts["gap"][closed], 0, atol=1e-9)
+        self.assertTrue((contacts["gap"] > -1e-9).all())
+        self.assertTrue((x[:, 2] < 1).all())
+        # Forces through the centre of a sphere turn nothing.
+        self.assertLess(numpy.linalg.norm(ticks["torque"][-1]), 1e-2 * 0.2 * numpy.linalg.norm(ticks["force"][-1]))
+
+    def test_friction(self):
+        text = cube_toml(6).replace("density = 1000", "friction = 0.1")
+        for given, mu in (((), 0.1), (("--friction", "0.3"), 0.3), (("--friction", "0"), 0)):
+            report, ticks, contacts = self.play(self.bake(text), self.PRESS, "--tool", "sphere:0.2", *given)
+            self.assertEqual(report["tool"]["friction"], mu if given else None)
+            f, n = self.vectors(contacts, "f"), self.vectors(contacts, "n")
+            normal = (f * n).sum(axis=1)
+            tangential = numpy.linalg.norm(f - normal[:, None] * n, axis=1)
+            self.assertTrue((tangential <= -mu * normal * (1 + 1e-6) + 1e-12).all())
+            # Dragged so far it slips somewhere.
+            self.assertGreater((tangential + 1e-12 >= -mu * normal * (1 - 1e-6))[normal < 0].sum(), 0)
+        self.assertEqual(report["status_ticks"]["pose_limited"], 0)
+
+    def test_coupling_and_largest_force(self):
+        file = self.bake(cube_toml(6))
+        _, rigid, _ = self.play(file, self.PRESS, "--tool", "sphere:0.2")
+        numpy.testing.assert_array_equal(rigid["tool_position"], rigid["device_position"])
+        report, ticks, _ = self.play(file, self.PRESS, "--tool", "sphere:0.2", "--coupling", "0.5")
+        self.assertEqual(report["tool"]["coupling_N_per_m"], 0.5)
+        stretch = ticks["tool_position"] - ticks["device_position"]
+        smoothed = ticks["status"] & HANDING_OVER > 0
+        self.assertLess(smoothed.sum(), 100)
+        numpy.testing.assert_allclose(0.5 * stretch[~smoothed], -ticks["force"][~smoothed], atol=1e-12)
+        self.assertLess(numpy.abs(ticks["force"]).max(), numpy.abs(rigid["force"]).max())
+
+        largest = numpy.linalg.norm(rigid["force"], axis=1).max()
+        report, limited, _ = self.play(file, self.PRESS, "--tool", "sphere:0.2", "--max-force", repr(float(largest / 2)))
+        self.assertAlmostEqual(numpy.linalg.norm(limited["force"], axis=1).max(), largest / 2)
+        self.assertGreater(report["status_ticks"]["force_limited"], 50)
+
+    def test_a_capsule_lies_along_its_own_z(self):
+        file = self.bake(cube_toml(6))
+        turn = f"{numpy.sqrt(0.5)},0,{numpy.sqrt(0.5)},0"  # z to x
+        script = f"t,x,y,z,qw,qx,qy,qz\n0,0.3,0.5,1.4,{turn}\n0.2,0.3,0.5,1.05,{turn}\n"
+        report, ticks, contacts = self.play(file, script, "--tool", "capsule:0.1,0.4", "--coupling-torsion", "1.0")
+        self.assertEqual((report["tool"]["radius_m"], report["tool"]["length_m"]), (0.1, 0.4))
+        self.assertEqual(report["tool"]["coupling_torsion_Nm_per_rad"], 1.0)
+        self.assertGreater(ticks["contacts"][-1], 1)
+        # The body feels the tool on both sides of its middle, 0.2 m along x from the origin: the torque there is small.
+        force, torque = ticks["force"][-1], ticks["torque"][-1]
+        middle = torque - numpy.cross([0.2, 0, 0], force)
+        self.assertLess(force[2], 0)
+        self.assertLess(numpy.linalg.norm(middle), 0.25 * numpy.linalg.norm(torque))
+        # The spring gives way: the tool is turned by torque over stiffness.
+        tool, device = ticks["tool_orientation"][-1], ticks["device_orientation"][-1]
+        angle = 2 * numpy.arccos(min(1, abs(tool @ device)))
+        self.assertAlmostEqual(angle, numpy.linalg.norm(torque) / 1.0, places=6)
+        f, x = self.vectors(contacts, "f"), self.vectors(contacts, "")
+        numpy.testing.assert_allclose(numpy.cross(x - ticks["tool_position"][-1], f).sum(axis=0), torque,
+                                      atol=0.02 * numpy.linalg.norm(torque))
+
+    def test_grab_holds_what_is_touched_and_pulls(self):
+        file = self.bake(cube_toml(6))
+        script = "t,x,y,z,grab\n0,0.5,0.5,1.4,0\n0.2,0.5,0.5,1.15,1\n0.4,0.5,0.5,1.3,1\n"
+        report, ticks, contacts = self.play(file, script, "--tool", "sphere:0.2")
+        self.assertLess(ticks["force"][200][2], 0)
+        self.assertGreater(ticks["force"][-1][2], 0)
+        self.assertTrue((contacts["held"] == 1).all())
+        self.assertEqual(len(contacts), ticks["contacts"][-1])
+        numpy.testing.assert_allclose(self.vectors(contacts, "f").sum(axis=0), ticks["force"][-1], rtol=1e-12)
+        numpy.testing.assert_array_equal(ticks["grab"], ticks["time"] >= 0.2)
+        self.assertEqual(report["status_ticks"]["nothing_in_reach"], 0)
+
+    def test_few_contacts(self):
+        file = self.bake(cube_toml(6))
+        report, _, contacts = self.play(file, self.PRESS, "--tool", "sphere:0.2", "--max-contacts", "2")
+        self.assertLessEqual(report["most_contacts"], 2)
+        self.assertLessEqual(len(contacts), 2)
+        self.assertGreater(report["status_ticks"]["capacity_full"], 0)
 
 
 class Usage(ProgramTest):
@@ -416,8 +542,20 @@ class Usage(ProgramTest):
         self.assert_usage("'0,0,nan'", "probe", "x.palpate.hdf", "--at", "0,0,1", "--displace", "0,0,nan")
         self.assert_usage("'-1'", "probe", "x.palpate.hdf", "--node", "-1", "--displace", "0,0,1")
         self.assert_usage("'mouse'", "play", "x.palpate.hdf", "--device", "mouse")
-        self.assert_usage("'inf'", "play", "x.palpate.hdf", "--device", "script:a.csv", "--reach", "inf")
-        self.assert_usage("'-1'", "play", "x.palpate.hdf", "--device", "script:a.csv", "--reach", "-1")
+
+    def test_wrong_tools(self):
+        for option, text, piece in (("--reach", "inf", "'inf'"), ("--reach", "-1", "'-1'"), ("--tool", "ball", "'ball'"),
+                                    ("--tool", "sphere", "'sphere' is none of"), ("--tool", "sphere:0.1,0.2", "is none of"),
+                                    ("--tool", "sphere:", "'' of 'sphere:'"), ("--tool", "sphere:5mm", "'5mm'"),
+                                    ("--tool", "sphere:0", "'0' of 'sphere:0' is not a positive"), ("--tool", "sphere:-1", "'-1'"),
+                                    ("--tool", "capsule:0.1", "is none of"), ("--tool", "capsule:0.1,nan", "'nan'"),
+                                    ("--tool", "point:1", "is none of"), ("--friction", "-0.1", "'-0.1'"),
+                                    ("--friction", "inf", "'inf'"), ("--friction", "", "''"), ("--coupling", "0", "N/m"), ("--coupling-torsion", "x", "N m/rad"),
+                                    ("--max-force", "-3", "newtons"), ("--max-contacts", "0", "from 1 to"),
+                                    ("--max-contacts", "1.5", "'1.5'"), ("--max-contacts", "100000", "from 1 to 1000")):
+            with self.subTest(option=option, text=text):
+                self.assert_usage(piece, "play", "x.palpate.hdf", "--device", "script:a.csv", option, text)
+                self.assert_usage(option, "play", "x.palpate.hdf", "--device", "script:a.csv", option, text)
 
 
 if __name__ == "__main__":

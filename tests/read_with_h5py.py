@@ -37,7 +37,7 @@ def check_model(path, element, scalar):
     with h5py.File(path) as file:
         attributes = file.attrs
         expect(attributes["format"] == b"palpate", "format")
-        expect(list(attributes["version"]) == [2, 0], "version")
+        expect(list(attributes["version"]) == [3, 0], "version")
         expect(attributes["units"] == b"m, N, Pa, kg, s", "units")
         expect(attributes["scalar"].decode() == scalar, "scalar")
         expect(attributes["element"].decode() == element and attributes["dimension"] == dimension, "element")
@@ -60,6 +60,7 @@ def check_model(path, element, scalar):
 
         isotropic, strain = file["/material/isotropic"][:], file["/material/initial_strain"][:]
         expect(np.array_equal(isotropic, [[5000, 0.49, 1060], [2e4, 0.3, 1100]]), "materials")
+        expect(np.array_equal(file["/material/friction"], [0.25, 0.5]), "friction")
         expect(np.array_equal(strain, [[0] * 6, [1e-3, 2e-3, 3e-3, -1e-3, -2e-3, -3e-3]]), "initial strain")
         expect(np.array_equal(file["/material/of_element"], np.arange(len(cells)) % 2), "material of element")
         expect(file["/material/thickness"][0] == (0.02 if dimension == 2 else 1), "thickness")
@@ -95,11 +96,16 @@ def enclosed(nodes, surface):
 def check_recording(path):
     with h5py.File(path) as file:
         expect(file.attrs["format"] == b"palpate-recording" and file.attrs["model"] == b"tet4.palpate.hdf", "recording")
+        expect(list(file.attrs["version"]) == [2, 0], "version")
         ticks = file["/ticks"]
+        widths = {"time": 1, "device_position": 3, "device_orientation": 4, "tool_position": 3, "tool_orientation": 4, "force": 3,
+                  "torque": 3, "contacts": 1, "stiffness": 6, "status": 1, "compute_ns": 1, "grab": 1}
+        expect({name: ticks[name].shape for name in ticks} ==
+               {name: (5000,) if width == 1 else (5000, width) for name, width in widths.items()}, "shapes")
         expect(np.array_equal(ticks["time"], 1e-3 * np.arange(5000)), "time")
         expect(np.array_equal(ticks["tool_position"][:, 1], 2.0 * np.arange(5000)), "tool_position")
-        expect(np.array_equal(ticks["node"], np.arange(5000) % 5 - 1), "node")
-        expect(all(ticks[name].shape[0] == 5000 for name in ticks) and len(ticks) == 8, "lengths")
+        expect(np.array_equal(ticks["contacts"], np.arange(5000) % 5), "contacts")
+        expect(np.array_equal(ticks["stiffness"][4999], [1, 2, 3, 4, 5, 4999]), "stiffness")
         print(f"{path.name}: 5000 ticks")
 
 

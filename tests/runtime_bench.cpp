@@ -1,14 +1,16 @@
-// What a tick costs. PALPATE_BENCH_MODEL=NAME.palpate.hdf measures a baked body; else bodies of random
-// Green's functions stand in, with the dofs of the two beams that SOFA was measured on (15x7x7 and 24x10x10
-// cells) and of a liver with 4 000 surface nodes. Nodes change from one iteration to the next, so that what
-// they read is not in the near caches. Counters: median and 99.9 % of the iterations.
+// What a tick costs. PALPATE_BENCH_MODEL=NAME.palpate.hdf measures a baked body; else blocks with
+// random Green's functions stand in: the two beams that SOFA was measured on (15x7x7 and 24x10x10 cells: 1368
+// and 3123 dofs) and one with 4 000 free surface nodes, as many as a fine liver has (25x31x31 cells). Nodes
+// change from one iteration to the next, so that what they read is not in the near caches. Counters: median
+// and 99.9 % of the iterations.
 #include <benchmark/benchmark.h>
 #include <cblas.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdlib>
-#include <map>
+#include <iterator>
 #include <memory>
 #include <numeric>
 #include <random>
@@ -16,7 +18,9 @@
 #include <vector>
 
 #include "formats/model_file.h"
-#include "runtime/step.h"
+#include "meshes/generate.h"
+#include "meshes/surface.h"
+#include "runtime/held_nodes.h"
 
 namespace palpate {
 namespace {
@@ -61,22 +65,25 @@ PackedGreens random_greens(std::int64_t order, Precision precision) {
   return {std::shared_ptr<const void>(packed, packed->data()), order, precision};
 }
 
-/// A body of free surface nodes only, with random Green's functions.
-Model random_model(std::int64_t order, Precision precision) {
+/// A block of 5 mm cells whose end x = 0 is clamped, with random Green's functions of its free surface nodes.
+Model random_model(const std::array<int, 3>& cells, Precision precision) {
   Model model;
+  model.mesh = generate(BoxShape{.size = 0.005 * Vec3(cells[0], cells[1], cells[2]), .cells = cells});
+  model.materials = {{.youngs_modulus = 1e4, .poissons_ratio = 0.45}};
+  model.material_of_element.assign(static_cast<std::size_t>(model.mesh.elements()), 0);
+  const Surface surface = extract_surface(model.mesh);
+  model.surface = surface_simplices(surface);
+  for (const Vec3& node : model.mesh.nodes) model.fixed.push_back(node.x() < 1e-9 ? 0b111 : 0);
+  model.rest_force.assign(model.mesh.nodes.size(), Vec3::Zero());
+  model.rest_displacement.assign(model.mesh.nodes.size(), Vec3::Zero());
+  model.scope = Scope::surface;
+  model.layers = 0;
+  std::copy_if(surface.nodes.begin(), surface.nodes.end(), std::back_inserter(model.stored_nodes),
+               [&](Index node) { return model.fixed[static_cast<std::size_t>(node)] == 0; });
+  const std::int64_t order = model.stored_dofs();
   model.name = std::to_string(order) + (precision == Precision::single_precision ? "/single" : "/double");
   model.greens = precision == Precision::single_precision ? random_greens<float>(order, precision)
                                                           : random_greens<double>(order, precision);
-  model.mesh.nodes.resize(static_cast<std::size_t>(order / 3));
-  model.fixed.resize(model.mesh.nodes.size());
-  model.stored_nodes.resize(model.mesh.nodes.size());
-  std::iota(model.stored_nodes.begin(), model.stored_nodes.end(), 0);
-  std::mt19937 random(2);
-  std::uniform_real_distribution<double> coordinate(0.0, 0.1);
-  for (Vec3& node : model.mesh.nodes) node = Vec3(coordinate(random), coordinate(random), coordinate(random));
-  for (Index k = 0; k + 2 < static_cast<Index>(order / 3); ++k)
-    model.surface.insert(model.surface.end(), {k, k + 1, k + 2});
-  model.rest_displacement.assign(model.mesh.nodes.size(), Vec3::Zero());
   return model;
 }
 
@@ -93,79 +100,68 @@ class NodeSource {
   std::size_t next_ = 0;
 };
 
-void move_contacts(const Body& body, State& state, NodeSource& nodes, std::int64_t contacts) {
-  release_all(state);
+void move_contacts(const Body& body, HeldNodes& held, NodeSource& nodes, std::int64_t contacts) {
+  held.release_all();
   for (std::int64_t k = 0; k < contacts; ++k) {
     const Index node = nodes.next();
-    hold(body, state, node);
-    prescribe(state, node, Vec3(0.0, -0.001, -0.001));
+    held.hold(body, node);
+    held.prescribe(node, Vec3(0.0, -0.001, -0.001));
   }
 }
 
 /// One node taken anew: gather, factor and solve.
 void new_contact(benchmark::State& run, const Body& body) {
-  State state(body);
+  HeldNodes held(body);
   NodeSource nodes(body);
   Samples samples;
   while (run.KeepRunning()) {
     samples.time(run, [&] {
-      move_contacts(body, state, nodes, 1);
-      benchmark::DoNotOptimize(solve(state));
+      move_contacts(body, held, nodes, 1);
+      benchmark::DoNotOptimize(held.solve());
     });
   }
   samples.report(run);
 }
 
-/// A tick that looks for the nearest node and takes it.
-void grab_tick(benchmark::State& run, const Body& body) {
-  State state(body, {.reach = 1.0});
-  NodeSource nodes(body);
-  Samples samples;
-  while (run.KeepRunning()) {
-    release_all(state);
-    ToolPose tool;
-    tool.grab = true;
-    tool.position = body.rest_position(nodes.next());
-    samples.time(run, [&] { benchmark::DoNotOptimize(step(body, state, tool)); });
-  }
-  samples.report(run);
-}
-
-/// A tick that holds a node.
+/// A held node that moves.
 void held_tick(benchmark::State& run, const Body& body) {
-  State state(body, {.reach = 1.0});
-  ToolPose tool;
-  tool.grab = true;
+  HeldNodes held(body);
+  const Index node = body.free_surface_nodes().front();
+  held.hold(body, node);
+  Vec3 displacement = Vec3::Zero();
   Samples samples;
   while (run.KeepRunning()) {
-    tool.position.x() += 1e-6;
-    samples.time(run, [&] { benchmark::DoNotOptimize(step(body, state, tool)); });
+    displacement.x() += 1e-6;
+    samples.time(run, [&] {
+      held.prescribe(node, displacement);
+      benchmark::DoNotOptimize(held.solve());
+    });
   }
   samples.report(run);
 }
 
 /// C of 30 nodes and its factor, from nothing.
 void capacitance_30(benchmark::State& run, const Body& body) {
-  State state(body);
+  HeldNodes held(body);
   NodeSource nodes(body);
   Samples samples;
   while (run.KeepRunning()) {
-    samples.time(run, [&] { move_contacts(body, state, nodes, 30); });
+    samples.time(run, [&] { move_contacts(body, held, nodes, 30); });
   }
   samples.report(run);
 }
 
 /// Contacts moved to new nodes: gather, factor, forces and the displacement of all stored nodes.
 void moved_contacts(benchmark::State& run, const Body& body, std::int64_t contacts) {
-  State state(body);
+  HeldNodes held(body);
   NodeSource nodes(body);
   std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
   Samples samples;
   while (run.KeepRunning()) {
     samples.time(run, [&] {
-      move_contacts(body, state, nodes, contacts);
-      solve(state);
-      surface_displacement(body, state, u);
+      move_contacts(body, held, nodes, contacts);
+      held.solve();
+      held.displace(body, u);
       benchmark::DoNotOptimize(u.data());
     });
   }
@@ -251,7 +247,6 @@ void register_body(Model model) {
 #endif
   };
   add("new_contact" + name, [body](benchmark::State& run) { new_contact(run, *body); });
-  add("grab_tick" + name, [body](benchmark::State& run) { grab_tick(run, *body); });
   add("held_tick" + name, [body](benchmark::State& run) { held_tick(run, *body); });
   add("capacitance_30" + name, [body](benchmark::State& run) { capacitance_30(run, *body); });
   for (const std::int64_t contacts : {1, 10, 30}) {
@@ -276,10 +271,10 @@ int main(int argc, char** argv) {
   if (const char* file = std::getenv("PALPATE_BENCH_MODEL")) {
     palpate::register_body(palpate::load_model(file));
   } else {
-    for (const std::int64_t order : {1368, 3123, 12000}) {
-      palpate::register_body(palpate::random_model(order, palpate::Precision::single_precision));
+    for (const std::array<int, 3> cells : {std::array{15, 7, 7}, {24, 10, 10}, {25, 31, 31}}) {
+      palpate::register_body(palpate::random_model(cells, palpate::Precision::single_precision));
     }
-    palpate::register_body(palpate::random_model(3123, palpate::Precision::double_precision));
+    palpate::register_body(palpate::random_model({24, 10, 10}, palpate::Precision::double_precision));
   }
   benchmark::RunSpecifiedBenchmarks();
 }

@@ -78,6 +78,28 @@ TEST_P(GreensLayouts, DisplacementIsTheProduct) {
   EXPECT_EQ(u, Eigen::VectorXd::Zero(xi_.rows()));
 }
 
+TEST_P(GreensLayouts, DisplacementOfAPartIsThatPartOfTheWhole) {
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> force(-1.0, 1.0);
+  std::vector<Index> loaded(5);
+  for (Index& node : loaded) node = std::uniform_int_distribution<Index>(0, greens_.nodes() - 1)(random);
+  std::vector<double> f(static_cast<std::size_t>(d_) * loaded.size());
+  for (double& value : f) value = force(random);
+  Eigen::VectorXd whole(xi_.rows());
+  greens_.displacement(loaded, f, {whole.data(), static_cast<std::size_t>(whole.size())});
+
+  const double rounding = 1e-15 * xi_.cwiseAbs().maxCoeff() * static_cast<double>(f.size());
+  for (int part = 0; part < 20; ++part) {
+    const Index first = std::uniform_int_distribution<Index>(0, greens_.nodes() - 1)(random);
+    const Index nodes = std::uniform_int_distribution<Index>(0, greens_.nodes() - first)(random);
+    Eigen::VectorXd expected = Eigen::VectorXd::Constant(xi_.rows(), 7.0);
+    expected.segment(d_ * first, d_ * nodes) = whole.segment(d_ * first, d_ * nodes);
+    Eigen::VectorXd u = Eigen::VectorXd::Constant(xi_.rows(), 7.0);
+    greens_.displacement(loaded, f, first, {u.data() + d_ * first, static_cast<std::size_t>(d_ * nodes)});
+    EXPECT_LE((u - expected).cwiseAbs().maxCoeff(), rounding) << first << ", " << nodes;
+  }
+}
+
 // Orders at and beside the bounds of tiles (64), cache lines and chunks of u (2048).
 std::vector<Case> cases() {
   std::vector<Case> all;

@@ -8,8 +8,12 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <limits>
+#include <span>
 #include <vector>
 
+#include "runtime/held_nodes.h"
+#include "runtime/palpate.h"
 #include "runtime/step.h"
 #include "tests/runtime_model.h"
 
@@ -63,16 +67,19 @@ void free(void* p) {
 namespace palpate {
 namespace {
 
-/// Ticks that grab, move, miss, let go and send nonsense, beside nodes that are held and dropped.
-void exercise(const Body& body, State& state, Eigen::VectorXd& u, const std::vector<ToolPose>& poses) {
+/// Ticks that touch, grab, move, miss, let go and send nonsense; beside them nodes that are held and dropped.
+void exercise(const Body& body, State& state, HeldNodes& held, std::span<double> u,
+              const std::vector<ToolPose>& poses) {
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const auto node = static_cast<Index>(k % 30);
-    if (k % 3 == 0) hold(body, state, node);
-    if (k % 7 == 0) release(state, node);
-    if (k % 100 == 99) release_all(state);
-    prescribe(state, node, Vec3(0.0, 0.001, 0.001));
+    if (k % 3 == 0) held.hold(body, node);
+    if (k % 7 == 0) held.release(node);
+    if (k % 100 == 99) held.release_all();
+    held.prescribe(node, Vec3(0.0, 0.001, 0.001));
+    held.solve();
     step(body, state, poses[k]);
-    if (k % 10 == 0) surface_displacement(body, state, {u.data(), static_cast<std::size_t>(u.size())});
+    if (k % 10 == 0) held.displace(body, u);
+    if (k % 10 == 5) surface_displacement(body, state, u);
   }
 }
 
@@ -90,8 +97,9 @@ class Tick : public testing::TestWithParam<int> {
 
   Body body_{
       test::unit_model(GetParam(), GetParam() == 3 ? 4 : 20, Scope::surface, Precision::single_precision)};
-  State state_{body_, {.reach = 0.3, .max_nodes = 24}};
-  Eigen::VectorXd u_{body_.greens().order()};
+  State state_{body_, {.tools = {Tool{.reach = 0.3}}}};
+  HeldNodes held_{body_, 24};
+  std::vector<double> u_ = std::vector<double>(static_cast<std::size_t>(body_.greens().order()));
   std::vector<ToolPose> poses_;
 };
 
@@ -106,11 +114,11 @@ TEST_P(Tick, MakesNoHeapCall) {
 
   heap_calls = 0;
   counting = true;
-  exercise(body_, state_, u_, poses_);
+  exercise(body_, state_, held_, u_, poses_);
   counting = false;
   EXPECT_EQ(heap_calls, 0);
 #else
-  exercise(body_, state_, u_, poses_);  // for the sanitizer, which has taken malloc
+  exercise(body_, state_, held_, u_, poses_);  // for the sanitizer, which has taken malloc
 #endif
   EXPECT_EQ(state_.ticks, 1000);
 }
@@ -124,7 +132,7 @@ TEST_P(Tick, MakesNoSystemCall) {
   ASSERT_GE(child, 0);
   if (child == 0) {
     if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
-    exercise(body_, state_, u_, poses_);
+    exercise(body_, state_, held_, u_, poses_);
     syscall(SYS_exit, state_.ticks == 1000 ? 0 : 1);
   }
   int status = 0;
@@ -133,6 +141,42 @@ TEST_P(Tick, MakesNoSystemCall) {
   EXPECT_FALSE(WIFSIGNALED(status)) << "signal " << WTERMSIG(status);
   EXPECT_EQ(WEXITSTATUS(status), 0);
 #endif
+}
+
+// libpalpate.so calls this program's malloc too.
+TEST(OwnLoop, MakesNoHeapCall) {
+  palpate_tool tool = palpate_default_tool();
+  tool.radius = 0.2;
+  tool.friction = 0.3;
+  const char* file = PALPATE_SOURCE_DIR "/tests/golden/cube2/cube2.palpate.hdf";
+  palpate_session* session = palpate_create(file, &tool, 1, 8, nullptr, 0);
+  ASSERT_NE(session, nullptr);
+  std::vector<double> xyz(3 * static_cast<std::size_t>(palpate_surface_counts(session).nodes));
+  palpate_result result{};
+  int touching = 0;
+  const auto loop = [&] {
+    for (int tick = 0; tick < 1000; ++tick) {
+      const double depth = 0.1 * (tick % 200) / 200.0 - 0.02;
+      const palpate_pose pose{
+          {0.3 + 0.0004 * tick, 0.5, 1.2 - depth}, {1.0, 0.1, 0.0, 0.0}, tick % 300 > 250 ? 1 : 0};
+      palpate_step(session, &pose);
+      palpate_get(session, 0, &result);
+      palpate_surface_displacement(session, xyz.data());
+      if (result.contacts > 0) ++touching;
+      if (tick == 500) palpate_reset(session);
+    }
+  };
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+  counting = true;
+  loop();
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+#else
+  loop();
+#endif
+  EXPECT_GT(touching, 500);
+  palpate_destroy(session);
 }
 
 static_assert(noexcept(step(std::declval<const Body&>(), std::declval<State&>(),

@@ -35,7 +35,8 @@ std::vector<Eigen::Index> dofs_of(int dimension, std::span<const Index> nodes) {
 
 Mesh unit_mesh(ElementType element, int cells) {
   if (traits(element).dimension == 2) return generate(RectangleShape{.cells = {cells, cells}}, element);
-  return generate(BoxShape{.cells = {cells, cells, cells}}, element);
+  const BoxShape box{.cells = {cells, cells, cells}};
+  return element == ElementType::hex8 ? generate(box, element) : with_elements(generate(box), element, "box");
 }
 
 double height(const Model& model, std::size_t node) {

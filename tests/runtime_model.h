@@ -17,7 +17,7 @@ PackedGreens pack(const Eigen::MatrixXd& matrix, Precision precision);
 /// A symmetric positive definite matrix with a dominant diagonal, the same for the same seed.
 Eigen::MatrixXd random_definite(Eigen::Index order, unsigned seed);
 
-/// The unit cube of cells^3 cells (tet4) or the unit square of cells^2 (quad4 or tri3, plane stress), E = 1
+/// The unit cube of cells^3 cells (tet4, tet10 or hex8) or the unit square of cells^2 (quad4 or tri3, plane stress), E = 1
 /// Pa, nu = 0.3, clamped at the bottom (z = 0, in the plane y = 0), without loads; stored nodes in a
 /// scrambled order.
 Model unit_model(ElementType element, int cells, Scope scope, Precision precision);

@@ -28,9 +28,9 @@ TEST(Numbers, VectorsHaveTwoOrThreeParts) {
     EXPECT_FALSE(parse_vector(text)) << text;
 }
 
-TEST(Numbers, NodesAreWholeNumbersFromZero) {
-  EXPECT_EQ(parse_node("17"), 17);
-  for (const char* text : {"-1", "1.0", "x", "", "99999999999"}) EXPECT_FALSE(parse_node(text)) << text;
+TEST(Numbers, IndicesAreWholeNumbersFromZero) {
+  EXPECT_EQ(parse_index("17"), 17);
+  for (const char* text : {"-1", "1.0", "x", "", "99999999999"}) EXPECT_FALSE(parse_index(text)) << text;
 }
 
 TEST(Script, MovesInStraightLinesAndGrabsByTheRowBefore) {
@@ -52,8 +52,27 @@ TEST(Script, TakesWhatSpreadsheetsWrite) {
   const ScriptDevice device =
       ScriptDevice::parse("\xEF\xBB\xBFt, x, y, z\r\n\r\n0, 1, 2, 3\r\n1, 1, 2, 4", "touch.csv");
   EXPECT_EQ(device.end_time(), 1.0);
-  EXPECT_TRUE(device.pose(0.5).grab) << "without a column it is always set";
+  EXPECT_FALSE(device.pose(0.5).grab) << "without a column it never is set";
   EXPECT_EQ(device.pose(0.5).position.z(), 3.5);
+}
+
+// Slerp by hand: half of a quarter turn about z is an eighth turn, from whatever length it is given in.
+TEST(Script, TurnsAtConstantSpeedTheShorterWay) {
+  const ScriptDevice device = ScriptDevice::parse(
+      "t,x,y,z,qw,qx,qy,qz,grab\n0,0,0,0,5,0,0,0,1\n1,0,0,0,1e-200,0,0,1e-200,0\n"
+      "2,0,0,0,-1e308,0,0,-1e308,0\n",
+      "touch.csv");
+  const auto about_z = [](double angle) {
+    return Eigen::Quaterniond(std::cos(angle / 2), 0.0, 0.0, std::sin(angle / 2));
+  };
+  constexpr double quarter = 1.5707963267948966;
+  for (const double share : {0.0, 0.25, 0.5, 0.9, 1.0}) {
+    EXPECT_LT(device.pose(share).orientation.angularDistance(about_z(share * quarter)), 1e-12) << share;
+    EXPECT_LT(device.pose(1 + share).orientation.angularDistance(about_z(quarter)), 1e-12) << share;
+  }
+  EXPECT_EQ(device.pose(0.5).orientation.coeffs().allFinite(), true);
+  EXPECT_TRUE(device.pose(0.5).grab);
+  EXPECT_FALSE(device.pose(1.0).grab);
 }
 
 struct BadScript {
@@ -91,6 +110,9 @@ INSTANTIATE_TEST_SUITE_P(
                     BadScript{"negative_time", "t,x,y,z\n-1,0,0,0\n", "touch.csv:2", "-1"},
                     BadScript{"milliseconds", "t,x,y,z\n0,0,0,0\n1e6,0,0,0\n", "touch.csv:3",
                               "more than a day"},
+                    BadScript{"no_orientation", "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0,0,0,0,0,0\n",
+                              "touch.csv:3", "quaternion is zero"},
+                    BadScript{"half_an_orientation", "t,x,y,z,qw,qx\n0,0,0,0,1,0\n", "touch.csv:1", "header"},
                     BadScript{"half_a_grab", "t,x,y,z,grab\n0,0,0,0,0.5\n", "touch.csv:2", "0.5"}),
     [](const testing::TestParamInfo<BadScript>& bad) { return bad.param.name; });
 

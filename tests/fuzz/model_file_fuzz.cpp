@@ -65,7 +65,7 @@ void use(const Model& model) {
   require(model.material_of_element.size() == elements &&
           indices(model.material_of_element, model.materials.size()));
   for (const Material& m : model.materials)
-    require(m.youngs_modulus > 0 && m.poissons_ratio < 0.5 && m.density > 0);
+    require(m.youngs_modulus > 0 && m.poissons_ratio < 0.5 && m.density > 0 && m.friction >= 0);
   require(model.thickness > 0 && std::isfinite(model.thickness));
   for (const std::uint8_t mask : model.fixed) require(mask < (1U << d));
   require(indices(model.stored_nodes, nodes));

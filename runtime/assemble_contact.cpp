@@ -1,0 +1,187 @@
+#include "runtime/assemble_contact.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "runtime/step.h"
+
+namespace palpate {
+namespace {
+
+constexpr double closed_gap = 0.01;  // of the mean edge: a contact that may be closed
+constexpr double least_tilt_radius =
+    0.5;  // of the mean edge: a sharp tool's contact slides on its face as well
+
+/// Places of the contact's nodes in the near field.
+std::array<Index, 3> places_of(const NearField& near, const ContactPoint& contact) noexcept {
+  std::array<Index, 3> places{-1, -1, -1};
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (contact.nodes[n] >= 0) places[n] = near.place_of(contact.nodes[n]);
+  }
+  return places;
+}
+
+ContactRow contact_row(const NearField& near, const ContactPoint& contact, const Vec3& direction) noexcept {
+  ContactRow row{.places = places_of(near, contact),
+                 .body = {},
+                 .tool = contact.tool,
+                 .force = direction,
+                 .moment = contact.arm.cross(direction)};
+  for (std::size_t n = 0; n < 3; ++n) row.body[n] = contact.weights[n] * direction;
+  return row;
+}
+
+/// Radius times the slope along a tangent, as a row.
+ContactRow tilt_row(const NearField& near, const ContactPoint& contact, double radius,
+                    const Vec3& tangent) noexcept {
+  ContactRow row;
+  row.places = places_of(near, contact);
+  for (std::size_t n = 0; n < 3; ++n)
+    row.body[n] = radius * contact.slope[n].dot(tangent) * contact.frame.col(0);
+  return row;
+}
+
+/// Motion along a row of the body's surface going back to rest.
+double unloading(const NearField& near, const ContactRow& row) noexcept {
+  double motion = 0.0;
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] >= 0) motion += row.body[n].dot(near.displacement(row.places[n]));
+  }
+  return motion;
+}
+
+/// The contact of the tick before that is the same one, null when there is none.
+const ContactPoint* same_contact(const State& state, const ContactPoint& contact) noexcept {
+  const auto end = state.last_contacts.begin() + state.last_count;
+  const auto found = std::find_if(state.last_contacts.begin(), end, [&](const ContactPoint& last) {
+    return last.feature == contact.feature && last.tool == contact.tool;
+  });
+  return found == end ? nullptr : &*found;
+}
+
+void add_contact(State& state, const ContactPoint& contact, const ContactPoint* last) noexcept {
+  ContactProblem& problem = state.problem;
+  const Index first = problem.rows;
+  problem.add(contact.friction, contact.held);
+  const ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
+  Vec3 motion = device_motion(tool.pose, tool.device, contact.arm);
+  if (contact.held) motion += tool.pose.position + contact.arm - contact.position;
+  for (Index i = first; i < problem.rows; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const Vec3 direction = contact.frame.col(i - first);
+    state.rows[at] = contact_row(state.near, contact, direction);
+    problem.b[at] = direction.dot(motion) + unloading(state.near, state.rows[at]);
+    if (i == first && !contact.held) problem.b[at] += contact.gap;
+    if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
+  }
+}
+
+/// The normal force by which a contact's tilt is judged: its own in the tick before, or, of one that has just
+/// become another vertex, edge or face, the mean of its tool's.
+double normal_force(const State& state, const ContactPoint& contact, const ContactPoint* last,
+                    double closed) noexcept {
+  if (last != nullptr) return last->force.dot(last->frame.col(0));
+  if (contact.gap > closed) return 0.0;
+  double sum = 0.0;
+  double count = 0.0;
+  for (Index k = 0; k < state.last_count; ++k) {
+    const ContactPoint& other = state.last_contacts[static_cast<std::size_t>(k)];
+    const double force = other.force.dot(other.frame.col(0));
+    if (other.tool != contact.tool || other.held || force <= 0.0) continue;
+    sum += force;
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
+void add_tilt(State& state, const ContactPoint& contact, double force, double least_radius,
+              std::span<double> spring) noexcept {
+  const double radius =
+      std::max(least_radius, state.tools[static_cast<std::size_t>(contact.tool)].tool.radius);
+  const auto nodes =
+      std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
+  if (contact.held || nodes < 2 || !(force * radius > 0.0)) return;
+  const auto add = [&](const Vec3& tangent) {
+    const auto at = static_cast<std::size_t>(state.problem.rows);
+    state.problem.add_held_row();
+    state.rows[at] = tilt_row(state.near, contact, radius, tangent);
+    state.problem.b[at] = unloading(state.near, state.rows[at]);
+    spring[at] = radius / force;
+  };
+  if (nodes == 3) {
+    add(contact.frame.col(1));
+    add(contact.frame.col(2));
+  } else {
+    const auto end =
+        std::find_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
+    add(contact.slope[static_cast<std::size_t>(end - contact.nodes.begin())].normalized());
+  }
+}
+
+/// W = J Xi J^T + J_tool C_tool J_tool^T.
+void assemble_compliance(State& state) noexcept {
+  ContactProblem& problem = state.problem;
+  const int d = state.near.dimension();
+  double* __restrict y = state.row_response.data();
+  for (Index j = 0; j < problem.rows; ++j) {
+    const ContactRow& by = state.rows[static_cast<std::size_t>(j)];
+    const std::ptrdiff_t width = std::ptrdiff_t{d} * state.near.count();
+    std::fill_n(y, width, 0.0);
+    for (std::size_t n = 0; n < 3; ++n) {
+      if (by.places[n] < 0) continue;
+      for (int axis = 0; axis < d; ++axis) {
+        const double factor = by.body[n][axis];
+        const double* __restrict c = state.near.row(d * by.places[n] + axis).data();
+#pragma omp simd
+        for (std::ptrdiff_t k = 0; k < width; ++k) y[k] += factor * c[k];
+      }
+    }
+    for (Index i = j; i < problem.rows; ++i) {
+      const ContactRow& at = state.rows[static_cast<std::size_t>(i)];
+      double w = 0.0;
+      for (std::size_t n = 0; n < 3; ++n) {
+        if (at.places[n] < 0) continue;
+        const double* u = y + std::ptrdiff_t{d} * at.places[n];
+        for (int axis = 0; axis < d; ++axis) w += at.body[n][axis] * u[axis];
+      }
+      if (at.tool == by.tool && by.tool >= 0) {
+        const Tool& tool = state.tools[static_cast<std::size_t>(by.tool)].tool;
+        w += at.force.dot(by.force) / tool.coupling_stiffness +
+             at.moment.dot(by.moment) / tool.coupling_torsion;
+      }
+      problem.w(i, j) = w;
+      problem.w(j, i) = w;
+    }
+  }
+}
+
+/// Contact points that nearly coincide make W nearly singular; the rounding of Xi must not make it
+/// indefinite.
+void regularise(const Body& body, State& state, std::span<const double> spring) noexcept {
+  const double rounding = body.greens().precision() == Precision::single_precision
+                              ? double{std::numeric_limits<float>::epsilon()}
+                              : std::numeric_limits<double>::epsilon();
+  for (Index i = 0; i < state.problem.rows; ++i) {
+    double& w = state.problem.w(i, i);
+    w += 4.0 * rounding * w + state.rigid_compliance + spring[static_cast<std::size_t>(i)];
+  }
+}
+
+}  // namespace
+
+void assemble_contact(const Body& body, State& state) noexcept {
+  state.problem.clear();
+  std::fill(state.row_change.begin(), state.row_change.end(), 0.0);
+  const std::span<double> spring = state.row_change;
+  const std::span<const ContactPoint> contacts = state.contacts();
+  for (const ContactPoint& contact : contacts) add_contact(state, contact, same_contact(state, contact));
+  const double edge = body.mean_surface_edge();
+  for (const ContactPoint& contact : contacts) {
+    const double force = normal_force(state, contact, same_contact(state, contact), closed_gap * edge);
+    add_tilt(state, contact, force, least_tilt_radius * edge, spring);
+  }
+  assemble_compliance(state);
+  regularise(body, state, spring);
+}
+
+}  // namespace palpate

@@ -1,0 +1,243 @@
+// The C functions of palpate.h over the C++ step.
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <new>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "formats/model_file.h"
+#include "meshes/error.h"
+#include "runtime/body.h"
+#include "runtime/latest.h"
+#include "runtime/node_vectors.h"
+#include "runtime/palpate.h"
+#include "runtime/step.h"
+
+namespace palpate {
+namespace {
+
+constexpr bool same(int bit, StepStatus status) {
+  return static_cast<std::uint32_t>(bit) == static_cast<std::uint32_t>(status);
+}
+static_assert(same(PALPATE_NOTHING_IN_REACH, StepStatus::nothing_in_reach));
+static_assert(same(PALPATE_CAPACITY_FULL, StepStatus::capacity_full));
+static_assert(same(PALPATE_POSE_NOT_FINITE, StepStatus::pose_not_finite));
+static_assert(same(PALPATE_RESULT_NOT_FINITE, StepStatus::result_not_finite));
+static_assert(same(PALPATE_INSIDE_BODY, StepStatus::inside_body));
+static_assert(same(PALPATE_POSE_LIMITED, StepStatus::pose_limited));
+static_assert(same(PALPATE_NOT_CONVERGED, StepStatus::not_converged));
+static_assert(same(PALPATE_FORCE_LIMITED, StepStatus::force_limited));
+static_assert(same(PALPATE_HANDING_OVER, StepStatus::handing_over));
+static_assert(status_names.size() == 9 + 2, "these and the two that only HeldNodes knows");
+
+constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
+
+/// What the surface's displacement follows from.
+struct Load {
+  std::vector<Index> nodes;    // stored nodes
+  std::vector<double> forces;  // [d nodes] [N]
+
+  void take(const NearField& near) {
+    nodes.assign(near.loaded_nodes().begin(), near.loaded_nodes().end());
+    forces.assign(near.loaded_forces().begin(), near.loaded_forces().end());
+  }
+};
+
+/// With room for the load of so many contacts, so that taking it allocates nothing.
+Load roomy_load(int dimension, int contacts) {
+  const auto nodes = 3 * static_cast<std::size_t>(contacts);
+  return {std::vector<Index>(nodes), std::vector<double>(static_cast<std::size_t>(dimension) * nodes)};
+}
+
+Tool to_tool(const palpate_tool& tool) {
+  Tool result{.radius = tool.radius,
+              .length = tool.length,
+              .coupling_stiffness = tool.coupling_stiffness,
+              .coupling_torsion = tool.coupling_torsion,
+              .max_force = tool.max_force,
+              .reach = tool.reach,
+              .friction = {}};
+  if (!(tool.friction < 0.0)) result.friction = tool.friction;
+  return result;
+}
+
+ToolPose to_pose(const palpate_pose& pose) noexcept {
+  const double* q = pose.orientation;
+  return {.orientation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]),
+          .position = Eigen::Map<const Vec3>(pose.position),
+          .grab = pose.grab != 0};
+}
+
+void copy(const Vec3& vector, double* xyz) noexcept {
+  std::copy_n(vector.data(), 3, xyz);
+}
+
+void copy_text(std::string_view text, char* to, std::size_t size) noexcept {
+  if (to == nullptr || size == 0) return;
+  const std::size_t length = std::min(text.size(), size - 1);
+  std::copy_n(text.data(), length, to);
+  to[length] = '\0';
+}
+
+/// What a person is told about the exception that is being handled.
+std::string explanation() {
+  try {
+    throw;
+  } catch (const Error& error) {
+    return to_text(error);
+  } catch (const std::bad_alloc&) {
+    return "error: there is not enough memory\nhint: Close other programs, or precompute with fewer surface "
+           "nodes.\n";
+  } catch (const std::exception& error) {
+    return std::string("error: ") + error.what() + "\nhint: This should not happen; please report it.\n";
+  }
+}
+
+StateOptions read_options(const palpate_tool* tools, int tool_count, int max_contacts) {
+  if (tools == nullptr || tool_count < 1)
+    throw Error("there is no tool", "palpate_create", "give at least one");
+  if (max_contacts < 1 || max_contacts > most_contacts) {
+    throw Error("room for " + std::to_string(max_contacts) + " contacts was asked for", "palpate_create",
+                "ask for 1 to " + std::to_string(most_contacts));
+  }
+  StateOptions options{.tools = {}, .max_contacts = max_contacts};
+  for (int k = 0; k < tool_count; ++k) options.tools.push_back(to_tool(tools[k]));
+  return options;
+}
+
+}  // namespace
+}  // namespace palpate
+
+using namespace palpate;
+
+struct palpate_session {
+  palpate_session(Model model, const StateOptions& options)
+      : body(std::move(model)),
+        untouched(body, options),
+        state(untouched),
+        poses(options.tools.size()),
+        load(roomy_load(body.dimension(), options.max_contacts)),
+        displacement(static_cast<std::size_t>(body.greens().order())) {
+    show();
+  }
+
+  /// Hands what the last tick did over to the thread that draws.
+  void show() noexcept {
+    load.next().take(state.near);
+    load.publish();
+  }
+
+  Body body;
+  State untouched;
+  State state;
+  std::vector<ToolPose> poses;
+  Latest<Load> load;
+  std::vector<double> displacement;  // of the stored nodes; scratch of the thread that draws
+};
+
+extern "C" {
+
+palpate_tool palpate_default_tool() noexcept {
+  const Tool tool;
+  return {.radius = tool.radius,
+          .length = tool.length,
+          .coupling_stiffness = tool.coupling_stiffness,
+          .coupling_torsion = tool.coupling_torsion,
+          .max_force = tool.max_force,
+          .friction = -1.0,
+          .reach = tool.reach};
+}
+
+const char* palpate_status_name(uint32_t bit) noexcept {
+  for (const auto& [status, name] : status_names) {
+    if (static_cast<std::uint32_t>(status) == bit) return name;
+  }
+  return nullptr;
+}
+
+palpate_session* palpate_create(const char* file, const palpate_tool* tools, int tool_count, int max_contacts,
+                                char* error, size_t error_size) noexcept {
+  copy_text("", error, error_size);
+  try {
+    if (file == nullptr) throw Error("there is no file name", "palpate_create", "name a .palpate.hdf file");
+    const StateOptions options = read_options(tools, tool_count, max_contacts);
+    return std::make_unique<palpate_session>(load_model(file), options).release();
+  } catch (...) {
+    try {
+      copy_text(explanation(), error, error_size);
+    } catch (...) {  // no memory even for that
+    }
+    return nullptr;
+  }
+}
+
+void palpate_destroy(palpate_session* session) noexcept {
+  const std::unique_ptr<palpate_session> ended(session);
+}
+
+uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexcept {
+  if (poses == nullptr) return PALPATE_POSE_NOT_FINITE;
+  std::transform(poses, poses + session->poses.size(), session->poses.begin(), to_pose);
+  const StepStatus status = step(session->body, session->state, session->poses);
+  session->show();
+  return static_cast<uint32_t>(status);
+}
+
+void palpate_get(const palpate_session* session, int tool, palpate_result* result) noexcept {
+  *result = {};
+  if (tool < 0 || static_cast<std::size_t>(tool) >= session->state.tools.size()) return;
+  const ToolState& state = session->state.tools[static_cast<std::size_t>(tool)];
+  copy(state.wrench.force, result->force);
+  copy(state.wrench.torque, result->torque);
+  copy(state.pose.position, result->tool_position);
+  const Eigen::Quaterniond& q = state.pose.orientation;
+  result->tool_orientation[0] = q.w();
+  result->tool_orientation[1] = q.x();
+  result->tool_orientation[2] = q.y();
+  result->tool_orientation[3] = q.z();
+  result->contacts = state.contacts;
+  for (int row = 0; row < 3; ++row) copy(state.local.stiffness.row(row), result->local_stiffness + 3 * row);
+  copy(state.local.point, result->local_point);
+  result->local_radius = state.local.radius;
+}
+
+void palpate_reset(palpate_session* session) noexcept {
+  session->state = session->untouched;
+  session->show();
+}
+
+palpate_counts palpate_surface_counts(const palpate_session* session) noexcept {
+  return {.nodes = static_cast<int32_t>(session->body.surface_rest_positions().size()),
+          .simplices = static_cast<int32_t>(session->body.surface_friction().size()),
+          .corners = session->body.dimension()};
+}
+
+void palpate_surface_rest(const palpate_session* session, double* xyz) noexcept {
+  for (const Vec3& position : session->body.surface_rest_positions()) {
+    copy(position, xyz);
+    xyz += 3;
+  }
+}
+
+void palpate_surface_simplices(const palpate_session* session, int32_t* corners) noexcept {
+  std::copy(session->body.simplices().begin(), session->body.simplices().end(), corners);
+}
+
+void palpate_surface_displacement(palpate_session* session, double* xyz) noexcept {
+  const Body& body = session->body;
+  const Load& load = session->load.read();
+  const std::span<double> u(session->displacement);
+  body.greens().displacement(load.nodes, load.forces, u);
+  for (const Index stored : body.surface_stored_nodes()) {
+    copy(stored < 0 ? Vec3::Zero() : vector_at(u, body.dimension(), stored), xyz);
+    xyz += 3;
+  }
+}
+
+}  // extern "C"

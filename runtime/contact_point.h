@@ -1,0 +1,37 @@
+// Where a tool and the deformed surface can touch.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+#include "meshes/mesh.h"
+
+namespace palpate {
+
+/// A place of the surface where the tool touches or may touch within this tick. The material point of the
+/// surface is fixed during the tick: sum of weights[k] times surface node nodes[k] (Body::simplices'
+/// numbering).
+struct ContactPoint {
+  std::int64_t feature = 0;  ///< the vertex, edge or face of the surface and the place on the tool: what
+                             ///< makes a contact the same one in the next tick
+  Index tool = 0;            ///< number of the tool
+  Index simplex = -1;
+  std::array<Index, 3> nodes{-1, -1, -1};  ///< surface nodes; -1 where the weight is 0
+  std::array<double, 3> weights{};
+  Vec3 position = Vec3::Zero();  ///< of the surface there, at the beginning of the tick [m]
+  Vec3 arm = Vec3::Zero();       ///< from the tool's origin to it [m]
+  Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  ///< columns: normal, out of the body; two tangents
+  double gap = 0.0;       ///< between tool and surface along the normal, at the beginning of the tick [m]
+  double free_gap = 0.0;  ///< that of the tick's device pose and the body at rest: below 0, how deep [m]
+  double friction = 0.0;  ///< Coulomb's coefficient
+  std::array<Vec3, 3> slope{Vec3::Zero(), Vec3::Zero(),
+                            Vec3::Zero()};  ///< gradient of each weight along the edge or
+                                            ///< face; zero for a vertex [1/m]
+  bool held = false;                        ///< by a grab: bilateral, and it does not slide
+  Vec3 tool_point =
+      Vec3::Zero();           ///< held: the place in the tool's own frame that stays with the surface [m]
+  Vec3 force = Vec3::Zero();  ///< on the tool, after the tick [N]
+};
+
+}  // namespace palpate

@@ -1,0 +1,131 @@
+/* Palpate in your own loop: feel a body that palpate-precompute has baked. C99 and C++.
+ *
+ * A session is one body and the tools that touch it. All units are SI: metres, newtons, radians. For a body
+ * in the plane, z of what you give is ignored and z of what you get is 0 (of a torque, only z is not).
+ *
+ * Nothing here throws, and nothing prints. Sessions are independent of each other. Of one session, one thread
+ * at a time may use the functions of the loop, palpate_step, palpate_get and palpate_reset; while it does,
+ * one other thread at a time may use those of the surface. "Real-time safe" below means: no memory is taken,
+ * no lock, no system call, and the time is bounded. A session must not be NULL but where that is said.
+ */
+#ifndef PALPATE_H
+#define PALPATE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+#define PALPATE_NOEXCEPT noexcept
+extern "C" {
+#else
+#define PALPATE_NOEXCEPT
+#endif
+
+typedef struct palpate_session palpate_session;
+
+/* A rigid tool: all points within `radius` of its core, the segment of `length` from the tool's origin along
+ * its own z axis (in the plane: its own y axis). With length 0 it is a sphere, with radius 0 too a point. It
+ * hangs on the device by a spring, the virtual coupling, in series with the body: what the hand feels is
+ * never stiffer than that. */
+typedef struct palpate_tool {
+  double radius;             /* [m] */
+  double length;             /* [m] */
+  double coupling_stiffness; /* [N/m] the stiffest that the device can show; HUGE_VAL: no spring */
+  double coupling_torsion;   /* [N m/rad] the same for turning */
+  double max_force;          /* [N] the largest force that the hand is given; HUGE_VAL: any */
+  double friction;           /* Coulomb's coefficient; negative: that of the body's material */
+  double reach;              /* [m] a grab that touches nothing holds the nearest surface within this */
+} palpate_tool;
+
+/* A point without a coupling or limit, with the material's friction and no reach. */
+palpate_tool palpate_default_tool(void) PALPATE_NOEXCEPT;
+
+/* Where the device wants a tool. */
+typedef struct palpate_pose {
+  double position[3];    /* of the tool's origin [m] */
+  double orientation[4]; /* quaternion w, x, y, z of any length but 0; 1, 0, 0, 0 is not turned */
+  int grab;              /* not 0: hold what the tool touches until it is 0 again */
+} palpate_pose;
+
+/* What palpate_step could not do; bits, 0 when all is well. Whatever they say, the forces are finite. */
+enum {
+  PALPATE_NOTHING_IN_REACH = 1 << 0,  /* grab is set, but the tool touches nothing and nothing is in reach */
+  PALPATE_CAPACITY_FULL = 1 << 1,     /* more contacts than there is room for: the deepest are kept */
+  PALPATE_POSE_NOT_FINITE = 1 << 3,   /* a pose was ignored: the last valid one stands */
+  PALPATE_RESULT_NOT_FINITE = 1 << 4, /* the forces overflowed: the last valid ones stand */
+  PALPATE_INSIDE_BODY = 1 << 6,       /* a tool began inside the body: it feels nothing until it is out */
+  PALPATE_POSE_LIMITED = 1 << 7,      /* a pose jumped: the tool follows at a bounded speed */
+  PALPATE_NOT_CONVERGED = 1 << 8,     /* the contact forces did not reach their tolerance within the budget */
+  PALPATE_FORCE_LIMITED = 1 << 9,     /* a force was cut to max_force */
+  PALPATE_HANDING_OVER = 1 << 10      /* a force is on its way to the contact's, so as not to kick */
+};
+
+/* "capacity_full" and so on; NULL for what is not one bit of these. Real-time safe. */
+const char* palpate_status_name(uint32_t bit) PALPATE_NOEXCEPT;
+
+/* Loads a baked file (NAME.palpate.hdf) and makes a session with `tool_count` tools and room for
+ * `max_contacts` contact points of all tools together, 1 to 256 (32 suits a finger tip). Takes from a tenth
+ * of a second to seconds, and several threads for unfolding.
+ *
+ * Returns NULL where that cannot be done; `error`, unless NULL, then says why and what to do about it: a line
+ * "error: ..." and a line "hint: ...", cut to `error_size` bytes with the zero at its end. It is empty where
+ * all is well. */
+palpate_session* palpate_create(const char* file, const palpate_tool* tools, int tool_count, int max_contacts,
+                                char* error, size_t error_size) PALPATE_NOEXCEPT;
+
+/* Ends a session; NULL is ignored. */
+void palpate_destroy(palpate_session* session) PALPATE_NOEXCEPT;
+
+/* --- The loop --- */
+
+/* One tick, a millisecond later than the last: one pose for each tool, in the order of palpate_create.
+ * Returns status bits. Real-time safe. With `poses` NULL nothing happens: PALPATE_POSE_NOT_FINITE. */
+uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) PALPATE_NOEXCEPT;
+
+/* What a tool feels since the last tick. For devices that run faster, and for ticks that come late: while the
+ * device is at x, within local_radius of local_point, the force is
+ *   force - local_stiffness (x - local_point). */
+typedef struct palpate_result {
+  double force[3];            /* on the hand: what the device is to display [N] */
+  double torque[3];           /* on the hand, about the tool's origin [N m] */
+  double tool_position[3];    /* of the tool itself, which the surface keeps outside [m] */
+  double tool_orientation[4]; /* quaternion w, x, y, z, length 1 */
+  int contacts;               /* places where tool and surface press on each other */
+  double local_stiffness[9];  /* symmetric, positive semidefinite, rows one after the other [N/m] */
+  double local_point[3];      /* [m] */
+  double local_radius;        /* [m] */
+} palpate_result;
+
+/* Of tool 0, 1, ...; all zero for a number that is none. Real-time safe. */
+void palpate_get(const palpate_session* session, int tool, palpate_result* result) PALPATE_NOEXCEPT;
+
+/* To the state after palpate_create: a body that nobody has touched. Takes no memory, but too long for a
+ * tick. */
+void palpate_reset(palpate_session* session) PALPATE_NOEXCEPT;
+
+/* --- The surface, for the eye --- */
+
+typedef struct palpate_counts {
+  int32_t nodes;
+  int32_t simplices;
+  int32_t corners; /* of a simplex: 3, triangles; in the plane 2, lines */
+} palpate_counts;
+
+palpate_counts palpate_surface_counts(const palpate_session* session) PALPATE_NOEXCEPT;
+
+/* Positions of the surface nodes on the body at rest, 3 `nodes` numbers x, y, z [m]. Never changes. */
+void palpate_surface_rest(const palpate_session* session, double* xyz) PALPATE_NOEXCEPT;
+
+/* Nodes of the simplices, `corners` `simplices` numbers from 0: triangles counter-clockwise seen from
+ * outside, lines with the body on their left. Never changes. */
+void palpate_surface_simplices(const palpate_session* session, int32_t* corners) PALPATE_NOEXCEPT;
+
+/* Displacement of the surface nodes from rest in the last tick that was finished, 3 `nodes` numbers [m];
+ * exactly zero where the body is fixed. Never makes the loop wait, but takes some microseconds a contact
+ * and thousand nodes, too long for a tick: call it where you draw. */
+void palpate_surface_displacement(palpate_session* session, double* xyz) PALPATE_NOEXCEPT;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,51 @@
+// What a tick could not do.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <utility>
+
+namespace palpate {
+
+/// What a tick or a call could not do; bits, none set when all is well.
+enum class StepStatus : std::uint32_t {
+  ok = 0,
+  nothing_in_reach = 1U << 0,       ///< grab is set, the tool touches nothing and no surface is within reach
+  capacity_full = 1U << 1,          ///< there is no room for another node or contact: the deepest are kept
+  not_positive_definite = 1U << 2,  ///< the node cannot be held beside those that are
+  pose_not_finite = 1U << 3,        ///< the pose was ignored: the last valid one stands
+  result_not_finite = 1U << 4,      ///< the force overflowed: the last valid result stands
+  no_such_node = 1U << 5,           ///< not a stored node, or not a held one
+  inside_body = 1U << 6,            ///< the tool is inside the body and touches nothing until it is out
+  pose_limited = 1U << 7,           ///< the pose jumped: the tool follows at a bounded speed
+  not_converged = 1U << 8,          ///< the contact forces did not reach their tolerance within the budget
+  force_limited = 1U << 9,          ///< the force was cut to the tool's largest
+  handing_over = 1U << 10,          ///< the force is on its way to the contact's, so as not to kick
+};
+
+constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
+  return static_cast<StepStatus>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
+}
+constexpr StepStatus& operator|=(StepStatus& a, StepStatus b) noexcept {
+  return a = a | b;
+}
+constexpr bool has(StepStatus status, StepStatus bit) noexcept {
+  return (static_cast<std::uint32_t>(status) & static_cast<std::uint32_t>(bit)) != 0;
+}
+
+/// The bits and their names, for reports.
+inline constexpr std::array<std::pair<StepStatus, const char*>, 11> status_names = {{
+    {StepStatus::nothing_in_reach, "nothing_in_reach"},
+    {StepStatus::capacity_full, "capacity_full"},
+    {StepStatus::not_positive_definite, "not_positive_definite"},
+    {StepStatus::pose_not_finite, "pose_not_finite"},
+    {StepStatus::result_not_finite, "result_not_finite"},
+    {StepStatus::no_such_node, "no_such_node"},
+    {StepStatus::inside_body, "inside_body"},
+    {StepStatus::pose_limited, "pose_limited"},
+    {StepStatus::not_converged, "not_converged"},
+    {StepStatus::force_limited, "force_limited"},
+    {StepStatus::handing_over, "handing_over"},
+}};
+
+}  // namespace palpate
