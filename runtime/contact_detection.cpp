@@ -9,9 +9,10 @@
 namespace palpate {
 namespace {
 
-constexpr double same_place = 1e-4;      // of the mean edge: nearer contact points are one
-constexpr double same_direction = 1e-6;  // 1 - cos of their normals
-constexpr double deepest_inside = 0.25;  // of the mean edge: deeper, the tool is lost in the body
+constexpr double same_place = 1e-4;       // of the mean edge: nearer contact points are one
+constexpr double same_held_place = 0.05;  // of the mean edge: nearer to a held place nothing else is touched
+constexpr double same_direction = 1e-6;   // 1 - cos of their normals
+constexpr double deepest_inside = 0.25;   // of the mean edge: deeper, the tool is lost in the body
 constexpr double on_surface =
     1e-6;  // of the mean edge: nearer, the face tells the normal and not the distance
 
@@ -181,18 +182,14 @@ bool is_duplicate(const Body& body, const State& state, Index begin, const Conta
   return false;
 }
 
-/// Whether a held contact holds all that the contact touches.
-bool is_held_already(const State& state, const ContactPoint& contact) noexcept {
-  const auto holds = [&](const ContactPoint& held, Index node) {
-    return std::find(held.nodes.begin(), held.nodes.end(), node) != held.nodes.end();
-  };
-  for (Index k = 0; k < state.held_count; ++k) {
-    const ContactPoint& held = state.contact_points[static_cast<std::size_t>(k)];
-    bool all = held.tool == contact.tool;
-    for (const Index node : contact.nodes) all = all && (node < 0 || holds(held, node));
-    if (all) return true;
-  }
-  return false;
+/// Whether a held contact of the same tool is at the same place.
+bool is_held_already(const Body& body, const State& state, const ContactPoint& contact) noexcept {
+  const double near = same_held_place * body.mean_surface_edge();
+  return std::any_of(state.contact_points.begin(), state.contact_points.begin() + state.held_count,
+                     [&](const ContactPoint& held) {
+                       return held.tool == contact.tool &&
+                              (held.position - contact.position).squaredNorm() < near * near;
+                     });
 }
 
 void add_candidate(const Body& body, State& state, Index tool_number, Index begin, const TouchingPair& pair,
@@ -221,13 +218,21 @@ void add_candidate(const Body& body, State& state, Index tool_number, Index begi
       tool.tool.friction.value_or(body.surface_friction()[static_cast<std::size_t>(pair.simplex)]);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state, contact));
-  if (is_duplicate(body, state, begin, contact) || is_held_already(state, contact)) return;
+  if (is_duplicate(body, state, begin, contact) || is_held_already(body, state, contact)) return;
   state.candidates[static_cast<std::size_t>(state.candidate_count++)] = contact;
 }
 
+/// Whether the simplex carried force at the same tool in the tick or pass before.
+bool carried(const State& state, Index tool, const TouchingPair& pair) noexcept {
+  const auto begin = state.last_contacts.begin();
+  return std::any_of(begin, begin + state.last_count, [&](const ContactPoint& last) {
+    return last.tool == tool && last.simplex == pair.simplex && !last.held && last.force.squaredNorm() > 0.0;
+  });
+}
+
 /// Contact points of one tool. From outside, a simplex is touched from its outer side: those that turn their
-/// back are behind others. From a little inside (rounding, or a fast tick), the nearest ones push out along
-/// their normals.
+/// back are behind others. From a little inside (rounding, or a fast tick), the nearest ones and those that
+/// carried force push out along their normals.
 void find_candidates(const Body& body, State& state, Index tool_number, double margin) noexcept {
   ToolState& tool = state.tools[static_cast<std::size_t>(tool_number)];
   const double edge = body.mean_surface_edge();
@@ -278,7 +283,8 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
     if (is_nearest(pair)) side += pair.height;
   }
   const bool inside = side < 0.0;
-  if (inside && nearest_distance > deepest_inside * edge) {
+  const double lost = deepest_inside * edge;
+  if (inside && nearest_distance > lost) {
     tool.engaged = false;
     return;
   }
@@ -286,7 +292,10 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
   const Index begin = state.candidate_count;
   const auto touch = [&](const TouchingPair& pair) {
     if (pair.distance - tool.tool.radius > margin) return;
-    const bool face_tells = (inside && is_nearest(pair)) || pair.distance < on_surface * edge;
+    const bool pushes_out =
+        pair.height < 0.0 && ((inside && pair.distance <= 2.0 * nearest_distance) ||
+                              (carried(state, tool_number, pair) && pair.distance < lost));
+    const bool face_tells = pushes_out || pair.distance < on_surface * edge;
     if (!face_tells && pair.height < 0.0) return;
     add_candidate(body, state, tool_number, begin, pair, face_tells);
   };

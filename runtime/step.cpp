@@ -326,6 +326,12 @@ void remember_contacts(State& state) noexcept {
   state.last_count = state.contact_count;
 }
 
+/// Back to the contacts that were solved for.
+void recall_contacts(State& state) noexcept {
+  std::copy_n(state.last_contacts.begin(), state.last_count, state.contact_points.begin());
+  state.contact_count = state.last_count;
+}
+
 }  // namespace
 
 State::State(const Body& body, const StateOptions& options)
@@ -364,13 +370,18 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
 
   // A pass is a Newton step: one is enough but for contact that slips far in a tick.
   const double rough = rough_penetration * body.mean_surface_edge();
-  bool again = true;
-  bool valid = true;
-  for (int pass = 0; again && valid && pass < most_passes; ++pass) {
-    if (pass > 0) remember_contacts(state);
+  find_contacts(body, state);
+  bool again = penetration(state) > rough;
+  bool valid = solve_contact(body, state);
+  for (int pass = 1; again && valid && pass < most_passes; ++pass) {
+    remember_contacts(state);
     find_contacts(body, state);
     again = penetration(state) > rough;
-    if (pass == 0 || again) valid = solve_contact(body, state);
+    if (again) {
+      valid = solve_contact(body, state);
+    } else {
+      recall_contacts(state);
+    }
   }
   if (valid) {
     linearise(state);
