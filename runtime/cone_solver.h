@@ -18,8 +18,8 @@ namespace palpate {
 /// memory is taken at construction.
 class ConeSolver {
  public:
-  static constexpr double tolerance = 1e-8;  ///< of the residual, relative to the largest force
-  static constexpr int most_rounds = 40;
+  static constexpr double tolerance = 1e-6;  ///< of the residual, relative to the largest force
+  static constexpr int most_rounds = 60;
   static constexpr double most_work = 2e6;  ///< multiplications in the factors of the Newton steps
 
   ConeSolver(Index max_contacts, Index max_rows);

@@ -237,7 +237,9 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
   ToolState& tool = state.tools[static_cast<std::size_t>(tool_number)];
   const double edge = body.mean_surface_edge();
   const Core core = core_of(tool.tool, tool.pose, body.dimension());
-  const std::size_t count = nearest_simplices(body, state, tool, core, tool.tool.radius + margin);
+  const double lost = deepest_inside * edge;
+  const std::size_t count =
+      nearest_simplices(body, state, tool, core, std::max(tool.tool.radius + margin, lost));
 
   Index usable = 0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -283,7 +285,6 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
     if (is_nearest(pair)) side += pair.height;
   }
   const bool inside = side < 0.0;
-  const double lost = deepest_inside * edge;
   if (inside && nearest_distance > lost) {
     tool.engaged = false;
     return;
@@ -291,12 +292,11 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
 
   const Index begin = state.candidate_count;
   const auto touch = [&](const TouchingPair& pair) {
-    if (pair.distance - tool.tool.radius > margin) return;
     const bool pushes_out =
         pair.height < 0.0 && ((inside && pair.distance <= 2.0 * nearest_distance) ||
                               (carried(state, tool_number, pair) && pair.distance < lost));
     const bool face_tells = pushes_out || pair.distance < on_surface * edge;
-    if (!face_tells && pair.height < 0.0) return;
+    if (!face_tells && (pair.height < 0.0 || pair.distance - tool.tool.radius > margin)) return;
     add_candidate(body, state, tool_number, begin, pair, face_tells);
   };
   for (Index k = 0; k < usable; ++k) {

@@ -14,7 +14,7 @@ namespace palpate {
 namespace {
 
 constexpr double tree_margin = 0.1;   // of the mean edge: how much larger boxes are
-constexpr double base_margin = 0.1;   // of the mean edge: how far a surface is looked for at least
+constexpr double base_margin = 0.03;   // of the mean edge: how far a surface is looked for at least
 constexpr double most_motion = 0.25;  // of the mean edge or the radius: what a tool may move in a tick
 constexpr Index far_blocks = 1024;    // pairs of loaded and renewed nodes a tick
 constexpr Index most_far_nodes = 64;
@@ -149,10 +149,10 @@ void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wan
     wanted = between(tool.device, wanted, most / wish);
   }
   tool.device = wanted;
-  tool.margin = least + std::min(wish, most_motion * size);
+  tool.margin = least + 2.0 * std::min(wish, most_motion * size);  // tool and surface may meet
   if (tool.contacts == 0 && !tool.holding) {  // free: it is where the device was
     const double moved = motion(tool.tool, tool.pose, tool.device);
-    tool.margin = least + std::min(moved, most_motion * size);
+    tool.margin = least + 2.0 * std::min(moved, most_motion * size);
   }
 }
 

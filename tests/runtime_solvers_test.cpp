@@ -167,7 +167,14 @@ TEST_P(Cones, MeetsSignoriniAndCoulomb) {
       ++unsolved;
       continue;
     }
-    expect_contact(problem, 1e-9, 1e-5);
+    double largest_force = 0.0;
+    double largest_compliance = 0.0;
+    for (Index i = 0; i < problem.rows; ++i) {
+      largest_force = std::max(largest_force, std::abs(problem.lambda[static_cast<std::size_t>(i)]));
+      largest_compliance = std::max(largest_compliance, problem.w(i, i));
+    }
+    const double force = 1e-15 + 3.0 * ConeSolver::tolerance * largest_force;
+    expect_contact(problem, force * largest_compliance, force);
   }
   EXPECT_LE(unsolved, GetParam().friction < 1.0 ? 0 : 2)
       << "with so much friction there need not be an answer";
@@ -178,8 +185,7 @@ TEST_P(Cones, TheSolutionIsItsOwnGuessSoNothingCreeps) {
       GetParam().dimension,
       std::vector<Contact>(static_cast<std::size_t>(GetParam().contacts), {GetParam().friction, false}), 3);
   ConeSolver solver(24, 72);
-  ASSERT_TRUE(solver.solve(problem));
-  ASSERT_TRUE(solver.solve(problem));
+  for (int k = 0; k < 20; ++k) ASSERT_TRUE(solver.solve(problem));
   const std::vector<double> before = problem.lambda;
   for (int k = 0; k < 1000; ++k) ASSERT_TRUE(solver.solve(problem));
   for (std::size_t i = 0; i < static_cast<std::size_t>(problem.rows); ++i)
