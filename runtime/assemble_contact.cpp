@@ -1,6 +1,7 @@
 #include "runtime/assemble_contact.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "runtime/step.h"
@@ -23,11 +24,13 @@ std::array<Index, 3> places_of(const NearField& near, const ContactPoint& contac
 
 ContactRow contact_row(const NearField& near, const ContactPoint& contact, const Vec3& direction) noexcept {
   ContactRow row{.places = places_of(near, contact),
-                 .body = {},
+                 .body = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()},
                  .tool = contact.tool,
                  .force = direction,
                  .moment = contact.arm.cross(direction)};
-  for (std::size_t n = 0; n < 3; ++n) row.body[n] = contact.weights[n] * direction;
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] >= 0) row.body[n] = contact.weights[n] * direction;
+  }
   return row;
 }
 
@@ -36,8 +39,10 @@ ContactRow tilt_row(const NearField& near, const ContactPoint& contact, double r
                     const Vec3& tangent) noexcept {
   ContactRow row;
   row.places = places_of(near, contact);
-  for (std::size_t n = 0; n < 3; ++n)
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] < 0) continue;
     row.body[n] = radius * contact.slope[n].dot(tangent) * contact.frame.col(0);
+  }
   return row;
 }
 
@@ -118,20 +123,20 @@ void add_tilt(State& state, const ContactPoint& contact, double force, double le
   }
 }
 
-/// W = J Xi J^T + J_tool C_tool J_tool^T.
-void assemble_compliance(State& state) noexcept {
+/// W = J Xi J^T, by y = Xi J^T row by row; D is the number of dofs a node.
+template <int D>
+void assemble_body_compliance(State& state) noexcept {
   ContactProblem& problem = state.problem;
-  const int d = state.near.dimension();
   double* __restrict y = state.row_response.data();
+  const std::ptrdiff_t width = std::ptrdiff_t{D} * state.near.count();
   for (Index j = 0; j < problem.rows; ++j) {
     const ContactRow& by = state.rows[static_cast<std::size_t>(j)];
-    const std::ptrdiff_t width = std::ptrdiff_t{d} * state.near.count();
     std::fill_n(y, width, 0.0);
     for (std::size_t n = 0; n < 3; ++n) {
       if (by.places[n] < 0) continue;
-      for (int axis = 0; axis < d; ++axis) {
+      for (int axis = 0; axis < D; ++axis) {
         const double factor = by.body[n][axis];
-        const double* __restrict c = state.near.row(d * by.places[n] + axis).data();
+        const double* __restrict c = state.near.row(D * by.places[n] + axis).data();
 #pragma omp simd
         for (std::ptrdiff_t k = 0; k < width; ++k) y[k] += factor * c[k];
       }
@@ -140,17 +145,28 @@ void assemble_compliance(State& state) noexcept {
       const ContactRow& at = state.rows[static_cast<std::size_t>(i)];
       double w = 0.0;
       for (std::size_t n = 0; n < 3; ++n) {
-        if (at.places[n] < 0) continue;
-        const double* u = y + std::ptrdiff_t{d} * at.places[n];
-        for (int axis = 0; axis < d; ++axis) w += at.body[n][axis] * u[axis];
-      }
-      if (at.tool == by.tool && by.tool >= 0) {
-        const Tool& tool = state.tools[static_cast<std::size_t>(by.tool)].tool;
-        w += at.force.dot(by.force) / tool.coupling_stiffness +
-             at.moment.dot(by.moment) / tool.coupling_torsion;
+        const double* u = y + D * std::ptrdiff_t{std::max<Index>(at.places[n], 0)};
+        for (int axis = 0; axis < D; ++axis) w += at.body[n][axis] * u[axis];
       }
       problem.w(i, j) = w;
       problem.w(j, i) = w;
+    }
+  }
+}
+
+/// What the couplings give way: W += J_tool C_tool J_tool^T.
+void add_coupling_compliance(State& state) noexcept {
+  ContactProblem& problem = state.problem;
+  for (Index j = 0; j < problem.rows; ++j) {
+    const ContactRow& by = state.rows[static_cast<std::size_t>(j)];
+    if (by.tool < 0) continue;
+    const Tool& tool = state.tools[static_cast<std::size_t>(by.tool)].tool;
+    if (std::isinf(tool.coupling_stiffness) && std::isinf(tool.coupling_torsion)) continue;
+    for (Index i = 0; i < problem.rows; ++i) {
+      const ContactRow& at = state.rows[static_cast<std::size_t>(i)];
+      if (at.tool != by.tool) continue;
+      problem.w(i, j) +=
+          at.force.dot(by.force) / tool.coupling_stiffness + at.moment.dot(by.moment) / tool.coupling_torsion;
     }
   }
 }
@@ -180,7 +196,12 @@ void assemble_contact(const Body& body, State& state) noexcept {
     const double force = normal_force(state, contact, same_contact(state, contact), closed_gap * edge);
     add_tilt(state, contact, force, least_tilt_radius * edge, spring);
   }
-  assemble_compliance(state);
+  if (body.dimension() == 3) {
+    assemble_body_compliance<3>(state);
+  } else {
+    assemble_body_compliance<2>(state);
+  }
+  add_coupling_compliance(state);
   regularise(body, state, spring);
 }
 
