@@ -61,6 +61,7 @@ Tool to_tool(const palpate_tool& tool) {
               .coupling_stiffness = tool.coupling_stiffness,
               .coupling_torsion = tool.coupling_torsion,
               .max_force = tool.max_force,
+              .hand_over = tool.hand_over,
               .reach = tool.reach,
               .friction = {}};
   if (!(tool.friction < 0.0)) result.friction = tool.friction;
@@ -151,7 +152,8 @@ palpate_tool palpate_default_tool() noexcept {
           .coupling_torsion = tool.coupling_torsion,
           .max_force = tool.max_force,
           .friction = -1.0,
-          .reach = tool.reach};
+          .reach = tool.reach,
+          .hand_over = tool.hand_over};
 }
 
 const char* palpate_status_name(uint32_t bit) noexcept {

@@ -182,13 +182,18 @@ bool is_duplicate(const Body& body, const State& state, Index begin, const Conta
   return false;
 }
 
-/// Whether a held contact of the same tool is at the same place.
+/// Whether a held contact of the same tool is at the same place, or holds all that this one touches.
 bool is_held_already(const Body& body, const State& state, const ContactPoint& contact) noexcept {
   const double near = same_held_place * body.mean_surface_edge();
+  const auto holds = [](const ContactPoint& held, Index node) {
+    return node < 0 || std::find(held.nodes.begin(), held.nodes.end(), node) != held.nodes.end();
+  };
   return std::any_of(state.contact_points.begin(), state.contact_points.begin() + state.held_count,
                      [&](const ContactPoint& held) {
                        return held.tool == contact.tool &&
-                              (held.position - contact.position).squaredNorm() < near * near;
+                              ((held.position - contact.position).squaredNorm() < near * near ||
+                               std::all_of(contact.nodes.begin(), contact.nodes.end(),
+                                           [&](Index node) { return holds(held, node); }));
                      });
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,6 +35,7 @@ struct Arguments {
   std::optional<std::string> coupling;
   std::optional<std::string> coupling_torsion;
   std::optional<std::string> max_force;
+  std::optional<std::string> hand_over;
   std::optional<std::string> reach;
   std::optional<std::string> max_contacts;
   bool fast = false;
@@ -92,6 +94,11 @@ void add_tool(CLI::App& play, Arguments& arguments) {
       ->type_name("NM_PER_RAD");
   play.add_option("--max-force", arguments.max_force, "the largest force that the hand is given")
       ->type_name("N");
+  play.add_option(
+          "--hand-over", arguments.hand_over,
+          "share of the force that may change in a tick without the tool's motion explaining it: less "
+          "is smoother where contact slips; else 0.01; inf for the contact's own force")
+      ->type_name("SHARE");
   play.add_option("--reach", arguments.reach,
                   "how far from its origin a grab that touches nothing takes hold of the surface; else the "
                   "longest edge of the surface")
@@ -199,6 +206,11 @@ std::optional<double> positive_argument(const std::string& option, const std::op
   return number;
 }
 
+std::optional<double> read_hand_over(const std::optional<std::string>& text) {
+  if (text && *text == "inf") return std::numeric_limits<double>::infinity();
+  return positive_argument("--hand-over", text, "the force, or inf");
+}
+
 Tool read_tool(const Arguments& arguments) {
   Tool tool = read_shape(arguments.tool);
   if (arguments.friction) {
@@ -211,6 +223,7 @@ Tool read_tool(const Arguments& arguments) {
   tool.coupling_torsion = positive_argument("--coupling-torsion", arguments.coupling_torsion, "N m/rad")
                               .value_or(tool.coupling_torsion);
   tool.max_force = positive_argument("--max-force", arguments.max_force, "newtons").value_or(tool.max_force);
+  tool.hand_over = read_hand_over(arguments.hand_over).value_or(tool.hand_over);
   return tool;
 }
 

@@ -35,9 +35,12 @@ typedef struct palpate_tool {
   double max_force;          /* [N] the largest force that the hand is given; HUGE_VAL: any */
   double friction;           /* Coulomb's coefficient; negative: that of the body's material */
   double reach;              /* [m] a grab that touches nothing holds the nearest surface within this */
+  double hand_over;          /* share of the force that may change in a tick without the tool's motion
+                              * explaining it; HUGE_VAL: any, then contact that slips is felt as a kick */
 } palpate_tool;
 
-/* A point without a coupling or limit, with the material's friction and no reach. */
+/* A point without a coupling or limit, with the material's friction, no reach and a hand-over of
+ * 0.01. */
 palpate_tool palpate_default_tool(void) PALPATE_NOEXCEPT;
 
 /* Where the device wants a tool. */

@@ -97,9 +97,10 @@ std::string json_number(double value) {
 std::string json_tool(const Tool& tool) {
   return fmt::format(
       "{{\"radius_m\": {}, \"length_m\": {}, \"reach_m\": {}, \"friction\": {}, \"coupling_N_per_m\": {}, "
-      "\"coupling_torsion_Nm_per_rad\": {}, \"max_force_N\": {}}}",
+      "\"coupling_torsion_Nm_per_rad\": {}, \"max_force_N\": {}, \"hand_over\": {}}}",
       tool.radius, tool.length, tool.reach, tool.friction ? json_number(*tool.friction) : "null",
-      json_number(tool.coupling_stiffness), json_number(tool.coupling_torsion), json_number(tool.max_force));
+      json_number(tool.coupling_stiffness), json_number(tool.coupling_torsion), json_number(tool.max_force),
+      json_number(tool.hand_over));
 }
 
 std::string json_report(const LoopReport& report, const PlayOptions& options, const Body& body,

@@ -76,6 +76,7 @@ class CInterface : public testing::TestWithParam<const char*> {
   CInterface() {
     tools_[0].friction = 0.4;
     tools_[0].reach = 0.2;
+    tools_[0].hand_over = 0.03;
     tools_[1].length = 0.1;
     tools_[1].coupling_stiffness = 0.5 * stiffness_;
     tools_[1].coupling_torsion = 0.1 * stiffness_;
@@ -90,6 +91,7 @@ class CInterface : public testing::TestWithParam<const char*> {
                        .coupling_stiffness = tool.coupling_stiffness,
                        .coupling_torsion = tool.coupling_torsion,
                        .max_force = tool.max_force,
+                       .hand_over = tool.hand_over,
                        .reach = tool.reach,
                        .friction = {}});
     }
