@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/step.h"
+#include "runtime/state.h"
 
 namespace palpate {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "runtime/step.h"
+#include "runtime/state.h"
 
 namespace palpate {
 namespace {

@@ -1,93 +1,14 @@
 // One tick: tools in, wrenches out.
 #pragma once
 
-#include <Eigen/Core>
-#include <cstdint>
 #include <span>
-#include <vector>
 
-#include "runtime/active_set.h"
-#include "runtime/assemble_contact.h"
 #include "runtime/body.h"
-#include "runtime/cone_solver.h"
-#include "runtime/contact_detection.h"
-#include "runtime/contact_point.h"
-#include "runtime/contact_problem.h"
-#include "runtime/local_model.h"
-#include "runtime/near_field.h"
+#include "runtime/state.h"
 #include "runtime/status.h"
-#include "runtime/surface_tree.h"
 #include "runtime/tool.h"
 
 namespace palpate {
-
-/// One tool.
-struct ToolState {
-  Tool tool;
-  ToolPose
-      pose;  ///< of the tool itself, which the body keeps outside; of the device: with the coupling's stretch
-  ToolPose device;   ///< the device pose that the tick used: the last finite one, approached at bounded speed
-  Wrench contact_wrench;  ///< of the contacts on the tool, about its origin
-  Wrench wrench;     ///< on the hand, about the tool's origin: what the device is to display
-  LocalModel local;  ///< of wrench.force
-  Index contacts = 0;    ///< closed contact points
-  bool placed = false;   ///< has had a pose
-  bool engaged = false;  ///< false until it has been clear of the body once: nothing is felt before
-  bool holding = false;  ///< a grab holds the surface
-  Vec3 last_device_position = Vec3::Zero();  ///< of the tick before [m]
-  double felt = 0.0;                         ///< the force of late [N]
-  double margin = 0.0;  ///< how far the surface may be from the tool and still be met in this tick [m]
-  StepStatus status = StepStatus::ok;  ///< of the last tick
-};
-
-struct StateOptions {
-  std::vector<Tool> tools = {Tool{}};
-  Index max_contacts = 32;  ///< contact points of all tools together; beyond, the deepest are kept
-};
-
-/// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
-/// replay are copies. All memory is taken here: copying allocates, a tick does not.
-struct State {
-  /// Of a body at rest that no tool touches. Throws Error for tools without sense (a size or stiffness that
-  /// is negative or not a number), none, or no room for contacts.
-  explicit State(const Body& body, const StateOptions& options = {});
-
-  /// Contact points of the last tick, closed ones with their force.
-  [[nodiscard]] std::span<const ContactPoint> contacts() const noexcept {
-    return {contact_points.data(), static_cast<std::size_t>(contact_count)};
-  }
-
-  std::vector<ToolState> tools;
-  std::vector<ContactPoint> contact_points;  ///< [max_contacts] held ones first
-  Index contact_count = 0;
-  Index held_count = 0;  ///< of contact_points, by grabs
-  Index max_contacts;
-  StepStatus status = StepStatus::ok;  ///< of the last tick, all tools
-  std::int64_t ticks = 0;              ///< taken so far
-
-  NearField near;
-  SurfaceTree tree;
-  ContactProblem problem;
-  ActiveSet active_set;
-  ConeSolver cone_solver;
-  std::vector<ContactRow> rows;      ///< [problem.rows]
-  std::vector<double> row_response;  // [d near nodes] displacement by one row's force
-  double rigid_compliance;           ///< of what is rigid, so that rigid on rigid has an answer [m/N]
-
-  // Scratch of a tick.
-  std::size_t most_simplices;            // that a tool may look at
-  std::vector<Index> found;              // [F] simplices near a tool
-  std::vector<double> found_distance;    // [F]
-  std::vector<TouchingPair> pairs;       // [most_simplices]
-  std::vector<ContactPoint> candidates;  // before the deepest are chosen
-  Index candidate_count = 0;
-  std::vector<ContactPoint> last_contacts;  // [max_contacts] of the tick before
-  Index last_count = 0;
-  std::vector<double> row_change;        // [rows] for the local model
-  std::vector<double> force_change;      // [rows]
-  std::vector<double> far_displacement;  // [d * slice]
-  Index next_far_node = 0;               // stored node from which the far field is renewed next
-};
 
 /// One tick for each tool's pose (as many as the state has tools). The tool is pushed out of the deformed
 /// surface, exactly: gaps >= 0, normal forces >= 0, one of them zero, with Coulomb friction where the surface

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -143,7 +144,7 @@ class RecordedLoop : public Loop {
   ~RecordedLoop() override { std::filesystem::remove_all(folder_); }
 
   const std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) / "palpate_runtime_recordings";
+      std::filesystem::path(testing::TempDir()) / ("palpate_recordings." + std::to_string(getpid()));
 };
 
 // 70 s: more ticks than the recorder's ring holds.

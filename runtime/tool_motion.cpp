@@ -1,0 +1,97 @@
+#include "runtime/tool_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/state.h"
+
+namespace palpate {
+namespace {
+
+constexpr double base_margin = 0.03;  // of the mean edge: how far a surface is looked for at least
+constexpr double most_motion = 0.25;  // of the mean edge or the radius: what a tool may move in a tick
+
+bool make_valid(ToolPose& pose, int dimension) noexcept {
+  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) return false;
+  if (dimension == 2) {
+    pose.position.z() = 0.0;
+    pose.orientation.x() = 0.0;
+    pose.orientation.y() = 0.0;
+  }
+  const double norm = pose.orientation.coeffs().stableNorm();
+  if (!(norm > 1e-6)) return false;
+  pose.orientation.coeffs() /= norm;
+  return std::isfinite(norm);
+}
+
+/// How far a tool's points move at most from one pose to another.
+double motion(const Tool& tool, const ToolPose& from, const ToolPose& to) noexcept {
+  const double turned =
+      tool.length > 0.0 || tool.radius > 0.0 ? from.orientation.angularDistance(to.orientation) : 0.0;
+  return (to.position - from.position).norm() + turned * (tool.length + tool.radius);
+}
+
+ToolPose between(const ToolPose& from, const ToolPose& to, double share) noexcept {
+  return {.orientation = from.orientation.slerp(share, to.orientation),
+          .position = from.position + share * (to.position - from.position),
+          .grab = to.grab};
+}
+
+}  // namespace
+
+void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wanted) noexcept {
+  tool.last_device_position = tool.device.position;
+  if (!make_valid(wanted, body.dimension())) {
+    tool.status |= StepStatus::pose_not_finite;
+    wanted = tool.device;
+    if (!tool.placed) return;
+  }
+  const double size = std::max(body.mean_surface_edge(), tool.tool.radius);
+  const double least = base_margin * body.mean_surface_edge();
+  const auto place = [&] {
+    if (!tool.placed) tool.last_device_position = wanted.position;
+    tool.pose = tool.device = wanted;
+    tool.margin = least;
+    tool.placed = true;
+  };
+  if (!tool.placed || !tool.engaged) {
+    place();
+    tool.engaged = is_clear(body, state, tool.tool, wanted);
+    if (!tool.engaged) tool.status |= StepStatus::inside_body;
+    return;
+  }
+
+  const double wish = motion(tool.tool, tool.device, wanted);
+  double most = most_motion * size;
+  if (wish > most && tool.contacts == 0 && !tool.holding) {
+    const double free = std::sqrt(state.tree.nearest(tool.device.position).nearest.squared_distance) -
+                        tool.tool.radius - tool.tool.length - least;
+    most = std::max(most, free);
+    if (wish <= free) return place();
+  }
+  if (wish > most) {
+    tool.status |= StepStatus::pose_limited;
+    wanted = between(tool.device, wanted, most / wish);
+  }
+  tool.device = wanted;
+  tool.margin = least + 2.0 * std::min(wish, most_motion * size);  // tool and surface may meet
+  if (tool.contacts == 0 && !tool.holding) {                       // free: it is where the device was
+    const double moved = motion(tool.tool, tool.pose, tool.device);
+    tool.margin = least + 2.0 * std::min(moved, most_motion * size);
+  }
+}
+
+void move_tools(const Body& body, State& state) noexcept {
+  for (ToolState& tool : state.tools) {
+    ToolPose pose = tool.device;
+    pose.position += tool.contact_wrench.force / tool.tool.coupling_stiffness;
+    const Vec3 turn = tool.contact_wrench.torque / tool.tool.coupling_torsion;
+    const double angle = turn.norm();
+    if (angle > 0.0) pose.orientation = Eigen::AngleAxisd(angle, turn / angle) * pose.orientation;
+    const double most = most_motion * std::max(body.mean_surface_edge(), tool.tool.radius) + tool.margin;
+    const double moved = motion(tool.tool, tool.pose, pose);
+    tool.pose = moved > most ? between(tool.pose, pose, most / moved) : pose;
+  }
+}
+
+}  // namespace palpate
