@@ -13,20 +13,18 @@ constexpr double memory = 0.98;  // of the force that was felt, a tick: the meas
 void hand_over(ToolState& tool) noexcept {
   const Wrench last = tool.wrench;
   const Wrench& contact = tool.contact_wrench;
-  tool.felt = std::max(contact.force.norm(), memory * tool.felt);
-  const Vec3 explained =
-      last.force - tool.local.stiffness * (tool.device.position - tool.last_device_position);
-  const Vec3 rest = contact.force - explained;
-  const double most = tool.contacts > 0
-                          ? tool.tool.hand_over * std::max(contact.force.norm(), last.force.norm())
-                          : std::max(tool.tool.hand_over, 1.0 / fade_ticks) * tool.felt;
-  const double size = rest.norm();
-  if (!(size > most)) {
+  const double size = contact.force.norm();
+  tool.felt = std::max(size, memory * tool.felt);
+  const double explained = (tool.local.stiffness * (tool.device.position - tool.last_device_position)).norm();
+  const double handed_over = tool.contacts > 0 ? tool.tool.hand_over * std::max(size, last.force.norm())
+                                               : std::max(tool.tool.hand_over, 1.0 / fade_ticks) * tool.felt;
+  const double change = (contact.force - last.force).norm();
+  if (!(change > explained + handed_over)) {
     tool.wrench = contact;
     return;
   }
-  const double share = most / size;
-  tool.wrench.force = explained + share * rest;
+  const double share = (explained + handed_over) / change;
+  tool.wrench.force = last.force + share * (contact.force - last.force);
   tool.wrench.torque = last.torque + share * (contact.torque - last.torque);
   tool.status |= StepStatus::handing_over;
 }

@@ -5,10 +5,11 @@ namespace palpate {
 
 struct ToolState;
 
-/// Sets tool.wrench from tool.contact_wrench and the local model of it. What the device's own motion explains
-/// (the local stiffness times how far it moved) goes through at once; what else changes, contact that slips
-/// from one piece of surface to another, is handed over by at most `hand_over` of the force a tick, and in
-/// `fade_ticks` where contact was lost: no kick. Then the tool's largest force is kept to. Sets status bits.
+/// Sets tool.wrench from tool.contact_wrench and the local model of it: straight towards the contact's
+/// wrench, by no more a tick than the device's own motion explains (the local stiffness times how far it
+/// moved) plus a share `hand_over` of the force. Contact that slips from one piece of surface to another is
+/// so handed over without a kick; where contact is lost, the force fades in 20 ticks. Then the tool's largest
+/// force is kept to. Sets status bits.
 void give_force(ToolState& tool) noexcept;
 
 }  // namespace palpate

@@ -97,7 +97,7 @@ void add_tool(CLI::App& play, Arguments& arguments) {
   play.add_option(
           "--hand-over", arguments.hand_over,
           "share of the force that may change in a tick without the tool's motion explaining it: less "
-          "is smoother where contact slips; else 0.01; inf for the contact's own force")
+          "is smoother where contact slips; else 0.005; inf for the contact's own force")
       ->type_name("SHARE");
   play.add_option("--reach", arguments.reach,
                   "how far from its origin a grab that touches nothing takes hold of the surface; else the "

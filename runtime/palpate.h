@@ -40,7 +40,7 @@ typedef struct palpate_tool {
 } palpate_tool;
 
 /* A point without a coupling or limit, with the material's friction, no reach and a hand-over of
- * 0.01. */
+ * 0.005. */
 palpate_tool palpate_default_tool(void) PALPATE_NOEXCEPT;
 
 /* Where the device wants a tool. */
