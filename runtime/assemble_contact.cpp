@@ -172,14 +172,23 @@ void add_coupling_compliance(State& state) noexcept {
 }
 
 /// Contact points that nearly coincide make W nearly singular; the rounding of Xi must not make it
-/// indefinite.
+/// indefinite. What that gives way along a tangent it gives from the force of the tick before: friction that
+/// sticks would creep by it in every tick.
 void regularise(const Body& body, State& state, std::span<const double> spring) noexcept {
   const double rounding = body.greens().precision() == Precision::single_precision
                               ? double{std::numeric_limits<float>::epsilon()}
                               : std::numeric_limits<double>::epsilon();
-  for (Index i = 0; i < state.problem.rows; ++i) {
-    double& w = state.problem.w(i, i);
-    w += 4.0 * rounding * w + state.rigid_compliance + spring[static_cast<std::size_t>(i)];
+  ContactProblem& problem = state.problem;
+  for (Index k = 0; k < problem.contacts; ++k) {
+    const Index first = problem.first_row(k);
+    for (Index i = first; i < first + problem.rows_of(k); ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      double& w = problem.w(i, i);
+      const double give = 4.0 * rounding * w + state.rigid_compliance;
+      w += give + spring[row];
+      if (i > first && problem.held[static_cast<std::size_t>(k)] == 0)
+        problem.b[row] -= give * problem.lambda[row];
+    }
   }
 }
 

@@ -86,12 +86,13 @@ Body::Body(Model model, const GreensOptions& options)
     const Index material = model_.material_of_element[static_cast<std::size_t>(element)];
     surface_friction_.push_back(model_.materials[static_cast<std::size_t>(material)].friction);
   }
-  measure_edges();
+  measure_surface();
   const std::size_t padded = (surface_.size() + search_block - 1) / search_block * search_block;
   for (std::vector<double>* coordinate : {&x_, &y_, &z_}) coordinate->resize(padded, infinity);
 }
 
-void Body::measure_edges() {
+void Body::measure_surface() {
+  for (const Vec3& position : surface_rest_) bounds_.extend(position);
   const auto corners = static_cast<std::size_t>(dimension());
   double sum = 0.0;
   for (std::size_t simplex = 0; simplex < simplices_.size(); simplex += corners) {

@@ -1,6 +1,7 @@
 // A loaded body, ready to be touched.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <span>
 #include <vector>
 
@@ -58,6 +59,9 @@ class Body {
   /// Mean length of the edges of the surface at rest [m].
   [[nodiscard]] double mean_surface_edge() const noexcept { return mean_surface_edge_; }
 
+  /// Box around the surface at rest [m].
+  [[nodiscard]] const Eigen::AlignedBox3d& bounds() const noexcept { return bounds_; }
+
   /// The surface that a tool meets, with its own numbering of the nodes on it, held ones too:
   /// [F * d] surface nodes of its simplices (triangles, in the plane lines), outward as in Model::surface.
   [[nodiscard]] std::span<const Index> simplices() const noexcept { return simplices_; }
@@ -75,7 +79,7 @@ class Body {
   [[nodiscard]] std::span<const double> surface_friction() const noexcept { return surface_friction_; }
 
  private:
-  void measure_edges();
+  void measure_surface();
 
   Model model_;
   Greens greens_;
@@ -84,6 +88,7 @@ class Body {
   std::vector<double> x_, y_, z_;      // [those, padded to whole blocks with infinity] rest positions
   double longest_surface_edge_ = 0.0;
   double mean_surface_edge_ = 0.0;
+  Eigen::AlignedBox3d bounds_;
   std::vector<Index> simplices_;               // [F * d]
   std::vector<Index> surface_mesh_nodes_;      // [S]
   std::vector<Index> surface_stored_nodes_;    // [S]

@@ -9,6 +9,8 @@ namespace palpate {
 namespace {
 
 constexpr int fewest_rounds = 4;
+constexpr int sweeps = 3;
+constexpr int local_rounds = 3;  // of a sweep at a contact
 constexpr int plain_rounds = 5;
 constexpr int spring_rounds = 12;
 // Springs of the proximal steps, of w_ii, and how much weaker the next ones are: of 250 problems of a sphere
@@ -126,7 +128,6 @@ double ConeSolver::residual(const ContactProblem& problem) const noexcept {
 
 /// Each contact in turn takes the forces that suit it, the others being as they are.
 void ConeSolver::sweep(ContactProblem& problem) noexcept {
-  constexpr int local_rounds = 3;
   for (Index k = 0; k < problem.contacts; ++k) {
     const Index first = problem.first_row(k);
     const Index count = problem.rows_of(k);
@@ -327,13 +328,14 @@ bool ConeSolver::iterate(ContactProblem& problem, int rounds) noexcept {
     std::copy_n(problem.lambda.begin(), problem.rows, from_.begin());
     const bool stepped = newton_step(problem);
     ++rounds_;
-    work_ += std::pow(unknowns_, 3) / 3.0;
+    work_ += std::pow(unknowns_, 3) / 3.0 + 2.0 * std::pow(problem.rows, 2);
     if (stepped && residual(problem) <= tolerance * largest_force(problem)) return true;
     if (stepped && search_along_step(problem, now)) continue;
     // Newton may run in circles between sets of closed contacts: sweeps from where it would go, at times from
     // here.
     start_from(problem, stepped && round % 5 != 4 ? newton_ : from_);
-    for (int k = 0; k < 3; ++k) sweep(problem);
+    for (int k = 0; k < sweeps; ++k) sweep(problem);
+    work_ += (3.0 * sweeps + 4.0) * std::pow(problem.rows, 2) * local_rounds;
     now = residual(problem);
   }
   if (best < now) start_from(problem, best_);

@@ -14,7 +14,7 @@ void hand_over(ToolState& tool) noexcept {
   const Wrench last = tool.wrench;
   const Wrench& contact = tool.contact_wrench;
   const double size = contact.force.norm();
-  tool.felt = std::max(size, memory * tool.felt);
+  tool.felt = std::max({size, last.force.norm(), memory * tool.felt});
   const double explained = (tool.local.stiffness * (tool.device.position - tool.last_device_position)).norm();
   const double handed_over = tool.contacts > 0 ? tool.tool.hand_over * std::max(size, last.force.norm())
                                                : std::max(tool.tool.hand_over, 1.0 / fade_ticks) * tool.felt;

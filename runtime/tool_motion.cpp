@@ -10,9 +10,10 @@ namespace {
 
 constexpr double base_margin = 0.03;  // of the mean edge: how far a surface is looked for at least
 constexpr double most_motion = 0.25;  // of the mean edge or the radius: what a tool may move in a tick
+constexpr double farthest = 1e100;    // that is a place [m]: squares of distances are numbers
 
 bool make_valid(ToolPose& pose, int dimension) noexcept {
-  if (!pose.position.allFinite() || !pose.orientation.coeffs().allFinite()) return false;
+  if (!(pose.position.stableNorm() < farthest) || !pose.orientation.coeffs().allFinite()) return false;
   if (dimension == 2) {
     pose.position.z() = 0.0;
     pose.orientation.x() = 0.0;
@@ -37,6 +38,13 @@ ToolPose between(const ToolPose& from, const ToolPose& to, double share) noexcep
           .grab = to.grab};
 }
 
+/// Farther from the resting body than the body is large, whatever the tool is caught in: a fold of the
+/// surface, or behind the body on a soft spring.
+bool has_gone_away(const Body& body, const ToolState& tool) noexcept {
+  const double distance = body.bounds().exteriorDistance(tool.device.position);
+  return !tool.holding && distance > tool.tool.radius + tool.tool.length + body.bounds().diagonal().norm();
+}
+
 }  // namespace
 
 void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wanted) noexcept {
@@ -54,7 +62,8 @@ void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wan
     tool.margin = least;
     tool.placed = true;
   };
-  if (!tool.placed || !tool.engaged) {
+  const bool caught = tool.contacts > 0 && has_gone_away(body, tool);
+  if (!tool.placed || (!tool.engaged && !tool.holding) || caught) {
     place();
     tool.engaged = is_clear(body, state, tool.tool, wanted);
     if (!tool.engaged) tool.status |= StepStatus::inside_body;

@@ -2,9 +2,12 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "meshes/element.h"
@@ -74,10 +77,10 @@ Eigen::MatrixXd random_definite(Eigen::Index order, unsigned seed) {
   return A;
 }
 
-Model unit_model(ElementType element, int cells, Scope scope, Precision precision) {
+Model bake(Mesh mesh, const std::function<bool(const Vec3&)>& clamped, Scope scope, Precision precision) {
   Model model;
   model.name = "box";
-  model.mesh = unit_mesh(element, cells);
+  model.mesh = std::move(mesh);
   const int d = model.dimension();
   model.analysis = d == 3 ? Analysis::solid : Analysis::plane_stress;
   model.materials = {{.youngs_modulus = 1.0, .poissons_ratio = 0.3, .density = 1000.0}};
@@ -92,9 +95,9 @@ Model unit_model(ElementType element, int cells, Scope scope, Precision precisio
   const auto all_axes = static_cast<std::uint8_t>((1U << d) - 1U);
   std::vector<Index> free;
   for (Index node = 0; node < static_cast<Index>(model.mesh.nodes.size()); ++node) {
-    const bool clamped = height(model, static_cast<std::size_t>(node)) < 1e-12;
-    model.fixed.push_back(clamped ? all_axes : std::uint8_t{0});
-    if (clamped) continue;
+    const bool held = clamped(model.mesh.nodes[static_cast<std::size_t>(node)]);
+    model.fixed.push_back(held ? all_axes : std::uint8_t{0});
+    if (held) continue;
     free.push_back(node);
     if (scope == Scope::full || std::binary_search(surface.nodes.begin(), surface.nodes.end(), node)) {
       model.stored_nodes.push_back(node);
@@ -115,8 +118,31 @@ Model unit_model(ElementType element, int cells, Scope scope, Precision precisio
   return model;
 }
 
+Model unit_model(ElementType element, int cells, Scope scope, Precision precision) {
+  const int up = traits(element).dimension - 1;
+  return bake(
+      unit_mesh(element, cells), [up](const Vec3& node) { return node[up] < 1e-12; }, scope, precision);
+}
+
 Model unit_model(int dimension, int cells, Scope scope, Precision precision) {
   return unit_model(dimension == 2 ? ElementType::quad4 : ElementType::tet4, cells, scope, precision);
+}
+
+Model round_model(int dimension) {
+  if (dimension == 3) {
+    Mesh mesh = generate(CylinderShape{.cells_across = 8, .cells_along = 4});
+    return bake(
+        std::move(mesh), [](const Vec3& node) { return std::abs(node.z() - 0.5) > 0.5 - 1e-12; },
+        Scope::surface, Precision::double_precision);
+  }
+  Mesh mesh = generate(RectangleShape{.cells = {16, 4}});
+  for (Vec3& node : mesh.nodes) {
+    const double angle = std::numbers::pi * (1.0 - node.x());
+    node = 0.5 * (1.0 + node.y()) * Vec3(std::cos(angle), std::sin(angle), 0.0);
+  }
+  return bake(
+      std::move(mesh), [](const Vec3& node) { return node.norm() < 0.5 + 1e-12; }, Scope::surface,
+      Precision::double_precision);
 }
 
 Vec3 upright(int dimension, double x, double y, double z) {

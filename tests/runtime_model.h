@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 
 #include "formats/model.h"
 
@@ -17,13 +18,20 @@ PackedGreens pack(const Eigen::MatrixXd& matrix, Precision precision);
 /// A symmetric positive definite matrix with a dominant diagonal, the same for the same seed.
 Eigen::MatrixXd random_definite(Eigen::Index order, unsigned seed);
 
-/// The unit cube of cells^3 cells (tet4, tet10 or hex8) or the unit square of cells^2 (quad4 or tri3, plane stress), E = 1
-/// Pa, nu = 0.3, clamped at the bottom (z = 0, in the plane y = 0), without loads; stored nodes in a
-/// scrambled order.
+/// A body of one material, E = 1 Pa, nu = 0.3, in the plane in plane stress, clamped where `clamped` says so,
+/// without loads; stored nodes in a scrambled order.
+Model bake(Mesh mesh, const std::function<bool(const Vec3&)>& clamped, Scope scope, Precision precision);
+
+/// The unit cube of cells^3 cells (tet4, tet10 or hex8) or the unit square of cells^2 (quad4 or tri3),
+/// clamped at the bottom (z = 0, in the plane y = 0).
 Model unit_model(ElementType element, int cells, Scope scope, Precision precision);
 
 /// That of tet4 or, with two dimensions, of quad4.
 Model unit_model(int dimension, int cells, Scope scope, Precision precision);
+
+/// A cylinder along z of radius 1 and height 1, held at both ends; in the plane half a ring of radii 1/2 and
+/// 1 over the x axis, clamped along the inner one. The round side has edges of about 0.2.
+Model round_model(int dimension);
 
 /// (x, y, z) in space, (x, z) in the plane: z is the height over the clamped side.
 Vec3 upright(int dimension, double x, double y, double z);
