@@ -141,8 +141,8 @@ INSTANTIATE_TEST_SUITE_P(Spheres, ComesToRest, testing::ValuesIn([] {
                            }
                            return cases;
                          }()),
-                         [](const testing::TestParamInfo<RestCase>& info) {
-                           const RestCase& c = info.param;
+                         [](const testing::TestParamInfo<RestCase>& tested) {
+                           const RestCase& c = tested.param;
                            return "Radius" + std::to_string(static_cast<int>(10.0 * c.radius)) + "Friction" +
                                   std::to_string(static_cast<int>(10.0 * c.friction)) +
                                   (c.dimension == 2 ? "InThePlane" : "");
