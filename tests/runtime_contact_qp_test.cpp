@@ -9,8 +9,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -114,9 +112,14 @@ Eigen::VectorXd solve_complementarity(const Eigen::MatrixXd& W, const Eigen::Vec
   return Eigen::VectorXd::Zero(b.size());
 }
 
+struct Closed {
+  double lambda;
+  Constraint constraint;
+};
+
 struct Solution {
   Eigen::VectorXd u;                 // [dN]
-  std::map<Feature, double> lambda;  // of closed constraints
+  std::map<Feature, Closed> closed;  // constraints that carry force
 };
 
 /// u of min u^T K u / 2 under the constraints, linear about `now`. Rows that turn out violated come in one
@@ -131,7 +134,7 @@ Solution solve_quadratic_program(const WholeMesh& mesh, const Constraints& const
     closed.push_back(is_closed);
   };
   for (auto row = constraints.begin(); row != constraints.end(); ++row) {
-    const bool was_closed = now.lambda.count(row->first) > 0;
+    const bool was_closed = now.closed.count(row->first) > 0;
     if (was_closed || row->second.gap < 0.0) take(row, was_closed);
   }
   for (;;) {
@@ -145,10 +148,11 @@ Solution solve_quadratic_program(const WholeMesh& mesh, const Constraints& const
       for (Eigen::Index j = 0; j < n; ++j) W(i, j) = value(row, responses[static_cast<std::size_t>(j)]);
     }
     const Eigen::VectorXd lambda = solve_complementarity(W, b, closed);
-    Solution solution{.u = Eigen::VectorXd::Zero(mesh.dofs()), .lambda = {}};
+    Solution solution{.u = Eigen::VectorXd::Zero(mesh.dofs()), .closed = {}};
     for (Eigen::Index i = 0; i < n; ++i) {
       solution.u += lambda[i] * responses[static_cast<std::size_t>(i)];
-      if (lambda[i] > 0.0) solution.lambda[rows[static_cast<std::size_t>(i)]->first] = lambda[i];
+      const auto& [feature, constraint] = *rows[static_cast<std::size_t>(i)];
+      if (lambda[i] > 0.0) solution.closed[feature] = {lambda[i], constraint};
     }
     const Eigen::VectorXd change = solution.u - now.u;
     const std::size_t before = rows.size();
@@ -162,49 +166,55 @@ Solution solve_quadratic_program(const WholeMesh& mesh, const Constraints& const
 }
 
 struct Pair {
-  Eigen::VectorXd weights;  // of the corners
-  Vec3 on_core;
-  Vec3 on_piece;
+  Eigen::VectorXd weights;  // of the piece's corners
+  Vec3 on_core = Vec3::Zero();
+  Vec3 on_piece = Vec3::Zero();
   double distance = infinity;
 };
 
-/// Where the hulls of a few points are nearest: the nearest pair of the planes through each choice of them,
-/// of those that lie within the hulls the nearest. The fewest points where several choices are as near.
+std::vector<Eigen::Index> chosen(unsigned choice) {
+  std::vector<Eigen::Index> points;
+  for (Eigen::Index k = 0; choice >> k != 0; ++k) {
+    if ((choice >> k & 1U) != 0) points.push_back(k);
+  }
+  return points;
+}
+
+/// Where the hulls of a few points are nearest: the nearest places of the planes through each choice of
+/// points, of those that lie within the hulls the nearest. The fewest points where choices are as near.
 Pair nearest(const std::vector<Vec3>& core, const std::vector<Vec3>& piece) {
+  const auto at = [](const std::vector<Vec3>& points, Eigen::Index k) {
+    return points[static_cast<std::size_t>(k)];
+  };
   Pair best;
-  for (unsigned choice = 1; choice < 1U << core.size(); ++choice) {
+  for (unsigned of_core = 1; of_core < 1U << core.size(); ++of_core) {
     for (unsigned of_piece = 1; of_piece < 1U << piece.size(); ++of_piece) {
-      std::vector<std::size_t> c;
-      std::vector<std::size_t> p;
-      for (std::size_t k = 0; k < core.size(); ++k) {
-        if ((choice >> k & 1U) != 0) c.push_back(k);
-      }
-      for (std::size_t k = 0; k < piece.size(); ++k) {
-        if ((of_piece >> k & 1U) != 0) p.push_back(k);
-      }
-      const auto from_core = static_cast<Eigen::Index>(c.size()) - 1;
-      const auto unknowns = from_core + static_cast<Eigen::Index>(p.size()) - 1;
-      Eigen::MatrixXd along(3, unknowns);
-      for (std::size_t k = 1; k < c.size(); ++k)
-        along.col(static_cast<Eigen::Index>(k) - 1) = core[c[k]] - core[c[0]];
-      for (std::size_t k = 1; k < p.size(); ++k)
-        along.col(from_core + static_cast<Eigen::Index>(k) - 1) = piece[p[0]] - piece[p[k]];
-      Eigen::VectorXd x = along.transpose() * Eigen::VectorXd(piece[p[0]] - core[c[0]]);
-      if (unknowns > 0) x = Eigen::MatrixXd(along.transpose() * along).ldlt().solve(x);
-      Pair pair{.weights = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(piece.size())),
-                .on_core = core[c[0]],
-                .on_piece = Vec3::Zero()};
-      double least = 1.0 - x.head(from_core).sum();
-      for (Eigen::Index k = 0; k < from_core; ++k) pair.on_core += x[k] * along.col(k);
-      pair.weights[static_cast<Eigen::Index>(p[0])] = 1.0 - x.tail(unknowns - from_core).sum();
-      for (Eigen::Index k = from_core; k < unknowns; ++k)
-        pair.weights[static_cast<Eigen::Index>(p[static_cast<std::size_t>(k - from_core) + 1])] = x[k];
-      for (std::size_t k = 0; k < piece.size(); ++k)
-        pair.on_piece += pair.weights[static_cast<Eigen::Index>(k)] * piece[k];
-      if (unknowns > 0) least = std::min(least, x.minCoeff());
-      least = std::min(least, pair.weights.minCoeff());
+      const std::vector<Eigen::Index> c = chosen(of_core);
+      const std::vector<Eigen::Index> p = chosen(of_piece);
+      const Eigen::VectorXd across = at(piece, p[0]) - at(core, c[0]);
+      Eigen::MatrixXd along(3, std::ssize(c) + std::ssize(p) - 2);
+      Eigen::Index column = 0;
+      for (std::size_t k = 1; k < c.size(); ++k) along.col(column++) = at(core, c[k]) - at(core, c[0]);
+      for (std::size_t k = 1; k < p.size(); ++k) along.col(column++) = at(piece, p[0]) - at(piece, p[k]);
+      Eigen::VectorXd x;
+      if (column > 0)
+        x = Eigen::MatrixXd(along.transpose() * along)
+                .ldlt()
+                .solve(Eigen::VectorXd(along.transpose() * across));
+
+      Eigen::VectorXd of_corner = Eigen::VectorXd::Zero(std::ssize(core));
+      Pair pair;
+      pair.weights = Eigen::VectorXd::Zero(std::ssize(piece));
+      of_corner[c[0]] = 1.0;
+      pair.weights[p[0]] = 1.0;
+      column = 0;
+      for (std::size_t k = 1; k < c.size(); ++k) of_corner[c[0]] -= of_corner[c[k]] = x[column++];
+      for (std::size_t k = 1; k < p.size(); ++k) pair.weights[p[0]] -= pair.weights[p[k]] = x[column++];
+      if (std::min(of_corner.minCoeff(), pair.weights.minCoeff()) < 0.0) continue;
+      for (const Eigen::Index k : c) pair.on_core += of_corner[k] * at(core, k);
+      for (const Eigen::Index k : p) pair.on_piece += pair.weights[k] * at(piece, k);
       pair.distance = (pair.on_core - pair.on_piece).norm();
-      if (least >= 0.0 && pair.distance < best.distance - 1e-14) best = pair;
+      if (pair.distance < best.distance - 1e-14) best = pair;
     }
   }
   return best;
@@ -271,7 +281,7 @@ Constraints constraints_at(const Model& model, const std::vector<Press>& presses
 /// The contact on the deformed surface: quadratic programs about the last displacement until nothing changes.
 /// Triangles tilt, which the linear gap does not know: only a share of each change is taken.
 Solution solve_whole_mesh(const Model& model, const WholeMesh& mesh, const std::vector<Press>& presses) {
-  Solution now{.u = Eigen::VectorXd::Zero(mesh.dofs()), .lambda = {}};
+  Solution now{.u = Eigen::VectorXd::Zero(mesh.dofs()), .closed = {}};
   double share = 0.5;
   double last_change = infinity;
   for (int iteration = 0; iteration < 300; ++iteration) {
@@ -281,19 +291,17 @@ Solution solve_whole_mesh(const Model& model, const WholeMesh& mesh, const std::
     if (change > last_change) share *= 0.8;
     last_change = change;
     now.u += share * (next.u - now.u);
-    now.lambda = std::move(next.lambda);
+    now.closed = std::move(next.closed);
   }
   ADD_FAILURE() << "the whole mesh does not come to rest";
   return now;
 }
 
-std::vector<Wrench> wrenches(const Model& model, const std::vector<Press>& presses,
-                             const Solution& solution) {
+std::vector<Wrench> wrenches(const std::vector<Press>& presses, const Solution& solution) {
   std::vector<Wrench> total(presses.size());
-  const Constraints constraints = constraints_at(model, presses, solution.u);
-  for (const auto& [feature, lambda] : solution.lambda) {
-    const Constraint& row = constraints.at(feature);
-    const Vec3 force = lambda * row.direction;
+  for (const auto& [feature, closed] : solution.closed) {
+    const Constraint& row = closed.constraint;
+    const Vec3 force = closed.lambda * row.direction;
     total[row.tool].force += force;
     total[row.tool].torque += (row.position - presses[row.tool].pose.position).cross(force);
   }
@@ -357,17 +365,17 @@ TEST_P(FlatPunch, GivesTheSamePressures) {
 
   const WholeMesh mesh(model);
   const Solution direct =
-      solve_quadratic_program(mesh, constraints, {.u = Eigen::VectorXd::Zero(mesh.dofs()), .lambda = {}});
-  EXPECT_EQ(std::ssize(direct.lambda) == n, all_touches);
+      solve_quadratic_program(mesh, constraints, {.u = Eigen::VectorXd::Zero(mesh.dofs()), .closed = {}});
+  EXPECT_EQ(std::ssize(direct.closed) == n, all_touches);
   double force = 0.0;
   double expected_force = 0.0;
   double largest = 0.0;
-  for (const auto& [feature, lambda] : direct.lambda) largest = std::max(largest, lambda);
+  for (const auto& [feature, closed] : direct.closed) largest = std::max(largest, closed.lambda);
   std::vector<double> f(under.size() * static_cast<std::size_t>(d));
   for (Index i = 0; i < n; ++i) {
     const double lambda = problem.lambda[static_cast<std::size_t>(i)];
-    const auto found = direct.lambda.find({{0, 0}, {i}});
-    const double expected = found == direct.lambda.end() ? 0.0 : found->second;
+    const auto found = direct.closed.find({{0, 0}, {i}});
+    const double expected = found == direct.closed.end() ? 0.0 : found->second.lambda;
     EXPECT_NEAR(lambda, expected, 1e-6 * largest);
     force += lambda;
     expected_force += expected;
@@ -426,8 +434,8 @@ TEST_P(WholeMeshContact, GivesTheSameForcesAndDisplacements) {
 
   const WholeMesh mesh(model);
   const Solution direct = solve_whole_mesh(model, mesh, contact.presses);
-  EXPECT_GE(std::ssize(direct.lambda), contact.least_contacts);
-  const std::vector<Wrench> expected = wrenches(model, contact.presses, direct);
+  EXPECT_GE(std::ssize(direct.closed), contact.least_contacts);
+  const std::vector<Wrench> expected = wrenches(contact.presses, direct);
   for (std::size_t k = 0; k < tools.size(); ++k) {
     const Wrench& wrench = state.tools[k].contact_wrench;
     const double scale = expected[k].force.norm();

@@ -194,7 +194,7 @@ INSTANTIATE_TEST_SUITE_P(
                     LocalCase{"Held", 3, 0.0, true}, LocalCase{"FrictionlessInThePlane", 2, 0.0, false},
                     LocalCase{"StickingInThePlane", 2, 5.0, false},
                     LocalCase{"HeldInThePlane", 2, 0.0, true}),
-    [](const testing::TestParamInfo<LocalCase>& info) { return std::string(info.param.name); });
+    [](const testing::TestParamInfo<LocalCase>& tested) { return std::string(tested.param.name); });
 
 // The model leaves out that normals turn as the tool moves: without friction to hold it, a share of depth /
 // radius of the stiffness is the sideways one of the pressed surface.

@@ -222,7 +222,7 @@ class Walk : public testing::TestWithParam<WalkCase> {
   std::vector<double> u_ = std::vector<double>(static_cast<std::size_t>(body_.greens().order()));
 };
 INSTANTIATE_TEST_SUITE_P(Tools, Walk, testing::ValuesIn(walk_cases()),
-                         [](const testing::TestParamInfo<WalkCase>& info) { return info.param.name; });
+                         [](const testing::TestParamInfo<WalkCase>& tested) { return tested.param.name; });
 
 TEST_P(Walk, NothingBreaksAndTheStateRecovers) {
   const int rounds = 10;
