@@ -30,7 +30,7 @@ void hand_over(ToolState& tool) noexcept {
 }
 
 void limit(ToolState& tool) noexcept {
-  const double force = tool.wrench.force.stableNorm();
+  const double force = tool.wrench.force.norm();
   if (!(force > tool.tool.max_force)) return;
   const double share = tool.tool.max_force / force;
   tool.wrench.force *= share;

@@ -12,17 +12,19 @@ constexpr double base_margin = 0.03;  // of the mean edge: how far a surface is 
 constexpr double most_motion = 0.25;  // of the mean edge or the radius: what a tool may move in a tick
 constexpr double farthest = 1e100;    // that is a place [m]: squares of distances are numbers
 
+/// Not with Eigen's stableNorm, whose last bits depend on where in memory a vector lies.
 bool make_valid(ToolPose& pose, int dimension) noexcept {
-  if (!(pose.position.stableNorm() < farthest) || !pose.orientation.coeffs().allFinite()) return false;
+  if (!(pose.position.array().abs() < farthest).all() || !pose.orientation.coeffs().allFinite()) return false;
   if (dimension == 2) {
     pose.position.z() = 0.0;
     pose.orientation.x() = 0.0;
     pose.orientation.y() = 0.0;
   }
-  const double norm = pose.orientation.coeffs().stableNorm();
-  if (!(norm > 1e-6)) return false;
-  pose.orientation.coeffs() /= norm;
-  return std::isfinite(norm);
+  const double largest = pose.orientation.coeffs().cwiseAbs().maxCoeff();
+  if (!(largest > 1e-6)) return false;
+  pose.orientation.coeffs() /= largest;
+  pose.orientation.normalize();
+  return true;
 }
 
 /// How far a tool's points move at most from one pose to another.
