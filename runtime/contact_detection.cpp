@@ -52,6 +52,29 @@ NearestPoint nearest_to_core(const SurfaceTree& tree, const std::array<Index, 3>
                       : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
 }
 
+/// Of a tool's core and a corner of a simplex.
+NearestPoint nearest_to_corner(const SurfaceTree& tree, const std::array<Index, 3>& nodes, std::size_t corner,
+                               const Core& core) noexcept {
+  NearestPoint result;
+  result.weights[corner] = 1.0;
+  result.on_simplex = tree.position(nodes[corner]);
+  result.on_core = nearest_on_line(result.on_simplex, core.origin, core.end).on_simplex;
+  result.squared_distance = (result.on_core - result.on_simplex).squaredNorm();
+  return result;
+}
+
+/// Of a tool's core and the edge of a triangle between two of its corners.
+NearestPoint nearest_to_edge(const SurfaceTree& tree, const std::array<Index, 3>& nodes, std::size_t from,
+                             std::size_t to, const Core& core) noexcept {
+  NearestPoint result =
+      nearest_of_segments(core.origin, core.end, tree.position(nodes[from]), tree.position(nodes[to]));
+  const std::array<double, 3> weights = result.weights;
+  result.weights = {};
+  result.weights[from] = weights[0];
+  result.weights[to] = weights[1];
+  return result;
+}
+
 NearestPoint nearest(const SurfaceTree& tree, const std::array<Index, 3>& nodes, const Core& core,
                      bool is_point) noexcept {
   return is_point ? nearest_on_simplex(tree, nodes, core.origin) : nearest_to_core(tree, nodes, core);
@@ -256,29 +279,25 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
     state.found[static_cast<std::size_t>(usable++)] = simplex;
   }
 
-  const auto pair_of = [&](Index simplex, int place) {
-    const std::array<Index, 3> nodes = nodes_of(body, simplex);
-    TouchingPair pair;
-    pair.simplex = simplex;
-    pair.place = place;
-    pair.normal = outward_normal(state.tree, nodes);
-    if (place == 2) {
-      pair.nearest = nearest_to_core(state.tree, nodes, core);
-    } else {
-      const Vec3& end = place == 0 ? core.origin : core.end;
-      pair.nearest = nearest_on_simplex(state.tree, nodes, end);
-      pair.nearest.on_core = end;
-    }
-    const Vec3 across = pair.nearest.on_core - pair.nearest.on_simplex;
+  const auto make_pair = [&](Index simplex, int place, const NearestPoint& nearest) {
+    TouchingPair pair{.simplex = simplex, .place = place, .nearest = nearest};
+    pair.normal = outward_normal(state.tree, nodes_of(body, simplex));
+    const Vec3 across = nearest.on_core - nearest.on_simplex;
     pair.height = across.dot(pair.normal);
     pair.distance = across.norm();
     return pair;
+  };
+  const auto pair_of_end = [&](Index simplex, int place) {
+    const Vec3& end = place == 0 ? core.origin : core.end;
+    NearestPoint nearest = nearest_on_simplex(state.tree, nodes_of(body, simplex), end);
+    nearest.on_core = end;
+    return make_pair(simplex, place, nearest);
   };
 
   double nearest_distance = std::numeric_limits<double>::infinity();
   for (Index k = 0; k < usable; ++k) {
     TouchingPair& pair = state.pairs[static_cast<std::size_t>(k)];
-    pair = pair_of(state.found[static_cast<std::size_t>(k)], 0);
+    pair = pair_of_end(state.found[static_cast<std::size_t>(k)], 0);
     nearest_distance = std::min(nearest_distance, pair.distance);
   }
   const auto is_nearest = [&](const TouchingPair& pair) {
@@ -304,11 +323,29 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
     if (!face_tells && (pair.height < 0.0 || pair.distance - tool.tool.radius > margin)) return;
     add_candidate(body, state, tool_number, begin, pair, face_tells);
   };
+  // On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
+  // now at the other: all corners under it are contact points, and under a segment the edges.
+  const bool is_segment = tool.tool.length > 0.0;
+  const auto touch_corners = [&](Index simplex) {
+    const std::array<Index, 3> nodes = nodes_of(body, simplex);
+    const std::size_t corners = nodes[2] < 0 ? 2 : 3;
+    for (std::size_t n = 0; n < corners; ++n) {
+      touch(make_pair(simplex, is_segment ? 2 : 0, nearest_to_corner(state.tree, nodes, n, core)));
+      if (is_segment && corners == 3)
+        touch(make_pair(simplex, 2, nearest_to_edge(state.tree, nodes, n, (n + 1) % 3, core)));
+    }
+  };
   for (Index k = 0; k < usable; ++k) {
-    touch(state.pairs[static_cast<std::size_t>(k)]);
-    if (tool.tool.length == 0.0) continue;
-    touch(pair_of(state.found[static_cast<std::size_t>(k)], 1));
-    touch(pair_of(state.found[static_cast<std::size_t>(k)], 2));
+    const Index simplex = state.found[static_cast<std::size_t>(k)];
+    TouchingPair pair = state.pairs[static_cast<std::size_t>(k)];
+    touch(pair);
+    if (is_segment) {
+      touch(pair_of_end(simplex, 1));
+      pair = make_pair(simplex, 2, nearest_to_core(state.tree, nodes_of(body, simplex), core));
+      touch(pair);
+    }
+    if ((is_segment || tool.tool.radius > edge) && pair.distance - tool.tool.radius <= margin)
+      touch_corners(simplex);
   }
 }
 

@@ -31,8 +31,9 @@ Core core_of(const Tool& tool, const ToolPose& pose, int dimension) noexcept;
 Vec3 device_motion(const ToolPose& from, const ToolPose& to, const Vec3& arm) noexcept;
 
 /// Fills state.contact_points: held ones first, then for each engaged tool the nearest points of the surface
-/// within the tool's margin, of each triangle (line) and core end or nearest pair one, without duplicates,
-/// the deepest where there are more than max_contacts. Nodes of all contacts are in state.near.
+/// within the tool's margin, of each triangle (line) and core end one, of a segment and a large sphere also
+/// those of corners and of a segment those of edges, without duplicates, the deepest where there are more
+/// than max_contacts. Nodes of all contacts are in state.near.
 void find_contacts(const Body& body, State& state) noexcept;
 
 /// Whether a tool is clear of the body at a pose: its origin outside, nothing nearer to its core than its

@@ -21,6 +21,7 @@ NearField::NearField(const Body& body, Index capacity)
       wanted_(static_cast<std::size_t>(capacity), 0),
       C_(static_cast<std::size_t>(stride_ * dimension_ * capacity)),
       force_(static_cast<std::size_t>(dimension_ * capacity)),
+      last_force_(force_.size()),
       displacement_(force_.size()),
       blocks_(static_cast<std::size_t>(dimension_) * force_.size()),
       loaded_(static_cast<std::size_t>(capacity), -1),
@@ -114,7 +115,13 @@ void NearField::forget(Index place) noexcept {
 }
 
 void NearField::unload() noexcept {
+  std::copy_n(force_.begin(), dimension_ * count_, last_force_.begin());
   std::fill_n(force_.begin(), dimension_ * count_, 0.0);
+}
+
+void NearField::retreat(double share) noexcept {
+  for (std::size_t dof = 0; dof < static_cast<std::size_t>(dimension_ * count_); ++dof)
+    force_[dof] = last_force_[dof] + share * (force_[dof] - last_force_[dof]);
 }
 
 void NearField::load(Index place, const Vec3& force) noexcept {

@@ -40,6 +40,8 @@ class NearField {
 
   /// Takes all forces off.
   void unload() noexcept;
+  /// Only a share of what the forces changed by since `unload`.
+  void retreat(double share) noexcept;
   /// Adds to the force on the body at a place [N].
   void load(Index place, const Vec3& force) noexcept;
   /// u = C f: the displacement of all nodes here by the forces. Also lists the loaded nodes.
@@ -73,6 +75,7 @@ class NearField {
   std::vector<std::int64_t> wanted_;  // [capacity] tick in which each was wanted last
   std::vector<double> C_;             // [d capacity x stride]
   std::vector<double> force_;         // [d capacity]
+  std::vector<double> last_force_;    // [d capacity] before `unload`
   std::vector<double> displacement_;  // [d capacity]
   std::vector<double> blocks_;        // [d x d capacity] block row of a node that comes
   std::vector<Index> loaded_;         // [capacity]

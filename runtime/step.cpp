@@ -17,6 +17,8 @@ namespace {
 constexpr Index far_blocks = 1024;           // pairs of loaded and renewed nodes a tick
 constexpr double rough_penetration = 0.002;  // of the mean edge: more calls for another pass
 constexpr int most_passes = 3;
+constexpr double most_motion =
+    0.25;  // of the mean edge and what the tools may move: of the surface in a pass
 constexpr double largest_number = 1e100;  // that is a force
 
 bool is_finite(const ContactProblem& problem) noexcept {
@@ -28,6 +30,7 @@ bool is_finite(const ContactProblem& problem) noexcept {
 void apply_forces(State& state) noexcept {
   state.near.unload();
   for (ToolState& tool : state.tools) {
+    tool.last_contact_wrench = tool.contact_wrench;
     tool.contact_wrench = {};
     tool.contacts = 0;
   }
@@ -51,6 +54,31 @@ void apply_forces(State& state) noexcept {
     ++tool.contacts;
     tool.contact_wrench.force += contact.force;
     tool.contact_wrench.torque += contact.arm.cross(contact.force);
+  }
+}
+
+/// A point that slides over the edge of a fold throws the surface from one side of it to the other, and back
+/// in the next tick. Where forces would take the near surface farther than in a step of Newton's method that
+/// can be trusted, only a share of their change is made.
+void retreat_from_leaps(const Body& body, State& state) noexcept {
+  if (state.near.loaded_nodes().empty()) return;
+  double farthest = 0.0;
+  for (Index place = 0; place < state.near.count(); ++place) {
+    const Index node = state.near.node(place);
+    const Vec3 to =
+        body.surface_rest_positions()[static_cast<std::size_t>(node)] + state.near.displacement(place);
+    farthest = std::max(farthest, (to - state.tree.position(node)).norm());
+  }
+  double most = most_motion * body.mean_surface_edge();
+  for (const ToolState& tool : state.tools) most += tool.margin;
+  if (!(farthest > most)) return;
+  const double share = most / farthest;
+  state.near.retreat(share);
+  state.near.displace();
+  for (ToolState& tool : state.tools) {
+    const Wrench& last = tool.last_contact_wrench;
+    tool.contact_wrench.force = last.force + share * (tool.contact_wrench.force - last.force);
+    tool.contact_wrench.torque = last.torque + share * (tool.contact_wrench.torque - last.torque);
   }
 }
 
@@ -103,6 +131,7 @@ bool solve_contact(const Body& body, State& state) noexcept {
     return false;
   }
   apply_forces(state);
+  retreat_from_leaps(body, state);
   move_tools(body, state);
   move_near_surface(body, state);
   return true;
