@@ -370,6 +370,17 @@ void update_held(const Body& body, State& state) noexcept {
   state.held_count = kept;
 }
 
+/// Whether no simplex is within a distance of a tool's core, nor cut by it.
+bool keeps_distance(const Body& body, State& state, const Tool& tool, const Core& core,
+                    double distance) noexcept {
+  const std::size_t count = state.tree.near_segment(core.origin, core.end, distance, state.found);
+  return std::all_of(
+      state.found.begin(), state.found.begin() + static_cast<std::ptrdiff_t>(count), [&](Index simplex) {
+        const NearestPoint pair = nearest(state.tree, nodes_of(body, simplex), core, tool.length == 0.0);
+        return pair.squared_distance > 0.0 && pair.squared_distance >= distance * distance;
+      });
+}
+
 }  // namespace
 
 Core core_of(const Tool& tool, const ToolPose& pose, int dimension) noexcept {
@@ -404,17 +415,18 @@ void find_contacts(const Body& body, State& state) noexcept {
   state.contact_count = state.held_count + state.candidate_count;
 }
 
+bool is_outside(const Body& body, State& state, const Tool& tool, const ToolPose& pose) noexcept {
+  const Core core = core_of(tool, pose, body.dimension());
+  return !state.tree.inside(core.origin) &&
+         (tool.length == 0.0 ||
+          (!state.tree.inside(core.end) && keeps_distance(body, state, tool, core, 0.0)));
+}
+
 bool is_clear(const Body& body, State& state, const Tool& tool, const ToolPose& pose) noexcept {
   const Core core = core_of(tool, pose, body.dimension());
-  if (state.tree.inside(core.origin) || (tool.length > 0.0 && state.tree.inside(core.end))) return false;
   const double radius = tool.radius - on_surface * body.mean_surface_edge();
-  if (radius <= 0.0) return true;
-  const std::size_t count = state.tree.near_segment(core.origin, core.end, radius, state.found);
-  for (std::size_t k = 0; k < count; ++k) {
-    const NearestPoint pair = nearest(state.tree, nodes_of(body, state.found[k]), core, tool.length == 0.0);
-    if (pair.squared_distance < radius * radius) return false;
-  }
-  return true;
+  return is_outside(body, state, tool, pose) &&
+         (radius <= 0.0 || keeps_distance(body, state, tool, core, radius));
 }
 
 }  // namespace palpate

@@ -36,8 +36,10 @@ Vec3 device_motion(const ToolPose& from, const ToolPose& to, const Vec3& arm) no
 /// than max_contacts. Nodes of all contacts are in state.near.
 void find_contacts(const Body& body, State& state) noexcept;
 
-/// Whether a tool is clear of the body at a pose: its origin outside, nothing nearer to its core than its
-/// radius.
+/// Whether a tool's core is outside of the body at a pose.
+bool is_outside(const Body& body, State& state, const Tool& tool, const ToolPose& pose) noexcept;
+
+/// Whether a tool is clear of the body at a pose: its core outside, nothing nearer to it than its radius.
 bool is_clear(const Body& body, State& state, const Tool& tool, const ToolPose& pose) noexcept;
 
 }  // namespace palpate

@@ -59,7 +59,7 @@ void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wan
   const double size = std::max(body.mean_surface_edge(), tool.tool.radius);
   const double least = base_margin * body.mean_surface_edge();
   const auto place = [&] {
-    if (!tool.placed) tool.last_device_position = wanted.position;
+    tool.last_device_position = wanted.position;  // nothing that is felt now comes from a motion
     tool.pose = tool.device = wanted;
     tool.margin = least;
     tool.placed = true;
@@ -67,7 +67,9 @@ void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wan
   const bool caught = tool.contacts > 0 && has_gone_away(body, tool);
   if (!tool.placed || (!tool.engaged && !tool.holding) || caught) {
     place();
-    tool.engaged = is_clear(body, state, tool.tool, wanted);
+    tool.engaged = tool.has_been_clear ? is_outside(body, state, tool.tool, wanted)
+                                       : is_clear(body, state, tool.tool, wanted);
+    tool.has_been_clear = tool.has_been_clear || tool.engaged;
     if (!tool.engaged) tool.status |= StepStatus::inside_body;
     return;
   }

@@ -168,6 +168,31 @@ TEST_P(Touch, BeginsToFeelOnlyOnceItHasBeenOutside) {
   EXPECT_GT(tool().wrench.force.norm(), 0.0);
 }
 
+// One that has been lost (here by hand) need not be taken away first, only out.
+TEST_P(Touch, OneLostInTheBodyIsFeltAgainWithoutAKick) {
+  State state(body_, {.tools = {{.radius = 0.1}}});
+  const ToolPose pressed = pose(at(0.5, 0.5, 1.07));
+  step(body_, state, pose(at(0.5, 0.5, 1.2)));
+  for (int k = 0; k < 300; ++k) step(body_, state, pressed);
+  const double force = state.tools[0].wrench.force.norm();
+  EXPECT_GT(force, 0.0);
+
+  state.tools[0].engaged = false;
+  for (int k = 0; k < 300; ++k)
+    EXPECT_TRUE(has(step(body_, state, pose(at(0.5, 0.5, 0.9))), StepStatus::inside_body));
+  EXPECT_EQ(state.tools[0].wrench.force, Vec3::Zero());
+  State anew(body_, {.tools = {{.radius = 0.1}}});
+  double last = 0.0;
+  for (int k = 0; k < 300; ++k) {
+    EXPECT_FALSE(has(step(body_, state, pressed), StepStatus::inside_body));
+    EXPECT_TRUE(has(step(body_, anew, pressed), StepStatus::inside_body)) << "never been clear";
+    const double now = state.tools[0].wrench.force.norm();
+    EXPECT_LE(now - last, 0.0051 * force);
+    last = now;
+  }
+  EXPECT_NEAR(last, force, 1e-9 * force);
+}
+
 // Free space is crossed at once; a body in the way is met however far the device jumps.
 TEST_P(Touch, ATeleportDoesNotPassThroughTheBody) {
   go(at(0.5, 0.5, 3.0));
