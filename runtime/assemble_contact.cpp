@@ -99,8 +99,9 @@ double normal_force(const State& state, const ContactPoint& contact, const Conta
   return count > 0.0 ? sum / count : 0.0;
 }
 
-void add_tilt(State& state, const ContactPoint& contact, double force, double least_radius,
+void add_tilt(State& state, Index number, double force, double least_radius,
               std::span<double> spring) noexcept {
+  const ContactPoint& contact = state.contact_points[static_cast<std::size_t>(number)];
   const double radius =
       std::max(least_radius, state.tools[static_cast<std::size_t>(contact.tool)].tool.radius);
   const auto nodes =
@@ -108,7 +109,7 @@ void add_tilt(State& state, const ContactPoint& contact, double force, double le
   if (contact.held || nodes < 2 || !(force * radius > 0.0)) return;
   const auto add = [&](const Vec3& tangent) {
     const auto at = static_cast<std::size_t>(state.problem.rows);
-    state.problem.add_held_row();
+    state.problem.add_held_row(number);
     state.rows[at] = tilt_row(state.near, contact, radius, tangent);
     state.problem.b[at] = unloading(state.near, state.rows[at]);
     spring[at] = radius / force;
@@ -201,9 +202,10 @@ void assemble_contact(const Body& body, State& state) noexcept {
   const std::span<const ContactPoint> contacts = state.contacts();
   for (const ContactPoint& contact : contacts) add_contact(state, contact, same_contact(state, contact));
   const double edge = body.mean_surface_edge();
-  for (const ContactPoint& contact : contacts) {
+  for (Index k = 0; k < state.contact_count; ++k) {
+    const ContactPoint& contact = contacts[static_cast<std::size_t>(k)];
     const double force = normal_force(state, contact, same_contact(state, contact), closed_gap * edge);
-    add_tilt(state, contact, force, least_tilt_radius * edge, spring);
+    add_tilt(state, k, force, least_tilt_radius * edge, spring);
   }
   if (body.dimension() == 3) {
     assemble_body_compliance<3>(state);

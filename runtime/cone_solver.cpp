@@ -57,7 +57,10 @@ Tangential tangential(const double* rows, Index count) noexcept {
 
 }  // namespace
 
-ConeSolver::ConeSolver(Index max_contacts, Index max_rows) : stride_((std::ptrdiff_t{max_rows} + 7) / 8 * 8) {
+ConeSolver::ConeSolver(Index max_contacts, Index max_rows)
+    : part_(3, max_contacts, max_rows), stride_((std::ptrdiff_t{max_rows} + 7) / 8 * 8) {
+  in_part_.resize(static_cast<std::size_t>(max_contacts));
+  row_.resize(static_cast<std::size_t>(max_rows));
   const auto rows = static_cast<std::size_t>(max_rows);
   motion_.resize(rows);
   weight_.resize(rows);
@@ -329,7 +332,7 @@ bool ConeSolver::iterate(ContactProblem& problem, int rounds) noexcept {
     const bool stepped = newton_step(problem);
     ++rounds_;
     work_ += std::pow(unknowns_, 3) / 3.0 + 2.0 * std::pow(problem.rows, 2);
-    if (stepped && residual(problem) <= tolerance * largest_force(problem)) return true;
+    if (stepped && is_good_enough(problem, tolerance)) return true;
     if (stepped && search_along_step(problem, now)) continue;
     // Newton may run in circles between sets of closed contacts: sweeps from where it would go, at times from
     // here.
@@ -360,22 +363,102 @@ void ConeSolver::remove_springs(ContactProblem& problem) noexcept {
   }
 }
 
+bool ConeSolver::is_good_enough(const ContactProblem& problem, double share) const noexcept {
+  return residual(problem) <= share * largest_force(problem);
+}
+
+/// Of the part that is solved for, from lambda.
+bool ConeSolver::solve_part() noexcept {
+  std::copy_n(part_.lambda.begin(), part_.rows, guess_.begin());
+  if (iterate(part_, plain_rounds)) return true;
+
+  start_from(part_, guess_);
+  for (double share = first_share; !budget_spent(); share *= next_share) {
+    add_springs(part_, share);
+    iterate(part_, spring_rounds);
+    remove_springs(part_);
+    scale_rows(part_);
+    find_motion(part_);
+    if (is_good_enough(part_, tolerance)) return true;
+  }
+  return is_good_enough(part_, accepted);
+}
+
+/// The held contacts and those that the guess closes.
+void ConeSolver::choose_part(const ContactProblem& problem) noexcept {
+  for (Index k = 0; k < problem.contacts; ++k) {
+    const auto contact = static_cast<std::size_t>(k);
+    const Index owner = problem.owner[contact];
+    in_part_[contact] = owner >= 0 ? in_part_[static_cast<std::size_t>(owner)]
+                                   : problem.held[contact] != 0 ||
+                                         problem.lambda[static_cast<std::size_t>(problem.first_row(k))] > 0.0;
+  }
+}
+
+void ConeSolver::gather_part(const ContactProblem& problem) noexcept {
+  part_.clear();
+  part_.dimension = problem.dimension;
+  for (Index k = 0; k < problem.contacts; ++k) {
+    const auto contact = static_cast<std::size_t>(k);
+    if (in_part_[contact] == 0) continue;
+    const Index begin = part_.rows;
+    if (problem.held[contact] != 0 && problem.rows_of(k) == 1) {
+      part_.add_held_row(-1);
+    } else {
+      part_.add(problem.friction[contact], problem.held[contact] != 0);
+    }
+    for (Index i = begin; i < part_.rows; ++i)
+      row_[static_cast<std::size_t>(i)] = problem.first_row(k) + i - begin;
+  }
+  for (Index i = 0; i < part_.rows; ++i) {
+    const auto row = static_cast<std::size_t>(row_[static_cast<std::size_t>(i)]);
+    const double* w = problem.row(static_cast<Index>(row));
+    for (Index j = 0; j < part_.rows; ++j) part_.w(i, j) = w[row_[static_cast<std::size_t>(j)]];
+    part_.b[static_cast<std::size_t>(i)] = problem.b[row];
+    part_.lambda[static_cast<std::size_t>(i)] = problem.lambda[row];
+  }
+}
+
+void ConeSolver::spread_part(ContactProblem& problem) const noexcept {
+  std::fill_n(problem.lambda.begin(), problem.rows, 0.0);
+  for (Index i = 0; i < part_.rows; ++i)
+    problem.lambda[static_cast<std::size_t>(row_[static_cast<std::size_t>(i)])] =
+        part_.lambda[static_cast<std::size_t>(i)];
+}
+
+/// Takes in the contacts that were left out and are penetrated. True when there are any.
+bool ConeSolver::take_in_penetrated(const ContactProblem& problem) noexcept {
+  const double least = accepted * largest_force(part_);
+  bool any = false;
+  for (Index k = 0; k < problem.contacts; ++k) {
+    const auto contact = static_cast<std::size_t>(k);
+    if (problem.owner[contact] >= 0) {
+      in_part_[contact] = in_part_[static_cast<std::size_t>(problem.owner[contact])];
+    }
+    if (in_part_[contact] != 0 || problem.owner[contact] >= 0) continue;
+    const Index row = problem.first_row(k);
+    const double* w = problem.row(row);
+    double gap = problem.b[static_cast<std::size_t>(row)];
+    for (Index i = 0; i < part_.rows; ++i)
+      gap += w[row_[static_cast<std::size_t>(i)]] * part_.lambda[static_cast<std::size_t>(i)];
+    if (-gap <= least * problem.w(row, row)) continue;
+    in_part_[contact] = 1;
+    any = true;
+  }
+  return any;
+}
+
 bool ConeSolver::solve(ContactProblem& problem) noexcept {
   rounds_ = 0;
   work_ = 0.0;
-  std::copy_n(problem.lambda.begin(), problem.rows, guess_.begin());
-  if (iterate(problem, plain_rounds)) return true;
-
-  start_from(problem, guess_);
-  for (double share = first_share; !budget_spent(); share *= next_share) {
-    add_springs(problem, share);
-    iterate(problem, spring_rounds);
-    remove_springs(problem);
-    scale_rows(problem);
-    find_motion(problem);
-    if (residual(problem) <= tolerance * largest_force(problem)) return true;
+  choose_part(problem);
+  for (;;) {
+    gather_part(problem);
+    const bool solved = solve_part();
+    spread_part(problem);
+    if (!take_in_penetrated(problem)) return solved;
+    if (budget_spent()) return false;
   }
-  return false;
 }
 
 bool ConeSolver::budget_spent() const noexcept {
@@ -384,30 +467,34 @@ bool ConeSolver::budget_spent() const noexcept {
 
 void ConeSolver::derivative(const ContactProblem& problem, std::span<const double> db,
                             std::span<double> dlambda) noexcept {
+  const auto db_of = [&](Index row) {
+    return db[static_cast<std::size_t>(row_[static_cast<std::size_t>(row)])];
+  };
   std::fill_n(dlambda.begin(), problem.rows, 0.0);
   Index next = 0;
-  for (Index k = 0; k < problem.contacts; ++k) {
+  for (Index k = 0; k < part_.contacts; ++k) {
     const auto contact = static_cast<std::size_t>(k);
     if (mode_[contact] == Mode::open) continue;
-    const Index first = problem.first_row(k);
-    const Index count = problem.rows_of(k);
+    const Index first = part_.first_row(k);
+    const Index count = part_.rows_of(k);
     for (Index i = 0; i < count; ++i) {
-      double value = db[static_cast<std::size_t>(first + i)];
+      double value = db_of(first + i);
       if (mode_[contact] == Mode::slip && i > 0) {
         value = 0.0;
         for (Index j = 1; j < count; ++j) {
           const double across = (i == j ? 1.0 : 0.0) - direction_[static_cast<std::size_t>(first + i)] *
                                                            direction_[static_cast<std::size_t>(first + j)];
-          value += share_[contact] * across * db[static_cast<std::size_t>(first + j)];
+          value += share_[contact] * across * db_of(first + j);
         }
       }
       x_[static_cast<std::size_t>(next++)] = -value;
     }
   }
   solve_jacobian();
-  for (Index j = 0; j < unknowns_; ++j)
-    dlambda[static_cast<std::size_t>(unknown_[static_cast<std::size_t>(j)])] =
-        x_[static_cast<std::size_t>(j)];
+  for (Index j = 0; j < unknowns_; ++j) {
+    const auto row = static_cast<std::size_t>(unknown_[static_cast<std::size_t>(j)]);
+    dlambda[static_cast<std::size_t>(row_[row])] = x_[static_cast<std::size_t>(j)];
+  }
 }
 
 }  // namespace palpate

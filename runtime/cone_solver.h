@@ -19,6 +19,7 @@ namespace palpate {
 class ConeSolver {
  public:
   static constexpr double tolerance = 1e-6;  ///< of the residual, relative to the largest force
+  static constexpr double accepted = 1e-4;   ///< where `tolerance` is not met
   static constexpr int most_rounds = 60;
   static constexpr double most_work = 2e6;  ///< multiplications, some 0.2 ms
 
@@ -52,12 +53,22 @@ class ConeSolver {
   void add_springs(ContactProblem& problem, double share) noexcept;
   void remove_springs(ContactProblem& problem) noexcept;
   [[nodiscard]] bool budget_spent() const noexcept;
+  [[nodiscard]] bool is_good_enough(const ContactProblem& problem, double share) const noexcept;
+  bool solve_part() noexcept;
+  void choose_part(const ContactProblem& problem) noexcept;
+  void gather_part(const ContactProblem& problem) noexcept;
+  void spread_part(ContactProblem& problem) const noexcept;
+  bool take_in_penetrated(const ContactProblem& problem) noexcept;
   void start_from(ContactProblem& problem, const std::vector<double>& lambda) noexcept;
   bool search_along_step(ContactProblem& problem, double& now) noexcept;
   [[nodiscard]] double* jacobian_row(Index i) noexcept {
     return J_.data() + static_cast<std::ptrdiff_t>(i) * stride_;
   }
 
+  ContactProblem part_;                // of the contacts that are solved for
+  std::vector<std::uint8_t> in_part_;  // [contacts]
+  std::vector<Index> row_;             // [part_.rows] the problem's rows
+  // All that follows is of part_.
   std::ptrdiff_t stride_;
   std::vector<double> motion_;     // [rows] r
   std::vector<double> weight_;     // [rows] 1 / w_n at normal rows, 1 / w_t at tangential ones [N/m]

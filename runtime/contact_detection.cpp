@@ -13,6 +13,7 @@ constexpr double same_place = 1e-4;       // of the mean edge: nearer contact po
 constexpr double same_held_place = 0.05;  // of the mean edge: nearer to a held place nothing else is touched
 constexpr double same_direction = 1e-6;   // 1 - cos of their normals
 constexpr double deepest_inside = 0.25;   // of the mean edge: deeper, the tool is lost in the body
+constexpr double flat_radius = 1000.0;    // of the mean edge: corners tell all that a larger sphere touches
 constexpr double on_surface =
     1e-6;  // of the mean edge: nearer, the face tells the normal and not the distance
 
@@ -326,6 +327,7 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
   // On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
   // now at the other: all corners under it are contact points, and under a segment the edges.
   const bool is_segment = tool.tool.length > 0.0;
+  const bool is_flat = !is_segment && tool.tool.radius > flat_radius * edge;
   const auto touch_corners = [&](Index simplex) {
     const std::array<Index, 3> nodes = nodes_of(body, simplex);
     const std::size_t corners = nodes[2] < 0 ? 2 : 3;
@@ -338,7 +340,7 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
   for (Index k = 0; k < usable; ++k) {
     const Index simplex = state.found[static_cast<std::size_t>(k)];
     TouchingPair pair = state.pairs[static_cast<std::size_t>(k)];
-    touch(pair);
+    if (!is_flat) touch(pair);
     if (is_segment) {
       touch(pair_of_end(simplex, 1));
       pair = make_pair(simplex, 2, nearest_to_core(state.tree, nodes_of(body, simplex), core));

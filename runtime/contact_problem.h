@@ -25,8 +25,8 @@ struct ContactProblem {
   void clear() noexcept;
   /// Appends a contact. Its rows of b and lambda are zero.
   void add(double mu, bool is_held) noexcept;
-  /// Appends one held row.
-  void add_held_row() noexcept;
+  /// Appends one held row that is there for a contact: where that is left out as open, so is the row.
+  void add_held_row(Index owner) noexcept;
 
   [[nodiscard]] Index first_row(Index contact) const noexcept {
     return first[static_cast<std::size_t>(contact)];
@@ -51,12 +51,13 @@ struct ContactProblem {
   std::vector<Index> first;        ///< [contacts + 1]
   std::vector<double> friction;    ///< [contacts] mu
   std::vector<std::uint8_t> held;  ///< [contacts]
+  std::vector<Index> owner;        ///< [contacts] contact that a held row is there for, else -1
   std::vector<double> W;           ///< [rows x stride] [m/N]
   std::vector<double> b;           ///< [rows] [m]
   std::vector<double> lambda;      ///< [rows] [N]; before solving: a guess
 
  private:
-  void append(double mu, bool is_held, Index count) noexcept;
+  void append(double mu, bool is_held, Index owner_of, Index count) noexcept;
 };
 
 }  // namespace palpate

@@ -36,7 +36,7 @@ struct ToolState {
   bool engaged = false;         ///< can touch
   bool has_been_clear = false;  ///< of the body once: nothing is felt before; one that is lost in the body
                                 ///< after that is felt again as soon as its core is outside
-  bool holding = false;                      ///< a grab holds the surface
+  bool holding = false;         ///< a grab holds the surface
   Vec3 last_device_position = Vec3::Zero();  ///< of the tick before [m]
   double felt = 0.0;                         ///< the force of late [N]
   double margin = 0.0;  ///< how far the surface may be from the tool and still be met in this tick [m]

@@ -166,7 +166,8 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   find_contacts(body, state);
   bool again = penetration(state) > rough;
   bool valid = solve_contact(body, state);
-  for (int pass = 1; again && valid && pass < most_passes; ++pass) {
+  const auto converged = [&] { return !has(state.status, StepStatus::not_converged); };
+  for (int pass = 1; again && valid && converged() && pass < most_passes; ++pass) {
     remember_contacts(state);
     find_contacts(body, state);
     again = penetration(state) > rough;
