@@ -58,9 +58,9 @@ Tangential tangential(const double* rows, Index count) noexcept {
 }  // namespace
 
 ConeSolver::ConeSolver(Index max_contacts, Index max_rows)
-    : part_(3, max_contacts, max_rows), stride_((std::ptrdiff_t{max_rows} + 7) / 8 * 8) {
-  in_part_.resize(static_cast<std::size_t>(max_contacts));
-  row_.resize(static_cast<std::size_t>(max_rows));
+    : part_(max_contacts, max_rows),
+      without_friction_(max_rows),
+      stride_((std::ptrdiff_t{max_rows} + 7) / 8 * 8) {
   const auto rows = static_cast<std::size_t>(max_rows);
   motion_.resize(rows);
   weight_.resize(rows);
@@ -113,10 +113,6 @@ double ConeSolver::residual(const ContactProblem& problem) const noexcept {
     const double* lambda = problem.lambda.data() + first;
     const double* r = motion_.data() + first;
     const double* weight = weight_.data() + first;
-    if (problem.held[static_cast<std::size_t>(k)] != 0) {
-      for (Index i = 0; i < count; ++i) worst = std::max(worst, std::abs(weight[i] * r[i]));
-      continue;
-    }
     const double normal = std::max(0.0, lambda[0] - weight[0] * r[0]);
     worst = std::max(worst, std::abs(lambda[0] - normal));
     if (count == 1) continue;
@@ -136,11 +132,6 @@ void ConeSolver::sweep(ContactProblem& problem) noexcept {
     const Index count = problem.rows_of(k);
     const auto at = static_cast<std::size_t>(first);
     for (int round = 0; round < local_rounds; ++round) {
-      if (problem.held[static_cast<std::size_t>(k)] != 0) {
-        for (Index i = first; i < first + count; ++i)
-          change(problem, i, -motion_[static_cast<std::size_t>(i)] / problem.w(i, i));
-        continue;
-      }
       const double normal = std::max(0.0, problem.lambda[at] - weight_[at] * motion_[at]);
       change(problem, first, normal - problem.lambda[at]);
       if (count == 1) break;
@@ -163,9 +154,7 @@ void ConeSolver::choose_modes(const ContactProblem& problem) noexcept {
     const auto at = static_cast<std::size_t>(first);
     const Index count = problem.rows_of(k);
     Mode mode = Mode::stick;
-    if (problem.held[contact] != 0) {
-      mode = Mode::held;
-    } else if (problem.lambda[at] - weight_[at] * motion_[at] <= 0.0) {
+    if (problem.lambda[at] - weight_[at] * motion_[at] <= 0.0) {
       mode = Mode::open;
     } else if (count > 1) {
       const Tangential now = tangential(problem.lambda.data() + first, count);
@@ -367,96 +356,38 @@ bool ConeSolver::is_good_enough(const ContactProblem& problem, double share) con
   return residual(problem) <= share * largest_force(problem);
 }
 
-/// Of the part that is solved for, from lambda.
-bool ConeSolver::solve_part() noexcept {
-  std::copy_n(part_.lambda.begin(), part_.rows, guess_.begin());
-  if (iterate(part_, plain_rounds)) return true;
+/// From lambda.
+bool ConeSolver::solve_part(ContactProblem& problem) noexcept {
+  std::copy_n(problem.lambda.begin(), problem.rows, guess_.begin());
+  if (iterate(problem, plain_rounds)) return true;
 
-  start_from(part_, guess_);
+  start_from(problem, guess_);
   for (double share = first_share; !budget_spent(); share *= next_share) {
-    add_springs(part_, share);
-    iterate(part_, spring_rounds);
-    remove_springs(part_);
-    scale_rows(part_);
-    find_motion(part_);
-    if (is_good_enough(part_, tolerance)) return true;
+    add_springs(problem, share);
+    iterate(problem, spring_rounds);
+    remove_springs(problem);
+    scale_rows(problem);
+    find_motion(problem);
+    if (is_good_enough(problem, tolerance)) return true;
   }
-  return is_good_enough(part_, accepted);
-}
-
-/// The held contacts and those that the guess closes.
-void ConeSolver::choose_part(const ContactProblem& problem) noexcept {
-  for (Index k = 0; k < problem.contacts; ++k) {
-    const auto contact = static_cast<std::size_t>(k);
-    const Index owner = problem.owner[contact];
-    in_part_[contact] = owner >= 0 ? in_part_[static_cast<std::size_t>(owner)]
-                                   : problem.held[contact] != 0 ||
-                                         problem.lambda[static_cast<std::size_t>(problem.first_row(k))] > 0.0;
-  }
-}
-
-void ConeSolver::gather_part(const ContactProblem& problem) noexcept {
-  part_.clear();
-  part_.dimension = problem.dimension;
-  for (Index k = 0; k < problem.contacts; ++k) {
-    const auto contact = static_cast<std::size_t>(k);
-    if (in_part_[contact] == 0) continue;
-    const Index begin = part_.rows;
-    if (problem.held[contact] != 0 && problem.rows_of(k) == 1) {
-      part_.add_held_row(-1);
-    } else {
-      part_.add(problem.friction[contact], problem.held[contact] != 0);
-    }
-    for (Index i = begin; i < part_.rows; ++i)
-      row_[static_cast<std::size_t>(i)] = problem.first_row(k) + i - begin;
-  }
-  for (Index i = 0; i < part_.rows; ++i) {
-    const auto row = static_cast<std::size_t>(row_[static_cast<std::size_t>(i)]);
-    const double* w = problem.row(static_cast<Index>(row));
-    for (Index j = 0; j < part_.rows; ++j) part_.w(i, j) = w[row_[static_cast<std::size_t>(j)]];
-    part_.b[static_cast<std::size_t>(i)] = problem.b[row];
-    part_.lambda[static_cast<std::size_t>(i)] = problem.lambda[row];
-  }
-}
-
-void ConeSolver::spread_part(ContactProblem& problem) const noexcept {
-  std::fill_n(problem.lambda.begin(), problem.rows, 0.0);
-  for (Index i = 0; i < part_.rows; ++i)
-    problem.lambda[static_cast<std::size_t>(row_[static_cast<std::size_t>(i)])] =
-        part_.lambda[static_cast<std::size_t>(i)];
-}
-
-/// Takes in the contacts that were left out and are penetrated. True when there are any.
-bool ConeSolver::take_in_penetrated(const ContactProblem& problem) noexcept {
-  const double least = accepted * largest_force(part_);
-  bool any = false;
-  for (Index k = 0; k < problem.contacts; ++k) {
-    const auto contact = static_cast<std::size_t>(k);
-    if (problem.owner[contact] >= 0) {
-      in_part_[contact] = in_part_[static_cast<std::size_t>(problem.owner[contact])];
-    }
-    if (in_part_[contact] != 0 || problem.owner[contact] >= 0) continue;
-    const Index row = problem.first_row(k);
-    const double* w = problem.row(row);
-    double gap = problem.b[static_cast<std::size_t>(row)];
-    for (Index i = 0; i < part_.rows; ++i)
-      gap += w[row_[static_cast<std::size_t>(i)]] * part_.lambda[static_cast<std::size_t>(i)];
-    if (-gap <= least * problem.w(row, row)) continue;
-    in_part_[contact] = 1;
-    any = true;
-  }
-  return any;
+  return is_good_enough(problem, accepted);
 }
 
 bool ConeSolver::solve(ContactProblem& problem) noexcept {
   rounds_ = 0;
   work_ = 0.0;
-  choose_part(problem);
+  if (!part_.choose_closed(problem)) {  // the solution without friction is the guess
+    part_.choose_all(problem);
+    part_.gather(problem, false);
+    without_friction_.solve(part_.problem);
+    part_.spread(problem);
+    part_.choose_closed(problem);
+  }
   for (;;) {
-    gather_part(problem);
-    const bool solved = solve_part();
-    spread_part(problem);
-    if (!take_in_penetrated(problem)) return solved;
+    part_.gather(problem, true);
+    const bool solved = solve_part(part_.problem);
+    part_.spread(problem);
+    if (!part_.take_in_penetrated(problem, accepted * largest_force(part_.problem))) return solved;
     if (budget_spent()) return false;
   }
 }
@@ -467,34 +398,32 @@ bool ConeSolver::budget_spent() const noexcept {
 
 void ConeSolver::derivative(const ContactProblem& problem, std::span<const double> db,
                             std::span<double> dlambda) noexcept {
-  const auto db_of = [&](Index row) {
-    return db[static_cast<std::size_t>(row_[static_cast<std::size_t>(row)])];
-  };
   std::fill_n(dlambda.begin(), problem.rows, 0.0);
+  part_.gather_change(db, b_);
   Index next = 0;
-  for (Index k = 0; k < part_.contacts; ++k) {
+  for (Index k = 0; k < part_.problem.contacts; ++k) {
     const auto contact = static_cast<std::size_t>(k);
     if (mode_[contact] == Mode::open) continue;
-    const Index first = part_.first_row(k);
-    const Index count = part_.rows_of(k);
+    const Index first = part_.problem.first_row(k);
+    const Index count = part_.problem.rows_of(k);
     for (Index i = 0; i < count; ++i) {
-      double value = db_of(first + i);
+      double value = b_[static_cast<std::size_t>(first + i)];
       if (mode_[contact] == Mode::slip && i > 0) {
         value = 0.0;
         for (Index j = 1; j < count; ++j) {
           const double across = (i == j ? 1.0 : 0.0) - direction_[static_cast<std::size_t>(first + i)] *
                                                            direction_[static_cast<std::size_t>(first + j)];
-          value += share_[contact] * across * db_of(first + j);
+          value += share_[contact] * across * b_[static_cast<std::size_t>(first + j)];
         }
       }
       x_[static_cast<std::size_t>(next++)] = -value;
     }
   }
   solve_jacobian();
-  for (Index j = 0; j < unknowns_; ++j) {
-    const auto row = static_cast<std::size_t>(unknown_[static_cast<std::size_t>(j)]);
-    dlambda[static_cast<std::size_t>(row_[row])] = x_[static_cast<std::size_t>(j)];
-  }
+  std::fill_n(guess_.begin(), part_.problem.rows, 0.0);
+  for (Index j = 0; j < unknowns_; ++j)
+    guess_[static_cast<std::size_t>(unknown_[static_cast<std::size_t>(j)])] = x_[static_cast<std::size_t>(j)];
+  part_.spread_change(guess_, dlambda);
 }
 
 }  // namespace palpate

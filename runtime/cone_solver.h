@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "runtime/active_set.h"
+#include "runtime/contact_part.h"
 #include "runtime/contact_problem.h"
 
 namespace palpate {
@@ -21,7 +23,7 @@ class ConeSolver {
   static constexpr double tolerance = 1e-6;  ///< of the residual, relative to the largest force
   static constexpr double accepted = 1e-4;   ///< where `tolerance` is not met
   static constexpr int most_rounds = 60;
-  static constexpr double most_work = 2e6;  ///< multiplications, some 0.2 ms
+  static constexpr double most_work = 6e5;  ///< multiplications, some 0.2 ms
 
   ConeSolver(Index max_contacts, Index max_rows);
 
@@ -34,10 +36,11 @@ class ConeSolver {
   void derivative(const ContactProblem& problem, std::span<const double> db,
                   std::span<double> dlambda) noexcept;
 
-  [[nodiscard]] int rounds() const noexcept { return rounds_; }  ///< of the last `solve`
+  [[nodiscard]] int rounds() const noexcept { return rounds_; }                     ///< of the last `solve`
+  [[nodiscard]] bool was_easy() const noexcept { return work_ < 0.1 * most_work; }  ///< the last `solve`
 
  private:
-  enum class Mode : std::uint8_t { open, stick, slip, held };
+  enum class Mode : std::uint8_t { open, stick, slip };
 
   void find_motion(const ContactProblem& problem) noexcept;
   void change(ContactProblem& problem, Index row, double by) noexcept;
@@ -54,21 +57,15 @@ class ConeSolver {
   void remove_springs(ContactProblem& problem) noexcept;
   [[nodiscard]] bool budget_spent() const noexcept;
   [[nodiscard]] bool is_good_enough(const ContactProblem& problem, double share) const noexcept;
-  bool solve_part() noexcept;
-  void choose_part(const ContactProblem& problem) noexcept;
-  void gather_part(const ContactProblem& problem) noexcept;
-  void spread_part(ContactProblem& problem) const noexcept;
-  bool take_in_penetrated(const ContactProblem& problem) noexcept;
+  bool solve_part(ContactProblem& problem) noexcept;
   void start_from(ContactProblem& problem, const std::vector<double>& lambda) noexcept;
   bool search_along_step(ContactProblem& problem, double& now) noexcept;
   [[nodiscard]] double* jacobian_row(Index i) noexcept {
     return J_.data() + static_cast<std::ptrdiff_t>(i) * stride_;
   }
 
-  ContactProblem part_;                // of the contacts that are solved for
-  std::vector<std::uint8_t> in_part_;  // [contacts]
-  std::vector<Index> row_;             // [part_.rows] the problem's rows
-  // All that follows is of part_.
+  ContactPart part_;  // that may be closed; all that follows is of it
+  ActiveSet without_friction_;
   std::ptrdiff_t stride_;
   std::vector<double> motion_;     // [rows] r
   std::vector<double> weight_;     // [rows] 1 / w_n at normal rows, 1 / w_t at tangential ones [N/m]
