@@ -194,12 +194,13 @@ std::size_t nearest_simplices(const Body& body, State& state, ToolState& tool, c
   return count;
 }
 
-bool is_duplicate(const Body& body, const State& state, Index begin, const ContactPoint& contact) noexcept {
+bool is_duplicate(const Body& body, const State& state, Index begin, const Vec3& position,
+                  const Vec3& normal) noexcept {
   const double near = same_place * body.mean_surface_edge();
   for (Index k = begin; k < state.candidate_count; ++k) {
     const ContactPoint& other = state.candidates[static_cast<std::size_t>(k)];
-    if ((other.position - contact.position).squaredNorm() < near * near &&
-        other.frame.col(0).dot(contact.frame.col(0)) > 1.0 - same_direction) {
+    if ((other.position - position).squaredNorm() < near * near &&
+        other.frame.col(0).dot(normal) > 1.0 - same_direction) {
       return true;
     }
   }
@@ -228,6 +229,9 @@ void add_candidate(const Body& body, State& state, Index tool_number, Index begi
     tool.status |= StepStatus::capacity_full;
     return;
   }
+  const Vec3 normal =
+      face_tells ? pair.normal : Vec3((pair.nearest.on_core - pair.nearest.on_simplex) / pair.distance);
+  if (is_duplicate(body, state, begin, pair.nearest.on_simplex, normal)) return;
   const std::array<Index, 3> nodes = nodes_of(body, pair.simplex);
   ContactPoint contact;
   contact.feature =
@@ -237,17 +241,15 @@ void add_candidate(const Body& body, State& state, Index tool_number, Index begi
   contact.weights = pair.nearest.weights;
   for (std::size_t k = 0; k < 3; ++k) contact.nodes[k] = contact.weights[k] > 0.0 ? nodes[k] : -1;
   contact.position = pair.nearest.on_simplex;
+  if (is_held_already(body, state, contact)) return;
   contact.arm = contact.position - tool.pose.position;
   contact.slope = slopes(state.tree, contact.nodes);
-  const Vec3 normal =
-      face_tells ? pair.normal : Vec3((pair.nearest.on_core - pair.nearest.on_simplex) / pair.distance);
   contact.frame = frame_of(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction =
       tool.tool.friction.value_or(body.surface_friction()[static_cast<std::size_t>(pair.simplex)]);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state, contact));
-  if (is_duplicate(body, state, begin, contact) || is_held_already(body, state, contact)) return;
   state.candidates[static_cast<std::size_t>(state.candidate_count++)] = contact;
 }
 

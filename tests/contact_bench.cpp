@@ -42,7 +42,7 @@ constexpr std::int64_t ticks = 20000;
 constexpr std::int64_t settling_ticks = 1000;  // untimed: coming down to the surface
 constexpr std::int64_t sparse_ticks = 300;
 constexpr std::int64_t stage_stride = 20;  // ticks from one whose stages are timed to the next
-constexpr Index max_contacts = 96;
+constexpr Index max_contacts = 32;         // as without an option
 
 double quantile(std::vector<double> values, double fraction) {
   if (values.empty()) return 0.0;
