@@ -275,13 +275,13 @@ Slide slide_along(const Track& track, double depth, double speed) {
         {.position = track.centres.front() + (smooth * (depth + height) - height) * track.inward});
   }
   slide.first_slide = slide.poses.size();
-  const double end = static_cast<double>(track.centres.size() - 1) * track.spacing;
-  double way = 0.0;
+  double at = 0.0;
   for (double time = tick;; time += tick) {
-    way += tick * speed * std::min(1.0, time / speed_up);
-    if (way >= end) return slide;
-    const double at = way / track.spacing;
+    const auto passed = static_cast<std::size_t>(at);
+    at += tick * speed * std::min(1.0, time / speed_up) /
+          (track.centres[passed + 1] - track.centres[passed]).norm();
     const auto before = static_cast<std::size_t>(at);
+    if (before + 1 >= track.centres.size()) return slide;
     const double share = at - static_cast<double>(before);
     const Vec3 centre = (1.0 - share) * track.centres[before] + share * track.centres[before + 1];
     slide.poses.push_back({.position = centre + depth * track.inward});
