@@ -117,6 +117,29 @@ TEST_P(Near, DisplacementIsThatOfTheGreensFunctions) {
   EXPECT_EQ(near.displacement(0), Vec3::Zero());
 }
 
+TEST_P(Near, RetreatMakesAShareOfTheChange) {
+  NearField near(body_, 20);
+  const std::vector<Index> nodes = free_nodes(5);
+  near.begin_tick();
+  for (std::size_t k = 0; k < 6; ++k) near.want(body_, nodes[k]);
+  const auto displacements = [&] {
+    near.displace();
+    std::vector<Vec3> u;
+    for (Index place = 0; place < near.count(); ++place) u.push_back(near.displacement(place));
+    return u;
+  };
+  near.load(near.place_of(nodes[1]), test::upright(GetParam(), 0.4, 0.0, 1.0));
+  const std::vector<Vec3> before = displacements();
+  near.unload();
+  near.load(near.place_of(nodes[2]), test::upright(GetParam(), 0.0, 0.0, -3.0));
+  const std::vector<Vec3> after = displacements();
+  near.retreat(0.25);
+  const std::vector<Vec3> between = displacements();
+  EXPECT_EQ(near.loaded_nodes().size(), 2U);
+  for (std::size_t k = 0; k < between.size(); ++k)
+    EXPECT_LT((between[k] - (0.75 * before[k] + 0.25 * after[k])).norm(), 1e-14 * after[k].norm());
+}
+
 /// Contact points of a sphere that presses on the top: nearest points of all simplices of the surface that
 /// are as near, by a search without tree, near field or margins.
 TEST_P(Near, ContactPointsAreTheNearestPointsOfTheDeformedSurface) {
