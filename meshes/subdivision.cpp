@@ -1,0 +1,154 @@
+#include "meshes/subdivision.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <string>
+
+#include "meshes/element.h"
+#include "meshes/error.h"
+#include "meshes/topology.h"
+
+namespace palpate {
+namespace {
+
+using Lattice = std::array<int, 3>;
+
+/// Gathers nodes, each once.
+class NodeList {
+ public:
+  explicit NodeList(Subdivision& result) : result_(result) {}
+  Index find(const std::array<int, 8>& weights, const Vec3& xi) {
+    const auto [found, is_new] = place_.emplace(weights, static_cast<Index>(result_.nodes.size()));
+    if (is_new) result_.nodes.push_back({weights, xi});
+    return found->second;
+  }
+
+ private:
+  Subdivision& result_;
+  std::map<std::array<int, 8>, Index> place_;
+};
+
+/// The node of a simplex with whole-number barycentric weights.
+Index simplex_node(NodeList& nodes, ElementType type, const std::array<int, 8>& weights, int denominator) {
+  Vec3 xi = Vec3::Zero();
+  for (int axis = 0; axis < traits(type).dimension; ++axis)
+    xi[axis] = static_cast<double>(weights[static_cast<std::size_t>(axis) + 1]) / denominator;
+  return nodes.find(weights, xi);
+}
+
+/// With ranked corners v_0 v_1 .. the point (x) of the lattice r >= x_1 >= x_2 >= .. >= 0 is
+/// v_0 + x_1/r (v_1 - v_0) + x_2/r (v_2 - v_1) + ..; Kuhn's simplices of the lattice's cells that are within
+/// are the children.
+void cut_simplex(ElementType type, int r, const std::array<int, 4>& order, Subdivision& result) {
+  const int d = traits(type).dimension;
+  const bool has_middles = traits(type).nodes > traits(type).corners;
+  const int scale = has_middles ? 2 : 1;
+  result.denominator = scale * r;
+  NodeList nodes(result);
+  const auto is_within = [&](const Lattice& x) {
+    for (int axis = 0; axis < d; ++axis) {
+      const auto at = static_cast<std::size_t>(axis);
+      if (x[at] > (axis == 0 ? r : x[at - 1]) || x[at] < 0) return false;
+    }
+    return true;
+  };
+  const auto weights_at = [&](const Lattice& x) {
+    std::array<int, 8> weights{};
+    int before = r;
+    for (int rank = 0; rank <= d; ++rank) {
+      const int here = rank < d ? x[static_cast<std::size_t>(rank)] : 0;
+      const auto corner =
+          static_cast<std::size_t>(std::find(order.begin(), order.begin() + d + 1, rank) - order.begin());
+      weights[corner] = scale * (before - here);
+      before = here;
+    }
+    return weights;
+  };
+  const auto add_child = [&](const std::array<Lattice, 4>& path) {
+    std::array<std::array<int, 8>, 4> corner;
+    for (std::size_t k = 0; k <= static_cast<std::size_t>(d); ++k) {
+      corner[k] = weights_at(path[k]);
+      result.connectivity.push_back(simplex_node(nodes, type, corner[k], result.denominator));
+    }
+    if (!has_middles) return;
+    for (const EdgeNodes& edge : element_edges(type)) {
+      std::array<int, 8> middle{};
+      for (std::size_t k = 0; k < middle.size(); ++k)
+        middle[k] = (corner[edge[0]][k] + corner[edge[1]][k]) / 2;
+      result.connectivity.push_back(simplex_node(nodes, type, middle, result.denominator));
+    }
+  };
+
+  std::array<int, 3> axes{0, 1, 2};
+  do {
+    Lattice cell{};
+    const int last = d == 3 ? r : 1;
+    for (cell[2] = 0; cell[2] < last; ++cell[2]) {
+      for (cell[1] = 0; cell[1] < r; ++cell[1]) {
+        for (cell[0] = 0; cell[0] < r; ++cell[0]) {
+          std::array<Lattice, 4> path{cell};
+          bool within = is_within(cell);
+          for (std::size_t k = 0; k < static_cast<std::size_t>(d); ++k) {
+            path[k + 1] = path[k];
+            ++path[k + 1][static_cast<std::size_t>(axes[k])];
+            within = within && is_within(path[k + 1]);
+          }
+          if (within) add_child(path);
+        }
+      }
+    }
+  } while (std::next_permutation(axes.begin(), axes.begin() + d));
+}
+
+void cut_cell(ElementType type, int r, Subdivision& result) {
+  const int d = traits(type).dimension;
+  const std::span<const Vec3> corners = reference_nodes(type);
+  result.denominator = d == 2 ? r * r : r * r * r;
+  NodeList nodes(result);
+  const auto node_at = [&](const Lattice& x) {
+    std::array<int, 8> weights{};
+    Vec3 xi = Vec3::Zero();
+    for (int axis = 0; axis < d; ++axis) xi[axis] = 2.0 * x[static_cast<std::size_t>(axis)] / r - 1.0;
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      weights[k] = 1;
+      for (int axis = 0; axis < d; ++axis) {
+        const int along = x[static_cast<std::size_t>(axis)];
+        weights[k] *= corners[k][axis] > 0.0 ? along : r - along;
+      }
+    }
+    return nodes.find(weights, xi);
+  };
+  Lattice cell{};
+  const int last = d == 3 ? r : 1;
+  for (cell[2] = 0; cell[2] < last; ++cell[2]) {
+    for (cell[1] = 0; cell[1] < r; ++cell[1]) {
+      for (cell[0] = 0; cell[0] < r; ++cell[0]) {
+        for (const Vec3& corner : corners) {
+          Lattice x = cell;
+          for (int axis = 0; axis < d; ++axis)
+            x[static_cast<std::size_t>(axis)] += corner[axis] > 0.0 ? 1 : 0;
+          result.connectivity.push_back(node_at(x));
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Subdivision subdivide(ElementType type, int r, const std::array<int, 4>& order) {
+  if (r < 1) {
+    throw Error("a refinement of " + std::to_string(r) + " was asked for", "subdivide",
+                "give 1 (as it is) or more");
+  }
+  Subdivision result;
+  if (type == ElementType::quad4 || type == ElementType::hex8) {
+    cut_cell(type, r, result);
+  } else {
+    cut_simplex(type, r, order, result);
+  }
+  return result;
+}
+
+}  // namespace palpate

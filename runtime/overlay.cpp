@@ -1,0 +1,129 @@
+#include "runtime/overlay.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/SparseCholesky>
+#include <string>
+#include <utility>
+
+#include "meshes/element.h"
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+/// K of all local dofs [d local nodes].
+Eigen::SparseMatrix<double> assemble_local(const Model& model, const PatchMesh& patch) {
+  const auto d = static_cast<Eigen::Index>(model.dimension());
+  std::vector<ElasticityMatrix> D;
+  for (const Material& material : model.materials) D.push_back(elasticity_matrix(material, model.analysis));
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Index e = 0; e < patch.local.elements(); ++e) {
+    const auto parent = static_cast<std::size_t>(patch.parent[static_cast<std::size_t>(e)]);
+    const auto nodes = patch.local.element_nodes(e);
+    const ElementMatrix K =
+        element_stiffness(patch.local.element, element_nodes(patch.local, e),
+                          D[static_cast<std::size_t>(model.material_of_element[parent])], model.thickness);
+    for (Eigen::Index i = 0; i < K.rows(); ++i) {
+      for (Eigen::Index j = 0; j < K.cols(); ++j) {
+        entries.emplace_back(d * nodes[static_cast<std::size_t>(i / d)] + i % d,
+                             d * nodes[static_cast<std::size_t>(j / d)] + j % d, K(i, j));
+      }
+    }
+  }
+  const Eigen::Index order = d * static_cast<Eigen::Index>(patch.local.nodes.size());
+  Eigen::SparseMatrix<double> result(order, order);
+  result.setFromTriplets(entries.begin(), entries.end());
+  return result;
+}
+
+/// The body's shape functions by dofs [d local nodes x d g], without held dofs.
+Eigen::SparseMatrix<double> shape_by_dofs(const Model& model, const PatchMesh& patch) {
+  const auto d = static_cast<Eigen::Index>(model.dimension());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index node = 0; node < patch.shape.outerSize(); ++node) {
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(patch.shape, node); it; ++it) {
+      const auto body_node = static_cast<std::size_t>(patch.nodes[static_cast<std::size_t>(it.col())]);
+      for (Eigen::Index axis = 0; axis < d; ++axis) {
+        if ((model.fixed[body_node] >> axis & 1) != 0) continue;
+        entries.emplace_back(d * node + axis, d * it.col() + axis, it.value());
+      }
+    }
+  }
+  Eigen::SparseMatrix<double> result(d * patch.shape.rows(), d * patch.shape.cols());
+  result.setFromTriplets(entries.begin(), entries.end());
+  return result;
+}
+
+}  // namespace
+
+PatchStiffness assemble_patch(const Model& model, const PatchMesh& patch) {
+  const Eigen::SparseMatrix<double> K = assemble_local(model, patch);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t dof = 0; dof < patch.free_dof.size(); ++dof) {
+    if (patch.free_dof[dof] >= 0)
+      entries.emplace_back(patch.free_dof[dof], static_cast<Eigen::Index>(dof), 1.0);
+  }
+  Eigen::SparseMatrix<double> pick(patch.free_dofs, K.rows());
+  pick.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SparseMatrix<double> rows = pick * K;
+  return {.K_L = rows * Eigen::SparseMatrix<double>(pick.transpose()),
+          .K_LG = Eigen::MatrixXd(rows * shape_by_dofs(model, patch))};
+}
+
+Eigen::MatrixXd greens_at(const Body& body, std::span<const Index> nodes) {
+  const auto d = static_cast<Eigen::Index>(body.dimension());
+  const Eigen::Index order = d * static_cast<Eigen::Index>(nodes.size());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> result(order, order);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    body.greens().gather(
+        nodes[k], nodes,
+        {result.data() + d * static_cast<Eigen::Index>(k) * order, static_cast<std::size_t>(d * order)});
+  }
+  return result;
+}
+
+Overlay::Overlay(const Body& body, PatchMesh patch) : patch_(std::move(patch)) {
+  for (const Index node : patch_.nodes) {
+    stored_.push_back(body.stored_node(node));
+    if (stored_.back() >= 0) continue;
+    throw Error(
+        "an overlay reaches node " + std::to_string(node) + ", whose Green's functions are not stored",
+        body.model().name, "precompute with scope = \"layers\" and as many layers as the overlay has rings");
+  }
+  const PatchStiffness stiffness = assemble_patch(body.model(), patch_);
+  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor(stiffness.K_L);
+  if (factor.info() != Eigen::Success)
+    throw Error("the stiffness of an overlay is not positive definite", body.model().name,
+                "the elements there are too flat: mesh the body anew");
+  recover_ = -factor.solve(stiffness.K_LG);
+  G_ = -stiffness.K_LG.transpose() * recover_;
+  const Eigen::MatrixXd greens = greens_at(body, stored_);
+  const Eigen::MatrixXd softened = Eigen::MatrixXd::Identity(G_.rows(), G_.cols()) - G_ * greens;
+  M_ = softened.partialPivLu().solve(G_);
+  M_ = 0.5 * (M_ + M_.transpose()).eval();
+}
+
+/// Xi at the patch's nodes, by forces on a node [d g x d].
+Eigen::MatrixXd Overlay::columns(const Body& body, Index node) const {
+  const auto d = static_cast<Eigen::Index>(body.dimension());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows(d, G_.rows());
+  body.greens().gather(node, stored_, {rows.data(), static_cast<std::size_t>(rows.size())});
+  return rows.transpose();
+}
+
+Eigen::MatrixXd Overlay::block(const Body& body, Index row, Index column) const {
+  return body.greens().block(row, column) + columns(body, row).transpose() * M_ * columns(body, column);
+}
+
+PartitionedInverse invert_by_partitioning(const PatchStiffness& stiffness, const Eigen::MatrixXd& greens) {
+  PartitionedInverse inverse;
+  const Eigen::MatrixXd psi = stiffness.K_LG * greens;
+  const Eigen::MatrixXd local = Eigen::MatrixXd(stiffness.K_L) - psi * stiffness.K_LG.transpose();
+  inverse.local = local.llt().solve(Eigen::MatrixXd::Identity(local.rows(), local.cols()));
+  inverse.mixed = -inverse.local * psi;
+  inverse.global = greens - inverse.mixed.transpose() * psi;
+  return inverse;
+}
+
+}  // namespace palpate

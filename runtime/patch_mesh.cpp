@@ -1,0 +1,260 @@
+#include "runtime/patch_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "meshes/element.h"
+#include "meshes/error.h"
+#include "meshes/subdivision.h"
+#include "meshes/surface.h"
+#include "meshes/topology.h"
+
+namespace palpate {
+namespace {
+
+constexpr double no_part = 1e-12;  // of a shape function
+
+/// A local node, by what is the same in all elements that have it: corners of the body's and their weights.
+using Key = std::vector<std::pair<Index, int>>;
+
+/// Rank of each corner of a simplex by its node number.
+std::array<int, 4> ranks(std::span<const Index> corners) {
+  std::array<int, 4> rank{};
+  for (std::size_t i = 0; i < std::min<std::size_t>(corners.size(), 4); ++i) {
+    rank[i] = static_cast<int>(
+        std::count_if(corners.begin(), corners.end(), [&](Index other) { return other < corners[i]; }));
+  }
+  return rank;
+}
+
+Key key_of(const Subdivision::Node& node, std::span<const Index> corners) {
+  Key key;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    if (node.weights[k] > 0) key.emplace_back(corners[k], node.weights[k]);
+  }
+  std::sort(key.begin(), key.end());
+  return key;
+}
+
+/// A side of an element of the patch that no other element of the patch has.
+struct OuterSide {
+  unsigned corners;  // bit k: the element's corner k is on it
+  bool is_border;    // the body goes on behind it; else it is the body's surface
+};
+
+std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at,
+                                   const std::vector<Index>& patch, Index element) {
+  const ElementTraits& kind = traits(mesh.element);
+  const auto nodes = mesh.element_nodes(element);
+  std::vector<OuterSide> outer;
+  for (const SideNodes& side : element_sides(mesh.element)) {
+    std::vector<Index> corners;
+    unsigned bits = 0;
+    for (int k = 0; k < traits(kind.facet).corners; ++k) {
+      corners.push_back(nodes[side[static_cast<std::size_t>(k)]]);
+      bits |= 1U << side[static_cast<std::size_t>(k)];
+    }
+    const auto neighbour = std::find_if(at[corners[0]].begin(), at[corners[0]].end(), [&](Index e) {
+      const auto others = mesh.element_nodes(e);
+      return e != element && std::all_of(corners.begin(), corners.end(), [&](Index corner) {
+               return std::find(others.begin(), others.end(), corner) != others.end();
+             });
+    });
+    const bool is_surface = neighbour == at[corners[0]].end();
+    if (is_surface || !std::binary_search(patch.begin(), patch.end(), *neighbour))
+      outer.push_back({bits, !is_surface});
+  }
+  return outer;
+}
+
+/// Builds a patch's mesh element by element.
+class Builder {
+ public:
+  Builder(const Model& model, const ElementsAtNodes& at, std::vector<Index> elements, int r)
+      : model_(model), at_(at), r_(r), d_(static_cast<std::size_t>(model.dimension())) {
+    patch_.elements = std::move(elements);
+    patch_.local.element = model.mesh.element;
+    surface_.facet = traits(model.mesh.element).facet;
+    choose_nodes();
+  }
+
+  PatchMesh build() {
+    for (const Index e : patch_.elements) cut(e);
+    patch_.local.regions.assign(patch_.parent.size(), 0);
+    patch_.surface = surface_simplices(surface_);
+    patch_.shape.resize(static_cast<Eigen::Index>(patch_.local.nodes.size()),
+                        static_cast<Eigen::Index>(patch_.nodes.size()));
+    patch_.shape.setFromTriplets(shape_.begin(), shape_.end());
+    for (const unsigned zero : zero_axes_) {
+      for (std::size_t axis = 0; axis < d_; ++axis)
+        patch_.free_dof.push_back((zero >> axis & 1U) != 0 ? -1 : patch_.free_dofs++);
+    }
+    return std::move(patch_);
+  }
+
+ private:
+  [[nodiscard]] unsigned all_axes() const { return (1U << d_) - 1; }
+  [[nodiscard]] unsigned held_axes(Index node) const {
+    return model_.fixed[static_cast<std::size_t>(node)] & all_axes();
+  }
+
+  void choose_nodes() {
+    for (const Index e : patch_.elements) {
+      for (const Index node : model_.mesh.element_nodes(e)) {
+        if (held_axes(node) != all_axes()) place_.emplace(node, 0);
+      }
+    }
+    for (auto& [node, place] : place_) {
+      place = static_cast<Index>(patch_.nodes.size());
+      patch_.nodes.push_back(node);
+    }
+  }
+
+  const Subdivision& subdivision(std::span<const Index> corners) {
+    const ElementType type = model_.mesh.element;
+    const bool is_simplex = type != ElementType::quad4 && type != ElementType::hex8;
+    const std::array<int, 4> order = is_simplex ? ranks(corners) : std::array<int, 4>{0, 1, 2, 3};
+    const auto found = cuts_.find(order);
+    return found != cuts_.end() ? found->second
+                                : cuts_.emplace(order, subdivide(type, r_, order)).first->second;
+  }
+
+  void cut(Index e) {
+    const auto nodes = model_.mesh.element_nodes(e);
+    const auto corners = nodes.first(static_cast<std::size_t>(traits(model_.mesh.element).corners));
+    const Subdivision& parts = subdivision(corners);
+    const std::vector<OuterSide> sides = outer_sides(model_.mesh, at_, patch_.elements, e);
+    std::vector<Index> local;           // numbers of the subdivision's nodes in the local mesh
+    std::vector<unsigned> corner_bits;  // and the corners that have a part in them
+    for (const Subdivision::Node& node : parts.nodes) {
+      const Index number = find_node(node, corners, nodes);
+      unsigned bits = 0;
+      for (std::size_t k = 0; k < corners.size(); ++k) bits |= node.weights[k] > 0 ? 1U << k : 0U;
+      local.push_back(number);
+      corner_bits.push_back(bits);
+      for (const OuterSide& side : sides) {
+        if (side.is_border && (bits & ~side.corners) == 0)
+          zero_axes_[static_cast<std::size_t>(number)] = all_axes();
+      }
+    }
+    const auto width = static_cast<std::size_t>(traits(model_.mesh.element).nodes);
+    for (std::size_t first = 0; first < parts.connectivity.size(); first += width)
+      add_child(e, {parts.connectivity.data() + first, width}, local, corner_bits, sides);
+  }
+
+  Index find_node(const Subdivision::Node& node, std::span<const Index> corners,
+                  std::span<const Index> nodes) {
+    const auto [found, is_new] =
+        local_of_key_.emplace(key_of(node, corners), static_cast<Index>(patch_.local.nodes.size()));
+    const Index number = found->second;
+    if (!is_new) return number;
+    const ShapeValues N = shape_functions(model_.mesh.element, node.xi);
+    Vec3 position = Vec3::Zero();
+    bool coincides = false;  // with a node of the body
+    unsigned zero = all_axes();  // held where all that have a part in it are
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const double part = N[static_cast<Eigen::Index>(k)];
+      if (std::abs(part) < no_part) continue;
+      coincides = coincides || std::abs(part - 1.0) < no_part;
+      position += part * model_.mesh.nodes[static_cast<std::size_t>(nodes[k])];
+      zero &= held_axes(nodes[k]);
+      const auto place = place_.find(nodes[k]);
+      if (place != place_.end()) shape_.emplace_back(number, place->second, part);
+    }
+    patch_.local.nodes.push_back(position);
+    zero_axes_.push_back(coincides ? all_axes() : zero);
+    return number;
+  }
+
+  /// One part of an element, in positive orientation, and those of its sides that are on the body's surface.
+  void add_child(Index parent, std::span<const Index> part, const std::vector<Index>& local,
+                 const std::vector<unsigned>& corner_bits, const std::vector<OuterSide>& sides) {
+    const ElementType type = model_.mesh.element;
+    std::vector<Index> child;
+    std::vector<unsigned> bits;
+    const auto take = [&](Index node) {
+      child.push_back(local[static_cast<std::size_t>(node)]);
+      bits.push_back(corner_bits[static_cast<std::size_t>(node)]);
+    };
+    for (const Index node : part) take(node);
+    if (smallest_determinant(type, positions(patch_.local, child)) < 0.0) {
+      child.clear();
+      bits.clear();
+      for (const std::uint8_t k : reversed_nodes(type)) take(part[k]);
+    }
+    patch_.local.connectivity.insert(patch_.local.connectivity.end(), child.begin(), child.end());
+    patch_.parent.push_back(parent);
+
+    const auto facet_nodes = static_cast<std::size_t>(traits(surface_.facet).nodes);
+    for (const SideNodes& side : element_sides(type)) {
+      const auto is_on = [&](const OuterSide& outer) {
+        return !outer.is_border && std::all_of(side.begin(), side.begin() + facet_nodes, [&](std::uint8_t k) {
+          return (bits[k] & ~outer.corners) == 0;
+        });
+      };
+      if (std::none_of(sides.begin(), sides.end(), is_on)) continue;
+      for (std::size_t k = 0; k < facet_nodes; ++k) surface_.facets.push_back(child[side[k]]);
+    }
+  }
+
+  const Model& model_;
+  const ElementsAtNodes& at_;
+  int r_;
+  std::size_t d_;
+  PatchMesh patch_;
+  Surface surface_;
+  std::map<Index, Index> place_;  // of the body's nodes in patch_.nodes
+  std::map<Key, Index> local_of_key_;
+  std::map<std::array<int, 4>, Subdivision> cuts_;
+  std::vector<Eigen::Triplet<double>> shape_;
+  std::vector<unsigned> zero_axes_;  // [local nodes] bits of the axes along which u_L = 0
+};
+
+}  // namespace
+
+ElementsAtNodes::ElementsAtNodes(const Mesh& mesh) : start_(mesh.nodes.size() + 1) {
+  for (const Index node : mesh.connectivity) ++start_[static_cast<std::size_t>(node) + 1];
+  for (std::size_t k = 1; k < start_.size(); ++k) start_[k] += start_[k - 1];
+  elements_.resize(mesh.connectivity.size());
+  std::vector<Index> next(start_.begin(), start_.end() - 1);
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    for (const Index node : mesh.element_nodes(e))
+      elements_[static_cast<std::size_t>(next[static_cast<std::size_t>(node)]++)] = e;
+  }
+}
+
+std::vector<Index> rings_round(const Mesh& mesh, const ElementsAtNodes& at, std::span<const Index> nodes,
+                               int rings) {
+  std::vector<Index> reached(nodes.begin(), nodes.end());
+  std::vector<Index> elements;
+  for (int ring = 0; ring < rings; ++ring) {
+    elements.clear();
+    for (const Index node : reached) elements.insert(elements.end(), at[node].begin(), at[node].end());
+    std::sort(elements.begin(), elements.end());
+    elements.erase(std::unique(elements.begin(), elements.end()), elements.end());
+    reached.clear();
+    for (const Index e : elements)
+      reached.insert(reached.end(), mesh.element_nodes(e).begin(), mesh.element_nodes(e).end());
+    std::sort(reached.begin(), reached.end());
+    reached.erase(std::unique(reached.begin(), reached.end()), reached.end());
+  }
+  return elements;
+}
+
+PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, std::vector<Index> elements, int r) {
+  std::sort(elements.begin(), elements.end());
+  if (r < 2 || elements.empty()) {
+    throw Error("an overlay of " + std::to_string(elements.size()) + " elements, refined " +
+                    std::to_string(r) + " times",
+                "make_patch_mesh", "take at least one element and a refinement of at least 2");
+  }
+  if (elements.front() < 0 || elements.back() >= model.mesh.elements())
+    throw Error("an overlay of elements that the body does not have", "make_patch_mesh", "");
+  return Builder(model, at, std::move(elements), r).build();
+}
+
+}  // namespace palpate
