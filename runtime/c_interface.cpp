@@ -204,7 +204,8 @@ void palpate_get(const palpate_session* session, int tool, palpate_result* resul
   result->tool_orientation[2] = q.y();
   result->tool_orientation[3] = q.z();
   result->contacts = state.contacts;
-  for (int row = 0; row < 3; ++row) copy(state.local.stiffness.row(row), result->local_stiffness + 3 * row);
+  for (Eigen::Index row = 0; row < 3; ++row)
+    copy(state.local.stiffness.row(row), result->local_stiffness + 3 * row);
   copy(state.local.point, result->local_point);
   result->local_radius = state.local.radius;
 }

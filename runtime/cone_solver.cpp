@@ -192,21 +192,23 @@ void ConeSolver::linearise(const ContactProblem& problem) noexcept {
     const Index base = next;
     next += count;
     for (Index i = 0; i < count; ++i) {
+      const Index row = first + i;
       double* out = jacobian_row(base + i);
       std::fill_n(out, unknowns_, 0.0);
       if (mode_[contact] != Mode::slip || i == 0) {
-        gather_row(first + i, 1.0, out);
+        gather_row(row, 1.0, out);
         continue;
       }
       // In metres like the other rows: the equation of forces over the weight.
-      const double compliance = 1.0 / weight_[static_cast<std::size_t>(first + i)];
-      const double e = direction_[static_cast<std::size_t>(first + i)];
+      const double compliance = 1.0 / weight_[static_cast<std::size_t>(row)];
+      const double e = direction_[static_cast<std::size_t>(row)];
       out[base] -= compliance * problem.friction[contact] * e;
       out[base + i] += compliance;
       for (Index j = 1; j < count; ++j) {
-        const double across = (i == j ? 1.0 : 0.0) - e * direction_[static_cast<std::size_t>(first + j)];
+        const Index tangent = first + j;
+        const double across = (i == j ? 1.0 : 0.0) - e * direction_[static_cast<std::size_t>(tangent)];
         out[base + j] -= compliance * share_[contact] * across;
-        gather_row(first + j, share_[contact] * across, out);
+        gather_row(tangent, share_[contact] * across, out);
       }
     }
   }
@@ -262,13 +264,12 @@ bool ConeSolver::newton_step(ContactProblem& problem) noexcept {
   for (Index k = 0; k < problem.contacts; ++k) {
     const auto contact = static_cast<std::size_t>(k);
     if (mode_[contact] == Mode::open) continue;
-    const Index first = problem.first_row(k);
+    const auto first = static_cast<std::size_t>(problem.first_row(k));
     for (Index i = 0; i < problem.rows_of(k); ++i) {
-      const auto row = static_cast<std::size_t>(first + i);
+      const std::size_t row = first + static_cast<std::size_t>(i);
       double value = motion_[row];
       if (mode_[contact] == Mode::slip && i > 0) {
-        const double bound =
-            problem.friction[contact] * std::max(0.0, problem.lambda[static_cast<std::size_t>(first)]);
+        const double bound = problem.friction[contact] * std::max(0.0, problem.lambda[first]);
         value = (problem.lambda[row] - bound * direction_[row]) / weight_[row];
       }
       x_[static_cast<std::size_t>(next++)] = -value;
@@ -404,16 +405,17 @@ void ConeSolver::derivative(const ContactProblem& problem, std::span<const doubl
   for (Index k = 0; k < part_.problem.contacts; ++k) {
     const auto contact = static_cast<std::size_t>(k);
     if (mode_[contact] == Mode::open) continue;
-    const Index first = part_.problem.first_row(k);
+    const auto first = static_cast<std::size_t>(part_.problem.first_row(k));
     const Index count = part_.problem.rows_of(k);
     for (Index i = 0; i < count; ++i) {
-      double value = b_[static_cast<std::size_t>(first + i)];
+      const std::size_t row = first + static_cast<std::size_t>(i);
+      double value = b_[row];
       if (mode_[contact] == Mode::slip && i > 0) {
         value = 0.0;
         for (Index j = 1; j < count; ++j) {
-          const double across = (i == j ? 1.0 : 0.0) - direction_[static_cast<std::size_t>(first + i)] *
-                                                           direction_[static_cast<std::size_t>(first + j)];
-          value += share_[contact] * across * b_[static_cast<std::size_t>(first + j)];
+          const std::size_t tangent = first + static_cast<std::size_t>(j);
+          const double across = (i == j ? 1.0 : 0.0) - direction_[row] * direction_[tangent];
+          value += share_[contact] * across * b_[tangent];
         }
       }
       x_[static_cast<std::size_t>(next++)] = -value;

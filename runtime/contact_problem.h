@@ -34,10 +34,8 @@ struct ContactProblem {
   [[nodiscard]] Index rows_of(Index contact) const noexcept {
     return first_row(contact + 1) - first_row(contact);
   }
-  [[nodiscard]] double& w(Index i, Index j) noexcept { return W[static_cast<std::size_t>(i * stride + j)]; }
-  [[nodiscard]] double w(Index i, Index j) const noexcept {
-    return W[static_cast<std::size_t>(i * stride + j)];
-  }
+  [[nodiscard]] double& w(Index i, Index j) noexcept { return W[place_in_w(i, j)]; }
+  [[nodiscard]] double w(Index i, Index j) const noexcept { return W[place_in_w(i, j)]; }
   /// Row i of W, `rows` long.
   [[nodiscard]] const double* row(Index i) const noexcept {
     return W.data() + static_cast<std::ptrdiff_t>(i) * stride;
@@ -57,6 +55,9 @@ struct ContactProblem {
   std::vector<double> lambda;      ///< [rows] [N]; before solving: a guess
 
  private:
+  [[nodiscard]] std::size_t place_in_w(Index i, Index j) const noexcept {
+    return static_cast<std::size_t>(i) * static_cast<std::size_t>(stride) + static_cast<std::size_t>(j);
+  }
   void append(double mu, bool is_held, Index owner_of, Index count) noexcept;
 };
 

@@ -45,8 +45,9 @@ void linearise_tool(State& state, Index number) noexcept {
   for (int axis = 0; axis < problem.dimension; ++axis) {
     for (Index k = 0; k < state.contact_count; ++k) {
       const ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+      const auto first = static_cast<std::size_t>(problem.first_row(k));
       for (Index i = 0; i < problem.rows_of(k); ++i) {
-        state.row_change[static_cast<std::size_t>(problem.first_row(k) + i)] =
+        state.row_change[first + static_cast<std::size_t>(i)] =
             contact.tool == number ? contact.frame(axis, i) : 0.0;
       }
     }

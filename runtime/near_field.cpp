@@ -120,13 +120,16 @@ void NearField::unload() noexcept {
 }
 
 void NearField::retreat(double share) noexcept {
-  for (std::size_t dof = 0; dof < static_cast<std::size_t>(dimension_ * count_); ++dof)
+  const Index dofs = dimension_ * count_;
+  for (std::size_t dof = 0; dof < static_cast<std::size_t>(dofs); ++dof)
     force_[dof] = last_force_[dof] + share * (force_[dof] - last_force_[dof]);
 }
 
 void NearField::load(Index place, const Vec3& force) noexcept {
-  for (int axis = 0; axis < dimension_; ++axis)
-    force_[static_cast<std::size_t>(dimension_ * place + axis)] += force[axis];
+  for (int axis = 0; axis < dimension_; ++axis) {
+    const Index dof = dimension_ * place + axis;
+    force_[static_cast<std::size_t>(dof)] += force[axis];
+  }
 }
 
 void NearField::displace() noexcept {

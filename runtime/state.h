@@ -23,23 +23,23 @@ namespace palpate {
 
 /// One tool.
 struct ToolState {
-  Tool tool;
   ToolPose
       pose;  ///< of the tool itself, which the body keeps outside; of the device: with the coupling's stretch
   ToolPose device;  ///< the device pose that the tick used: the last finite one, approached at bounded speed
-  Wrench contact_wrench;        ///< of the contacts on the tool, about its origin
-  Wrench wrench;                ///< on the hand, about the tool's origin: what the device is to display
-  LocalModel local;             ///< of wrench.force
-  Wrench last_contact_wrench;   ///< of the tick or pass before
-  Index contacts = 0;           ///< closed contact points
-  bool placed = false;          ///< has had a pose
-  bool engaged = false;         ///< can touch
+  Tool tool;
+  Wrench contact_wrench;       ///< of the contacts on the tool, about its origin
+  Wrench wrench;               ///< on the hand, about the tool's origin: what the device is to display
+  LocalModel local;            ///< of wrench.force
+  Wrench last_contact_wrench;  ///< of the tick or pass before
+  Vec3 last_device_position = Vec3::Zero();  ///< of the tick before [m]
+  double felt = 0.0;                         ///< the force of late [N]
+  double margin = 0.0;   ///< how far the surface may be from the tool and still be met in this tick [m]
+  Index contacts = 0;    ///< closed contact points
+  bool placed = false;   ///< has had a pose
+  bool engaged = false;  ///< can touch
   bool has_been_clear = false;  ///< of the body once: nothing is felt before; one that is lost in the body
                                 ///< after that is felt again as soon as its core is outside
   bool holding = false;         ///< a grab holds the surface
-  Vec3 last_device_position = Vec3::Zero();  ///< of the tick before [m]
-  double felt = 0.0;                         ///< the force of late [N]
-  double margin = 0.0;  ///< how far the surface may be from the tool and still be met in this tick [m]
   StepStatus status = StepStatus::ok;  ///< of the last tick
 };
 

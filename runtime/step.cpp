@@ -45,10 +45,10 @@ void apply_forces(State& state) noexcept {
   state.near.displace();
   for (Index k = 0; k < state.contact_count; ++k) {
     ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
-    const Index first = state.problem.first_row(k);
+    const auto first = static_cast<std::size_t>(state.problem.first_row(k));
     contact.force.setZero();
     for (Index i = 0; i < state.problem.rows_of(k); ++i)
-      contact.force += state.problem.lambda[static_cast<std::size_t>(first + i)] * contact.frame.col(i);
+      contact.force += state.problem.lambda[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
     if (contact.force.squaredNorm() == 0.0) continue;
     ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
     ++tool.contacts;

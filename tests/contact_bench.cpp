@@ -356,9 +356,11 @@ void register_body(const std::shared_ptr<const Body>& body, double radius) {
   for (const double friction : {0.0, 0.2}) {
     const std::string kind = friction > 0.0 ? "/friction:0.2" : "/frictionless";
     add_motions(sphere + kind, radius, friction);
-    for (const auto& [contacts, size] : radii)
-      add_motions(model + "/contacts:" + std::to_string(contacts) + "/sphere:" + millimetres(size) + kind,
-                  size, friction);
+    for (const auto& [contacts, size] : radii) {
+      const std::string with_contacts =
+          model + "/contacts:" + std::to_string(contacts) + "/sphere:" + millimetres(size);
+      add_motions(with_contacts + kind, size, friction);
+    }
   }
 }
 

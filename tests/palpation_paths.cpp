@@ -133,7 +133,8 @@ std::optional<Track> lay_track(const Body& body, const RestSurface& surface, Sta
                      normal.unitOrthogonal();
   Track track{.centres = {}, .inward = -normal, .spacing = spacing};
   double way_before = 0.0;
-  for (double s = -0.5 * length; s <= 0.5 * length; s += spacing) {
+  double s = -0.5 * length;  // along the track, from its middle
+  while (s <= 0.5 * length) {
     const double begin = track.centres.empty() ? 0.0 : std::max(0.0, way_before - radius);
     const Vec3 from = middle.position + s * along + (height - begin) * normal;
     const std::optional<double> way = touch(body, rest, from, track.inward, 2.0 * height);
@@ -143,6 +144,7 @@ std::optional<Track> lay_track(const Body& body, const RestSurface& surface, Sta
     track.centres.emplace_back(from + *way * track.inward);
     const RestSurface::Place under = surface.nearest(track.centres.back());
     if (!under.free) return std::nullopt;
+    s += spacing;
   }
   return track;
 }

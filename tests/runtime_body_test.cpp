@@ -171,7 +171,8 @@ TEST_P(SurfaceOf, HasTheFrictionOfTheElementUnderIt) {
     model.materials[e].friction = 0.01 * static_cast<double>(e);
     model.material_of_element[e] = static_cast<Index>(e);
   }
-  std::rotate(model.surface.begin(), model.surface.begin() + 5 * model.dimension(), model.surface.end());
+  const std::ptrdiff_t corners = model.dimension();
+  std::rotate(model.surface.begin(), model.surface.begin() + 5 * corners, model.surface.end());
   const Body body(std::move(model));
   const Mesh& mesh = body.model().mesh;
   const auto d = static_cast<std::size_t>(body.dimension());

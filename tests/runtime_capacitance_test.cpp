@@ -57,7 +57,8 @@ class Capacitance {
   [[nodiscard]] std::vector<Eigen::Index> dofs(const std::vector<Index>& nodes) const {
     std::vector<Eigen::Index> all;
     for (const Index node : nodes) {
-      for (Eigen::Index axis = 0; axis < C_.dimension(); ++axis) all.push_back(C_.dimension() * node + axis);
+      const Index first = C_.dimension() * node;
+      for (Eigen::Index axis = 0; axis < C_.dimension(); ++axis) all.push_back(first + axis);
     }
     return all;
   }
@@ -101,7 +102,7 @@ TEST_P(CapacitanceMatrices, SolveInvertsC) {
   const Eigen::MatrixXd xi = random_greens(GetParam(), 45);
   Capacitance capacitance(xi, GetParam(), 64);
   for (Index node = 0; node < 45; ++node) ASSERT_EQ(capacitance.add(node), CapacitanceStatus::ok);
-  const Eigen::VectorXd u = Eigen::VectorXd::LinSpaced(GetParam() * 45, -1.0, 2.0);
+  const Eigen::VectorXd u = Eigen::VectorXd::LinSpaced(xi.rows(), -1.0, 2.0);
   Eigen::VectorXd f = u;
   capacitance.C_.solve({f.data(), static_cast<std::size_t>(f.size())});
   EXPECT_LT((capacitance.fresh() * f - u).norm(), 1e-12 * u.norm());
@@ -168,8 +169,8 @@ TEST_P(CapacitanceMatrices, RefusesWhatDoesNotFitAndStaysAsItWas) {
   Capacitance capacitance(xi, GetParam(), 3);
   ASSERT_EQ(capacitance.add(0), CapacitanceStatus::ok);
   EXPECT_EQ(capacitance.add(0), CapacitanceStatus::not_positive_definite) << "a node held twice";
-  const auto entries = static_cast<std::size_t>(2 * GetParam() * GetParam());
-  const std::vector<double> nonsense(entries, std::numeric_limits<double>::quiet_NaN());
+  const auto d = static_cast<std::size_t>(GetParam());
+  const std::vector<double> nonsense(2 * d * d, std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(capacitance.C_.add(nonsense), CapacitanceStatus::not_positive_definite);
   ASSERT_EQ(capacitance.add(1), CapacitanceStatus::ok);
   ASSERT_EQ(capacitance.add(2), CapacitanceStatus::ok);

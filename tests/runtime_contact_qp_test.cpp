@@ -307,7 +307,7 @@ std::vector<Wrench> wrenches(const std::vector<Press>& presses, const Solution& 
 
 /// Within the 1e-6 of the largest, at all surface nodes.
 void expect_equal_displacements(const Body& body, const Eigen::VectorXd& u, const Eigen::VectorXd& direct) {
-  const int d = body.dimension();
+  const Eigen::Index d = body.dimension();
   double largest = 0.0;
   double difference = 0.0;
   for (Eigen::Index dof = 0; dof < u.size(); ++dof) {

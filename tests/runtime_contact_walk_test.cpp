@@ -210,7 +210,7 @@ class Walk : public testing::TestWithParam<WalkCase> {
       step(body_, state, poses);
     }
     for (int k = 0; k < 300; ++k) step(body_, state, poses);
-    const Vec3 force = state.tools[0].contact_wrench.force;
+    Vec3 force = state.tools[0].contact_wrench.force;
     poses[0].position = away(0);
     for (int k = 0; k < 200; ++k) step(body_, state, poses);
     return force;

@@ -125,6 +125,7 @@ TEST_P(Near, RetreatMakesAShareOfTheChange) {
   const auto displacements = [&] {
     near.displace();
     std::vector<Vec3> u;
+    u.reserve(static_cast<std::size_t>(near.count()));
     for (Index place = 0; place < near.count(); ++place) u.push_back(near.displacement(place));
     return u;
   };

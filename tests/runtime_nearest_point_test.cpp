@@ -173,7 +173,7 @@ class ATriangle {
   /// Direction that points more than a little away from both other corners: its nearest point is corner k.
   Vec3 off_corner(std::size_t k) {
     while (true) {
-      const Vec3 d = vector().normalized();
+      Vec3 d = vector().normalized();
       if (d.dot((*this)[k + 1] - (*this)[k]) < -0.1 && d.dot((*this)[k + 2] - (*this)[k]) < -0.1) return d;
     }
   }

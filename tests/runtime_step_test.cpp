@@ -233,6 +233,7 @@ TEST_P(Touch, CopiesReplayBitwise) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> move(-0.05, 0.05);
   std::vector<std::array<ToolPose, 2>> poses;
+  poses.reserve(200);
   for (int k = 0; k < 200; ++k) {
     poses.push_back({pose(at(0.3, 0.4, 1.08) + at(move(random), move(random), move(random)), k % 70 > 50),
                      pose(at(0.7, 0.6, 1.0) + at(move(random), move(random), move(random)), k % 50 > 5)});
