@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
@@ -128,8 +129,8 @@ TEST_P(EveryKind, OverAllElementsIsTheFinerMesh) {
   const Body coarse(test::unit_model(element, 2, Scope::full, Precision::double_precision));
   const Body fine(test::unit_model(element, 2 * r, Scope::full, Precision::double_precision));
   const Mesh& mesh = coarse.model().mesh;
-  std::vector<Index> elements;
-  for (Index e = 0; e < mesh.elements(); ++e) elements.push_back(e);
+  std::vector<Index> elements(static_cast<std::size_t>(mesh.elements()));
+  std::iota(elements.begin(), elements.end(), 0);
   const Overlay overlay(coarse, make_patch_mesh(coarse.model(), ElementsAtNodes(mesh), elements, r));
   EXPECT_EQ(overlay.patch().local.nodes.size(), fine.model().mesh.nodes.size());
   EXPECT_EQ(overlay.patch().local.elements(), fine.model().mesh.elements());
@@ -176,8 +177,8 @@ TEST_P(EveryKind, OverAllElementsIsTheFinerMesh) {
 TEST_P(EveryKind, TheSurfaceIsThatOfTheBody) {
   const auto [element, r] = GetParam();
   const Model model = test::unit_model(element, 2, Scope::full, Precision::double_precision);
-  std::vector<Index> elements;
-  for (Index e = 0; e < model.mesh.elements(); ++e) elements.push_back(e);
+  std::vector<Index> elements(static_cast<std::size_t>(model.mesh.elements()));
+  std::iota(elements.begin(), elements.end(), 0);
   const PatchMesh patch = make_patch_mesh(model, ElementsAtNodes(model.mesh), elements, r);
   std::multiset<std::vector<Index>> expected;
   std::multiset<std::vector<Index>> found;
