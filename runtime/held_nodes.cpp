@@ -25,8 +25,9 @@ void erase_entries(std::vector<T>& values, Index k, Index nodes, std::ptrdiff_t 
 
 }  // namespace
 
-HeldNodes::HeldNodes(const Body& body, Index max_nodes)
+HeldNodes::HeldNodes(const Body& body, Index max_nodes, const Overlay* overlay)
     : capacitance_(body.dimension(), max_nodes),
+      overlay_(overlay),
       nodes_(static_cast<std::size_t>(max_nodes), -1),
       displacement_(dofs(body.dimension(), max_nodes)),
       force_(dofs(body.dimension(), max_nodes)),
@@ -52,7 +53,9 @@ StepStatus HeldNodes::hold(const Body& body, Index node) noexcept {
   const auto d = static_cast<std::size_t>(dimension());
   const std::size_t width = d * static_cast<std::size_t>(k + 1);
   const std::span<double> blocks(work_.data(), d * width);
-  body.greens().gather(node, {nodes_.data(), static_cast<std::size_t>(k + 1)}, blocks);
+  const std::span<const Index> columns(nodes_.data(), static_cast<std::size_t>(k) + 1);
+  body.greens().gather(node, columns, blocks);
+  if (overlay_ != nullptr) overlay_->add_to_blocks(body, node, columns, blocks);
 
   Vec3 where_it_is = Vec3::Zero();
   for (std::size_t axis = 0; axis < d; ++axis) {
@@ -98,7 +101,13 @@ Index HeldNodes::position_of(Index node) const noexcept {
 }
 
 void HeldNodes::displace(const Body& body, std::span<double> u) const noexcept {
-  body.greens().displacement(nodes(), forces(), u);
+  if (overlay_ == nullptr) return body.greens().displacement(nodes(), forces(), u);
+  const Eigen::VectorXd beside = overlay_->forces_beside(body, nodes(), forces());
+  std::vector<Index> all(nodes().begin(), nodes().end());
+  std::vector<double> f(forces().begin(), forces().end());
+  all.insert(all.end(), overlay_->stored_nodes().begin(), overlay_->stored_nodes().end());
+  f.insert(f.end(), beside.begin(), beside.end());
+  body.greens().displacement(all, f, u);
 }
 
 }  // namespace palpate

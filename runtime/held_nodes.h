@@ -6,6 +6,7 @@
 
 #include "runtime/body.h"
 #include "runtime/capacitance.h"
+#include "runtime/overlay.h"
 #include "runtime/status.h"
 
 namespace palpate {
@@ -16,8 +17,9 @@ namespace palpate {
 /// in the plane).
 class HeldNodes {
  public:
-  /// Holds nothing; room for `max_nodes`. Throws Error unless that is at least one.
-  explicit HeldNodes(const Body& body, Index max_nodes = 256);
+  /// Holds nothing; room for `max_nodes`. Throws Error unless that is at least one. With an overlay, which
+  /// must live as long, the body is the finer one: then `hold` and `displace` take memory.
+  explicit HeldNodes(const Body& body, Index max_nodes = 256, const Overlay* overlay = nullptr);
 
   [[nodiscard]] int dimension() const noexcept { return capacitance_.dimension(); }  ///< d, dofs a node
   [[nodiscard]] Index count() const noexcept { return capacitance_.nodes(); }  ///< m, number of held nodes
@@ -52,6 +54,7 @@ class HeldNodes {
 
  private:
   CapacitanceMatrix capacitance_;
+  const Overlay* overlay_;
   std::vector<Index> nodes_;
   std::vector<double> displacement_;
   std::vector<double> force_;

@@ -28,6 +28,7 @@ struct Arguments {
   std::vector<std::string> node;
   std::vector<std::string> displace;
   bool json = false;
+  std::optional<std::string> overlay;
   std::string field;
   std::string device;
   std::string tool = "point";
@@ -65,6 +66,12 @@ CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
   add_repeatable(*probe, "--displace", arguments.displace, "DX,DY,DZ",
                  "its displacement [m]; one for each --at and --node, in the same order")
       ->required();
+  probe
+      ->add_option(
+          "--overlay", arguments.overlay,
+          "a finer mesh over the elements in N rings round those nodes, each cut into R to the power "
+          "of the dimension (s-FEM)")
+      ->type_name("r=R,rings=N");
   probe->add_flag("--json", arguments.json, "print JSON");
   probe
       ->add_option(
@@ -173,6 +180,26 @@ std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& argu
   return places;
 }
 
+/// "r=3,rings=2", either part with its default when it is left out.
+OverlayOptions read_overlay(const std::string& text) {
+  OverlayOptions overlay;
+  for (const std::string_view part : split_commas(text)) {
+    const std::size_t equals = std::min(part.find('='), part.size());
+    const std::string_view name = part.substr(0, equals);
+    const std::optional<Index> value =
+        parse_index(std::string(part.substr(std::min(equals + 1, part.size()))));
+    if (name == "r" && value && *value >= 2 && *value <= 16) {
+      overlay.refinement = *value;
+    } else if (name == "rings" && value && *value >= 1 && *value <= 16) {
+      overlay.rings = *value;
+    } else {
+      throw CLI::ValidationError("--overlay",
+                                 fmt::format("'{}' is neither r=2 to r=16 nor rings=1 to rings=16", part));
+    }
+  }
+  return overlay;
+}
+
 /// "point", "sphere:RADIUS" or "capsule:RADIUS,LENGTH".
 Tool read_shape(const std::string& text) {
   Tool tool;
@@ -270,11 +297,13 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
     if (app.get_subcommands().empty()) throw CLI::RequiredError("probe or play");
     if (play_command->parsed()) return play(read_play(arguments));
-    return probe({.file = arguments.file,
-                  .model_toml = arguments.model_toml,
-                  .places = read_places(*probe_command, arguments),
-                  .json = arguments.json,
-                  .field = arguments.field});
+    return probe(
+        {.file = arguments.file,
+         .model_toml = arguments.model_toml,
+         .places = read_places(*probe_command, arguments),
+         .overlay = arguments.overlay ? std::optional(read_overlay(*arguments.overlay)) : std::nullopt,
+         .json = arguments.json,
+         .field = arguments.field});
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const std::string command =

@@ -112,6 +112,26 @@ Eigen::MatrixXd Overlay::columns(const Body& body, Index node) const {
   return rows.transpose();
 }
 
+void Overlay::add_to_blocks(const Body& body, Index row, std::span<const Index> nodes,
+                            std::span<double> blocks) const {
+  const auto d = static_cast<Eigen::Index>(body.dimension());
+  const Eigen::MatrixXd left = columns(body, row).transpose() * M_;
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> result(
+      blocks.data(), d, d * static_cast<Eigen::Index>(nodes.size()));
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    result.middleCols(d * static_cast<Eigen::Index>(k), d) += left * columns(body, nodes[k]);
+}
+
+Eigen::VectorXd Overlay::forces_beside(const Body& body, std::span<const Index> nodes,
+                                       std::span<const double> f) const {
+  const auto d = static_cast<Eigen::Index>(body.dimension());
+  const Eigen::Map<const Eigen::VectorXd> forces(f.data(), static_cast<Eigen::Index>(f.size()));
+  Eigen::VectorXd u_Q = Eigen::VectorXd::Zero(M_.rows());
+  for (std::size_t k = 0; k < nodes.size(); ++k)
+    u_Q += columns(body, nodes[k]) * forces.segment(d * static_cast<Eigen::Index>(k), d);
+  return M_ * u_Q;
+}
+
 Eigen::MatrixXd Overlay::block(const Body& body, Index row, Index column) const {
   return body.greens().block(row, column) + columns(body, row).transpose() * M_ * columns(body, column);
 }

@@ -35,6 +35,15 @@ class Overlay {
   [[nodiscard]] const Eigen::MatrixXd& superelement() const noexcept { return G_; }  ///< [d g x d g] [N/m]
   [[nodiscard]] const Eigen::MatrixXd& correction() const noexcept { return M_; }    ///< [d g x d g] M [N/m]
 
+  /// Adds what the overlay changes to the block row that Greens::gather gives.
+  void add_to_blocks(const Body& body, Index row, std::span<const Index> columns,
+                     std::span<double> blocks) const;
+
+  /// The forces [d g] on the patch's nodes that, beside the forces f [d m] on stored nodes, give the body the
+  /// displacement that it has with the overlay: M Xi_Q f.
+  [[nodiscard]] Eigen::VectorXd forces_beside(const Body& body, std::span<const Index> nodes,
+                                              std::span<const double> f) const;
+
   /// Xi_G at (row, column) of stored nodes [d, d] [m/N].
   [[nodiscard]] Eigen::MatrixXd block(const Body& body, Index row, Index column) const;
 

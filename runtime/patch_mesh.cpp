@@ -154,7 +154,7 @@ class Builder {
     if (!is_new) return number;
     const ShapeValues N = shape_functions(model_.mesh.element, node.xi);
     Vec3 position = Vec3::Zero();
-    bool coincides = false;  // with a node of the body
+    bool coincides = false;      // with a node of the body
     unsigned zero = all_axes();  // held where all that have a part in it are
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const double part = N[static_cast<Eigen::Index>(k)];

@@ -19,11 +19,12 @@ namespace {
 
 /// What is told of one node.
 struct Answer {
-  Index node;                      // of the mesh
-  Vec3 position;                   // at rest [m]
-  std::optional<double> distance;  // from the point asked for [m]
-  Vec3 displacement;               // relative to rest [m]
-  Vec3 force;                      // on the body [N]
+  Index node = -1;                   // of the mesh
+  Index stored = -1;                 // stored node
+  Vec3 position = Vec3::Zero();      // at rest [m]
+  std::optional<double> distance;    // from the point asked for [m]
+  Vec3 displacement = Vec3::Zero();  // relative to rest [m]
+  Vec3 force = Vec3::Zero();         // on the body [N]
 };
 
 /// A vector as it was written, in the space that the body moves in.
@@ -78,40 +79,59 @@ Index stored_node_of(const Body& body, Index node, const std::string& where) {
               "give a surface node, or precompute with storage scope \"full\" or more layers");
 }
 
-std::vector<Answer> ask(const Body& body, HeldNodes& contact, const ProbeOptions& options) {
+/// The nodes that are meant, and what is asked for there; forces come later.
+std::vector<Answer> read_questions(const Body& body, const ProbeOptions& options) {
   const std::string where = options.file.string();
   std::vector<Answer> answers;
   for (const ProbePlace& place : options.places) {
-    const Vec3 displacement = vector_of(place.displacement, body, "--displace", where);
-    std::optional<double> distance;
-    Index stored = -1;
+    Answer answer;
+    answer.displacement = vector_of(place.displacement, body, "--displace", where);
     if (place.at) {
       const NearestNode nearest = body.nearest_surface_node(vector_of(*place.at, body, "--at", where));
-      stored = nearest.node;
-      distance = nearest.distance;
+      answer.stored = nearest.node;
+      answer.distance = nearest.distance;
     } else {
-      stored = stored_node_of(body, place.node.value(), where);
+      answer.stored = stored_node_of(body, place.node.value(), where);
     }
-    const Index node = body.mesh_node(stored);
-    if (contact.position_of(stored) >= 0) {
-      throw Error(fmt::format("node {} is asked for twice", node), where,
+    answer.node = body.mesh_node(answer.stored);
+    answer.position = body.rest_position(answer.stored);
+    const bool twice = std::any_of(answers.begin(), answers.end(),
+                                   [&](const Answer& other) { return other.stored == answer.stored; });
+    if (twice) {
+      throw Error(fmt::format("node {} is asked for twice", answer.node), where,
                   "give each node one displacement; places closer than the mesh is fine share a node");
     }
-    if (contact.hold(body, stored) != StepStatus::ok ||
-        contact.prescribe(stored, displacement) != StepStatus::ok) {
+    answers.push_back(answer);
+  }
+  return answers;
+}
+
+/// A finer mesh over the elements round all nodes that are asked for.
+Overlay make_overlay(const Body& body, const std::vector<Answer>& answers, const OverlayOptions& options) {
+  const Model& model = body.model();
+  const ElementsAtNodes at(model.mesh);
+  std::vector<Index> nodes;
+  nodes.reserve(answers.size());
+  for (const Answer& answer : answers) nodes.push_back(answer.node);
+  return {body,
+          make_patch_mesh(model, at, rings_round(model.mesh, at, nodes, options.rings), options.refinement)};
+}
+
+void solve(const Body& body, HeldNodes& contact, std::vector<Answer>& answers, const std::string& where) {
+  for (const Answer& answer : answers) {
+    if (contact.hold(body, answer.stored) != StepStatus::ok ||
+        contact.prescribe(answer.stored, answer.displacement) != StepStatus::ok) {
       throw Error(
           fmt::format("node {} does not move independently of the others in the stored Green's functions",
-                      node),
+                      answer.node),
           where, "check the file with palpate-precompute verify");
     }
-    answers.push_back({node, body.rest_position(stored), distance, displacement, Vec3::Zero()});
   }
   if (contact.solve() != StepStatus::ok) {
     throw Error("the forces are too large for a number", where, "give displacements in metres");
   }
   for (std::size_t k = 0; k < answers.size(); ++k)
     answers[k].force = vector_at(contact.forces(), contact.dimension(), static_cast<Index>(k));
-  return answers;
 }
 
 Vec3 total_force(const std::vector<Answer>& answers) {
@@ -222,8 +242,11 @@ int probe(const ProbeOptions& options) {
                 "name the field by what it should be, e.g. out.vtu");
   }
   const Body body = load_body(options.file, options.model_toml);
-  HeldNodes contact(body, static_cast<Index>(options.places.size()));
-  const std::vector<Answer> answers = ask(body, contact, options);
+  std::vector<Answer> answers = read_questions(body, options);
+  std::optional<Overlay> overlay;
+  if (options.overlay) overlay.emplace(make_overlay(body, answers, *options.overlay));
+  HeldNodes contact(body, static_cast<Index>(options.places.size()), overlay ? &*overlay : nullptr);
+  solve(body, contact, answers, options.file.string());
 
   if (!options.field.empty()) {
     std::vector<double> u(static_cast<std::size_t>(body.greens().order()));

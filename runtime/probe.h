@@ -16,10 +16,17 @@ struct ProbePlace {
   std::vector<double> displacement;       ///< [m] relative to rest
 };
 
+/// A finer mesh round the nodes that are displaced.
+struct OverlayOptions {
+  int refinement = 3;  ///< r: each element is cut into r^d
+  int rings = 2;       ///< of elements round the nodes
+};
+
 struct ProbeOptions {
   std::filesystem::path file;        ///< baked model
   std::filesystem::path model_toml;  ///< that it must have been made from; empty: not asked
   std::vector<ProbePlace> places;
+  std::optional<OverlayOptions> overlay;  ///< none: the body's own mesh
   bool json = false;
   std::filesystem::path field;  ///< .csv or .vtu for the whole displacement, at rest and by the probe; empty:
                                 ///< none
