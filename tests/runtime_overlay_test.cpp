@@ -2,9 +2,11 @@
 // against a finer mesh.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <numeric>
+#include <random>
 #include <set>
 #include <string>
 #include <vector>
@@ -203,6 +205,50 @@ TEST_P(EveryKind, TheSurfaceIsThatOfTheBody) {
       middle += one.local.nodes[static_cast<std::size_t>(one.surface[k + n])] / static_cast<double>(d);
     const Vec3 from_centre = middle - test::upright(model.dimension(), 0.5, 0.5, 0.5);
     EXPECT_NEAR(from_centre.lpNorm<Eigen::Infinity>(), 0.5, 1e-12);
+  }
+}
+
+/// A cube of tetrahedra of all shapes: nodes in arbitrary order, those inside and on the top moved about.
+Model crooked_model() {
+  const Model regular = test::unit_model(3, 4, Scope::full, Precision::double_precision);
+  Mesh mesh = regular.mesh;
+  std::mt19937 random(3);
+  std::vector<Index> number(mesh.nodes.size());
+  std::iota(number.begin(), number.end(), 0);
+  std::shuffle(number.begin(), number.end(), random);
+  std::uniform_real_distribution<double> shift(-0.03, 0.03);
+  for (std::size_t k = 0; k < number.size(); ++k) {
+    const Vec3& from = regular.mesh.nodes[k];
+    const bool moves = from.z() > 0.1 && from.head<2>().minCoeff() > 0.1 && from.head<2>().maxCoeff() < 0.9;
+    mesh.nodes[static_cast<std::size_t>(number[k])] =
+        moves ? Vec3(from + Vec3(shift(random), shift(random), shift(random))) : from;
+  }
+  for (Index& node : mesh.connectivity) node = number[static_cast<std::size_t>(node)];
+  return test::bake(
+      std::move(mesh), [](const Vec3& node) { return node.z() < 1e-12; }, Scope::full,
+      Precision::double_precision);
+}
+
+TEST(Overlay, BothWaysAgreeOnRandomPatches) {
+  const Body body(crooked_model());
+  const ElementsAtNodes at(body.model().mesh);
+  std::mt19937 random(1);
+  for (int k = 0; k < 40; ++k) {
+    const std::vector<Index>& surface = body.free_surface_nodes();
+    const std::vector<Index> nodes = {body.mesh_node(surface[random() % surface.size()])};
+    const int rings = k % 4 == 0 ? 2 : 1;
+    const int r = 2 + k % 3;
+    if (rings == 2 && r == 4) continue;  // some seconds by partitioning
+    const Overlay overlay(
+        body, make_patch_mesh(body.model(), at, rings_round(body.model().mesh, at, nodes, rings), r));
+    const Eigen::MatrixXd greens = greens_at(body, overlay.stored_nodes());
+    const PartitionedInverse reference =
+        invert_by_partitioning(assemble_patch(body.model(), overlay.patch()), greens);
+    const Eigen::MatrixXd condensed = greens + greens * overlay.correction() * greens;
+    EXPECT_LT((condensed - reference.global).norm(), 1e-10 * reference.global.norm());
+    // What is finer gives way more, to any force.
+    const Eigen::MatrixXd more = reference.global - greens;
+    EXPECT_GT(more.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-10 * more.norm());
   }
 }
 
