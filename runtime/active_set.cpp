@@ -3,17 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/vector_loops.h"
+
 namespace palpate {
 namespace {
 
 constexpr double gap_tolerance = 1e-11;  // of the largest entry of b: rounding
-
-double dot(const double* __restrict a, const double* __restrict b, Index count) noexcept {
-  double sum = 0.0;
-#pragma omp simd reduction(+ : sum)
-  for (Index i = 0; i < count; ++i) sum += a[i] * b[i];
-  return sum;
-}
 
 }  // namespace
 

@@ -8,6 +8,7 @@
 
 #include "formats/packed.h"
 #include "meshes/error.h"
+#include "runtime/vector_loops.h"
 
 namespace palpate {
 namespace {
@@ -35,13 +36,6 @@ void subtract_columns(const std::array<const double*, D>& L, const std::array<do
     for (std::size_t p = 0; p < D; ++p) sum += L[p][i] * x[p];
     y[i] -= sum;
   }
-}
-
-double dot(const double* __restrict a, const double* __restrict b, std::int64_t count) noexcept {
-  double sum = 0.0;
-#pragma omp simd reduction(+ : sum)
-  for (std::int64_t i = 0; i < count; ++i) sum += a[i] * b[i];
-  return sum;
 }
 
 /// Givens rotation of the column pair (L, w) that keeps L L^T + w w^T and zeroes w at the top.

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/vector_loops.h"
+
 namespace palpate {
 namespace {
 
@@ -18,18 +20,6 @@ constexpr int spring_rounds = 12;
 // the force.
 constexpr double first_share = 0.01;
 constexpr double next_share = 0.5;
-
-double dot(const double* __restrict a, const double* __restrict b, Index count) noexcept {
-  double sum = 0.0;
-#pragma omp simd reduction(+ : sum)
-  for (Index i = 0; i < count; ++i) sum += a[i] * b[i];
-  return sum;
-}
-
-void subtract(const double* __restrict x, double factor, double* __restrict y, Index count) noexcept {
-#pragma omp simd
-  for (Index i = 0; i < count; ++i) y[i] -= factor * x[i];
-}
 
 double largest_force(const ContactProblem& problem) noexcept {
   double largest = 0.0;

@@ -16,8 +16,9 @@ namespace palpate {
 ///   lambda_t = the point nearest to lambda_t - r_t / w_t within the disc of radius mu lambda_n,
 /// guarded by block Gauss-Seidel sweeps, and where that runs in circles by proximal steps: springs draw the
 /// forces to where they are, and are made weaker from step to step (Rockafellar 1976). Residual: the largest
-/// difference of the two sides. The budget is `most_rounds` rounds, and beyond the fourth `most_work`. All
-/// memory is taken at construction.
+/// difference of the two sides. Solved are the contacts that the guess closes (without a guess: those that
+/// are closed without friction); those left out that are then penetrated are taken in. The budget is
+/// `most_rounds` rounds, and beyond the fourth `most_work`. All memory is taken at construction.
 class ConeSolver {
  public:
   static constexpr double tolerance = 1e-6;  ///< of the residual, relative to the largest force
@@ -27,8 +28,9 @@ class ConeSolver {
 
   ConeSolver(Index max_contacts, Index max_rows);
 
-  /// Fills problem.lambda from the guess in it. False when the rounds did not suffice: lambda is then the
-  /// best that was found; forces are within the cones.
+  /// Fills problem.lambda from the guess in it, to `tolerance` where the budget suffices. False when the
+  /// residual is over `accepted`, or a contact left out is penetrated: lambda is then the best that was
+  /// found; forces are within the cones.
   bool solve(ContactProblem& problem) noexcept;
 
   /// What lambda changes by when b changes by `db` [rows], to first order: [rows]. Contacts stay open,
@@ -36,8 +38,10 @@ class ConeSolver {
   void derivative(const ContactProblem& problem, std::span<const double> db,
                   std::span<double> dlambda) noexcept;
 
-  [[nodiscard]] int rounds() const noexcept { return rounds_; }                     ///< of the last `solve`
-  [[nodiscard]] bool was_easy() const noexcept { return work_ < 0.1 * most_work; }  ///< the last `solve`
+  [[nodiscard]] int rounds() const noexcept { return rounds_; }  ///< of the last `solve`
+  [[nodiscard]] bool was_easy() const noexcept {
+    return work_ < 0.1 * most_work;
+  }  ///< `solve` left time for another
 
  private:
   enum class Mode : std::uint8_t { open, stick, slip };

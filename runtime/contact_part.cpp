@@ -3,22 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/vector_loops.h"
+
 namespace palpate {
 namespace {
 
 constexpr double least_pivot = 1e-12;  // of the row's own compliance: less depends on the rows before
-
-double dot(const double* __restrict a, const double* __restrict b, Index count) noexcept {
-  double sum = 0.0;
-#pragma omp simd reduction(+ : sum)
-  for (Index i = 0; i < count; ++i) sum += a[i] * b[i];
-  return sum;
-}
-
-void subtract(const double* __restrict x, double factor, double* __restrict y, Index count) noexcept {
-#pragma omp simd
-  for (Index i = 0; i < count; ++i) y[i] -= factor * x[i];
-}
 
 bool is_held(const ContactProblem& whole, Index contact) noexcept {
   return whole.held[static_cast<std::size_t>(contact)] != 0;

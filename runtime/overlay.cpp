@@ -97,17 +97,17 @@ Overlay::Overlay(const Body& body, PatchMesh patch) : patch_(std::move(patch)) {
     throw Error("the stiffness of an overlay is not positive definite", body.model().name,
                 "the elements there are too flat: mesh the body anew");
   recover_ = -factor.solve(stiffness.K_LG);
-  G_ = -stiffness.K_LG.transpose() * recover_;
+  const Eigen::MatrixXd G = -stiffness.K_LG.transpose() * recover_;
   const Eigen::MatrixXd greens = greens_at(body, stored_);
-  const Eigen::MatrixXd softened = Eigen::MatrixXd::Identity(G_.rows(), G_.cols()) - G_ * greens;
-  M_ = softened.partialPivLu().solve(G_);
+  const Eigen::MatrixXd softened = Eigen::MatrixXd::Identity(G.rows(), G.cols()) - G * greens;
+  M_ = softened.partialPivLu().solve(G);
   M_ = 0.5 * (M_ + M_.transpose()).eval();
 }
 
 /// Xi at the patch's nodes, by forces on a node [d g x d].
 Eigen::MatrixXd Overlay::columns(const Body& body, Index node) const {
   const auto d = static_cast<Eigen::Index>(body.dimension());
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows(d, G_.rows());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows(d, M_.rows());
   body.greens().gather(node, stored_, {rows.data(), static_cast<std::size_t>(rows.size())});
   return rows.transpose();
 }
@@ -133,7 +133,12 @@ Eigen::VectorXd Overlay::forces_beside(const Body& body, std::span<const Index> 
 }
 
 Eigen::MatrixXd Overlay::block(const Body& body, Index row, Index column) const {
-  return body.greens().block(row, column) + columns(body, row).transpose() * M_ * columns(body, column);
+  const auto d = static_cast<Eigen::Index>(body.dimension());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> result(d, d);
+  const std::span<double> entries(result.data(), static_cast<std::size_t>(result.size()));
+  body.greens().gather(row, {&column, 1}, entries);
+  add_to_blocks(body, row, {&column, 1}, entries);
+  return result;
 }
 
 PartitionedInverse invert_by_partitioning(const PatchStiffness& stiffness, const Eigen::MatrixXd& greens) {

@@ -32,8 +32,7 @@ class Overlay {
 
   [[nodiscard]] const PatchMesh& patch() const noexcept { return patch_; }
   [[nodiscard]] std::span<const Index> stored_nodes() const noexcept { return stored_; }  ///< [g] Q
-  [[nodiscard]] const Eigen::MatrixXd& superelement() const noexcept { return G_; }  ///< [d g x d g] [N/m]
-  [[nodiscard]] const Eigen::MatrixXd& correction() const noexcept { return M_; }    ///< [d g x d g] M [N/m]
+  [[nodiscard]] const Eigen::MatrixXd& correction() const noexcept { return M_; }  ///< [d g x d g] M [N/m]
 
   /// Adds what the overlay changes to the block row that Greens::gather gives.
   void add_to_blocks(const Body& body, Index row, std::span<const Index> columns,
@@ -57,7 +56,6 @@ class Overlay {
 
   PatchMesh patch_;
   std::vector<Index> stored_;
-  Eigen::MatrixXd G_;
   Eigen::MatrixXd M_;
   Eigen::MatrixXd recover_;
 };
