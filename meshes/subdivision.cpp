@@ -1,6 +1,8 @@
 #include "meshes/subdivision.h"
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <string>
@@ -135,6 +137,53 @@ void cut_cell(ElementType type, int r, Subdivision& result) {
   }
 }
 
+std::span<const Index> part_nodes(const Subdivision& parts, ElementType type, std::size_t part) {
+  const auto width = static_cast<std::size_t>(traits(type).nodes);
+  return {parts.connectivity.data() + part * width, width};
+}
+
+std::size_t count_parts(const Subdivision& parts, ElementType type) {
+  return parts.connectivity.size() / static_cast<std::size_t>(traits(type).nodes);
+}
+
+void orient(ElementType type, Subdivision& result) {
+  const int d = traits(type).dimension;
+  for (std::size_t part = 0; part < count_parts(result, type); ++part) {
+    const std::span<const Index> found = part_nodes(result, type, part);
+    const std::vector<Index> nodes(found.begin(), found.end());
+    const auto xi = [&](int corner) -> const Vec3& {
+      return result.nodes[static_cast<std::size_t>(nodes[static_cast<std::size_t>(corner)])].xi;
+    };
+    Eigen::Matrix3d edges = Eigen::Matrix3d::Identity();
+    for (int axis = 0; axis < d; ++axis) edges.col(axis) = xi(axis + 1) - xi(0);
+    if (edges.determinant() > 0.0) continue;
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      result.connectivity[part * nodes.size() + k] = nodes[reversed_nodes(type)[k]];
+  }
+}
+
+void find_sides(ElementType type, Subdivision& result) {
+  const ElementTraits& facet = traits(traits(type).facet);
+  for (const SideNodes& side : element_sides(type)) {
+    const auto is_on = [&](Index node) {
+      const std::array<int, 8>& weights = result.nodes[static_cast<std::size_t>(node)].weights;
+      int sum = 0;
+      for (int k = 0; k < facet.corners; ++k) sum += weights[side[static_cast<std::size_t>(k)]];
+      return sum == result.denominator;
+    };
+    std::vector<Index>& facets = result.sides.emplace_back();
+    for (std::size_t part = 0; part < count_parts(result, type); ++part) {
+      const std::span<const Index> nodes = part_nodes(result, type, part);
+      for (const SideNodes& part_side : element_sides(type)) {
+        const auto end = part_side.begin() + facet.nodes;
+        if (!std::all_of(part_side.begin(), end, [&](std::uint8_t k) { return is_on(nodes[k]); })) continue;
+        std::transform(part_side.begin(), end, std::back_inserter(facets),
+                       [&](std::uint8_t k) { return nodes[k]; });
+      }
+    }
+  }
+}
+
 }  // namespace
 
 Subdivision subdivide(ElementType type, int r, const std::array<int, 4>& order) {
@@ -147,7 +196,9 @@ Subdivision subdivide(ElementType type, int r, const std::array<int, 4>& order) 
     cut_cell(type, r, result);
   } else {
     cut_simplex(type, r, order, result);
+    orient(type, result);
   }
+  find_sides(type, result);
   return result;
 }
 

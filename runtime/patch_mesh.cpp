@@ -18,31 +18,10 @@ namespace {
 
 constexpr double no_part = 1e-12;  // of a shape function
 
-/// A local node, by what is the same in all elements that have it: corners of the body's and their weights.
-using Key = std::vector<std::pair<Index, int>>;
-
-/// Rank of each corner of a simplex by its node number.
-std::array<int, 4> ranks(std::span<const Index> corners) {
-  std::array<int, 4> rank{};
-  for (std::size_t i = 0; i < std::min<std::size_t>(corners.size(), 4); ++i) {
-    rank[i] = static_cast<int>(
-        std::count_if(corners.begin(), corners.end(), [&](Index other) { return other < corners[i]; }));
-  }
-  return rank;
-}
-
-Key key_of(const Subdivision::Node& node, std::span<const Index> corners) {
-  Key key;
-  for (std::size_t k = 0; k < corners.size(); ++k) {
-    if (node.weights[k] > 0) key.emplace_back(corners[k], node.weights[k]);
-  }
-  std::sort(key.begin(), key.end());
-  return key;
-}
-
 /// A side of an element of the patch that no other element of the patch has.
 struct OuterSide {
-  unsigned corners;  // bit k: the element's corner k is on it
+  std::size_t number;  // among the element's sides
+  unsigned corners;    // bit k: the element's corner k is on it
   bool is_border;    // the body goes on behind it; else it is the body's surface
 };
 
@@ -51,6 +30,7 @@ std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at,
   const ElementTraits& kind = traits(mesh.element);
   const auto nodes = mesh.element_nodes(element);
   std::vector<OuterSide> outer;
+  std::size_t number = 0;
   for (const SideNodes& side : element_sides(mesh.element)) {
     std::vector<Index> corners;
     unsigned bits = 0;
@@ -66,7 +46,8 @@ std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at,
     });
     const bool is_surface = neighbour == at[corners[0]].end();
     if (is_surface || !std::binary_search(patch.begin(), patch.end(), *neighbour))
-      outer.push_back({bits, !is_surface});
+      outer.push_back({number, bits, !is_surface});
+    ++number;
   }
   return outer;
 }
@@ -74,8 +55,8 @@ std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at,
 /// Builds a patch's mesh element by element.
 class Builder {
  public:
-  Builder(const Model& model, const ElementsAtNodes& at, std::vector<Index> elements, int r)
-      : model_(model), at_(at), r_(r), d_(static_cast<std::size_t>(model.dimension())) {
+  Builder(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts, std::vector<Index> elements)
+      : model_(model), at_(at), cuts_(cuts), d_(static_cast<std::size_t>(model.dimension())) {
     patch_.elements = std::move(elements);
     patch_.local.element = model.mesh.element;
     surface_.facet = traits(model.mesh.element).facet;
@@ -114,42 +95,37 @@ class Builder {
     }
   }
 
-  const Subdivision& subdivision(std::span<const Index> corners) {
-    const ElementType type = model_.mesh.element;
-    const bool is_simplex = type != ElementType::quad4 && type != ElementType::hex8;
-    const std::array<int, 4> order = is_simplex ? ranks(corners) : std::array<int, 4>{0, 1, 2, 3};
-    const auto found = cuts_.find(order);
-    return found != cuts_.end() ? found->second
-                                : cuts_.emplace(order, subdivide(type, r_, order)).first->second;
-  }
-
   void cut(Index e) {
     const auto nodes = model_.mesh.element_nodes(e);
     const auto corners = nodes.first(static_cast<std::size_t>(traits(model_.mesh.element).corners));
-    const Subdivision& parts = subdivision(corners);
+    const Subdivision& parts = cuts_.of(corners);
     const std::vector<OuterSide> sides = outer_sides(model_.mesh, at_, patch_.elements, e);
-    std::vector<Index> local;           // numbers of the subdivision's nodes in the local mesh
-    std::vector<unsigned> corner_bits;  // and the corners that have a part in them
+    std::vector<Index> local;  // numbers of the subdivision's nodes in the local mesh
     for (const Subdivision::Node& node : parts.nodes) {
       const Index number = find_node(node, corners, nodes);
-      unsigned bits = 0;
+      unsigned bits = 0;  // of the corners that have a part in it
       for (std::size_t k = 0; k < corners.size(); ++k) bits |= node.weights[k] > 0 ? 1U << k : 0U;
       local.push_back(number);
-      corner_bits.push_back(bits);
       for (const OuterSide& side : sides) {
         if (side.is_border && (bits & ~side.corners) == 0)
           zero_axes_[static_cast<std::size_t>(number)] = all_axes();
       }
     }
+    const auto add = [&local](const std::vector<Index>& from, std::vector<Index>& to) {
+      for (const Index node : from) to.push_back(local[static_cast<std::size_t>(node)]);
+    };
+    add(parts.connectivity, patch_.local.connectivity);
     const auto width = static_cast<std::size_t>(traits(model_.mesh.element).nodes);
-    for (std::size_t first = 0; first < parts.connectivity.size(); first += width)
-      add_child(e, {parts.connectivity.data() + first, width}, local, corner_bits, sides);
+    patch_.parent.insert(patch_.parent.end(), parts.connectivity.size() / width, e);
+    for (const OuterSide& side : sides) {
+      if (!side.is_border) add(parts.sides[side.number], surface_.facets);
+    }
   }
 
   Index find_node(const Subdivision::Node& node, std::span<const Index> corners,
                   std::span<const Index> nodes) {
     const auto [found, is_new] =
-        local_of_key_.emplace(key_of(node, corners), static_cast<Index>(patch_.local.nodes.size()));
+        patch_.node_of_key.emplace(key_of(node, corners), static_cast<Index>(patch_.local.nodes.size()));
     const Index number = found->second;
     if (!is_new) return number;
     const ShapeValues N = shape_functions(model_.mesh.element, node.xi);
@@ -170,46 +146,13 @@ class Builder {
     return number;
   }
 
-  /// One part of an element, in positive orientation, and those of its sides that are on the body's surface.
-  void add_child(Index parent, std::span<const Index> part, const std::vector<Index>& local,
-                 const std::vector<unsigned>& corner_bits, const std::vector<OuterSide>& sides) {
-    const ElementType type = model_.mesh.element;
-    std::vector<Index> child;
-    std::vector<unsigned> bits;
-    const auto take = [&](Index node) {
-      child.push_back(local[static_cast<std::size_t>(node)]);
-      bits.push_back(corner_bits[static_cast<std::size_t>(node)]);
-    };
-    for (const Index node : part) take(node);
-    if (smallest_determinant(type, positions(patch_.local, child)) < 0.0) {
-      child.clear();
-      bits.clear();
-      for (const std::uint8_t k : reversed_nodes(type)) take(part[k]);
-    }
-    patch_.local.connectivity.insert(patch_.local.connectivity.end(), child.begin(), child.end());
-    patch_.parent.push_back(parent);
-
-    const auto facet_nodes = static_cast<std::size_t>(traits(surface_.facet).nodes);
-    for (const SideNodes& side : element_sides(type)) {
-      const auto is_on = [&](const OuterSide& outer) {
-        return !outer.is_border && std::all_of(side.begin(), side.begin() + facet_nodes, [&](std::uint8_t k) {
-          return (bits[k] & ~outer.corners) == 0;
-        });
-      };
-      if (std::none_of(sides.begin(), sides.end(), is_on)) continue;
-      for (std::size_t k = 0; k < facet_nodes; ++k) surface_.facets.push_back(child[side[k]]);
-    }
-  }
-
   const Model& model_;
   const ElementsAtNodes& at_;
-  int r_;
+  Subdivisions& cuts_;
   std::size_t d_;
   PatchMesh patch_;
   Surface surface_;
   std::map<Index, Index> place_;  // of the body's nodes in patch_.nodes
-  std::map<Key, Index> local_of_key_;
-  std::map<std::array<int, 4>, Subdivision> cuts_;
   std::vector<Eigen::Triplet<double>> shape_;
   std::vector<unsigned> zero_axes_;  // [local nodes] bits of the axes along which u_L = 0
 };
@@ -245,16 +188,22 @@ std::vector<Index> rings_round(const Mesh& mesh, const ElementsAtNodes& at, std:
   return elements;
 }
 
-PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, std::vector<Index> elements, int r) {
+PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts,
+                          std::vector<Index> elements) {
   std::sort(elements.begin(), elements.end());
-  if (r < 2 || elements.empty()) {
+  if (cuts.refinement() < 2 || elements.empty()) {
     throw Error("an overlay of " + std::to_string(elements.size()) + " elements, refined " +
-                    std::to_string(r) + " times",
+                    std::to_string(cuts.refinement()) + " times",
                 "make_patch_mesh", "take at least one element and a refinement of at least 2");
   }
   if (elements.front() < 0 || elements.back() >= model.mesh.elements())
     throw Error("an overlay of elements that the body does not have", "make_patch_mesh", "");
-  return Builder(model, at, std::move(elements), r).build();
+  return Builder(model, at, cuts, std::move(elements)).build();
+}
+
+PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, std::vector<Index> elements, int r) {
+  Subdivisions cuts(model.mesh.element, r);
+  return make_patch_mesh(model, at, cuts, std::move(elements));
 }
 
 }  // namespace palpate

@@ -2,11 +2,12 @@
 #pragma once
 
 #include <Eigen/SparseCore>
-#include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
 #include "formats/model.h"
+#include "runtime/nested_nodes.h"
 
 namespace palpate {
 
@@ -44,10 +45,13 @@ struct PatchMesh {
   /// (theory.md section 4).
   std::vector<Index> free_dof;
   Index free_dofs = 0;
+  std::map<NodeKey, Index> node_of_key;  ///< every local node
 };
 
 /// Cuts each of the elements into r^d. Throws Error unless r >= 2, when an element is not one of the model's,
-/// or when there is none.
+/// or when there is none. Subdivisions that are kept from patch to patch need not be made again.
+PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts,
+                          std::vector<Index> elements);
 PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, std::vector<Index> elements, int r);
 
 }  // namespace palpate
