@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -45,6 +46,20 @@ void check_sizes(const Model& model) {
   }
 }
 
+/// The surface of the elements themselves.
+FineSurface surface_as_it_is(const Model& model) {
+  SurfaceNumbering numbering = number_surface(model.surface, model.mesh.nodes.size());
+  FineSurface surface;
+  surface.simplices = std::move(numbering.simplices);
+  surface.element = surface_elements(model);
+  surface.mesh_nodes = std::move(numbering.mesh_nodes);
+  surface.parents = surface.mesh_nodes;
+  surface.weights.assign(surface.parents.size(), 1.0);
+  surface.first.resize(surface.parents.size() + 1);
+  std::iota(surface.first.begin(), surface.first.end(), 0);
+  return surface;
+}
+
 Greens take_greens(Model& model, const GreensOptions& options) {
   check_sizes(model);
   return Greens(std::exchange(model.greens, {}), model.dimension(), options);
@@ -52,59 +67,95 @@ Greens take_greens(Model& model, const GreensOptions& options) {
 
 }  // namespace
 
-Body::Body(Model model, const GreensOptions& options)
-    : model_(std::move(model)), greens_(take_greens(model_, options)) {
-  std::vector<Vec3> rest = model_.mesh.nodes;
-  for (std::size_t node = 0; node < rest.size(); ++node) rest[node] += model_.rest_displacement[node];
-  stored_of_mesh_.assign(rest.size(), -1);
+Body::Body(Model model, const GreensOptions& options, int refinement)
+    : model_(std::move(model)), greens_(take_greens(model_, options)), refinement_(refinement) {
+  stored_of_mesh_.assign(model_.mesh.nodes.size(), -1);
   for (std::size_t k = 0; k < model_.stored_nodes.size(); ++k) {
     stored_of_mesh_[static_cast<std::size_t>(model_.stored_nodes[k])] = static_cast<Index>(k);
   }
+  fine_ = refinement_ > 1 ? make_fine_surface(model_, refinement_) : surface_as_it_is(model_);
+  find_free_nodes();
+  follow_body();
+  for (const Index element : fine_.element) {
+    const Index material = model_.material_of_element[static_cast<std::size_t>(element)];
+    surface_friction_.push_back(model_.materials[static_cast<std::size_t>(material)].friction);
+  }
+  measure_surface();
+}
 
-  SurfaceNumbering numbering = number_surface(model_.surface, rest.size());
-  surface_mesh_nodes_ = std::move(numbering.mesh_nodes);
+void Body::find_free_nodes() {
   surface_node_of_stored_.assign(model_.stored_nodes.size(), -1);
-  simplices_ = std::move(numbering.simplices);
-  for (const Index mesh_node : surface_mesh_nodes_) {
-    const auto node = static_cast<std::size_t>(mesh_node);
-    surface_stored_nodes_.push_back(stored_of_mesh_[node]);
-    if (stored_of_mesh_[node] >= 0)
-      surface_node_of_stored_[static_cast<std::size_t>(stored_of_mesh_[node])] =
-          static_cast<Index>(surface_rest_.size());
-    surface_rest_.push_back(rest[node]);
-    if (stored_of_mesh_[node] < 0 || model_.fixed[node] != 0) continue;
-    surface_.push_back(stored_of_mesh_[node]);
-    x_.push_back(rest[node].x());
-    y_.push_back(rest[node].y());
-    z_.push_back(rest[node].z());
+  for (std::size_t k = 0; k < fine_.mesh_nodes.size(); ++k) {
+    const auto node = static_cast<std::size_t>(fine_.mesh_nodes[k]);
+    const Index stored = stored_of_mesh_[node];
+    surface_stored_nodes_.push_back(stored);
+    if (stored >= 0) surface_node_of_stored_[static_cast<std::size_t>(stored)] = static_cast<Index>(k);
+    if (stored < 0 || model_.fixed[node] != 0) continue;
+    const Vec3 rest = rest_position(stored);
+    surface_.push_back(stored);
+    x_.push_back(rest.x());
+    y_.push_back(rest.y());
+    z_.push_back(rest.z());
   }
   if (surface_.empty()) {
     throw Error("no node of the surface is free to move, so nothing can be touched", model_.name,
                 "fix a smaller region of the body and precompute the model again");
   }
-  for (const Index element : surface_elements(model_)) {
-    const Index material = model_.material_of_element[static_cast<std::size_t>(element)];
-    surface_friction_.push_back(model_.materials[static_cast<std::size_t>(material)].friction);
-  }
-  measure_surface();
   const std::size_t padded = (surface_.size() + search_block - 1) / search_block * search_block;
   for (std::vector<double>* coordinate : {&x_, &y_, &z_}) coordinate->resize(padded, infinity);
+}
+
+void Body::follow_body() {
+  first_part_.push_back(0);
+  std::vector<Index> last_part;  // of each surface node, -1 for none
+  for (Index node = 0; node < fine_.nodes(); ++node) {
+    const auto at = static_cast<std::size_t>(node);
+    Vec3 rest = Vec3::Zero();
+    std::vector<std::pair<Index, double>> parts;
+    for (Index k = fine_.first[at]; k < fine_.first[at + 1]; ++k) {
+      const auto parent = static_cast<std::size_t>(fine_.parents[static_cast<std::size_t>(k)]);
+      const double weight = fine_.weights[static_cast<std::size_t>(k)];
+      rest += weight * (model_.mesh.nodes[parent] + model_.rest_displacement[parent]);
+      if (stored_of_mesh_[parent] >= 0) parts.emplace_back(stored_of_mesh_[parent], weight);
+    }
+    std::sort(parts.begin(), parts.end());
+    for (const auto& [stored, weight] : parts) {
+      part_stored_.push_back(stored);
+      part_weight_.push_back(weight);
+    }
+    first_part_.push_back(static_cast<Index>(part_stored_.size()));
+    most_surface_parts_ = std::max(most_surface_parts_, static_cast<Index>(parts.size()));
+    last_part.push_back(parts.empty() ? -1 : parts.back().first);
+    surface_rest_.push_back(rest);
+  }
+  first_follower_.assign(model_.stored_nodes.size() + 1, 0);
+  for (const Index stored : last_part) {
+    if (stored >= 0) ++first_follower_[static_cast<std::size_t>(stored) + 1];
+  }
+  std::partial_sum(first_follower_.begin(), first_follower_.end(), first_follower_.begin());
+  followers_.resize(static_cast<std::size_t>(first_follower_.back()));
+  std::vector<Index> next(first_follower_.begin(), first_follower_.end() - 1);
+  for (std::size_t node = 0; node < last_part.size(); ++node) {
+    if (last_part[node] < 0) continue;
+    Index& place = next[static_cast<std::size_t>(last_part[node])];
+    followers_[static_cast<std::size_t>(place++)] = static_cast<Index>(node);
+  }
 }
 
 void Body::measure_surface() {
   for (const Vec3& position : surface_rest_) bounds_.extend(position);
   const auto corners = static_cast<std::size_t>(dimension());
   double sum = 0.0;
-  for (std::size_t simplex = 0; simplex < simplices_.size(); simplex += corners) {
+  for (std::size_t simplex = 0; simplex < simplices().size(); simplex += corners) {
     for (std::size_t k = 0; k < corners; ++k) {
-      const auto a = static_cast<std::size_t>(simplices_[simplex + k]);
-      const auto b = static_cast<std::size_t>(simplices_[simplex + (k + 1) % corners]);
+      const auto a = static_cast<std::size_t>(simplices()[simplex + k]);
+      const auto b = static_cast<std::size_t>(simplices()[simplex + (k + 1) % corners]);
       const double length = (surface_rest_[a] - surface_rest_[b]).norm();
       longest_surface_edge_ = std::max(longest_surface_edge_, length);
       sum += length;  // a closed surface has each edge as often
     }
   }
-  mean_surface_edge_ = sum / static_cast<double>(simplices_.size());
+  mean_surface_edge_ = sum / static_cast<double>(simplices().size());
 }
 
 NearestNode Body::nearest_surface_node(const Vec3& point) const noexcept {

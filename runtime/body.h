@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/model.h"
+#include "runtime/fine_surface.h"
 #include "runtime/greens.h"
 
 namespace palpate {
@@ -16,14 +17,23 @@ struct NearestNode {
   double distance;  ///< [m]
 };
 
+/// How a surface node follows the body's nodes where no overlay is: its displacement is the sum of weights
+/// times those of stored nodes. Empty where it is held along every axis.
+struct SurfaceParts {
+  std::span<const Index> stored;    ///< ascending
+  std::span<const double> weights;
+};
+
 /// The constant side of a tick: the Model, its Green's functions as the tick wants them, and look-ups. The
 /// body rests in the displacement u0 that its loads give it; what a tool does comes on top. Shared by
 /// threads.
 class Body {
  public:
-  /// Takes the model over and unfolds its Green's functions. Throws Error when no free surface node is
-  /// stored, as then nothing can be touched, or when the sizes of the model's parts do not fit together.
-  explicit Body(Model model, const GreensOptions& options = {});
+  /// Takes the model over and unfolds its Green's functions. The surface that a tool meets has the sides of
+  /// the elements, with `refinement` r > 1 of elements cut into r^d, as the overlays have them that are to be
+  /// used. Throws Error when no free surface node is stored, as then nothing can be touched, or when the sizes
+  /// of the model's parts do not fit together.
+  explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1);
 
   /// Everything baked, except `greens`, which greens() has taken over.
   [[nodiscard]] const Model& model() const noexcept { return model_; }
@@ -53,6 +63,7 @@ class Body {
   /// the point's z is ignored.
   [[nodiscard]] NearestNode nearest_surface_node(const Vec3& point) const noexcept;
 
+  [[nodiscard]] int refinement() const noexcept { return refinement_; }  ///< r, of the surface
   /// Longest edge of the surface at rest [m]: no point of the surface is farther than that from a surface
   /// node.
   [[nodiscard]] double longest_surface_edge() const noexcept { return longest_surface_edge_; }
@@ -62,13 +73,32 @@ class Body {
   /// Box around the surface at rest [m].
   [[nodiscard]] const Eigen::AlignedBox3d& bounds() const noexcept { return bounds_; }
 
-  /// The surface that a tool meets, with its own numbering of the nodes on it, held ones too:
+  /// The surface that a tool meets, with its own numbering of the nodes on it, held ones too; those of the
+  /// body come first:
   /// [F * d] surface nodes of its simplices (triangles, in the plane lines), outward as in Model::surface.
-  [[nodiscard]] std::span<const Index> simplices() const noexcept { return simplices_; }
-  /// [S] mesh node of each surface node, ascending.
-  [[nodiscard]] std::span<const Index> surface_mesh_nodes() const noexcept { return surface_mesh_nodes_; }
-  /// [S] stored node of each surface node, -1 for those that are held along every axis.
+  [[nodiscard]] std::span<const Index> simplices() const noexcept { return fine_.simplices; }
+  /// [surface nodes of the body] their mesh nodes, ascending.
+  [[nodiscard]] std::span<const Index> surface_mesh_nodes() const noexcept { return fine_.mesh_nodes; }
+  /// [the same] their stored nodes, -1 for those that are held along every axis.
   [[nodiscard]] std::span<const Index> surface_stored_nodes() const noexcept { return surface_stored_nodes_; }
+  /// How a surface node moves with the body's.
+  [[nodiscard]] SurfaceParts surface_parts(Index node) const noexcept {
+    const auto first = static_cast<std::size_t>(first_part_[static_cast<std::size_t>(node)]);
+    const auto count = static_cast<std::size_t>(first_part_[static_cast<std::size_t>(node) + 1]) - first;
+    return {{part_stored_.data() + first, count}, {part_weight_.data() + first, count}};
+  }
+  /// Whether a surface node can move along some axis.
+  [[nodiscard]] bool surface_moves(Index node) const noexcept { return !surface_parts(node).stored.empty(); }
+  /// Most stored nodes that a surface node follows.
+  [[nodiscard]] Index most_surface_parts() const noexcept { return most_surface_parts_; }
+  /// Surface nodes whose last part is a stored node: with it, all that they follow are known.
+  [[nodiscard]] std::span<const Index> followers(Index stored) const noexcept {
+    const auto first = static_cast<std::size_t>(first_follower_[static_cast<std::size_t>(stored)]);
+    const auto end = static_cast<std::size_t>(first_follower_[static_cast<std::size_t>(stored) + 1]);
+    return {followers_.data() + first, end - first};
+  }
+  /// The surface as it was refined: finds the nodes of overlays on it.
+  [[nodiscard]] const FineSurface& fine_surface() const noexcept { return fine_; }
   /// Surface node of a stored node, -1 when it is inside the body.
   [[nodiscard]] Index surface_node_of_stored(Index stored) const noexcept {
     return surface_node_of_stored_[static_cast<std::size_t>(stored)];
@@ -79,22 +109,30 @@ class Body {
   [[nodiscard]] std::span<const double> surface_friction() const noexcept { return surface_friction_; }
 
  private:
+  void find_free_nodes();
+  void follow_body();
   void measure_surface();
 
   Model model_;
   Greens greens_;
+  int refinement_;
+  FineSurface fine_;
   std::vector<Index> stored_of_mesh_;  // [N]
   std::vector<Index> surface_;         // free surface nodes
   std::vector<double> x_, y_, z_;      // [those, padded to whole blocks with infinity] rest positions
   double longest_surface_edge_ = 0.0;
   double mean_surface_edge_ = 0.0;
   Eigen::AlignedBox3d bounds_;
-  std::vector<Index> simplices_;               // [F * d]
-  std::vector<Index> surface_mesh_nodes_;      // [S]
-  std::vector<Index> surface_stored_nodes_;    // [S]
+  std::vector<Index> surface_stored_nodes_;    // [surface nodes of the body]
   std::vector<Index> surface_node_of_stored_;  // [stored]
-  std::vector<Vec3> surface_rest_;             // [S]
-  std::vector<double> surface_friction_;       // [F]
+  std::vector<Index> first_part_;              // [S + 1]
+  std::vector<Index> part_stored_;
+  std::vector<double> part_weight_;
+  Index most_surface_parts_ = 1;
+  std::vector<Index> first_follower_;     // [stored + 1]
+  std::vector<Index> followers_;          // surface nodes
+  std::vector<Vec3> surface_rest_;        // [S]
+  std::vector<double> surface_friction_;  // [F]
 };
 
 }  // namespace palpate

@@ -100,8 +100,7 @@ std::int64_t feature_of(Index tool, int place, Index simplex, bool face_tells,
 Vec3 displacement_of(const Body& body, const State& state, const ContactPoint& contact) noexcept {
   Vec3 u = Vec3::Zero();
   for (std::size_t k = 0; k < 3; ++k) {
-    if (contact.nodes[k] < 0 || body.surface_stored_nodes()[static_cast<std::size_t>(contact.nodes[k])] < 0)
-      continue;
+    if (contact.nodes[k] < 0 || !body.surface_moves(contact.nodes[k])) continue;
     u += contact.weights[k] * state.near.displacement(state.near.place_of(contact.nodes[k]));
   }
   return u;
@@ -151,12 +150,12 @@ std::array<Vec3, 3> slopes(const SurfaceTree& tree, const std::array<Index, 3>& 
 bool want_nodes(const Body& body, State& state, const std::array<Index, 3>& nodes) noexcept {
   bool room = true;
   for (const Index node : nodes) {
-    if (node < 0 || body.surface_stored_nodes()[static_cast<std::size_t>(node)] < 0) continue;
+    if (node < 0 || !body.surface_moves(node)) continue;
     room = state.near.want(body, node) && room;
   }
   if (!room) return false;
   for (const Index node : nodes) {
-    if (node < 0 || body.surface_stored_nodes()[static_cast<std::size_t>(node)] < 0) continue;
+    if (node < 0 || !body.surface_moves(node)) continue;
     state.tree.move(node, body.surface_rest_positions()[static_cast<std::size_t>(node)] +
                               state.near.displacement(state.near.place_of(node)));
   }

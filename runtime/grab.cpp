@@ -32,7 +32,7 @@ bool reach_out(const Body& body, State& state, Index number) noexcept {
   for (std::size_t k = 0; k < d; ++k) {
     if (contact.weights[k] == 0.0) continue;
     contact.nodes[k] = body.simplices()[d * static_cast<std::size_t>(found.simplex) + k];
-    free = free || body.surface_stored_nodes()[static_cast<std::size_t>(contact.nodes[k])] >= 0;
+    free = free || body.surface_moves(contact.nodes[k]);
   }
   if (!free) return false;
   hold_contact(state, contact);

@@ -1,13 +1,13 @@
 #include "runtime/overlay.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 #include <string>
 #include <utility>
 
 #include "meshes/element.h"
 #include "meshes/error.h"
+#include "runtime/patch.h"
 
 namespace palpate {
 namespace {
@@ -83,14 +83,20 @@ Eigen::MatrixXd greens_at(const Body& body, std::span<const Index> nodes) {
   return result;
 }
 
-Overlay::Overlay(const Body& body, PatchMesh patch) : patch_(std::move(patch)) {
-  for (const Index node : patch_.nodes) {
-    stored_.push_back(body.stored_node(node));
-    if (stored_.back() >= 0) continue;
+std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch) {
+  std::vector<Index> stored;
+  for (const Index node : patch.nodes) {
+    stored.push_back(body.stored_node(node));
+    if (stored.back() >= 0) continue;
     throw Error(
         "an overlay reaches node " + std::to_string(node) + ", whose Green's functions are not stored",
         body.model().name, "precompute with scope = \"layers\" and as many layers as the overlay has rings");
   }
+  return stored;
+}
+
+Overlay::Overlay(const Body& body, PatchMesh patch)
+    : patch_(std::move(patch)), stored_(stored_nodes_of(body, patch_)) {
   const PatchStiffness stiffness = assemble_patch(body.model(), patch_);
   const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor(stiffness.K_L);
   if (factor.info() != Eigen::Success)
@@ -98,10 +104,7 @@ Overlay::Overlay(const Body& body, PatchMesh patch) : patch_(std::move(patch)) {
                 "the elements there are too flat: mesh the body anew");
   recover_ = -factor.solve(stiffness.K_LG);
   const Eigen::MatrixXd G = -stiffness.K_LG.transpose() * recover_;
-  const Eigen::MatrixXd greens = greens_at(body, stored_);
-  const Eigen::MatrixXd softened = Eigen::MatrixXd::Identity(G.rows(), G.cols()) - G * greens;
-  M_ = softened.partialPivLu().solve(G);
-  M_ = 0.5 * (M_ + M_.transpose()).eval();
+  M_ = overlay_correction(G, greens_at(body, stored_));
 }
 
 /// Xi at the patch's nodes, by forces on a node [d g x d].

@@ -27,7 +27,7 @@ PatchStiffness assemble_patch(const Model& model, const PatchMesh& patch);
 /// added on the patch's nodes, with u_Q what f does to them without the overlay.
 class Overlay {
  public:
-  /// Throws Error when a node of the patch is not stored: the file keeps too few layers below the surface.
+  /// Throws Error when a node of the patch is not stored.
   Overlay(const Body& body, PatchMesh patch);
 
   [[nodiscard]] const PatchMesh& patch() const noexcept { return patch_; }
@@ -69,6 +69,10 @@ struct PartitionedInverse {
   Eigen::MatrixXd global;  ///< Xi_G at the patch's nodes [d g x d g]
 };
 PartitionedInverse invert_by_partitioning(const PatchStiffness& stiffness, const Eigen::MatrixXd& greens);
+
+/// [g] stored nodes of a patch's nodes. Throws Error when one is not stored: the file keeps too few layers
+/// below the surface.
+std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch);
 
 /// Xi at the blocks of some stored nodes [d m x d m].
 Eigen::MatrixXd greens_at(const Body& body, std::span<const Index> nodes);

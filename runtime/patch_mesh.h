@@ -46,6 +46,7 @@ struct PatchMesh {
   std::vector<Index> free_dof;
   Index free_dofs = 0;
   std::map<NodeKey, Index> node_of_key;  ///< every local node
+  std::vector<Index> mesh_node;          ///< [local nodes] of the body that each coincides with, or -1
 };
 
 /// Cuts each of the elements into r^d. Throws Error unless r >= 2, when an element is not one of the model's,

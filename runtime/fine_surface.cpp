@@ -1,0 +1,106 @@
+#include "runtime/fine_surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "meshes/element.h"
+#include "meshes/surface.h"
+#include "meshes/topology.h"
+
+namespace palpate {
+namespace {
+
+constexpr double no_part = 1e-12;  // of a shape function
+
+/// The sides that belong to one element only, in the order of the elements.
+std::vector<ElementSide> boundary_sides(const Mesh& mesh) {
+  std::vector<ElementSide> boundary;
+  const std::vector<ElementSide> sides = sorted_sides(mesh);
+  for (auto side = sides.begin(); side != sides.end();) {
+    const auto end =
+        std::find_if(side, sides.end(), [&](const ElementSide& s) { return s.corners != side->corners; });
+    if (end - side == 1) boundary.push_back(*side);
+    side = end;
+  }
+  std::sort(boundary.begin(), boundary.end(), [](const ElementSide& a, const ElementSide& b) {
+    return a.element < b.element || (a.element == b.element && a.side < b.side);
+  });
+  return boundary;
+}
+
+class Builder {
+ public:
+  Builder(const Model& model, int r) : mesh_(model.mesh), cuts_(model.mesh.element, r) {
+    result_.mesh_nodes = model.surface;
+    std::sort(result_.mesh_nodes.begin(), result_.mesh_nodes.end());
+    result_.mesh_nodes.erase(std::unique(result_.mesh_nodes.begin(), result_.mesh_nodes.end()),
+                             result_.mesh_nodes.end());
+    result_.first.push_back(0);
+    for (const Index node : result_.mesh_nodes) add_node({{node, 1.0}});
+  }
+
+  FineSurface build() {
+    Surface surface;
+    surface.facet = traits(mesh_.element).facet;
+    std::vector<Index> elements;  // of each facet
+    for (const ElementSide& side : boundary_sides(mesh_)) {
+      const auto nodes = mesh_.element_nodes(side.element);
+      const auto corners = nodes.first(static_cast<std::size_t>(traits(mesh_.element).corners));
+      const Subdivision& parts = cuts_.of(corners);
+      for (const Index node : parts.sides[side.side])
+        surface.facets.push_back(number_of(parts.nodes[static_cast<std::size_t>(node)], corners, nodes));
+      elements.resize(static_cast<std::size_t>(surface.count()), side.element);
+    }
+    result_.simplices = surface_simplices(surface);
+    const auto d = static_cast<std::size_t>(mesh_.dimension());
+    const std::size_t parts = result_.simplices.size() / d / elements.size();
+    for (const Index element : elements) result_.element.insert(result_.element.end(), parts, element);
+    return std::move(result_);
+  }
+
+ private:
+  using Parts = std::vector<std::pair<Index, double>>;
+
+  Index add_node(const Parts& parts) {
+    for (const auto& [node, weight] : parts) {
+      result_.parents.push_back(node);
+      result_.weights.push_back(weight);
+    }
+    result_.first.push_back(static_cast<Index>(result_.parents.size()));
+    return result_.nodes() - 1;
+  }
+
+  Index number_of(const Subdivision::Node& node, std::span<const Index> corners,
+                  std::span<const Index> nodes) {
+    const NodeKey key = key_of(node, corners);
+    const auto found = result_.number.find(key);
+    if (found != result_.number.end()) return found->second;
+    const ShapeValues N = shape_functions(mesh_.element, node.xi);
+    Parts parts;
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const double part = N[static_cast<Eigen::Index>(k)];
+      if (std::abs(part) > no_part) parts.emplace_back(nodes[k], part);
+    }
+    std::sort(parts.begin(), parts.end());
+    if (parts.size() == 1) {
+      const auto place =
+          std::lower_bound(result_.mesh_nodes.begin(), result_.mesh_nodes.end(), parts.front().first);
+      return static_cast<Index>(place - result_.mesh_nodes.begin());
+    }
+    const Index number = add_node(parts);
+    result_.number.emplace(key, number);
+    return number;
+  }
+
+  const Mesh& mesh_;
+  Subdivisions cuts_;
+  FineSurface result_;
+};
+
+}  // namespace
+
+FineSurface make_fine_surface(const Model& model, int r) {
+  return Builder(model, r).build();
+}
+
+}  // namespace palpate
