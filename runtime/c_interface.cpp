@@ -38,23 +38,6 @@ static_assert(status_names.size() == 9 + 2, "these and the two that only HeldNod
 
 constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
 
-/// What the surface's displacement follows from.
-struct Load {
-  std::vector<Index> nodes;    // stored nodes
-  std::vector<double> forces;  // [d nodes] [N]
-
-  void take(const NearField& near) {
-    nodes.assign(near.loaded_nodes().begin(), near.loaded_nodes().end());
-    forces.assign(near.loaded_forces().begin(), near.loaded_forces().end());
-  }
-};
-
-/// With room for the load of so many contacts, so that taking it allocates nothing.
-Load roomy_load(int dimension, int contacts) {
-  const auto nodes = 3 * static_cast<std::size_t>(contacts);
-  return {std::vector<Index>(nodes), std::vector<double>(static_cast<std::size_t>(dimension) * nodes)};
-}
-
 Tool to_tool(const palpate_tool& tool) {
   Tool result{.radius = tool.radius,
               .length = tool.length,
@@ -123,14 +106,15 @@ struct palpate_session {
         untouched(body, options),
         state(untouched),
         poses(options.tools.size()),
-        load(roomy_load(body.dimension(), options.max_contacts)),
-        displacement(static_cast<std::size_t>(body.greens().order())) {
+        load(state.near.load()),
+        stored_displacement(static_cast<std::size_t>(body.greens().order())),
+        displacement(body.surface_rest_positions().size()) {
     show();
   }
 
   /// Hands what the last tick did over to the thread that draws.
   void show() noexcept {
-    load.next().take(state.near);
+    load.next() = state.near.load();
     load.publish();
   }
 
@@ -138,8 +122,9 @@ struct palpate_session {
   State untouched;
   State state;
   std::vector<ToolPose> poses;
-  Latest<Load> load;
-  std::vector<double> displacement;  // of the stored nodes; scratch of the thread that draws
+  Latest<SurfaceLoad> load;
+  std::vector<double> stored_displacement;  // scratch of the thread that draws
+  std::vector<Vec3> displacement;
 };
 
 extern "C" {
@@ -233,12 +218,10 @@ void palpate_surface_simplices(const palpate_session* session, int32_t* corners)
 }
 
 void palpate_surface_displacement(palpate_session* session, double* xyz) noexcept {
-  const Body& body = session->body;
-  const Load& load = session->load.read();
-  const std::span<double> u(session->displacement);
-  body.greens().displacement(load.nodes, load.forces, u);
-  for (const Index stored : body.surface_stored_nodes()) {
-    copy(stored < 0 ? Vec3::Zero() : vector_at(u, body.dimension(), stored), xyz);
+  surface_displacement(session->body, session->load.read(), session->stored_displacement,
+                       session->displacement);
+  for (const Vec3& u : session->displacement) {
+    copy(u, xyz);
     xyz += 3;
   }
 }

@@ -1,31 +1,53 @@
 #include "runtime/near_field.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "runtime/node_vectors.h"
+#include "runtime/vector_loops.h"
 
 namespace palpate {
 namespace {
 
 constexpr std::int64_t patience = 200;  // ticks that an unwanted node stays: a tool often comes back
 
+std::size_t at(Index i) noexcept {
+  return static_cast<std::size_t>(i);
+}
+
 }  // namespace
 
-NearField::NearField(const Body& body, Index capacity)
+NearField::NearField(const Body& body, Index capacity, const PatchRoom& room)
     : dimension_(body.dimension()),
       capacity_(capacity),
+      parts_(body.most_surface_parts()),
       stride_((static_cast<std::ptrdiff_t>(dimension_) * capacity + 7) / 8 * 8),
-      place_(body.surface_stored_nodes().size(), -1),
-      nodes_(static_cast<std::size_t>(capacity), -1),
-      stored_(static_cast<std::size_t>(capacity), -1),
-      wanted_(static_cast<std::size_t>(capacity), 0),
+      patch_stride_((static_cast<std::ptrdiff_t>(dimension_) * room.stored_nodes + 7) / 8 * 8),
+      room_(room),
+      place_(body.surface_rest_positions().size(), -1),
+      place_in_patch_(place_.size(), -1),
+      nodes_(at(capacity), -1),
+      row_(at(capacity), -1),
+      wanted_(at(capacity), 0),
       C_(static_cast<std::size_t>(stride_ * dimension_ * capacity)),
       force_(static_cast<std::size_t>(dimension_ * capacity)),
       last_force_(force_.size()),
       displacement_(force_.size()),
       blocks_(static_cast<std::size_t>(dimension_) * force_.size()),
-      loaded_(static_cast<std::size_t>(capacity), -1),
-      loaded_force_(force_.size()) {}
+      base_(at(parts_ * capacity)),
+      base_uses_(base_.size()),
+      base_of_stored_(at(body.greens().nodes()), -1),
+      bases_of_(base_.size()),
+      part_weight_(base_.size()),
+      part_count_(at(capacity)),
+      by_base_(static_cast<std::size_t>(dimension_ * dimension_) * base_.size()),
+      gathered_(static_cast<std::size_t>(dimension_ * dimension_) *
+                std::max(base_.size(), at(room.stored_nodes))),
+      base_force_(static_cast<std::size_t>(dimension_) * base_.size()),
+      X_(force_.size() * static_cast<std::size_t>(patch_stride_)),
+      Y_(X_.size()),
+      patch_force_(static_cast<std::size_t>(patch_stride_)),
+      load_(dimension_, capacity, static_cast<Index>(base_.size()), room) {}
 
 bool NearField::is_loaded(Index place) const noexcept {
   const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
@@ -66,36 +88,145 @@ bool NearField::want(const Body& body, Index surface_node) noexcept {
 
 void NearField::add(const Body& body, Index surface_node) noexcept {
   const Index place = count_++;
-  const auto d = static_cast<std::ptrdiff_t>(dimension_);
-  place_[static_cast<std::size_t>(surface_node)] = place;
-  nodes_[static_cast<std::size_t>(place)] = surface_node;
-  stored_[static_cast<std::size_t>(place)] =
-      body.surface_stored_nodes()[static_cast<std::size_t>(surface_node)];
+  place_[at(surface_node)] = place;
+  nodes_[at(place)] = surface_node;
+  enter(body, place);
+  connect(body, place);
+  for (Index dof = dimension_ * place; dof < dimension_ * (place + 1); ++dof) {
+    force_[at(dof)] = 0.0;
+    displacement_[at(dof)] = dot(row(dof).data(), force_.data(), std::ptrdiff_t{dimension_} * place);
+  }
+}
 
-  const std::ptrdiff_t width = d * count_;
-  body.greens().gather(stored_[static_cast<std::size_t>(place)],
-                       {stored_.data(), static_cast<std::size_t>(count_)},
-                       {blocks_.data(), static_cast<std::size_t>(d * width)});
+/// What is known of a node alone: its place in the patch, or the stored nodes that it follows and how the
+/// patch responds to it.
+void NearField::enter(const Body& body, Index place) noexcept {
+  row_[at(place)] = place_in_patch(node(place));
+  part_count_[at(place)] = 0;
+  if (row_of(place) >= 0) return;
+  const SurfaceParts parts = body.surface_parts(node(place));
+  part_count_[at(place)] = static_cast<Index>(parts.stored.size());
+  for (std::size_t k = 0; k < parts.stored.size(); ++k) {
+    Index& base = base_of_stored_[at(parts.stored[k])];
+    if (base < 0) {
+      base = base_count_++;
+      base_[at(base)] = parts.stored[k];
+      base_uses_[at(base)] = 0;
+    }
+    ++base_uses_[at(base)];
+    bases_of_[at(parts_ * place) + k] = base;
+    part_weight_[at(parts_ * place) + k] = parts.weights[k];
+  }
+  if (patch() != nullptr) respond(body, place);
+}
+
+/// Lets go of the stored nodes that nobody else follows; the last one takes the place of one that goes.
+void NearField::leave(Index place) noexcept {
+  for (Index k = 0; k < part_count_[at(place)]; ++k) {
+    const Index base = bases_of_[at(parts_ * place + k)];
+    if (--base_uses_[at(base)] > 0) continue;
+    base_of_stored_[at(base_[at(base)])] = -1;
+    const Index last = --base_count_;
+    if (base == last) continue;
+    base_[at(base)] = base_[at(last)];
+    base_uses_[at(base)] = base_uses_[at(last)];
+    base_of_stored_[at(base_[at(base)])] = base;
+    for (Index other = 0; other < count_; ++other) {
+      const auto first = bases_of_.begin() + std::ptrdiff_t{parts_} * other;
+      std::replace(first, first + part_count_[at(other)], last, base);
+    }
+  }
+  part_count_[at(place)] = 0;
+}
+
+/// X = Xi_Q of forces on the node, and Y = M X.
+void NearField::respond(const Body& body, Index place) noexcept {
+  const std::span<const Index> Q = patch()->stored_nodes();
+  const std::ptrdiff_t width = patch_dofs();
+  for (int axis = 0; axis < dimension_; ++axis) std::fill_n(X(dimension_ * place + axis), width, 0.0);
+  for (Index k = 0; k < part_count_[at(place)]; ++k) {
+    body.greens().gather(base_[at(bases_of_[at(parts_ * place + k)])], Q,
+                         {gathered_.data(), static_cast<std::size_t>(dimension_ * width)});
+    const double weight = part_weight_[at(parts_ * place + k)];
+    for (int axis = 0; axis < dimension_; ++axis)
+      subtract(gathered_.data() + axis * width, -weight, X(dimension_ * place + axis), width);
+  }
+  for (int axis = 0; axis < dimension_; ++axis) {
+    const double* x = X(dimension_ * place + axis);
+    double* y = Y(dimension_ * place + axis);
+    for (std::ptrdiff_t dof = 0; dof < width; ++dof)
+      y[dof] = dot(patch()->correction(static_cast<Index>(dof)), x, width);
+  }
+}
+
+/// C between a node and those before it and itself.
+void NearField::connect(const Body& body, Index place) noexcept {
+  if (row_of(place) >= 0) {
+    connect_within_patch(place);
+  } else {
+    connect_beside_patch(body, place);
+  }
+  const std::ptrdiff_t d = dimension_;
+  const std::ptrdiff_t width = d * (place + 1);
   for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
     const double* block = blocks_.data() + axis * width;
     std::copy_n(block, width, C_.data() + (d * place + axis) * stride_);
     double* column = C_.data() + d * place + axis;
     for (std::ptrdiff_t dof = 0; dof < width; ++dof) column[dof * stride_] = block[dof];
+  }
+}
 
-    double u = 0.0;
-    for (std::ptrdiff_t dof = 0; dof < d * place; ++dof)
-      u += block[dof] * force_[static_cast<std::size_t>(dof)];
-    force_[static_cast<std::size_t>(d * place + axis)] = 0.0;
-    displacement_[static_cast<std::size_t>(d * place + axis)] = u;
+void NearField::connect_within_patch(Index place) noexcept {
+  const Index d = dimension_;
+  double* block = blocks_.data();
+  for (Index i = 0; i < d; ++i) {
+    const double* C = patch()->compliance(d * row_of(place) + i);
+    const double* H = patch()->response(d * row_of(place) + i);
+    for (Index other = 0; other <= place; ++other) {
+      for (Index j = 0; j < d; ++j) {
+        *block++ = row_of(other) >= 0 ? C[d * row_of(other) + j] : dot(H, X(d * other + j), patch_dofs());
+      }
+    }
+  }
+}
+
+void NearField::connect_beside_patch(const Body& body, Index place) noexcept {
+  const Index d = dimension_;
+  const std::ptrdiff_t width = std::ptrdiff_t{d} * base_count_;
+  std::fill_n(by_base_.data(), d * width, 0.0);
+  for (Index k = 0; k < part_count_[at(place)]; ++k) {
+    body.greens().gather(base_[at(bases_of_[at(parts_ * place + k)])], {base_.data(), at(base_count_)},
+                         {gathered_.data(), static_cast<std::size_t>(d * width)});
+    subtract(gathered_.data(), -part_weight_[at(parts_ * place + k)], by_base_.data(), d * width);
+  }
+  double* block = blocks_.data();
+  for (Index i = 0; i < d; ++i) {
+    const double* by = by_base_.data() + i * width;
+    for (Index other = 0; other <= place; ++other) {
+      for (Index j = 0; j < d; ++j) {
+        double sum = 0.0;
+        if (row_of(other) >= 0) {
+          sum = dot(patch()->response(d * row_of(other) + j), X(d * place + i), patch_dofs());
+        } else {
+          for (Index k = 0; k < part_count_[at(other)]; ++k) {
+            const auto part = at(parts_ * other + k);
+            sum += part_weight_[part] * by[d * bases_of_[part] + j];
+          }
+          if (patch() != nullptr) sum += dot(X(d * other + j), Y(d * place + i), patch_dofs());
+        }
+        *block++ = sum;
+      }
+    }
   }
 }
 
 /// The last node takes its place.
 void NearField::forget(Index place) noexcept {
+  leave(place);
   const Index last = --count_;
-  place_[static_cast<std::size_t>(nodes_[static_cast<std::size_t>(place)])] = -1;
+  place_[at(node(place))] = -1;
   if (place == last) return;
-  const auto d = static_cast<std::ptrdiff_t>(dimension_);
+  const std::ptrdiff_t d = dimension_;
   const std::ptrdiff_t width = d * (last + 1);
   for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
     std::copy_n(C_.data() + (d * last + axis) * stride_, width, C_.data() + (d * place + axis) * stride_);
@@ -104,14 +235,59 @@ void NearField::forget(Index place) noexcept {
     double* row = C_.data() + dof * stride_;
     std::copy_n(row + d * last, d, row + d * place);
   }
-  const auto to = static_cast<std::size_t>(place);
-  const auto from = static_cast<std::size_t>(last);
-  nodes_[to] = nodes_[from];
-  stored_[to] = stored_[from];
-  wanted_[to] = wanted_[from];
-  std::copy_n(force_.data() + d * last, d, force_.data() + d * place);
-  std::copy_n(displacement_.data() + d * last, d, displacement_.data() + d * place);
-  place_[static_cast<std::size_t>(nodes_[to])] = place;
+  move(last, place);
+  if (patch() == nullptr || row_of(place) >= 0) return;
+  for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
+    std::copy_n(X(static_cast<Index>(d * last + axis)), patch_dofs(), X(static_cast<Index>(d * place + axis)));
+    std::copy_n(Y(static_cast<Index>(d * last + axis)), patch_dofs(), Y(static_cast<Index>(d * place + axis)));
+  }
+}
+
+/// All that is known of a node but C, X and Y.
+void NearField::move(Index from, Index to) noexcept {
+  nodes_[at(to)] = nodes_[at(from)];
+  row_[at(to)] = row_[at(from)];
+  wanted_[at(to)] = wanted_[at(from)];
+  part_count_[at(to)] = part_count_[at(from)];
+  std::copy_n(bases_of_.begin() + std::ptrdiff_t{parts_} * from, parts_,
+              bases_of_.begin() + std::ptrdiff_t{parts_} * to);
+  std::copy_n(part_weight_.begin() + std::ptrdiff_t{parts_} * from, parts_,
+              part_weight_.begin() + std::ptrdiff_t{parts_} * to);
+  for (std::vector<double>* of_dofs : {&force_, &last_force_, &displacement_}) {
+    std::copy_n(of_dofs->begin() + std::ptrdiff_t{dimension_} * from, dimension_,
+                of_dofs->begin() + std::ptrdiff_t{dimension_} * to);
+  }
+  place_[at(nodes_[at(to)])] = to;
+}
+
+bool NearField::change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept {
+  if (patch != nullptr && (std::ssize(patch->stored_nodes()) > room_.stored_nodes ||
+                           std::ssize(patch->surface_nodes()) > room_.surface_nodes)) {
+    return false;
+  }
+  for (Index place = 0; place < count_; ++place) leave(place);
+  const Index before = count_;
+  count_ = 0;
+  for (Index place = 0; place < before; ++place) {
+    if (wanted_[at(place)] != tick_) {
+      place_[at(node(place))] = -1;
+    } else {
+      move(place, count_++);
+    }
+  }
+  if (load_.patch != nullptr) {
+    for (const Index surface_node : load_.patch->surface_nodes()) place_in_patch_[at(surface_node)] = -1;
+  }
+  load_.patch = std::move(patch);
+  if (load_.patch != nullptr) {
+    Index k = 0;
+    for (const Index surface_node : load_.patch->surface_nodes()) place_in_patch_[at(surface_node)] = k++;
+  }
+  for (Index place = 0; place < count_; ++place) {
+    enter(body, place);
+    connect(body, place);
+  }
+  return true;
 }
 
 void NearField::unload() noexcept {
@@ -134,21 +310,40 @@ void NearField::load(Index place, const Vec3& force) noexcept {
 
 void NearField::displace() noexcept {
   const std::ptrdiff_t width = std::ptrdiff_t{dimension_} * count_;
-  double* __restrict u = displacement_.data();
-  std::fill_n(u, width, 0.0);
-  loaded_count_ = 0;
+  std::fill_n(displacement_.data(), width, 0.0);
+  std::fill_n(base_force_.data(), dimension_ * base_count_, 0.0);
+  std::fill(patch_force_.begin(), patch_force_.end(), 0.0);
+  load_.clear();
   for (Index place = 0; place < count_; ++place) {
     if (!is_loaded(place)) continue;
     const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
-    loaded_[static_cast<std::size_t>(loaded_count_)] = stored_[static_cast<std::size_t>(place)];
-    std::copy_n(f, dimension_, loaded_force_.data() + std::ptrdiff_t{dimension_} * loaded_count_);
-    ++loaded_count_;
-    for (int axis = 0; axis < dimension_; ++axis) {
-      const double* __restrict c = C_.data() + (std::ptrdiff_t{dimension_} * place + axis) * stride_;
-      const double force = f[axis];
-#pragma omp simd
-      for (std::ptrdiff_t dof = 0; dof < width; ++dof) u[dof] += force * c[dof];
+    for (int axis = 0; axis < dimension_; ++axis)
+      subtract(row(dimension_ * place + axis).data(), -f[axis], displacement_.data(), width);
+    for (Index k = 0; k < part_count_[at(place)]; ++k) {
+      const auto part = at(parts_ * place + k);
+      double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
+      for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * f[axis];
     }
+    if (patch() == nullptr) continue;
+    const Index in_patch = row_of(place);
+    if (in_patch >= 0) load_.add_to_patch(in_patch, f);
+    for (int axis = 0; axis < dimension_; ++axis) {
+      const Index dof = dimension_ * place + axis;
+      const double* on_patch = in_patch >= 0 ? patch()->response(dimension_ * in_patch + axis) : Y(dof);
+      subtract(on_patch, -f[axis], patch_force_.data(), patch_dofs());
+      if (in_patch < 0) subtract(X(dof), -f[axis], load_.beside.data(), patch_dofs());
+    }
+  }
+  const auto add = [&](const Index* stored, const double* force, Index count) {
+    for (Index k = 0; k < count; ++k) {
+      const double* f = force + std::ptrdiff_t{dimension_} * k;
+      if (std::any_of(f, f + dimension_, [](double value) { return value != 0.0; })) load_.add(stored[k], f);
+    }
+  };
+  add(base_.data(), base_force_.data(), base_count_);
+  if (patch() != nullptr) {
+    const std::span<const Index> Q = patch()->stored_nodes();
+    add(Q.data(), patch_force_.data(), static_cast<Index>(Q.size()));
   }
 }
 

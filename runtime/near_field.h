@@ -2,20 +2,27 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "runtime/body.h"
+#include "runtime/patch.h"
+#include "runtime/surface_load.h"
 
 namespace palpate {
 
 /// C = E^T Xi E [m/N] of the surface nodes near the tools (theory.md section 3), the forces on them and their
 /// displacement. A tick gathers only what is new: one block row for each node that comes. Nodes that are held
-/// along every axis do not move and have no place here. All memory is taken at construction.
+/// along every axis do not move and have no place here.
+///
+/// With a patch, Xi is that of the body with the overlay: between surface nodes of the patch it is there,
+/// between them (H) and others (X = Xi_Q, of forces there without the overlay) it is H X, and between others
+/// Xi + X^T M X (theory.md section 4). All memory is taken at construction.
 class NearField {
  public:
   /// Empty, with room for `capacity` nodes.
-  NearField(const Body& body, Index capacity);
+  NearField(const Body& body, Index capacity, const PatchRoom& room = {});
 
   [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d
   [[nodiscard]] Index count() const noexcept { return count_; }        ///< m, nodes that are here
@@ -38,48 +45,83 @@ class NearField {
   /// that was not wanted for longest goes. False when all others are wanted or loaded.
   bool want(const Body& body, Index surface_node) noexcept;
 
+  /// The overlay that is in C, null for none.
+  [[nodiscard]] const std::shared_ptr<const Patch>& patch() const noexcept { return load_.patch; }
+  /// Gathers all of C anew, with another overlay or none. Forces and displacement stay as they are, so that
+  /// nothing that is touched jumps away: the next forces are those of the new C. Nodes that were not wanted
+  /// in this tick are forgotten. False, and nothing happens, when the patch is larger than there is room for.
+  bool change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept;
+  /// Place of a surface node in the patch, -1 when it is beside it.
+  [[nodiscard]] Index place_in_patch(Index surface_node) const noexcept {
+    return place_in_patch_[static_cast<std::size_t>(surface_node)];
+  }
+
   /// Takes all forces off.
   void unload() noexcept;
   /// Only a share of what the forces changed by since `unload`.
   void retreat(double share) noexcept;
   /// Adds to the force on the body at a place [N].
   void load(Index place, const Vec3& force) noexcept;
-  /// u = C f: the displacement of all nodes here by the forces. Also lists the loaded nodes.
+  /// u = C f: the displacement of all nodes here by the forces, and what the rest of the surface follows from.
   void displace() noexcept;
 
   /// Displacement at a place by the forces of the last `displace` [m].
   [[nodiscard]] Vec3 displacement(Index place) const noexcept;
-  /// Stored nodes that carry a force, and the forces on them, d numbers a node [N].
-  [[nodiscard]] std::span<const Index> loaded_nodes() const noexcept {
-    return {loaded_.data(), static_cast<std::size_t>(loaded_count_)};
-  }
-  [[nodiscard]] std::span<const double> loaded_forces() const noexcept {
-    return {loaded_force_.data(), static_cast<std::size_t>(dimension_ * loaded_count_)};
-  }
+  /// The forces of the last `displace`.
+  [[nodiscard]] const SurfaceLoad& load() const noexcept { return load_; }
 
  private:
   void add(const Body& body, Index surface_node) noexcept;
   void forget(Index place) noexcept;
+  void enter(const Body& body, Index place) noexcept;
+  void leave(Index place) noexcept;
+  void move(Index from, Index to) noexcept;
+  void connect(const Body& body, Index place) noexcept;
+  void connect_within_patch(Index place) noexcept;
+  void connect_beside_patch(const Body& body, Index place) noexcept;
+  void respond(const Body& body, Index place) noexcept;
   [[nodiscard]] Index longest_unwanted() const noexcept;
   [[nodiscard]] bool is_loaded(Index place) const noexcept;
+  [[nodiscard]] Index row_of(Index place) const noexcept { return row_[static_cast<std::size_t>(place)]; }
+  /// Row [d g] of X or Y of a dof.
+  [[nodiscard]] double* X(Index dof) noexcept { return X_.data() + std::ptrdiff_t{dof} * patch_stride_; }
+  [[nodiscard]] double* Y(Index dof) noexcept { return Y_.data() + std::ptrdiff_t{dof} * patch_stride_; }
+  [[nodiscard]] std::ptrdiff_t patch_dofs() const noexcept {
+    return dimension_ * std::ssize(load_.patch->stored_nodes());
+  }
 
   int dimension_;
   Index capacity_;
+  Index parts_;  // room of each node for stored nodes that it follows
   Index count_ = 0;
-  Index loaded_count_ = 0;
   std::ptrdiff_t stride_;
+  std::ptrdiff_t patch_stride_;
+  PatchRoom room_;
   std::int64_t tick_ = 0;
-  std::vector<Index> place_;          // [S]
-  std::vector<Index> nodes_;          // [capacity] surface nodes
-  std::vector<Index> stored_;         // [capacity] their stored nodes
-  std::vector<std::int64_t> wanted_;  // [capacity] tick in which each was wanted last
-  std::vector<double> C_;             // [d capacity x stride]
-  std::vector<double> force_;         // [d capacity]
-  std::vector<double> last_force_;    // [d capacity] before `unload`
-  std::vector<double> displacement_;  // [d capacity]
-  std::vector<double> blocks_;        // [d x d capacity] block row of a node that comes
-  std::vector<Index> loaded_;         // [capacity]
-  std::vector<double> loaded_force_;  // [d capacity]
+  std::vector<Index> place_;           // [S]
+  std::vector<Index> place_in_patch_;  // [S]
+  std::vector<Index> nodes_;           // [capacity] surface nodes
+  std::vector<Index> row_;             // [capacity] place in the patch, -1 beside it
+  std::vector<std::int64_t> wanted_;   // [capacity] tick in which each was wanted last
+  std::vector<double> C_;              // [d capacity x stride]
+  std::vector<double> force_;          // [d capacity]
+  std::vector<double> last_force_;     // [d capacity] before `unload`
+  std::vector<double> displacement_;   // [d capacity]
+  std::vector<double> blocks_;         // [d x d capacity] block row of a node that comes
+  // Stored nodes that those beside the patch follow, each once.
+  Index base_count_ = 0;
+  std::vector<Index> base_;            // [parts capacity] stored nodes
+  std::vector<Index> base_uses_;       // [parts capacity] nodes that follow each
+  std::vector<Index> base_of_stored_;  // [stored nodes] -1 for none
+  std::vector<Index> bases_of_;        // [parts x capacity] of each node
+  std::vector<double> part_weight_;    // [parts x capacity]
+  std::vector<Index> part_count_;      // [capacity]
+  std::vector<double> by_base_;        // [d x d parts capacity] displacement of a node that comes
+  std::vector<double> gathered_;       // [d x d max(parts capacity, room)]
+  std::vector<double> base_force_;     // [d parts capacity]
+  std::vector<double> X_, Y_;          // [d capacity x patch stride] X and M X of nodes beside the patch
+  std::vector<double> patch_force_;    // [d room] on Q
+  SurfaceLoad load_;
 };
 
 }  // namespace palpate

@@ -81,7 +81,7 @@ State::State(const Body& body, const StateOptions& options)
     : tools(make_tools(options)),
       contact_points(static_cast<std::size_t>(options.max_contacts)),
       max_contacts(options.max_contacts),
-      near(body, near_room(options)),
+      near(body, near_room(options), options.patches),
       tree(body.simplices(), body.dimension(), body.surface_rest_positions(),
            tree_margin * body.mean_surface_edge()),
       problem(body.dimension(), entries(body, options), most_rows(body, options)),
@@ -98,6 +98,7 @@ State::State(const Body& body, const StateOptions& options)
       last_contacts(static_cast<std::size_t>(options.max_contacts)),
       row_change(rows.size()),
       force_change(rows.size()),
-      far_displacement(static_cast<std::size_t>(body.dimension() * most_far_nodes)) {}
+      far_displacement(static_cast<std::size_t>(body.dimension() * most_far_nodes)),
+      stored_displacement(static_cast<std::size_t>(body.greens().order())) {}
 
 }  // namespace palpate

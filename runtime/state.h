@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -46,12 +47,14 @@ struct ToolState {
 struct StateOptions {
   std::vector<Tool> tools = {Tool{}};
   Index max_contacts = 32;  ///< contact points of all tools together; beyond, the deepest are kept
+  PatchRoom patches = {};   ///< for overlays
 };
 
 /// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
 /// replay are copies. All memory is taken here: copying allocates, a tick does not.
 struct State {
-  static constexpr Index most_far_nodes = 64;  ///< whose far displacement a tick renews
+  static constexpr Index most_far_nodes = 64;  ///< of the body, whose far displacement a tick renews
+  static constexpr Index most_far_patch_nodes = 16;  ///< and of the patch's surface
 
   /// Of a body at rest that no tool touches. Throws Error for tools without sense (a size or stiffness that
   /// is negative or not a number), none, or no room for contacts.
@@ -69,6 +72,9 @@ struct State {
   Index max_contacts;
   StepStatus status = StepStatus::ok;  ///< of the last tick, all tools
   std::int64_t ticks = 0;              ///< taken so far
+
+  /// The overlay that ticks are to use; null: none. A change comes with the next tick.
+  std::shared_ptr<const Patch> patch;
 
   NearField near;
   SurfaceTree tree;
@@ -92,6 +98,8 @@ struct State {
   std::vector<double> force_change;      // [rows]
   std::vector<double> far_displacement;  // [d * slice]
   Index next_far_node = 0;               // stored node from which the far field is renewed next
+  std::vector<double> stored_displacement;  // [n] as it was renewed last
+  Index next_patch_node = 0;                // place in the patch from which its surface is renewed next
 };
 
 }  // namespace palpate

@@ -15,6 +15,7 @@ namespace palpate {
 namespace {
 
 constexpr Index far_blocks = 1024;           // pairs of loaded and renewed nodes a tick
+constexpr Index most_far_moves = 128;        // surface nodes that are moved with them
 constexpr double rough_penetration = 0.002;  // of the mean edge: more calls for another pass
 constexpr int most_passes = 3;
 constexpr double most_motion =
@@ -61,7 +62,7 @@ void apply_forces(State& state) noexcept {
 /// in the next tick. Where forces would take the near surface farther than in a step of Newton's method that
 /// can be trusted, only a share of their change is made.
 void retreat_from_leaps(const Body& body, State& state) noexcept {
-  if (state.near.loaded_nodes().empty()) return;
+  if (state.near.load().count == 0) return;
   double farthest = 0.0;
   for (Index place = 0; place < state.near.count(); ++place) {
     const Index node = state.near.node(place);
@@ -92,22 +93,54 @@ void move_near_surface(const Body& body, State& state) noexcept {
   }
 }
 
-/// The rest of the surface follows in slices, a bounded number of nodes a tick.
+/// Moves a surface node that is not near a tool.
+void move_far(const Body& body, State& state, Index node, const Vec3& u) noexcept {
+  if (state.near.place_of(node) >= 0) return;
+  const Vec3 position = body.surface_rest_positions()[static_cast<std::size_t>(node)] + u;
+  if (position.allFinite()) state.tree.move(node, position);
+}
+
+/// The rest of the surface follows in slices, a bounded number of nodes a tick: beside the patch by stored
+/// nodes.
 void move_far_slice(const Body& body, State& state) noexcept {
-  const auto d = static_cast<std::size_t>(body.dimension());
-  const Index loaded = static_cast<Index>(state.near.loaded_nodes().size());
-  const Index count = std::min({State::most_far_nodes, far_blocks / std::max<Index>(loaded, 1) + 1,
-                                body.greens().nodes() - state.next_far_node});
-  const std::span<double> u(state.far_displacement.data(), d * static_cast<std::size_t>(count));
-  body.greens().displacement(state.near.loaded_nodes(), state.near.loaded_forces(), state.next_far_node, u);
-  for (Index k = 0; k < count; ++k) {
-    const Index node = body.surface_node_of_stored(state.next_far_node + k);
-    if (node < 0 || state.near.place_of(node) >= 0) continue;
-    const Vec3 position =
-        body.surface_rest_positions()[static_cast<std::size_t>(node)] + vector_at(u, body.dimension(), k);
-    if (position.allFinite()) state.tree.move(node, position);
+  const int d = body.dimension();
+  const SurfaceLoad& load = state.near.load();
+  const auto most = [&](Index budget) {
+    return std::min(budget, far_blocks / std::max<Index>(load.count, 1) + 1);
+  };
+  const Index end = std::min(state.next_far_node + most(State::most_far_nodes), body.greens().nodes());
+  Index next = state.next_far_node;
+  for (Index moves = 0; next < end && moves < most_far_moves; ++next) moves += static_cast<Index>(body.followers(next).size());
+  const std::span<double> u(state.far_displacement.data(),
+                            static_cast<std::size_t>(d * (next - state.next_far_node)));
+  body.greens().displacement(load.nodes(), load.forces(), state.next_far_node, u);
+  std::copy(u.begin(), u.end(), state.stored_displacement.begin() + std::ptrdiff_t{d} * state.next_far_node);
+  for (Index stored = state.next_far_node; stored < next; ++stored) {
+    for (const Index node : body.followers(stored)) {
+      if (state.near.place_in_patch(node) >= 0) continue;
+      const SurfaceParts parts = body.surface_parts(node);
+      Vec3 sum = Vec3::Zero();
+      for (std::size_t k = 0; k < parts.stored.size(); ++k)
+        sum += parts.weights[k] * vector_at(state.stored_displacement, d, parts.stored[k]);
+      move_far(body, state, node, sum);
+    }
   }
-  state.next_far_node = (state.next_far_node + count) % body.greens().nodes();
+  state.next_far_node = next % body.greens().nodes();
+}
+
+/// And the surface of the patch.
+void move_patch_slice(const Body& body, State& state) noexcept {
+  if (state.near.patch() == nullptr) return;
+  const std::span<const Index> nodes = state.near.patch()->surface_nodes();
+  const auto count = static_cast<Index>(nodes.size());
+  state.next_patch_node %= count;
+  const Index end = std::min(state.next_patch_node + State::most_far_patch_nodes, count);
+  const std::span<double> u(state.far_displacement.data(),
+                            static_cast<std::size_t>(body.dimension() * (end - state.next_patch_node)));
+  patch_displacement(state.near.load(), state.next_patch_node, u);
+  for (Index k = state.next_patch_node; k < end; ++k)
+    move_far(body, state, nodes[static_cast<std::size_t>(k)], vector_at(u, body.dimension(), k - state.next_patch_node));
+  state.next_patch_node = end;
 }
 
 /// Deepest penetration at the contact points, as the tick before or the pass before left it [m].
@@ -164,6 +197,10 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   // A pass is a Newton step: one is enough but for contact that slips far in a tick.
   const double rough = rough_penetration * body.mean_surface_edge();
   find_contacts(body, state);
+  if (state.patch != state.near.patch() && !state.near.change_patch(body, state.patch)) {
+    state.patch = state.near.patch();
+    state.status |= StepStatus::capacity_full;
+  }
   bool again = penetration(state) > rough;
   bool valid = solve_contact(body, state);
   const auto easy = [&] { return state.problem.frictionless || state.cone_solver.was_easy(); };
@@ -182,6 +219,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
     for (ToolState& tool : state.tools) give_force(tool);
   }
   move_far_slice(body, state);
+  move_patch_slice(body, state);
   for (const ToolState& tool : state.tools) state.status |= tool.status;
   return state.status;
 }
@@ -191,7 +229,7 @@ StepStatus step(const Body& body, State& state, const ToolPose& pose) noexcept {
 }
 
 void surface_displacement(const Body& body, const State& state, std::span<double> u) noexcept {
-  body.greens().displacement(state.near.loaded_nodes(), state.near.loaded_forces(), u);
+  body.greens().displacement(state.near.load().nodes(), state.near.load().forces(), u);
 }
 
 }  // namespace palpate

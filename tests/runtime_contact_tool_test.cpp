@@ -255,9 +255,9 @@ TEST_P(Tools, TheWrenchIsThatOfTheForcesOnTheBody) {
     ASSERT_GT(tool.wrench.torque.norm(), 0.1 * edge_ * tool.wrench.force.norm());
     Vec3 force = Vec3::Zero();
     Vec3 torque = Vec3::Zero();
-    const std::span<const Index> nodes = state.near.loaded_nodes();
+    const std::span<const Index> nodes = state.near.load().nodes();
     for (Index k = 0; k < static_cast<Index>(nodes.size()); ++k) {
-      const Vec3 f = vector_at(state.near.loaded_forces(), GetParam(), k);
+      const Vec3 f = vector_at(state.near.load().forces(), GetParam(), k);
       const Index node = body_.surface_node_of_stored(nodes[static_cast<std::size_t>(k)]);
       force += f;
       torque += (state.tree.position(node) - tool.pose.position).cross(f);

@@ -197,7 +197,7 @@ class Walk : public testing::TestWithParam<WalkCase> {
       ASSERT_EQ(tool.wrench.torque, Vec3::Zero());
       ASSERT_EQ(tool.contacts, 0);
     }
-    ASSERT_TRUE(state_.near.loaded_nodes().empty());
+    ASSERT_TRUE(state_.near.load().nodes().empty());
   }
 
   /// Presses the first tool in and comes back: the force there.

@@ -102,10 +102,10 @@ TEST_P(Near, DisplacementIsThatOfTheGreensFunctions) {
     near.load(near.place_of(nodes[k]), test::upright(GetParam(), 0.1, 0.0, 0.0));
   }
   near.displace();
-  EXPECT_EQ(near.loaded_nodes().size(), 3U);
+  EXPECT_EQ(near.load().nodes().size(), 3U);
   for (std::size_t k = 6; k < 12; ++k) near.want(body_, nodes[k]);  // these come after the forces
   std::vector<double> u(static_cast<std::size_t>(body_.greens().order()));
-  body_.greens().displacement(near.loaded_nodes(), near.loaded_forces(), u);
+  body_.greens().displacement(near.load().nodes(), near.load().forces(), u);
   for (std::size_t k = 0; k < 12; ++k) {
     const Vec3 expected = vector_at(u, GetParam(), stored(nodes[k]));
     EXPECT_GT(expected.norm(), 1e-6);
@@ -113,7 +113,7 @@ TEST_P(Near, DisplacementIsThatOfTheGreensFunctions) {
   }
   near.unload();
   near.displace();
-  EXPECT_EQ(near.loaded_nodes().size(), 0U);
+  EXPECT_EQ(near.load().nodes().size(), 0U);
   EXPECT_EQ(near.displacement(0), Vec3::Zero());
 }
 
@@ -136,7 +136,7 @@ TEST_P(Near, RetreatMakesAShareOfTheChange) {
   const std::vector<Vec3> after = displacements();
   near.retreat(0.25);
   const std::vector<Vec3> between = displacements();
-  EXPECT_EQ(near.loaded_nodes().size(), 2U);
+  EXPECT_EQ(near.load().nodes().size(), 2U);
   for (std::size_t k = 0; k < between.size(); ++k)
     EXPECT_LT((between[k] - (0.75 * before[k] + 0.25 * after[k])).norm(), 1e-14 * after[k].norm());
 }
