@@ -5,10 +5,14 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <iterator>
+#include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "meshes/element.h"
+#include "runtime/near_field.h"
 #include "runtime/overlay.h"
 #include "tests/runtime_model.h"
 
@@ -42,8 +46,13 @@ class Patches : public testing::TestWithParam<Case> {
   }
 
   /// Displacement of fine surface nodes and of all stored nodes by forces on them [m/N].
-  [[nodiscard]] MatrixXd reference(const PatchMesh& patch, std::span<const Index> surface_nodes) const {
-    const PatchStiffness local = assemble_patch(body_.model(), patch);
+  [[nodiscard]] MatrixXd reference(const PatchMesh& patch, std::span<const Index> surface_nodes,
+                                   bool overlay = true) const {
+    PatchStiffness local = assemble_patch(body_.model(), patch);
+    if (!overlay) {
+      local.K_L.setIdentity();
+      local.K_LG.setZero();
+    }
     const MatrixXd Xi = whole_greens();
     const Eigen::Index n = Xi.rows();
     const Eigen::Index l = local.K_L.rows();
@@ -64,7 +73,8 @@ class Patches : public testing::TestWithParam<Case> {
       for (int axis = 0; axis < d_; ++axis) {
         for (std::size_t p = 0; p < parts.stored.size(); ++p)
           E(d_ * k + axis, d_ * parts.stored[p] + axis) = parts.weights[p];
-        const Index free = patch.free_dof[static_cast<std::size_t>(d_ * local_node(patch, node) + axis)];
+        const Index place = overlay ? local_node(patch, node) : -1;
+        const Index free = place < 0 ? -1 : patch.free_dof[static_cast<std::size_t>(d_ * place + axis)];
         if (free >= 0) E(d_ * k + axis, n + free) = 1.0;
       }
     }
@@ -79,14 +89,13 @@ class Patches : public testing::TestWithParam<Case> {
     return greens_at(body_, all);
   }
 
-  /// By its place, where Patch goes by the corners and weights.
+  /// By its place, where Patch goes by the corners and weights; -1 beside the patch.
   [[nodiscard]] Index local_node(const PatchMesh& patch, Index surface_node) const {
     const Vec3& x = body_.surface_rest_positions()[static_cast<std::size_t>(surface_node)];
     for (std::size_t k = 0; k < patch.local.nodes.size(); ++k) {
       if ((patch.local.nodes[k] - x).norm() < 1e-9) return static_cast<Index>(k);
     }
-    ADD_FAILURE() << "surface node " << surface_node << " is not in the patch";
-    return 0;
+    return -1;
   }
 };
 
@@ -139,6 +148,87 @@ TEST_P(Patches, AreTheFineMeshExactly) {
   const MatrixXd Xi = greens_at(body_, stored);
   EXPECT_LT((Xi + change - reference.bottomRightCorner(n, n)).norm(), 1e-11 * scale);
   EXPECT_GT(change.norm(), 1e-4 * scale);
+}
+
+/// The compliance that a near field has, in the order of its places, is that of the reference.
+void expect_compliance(const NearField& near, const MatrixXd& reference) {
+  const Index d = near.dimension();
+  const double tolerance = 1e-11 * reference.norm();
+  for (Index i = 0; i < d * near.count(); ++i) {
+    for (Index j = 0; j < d * near.count(); ++j) {
+      const double expected = reference(d * near.node(i / d) + i % d, d * near.node(j / d) + j % d);
+      ASSERT_NEAR(near.row(i)[static_cast<std::size_t>(j)], expected, tolerance)
+          << "places " << i / d << " and " << j / d;
+    }
+  }
+}
+
+// All surface nodes in turn, in the patch and beside it, with patches that come and go.
+TEST_P(Patches, AreWhatTheNearFieldHas) {
+  const PatchMesh patch_mesh = mesh();
+  const auto patch =
+      std::make_shared<const Patch>(body_, patch_mesh, condense(body_.model(), patch_mesh));
+  std::vector<Index> all(body_.surface_rest_positions().size());
+  for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<Index>(k);
+  const MatrixXd with = reference(patch_mesh, all);
+  const MatrixXd without = reference(patch_mesh, all, false);
+
+  constexpr Index room = 24;
+  NearField near(body_, room,
+                 {.stored_nodes = static_cast<Index>(patch->stored_nodes().size()),
+                  .surface_nodes = static_cast<Index>(patch->surface_nodes().size())});
+  std::mt19937 random(3);
+  std::vector<Index> moving;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(moving),
+               [&](Index node) { return body_.surface_moves(node); });
+  const auto any = [&] { return moving[random() % moving.size()]; };
+  const auto any_in_patch = [&] {
+    Index node = -1;
+    while (node < 0 || !body_.surface_moves(node))
+      node = patch->surface_nodes()[random() % patch->surface_nodes().size()];
+    return node;
+  };
+  for (int tick = 0; tick < 30; ++tick) {
+    near.begin_tick();
+    for (int k = 0; k < 3; ++k) {
+      near.want(body_, any());
+      near.want(body_, any_in_patch());
+    }
+    if (tick % 5 == 4) {
+      const Index before = near.count();
+      ASSERT_TRUE(near.change_patch(body_, tick % 10 == 4 ? patch : nullptr));
+      EXPECT_LE(near.count(), 6);
+      EXPECT_LT(near.count(), before);
+      for (int k = 0; k < 8; ++k) near.want(body_, any());
+    }
+    expect_compliance(near, near.patch() != nullptr ? with : without);
+    if (HasFatalFailure()) return;
+
+    Eigen::VectorXd f = Eigen::VectorXd::Zero(with.cols());
+    near.unload();
+    for (Index place = 0; place < near.count(); place += 2) {
+      Vec3 force = Vec3::Zero();
+      for (int axis = 0; axis < d_; ++axis) force[axis] = static_cast<double>(random() % 100) - 50.0;
+      near.load(place, force);
+      f.segment(d_ * near.node(place), d_) = force.head(d_);
+    }
+    near.displace();
+    const Eigen::VectorXd u = (near.patch() != nullptr ? with : without) * f;
+    for (Index place = 0; place < near.count(); ++place) {
+      EXPECT_LT((near.displacement(place).head(d_) - u.segment(d_ * near.node(place), d_)).norm(),
+                1e-11 * u.norm());
+    }
+    std::vector<double> stored(static_cast<std::size_t>(body_.greens().order()));
+    std::vector<Vec3> surface(all.size());
+    surface_displacement(body_, near.load(), stored, surface);
+    for (std::size_t node = 0; node < all.size(); ++node) {
+      ASSERT_LT((surface[node].head(d_) - u.segment(d_ * static_cast<Index>(node), d_)).norm(),
+                1e-11 * u.norm())
+          << "surface node " << node << (near.patch() != nullptr ? " with" : " without") << " patch";
+    }
+    const Eigen::Map<const Eigen::VectorXd> of_body(stored.data(), std::ssize(stored));
+    EXPECT_LT((of_body - u.tail(of_body.size())).norm(), 1e-11 * u.norm());
+  }
 }
 
 TEST_P(Patches, CondenseAsTheOverlayDoes) {
