@@ -34,7 +34,8 @@ static_assert(same(PALPATE_POSE_LIMITED, StepStatus::pose_limited));
 static_assert(same(PALPATE_NOT_CONVERGED, StepStatus::not_converged));
 static_assert(same(PALPATE_FORCE_LIMITED, StepStatus::force_limited));
 static_assert(same(PALPATE_HANDING_OVER, StepStatus::handing_over));
-static_assert(status_names.size() == 9 + 2, "these and the two that only HeldNodes knows");
+static_assert(same(PALPATE_OLDER_PATCH, StepStatus::older_patch));
+static_assert(status_names.size() == 10 + 2, "these and the two that only HeldNodes knows");
 
 constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
 

@@ -17,13 +17,13 @@ std::size_t at(Index i) noexcept {
 
 }  // namespace
 
-NearField::NearField(const Body& body, Index capacity, const PatchRoom& room)
+NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
     : dimension_(body.dimension()),
       capacity_(capacity),
       parts_(body.most_surface_parts()),
       stride_((static_cast<std::ptrdiff_t>(dimension_) * capacity + 7) / 8 * 8),
-      patch_stride_((static_cast<std::ptrdiff_t>(dimension_) * room.stored_nodes + 7) / 8 * 8),
-      room_(room),
+      patch_stride_((static_cast<std::ptrdiff_t>(dimension_) * patch_nodes + 7) / 8 * 8),
+      patch_room_(patch_nodes),
       place_(body.surface_rest_positions().size(), -1),
       place_in_patch_(place_.size(), -1),
       nodes_(at(capacity), -1),
@@ -42,12 +42,12 @@ NearField::NearField(const Body& body, Index capacity, const PatchRoom& room)
       part_count_(at(capacity)),
       by_base_(static_cast<std::size_t>(dimension_ * dimension_) * base_.size()),
       gathered_(static_cast<std::size_t>(dimension_ * dimension_) *
-                std::max(base_.size(), at(room.stored_nodes))),
+                std::max(base_.size(), at(patch_nodes))),
       base_force_(static_cast<std::size_t>(dimension_) * base_.size()),
       X_(force_.size() * static_cast<std::size_t>(patch_stride_)),
       Y_(X_.size()),
       patch_force_(static_cast<std::size_t>(patch_stride_)),
-      load_(dimension_, capacity, static_cast<Index>(base_.size()), room) {}
+      load_(dimension_, capacity, static_cast<Index>(base_.size()), patch_nodes) {}
 
 bool NearField::is_loaded(Index place) const noexcept {
   const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
@@ -261,10 +261,7 @@ void NearField::move(Index from, Index to) noexcept {
 }
 
 bool NearField::change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept {
-  if (patch != nullptr && (std::ssize(patch->stored_nodes()) > room_.stored_nodes ||
-                           std::ssize(patch->surface_nodes()) > room_.surface_nodes)) {
-    return false;
-  }
+  if (patch != nullptr && std::ssize(patch->stored_nodes()) > patch_room_) return false;
   for (Index place = 0; place < count_; ++place) leave(place);
   const Index before = count_;
   count_ = 0;

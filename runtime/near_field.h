@@ -21,8 +21,8 @@ namespace palpate {
 /// Xi + X^T M X (theory.md section 4). All memory is taken at construction.
 class NearField {
  public:
-  /// Empty, with room for `capacity` nodes.
-  NearField(const Body& body, Index capacity, const PatchRoom& room = {});
+  /// Empty, with room for `capacity` nodes and for patches of up to `patch_nodes` nodes g.
+  NearField(const Body& body, Index capacity, Index patch_nodes = 0);
 
   [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d
   [[nodiscard]] Index count() const noexcept { return count_; }        ///< m, nodes that are here
@@ -96,7 +96,7 @@ class NearField {
   Index count_ = 0;
   std::ptrdiff_t stride_;
   std::ptrdiff_t patch_stride_;
-  PatchRoom room_;
+  Index patch_room_;
   std::int64_t tick_ = 0;
   std::vector<Index> place_;           // [S]
   std::vector<Index> place_in_patch_;  // [S]
@@ -117,10 +117,10 @@ class NearField {
   std::vector<double> part_weight_;    // [parts x capacity]
   std::vector<Index> part_count_;      // [capacity]
   std::vector<double> by_base_;        // [d x d parts capacity] displacement of a node that comes
-  std::vector<double> gathered_;       // [d x d max(parts capacity, room)]
+  std::vector<double> gathered_;       // [d x d max(parts capacity, patch room)]
   std::vector<double> base_force_;     // [d parts capacity]
   std::vector<double> X_, Y_;          // [d capacity x patch stride] X and M X of nodes beside the patch
-  std::vector<double> patch_force_;    // [d room] on Q
+  std::vector<double> patch_force_;    // [d patch room] on Q
   SurfaceLoad load_;
 };
 

@@ -60,7 +60,8 @@ enum {
   PALPATE_POSE_LIMITED = 1 << 7,      /* a pose jumped: the tool follows at a bounded speed */
   PALPATE_NOT_CONVERGED = 1 << 8,     /* the contact forces did not reach their tolerance within the budget */
   PALPATE_FORCE_LIMITED = 1 << 9,     /* a force was cut to max_force */
-  PALPATE_HANDING_OVER = 1 << 10      /* a force is on its way to the contact's, so as not to kick */
+  PALPATE_HANDING_OVER = 1 << 10,     /* a force is on its way to the contact's, so as not to kick */
+  PALPATE_OLDER_PATCH = 1 << 11       /* the overlay for this place was not there yet */
 };
 
 /* "capacity_full" and so on; NULL for what is not one bit of these. Real-time safe. */

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "meshes/mesh.h"
+#include "runtime/patch_maker.h"
 
 namespace palpate {
 
@@ -16,17 +17,11 @@ struct ProbePlace {
   std::vector<double> displacement;       ///< [m] relative to rest
 };
 
-/// A finer mesh round the nodes that are displaced.
-struct OverlayOptions {
-  int refinement = 3;  ///< r: each element is cut into r^d
-  int rings = 2;       ///< of elements round the nodes
-};
-
 struct ProbeOptions {
   std::filesystem::path file;        ///< baked model
   std::filesystem::path model_toml;  ///< that it must have been made from; empty: not asked
   std::vector<ProbePlace> places;
-  std::optional<OverlayOptions> overlay;  ///< none: the body's own mesh
+  std::optional<OverlayOptions> overlay;  ///< round the nodes that are displaced; none: the body's own mesh
   bool json = false;
   std::filesystem::path field;  ///< .csv or .vtu for the whole displacement, at rest and by the probe; empty:
                                 ///< none

@@ -81,7 +81,7 @@ State::State(const Body& body, const StateOptions& options)
     : tools(make_tools(options)),
       contact_points(static_cast<std::size_t>(options.max_contacts)),
       max_contacts(options.max_contacts),
-      near(body, near_room(options), options.patches),
+      near(body, near_room(options), options.patch_nodes),
       tree(body.simplices(), body.dimension(), body.surface_rest_positions(),
            tree_margin * body.mean_surface_edge()),
       problem(body.dimension(), entries(body, options), most_rows(body, options)),

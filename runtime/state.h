@@ -47,7 +47,7 @@ struct ToolState {
 struct StateOptions {
   std::vector<Tool> tools = {Tool{}};
   Index max_contacts = 32;  ///< contact points of all tools together; beyond, the deepest are kept
-  PatchRoom patches = {};   ///< for overlays
+  Index patch_nodes = 0;    ///< most nodes g of a patch that is to be used
 };
 
 /// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
@@ -75,6 +75,7 @@ struct State {
 
   /// The overlay that ticks are to use; null: none. A change comes with the next tick.
   std::shared_ptr<const Patch> patch;
+  bool patch_is_older = false;  ///< than what is wanted: to be told in the status
 
   NearField near;
   SurfaceTree tree;

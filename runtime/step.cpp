@@ -185,7 +185,7 @@ void recall_contacts(State& state) noexcept {
 
 StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses) noexcept {
   ++state.ticks;
-  state.status = StepStatus::ok;
+  state.status = state.patch_is_older ? StepStatus::older_patch : StepStatus::ok;
   for (std::size_t k = 0; k < state.tools.size(); ++k) {
     state.tools[k].status = StepStatus::ok;
     follow_device(body, state, state.tools[k], poses[k]);

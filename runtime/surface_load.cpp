@@ -14,13 +14,13 @@ std::size_t dofs(int dimension, Index nodes) noexcept {
 
 }  // namespace
 
-SurfaceLoad::SurfaceLoad(int d, Index near_nodes, Index stored_nodes, const PatchRoom& room)
+SurfaceLoad::SurfaceLoad(int d, Index near_nodes, Index stored_nodes, Index patch_nodes)
     : dimension(d),
-      node(static_cast<std::size_t>(stored_nodes + room.stored_nodes)),
-      force(dofs(d, stored_nodes + room.stored_nodes)),
-      patch_place(static_cast<std::size_t>(room.stored_nodes > 0 ? near_nodes : 0)),
+      node(static_cast<std::size_t>(stored_nodes + patch_nodes)),
+      force(dofs(d, stored_nodes + patch_nodes)),
+      patch_place(static_cast<std::size_t>(patch_nodes > 0 ? near_nodes : 0)),
       patch_force(dofs(d, static_cast<Index>(patch_place.size()))),
-      beside(dofs(d, room.stored_nodes)) {}
+      beside(dofs(d, patch_nodes)) {}
 
 void SurfaceLoad::clear() noexcept {
   count = 0;

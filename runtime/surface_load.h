@@ -9,15 +9,10 @@
 
 namespace palpate {
 
-/// Room that a state has for patches; none without overlays.
-struct PatchRoom {
-  Index stored_nodes = 0;   ///< largest g
-  Index surface_nodes = 0;  ///< largest m
-};
-
 /// The forces of a tick. Taking one over another of the same body and room allocates nothing.
 struct SurfaceLoad {
-  SurfaceLoad(int dimension, Index near_nodes, Index stored_nodes, const PatchRoom& room);
+  /// Room for so many loaded nodes near the tools, stored nodes that those follow, and nodes g of a patch.
+  SurfaceLoad(int dimension, Index near_nodes, Index stored_nodes, Index patch_nodes);
 
   void clear() noexcept;
   /// Adds a force [N] on a stored node.

@@ -174,9 +174,7 @@ TEST_P(Patches, AreWhatTheNearFieldHas) {
   const MatrixXd without = reference(patch_mesh, all, false);
 
   constexpr Index room = 24;
-  NearField near(body_, room,
-                 {.stored_nodes = static_cast<Index>(patch->stored_nodes().size()),
-                  .surface_nodes = static_cast<Index>(patch->surface_nodes().size())});
+  NearField near(body_, room, static_cast<Index>(patch->stored_nodes().size()));
   std::mt19937 random(3);
   std::vector<Index> moving;
   std::copy_if(all.begin(), all.end(), std::back_inserter(moving),

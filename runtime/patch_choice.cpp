@@ -1,0 +1,150 @@
+#include "runtime/patch_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate {
+namespace {
+
+constexpr double clearly_more = 0.1;    // of a tool's force, that another node must carry to become the centre
+constexpr double clearly_nearer = 0.1;  // the same of a free tool's weights of the nearest nodes
+constexpr double near_edges = 3.0;      // mean edges of the body's mesh: nearer, a free tool has an overlay
+constexpr double smoothing = 0.05;      // of the velocity, a tick
+constexpr std::int64_t look_stride = 8;
+constexpr std::array<double, 4> ahead = {15.0, 40.0, 80.0, 150.0};  // ticks
+
+/// The node of the body with the largest weight at a place of the surface; the one that there is unless
+/// another has clearly more.
+Index centre_at(const Body& body, const NearestSimplex& found, Index present) noexcept {
+  const auto d = static_cast<std::size_t>(body.dimension());
+  Index best = -1;
+  double best_weight = 0.0;
+  double present_weight = 0.0;
+  for (std::size_t k = 0; k < d; ++k) {
+    const Index node = body.simplices()[d * static_cast<std::size_t>(found.simplex) + k];
+    const SurfaceParts parts = body.surface_parts(node);
+    for (std::size_t p = 0; p < parts.stored.size(); ++p) {
+      const Index stored = parts.stored[p];
+      double weight = 0.0;  // of this node at the place
+      for (std::size_t j = 0; j < d; ++j) {
+        const SurfaceParts others =
+            body.surface_parts(body.simplices()[d * static_cast<std::size_t>(found.simplex) + j]);
+        for (std::size_t q = 0; q < others.stored.size(); ++q) {
+          if (others.stored[q] == stored) weight += found.nearest.weights[j] * others.weights[q];
+        }
+      }
+      if (stored == present) present_weight = weight;
+      if (weight > best_weight) {
+        best_weight = weight;
+        best = stored;
+      }
+    }
+  }
+  return present >= 0 && best_weight < present_weight + clearly_nearer ? present : best;
+}
+
+}  // namespace
+
+Index PatchKey::count() const noexcept {
+  return static_cast<Index>(std::count_if(centres.begin(), centres.end(), [](Index c) { return c >= 0; }));
+}
+
+void PatchKey::add(Index centre) noexcept {
+  const auto end = centres.begin() + count();
+  if (end == centres.end() || std::find(centres.begin(), end, centre) != end) return;
+  *end = centre;
+  std::sort(centres.begin(), end + 1);
+}
+
+void PatchWishes::add(const PatchKey& key) noexcept {
+  const auto end = keys.begin() + static_cast<std::ptrdiff_t>(count);
+  if (key.empty() || count == most || std::find(keys.begin(), end, key) != end) return;
+  keys[count++] = key;
+}
+
+PatchChoice::PatchChoice(const Body& body, const State& state)
+    : reach_(near_edges * body.mean_surface_edge() * body.refinement()),
+      tools_(state.tools.size()),
+      touched_(static_cast<std::size_t>(3 * body.most_surface_parts() * state.max_contacts)),
+      share_(touched_.size()) {}
+
+Index PatchChoice::loaded_centre(const Body& body, const State& state, std::size_t number) noexcept {
+  std::size_t count = 0;
+  double sum = 0.0;
+  for (const ContactPoint& contact : state.contacts()) {
+    const double force = contact.force.norm();
+    if (contact.tool != static_cast<Index>(number) || force == 0.0) continue;
+    sum += force;
+    for (std::size_t n = 0; n < 3; ++n) {
+      if (contact.nodes[n] < 0) continue;
+      const SurfaceParts parts = body.surface_parts(contact.nodes[n]);
+      for (std::size_t p = 0; p < parts.stored.size(); ++p) {
+        const auto end = touched_.begin() + static_cast<std::ptrdiff_t>(count);
+        const auto place = static_cast<std::size_t>(std::find(touched_.begin(), end, parts.stored[p]) - touched_.begin());
+        if (place == count) {
+          touched_[count] = parts.stored[p];
+          share_[count++] = 0.0;
+        }
+        share_[place] += force * contact.weights[n] * parts.weights[p];
+      }
+    }
+  }
+  if (count == 0) return -1;
+  const Index present = tools_[number].centre;
+  std::size_t best = 0;
+  double of_present = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (share_[k] > share_[best]) best = k;
+    if (touched_[k] == present) of_present = share_[k];
+  }
+  return present >= 0 && share_[best] < of_present + clearly_more * sum ? present : touched_[best];
+}
+
+void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t number) noexcept {
+  const ToolState& tool = state.tools[number];
+  Followed& followed = tools_[number];
+  if (!tool.placed) return;
+  const Vec3 moved = tool.device.position - tool.last_device_position;
+  followed.velocity += smoothing * (moved - followed.velocity);
+  if (tool.contacts > 0) {
+    const Index centre = loaded_centre(body, state, number);
+    if (centre >= 0) followed.centre = centre;
+    return;
+  }
+  if (ticks_ % look_stride != 0) return;
+  const NearestSimplex found = state.tree.nearest(tool.pose.position);
+  const double most = reach_ + tool.tool.radius + tool.tool.length;
+  followed.centre = tool.engaged && found.nearest.squared_distance < most * most
+                        ? centre_at(body, found, followed.centre)
+                        : -1;
+}
+
+void PatchChoice::look_ahead(const Body& body, const State& state) noexcept {
+  for (const double ticks : ahead) {
+    PatchKey key;
+    for (std::size_t k = 0; k < tools_.size(); ++k) {
+      if (tools_[k].centre < 0) continue;
+      const Vec3 place = state.tools[k].pose.position + ticks * tools_[k].velocity;
+      if (!place.allFinite()) continue;
+      const Index centre = centre_at(body, state.tree.nearest(place), -1);
+      if (centre >= 0) key.add(centre);
+    }
+    wishes_.add(key);
+  }
+}
+
+void PatchChoice::follow(const Body& body, const State& state) noexcept {
+  now_ = {};
+  for (std::size_t k = 0; k < tools_.size(); ++k) {
+    follow_tool(body, state, k);
+    if (tools_[k].centre >= 0) now_.add(tools_[k].centre);
+  }
+  if (wishes_.count > 0 && wishes_.keys[0] == now_ && ticks_++ % look_stride != 0) return;
+  wishes_.count = 0;
+  wishes_.add(now_);
+  const double speed = tools_.front().velocity.norm();
+  wishes_.direction = speed > 0.0 ? Vec3(tools_.front().velocity / speed) : Vec3::Zero();
+  if (!now_.empty()) look_ahead(body, state);
+}
+
+}  // namespace palpate

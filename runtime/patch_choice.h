@@ -1,0 +1,64 @@
+// Which overlays the tools want, now and soon.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "runtime/state.h"
+
+namespace palpate {
+
+/// The centres of a patch, stored nodes, ascending; -1 behind the last.
+struct PatchKey {
+  static constexpr std::size_t most = 4;  ///< tools that overlays follow
+  std::array<Index, most> centres{-1, -1, -1, -1};
+
+  [[nodiscard]] bool empty() const noexcept { return centres[0] < 0; }
+  [[nodiscard]] Index count() const noexcept;
+  void add(Index centre) noexcept;
+  bool operator==(const PatchKey&) const = default;
+};
+
+/// What is wanted of overlays, the most urgent first, each once.
+struct PatchWishes {
+  static constexpr std::size_t most = 8;
+  std::array<PatchKey, most> keys{};
+  std::size_t count = 0;
+  Vec3 direction = Vec3::Zero();  ///< in which the first tool moves, unit, or zero
+
+  void add(const PatchKey& key) noexcept;
+};
+
+/// Follows the tools and tells where overlays belong: round the node of the body that carries most of a tool's
+/// contact, or that a free tool is nearest to. It changes to another node only when that one clearly has more,
+/// so that a tool on the border between two does not go to and fro. All memory is taken at construction.
+class PatchChoice {
+ public:
+  explicit PatchChoice(const Body& body, const State& state);
+
+  /// After each tick. Looks ahead every few ticks only.
+  void follow(const Body& body, const State& state) noexcept;
+
+  [[nodiscard]] const PatchKey& now() const noexcept { return now_; }  ///< empty while no tool is near
+  [[nodiscard]] const PatchWishes& wishes() const noexcept { return wishes_; }
+
+ private:
+  struct Followed {
+    Index centre = -1;
+    Vec3 velocity = Vec3::Zero();  // of the device, smoothed [m a tick]
+  };
+
+  void follow_tool(const Body& body, const State& state, std::size_t number) noexcept;
+  void look_ahead(const Body& body, const State& state) noexcept;
+  [[nodiscard]] Index loaded_centre(const Body& body, const State& state, std::size_t number) noexcept;
+
+  double reach_;  // how far from the body overlays are made for a tool [m]
+  std::int64_t ticks_ = 0;
+  std::vector<Followed> tools_;
+  std::vector<Index> touched_;  // stored nodes that contacts are on, and their shares of the force
+  std::vector<double> share_;
+  PatchKey now_;
+  PatchWishes wishes_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,65 @@
+#include "runtime/patch_maker.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+/// Nodes of elements, each once.
+std::vector<Index> nodes_of(const Mesh& mesh, const std::vector<Index>& elements) {
+  std::vector<Index> nodes;
+  for (const Index e : elements) nodes.insert(nodes.end(), mesh.element_nodes(e).begin(), mesh.element_nodes(e).end());
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
+}
+
+}  // namespace
+
+PatchMaker::PatchMaker(const Body& body, int rings)
+    : body_(body), at_(body.model().mesh), cuts_(body.model().mesh.element, body.refinement()), rings_(rings) {
+  const Model& model = body.model();
+  const unsigned all_axes = (1U << model.dimension()) - 1U;
+  for (const Index stored : body.surface_stored_nodes()) {
+    if (stored < 0) continue;
+    const Index centre = body.mesh_node(stored);
+    Index count = 0;
+    for (const Index node : nodes_of(model.mesh, rings_round(model.mesh, at_, {&centre, 1}, rings))) {
+      if ((model.fixed[static_cast<std::size_t>(node)] & all_axes) == all_axes) continue;
+      ++count;
+      if (body.stored_node(node) >= 0) continue;
+      throw Error("an overlay of " + std::to_string(rings) + " rings reaches node " + std::to_string(node) +
+                      ", whose Green's functions are not stored",
+                  model.name,
+                  "precompute with [storage] scope = \"layers\" and layers = " + std::to_string(rings) +
+                      ", or take fewer rings");
+    }
+    most_nodes_ = std::max(most_nodes_, count);
+  }
+}
+
+std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
+  const Model& model = body_.model();
+  std::vector<Index> nodes;
+  for (const Index centre : centres) nodes.push_back(body_.mesh_node(centre));
+  const PatchMesh mesh =
+      make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
+  return std::make_shared<const Patch>(body_, mesh, condense(model, mesh));
+}
+
+std::vector<Index> PatchMaker::neighbours(Index centre) const {
+  const Mesh& mesh = body_.model().mesh;
+  const auto around = at_[body_.mesh_node(centre)];
+  std::vector<Index> found;
+  for (const Index node : nodes_of(mesh, {around.begin(), around.end()})) {
+    const Index stored = body_.stored_node(node);
+    if (stored >= 0 && stored != centre && body_.surface_node_of_stored(stored) >= 0) found.push_back(stored);
+  }
+  return found;
+}
+
+}  // namespace palpate

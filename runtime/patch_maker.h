@@ -1,0 +1,42 @@
+// Makes the overlays of a body.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "runtime/patch.h"
+
+namespace palpate {
+
+/// How fine overlays are and how far they reach.
+struct OverlayOptions {
+  int refinement = 3;  ///< r: each element is cut into r^d
+  int rings = 2;       ///< of elements round the centres
+};
+
+/// Patches round nodes of a body's surface. For one thread at a time.
+class PatchMaker {
+ public:
+  /// Of a body whose surface is refined as the overlays will be; it must live as long. Throws Error when the
+  /// file keeps too few layers below the surface.
+  PatchMaker(const Body& body, int rings);
+
+  /// One patch over the elements within the rings round all centres (stored nodes): where those of several
+  /// overlap they are one. Throws Error when the elements are too flat.
+  [[nodiscard]] std::shared_ptr<const Patch> make(std::span<const Index> centres);
+
+  /// Most nodes g of a patch round one centre.
+  [[nodiscard]] Index most_nodes() const noexcept { return most_nodes_; }
+
+  /// Stored nodes on the surface that share an element with one.
+  [[nodiscard]] std::vector<Index> neighbours(Index centre) const;
+
+ private:
+  const Body& body_;
+  ElementsAtNodes at_;
+  Subdivisions cuts_;
+  int rings_;
+  Index most_nodes_ = 0;
+};
+
+}  // namespace palpate

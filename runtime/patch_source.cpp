@@ -1,0 +1,178 @@
+#include "runtime/patch_source.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t most_patches = 4096;
+constexpr auto pause = std::chrono::microseconds(500);
+
+}  // namespace
+
+Index patch_room(const Body& body, int rings, std::size_t tools) {
+  return PatchMaker(body, rings).most_nodes() * static_cast<Index>(std::min(tools, PatchKey::most));
+}
+
+PatchSource::PatchSource(const Body& body, const State& state, const PatchSourceOptions& options)
+    : body_(body),
+      options_(options),
+      maker_(body, options.rings),
+      choice_(body, state),
+      slots_(most_patches),
+      first_slot_(static_cast<std::size_t>(body.greens().nodes()), -1),
+      next_slot_(most_patches, -1),
+      wishes_(PatchWishes{}),
+      deliveries_(2 * most_patches) {
+  for (std::size_t slot = most_patches; slot-- > 0;) free_slots_.push_back(static_cast<Index>(slot));
+  if (options_.in_background) builder_ = std::thread([this] { build_wishes(); });
+}
+
+PatchSource::~PatchSource() {
+  stop_ = true;
+  if (builder_.joinable()) builder_.join();
+}
+
+void PatchSource::serve(State& state) noexcept {
+  choice_.follow(body_, state);
+  if (!options_.in_background && !choice_.now().empty()) {
+    ++round_;
+    build(choice_.now());
+  }
+  wishes_.next() = choice_.wishes();
+  wishes_.publish();
+  receive();
+  const PatchKey& wanted = choice_.now();
+  state.patch_is_older = false;
+  if (wanted.empty()) return;
+  if (!(wanted == used_ && state.patch != nullptr)) {
+    const std::shared_ptr<const Patch>* patch = find(wanted);
+    state.patch_is_older = patch == nullptr;
+    if (patch != nullptr) {
+      if (state.patch != nullptr) ++counts_.switches;
+      state.patch = *patch;
+      used_ = wanted;
+    }
+  }
+  count(state);
+}
+
+void PatchSource::count(const State& state) noexcept {
+  const bool touches = std::any_of(state.tools.begin(), state.tools.end(),
+                                   [](const ToolState& tool) { return tool.contacts > 0; });
+  ++counts_.ticks;
+  counts_.older += state.patch_is_older ? 1 : 0;
+  counts_.in_contact += touches ? 1 : 0;
+  counts_.older_in_contact += touches && state.patch_is_older ? 1 : 0;
+}
+
+void PatchSource::receive() noexcept {
+  Delivery delivery;
+  while (deliveries_.pop(delivery)) {
+    Delivery& slot = slots_[static_cast<std::size_t>(delivery.slot)];
+    if (slot.patch != nullptr) unlink(delivery.slot);
+    slot = std::move(delivery);
+    if (slot.patch == nullptr) continue;
+    Index& first = first_slot_[static_cast<std::size_t>(slot.key.centres[0])];
+    next_slot_[static_cast<std::size_t>(slot.slot)] = first;
+    first = slot.slot;
+  }
+}
+
+void PatchSource::unlink(Index slot) noexcept {
+  Index* link =
+      &first_slot_[static_cast<std::size_t>(slots_[static_cast<std::size_t>(slot)].key.centres[0])];
+  while (*link != slot) link = &next_slot_[static_cast<std::size_t>(*link)];
+  *link = next_slot_[static_cast<std::size_t>(slot)];
+}
+
+const std::shared_ptr<const Patch>* PatchSource::find(const PatchKey& key) const noexcept {
+  for (Index slot = first_slot_[static_cast<std::size_t>(key.centres[0])]; slot >= 0;
+       slot = next_slot_[static_cast<std::size_t>(slot)]) {
+    const Delivery& at = slots_[static_cast<std::size_t>(slot)];
+    if (at.key == key) return &at.patch;
+  }
+  return nullptr;
+}
+
+void PatchSource::build_wishes() {
+  while (!stop_) {
+    ++round_;
+    std::erase_if(retired_, [](const auto& patch) { return patch.use_count() == 1; });
+    if (!build_next(wishes_.read())) std::this_thread::sleep_for(pause);
+  }
+}
+
+/// What is wished for first, then round the first centre, those first that the tool moves towards.
+bool PatchSource::build_next(const PatchWishes& wishes) {
+  bool built = false;
+  for (std::size_t k = 0; k < wishes.count && !built; ++k) built = build(wishes.keys[k]);
+  if (built || wishes.count == 0 || wishes.keys[0].count() != 1) return built;
+  const Index centre = wishes.keys[0].centres[0];
+  std::vector<Index> neighbours = maker_.neighbours(centre);
+  const auto along = [&](Index node) {
+    return (body_.rest_position(node) - body_.rest_position(centre)).dot(wishes.direction);
+  };
+  std::sort(neighbours.begin(), neighbours.end(),
+            [&](Index a, Index b) { return along(a) != along(b) ? along(a) > along(b) : a < b; });
+  for (const Index neighbour : neighbours) {
+    PatchKey key;
+    key.add(neighbour);
+    if (build(key)) return true;
+  }
+  return false;
+}
+
+bool PatchSource::build(const PatchKey& key) {
+  const auto found = kept_.find(key);
+  if (found != kept_.end()) {
+    found->second.wanted = round_;
+    return false;
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  std::shared_ptr<const Patch> patch;
+  try {
+    patch = maker_.make({key.centres.data(), static_cast<std::size_t>(key.count())});
+  } catch (const std::exception&) {
+    ++failed_;  // it is not tried again, and the tick goes on without
+  }
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  longest_build_ = std::max<double>(longest_build_, took.count());
+  Kept& kept = kept_[key];
+  kept.wanted = round_;
+  if (patch == nullptr) return true;
+  ++built_;
+  bytes_ += patch->bytes();
+  make_room();
+  kept.slot = free_slots_.back();
+  free_slots_.pop_back();
+  kept.patch = patch;
+  deliver({kept.slot, key, std::move(patch)});
+  return true;
+}
+
+/// Lets go of those that were not wanted for longest until the rest is within the budget.
+void PatchSource::make_room() {
+  while (bytes_ > options_.memory || free_slots_.empty()) {
+    auto oldest = kept_.end();
+    for (auto it = kept_.begin(); it != kept_.end(); ++it) {
+      if (it->second.slot < 0 || it->second.wanted == round_) continue;
+      if (oldest == kept_.end() || it->second.wanted < oldest->second.wanted) oldest = it;
+    }
+    if (oldest == kept_.end()) return;
+    bytes_ -= oldest->second.patch->bytes();
+    free_slots_.push_back(oldest->second.slot);
+    deliver({oldest->second.slot, oldest->first, nullptr});
+    retired_.push_back(std::move(oldest->second.patch));
+    kept_.erase(oldest);
+  }
+}
+
+void PatchSource::deliver(Delivery&& delivery) {
+  while (!deliveries_.push(std::move(delivery)) && !stop_) std::this_thread::sleep_for(pause);
+}
+
+}  // namespace palpate
