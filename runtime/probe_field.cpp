@@ -132,9 +132,10 @@ std::vector<std::size_t> keep_used_nodes(Cells& cells, std::size_t nodes) {
 /// held along every axis and shown at rest.
 void write_grid(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
                 std::span<const double> u) {
+  const auto body_nodes = static_cast<Index>(body.model().mesh.nodes.size());
   std::vector<FieldNode> all;
-  for (Index node = 0; node < static_cast<Index>(body.model().mesh.nodes.size()); ++node)
-    all.push_back(body_node(body, node, u));
+  all.reserve(body.model().mesh.nodes.size());
+  for (Index node = 0; node < body_nodes; ++node) all.push_back(body_node(body, node, u));
   Cells cells = shown_cells(body);
   if (overlay != nullptr) {
     lay_over(cells, body, overlay->patch());

@@ -15,7 +15,6 @@
 #include <fstream>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "formats/model_file.h"
@@ -111,12 +110,11 @@ std::vector<Index> elements_in(const Body& body, const Eigen::AlignedBox3d& box)
   return elements;
 }
 
-void add(const std::string& title, Patch patch, int refinement) {
+void add(const std::string& title, const Patch& patch, int refinement) {
 #ifndef __clang_analyzer__  // takes what the library keeps for ever for a leak
-  benchmark::RegisterBenchmark(title.c_str(),
-                               [patch = std::move(patch), refinement](benchmark::State& run) {
-                                 time_partitioning(run, patch, refinement);
-                               })
+  benchmark::RegisterBenchmark(
+      title.c_str(),
+      [patch, refinement](benchmark::State& run) { time_partitioning(run, patch, refinement); })
       ->UseManualTime()
       ->Unit(benchmark::kMicrosecond);
 #endif
