@@ -144,14 +144,4 @@ Eigen::MatrixXd Overlay::block(const Body& body, Index row, Index column) const 
   return result;
 }
 
-PartitionedInverse invert_by_partitioning(const PatchStiffness& stiffness, const Eigen::MatrixXd& greens) {
-  PartitionedInverse inverse;
-  const Eigen::MatrixXd psi = stiffness.K_LG * greens;
-  const Eigen::MatrixXd local = Eigen::MatrixXd(stiffness.K_L) - psi * stiffness.K_LG.transpose();
-  inverse.local = local.llt().solve(Eigen::MatrixXd::Identity(local.rows(), local.cols()));
-  inverse.mixed = -inverse.local * psi;
-  inverse.global = greens - inverse.mixed.transpose() * psi;
-  return inverse;
-}
-
 }  // namespace palpate

@@ -60,16 +60,6 @@ class Overlay {
   Eigen::MatrixXd recover_;
 };
 
-/// The papers' way to the same, the reference for tests: inversion by partitioning (s-FEM paper; theory.md
-/// section 4), which works with all local dofs,
-///   Xi_L = (K_L - K_LG Xi_QQ K_GL)^-1,  Xi_LG = -Xi_L K_LG Xi_QQ,  Xi_G = Xi_QQ - Xi_LG^T K_LG Xi_QQ.
-struct PartitionedInverse {
-  Eigen::MatrixXd local;   ///< Xi_L [L x L]
-  Eigen::MatrixXd mixed;   ///< Xi_LG [L x d g]
-  Eigen::MatrixXd global;  ///< Xi_G at the patch's nodes [d g x d g]
-};
-PartitionedInverse invert_by_partitioning(const PatchStiffness& stiffness, const Eigen::MatrixXd& greens);
-
 /// [g] stored nodes of a patch's nodes. Throws Error when one is not stored: the file keeps too few layers
 /// below the surface.
 std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch);

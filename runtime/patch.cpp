@@ -27,7 +27,7 @@ std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
     if (node < 0) {
       // Mesh nodes are where the shape functions of one of them alone are not zero; held ones are not in Q.
       node = static_cast<Index>(std::lower_bound(of_body.begin(), of_body.end(),
-                                                 mesh.mesh_node[static_cast<std::size_t>(local)]) -
+                                                 mesh.body_node[static_cast<std::size_t>(local)]) -
                                 of_body.begin());
     }
     result.push_back(node);

@@ -130,20 +130,23 @@ class Builder {
     if (!is_new) return number;
     const ShapeValues N = shape_functions(model_.mesh.element, node.xi);
     Vec3 position = Vec3::Zero();
-    Index same = -1;             // node of the body there
+    Vec3 rest = Vec3::Zero();
+    Index coincident = -1;       // node of the body
     unsigned zero = all_axes();  // held where all that have a part in it are
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const double part = N[static_cast<Eigen::Index>(k)];
       if (std::abs(part) < no_part) continue;
-      if (std::abs(part - 1.0) < no_part) same = nodes[k];
+      if (std::abs(part - 1.0) < no_part) coincident = nodes[k];
       position += part * model_.mesh.nodes[static_cast<std::size_t>(nodes[k])];
+      rest += part * model_.rest_displacement[static_cast<std::size_t>(nodes[k])];
       zero &= held_axes(nodes[k]);
       const auto place = place_.find(nodes[k]);
       if (place != place_.end()) shape_.emplace_back(number, place->second, part);
     }
     patch_.local.nodes.push_back(position);
-    patch_.mesh_node.push_back(same);
-    zero_axes_.push_back(same >= 0 ? all_axes() : zero);
+    patch_.rest_displacement.push_back(rest);
+    patch_.body_node.push_back(coincident);
+    zero_axes_.push_back(coincident >= 0 ? all_axes() : zero);
     return number;
   }
 

@@ -36,7 +36,9 @@ struct PatchMesh {
   std::vector<Index>
       nodes;   ///< [g] mesh nodes of those elements that are not held along every axis, ascending
   Mesh local;  ///< the fine mesh
-  std::vector<Index> parent;   ///< [local elements] element of the body that each is a part of
+  std::vector<Index> body_node;         ///< [local nodes] node of the body where each is, -1 where none is
+  std::vector<Vec3> rest_displacement;  ///< [local nodes] u0 there, by the body's shape functions [m]
+  std::vector<Index> parent;            ///< [local elements] element of the body that each is a part of
   std::vector<Index> surface;  ///< [simplices * d] local nodes on the body's surface, as Model::surface
   /// [local nodes x g] the body's shape functions of `nodes` at the local nodes: u_G there is `shape` u_G.
   Eigen::SparseMatrix<double, Eigen::RowMajor> shape;
@@ -46,7 +48,6 @@ struct PatchMesh {
   std::vector<Index> free_dof;
   Index free_dofs = 0;
   std::map<NodeKey, Index> node_of_key;  ///< every local node
-  std::vector<Index> mesh_node;          ///< [local nodes] of the body that each coincides with, or -1
 };
 
 /// Cuts each of the elements into r^d. Throws Error unless r >= 2, when an element is not one of the model's,

@@ -8,11 +8,11 @@
 #include <string>
 
 #include "meshes/error.h"
-#include "meshes/vtu_writer.h"
 #include "runtime/held_nodes.h"
 #include "runtime/loading.h"
 #include "runtime/node_vectors.h"
 #include "runtime/output.h"
+#include "runtime/probe_field.h"
 
 namespace palpate {
 namespace {
@@ -168,71 +168,6 @@ void print_json(const std::vector<Answer>& answers, const ProbeOptions& options)
   fmt::print("\n  ],\n  \"total_force\": {}\n}}\n", json_vector(total_force(answers)));
 }
 
-/// A row a stored node: its place in the mesh, u0 and u.
-void write_csv(const std::filesystem::path& file, const Body& body, std::span<const double> u) {
-  const Model& model = body.model();
-  std::string csv = "node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n";
-  for (Index stored = 0; stored < body.greens().nodes(); ++stored) {
-    const Index node = body.mesh_node(stored);
-    const Vec3& x = model.mesh.nodes[static_cast<std::size_t>(node)];
-    const Vec3& u0 = model.rest_displacement[static_cast<std::size_t>(node)];
-    const Vec3 v = vector_at(u, body.dimension(), stored);
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", node, x.x(), x.y(), x.z(), u0.x(), u0.y(), u0.z(),
-                       v.x(), v.y(), v.z());
-  }
-  write_text_file(file, csv);
-}
-
-/// Elements of one kind.
-struct Cells {
-  ElementType element;
-  std::vector<Index> connectivity;
-};
-
-/// The whole mesh where every node of it is stored or held, else its surface.
-Cells shown_cells(const Body& body) {
-  const Model& model = body.model();
-  bool whole = true;
-  for (std::size_t node = 0; node < model.mesh.nodes.size(); ++node) {
-    whole = whole && (body.stored_node(static_cast<Index>(node)) >= 0 || model.fixed[node] != 0);
-  }
-  if (whole) return {model.mesh.element, model.mesh.connectivity};
-  return {body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, model.surface};
-}
-
-/// Drops the nodes that no cell has: returns the mesh node of each that is left.
-std::vector<Index> keep_used_nodes(Cells& cells, std::size_t mesh_nodes) {
-  std::vector<Index> number(mesh_nodes, -1);
-  for (const Index node : cells.connectivity) number[static_cast<std::size_t>(node)] = 0;
-  std::vector<Index> kept;
-  for (std::size_t node = 0; node < mesh_nodes; ++node) {
-    if (number[node] < 0) continue;
-    number[node] = static_cast<Index>(kept.size());
-    kept.push_back(static_cast<Index>(node));
-  }
-  for (Index& node : cells.connectivity) node = number[static_cast<std::size_t>(node)];
-  return kept;
-}
-
-/// A grid of the undeformed body with u0 and u0 + u, which is what is seen. Nodes that are not stored are
-/// held along every axis and shown at rest.
-void write_grid(const std::filesystem::path& file, const Body& body, std::span<const double> u) {
-  const Model& model = body.model();
-  Cells cells = shown_cells(body);
-  std::vector<Vec3> nodes;
-  std::vector<double> rest, total;
-  for (const Index node : keep_used_nodes(cells, model.mesh.nodes.size())) {
-    nodes.push_back(model.mesh.nodes[static_cast<std::size_t>(node)]);
-    const Vec3& u0 = model.rest_displacement[static_cast<std::size_t>(node)];
-    const Index stored = body.stored_node(node);
-    const Vec3 seen = stored < 0 ? u0 : Vec3(u0 + vector_at(u, body.dimension(), stored));
-    rest.insert(rest.end(), u0.begin(), u0.end());
-    total.insert(total.end(), seen.begin(), seen.end());
-  }
-  const std::vector<NodalField> fields = {{"displacement", 3, total}, {"rest_displacement", 3, rest}};
-  write_vtu(file, nodes, cells.element, cells.connectivity, fields);
-}
-
 }  // namespace
 
 int probe(const ProbeOptions& options) {
@@ -251,11 +186,7 @@ int probe(const ProbeOptions& options) {
   if (!options.field.empty()) {
     std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
     contact.displace(body, u);
-    if (extension == ".csv") {
-      write_csv(options.field, body, u);
-    } else {
-      write_grid(options.field, body, u);
-    }
+    write_field(options.field, body, overlay ? &*overlay : nullptr, u);
   }
   if (options.json) {
     print_json(answers, options);

@@ -23,8 +23,8 @@ struct ProbeOptions {
   std::vector<ProbePlace> places;
   std::optional<OverlayOptions> overlay;  ///< round the nodes that are displaced; none: the body's own mesh
   bool json = false;
-  std::filesystem::path field;  ///< .csv or .vtu for the whole displacement, at rest and by the probe; empty:
-                                ///< none
+  std::filesystem::path field;  ///< .csv or .vtu for the whole displacement, at rest and by the probe, the
+                                ///< overlay's too; empty: none
 };
 
 /// Prints the forces that hold the nodes displaced, and writes the field. Returns the exit code; throws
