@@ -74,6 +74,7 @@ Body::Body(Model model, const GreensOptions& options, int refinement)
     stored_of_mesh_[static_cast<std::size_t>(model_.stored_nodes[k])] = static_cast<Index>(k);
   }
   fine_ = refinement_ > 1 ? make_fine_surface(model_, refinement_) : surface_as_it_is(model_);
+  order_by_last_part();
   find_free_nodes();
   follow_body();
   for (const Index element : fine_.element) {
@@ -81,6 +82,23 @@ Body::Body(Model model, const GreensOptions& options, int refinement)
     surface_friction_.push_back(model_.materials[static_cast<std::size_t>(material)].friction);
   }
   measure_surface();
+}
+
+/// Surface nodes that follow the same node of the body lie together in memory: the tick moves them together.
+void Body::order_by_last_part() {
+  const auto of_body = static_cast<Index>(fine_.mesh_nodes.size());
+  std::vector<Index> last;
+  for (auto node = static_cast<std::size_t>(of_body); node < static_cast<std::size_t>(fine_.nodes()); ++node) {
+    Index& most = last.emplace_back(-1);
+    for (auto k = static_cast<std::size_t>(fine_.first[node]); k < static_cast<std::size_t>(fine_.first[node + 1]); ++k)
+      most = std::max(most, stored_of_mesh_[static_cast<std::size_t>(fine_.parents[k])]);
+  }
+  std::vector<Index> order(last.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
+    return last[static_cast<std::size_t>(a)] < last[static_cast<std::size_t>(b)];
+  });
+  reorder(fine_, order);
 }
 
 void Body::find_free_nodes() {
@@ -140,6 +158,17 @@ void Body::follow_body() {
     Index& place = next[static_cast<std::size_t>(last_part[node])];
     followers_[static_cast<std::size_t>(place++)] = static_cast<Index>(node);
   }
+}
+
+std::vector<Vec3> Body::surface_in_mesh() const {
+  std::vector<Vec3> positions(surface_rest_.size(), Vec3::Zero());
+  for (std::size_t node = 0; node < positions.size(); ++node) {
+    for (auto k = static_cast<std::size_t>(fine_.first[node]); k < static_cast<std::size_t>(fine_.first[node + 1]);
+         ++k) {
+      positions[node] += fine_.weights[k] * model_.mesh.nodes[static_cast<std::size_t>(fine_.parents[k])];
+    }
+  }
+  return positions;
 }
 
 void Body::measure_surface() {

@@ -105,10 +105,13 @@ class Body {
   }
   /// [S] where each rests [m].
   [[nodiscard]] std::span<const Vec3> surface_rest_positions() const noexcept { return surface_rest_; }
+  /// [S] where each is without loads [m]: what the mesh says.
+  [[nodiscard]] std::vector<Vec3> surface_in_mesh() const;
   /// [F] Coulomb's coefficient of each simplex: that of the material of its element.
   [[nodiscard]] std::span<const double> surface_friction() const noexcept { return surface_friction_; }
 
  private:
+  void order_by_last_part();
   void find_free_nodes();
   void follow_body();
   void measure_surface();

@@ -14,6 +14,7 @@ constexpr double same_held_place = 0.05;  // of the mean edge: nearer to a held 
 constexpr double same_direction = 1e-6;   // 1 - cos of their normals
 constexpr double deepest_inside = 0.25;   // of the mean edge: deeper, the tool is lost in the body
 constexpr double flat_radius = 1000.0;    // of the mean edge: corners tell all that a larger sphere touches
+constexpr double smooth_radius = 6.0;     // the same on the surface of an overlay
 constexpr double on_surface =
     1e-6;  // of the mean edge: nearer, the face tells the normal and not the distance
 
@@ -328,7 +329,10 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
   // On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
   // now at the other: all corners under it are contact points, and under a segment the edges.
   const bool is_segment = tool.tool.length > 0.0;
-  const bool is_flat = !is_segment && tool.tool.radius > flat_radius * edge;
+  // Between the nodes of an overlay the surface is smooth: its triangles are chords of a sphere that is large
+  // against them, and would hold it out by edge^2 / 6 R.
+  const double large = body.refinement() > 1 ? smooth_radius : flat_radius;
+  const bool is_flat = !is_segment && tool.tool.radius > large * edge;
   const auto touch_corners = [&](Index simplex) {
     const std::array<Index, 3> nodes = nodes_of(body, simplex);
     const std::size_t corners = nodes[2] < 0 ? 2 : 3;

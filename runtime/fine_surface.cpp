@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "meshes/element.h"
 #include "meshes/surface.h"
@@ -98,6 +99,29 @@ class Builder {
 };
 
 }  // namespace
+
+void reorder(FineSurface& surface, std::span<const Index> order) {
+  const auto of_body = static_cast<Index>(surface.mesh_nodes.size());
+  std::vector<Index> number(static_cast<std::size_t>(surface.nodes()));  // new, of each old one
+  std::iota(number.begin(), number.end(), 0);
+  const FineSurface old = surface;
+  const auto kept = static_cast<std::size_t>(old.first[static_cast<std::size_t>(of_body)]);
+  surface.first.resize(static_cast<std::size_t>(of_body) + 1);
+  surface.parents.resize(kept);
+  surface.weights.resize(kept);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto from = static_cast<std::size_t>(of_body + order[k]);
+    number[from] = of_body + static_cast<Index>(k);
+    for (auto part = static_cast<std::size_t>(old.first[from]); part < static_cast<std::size_t>(old.first[from + 1]);
+         ++part) {
+      surface.parents.push_back(old.parents[part]);
+      surface.weights.push_back(old.weights[part]);
+    }
+    surface.first.push_back(static_cast<Index>(surface.parents.size()));
+  }
+  for (Index& node : surface.simplices) node = number[static_cast<std::size_t>(node)];
+  for (auto& [key, node] : surface.number) node = number[static_cast<std::size_t>(node)];
+}
 
 FineSurface make_fine_surface(const Model& model, int r) {
   return Builder(model, r).build();

@@ -25,6 +25,9 @@ struct FineSurface {
   [[nodiscard]] Index nodes() const noexcept { return static_cast<Index>(first.size()) - 1; }
 };
 
+/// Numbers the nodes that are not the body's anew: the k-th of them becomes the one that was order[k]-th.
+void reorder(FineSurface& surface, std::span<const Index> order);
+
 /// Throws Error unless r >= 2.
 FineSurface make_fine_surface(const Model& model, int r);
 

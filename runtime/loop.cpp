@@ -88,8 +88,8 @@ std::int64_t count_ticks(const ScriptDevice& device) {
   return static_cast<std::int64_t>(std::floor(device.end_time() * ticks_per_second + rounding)) + 1;
 }
 
-LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, Recorder* recorder, bool fast,
-                    const std::atomic<bool>& stop) {
+LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
+                    Recorder* recorder, bool fast, const std::atomic<bool>& stop) {
   LoopReport report;
   const std::int64_t ticks = count_ticks(device);
   const std::int64_t start = now() + period;
@@ -105,6 +105,7 @@ LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, 
     const ToolPose pose = device.pose(time);
     const Vec3 force_before = state.tools.front().wrench.force;
     const std::int64_t begin = now();
+    if (overlays != nullptr) overlays->serve(state);
     step(body, state, pose);
     const std::int64_t end = now();
 

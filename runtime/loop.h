@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "runtime/histogram.h"
+#include "runtime/patch_source.h"
 #include "runtime/recorder.h"
 #include "runtime/script_device.h"
 #include "runtime/step.h"
@@ -22,7 +23,7 @@ struct LoopReport {
   Index most_contacts = 0;              ///< closed contact points in one tick
   std::int64_t deadline_misses = 0;     ///< ticks that were not done when the next one was due
   std::int64_t worst_lateness = 0;      ///< from when a tick was due to when it began [ns]
-  TimeHistogram compute;                ///< of `step` alone [ns]
+  TimeHistogram compute;                ///< of the choice of the overlay and `step` [ns]
   double largest_force = 0.0;           ///< [N]
   double largest_force_time = 0.0;      ///< [s]
   double largest_jump = 0.0;            ///< of the force between two ticks [N]
@@ -36,8 +37,8 @@ struct LoopReport {
 std::int64_t count_ticks(const ScriptDevice& device);
 
 /// Steps through the script at 1 kHz, or as fast as it goes without waiting (`fast`: deterministic).
-/// `state` has one tool. `recorder` may be null. Ends early when `stop` becomes true.
-LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, Recorder* recorder, bool fast,
-                    const std::atomic<bool>& stop);
+/// `state` has one tool. `overlays` and `recorder` may be null. Ends early when `stop` becomes true.
+LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
+                    Recorder* recorder, bool fast, const std::atomic<bool>& stop);
 
 }  // namespace palpate

@@ -40,8 +40,10 @@ struct Arguments {
   std::optional<std::string> reach;
   std::optional<std::string> max_contacts;
   bool fast = false;
+  std::optional<std::string> overlay_memory;
   std::string record;
   std::string report;
+  std::string surface;
   std::string contacts;
 };
 
@@ -123,11 +125,20 @@ CLI::App* add_play(CLI::App& app, Arguments& arguments) {
       ->type_name("script:TOUCH.csv")
       ->required();
   add_tool(*play, arguments);
+  play->add_option("--overlay", arguments.overlay,
+                   "a finer mesh under the tool: each element within N rings round it is cut into R to the "
+                   "power of the dimension (s-FEM)")
+      ->type_name("r=R,rings=N");
+  play->add_option("--overlay-memory", arguments.overlay_memory, "most that overlays may take; else 512")
+      ->type_name("MB");
   play->add_flag("--fast", arguments.fast,
                  "do not wait for the clock: deterministic, equal runs leave equal recordings");
   play->add_option("--record", arguments.record, "write every tick to this HDF5 file")->type_name("OUT.h5");
   play->add_option("--report", arguments.report, "write the JSON report here and not to the standard output")
       ->type_name("OUT.json");
+  play->add_option("--surface", arguments.surface,
+                   "write the surface after the last tick, as fine as the overlay makes it, for ParaView")
+      ->type_name("OUT.vtu");
   play->add_option("--contacts", arguments.contacts, "write the contact points after the last tick")
       ->type_name("OUT.csv");
   play->footer(
@@ -265,6 +276,14 @@ Index read_max_contacts(const std::optional<std::string>& text) {
   return *count;
 }
 
+std::size_t read_overlay_memory(const std::optional<std::string>& text) {
+  if (!text) return PatchSourceOptions{}.memory;
+  const std::optional<Index> megabytes = parse_index(*text);
+  if (!megabytes || *megabytes < 1)
+    throw CLI::ValidationError("--overlay-memory", "'" + *text + "' is not a whole number of megabytes");
+  return static_cast<std::size_t>(*megabytes) << 20;
+}
+
 PlayOptions read_play(const Arguments& arguments) {
   const std::string scripted = "script:";
   if (!arguments.device.starts_with(scripted) || arguments.device.size() == scripted.size()) {
@@ -277,9 +296,12 @@ PlayOptions read_play(const Arguments& arguments) {
           .tool = read_tool(arguments),
           .reach = positive_argument("--reach", arguments.reach, "metres"),
           .max_contacts = read_max_contacts(arguments.max_contacts),
+          .overlay = arguments.overlay ? std::optional(read_overlay(*arguments.overlay)) : std::nullopt,
+          .overlay_memory = read_overlay_memory(arguments.overlay_memory),
           .fast = arguments.fast,
           .record = arguments.record,
           .report = arguments.report,
+          .surface = arguments.surface,
           .contacts = arguments.contacts};
 }
 

@@ -10,8 +10,7 @@ constexpr double clearly_more = 0.1;    // of a tool's force, that another node 
 constexpr double clearly_nearer = 0.1;  // the same of a free tool's weights of the nearest nodes
 constexpr double near_edges = 3.0;      // mean edges of the body's mesh: nearer, a free tool has an overlay
 constexpr double smoothing = 0.05;      // of the velocity, a tick
-constexpr std::int64_t look_stride = 8;
-constexpr std::array<double, 4> ahead = {15.0, 40.0, 80.0, 150.0};  // ticks
+constexpr std::int64_t look_stride = 8;  // ticks, of a free tool
 
 /// The node of the body with the largest weight at a place of the surface; the one that there is unless
 /// another has clearly more.
@@ -51,7 +50,7 @@ Index PatchKey::count() const noexcept {
 
 void PatchKey::add(Index centre) noexcept {
   const auto end = centres.begin() + count();
-  if (end == centres.end() || std::find(centres.begin(), end, centre) != end) return;
+  if (centre < 0 || end == centres.end() || std::find(centres.begin(), end, centre) != end) return;
   *end = centre;
   std::sort(centres.begin(), end + 1);
 }
@@ -119,32 +118,31 @@ void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t 
                         : -1;
 }
 
-void PatchChoice::look_ahead(const Body& body, const State& state) noexcept {
-  for (const double ticks : ahead) {
-    PatchKey key;
-    for (std::size_t k = 0; k < tools_.size(); ++k) {
-      if (tools_[k].centre < 0) continue;
-      const Vec3 place = state.tools[k].pose.position + ticks * tools_[k].velocity;
-      if (!place.allFinite()) continue;
-      const Index centre = centre_at(body, state.tree.nearest(place), -1);
-      if (centre >= 0) key.add(centre);
-    }
-    wishes_.add(key);
+/// The centres that the tools will want in some ticks.
+PatchKey PatchChoice::key_at(const Body& body, const State& state, double ticks) const noexcept {
+  PatchKey key;
+  for (std::size_t k = 0; k < tools_.size(); ++k) {
+    if (tools_[k].centre < 0) continue;
+    const Vec3 place = state.tools[k].pose.position + ticks * tools_[k].velocity;
+    if (place.allFinite()) key.add(centre_at(body, state.tree.nearest(place), -1));
   }
+  return key;
 }
 
 void PatchChoice::follow(const Body& body, const State& state) noexcept {
+  ++ticks_;
   now_ = {};
   for (std::size_t k = 0; k < tools_.size(); ++k) {
     follow_tool(body, state, k);
     if (tools_[k].centre >= 0) now_.add(tools_[k].centre);
   }
-  if (wishes_.count > 0 && wishes_.keys[0] == now_ && ticks_++ % look_stride != 0) return;
+  const auto turn = static_cast<std::size_t>(ticks_) % ahead_.size();
+  ahead_[turn] = now_.empty() ? PatchKey{} : key_at(body, state, times_ahead[turn]);
   wishes_.count = 0;
   wishes_.add(now_);
+  for (const PatchKey& key : ahead_) wishes_.add(key);
   const double speed = tools_.front().velocity.norm();
   wishes_.direction = speed > 0.0 ? Vec3(tools_.front().velocity / speed) : Vec3::Zero();
-  if (!now_.empty()) look_ahead(body, state);
 }
 
 }  // namespace palpate

@@ -36,20 +36,22 @@ class PatchChoice {
  public:
   explicit PatchChoice(const Body& body, const State& state);
 
-  /// After each tick. Looks ahead every few ticks only.
+  /// After each tick. Looks ahead to one time a tick, in turn.
   void follow(const Body& body, const State& state) noexcept;
 
   [[nodiscard]] const PatchKey& now() const noexcept { return now_; }  ///< empty while no tool is near
   [[nodiscard]] const PatchWishes& wishes() const noexcept { return wishes_; }
 
  private:
+  static constexpr std::array<double, 4> times_ahead = {15.0, 40.0, 80.0, 150.0};  // ticks
+
   struct Followed {
     Index centre = -1;
     Vec3 velocity = Vec3::Zero();  // of the device, smoothed [m a tick]
   };
 
   void follow_tool(const Body& body, const State& state, std::size_t number) noexcept;
-  void look_ahead(const Body& body, const State& state) noexcept;
+  [[nodiscard]] PatchKey key_at(const Body& body, const State& state, double ticks) const noexcept;
   [[nodiscard]] Index loaded_centre(const Body& body, const State& state, std::size_t number) noexcept;
 
   double reach_;  // how far from the body overlays are made for a tool [m]
@@ -58,6 +60,7 @@ class PatchChoice {
   std::vector<Index> touched_;  // stored nodes that contacts are on, and their shares of the force
   std::vector<double> share_;
   PatchKey now_;
+  std::array<PatchKey, times_ahead.size()> ahead_;  // where the tools will be
   PatchWishes wishes_;
 };
 

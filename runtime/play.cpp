@@ -11,6 +11,7 @@
 #include <span>
 
 #include "meshes/error.h"
+#include "meshes/vtu_writer.h"
 #include "runtime/loading.h"
 #include "runtime/loop.h"
 #include "runtime/output.h"
@@ -42,6 +43,18 @@ void print_loaded(const Body& body, double seconds) {
 
 double microseconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) * 1e-3;
+}
+
+void print_overlays(const PatchSource& overlays) {
+  const PatchCounts& counts = overlays.counts();
+  const auto in_contact = static_cast<double>(std::max<std::int64_t>(counts.in_contact, 1));
+  fmt::print(stderr,
+             "overlay: {} patches built (longest {:.1f} ms, {:.0f} MB kept), {} switches, {:.2f} % of the ticks in "
+             "contact on an older patch or none\n",
+             overlays.built(), 1e3 * overlays.longest_build(), 1e-6 * static_cast<double>(overlays.bytes()),
+             counts.switches, 100.0 * static_cast<double>(counts.older_in_contact) / in_contact);
+  if (overlays.failed() > 0)
+    print_warning(fmt::format("{} overlays could not be made: the elements there are too flat", overlays.failed()));
 }
 
 void print_report(const LoopReport& report, const PlayOptions& options, std::int64_t dropped) {
@@ -103,8 +116,18 @@ std::string json_tool(const Tool& tool) {
       json_number(tool.hand_over));
 }
 
+std::string json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
+  const PatchCounts& counts = overlays.counts();
+  return fmt::format(
+      "{{\"refinement\": {}, \"rings\": {}, \"built\": {}, \"failed\": {}, \"longest_build_s\": {}, \"bytes\": {}, "
+      "\"switches\": {}, \"ticks_near\": {}, \"older_ticks_near\": {}, \"ticks_in_contact\": {}, "
+      "\"older_ticks_in_contact\": {}}}",
+      options.refinement, options.rings, overlays.built(), overlays.failed(), overlays.longest_build(),
+      overlays.bytes(), counts.switches, counts.ticks, counts.older, counts.in_contact, counts.older_in_contact);
+}
+
 std::string json_report(const LoopReport& report, const PlayOptions& options, const Body& body,
-                        const Tool& tool, std::int64_t dropped) {
+                        const Tool& tool, const PatchSource* overlays, std::int64_t dropped) {
   std::string status;
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, report.status_ticks[k]);
@@ -127,6 +150,8 @@ std::string json_report(const LoopReport& report, const PlayOptions& options, co
   json += fmt::format("  \"largest_jump_N\": {},\n  \"largest_jump_time_s\": {},\n", report.largest_jump,
                       report.largest_jump_time);
   json += fmt::format("  \"status_ticks\": {{{}}},\n", status);
+  if (overlays != nullptr)
+    json += fmt::format("  \"overlay\": {},\n", json_overlays(*overlays, options.overlay.value()));
   if (!options.record.empty())
     json += fmt::format("  \"recording\": {},\n", json_string(options.record.string()));
   json += fmt::format("  \"dropped_ticks\": {}\n}}\n", dropped);
@@ -177,12 +202,28 @@ std::string contact_table(const Body& body, const State& state) {
   return table;
 }
 
-/// The loop with the rights it needs, which the recorder's thread, started before, does not inherit.
-LoopReport run(const Body& body, State& state, const ScriptDevice& device, Recorder* recorder, bool fast) {
-  if (fast) return run_loop(body, state, device, recorder, fast, stop_asked);
+/// The surface after the last tick, undeformed, with u0 + u, which is what is seen.
+void write_surface(const std::filesystem::path& file, const Body& body, const State& state) {
+  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
+  std::vector<Vec3> u(body.surface_rest_positions().size());
+  surface_displacement(body, state.near.load(), stored, u);
+  const std::vector<Vec3> nodes = body.surface_in_mesh();
+  std::vector<double> total;
+  for (std::size_t node = 0; node < u.size(); ++node) {
+    const Vec3 seen = body.surface_rest_positions()[node] + u[node] - nodes[node];
+    total.insert(total.end(), seen.begin(), seen.end());
+  }
+  const std::vector<NodalField> fields = {{"displacement", 3, total}};
+  write_vtu(file, nodes, body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, body.simplices(), fields);
+}
+
+/// The loop with the rights it needs, which the threads that were started before do not inherit.
+LoopReport run(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
+               Recorder* recorder, bool fast) {
+  if (fast) return run_loop(body, state, device, overlays, recorder, fast, stop_asked);
   const RealTimeRights rights;
   if (!rights.refused().empty()) print_warning(rights.refused());
-  return run_loop(body, state, device, recorder, fast, stop_asked);
+  return run_loop(body, state, device, overlays, recorder, fast, stop_asked);
 }
 
 }  // namespace
@@ -190,25 +231,38 @@ LoopReport run(const Body& body, State& state, const ScriptDevice& device, Recor
 int play(const PlayOptions& options) {
   const ScriptDevice device = ScriptDevice::read(options.script);
   const auto start = std::chrono::steady_clock::now();
-  const Body body = load_body(options.file, options.model_toml);
+  const Body body =
+      load_body(options.file, options.model_toml, options.overlay ? options.overlay->refinement : 1);
   print_loaded(body, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
 
   Tool tool = options.tool;
   tool.reach = options.reach.value_or(body.longest_surface_edge());
-  State state(body, {.tools = {tool}, .max_contacts = options.max_contacts});
+  State state(body, {.tools = {tool},
+                     .max_contacts = options.max_contacts,
+                     .patch_nodes = options.overlay ? patch_room(body, options.overlay->rings, 1) : 0});
+  std::optional<PatchSource> overlays;
+  if (options.overlay) {
+    overlays.emplace(body, state,
+                     PatchSourceOptions{.rings = options.overlay->rings,
+                                        .memory = options.overlay_memory,
+                                        .in_background = !options.fast});
+  }
+  PatchSource* const source = overlays ? &*overlays : nullptr;
   std::optional<Recorder> recorder;
   if (!options.record.empty())
     recorder.emplace(options.record, options.file.string(), body.model().content_hash);
 
   stop_on_signals();
-  const LoopReport report = run(body, state, device, recorder ? &*recorder : nullptr, options.fast);
+  const LoopReport report = run(body, state, device, source, recorder ? &*recorder : nullptr, options.fast);
   if (recorder) recorder->finish();
 
   const std::int64_t dropped = recorder ? recorder->dropped() : 0;
   print_report(report, options, dropped);
+  if (source != nullptr) print_overlays(*source);
   warn_of_script(report, body);
   if (!options.contacts.empty()) write_text_file(options.contacts, contact_table(body, state));
-  const std::string json = json_report(report, options, body, tool, dropped);
+  if (!options.surface.empty()) write_surface(options.surface, body, state);
+  const std::string json = json_report(report, options, body, tool, source, dropped);
   if (options.report.empty()) {
     fmt::print("{}", json);
   } else {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "runtime/patch_source.h"
 #include "runtime/step.h"
 
 namespace palpate {
@@ -16,9 +17,12 @@ struct PlayOptions {
   Tool tool;                         ///< but for its reach
   std::optional<double> reach;       ///< [m]; else the longest edge of the surface
   Index max_contacts = StateOptions{}.max_contacts;
+  std::optional<OverlayOptions> overlay;  ///< none: the body's own mesh
+  std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
   bool fast = false;
   std::filesystem::path record;    ///< empty: nothing is recorded
   std::filesystem::path report;    ///< JSON; empty: on the standard output
+  std::filesystem::path surface;   ///< grid of the surface after the last tick, .vtu; empty: none
   std::filesystem::path contacts;  ///< CSV of the contact points after the last tick; empty: none
 };
 

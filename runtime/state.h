@@ -54,7 +54,7 @@ struct StateOptions {
 /// replay are copies. All memory is taken here: copying allocates, a tick does not.
 struct State {
   static constexpr Index most_far_nodes = 64;  ///< of the body, whose far displacement a tick renews
-  static constexpr Index most_far_patch_nodes = 16;  ///< and of the patch's surface
+  static constexpr Index most_far_patch_nodes = 8;   ///< and of the patch's surface
 
   /// Of a body at rest that no tool touches. Throws Error for tools without sense (a size or stiffness that
   /// is negative or not a number), none, or no room for contacts.

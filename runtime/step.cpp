@@ -14,8 +14,8 @@
 namespace palpate {
 namespace {
 
-constexpr Index far_blocks = 1024;           // pairs of loaded and renewed nodes a tick
-constexpr Index most_far_moves = 128;        // surface nodes that are moved with them
+constexpr Index far_blocks = 512;            // pairs of loaded and renewed nodes a tick
+constexpr Index most_far_moves = 64;         // surface nodes that are moved with them
 constexpr double rough_penetration = 0.002;  // of the mean edge: more calls for another pass
 constexpr int most_passes = 3;
 constexpr double most_motion =
@@ -108,14 +108,15 @@ void move_far_slice(const Body& body, State& state) noexcept {
   const auto most = [&](Index budget) {
     return std::min(budget, far_blocks / std::max<Index>(load.count, 1) + 1);
   };
-  const Index end = std::min(state.next_far_node + most(State::most_far_nodes), body.greens().nodes());
-  Index next = state.next_far_node;
-  for (Index moves = 0; next < end && moves < most_far_moves; ++next) moves += static_cast<Index>(body.followers(next).size());
-  const std::span<double> u(state.far_displacement.data(),
-                            static_cast<std::size_t>(d * (next - state.next_far_node)));
-  body.greens().displacement(load.nodes(), load.forces(), state.next_far_node, u);
-  std::copy(u.begin(), u.end(), state.stored_displacement.begin() + std::ptrdiff_t{d} * state.next_far_node);
-  for (Index stored = state.next_far_node; stored < next; ++stored) {
+  const Index first = state.next_far_node;
+  const Index end = std::min(first + most(State::most_far_nodes), body.greens().nodes());
+  const std::span<double> u(state.far_displacement.data(), static_cast<std::size_t>(d * (end - first)));
+  body.greens().displacement(load.nodes(), load.forces(), first, u);
+  std::copy(u.begin(), u.end(), state.stored_displacement.begin() + std::ptrdiff_t{d} * first);
+  Index moves = 0;
+  Index stored = first;
+  for (; stored < end && moves < most_far_moves; ++stored) {
+    moves += static_cast<Index>(body.followers(stored).size());
     for (const Index node : body.followers(stored)) {
       if (state.near.place_in_patch(node) >= 0) continue;
       const SurfaceParts parts = body.surface_parts(node);
@@ -125,7 +126,7 @@ void move_far_slice(const Body& body, State& state) noexcept {
       move_far(body, state, node, sum);
     }
   }
-  state.next_far_node = next % body.greens().nodes();
+  state.next_far_node = stored % body.greens().nodes();
 }
 
 /// And the surface of the patch.
