@@ -9,11 +9,13 @@
 #include <csignal>
 #include <cstdlib>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "runtime/held_nodes.h"
 #include "runtime/palpate.h"
+#include "runtime/patch_source.h"
 #include "runtime/step.h"
 #include "tests/runtime_model.h"
 
@@ -121,6 +123,102 @@ TEST_P(Tick, MakesNoHeapCall) {
   exercise(body_, state_, held_, u_, poses_);  // for the sanitizer, which has taken malloc
 #endif
   EXPECT_EQ(state_.ticks, 1000);
+}
+
+/// The same body with a finer surface, and patches that take turns.
+class OverlayTick : public Tick {
+ protected:
+  void SetUp() override {
+    Tick::SetUp();
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      const double height = k % 200 < 20 ? 9.0 : 1.04;
+      poses_[k].position = test::upright(GetParam(), 0.2 + 0.001 * static_cast<double>(k % 50), 0.5, height);
+    }
+    PatchMaker maker(overlaid_, 1);
+    for (const double x : {0.0, 0.3, 0.6}) {
+      const Index centre = overlaid_.nearest_surface_node(test::upright(GetParam(), x, 0.5, 1.0)).node;
+      patches_.push_back(maker.make({&centre, 1}));
+    }
+    patches_.push_back(nullptr);
+  }
+  void exercise_patches() {
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      if (k % 13 == 0) with_.patch = patches_[k / 13 % patches_.size()];
+      step(overlaid_, with_, poses_[k]);
+      touching_ += with_.tools.front().contacts > 0 ? 1 : 0;
+      load_ = with_.near.load();
+      if (k % 10 == 5) surface_displacement(overlaid_, load_, stored_, surface_);
+    }
+  }
+
+  Body overlaid_{test::unit_model(GetParam(), GetParam() == 3 ? 4 : 20, Scope::full, Precision::double_precision), {}, 3};
+  Index room_ = patch_room(overlaid_, 1, 1);
+  State with_{overlaid_, {.tools = {Tool{.radius = 0.05, .reach = 0.3}}, .patch_nodes = room_}};
+  int touching_ = 0;
+  SurfaceLoad load_ = with_.near.load();
+  std::vector<std::shared_ptr<const Patch>> patches_;
+  std::vector<double> stored_ = std::vector<double>(static_cast<std::size_t>(overlaid_.greens().order()));
+  std::vector<Vec3> surface_ = std::vector<Vec3>(overlaid_.surface_rest_positions().size());
+};
+
+INSTANTIATE_TEST_SUITE_P(Dimension, OverlayTick, testing::Values(2, 3));
+
+TEST_P(OverlayTick, MakesNoHeapCall) {
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+  counting = true;
+  exercise_patches();
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+#else
+  exercise_patches();
+#endif
+  EXPECT_EQ(with_.ticks, 1000);
+  EXPECT_GT(touching_, 500);
+}
+
+// With the thread that builds patches and lets them go beside it, which takes memory all the time.
+TEST_P(OverlayTick, MakesNoHeapCallBesideTheBuilder) {
+  PatchSource source(overlaid_, with_, {.rings = 1, .memory = 1 << 16});
+  const auto exercise = [&] {
+    for (int round = 0; round < 20; ++round) {
+      for (std::size_t k = 0; k < poses_.size(); ++k) {
+        ToolPose pose = poses_[k];
+        pose.position.x() += 0.04 * round;
+        source.serve(with_);
+        step(overlaid_, with_, pose);
+      }
+    }
+  };
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+  counting = true;
+  exercise();
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+#else
+  exercise();
+#endif
+  EXPECT_GT(source.built(), 1);
+}
+
+TEST_P(OverlayTick, MakesNoSystemCall) {
+#if !PALPATE_OWN_MALLOC
+  GTEST_SKIP() << "sanitizers make system calls";
+#else
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+    exercise_patches();
+    syscall(SYS_exit, with_.ticks == 1000 ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no seccomp here";
+  EXPECT_FALSE(WIFSIGNALED(status)) << "signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+#endif
 }
 
 // In a process that the kernel kills at the first system call but write and exit.
