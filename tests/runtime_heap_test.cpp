@@ -131,7 +131,7 @@ class OverlayTick : public Tick {
   void SetUp() override {
     Tick::SetUp();
     for (std::size_t k = 0; k < poses_.size(); ++k) {
-      const double height = k % 200 < 20 ? 9.0 : 1.04;
+      const double height = k % 200 < 20 ? 1.1 : 1.04;
       poses_[k].position = test::upright(GetParam(), 0.2 + 0.001 * static_cast<double>(k % 50), 0.5, height);
     }
     PatchMaker maker(overlaid_, 1);
