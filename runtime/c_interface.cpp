@@ -5,6 +5,7 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,6 +18,7 @@
 #include "runtime/latest.h"
 #include "runtime/node_vectors.h"
 #include "runtime/palpate.h"
+#include "runtime/patch_source.h"
 #include "runtime/step.h"
 
 namespace palpate {
@@ -96,21 +98,40 @@ StateOptions read_options(const palpate_tool* tools, int tool_count, int max_con
   return options;
 }
 
+/// None: refinement 1.
+OverlayOptions read_overlay(const palpate_overlay* overlay) {
+  if (overlay == nullptr) return {.refinement = 1, .rings = 0};
+  constexpr int most = 16;
+  if (overlay->refinement < 2 || overlay->refinement > most || overlay->rings < 1 || overlay->rings > most) {
+    throw Error("an overlay of " + std::to_string(overlay->rings) + " rings, refined " +
+                    std::to_string(overlay->refinement) + " times, was asked for",
+                "palpate_create_with_overlay", "ask for 1 to 16 rings, refined 2 to 16 times");
+  }
+  return {.refinement = overlay->refinement, .rings = overlay->rings};
+}
+
+StateOptions with_room(StateOptions options, const Body& body, const OverlayOptions& overlay) {
+  if (overlay.refinement > 1) options.patch_nodes = patch_room(body, overlay.rings, options.tools.size());
+  return options;
+}
+
 }  // namespace
 }  // namespace palpate
 
 using namespace palpate;
 
 struct palpate_session {
-  palpate_session(Model model, const StateOptions& options)
-      : body(std::move(model)),
-        untouched(body, options),
+  palpate_session(Model model, const StateOptions& options, const OverlayOptions& overlay, std::size_t memory)
+      : body(std::move(model), {}, overlay.refinement),
+        untouched(body, with_room(options, body, overlay)),
         state(untouched),
         poses(options.tools.size()),
         load(state.near.load()),
         stored_displacement(static_cast<std::size_t>(body.greens().order())),
         displacement(body.surface_rest_positions().size()) {
     show();
+    if (overlay.refinement > 1)
+      overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = memory});
   }
 
   /// Hands what the last tick did over to the thread that draws.
@@ -126,6 +147,7 @@ struct palpate_session {
   Latest<SurfaceLoad> load;
   std::vector<double> stored_displacement;  // scratch of the thread that draws
   std::vector<Vec3> displacement;
+  std::optional<PatchSource> overlays;
 };
 
 extern "C" {
@@ -151,11 +173,19 @@ const char* palpate_status_name(uint32_t bit) noexcept {
 
 palpate_session* palpate_create(const char* file, const palpate_tool* tools, int tool_count, int max_contacts,
                                 char* error, size_t error_size) noexcept {
+  return palpate_create_with_overlay(file, tools, tool_count, max_contacts, nullptr, error, error_size);
+}
+
+palpate_session* palpate_create_with_overlay(const char* file, const palpate_tool* tools, int tool_count,
+                                             int max_contacts, const palpate_overlay* overlay, char* error,
+                                             size_t error_size) noexcept {
   copy_text("", error, error_size);
   try {
     if (file == nullptr) throw Error("there is no file name", "palpate_create", "name a .palpate.hdf file");
     const StateOptions options = read_options(tools, tool_count, max_contacts);
-    return std::make_unique<palpate_session>(load_model(file), options).release();
+    const OverlayOptions fine = read_overlay(overlay);
+    const std::size_t memory = overlay != nullptr ? overlay->memory : 0;
+    return std::make_unique<palpate_session>(load_model(file), options, fine, memory).release();
   } catch (...) {
     try {
       copy_text(explanation(), error, error_size);
@@ -172,6 +202,7 @@ void palpate_destroy(palpate_session* session) noexcept {
 uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexcept {
   if (poses == nullptr) return PALPATE_POSE_NOT_FINITE;
   std::transform(poses, poses + session->poses.size(), session->poses.begin(), to_pose);
+  if (session->overlays) session->overlays->serve(session->state);
   const StepStatus status = step(session->body, session->state, session->poses);
   session->show();
   return static_cast<uint32_t>(status);

@@ -77,6 +77,21 @@ const char* palpate_status_name(uint32_t bit) PALPATE_NOEXCEPT;
 palpate_session* palpate_create(const char* file, const palpate_tool* tools, int tool_count, int max_contacts,
                                 char* error, size_t error_size) PALPATE_NOEXCEPT;
 
+/* A finer mesh under the tools (s-FEM): each element of the body within `rings` rings round where a tool is
+ * is cut into refinement^3 (in the plane refinement^2). The whole surface is then as fine, so that small tools
+ * are felt; the file must keep as many layers below the surface as there are rings. */
+typedef struct palpate_overlay {
+  int refinement; /* 2 to 16; 3 is a good beginning */
+  int rings;      /* 1 to 16; 2 is markedly better than 1 */
+  size_t memory;  /* [bytes] that overlays may take; 512 MB is much */
+} palpate_overlay;
+
+/* The same with overlays; NULL: none. A thread of the session builds them ahead of the tools, at the
+ * priority of the thread that calls this; palpate_step never waits for it. */
+palpate_session* palpate_create_with_overlay(const char* file, const palpate_tool* tools, int tool_count,
+                                             int max_contacts, const palpate_overlay* overlay, char* error,
+                                             size_t error_size) PALPATE_NOEXCEPT;
+
 /* Ends a session; NULL is ignored. */
 void palpate_destroy(palpate_session* session) PALPATE_NOEXCEPT;
 

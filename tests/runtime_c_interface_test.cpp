@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -17,6 +19,7 @@
 #include "formats/model_file.h"
 #include "runtime/node_vectors.h"
 #include "runtime/palpate.h"
+#include "runtime/patch_source.h"
 #include "runtime/status.h"
 #include "runtime/step.h"
 
@@ -47,6 +50,60 @@ Session open(const std::string& name, const std::vector<palpate_tool>& tools) {
   EXPECT_NE(session, nullptr) << error;
   EXPECT_STREQ(error, "");
   return session;
+}
+
+/// The same as the step with the patch that it wants, once it is there.
+TEST(COverlay, FeelsAsTheStepWithItsPatch) {
+  const palpate_tool tool = sphere(0.2);
+  const palpate_overlay overlay{.refinement = 3, .rings = 1, .memory = std::size_t{1} << 28};
+  char error[300];
+  const Session session(
+      palpate_create_with_overlay(golden("cube2").c_str(), &tool, 1, 64, &overlay, error, sizeof error));
+  ASSERT_NE(session, nullptr) << error;
+  const Body body(load_model(golden("cube2")), {}, 3);
+  EXPECT_EQ(palpate_surface_counts(session.get()).nodes, std::ssize(body.surface_rest_positions()));
+  EXPECT_GT(body.surface_rest_positions().size(), body.surface_mesh_nodes().size());
+
+  const auto pose = [](int tick) {
+    return palpate_pose{{0.45, 0.5, 1.25 - 0.001 * std::min(tick, 100)}, {1.0, 0.0, 0.0, 0.0}, 0};
+  };
+  for (int tick = 0; tick < 20000; ++tick) {  // hovers until the builder has made the patch
+    if (palpate_step(session.get(), std::array{pose(0)}.data()) == 0) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  State state(body, {.tools = {Tool{.radius = 0.2}}, .max_contacts = 64, .patch_nodes = patch_room(body, 1, 1)});
+  PatchSource source(body, state, {.rings = 1, .in_background = false});
+  for (int tick = 0; tick < 1000; ++tick) {
+    palpate_step(session.get(), std::array{pose(tick)}.data());
+    source.serve(state);
+    const double* x = pose(tick).position;
+    step(body, state, ToolPose{.position = Vec3(x[0], x[1], x[2])});
+  }
+  palpate_result result;
+  palpate_get(session.get(), 0, &result);
+  const Vec3 force = state.tools.front().wrench.force;
+  EXPECT_GT(force.z(), 0.0);
+  EXPECT_LT((Eigen::Map<const Vec3>(result.force) - force).norm(), 1e-6 * force.norm());
+
+  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
+  std::vector<Vec3> u(body.surface_rest_positions().size());
+  surface_displacement(body, state.near.load(), stored, u);
+  std::vector<double> xyz(3 * u.size());
+  palpate_surface_displacement(session.get(), xyz.data());
+  double largest = 0.0;
+  for (const Vec3& displacement : u) largest = std::max(largest, displacement.norm());
+  for (std::size_t node = 0; node < u.size(); ++node)
+    EXPECT_LT((Eigen::Map<const Vec3>(&xyz[3 * node]) - u[node]).norm(), 1e-5 * largest);
+}
+
+TEST(COverlay, RefusesWhatCannotBe) {
+  const palpate_tool tool = sphere(0.2);
+  char error[300];
+  for (const palpate_overlay& overlay : {palpate_overlay{1, 1, 1000}, palpate_overlay{3, 0, 1000}, palpate_overlay{99, 1, 1000}}) {
+    EXPECT_EQ(palpate_create_with_overlay(golden("cube2").c_str(), &tool, 1, 64, &overlay, error, sizeof error),
+              nullptr);
+    EXPECT_NE(std::string(error).find("overlay"), std::string::npos) << error;
+  }
 }
 
 /// What is said when a session cannot be made.
