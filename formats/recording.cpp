@@ -11,7 +11,7 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t ticks_at_once = 4096;  // rows of a chunk; written together
-constexpr std::array<std::int64_t, 2> version = {2, 0};
+constexpr std::array<std::int64_t, 2> version = {3, 0};
 constexpr const char* format_name = "palpate-recording";
 
 /// One dataset a field of TickRecord: path, number of components, member.
@@ -29,6 +29,7 @@ void for_each_tick_field(Visitor&& visit) {
   visit("/ticks/status", 1, &TickRecord::status);
   visit("/ticks/compute_ns", 1, &TickRecord::compute_ns);
   visit("/ticks/grab", 1, &TickRecord::grab);
+  visit("/ticks/patch", 1, &TickRecord::patch);
 }
 
 template <class Member>
@@ -78,7 +79,8 @@ void append_rows(const hdf5::File& file, const char* path, int components, const
 }  // namespace
 
 struct RecordingWriter::Impl {
-  Impl(std::filesystem::path to, const std::string& model_path, const std::string& content_hash)
+  Impl(std::filesystem::path to, const std::string& model_path, const std::string& content_hash,
+       const std::string& overlay)
       : path(std::move(to)), partial(with_suffix(path, ".partial")), file(hdf5::File::create(partial)) {
     file.write_attribute("/", "format", std::string(format_name));
     file.write_attribute("/", "version", version);
@@ -86,6 +88,7 @@ struct RecordingWriter::Impl {
     file.write_attribute("/", "units", std::string("s, m, N, N m, N/m; compute_ns in ns"));
     file.write_attribute("/", "model", model_path);
     file.write_attribute("/", "content_hash", content_hash);
+    file.write_attribute("/", "overlay", overlay);
     file.make_group("/ticks");
     for_each_tick_field([this]<class Member>(const char* name, int components, Member TickRecord::*) {
       make_extendible(file, name, components, hdf5::element_type<Scalar<Member>>());
@@ -114,11 +117,11 @@ struct RecordingWriter::Impl {
 };
 
 RecordingWriter::RecordingWriter(std::filesystem::path path, const std::string& model_path,
-                                 const std::string& content_hash) {
+                                 const std::string& content_hash, const std::string& overlay) {
   const hdf5::Quiet quiet;
   const std::filesystem::path partial = with_suffix(path, ".partial");
   try {
-    impl_ = std::make_unique<Impl>(std::move(path), model_path, content_hash);
+    impl_ = std::make_unique<Impl>(std::move(path), model_path, content_hash, overlay);
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(partial, ignored);
@@ -159,6 +162,7 @@ Recording read_recording(const std::filesystem::path& path) {
   Recording recording;
   recording.model_path = file.text_attribute("/", "model").value_or("");
   recording.content_hash = file.text_attribute("/", "content_hash").value_or("");
+  recording.overlay = file.text_attribute("/", "overlay").value_or("");
   bool first = true;
   for_each_tick_field([&]<class Member>(const char* name, int components, Member TickRecord::*member) {
     const hdf5::Id dataset(H5Dopen2(file.id(), name, H5P_DEFAULT), H5Dclose);

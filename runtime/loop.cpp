@@ -38,8 +38,8 @@ void set(double (&symmetric)[6], const Eigen::Matrix3d& value) noexcept {
   std::copy(numbers.begin(), numbers.end(), symmetric);
 }
 
-TickRecord make_record(const State& state, const ToolPose& device, double time,
-                       std::int64_t compute_ns) noexcept {
+TickRecord make_record(const Body& body, const State& state, const PatchSource* overlays, const ToolPose& device,
+                       double time, std::int64_t compute_ns) noexcept {
   const ToolState& tool = state.tools.front();
   TickRecord record;
   record.time = time;
@@ -54,6 +54,7 @@ TickRecord make_record(const State& state, const ToolPose& device, double time,
   record.status = static_cast<std::uint32_t>(state.status);
   record.compute_ns = static_cast<std::uint32_t>(std::min<std::int64_t>(compute_ns, UINT32_MAX));
   record.grab = device.grab ? 1 : 0;
+  if (overlays != nullptr && overlays->centre() >= 0) record.patch = body.mesh_node(overlays->centre());
   return record;
 }
 
@@ -112,8 +113,13 @@ LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, 
 
     if (!fast && end > due + period) ++report.deadline_misses;
     count_step(report, state, force_before, time, end - begin);
-    if (recorder != nullptr && fast) recorder->push_waiting(make_record(state, pose, time, 0));
-    if (recorder != nullptr && !fast) recorder->push(make_record(state, pose, time, end - begin));
+    if (recorder == nullptr) continue;
+    const TickRecord record = make_record(body, state, overlays, pose, time, fast ? 0 : end - begin);
+    if (fast) {
+      recorder->push_waiting(record);
+    } else {
+      recorder->push(record);
+    }
   }
   report.interrupted = stop;
   return report;

@@ -6,7 +6,7 @@
 namespace palpate {
 namespace {
 
-constexpr double clearly_more = 0.1;    // of a tool's force, that another node must carry to become the centre
+constexpr double clearly_more = 0.1;    // of a tool's contacts, that another node must have to become the centre
 constexpr double clearly_nearer = 0.1;  // the same of a free tool's weights of the nearest nodes
 constexpr double near_edges = 3.0;      // mean edges of the body's mesh: nearer, a free tool has an overlay
 constexpr double smoothing = 0.05;      // of the velocity, a tick
@@ -67,13 +67,12 @@ PatchChoice::PatchChoice(const Body& body, const State& state)
       touched_(static_cast<std::size_t>(3 * body.most_surface_parts() * state.max_contacts)),
       share_(touched_.size()) {}
 
-Index PatchChoice::loaded_centre(const Body& body, const State& state, std::size_t number) noexcept {
+Index PatchChoice::touched_centre(const Body& body, const State& state, std::size_t number) noexcept {
   std::size_t count = 0;
   double sum = 0.0;
   for (const ContactPoint& contact : state.contacts()) {
-    const double force = contact.force.norm();
-    if (contact.tool != static_cast<Index>(number) || force == 0.0) continue;
-    sum += force;
+    if (contact.tool != static_cast<Index>(number) || contact.force.squaredNorm() == 0.0) continue;
+    sum += 1.0;
     for (std::size_t n = 0; n < 3; ++n) {
       if (contact.nodes[n] < 0) continue;
       const SurfaceParts parts = body.surface_parts(contact.nodes[n]);
@@ -84,7 +83,7 @@ Index PatchChoice::loaded_centre(const Body& body, const State& state, std::size
           touched_[count] = parts.stored[p];
           share_[count++] = 0.0;
         }
-        share_[place] += force * contact.weights[n] * parts.weights[p];
+        share_[place] += contact.weights[n] * parts.weights[p];
       }
     }
   }
@@ -106,7 +105,7 @@ void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t 
   const Vec3 moved = tool.device.position - tool.last_device_position;
   followed.velocity += smoothing * (moved - followed.velocity);
   if (tool.contacts > 0) {
-    const Index centre = loaded_centre(body, state, number);
+    const Index centre = touched_centre(body, state, number);
     if (centre >= 0) followed.centre = centre;
     return;
   }

@@ -29,9 +29,11 @@ struct PatchWishes {
   void add(const PatchKey& key) noexcept;
 };
 
-/// Follows the tools and tells where overlays belong: round the node of the body that carries most of a tool's
-/// contact, or that a free tool is nearest to. It changes to another node only when that one clearly has more,
-/// so that a tool on the border between two does not go to and fro. All memory is taken at construction.
+/// Follows the tools and tells where overlays belong: round the node of the body that has the largest part in
+/// the places where a tool touches, or that a free tool is nearest to. It changes to another node only when that
+/// one clearly has more, so that a tool on the border between two does not go to and fro. Forces have no say:
+/// beside a patch the body is stiffer and carries more, so that the patch would follow its own absence. All
+/// memory is taken at construction.
 class PatchChoice {
  public:
   explicit PatchChoice(const Body& body, const State& state);
@@ -52,12 +54,12 @@ class PatchChoice {
 
   void follow_tool(const Body& body, const State& state, std::size_t number) noexcept;
   [[nodiscard]] PatchKey key_at(const Body& body, const State& state, double ticks) const noexcept;
-  [[nodiscard]] Index loaded_centre(const Body& body, const State& state, std::size_t number) noexcept;
+  [[nodiscard]] Index touched_centre(const Body& body, const State& state, std::size_t number) noexcept;
 
   double reach_;  // how far from the body overlays are made for a tool [m]
   std::int64_t ticks_ = 0;
   std::vector<Followed> tools_;
-  std::vector<Index> touched_;  // stored nodes that contacts are on, and their shares of the force
+  std::vector<Index> touched_;  // stored nodes that contacts are on, and their shares of them
   std::vector<double> share_;
   PatchKey now_;
   std::array<PatchKey, times_ahead.size()> ahead_;  // where the tools will be

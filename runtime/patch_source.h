@@ -47,6 +47,9 @@ class PatchSource {
   /// of the tick before.
   void serve(State& state) noexcept;
 
+  /// The stored node that the patch which the last tick was given lies round (the first, of several), -1
+  /// before there was one.
+  [[nodiscard]] Index centre() const noexcept { return used_.centres[0]; }
   [[nodiscard]] const PatchCounts& counts() const noexcept { return counts_; }
   [[nodiscard]] std::int64_t built() const noexcept { return built_; }  ///< patches so far
   [[nodiscard]] double longest_build() const noexcept { return longest_build_; }  ///< [s]

@@ -250,7 +250,9 @@ int play(const PlayOptions& options) {
   PatchSource* const source = overlays ? &*overlays : nullptr;
   std::optional<Recorder> recorder;
   if (!options.record.empty())
-    recorder.emplace(options.record, options.file.string(), body.model().content_hash);
+    recorder.emplace(options.record, options.file.string(), body.model().content_hash,
+                     options.overlay ? fmt::format("r={},rings={}", options.overlay->refinement, options.overlay->rings)
+                                     : "");
 
   stop_on_signals();
   const LoopReport report = run(body, state, device, source, recorder ? &*recorder : nullptr, options.fast);

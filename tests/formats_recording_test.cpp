@@ -24,7 +24,8 @@ std::vector<TickRecord> some_ticks(std::size_t count) {
                 .stiffness = {x, 2 * x, 3 * x, -4 * x, 5 * x, 6 * x},
                 .status = static_cast<std::uint32_t>(i % 3),
                 .compute_ns = static_cast<std::uint32_t>(4'000'000'000U - i),
-                .grab = static_cast<std::uint8_t>(i % 2)};
+                .grab = static_cast<std::uint8_t>(i % 2),
+                .patch = static_cast<std::int32_t>(i % 7) - 1};
   }
   return ticks;
 }
@@ -36,11 +37,12 @@ bool same(const TickRecord& a, const TickRecord& b) {
          std::ranges::equal(a.tool_orientation, b.tool_orientation) && std::ranges::equal(a.force, b.force) &&
          std::ranges::equal(a.torque, b.torque) && a.contacts == b.contacts &&
          std::ranges::equal(a.stiffness, b.stiffness) && a.status == b.status &&
-         a.compute_ns == b.compute_ns && a.grab == b.grab;
+         a.compute_ns == b.compute_ns && a.grab == b.grab &&
+         a.patch == b.patch;
 }
 
 void record(const std::filesystem::path& path, std::span<const TickRecord> ticks, std::size_t at_once) {
-  RecordingWriter writer(path, "liver.palpate.hdf", "00ff");
+  RecordingWriter writer(path, "liver.palpate.hdf", "00ff", "r=3,rings=2");
   for (std::size_t at = 0; at < ticks.size(); at += at_once)
     writer.append(ticks.subspan(at, std::min(at_once, ticks.size() - at)));
   writer.finish();
@@ -55,6 +57,7 @@ TEST_P(Lengths, AreReadBack) {
   const Recording read = read_recording(folder / "a.h5");
   EXPECT_EQ(read.model_path, "liver.palpate.hdf");
   EXPECT_EQ(read.content_hash, "00ff");
+  EXPECT_EQ(read.overlay, "r=3,rings=2");
   ASSERT_EQ(read.ticks.size(), ticks.size());
   for (std::size_t i = 0; i < ticks.size(); ++i) ASSERT_TRUE(same(read.ticks[i], ticks[i])) << i;
 }

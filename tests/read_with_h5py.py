@@ -96,10 +96,10 @@ def enclosed(nodes, surface):
 def check_recording(path):
     with h5py.File(path) as file:
         expect(file.attrs["format"] == b"palpate-recording" and file.attrs["model"] == b"tet4.palpate.hdf", "recording")
-        expect(list(file.attrs["version"]) == [2, 0], "version")
+        expect(list(file.attrs["version"]) == [3, 0], "version")
         ticks = file["/ticks"]
         widths = {"time": 1, "device_position": 3, "device_orientation": 4, "tool_position": 3, "tool_orientation": 4, "force": 3,
-                  "torque": 3, "contacts": 1, "stiffness": 6, "status": 1, "compute_ns": 1, "grab": 1}
+                  "torque": 3, "contacts": 1, "stiffness": 6, "status": 1, "compute_ns": 1, "grab": 1, "patch": 1}
         expect({name: ticks[name].shape for name in ticks} ==
                {name: (5000,) if width == 1 else (5000, width) for name, width in widths.items()}, "shapes")
         expect(np.array_equal(ticks["time"], 1e-3 * np.arange(5000)), "time")

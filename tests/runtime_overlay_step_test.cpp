@@ -189,6 +189,29 @@ TEST_P(Sliding, FollowsTheToolWithoutAJump) {
   EXPECT_LT(largest, 1.01 * Tool{}.hand_over);
 }
 
+// Wherever a tool rests, also between two nodes, it keeps its patch.
+TEST_P(Sliding, KeepsThePatchUnderAToolThatRests) {
+  for (const int rings : {1, 2}) {
+    State state = this->state(infinity);
+    PatchSource source(body_, state, {.rings = rings, .in_background = false});
+    press(state, 0.08, &source);
+    for (int place = 0; place < 40; ++place) {
+      const double x = 0.3 + 0.01 * place;
+      for (int tick = 0; tick < 30; ++tick) {  // there, and time to settle
+        source.serve(state);
+        step(body_, state, pose(x - 0.01 + 0.01 * std::min(1.0, tick / 10.0), 0.08));
+      }
+      const std::int64_t switches = source.counts().switches;
+      for (int tick = 0; tick < 60; ++tick) {
+        source.serve(state);
+        step(body_, state, pose(x, 0.08));
+      }
+      EXPECT_EQ(source.counts().switches, switches) << "at x = " << x << ", " << rings << " rings";
+    }
+    EXPECT_GE(source.counts().switches, 1);
+  }
+}
+
 TEST_P(Sliding, BuildsAheadInTheBackground) {
   State state = this->state();
   PatchSource source(body_, state, {});
