@@ -6,7 +6,7 @@
 namespace palpate {
 namespace {
 
-constexpr double clearly_more = 0.1;    // of a tool's contacts, that another node must have to become the centre
+constexpr double clearly_more = 0.1;    // of where a tool touches, that another node must have to become the centre
 constexpr double clearly_nearer = 0.1;  // the same of a free tool's weights of the nearest nodes
 constexpr double near_edges = 3.0;      // mean edges of the body's mesh: nearer, a free tool has an overlay
 constexpr double smoothing = 0.05;      // of the velocity, a tick
@@ -42,6 +42,14 @@ Index centre_at(const Body& body, const NearestSimplex& found, Index present) no
   return present >= 0 && best_weight < present_weight + clearly_nearer ? present : best;
 }
 
+/// How much a contact point tells where a tool touches: by how deep the device is in the body at rest there,
+/// squared.
+double share_of(const ContactPoint& contact) noexcept {
+  if (contact.held) return 1.0;
+  const double depth = std::max(0.0, -contact.free_gap);
+  return depth * depth;
+}
+
 }  // namespace
 
 Index PatchKey::count() const noexcept {
@@ -71,8 +79,9 @@ Index PatchChoice::touched_centre(const Body& body, const State& state, std::siz
   std::size_t count = 0;
   double sum = 0.0;
   for (const ContactPoint& contact : state.contacts()) {
-    if (contact.tool != static_cast<Index>(number) || contact.force.squaredNorm() == 0.0) continue;
-    sum += 1.0;
+    const double share = contact.tool == static_cast<Index>(number) ? share_of(contact) : 0.0;
+    if (share == 0.0) continue;
+    sum += share;
     for (std::size_t n = 0; n < 3; ++n) {
       if (contact.nodes[n] < 0) continue;
       const SurfaceParts parts = body.surface_parts(contact.nodes[n]);
@@ -83,7 +92,7 @@ Index PatchChoice::touched_centre(const Body& body, const State& state, std::siz
           touched_[count] = parts.stored[p];
           share_[count++] = 0.0;
         }
-        share_[place] += contact.weights[n] * parts.weights[p];
+        share_[place] += share * contact.weights[n] * parts.weights[p];
       }
     }
   }

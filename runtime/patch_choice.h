@@ -30,10 +30,10 @@ struct PatchWishes {
 };
 
 /// Follows the tools and tells where overlays belong: round the node of the body that has the largest part in
-/// the places where a tool touches, or that a free tool is nearest to. It changes to another node only when that
-/// one clearly has more, so that a tool on the border between two does not go to and fro. Forces have no say:
-/// beside a patch the body is stiffer and carries more, so that the patch would follow its own absence. All
-/// memory is taken at construction.
+/// the places where a tool is deepest in the body at rest, or that a free tool is nearest to. It changes to
+/// another node only when that one clearly has more, so that a tool on the border between two does not go to and
+/// fro. Forces have no say: beside a patch the body is stiffer and carries more, so that the patch would follow
+/// its own absence. All memory is taken at construction.
 class PatchChoice {
  public:
   explicit PatchChoice(const Body& body, const State& state);
@@ -59,7 +59,7 @@ class PatchChoice {
   double reach_;  // how far from the body overlays are made for a tool [m]
   std::int64_t ticks_ = 0;
   std::vector<Followed> tools_;
-  std::vector<Index> touched_;  // stored nodes that contacts are on, and their shares of them
+  std::vector<Index> touched_;  // stored nodes that contacts are on, and their shares
   std::vector<double> share_;
   PatchKey now_;
   std::array<PatchKey, times_ahead.size()> ahead_;  // where the tools will be
