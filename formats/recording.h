@@ -25,7 +25,7 @@ struct TickRecord {
   std::uint32_t status = 0;   ///< StepStatus bits
   std::uint32_t compute_ns =
       0;  ///< time that `step` took; 0 in a run without waiting, so that two such runs are equal
-  std::uint8_t grab = 0;  ///< grab button
+  std::uint8_t grab = 0;    ///< grab button
   std::int32_t patch = -1;  ///< mesh node that the overlay lies round, -1: none
 };
 
@@ -33,8 +33,8 @@ struct TickRecord {
 /// under a temporary name until `finish`. Not for the tick: a recorder thread calls it.
 class RecordingWriter {
  public:
-  /// `model_path` and `content_hash` of the model and what overlays there were ("r=3,rings=2", empty: none) are
-  /// kept as attributes, with the program's version. Throws Error when PATH cannot be made.
+  /// `model_path` and `content_hash` of the model and what overlays there were ("r=3,rings=2", empty: none)
+  /// are kept as attributes, with the program's version. Throws Error when PATH cannot be made.
   RecordingWriter(std::filesystem::path path, const std::string& model_path, const std::string& content_hash,
                   const std::string& overlay = "");
   ~RecordingWriter();  ///< without `finish`, removes the temporary file

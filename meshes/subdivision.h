@@ -17,7 +17,8 @@ struct Subdivision {
   };
   int denominator;  ///< sum of the weights
   std::vector<Node> nodes;
-  std::vector<Index> connectivity;  ///< [r^d * nodes an element] positions in `nodes`; oriented as the element
+  std::vector<Index>
+      connectivity;  ///< [r^d * nodes an element] positions in `nodes`; oriented as the element
   /// [sides of the element] facets that the parts have on each, in the order of element_sides and oriented as
   /// it: [facets * nodes a facet] positions in `nodes`.
   std::vector<std::vector<Index>> sides;

@@ -88,9 +88,11 @@ Body::Body(Model model, const GreensOptions& options, int refinement)
 void Body::order_by_last_part() {
   const auto of_body = static_cast<Index>(fine_.mesh_nodes.size());
   std::vector<Index> last;
-  for (auto node = static_cast<std::size_t>(of_body); node < static_cast<std::size_t>(fine_.nodes()); ++node) {
+  for (auto node = static_cast<std::size_t>(of_body); node < static_cast<std::size_t>(fine_.nodes());
+       ++node) {
     Index& most = last.emplace_back(-1);
-    for (auto k = static_cast<std::size_t>(fine_.first[node]); k < static_cast<std::size_t>(fine_.first[node + 1]); ++k)
+    for (auto k = static_cast<std::size_t>(fine_.first[node]);
+         k < static_cast<std::size_t>(fine_.first[node + 1]); ++k)
       most = std::max(most, stored_of_mesh_[static_cast<std::size_t>(fine_.parents[k])]);
   }
   std::vector<Index> order(last.size());
@@ -163,8 +165,8 @@ void Body::follow_body() {
 std::vector<Vec3> Body::surface_in_mesh() const {
   std::vector<Vec3> positions(surface_rest_.size(), Vec3::Zero());
   for (std::size_t node = 0; node < positions.size(); ++node) {
-    for (auto k = static_cast<std::size_t>(fine_.first[node]); k < static_cast<std::size_t>(fine_.first[node + 1]);
-         ++k) {
+    for (auto k = static_cast<std::size_t>(fine_.first[node]);
+         k < static_cast<std::size_t>(fine_.first[node + 1]); ++k) {
       positions[node] += fine_.weights[k] * model_.mesh.nodes[static_cast<std::size_t>(fine_.parents[k])];
     }
   }

@@ -20,7 +20,7 @@ struct NearestNode {
 /// How a surface node follows the body's nodes where no overlay is: its displacement is the sum of weights
 /// times those of stored nodes. Empty where it is held along every axis.
 struct SurfaceParts {
-  std::span<const Index> stored;    ///< ascending
+  std::span<const Index> stored;  ///< ascending
   std::span<const double> weights;
 };
 
@@ -31,8 +31,8 @@ class Body {
  public:
   /// Takes the model over and unfolds its Green's functions. The surface that a tool meets has the sides of
   /// the elements, with `refinement` r > 1 of elements cut into r^d, as the overlays have them that are to be
-  /// used. Throws Error when no free surface node is stored, as then nothing can be touched, or when the sizes
-  /// of the model's parts do not fit together.
+  /// used. Throws Error when no free surface node is stored, as then nothing can be touched, or when the
+  /// sizes of the model's parts do not fit together.
   explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1);
 
   /// Everything baked, except `greens`, which greens() has taken over.

@@ -19,8 +19,8 @@ struct CondensedPatch {
   Eigen::MatrixXd compliance;  ///< [d m x d m] K_L^-1 there [m/N], zero where u_L = 0
 };
 
-/// Eliminates the free local dofs layer by layer of nodes, from the deepest to the surface: a layer has common
-/// elements with the next ones only. Throws Error when K_L is not positive definite.
+/// Eliminates the free local dofs layer by layer of nodes, from the deepest to the surface: a layer has
+/// common elements with the next ones only. Throws Error when K_L is not positive definite.
 CondensedPatch condense(const Model& model, const PatchMesh& patch);
 
 }  // namespace palpate

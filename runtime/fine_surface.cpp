@@ -101,19 +101,19 @@ class Builder {
 }  // namespace
 
 void reorder(FineSurface& surface, std::span<const Index> order) {
-  const auto of_body = static_cast<Index>(surface.mesh_nodes.size());
+  const std::size_t of_body = surface.mesh_nodes.size();
   std::vector<Index> number(static_cast<std::size_t>(surface.nodes()));  // new, of each old one
   std::iota(number.begin(), number.end(), 0);
   const FineSurface old = surface;
-  const auto kept = static_cast<std::size_t>(old.first[static_cast<std::size_t>(of_body)]);
-  surface.first.resize(static_cast<std::size_t>(of_body) + 1);
+  const auto kept = static_cast<std::size_t>(old.first[of_body]);
+  surface.first.resize(of_body + 1);
   surface.parents.resize(kept);
   surface.weights.resize(kept);
   for (std::size_t k = 0; k < order.size(); ++k) {
-    const auto from = static_cast<std::size_t>(of_body + order[k]);
-    number[from] = of_body + static_cast<Index>(k);
-    for (auto part = static_cast<std::size_t>(old.first[from]); part < static_cast<std::size_t>(old.first[from + 1]);
-         ++part) {
+    const std::size_t from = of_body + static_cast<std::size_t>(order[k]);
+    number[from] = static_cast<Index>(of_body + k);
+    for (auto part = static_cast<std::size_t>(old.first[from]);
+         part < static_cast<std::size_t>(old.first[from + 1]); ++part) {
       surface.parents.push_back(old.parents[part]);
       surface.weights.push_back(old.weights[part]);
     }

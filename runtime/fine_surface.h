@@ -14,13 +14,13 @@ namespace palpate {
 /// The surface of all elements cut into r^d: the nodes on it, and how they follow the body's where no overlay
 /// is. Nodes of the body come first, ascending.
 struct FineSurface {
-  std::vector<Index> simplices;    ///< [F * d] outward as Model::surface, in this numbering
-  std::vector<Index> element;      ///< [F] of the body, that each is on
-  std::vector<Index> mesh_nodes;   ///< [nodes of the body] their numbers in the mesh
-  std::vector<Index> first;        ///< [S + 1] of each node in `parents` and `weights`
-  std::vector<Index> parents;      ///< mesh nodes whose shape functions are not zero there
-  std::vector<double> weights;     ///< and their values
-  std::map<NodeKey, Index> number; ///< of every node that is not one of the body's
+  std::vector<Index> simplices;     ///< [F * d] outward as Model::surface, in this numbering
+  std::vector<Index> element;       ///< [F] of the body, that each is on
+  std::vector<Index> mesh_nodes;    ///< [nodes of the body] their numbers in the mesh
+  std::vector<Index> first;         ///< [S + 1] of each node in `parents` and `weights`
+  std::vector<Index> parents;       ///< mesh nodes whose shape functions are not zero there
+  std::vector<double> weights;      ///< and their values
+  std::map<NodeKey, Index> number;  ///< of every node that is not one of the body's
 
   [[nodiscard]] Index nodes() const noexcept { return static_cast<Index>(first.size()) - 1; }
 };

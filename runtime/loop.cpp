@@ -38,8 +38,8 @@ void set(double (&symmetric)[6], const Eigen::Matrix3d& value) noexcept {
   std::copy(numbers.begin(), numbers.end(), symmetric);
 }
 
-TickRecord make_record(const Body& body, const State& state, const PatchSource* overlays, const ToolPose& device,
-                       double time, std::int64_t compute_ns) noexcept {
+TickRecord make_record(const Body& body, const State& state, const PatchSource* overlays,
+                       const ToolPose& device, double time, std::int64_t compute_ns) noexcept {
   const ToolState& tool = state.tools.front();
   TickRecord record;
   record.time = time;

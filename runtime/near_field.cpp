@@ -41,8 +41,7 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       part_weight_(base_.size()),
       part_count_(at(capacity)),
       by_base_(static_cast<std::size_t>(dimension_ * dimension_) * base_.size()),
-      gathered_(static_cast<std::size_t>(dimension_ * dimension_) *
-                std::max(base_.size(), at(patch_nodes))),
+      gathered_(static_cast<std::size_t>(dimension_ * dimension_) * std::max(base_.size(), at(patch_nodes))),
       base_force_(static_cast<std::size_t>(dimension_) * base_.size()),
       X_(force_.size() * static_cast<std::size_t>(patch_stride_)),
       Y_(X_.size()),
@@ -238,8 +237,10 @@ void NearField::forget(Index place) noexcept {
   move(last, place);
   if (patch() == nullptr || row_of(place) >= 0) return;
   for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
-    std::copy_n(X(static_cast<Index>(d * last + axis)), patch_dofs(), X(static_cast<Index>(d * place + axis)));
-    std::copy_n(Y(static_cast<Index>(d * last + axis)), patch_dofs(), Y(static_cast<Index>(d * place + axis)));
+    std::copy_n(X(static_cast<Index>(d * last + axis)), patch_dofs(),
+                X(static_cast<Index>(d * place + axis)));
+    std::copy_n(Y(static_cast<Index>(d * last + axis)), patch_dofs(),
+                Y(static_cast<Index>(d * place + axis)));
   }
 }
 

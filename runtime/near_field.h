@@ -62,7 +62,8 @@ class NearField {
   void retreat(double share) noexcept;
   /// Adds to the force on the body at a place [N].
   void load(Index place, const Vec3& force) noexcept;
-  /// u = C f: the displacement of all nodes here by the forces, and what the rest of the surface follows from.
+  /// u = C f: the displacement of all nodes here by the forces, and what the rest of the surface follows
+  /// from.
   void displace() noexcept;
 
   /// Displacement at a place by the forces of the last `displace` [m].

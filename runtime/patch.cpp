@@ -26,9 +26,9 @@ std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
     Index node = number[static_cast<std::size_t>(local)];
     if (node < 0) {
       // Mesh nodes are where the shape functions of one of them alone are not zero; held ones are not in Q.
-      node = static_cast<Index>(std::lower_bound(of_body.begin(), of_body.end(),
-                                                 mesh.body_node[static_cast<std::size_t>(local)]) -
-                                of_body.begin());
+      node = static_cast<Index>(
+          std::lower_bound(of_body.begin(), of_body.end(), mesh.body_node[static_cast<std::size_t>(local)]) -
+          of_body.begin());
     }
     result.push_back(node);
   }
@@ -49,7 +49,8 @@ Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& cond
   const std::vector<Index> numbers = surface_numbers(body, mesh, condensed.surface);
   std::vector<std::size_t> order(numbers.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return numbers[a] < numbers[b]; });
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return numbers[a] < numbers[b]; });
   std::vector<Eigen::Index> dofs;
   for (const std::size_t k : order) {
     surface_nodes_.push_back(numbers[k]);
@@ -71,7 +72,8 @@ Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& cond
 }
 
 std::size_t Patch::bytes() const noexcept {
-  return sizeof(double) * static_cast<std::size_t>(compliance_.size() + response_.size() + correction_.size()) +
+  return sizeof(double) *
+             static_cast<std::size_t>(compliance_.size() + response_.size() + correction_.size()) +
          sizeof(Index) * (surface_nodes_.size() + stored_nodes_.size());
 }
 

@@ -6,10 +6,11 @@
 namespace palpate {
 namespace {
 
-constexpr double clearly_more = 0.1;    // of where a tool touches, that another node must have to become the centre
-constexpr double clearly_nearer = 0.1;  // the same of a free tool's weights of the nearest nodes
-constexpr double near_edges = 3.0;      // mean edges of the body's mesh: nearer, a free tool has an overlay
-constexpr double smoothing = 0.05;      // of the velocity, a tick
+constexpr double clearly_more =
+    0.1;  // of where a tool touches, that another node must have to become the centre
+constexpr double clearly_nearer = 0.1;   // the same of a free tool's weights of the nearest nodes
+constexpr double near_edges = 3.0;       // mean edges of the body's mesh: nearer, a free tool has an overlay
+constexpr double smoothing = 0.05;       // of the velocity, a tick
 constexpr std::int64_t look_stride = 8;  // ticks, of a free tool
 
 /// The node of the body with the largest weight at a place of the surface; the one that there is unless
@@ -19,17 +20,15 @@ Index centre_at(const Body& body, const NearestSimplex& found, Index present) no
   Index best = -1;
   double best_weight = 0.0;
   double present_weight = 0.0;
-  for (std::size_t k = 0; k < d; ++k) {
-    const Index node = body.simplices()[d * static_cast<std::size_t>(found.simplex) + k];
-    const SurfaceParts parts = body.surface_parts(node);
-    for (std::size_t p = 0; p < parts.stored.size(); ++p) {
-      const Index stored = parts.stored[p];
+  const std::span<const Index> corners =
+      body.simplices().subspan(d * static_cast<std::size_t>(found.simplex), d);
+  for (const Index corner : corners) {
+    for (const Index stored : body.surface_parts(corner).stored) {
       double weight = 0.0;  // of this node at the place
       for (std::size_t j = 0; j < d; ++j) {
-        const SurfaceParts others =
-            body.surface_parts(body.simplices()[d * static_cast<std::size_t>(found.simplex) + j]);
-        for (std::size_t q = 0; q < others.stored.size(); ++q) {
-          if (others.stored[q] == stored) weight += found.nearest.weights[j] * others.weights[q];
+        const SurfaceParts parts = body.surface_parts(corners[j]);
+        for (std::size_t p = 0; p < parts.stored.size(); ++p) {
+          if (parts.stored[p] == stored) weight += found.nearest.weights[j] * parts.weights[p];
         }
       }
       if (stored == present) present_weight = weight;
@@ -87,7 +86,8 @@ Index PatchChoice::touched_centre(const Body& body, const State& state, std::siz
       const SurfaceParts parts = body.surface_parts(contact.nodes[n]);
       for (std::size_t p = 0; p < parts.stored.size(); ++p) {
         const auto end = touched_.begin() + static_cast<std::ptrdiff_t>(count);
-        const auto place = static_cast<std::size_t>(std::find(touched_.begin(), end, parts.stored[p]) - touched_.begin());
+        const auto place =
+            static_cast<std::size_t>(std::find(touched_.begin(), end, parts.stored[p]) - touched_.begin());
         if (place == count) {
           touched_[count] = parts.stored[p];
           share_[count++] = 0.0;

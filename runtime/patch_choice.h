@@ -31,9 +31,9 @@ struct PatchWishes {
 
 /// Follows the tools and tells where overlays belong: round the node of the body that has the largest part in
 /// the places where a tool is deepest in the body at rest, or that a free tool is nearest to. It changes to
-/// another node only when that one clearly has more, so that a tool on the border between two does not go to and
-/// fro. Forces have no say: beside a patch the body is stiffer and carries more, so that the patch would follow
-/// its own absence. All memory is taken at construction.
+/// another node only when that one clearly has more, so that a tool on the border between two does not go to
+/// and fro. Forces have no say: beside a patch the body is stiffer and carries more, so that the patch would
+/// follow its own absence. All memory is taken at construction.
 class PatchChoice {
  public:
   explicit PatchChoice(const Body& body, const State& state);

@@ -12,7 +12,8 @@ namespace {
 /// Nodes of elements, each once.
 std::vector<Index> nodes_of(const Mesh& mesh, const std::vector<Index>& elements) {
   std::vector<Index> nodes;
-  for (const Index e : elements) nodes.insert(nodes.end(), mesh.element_nodes(e).begin(), mesh.element_nodes(e).end());
+  for (const Index e : elements)
+    nodes.insert(nodes.end(), mesh.element_nodes(e).begin(), mesh.element_nodes(e).end());
   std::sort(nodes.begin(), nodes.end());
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   return nodes;
@@ -21,7 +22,10 @@ std::vector<Index> nodes_of(const Mesh& mesh, const std::vector<Index>& elements
 }  // namespace
 
 PatchMaker::PatchMaker(const Body& body, int rings)
-    : body_(body), at_(body.model().mesh), cuts_(body.model().mesh.element, body.refinement()), rings_(rings) {
+    : body_(body),
+      at_(body.model().mesh),
+      cuts_(body.model().mesh.element, body.refinement()),
+      rings_(rings) {
   const Model& model = body.model();
   const unsigned all_axes = (1U << model.dimension()) - 1U;
   for (const Index stored : body.surface_stored_nodes()) {
@@ -46,8 +50,7 @@ std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
   const Model& model = body_.model();
   std::vector<Index> nodes;
   for (const Index centre : centres) nodes.push_back(body_.mesh_node(centre));
-  const PatchMesh mesh =
-      make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
+  const PatchMesh mesh = make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
   return std::make_shared<const Patch>(body_, mesh, condense(model, mesh));
 }
 

@@ -83,8 +83,7 @@ void PatchSource::receive() noexcept {
 }
 
 void PatchSource::unlink(Index slot) noexcept {
-  Index* link =
-      &first_slot_[static_cast<std::size_t>(slots_[static_cast<std::size_t>(slot)].key.centres[0])];
+  Index* link = &first_slot_[static_cast<std::size_t>(slots_[static_cast<std::size_t>(slot)].key.centres[0])];
   while (*link != slot) link = &next_slot_[static_cast<std::size_t>(*link)];
   *link = next_slot_[static_cast<std::size_t>(slot)];
 }
@@ -171,8 +170,8 @@ void PatchSource::make_room() {
   }
 }
 
-void PatchSource::deliver(Delivery&& delivery) {
-  while (!deliveries_.push(std::move(delivery)) && !stop_) std::this_thread::sleep_for(pause);
+void PatchSource::deliver(Delivery delivery) {
+  while (!deliveries_.push(delivery) && !stop_) std::this_thread::sleep_for(pause);
 }
 
 }  // namespace palpate

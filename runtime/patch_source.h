@@ -20,16 +20,16 @@ namespace palpate {
 struct PatchSourceOptions {
   int rings = OverlayOptions{}.rings;
   std::size_t memory = std::size_t{512} << 20;  ///< that patches may take [bytes]
-  bool in_background = true;                    ///< false: `serve` builds what is missing itself, for runs that nobody feels
+  bool in_background = true;  ///< false: `serve` builds what is missing itself, for runs that nobody feels
 };
 
 /// What is told of it.
 struct PatchCounts {
-  std::int64_t ticks = 0;          ///< with a tool near the body
-  std::int64_t older = 0;          ///< of them with another patch than wanted, or none
-  std::int64_t in_contact = 0;     ///< ticks in which something is touched
+  std::int64_t ticks = 0;       ///< with a tool near the body
+  std::int64_t older = 0;       ///< of them with another patch than wanted, or none
+  std::int64_t in_contact = 0;  ///< ticks in which something is touched
   std::int64_t older_in_contact = 0;
-  std::int64_t switches = 0;       ///< from one patch to another
+  std::int64_t switches = 0;  ///< from one patch to another
 };
 
 /// The overlays of one loop. The loop calls `serve` before each tick, from the tick's thread: it never waits,
@@ -51,7 +51,7 @@ class PatchSource {
   /// before there was one.
   [[nodiscard]] Index centre() const noexcept { return used_.centres[0]; }
   [[nodiscard]] const PatchCounts& counts() const noexcept { return counts_; }
-  [[nodiscard]] std::int64_t built() const noexcept { return built_; }  ///< patches so far
+  [[nodiscard]] std::int64_t built() const noexcept { return built_; }            ///< patches so far
   [[nodiscard]] double longest_build() const noexcept { return longest_build_; }  ///< [s]
   [[nodiscard]] std::int64_t failed() const noexcept { return failed_; }  ///< patches that could not be made
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }     ///< that the cache takes
@@ -83,7 +83,7 @@ class PatchSource {
   bool build_next(const PatchWishes& wishes);
   bool build(const PatchKey& key);
   void make_room();
-  void deliver(Delivery&& delivery);
+  void deliver(Delivery delivery);
 
   const Body& body_;
   PatchSourceOptions options_;

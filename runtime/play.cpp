@@ -48,13 +48,15 @@ double microseconds(std::int64_t nanoseconds) {
 void print_overlays(const PatchSource& overlays) {
   const PatchCounts& counts = overlays.counts();
   const auto in_contact = static_cast<double>(std::max<std::int64_t>(counts.in_contact, 1));
-  fmt::print(stderr,
-             "overlay: {} patches built (longest {:.1f} ms, {:.0f} MB kept), {} switches, {:.2f} % of the ticks in "
-             "contact on an older patch or none\n",
-             overlays.built(), 1e3 * overlays.longest_build(), 1e-6 * static_cast<double>(overlays.bytes()),
-             counts.switches, 100.0 * static_cast<double>(counts.older_in_contact) / in_contact);
+  fmt::print(
+      stderr,
+      "overlay: {} patches built (longest {:.1f} ms, {:.0f} MB kept), {} switches, {:.2f} % of the ticks in "
+      "contact on an older patch or none\n",
+      overlays.built(), 1e3 * overlays.longest_build(), 1e-6 * static_cast<double>(overlays.bytes()),
+      counts.switches, 100.0 * static_cast<double>(counts.older_in_contact) / in_contact);
   if (overlays.failed() > 0)
-    print_warning(fmt::format("{} overlays could not be made: the elements there are too flat", overlays.failed()));
+    print_warning(
+        fmt::format("{} overlays could not be made: the elements there are too flat", overlays.failed()));
 }
 
 void print_report(const LoopReport& report, const PlayOptions& options, std::int64_t dropped) {
@@ -119,11 +121,13 @@ std::string json_tool(const Tool& tool) {
 std::string json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
   const PatchCounts& counts = overlays.counts();
   return fmt::format(
-      "{{\"refinement\": {}, \"rings\": {}, \"built\": {}, \"failed\": {}, \"longest_build_s\": {}, \"bytes\": {}, "
+      "{{\"refinement\": {}, \"rings\": {}, \"built\": {}, \"failed\": {}, \"longest_build_s\": {}, "
+      "\"bytes\": {}, "
       "\"switches\": {}, \"ticks_near\": {}, \"older_ticks_near\": {}, \"ticks_in_contact\": {}, "
       "\"older_ticks_in_contact\": {}}}",
       options.refinement, options.rings, overlays.built(), overlays.failed(), overlays.longest_build(),
-      overlays.bytes(), counts.switches, counts.ticks, counts.older, counts.in_contact, counts.older_in_contact);
+      overlays.bytes(), counts.switches, counts.ticks, counts.older, counts.in_contact,
+      counts.older_in_contact);
 }
 
 std::string json_report(const LoopReport& report, const PlayOptions& options, const Body& body,
@@ -214,7 +218,8 @@ void write_surface(const std::filesystem::path& file, const Body& body, const St
     total.insert(total.end(), seen.begin(), seen.end());
   }
   const std::vector<NodalField> fields = {{"displacement", 3, total}};
-  write_vtu(file, nodes, body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, body.simplices(), fields);
+  write_vtu(file, nodes, body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, body.simplices(),
+            fields);
 }
 
 /// The loop with the rights it needs, which the threads that were started before do not inherit.
@@ -251,8 +256,9 @@ int play(const PlayOptions& options) {
   std::optional<Recorder> recorder;
   if (!options.record.empty())
     recorder.emplace(options.record, options.file.string(), body.model().content_hash,
-                     options.overlay ? fmt::format("r={},rings={}", options.overlay->refinement, options.overlay->rings)
-                                     : "");
+                     options.overlay
+                         ? fmt::format("r={},rings={}", options.overlay->refinement, options.overlay->rings)
+                         : "");
 
   stop_on_signals();
   const LoopReport report = run(body, state, device, source, recorder ? &*recorder : nullptr, options.fast);

@@ -17,7 +17,9 @@ static_assert(ring_size % batch == 0);
 
 Recorder::Recorder(const std::filesystem::path& path, const std::string& model_path,
                    const std::string& content_hash, const std::string& overlay)
-    : writer_(path, model_path, content_hash, overlay), ring_(ring_size), thread_([this] { write_ticks(); }) {}
+    : writer_(path, model_path, content_hash, overlay),
+      ring_(ring_size),
+      thread_([this] { write_ticks(); }) {}
 
 Recorder::~Recorder() {
   closing_ = true;

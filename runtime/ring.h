@@ -14,8 +14,8 @@ class Ring {
  public:
   explicit Ring(std::size_t capacity) : slots_(capacity) {}
 
-  /// False when it is full.
-  bool push(T&& value) noexcept {
+  /// False, and `value` stays as it is, when it is full.
+  bool push(T& value) noexcept {
     const std::size_t pushed = pushed_.load(std::memory_order_relaxed);
     if (pushed - popped_.load(std::memory_order_acquire) == slots_.size()) return false;
     slots_[pushed % slots_.size()] = std::move(value);

@@ -53,8 +53,8 @@ struct StateOptions {
 /// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
 /// replay are copies. All memory is taken here: copying allocates, a tick does not.
 struct State {
-  static constexpr Index most_far_nodes = 64;  ///< of the body, whose far displacement a tick renews
-  static constexpr Index most_far_patch_nodes = 8;   ///< and of the patch's surface
+  static constexpr Index most_far_nodes = 64;       ///< of the body, whose far displacement a tick renews
+  static constexpr Index most_far_patch_nodes = 8;  ///< and of the patch's surface
 
   /// Of a body at rest that no tool touches. Throws Error for tools without sense (a size or stiffness that
   /// is negative or not a number), none, or no room for contacts.
@@ -95,10 +95,10 @@ struct State {
   Index candidate_count = 0;
   std::vector<ContactPoint> last_contacts;  // [max_contacts] of the tick before
   Index last_count = 0;
-  std::vector<double> row_change;        // [rows] for the local model
-  std::vector<double> force_change;      // [rows]
-  std::vector<double> far_displacement;  // [d * slice]
-  Index next_far_node = 0;               // stored node from which the far field is renewed next
+  std::vector<double> row_change;           // [rows] for the local model
+  std::vector<double> force_change;         // [rows]
+  std::vector<double> far_displacement;     // [d * slice]
+  Index next_far_node = 0;                  // stored node from which the far field is renewed next
   std::vector<double> stored_displacement;  // [n] as it was renewed last
   Index next_patch_node = 0;                // place in the patch from which its surface is renewed next
 };

@@ -21,7 +21,7 @@ enum class StepStatus : std::uint32_t {
   not_converged = 1U << 8,          ///< the contact forces did not reach their tolerance within the budget
   force_limited = 1U << 9,          ///< the force was cut to the tool's largest
   handing_over = 1U << 10,          ///< the force is on its way to the contact's, so as not to kick
-  older_patch = 1U << 11,           ///< the overlay for this place was not there yet: an older one was used, or none
+  older_patch = 1U << 11,  ///< the overlay for this place was not there yet: an older one was used, or none
 };
 
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {

@@ -140,7 +140,8 @@ void move_patch_slice(const Body& body, State& state) noexcept {
                             static_cast<std::size_t>(body.dimension() * (end - state.next_patch_node)));
   patch_displacement(state.near.load(), state.next_patch_node, u);
   for (Index k = state.next_patch_node; k < end; ++k)
-    move_far(body, state, nodes[static_cast<std::size_t>(k)], vector_at(u, body.dimension(), k - state.next_patch_node));
+    move_far(body, state, nodes[static_cast<std::size_t>(k)],
+             vector_at(u, body.dimension(), k - state.next_patch_node));
   state.next_patch_node = end;
 }
 

@@ -1,23 +1,25 @@
 // What an overlay costs.
 //
-// partitioning: by inversion by partitioning, as the papers had it: from a patch whose stiffness is assembled to
-// Xi_G, Xi_LG and Xi_L, the body's Green's functions gathered included. One thread of BLAS. Counters: the local
-// dofs and the patch's nodes; medians of making the patch's mesh, of assembling its stiffness, and of the
-// inversion, which is what is timed.
+// partitioning: by inversion by partitioning, as the papers had it: from a patch whose stiffness is assembled
+// to Xi_G, Xi_LG and Xi_L, the body's Green's functions gathered included. One thread of BLAS. Counters: the
+// local dofs and the patch's nodes; medians of making the patch's mesh, of assembling its stiffness, and of
+// the inversion, which is what is timed.
 //
 // patch: what the builder does for a patch. Counters: medians of its mesh, its condensation and the rest; its
 // size; the force that displaces the node in the middle by 1 m along the last axis with the others held, and
 // that of the mesh alone.
 //
 // switch: a tick in which a tool that rests on the body is given another patch, of the node next to the one
-// before. Counters: medians of such ticks and of those between, their difference, and how many nodes are near.
+// before. Counters: medians of such ticks and of those between, their difference, and how many nodes are
+// near.
 //
-// held: a tick with a patch while a tool holds the surface, so that it has the same contact points whatever the
-// body's compliance. Counters: medians with the patch, and without, in turn; their difference.
+// held: a tick with a patch while a tool holds the surface, so that it has the same contact points whatever
+// the body's compliance. Counters: medians with the patch, and without, in turn; their difference.
 //
 // Bodies: a block of tet4 with cells of 5 mm, touched in the middle of its upper side, and the plate of the
-// papers' Table 1 (4 x 4 quad4, 6 x 6 local elements over the 2 x 2 under the contact; patches are those of the
-// two elements at its node); with PALPATE_BENCH_MODEL=NAME.palpate.hdf that body, at its highest free node.
+// papers' Table 1 (4 x 4 quad4, 6 x 6 local elements over the 2 x 2 under the contact; patches are those of
+// the two elements at its node); with PALPATE_BENCH_MODEL=NAME.palpate.hdf that body, at its highest free
+// node.
 #include <benchmark/benchmark.h>
 #include <cblas.h>
 
@@ -95,7 +97,8 @@ struct Touched {
   double depth;   // [m]
 };
 
-/// Where tools and patches are: the free surface node that is highest along the last axis, nearest to the middle.
+/// Where tools and patches are: the free surface node that is highest along the last axis, nearest to the
+/// middle.
 Index top_node(const Body& body) {
   const int up = body.dimension() - 1;
   const Vec3 middle = body.bounds().center();
@@ -111,7 +114,8 @@ Index top_node(const Body& body) {
   return best;
 }
 
-/// A body with a fine surface, a tool that is pressed on it, and the patches of its node and of one beside it.
+/// A body with a fine surface, a tool that is pressed on it, and the patches of its node and of one beside
+/// it.
 struct Overlaid {
   Body body;
   PatchMaker maker;
@@ -127,8 +131,8 @@ struct Overlaid {
                      .patch_nodes = 2 * maker.most_nodes()}) {
     const Vec3 up = Vec3::Unit(body.dimension() - 1);
     for (int k = 200; k >= 0; --k) {
-      pose.position = body.rest_position(centre) +
-                      (touched.radius - touched.depth + 0.01 * k * 2.0 * touched.depth) * up;
+      pose.position =
+          body.rest_position(centre) + (touched.radius - touched.depth + 0.01 * k * 2.0 * touched.depth) * up;
       step(body, state, pose);
     }
   }
@@ -146,8 +150,9 @@ void time_patch(benchmark::State& run, const Touched& touched, int refinement, i
   std::shared_ptr<const Patch> patch;
   while (run.KeepRunning()) {
     PatchMesh mesh;
-    cut.push_back(seconds(
-        [&] { mesh = make_patch_mesh(model, at, cuts, rings_round(model.mesh, at, {&node, 1}, rings)); }));
+    cut.push_back(seconds([&] {
+      mesh = make_patch_mesh(model, at, cuts, rings_round(model.mesh, at, {&node, 1}, rings));
+    }));
     CondensedPatch inner;
     condensed.push_back(seconds([&] { inner = condense(model, mesh); }));
     rest.push_back(seconds([&] { patch = std::make_shared<const Patch>(body, mesh, inner); }));
@@ -180,7 +185,7 @@ void time_switch(benchmark::State& run, const Touched& touched, int refinement, 
   State& state = overlaid.state;
   const std::vector<Index> neighbours = overlaid.maker.neighbours(overlaid.centre);
   const std::array<std::shared_ptr<const Patch>, 2> patches = {overlaid.patch(overlaid.centre),
-                                                                         overlaid.patch(neighbours.front())};
+                                                               overlaid.patch(neighbours.front())};
   std::vector<double> changes, between;
   std::size_t turn = 0;
   double near = 0.0;
@@ -302,7 +307,8 @@ void register_bodies(const std::filesystem::path& folder) {
     register_body({.name = "model", .file = file, .radius = 0.005, .depth = 0.002}, {2, 3, 4});
     return;
   }
-  const std::filesystem::path model = std::filesystem::path(PALPATE_SOURCE_DIR) / "meshes/models/plate/model.toml";
+  const std::filesystem::path model =
+      std::filesystem::path(PALPATE_SOURCE_DIR) / "meshes/models/plate/model.toml";
   const Touched plate{
       .name = "plate", .file = bake_body(model, folder / "plate.palpate.hdf"), .radius = 0.1, .depth = 0.02};
   const auto body = std::make_shared<const Body>(load_model(plate.file));

@@ -3,9 +3,9 @@
 //   overlay_study MODEL.palpate.hdf [RADIUS [DEPTH [MM_PER_S]]]
 //
 // In real time, with the thread that builds patches beside it: without an overlay, then for each refinement
-// and number of rings, over the same tracks, each begun with no patch built. Printed are the tick's time, late
-// ticks, how much the force changes from tick to tick, and how many ticks had to use an older patch or none.
-// scripts/sliding --overlay runs it.
+// and number of rings, over the same tracks, each begun with no patch built. Printed are the tick's time,
+// late ticks, how much the force changes from tick to tick, and how many ticks had to use an older patch or
+// none. scripts/sliding --overlay runs it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -51,12 +51,12 @@ double quantile(std::vector<double> values, double fraction) {
 
 /// What is measured while the sphere slides.
 struct Figures {
-  std::vector<double> compute;     // [us] of each tick
-  std::vector<double> change;      // of the hand's force from the tick before, as a share
-  std::vector<double> force;       // [N]
-  std::int64_t late = 0;           // ticks that ended after the next one was due
-  std::int64_t late_wakes = 0;     // of them begun more than half a period late: the machine's doing
-  std::int64_t older = 0;          // ticks with an older patch or none
+  std::vector<double> compute;  // [us] of each tick
+  std::vector<double> change;   // of the hand's force from the tick before, as a share
+  std::vector<double> force;    // [N]
+  std::int64_t late = 0;        // ticks that ended after the next one was due
+  std::int64_t late_wakes = 0;  // of them begun more than half a period late: the machine's doing
+  std::int64_t older = 0;       // ticks with an older patch or none
   std::int64_t not_converged = 0;
   std::int64_t switches = 0, built = 0;
   double longest_build = 0.0;  // [s]
@@ -93,8 +93,8 @@ struct Overlaid {
   int rings;
 };
 
-Figures measure(const Body& body, const std::vector<test::Track>& tracks, const Overlaid& overlay, double radius,
-                double depth, double speed, const std::optional<double>& friction) {
+Figures measure(const Body& body, const std::vector<test::Track>& tracks, const Overlaid& overlay,
+                double radius, double depth, double speed, const std::optional<double>& friction) {
   Figures figures;
   StateOptions options{.tools = {Tool{.radius = radius, .friction = friction}}};
   if (overlay.refinement > 1) options.patch_nodes = patch_room(body, overlay.rings, 1);
@@ -118,9 +118,11 @@ void print_row(const Overlaid& overlay, const std::optional<double>& friction, c
   const auto per_cent = [](const std::vector<double>& values, double fraction) {
     return 100.0 * quantile(values, fraction);
   };
-  const auto over = std::count_if(figures.change.begin(), figures.change.end(), [](double c) { return c > 0.02; });
+  const auto over =
+      std::count_if(figures.change.begin(), figures.change.end(), [](double c) { return c > 0.02; });
   fmt::print(
-      "| {} | {} | {} | {:.1f} | {:.0f} | {:.0f} | {} ({}) | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | {:.2f} % | {} | "
+      "| {} | {} | {} | {:.1f} | {:.0f} | {:.0f} | {} ({}) | {:.2f} % | {:.2f} % | {:.2f} % | {:.1f} % | "
+      "{:.2f} % | {} | "
       "{} | {:.1f} | {:.0f} | {} | {:.3f} |\n",
       overlay.refinement > 1 ? fmt::format("r={},rings={}", overlay.refinement, overlay.rings) : "none",
       friction ? fmt::format("{:g}", *friction) : "the material's", figures.compute.size(),
@@ -141,10 +143,13 @@ void study(const std::string& file, double radius, double depth, double speed) {
     if (tracks.empty()) {
       tracks = test::lay_tracks(body, radius, track_length, tracks_laid);
       fmt::print("{}: {} tracks of {:.0f} mm at {:.0f} mm/s, sphere of {:.1f} mm, {:.1f} mm deep\n\n",
-                 body.model().name, tracks.size(), 1e3 * track_length, 1e3 * speed, 1e3 * radius, 1e3 * depth);
+                 body.model().name, tracks.size(), 1e3 * track_length, 1e3 * speed, 1e3 * radius,
+                 1e3 * depth);
       fmt::print(
-          "| overlay | friction | ticks | µs: median | 99.9 % | worst | late ticks (woken late) | change: largest | "
-          "99 % | median | over 2 % | older patch or none | switches | built | longest build ms | MB | not converged "
+          "| overlay | friction | ticks | µs: median | 99.9 % | worst | late ticks (woken late) | change: "
+          "largest | "
+          "99 % | median | over 2 % | older patch or none | switches | built | longest build ms | MB | not "
+          "converged "
           "| median force N |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     }
     for (const std::optional<double> friction : {std::optional<double>(0.0), std::optional<double>()})

@@ -71,7 +71,8 @@ TEST(COverlay, FeelsAsTheStepWithItsPatch) {
     if (palpate_step(session.get(), std::array{pose(0)}.data()) == 0) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  State state(body, {.tools = {Tool{.radius = 0.2}}, .max_contacts = 64, .patch_nodes = patch_room(body, 1, 1)});
+  State state(body,
+              {.tools = {Tool{.radius = 0.2}}, .max_contacts = 64, .patch_nodes = patch_room(body, 1, 1)});
   PatchSource source(body, state, {.rings = 1, .in_background = false});
   for (int tick = 0; tick < 1000; ++tick) {
     palpate_step(session.get(), std::array{pose(tick)}.data());
@@ -99,9 +100,11 @@ TEST(COverlay, FeelsAsTheStepWithItsPatch) {
 TEST(COverlay, RefusesWhatCannotBe) {
   const palpate_tool tool = sphere(0.2);
   char error[300];
-  for (const palpate_overlay& overlay : {palpate_overlay{1, 1, 1000}, palpate_overlay{3, 0, 1000}, palpate_overlay{99, 1, 1000}}) {
-    EXPECT_EQ(palpate_create_with_overlay(golden("cube2").c_str(), &tool, 1, 64, &overlay, error, sizeof error),
-              nullptr);
+  for (const palpate_overlay& overlay :
+       {palpate_overlay{1, 1, 1000}, palpate_overlay{3, 0, 1000}, palpate_overlay{99, 1, 1000}}) {
+    EXPECT_EQ(
+        palpate_create_with_overlay(golden("cube2").c_str(), &tool, 1, 64, &overlay, error, sizeof error),
+        nullptr);
     EXPECT_NE(std::string(error).find("overlay"), std::string::npos) << error;
   }
 }

@@ -151,7 +151,10 @@ class OverlayTick : public Tick {
     }
   }
 
-  Body overlaid_{test::unit_model(GetParam(), GetParam() == 3 ? 4 : 20, Scope::full, Precision::double_precision), {}, 3};
+  Body overlaid_{
+      test::unit_model(GetParam(), GetParam() == 3 ? 4 : 20, Scope::full, Precision::double_precision),
+      {},
+      3};
   Index room_ = patch_room(overlaid_, 1, 1);
   State with_{overlaid_, {.tools = {Tool{.radius = 0.05, .reach = 0.3}}, .patch_nodes = room_}};
   int touching_ = 0;

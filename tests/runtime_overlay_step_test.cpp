@@ -31,17 +31,18 @@ struct Case {
 std::string name_of(const testing::TestParamInfo<Case>& tested) {
   const Case& c = tested.param;
   return std::string(traits(c.element).name) + "Cells" + std::to_string(c.cells) + "Refinement" +
-         std::to_string(c.refinement) + (c.radius > 0.0 ? "Sphere" : "Point") + (c.friction > 0.0 ? "Rough" : "") +
-         (c.grab ? "Grabs" : "");
+         std::to_string(c.refinement) + (c.radius > 0.0 ? "Sphere" : "Point") +
+         (c.friction > 0.0 ? "Rough" : "") + (c.grab ? "Grabs" : "");
 }
 
 /// A coarse body whose overlay is over all of it, and the body that is as fine everywhere.
 class WholeOverlay : public testing::TestWithParam<Case> {
  protected:
-  Body coarse_{test::unit_model(GetParam().element, GetParam().cells, Scope::full, Precision::double_precision),
-               {},
-               GetParam().refinement};
-  Body fine_{test::unit_model(GetParam().element, GetParam().cells * GetParam().refinement, Scope::full,
+  Body coarse_{
+      test::unit_model(GetParam().element, GetParam().cells, Scope::full, Precision::double_precision),
+      {},
+      GetParam().refinement};
+  Body fine_{test::unit_model(GetParam().element, GetParam().cells* GetParam().refinement, Scope::full,
                               Precision::double_precision)};
   int d_ = coarse_.dimension();
 
@@ -67,13 +68,15 @@ class WholeOverlay : public testing::TestWithParam<Case> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(
-    Elements, WholeOverlay,
-    testing::Values(Case{ElementType::quad4, 3, 3, 0.3, 0.0, false}, Case{ElementType::tri3, 4, 2, 0.3, 0.4, false},
-                    Case{ElementType::tet4, 2, 2, 0.3, 0.0, false}, Case{ElementType::tet4, 2, 3, 0.0, 0.0, false},
-                    Case{ElementType::tet4, 2, 3, 0.3, 0.3, false}, Case{ElementType::tet4, 2, 2, 0.3, 0.0, true},
-                    Case{ElementType::hex8, 2, 3, 0.25, 0.0, false}),
-    name_of);
+INSTANTIATE_TEST_SUITE_P(Elements, WholeOverlay,
+                         testing::Values(Case{ElementType::quad4, 3, 3, 0.3, 0.0, false},
+                                         Case{ElementType::tri3, 4, 2, 0.3, 0.4, false},
+                                         Case{ElementType::tet4, 2, 2, 0.3, 0.0, false},
+                                         Case{ElementType::tet4, 2, 3, 0.0, 0.0, false},
+                                         Case{ElementType::tet4, 2, 3, 0.3, 0.3, false},
+                                         Case{ElementType::tet4, 2, 2, 0.3, 0.0, true},
+                                         Case{ElementType::hex8, 2, 3, 0.25, 0.0, false}),
+                         name_of);
 
 TEST_P(WholeOverlay, FeelsAsTheFinerBodyDoes) {
   const std::shared_ptr<const Patch> patch = this->patch();
@@ -124,7 +127,8 @@ TEST_P(WholeOverlay, FeelsAsTheFinerBodyDoes) {
 /// A block with a tool on its top, and patches round the nodes there.
 class Sliding : public testing::TestWithParam<int> {
  protected:
-  Body body_{test::unit_model(GetParam(), GetParam() == 3 ? 4 : 8, Scope::full, Precision::double_precision), {}, 3};
+  Body body_{
+      test::unit_model(GetParam(), GetParam() == 3 ? 4 : 8, Scope::full, Precision::double_precision), {}, 3};
   double radius_ = 0.2;
   Index room_ = patch_room(body_, 2, 2);
 
@@ -149,9 +153,8 @@ TEST_P(Sliding, ChangesThePatchWithoutAKick) {
   PatchSource source(body_, state, {.in_background = false});
   press(state, 0.05, nullptr);
   const Vec3 before = state.tools.front().wrench.force;
-  const Vec3 at = state.near.displacement(state.near.place_of(state.contacts()[0].nodes[0] >= 0
-                                                                  ? state.contacts()[0].nodes[0]
-                                                                  : state.contacts()[0].nodes[1]));
+  const Vec3 at = state.near.displacement(state.near.place_of(
+      state.contacts()[0].nodes[0] >= 0 ? state.contacts()[0].nodes[0] : state.contacts()[0].nodes[1]));
   // From none to one, under a tool that rests: the force falls to what the finer body has, a little a tick.
   Vec3 last = before;
   double largest = 0.0;
@@ -179,7 +182,8 @@ TEST_P(Sliding, FollowsTheToolWithoutAJump) {
     source.serve(state);
     EXPECT_FALSE(has(step(body_, state, pose(0.3 + 0.0005 * tick, 0.05)), StepStatus::older_patch));
     const ToolState& tool = state.tools.front();
-    const double explained = (tool.local.stiffness * (tool.device.position - tool.last_device_position)).norm();
+    const double explained =
+        (tool.local.stiffness * (tool.device.position - tool.last_device_position)).norm();
     largest = std::max(largest, ((tool.wrench.force - last).norm() - explained) / tool.wrench.force.norm());
     last = tool.wrench.force;
   }
@@ -205,7 +209,8 @@ TEST_P(Sliding, KeepsThePatchUnderAToolThatRests) {
       const double depth = 0.1 * (2.0 * std::min(k, 200) / 200.0 - 1.0);
       source.serve(state);
       step(body, state,
-           {.position = test::upright(GetParam(), 0.5 + 0.05 * place * size, 0.5 - 0.05 * place * size, 1.0 + (1.0 - depth) * size)});
+           {.position = test::upright(GetParam(), 0.5 + 0.05 * place * size, 0.5 - 0.05 * place * size,
+                                      1.0 + (1.0 - depth) * size)});
       if (k == 220) switches = source.counts().switches;
     }
     EXPECT_EQ(source.counts().switches, switches) << 0.05 * place << " elements along";
@@ -260,7 +265,8 @@ TEST_P(Sliding, KeepsToItsMemory) {
 
 // Each alone has its own patch; beside each other they share one that is over the elements of both.
 TEST_P(Sliding, MergesThePatchesOfTwoTools) {
-  State two(body_, {.tools = {Tool{.radius = 0.1, .hand_over = infinity}, Tool{.radius = 0.1, .hand_over = infinity}},
+  State two(body_, {.tools = {Tool{.radius = 0.1, .hand_over = infinity},
+                              Tool{.radius = 0.1, .hand_over = infinity}},
                     .patch_nodes = room_});
   PatchSource source(body_, two, {.in_background = false});
   std::vector<ToolPose> poses(2);

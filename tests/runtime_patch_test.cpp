@@ -1,6 +1,4 @@
 // Patches as the tick uses them, against the body and its fine mesh solved as one dense system.
-#include "runtime/patch.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -14,6 +12,7 @@
 #include "meshes/element.h"
 #include "runtime/near_field.h"
 #include "runtime/overlay.h"
+#include "runtime/patch.h"
 #include "tests/runtime_model.h"
 
 namespace palpate {
@@ -99,18 +98,19 @@ class Patches : public testing::TestWithParam<Case> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(
-    Elements, Patches,
-    testing::Values(Case{ElementType::tri3, 4, 3, 1}, Case{ElementType::tri3, 4, 2, 2},
-                    Case{ElementType::quad4, 4, 3, 1}, Case{ElementType::tet4, 4, 2, 1},
-                    Case{ElementType::tet4, 4, 3, 1}, Case{ElementType::tet4, 3, 3, 2},
-                    Case{ElementType::tet10, 2, 2, 1}, Case{ElementType::hex8, 4, 3, 1},
-                    Case{ElementType::tet4, 2, 2, 4}),  // the whole body, with nodes that are held
-    [](const testing::TestParamInfo<Case>& tested) {
-      return std::string(traits(tested.param.element).name) + "Cells" + std::to_string(tested.param.cells) +
-             "Refinement" + std::to_string(tested.param.refinement) + "Rings" +
-             std::to_string(tested.param.rings);
-    });
+INSTANTIATE_TEST_SUITE_P(Elements, Patches,
+                         testing::Values(Case{ElementType::tri3, 4, 3, 1}, Case{ElementType::tri3, 4, 2, 2},
+                                         Case{ElementType::quad4, 4, 3, 1}, Case{ElementType::tet4, 4, 2, 1},
+                                         Case{ElementType::tet4, 4, 3, 1}, Case{ElementType::tet4, 3, 3, 2},
+                                         Case{ElementType::tet10, 2, 2, 1}, Case{ElementType::hex8, 4, 3, 1},
+                                         Case{ElementType::tet4, 2, 2,
+                                              4}),  // the whole body, with nodes that are held
+                         [](const testing::TestParamInfo<Case>& tested) {
+                           return std::string(traits(tested.param.element).name) + "Cells" +
+                                  std::to_string(tested.param.cells) + "Refinement" +
+                                  std::to_string(tested.param.refinement) + "Rings" +
+                                  std::to_string(tested.param.rings);
+                         });
 
 TEST_P(Patches, AreTheFineMeshExactly) {
   const PatchMesh patch_mesh = mesh();
@@ -166,8 +166,7 @@ void expect_compliance(const NearField& near, const MatrixXd& reference) {
 // All surface nodes in turn, in the patch and beside it, with patches that come and go.
 TEST_P(Patches, AreWhatTheNearFieldHas) {
   const PatchMesh patch_mesh = mesh();
-  const auto patch =
-      std::make_shared<const Patch>(body_, patch_mesh, condense(body_.model(), patch_mesh));
+  const auto patch = std::make_shared<const Patch>(body_, patch_mesh, condense(body_.model(), patch_mesh));
   std::vector<Index> all(body_.surface_rest_positions().size());
   for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<Index>(k);
   const MatrixXd with = reference(patch_mesh, all);
