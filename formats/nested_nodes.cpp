@@ -1,4 +1,4 @@
-#include "runtime/nested_nodes.h"
+#include "formats/nested_nodes.h"
 
 #include <algorithm>
 
@@ -30,7 +30,8 @@ const Subdivision& Subdivisions::of(std::span<const Index> corners) {
   const bool is_simplex = type_ != ElementType::quad4 && type_ != ElementType::hex8;
   const std::array<int, 4> order = is_simplex ? ranks(corners) : std::array<int, 4>{0, 1, 2, 3};
   const auto found = made_.find(order);
-  return found != made_.end() ? found->second : made_.emplace(order, subdivide(type_, r_, order)).first->second;
+  return found != made_.end() ? found->second
+                              : made_.emplace(order, subdivide(type_, r_, order)).first->second;
 }
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-#include "runtime/patch_mesh.h"
+#include "formats/patch_mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@ constexpr double no_part = 1e-12;  // of a shape function
 struct OuterSide {
   std::size_t number;  // among the element's sides
   unsigned corners;    // bit k: the element's corner k is on it
-  bool is_border;    // the body goes on behind it; else it is the body's surface
+  bool is_border;      // the body goes on behind it; else it is the body's surface
 };
 
 std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at,

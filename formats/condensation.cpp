@@ -1,4 +1,4 @@
-#include "runtime/condensation.h"
+#include "formats/condensation.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -156,8 +156,7 @@ LayeredStiffness assemble(const Model& model, const PatchMesh& patch, const Laye
       if (layer < 0) continue;
       const auto l = static_cast<std::size_t>(layer);
       for (std::size_t b = 0; b < nodes.size(); ++b) {
-        const auto part =
-            K_e.block(d * static_cast<Eigen::Index>(a), d * static_cast<Eigen::Index>(b), d, d);
+        const auto part = K_e.block(d * static_cast<Eigen::Index>(a), d * static_cast<Eigen::Index>(b), d, d);
         const int other = layers.layer_of(nodes[b]);
         if (other == layer) add(K.diagonal[l], nodes[a], nodes[b], part);
         if (other >= 0 && other == layer - 1) add(K.above[l], nodes[a], nodes[b], part);
@@ -244,7 +243,8 @@ CondensedPatch condense(const Model& model, const PatchMesh& patch) {
     const auto row = static_cast<Eigen::Index>(i);
     result.T.row(row) -= u_L.row(place[i]);
     for (std::size_t j = 0; j < place.size(); ++j) {
-      if (place[j] >= 0) result.compliance(static_cast<Eigen::Index>(j), row) = compliance(place[j], place[i]);
+      if (place[j] >= 0)
+        result.compliance(static_cast<Eigen::Index>(j), row) = compliance(place[j], place[i]);
     }
   }
   return result;
