@@ -185,10 +185,10 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   OverlayPlan overlays;
   if (description.overlay) {
     overlays = plan_overlays(model, *description.overlay, description.file.string());
-    progress.line(fmt::format("overlays: {} patches, each element within {} rings cut into {}^{}: {:.1f} MB",
+    progress.line(fmt::format("overlays: {} patches, {} ring{} of elements each, cut into {}^{}: {:.1f} MB",
                               overlays.centres.size(), description.overlay->rings,
-                              description.overlay->refinement, model.dimension(),
-                              static_cast<double>(overlays.file_bytes) * 1e-6));
+                              description.overlay->rings == 1 ? "" : "s", description.overlay->refinement,
+                              model.dimension(), static_cast<double>(overlays.file_bytes) * 1e-6));
     plan.overlay_bytes = overlays.memory_bytes;
   }
   check_memory(plan);
