@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/condensed_patch.h"
 #include "formats/packed.h"
 #include "meshes/material.h"
 #include "meshes/mesh.h"
@@ -34,6 +35,17 @@ struct Probe {
   std::vector<double> displacement;  ///< [n] of the stored dofs [m], by a sparse solve with K
 };
 
+/// What overlays can be.
+inline constexpr int least_refinement = 2, most_refinement = 16, most_rings = 16;
+
+/// Overlays that were condensed ahead, each over the elements within some rings round one node.
+struct StoredOverlay {
+  int refinement = 0;                   ///< r: each element is cut into r^d; 0: none are stored
+  int rings = 0;                        ///< of elements round the centres
+  std::vector<Index> centres;           ///< [P] mesh nodes on the surface, ascending
+  std::vector<CondensedPatch> patches;  ///< [P]
+};
+
 /// Everything baked. Constant once loaded; shared by all threads.
 /// With d = dimension(), a stored dof is d k + axis for stored node k; `stored_nodes[k]` is its mesh node.
 /// A node that is held along some axes only is stored whole: rows and columns of its held dofs are zero.
@@ -59,6 +71,7 @@ struct Model {
   QualityReport quality;
   std::vector<SourceFile> sources;
   std::vector<Probe> probes;
+  StoredOverlay overlay;
   PackedGreens greens;       ///< Xi of the stored dofs [m/N]
   std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
 

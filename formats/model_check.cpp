@@ -1,5 +1,7 @@
 #include "formats/model_check.h"
 
+#include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "meshes/element.h"
@@ -16,12 +18,29 @@ std::int64_t smallest(Count count) {
     case Count::elements:
     case Count::materials:
     case Count::stored_nodes:
+    case Count::patches:
       return 1;
     case Count::nodes:
       return 3;
     default:
       return 0;
   }
+}
+
+/// What the sizes of the patches' matrices ask for.
+void count_patches(const Model& model, Counts& counts) {
+  counts.set(Count::patches, std::ssize(model.overlay.patches), "/overlay/centres");
+  std::int64_t surface = 0, softening = 0, transfer = 0, compliance = 0;
+  for (const CondensedPatch& patch : model.overlay.patches) {
+    surface += patch.compliance.cols() / model.dimension();
+    softening += packed_size(patch.G.cols());
+    transfer += patch.compliance.cols() * patch.G.cols();
+    compliance += packed_size(patch.compliance.cols());
+  }
+  counts.set(Count::patch_surface_nodes, surface, "/overlay/surface_nodes");
+  counts.set(Count::patch_softening_entries, softening, "/overlay/nodes");
+  counts.set(Count::patch_transfer_entries, transfer, "/overlay/nodes");
+  counts.set(Count::patch_compliance_entries, compliance, "/overlay/surface_nodes");
 }
 
 bool counts_index_numbers(Count count) {
@@ -73,6 +92,35 @@ void check_stored_nodes(const Model& model, const std::string& where) {
   }
 }
 
+void check_range(const char* path, int value, int low, int high, const std::string& where) {
+  if (value < low || value > high)
+    refuse(where, std::string(path) + " is " + std::to_string(value) + ", only " + std::to_string(low) +
+                      " to " + std::to_string(high) + " are possible");
+}
+
+/// Whether the patches belong to their fine meshes is seen when these are made.
+void check_overlay(const Model& model, const std::string& where) {
+  const StoredOverlay& overlay = model.overlay;
+  check_range("/overlay/refinement", overlay.refinement, least_refinement, most_refinement, where);
+  check_range("/overlay/rings", overlay.rings, 1, most_rings, where);
+  std::vector<bool> stored(model.mesh.nodes.size(), false), touched(model.mesh.nodes.size(), false);
+  for (const Index node : model.stored_nodes) stored[static_cast<std::size_t>(node)] = true;
+  for (const Index node : model.surface) touched[static_cast<std::size_t>(node)] = true;
+  for (std::size_t k = 0; k < overlay.centres.size(); ++k) {
+    const auto node = static_cast<std::size_t>(overlay.centres[k]);
+    if (!stored[node] || !touched[node])
+      refuse(where, "/overlay/centres: node " + std::to_string(node) +
+                        (touched[node] ? " is not stored" : " is not on the surface"));
+    if (k > 0 && overlay.centres[k - 1] >= overlay.centres[k])
+      refuse(where, "/overlay/centres: entry " + std::to_string(k) + " is not greater than the one before");
+    const CondensedPatch& patch = overlay.patches[k];
+    if (!std::is_sorted(patch.surface.begin(), patch.surface.end(), std::less_equal<>()))
+      refuse(where, "/overlay/surface: the nodes of patch " + std::to_string(k) + " do not ascend");
+    if (patch.compliance.size() > 0 && patch.compliance.diagonal().minCoeff() < 0.0)
+      refuse(where, "/overlay/compliance: patch " + std::to_string(k) + " has a negative diagonal entry");
+  }
+}
+
 }  // namespace
 
 void refuse(const std::string& where, const std::string& what) {
@@ -97,6 +145,7 @@ Counts Counts::of(const Model& model, std::string where) {
   set(Count::probes, model.probes.size(), "/probes/forces");
   set(Count::bytes_of_text, model.model_toml.size(), "/model_toml");
   set(Count::bytes_of_sources, sources_text(model).size(), "/provenance/sources");
+  if (model.overlay.refinement != 0) count_patches(model, counts);
   return counts;
 }
 
@@ -153,6 +202,7 @@ void check_model(const Model& model, const std::string& where) {
   check_elements(model.mesh, where);
   check_surface(model, where);
   check_stored_nodes(model, where);
+  if (model.overlay.refinement != 0) check_overlay(model, where);
 }
 
 }  // namespace palpate

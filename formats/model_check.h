@@ -67,7 +67,8 @@ void check_values(const Field<T>& field, const std::vector<T>& values, const Cou
 
 /// Proves what involves several fields: an analysis that fits the elements, valid materials and thickness, a
 /// plane body in z = 0, elements that are nowhere inverted, surface simplices with distinct corners, stored
-/// nodes that are free along every axis and named once. Sizes are right and values in their ranges already.
+/// nodes that are free along some axis and named once, patches
+/// in their order round stored nodes of the surface. Sizes are right and values in their ranges already.
 /// Throws Error (where = `where`) naming the field.
 void check_model(const Model& model, const std::string& where);
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <span>
 #include <string_view>
 
 namespace palpate {
@@ -19,6 +20,48 @@ std::string_view cut(std::string_view& rest, char separator) {
   const std::string_view part = rest.substr(0, at);
   rest.remove_prefix(at + 1);
   return part;
+}
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Gives each patch its part of the values, as long as its size says. Throws Unreadable when they are not as
+/// many as all need.
+template <class T, class Size, class Put>
+void hand_out(Model& model, const std::vector<T>& values, Size&& size, Put&& put) {
+  std::vector<CondensedPatch>& patches = model.overlay.patches;
+  std::int64_t left = std::ssize(values);
+  for (std::size_t k = 0; k < patches.size(); ++k) {
+    left -= size(patches[k]);
+    if (left < 0) throw Unreadable{"ends within patch " + std::to_string(k)};
+  }
+  if (left > 0) throw Unreadable{"has " + std::to_string(left) + " entries more than its patches"};
+  std::span<const T> rest = values;
+  for (CondensedPatch& patch : patches) {
+    const auto count = static_cast<std::size_t>(size(patch));
+    put(patch, rest.first(count));
+    rest = rest.subspan(count);
+  }
+}
+
+/// Lower triangles of a matrix of each patch, column by column.
+template <class Which>
+std::vector<double> all_packed(const Model& model, Which&& which) {
+  std::vector<double> values;
+  for (const CondensedPatch& patch : model.overlay.patches) {
+    const Eigen::MatrixXd& matrix = which(patch);
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j)
+      for (Eigen::Index i = j; i < matrix.rows(); ++i) values.push_back(matrix(i, j));
+  }
+  return values;
+}
+
+/// Whose columns are there already.
+void unpack(std::span<const double> packed, Eigen::MatrixXd& matrix) {
+  const Eigen::Index order = matrix.cols();
+  matrix.resize(order, order);
+  auto value = packed.begin();
+  for (Eigen::Index j = 0; j < order; ++j)
+    for (Eigen::Index i = j; i < order; ++i) matrix(i, j) = matrix(j, i) = *value++;
 }
 
 bool is_checksum(std::string_view text) {
@@ -189,6 +232,92 @@ void put_sources_text(Model& model, const std::vector<std::uint8_t>& text) {
       throw Unreadable{"has a line that is not 'role bytes checksum path'"};
     model.sources.push_back(std::move(source));
   }
+}
+
+void put_centres(Model& model, const std::vector<std::int32_t>& values) {
+  model.overlay.centres = values;
+  model.overlay.patches.resize(values.size());
+}
+
+// Before its entries are there, a matrix has columns but no rows: no memory is taken for what a file only
+// claims.
+
+std::vector<std::int32_t> patch_node_counts(const Model& model) {
+  std::vector<std::int32_t> counts;
+  for (const CondensedPatch& patch : model.overlay.patches)
+    counts.push_back(static_cast<std::int32_t>(patch.G.cols() / model.dimension()));
+  return counts;
+}
+
+void put_patch_node_counts(Model& model, const std::vector<std::int32_t>& values) {
+  for (std::size_t k = 0; k < values.size(); ++k)
+    model.overlay.patches[k].G.resize(0, model.dimension() * Eigen::Index{values[k]});
+}
+
+std::vector<std::int32_t> patch_surface_counts(const Model& model) {
+  std::vector<std::int32_t> counts;
+  for (const CondensedPatch& patch : model.overlay.patches)
+    counts.push_back(static_cast<std::int32_t>(patch.compliance.cols() / model.dimension()));
+  return counts;
+}
+
+void put_patch_surface_counts(Model& model, const std::vector<std::int32_t>& values) {
+  for (std::size_t k = 0; k < values.size(); ++k)
+    model.overlay.patches[k].compliance.resize(0, model.dimension() * Eigen::Index{values[k]});
+}
+
+std::vector<std::int32_t> patch_surface_nodes(const Model& model) {
+  std::vector<std::int32_t> nodes;
+  for (const CondensedPatch& patch : model.overlay.patches)
+    nodes.insert(nodes.end(), patch.surface.begin(), patch.surface.end());
+  return nodes;
+}
+
+void put_patch_surface_nodes(Model& model, const std::vector<std::int32_t>& values) {
+  hand_out(
+      model, values, [&](const CondensedPatch& patch) { return patch.compliance.cols() / model.dimension(); },
+      [](CondensedPatch& patch, std::span<const std::int32_t> part) {
+        patch.surface.assign(part.begin(), part.end());
+      });
+}
+
+std::vector<double> patch_softenings(const Model& model) {
+  return all_packed(
+      model, [](const CondensedPatch& patch) -> auto& { return patch.G; });
+}
+
+void put_patch_softenings(Model& model, const std::vector<double>& values) {
+  hand_out(
+      model, values, [](const CondensedPatch& patch) { return packed_size(patch.G.cols()); },
+      [](CondensedPatch& patch, std::span<const double> part) { unpack(part, patch.G); });
+}
+
+std::vector<double> patch_transfers(const Model& model) {
+  std::vector<double> values;
+  for (const CondensedPatch& patch : model.overlay.patches) {
+    const RowMajor rows = patch.T;
+    values.insert(values.end(), rows.data(), rows.data() + rows.size());
+  }
+  return values;
+}
+
+void put_patch_transfers(Model& model, const std::vector<double>& values) {
+  hand_out(
+      model, values, [](const CondensedPatch& patch) { return patch.compliance.cols() * patch.G.cols(); },
+      [](CondensedPatch& patch, std::span<const double> part) {
+        patch.T = Eigen::Map<const RowMajor>(part.data(), patch.compliance.cols(), patch.G.cols());
+      });
+}
+
+std::vector<double> patch_compliances(const Model& model) {
+  return all_packed(
+      model, [](const CondensedPatch& patch) -> auto& { return patch.compliance; });
+}
+
+void put_patch_compliances(Model& model, const std::vector<double>& values) {
+  hand_out(
+      model, values, [](const CondensedPatch& patch) { return packed_size(patch.compliance.cols()); },
+      [](CondensedPatch& patch, std::span<const double> part) { unpack(part, patch.compliance); });
 }
 
 }  // namespace palpate

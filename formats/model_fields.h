@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -21,9 +22,14 @@ enum class Count : std::uint8_t {
   stored_nodes,
   probes,
   bytes_of_text,
-  bytes_of_sources
+  bytes_of_sources,
+  patches,
+  patch_surface_nodes,  // of all patches together, as the next ones are
+  patch_softening_entries,
+  patch_transfer_entries,
+  patch_compliance_entries
 };
-inline constexpr std::size_t number_of_counts = 9;
+inline constexpr std::size_t number_of_counts = 14;
 
 /// One dimension of a field: factor * count + plus.
 struct Extent {
@@ -57,6 +63,9 @@ struct Field {
   Extent below = {Count::one, 0, 0};   ///< integers: every value must be in [0, below); no limit when 0
 };
 
+/// More nodes on the surface of one patch are refused: its matrices' sizes would not be numbers.
+inline constexpr std::int64_t most_patch_surface_nodes = 1 << 28;
+
 /// Thrown by `put`: what is wrong with the values, without the field's name.
 struct Unreadable {
   std::string what;
@@ -81,6 +90,21 @@ std::vector<double> quality_summary(const Model& model);
 void put_quality_summary(Model& model, const std::vector<double>& values);
 std::vector<std::uint8_t> sources_text(const Model& model);
 void put_sources_text(Model& model, const std::vector<std::uint8_t>& text);
+void put_centres(Model& model, const std::vector<std::int32_t>& values);
+std::vector<std::int32_t> patch_node_counts(const Model& model);
+void put_patch_node_counts(Model& model, const std::vector<std::int32_t>& values);
+std::vector<std::int32_t> patch_surface_counts(const Model& model);
+void put_patch_surface_counts(Model& model, const std::vector<std::int32_t>& values);
+std::vector<std::int32_t> patch_surface_nodes(const Model& model);
+void put_patch_surface_nodes(Model& model, const std::vector<std::int32_t>& values);
+/// Of all patches, one after the other: symmetric matrices by their lower triangles, column by column, T by
+/// its rows.
+std::vector<double> patch_softenings(const Model& model);
+void put_patch_softenings(Model& model, const std::vector<double>& values);
+std::vector<double> patch_transfers(const Model& model);
+void put_patch_transfers(Model& model, const std::vector<double>& values);
+std::vector<double> patch_compliances(const Model& model);
+void put_patch_compliances(Model& model, const std::vector<double>& values);
 void expect_dimension(const Model& model, std::int64_t dimension);
 ElementType element_from(const std::string& text);
 Analysis analysis_from(const std::string& text);
@@ -251,7 +275,46 @@ void for_each_probe_field(ElementType element, Visitor&& visit) {
                       }});
 }
 
-/// Every dataset but the Green's functions, which are mapped and not copied.
+inline constexpr const char* overlay_group = "/overlay";
+
+/// Datasets of files that hold overlays; others do not have the group.
+template <class Visitor>
+void for_each_overlay_field(Visitor&& visit) {
+  using Int32s = std::vector<std::int32_t>;
+  const Extent one = {Count::one}, patches = {Count::patches};
+  visit(Field<std::int32_t>{"/overlay/refinement",
+                            {one},
+                            [](const Model& m) { return Int32s{m.overlay.refinement}; },
+                            [](Model& m, const Int32s& v) { m.overlay.refinement = v[0]; }});
+  visit(Field<std::int32_t>{"/overlay/rings",
+                            {one},
+                            [](const Model& m) { return Int32s{m.overlay.rings}; },
+                            [](Model& m, const Int32s& v) { m.overlay.rings = v[0]; }});
+  visit(Field<std::int32_t>{"/overlay/centres",
+                            {patches},
+                            [](const Model& m) { return Int32s(m.overlay.centres); },
+                            put_centres,
+                            {Count::nodes}});
+  visit(Field<std::int32_t>{
+      "/overlay/nodes", {patches}, patch_node_counts, put_patch_node_counts, {Count::nodes, 1, 1}});
+  visit(Field<std::int32_t>{"/overlay/surface_nodes",
+                            {patches},
+                            patch_surface_counts,
+                            put_patch_surface_counts,
+                            {Count::one, most_patch_surface_nodes, 1}});
+  visit(Field<std::int32_t>{"/overlay/surface",
+                            {{Count::patch_surface_nodes}},
+                            patch_surface_nodes,
+                            put_patch_surface_nodes,
+                            {Count::one, std::numeric_limits<std::int32_t>::max(), 0}});
+  visit(Field<double>{
+      "/overlay/G", {{Count::patch_softening_entries}}, patch_softenings, put_patch_softenings});
+  visit(Field<double>{"/overlay/T", {{Count::patch_transfer_entries}}, patch_transfers, put_patch_transfers});
+  visit(Field<double>{
+      "/overlay/compliance", {{Count::patch_compliance_entries}}, patch_compliances, put_patch_compliances});
+}
+
+/// Every dataset but those of overlays and the Green's functions, which are mapped and not copied.
 template <class Visitor>
 void for_each_field(ElementType element, Visitor&& visit) {
   for_each_body_field(element, visit);

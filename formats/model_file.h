@@ -14,7 +14,7 @@
 namespace palpate {
 
 inline constexpr int format_major = 3;  ///< another major version is refused: "precompute it again"
-inline constexpr int format_minor = 0;  ///< newer minor versions are read, what they add is ignored
+inline constexpr int format_minor = 1;  ///< newer minor versions are read, what they add is ignored
 
 /// Streams a model to disk. Everything but Green's functions and probes is written by the constructor to
 /// PATH.partial, with the space of the packed matrix reserved (contiguous, page-aligned); columns then arrive

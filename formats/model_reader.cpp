@@ -101,6 +101,10 @@ Model Reader::read() {
   const std::vector<std::int64_t> version = read_version(file_);
   for_each_attribute([this](const auto& attribute) { read_attribute(attribute); });
   for_each_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
+  if (file_.has(overlay_group)) {
+    for_each_overlay_field([this](const auto& field) { read_field(field); });
+    if (model_.overlay.refinement == 0) refuse(where_, "/overlay/refinement is 0");
+  }
   check_model(model_, where_);
   map_greens();
   check_content(version);

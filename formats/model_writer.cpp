@@ -43,6 +43,13 @@ void write_field(hdf5::File& file, const Field<T>& field, const Model& model, co
   file.write_attribute(field.path, "xxh3", checksum_of(values));
 }
 
+/// Datasets that are known before the Green's functions, those of overlays where there are any.
+template <class Visitor>
+void for_each_known_field(const Model& model, Visitor&& visit) {
+  for_each_body_field(model.mesh.element, visit);
+  if (model.overlay.refinement != 0) for_each_overlay_field(visit);
+}
+
 void write_attributes(hdf5::File& file, const Model& model, const FileHeader& header) {
   file.write_attribute("/", "format", std::string("palpate"));
   file.write_attribute("/", "version", version);
@@ -144,7 +151,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
 JournalFrame ModelWriter::Impl::examine(const Model& model) {
   add_attributes(content, model, header, version);
   std::int64_t bytes = 0;
-  for_each_body_field(model.mesh.element, [&](const auto& field) {
+  for_each_known_field(model, [&](const auto& field) {
     const auto values = field.take(model);
     check_values(field, values, counts);
     content.add_dataset(field.path, checksum_of(values));
@@ -204,8 +211,7 @@ void ModelWriter::Impl::write_body(const Model& model) {
 
   hdf5::File file = hdf5::File::create(partial, entries * bytes_per_scalar(header.precision));
   write_attributes(file, model, header);
-  for_each_body_field(model.mesh.element,
-                      [&](const auto& field) { write_field(file, field, model, counts); });
+  for_each_known_field(model, [&](const auto& field) { write_field(file, field, model, counts); });
   write_vtk_view(file);
   file.write(greens_path, scalar, std::array{entries}, nullptr);
   frame.greens_at = file.locate(greens_path, scalar, 1).offset;

@@ -18,6 +18,7 @@
 #include "precompute/greens.h"
 #include "precompute/interrupt.h"
 #include "precompute/loads.h"
+#include "precompute/overlay_regions.h"
 #include "precompute/plan.h"
 #include "precompute/progress.h"
 #include "precompute/scope.h"
@@ -79,6 +80,7 @@ Model describe_model(const Description& description, const BakeOptions& options,
   model.layers = description.scope == Scope::layers ? description.layers : 0;
   model.quality = measure_quality(body.mesh);
   model.mesh = std::move(body.mesh);
+  model.rest_displacement.assign(model.mesh.nodes.size(), Vec3::Zero());  // until it is known
   model.sources.push_back(describe_source("model", description.file, options.output));
   for (const auto& file : input_files(description)) {
     model.sources.push_back(describe_source("geometry", file, options.output));
@@ -178,8 +180,17 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
     throw Error("no node of the boundary is free along every axis, so nothing can be touched",
                 description.file.string(), "Hold a smaller part of the body in [[fixed]].");
   }
-  const Plan plan = make_plan(model.mesh, factor, solver, description.precision, options.jobs);
+  Plan plan = make_plan(model.mesh, factor, solver, description.precision, options.jobs);
   print_plan(plan, model, description, options, progress);
+  OverlayPlan overlays;
+  if (description.overlay) {
+    overlays = plan_overlays(model, *description.overlay, description.file.string());
+    progress.line(fmt::format("overlays: {} patches, {} ring{} of elements each, cut into {}^{}: {:.1f} MB",
+                              overlays.centres.size(), description.overlay->rings,
+                              description.overlay->rings == 1 ? "" : "s", description.overlay->refinement,
+                              model.dimension(), static_cast<double>(overlays.file_bytes) * 1e-6));
+    plan.overlay_bytes = overlays.memory_bytes;
+  }
   check_memory(plan);
   if (options.dry_run) return BakeResult::planned;
 
@@ -189,7 +200,19 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   model.rest_force = loads;
   model.rest_displacement = rest_displacement(factor, stiffness, loads, prescribed, model.dimension());
   const InterruptGuard interrupt;
+  if (description.overlay) {
+    model.overlay =
+        condense_overlays(model, *description.overlay, overlays.centres, options.jobs, [&](double share) {
+          progress.step("overlays", share);
+          return !interrupt.requested();
+        });
+    if (interrupt.requested()) {
+      progress.line("interrupted: nothing was written");
+      return BakeResult::interrupted;
+    }
+  }
   ModelWriter writer(options.output, model, description.precision);
+  model.overlay = {};  // written by now
   if (!solve_columns(solver, plan, options.jobs, writer, progress, interrupt)) {
     writer.discard();
     progress.line("interrupted: nothing was written");

@@ -114,7 +114,7 @@ Description read_description(const std::filesystem::path& path) {
   const toml::table empty;
   const Section root(
       table, "", file,
-      {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load", "storage"});
+      {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load", "storage", "overlay"});
   const auto optional_section = [&](std::string_view key, const Keys& keys) {
     return root.has(key) ? root.section(key, keys)
                          : Section(empty, std::string("[").append(key).append("]"), file, keys);
@@ -141,6 +141,10 @@ Description read_description(const std::filesystem::path& path) {
   result.scope = read_scope(storage, dimension);
   result.layers = read_layers(storage, result.scope);
   result.precision = read_precision(storage);
+  if (root.has("overlay")) {
+    result.overlay =
+        read_overlay(root.section("overlay", overlay_keys), dimension, result.scope, result.layers);
+  }
   return result;
 }
 

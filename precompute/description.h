@@ -104,6 +104,13 @@ struct Gravity {
 };
 using Load = std::variant<NodalForce, Traction, Gravity>;
 
+/// Overlays that are condensed ahead: one round each surface node in the regions.
+struct OverlayRegions {
+  int refinement = 3;  ///< each element is cut into r^d
+  int rings = 2;       ///< of elements round the node
+  std::vector<Selection> regions;
+};
+
 /// The whole model.toml, checked.
 struct Description {
   std::filesystem::path file;  ///< model.toml itself
@@ -120,6 +127,7 @@ struct Description {
   Scope scope = Scope::layers;
   Index layers = 1;
   Precision precision = Precision::single_precision;
+  std::optional<OverlayRegions> overlay;
 };
 
 /// Reads and checks model.toml. Relative files are taken from its folder. Throws Error with file, line and

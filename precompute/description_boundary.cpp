@@ -61,6 +61,18 @@ Load read_load(const Section& entry, int dimension) {
   return NodalForce{value, where};
 }
 
+int count_within(const Section& section, std::string_view key, int low, int high, int fallback) {
+  if (!section.has(key)) {
+    return fallback;
+  }
+  const Index value = section.integer(key);
+  if (value < low || value > high) {
+    section.fail(key, fmt::format("{} must be from {} to {}, not {}", section.name_of(key), low, high, value),
+                 fmt::format("use {} unless you know better", fallback));
+  }
+  return value;
+}
+
 Keys with_selections(Keys keys) {
   keys.insert(keys.end(), selection_kinds.begin(), selection_kinds.end());
   return keys;
@@ -78,6 +90,34 @@ std::vector<Fixing> read_fixed(const Section& root, int dimension) {
   std::vector<Fixing> result;
   for (const Section& entry : root.sections("fixed", with_selections({"axes", "displacement"}), hint)) {
     result.push_back(read_fixing(entry, dimension));
+  }
+  return result;
+}
+
+const Keys overlay_keys = {"refinement", "rings", "region"};
+
+OverlayRegions read_overlay(const Section& overlay, int dimension, Scope scope, Index layers) {
+  OverlayRegions result;
+  result.refinement =
+      count_within(overlay, "refinement", least_refinement, most_refinement, result.refinement);
+  result.rings = count_within(overlay, "rings", 1, most_rings, result.rings);
+  if (scope != Scope::full && result.rings > layers) {
+    const std::string kept = scope == Scope::surface ? "none" : std::to_string(layers);
+    overlay.fail(
+        "rings",
+        fmt::format("[overlay] rings reaches {} layer{} of elements deep, of which [storage] keeps {}",
+                    result.rings, result.rings == 1 ? "" : "s", kept),
+        fmt::format("set scope = \"layers\" and layers = {0} in [storage], or take fewer rings",
+                    result.rings));
+  }
+  const std::string hint =
+      dimension == 3 ? "write for example\n[[overlay.region]]\nsphere = {center = [0, 0, 0], radius = 0.01}"
+                     : "write for example\n[[overlay.region]]\nsphere = {center = [0, 0], radius = 0.01}";
+  if (!overlay.has("region")) {
+    overlay.fail("region", "[overlay] has no region", hint);
+  }
+  for (const Section& entry : overlay.sections("region", selection_kinds, hint)) {
+    result.regions.push_back(read_selection(entry, entry.only_one_of(selection_kinds), dimension));
   }
   return result;
 }

@@ -30,6 +30,9 @@ Selection read_selection(const Section& entry, std::string_view kind, int dimens
 std::vector<MaterialPart> read_materials(const Section& root, int dimension);
 /// Every [[fixed]]: at least one.
 std::vector<Fixing> read_fixed(const Section& root, int dimension);
+extern const Keys overlay_keys;
+/// [overlay], for what [storage] keeps.
+OverlayRegions read_overlay(const Section& overlay, int dimension, Scope scope, Index layers);
 /// Every [[load]], possibly none.
 std::vector<Load> read_loads(const Section& root, int dimension);
 

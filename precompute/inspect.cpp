@@ -63,6 +63,18 @@ std::string materials_text(const Model& model) {
   return text;
 }
 
+/// Nothing where none are stored.
+std::string overlay_text(const Model& model) {
+  const StoredOverlay& overlay = model.overlay;
+  if (overlay.refinement == 0) return "";
+  std::int64_t entries = 0;
+  for (const CondensedPatch& patch : overlay.patches)
+    entries += packed_size(patch.G.rows()) + patch.T.size() + packed_size(patch.compliance.rows());
+  return fmt::format("  overlays          {} patches, r = {}, {} ring{}, {:.1f} MB\n", overlay.patches.size(),
+                     overlay.refinement, overlay.rings, overlay.rings == 1 ? "" : "s",
+                     8e-6 * static_cast<double>(entries));
+}
+
 /// The largest displacement at rest and the force that the loads put on the body in all.
 std::string rest_text(const Model& model) {
   Vec3 total = Vec3::Zero();
@@ -100,6 +112,7 @@ std::string inspect(const Model& model) {
       model.stored_nodes.size(), model.stored_dofs(), single ? "single" : "double",
       static_cast<double>(packed_size(model.stored_dofs()) * bytes_per_scalar(model.greens.precision())) *
           1e-6);
+  text += overlay_text(model);
   text += fmt::format("  probes            {}\n", model.probes.size());
   text += fmt::format("  edges             {:.4g} to {:.4g} m\n", q.min_edge, q.max_edge);
   text += fmt::format("  {:17} {:.2f} to {:.2f} deg\n", plane ? "corner angles" : "dihedral angles",

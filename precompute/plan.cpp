@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <string>
 #include <vector>
 
 #include "formats/memory.h"
@@ -62,14 +63,21 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
 
 void check_memory(const Plan& plan) {
   const std::int64_t available = available_memory();
-  if (available == 0 || plan.memory_bytes <= available) return;  // 0: the kernel does not say
+  const std::int64_t needed = plan.memory_bytes + plan.overlay_bytes;
+  if (available == 0 || needed <= available) return;  // 0: the kernel does not say
+  const std::string overlays =
+      plan.overlay_bytes == 0
+          ? ""
+          : fmt::format(", {:.2f} GB for overlays", static_cast<double>(plan.overlay_bytes) / 1e9);
   throw Error(
-      fmt::format("{:.2f} GB of memory are needed, {:.2f} GB are free: {:.2f} GB for the factor ({} entries) "
-                  "and the rest "
-                  "for blocks of {} columns",
-                  static_cast<double>(plan.memory_bytes) / 1e9, static_cast<double>(available) / 1e9,
-                  static_cast<double>(plan.factor_entries) * 8e-9, plan.factor_entries, plan.block_columns),
-      "memory", "Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading.");
+      fmt::format("{:.2f} GB of memory are needed, {:.2f} GB are free: {:.2f} GB for the factor ({} entries)"
+                  "{} and the rest for blocks of {} columns",
+                  static_cast<double>(needed) / 1e9, static_cast<double>(available) / 1e9,
+                  static_cast<double>(plan.factor_entries) * 8e-9, plan.factor_entries, overlays,
+                  plan.block_columns),
+      "memory",
+      std::string("Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading") +
+          (overlays.empty() ? "." : ", or smaller regions in [overlay]."));
 }
 
 }  // namespace palpate

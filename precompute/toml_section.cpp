@@ -259,12 +259,15 @@ std::vector<Section> Section::sections(std::string_view key, const Keys& known,
   if (entries == nullptr || entries->empty()) {
     fail(key, name_of(key) + " must be a list of at least one table", hint);
   }
+  // "[overlay]" and "region" make "[[overlay.region]]".
+  const std::string path =
+      (title_.empty() ? "" : title_.substr(1, title_.size() - 2) + ".") + std::string(key);
   std::vector<Section> result;
   for (const toml::node& entry : *entries) {
     if (!entry.is_table()) {
       throw Error("every entry of " + name_of(key) + " must be a table", place(entry), hint);
     }
-    result.emplace_back(*entry.as_table(), std::string("[[").append(key).append("]]"), file_, known);
+    result.emplace_back(*entry.as_table(), "[[" + path + "]]", file_, known);
   }
   return result;
 }

@@ -5,8 +5,8 @@
 #include <Eigen/SparseCore>
 #include <vector>
 
+#include "formats/patch_mesh.h"
 #include "runtime/body.h"
-#include "runtime/patch_mesh.h"
 
 namespace palpate {
 

@@ -77,4 +77,11 @@ std::size_t Patch::bytes() const noexcept {
          sizeof(Index) * (surface_nodes_.size() + stored_nodes_.size());
 }
 
+std::size_t Patch::bytes_of(const CondensedPatch& condensed) noexcept {
+  const auto entries =
+      static_cast<std::size_t>(condensed.compliance.size() + condensed.T.size() + condensed.G.size());
+  const auto dofs = static_cast<std::size_t>(condensed.T.rows() + condensed.T.cols());
+  return sizeof(double) * entries + sizeof(Index) * dofs;  // the indices by dofs: an upper bound
+}
+
 }  // namespace palpate

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "formats/condensation.h"
 #include "runtime/body.h"
-#include "runtime/condensation.h"
 
 namespace palpate {
 
@@ -36,6 +36,8 @@ class Patch {
 
   /// Memory that it takes.
   [[nodiscard]] std::size_t bytes() const noexcept;
+  /// Memory that one of this takes.
+  [[nodiscard]] static std::size_t bytes_of(const CondensedPatch& condensed) noexcept;
 
  private:
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;

@@ -19,6 +19,17 @@ std::vector<Index> nodes_of(const Mesh& mesh, const std::vector<Index>& elements
   return nodes;
 }
 
+/// Whether the sizes are those of this mesh, and the surface's nodes.
+bool fits(const CondensedPatch& condensed, const PatchMesh& mesh, int dimension) {
+  std::vector<Index> surface = mesh.surface;
+  std::sort(surface.begin(), surface.end());
+  surface.erase(std::unique(surface.begin(), surface.end()), surface.end());
+  const Eigen::Index g = dimension * std::ssize(mesh.nodes), m = dimension * std::ssize(surface);
+  return condensed.surface == surface && condensed.G.rows() == g && condensed.G.cols() == g &&
+         condensed.T.rows() == m && condensed.T.cols() == g && condensed.compliance.rows() == m &&
+         condensed.compliance.cols() == m;
+}
+
 }  // namespace
 
 PatchMaker::PatchMaker(const Body& body, int rings)
@@ -50,8 +61,24 @@ std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
   const Model& model = body_.model();
   std::vector<Index> nodes;
   for (const Index centre : centres) nodes.push_back(body_.mesh_node(centre));
-  const PatchMesh mesh = make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
-  return std::make_shared<const Patch>(body_, mesh, condense(model, mesh));
+  const PatchMesh mesh =
+      make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
+  const CondensedPatch* ready = centres.size() == 1 ? stored(centres[0]) : nullptr;
+  if (ready == nullptr) return std::make_shared<const Patch>(body_, mesh, condense(model, mesh));
+  if (!fits(*ready, mesh, body_.dimension()))
+    throw Error("the overlay that is stored for node " + std::to_string(nodes[0]) +
+                    " does not belong to the fine mesh there",
+                model.name, "precompute it again");
+  return std::make_shared<const Patch>(body_, mesh, *ready);
+}
+
+const CondensedPatch* PatchMaker::stored(Index centre) const noexcept {
+  const StoredOverlay& overlay = body_.model().overlay;
+  if (overlay.refinement != body_.refinement() || overlay.rings != rings_) return nullptr;
+  const Index node = body_.mesh_node(centre);
+  const auto found = std::lower_bound(overlay.centres.begin(), overlay.centres.end(), node);
+  if (found == overlay.centres.end() || *found != node) return nullptr;
+  return &overlay.patches[static_cast<std::size_t>(found - overlay.centres.begin())];
 }
 
 std::vector<Index> PatchMaker::neighbours(Index centre) const {

@@ -22,8 +22,12 @@ class PatchMaker {
   PatchMaker(const Body& body, int rings);
 
   /// One patch over the elements within the rings round all centres (stored nodes): where those of several
-  /// overlap they are one. Throws Error when the elements are too flat.
+  /// overlap they are one. Round one centre it is taken from the file where that has it, else condensed.
+  /// Throws Error when the elements are too flat, or when what the file has is not of this patch.
   [[nodiscard]] std::shared_ptr<const Patch> make(std::span<const Index> centres);
+
+  /// What the file has of the patch round a stored node, null where it has none as the body's and ours are.
+  [[nodiscard]] const CondensedPatch* stored(Index centre) const noexcept;
 
   /// Most nodes g of a patch round one centre.
   [[nodiscard]] Index most_nodes() const noexcept { return most_nodes_; }

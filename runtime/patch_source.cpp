@@ -105,11 +105,12 @@ void PatchSource::build_wishes() {
   }
 }
 
-/// What is wished for first, then round the first centre, those first that the tool moves towards.
+/// What is wished for first, then what the file has, then round the first centre, those first that the tool moves towards.
 bool PatchSource::build_next(const PatchWishes& wishes) {
   bool built = false;
   for (std::size_t k = 0; k < wishes.count && !built; ++k) built = build(wishes.keys[k]);
-  if (built || wishes.count == 0 || wishes.keys[0].count() != 1) return built;
+  if (built || build_stored()) return true;
+  if (wishes.count == 0 || wishes.keys[0].count() != 1) return false;
   const Index centre = wishes.keys[0].centres[0];
   std::vector<Index> neighbours = maker_.neighbours(centre);
   const auto along = [&](Index node) {
@@ -120,6 +121,25 @@ bool PatchSource::build_next(const PatchWishes& wishes) {
   for (const Index neighbour : neighbours) {
     PatchKey key;
     key.add(neighbour);
+    if (build(key)) return true;
+  }
+  return false;
+}
+
+/// The next of the file's patches, in their order, as long as there is memory for them.
+bool PatchSource::build_stored() {
+  const StoredOverlay& overlay = body_.model().overlay;
+  while (next_stored_ < overlay.centres.size()) {
+    const Index centre = body_.stored_node(overlay.centres[next_stored_]);
+    const CondensedPatch* condensed = centre >= 0 ? maker_.stored(centre) : nullptr;
+    if (condensed == nullptr || free_slots_.empty() ||
+        bytes_ + Patch::bytes_of(*condensed) > options_.memory) {
+      next_stored_ = overlay.centres.size();
+      break;
+    }
+    ++next_stored_;
+    PatchKey key;
+    key.add(centre);
     if (build(key)) return true;
   }
   return false;

@@ -36,7 +36,7 @@ struct PatchCounts {
 /// locks or allocates. Patches are freed by the builder, after nobody uses them any more.
 class PatchSource {
  public:
-  /// Starts the builder. `body` must live as long; `state` is one that the loop will use, or a copy. Throws
+  /// Starts the builder, which makes what the file has of patches first of all but the wishes. `body` must live as long; `state` is one that the loop will use, or a copy. Throws
   /// Error when the file keeps too few layers below the surface.
   PatchSource(const Body& body, const State& state, const PatchSourceOptions& options);
   ~PatchSource();
@@ -81,6 +81,7 @@ class PatchSource {
 
   void build_wishes();
   bool build_next(const PatchWishes& wishes);
+  bool build_stored();
   bool build(const PatchKey& key);
   void make_room();
   void deliver(Delivery delivery);
@@ -103,6 +104,7 @@ class PatchSource {
   std::map<PatchKey, Kept, Less> kept_;
   std::vector<Index> free_slots_;
   std::vector<std::shared_ptr<const Patch>> retired_;
+  std::size_t next_stored_ = 0;  // of the file's patches
   std::int64_t round_ = 0;
   std::atomic<std::int64_t> built_ = 0;
   std::atomic<std::int64_t> failed_ = 0;

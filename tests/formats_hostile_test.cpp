@@ -418,6 +418,58 @@ const Edit edits[] = {
     {"ManyLayers",
      [](const Path& p) { set_integers(p, "layers", {std::int64_t{1} << 40}); },
      {"attribute layers is"}},
+    // overlays
+    {"OverlayWithoutCentres",
+     [](const Path& p) { remove_object(p, "/overlay/centres"); },
+     {"/overlay/centres is missing"}},
+    {"OverlayRefinementZero",
+     [](const Path& p) { set_entry(p, "/overlay/refinement", 0, std::int32_t{0}); },
+     {"/overlay/refinement is 0"}},
+    {"OverlayRefinementLarge",
+     [](const Path& p) { set_entry(p, "/overlay/refinement", 0, std::int32_t{17}); },
+     {"/overlay/refinement is 17, only 2 to 16"}},
+    {"OverlayRingsNegative",
+     [](const Path& p) { set_entry(p, "/overlay/rings", 0, std::int32_t{-1}); },
+     {"/overlay/rings is -1, only 1 to 16"}},
+    {"OverlayCentreOutside",
+     [](const Path& p) { set_entry(p, "/overlay/centres", 1, std::int32_t{27}); },
+     {"/overlay/centres holds 27 (entry 1)"}},
+    {"OverlayCentreInside",
+     [](const Path& p) { set_entry(p, "/overlay/centres", 0, std::int32_t{13}); },
+     {"/overlay/centres: node 13 is not on the surface"}},
+    {"OverlayCentreHeld",
+     [](const Path& p) { set_entry(p, "/overlay/centres", 0, std::int32_t{0}); },
+     {"/overlay/centres: node 0 is not stored"}},
+    {"OverlayCentresTheSame",
+     [](const Path& p) { set_entry(p, "/overlay/centres", 0, std::int32_t{26}); },
+     {"/overlay/centres: entry 1 is not greater"}},
+    {"OverlayOfMoreNodesThanTheBody",
+     [](const Path& p) { set_entry(p, "/overlay/nodes", 0, std::int32_t{28}); },
+     {"/overlay/nodes holds 28 (entry 0), only 0 to 27"}},
+    {"OverlayOfMoreNodes",
+     [](const Path& p) { set_entry(p, "/overlay/nodes", 0, std::int32_t{20}); },
+     {"/overlay/G ends within patch 0"}},
+    {"OverlayOfFewerNodes",
+     [](const Path& p) { set_entry(p, "/overlay/nodes", 1, std::int32_t{2}); },
+     {"/overlay/G has 24 entries more"}},
+    {"OverlayOfHugeSurface",
+     [](const Path& p) { set_entry(p, "/overlay/surface_nodes", 1, std::int32_t{1} << 28); },
+     {"/overlay/surface ends within patch 1"}},
+    {"OverlaySurfaceNegative",
+     [](const Path& p) { set_entry(p, "/overlay/surface", 2, std::int32_t{-5}); },
+     {"/overlay/surface holds -5 (entry 2)"}},
+    {"OverlaySurfaceDescends",
+     [](const Path& p) { set_entry(p, "/overlay/surface", 1, std::int32_t{1}); },
+     {"/overlay/surface: the nodes of patch 0 do not ascend"}},
+    {"OverlayTransferTooShort",
+     [](const Path& p) { replace(p, "/overlay/T", H5T_IEEE_F64LE, {80}); },
+     {"/overlay/T ends within patch 1"}},
+    {"OverlayNotFinite",
+     [](const Path& p) { set_entry(p, "/overlay/G", 7, nan); },
+     {"/overlay/G holds a value that is not finite (entry 7)"}},
+    {"OverlayPullsBack",
+     [](const Path& p) { set_entry(p, "/overlay/compliance", 0, -1.0); },
+     {"/overlay/compliance: patch 0 has a negative diagonal"}},
     {"NoChecksum",
      [](const Path& p) { remove_attribute(p, "/mesh/nodes", "xxh3"); },
      {"/mesh/nodes has no checksum"}},
@@ -488,7 +540,7 @@ INSTANTIATE_TEST_SUITE_P(Files, HostilePlane, testing::ValuesIn(plane_edits),
 
 TEST(AlteredFile, EveryDatasetIsNamed) {
   const auto datasets = checked_datasets(good_file());
-  EXPECT_EQ(datasets.size(), 25U);
+  EXPECT_EQ(datasets.size(), 34U);
   for (const std::string& dataset : datasets) {
     const Folder folder;
     std::filesystem::copy_file(good_file(), folder / "x.hdf");
@@ -506,6 +558,18 @@ TEST(AlteredFile, AttributesAreNoticed) {
   remove_attribute(folder / "x.hdf", "/", "content_hash");
   EXPECT_NE(refusal([&] { load_model(folder / "x.hdf"); }).find("content_hash is missing"),
             std::string::npos);
+}
+
+TEST(OlderMinorVersion, HasNoOverlays) {
+  const Folder folder;
+  std::filesystem::copy_file(good_file(), folder / "x.hdf");
+  set_integers(folder / "x.hdf", "version", {3, 0});
+  remove_object(folder / "x.hdf", "/overlay");
+  EXPECT_NE(refusal([&] { load_model(folder / "x.hdf"); }).find("content_hash"), std::string::npos);
+  reseal(folder / "x.hdf");
+  const Model old = load_model(folder / "x.hdf");
+  EXPECT_EQ(old.overlay.refinement, 0);
+  EXPECT_EQ(difference(load_model(good_file()), old), "overlay");
 }
 
 TEST(NewerMinorVersion, IsReadAndWhatItAddsIsIgnored) {

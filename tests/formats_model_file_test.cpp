@@ -136,13 +136,14 @@ TEST(ModelFile, ChecksumsFollowTheDocumentedRule) {
   EXPECT_EQ(before.content_hash, after.content_hash);
 }
 
-TEST(ModelFile, AModelWithoutProbesTextAndSources) {
+TEST(ModelFile, AModelWithoutProbesTextSourcesAndOverlays) {
   const Folder folder;
   Model model = sample_model();
   model.model_toml.clear();
   model.name.clear();
   model.sources.clear();
   model.probes.clear();
+  model.overlay = {};
   const std::int64_t n = model.stored_dofs();
   ModelWriter writer(folder / "a.palpate.hdf", model, Precision::single_precision);
   writer.write_columns(0, n, sample_columns(0, n, n));
@@ -272,6 +273,13 @@ TEST(ModelFile, AnotherFrictionStartsAnew) {
   EXPECT_FALSE(after_kill(folder, other, Precision::double_precision, [] {}).has_columns(0, 1));
 }
 
+TEST(ModelFile, AnotherOverlayStartsAnew) {
+  const Folder folder;
+  Model other = sample_model();
+  other.overlay.patches[1].compliance(0, 0) += 1.0;
+  EXPECT_FALSE(after_kill(folder, other, Precision::double_precision, [] {}).has_columns(0, 1));
+}
+
 TEST(ModelFile, AnotherPrecisionStartsAnew) {
   const Folder folder;
   EXPECT_FALSE(after_kill(folder, sample_model(), Precision::single_precision, [] {}).has_columns(0, 1));
@@ -374,6 +382,12 @@ TEST(ModelFile, WhatAReaderWouldRefuseIsNotWritten) {
   EXPECT_NE(refusal([&] {
               ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision);
             }).find("/material/friction, row 1 is -0.5"),
+            std::string::npos);
+  model = sample_model();
+  model.overlay.patches[0].T.conservativeResize(4, Eigen::NoChange);
+  EXPECT_NE(refusal([&] {
+              ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision);
+            }).find("/overlay/T has 51 values, 81 are expected"),
             std::string::npos);
   EXPECT_EQ(files_in(folder), Names{});
 }

@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -45,6 +46,29 @@ bool same_material(const Material& a, const Material& b) {
          a.density == b.density && a.friction == b.friction && a.initial_strain == b.initial_strain;
 }
 
+bool same_overlay(const StoredOverlay& a, const StoredOverlay& b) {
+  return a.refinement == b.refinement && a.rings == b.rings && a.centres == b.centres &&
+         same(a.patches, b.patches, [](const CondensedPatch& x, const CondensedPatch& y) {
+           return x.surface == y.surface && x.G == y.G && x.T == y.T && x.compliance == y.compliance;
+         });
+}
+
+/// Made-up numbers, no two alike in a patch, of a size that depends on the number of nodes.
+CondensedPatch sample_patch(int dimension, Index nodes, Index surface_nodes) {
+  CondensedPatch patch;
+  for (Index k = 0; k < surface_nodes; ++k) patch.surface.push_back(2 * k + 1);
+  const Index g = dimension * nodes, m = dimension * surface_nodes;
+  const auto symmetric = [](Eigen::Index i, Eigen::Index j) {
+    return 1.0 / static_cast<double>(1 + i + j) + static_cast<double>(i * j);
+  };
+  patch.G = Eigen::MatrixXd::NullaryExpr(g, g, symmetric);
+  patch.T = Eigen::MatrixXd::NullaryExpr(m, g, [](Eigen::Index i, Eigen::Index j) {
+    return static_cast<double>(i) - 0.01 * static_cast<double>(j);
+  });
+  patch.compliance = 1e-3 * Eigen::MatrixXd::NullaryExpr(m, m, symmetric);
+  return patch;
+}
+
 Mesh sample_mesh(ElementType element, int cells) {
   if (traits(element).dimension == 2)
     return generate(RectangleShape{.origin = {0.1, 0.2, 0.0}, .size = {1, 2, 0}, .cells = {cells, cells}},
@@ -52,6 +76,14 @@ Mesh sample_mesh(ElementType element, int cells) {
   const BoxShape box{.origin = {0.1, 0.2, 0.3}, .size = {1, 2, 3}, .cells = {cells, cells, cells}};
   return element == ElementType::hex8 ? generate(box, element)
                                       : with_elements(generate(box), element, "sample");
+}
+
+/// The first and the last stored node of the surface.
+std::vector<Index> sample_centres(const Model& model) {
+  std::vector<Index> nodes = model.surface;
+  std::erase_if(nodes, [&](Index node) { return model.fixed[static_cast<std::size_t>(node)] != 0; });
+  const auto [first, last] = std::minmax_element(nodes.begin(), nodes.end());
+  return {*first, *last};
 }
 
 }  // namespace
@@ -84,6 +116,7 @@ Model sample_model(ElementType element, int cells) {
   }
   for (std::size_t i = model.fixed.size(); i-- > 0;)
     if (model.fixed[i] == 0) model.stored_nodes.push_back(static_cast<Index>(i));
+  model.overlay = {3, 2, sample_centres(model), {sample_patch(d, 2, 3), sample_patch(d, 3, 1)}};
   model.scope = Scope::full;
   model.layers = 0;
   model.quality.min_angle = 45.0;
@@ -189,6 +222,7 @@ std::string difference(const Model& a, const Model& b) {
         return x.force == y.force && x.displacement == y.displacement;
       }))
     return "probes";
+  if (!same_overlay(a.overlay, b.overlay)) return "overlay";
   if (!same_greens(a.greens, b.greens)) return "greens";
   return {};
 }

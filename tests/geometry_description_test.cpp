@@ -51,6 +51,7 @@ TEST(Description, ReadsDefaults) {
   EXPECT_EQ(d.scope, Scope::layers);
   EXPECT_EQ(d.layers, 1);
   EXPECT_EQ(d.precision, Precision::single_precision);
+  EXPECT_FALSE(d.overlay);
 }
 
 TEST(Description, ReadsEveryKey) {
@@ -192,6 +193,28 @@ TEST(Description, ReadsThePlane) {
       std::holds_alternative<VolumeGeometry>(plane("plane = \"stress\"", "volume = \"plate.msh\"").geometry));
 }
 
+TEST(Description, ReadsOverlays) {
+  const TempFolder folder;
+  const std::string head = "name = \"a\"\n" + box + material + fixed + "[storage]\nlayers = 4\n";
+  const Description usual = read(folder, head + "[overlay]\n[[overlay.region]]\ntag = 2\n");
+  ASSERT_TRUE(usual.overlay);
+  EXPECT_EQ(usual.overlay->refinement, 3);
+  EXPECT_EQ(usual.overlay->rings, 2);
+  const Description d = read(folder, head + R"([overlay]
+refinement = 2
+rings = 4
+[[overlay.region]]
+sphere = {center = [1, 2, 3], radius = 0.5}
+[[overlay.region]]
+lowest = {axis = "z", percent = 25}
+)");
+  EXPECT_EQ(d.overlay->refinement, 2);
+  EXPECT_EQ(d.overlay->rings, 4);
+  ASSERT_EQ(d.overlay->regions.size(), 2U);
+  EXPECT_EQ(std::get<SelectSphere>(d.overlay->regions[0]).center, Vec3(1, 2, 3));
+  EXPECT_EQ(std::get<SelectLowest>(d.overlay->regions[1]).fraction, 0.25);
+}
+
 TEST(Description, ReadsVectorsOfThePlane) {
   const TempFolder folder;
   const Description d = read(folder, "name = \"p\"\nplane = \"stress\"\n" + rectangle + material +
@@ -295,6 +318,10 @@ std::string with_fixed(const std::string& lines) {
 }
 std::string with_storage(const std::string& lines) {
   return "name = \"a\"\n" + box + material + fixed + "[storage]\n" + lines + "\n";
+}
+const std::string region = "[[overlay.region]]\nnodes = [1]\n";
+std::string with_overlay(const std::string& lines) {
+  return with_storage("scope = \"layers\"\nlayers = 2\n[overlay]\n" + lines);
 }
 std::string with_image_mesh(const std::string& lines) {
   return with_geometry("image = \"i.inr\"\n[mesh]\n" + lines);
@@ -584,6 +611,31 @@ const BadCase bad_cases[] = {
      with_storage("scope = \"surface\"\nlayers = 2"),
      {"layers applies to scope \"layers\" only"}},
     {"LayersZero", with_storage("layers = 0"), {"layers must be at least 1"}},
+    {"OverlayUnknownKey",
+     with_overlay("ring = 2\n" + region),
+     {"model.toml:13:", "\"ring\"", "[overlay]", "\"rings\""}},
+    {"OverlayRefinementOne",
+     with_overlay("refinement = 1\n" + region),
+     {"model.toml:13:", "[overlay] refinement must be from 2 to 16, not 1"}},
+    {"OverlayRingsTooMany",
+     with_overlay("rings = 17\n" + region),
+     {"[overlay] rings must be from 1 to 16, not 17"}},
+    {"OverlayDeeperThanStored",
+     with_overlay("rings = 3\n" + region),
+     {"model.toml:13:", "[overlay] rings reaches 3 layers", "[storage] keeps 2", "layers = 3"}},
+    {"OverlayOfSurface",
+     with_storage("scope = \"surface\"\n[overlay]\nrings = 1\n" + region),
+     {"reaches 1 layer of", "keeps none"}},
+    {"OverlayWithoutRegion", with_overlay("rings = 1\n"), {"[overlay] has no region", "[[overlay.region]]"}},
+    {"OverlayRegionIsTable",
+     with_overlay("[overlay.region]\nnodes = [1]\n"),
+     {"[overlay] region must be a list of at least one table"}},
+    {"OverlayRegionUnknown",
+     with_overlay("[[overlay.region]]\nnode = [1]\n"),
+     {"\"node\"", "[[overlay.region]]", "\"nodes\""}},
+    {"OverlayRegionSaysNothing",
+     with_overlay("[[overlay.region]]\n"),
+     {"[[overlay.region]] has none of box"}},
     {"BadPrecision", with_storage("precision = \"half\""), {"\"half\"", "\"single\""}},
 };
 

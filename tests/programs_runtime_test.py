@@ -11,7 +11,7 @@ import h5py
 import numpy
 import vtk
 
-from programs import RUNTIME, ProgramTest, cube_toml, run
+from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
 
 TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
 HANDING_OVER = 1 << 10  # runtime/status.h
@@ -387,6 +387,39 @@ class Play(ProgramTest):
             self.assertEqual(len(warnings), 1, result.stderr)
             self.assertRegex(warnings[0], warning)
             self.assertEqual(json.loads(result.stdout)["ticks_in_contact"] > 0, "until" in warning)
+
+
+class PlayOverlay(ProgramTest):
+    SCRIPT = "t,x,y,z,grab\n0,0.4,0.5,1.25,0\n0.1,0.4,0.5,1.17,0\n0.2,0.8,0.5,1.17,0\n"
+
+    def ticks(self, file, overlay):
+        script = self.write("slide.csv", self.SCRIPT)
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--overlay", overlay,
+                     "--record", "out.h5", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with h5py.File(self.folder / "out.h5") as recording:
+            return {name: data[:] for name, data in recording["ticks"].items()}
+
+    def test_overlays_of_the_file_change_nothing_but_the_time(self):
+        toml = cube_toml(4, scope="layers")
+        self.assertIn('scope = "layers"', toml)
+        stored = "[overlay]\nrefinement = 2\nrings = 1\n[[overlay.region]]\nhalf_space = { point = [0.2, 0, 1], normal = [0, 0, 1] }\n"
+        without = self.bake(toml, name="without.toml")
+        model = self.write("with.toml", toml + stored)
+        planned = run(PRECOMPUTE, model, "--dry-run", cwd=self.folder)
+        self.assertIn("overlays: 25 patches, 1 ring of elements each, cut into 2^3", planned.stderr)
+        with_overlays = self.bake(toml + stored, name="with.toml")
+        self.assertRegex(run(PRECOMPUTE, "inspect", with_overlays).stdout, r"overlays +25 patches, r = 2, 1 ring, \d+\.\d MB")
+        self.assertEqual(run(PRECOMPUTE, "verify", with_overlays).returncode, 0)
+        for overlay in ("r=2,rings=1", "r=3,rings=1"):
+            expected, found = self.ticks(without, overlay), self.ticks(with_overlays, overlay)
+            self.assertGreater(numpy.linalg.norm(expected["force"], axis=1).max(), 1e-3)
+            for name, values in expected.items():
+                numpy.testing.assert_array_equal(found[name], values, err_msg=f"{overlay}: {name}")
+
+    def test_deeper_than_what_is_stored(self):
+        model = self.write("model.toml", cube_toml(4, scope="layers") + "[overlay]\n[[overlay.region]]\nnodes = [124]\n")
+        self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), "[overlay] rings reaches 2 layers", "layers = 2", "model.toml")
 
 
 class Tools(ProgramTest):

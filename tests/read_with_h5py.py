@@ -37,7 +37,7 @@ def check_model(path, element, scalar):
     with h5py.File(path) as file:
         attributes = file.attrs
         expect(attributes["format"] == b"palpate", "format")
-        expect(list(attributes["version"]) == [3, 0], "version")
+        expect(list(attributes["version"]) == [3, 1], "version")
         expect(attributes["units"] == b"m, N, Pa, kg, s", "units")
         expect(attributes["scalar"].decode() == scalar, "scalar")
         expect(attributes["element"].decode() == element and attributes["dimension"] == dimension, "element")
@@ -82,6 +82,18 @@ def check_model(path, element, scalar):
         expect(np.isclose(xi[7, 3], 1e-3 / (1 + 7 + 1.1 * 3)), "an entry of the Green's functions")
         expect(packed.id.get_offset() % 4096 == 0, "page alignment")
         expect(file["/probes/forces"].shape == file["/probes/displacements"].shape == (2, n), "probes")
+
+        overlay = file["/overlay"]
+        expect((overlay["refinement"][0], overlay["rings"][0]) == (3, 2), "overlay")
+        expect(list(overlay["nodes"]) == [2, 3] and list(overlay["surface_nodes"]) == [3, 1], "sizes of overlays")
+        expect(set(overlay["centres"]) <= set(surface.ravel()) & set(stored), "centres of overlays")
+        expect(list(overlay["surface"]) == [1, 3, 5, 1], "surface of overlays")
+        g, m = dimension * overlay["nodes"][:], dimension * overlay["surface_nodes"][:]
+        second = overlay["T"][m[0] * g[0]:].reshape(m[1], g[1])
+        expect(np.allclose(second, np.arange(m[1])[:, None] - 0.01 * np.arange(g[1])), "T of overlays")
+        column, row = np.triu_indices(g[0])
+        expect(np.allclose(overlay["G"][:len(row)], 1 / (1 + row + column) + row * column), "G of overlays")
+        expect(overlay["compliance"].shape == ((m * (m + 1) // 2).sum(),), "compliance of overlays")
         print(f"{path.name}: {len(nodes)} nodes, {len(cells)} {element} elements, {n} stored dofs")
 
 

@@ -1,4 +1,4 @@
-#include "runtime/nested_nodes.h"
+#include "formats/nested_nodes.h"
 
 #include <algorithm>
 

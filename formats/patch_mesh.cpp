@@ -1,4 +1,4 @@
-#include "runtime/patch_mesh.h"
+#include "formats/patch_mesh.h"
 
 #include <algorithm>
 #include <array>

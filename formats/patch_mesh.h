@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "formats/model.h"
-#include "runtime/nested_nodes.h"
+#include "formats/nested_nodes.h"
 
 namespace palpate {
 

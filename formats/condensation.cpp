@@ -1,4 +1,4 @@
-#include "runtime/condensation.h"
+#include "formats/condensation.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
