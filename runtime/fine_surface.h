@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "formats/nested_nodes.h"
 #include "formats/model.h"
+#include "formats/nested_nodes.h"
 
 namespace palpate {
 

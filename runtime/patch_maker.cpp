@@ -61,8 +61,7 @@ std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
   const Model& model = body_.model();
   std::vector<Index> nodes;
   for (const Index centre : centres) nodes.push_back(body_.mesh_node(centre));
-  const PatchMesh mesh =
-      make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
+  const PatchMesh mesh = make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
   const CondensedPatch* ready = centres.size() == 1 ? stored(centres[0]) : nullptr;
   if (ready == nullptr) return std::make_shared<const Patch>(body_, mesh, condense(model, mesh));
   if (!fits(*ready, mesh, body_.dimension()))

@@ -105,7 +105,8 @@ void PatchSource::build_wishes() {
   }
 }
 
-/// What is wished for first, then what the file has, then round the first centre, those first that the tool moves towards.
+/// What is wished for first, then what the file has, then round the first centre, those first that the tool
+/// moves towards.
 bool PatchSource::build_next(const PatchWishes& wishes) {
   bool built = false;
   for (std::size_t k = 0; k < wishes.count && !built; ++k) built = build(wishes.keys[k]);

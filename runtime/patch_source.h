@@ -36,8 +36,9 @@ struct PatchCounts {
 /// locks or allocates. Patches are freed by the builder, after nobody uses them any more.
 class PatchSource {
  public:
-  /// Starts the builder, which makes what the file has of patches first of all but the wishes. `body` must live as long; `state` is one that the loop will use, or a copy. Throws
-  /// Error when the file keeps too few layers below the surface.
+  /// Starts the builder, which makes what the file has of patches first of all but the wishes. `body` must
+  /// live as long; `state` is one that the loop will use, or a copy. Throws Error when the file keeps too few
+  /// layers below the surface.
   PatchSource(const Body& body, const State& state, const PatchSourceOptions& options);
   ~PatchSource();
   PatchSource(const PatchSource&) = delete;

@@ -55,9 +55,10 @@ void print_overlays(const PatchSource& overlays) {
       overlays.built(), 1e3 * overlays.longest_build(), 1e-6 * static_cast<double>(overlays.bytes()),
       counts.switches, 100.0 * static_cast<double>(counts.older_in_contact) / in_contact);
   if (overlays.failed() > 0)
-    print_warning(fmt::format("{} overlays could not be made: the elements there are too flat, or those of the file do "
-                              "not belong to its mesh (precompute it again)",
-                              overlays.failed()));
+    print_warning(
+        fmt::format("{} overlays could not be made: the elements there are too flat, or those of the file do "
+                    "not belong to its mesh (precompute it again)",
+                    overlays.failed()));
 }
 
 void print_report(const LoopReport& report, const PlayOptions& options, std::int64_t dropped) {

@@ -37,8 +37,7 @@ bool same(const TickRecord& a, const TickRecord& b) {
          std::ranges::equal(a.tool_orientation, b.tool_orientation) && std::ranges::equal(a.force, b.force) &&
          std::ranges::equal(a.torque, b.torque) && a.contacts == b.contacts &&
          std::ranges::equal(a.stiffness, b.stiffness) && a.status == b.status &&
-         a.compute_ns == b.compute_ns && a.grab == b.grab &&
-         a.patch == b.patch;
+         a.compute_ns == b.compute_ns && a.grab == b.grab && a.patch == b.patch;
 }
 
 void record(const std::filesystem::path& path, std::span<const TickRecord> ticks, std::size_t at_once) {
