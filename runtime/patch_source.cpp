@@ -105,12 +105,14 @@ void PatchSource::build_wishes() {
   }
 }
 
-/// What is wished for first, then what the file has, then round the first centre, those first that the tool
-/// moves towards.
+/// What is wished for first, then what the file has, then, while there is memory, round the first centre,
+/// those first that the tool moves towards.
 bool PatchSource::build_next(const PatchWishes& wishes) {
   bool built = false;
   for (std::size_t k = 0; k < wishes.count && !built; ++k) built = build(wishes.keys[k]);
   if (built || build_stored()) return true;
+  const std::size_t usual = kept_.empty() ? 0 : bytes_ / kept_.size();
+  if (bytes_ + 2 * usual > options_.memory) return false;
   if (wishes.count == 0 || wishes.keys[0].count() != 1) return false;
   const Index centre = wishes.keys[0].centres[0];
   std::vector<Index> neighbours = maker_.neighbours(centre);

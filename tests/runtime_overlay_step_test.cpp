@@ -263,6 +263,27 @@ TEST_P(Sliding, KeepsToItsMemory) {
   EXPECT_GT(anew, all);  // what was let go of is built anew
 }
 
+// A builder without memory for the neighbours leaves them, and does not let go of one for the other for ever.
+TEST_P(Sliding, RestsWhenItsMemoryIsFull) {
+  State state = this->state();
+  std::size_t one = 0;
+  {
+    PatchSource source(body_, state, {.in_background = false});
+    press(state, 0.05, &source);
+    one = source.bytes();
+  }
+  State again = this->state();
+  PatchSource source(body_, again, {.memory = one + one / 2});
+  for (int tick = 0; tick < 20000 && again.patch == nullptr; ++tick) {
+    source.serve(again);
+    step(body_, again, pose(0.3, -0.1));
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
+  }
+  ASSERT_NE(again.patch, nullptr);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_LE(source.built(), 2);
+}
+
 // Each alone has its own patch; beside each other they share one that is over the elements of both.
 TEST_P(Sliding, MergesThePatchesOfTwoTools) {
   State two(body_, {.tools = {Tool{.radius = 0.1, .hand_over = infinity},
