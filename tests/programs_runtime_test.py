@@ -10,6 +10,7 @@ import unittest
 import h5py
 import numpy
 import vtk
+from vtk.util.numpy_support import vtk_to_numpy
 
 from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
 
@@ -416,6 +417,38 @@ class PlayOverlay(ProgramTest):
             self.assertGreater(numpy.linalg.norm(expected["force"], axis=1).max(), 1e-3)
             for name, values in expected.items():
                 numpy.testing.assert_array_equal(found[name], values, err_msg=f"{overlay}: {name}")
+
+    def test_over_everything_it_is_the_finer_cube(self):
+        coarse = self.bake(cube_toml(2, scope="full"), name="coarse.toml")
+        fine = self.bake(cube_toml(4, scope="full"), name="fine.toml")
+        script = self.write("press.csv", "t,x,y,z\n0,0.4,0.5,1.25\n0.1,0.4,0.5,1.17\n0.3,0.45,0.5,1.17\n")
+        forces, surfaces = [], []
+        for file, overlay in ((coarse, ("--overlay", "r=2,rings=4")), (fine, ())):
+            result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--record", "out.h5",
+                         "--surface", "out.vtu", "--report", "report.json", *overlay, cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            report = json.loads((self.folder / "report.json").read_text())
+            with h5py.File(self.folder / "out.h5") as recording:
+                forces.append(recording["ticks/force"][:])
+                self.assertEqual(recording.attrs["overlay"].decode(), overlay[1] if overlay else "")
+                touched = recording["ticks/contacts"][:] > 0
+                self.assertTrue(touched[-1])
+                self.assertEqual((recording["ticks/patch"][:][touched] >= 0).all(), bool(overlay))
+            if overlay:
+                self.assertEqual((report["overlay"]["refinement"], report["overlay"]["rings"]), (2, 4))
+                self.assertEqual(report["overlay"]["older_ticks_in_contact"], 0)
+                self.assertRegex(result.stderr, r"overlay: \d+ patches built")
+            self.assertEqual("overlay" in report, bool(overlay))
+            grid = read_grid(self.folder / "out.vtu")
+            surfaces.append((vtk_to_numpy(grid.GetPoints().GetData()), vtk_to_numpy(grid.GetPointData().GetArray("displacement"))))
+        largest = numpy.abs(forces[1]).max()
+        numpy.testing.assert_allclose(forces[0], forces[1], atol=1e-4 * largest)
+        (nodes, u), (fine_nodes, fine_u) = surfaces
+        self.assertEqual(len(nodes), len(fine_nodes))
+        self.assertEqual(len(nodes), 98)  # 5^3 - 3^3 nodes on the surface
+        order = [numpy.argmin(numpy.linalg.norm(fine_nodes - node, axis=1)) for node in nodes]
+        numpy.testing.assert_allclose(fine_nodes[order], nodes, atol=1e-12)
+        numpy.testing.assert_allclose(u, fine_u[order], atol=1e-4 * numpy.abs(fine_u).max())
 
     def test_deeper_than_what_is_stored(self):
         model = self.write("model.toml", cube_toml(4, scope="layers") + "[overlay]\n[[overlay.region]]\nnodes = [124]\n")
