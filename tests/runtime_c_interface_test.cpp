@@ -77,8 +77,8 @@ TEST(COverlay, FeelsAsTheStepWithItsPatch) {
   for (int tick = 0; tick < 1000; ++tick) {
     palpate_step(session.get(), std::array{pose(tick)}.data());
     source.serve(state);
-    const double* x = pose(tick).position;
-    step(body, state, ToolPose{.position = Vec3(x[0], x[1], x[2])});
+    const palpate_pose device = pose(tick);
+    step(body, state, ToolPose{.position = Eigen::Map<const Vec3>(device.position)});
   }
   palpate_result result;
   palpate_get(session.get(), 0, &result);
