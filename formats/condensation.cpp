@@ -10,6 +10,7 @@ namespace palpate {
 namespace {
 
 using Eigen::MatrixXd;
+using Rows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 std::size_t at(Index i) noexcept {
   return static_cast<std::size_t>(i);
@@ -117,11 +118,6 @@ class ElementStiffness {
   ElementMatrix K_;
 };
 
-/// The body's shape functions at a local node.
-struct Shape {
-  std::vector<std::pair<Index, double>> parts;  // position in PatchMesh::nodes, value
-};
-
 /// K_L and K_LG by layers: K_L is block tridiagonal.
 struct LayeredStiffness {
   std::vector<MatrixXd> diagonal;  // [n_k x n_k] lower triangle
@@ -129,7 +125,8 @@ struct LayeredStiffness {
   std::vector<MatrixXd> to_body;   // [n_k x d g]
 };
 
-LayeredStiffness assemble(const Model& model, const PatchMesh& patch, const Layers& layers) {
+LayeredStiffness assemble(const Model& model, const PatchMesh& patch, const Rows& shape,
+                          const Layers& layers) {
   const auto d = static_cast<Eigen::Index>(model.dimension());
   const Eigen::Index body_dofs = d * static_cast<Eigen::Index>(patch.nodes.size());
   LayeredStiffness K;
@@ -160,14 +157,11 @@ LayeredStiffness assemble(const Model& model, const PatchMesh& patch, const Laye
         const int other = layers.layer_of(nodes[b]);
         if (other == layer) add(K.diagonal[l], nodes[a], nodes[b], part);
         if (other >= 0 && other == layer - 1) add(K.above[l], nodes[a], nodes[b], part);
-        using Row = Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
-        for (Row it(patch.shape, nodes[b]); it; ++it) {
-          const unsigned held = model.fixed[at(patch.nodes[static_cast<std::size_t>(it.col())])];
-          for (Eigen::Index j = 0; j < d; ++j) {
-            if ((held >> j & 1U) != 0) continue;
+        for (Eigen::Index j = 0; j < d; ++j) {
+          for (Rows::InnerIterator it(shape, d * nodes[b] + j); it; ++it) {
             for (Eigen::Index i = 0; i < d; ++i) {
               const Index row = layers.place_of(static_cast<std::size_t>(d * nodes[a] + i));
-              if (row >= 0) K.to_body[l](row, d * it.col() + j) += it.value() * part(i, j);
+              if (row >= 0) K.to_body[l](row, it.col()) += it.value() * part(i, j);
             }
           }
         }
@@ -177,33 +171,15 @@ LayeredStiffness assemble(const Model& model, const PatchMesh& patch, const Laye
   return K;
 }
 
-/// The body's shape functions at surface nodes, by dofs, without held ones.
-MatrixXd shape_at(const Model& model, const PatchMesh& patch, const std::vector<Index>& nodes) {
-  const auto d = static_cast<Eigen::Index>(model.dimension());
-  MatrixXd shape = MatrixXd::Zero(d * std::ssize(nodes), d * std::ssize(patch.nodes));
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(patch.shape, nodes[k]); it; ++it) {
-      const unsigned held = model.fixed[at(patch.nodes[static_cast<std::size_t>(it.col())])];
-      for (Eigen::Index axis = 0; axis < d; ++axis) {
-        if ((held >> axis & 1U) == 0)
-          shape(d * static_cast<Eigen::Index>(k) + axis, d * it.col() + axis) = it.value();
-      }
-    }
-  }
-  return shape;
-}
-
 }  // namespace
 
 CondensedPatch condense(const Model& model, const PatchMesh& patch) {
   const auto d = static_cast<Eigen::Index>(model.dimension());
   CondensedPatch result;
-  result.surface = patch.surface;
-  std::sort(result.surface.begin(), result.surface.end());
-  result.surface.erase(std::unique(result.surface.begin(), result.surface.end()), result.surface.end());
-
+  result.surface = surface_nodes(patch);
   const Layers layers(patch, model.dimension(), result.surface);
-  LayeredStiffness K = assemble(model, patch, layers);
+  const Rows shape = shape_by_dofs(model, patch);
+  LayeredStiffness K = assemble(model, patch, shape, layers);
   const Eigen::Index body_dofs = d * std::ssize(patch.nodes);
   result.G = MatrixXd::Zero(body_dofs, body_dofs);
   for (int k = layers.count() - 1; k >= 0; --k) {
@@ -231,12 +207,14 @@ CondensedPatch condense(const Model& model, const PatchMesh& patch) {
   compliance.selfadjointView<Eigen::Lower>().rankUpdate(inverse.transpose());
   compliance.triangularView<Eigen::StrictlyUpper>() = compliance.transpose();
 
-  result.T = shape_at(model, patch, result.surface);
+  result.T = MatrixXd::Zero(d * std::ssize(result.surface), body_dofs);
   result.compliance = MatrixXd::Zero(result.T.rows(), result.T.rows());
   std::vector<Eigen::Index> place(static_cast<std::size_t>(result.T.rows()));
   for (std::size_t dof = 0; dof < place.size(); ++dof) {
     const auto width = static_cast<std::size_t>(d);
-    place[dof] = layers.place_of(width * at(result.surface[dof / width]) + dof % width);
+    const std::size_t local = width * at(result.surface[dof / width]) + dof % width;
+    place[dof] = layers.place_of(local);
+    result.T.row(static_cast<Eigen::Index>(dof)) = shape.row(static_cast<Eigen::Index>(local));
   }
   for (std::size_t i = 0; i < place.size(); ++i) {
     if (place[i] < 0) continue;

@@ -161,6 +161,11 @@ class Builder {
   std::vector<unsigned> zero_axes_;  // [local nodes] bits of the axes along which u_L = 0
 };
 
+void sort_unique(std::vector<Index>& numbers) {
+  std::sort(numbers.begin(), numbers.end());
+  numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+}
+
 }  // namespace
 
 ElementsAtNodes::ElementsAtNodes(const Mesh& mesh) : start_(mesh.nodes.size() + 1) {
@@ -181,15 +186,41 @@ std::vector<Index> rings_round(const Mesh& mesh, const ElementsAtNodes& at, std:
   for (int ring = 0; ring < rings; ++ring) {
     elements.clear();
     for (const Index node : reached) elements.insert(elements.end(), at[node].begin(), at[node].end());
-    std::sort(elements.begin(), elements.end());
-    elements.erase(std::unique(elements.begin(), elements.end()), elements.end());
-    reached.clear();
-    for (const Index e : elements)
-      reached.insert(reached.end(), mesh.element_nodes(e).begin(), mesh.element_nodes(e).end());
-    std::sort(reached.begin(), reached.end());
-    reached.erase(std::unique(reached.begin(), reached.end()), reached.end());
+    sort_unique(elements);
+    reached = nodes_of(mesh, elements);
   }
   return elements;
+}
+
+std::vector<Index> nodes_of(const Mesh& mesh, std::span<const Index> elements) {
+  std::vector<Index> nodes;
+  for (const Index e : elements)
+    nodes.insert(nodes.end(), mesh.element_nodes(e).begin(), mesh.element_nodes(e).end());
+  sort_unique(nodes);
+  return nodes;
+}
+
+std::vector<Index> surface_nodes(const PatchMesh& patch) {
+  std::vector<Index> nodes = patch.surface;
+  sort_unique(nodes);
+  return nodes;
+}
+
+Eigen::SparseMatrix<double, Eigen::RowMajor> shape_by_dofs(const Model& model, const PatchMesh& patch) {
+  const auto d = static_cast<Eigen::Index>(model.dimension());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index node = 0; node < patch.shape.outerSize(); ++node) {
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(patch.shape, node); it; ++it) {
+      const auto body_node = static_cast<std::size_t>(patch.nodes[static_cast<std::size_t>(it.col())]);
+      for (Eigen::Index axis = 0; axis < d; ++axis) {
+        if ((model.fixed[body_node] >> axis & 1) == 0)
+          entries.emplace_back(d * node + axis, d * it.col() + axis, it.value());
+      }
+    }
+  }
+  Eigen::SparseMatrix<double, Eigen::RowMajor> result(d * patch.shape.rows(), d * patch.shape.cols());
+  result.setFromTriplets(entries.begin(), entries.end());
+  return result;
 }
 
 PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts,

@@ -30,6 +30,9 @@ class ElementsAtNodes {
 std::vector<Index> rings_round(const Mesh& mesh, const ElementsAtNodes& at, std::span<const Index> nodes,
                                int rings);
 
+/// Nodes of some elements, each once, ascending.
+std::vector<Index> nodes_of(const Mesh& mesh, std::span<const Index> elements);
+
 /// A patch of elements and the mesh nested in it.
 struct PatchMesh {
   std::vector<Index> elements;  ///< of the body, ascending
@@ -49,6 +52,13 @@ struct PatchMesh {
   Index free_dofs = 0;
   std::map<NodeKey, Index> node_of_key;  ///< every local node
 };
+
+/// [m] local nodes on the body's surface, ascending.
+std::vector<Index> surface_nodes(const PatchMesh& patch);
+
+/// The body's shape functions by dofs, without those along which the body's nodes are held: u_G of all local
+/// dofs [d local nodes x d g] by u_G of the patch's nodes.
+Eigen::SparseMatrix<double, Eigen::RowMajor> shape_by_dofs(const Model& model, const PatchMesh& patch);
 
 /// Cuts each of the elements into r^d. Throws Error unless r >= 2, when an element is not one of the model's,
 /// or when there is none. Subdivisions that are kept from patch to patch need not be made again.

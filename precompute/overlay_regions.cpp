@@ -68,10 +68,8 @@ OverlayPlan plan_overlays(const Model& model, const OverlayRegions& overlay, con
   constexpr auto scalar = static_cast<std::int64_t>(sizeof(double));
   for (const Index centre : plan.centres) {
     const PatchMesh mesh = meshes.round(centre);
-    std::vector<Index> surface = mesh.surface;
-    std::sort(surface.begin(), surface.end());
-    const auto nodes = std::unique(surface.begin(), surface.end()) - surface.begin();
-    const std::int64_t m = model.dimension() * nodes, g = model.dimension() * std::ssize(mesh.nodes);
+    const std::int64_t m = model.dimension() * std::ssize(surface_nodes(mesh)),
+                       g = model.dimension() * std::ssize(mesh.nodes);
     plan.file_bytes += scalar * (packed_size(g) + m * g + packed_size(m));
     plan.memory_bytes += scalar * (g * g + m * g + m * m + packed_size(m));  // all, and a field's copy
   }

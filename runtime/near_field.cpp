@@ -27,7 +27,6 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       place_(body.surface_rest_positions().size(), -1),
       place_in_patch_(place_.size(), -1),
       nodes_(at(capacity), -1),
-      row_(at(capacity), -1),
       wanted_(at(capacity), 0),
       C_(static_cast<std::size_t>(stride_ * dimension_ * capacity)),
       force_(static_cast<std::size_t>(dimension_ * capacity)),
@@ -97,12 +96,10 @@ void NearField::add(const Body& body, Index surface_node) noexcept {
   }
 }
 
-/// What is known of a node alone: its place in the patch, or the stored nodes that it follows and how the
-/// patch responds to it.
+/// Of a node beside the patch: the stored nodes that it follows, and how the patch responds to it.
 void NearField::enter(const Body& body, Index place) noexcept {
-  row_[at(place)] = place_in_patch(node(place));
   part_count_[at(place)] = 0;
-  if (row_of(place) >= 0) return;
+  if (patch_place(place) >= 0) return;
   const SurfaceParts parts = body.surface_parts(node(place));
   part_count_[at(place)] = static_cast<Index>(parts.stored.size());
   for (std::size_t k = 0; k < parts.stored.size(); ++k) {
@@ -148,7 +145,7 @@ void NearField::respond(const Body& body, Index place) noexcept {
                          {gathered_.data(), static_cast<std::size_t>(dimension_ * width)});
     const double weight = part_weight_[at(parts_ * place + k)];
     for (int axis = 0; axis < dimension_; ++axis)
-      subtract(gathered_.data() + axis * width, -weight, X(dimension_ * place + axis), width);
+      palpate::add(gathered_.data() + axis * width, weight, X(dimension_ * place + axis), width);
   }
   for (int axis = 0; axis < dimension_; ++axis) {
     const double* x = X(dimension_ * place + axis);
@@ -160,7 +157,7 @@ void NearField::respond(const Body& body, Index place) noexcept {
 
 /// C between a node and those before it and itself.
 void NearField::connect(const Body& body, Index place) noexcept {
-  if (row_of(place) >= 0) {
+  if (patch_place(place) >= 0) {
     connect_within_patch(place);
   } else {
     connect_beside_patch(body, place);
@@ -179,11 +176,12 @@ void NearField::connect_within_patch(Index place) noexcept {
   const Index d = dimension_;
   double* block = blocks_.data();
   for (Index i = 0; i < d; ++i) {
-    const double* C = patch()->compliance(d * row_of(place) + i);
-    const double* H = patch()->response(d * row_of(place) + i);
+    const double* C = patch()->compliance(d * patch_place(place) + i);
+    const double* H = patch()->response(d * patch_place(place) + i);
     for (Index other = 0; other <= place; ++other) {
       for (Index j = 0; j < d; ++j) {
-        *block++ = row_of(other) >= 0 ? C[d * row_of(other) + j] : dot(H, X(d * other + j), patch_dofs());
+        *block++ =
+            patch_place(other) >= 0 ? C[d * patch_place(other) + j] : dot(H, X(d * other + j), patch_dofs());
       }
     }
   }
@@ -196,7 +194,7 @@ void NearField::connect_beside_patch(const Body& body, Index place) noexcept {
   for (Index k = 0; k < part_count_[at(place)]; ++k) {
     body.greens().gather(base_[at(bases_of_[at(parts_ * place + k)])], {base_.data(), at(base_count_)},
                          {gathered_.data(), static_cast<std::size_t>(d * width)});
-    subtract(gathered_.data(), -part_weight_[at(parts_ * place + k)], by_base_.data(), d * width);
+    palpate::add(gathered_.data(), part_weight_[at(parts_ * place + k)], by_base_.data(), d * width);
   }
   double* block = blocks_.data();
   for (Index i = 0; i < d; ++i) {
@@ -204,8 +202,8 @@ void NearField::connect_beside_patch(const Body& body, Index place) noexcept {
     for (Index other = 0; other <= place; ++other) {
       for (Index j = 0; j < d; ++j) {
         double sum = 0.0;
-        if (row_of(other) >= 0) {
-          sum = dot(patch()->response(d * row_of(other) + j), X(d * place + i), patch_dofs());
+        if (patch_place(other) >= 0) {
+          sum = dot(patch()->response(d * patch_place(other) + j), X(d * place + i), patch_dofs());
         } else {
           for (Index k = 0; k < part_count_[at(other)]; ++k) {
             const auto part = at(parts_ * other + k);
@@ -235,7 +233,7 @@ void NearField::forget(Index place) noexcept {
     std::copy_n(row + d * last, d, row + d * place);
   }
   move(last, place);
-  if (patch() == nullptr || row_of(place) >= 0) return;
+  if (patch() == nullptr || patch_place(place) >= 0) return;
   for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
     std::copy_n(X(static_cast<Index>(d * last + axis)), patch_dofs(),
                 X(static_cast<Index>(d * place + axis)));
@@ -247,7 +245,6 @@ void NearField::forget(Index place) noexcept {
 /// All that is known of a node but C, X and Y.
 void NearField::move(Index from, Index to) noexcept {
   nodes_[at(to)] = nodes_[at(from)];
-  row_[at(to)] = row_[at(from)];
   wanted_[at(to)] = wanted_[at(from)];
   part_count_[at(to)] = part_count_[at(from)];
   std::copy_n(bases_of_.begin() + std::ptrdiff_t{parts_} * from, parts_,
@@ -316,20 +313,20 @@ void NearField::displace() noexcept {
     if (!is_loaded(place)) continue;
     const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
     for (int axis = 0; axis < dimension_; ++axis)
-      subtract(row(dimension_ * place + axis).data(), -f[axis], displacement_.data(), width);
+      palpate::add(row(dimension_ * place + axis).data(), f[axis], displacement_.data(), width);
     for (Index k = 0; k < part_count_[at(place)]; ++k) {
       const auto part = at(parts_ * place + k);
       double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
       for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * f[axis];
     }
     if (patch() == nullptr) continue;
-    const Index in_patch = row_of(place);
+    const Index in_patch = patch_place(place);
     if (in_patch >= 0) load_.add_to_patch(in_patch, f);
     for (int axis = 0; axis < dimension_; ++axis) {
       const Index dof = dimension_ * place + axis;
       const double* on_patch = in_patch >= 0 ? patch()->response(dimension_ * in_patch + axis) : Y(dof);
-      subtract(on_patch, -f[axis], patch_force_.data(), patch_dofs());
-      if (in_patch < 0) subtract(X(dof), -f[axis], load_.beside.data(), patch_dofs());
+      palpate::add(on_patch, f[axis], patch_force_.data(), patch_dofs());
+      if (in_patch < 0) palpate::add(X(dof), f[axis], load_.beside.data(), patch_dofs());
     }
   }
   const auto add = [&](const Index* stored, const double* force, Index count) {

@@ -83,7 +83,7 @@ class NearField {
   void respond(const Body& body, Index place) noexcept;
   [[nodiscard]] Index longest_unwanted() const noexcept;
   [[nodiscard]] bool is_loaded(Index place) const noexcept;
-  [[nodiscard]] Index row_of(Index place) const noexcept { return row_[static_cast<std::size_t>(place)]; }
+  [[nodiscard]] Index patch_place(Index place) const noexcept { return place_in_patch(node(place)); }
   /// Row [d g] of X or Y of a dof.
   [[nodiscard]] double* X(Index dof) noexcept { return X_.data() + std::ptrdiff_t{dof} * patch_stride_; }
   [[nodiscard]] double* Y(Index dof) noexcept { return Y_.data() + std::ptrdiff_t{dof} * patch_stride_; }
@@ -102,7 +102,6 @@ class NearField {
   std::vector<Index> place_;           // [S]
   std::vector<Index> place_in_patch_;  // [S]
   std::vector<Index> nodes_;           // [capacity] surface nodes
-  std::vector<Index> row_;             // [capacity] place in the patch, -1 beside it
   std::vector<std::int64_t> wanted_;   // [capacity] tick in which each was wanted last
   std::vector<double> C_;              // [d capacity x stride]
   std::vector<double> force_;          // [d capacity]

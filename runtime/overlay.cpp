@@ -37,24 +37,6 @@ Eigen::SparseMatrix<double> assemble_local(const Model& model, const PatchMesh& 
   return result;
 }
 
-/// The body's shape functions by dofs [d local nodes x d g], without held dofs.
-Eigen::SparseMatrix<double> shape_by_dofs(const Model& model, const PatchMesh& patch) {
-  const auto d = static_cast<Eigen::Index>(model.dimension());
-  std::vector<Eigen::Triplet<double>> entries;
-  for (Eigen::Index node = 0; node < patch.shape.outerSize(); ++node) {
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(patch.shape, node); it; ++it) {
-      const auto body_node = static_cast<std::size_t>(patch.nodes[static_cast<std::size_t>(it.col())]);
-      for (Eigen::Index axis = 0; axis < d; ++axis) {
-        if ((model.fixed[body_node] >> axis & 1) != 0) continue;
-        entries.emplace_back(d * node + axis, d * it.col() + axis, it.value());
-      }
-    }
-  }
-  Eigen::SparseMatrix<double> result(d * patch.shape.rows(), d * patch.shape.cols());
-  result.setFromTriplets(entries.begin(), entries.end());
-  return result;
-}
-
 }  // namespace
 
 PatchStiffness assemble_patch(const Model& model, const PatchMesh& patch) {

@@ -79,7 +79,8 @@ palpate_session* palpate_create(const char* file, const palpate_tool* tools, int
 
 /* A finer mesh under the tools (s-FEM): each element of the body within `rings` rings round where a tool is
  * is cut into refinement^3 (in the plane refinement^2). The whole surface is then as fine, so that small
- * tools are felt; the file must keep as many layers below the surface as there are rings. */
+ * tools are felt; the file must keep as many layers below the surface as there are rings. Four tools at most
+ * have overlays. */
 typedef struct palpate_overlay {
   int refinement; /* 2 to 16; 3 is a good beginning */
   int rings;      /* 1 to 16; 2 is markedly better than 1 */

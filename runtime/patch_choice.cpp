@@ -1,45 +1,14 @@
 #include "runtime/patch_choice.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace palpate {
 namespace {
 
-constexpr double clearly_more =
-    0.1;  // of where a tool touches, that another node must have to become the centre
-constexpr double clearly_nearer = 0.1;   // the same of a free tool's weights of the nearest nodes
+constexpr double clearly_more = 0.1;     // of all, that another node must have to become the centre
 constexpr double near_edges = 3.0;       // mean edges of the body's mesh: nearer, a free tool has an overlay
 constexpr double smoothing = 0.05;       // of the velocity, a tick
 constexpr std::int64_t look_stride = 8;  // ticks, of a free tool
-
-/// The node of the body with the largest weight at a place of the surface; the one that there is unless
-/// another has clearly more.
-Index centre_at(const Body& body, const NearestSimplex& found, Index present) noexcept {
-  const auto d = static_cast<std::size_t>(body.dimension());
-  Index best = -1;
-  double best_weight = 0.0;
-  double present_weight = 0.0;
-  const std::span<const Index> corners =
-      body.simplices().subspan(d * static_cast<std::size_t>(found.simplex), d);
-  for (const Index corner : corners) {
-    for (const Index stored : body.surface_parts(corner).stored) {
-      double weight = 0.0;  // of this node at the place
-      for (std::size_t j = 0; j < d; ++j) {
-        const SurfaceParts parts = body.surface_parts(corners[j]);
-        for (std::size_t p = 0; p < parts.stored.size(); ++p) {
-          if (parts.stored[p] == stored) weight += found.nearest.weights[j] * parts.weights[p];
-        }
-      }
-      if (stored == present) present_weight = weight;
-      if (weight > best_weight) {
-        best_weight = weight;
-        best = stored;
-      }
-    }
-  }
-  return present >= 0 && best_weight < present_weight + clearly_nearer ? present : best;
-}
 
 /// How much a contact point tells where a tool touches: by how deep the device is in the body at rest there,
 /// squared.
@@ -74,37 +43,53 @@ PatchChoice::PatchChoice(const Body& body, const State& state)
       touched_(static_cast<std::size_t>(3 * body.most_surface_parts() * state.max_contacts)),
       share_(touched_.size()) {}
 
+/// Gives the nodes of the body that a surface node follows their parts of a share.
+void PatchChoice::add_share(const Body& body, Index surface_node, double share) noexcept {
+  const SurfaceParts parts = body.surface_parts(surface_node);
+  for (std::size_t p = 0; p < parts.stored.size(); ++p) {
+    const auto end = touched_.begin() + static_cast<std::ptrdiff_t>(count_);
+    const auto place =
+        static_cast<std::size_t>(std::find(touched_.begin(), end, parts.stored[p]) - touched_.begin());
+    if (place == count_) {
+      touched_[count_] = parts.stored[p];
+      share_[count_++] = 0.0;
+    }
+    share_[place] += share * parts.weights[p];
+  }
+}
+
+/// The node with the largest share, but the present one, where there is one, unless that has clearly less.
+Index PatchChoice::chosen(Index present) const noexcept {
+  Index best = -1;
+  double of_best = 0.0, of_present = 0.0, sum = 0.0;
+  for (std::size_t k = 0; k < count_; ++k) {
+    sum += share_[k];
+    if (touched_[k] == present) of_present = share_[k];
+    if (share_[k] <= of_best) continue;
+    of_best = share_[k];
+    best = touched_[k];
+  }
+  return present >= 0 && of_best <= of_present + clearly_more * sum ? present : best;
+}
+
 Index PatchChoice::touched_centre(const Body& body, const State& state, std::size_t number) noexcept {
-  std::size_t count = 0;
-  double sum = 0.0;
+  count_ = 0;
   for (const ContactPoint& contact : state.contacts()) {
-    const double share = contact.tool == static_cast<Index>(number) ? share_of(contact) : 0.0;
-    if (share == 0.0) continue;
-    sum += share;
+    if (contact.tool != static_cast<Index>(number)) continue;
     for (std::size_t n = 0; n < 3; ++n) {
-      if (contact.nodes[n] < 0) continue;
-      const SurfaceParts parts = body.surface_parts(contact.nodes[n]);
-      for (std::size_t p = 0; p < parts.stored.size(); ++p) {
-        const auto end = touched_.begin() + static_cast<std::ptrdiff_t>(count);
-        const auto place =
-            static_cast<std::size_t>(std::find(touched_.begin(), end, parts.stored[p]) - touched_.begin());
-        if (place == count) {
-          touched_[count] = parts.stored[p];
-          share_[count++] = 0.0;
-        }
-        share_[place] += share * contact.weights[n] * parts.weights[p];
-      }
+      if (contact.nodes[n] >= 0) add_share(body, contact.nodes[n], share_of(contact) * contact.weights[n]);
     }
   }
-  if (count == 0) return -1;
-  const Index present = tools_[number].centre;
-  std::size_t best = 0;
-  double of_present = 0.0;
-  for (std::size_t k = 0; k < count; ++k) {
-    if (share_[k] > share_[best]) best = k;
-    if (touched_[k] == present) of_present = share_[k];
-  }
-  return present >= 0 && share_[best] < of_present + clearly_more * sum ? present : touched_[best];
+  return chosen(tools_[number].centre);
+}
+
+Index PatchChoice::nearest_centre(const Body& body, const NearestSimplex& found, Index present) noexcept {
+  const auto d = static_cast<std::size_t>(body.dimension());
+  const std::span<const Index> corners =
+      body.simplices().subspan(d * static_cast<std::size_t>(found.simplex), d);
+  count_ = 0;
+  for (std::size_t k = 0; k < d; ++k) add_share(body, corners[k], found.nearest.weights[k]);
+  return chosen(present);
 }
 
 void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t number) noexcept {
@@ -114,25 +99,24 @@ void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t 
   const Vec3 moved = tool.device.position - tool.last_device_position;
   followed.velocity += smoothing * (moved - followed.velocity);
   if (tool.contacts > 0) {
-    const Index centre = touched_centre(body, state, number);
-    if (centre >= 0) followed.centre = centre;
+    followed.centre = touched_centre(body, state, number);
     return;
   }
   if (ticks_ % look_stride != 0) return;
   const NearestSimplex found = state.tree.nearest(tool.pose.position);
   const double most = reach_ + tool.tool.radius + tool.tool.length;
   followed.centre = tool.engaged && found.nearest.squared_distance < most * most
-                        ? centre_at(body, found, followed.centre)
+                        ? nearest_centre(body, found, followed.centre)
                         : -1;
 }
 
 /// The centres that the tools will want in some ticks.
-PatchKey PatchChoice::key_at(const Body& body, const State& state, double ticks) const noexcept {
+PatchKey PatchChoice::key_at(const Body& body, const State& state, double ticks) noexcept {
   PatchKey key;
   for (std::size_t k = 0; k < tools_.size(); ++k) {
     if (tools_[k].centre < 0) continue;
     const Vec3 place = state.tools[k].pose.position + ticks * tools_[k].velocity;
-    if (place.allFinite()) key.add(centre_at(body, state.tree.nearest(place), -1));
+    if (place.allFinite()) key.add(nearest_centre(body, state.tree.nearest(place), -1));
   }
   return key;
 }

@@ -2,21 +2,22 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <vector>
 
+#include "runtime/patch_maker.h"
 #include "runtime/state.h"
 
 namespace palpate {
 
 /// The centres of a patch, stored nodes, ascending; -1 behind the last.
 struct PatchKey {
-  static constexpr std::size_t most = 4;  ///< tools that overlays follow
-  std::array<Index, most> centres{-1, -1, -1, -1};
+  std::array<Index, most_overlay_tools> centres{-1, -1, -1, -1};
 
   [[nodiscard]] bool empty() const noexcept { return centres[0] < 0; }
   [[nodiscard]] Index count() const noexcept;
   void add(Index centre) noexcept;
-  bool operator==(const PatchKey&) const = default;
+  auto operator<=>(const PatchKey&) const = default;
 };
 
 /// What is wanted of overlays, the most urgent first, each once.
@@ -36,9 +37,9 @@ struct PatchWishes {
 /// follow its own absence. All memory is taken at construction.
 class PatchChoice {
  public:
-  explicit PatchChoice(const Body& body, const State& state);
+  PatchChoice(const Body& body, const State& state);
 
-  /// After each tick. Looks ahead to one time a tick, in turn.
+  /// By the tick before. Looks ahead to one time a tick, in turn.
   void follow(const Body& body, const State& state) noexcept;
 
   [[nodiscard]] const PatchKey& now() const noexcept { return now_; }  ///< empty while no tool is near
@@ -53,14 +54,19 @@ class PatchChoice {
   };
 
   void follow_tool(const Body& body, const State& state, std::size_t number) noexcept;
-  [[nodiscard]] PatchKey key_at(const Body& body, const State& state, double ticks) const noexcept;
+  [[nodiscard]] PatchKey key_at(const Body& body, const State& state, double ticks) noexcept;
   [[nodiscard]] Index touched_centre(const Body& body, const State& state, std::size_t number) noexcept;
+  [[nodiscard]] Index nearest_centre(const Body& body, const NearestSimplex& found, Index present) noexcept;
+  void add_share(const Body& body, Index surface_node, double share) noexcept;
+  [[nodiscard]] Index chosen(Index present) const noexcept;
 
   double reach_;  // how far from the body overlays are made for a tool [m]
   std::int64_t ticks_ = 0;
   std::vector<Followed> tools_;
-  std::vector<Index> touched_;  // stored nodes that contacts are on, and their shares
-  std::vector<double> share_;
+  // Scratch of a choice.
+  std::size_t count_ = 0;
+  std::vector<Index> touched_;  // stored nodes that have a part in the places that count
+  std::vector<double> share_;   // and how much
   PatchKey now_;
   std::array<PatchKey, times_ahead.size()> ahead_;  // where the tools will be
   PatchWishes wishes_;

@@ -9,21 +9,9 @@
 namespace palpate {
 namespace {
 
-/// Nodes of elements, each once.
-std::vector<Index> nodes_of(const Mesh& mesh, const std::vector<Index>& elements) {
-  std::vector<Index> nodes;
-  for (const Index e : elements)
-    nodes.insert(nodes.end(), mesh.element_nodes(e).begin(), mesh.element_nodes(e).end());
-  std::sort(nodes.begin(), nodes.end());
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-  return nodes;
-}
-
 /// Whether the sizes are those of this mesh, and the surface's nodes.
 bool fits(const CondensedPatch& condensed, const PatchMesh& mesh, int dimension) {
-  std::vector<Index> surface = mesh.surface;
-  std::sort(surface.begin(), surface.end());
-  surface.erase(std::unique(surface.begin(), surface.end()), surface.end());
+  const std::vector<Index> surface = surface_nodes(mesh);
   const Eigen::Index g = dimension * std::ssize(mesh.nodes), m = dimension * std::ssize(surface);
   return condensed.surface == surface && condensed.G.rows() == g && condensed.G.cols() == g &&
          condensed.T.rows() == m && condensed.T.cols() == g && condensed.compliance.rows() == m &&
@@ -32,18 +20,16 @@ bool fits(const CondensedPatch& condensed, const PatchMesh& mesh, int dimension)
 
 }  // namespace
 
-PatchMaker::PatchMaker(const Body& body, int rings)
-    : body_(body),
-      at_(body.model().mesh),
-      cuts_(body.model().mesh.element, body.refinement()),
-      rings_(rings) {
+Index patch_room(const Body& body, int rings, std::size_t tools) {
   const Model& model = body.model();
+  const ElementsAtNodes at(model.mesh);
   const unsigned all_axes = (1U << model.dimension()) - 1U;
+  Index most = 0;
   for (const Index stored : body.surface_stored_nodes()) {
     if (stored < 0) continue;
     const Index centre = body.mesh_node(stored);
     Index count = 0;
-    for (const Index node : nodes_of(model.mesh, rings_round(model.mesh, at_, {&centre, 1}, rings))) {
+    for (const Index node : nodes_of(model.mesh, rings_round(model.mesh, at, {&centre, 1}, rings))) {
       if ((model.fixed[static_cast<std::size_t>(node)] & all_axes) == all_axes) continue;
       ++count;
       if (body.stored_node(node) >= 0) continue;
@@ -53,9 +39,16 @@ PatchMaker::PatchMaker(const Body& body, int rings)
                   "precompute with [storage] scope = \"layers\" and layers = " + std::to_string(rings) +
                       ", or take fewer rings");
     }
-    most_nodes_ = std::max(most_nodes_, count);
+    most = std::max(most, count);
   }
+  return most * static_cast<Index>(std::min(tools, most_overlay_tools));
 }
+
+PatchMaker::PatchMaker(const Body& body, int rings)
+    : body_(body),
+      at_(body.model().mesh),
+      cuts_(body.model().mesh.element, body.refinement()),
+      rings_(rings) {}
 
 std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
   const Model& model = body_.model();

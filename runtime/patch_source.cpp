@@ -13,10 +13,6 @@ constexpr auto pause = std::chrono::microseconds(500);
 
 }  // namespace
 
-Index patch_room(const Body& body, int rings, std::size_t tools) {
-  return PatchMaker(body, rings).most_nodes() * static_cast<Index>(std::min(tools, PatchKey::most));
-}
-
 PatchSource::PatchSource(const Body& body, const State& state, const PatchSourceOptions& options)
     : body_(body),
       options_(options),
@@ -100,7 +96,6 @@ const std::shared_ptr<const Patch>* PatchSource::find(const PatchKey& key) const
 void PatchSource::build_wishes() {
   while (!stop_) {
     ++round_;
-    std::erase_if(retired_, [](const auto& patch) { return patch.use_count() == 1; });
     if (!build_next(wishes_.read())) std::this_thread::sleep_for(pause);
   }
 }
@@ -108,10 +103,14 @@ void PatchSource::build_wishes() {
 /// What is wished for first, then what the file has, then, while there is memory, round the first centre,
 /// those first that the tool moves towards.
 bool PatchSource::build_next(const PatchWishes& wishes) {
-  bool built = false;
-  for (std::size_t k = 0; k < wishes.count && !built; ++k) built = build(wishes.keys[k]);
-  if (built || build_stored()) return true;
   const std::size_t usual = kept_.empty() ? 0 : bytes_ / kept_.size();
+  std::size_t wanted = 0;  // bytes of the wishes so far: later ones must not push them out
+  for (std::size_t k = 0; k < wishes.count && (k == 0 || wanted + usual <= options_.memory); ++k) {
+    if (build(wishes.keys[k])) return true;
+    const std::shared_ptr<const Patch>& patch = kept_.at(wishes.keys[k]).patch;
+    if (patch != nullptr) wanted += patch->bytes();
+  }
+  if (build_stored()) return true;
   if (bytes_ + 2 * usual > options_.memory) return false;
   if (wishes.count == 0 || wishes.keys[0].count() != 1) return false;
   const Index centre = wishes.keys[0].centres[0];
@@ -149,6 +148,7 @@ bool PatchSource::build_stored() {
 }
 
 bool PatchSource::build(const PatchKey& key) {
+  std::erase_if(retired_, [](const auto& patch) { return patch.use_count() == 1; });
   const auto found = kept_.find(key);
   if (found != kept_.end()) {
     found->second.wanted = round_;
@@ -176,7 +176,8 @@ bool PatchSource::build(const PatchKey& key) {
   return true;
 }
 
-/// Lets go of those that were not wanted for longest until the rest is within the budget.
+/// Lets go of those that were not wanted for longest until the rest is within the budget. They are freed by a
+/// later `build`, after the tick and whoever shows the surface have let go of them too.
 void PatchSource::make_room() {
   while (bytes_ > options_.memory || free_slots_.empty()) {
     auto oldest = kept_.end();

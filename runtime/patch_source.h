@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <string>
 #include <thread>
 #include <vector>
 
@@ -37,8 +36,7 @@ struct PatchCounts {
 class PatchSource {
  public:
   /// Starts the builder, which makes what the file has of patches first of all but the wishes. `body` must
-  /// live as long; `state` is one that the loop will use, or a copy. Throws Error when the file keeps too few
-  /// layers below the surface.
+  /// live as long; `state` is one that the loop will use, or a copy, with room as patch_room says.
   PatchSource(const Body& body, const State& state, const PatchSourceOptions& options);
   ~PatchSource();
   PatchSource(const PatchSource&) = delete;
@@ -70,10 +68,6 @@ class PatchSource {
     std::shared_ptr<const Patch> patch;
     std::int64_t wanted = 0;  // in which round last
   };
-  /// Order in the builder's cache.
-  struct Less {
-    bool operator()(const PatchKey& a, const PatchKey& b) const noexcept { return a.centres < b.centres; }
-  };
 
   void receive() noexcept;
   void unlink(Index slot) noexcept;
@@ -102,7 +96,7 @@ class PatchSource {
   Ring<Delivery> deliveries_;
 
   // The builder's side.
-  std::map<PatchKey, Kept, Less> kept_;
+  std::map<PatchKey, Kept> kept_;
   std::vector<Index> free_slots_;
   std::vector<std::shared_ptr<const Patch>> retired_;
   std::size_t next_stored_ = 0;  // of the file's patches
@@ -114,8 +108,5 @@ class PatchSource {
   std::atomic<bool> stop_ = false;
   std::thread builder_;
 };
-
-/// Room that a state needs for patches of this source's body: give it as StateOptions::patch_nodes.
-Index patch_room(const Body& body, int rings, std::size_t tools);
 
 }  // namespace palpate

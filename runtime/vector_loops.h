@@ -14,6 +14,13 @@ inline double dot(const double* __restrict a, const double* __restrict b, std::p
   return sum;
 }
 
+/// y += factor x
+inline void add(const double* __restrict x, double factor, double* __restrict y,
+                std::ptrdiff_t count) noexcept {
+#pragma omp simd
+  for (std::ptrdiff_t i = 0; i < count; ++i) y[i] += factor * x[i];
+}
+
 /// y -= factor x
 inline void subtract(const double* __restrict x, double factor, double* __restrict y,
                      std::ptrdiff_t count) noexcept {

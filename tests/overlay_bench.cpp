@@ -130,7 +130,7 @@ struct Overlaid {
         maker(body, rings),
         centre(top_node(body)),
         state(body, {.tools = {Tool{.radius = touched.radius, .reach = 10.0 * touched.radius}},
-                     .patch_nodes = 2 * maker.most_nodes()}) {
+                     .patch_nodes = patch_room(body, rings, 2)}) {
     const Vec3 up = Vec3::Unit(body.dimension() - 1);
     for (int k = 200; k >= 0; --k) {
       pose.position =

@@ -125,6 +125,21 @@ TEST_P(Tick, MakesNoHeapCall) {
   EXPECT_EQ(state_.ticks, 1000);
 }
 
+/// Runs in a process that the kernel kills at the first system call but write and exit.
+[[maybe_unused]] void expect_no_system_call(const std::function<bool()>& run) {
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+    syscall(SYS_exit, run() ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no seccomp here";
+  EXPECT_FALSE(WIFSIGNALED(status)) << "signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
 /// The same body with a finer surface, and patches that take turns.
 class OverlayTick : public Tick {
  protected:
@@ -209,38 +224,21 @@ TEST_P(OverlayTick, MakesNoSystemCall) {
 #if !PALPATE_OWN_MALLOC
   GTEST_SKIP() << "sanitizers make system calls";
 #else
-  const pid_t child = fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+  expect_no_system_call([&] {
     exercise_patches();
-    syscall(SYS_exit, with_.ticks == 1000 ? 0 : 1);
-  }
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no seccomp here";
-  EXPECT_FALSE(WIFSIGNALED(status)) << "signal " << WTERMSIG(status);
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+    return with_.ticks == 1000;
+  });
 #endif
 }
 
-// In a process that the kernel kills at the first system call but write and exit.
 TEST_P(Tick, MakesNoSystemCall) {
 #if !PALPATE_OWN_MALLOC
   GTEST_SKIP() << "sanitizers make system calls";
 #else
-  const pid_t child = fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+  expect_no_system_call([&] {
     exercise(body_, state_, held_, u_, poses_);
-    syscall(SYS_exit, state_.ticks == 1000 ? 0 : 1);
-  }
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no seccomp here";
-  EXPECT_FALSE(WIFSIGNALED(status)) << "signal " << WTERMSIG(status);
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+    return state_.ticks == 1000;
+  });
 #endif
 }
 
