@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/condensed_patch.h"
+#include "formats/newmark.h"
 #include "formats/packed.h"
 #include "meshes/material.h"
 #include "meshes/mesh.h"
@@ -46,6 +47,38 @@ struct StoredOverlay {
   std::vector<CondensedPatch> patches;  ///< [P]
 };
 
+/// How the body swings once it is let go.
+enum class DynamicsMethod : std::uint8_t {
+  none,    ///< it does not: the file has no dynamics
+  packed,  ///< all stored dofs by the packed inverse of K_bar = K + a0 M + a1 C_d; scope full
+  modal,   ///< its lowest modes
+};
+
+/// A symmetric sparse matrix pair of the stored dofs by columns of the lower triangle.
+struct MassAndDamping {
+  std::vector<std::int64_t> start;  ///< [n + 1] first entry of each column
+  std::vector<Index> row;           ///< [entries] ascending in a column, none above the diagonal
+  std::vector<double> mass;         ///< [entries] M [kg]
+  std::vector<double> damping;      ///< [entries] C_d [N s/m]
+};
+
+/// What Newmark's method needs (theory.md section 5).
+struct StoredDynamics {
+  DynamicsMethod method = DynamicsMethod::none;
+  bool lumped = false;  ///< M is diagonal
+  Newmark newmark;
+  Rayleigh damping;
+  MassAndDamping matrices;     ///< packed
+  PackedGreens inverse;        ///< packed: K_bar^-1 of the stored dofs [m/N]
+  std::vector<double> omega;   ///< modal: [k + 1] angular frequencies [rad/s], ascending; the last is that of
+                               ///< the first mode that is not kept (infinity when all are)
+  std::vector<double> shapes;  ///< modal: [k x n] the modes at the stored dofs, phi^T M phi = 1 [1/sqrt(kg)]
+
+  [[nodiscard]] Index modes() const noexcept {  ///< k
+    return omega.empty() ? 0 : static_cast<Index>(omega.size()) - 1;
+  }
+};
+
 /// Everything baked. Constant once loaded; shared by all threads.
 /// With d = dimension(), a stored dof is d k + axis for stored node k; `stored_nodes[k]` is its mesh node.
 /// A node that is held along some axes only is stored whole: rows and columns of its held dofs are zero.
@@ -72,6 +105,7 @@ struct Model {
   std::vector<SourceFile> sources;
   std::vector<Probe> probes;
   StoredOverlay overlay;
+  StoredDynamics dynamics;
   PackedGreens greens;       ///< Xi of the stored dofs [m/N]
   std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
 

@@ -107,6 +107,36 @@ std::vector<Vec3> make_nodes(ElementType type) {
   return nodes;
 }
 
+/// Points whose barycentric coordinates are `a` but for one, or (`pairs`) but for two that are 1/2 - a.
+void add_orbit(std::vector<QuadraturePoint>& rule, double a, double weight, bool pairs) {
+  for (int i = 0; i < 4; ++i) {
+    for (int j = pairs ? i + 1 : i; j < (pairs ? 4 : i + 1); ++j) {
+      std::array<double, 4> L{a, a, a, a};
+      L[static_cast<std::size_t>(i)] = L[static_cast<std::size_t>(j)] = pairs ? 0.5 - a : 1.0 - 3.0 * a;
+      rule.push_back({Vec3(L[1], L[2], L[3]), weight});
+    }
+  }
+}
+
+/// Points that integrate N_i N_j exactly: of degree 2 for tri3 and tet4, of 5 for tet10 (Walkington 2000, 14
+/// points); those of the stiffness do it on quad4 and hex8.
+std::vector<QuadraturePoint> make_mass_rule(ElementType type) {
+  std::vector<QuadraturePoint> rule;
+  if (type == ElementType::tri3) {
+    for (const Vec3& xi : {Vec3(0.5, 0.0, 0.0), Vec3(0.5, 0.5, 0.0), Vec3(0.0, 0.5, 0.0)})
+      rule.push_back({xi, 1.0 / 6.0});
+  } else if (type == ElementType::tet4) {
+    add_orbit(rule, (5.0 - std::sqrt(5.0)) / 20.0, 1.0 / 24.0, false);
+  } else if (type == ElementType::tet10) {
+    add_orbit(rule, 0.09273525031089123, 0.01224884051939366, false);
+    add_orbit(rule, 0.31088591926330061, 0.01878132095300264, false);
+    add_orbit(rule, 0.04550370412564965, 0.007091003462846911, true);
+  } else {
+    rule = make_rule(type);
+  }
+  return rule;
+}
+
 template <class T>
 using PerType = std::array<std::vector<T>, element_traits.size()>;
 
@@ -121,6 +151,11 @@ PerType<T> for_all_types(Make make) {
 Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> jacobian(ElementType type, const ElementNodes& x,
                                                            const Vec3& xi) {
   return x.transpose() * reference_gradients(type, xi);
+}
+
+std::span<const QuadraturePoint> mass_quadrature(ElementType type) {
+  static const auto rules = for_all_types<QuadraturePoint>(make_mass_rule);
+  return rules[static_cast<std::size_t>(type)];
 }
 
 double determinant(ElementType type, const ElementNodes& x, const Vec3& xi) {
@@ -270,6 +305,21 @@ ElementMatrix element_stiffness(ElementType type, const ElementNodes& x, const E
     K.noalias() += (q.weight * thickness * mapped.determinant) * B.transpose().lazyProduct(DB);
   }
   return K;
+}
+
+ElementMass element_mass(ElementType type, const ElementNodes& x, double density, double thickness) {
+  ElementMass M = ElementMass::Zero(x.rows(), x.rows());
+  for (const QuadraturePoint& q : mass_quadrature(type)) {
+    const ShapeValues N = shape_functions(type, q.xi);
+    M.noalias() +=
+        (q.weight * density * thickness * determinant(type, x, q.xi)) * N.lazyProduct(N.transpose());
+  }
+  return M;
+}
+
+ShapeValues element_lumped_mass(ElementType type, const ElementNodes& x, double density, double thickness) {
+  const ElementMass M = element_mass(type, x, density, thickness);
+  return M.diagonal() * (M.sum() / M.trace());
 }
 
 ElementVector element_stress_force(ElementType type, const ElementNodes& x, const StressVector& stress,

@@ -69,6 +69,16 @@ StrainMatrix strain_matrix(const ShapeGradients& gradients);
 ElementMatrix element_stiffness(ElementType type, const ElementNodes& x, const ElasticityMatrix& D,
                                 double thickness);
 
+/// Integral of t density N_i N_j over the element [kg], the same along every axis: the consistent mass
+/// matrix. Exact on straight-edged simplices and on affine quad4 and hex8.
+using ElementMass =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_element_nodes, max_element_nodes>;
+ElementMass element_mass(ElementType type, const ElementNodes& x, double density, double thickness);
+
+/// Diagonal of the lumped mass matrix [kg]: that of the consistent one, scaled so that the element's mass
+/// stays (Hinton, Rock and Zienkiewicz 1976); positive for every kind of element.
+ShapeValues element_lumped_mass(ElementType type, const ElementNodes& x, double density, double thickness);
+
 /// Integral of t B^T sigma for a constant stress [N], e.g. D eps_0 (Fagerholt eq. 3.25-3.30).
 ElementVector element_stress_force(ElementType type, const ElementNodes& x, const StressVector& stress,
                                    double thickness);

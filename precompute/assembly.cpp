@@ -160,4 +160,41 @@ Stiffness assemble_stiffness(const ElasticBody& body) {
   return result;
 }
 
+SparseMatrix assemble_mass(const ElasticBody& body, const Stiffness& stiffness, bool lumped) {
+  const int d = body.mesh.dimension();
+  SparseMatrix M = stiffness.K;
+  std::fill_n(M.valuePtr(), M.nonZeros(), 0.0);
+  const auto add = [&](Index a, Index b, double mass) {
+    for (int axis = 0; axis < d; ++axis) {
+      const std::int64_t row = stiffness.free_of_dof[static_cast<std::size_t>(std::int64_t{d} * a + axis)];
+      const std::int64_t column = stiffness.free_of_dof[static_cast<std::size_t>(std::int64_t{d} * b + axis)];
+      if (column >= 0 && row >= column) M.coeffRef(row, column) += mass;
+    }
+  };
+  for (Index e = 0; e < body.mesh.elements(); ++e) {
+    const auto material = static_cast<std::size_t>(body.material_of_element[static_cast<std::size_t>(e)]);
+    const double density = body.materials[material].density;
+    const std::span<const Index> nodes = body.mesh.element_nodes(e);
+    const ElementNodes x = element_nodes(body.mesh, e);
+    const ElementMass Me =
+        lumped ? ElementMass(element_lumped_mass(body.mesh.element, x, density, body.thickness).asDiagonal())
+               : element_mass(body.mesh.element, x, density, body.thickness);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      for (std::size_t j = 0; j < nodes.size(); ++j)
+        add(nodes[i], nodes[j], Me(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)));
+    }
+  }
+  return M;
+}
+
+SparseMatrix effective_stiffness(const SparseMatrix& K, const SparseMatrix& M, const Rayleigh& damping,
+                                 const Newmark& newmark) {
+  const double of_K = 1.0 + newmark.a1() * damping.stiffness;
+  const double of_M = newmark.a0() + newmark.a1() * damping.mass;
+  SparseMatrix K_bar = K;
+  for (std::int64_t k = 0; k < K_bar.nonZeros(); ++k)
+    K_bar.valuePtr()[k] = of_K * K.valuePtr()[k] + of_M * M.valuePtr()[k];
+  return K_bar;
+}
+
 }  // namespace palpate

@@ -39,4 +39,12 @@ ElasticBody elastic_body(const Model& model);
 /// K = sum over elements of the integral of t B^T D B (theory.md section 1). At least one dof must be free.
 Stiffness assemble_stiffness(const ElasticBody& body);
 
+/// M = sum over elements of the integral of t density N^T N [kg], of the free dofs, in K's pattern, the lower
+/// triangle; consistent or `lumped`.
+SparseMatrix assemble_mass(const ElasticBody& body, const Stiffness& stiffness, bool lumped);
+
+/// K_bar = K + a0 M + a1 C_d (theory.md section 5), in the same pattern.
+SparseMatrix effective_stiffness(const SparseMatrix& K, const SparseMatrix& M, const Rayleigh& damping,
+                                 const Newmark& newmark);
+
 }  // namespace palpate

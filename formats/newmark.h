@@ -1,0 +1,38 @@
+// Newmark's method and Rayleigh damping (theory.md section 5).
+#pragma once
+
+#include <cmath>
+
+namespace palpate {
+
+/// u' = u + Dt v + Dt^2 [(1/2 - alpha) a + alpha a'],  v' = v + Dt [(1 - delta) a + delta a'].
+/// Unconditionally stable for delta >= 1/2, alpha >= (delta + 1/2)^2 / 4; with alpha = 1/4, delta = 1/2
+/// energy stays without damping.
+struct Newmark {
+  double alpha = 0.25;
+  double delta = 0.5;
+  double time_step = 0.001;  ///< Dt [s]
+
+  [[nodiscard]] double a0() const noexcept { return 1.0 / (alpha * time_step * time_step); }
+  [[nodiscard]] double a1() const noexcept { return delta / (alpha * time_step); }
+  [[nodiscard]] double a2() const noexcept { return 1.0 / (alpha * time_step); }
+  [[nodiscard]] double a3() const noexcept { return 0.5 / alpha - 1.0; }
+  [[nodiscard]] double a4() const noexcept { return delta / alpha - 1.0; }
+  [[nodiscard]] double a5() const noexcept { return 0.5 * time_step * (delta / alpha - 2.0); }
+};
+
+/// C_d = mass M + stiffness K.
+struct Rayleigh {
+  double mass = 0.0;       ///< [1/s]
+  double stiffness = 0.0;  ///< [s]
+};
+
+/// The coefficients that damp oscillations of two angular frequencies [rad/s], not equal, by the ratios zeta
+/// (1: critical): zeta = (mass / omega + stiffness omega) / 2.
+inline Rayleigh rayleigh_damping(double omega1, double zeta1, double omega2, double zeta2) noexcept {
+  const double span = omega2 * omega2 - omega1 * omega1;
+  return {.mass = 2.0 * omega1 * omega2 * (zeta1 * omega2 - zeta2 * omega1) / span,
+          .stiffness = 2.0 * (zeta2 * omega2 - zeta1 * omega1) / span};
+}
+
+}  // namespace palpate
