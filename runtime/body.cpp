@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "meshes/error.h"
+#include "runtime/modal_newmark.h"
 #include "runtime/surface_numbering.h"
 
 namespace palpate {
@@ -60,15 +61,44 @@ FineSurface surface_as_it_is(const Model& model) {
   return surface;
 }
 
-Greens take_greens(Model& model, const GreensOptions& options) {
+/// Those that contact is to meet; of dynamic contact with modes still without them.
+Greens take_greens(Model& model, const GreensOptions& options, ContactModel contact) {
   check_sizes(model);
-  return Greens(std::exchange(model.greens, {}), model.dimension(), options);
+  PackedGreens greens = std::exchange(model.greens, {});
+  if (contact == ContactModel::dynamic) {
+    if (model.dynamics.method == DynamicsMethod::none) {
+      throw Error("the file has no dynamics, which dynamic contact needs", model.name,
+                  "add [dynamics] to its model.toml and precompute it again");
+    }
+    if (model.dynamics.method == DynamicsMethod::packed) greens = model.dynamics.inverse;
+  }
+  return Greens(std::move(greens), model.dimension(), options);
+}
+
+/// 1 / k_bar_i - 1 / omega_i^2
+std::vector<double> dynamic_weights(const Modes& modes, const StoredDynamics& dynamics) {
+  const ModalNewmark newmark(modes.omega(), dynamics.damping, dynamics.newmark);
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < modes.omega().size(); ++i) {
+    const double omega = modes.omega()[i];
+    weights.push_back(1.0 / newmark.effective_stiffness()[i] - 1.0 / (omega * omega));
+  }
+  return weights;
 }
 
 }  // namespace
 
-Body::Body(Model model, const GreensOptions& options, int refinement)
-    : model_(std::move(model)), greens_(take_greens(model_, options)), refinement_(refinement) {
+Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact)
+    : model_(std::move(model)),
+      contact_model_(contact),
+      greens_(take_greens(model_, options, contact)),
+      refinement_(refinement) {
+  if (model_.dynamics.method == DynamicsMethod::modal) {
+    modes_ = std::make_shared<const Modes>(model_);
+    model_.dynamics.shapes = {};
+    if (contact == ContactModel::dynamic)
+      greens_.add_modes(modes_, dynamic_weights(*modes_, model_.dynamics));
+  }
   stored_of_mesh_.assign(model_.mesh.nodes.size(), -1);
   for (std::size_t k = 0; k < model_.stored_nodes.size(); ++k) {
     stored_of_mesh_[static_cast<std::size_t>(model_.stored_nodes[k])] = static_cast<Index>(k);

@@ -11,6 +11,12 @@
 
 namespace palpate {
 
+/// What a contact force meets.
+enum class ContactModel : std::uint8_t {
+  quasi_static,  ///< the body's stiffness: Xi
+  dynamic,       ///< its inertia and viscosity too: K_bar^-1 of one time step (theory.md section 5)
+};
+
 /// The free surface node that is nearest to a point.
 struct NearestNode {
   Index node;       ///< stored node
@@ -31,13 +37,18 @@ class Body {
  public:
   /// Takes the model over and unfolds its Green's functions. The surface that a tool meets has the sides of
   /// the elements, with `refinement` r > 1 of elements cut into r^d, as the overlays have them that are to be
-  /// used. Throws Error when no free surface node is stored, as then nothing can be touched, or when the
-  /// sizes of the model's parts do not fit together.
-  explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1);
+  /// used. Throws Error when no free surface node is stored, as then nothing can be touched, when the
+  /// sizes of the model's parts do not fit together, or for dynamic contact with a model without dynamics.
+  explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1,
+                ContactModel contact = ContactModel::quasi_static);
 
   /// Everything baked, except `greens`, which greens() has taken over.
   [[nodiscard]] const Model& model() const noexcept { return model_; }
+  /// Of the static body; with dynamic contact K_bar^-1.
   [[nodiscard]] const Greens& greens() const noexcept { return greens_; }
+  [[nodiscard]] ContactModel contact_model() const noexcept { return contact_model_; }
+  /// Null unless the dynamics are modal.
+  [[nodiscard]] const Modes* modes() const noexcept { return modes_.get(); }
 
   /// d, dofs a node: 2 in the plane, 3 in space.
   [[nodiscard]] int dimension() const noexcept { return greens_.dimension(); }
@@ -117,7 +128,9 @@ class Body {
   void measure_surface();
 
   Model model_;
+  ContactModel contact_model_;
   Greens greens_;
+  std::shared_ptr<const Modes> modes_;
   int refinement_;
   FineSurface fine_;
   std::vector<Index> stored_of_mesh_;  // [N]

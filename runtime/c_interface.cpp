@@ -16,6 +16,7 @@
 #include "meshes/error.h"
 #include "runtime/body.h"
 #include "runtime/latest.h"
+#include "runtime/motion_source.h"
 #include "runtime/node_vectors.h"
 #include "runtime/palpate.h"
 #include "runtime/patch_source.h"
@@ -105,7 +106,7 @@ OverlayOptions read_overlay(const palpate_overlay* overlay) {
   if (overlay->refinement < 2 || overlay->refinement > most || overlay->rings < 1 || overlay->rings > most) {
     throw Error("an overlay of " + std::to_string(overlay->rings) + " rings, refined " +
                     std::to_string(overlay->refinement) + " times, was asked for",
-                "palpate_create_with_overlay", "ask for 1 to 16 rings, refined 2 to 16 times");
+                "palpate_create_with_options", "ask for 1 to 16 rings, refined 2 to 16 times");
   }
   return {.refinement = overlay->refinement, .rings = overlay->rings};
 }
@@ -120,34 +121,46 @@ StateOptions with_room(StateOptions options, const Body& body, const OverlayOpti
 
 using namespace palpate;
 
+/// What a tick left, for the eye.
+struct Shown {
+  SurfaceLoad load;
+  ShownMotion motion;
+};
+
 struct palpate_session {
-  palpate_session(Model model, const StateOptions& options, const OverlayOptions& overlay, std::size_t memory)
-      : body(std::move(model), {}, overlay.refinement),
+  palpate_session(Model model, const StateOptions& options, const OverlayOptions& overlay, std::size_t memory,
+                  ContactModel contact)
+      : body(std::move(model), {}, overlay.refinement, contact),
         untouched(body, with_room(options, body, overlay)),
         state(untouched),
         poses(options.tools.size()),
-        load(state.near.load()),
+        shown(Shown{.load = state.near.load(), .motion = ShownMotion(body)}),
         stored_displacement(static_cast<std::size_t>(body.greens().order())),
         displacement(body.surface_rest_positions().size()) {
     show();
     if (overlay.refinement > 1)
       overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = memory});
+    if (body.model().dynamics.method == DynamicsMethod::packed)
+      motion.emplace(body, state, MotionSourceOptions{});
   }
 
   /// Hands what the last tick did over to the thread that draws.
   void show() noexcept {
-    load.next() = state.near.load();
-    load.publish();
+    Shown& next = shown.next();
+    next.load = state.near.load();
+    state.motion.show(next.motion);
+    shown.publish();
   }
 
   Body body;
   State untouched;
   State state;
   std::vector<ToolPose> poses;
-  Latest<SurfaceLoad> load;
+  Latest<Shown> shown;
   std::vector<double> stored_displacement;  // scratch of the thread that draws
   std::vector<Vec3> displacement;
   std::optional<PatchSource> overlays;
+  std::optional<MotionSource> motion;
 };
 
 extern "C" {
@@ -171,21 +184,31 @@ const char* palpate_status_name(uint32_t bit) noexcept {
   return nullptr;
 }
 
-palpate_session* palpate_create(const char* file, const palpate_tool* tools, int tool_count, int max_contacts,
-                                char* error, size_t error_size) noexcept {
-  return palpate_create_with_overlay(file, tools, tool_count, max_contacts, nullptr, error, error_size);
+palpate_options palpate_default_options(void) noexcept {
+  return {.overlay = nullptr, .dynamic_contact = 0, .tick = StateOptions{}.tick};
 }
 
-palpate_session* palpate_create_with_overlay(const char* file, const palpate_tool* tools, int tool_count,
-                                             int max_contacts, const palpate_overlay* overlay, char* error,
+palpate_session* palpate_create(const char* file, const palpate_tool* tools, int tool_count, int max_contacts,
+                                char* error, size_t error_size) noexcept {
+  const palpate_options options = palpate_default_options();
+  return palpate_create_with_options(file, tools, tool_count, max_contacts, &options, error, error_size);
+}
+
+palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
+                                             int max_contacts, const palpate_options* options, char* error,
                                              size_t error_size) noexcept {
   copy_text("", error, error_size);
   try {
     if (file == nullptr) throw Error("there is no file name", "palpate_create", "name a .palpate.hdf file");
-    const StateOptions options = read_options(tools, tool_count, max_contacts);
-    const OverlayOptions fine = read_overlay(overlay);
-    const std::size_t memory = overlay != nullptr ? overlay->memory : 0;
-    return std::make_unique<palpate_session>(load_model(file), options, fine, memory).release();
+    if (options == nullptr)
+      throw Error("there are no options", "palpate_create_with_options", "take palpate_default_options()");
+    StateOptions wanted = read_options(tools, tool_count, max_contacts);
+    wanted.tick = options->tick;
+    const OverlayOptions fine = read_overlay(options->overlay);
+    const std::size_t memory = options->overlay != nullptr ? options->overlay->memory : 0;
+    const ContactModel contact =
+        options->dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
+    return std::make_unique<palpate_session>(load_model(file), wanted, fine, memory, contact).release();
   } catch (...) {
     try {
       copy_text(explanation(), error, error_size);
@@ -203,7 +226,9 @@ uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexc
   if (poses == nullptr) return PALPATE_POSE_NOT_FINITE;
   std::transform(poses, poses + session->poses.size(), session->poses.begin(), to_pose);
   if (session->overlays) session->overlays->serve(session->state);
+  if (session->motion) session->motion->receive(session->state);
   const StepStatus status = step(session->body, session->state, session->poses);
+  if (session->motion) session->motion->post(session->state);
   session->show();
   return static_cast<uint32_t>(status);
 }
@@ -250,8 +275,9 @@ void palpate_surface_simplices(const palpate_session* session, int32_t* corners)
 }
 
 void palpate_surface_displacement(palpate_session* session, double* xyz) noexcept {
-  surface_displacement(session->body, session->load.read(), session->stored_displacement,
-                       session->displacement);
+  const Shown& shown = session->shown.read();
+  surface_displacement(session->body, shown.load, session->stored_displacement, session->displacement,
+                       &shown.motion);
   for (const Vec3& u : session->displacement) {
     copy(u, xyz);
     xyz += 3;

@@ -157,8 +157,8 @@ bool want_nodes(const Body& body, State& state, const std::array<Index, 3>& node
   if (!room) return false;
   for (const Index node : nodes) {
     if (node < 0 || !body.surface_moves(node)) continue;
-    state.tree.move(node, body.surface_rest_positions()[static_cast<std::size_t>(node)] +
-                              state.near.displacement(state.near.place_of(node)));
+    state.tree.move(
+        node, unloaded_position(body, state, node) + state.near.displacement(state.near.place_of(node)));
   }
   return true;
 }

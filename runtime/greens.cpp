@@ -13,6 +13,7 @@
 
 #include "formats/memory.h"
 #include "meshes/error.h"
+#include "runtime/vector_loops.h"
 
 namespace palpate {
 namespace {
@@ -211,7 +212,8 @@ Eigen::MatrixXd Greens::block(Index row, Index column) const {
   return xi;
 }
 
-void Greens::gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
+void Greens::gather_static(Index row, std::span<const Index> columns,
+                           std::span<double> blocks) const noexcept {
   if (!unfolded()) {
     gather_from_packed(packed_, dimension_, row, columns, blocks.data());
     return;
@@ -230,8 +232,8 @@ void Greens::displacement(std::span<const Index> nodes, std::span<const double> 
   displacement(nodes, f, 0, u);
 }
 
-void Greens::displacement(std::span<const Index> nodes, std::span<const double> f, Index first_node,
-                          std::span<double> u) const noexcept {
+void Greens::displace_statically(std::span<const Index> nodes, std::span<const double> f, Index first_node,
+                                 std::span<double> u) const noexcept {
   const std::int64_t first = std::int64_t{dimension_} * first_node;
   if (!unfolded()) {
     with_scalars(packed_.data(), precision_, [&]<class T>(const T*) {
@@ -246,6 +248,44 @@ void Greens::displacement(std::span<const Index> nodes, std::span<const double> 
       displacement_from_square<3>(square, stride_, nodes, f.data(), first, u);
     }
   });
+}
+
+void Greens::add_modes(std::shared_ptr<const Modes> modes, std::span<const double> weights) {
+  modes_ = std::move(modes);
+  const std::size_t k = weights.size();
+  weighted_.resize(static_cast<std::size_t>(order_) * k);
+  for (std::int64_t dof = 0; dof < order_; ++dof) {
+    for (std::size_t i = 0; i < k; ++i)
+      weighted_[static_cast<std::size_t>(dof) * k + i] = weights[i] * modes_->row(dof)[i];
+  }
+}
+
+void Greens::gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
+  gather_static(row, columns, blocks);
+  if (modes_ == nullptr) return;
+  const std::int64_t d = dimension_, k = modes_->count();
+  double* block = blocks.data();
+  for (std::int64_t axis = 0; axis < d; ++axis) {
+    const double* by = weighted_.data() + (d * row + axis) * k;
+    for (const Index column : columns) {
+      for (std::int64_t j = 0; j < d; ++j) *block++ += dot(by, modes_->row(d * column + j), k);
+    }
+  }
+}
+
+void Greens::displacement(std::span<const Index> nodes, std::span<const double> f, Index first_node,
+                          std::span<double> u) const noexcept {
+  displace_statically(nodes, f, first_node, u);
+  if (modes_ == nullptr) return;
+  const std::int64_t d = dimension_, k = modes_->count();
+  std::array<double, most_modes> modal;
+  std::fill_n(modal.begin(), k, 0.0);
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    const std::int64_t dof = d * nodes[i / static_cast<std::size_t>(d)] + static_cast<std::int64_t>(i) % d;
+    add(weighted_.data() + dof * k, f[i], modal.data(), k);
+  }
+  for (std::size_t i = 0; i < u.size(); ++i)
+    u[i] += dot(modes_->row(d * first_node + static_cast<std::int64_t>(i)), modal.data(), k);
 }
 
 }  // namespace palpate

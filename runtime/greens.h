@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "formats/packed.h"
 #include "meshes/mesh.h"
+#include "runtime/modes.h"
 
 namespace palpate {
 
@@ -27,6 +29,11 @@ class Greens {
  public:
   /// `dimension`: dofs a node, 2 or 3. Throws Error when the order is not that many for each of some nodes.
   Greens(PackedGreens packed, int dimension, const GreensOptions& options = {});
+
+  /// From now on Xi + sum_i weights_i phi_i phi_i^T: with weights 1 / k_bar_i - 1 / omega_i^2 that is
+  /// K_bar^-1 of the modes, and of what they do not carry the static response (theory.md section 5, modal
+  /// form with static correction). Modes of the same dofs.
+  void add_modes(std::shared_ptr<const Modes> modes, std::span<const double> weights);
 
   [[nodiscard]] std::int64_t order() const noexcept { return order_; }  ///< n, number of stored dofs
   [[nodiscard]] int dimension() const noexcept { return dimension_; }   ///< d, dofs a node
@@ -55,6 +62,10 @@ class Greens {
                     std::span<double> u) const noexcept;
 
  private:
+  void gather_static(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
+  void displace_statically(std::span<const Index> nodes, std::span<const double> f, Index first_node,
+                           std::span<double> u) const noexcept;
+
   PackedGreens packed_;                 // empty when unfolded: the square has taken its place
   std::shared_ptr<const void> square_;  // [n x stride_] rows of the stored scalar
   std::int64_t order_ = 0;
@@ -62,6 +73,8 @@ class Greens {
   int dimension_ = 3;
   Index nodes_ = 0;
   Precision precision_ = Precision::double_precision;
+  std::shared_ptr<const Modes> modes_;
+  std::vector<double> weighted_;  // [n x k] rows of the modes times their weights
 };
 
 }  // namespace palpate

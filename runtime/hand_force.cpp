@@ -15,7 +15,8 @@ void hand_over(ToolState& tool) noexcept {
   const Wrench& contact = tool.contact_wrench;
   const double size = contact.force.norm();
   tool.felt = std::max({size, last.force.norm(), memory * tool.felt});
-  const double explained = (tool.local.stiffness * (tool.device.position - tool.last_device_position)).norm();
+  const Vec3 moved = tool.device.position - tool.last_device_position - tool.surface_change;
+  const double explained = (tool.local.stiffness * moved).norm();
   const double handed_over = tool.contacts > 0 ? tool.tool.hand_over * std::max(size, last.force.norm())
                                                : std::max(tool.tool.hand_over, 1.0 / fade_ticks) * tool.felt;
   const double change = (contact.force - last.force).norm();

@@ -24,7 +24,8 @@ std::string read_text(const std::filesystem::path& file) {
 
 }  // namespace
 
-Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml, int refinement) {
+Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml, int refinement,
+               ContactModel contact) {
   Model model = load_model(file);
   if (!model_toml.empty() && read_text(model_toml) != model.model_toml) {
     throw Error("was not made from " + model_toml.string() + ": the description stored in it is another one",
@@ -33,7 +34,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   for (const std::string& stale : stale_sources(model, file)) {
     print_warning(file.string() + ": " + stale + " (precompute it again)");
   }
-  return Body(std::move(model), {}, refinement);
+  return Body(std::move(model), {}, refinement, contact);
 }
 
 }  // namespace palpate

@@ -10,7 +10,7 @@ namespace palpate {
 /// Loads `file` and prints a warning for each source that is no longer what it was. With `model_toml` (else
 /// empty) the file must have been made from exactly that description. `refinement`: of the surface, see Body.
 /// Throws Error.
-Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
-               int refinement = 1);
+Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml, int refinement = 1,
+               ContactModel contact = ContactModel::quasi_static);
 
 }  // namespace palpate

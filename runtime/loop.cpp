@@ -90,7 +90,7 @@ std::int64_t count_ticks(const ScriptDevice& device) {
 }
 
 LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
-                    Recorder* recorder, bool fast, const std::atomic<bool>& stop) {
+                    MotionSource* motion, Recorder* recorder, bool fast, const std::atomic<bool>& stop) {
   LoopReport report;
   const std::int64_t ticks = count_ticks(device);
   const std::int64_t start = now() + period;
@@ -105,10 +105,15 @@ LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, 
     const double time = static_cast<double>(tick) / ticks_per_second;
     const ToolPose pose = device.pose(time);
     const Vec3 force_before = state.tools.front().wrench.force;
-    if (overlays != nullptr && fast) overlays->serve(state);  // it builds what is missing, untimed
+    const auto serve = [&] {
+      if (overlays != nullptr) overlays->serve(state);
+      if (motion != nullptr) motion->receive(state);
+    };
+    if (fast) serve();  // they do what is missing, untimed
     const std::int64_t begin = now();
-    if (overlays != nullptr && !fast) overlays->serve(state);
+    if (!fast) serve();
     step(body, state, pose);
+    if (motion != nullptr) motion->post(state);
     const std::int64_t end = now();
 
     if (!fast && end > due + period) ++report.deadline_misses;

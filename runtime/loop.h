@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "runtime/histogram.h"
+#include "runtime/motion_source.h"
 #include "runtime/patch_source.h"
 #include "runtime/recorder.h"
 #include "runtime/script_device.h"
@@ -37,8 +38,9 @@ struct LoopReport {
 std::int64_t count_ticks(const ScriptDevice& device);
 
 /// Steps through the script at 1 kHz, or as fast as it goes without waiting (`fast`: deterministic).
-/// `state` has one tool. `overlays` and `recorder` may be null. Ends early when `stop` becomes true.
+/// `state` has one tool. `overlays`, `motion` and `recorder` may be null. Ends early when `stop` becomes
+/// true.
 LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
-                    Recorder* recorder, bool fast, const std::atomic<bool>& stop);
+                    MotionSource* motion, Recorder* recorder, bool fast, const std::atomic<bool>& stop);
 
 }  // namespace palpate

@@ -40,6 +40,7 @@ struct Arguments {
   std::optional<std::string> reach;
   std::optional<std::string> max_contacts;
   bool fast = false;
+  std::string contact = "quasi-static";
   std::optional<std::string> overlay_memory;
   std::string record;
   std::string report;
@@ -131,6 +132,11 @@ CLI::App* add_play(CLI::App& app, Arguments& arguments) {
       ->type_name("r=R,rings=N");
   play->add_option("--overlay-memory", arguments.overlay_memory, "most that overlays may take; else 512")
       ->type_name("MB");
+  play->add_option(
+          "--contact", arguments.contact,
+          "quasi-static: the tool meets the body's stiffness; dynamic: its inertia and viscosity too, "
+          "for files with [dynamics] and a time step of one tick")
+      ->type_name("quasi-static|dynamic");
   play->add_flag("--fast", arguments.fast,
                  "do not wait for the clock: deterministic, equal runs leave equal recordings");
   play->add_option("--record", arguments.record, "write every tick to this HDF5 file")->type_name("OUT.h5");
@@ -284,6 +290,12 @@ std::size_t read_overlay_memory(const std::optional<std::string>& text) {
   return static_cast<std::size_t>(*megabytes) << 20;
 }
 
+ContactModel read_contact(const std::string& text) {
+  if (text == "quasi-static") return ContactModel::quasi_static;
+  if (text == "dynamic") return ContactModel::dynamic;
+  throw CLI::ValidationError("--contact", "'" + text + "' is neither quasi-static nor dynamic");
+}
+
 PlayOptions read_play(const Arguments& arguments) {
   const std::string scripted = "script:";
   if (!arguments.device.starts_with(scripted) || arguments.device.size() == scripted.size()) {
@@ -296,6 +308,7 @@ PlayOptions read_play(const Arguments& arguments) {
           .tool = read_tool(arguments),
           .reach = positive_argument("--reach", arguments.reach, "metres"),
           .max_contacts = read_max_contacts(arguments.max_contacts),
+          .contact = read_contact(arguments.contact),
           .overlay = arguments.overlay ? std::optional(read_overlay(*arguments.overlay)) : std::nullopt,
           .overlay_memory = read_overlay_memory(arguments.overlay_memory),
           .fast = arguments.fast,

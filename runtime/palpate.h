@@ -61,7 +61,8 @@ enum {
   PALPATE_NOT_CONVERGED = 1 << 8,     /* the contact forces did not reach their tolerance within the budget */
   PALPATE_FORCE_LIMITED = 1 << 9,     /* a force was cut to max_force */
   PALPATE_HANDING_OVER = 1 << 10,     /* a force is on its way to the contact's, so as not to kick */
-  PALPATE_OLDER_PATCH = 1 << 11       /* the overlay for this place was not there yet */
+  PALPATE_OLDER_PATCH = 1 << 11,      /* the overlay for this place was not there yet */
+  PALPATE_LATE_MOTION = 1 << 12       /* the body's free motion was not there in time */
 };
 
 /* "capacity_full" and so on; NULL for what is not one bit of these. Real-time safe. */
@@ -87,10 +88,24 @@ typedef struct palpate_overlay {
   size_t memory;  /* [bytes] that overlays may take; 512 MB is much */
 } palpate_overlay;
 
-/* The same with overlays; NULL: none. A thread of the session builds them ahead of the tools, at the
- * priority of the thread that calls this; palpate_step never waits for it. */
-palpate_session* palpate_create_with_overlay(const char* file, const palpate_tool* tools, int tool_count,
-                                             int max_contacts, const palpate_overlay* overlay, char* error,
+/* How a session is to be, beyond its tools. Take it from palpate_default_options and change what is to
+ * differ.
+ */
+typedef struct palpate_options {
+  const palpate_overlay*
+      overlay;         /* NULL: none. A thread of the session builds overlays ahead of the tools, at
+                        * the priority of the thread that calls this; palpate_step never waits */
+  int dynamic_contact; /* not 0: the tools meet the body's inertia and viscosity too. The file must have
+                        * dynamics, with a time step of one tick */
+  double tick;         /* time from one palpate_step to the next, for bodies that swing [s] */
+} palpate_options;
+
+/* No overlay, quasi-static contact, 0.001 s. */
+palpate_options palpate_default_options(void) PALPATE_NOEXCEPT;
+
+/* palpate_create with options. A body whose file has packed dynamics is swung by threads of the session. */
+palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
+                                             int max_contacts, const palpate_options* options, char* error,
                                              size_t error_size) PALPATE_NOEXCEPT;
 
 /* Ends a session; NULL is ignored. */
@@ -98,7 +113,7 @@ void palpate_destroy(palpate_session* session) PALPATE_NOEXCEPT;
 
 /* --- The loop --- */
 
-/* One tick, a millisecond later than the last: one pose for each tool, in the order of palpate_create.
+/* One tick: one pose for each tool, in the order of palpate_create.
  * Returns status bits. Real-time safe. With `poses` NULL nothing happens: PALPATE_POSE_NOT_FINITE. */
 uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) PALPATE_NOEXCEPT;
 

@@ -132,8 +132,23 @@ std::string json_overlays(const PatchSource& overlays, const OverlayOptions& opt
       counts.older_in_contact);
 }
 
+std::string_view name_of(DynamicsMethod method) {
+  if (method == DynamicsMethod::none) return "none";
+  return method == DynamicsMethod::packed ? "packed" : "modal";
+}
+
+std::string json_dynamics(const Body& body, const MotionSource* motion) {
+  const StoredDynamics& dynamics = body.model().dynamics;
+  std::string json = fmt::format("{{\"method\": \"{}\", \"contact\": \"{}\"", name_of(dynamics.method),
+                                 body.contact_model() == ContactModel::dynamic ? "dynamic" : "quasi-static");
+  if (motion != nullptr)
+    json += fmt::format(", \"steps\": {}, \"longest_step_s\": {}", motion->steps(), motion->longest_step());
+  return json + "}";
+}
+
 std::string json_report(const LoopReport& report, const PlayOptions& options, const Body& body,
-                        const Tool& tool, const PatchSource* overlays, std::int64_t dropped) {
+                        const Tool& tool, const PatchSource* overlays, const MotionSource* motion,
+                        std::int64_t dropped) {
   std::string status;
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, report.status_ticks[k]);
@@ -158,6 +173,7 @@ std::string json_report(const LoopReport& report, const PlayOptions& options, co
   json += fmt::format("  \"status_ticks\": {{{}}},\n", status);
   if (overlays != nullptr)
     json += fmt::format("  \"overlay\": {},\n", json_overlays(*overlays, options.overlay.value()));
+  json += fmt::format("  \"dynamics\": {},\n", json_dynamics(body, motion));
   if (!options.record.empty())
     json += fmt::format("  \"recording\": {},\n", json_string(options.record.string()));
   json += fmt::format("  \"dropped_ticks\": {}\n}}\n", dropped);
@@ -212,7 +228,9 @@ std::string contact_table(const Body& body, const State& state) {
 void write_surface(const std::filesystem::path& file, const Body& body, const State& state) {
   std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
   std::vector<Vec3> u(body.surface_rest_positions().size());
-  surface_displacement(body, state.near.load(), stored, u);
+  ShownMotion motion(body);
+  state.motion.show(motion);
+  surface_displacement(body, state.near.load(), stored, u, &motion);
   const std::vector<Vec3> nodes = body.surface_in_mesh();
   std::vector<double> total;
   for (std::size_t node = 0; node < u.size(); ++node) {
@@ -226,11 +244,11 @@ void write_surface(const std::filesystem::path& file, const Body& body, const St
 
 /// The loop with the rights it needs, which the threads that were started before do not inherit.
 LoopReport run(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
-               Recorder* recorder, bool fast) {
-  if (fast) return run_loop(body, state, device, overlays, recorder, fast, stop_asked);
+               MotionSource* motion, Recorder* recorder, bool fast) {
+  if (fast) return run_loop(body, state, device, overlays, motion, recorder, fast, stop_asked);
   const RealTimeRights rights;
   if (!rights.refused().empty()) print_warning(rights.refused());
-  return run_loop(body, state, device, overlays, recorder, fast, stop_asked);
+  return run_loop(body, state, device, overlays, motion, recorder, fast, stop_asked);
 }
 
 }  // namespace
@@ -238,8 +256,8 @@ LoopReport run(const Body& body, State& state, const ScriptDevice& device, Patch
 int play(const PlayOptions& options) {
   const ScriptDevice device = ScriptDevice::read(options.script);
   const auto start = std::chrono::steady_clock::now();
-  const Body body =
-      load_body(options.file, options.model_toml, options.overlay ? options.overlay->refinement : 1);
+  const Body body = load_body(options.file, options.model_toml,
+                              options.overlay ? options.overlay->refinement : 1, options.contact);
   print_loaded(body, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
 
   Tool tool = options.tool;
@@ -255,6 +273,9 @@ int play(const PlayOptions& options) {
                                         .in_background = !options.fast});
   }
   PatchSource* const source = overlays ? &*overlays : nullptr;
+  std::optional<MotionSource> motion;
+  if (body.model().dynamics.method == DynamicsMethod::packed)
+    motion.emplace(body, state, MotionSourceOptions{.in_background = !options.fast});
   std::optional<Recorder> recorder;
   if (!options.record.empty())
     recorder.emplace(options.record, options.file.string(), body.model().content_hash,
@@ -263,16 +284,22 @@ int play(const PlayOptions& options) {
                          : "");
 
   stop_on_signals();
-  const LoopReport report = run(body, state, device, source, recorder ? &*recorder : nullptr, options.fast);
+  const LoopReport report = run(body, state, device, source, motion ? &*motion : nullptr,
+                                recorder ? &*recorder : nullptr, options.fast);
   if (recorder) recorder->finish();
 
   const std::int64_t dropped = recorder ? recorder->dropped() : 0;
   print_report(report, options, dropped);
   if (source != nullptr) print_overlays(*source);
+  if (motion) {
+    fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", motion->steps(),
+               1e3 * body.model().dynamics.newmark.time_step, 1e3 * motion->longest_step());
+  }
   warn_of_script(report, body);
   if (!options.contacts.empty()) write_text_file(options.contacts, contact_table(body, state));
   if (!options.surface.empty()) write_surface(options.surface, body, state);
-  const std::string json = json_report(report, options, body, tool, source, dropped);
+  const std::string json =
+      json_report(report, options, body, tool, source, motion ? &*motion : nullptr, dropped);
   if (options.report.empty()) {
     fmt::print("{}", json);
   } else {

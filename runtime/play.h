@@ -17,6 +17,7 @@ struct PlayOptions {
   Tool tool;                         ///< but for its reach
   std::optional<double> reach;       ///< [m]; else the longest edge of the surface
   Index max_contacts = StateOptions{}.max_contacts;
+  ContactModel contact = ContactModel::quasi_static;
   std::optional<OverlayOptions> overlay;                     ///< none: the body's own mesh
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
   bool fast = false;

@@ -41,6 +41,10 @@ std::vector<ToolState> make_tools(const StateOptions& options) {
     throw Error("room for " + std::to_string(options.max_contacts) + " contacts was asked for", "State",
                 "ask for room for at least one");
   }
+  if (!(options.tick > 0.0 && std::isfinite(options.tick))) {
+    throw Error("a tick of " + std::to_string(options.tick) + " s was asked for", "State",
+                "ask for one that is positive");
+  }
   std::vector<ToolState> tools;
   for (const Tool& tool : options.tools) {
     check(tool, tools.size());
@@ -82,6 +86,7 @@ State::State(const Body& body, const StateOptions& options)
       contact_points(static_cast<std::size_t>(options.max_contacts)),
       max_contacts(options.max_contacts),
       near(body, near_room(options), options.patch_nodes),
+      motion(body, options.tick, static_cast<Index>(near.load().node.size())),
       tree(body.simplices(), body.dimension(), body.surface_rest_positions(),
            tree_margin * body.mean_surface_edge()),
       problem(body.dimension(), entries(body, options), most_rows(body, options)),

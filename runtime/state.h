@@ -14,6 +14,7 @@
 #include "runtime/contact_detection.h"
 #include "runtime/contact_point.h"
 #include "runtime/contact_problem.h"
+#include "runtime/free_motion.h"
 #include "runtime/local_model.h"
 #include "runtime/near_field.h"
 #include "runtime/status.h"
@@ -33,6 +34,7 @@ struct ToolState {
   LocalModel local;            ///< of wrench.force
   Wrench last_contact_wrench;  ///< of the tick or pass before
   Vec3 last_device_position = Vec3::Zero();  ///< of the tick before [m]
+  Vec3 surface_change = Vec3::Zero();        ///< free motion of what it touches, since the tick before [m]
   double felt = 0.0;                         ///< the force of late [N]
   double margin = 0.0;   ///< how far the surface may be from the tool and still be met in this tick [m]
   Index contacts = 0;    ///< closed contact points
@@ -41,6 +43,8 @@ struct ToolState {
   bool has_been_clear = false;  ///< of the body once: nothing is felt before; one that is lost in the body
                                 ///< after that is felt again as soon as its core is outside
   bool holding = false;         ///< a grab holds the surface
+  bool touched = false;         ///< in the tick before
+  bool held = false;            ///< a grab, in the tick before
   StepStatus status = StepStatus::ok;  ///< of the last tick
 };
 
@@ -48,6 +52,7 @@ struct StateOptions {
   std::vector<Tool> tools = {Tool{}};
   Index max_contacts = 32;  ///< contact points of all tools together; beyond, the deepest are kept
   Index patch_nodes = 0;    ///< most nodes g of a patch that is to be used
+  double tick = 0.001;      ///< time from one tick to the next, for bodies that swing [s]
 };
 
 /// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
@@ -78,6 +83,7 @@ struct State {
   bool patch_is_older = false;  ///< than what is wanted: to be told in the status
 
   NearField near;
+  FreeMotion motion;
   SurfaceTree tree;
   ContactProblem problem;
   ActiveSet active_set;
@@ -100,7 +106,15 @@ struct State {
   std::vector<double> far_displacement;     // [d * slice]
   Index next_far_node = 0;                  // stored node from which the far field is renewed next
   std::vector<double> stored_displacement;  // [n] as it was renewed last
+  double sweep_change = 0.0;                // how far a far node was moved at most in this sweep [m]
+  double far_change = 0.0;                  // and in the one before: how wrong a far node can be [m]
   Index next_patch_node = 0;                // place in the patch from which its surface is renewed next
 };
+
+/// Where a surface node is in this tick without the forces of its contacts [m].
+inline Vec3 unloaded_position(const Body& body, State& state, Index surface_node) noexcept {
+  return body.surface_rest_positions()[static_cast<std::size_t>(surface_node)] +
+         state.motion.at(body, surface_node);
+}
 
 }  // namespace palpate

@@ -22,6 +22,7 @@ enum class StepStatus : std::uint32_t {
   force_limited = 1U << 9,          ///< the force was cut to the tool's largest
   handing_over = 1U << 10,          ///< the force is on its way to the contact's, so as not to kick
   older_patch = 1U << 11,  ///< the overlay for this place was not there yet: an older one was used, or none
+  late_motion = 1U << 12,  ///< the body's free motion was not there in time: the surface waits for it
 };
 
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
@@ -35,7 +36,7 @@ constexpr bool has(StepStatus status, StepStatus bit) noexcept {
 }
 
 /// The bits and their names, for reports.
-inline constexpr std::array<std::pair<StepStatus, const char*>, 12> status_names = {{
+inline constexpr std::array<std::pair<StepStatus, const char*>, 13> status_names = {{
     {StepStatus::nothing_in_reach, "nothing_in_reach"},
     {StepStatus::capacity_full, "capacity_full"},
     {StepStatus::not_positive_definite, "not_positive_definite"},
@@ -48,6 +49,7 @@ inline constexpr std::array<std::pair<StepStatus, const char*>, 12> status_names
     {StepStatus::force_limited, "force_limited"},
     {StepStatus::handing_over, "handing_over"},
     {StepStatus::older_patch, "older_patch"},
+    {StepStatus::late_motion, "late_motion"},
 }};
 
 }  // namespace palpate

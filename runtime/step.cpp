@@ -66,8 +66,7 @@ void retreat_from_leaps(const Body& body, State& state) noexcept {
   double farthest = 0.0;
   for (Index place = 0; place < state.near.count(); ++place) {
     const Index node = state.near.node(place);
-    const Vec3 to =
-        body.surface_rest_positions()[static_cast<std::size_t>(node)] + state.near.displacement(place);
+    const Vec3 to = unloaded_position(body, state, node) + state.near.displacement(place);
     farthest = std::max(farthest, (to - state.tree.position(node)).norm());
   }
   double most = most_motion * body.mean_surface_edge();
@@ -87,8 +86,7 @@ void retreat_from_leaps(const Body& body, State& state) noexcept {
 void move_near_surface(const Body& body, State& state) noexcept {
   for (Index place = 0; place < state.near.count(); ++place) {
     const Index node = state.near.node(place);
-    const Vec3 position =
-        body.surface_rest_positions()[static_cast<std::size_t>(node)] + state.near.displacement(place);
+    const Vec3 position = unloaded_position(body, state, node) + state.near.displacement(place);
     if (position.allFinite()) state.tree.move(node, position);
   }
 }
@@ -96,8 +94,19 @@ void move_near_surface(const Body& body, State& state) noexcept {
 /// Moves a surface node that is not near a tool.
 void move_far(const Body& body, State& state, Index node, const Vec3& u) noexcept {
   if (state.near.place_of(node) >= 0) return;
-  const Vec3 position = body.surface_rest_positions()[static_cast<std::size_t>(node)] + u;
-  if (position.allFinite()) state.tree.move(node, position);
+  const Vec3 position = unloaded_position(body, state, node) + u;
+  if (!position.allFinite()) return;
+  state.sweep_change = std::max(state.sweep_change, (position - state.tree.position(node)).norm());
+  state.tree.move(node, position);
+}
+
+/// u of a surface node that the body's nodes give, as it was renewed last.
+Vec3 stored_displacement(const Body& body, const State& state, Index node) noexcept {
+  const SurfaceParts parts = body.surface_parts(node);
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t k = 0; k < parts.stored.size(); ++k)
+    sum += parts.weights[k] * vector_at(state.stored_displacement, body.dimension(), parts.stored[k]);
+  return sum;
 }
 
 /// The rest of the surface follows in slices, a bounded number of nodes a tick: beside the patch by stored
@@ -119,14 +128,74 @@ void move_far_slice(const Body& body, State& state) noexcept {
     moves += static_cast<Index>(body.followers(stored).size());
     for (const Index node : body.followers(stored)) {
       if (state.near.place_in_patch(node) >= 0) continue;
-      const SurfaceParts parts = body.surface_parts(node);
-      Vec3 sum = Vec3::Zero();
-      for (std::size_t k = 0; k < parts.stored.size(); ++k)
-        sum += parts.weights[k] * vector_at(state.stored_displacement, d, parts.stored[k]);
-      move_far(body, state, node, sum);
+      move_far(body, state, node, stored_displacement(body, state, node));
     }
   }
   state.next_far_node = stored % body.greens().nodes();
+  if (state.next_far_node != 0) return;
+  state.far_change = state.sweep_change;
+  state.sweep_change = 0.0;
+}
+
+/// The surface that moves on its own to where it is in this tick: all that is near, and as much around the
+/// tools as may have come near since it was looked at.
+void follow_free_motion(const Body& body, State& state) noexcept {
+  state.motion.begin_tick(body);
+  if (!state.motion.active()) return;
+  if (state.motion.is_late()) state.status |= StepStatus::late_motion;
+  move_near_surface(body, state);
+  const auto d = static_cast<std::size_t>(body.dimension());
+  for (const ToolState& tool : state.tools) {
+    if (!tool.placed) continue;
+    const Core core = core_of(tool.tool, tool.pose, body.dimension());
+    const double reach =
+        tool.tool.radius + tool.margin + 2.0 * std::max(state.far_change, state.sweep_change);
+    const std::size_t found =
+        std::min(state.tree.near_segment(core.origin, core.end, reach, state.found), state.most_simplices);
+    for (std::size_t k = 0; k < found; ++k) {
+      for (const Index node : body.simplices().subspan(d * static_cast<std::size_t>(state.found[k]), d)) {
+        if (body.surface_moves(node)) move_far(body, state, node, stored_displacement(body, state, node));
+      }
+    }
+  }
+}
+
+/// How what a tool touches moves on its own.
+void note_surface_change(const State& state, ToolState& tool, Index number) noexcept {
+  tool.surface_change.setZero();
+  if (!state.motion.active()) return;
+  double sum = 0.0;
+  for (const ContactPoint& contact : state.contacts()) {
+    const double force = contact.tool == number ? contact.force.norm() : 0.0;
+    for (std::size_t n = 0; n < 3; ++n) {
+      if (contact.nodes[n] >= 0)
+        tool.surface_change += force * contact.weights[n] * state.motion.change(contact.nodes[n]);
+    }
+    sum += force;
+  }
+  if (sum > 0.0) tool.surface_change /= sum;
+}
+
+/// Forces that ended with this tick become free motion.
+void let_go(const Body& body, State& state) noexcept {
+  const bool let_go = std::any_of(state.tools.begin(), state.tools.end(), [](const ToolState& tool) {
+    return (tool.touched && tool.contacts == 0) || (tool.held && !tool.holding);
+  });
+  if (let_go) {
+    state.motion.let_go(body, state.near.load(), state.stored_displacement);
+    move_near_surface(body, state);
+  }
+  state.motion.end_tick(body, state.near.load());
+}
+
+/// What the near field knows of the body's nodes.
+void renew_stored_displacement(const Body& body, State& state) noexcept {
+  for (Index place = 0; place < state.near.count(); ++place) {
+    const auto node = static_cast<std::size_t>(state.near.node(place));
+    if (node >= body.surface_stored_nodes().size()) continue;
+    set_vector(state.stored_displacement, body.dimension(), body.surface_stored_nodes()[node],
+               state.near.displacement(place));
+  }
 }
 
 /// And the surface of the patch.
@@ -188,9 +257,13 @@ void recall_contacts(State& state) noexcept {
 StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses) noexcept {
   ++state.ticks;
   state.status = state.patch_is_older ? StepStatus::older_patch : StepStatus::ok;
+  follow_free_motion(body, state);
   for (std::size_t k = 0; k < state.tools.size(); ++k) {
-    state.tools[k].status = StepStatus::ok;
-    follow_device(body, state, state.tools[k], poses[k]);
+    ToolState& tool = state.tools[k];
+    tool.status = StepStatus::ok;
+    tool.touched = tool.contacts > 0;
+    tool.held = tool.holding;
+    follow_device(body, state, tool, poses[k]);
   }
   state.near.begin_tick();
   remember_contacts(state);
@@ -218,8 +291,13 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   }
   if (valid) {
     linearise(state);
-    for (ToolState& tool : state.tools) give_force(tool);
+    for (std::size_t k = 0; k < state.tools.size(); ++k) {
+      note_surface_change(state, state.tools[k], static_cast<Index>(k));
+      give_force(state.tools[k]);
+    }
   }
+  let_go(body, state);
+  renew_stored_displacement(body, state);
   move_far_slice(body, state);
   move_patch_slice(body, state);
   for (const ToolState& tool : state.tools) state.status |= tool.status;
@@ -232,6 +310,10 @@ StepStatus step(const Body& body, State& state, const ToolPose& pose) noexcept {
 
 void surface_displacement(const Body& body, const State& state, std::span<double> u) noexcept {
   body.greens().displacement(state.near.load().nodes(), state.near.load().forces(), u);
+  if (!state.motion.active()) return;
+  const int d = body.dimension();
+  for (Index node = 0; node < body.greens().nodes(); ++node)
+    set_vector(u, d, node, vector_at(u, d, node) + state.motion.displacement(body, node));
 }
 
 }  // namespace palpate

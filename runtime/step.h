@@ -20,7 +20,8 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
 StepStatus step(const Body& body, State& state, const ToolPose& pose) noexcept;
 
 /// u = Xi E f: displacement u [n] of all stored nodes [m] by the present contact forces, relative to rest
-/// (theory.md section 3). What is seen is node + u0 + u. For the eye; not needed by a tick.
+/// (theory.md section 3), and what the body's free motion adds. What is seen is node + u0 + u. For the eye;
+/// not needed by a tick.
 void surface_displacement(const Body& body, const State& state, std::span<double> u) noexcept;
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "runtime/free_motion.h"
 #include "runtime/node_vectors.h"
 #include "runtime/vector_loops.h"
 
@@ -57,20 +58,29 @@ void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> 
 }
 
 void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<double> stored,
-                          std::span<Vec3> u) noexcept {
-  body.greens().displacement(load.nodes(), load.forces(), stored);
-  for (std::size_t node = 0; node < u.size(); ++node) {
-    const SurfaceParts parts = body.surface_parts(static_cast<Index>(node));
-    u[node].setZero();
+                          std::span<Vec3> u, const ShownMotion* motion) noexcept {
+  const bool moves = motion != nullptr && motion->moves;
+  const auto follow_body = [&](Index node, const auto& of_stored) {
+    const SurfaceParts parts = body.surface_parts(node);
+    Vec3 sum = Vec3::Zero();
     for (std::size_t k = 0; k < parts.stored.size(); ++k)
-      u[node] += parts.weights[k] * vector_at(stored, load.dimension, parts.stored[k]);
+      sum += parts.weights[k] * of_stored(parts.stored[k]);
+    return sum;
+  };
+  body.greens().displacement(load.nodes(), load.forces(), stored);
+  if (moves) add_motion(body, *motion, stored);
+  for (std::size_t node = 0; node < u.size(); ++node) {
+    u[node] =
+        follow_body(static_cast<Index>(node), [&](Index k) { return vector_at(stored, load.dimension, k); });
   }
   if (load.patch == nullptr) return;
   const std::span<const Index> nodes = load.patch->surface_nodes();
   for (std::size_t k = 0; k < nodes.size(); ++k) {
     double values[3] = {};
     patch_displacement(load, static_cast<Index>(k), {values, static_cast<std::size_t>(load.dimension)});
-    u[static_cast<std::size_t>(nodes[k])] = Vec3(values[0], values[1], values[2]);
+    Vec3& at = u[static_cast<std::size_t>(nodes[k])];
+    at = Vec3(values[0], values[1], values[2]);
+    if (moves) at += follow_body(nodes[k], [&](Index j) { return displacement(body, *motion, j); });
   }
 }
 

@@ -56,9 +56,11 @@ Session open(const std::string& name, const std::vector<palpate_tool>& tools) {
 TEST(COverlay, FeelsAsTheStepWithItsPatch) {
   const palpate_tool tool = sphere(0.2);
   const palpate_overlay overlay{.refinement = 3, .rings = 1, .memory = std::size_t{1} << 28};
+  palpate_options options = palpate_default_options();
+  options.overlay = &overlay;
   char error[300];
   const Session session(
-      palpate_create_with_overlay(golden("cube2").c_str(), &tool, 1, 64, &overlay, error, sizeof error));
+      palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 64, &options, error, sizeof error));
   ASSERT_NE(session, nullptr) << error;
   const Body body(load_model(golden("cube2")), {}, 3);
   EXPECT_EQ(palpate_surface_counts(session.get()).nodes, std::ssize(body.surface_rest_positions()));
@@ -102,8 +104,10 @@ TEST(COverlay, RefusesWhatCannotBe) {
   char error[300];
   for (const palpate_overlay& overlay :
        {palpate_overlay{1, 1, 1000}, palpate_overlay{3, 0, 1000}, palpate_overlay{99, 1, 1000}}) {
+    palpate_options options = palpate_default_options();
+    options.overlay = &overlay;
     EXPECT_EQ(
-        palpate_create_with_overlay(golden("cube2").c_str(), &tool, 1, 64, &overlay, error, sizeof error),
+        palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 64, &options, error, sizeof error),
         nullptr);
     EXPECT_NE(std::string(error).find("overlay"), std::string::npos) << error;
   }

@@ -41,7 +41,7 @@ class Loop : public testing::Test {
 
 TEST_F(Loop, StepsThroughTheScriptAndReports) {
   const ScriptDevice device = ScriptDevice::parse(pull, "pull.csv");
-  const LoopReport report = run_loop(body_, state_, device, nullptr, nullptr, true, stop_);
+  const LoopReport report = run_loop(body_, state_, device, nullptr, nullptr, nullptr, true, stop_);
   EXPECT_EQ(report.ticks, 301);
   EXPECT_EQ(state_.ticks, 301);
   EXPECT_FALSE(report.interrupted);
@@ -68,7 +68,7 @@ TEST_F(Loop, ReportsTheLargestOfWhatEachTickGave) {
   const ScriptDevice device = ScriptDevice::parse(slide, "slide.csv");
   State state(body_, {.tools = {finger}});
   State again = state;
-  const LoopReport report = run_loop(body_, state, device, nullptr, nullptr, true, stop_);
+  const LoopReport report = run_loop(body_, state, device, nullptr, nullptr, nullptr, true, stop_);
 
   std::int64_t in_contact = 0;
   Index most = 0;
@@ -101,8 +101,8 @@ TEST_F(Loop, ReportsTheLargestOfWhatEachTickGave) {
 TEST_F(Loop, TellsHowLongTheToolWasInsideAtFirst) {
   // At 0.9 + 0.0021 k: inside in ticks 0 to 47. It comes back to touch.
   const char* const rows = "t,x,y,z\n0,0.52,0.5,0.9\n0.1,0.52,0.5,1.11\n0.2,0.52,0.5,0.95\n";
-  const LoopReport report =
-      run_loop(body_, state_, ScriptDevice::parse(rows, "inside.csv"), nullptr, nullptr, true, stop_);
+  const LoopReport report = run_loop(body_, state_, ScriptDevice::parse(rows, "inside.csv"), nullptr, nullptr,
+                                     nullptr, true, stop_);
   EXPECT_EQ(report.ticks_begun_inside, 48);
   EXPECT_GT(report.ticks_in_contact, 20);
   EXPECT_LT(report.ticks_in_contact, 40);
@@ -113,7 +113,7 @@ TEST_F(Loop, KeepsTheClockWhenItIsReal) {
   timespec begin{};
   timespec end{};
   clock_gettime(CLOCK_MONOTONIC, &begin);
-  const LoopReport report = run_loop(body_, state_, device, nullptr, nullptr, false, stop_);
+  const LoopReport report = run_loop(body_, state_, device, nullptr, nullptr, nullptr, false, stop_);
   clock_gettime(CLOCK_MONOTONIC, &end);
   const double seconds = static_cast<double>(end.tv_sec - begin.tv_sec) +
                          1e-9 * static_cast<double>(end.tv_nsec - begin.tv_nsec);
@@ -125,7 +125,7 @@ TEST_F(Loop, KeepsTheClockWhenItIsReal) {
 TEST_F(Loop, StopsWhenAsked) {
   stop_ = true;
   const LoopReport report =
-      run_loop(body_, state_, ScriptDevice::parse(pull, "pull.csv"), nullptr, nullptr, false, stop_);
+      run_loop(body_, state_, ScriptDevice::parse(pull, "pull.csv"), nullptr, nullptr, nullptr, false, stop_);
   EXPECT_TRUE(report.interrupted);
   EXPECT_EQ(report.ticks, 0);
 }
@@ -154,7 +154,7 @@ TEST_F(RecordedLoop, FastRunsLeaveTheSameRecordingToTheLastBit) {
   for (const char* name : {"one.h5", "two.h5"}) {
     State state(body_, {.tools = {{.reach = 0.01}}});
     Recorder recorder(folder_ / name, "box.palpate.hdf", "0123");
-    EXPECT_EQ(run_loop(body_, state, device, nullptr, &recorder, true, stop_).ticks, 70001);
+    EXPECT_EQ(run_loop(body_, state, device, nullptr, nullptr, &recorder, true, stop_).ticks, 70001);
     recorder.finish();
     EXPECT_EQ(recorder.dropped(), 0);
   }
@@ -174,7 +174,7 @@ TEST_F(RecordedLoop, KeepsWhatEachTickGave) {
   State again = state;
   {
     Recorder recorder(folder_ / "slide.h5", "box.palpate.hdf", "0123");
-    run_loop(body_, state, device, nullptr, &recorder, true, stop_);
+    run_loop(body_, state, device, nullptr, nullptr, &recorder, true, stop_);
     recorder.finish();
   }
   const Recording recording = read_recording(folder_ / "slide.h5");
@@ -217,7 +217,7 @@ TEST(PlaneLoop, IgnoresTheScriptsZ) {
     State state(body, {.tools = {{.reach = 0.1}}});
     const std::string rows = "t,x,y,z,grab\n0,0.5,1,0,1\n0.1,0.5,0.95," + std::to_string(z) + ",1\n";
     const LoopReport report =
-        run_loop(body, state, ScriptDevice::parse(rows, "plane.csv"), nullptr, nullptr, true, stop);
+        run_loop(body, state, ScriptDevice::parse(rows, "plane.csv"), nullptr, nullptr, nullptr, true, stop);
     EXPECT_EQ(report.ticks_in_contact, 100) << "all but the first, in which there is no force yet";
     largest[z == 0 ? 0 : 1] = report.largest_force;
   }

@@ -1,0 +1,50 @@
+// The body's lowest modes as a tick reads them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "formats/model.h"
+
+namespace palpate {
+
+/// More modes are refused: a tick keeps as many numbers on its stack.
+inline constexpr Index most_modes = 2048;
+
+/// K phi_i = omega_i^2 M phi_i, phi_i^T M phi_i = 1 (theory.md section 5), i < k, at the stored dofs: what a
+/// tick needs of a dof is one row, contiguous in memory.
+class Modes {
+ public:
+  /// Of a model with modal dynamics. Throws Error when there are none or too many, or their sizes do not fit.
+  explicit Modes(const Model& model);
+
+  [[nodiscard]] Index count() const noexcept { return count_; }  ///< k
+  [[nodiscard]] int dimension() const noexcept { return dimension_; }
+  /// [k] angular frequencies [rad/s]
+  [[nodiscard]] std::span<const double> omega() const noexcept { return omega_; }
+  /// That of the first mode that is not kept; infinity when all are [rad/s].
+  [[nodiscard]] double first_dropped_omega() const noexcept { return first_dropped_omega_; }
+
+  /// [k] the modes at a stored dof [1/sqrt(kg)].
+  [[nodiscard]] const double* row(std::int64_t dof) const noexcept {
+    return rows_.data() + dof * std::ptrdiff_t{count_};
+  }
+
+  /// Adds factor phi_i^T E f to `modal` [k]: forces f [dm] on m stored nodes [N].
+  void add_projection(std::span<const Index> nodes, std::span<const double> f, double factor,
+                      std::span<double> modal) const noexcept;
+
+  /// u [m] of a stored node by modal coordinates q [k].
+  [[nodiscard]] Vec3 displacement(Index stored, std::span<const double> q) const noexcept;
+
+ private:
+  int dimension_;
+  Index count_;
+  std::vector<double> omega_;
+  double first_dropped_omega_;
+  std::vector<double> rows_;  // [n x k]
+};
+
+}  // namespace palpate
