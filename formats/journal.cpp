@@ -14,7 +14,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::string_view first_line = "palpate-progress 1";
+constexpr std::string_view first_line = "palpate-progress 2";
 
 /// The words of a line.
 std::vector<std::string_view> words(std::string_view line) {
@@ -43,8 +43,8 @@ std::vector<std::string_view> lines(std::string_view text) {
 }
 
 std::string line_of(const JournalRange& range) {
-  return "columns " + std::to_string(range.first) + ' ' + std::to_string(range.count) + ' ' + range.checksum +
-         '\n';
+  return "columns " + std::to_string(range.matrix) + ' ' + std::to_string(range.first) + ' ' +
+         std::to_string(range.count) + ' ' + range.checksum + '\n';
 }
 
 /// False when the file was deleted or replaced between opening and locking it.
@@ -75,18 +75,20 @@ std::optional<JournalContents> Journal::read() const {
   JournalContents contents;
   JournalFrame& frame = contents.frame;
   const auto frame_words = words(all[1]);
-  if (frame_words.size() != 5 || frame_words[0] != "model" || !to_number(frame_words[2], frame.greens_at) ||
-      !to_number(frame_words[3], frame.file_bytes))
+  if (frame_words.size() < 4 || frame_words[0] != "model" || !to_number(frame_words[2], frame.file_bytes))
     return {};
   frame.key = frame_words[1];
-  frame.checksum = frame_words[4];
+  frame.checksum = frame_words[3];
+  for (std::size_t i = 4; i < frame_words.size(); ++i)
+    if (!to_number(frame_words[i], frame.packed_at.emplace_back())) return {};
 
   for (std::size_t i = 2; i < all.size(); ++i) {
     const auto w = words(all[i]);
     JournalRange range;
-    if (w.size() != 4 || w[0] != "columns" || !to_number(w[1], range.first) || !to_number(w[2], range.count))
+    if (w.size() != 5 || w[0] != "columns" || !to_number(w[1], range.matrix) ||
+        !to_number(w[2], range.first) || !to_number(w[3], range.count))
       break;
-    range.checksum = w[3];
+    range.checksum = w[4];
     contents.ranges.push_back(std::move(range));
   }
   return contents;
@@ -95,8 +97,9 @@ std::optional<JournalContents> Journal::read() const {
 void Journal::write(const JournalContents& contents) {
   const JournalFrame& frame = contents.frame;
   std::string text = std::string(first_line) + "\nmodel " + frame.key + ' ' +
-                     std::to_string(frame.greens_at) + ' ' + std::to_string(frame.file_bytes) + ' ' +
-                     frame.checksum + '\n';
+                     std::to_string(frame.file_bytes) + ' ' + frame.checksum;
+  for (const std::int64_t at : frame.packed_at) text += ' ' + std::to_string(at);
+  text += '\n';
   for (const JournalRange& range : contents.ranges) text += line_of(range);
   empty();
   append_text(file_, text);

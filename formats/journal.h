@@ -13,14 +13,15 @@ namespace palpate {
 
 /// The part of PATH.partial that is finished before the columns arrive.
 struct JournalFrame {
-  std::string key;             ///< of the model that is being written
-  std::int64_t greens_at = 0;  ///< first byte of the Green's functions
+  std::string key;  ///< of the model that is being written
   std::int64_t file_bytes = 0;
-  std::string checksum;  ///< of all bytes but the Green's functions
+  std::string checksum;                 ///< of all bytes but the packed matrices
+  std::vector<std::int64_t> packed_at;  ///< first byte of each packed matrix
 };
 
-/// Columns [first, first + count) and the checksum of their bytes.
+/// Columns [first, first + count) of a packed matrix and the checksum of their bytes.
 struct JournalRange {
+  std::int64_t matrix = 0;
   std::int64_t first = 0;
   std::int64_t count = 0;
   std::string checksum;

@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 
+#include "formats/dynamics_fields.h"
 #include "meshes/element.h"
 #include "meshes/error.h"
 
@@ -19,6 +20,7 @@ std::int64_t smallest(Count count) {
     case Count::materials:
     case Count::stored_nodes:
     case Count::patches:
+    case Count::modes:
       return 1;
     case Count::nodes:
       return 3;
@@ -146,6 +148,10 @@ Counts Counts::of(const Model& model, std::string where) {
   set(Count::bytes_of_text, model.model_toml.size(), "/model_toml");
   set(Count::bytes_of_sources, sources_text(model).size(), "/provenance/sources");
   if (model.overlay.refinement != 0) count_patches(model, counts);
+  if (model.dynamics.method == DynamicsMethod::packed)
+    set(Count::matrix_entries, model.dynamics.matrices.row.size(), "/dynamics/matrices/row");
+  if (model.dynamics.method == DynamicsMethod::modal)
+    counts.set(Count::modes, model.dynamics.modes(), "/dynamics/modes/omega");
   return counts;
 }
 
@@ -203,6 +209,7 @@ void check_model(const Model& model, const std::string& where) {
   check_surface(model, where);
   check_stored_nodes(model, where);
   if (model.overlay.refinement != 0) check_overlay(model, where);
+  if (model.dynamics.method != DynamicsMethod::none) check_dynamics(model, where);
 }
 
 }  // namespace palpate

@@ -54,7 +54,7 @@ void check_values(const Field<T>& field, const std::vector<T>& values, const Cou
   const std::int64_t below = counts.size(field.below);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if constexpr (std::is_floating_point_v<T>) {
-      if (!std::isfinite(values[i]))
+      if (!std::isfinite(values[i]) && !(field.infinite && std::isinf(values[i])))
         refuse(counts.where(), std::string(field.path) + " holds a value that is not finite (entry " +
                                    std::to_string(i) + ")");
     } else if (below > 0 && (std::int64_t{values[i]} < 0 || std::int64_t{values[i]} >= below)) {

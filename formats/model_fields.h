@@ -27,9 +27,11 @@ enum class Count : std::uint8_t {
   patch_surface_nodes,  // of all patches together, as the next ones are
   patch_softening_entries,
   patch_transfer_entries,
-  patch_compliance_entries
+  patch_compliance_entries,
+  matrix_entries,  // of M and C_d
+  modes
 };
-inline constexpr std::size_t number_of_counts = 14;
+inline constexpr std::size_t number_of_counts = 16;
 
 /// One dimension of a field: factor * count + plus.
 struct Extent {
@@ -61,6 +63,7 @@ struct Field {
   void (*put)(Model&,
               const std::vector<T>&);  ///< null: it must have the values that `take` gives; throws Unreadable
   Extent below = {Count::one, 0, 0};   ///< integers: every value must be in [0, below); no limit when 0
+  bool infinite = false;               ///< numbers: infinity is a value too
 };
 
 /// More nodes on the surface of one patch are refused: its matrices' sizes would not be numbers.
@@ -314,7 +317,8 @@ void for_each_overlay_field(Visitor&& visit) {
       "/overlay/compliance", {{Count::patch_compliance_entries}}, patch_compliances, put_patch_compliances});
 }
 
-/// Every dataset but those of overlays and the Green's functions, which are mapped and not copied.
+/// Every dataset but those of overlays and dynamics, and the Green's functions, which are mapped and not
+/// copied.
 template <class Visitor>
 void for_each_field(ElementType element, Visitor&& visit) {
   for_each_body_field(element, visit);

@@ -14,34 +14,42 @@
 namespace palpate {
 
 inline constexpr int format_major = 3;  ///< another major version is refused: "precompute it again"
-inline constexpr int format_minor = 1;  ///< newer minor versions are read, what they add is ignored
+inline constexpr int format_minor = 2;  ///< newer minor versions are read, what they add is ignored
 
-/// Streams a model to disk. Everything but Green's functions and probes is written by the constructor to
-/// PATH.partial, with the space of the packed matrix reserved (contiguous, page-aligned); columns then arrive
-/// in any order from any thread; `finish` adds probes, checksums and content hash and renames PATH.partial to
-/// PATH. Which columns are done is journalled (with their checksums) in PATH.progress, so a killed run is
-/// continued by constructing the writer again with an equal model. An existing PATH is untouched until the
-/// rename.
+/// A packed matrix that is streamed to disk.
+enum class PackedMatrix : std::uint8_t {
+  greens,   ///< Model::greens
+  inverse,  ///< StoredDynamics::inverse, of models whose dynamics is packed
+};
+
+/// Streams a model to disk. Everything but packed matrices and probes is written by the constructor to
+/// PATH.partial, with the space of the packed matrices reserved (contiguous, page-aligned); columns then
+/// arrive in any order from any thread; `finish` adds probes, checksums and content hash and renames
+/// PATH.partial to PATH. Which columns are done is journalled (with their checksums) in PATH.progress, so a
+/// killed run is continued by constructing the writer again with an equal model. An existing PATH is
+/// untouched until the rename.
 class ModelWriter {
  public:
-  /// `model.greens` and `model.probes` are ignored. Continues PATH.partial when its journal has the same key
-  /// (a hash of all fields but Green's functions and probes, and of format and precision) and each journalled
-  /// range still has its checksum. Throws Error when the file cannot be created or the disk cannot hold it
-  /// (with the numbers).
+  /// `model.greens`, `model.dynamics.inverse` and `model.probes` are ignored. Continues PATH.partial when its
+  /// journal has the same key (a hash of all fields but those, and of format and precision) and each
+  /// journalled range still has its checksum. Throws Error when the file cannot be created or the disk cannot
+  /// hold it (with the numbers).
   ModelWriter(std::filesystem::path path, const Model& model, Precision precision);
   ~ModelWriter();
   ModelWriter(const ModelWriter&) = delete;
   ModelWriter& operator=(const ModelWriter&) = delete;
 
   /// Whether columns [first, first + count) were written by an earlier, killed run.
-  [[nodiscard]] bool has_columns(std::int64_t first, std::int64_t count) const;
+  [[nodiscard]] bool has_columns(std::int64_t first, std::int64_t count,
+                                 PackedMatrix matrix = PackedMatrix::greens) const;
 
   /// Stores columns [first, first + count) of the lower triangle: `packed` holds their entries one column
-  /// after the other, column j from its diagonal down. Converts to the stored precision. Thread-safe for
-  /// disjoint ranges.
-  void write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed);
+  /// after the other, column j from its diagonal down. Converts to the stored precision, subnormal
+  /// numbers to 0: a tick would take many times as long with them. Thread-safe for disjoint ranges.
+  void write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed,
+                     PackedMatrix matrix = PackedMatrix::greens);
 
-  /// Adds the probes, seals and renames. All columns must have been written.
+  /// Adds the probes, seals and renames. All columns of all matrices must have been written.
   void finish(const std::vector<Probe>& probes);
 
   /// Removes PATH.partial and PATH.progress (Ctrl-C: nothing half-written stays behind).
@@ -52,7 +60,7 @@ class ModelWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Loads a file: maps the Green's functions, reads the rest, and proves every size, range, index, finite
+/// Loads a file: maps the packed matrices, reads the rest, and proves every size, range, index, finite
 /// value and checksum once. Throws Error naming the field that is wrong.
 Model load_model(const std::filesystem::path& path);
 

@@ -7,6 +7,7 @@
 
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
+#include "formats/dynamics_fields.h"
 #include "formats/file_io.h"
 #include "formats/hdf5.h"
 #include "formats/model_check.h"
@@ -82,7 +83,7 @@ class Reader {
   void read_attribute(const Attribute<T>& attribute);
   template <class T>
   void read_field(const Field<T>& field);
-  void map_greens();
+  [[nodiscard]] PackedGreens map_packed(const std::string& path);
   void check_content(const std::vector<std::int64_t>& version);
   void check_stored_checksum(const std::string& path, const std::string& found);
   template <class T>
@@ -105,8 +106,11 @@ Model Reader::read() {
     for_each_overlay_field([this](const auto& field) { read_field(field); });
     if (model_.overlay.refinement == 0) refuse(where_, "/overlay/refinement is 0");
   }
+  if (file_.has(dynamics_group))
+    for_each_dynamics_field(model_, [this](const auto& field) { read_field(field); });
   check_model(model_, where_);
-  map_greens();
+  model_.greens = map_packed(greens_path);
+  if (model_.dynamics.method == DynamicsMethod::packed) model_.dynamics.inverse = map_packed(inverse_path);
   check_content(version);
   return std::move(model_);
 }
@@ -185,37 +189,38 @@ ChunkedChecksum::Inspect Reader::first_not_finite(std::atomic<std::size_t>& firs
   };
 }
 
-void Reader::map_greens() {
+/// Maps a packed matrix of the stored dofs and proves its values.
+PackedGreens Reader::map_packed(const std::string& path) {
   const std::int64_t order = model_.stored_dofs();
   const bool single = header_.precision == Precision::single_precision;
   const hdf5::Stored stored =
-      file_.locate(greens_path, single ? hdf5::element_type<float>() : hdf5::element_type<double>(), 1);
+      file_.locate(path, single ? hdf5::element_type<float>() : hdf5::element_type<double>(), 1);
   if (stored.dims[0] != packed_size(order))
-    refuse(where_, std::string(greens_path) + " has " + std::to_string(stored.dims[0]) + " entries, " +
+    refuse(where_, path + " has " + std::to_string(stored.dims[0]) + " entries, " +
                        std::to_string(packed_size(order)) + " are expected by /dofs/stored_nodes");
   if (stored.offset % bytes_per_scalar(header_.precision) != 0)
-    refuse(where_, std::string(greens_path) + " does not start at a multiple of its scalar's size");
+    refuse(where_, path + " does not start at a multiple of its scalar's size");
 
   const std::shared_ptr<const void> mapped = map_file(bytes_, stored.offset, stored.bytes);
-  model_.greens = PackedGreens(mapped, order, header_.precision);
+  PackedGreens matrix(mapped, order, header_.precision);
 
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   std::atomic<std::size_t> bad{none};
   ChunkedChecksum found;
   found.append({static_cast<const std::byte*>(mapped.get()), static_cast<std::size_t>(stored.bytes)},
                single ? first_not_finite<float>(bad) : first_not_finite<double>(bad));
-  check_stored_checksum(greens_path, found.digits());
+  check_stored_checksum(path, found.digits());
   if (bad != none)
-    refuse(where_, std::string(greens_path) + " holds a value that is not finite (entry " +
-                       std::to_string(bad) + ")");
+    refuse(where_, path + " holds a value that is not finite (entry " + std::to_string(bad) + ")");
   for (std::int64_t i = 0; i < order; ++i) {
     const Index node = model_.stored_nodes[static_cast<std::size_t>(i / model_.dimension())];
     const bool held = (model_.fixed[static_cast<std::size_t>(node)] >> i % model_.dimension() & 1) != 0;
-    const double entry = model_.greens(i, i);
+    const double entry = matrix(i, i);
     if (held ? entry != 0.0 : !(entry > 0.0))
-      refuse(where_, std::string(greens_path) + ": diagonal entry " + std::to_string(i) + " is not " +
+      refuse(where_, path + ": diagonal entry " + std::to_string(i) + " is not " +
                          (held ? "zero, though its dof is held" : "positive"));
   }
+  return matrix;
 }
 
 /// Every dataset agrees with its own checksum by now; what is left are the attributes.

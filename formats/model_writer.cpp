@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <optional>
 
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
+#include "formats/dynamics_fields.h"
 #include "formats/file_io.h"
 #include "formats/hdf5.h"
 #include "formats/journal.h"
@@ -43,11 +45,12 @@ void write_field(hdf5::File& file, const Field<T>& field, const Model& model, co
   file.write_attribute(field.path, "xxh3", checksum_of(values));
 }
 
-/// Datasets that are known before the Green's functions, those of overlays where there are any.
+/// Datasets that are known before the Green's functions, those of overlays and dynamics where there are any.
 template <class Visitor>
 void for_each_known_field(const Model& model, Visitor&& visit) {
   for_each_body_field(model.mesh.element, visit);
   if (model.overlay.refinement != 0) for_each_overlay_field(visit);
+  if (model.dynamics.method != DynamicsMethod::none) for_each_dynamics_field(model, visit);
 }
 
 void write_attributes(hdf5::File& file, const Model& model, const FileHeader& header) {
@@ -90,12 +93,26 @@ void add_bytes(RunningChecksum& running, const FileDescriptor& file, std::int64_
   }
 }
 
-std::string checksum_around(const FileDescriptor& file, std::int64_t gap_begin, std::int64_t gap_end) {
+/// Of all bytes of the file but `gap_bytes` from each of the places.
+std::string checksum_around(const FileDescriptor& file, std::vector<std::int64_t> gaps_at,
+                            std::int64_t gap_bytes) {
+  std::sort(gaps_at.begin(), gaps_at.end());
   RunningChecksum running;
-  add_bytes(running, file, 0, gap_begin);
-  add_bytes(running, file, gap_end, file_size(file));
+  std::int64_t from = 0;
+  for (const std::int64_t gap : gaps_at) {
+    add_bytes(running, file, from, gap);
+    from = gap + gap_bytes;
+  }
+  add_bytes(running, file, from, file_size(file));
   return running.digits();
 }
+
+/// A packed matrix that arrives by columns.
+struct Streamed {
+  const char* path;
+  const char* name;
+  std::vector<bool> done;  ///< [n] columns
+};
 
 }  // namespace
 
@@ -107,11 +124,12 @@ struct ModelWriter::Impl {
   void start(const Model& model);
   void write_body(const Model& model);
   template <class T>
-  void store(std::int64_t first, std::int64_t count, std::span<const double> packed);
+  void store(std::size_t matrix, std::int64_t first, std::int64_t count, std::span<const double> packed);
   void seal(const std::vector<Probe>& probes);
-  [[nodiscard]] std::int64_t byte_of_column(std::int64_t column) const;
-  [[nodiscard]] std::string greens_checksum() const;
-  void mark_done(std::int64_t first, std::int64_t count);
+  [[nodiscard]] std::int64_t packed_bytes() const;
+  [[nodiscard]] std::int64_t byte_of_column(std::size_t matrix, std::int64_t column) const;
+  [[nodiscard]] std::string packed_checksum(std::size_t matrix) const;
+  void mark_done(const JournalRange& range);
   void discard() noexcept;
 
   std::filesystem::path path, partial;
@@ -123,8 +141,8 @@ struct ModelWriter::Impl {
   JournalFrame frame;
   Journal journal;
   FileDescriptor data;
-  mutable std::mutex mutex;  // guards `done` and the journal
-  std::vector<bool> done;    // [n] columns
+  mutable std::mutex mutex;  // guards what is done and the journal
+  std::vector<Streamed> matrices;
 };
 
 ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision)
@@ -135,8 +153,11 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
       element(model.mesh.element),
       order(model.stored_dofs()),
       frame(examine(model)),
-      journal(with_suffix(path, ".progress")),
-      done(static_cast<std::size_t>(order), false) {
+      journal(with_suffix(path, ".progress")) {
+  const std::vector<bool> none(static_cast<std::size_t>(order), false);
+  matrices.push_back({greens_path, "the Green's functions", none});
+  if (model.dynamics.method == DynamicsMethod::packed)
+    matrices.push_back({inverse_path, "the inverse of K_bar", none});
   if (resume()) return;
   try {
     start(model);
@@ -160,29 +181,36 @@ JournalFrame ModelWriter::Impl::examine(const Model& model) {
   check_model(model, path.string());
   JournalFrame expected;
   expected.key = content.digits();
-  expected.file_bytes = bytes + packed_size(order) * bytes_per_scalar(header.precision) + metadata_allowance;
+  const int packed_matrices = model.dynamics.method == DynamicsMethod::packed ? 2 : 1;
+  expected.file_bytes = bytes + packed_matrices * packed_bytes() + metadata_allowance;
   return expected;
 }
 
 /// Takes up what a killed run left; false when that is not the same model or was altered.
 bool ModelWriter::Impl::resume() {
   const std::optional<JournalContents> left = journal.read();
-  if (!left || left->frame.key != frame.key || !std::filesystem::exists(partial)) return false;
+  if (!left || left->frame.key != frame.key || left->frame.packed_at.size() != matrices.size() ||
+      !std::filesystem::exists(partial))
+    return false;
   data = open_file(partial, OpenMode::write);
-  const std::int64_t greens_end =
-      left->frame.greens_at + packed_size(order) * bytes_per_scalar(header.precision);
-  if (file_size(data) != left->frame.file_bytes || greens_end > left->frame.file_bytes ||
-      checksum_around(data, left->frame.greens_at, greens_end) != left->frame.checksum)
+  const bool inside =
+      std::all_of(left->frame.packed_at.begin(), left->frame.packed_at.end(),
+                  [&](std::int64_t at) { return at <= left->frame.file_bytes - packed_bytes(); });
+  if (file_size(data) != left->frame.file_bytes || !inside ||
+      checksum_around(data, left->frame.packed_at, packed_bytes()) != left->frame.checksum)
     return false;
 
   frame = left->frame;
   std::vector<JournalRange> whole;
   for (const JournalRange& range : left->ranges) {
-    if (range.first > order || range.count > order - range.first) continue;
+    if (range.matrix >= std::ssize(matrices) || range.first > order || range.count > order - range.first)
+      continue;
+    const auto matrix = static_cast<std::size_t>(range.matrix);
     RunningChecksum stored;
-    add_bytes(stored, data, byte_of_column(range.first), byte_of_column(range.first + range.count));
+    add_bytes(stored, data, byte_of_column(matrix, range.first),
+              byte_of_column(matrix, range.first + range.count));
     if (stored.digits() != range.checksum) continue;
-    mark_done(range.first, range.count);
+    mark_done(range);
     whole.push_back(range);
   }
   journal.write({frame, whole});
@@ -195,10 +223,9 @@ void ModelWriter::Impl::start(const Model& model) {
   check_free_space(partial, frame.file_bytes);
   write_body(model);
   data = open_file(partial, OpenMode::write);
-  const std::int64_t greens_end = byte_of_column(order);
-  reserve_space(data, frame.greens_at, greens_end - frame.greens_at);
+  for (const std::int64_t at : frame.packed_at) reserve_space(data, at, packed_bytes());
   frame.file_bytes = file_size(data);
-  frame.checksum = checksum_around(data, frame.greens_at, greens_end);
+  frame.checksum = checksum_around(data, frame.packed_at, packed_bytes());
   journal.write({frame, {}});
 }
 
@@ -209,35 +236,44 @@ void ModelWriter::Impl::write_body(const Model& model) {
   const hdf5::ElementType scalar = single ? hdf5::element_type<float>() : hdf5::element_type<double>();
   const std::int64_t entries = packed_size(order);
 
-  hdf5::File file = hdf5::File::create(partial, entries * bytes_per_scalar(header.precision));
+  hdf5::File file = hdf5::File::create(partial, packed_bytes());
   write_attributes(file, model, header);
   for_each_known_field(model, [&](const auto& field) { write_field(file, field, model, counts); });
   write_vtk_view(file);
-  file.write(greens_path, scalar, std::array{entries}, nullptr);
-  frame.greens_at = file.locate(greens_path, scalar, 1).offset;
+  for (const Streamed& matrix : matrices) {
+    file.write(matrix.path, scalar, std::array{entries}, nullptr);
+    frame.packed_at.push_back(file.locate(matrix.path, scalar, 1).offset);
+  }
   file.close();
 }
 
-std::int64_t ModelWriter::Impl::byte_of_column(std::int64_t column) const {
-  return frame.greens_at + packed_column(column, order) * bytes_per_scalar(header.precision);
+std::int64_t ModelWriter::Impl::packed_bytes() const {
+  return packed_size(order) * bytes_per_scalar(header.precision);
 }
 
-void ModelWriter::Impl::mark_done(std::int64_t first, std::int64_t count) {
-  const auto begin = done.begin() + first;
-  std::fill(begin, begin + count, true);
+std::int64_t ModelWriter::Impl::byte_of_column(std::size_t matrix, std::int64_t column) const {
+  return frame.packed_at[matrix] + packed_column(column, order) * bytes_per_scalar(header.precision);
+}
+
+void ModelWriter::Impl::mark_done(const JournalRange& range) {
+  const auto begin = matrices[static_cast<std::size_t>(range.matrix)].done.begin() + range.first;
+  std::fill(begin, begin + range.count, true);
 }
 
 template <class T>
-void ModelWriter::Impl::store(std::int64_t first, std::int64_t count, std::span<const double> packed) {
+void ModelWriter::Impl::store(std::size_t matrix, std::int64_t first, std::int64_t count,
+                              std::span<const double> packed) {
   RunningChecksum stored;
   std::vector<T> converted;
-  std::int64_t at = byte_of_column(first);
+  std::int64_t at = byte_of_column(matrix, first);
   for (auto rest = packed; !rest.empty(); rest = rest.subspan(converted.size())) {
     const auto part = rest.first(std::min(values_at_once, rest.size()));
     converted.assign(part.begin(), part.end());
+    for (T& value : converted)
+      if (std::abs(value) < std::numeric_limits<T>::min()) value = T{0};
     if (!std::all_of(converted.begin(), converted.end(), [](T value) { return std::isfinite(value); }))
-      throw Error("the Green's functions of columns " + std::to_string(first) + " to " +
-                      std::to_string(first + count - 1) +
+      throw Error(std::string("columns ") + std::to_string(first) + " to " +
+                      std::to_string(first + count - 1) + " of " + matrices[matrix].name +
                       " hold a value that is not finite in the stored precision",
                   path.string(), "Check the material and the mesh's quality, or store in double precision.");
     stored.update(bytes_of(converted));
@@ -245,15 +281,16 @@ void ModelWriter::Impl::store(std::int64_t first, std::int64_t count, std::span<
     at += static_cast<std::int64_t>(bytes_of(converted).size());
   }
   const std::scoped_lock lock(mutex);
-  journal.add({first, count, stored.digits()});
-  mark_done(first, count);
+  const JournalRange range{static_cast<std::int64_t>(matrix), first, count, stored.digits()};
+  journal.add(range);
+  mark_done(range);
 }
 
 /// Window by window, so that the file does not fill the memory.
-std::string ModelWriter::Impl::greens_checksum() const {
+std::string ModelWriter::Impl::packed_checksum(std::size_t matrix) const {
   ChunkedChecksum running;
-  const std::int64_t end = byte_of_column(order);
-  for (std::int64_t at = frame.greens_at; at < end; at += window) {
+  const std::int64_t end = byte_of_column(matrix, order);
+  for (std::int64_t at = frame.packed_at[matrix]; at < end; at += window) {
     const std::int64_t bytes = std::min(window, end - at);
     const std::shared_ptr<const void> mapped = map_file(data, at, bytes);
     running.append({static_cast<const std::byte*>(mapped.get()), static_cast<std::size_t>(bytes)});
@@ -271,11 +308,15 @@ void ModelWriter::Impl::seal(const std::vector<Probe>& probes) {
         probe.displacement.size() != probe.force.size())
       refuse(path.string(), "/probes/forces: a probe does not have " + std::to_string(order) + " values");
 
-  const std::string greens = greens_checksum();
-  content.add_dataset(greens_path, greens);
+  std::vector<std::string> checksums;
+  for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
+    checksums.push_back(packed_checksum(matrix));
+    content.add_dataset(matrices[matrix].path, checksums.back());
+  }
   const hdf5::Quiet quiet;
   hdf5::File file = hdf5::File::open_to_change(partial);
-  file.write_attribute(greens_path, "xxh3", greens);
+  for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix)
+    file.write_attribute(matrices[matrix].path, "xxh3", checksums[matrix]);
   for_each_probe_field(element, [&](const auto& field) {
     const auto values = field.take(extra);
     check_values(field, values, counts);
@@ -299,16 +340,21 @@ ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precisi
 
 ModelWriter::~ModelWriter() = default;
 
-bool ModelWriter::has_columns(std::int64_t first, std::int64_t count) const {
+bool ModelWriter::has_columns(std::int64_t first, std::int64_t count, PackedMatrix matrix) const {
   const std::scoped_lock lock(impl_->mutex);
-  if (first < 0 || count < 0 || first > impl_->order || count > impl_->order - first) return false;
-  const auto begin = impl_->done.begin() + first;
+  const auto which = static_cast<std::size_t>(matrix);
+  if (which >= impl_->matrices.size() || first < 0 || count < 0 || first > impl_->order ||
+      count > impl_->order - first)
+    return false;
+  const auto begin = impl_->matrices[which].done.begin() + first;
   return std::all_of(begin, begin + count, [](bool done) { return done; });
 }
 
-void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed) {
+void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed,
+                                PackedMatrix matrix) {
   const std::int64_t n = impl_->order;
-  if (first < 0 || count < 0 || first > n || count > n - first ||
+  const auto which = static_cast<std::size_t>(matrix);
+  if (which >= impl_->matrices.size() || first < 0 || count < 0 || first > n || count > n - first ||
       static_cast<std::int64_t>(packed.size()) != packed_column(first + count, n) - packed_column(first, n))
     throw Error("columns " + std::to_string(first) + " to " + std::to_string(first + count - 1) + " with " +
                     std::to_string(packed.size()) + " entries do not fit a matrix of order " +
@@ -316,9 +362,9 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
                 impl_->path.string(), "This is a mistake in the program; please report it.");
   try {
     if (impl_->header.precision == Precision::single_precision)
-      impl_->store<float>(first, count, packed);
+      impl_->store<float>(which, first, count, packed);
     else
-      impl_->store<double>(first, count, packed);
+      impl_->store<double>(which, first, count, packed);
   } catch (...) {
     discard();
     throw;
@@ -326,11 +372,13 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
 }
 
 void ModelWriter::finish(const std::vector<Probe>& probes) {
-  const auto missing = std::find(impl_->done.begin(), impl_->done.end(), false);
-  if (missing != impl_->done.end())
-    throw Error("column " + std::to_string(missing - impl_->done.begin()) +
-                    " of the Green's functions was not written",
-                impl_->path.string(), "This is a mistake in the program; please report it.");
+  for (const Streamed& matrix : impl_->matrices) {
+    const auto missing = std::find(matrix.done.begin(), matrix.done.end(), false);
+    if (missing != matrix.done.end())
+      throw Error("column " + std::to_string(missing - matrix.done.begin()) + " of " + matrix.name +
+                      " was not written",
+                  impl_->path.string(), "This is a mistake in the program; please report it.");
+  }
   try {
     impl_->seal(probes);
   } catch (...) {

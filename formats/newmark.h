@@ -13,6 +13,13 @@ struct Newmark {
   double delta = 0.5;
   double time_step = 0.001;  ///< Dt [s]
 
+  /// The smallest alpha that is unconditionally stable with this delta.
+  [[nodiscard]] double least_alpha() const noexcept { return 0.25 * (delta + 0.5) * (delta + 0.5); }
+  /// Up to rounding: 0.3025 is enough for delta = 0.6.
+  [[nodiscard]] bool stable() const noexcept {
+    return delta >= 0.5 && alpha >= (1.0 - 1e-12) * least_alpha();
+  }
+
   [[nodiscard]] double a0() const noexcept { return 1.0 / (alpha * time_step * time_step); }
   [[nodiscard]] double a1() const noexcept { return delta / (alpha * time_step); }
   [[nodiscard]] double a2() const noexcept { return 1.0 / (alpha * time_step); }

@@ -111,6 +111,15 @@ struct OverlayRegions {
   std::vector<Selection> regions;
 };
 
+/// Swinging after the body is let go.
+struct DynamicsOptions {
+  std::optional<DynamicsMethod> method;  ///< packed or modal; empty: what fits
+  bool lumped = false;                   ///< M is diagonal
+  Newmark newmark;
+  Rayleigh damping;
+  std::optional<Index> modes;  ///< modal: how many; empty: 100, or all where there are fewer
+};
+
 /// The whole model.toml, checked.
 struct Description {
   std::filesystem::path file;  ///< model.toml itself
@@ -128,6 +137,7 @@ struct Description {
   Index layers = 1;
   Precision precision = Precision::single_precision;
   std::optional<OverlayRegions> overlay;
+  std::optional<DynamicsOptions> dynamics;
 };
 
 /// Reads and checks model.toml. Relative files are taken from its folder. Throws Error with file, line and
