@@ -28,19 +28,6 @@ inline Equation oscillator(double omega, double zeta = 0.0, const std::function<
   return equation;
 }
 
-/// (u', v') = A (u, v) of one step of the oscillator, seen by taking a step from (1, 0) and one from (0, 1);
-/// make(u, v) gives the integrator that starts there.
-template <class Make>
-Eigen::Matrix2d amplification(Make make) {
-  Eigen::Matrix2d A;
-  for (int k = 0; k < 2; ++k) {
-    const std::unique_ptr<Integrator> integrator = make(scalar(1 - k), scalar(k));
-    integrator->step();
-    A.col(k) << integrator->u()[0], integrator->v()[0];
-  }
-  return A;
-}
-
 /// A body's equation of free motion.
 inline Equation equation_of(const ElasticCase& body, bool lumped = false, const Rayleigh& damping = {}) {
   const Stiffness stiffness = assemble_stiffness(body.body());

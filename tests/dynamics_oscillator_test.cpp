@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/dynamics_bodies.h"
+#include "tests/stability_limit.h"
 
 namespace palpate {
 namespace {

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "tests/dynamics_bodies.h"
+#include "tests/stability_limit.h"
 
 namespace palpate {
 namespace {
@@ -16,32 +17,16 @@ using test::Method;
 using test::oscillator;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double shortest = 0.05, longest = 1e4;  // omega Dt that are looked at
 
-/// Whether no motion of the oscillator of 1 rad/s grows: both amplification factors within the unit circle.
-template <class Make>
-bool is_stable(Make make) {
-  const Eigen::Matrix2d A = test::amplification(make);
-  return A.eigenvalues().cwiseAbs().maxCoeff() < 1.0 + 1e-8;
-}
-
-/// Largest stable omega Dt by bisection; 0 or infinity where the shortest is unstable or the longest stable.
-/// stable(omega Dt).
+/// In omega Dt.
 template <class Stable>
-double stability_limit(Stable stable) {
-  double low = shortest, high = longest;
-  if (!stable(low)) return 0.0;
-  if (stable(high)) return infinity;
-  while (high - low > 1e-9 * high) {
-    const double middle = std::sqrt(low * high);
-    (stable(middle) ? low : high) = middle;
-  }
-  return low;
+double limit_of(Stable stable) {
+  return test::stability_limit(stable, 0.05, 1e4);
 }
 
 double measured_limit(Method method, double zeta) {
-  return stability_limit([&](double h) {
-    return is_stable([&](const auto& u, const auto& v) {
+  return limit_of([&](double h) {
+    return test::is_stable([&](const auto& u, const auto& v) {
       return make_integrator(method, oscillator(1.0, zeta), u, v, h);
     });
   });
@@ -50,7 +35,7 @@ double measured_limit(Method method, double zeta) {
 /// Where |1 + z + ... + z^order / order!| leaves 1 along z = h (-zeta + i sqrt(1 - zeta^2)): a Runge-Kutta
 /// method of as many stages as its order.
 double runge_kutta_limit(int order, double zeta) {
-  return stability_limit([&](double h) {
+  return limit_of([&](double h) {
     const std::complex<double> z = h * std::complex<double>(-zeta, std::sqrt(1.0 - zeta * zeta));
     std::complex<double> R = 1.0, term = 1.0;
     for (int k = 1; k <= order; ++k) R += term *= z / static_cast<double>(k);
@@ -94,8 +79,8 @@ TEST(Stability, LimitsWithDamping) {
 // With alpha below (delta + 1/2)^2 / 4 Newmark too has a limit: 1 / sqrt(delta / 2 - alpha) at delta = 1/2.
 TEST(Stability, NewmarkBelowItsLeastAlpha) {
   for (const double alpha : {1.0 / 6.0, 1.0 / 12.0, 0.2}) {
-    const double limit = stability_limit([&](double h) {
-      return is_stable([&](const auto& u, const auto& v) {
+    const double limit = limit_of([&](double h) {
+      return test::is_stable([&](const auto& u, const auto& v) {
         return std::make_unique<test::NewmarkIntegrator>(
             oscillator(1.0), Newmark{.alpha = alpha, .delta = 0.5, .time_step = h}, u, v);
       });
