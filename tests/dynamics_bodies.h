@@ -10,10 +10,7 @@
 namespace palpate::test {
 
 inline SparseMatrix one_by_one(double value) {
-  SparseMatrix matrix(1, 1);
-  matrix.insert(0, 0) = value;
-  matrix.makeCompressed();
-  return matrix;
+  return Eigen::MatrixXd::Constant(1, 1, value).sparseView();
 }
 
 inline Eigen::VectorXd scalar(double value) {
@@ -31,9 +28,8 @@ inline Equation oscillator(double omega, double zeta = 0.0, const std::function<
 /// A body's equation of free motion.
 inline Equation equation_of(const ElasticCase& body, bool lumped = false, const Rayleigh& damping = {}) {
   const Stiffness stiffness = assemble_stiffness(body.body());
-  SparseMatrix M = assemble_mass(body.body(), stiffness, lumped);
-  SparseMatrix C = damping_matrix(M, stiffness.K, damping);
-  return {.M = std::move(M), .K = stiffness.K, .C = std::move(C), .f = {}};
+  const SparseMatrix M = assemble_mass(body.body(), stiffness, lumped);
+  return {.M = M, .K = stiffness.K, .C = damping_matrix(M, stiffness.K, damping), .f = {}};
 }
 
 /// A block like liver, 100 x 60 x 50 mm of hex8, clamped at x = 0.

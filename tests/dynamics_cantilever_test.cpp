@@ -110,7 +110,7 @@ double spectrum(const std::vector<double>& signal, double Dt, double omega) {
 std::vector<double> peaks(const std::vector<double>& signal, double Dt, double end, std::size_t count) {
   const double bin = std::numbers::pi / (Dt * static_cast<double>(signal.size()));  // half of a bin
   std::vector<double> values;
-  for (double omega = 0.0; omega < end; omega += bin) values.push_back(spectrum(signal, Dt, omega));
+  for (int k = 0; k * bin < end; ++k) values.push_back(spectrum(signal, Dt, k * bin));
   const double highest = *std::max_element(values.begin(), values.end());
   std::vector<double> found;
   for (std::size_t k = 1; k + 1 < values.size() && found.size() < count; ++k) {

@@ -36,8 +36,8 @@ inline double frequency_equation(const Beam& beam, double omega) {
 /// The lowest angular frequencies [rad/s], by bisection between changes of sign `scan` apart.
 inline std::vector<double> frequencies(const Beam& beam, std::size_t count, double scan) {
   std::vector<double> found;
-  for (double low = scan; found.size() < count; low += scan) {
-    double a = low, b = low + scan;
+  for (int k = 1; found.size() < count; ++k) {
+    double a = k * scan, b = a + scan;
     const bool sign = frequency_equation(beam, a) > 0.0;
     if ((frequency_equation(beam, b) > 0.0) == sign) continue;
     while (b - a > 1e-10 * b) {
