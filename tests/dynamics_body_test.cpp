@@ -18,6 +18,67 @@ using test::Method;
 using test::Modes;
 using test::NewmarkIntegrator;
 
+/// A damped block under a force that changes.
+Equation pushed_block(bool lumped) {
+  Equation equation = equation_of(clamped_block({3, 2, 2}), lumped, {.mass = 0.8, .stiffness = 2e-3});
+  equation.f = [n = equation.M.rows()](double time) -> VectorXd {
+    return std::sin(30.0 * time) * VectorXd::LinSpaced(n, -1e-3, 3e-3);
+  };
+  return equation;
+}
+
+/// |M a + C v + K u - f| at the end of a step, of |M a|.
+double imbalance(const Integrator& at, const Equation& equation) {
+  const VectorXd inertia = equation.M.selfadjointView<Eigen::Lower>() * at.a();
+  return (inertia - equation.force_left(at.time(), at.u(), at.v())).norm() / inertia.norm();
+}
+
+TEST(Swing, EveryStepEndsInBalance) {
+  for (const bool lumped : {false, true}) {
+    const Equation equation = pushed_block(lumped);
+    const Eigen::Index n = equation.M.rows();
+    for (const Method method : test::all_methods) {
+      const std::unique_ptr<Integrator> integrator =
+          make_integrator(method, equation, VectorXd::LinSpaced(n, 1e-3, 0.0), VectorXd::Zero(n), 1e-4);
+      EXPECT_LT(imbalance(*integrator, equation), 1e-10) << name_of(method) << " at release";
+      for (int k = 0; k < 20; ++k) {
+        integrator->step();
+        EXPECT_LT(imbalance(*integrator, equation), 1e-9) << name_of(method);
+      }
+    }
+  }
+}
+
+// What the implicit ones solve for, besides the balance: u' and v' as each of them defines these.
+TEST(Swing, ImplicitStepsAreWhatDefinesThem) {
+  const Equation equation = pushed_block(false);
+  const Eigen::Index n = equation.M.rows();
+  const VectorXd u0 = VectorXd::LinSpaced(n, 1e-3, 0.0), v0 = VectorXd::LinSpaced(n, 0.0, 0.01);
+  const double Dt = 5e-3;
+  for (const Newmark& newmark : {Newmark{.alpha = 0.25, .delta = 0.5, .time_step = Dt},
+                                 Newmark{.alpha = 0.3025, .delta = 0.6, .time_step = Dt},
+                                 Newmark{.alpha = 0.5, .delta = 0.75, .time_step = Dt}}) {
+    NewmarkIntegrator swing(equation, newmark, u0, v0);
+    for (int k = 0; k < 10; ++k) {
+      const VectorXd u = swing.u(), v = swing.v(), a = swing.a();
+      swing.step();
+      const VectorXd u_after = u + Dt * v + Dt * Dt * ((0.5 - newmark.alpha) * a + newmark.alpha * swing.a());
+      const VectorXd v_after = v + Dt * ((1.0 - newmark.delta) * a + newmark.delta * swing.a());
+      EXPECT_LT((swing.u() - u_after).norm(), 1e-12 * u.norm());
+      EXPECT_LT((swing.v() - v_after).norm(), 1e-12 * v.norm());
+      EXPECT_LT(imbalance(swing, equation), 1e-9);
+    }
+  }
+  const auto euler = make_integrator(Method::implicit_euler, equation, u0, v0, Dt);
+  for (int k = 0; k < 10; ++k) {
+    const VectorXd u = euler->u(), v = euler->v();
+    euler->step();
+    EXPECT_LT((euler->u() - u - Dt * euler->v()).norm(), 1e-12 * u.norm());
+    EXPECT_LT((euler->v() - v - Dt * euler->a()).norm(), 1e-12 * v.norm());
+    EXPECT_LT(imbalance(*euler, equation), 1e-9);
+  }
+}
+
 // C = 0, f = 0: Newmark's with alpha = 1/4, delta = 1/2 is the trapezoidal rule, which keeps the energy.
 TEST(Swing, NewmarkKeepsTheEnergy) {
   for (const bool lumped : {false, true}) {

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCholesky>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
