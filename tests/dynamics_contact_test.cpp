@@ -1,0 +1,205 @@
+// Dynamic contact: the tool meets inertia and viscosity.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "meshes/error.h"
+#include "runtime/motion_source.h"
+#include "runtime/packed_newmark.h"
+#include "tests/dynamics_sample.h"
+#include "tests/runtime_tool.h"
+
+namespace palpate {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using test::pose;
+
+/// A body with dynamic contact and the loop around its ticks.
+class Loop {
+ public:
+  Loop(Model model, const Tool& tool, int refinement = 1)
+      : body(std::move(model), {}, refinement, ContactModel::dynamic),
+        state(body, {.tools = {tool}, .tick = test::tick}) {
+    if (body.model().dynamics.method == DynamicsMethod::packed)
+      source.emplace(body, state, MotionSourceOptions{.in_background = false, .jobs = 1});
+  }
+  Vec3 step(const ToolPose& at) {
+    if (source) source->receive(state);
+    palpate::step(body, state, at);
+    if (source) source->post(state);
+    return state.tools.front().wrench.force;
+  }
+
+  Body body;
+  State state;
+  std::optional<MotionSource> source;
+};
+
+Vec3 shaken(int k) {
+  const double t = k * test::tick;
+  return {0.02 * std::sin(40.0 * t), 0.01 * (1.0 - std::cos(25.0 * t)), 0.03 * std::sin(15.0 * t)};
+}
+
+// A node of a cube that is shaken: against Newmark's method with the constraint u' = u_bar, solved densely.
+TEST(DynamicContact, IsTheConstrainedNewmarkStep) {
+  const Model model = test::swinging_model(ElementType::tet4, test::packed());
+  const test::SparseRoute sparse(model);
+  const MatrixXd K_bar = effective_stiffness(sparse.equation.K, sparse.equation.M, model.dynamics.damping,
+                                             model.dynamics.newmark);
+  const MatrixXd inverse =
+      K_bar.selfadjointView<Eigen::Lower>().llt().solve(MatrixXd::Identity(K_bar.rows(), K_bar.cols()));
+
+  for (const bool is_packed : {true, false}) {
+    Loop loop(test::swinging_model(ElementType::tet4, is_packed ? test::packed() : test::all_modes()),
+              test::plain({.reach = 0.5}));
+    const Index held = loop.body.nearest_surface_node(Vec3(1.0, 1.0, 1.0)).node;
+    const Vec3 at = loop.body.rest_position(held) + Vec3(0.001, 0.001, 0.001);
+    Eigen::Vector3i dofs;
+    for (int axis = 0; axis < 3; ++axis)
+      dofs[axis] = static_cast<int>(sparse.stored_dofs[static_cast<std::size_t>(3 * held + axis)]);
+
+    // The reference: predict without force, then the force that the constraint takes.
+    const Newmark h = model.dynamics.newmark;
+    const VectorXd zero = VectorXd::Zero(K_bar.rows());
+    VectorXd u = zero, v = zero, a = zero;
+    const auto M = sparse.equation.M.selfadjointView<Eigen::Lower>();
+    const auto C = sparse.equation.C.selfadjointView<Eigen::Lower>();
+    loop.step(pose(at));
+    double size = 0.0;
+    for (int k = 0; k < 300; ++k) {
+      const Vec3 force = loop.step(pose(at + shaken(k), true));
+      const VectorXd f_bar = M * VectorXd(h.a0() * u + h.a2() * v + h.a3() * a) +
+                             C * VectorXd(h.a1() * u + h.a4() * v + h.a5() * a);
+      const VectorXd predicted = inverse * f_bar;
+      const Eigen::Vector3d f =
+          inverse(dofs, dofs).llt().solve(Eigen::Vector3d(shaken(k) - Vec3(predicted(dofs))));
+      VectorXd next = predicted;
+      for (int axis = 0; axis < 3; ++axis) next += inverse.col(dofs[axis]) * f[axis];
+      const VectorXd a_next = h.a0() * (next - u) - h.a2() * v - h.a3() * a;
+      v += h.time_step * ((1.0 - h.delta) * a + h.delta * a_next);
+      u = next;
+      a = a_next;
+      size = std::max(size, f.norm());
+      ASSERT_LT((force + Vec3(f)).norm(), 3e-6 * size) << k << (is_packed ? " packed" : " modal");
+      ASSERT_LT((test::displacement(loop.body, loop.state) - sparse.to_stored(u)).norm(), 3e-6 * u.norm());
+    }
+    EXPECT_GT(size, 0.0);
+  }
+}
+
+/// Damped and of many modes: the force of a slow push is the static one.
+TEST(DynamicContact, SlowlyIsQuasiStatic) {
+  DynamicsOptions options = test::all_modes();
+  options.damping = {.mass = 100.0, .stiffness = 1e-3};
+  for (const Index modes : {Index{5}, Index{10000}}) {
+    options.modes = modes;
+    const Model model = test::swinging_model(ElementType::tet4, options);
+    Loop dynamic(model, test::plain({.radius = 0.3}));
+    const Body body(model);
+    State state(body, {.tools = {test::plain({.radius = 0.3})}});
+    const Vec3 top = test::top_middle(3);
+    Vec3 with_inertia = Vec3::Zero();
+    for (int k = 0; k <= 4000; ++k) {
+      const ToolPose at = pose(top + Vec3(0.0, 0.0, 0.31 - 0.05 * std::min(k, 2000) / 2000.0));
+      with_inertia = dynamic.step(at);
+      step(body, state, at);
+    }
+    const Vec3 force = state.tools.front().wrench.force;
+    ASSERT_GT(force.norm(), 1e-3);
+    EXPECT_LT((with_inertia - force).norm(), 1e-3 * force.norm()) << modes << " modes";
+  }
+}
+
+// A body that is shaken faster than it can follow is heavy: more force in phase against the motion.
+TEST(DynamicContact, FeelsInertiaAndViscosity) {
+  const auto work_and_peak = [](const Rayleigh& damping, double omega) {
+    DynamicsOptions options = test::all_modes();
+    options.damping = damping;
+    Loop loop(test::swinging_model(ElementType::tet4, options), test::plain({.reach = 0.5}));
+    const Vec3 at = test::top_middle(3) + Vec3(0.0, 0.0, 0.001);
+    loop.step(pose(at));
+    double work = 0.0, peak = 0.0;
+    Vec3 last = at;
+    for (int k = 0; k < 2000; ++k) {
+      const Vec3 now = at + Vec3(0.0, 0.0, 0.02 * std::sin(omega * k * test::tick));
+      const Vec3 force = loop.step(pose(now, true));
+      if (k > 1000) {
+        work -= force.dot(now - last);
+        peak = std::max(peak, force.norm());
+      }
+      last = now;
+    }
+    return std::pair(work, peak);
+  };
+  const auto [slow_work, slow_peak] = work_and_peak({.mass = 5.0, .stiffness = 1e-4}, 2.0);
+  const auto [viscous_work, viscous_peak] = work_and_peak({.mass = 50.0, .stiffness = 2e-3}, 2.0);
+  EXPECT_GT(viscous_work, 3.0 * slow_work);
+  const auto [fast_work, fast_peak] = work_and_peak({.mass = 5.0, .stiffness = 1e-4}, 300.0);
+  EXPECT_GT(fast_peak, 1.5 * slow_peak);
+  EXPECT_GT(fast_work, slow_work);
+}
+
+struct Device {
+  double mass;      // [kg] of hand and handle
+  double coupling;  // [N/m]
+};
+
+class Passivity : public testing::TestWithParam<std::tuple<bool, double, double>> {};
+
+// A device with a hand's mass is thrown against the body: what comes back is never more than what went in. A
+// spring that is felt once a tick gives k dt / 2 of negative damping (Colgate & Schenkel 1997): devices have
+// at least that much friction of their own, which the observer counts.
+TEST_P(Passivity, NothingIsGained) {
+  const auto [is_packed, mass, stiffness] = GetParam();
+  DynamicsOptions options = is_packed ? test::packed() : test::all_modes();
+  if (!is_packed) options.modes = 30;
+  options.damping = {};
+  Model model = test::unit_model(ElementType::tet4, 3, Scope::full, Precision::double_precision);
+  model.materials.front() = {.youngs_modulus = 5000.0, .poissons_ratio = 0.3, .density = 1000.0};
+  for (Vec3& node : model.mesh.nodes) node *= 0.1;  // ten centimetres: K grows with E and the size
+  MatrixXd Xi(model.greens.order(), model.greens.order());
+  for (Eigen::Index i = 0; i < Xi.rows(); ++i) {
+    for (Eigen::Index j = 0; j < Xi.cols(); ++j) Xi(i, j) = model.greens(i, j) / (5000.0 * 0.1);
+  }
+  model.greens = test::pack(Xi, Precision::double_precision);
+  model.dynamics = make_dynamics(model, options, Precision::double_precision);
+  const double friction = 0.5 * stiffness * test::tick;  // of the device [N s/m]
+  Loop loop(std::move(model), {.radius = 0.02, .coupling_stiffness = stiffness});
+
+  Vec3 x(0.05, 0.05, 0.125), v(0.02, 0.0, -0.3);
+  double lost = 0.0, least = 0.0;
+  int bounces = 0;
+  bool touched = false;
+  const double begin = 0.5 * mass * v.squaredNorm();
+  for (int k = 0; k < 3000; ++k) {
+    const Vec3 force = loop.step(pose(x)) - friction * v - Vec3(0.0, 0.0, mass * 2.0);  // and a weight
+    v += test::tick / mass * force;
+    const Vec3 moved = test::tick * v;
+    lost += friction * v.squaredNorm() * test::tick;
+    x += moved;
+    const double kinetic = 0.5 * mass * v.squaredNorm(), potential = mass * 2.0 * (x.z() - 0.125);
+    least = std::min(least, begin - kinetic - potential - lost);  // what the body has
+    const bool touches = loop.state.tools.front().contacts > 0;
+    bounces += touches && !touched ? 1 : 0;
+    touched = touches;
+    ASSERT_TRUE(std::isfinite(kinetic));
+  }
+  EXPECT_GE(bounces, 1);
+  EXPECT_GT(least, -1e-3 * begin);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, Passivity,
+                         testing::Combine(testing::Bool(), testing::Values(0.05, 0.2, 1.0),
+                                          testing::Values(100.0, 500.0, 2000.0)));
+
+TEST(DynamicContact, NeedsDynamics) {
+  EXPECT_THROW(Body(test::unit_model(ElementType::tet4, 2, Scope::full, Precision::double_precision), {}, 1,
+                    ContactModel::dynamic),
+               Error);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,341 @@
+// Let go, and touch again what moves.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "meshes/error.h"
+#include "runtime/motion_source.h"
+#include "tests/dynamics_sample.h"
+#include "tests/runtime_tool.h"
+
+namespace palpate {
+namespace {
+
+using Eigen::VectorXd;
+using test::pose;
+
+/// A loop that steps packed dynamics between its ticks.
+class Loop {
+ public:
+  Loop(Model model, const Tool& tool, ContactModel contact = ContactModel::quasi_static, int refinement = 1)
+      : body(std::move(model), {}, refinement, contact), state(body, {.tools = {tool}, .tick = test::tick}) {
+    if (body.model().dynamics.method == DynamicsMethod::packed)
+      source.emplace(body, state, MotionSourceOptions{.in_background = false, .jobs = 1});
+  }
+  void step(const ToolPose& at) {
+    if (source) source->receive(state);
+    palpate::step(body, state, at);
+    if (source) source->post(state);
+  }
+  Vec3 surface(Index node) const { return state.tree.position(node); }
+
+  Body body;
+  State state;
+  std::optional<MotionSource> source;
+};
+
+struct ReleaseCase {
+  const char* name;
+  ElementType element;
+  bool packed;
+  int ticks_per_step;
+};
+
+class Release : public testing::TestWithParam<ReleaseCase> {
+ protected:
+  Release()
+      : options_(GetParam().packed ? test::packed() : test::all_modes()),
+        d_(traits(GetParam().element).dimension) {
+    options_.newmark.time_step = test::tick * GetParam().ticks_per_step;
+  }
+  Model model() const { return test::swinging_model(GetParam().element, options_); }
+  /// Grabs the middle of the top and takes it to `by` in 200 ticks, then waits for `rest` ticks.
+  void pull(Loop& loop, const Vec3& by, int rest) {
+    const Vec3 top = test::top_middle(d_);
+    const Vec3 above = top + 0.01 * test::upright(d_, 0.0, 0.0, 1.0);
+    loop.step(pose(above));
+    for (int k = 0; k <= 200; ++k) loop.step(pose(above + by * (k / 200.0), true));
+    for (int k = 0; k < rest; ++k) loop.step(pose(above + by, true));
+    last_ = above + by;
+  }
+
+  DynamicsOptions options_;
+  int d_;
+  Vec3 last_;
+  const Tool tool_ = test::plain({.reach = 0.5});
+};
+
+TEST_P(Release, GoesOnAsTheSparseRouteDoes) {
+  Loop loop(model(), tool_);
+  pull(loop, test::upright(d_, 0.05, 0.02, 0.04), 20);
+  const VectorXd held = test::displacement(loop.body, loop.state);
+  ASSERT_GT(held.norm(), 0.03);
+  ASSERT_FALSE(loop.state.motion.active());
+  const test::SparseRoute sparse(model());
+  test::NewmarkIntegrator reference = sparse.start(held, VectorXd::Zero(held.size()));
+
+  const Vec3 far = last_ + test::upright(d_, 0.0, 0.0, 1.0);
+  loop.step(pose(far));
+  EXPECT_EQ(loop.state.near.load().count, 0);
+  EXPECT_LT((test::displacement(loop.body, loop.state) - held).norm(), 1e-12 * held.norm())
+      << "it stays in the tick";
+  const int m = GetParam().ticks_per_step;
+  int ticks = 0;
+  while ((test::displacement(loop.body, loop.state) - held).norm() < 1e-12 * held.norm() && ticks < 5 * m) {
+    loop.step(pose(far));  // until the next step of the dynamics begins
+    ++ticks;
+  }
+  VectorXd before = held;
+  double largest = 0.0;
+  for (int k = 0; k < 400; ++k) {
+    reference.step();
+    const VectorXd after = sparse.to_stored(reference.u());
+    for (int j = 1; j <= m; ++j) {
+      const VectorXd expected = before + (after - before) * j / m;
+      largest = std::max(largest, (test::displacement(loop.body, loop.state) - expected).norm());
+      loop.step(pose(far));
+    }
+    before = after;
+  }
+  EXPECT_LT(largest, 1e-8 * held.norm());
+}
+
+// A hand that moves as it lets go throws the body.
+TEST_P(Release, TakesTheVelocityFromTheContact) {
+  Loop loop(model(), tool_);
+  const Vec3 by = test::upright(d_, 0.05, 0.02, 0.04);
+  pull(loop, by, 0);  // moves by / 200 a tick
+  const VectorXd held = test::displacement(loop.body, loop.state);
+  const VectorXd velocity = held / 200.0 / test::tick;  // it grows in proportion
+  const test::SparseRoute sparse(model());
+  test::NewmarkIntegrator reference = sparse.start(held, velocity);
+  const Vec3 far = last_ + test::upright(d_, 0.0, 0.0, 1.0);
+  loop.step(pose(far));
+  int waited = 0;
+  while ((test::displacement(loop.body, loop.state) - held).norm() < 1e-12 * held.norm() && waited++ < 20)
+    loop.step(pose(far));
+  for (int j = 1; j < GetParam().ticks_per_step; ++j) loop.step(pose(far));
+  reference.step();
+  const VectorXd expected = sparse.to_stored(reference.u());
+  EXPECT_LT((test::displacement(loop.body, loop.state) - expected).norm(), 1e-6 * (expected - held).norm());
+}
+
+// By superposition, also while it still moves from the last time.
+TEST_P(Release, AddsToWhatMoves) {
+  Loop loop(model(), tool_);
+  const Greens& greens = loop.body.greens();
+  const auto n = static_cast<std::size_t>(greens.order());
+  const test::SparseRoute sparse(model());
+  FreeMotion& motion = loop.state.motion;
+  SurfaceLoad none(d_, 0, 8, 0), first(d_, 0, 8, 0), second(d_, 0, 8, 0);
+  const std::vector<double> f = {1e-3, -2e-3, 0.5e-3};
+  first.add(3, f.data());
+  second.add(1, f.data());
+  second.add(4, f.data());
+  const VectorXd still = VectorXd::Zero(greens.order());
+  std::optional<test::NewmarkIntegrator> alone[2];
+  const int m = GetParam().ticks_per_step;
+  // Loads that were there for as long as velocities are taken over, then are gone.
+  const auto press_and_let_go = [&](const SurfaceLoad& load, std::size_t which) {
+    std::vector<double> u(n);
+    greens.displacement(load.nodes(), load.forces(), u);
+    const VectorXd before = Eigen::Map<const VectorXd>(u.data(), greens.order());
+    for (int k = 0; k < 3 * m * 4; ++k) {
+      if (loop.source) loop.source->receive(loop.state);
+      motion.begin_tick(loop.body);
+      motion.end_tick(loop.body, load);
+      if (k % m == 0 && alone[0]) alone[0]->step();
+    }
+    if (loop.source) loop.source->receive(loop.state);
+    motion.begin_tick(loop.body);
+    motion.let_go(loop.body, none, u);
+    EXPECT_EQ(Eigen::Map<const VectorXd>(u.data(), greens.order()).norm(), 0.0);
+    motion.end_tick(loop.body, none);
+    for (int k = 1; k < m && alone[0]; ++k) {  // to the end of the step, which the first one begins
+      if (loop.source) loop.source->receive(loop.state);
+      motion.begin_tick(loop.body);
+      motion.end_tick(loop.body, none);
+    }
+    if (alone[0]) alone[0]->step();
+    alone[which].emplace(sparse.equation, sparse.newmark, sparse.from_stored(before),
+                         sparse.from_stored(still));
+  };
+  press_and_let_go(first, 0);
+  press_and_let_go(second, 1);
+  double largest = 0.0, size = 0.0;
+  for (int k = 0; k < 200; ++k) {
+    for (int j = 0; j < m; ++j) {
+      if (loop.source) loop.source->receive(loop.state);
+      motion.begin_tick(loop.body);
+      motion.end_tick(loop.body, none);
+    }
+    for (auto& integrator : alone) integrator->step();
+    const VectorXd expected = sparse.to_stored(alone[0]->u() + alone[1]->u());
+    VectorXd shown(greens.order());
+    for (Index node = 0; node < greens.nodes(); ++node)
+      shown.segment(d_ * node, d_) = motion.displacement(loop.body, node).head(d_);
+    size = std::max(size, expected.norm());
+    largest = std::max(largest, (shown - expected).norm());
+  }
+  EXPECT_GT(size, 0.0);
+  EXPECT_LT(largest, 1e-8 * size);
+}
+
+// All of the surface, where the tree has it.
+TEST_P(Release, LeavesTheSurfaceWhereItIs) {
+  Loop loop(model(), tool_);
+  pull(loop, test::upright(d_, 0.05, 0.02, 0.04), 20);
+  const Vec3 far = last_ + test::upright(d_, 0.0, 0.0, 1.0);
+  std::vector<Vec3> held;
+  for (Index node = 0; node < std::ssize(loop.body.surface_rest_positions()); ++node)
+    held.push_back(loop.surface(node));
+  loop.step(pose(far));
+  double jump = 0.0;
+  for (std::size_t node = 0; node < held.size(); ++node)
+    jump = std::max(jump, (loop.surface(static_cast<Index>(node)) - held[node]).norm());
+  EXPECT_LT(jump, 1e-12);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bodies, Release,
+                         testing::Values(ReleaseCase{"PackedTet4", ElementType::tet4, true, 1},
+                                         ReleaseCase{"ModalTet4", ElementType::tet4, false, 1},
+                                         ReleaseCase{"PackedQuad4", ElementType::quad4, true, 1},
+                                         ReleaseCase{"ModalQuad4", ElementType::quad4, false, 1},
+                                         ReleaseCase{"PackedSlowTet4", ElementType::tet4, true, 4},
+                                         ReleaseCase{"ModalSlowTet4", ElementType::tet4, false, 4}),
+                         [](const auto& tested) { return tested.param.name; });
+
+/// A cube with a few modes only.
+Model few_modes(Index count) {
+  DynamicsOptions options = test::all_modes();
+  options.modes = count;
+  return test::swinging_model(ElementType::tet4, options);
+}
+
+// What the modes do not carry stays in the tick of the release and fades.
+TEST(FewModes, LoseNothingAtOnce) {
+  Loop loop(few_modes(6), test::plain({.reach = 0.5}));
+  const Vec3 top = test::top_middle(3), above = top + Vec3(0.0, 0.0, 0.01);
+  for (int k = 0; k <= 200; ++k) loop.step(pose(above + Vec3(0.0, 0.0, 0.05 * k / 200.0), k > 0));
+  for (int k = 0; k < 50; ++k) loop.step(pose(above + Vec3(0.0, 0.0, 0.05), true));
+  const VectorXd held = test::displacement(loop.body, loop.state);
+  const Vec3 far(0.5, 0.5, 3.0);
+  loop.step(pose(far));
+  EXPECT_LT((test::displacement(loop.body, loop.state) - held).norm(), 1e-12 * held.norm());
+  VectorXd before = held;
+  for (int k = 0; k < 500; ++k) {
+    loop.step(pose(far));
+    const VectorXd now = test::displacement(loop.body, loop.state);
+    ASSERT_LT((now - before).norm(), 0.25 * held.norm()) << k;
+    before = now;
+  }
+  // Then only the modes are left.
+  VectorXd residual = before;
+  const Modes& modes = *loop.body.modes();
+  Eigen::MatrixXd Phi(residual.size(), modes.count());
+  for (Eigen::Index dof = 0; dof < residual.size(); ++dof)
+    Phi.row(dof) = Eigen::Map<const Eigen::RowVectorXd>(modes.row(dof), modes.count());
+  residual -= Phi * Phi.colPivHouseholderQr().solve(residual);
+  EXPECT_LT(residual.norm(), 1e-6 * held.norm());
+}
+
+class TouchAgain : public testing::TestWithParam<bool> {};
+
+// A ball that waits beside a swinging body is struck by it: pushed away, without a jump, and never inside.
+TEST_P(TouchAgain, IsContactWithAMovingSurface) {
+  DynamicsOptions options = GetParam() ? test::packed() : test::all_modes();
+  options.damping = {};
+  Loop loop(test::swinging_model(ElementType::tet4, options),
+            {.radius = 0.1, .coupling_stiffness = 5.0, .reach = 0.5});
+  const Vec3 above(0.5, 0.5, 1.11);
+  loop.step(pose(above));
+  for (int k = 0; k <= 300; ++k) loop.step(pose(above - Vec3(0.0, 0.0, 0.09 * k / 300.0), true));
+  // Let go of, it comes up; the ball waits a little over the resting surface.
+  const Vec3 wait(0.5, 0.5, 1.105);
+  double largest = 0.0, largest_jump = 0.0, last = 0.0;
+  int touched = 0, free = 0;
+  for (int k = 0; k < 1500; ++k) {
+    loop.step(pose(wait));
+    const ToolState& tool = loop.state.tools.front();
+    ASSERT_FALSE(has(loop.state.status, StepStatus::inside_body)) << k;
+    const double force = tool.wrench.force.z();
+    ASSERT_GT(force, -1e-9) << k;
+    if (k > 100) {
+      largest_jump = std::max(largest_jump, std::abs(force - last));
+      touched += tool.contacts > 0 ? 1 : 0;
+      free += tool.contacts == 0 ? 1 : 0;
+    }
+    last = force;
+    largest = std::max(largest, force);
+  }
+  EXPECT_GT(touched, 100);
+  EXPECT_GT(free, 100);
+  EXPECT_GT(largest, 1e-4);
+  EXPECT_LT(largest_jump, 0.1 * largest);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, TouchAgain, testing::Bool(),
+                         [](const auto& tested) { return std::string(tested.param ? "Packed" : "Modal"); });
+
+// In the background, in its own time: what comes is the same motion.
+TEST(Background, SwingsTheSameBody) {
+  const Tool tool = test::plain({.reach = 0.5});
+  const Vec3 above(0.5, 0.5, 1.01), far(0.5, 0.5, 3.0);
+  const auto run = [&](bool in_background) {
+    const Body body(test::swinging_model(ElementType::tet4, test::packed()));
+    State state(body, {.tools = {tool}});
+    MotionSource source(body, state, {.in_background = in_background, .jobs = 2});
+    std::vector<VectorXd> motion;
+    for (int k = 0; k < 400; ++k) {
+      source.receive(state);
+      step(body, state, k < 201 ? pose(above + Vec3(0.0, 0.0, 0.05 * k / 200.0), k > 0) : pose(far));
+      source.post(state);
+      motion.push_back(test::displacement(body, state));
+      if (!in_background || !state.motion.active()) continue;
+      const std::int64_t posted = state.motion.job().step;  // wait as a loop in real time would
+      while (source.steps() < posted) std::this_thread::yield();
+    }
+    return motion;
+  };
+  const std::vector<VectorXd> waited = run(true), alone = run(false);
+  for (std::size_t k = 0; k < alone.size(); ++k) ASSERT_EQ(waited[k], alone[k]) << k;
+}
+
+// A worker that is late is told of, and the body's time stands still meanwhile.
+TEST(Background, IsToldWhenItIsLate) {
+  const Body body(test::swinging_model(ElementType::tet4, test::packed()));
+  State state(body, {.tools = {test::plain({.reach = 0.5})}});
+  const Vec3 above(0.5, 0.5, 1.01);
+  for (int k = 0; k < 200; ++k) step(body, state, pose(above + Vec3(0.0, 0.0, 0.05 * k / 200.0), k > 0));
+  const VectorXd held = test::displacement(body, state);
+  for (int k = 0; k < 5; ++k) step(body, state, pose(Vec3(0.5, 0.5, 3.0)));
+  EXPECT_TRUE(has(state.status, StepStatus::late_motion));
+  EXPECT_LT((test::displacement(body, state) - held).norm(), 1e-12 * held.norm());
+}
+
+TEST(TimeStep, IsAWholeNumberOfTicks) {
+  DynamicsOptions options = test::packed();
+  options.newmark.time_step = 0.0025;
+  const Body body(test::swinging_model(ElementType::tet4, options));
+  EXPECT_THROW(State(body, {.tick = 0.001}), Error);
+  EXPECT_NO_THROW(State(body, {.tick = 0.0005}));
+  EXPECT_NO_THROW(State(body, {.tick = 0.0025}));
+  EXPECT_THROW(State(body, {.tick = 0.005}), Error);
+  EXPECT_THROW(State(body, {.tick = 0.0}), Error);
+  const Body dynamic(test::swinging_model(ElementType::tet4, options), {}, 1, ContactModel::dynamic);
+  EXPECT_THROW(State(dynamic, {.tick = 0.0005}), Error);
+  EXPECT_NO_THROW(State(dynamic, {.tick = 0.0025}));
+}
+
+TEST(WithoutDynamics, NothingSwings) {
+  const Body body(test::unit_model(ElementType::tet4, 3, Scope::full, Precision::double_precision));
+  State state(body, {.tools = {test::plain({.reach = 0.5})}});
+  const Vec3 above(0.5, 0.5, 1.01);
+  for (int k = 0; k < 100; ++k) step(body, state, pose(above + Vec3(0.0, 0.0, 0.05 * k / 100.0), k > 0));
+  step(body, state, pose(Vec3(0.5, 0.5, 3.0)));
+  EXPECT_FALSE(state.motion.active());
+  EXPECT_EQ(test::displacement(body, state).norm(), 0.0);
+}
+
+}  // namespace
+}  // namespace palpate
