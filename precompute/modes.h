@@ -18,7 +18,7 @@ struct Modes {
 };
 
 /// More dofs than these take too long to be solved densely.
-inline constexpr std::int64_t most_dense_dofs = 5000;
+inline constexpr std::int64_t most_dense_dofs = 2000;
 
 /// Whether `count` modes of `dofs` are so many that all are computed.
 bool dense_modes(std::int64_t count, std::int64_t dofs) noexcept;
