@@ -218,8 +218,9 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
                              description.precision);
     const std::string method =
         dynamics.method == DynamicsMethod::packed ? "packed" : fmt::format("modal, {} modes", dynamics.modes);
-    progress.line(fmt::format("dynamics: {}, {:.1f} MB ({})", method,
-                              static_cast<double>(dynamics.file_bytes) * 1e-6, dynamics.reason));
+    progress.line(fmt::format("dynamics: {}, {:.1f} MB, {:.2f} GB of memory ({})", method,
+                              static_cast<double>(dynamics.file_bytes) * 1e-6,
+                              static_cast<double>(dynamics.memory_bytes) * 1e-9, dynamics.reason));
     plan.dynamics_bytes = dynamics.memory_bytes;
   }
   check_memory(plan);
