@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -14,6 +15,7 @@
 #include "meshes/error.h"
 #include "meshes/quality.h"
 #include "precompute/body.h"
+#include "precompute/dynamics.h"
 #include "precompute/factor.h"
 #include "precompute/greens.h"
 #include "precompute/interrupt.h"
@@ -108,9 +110,11 @@ std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int6
   return probes;
 }
 
-/// Computes all blocks of columns that the file does not have yet, `jobs` at a time. False when interrupted.
+/// Computes all blocks of columns of a packed matrix that the file does not have yet, `jobs` at a time. False
+/// when interrupted.
 bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, ModelWriter& writer,
-                   Progress& progress, const InterruptGuard& interrupt) {
+                   PackedMatrix matrix, Progress& progress, const InterruptGuard& interrupt) {
+  const std::string name = matrix == PackedMatrix::greens ? "Green's functions" : "inverse of K_bar";
   const std::int64_t blocks = (plan.stored_dofs + plan.block_columns - 1) / plan.block_columns;
   std::atomic<std::int64_t> next{0};
   std::atomic<bool> failed{false};
@@ -126,16 +130,16 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
       for (std::int64_t block = next++; block < blocks && !failed && !interrupt.requested(); block = next++) {
         const std::int64_t first = block * plan.block_columns;
         const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
-        const bool have = writer.has_columns(first, count);
+        const bool have = writer.has_columns(first, count, matrix);
         if (!have) {
           solver.columns(first, count, workspace, packed);
-          writer.write_columns(first, count, packed);
+          writer.write_columns(first, count, packed, matrix);
         }
         const double flops = solver.flops(first, count);
         const std::scoped_lock lock(mutex);
         reused += have ? count : 0;
         done_flops += flops;
-        progress.step("Green's functions", done_flops / plan.flops);
+        progress.step(name, done_flops / plan.flops);
       }
     } catch (...) {
       const std::scoped_lock lock(mutex);
@@ -150,9 +154,26 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
   if (failure) std::rethrow_exception(failure);
   if (interrupt.requested()) return false;
   if (reused > 0)
-    progress.line(
-        fmt::format("{} of {} columns were kept from an earlier, unfinished run", reused, plan.stored_dofs));
+    progress.line(fmt::format("{}: {} of {} columns were kept from an earlier, unfinished run", name, reused,
+                              plan.stored_dofs));
   return true;
+}
+
+/// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
+bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const DynamicsOptions& options,
+                   const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
+                   const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
+                   const InterruptGuard& interrupt) {
+  const SparseMatrix K_bar = effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped),
+                                                 options.damping, options.newmark);
+  Factor factor(K_bar, stiffness.node_start);
+  const GreensSolver solver(factor, stored, stiffness.free_dofs, body.mesh.dimension());
+  if (solver.stored_dofs() != stored_dofs) {
+    throw std::logic_error("K_bar and K, of one pattern, have different elimination orders");
+  }
+  factor.factorize();
+  progress.line("K_bar factorised");
+  return solve_columns(solver, plan, jobs, writer, PackedMatrix::inverse, progress, interrupt);
 }
 
 }  // namespace
@@ -171,16 +192,16 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   const Stiffness stiffness = assemble_stiffness(elastic);
   openblas_set_num_threads(
       1);  // the blocks of columns are the parallel work, and the bytes do not depend on the jobs
-  Factor factor(stiffness.K, stiffness.node_start);
-  const GreensSolver solver(
-      factor, stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers),
-      stiffness.free_dofs, model.dimension());
+  auto factor = std::make_unique<Factor>(stiffness.K, stiffness.node_start);
+  const std::vector<std::uint8_t> stored =
+      stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers);
+  const GreensSolver solver(*factor, stored, stiffness.free_dofs, model.dimension());
   if (std::none_of(surface.nodes.begin(), surface.nodes.end(),
                    [&](Index node) { return model.fixed[static_cast<std::size_t>(node)] == 0; })) {
     throw Error("no node of the boundary is free along every axis, so nothing can be touched",
                 description.file.string(), "Hold a smaller part of the body in [[fixed]].");
   }
-  Plan plan = make_plan(model.mesh, factor, solver, description.precision, options.jobs);
+  Plan plan = make_plan(model.mesh, *factor, solver, description.precision, options.jobs);
   print_plan(plan, model, description, options, progress);
   OverlayPlan overlays;
   if (description.overlay) {
@@ -191,14 +212,25 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
                               model.dimension(), static_cast<double>(overlays.file_bytes) * 1e-6));
     plan.overlay_bytes = overlays.memory_bytes;
   }
+  DynamicsPlan dynamics;
+  if (description.dynamics) {
+    dynamics = plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
+                             description.precision);
+    const std::string method =
+        dynamics.method == DynamicsMethod::packed ? "packed" : fmt::format("modal, {} modes", dynamics.modes);
+    progress.line(fmt::format("dynamics: {}, {:.1f} MB, {:.2f} GB of memory ({})", method,
+                              static_cast<double>(dynamics.file_bytes) * 1e-6,
+                              static_cast<double>(dynamics.memory_bytes) * 1e-9, dynamics.reason));
+    plan.dynamics_bytes = dynamics.memory_bytes;
+  }
   check_memory(plan);
   if (options.dry_run) return BakeResult::planned;
 
-  factor.factorize();
+  factor->factorize();
   progress.line("K factorised");
   model.stored_nodes = stored_nodes(solver, stiffness, model.dimension());
   model.rest_force = loads;
-  model.rest_displacement = rest_displacement(factor, stiffness, loads, prescribed, model.dimension());
+  model.rest_displacement = rest_displacement(*factor, stiffness, loads, prescribed, model.dimension());
   const InterruptGuard interrupt;
   if (description.overlay) {
     model.overlay =
@@ -211,14 +243,30 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
       return BakeResult::interrupted;
     }
   }
+  const std::vector<std::int64_t> stored_dofs = solver.stored_dofs();
+  if (description.dynamics) {
+    model.dynamics = describe_dynamics(*description.dynamics, dynamics, stiffness.K,
+                                       assemble_mass(elastic, stiffness, description.dynamics->lumped),
+                                       *factor, stored_dofs);
+    if (dynamics.method == DynamicsMethod::modal) progress.line("modes found");
+  }
   ModelWriter writer(options.output, model, description.precision);
   model.overlay = {};  // written by now
-  if (!solve_columns(solver, plan, options.jobs, writer, progress, interrupt)) {
+  model.dynamics = {};
+  bool whole = solve_columns(solver, plan, options.jobs, writer, PackedMatrix::greens, progress, interrupt);
+  std::vector<Probe> probes;
+  if (whole) probes = make_probes(*factor, stored_dofs);
+  if (whole && dynamics.method == DynamicsMethod::packed) {
+    factor.reset();  // its memory is for that of K_bar
+    whole = solve_inverse(elastic, stiffness, *description.dynamics, stored, stored_dofs, plan, options.jobs,
+                          writer, progress, interrupt);
+  }
+  if (!whole) {
     writer.discard();
     progress.line("interrupted: nothing was written");
     return BakeResult::interrupted;
   }
-  writer.finish(make_probes(factor, solver.stored_dofs()));
+  writer.finish(probes);
   progress.line(fmt::format("{} written", options.output.string()));
   return BakeResult::done;
 }

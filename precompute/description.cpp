@@ -112,9 +112,9 @@ Description read_description(const std::filesystem::path& path) {
   result.text = read_text(path);
   const toml::table table = parse(result.text, file);
   const toml::table empty;
-  const Section root(
-      table, "", file,
-      {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load", "storage", "overlay"});
+  const Section root(table, "", file,
+                     {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load",
+                      "storage", "overlay", "dynamics"});
   const auto optional_section = [&](std::string_view key, const Keys& keys) {
     return root.has(key) ? root.section(key, keys)
                          : Section(empty, std::string("[").append(key).append("]"), file, keys);
@@ -144,6 +144,9 @@ Description read_description(const std::filesystem::path& path) {
   if (root.has("overlay")) {
     result.overlay =
         read_overlay(root.section("overlay", overlay_keys), dimension, result.scope, result.layers);
+  }
+  if (root.has("dynamics")) {
+    result.dynamics = read_dynamics(root.section("dynamics", dynamics_keys), result.scope);
   }
   return result;
 }

@@ -118,6 +118,7 @@ struct DynamicsOptions {
   Newmark newmark;
   Rayleigh damping;
   std::optional<Index> modes;  ///< modal: how many; empty: 100, or all where there are fewer
+  std::string place;           ///< of `modes`, else of the table: file, line and column, for errors
 };
 
 /// The whole model.toml, checked.

@@ -33,6 +33,9 @@ std::vector<Fixing> read_fixed(const Section& root, int dimension);
 extern const Keys overlay_keys;
 /// [overlay], for what [storage] keeps.
 OverlayRegions read_overlay(const Section& overlay, int dimension, Scope scope, Index layers);
+extern const Keys dynamics_keys;
+/// [dynamics], for what [storage] keeps.
+DynamicsOptions read_dynamics(const Section& dynamics, Scope scope);
 /// Every [[load]], possibly none.
 std::vector<Load> read_loads(const Section& root, int dimension);
 

@@ -14,10 +14,6 @@ namespace {
 constexpr double bytes_per_second = 10e9;  // at which a step reads K_bar^-1
 constexpr Index usual_modes = 100;
 
-double packed_bytes(std::int64_t stored_dofs, Precision precision) {
-  return static_cast<double>(packed_size(stored_dofs) * bytes_per_scalar(precision));
-}
-
 /// K_bar^-1 of the stored dofs, column by column.
 template <class T>
 std::shared_ptr<const void> packed_inverse(const Factor& K_bar, std::span<const std::int64_t> stored_dofs) {
@@ -46,35 +42,43 @@ std::vector<double> at_stored_dofs(const Eigen::MatrixXd& shapes, std::span<cons
 }  // namespace
 
 DynamicsPlan plan_dynamics(const DynamicsOptions& options, Scope scope, std::int64_t stored_dofs,
-                           const SparseMatrix& K, Precision precision, const std::string& where) {
+                           const SparseMatrix& K, Precision precision) {
   constexpr auto scalar = static_cast<std::int64_t>(sizeof(double));
   const bool full = scope == Scope::full;
-  const double bytes = packed_bytes(stored_dofs, precision), steps = bytes_per_second / bytes;
+  const std::int64_t packed_bytes = packed_size(stored_dofs) * bytes_per_scalar(precision);
+  const auto bytes = static_cast<double>(packed_bytes);
   const bool fits = bytes <= bytes_per_second * options.newmark.time_step;
   const std::string numbers = fmt::format(
-      "packed, K_bar^-1 has {:.1f} MB: {:.0f} steps a second at {:.0f} GB/s, {:.0f} are asked for",
-      bytes * 1e-6, steps, bytes_per_second * 1e-9, 1.0 / options.newmark.time_step);
+      "a step reads the packed inverse of K_bar, {:.1f} MB: {:.0f} steps a second at {:.0f} GB/s, {:.0f} are "
+      "asked for",
+      bytes * 1e-6, bytes_per_second / bytes, bytes_per_second * 1e-9, 1.0 / options.newmark.time_step);
+  const std::int64_t matrices = 2 * K.nonZeros() * 2 * scalar;  // M and K_bar with their row numbers
   DynamicsPlan plan;
   plan.method = options.method.value_or(full && fits ? DynamicsMethod::packed : DynamicsMethod::modal);
-  const std::int64_t matrices = 2 * K.nonZeros() * 2 * scalar;  // M and K_bar with their row numbers
   if (plan.method == DynamicsMethod::packed) {
     if (!full)
-      throw Error("[dynamics] method \"packed\" needs every free dof, but the scope is not full", where,
-                  "set scope = \"full\" in [storage], or method = \"modal\"");
-    plan.reason = options.method ? "as told; " + numbers : numbers;
-    plan.file_bytes = packed_size(stored_dofs) * bytes_per_scalar(precision);
-    plan.memory_bytes =
-        matrices + 3 * K.nonZeros() * 3 * scalar;  // M and C_d, sorted and as they are written
+      throw Error("[dynamics] method \"packed\" needs every free dof, but the scope is not full",
+                  options.place, "set scope = \"full\" in [storage], or method = \"modal\"");
+    plan.reason = numbers;
+    plan.file_bytes = packed_bytes;
+    plan.memory_bytes = matrices + 3 * K.nonZeros() * 3 * scalar;  // M and C_d: sorted, kept, being written
     return plan;
   }
-  const auto free = static_cast<Index>(std::min<std::int64_t>(K.rows(), std::numeric_limits<Index>::max()));
-  plan.modes = options.modes.value_or(std::min(usual_modes, free));
+  const std::int64_t free = K.rows();
+  plan.modes = options.modes.value_or(static_cast<Index>(std::min<std::int64_t>(usual_modes, free)));
   if (plan.modes > free)
     throw Error(fmt::format("[dynamics] modes is {}, but the body has only {} free dofs", plan.modes, free),
-                where, fmt::format("use at most {}", free));
-  plan.reason = options.method ? "as told" : full ? numbers : "not every free dof is stored (scope)";
+                options.place, fmt::format("use at most {}", free));
+  if (dense_modes(plan.modes, free) && free > most_dense_dofs)
+    throw Error(fmt::format("[dynamics] modes is {}, more than a third of {} free dofs: that takes a dense "
+                            "matrix of all of them",
+                            plan.modes, free),
+                options.place,
+                fmt::format("use at most {}, or mesh the body with at most {} free dofs", free / 3 - 1,
+                            most_dense_dofs));
+  plan.reason = options.method ? "as told" : full ? numbers : "the scope is not full";
   plan.file_bytes = plan.modes * stored_dofs * scalar;
-  plan.memory_bytes = matrices + modes_bytes(plan.modes, K.rows()) + 2 * plan.file_bytes;
+  plan.memory_bytes = matrices + modes_bytes(plan.modes, free) + 2 * plan.file_bytes;
   return plan;
 }
 
@@ -144,8 +148,7 @@ StoredDynamics make_dynamics(const Model& model, const DynamicsOptions& options,
   const Stiffness stiffness = assemble_stiffness(body);
   const SparseMatrix M = assemble_mass(body, stiffness, options.lumped);
   const std::vector<std::int64_t> stored_dofs = stored_dofs_of(model, stiffness);
-  const DynamicsPlan plan =
-      plan_dynamics(options, model.scope, model.stored_dofs(), stiffness.K, precision, model.name);
+  const DynamicsPlan plan = plan_dynamics(options, model.scope, model.stored_dofs(), stiffness.K, precision);
   Factor factor(stiffness.K, stiffness.node_start);
   factor.factorize();
   StoredDynamics result = describe_dynamics(options, plan, stiffness.K, M, factor, stored_dofs);

@@ -21,10 +21,10 @@ struct DynamicsPlan {
 };
 
 /// Decides for the method where it is left open: packed where the scope is full and K_bar^-1 can be read once
-/// in a time step at 10 GB/s. Throws Error (where = `where`) for packed without the full scope and for more
-/// modes than free dofs.
+/// in a time step at 10 GB/s. Throws Error for packed without the full scope and for more modes than free
+/// dofs.
 DynamicsPlan plan_dynamics(const DynamicsOptions& options, Scope scope, std::int64_t stored_dofs,
-                           const SparseMatrix& K, Precision precision, const std::string& where);
+                           const SparseMatrix& K, Precision precision);
 
 /// M and C_d = a M + b K of the stored dofs. `stored_dofs`: dof of K of each, -1 where it is held (its row
 /// and column are empty). K and M are lower triangles in one pattern.

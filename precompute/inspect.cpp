@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <numbers>
 
 namespace palpate {
 namespace {
@@ -75,6 +76,39 @@ std::string overlay_text(const Model& model) {
                      8e-6 * static_cast<double>(entries));
 }
 
+/// Of damping a M + b K.
+std::string damping_text(const Rayleigh& damping) {
+  if (damping.mass == 0.0 && damping.stiffness == 0.0) return "no damping";
+  return fmt::format("damping {:.4g}/s M + {:.4g} s K", damping.mass, damping.stiffness);
+}
+
+/// Nothing where the body does not swing.
+std::string dynamics_text(const Model& model) {
+  const StoredDynamics& dynamics = model.dynamics;
+  if (dynamics.method == DynamicsMethod::none) return "";
+  std::string text;
+  if (dynamics.method == DynamicsMethod::packed) {
+    text = fmt::format("  dynamics          packed: inverse of K_bar, {:.1f} MB; M and C_d of {} entries\n",
+                       static_cast<double>(packed_size(dynamics.inverse.order()) *
+                                           bytes_per_scalar(dynamics.inverse.precision())) *
+                           1e-6,
+                       dynamics.matrices.row.size());
+  } else {
+    const auto modes = static_cast<std::size_t>(dynamics.modes());
+    std::vector<double> hertz;
+    for (std::size_t i = 0; i < modes; ++i) hertz.push_back(dynamics.omega[i] / (2.0 * std::numbers::pi));
+    const std::vector<double> first(hertz.begin(),
+                                    hertz.begin() + std::min<std::ptrdiff_t>(5, dynamics.modes()));
+    text = fmt::format("  dynamics          modal: {} modes of {:.4g}{} to {:.4g} Hz, {:.1f} MB\n", modes,
+                       fmt::join(first, ", "), modes > first.size() ? ", ..." : "", hertz.back(),
+                       8e-6 * static_cast<double>(dynamics.shapes.size()));
+  }
+  const Newmark& newmark = dynamics.newmark;
+  return text + fmt::format("    Newmark         time step {:g} s, alpha = {:g}, delta = {:g}; {} mass, {}\n",
+                            newmark.time_step, newmark.alpha, newmark.delta,
+                            dynamics.lumped ? "lumped" : "consistent", damping_text(dynamics.damping));
+}
+
 /// The largest displacement at rest and the force that the loads put on the body in all.
 std::string rest_text(const Model& model) {
   Vec3 total = Vec3::Zero();
@@ -113,6 +147,7 @@ std::string inspect(const Model& model) {
       static_cast<double>(packed_size(model.stored_dofs()) * bytes_per_scalar(model.greens.precision())) *
           1e-6);
   text += overlay_text(model);
+  text += dynamics_text(model);
   text += fmt::format("  probes            {}\n", model.probes.size());
   text += fmt::format("  edges             {:.4g} to {:.4g} m\n", q.min_edge, q.max_edge);
   text += fmt::format("  {:17} {:.2f} to {:.2f} deg\n", plane ? "corner angles" : "dihedral angles",

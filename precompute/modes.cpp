@@ -71,12 +71,6 @@ void normalize(Eigen::MatrixXd& shapes, const SparseMatrix& M) {
 }
 
 Modes all_modes(const SparseMatrix& K, const SparseMatrix& M, std::int64_t count) {
-  if (K.rows() > most_dense_dofs)
-    throw Error(fmt::format("{} of {} modes are more than a third: that takes a dense matrix of all of them",
-                            count, K.rows()),
-                "[dynamics] modes",
-                fmt::format("Keep at most {} modes, or mesh the body with fewer than {} dofs.",
-                            K.rows() / 3 - 1, most_dense_dofs));
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(K),
                                                                          Eigen::MatrixXd(M)};
   if (solver.info() != Eigen::Success)

@@ -13,12 +13,12 @@ namespace palpate {
 struct Modes {
   std::vector<double> omega;  ///< [k + 1] angular frequencies [rad/s], ascending; the last is that of the
                               ///< first mode that is not among the shapes, infinity when there is none
-  Eigen::MatrixXd shapes;  ///< [n, k] of the dofs of K, phi^T M phi = 1 [1/sqrt(kg)]; the entry of largest
-                           ///< magnitude is positive
+  Eigen::MatrixXd shapes;     ///< [n, k] of the dofs of K, phi^T M phi = 1 [1/sqrt(kg)]; the entry of largest
+                              ///< magnitude is positive
 };
 
-/// More dofs than these are not solved densely, which is what more than a third of all modes takes.
-inline constexpr std::int64_t most_dense_dofs = 5000;
+/// More dofs than these take too long to be solved densely.
+inline constexpr std::int64_t most_dense_dofs = 2000;
 
 /// Whether `count` modes of `dofs` are so many that all are computed.
 bool dense_modes(std::int64_t count, std::int64_t dofs) noexcept;

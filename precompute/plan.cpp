@@ -63,21 +63,26 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
 
 void check_memory(const Plan& plan) {
   const std::int64_t available = available_memory();
-  const std::int64_t needed = plan.memory_bytes + plan.overlay_bytes;
+  const std::int64_t needed = plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes;
   if (available == 0 || needed <= available) return;  // 0: the kernel does not say
   const std::string overlays =
       plan.overlay_bytes == 0
           ? ""
           : fmt::format(", {:.2f} GB for overlays", static_cast<double>(plan.overlay_bytes) / 1e9);
+  const std::string dynamics =
+      plan.dynamics_bytes == 0
+          ? ""
+          : fmt::format(", {:.2f} GB for dynamics", static_cast<double>(plan.dynamics_bytes) / 1e9);
   throw Error(
       fmt::format("{:.2f} GB of memory are needed, {:.2f} GB are free: {:.2f} GB for the factor ({} entries)"
-                  "{} and the rest for blocks of {} columns",
+                  "{}{} and the rest for blocks of {} columns",
                   static_cast<double>(needed) / 1e9, static_cast<double>(available) / 1e9,
-                  static_cast<double>(plan.factor_entries) * 8e-9, plan.factor_entries, overlays,
+                  static_cast<double>(plan.factor_entries) * 8e-9, plan.factor_entries, overlays, dynamics,
                   plan.block_columns),
       "memory",
       std::string("Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading") +
-          (overlays.empty() ? "." : ", or smaller regions in [overlay]."));
+          (overlays.empty() ? "" : ", or smaller regions in [overlay]") +
+          (dynamics.empty() ? "." : ", or fewer modes in [dynamics]."));
 }
 
 }  // namespace palpate

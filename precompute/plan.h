@@ -18,6 +18,7 @@ struct Plan {
   std::int64_t file_bytes = 0;      ///< of the packed matrix, the bulk of the file
   std::int64_t memory_bytes = 0;    ///< largest demand: factor and workspaces of all jobs
   std::int64_t overlay_bytes = 0;   ///< of memory, for overlays until they are written
+  std::int64_t dynamics_bytes = 0;  ///< of memory, for mass, damping, K_bar and modes
   std::int64_t block_columns = 0;   ///< right-hand sides solved at a time; the same for any number of jobs
   double flops = 0.0;               ///< of the column solves
   double seconds = 0.0;             ///< estimate of the column solves with all jobs, from a measured rate

@@ -273,8 +273,12 @@ std::vector<Section> Section::sections(std::string_view key, const Keys& known,
 }
 
 void Section::fail(std::string_view key, const std::string& what, const std::string& hint) const {
+  throw Error(what, place_of(key), hint);
+}
+
+std::string Section::place_of(std::string_view key) const {
   const toml::node* node = table_.get(key);
-  throw Error(what, place(node != nullptr ? *node : table_), hint);
+  return place(node != nullptr ? *node : table_);
 }
 
 std::string Section::name_of(std::string_view key) const {

@@ -72,6 +72,8 @@ class Section {
 
   /// Throws Error that points at the value of `key`; at the table itself where it is empty or absent.
   [[noreturn]] void fail(std::string_view key, const std::string& what, const std::string& hint) const;
+  /// File, line and column of the value of `key`; of the table itself where it is empty or absent.
+  [[nodiscard]] std::string place_of(std::string_view key) const;
   /// "[mesh] grading".
   [[nodiscard]] std::string name_of(std::string_view key) const;
 

@@ -9,6 +9,7 @@
 #include "formats/model_file.h"
 #include "precompute/assembly.h"
 #include "precompute/factor.h"
+#include "precompute/verify_dynamics.h"
 
 namespace palpate {
 namespace {
@@ -200,6 +201,10 @@ VerifyReport verify(const Model& model, const std::filesystem::path& file, int s
   const std::vector<Check> columns = check_columns(model, stiffness, factor, bounds, samples);
   report.checks.insert(report.checks.end(), columns.begin(), columns.end());
   report.checks.push_back(check_rest_state(model, stiffness));
+  if (model.dynamics.method != DynamicsMethod::none) {
+    const std::vector<Check> dynamics = verify_dynamics(model, stiffness, bounds.column, samples);
+    report.checks.insert(report.checks.end(), dynamics.begin(), dynamics.end());
+  }
   report.stale = stale_sources(model, file);
   return report;
 }

@@ -33,7 +33,8 @@ struct VerifyReport {
 /// - residual: for the same columns, K u - e with the nodes that are not stored condensed (theory.md section
 /// 2), as normwise backward error
 ///   |K u - e|_max / (|K|_inf |u|_max + 1);
-/// - rest state: K u0 = f on the free dofs, held ones as prescribed: |K u0 - f|_max / |f|_max.
+/// - rest state: K u0 = f on the free dofs, held ones as prescribed: |K u0 - f|_max / |f|_max;
+/// - of dynamics: see verify_dynamics.
 VerifyReport verify(const Model& model, const std::filesystem::path& file, int samples = 12);
 
 /// The report as lines of text.

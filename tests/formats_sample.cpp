@@ -3,9 +3,11 @@
 #include <stdlib.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <limits>
 
 #include "meshes/error.h"
 #include "meshes/generate.h"
@@ -67,6 +69,15 @@ CondensedPatch sample_patch(int dimension, Index nodes, Index surface_nodes) {
   });
   patch.compliance = 1e-3 * Eigen::MatrixXd::NullaryExpr(m, m, symmetric);
   return patch;
+}
+
+bool same_dynamics(const StoredDynamics& a, const StoredDynamics& b) {
+  return a.method == b.method && a.lumped == b.lumped && a.newmark.alpha == b.newmark.alpha &&
+         a.newmark.delta == b.newmark.delta && a.newmark.time_step == b.newmark.time_step &&
+         a.damping.mass == b.damping.mass && a.damping.stiffness == b.damping.stiffness &&
+         a.matrices.start == b.matrices.start && a.matrices.row == b.matrices.row &&
+         a.matrices.mass == b.matrices.mass && a.matrices.damping == b.matrices.damping &&
+         a.omega == b.omega && a.shapes == b.shapes && same_greens(a.inverse, b.inverse);
 }
 
 Mesh sample_mesh(ElementType element, int cells) {
@@ -166,6 +177,55 @@ Model write_sample(const std::filesystem::path& path, Precision precision, Eleme
   return model;
 }
 
+Model swinging_sample(DynamicsMethod method, ElementType element, Index modes) {
+  Model model = sample_model(element);
+  const auto all_axes = static_cast<std::uint8_t>((1 << model.dimension()) - 1);
+  for (std::uint8_t& fixed : model.fixed) fixed = fixed == 0 ? std::uint8_t{0} : all_axes;
+  const std::int64_t n = model.stored_dofs();
+  StoredDynamics& dynamics = model.dynamics;
+  dynamics.method = method;
+  dynamics.newmark = {.alpha = 0.3025, .delta = 0.6, .time_step = 0.002};
+  dynamics.damping = {.mass = 0.5, .stiffness = 1e-4};
+  if (method == DynamicsMethod::modal) {
+    for (Index i = 0; i < modes; ++i) {
+      dynamics.omega.push_back(10.0 + i / 2);  // NOLINT(bugprone-integer-division): pairs of equal ones
+      for (std::int64_t dof = 0; dof < n; ++dof)
+        dynamics.shapes.push_back(std::cos(0.1 * static_cast<double>((i + 1) * dof)));
+    }
+    dynamics.omega.push_back(modes == n ? std::numeric_limits<double>::infinity() : 1e3);
+    return model;
+  }
+  MassAndDamping& matrices = dynamics.matrices;
+  matrices.start = {0};
+  for (std::int64_t j = 0; j < n; ++j) {
+    for (std::int64_t i = j; i < std::min(j + 2, n); ++i) {
+      matrices.row.push_back(static_cast<Index>(i));
+      matrices.mass.push_back(i == j ? 0.1 + 1e-3 * static_cast<double>(j) : 0.01);
+      matrices.damping.push_back(i == j ? 0.5 + 1e-3 * static_cast<double>(j) : -0.02);
+    }
+    matrices.start.push_back(std::ssize(matrices.row));
+  }
+  return model;
+}
+
+std::vector<double> sample_inverse_columns(std::int64_t first, std::int64_t count, std::int64_t order) {
+  std::vector<double> packed = sample_columns(first, count, order);
+  for (double& entry : packed) entry *= 0.125;
+  return packed;
+}
+
+Model write_swinging_sample(const std::filesystem::path& path, DynamicsMethod method, Precision precision,
+                            ElementType element) {
+  Model model = swinging_sample(method, element);
+  const std::int64_t n = model.stored_dofs();
+  ModelWriter writer(path, model, precision);
+  writer.write_columns(0, n, sample_columns(0, n, n));
+  if (method == DynamicsMethod::packed)
+    writer.write_columns(0, n, sample_inverse_columns(0, n, n), PackedMatrix::inverse);
+  writer.finish(model.probes);
+  return model;
+}
+
 Folder::Folder() {
   std::string name = (std::filesystem::temp_directory_path() / "palpate_test_XXXXXX").string();
   if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no folder for tests");
@@ -223,6 +283,7 @@ std::string difference(const Model& a, const Model& b) {
       }))
     return "probes";
   if (!same_overlay(a.overlay, b.overlay)) return "overlay";
+  if (!same_dynamics(a.dynamics, b.dynamics)) return "dynamics";
   if (!same_greens(a.greens, b.greens)) return "greens";
   return {};
 }

@@ -26,6 +26,18 @@ std::vector<double> sample_columns(std::int64_t first, std::int64_t count, std::
 Model write_sample(const std::filesystem::path& path, Precision precision = Precision::double_precision,
                    ElementType element = ElementType::tet4, int cells = 2);
 
+/// The sample with its lowest nodes held whole and with made-up dynamics: M and C_d of two diagonals, or
+/// `modes` modes.
+Model swinging_sample(DynamicsMethod method, ElementType element = ElementType::tet4, Index modes = 5);
+
+/// Columns of its inverse of K_bar.
+std::vector<double> sample_inverse_columns(std::int64_t first, std::int64_t count, std::int64_t order);
+
+/// Writes the whole of it and returns what was written.
+Model write_swinging_sample(const std::filesystem::path& path, DynamicsMethod method,
+                            Precision precision = Precision::double_precision,
+                            ElementType element = ElementType::tet4);
+
 /// An empty folder that goes when the test ends.
 class Folder {
  public:

@@ -1,5 +1,6 @@
 // Writes files for the tests in Python: formats_sample_file FOLDER makes FOLDER/ELEMENT.palpate.hdf of every
-// kind of element, FOLDER/single.palpate.hdf (tet4 in single precision) and FOLDER/recording.h5.
+// kind of element, FOLDER/single.palpate.hdf (tet4 in single precision), FOLDER/packed.palpate.hdf and
+// FOLDER/modal.palpate.hdf (with dynamics) and FOLDER/recording.h5.
 #include <array>
 #include <iostream>
 
@@ -16,6 +17,9 @@ int main(int count, char** arguments) {
     for (const palpate::ElementType element : palpate::body_elements)
       palpate::test::write_sample(folder / (std::string(palpate::traits(element).name) + ".palpate.hdf"),
                                   palpate::Precision::double_precision, element);
+    palpate::test::write_swinging_sample(folder / "packed.palpate.hdf", palpate::DynamicsMethod::packed,
+                                         palpate::Precision::single_precision);
+    palpate::test::write_swinging_sample(folder / "modal.palpate.hdf", palpate::DynamicsMethod::modal);
     palpate::RecordingWriter recording(folder / "recording.h5", "tet4.palpate.hdf", "00ff");
     for (int i = 0; i < 5000; ++i) {
       const double x = i;

@@ -52,6 +52,7 @@ TEST(Description, ReadsDefaults) {
   EXPECT_EQ(d.layers, 1);
   EXPECT_EQ(d.precision, Precision::single_precision);
   EXPECT_FALSE(d.overlay);
+  EXPECT_FALSE(d.dynamics);
 }
 
 TEST(Description, ReadsEveryKey) {
@@ -215,6 +216,54 @@ lowest = {axis = "z", percent = 25}
   EXPECT_EQ(std::get<SelectLowest>(d.overlay->regions[1]).fraction, 0.25);
 }
 
+TEST(Description, ReadsDynamics) {
+  const TempFolder folder;
+  const std::string head = "name = \"a\"\n" + box + material + fixed + "[storage]\nscope = \"full\"\n";
+  const Description usual = read(folder, head + "[dynamics]\n");
+  ASSERT_TRUE(usual.dynamics);
+  EXPECT_FALSE(usual.dynamics->method);
+  EXPECT_FALSE(usual.dynamics->modes);
+  EXPECT_FALSE(usual.dynamics->lumped);
+  EXPECT_EQ(usual.dynamics->newmark.time_step, 0.001);
+  EXPECT_EQ(usual.dynamics->newmark.alpha, 0.25);
+  EXPECT_EQ(usual.dynamics->newmark.delta, 0.5);
+  EXPECT_EQ(usual.dynamics->damping.mass, 0.0);
+  EXPECT_EQ(usual.dynamics->damping.stiffness, 0.0);
+  const Description packed = read(folder, head + R"([dynamics]
+method = "packed"
+time_step = 0.002
+delta = 0.6
+alpha = 0.3025
+mass = "lumped"
+damping = {stiffness = 1e-4}
+)");
+  EXPECT_EQ(packed.dynamics->method, DynamicsMethod::packed);
+  EXPECT_TRUE(packed.dynamics->lumped);
+  EXPECT_EQ(packed.dynamics->newmark.time_step, 0.002);
+  EXPECT_EQ(packed.dynamics->newmark.alpha, 0.3025);
+  EXPECT_EQ(packed.dynamics->newmark.delta, 0.6);
+  EXPECT_EQ(packed.dynamics->damping.mass, 0.0);
+  EXPECT_EQ(packed.dynamics->damping.stiffness, 1e-4);
+}
+
+/// zeta = (a / omega + b omega) / 2 at both frequencies.
+TEST(Description, DampingRatiosAreThoseAtTheirFrequencies) {
+  const TempFolder folder;
+  const Description d = read(folder, "name = \"a\"\n" + box + material + fixed + R"([dynamics]
+method = "modal"
+modes = 7
+damping = {ratios = [0.05, 0.08], frequencies = [20, 2]}
+)");
+  EXPECT_EQ(d.dynamics->modes, 7);
+  const Rayleigh damping = d.dynamics->damping;
+  const auto ratio = [&](double hertz) {
+    const double omega = 2.0 * std::acos(-1.0) * hertz;
+    return (damping.mass / omega + damping.stiffness * omega) / 2.0;
+  };
+  EXPECT_NEAR(ratio(20.0), 0.05, 1e-12);
+  EXPECT_NEAR(ratio(2.0), 0.08, 1e-12);
+}
+
 TEST(Description, ReadsVectorsOfThePlane) {
   const TempFolder folder;
   const Description d = read(folder, "name = \"p\"\nplane = \"stress\"\n" + rectangle + material +
@@ -322,6 +371,10 @@ std::string with_storage(const std::string& lines) {
 const std::string region = "[[overlay.region]]\nnodes = [1]\n";
 std::string with_overlay(const std::string& lines) {
   return with_storage("scope = \"layers\"\nlayers = 2\n[overlay]\n" + lines);
+}
+/// Line 10 is the first of the table.
+std::string with_dynamics(const std::string& lines) {
+  return "name = \"a\"\n" + box + material + fixed + "[dynamics]\n" + lines + "\n";
 }
 std::string with_image_mesh(const std::string& lines) {
   return with_geometry("image = \"i.inr\"\n[mesh]\n" + lines);
@@ -636,6 +689,81 @@ const BadCase bad_cases[] = {
     {"OverlayRegionSaysNothing",
      with_overlay("[[overlay.region]]\n"),
      {"[[overlay.region]] has none of box"}},
+    {"DynamicsUnknownKey",
+     with_dynamics("timestep = 0.001"),
+     {"model.toml:10:1", "\"timestep\"", "[dynamics]", "\"time_step\""}},
+    {"DynamicsIsList",
+     "name = \"a\"\n" + box + material + fixed + "[[dynamics]]\nmodes = 3\n",
+     {"model.toml:9:1", "dynamics must be a table"}},
+    {"DynamicsBadMethod",
+     with_dynamics("method = \"implicit\""),
+     {"model.toml:10:10", "\"implicit\"", "\"auto\", \"packed\" or \"modal\""}},
+    {"DynamicsPackedOfLayers",
+     with_dynamics("method = \"packed\""),
+     {"model.toml:10:10", "needs every free dof", "scope = \"full\" in [storage]"}},
+    {"DynamicsNoTime",
+     with_dynamics("time_step = 0"),
+     {"model.toml:10:13", "[dynamics] time_step must be greater than 0, not 0"}},
+    {"DynamicsTimeBackwards",
+     with_dynamics("time_step = -0.001"),
+     {"model.toml:10:13", "time_step must be greater than 0, not -0.001"}},
+    {"DynamicsTimeNan", with_dynamics("time_step = nan"), {"model.toml:10:13", "not a finite number"}},
+    {"DynamicsDeltaSmall",
+     with_dynamics("delta = 0.49"),
+     {"model.toml:10:9", "delta must be at least 0.5, not 0.49", "energy grows"}},
+    {"DynamicsAlphaSmall",
+     with_dynamics("alpha = 0.2"),
+     {"model.toml:10:9", "alpha must be at least (delta + 1/2)^2 / 4 = 0.25, not 0.2", "set alpha = 0.25"}},
+    {"DynamicsAlphaSmallForDelta",
+     with_dynamics("delta = 0.6"),
+     {"model.toml:9:1", "= 0.3025, not 0.25", "set alpha = 0.3025"}},
+    {"DynamicsBadMass",
+     with_dynamics("mass = \"diagonal\""),
+     {"model.toml:10:8", "\"diagonal\"", "\"consistent\" or \"lumped\""}},
+    {"DynamicsDampingIsNumber",
+     with_dynamics("damping = 0.1"),
+     {"model.toml:10:11", "damping must be a table"}},
+    {"DynamicsDampingUnknownKey",
+     with_dynamics("damping = {ratio = 0.1}"),
+     {"model.toml:10:12", "\"ratio\"", "[dynamics] damping", "\"ratios\""}},
+    {"DynamicsDampingMassNegative",
+     with_dynamics("damping = {mass = -1, stiffness = 0.1}"),
+     {"model.toml:10:19", "[dynamics] damping mass must be 0 or more, not -1"}},
+    {"DynamicsDampingStiffnessNegative",
+     with_dynamics("damping = {stiffness = -0.1}"),
+     {"model.toml:10:24", "[dynamics] damping stiffness must be 0 or more, not -0.1"}},
+    {"DynamicsDampingTwice",
+     with_dynamics("damping = {mass = 1, ratios = [0.1, 0.1], frequencies = [1, 2]}"),
+     {"model.toml:10:19", "damping mass is given beside ratios"}},
+    {"DynamicsRatiosWithoutFrequencies",
+     with_dynamics("damping = {ratios = [0.1, 0.1]}"),
+     {"model.toml:10:11", "[dynamics] damping frequencies is missing"}},
+    {"DynamicsFrequenciesWithoutRatios",
+     with_dynamics("damping = {frequencies = [1, 2]}"),
+     {"[dynamics] damping ratios is missing"}},
+    {"DynamicsOneRatio",
+     with_dynamics("damping = {ratios = [0.1], frequencies = [1, 2]}"),
+     {"damping ratios must be [two numbers]"}},
+    {"DynamicsRatioNegative",
+     with_dynamics("damping = {ratios = [0.1, -0.1], frequencies = [1, 2]}"),
+     {"model.toml:10:21", "ratios must be 0 or more, not -0.1"}},
+    {"DynamicsFrequencyZero",
+     with_dynamics("damping = {ratios = [0.1, 0.1], frequencies = [0, 2]}"),
+     {"model.toml:10:47", "frequencies must be greater than 0, not 0"}},
+    {"DynamicsFrequenciesEqual",
+     with_dynamics("damping = {ratios = [0.1, 0.2], frequencies = [2, 2]}"),
+     {"model.toml:10:47", "frequencies are equal: 2"}},
+    {"DynamicsRatiosGiveNegativeStiffness",
+     with_dynamics("damping = {ratios = [0.1, 0.001], frequencies = [2, 20]}"),
+     {"model.toml:10:21", "0.1 at 2 Hz and 0.001 at 20 Hz give stiffness = -", "negative damping"}},
+    {"DynamicsRatiosGiveNegativeMass",
+     with_dynamics("damping = {ratios = [0.001, 0.1], frequencies = [2, 20]}"),
+     {"model.toml:10:21", "give mass = -", "negative damping"}},
+    {"DynamicsNoModes", with_dynamics("modes = 0"), {"model.toml:10:9", "modes must be at least 1, not 0"}},
+    {"DynamicsHalfAMode", with_dynamics("modes = 1.5"), {"model.toml:10:9", "modes must be a whole number"}},
+    {"DynamicsModesOfPacked",
+     with_storage("scope = \"full\"\n[dynamics]\nmethod = \"packed\"\nmodes = 7"),
+     {"model.toml:13:9", "modes applies to method \"modal\" only"}},
     {"BadPrecision", with_storage("precision = \"half\""), {"\"half\"", "\"single\""}},
 };
 

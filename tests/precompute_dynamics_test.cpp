@@ -245,7 +245,7 @@ TEST(Dynamics, ModalIsWhatTheModesSayAtTheStoredDofs) {
 TEST(Dynamics, TakesThePackedInverseWhereItIsReadInATimeStep) {
   const SparseMatrix K(300, 300);
   const auto method = [&](Scope scope, std::int64_t n, Precision precision) {
-    return plan_dynamics({}, scope, n, K, precision, "model.toml").method;
+    return plan_dynamics({}, scope, n, K, precision).method;
   };
   EXPECT_EQ(method(Scope::full, 2235, Precision::single_precision), DynamicsMethod::packed);
   EXPECT_EQ(method(Scope::full, 2236, Precision::single_precision), DynamicsMethod::modal);
@@ -257,9 +257,9 @@ TEST(Dynamics, RefusesWhatCannotBe) {
   const SparseMatrix K(300, 300);
   DynamicsOptions options;
   options.modes = 301;
-  EXPECT_THROW(plan_dynamics(options, Scope::surface, 90, K, Precision::single_precision, "x"), Error);
+  EXPECT_THROW(plan_dynamics(options, Scope::surface, 90, K, Precision::single_precision), Error);
   options.method = DynamicsMethod::packed;
-  EXPECT_THROW(plan_dynamics(options, Scope::surface, 90, K, Precision::single_precision, "x"), Error);
+  EXPECT_THROW(plan_dynamics(options, Scope::surface, 90, K, Precision::single_precision), Error);
 }
 
 }  // namespace

@@ -37,7 +37,11 @@ class Verify : public ::testing::Test {
  protected:
   void SetUp() override {
     std::filesystem::create_directories(folder_);
-    std::ofstream(folder_ / "model.toml") << loaded_block;
+    bake_block(loaded_block);
+  }
+
+  void bake_block(const std::string& text) {
+    std::ofstream(folder_ / "model.toml") << text;
     testing::internal::CaptureStderr();
     bake(read_description(folder_ / "model.toml"), {.output = file_, .jobs = 1, .dry_run = false});
     testing::internal::GetCapturedStderr();
@@ -80,6 +84,88 @@ TEST_F(Verify, FindsAnotherLoad) {
   model_.rest_force.back() += Vec3(0.0, 0.0, 1e-4);
   EXPECT_EQ(failures(), std::vector<std::string>{"rest state"});
 }
+
+/// The block with all nodes stored, or those of the surface, and [dynamics].
+std::string swinging_block(const std::string& scope, const std::string& dynamics) {
+  std::string text = loaded_block;
+  text.replace(text.find("\"surface\""), 9, "\"" + scope + "\"");
+  return text + "[dynamics]\n" + dynamics;
+}
+
+class VerifyPacked : public Verify {
+ protected:
+  void SetUp() override {
+    Verify::SetUp();
+    bake_block(swinging_block("full", "method = \"packed\"\ndamping = {mass = 1, stiffness = 1e-3}\n"));
+  }
+};
+
+TEST_F(VerifyPacked, PassesWhatWasBaked) {
+  EXPECT_EQ(model_.dynamics.method, DynamicsMethod::packed);
+  EXPECT_EQ(failures(), std::vector<std::string>());
+}
+
+TEST_F(VerifyPacked, FindsAnotherTimeStep) {
+  model_.dynamics.newmark.time_step *= 1.0 + 1e-6;
+  EXPECT_EQ(failures(), std::vector<std::string>{"inverse"});
+}
+
+TEST_F(VerifyPacked, FindsAnotherMass) {
+  model_.dynamics.matrices.mass[17] *= 1.0 + 1e-6;
+  EXPECT_EQ(failures(), std::vector<std::string>{"mass"});
+}
+
+TEST_F(VerifyPacked, FindsOtherDamping) {
+  model_.dynamics.damping.mass *= 1.0 + 1e-6;
+  EXPECT_EQ(failures(), std::vector<std::string>{"damping"});
+}
+
+TEST_F(VerifyPacked, FindsAMassThatIsNotLumped) {
+  model_.dynamics.lumped = true;
+  EXPECT_EQ(failures(), (std::vector<std::string>{"mass", "damping", "inverse"}));
+}
+
+class VerifyModal : public Verify, public ::testing::WithParamInterface<const char*> {
+ protected:
+  void SetUp() override {
+    Verify::SetUp();
+    bake_block(swinging_block(GetParam(), "method = \"modal\"\nmodes = 9\nmass = \"lumped\"\n"));
+  }
+};
+
+TEST_P(VerifyModal, PassesWhatWasBaked) {
+  ASSERT_EQ(model_.dynamics.modes(), 9);
+  EXPECT_EQ(failures(), std::vector<std::string>());
+}
+
+TEST_P(VerifyModal, FindsAnotherFrequency) {
+  model_.dynamics.omega[8] *= 1.0 - 1e-5;
+  const std::vector<std::string> found = failures();
+  EXPECT_NE(std::find(found.begin(), found.end(), "modes"), found.end());
+}
+
+TEST_P(VerifyModal, FindsAnotherScale) {
+  const auto n = static_cast<std::size_t>(model_.stored_dofs());
+  for (std::size_t s = 0; s < n; ++s) model_.dynamics.shapes[s] *= 1.0 + 1e-5;
+  EXPECT_EQ(failures(), std::vector<std::string>{"modal mass"});
+}
+
+TEST_P(VerifyModal, FindsAnotherShape) {
+  for (std::size_t s = 0; s < 30; ++s) model_.dynamics.shapes[s] *= 1.0 + 1e-4;
+  const std::vector<std::string> found = failures();
+  EXPECT_NE(std::find(found.begin(), found.end(), "modes"), found.end());
+}
+
+TEST_P(VerifyModal, FindsThatAModeIsMissing) {
+  StoredDynamics& dynamics = model_.dynamics;
+  const auto n = static_cast<std::ptrdiff_t>(model_.stored_dofs());
+  dynamics.omega.erase(dynamics.omega.begin() + 4);
+  dynamics.shapes.erase(dynamics.shapes.begin() + 4 * n, dynamics.shapes.begin() + 5 * n);
+  EXPECT_EQ(failures(), std::vector<std::string>{"mode count"});
+}
+
+INSTANTIATE_TEST_SUITE_P(Scopes, VerifyModal, ::testing::Values("surface", "full"),
+                         [](const auto& scope) { return std::string(scope.param); });
 
 TEST_F(Verify, FindsAnotherMaterial) {
   model_.materials[0].youngs_modulus *= 1.0 + 1e-6;

@@ -83,14 +83,87 @@ class Bake(ProgramTest):
         self.assert_refused(run(PRECOMPUTE, model, "-o", self.folder / "no" / "x.palpate.hdf"), "x.palpate.hdf")
 
 
+class Dynamics(ProgramTest):
+    TABLE = "[dynamics]\ndamping = {ratios = [0.02, 0.02], frequencies = [0.001, 0.01]}\n"
+
+    def test_packed(self):
+        text = cube_toml(4, scope="full") + self.TABLE + 'method = "packed"\ntime_step = 0.5\nmass = "lumped"\n'
+        file = self.bake(text)
+        inspected = run(PRECOMPUTE, "inspect", file).stdout
+        self.assertRegex(inspected, r"dynamics +packed: inverse of K_bar, 0\.4 MB; M and C_d of \d+ entries")  # 300 dofs
+        self.assertRegex(inspected, r"Newmark +time step 0\.5 s, alpha = 0\.25, delta = 0\.5; lumped mass, damping 0\.000228")
+        verified = run(PRECOMPUTE, "verify", file)
+        self.assertEqual(verified.returncode, 0, verified.stdout)
+        for check in ("mass", "damping", "inverse"):
+            self.assertRegex(verified.stdout, rf"\n{check} +ok ")
+
+    def test_modal(self):
+        hex8 = cube_toml(4, scope="layers").replace("[material]", '[mesh]\nelement = "hex8"\n[material]')
+        file = self.bake(hex8 + self.TABLE + "modes = 20\n")
+        inspected = run(PRECOMPUTE, "inspect", file).stdout
+        # two bending modes of one frequency, sqrt(E / density) / 1 m = 0.032 rad/s
+        first, second = re.search(r"dynamics +modal: 20 modes of ([0-9.]+), ([0-9.]+), ", inspected).groups()
+        self.assertEqual(first, second)
+        self.assertAlmostEqual(float(first), 0.0034, delta=0.0005)
+        verified = run(PRECOMPUTE, "verify", file)
+        self.assertEqual(verified.returncode, 0, verified.stdout)
+        for check in ("modes", "modal mass", "mode count"):
+            self.assertRegex(verified.stdout, rf"\n{check} +ok ")
+
+    def test_all_scopes_verify(self):
+        for scope in ("surface", "layers", "full"):
+            file = self.bake(cube_toml(5, scope, "single") + '[dynamics]\nmethod = "modal"\nmodes = 30\n', name=f"{scope}.toml")
+            result = run(PRECOMPUTE, "verify", file)
+            self.assertEqual(result.returncode, 0, result.stdout)
+
+    def test_same_input_gives_the_same_bytes_with_any_number_of_jobs(self):
+        for method in ("packed", "modal"):
+            text = cube_toml(6, scope="full") + f'[dynamics]\nmethod = "{method}"\n'
+            one = self.bake(text, "--jobs", "1", name="one.toml").read_bytes()
+            (self.folder / "one.palpate.hdf").unlink()
+            two = self.bake(text, "--jobs", "2", name="one.toml").read_bytes()
+            self.assertEqual(one, two)
+
+    def plan(self, text):
+        model = self.write("model.toml", text)
+        result = run(PRECOMPUTE, model, "--dry-run", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stderr
+
+    def test_auto_says_what_it_takes_and_why(self):
+        # 882 dofs: 3.1 MB in double, 3210 steps a second at 10 GB/s
+        packed = self.plan(cube_toml(6, scope="full") + "[dynamics]\n")
+        self.assertRegex(packed, r"dynamics: packed, 3\.1 MB, 0\.\d\d GB of memory \(a step reads the packed inverse of K_bar, 3\.1 MB: "
+                         r"3210 steps a second at 10 GB/s, 1000 are asked for\)")
+        modal = self.plan(cube_toml(6, scope="full") + "[dynamics]\ntime_step = 0.0003\n")
+        self.assertRegex(modal, r"dynamics: modal, 100 modes, 0\.7 MB, .* \(a step reads the packed inverse of K_bar, 3\.1 MB: 3210")
+        self.assertRegex(self.plan(cube_toml(6) + "[dynamics]\n"), r"dynamics: modal, 100 modes, 0\.4 MB, .* \(the scope is not full\)")
+        self.assertIn("dynamics: modal, 54 modes", self.plan(cube_toml(2) + "[dynamics]\n"))  # all that there are
+
+    def test_more_modes_than_dofs(self):
+        model = self.write("model.toml", cube_toml(2) + "[dynamics]\nmodes = 55\n")
+        self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), "model.toml:14:9", "modes is 55", "only 54 free dofs")
+        model = self.write("model.toml", cube_toml(12) + "[dynamics]\nmodes = 3000\n")
+        self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), "model.toml:14:9", "more than a third of 6084 free dofs")
+
+    def test_all_modes(self):
+        file = self.bake(cube_toml(2) + "[dynamics]\nmodes = 54\n")
+        self.assertEqual(run(PRECOMPUTE, "verify", file).returncode, 0)
+
+    def test_memory_for_modes_is_counted(self):
+        model = self.write("model.toml", cube_toml(24) + "[dynamics]\nmodes = 3000\n")
+        limited = run(PRECOMPUTE, model, "--jobs", "1024", cwd=self.folder)
+        self.assert_refused(limited, "GB of memory are needed", "GB for dynamics", "fewer modes")
+
+
 class Stopped(ProgramTest):
-    def start_and_wait_for_columns(self, model, output):
-        """A running bake that has written some columns but not all."""
+    def start_and_wait_for_columns(self, model, output, matrix=0):
+        """A running bake that has written some columns of the matrix but not all."""
         process = subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.DEVNULL)
         journal = output.with_name(output.name + ".progress")
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline and process.poll() is None:
-            if journal.exists() and len(journal.read_text().splitlines()) >= 3:
+            if journal.exists() and f"\ncolumns {matrix} " in journal.read_text():
                 return process
             time.sleep(0.002)
         self.fail("the run ended before it could be stopped")
@@ -110,6 +183,28 @@ class Stopped(ProgramTest):
         self.assertEqual(output.read_bytes(), straight.read_bytes())
         self.assertEqual(sorted(p.name for p in self.folder.iterdir()),
                          ["killed.palpate.hdf", "model.toml", "straight.palpate.hdf"])
+
+    def test_run_killed_in_the_inverse_of_dynamics_is_resumed(self):
+        model = self.write("model.toml", cube_toml(11, scope="full") + '[dynamics]\nmethod = "packed"\n')
+        output = self.folder / "killed.palpate.hdf"
+        process = self.start_and_wait_for_columns(model, output, matrix=1)
+        process.kill()
+        process.wait()
+        self.assertFalse(output.exists())
+        result = run(PRECOMPUTE, model, "-o", output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("Green's functions: 4752 of 4752 columns were kept", result.stderr)
+        self.assertRegex(result.stderr, r"inverse of K_bar: [1-9]\d* of 4752 columns were kept")
+        straight = self.folder / "straight.palpate.hdf"
+        self.assertEqual(run(PRECOMPUTE, model, "-o", straight).returncode, 0)
+        self.assertEqual(output.read_bytes(), straight.read_bytes())
+
+    def test_interrupt_in_the_inverse_of_dynamics_leaves_nothing(self):
+        model = self.write("model.toml", cube_toml(11, scope="full") + '[dynamics]\nmethod = "packed"\n')
+        process = self.start_and_wait_for_columns(model, self.folder / "x.palpate.hdf", matrix=1)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(), 130)
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
 
     def test_killed_at_any_moment_again_and_again(self):
         model = self.write("model.toml", cube_toml(12, scope="full"))
@@ -218,7 +313,7 @@ class BadDescriptions(ProgramTest):
 
 class Models(ProgramTest):
     def test_sample_models_that_need_no_download(self):
-        for name in ("cube", "beam", "sphere", "plate"):
+        for name in ("cube", "beam", "sphere", "plate", "cantilever"):
             shutil.copytree(MODELS / name, self.folder / name)
             result = run(PRECOMPUTE, self.folder / name / "model.toml", cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)

@@ -37,7 +37,7 @@ def check_model(path, element, scalar):
     with h5py.File(path) as file:
         attributes = file.attrs
         expect(attributes["format"] == b"palpate", "format")
-        expect(list(attributes["version"]) == [3, 1], "version")
+        expect(list(attributes["version"]) == [3, 2], "version")
         expect(attributes["units"] == b"m, N, Pa, kg, s", "units")
         expect(attributes["scalar"].decode() == scalar, "scalar")
         expect(attributes["element"].decode() == element and attributes["dimension"] == dimension, "element")
@@ -97,6 +97,33 @@ def check_model(path, element, scalar):
         print(f"{path.name}: {len(nodes)} nodes, {len(cells)} {element} elements, {n} stored dofs")
 
 
+def check_dynamics(path):
+    with h5py.File(path) as file:
+        dynamics = file["/dynamics"]
+        n = file.attrs["dimension"] * len(file["/dofs/stored_nodes"])
+        expect(np.array_equal(dynamics["newmark"], [0.3025, 0.6, 0.002]), "newmark")
+        expect(np.array_equal(dynamics["damping"], [0.5, 1e-4]), "damping")
+        expect(list(dynamics["lumped"]) == [0], "lumped")
+        if dynamics["method"][0] == 1:
+            expect(set(dynamics) == {"method", "lumped", "newmark", "damping", "matrices", "inverse"}, "packed dynamics")
+            matrices = dynamics["matrices"]
+            mass, damping = np.zeros((n, n)), np.zeros((n, n))
+            column = np.repeat(np.arange(n), np.diff(matrices["start"]))
+            mass[matrices["row"][:], column] = matrices["mass"]
+            damping[matrices["row"][:], column] = matrices["damping"]
+            expect(np.allclose(mass, np.diag(0.1 + 1e-3 * np.arange(n)) + np.diag(np.full(n - 1, 0.01), -1)), "mass")
+            expect(np.allclose(damping, np.diag(0.5 + 1e-3 * np.arange(n)) - np.diag(np.full(n - 1, 0.02), -1)), "damping")
+            expect(dynamics["inverse"].dtype == file["/greens/packed"].dtype, "precision of the inverse")
+            expect(dynamics["inverse"].id.get_offset() % 4096 == 0, "page alignment of the inverse")
+            expect(np.allclose(dynamics["inverse"][:], file["/greens/packed"][:] / 8), "inverse")
+        else:
+            expect(set(dynamics) == {"method", "lumped", "newmark", "damping", "modes"}, "modal dynamics")
+            expect(list(dynamics["modes/omega"]) == [10, 10, 11, 11, 12, 1000], "omega")
+            modes, dofs = np.arange(1, 6)[:, None], np.arange(n)
+            expect(np.allclose(dynamics["modes/shapes"], np.cos(0.1 * modes * dofs)), "shapes")
+        print(f"{path.name}: dynamics by method {dynamics['method'][0]}")
+
+
 def enclosed(nodes, surface):
     """Volume inside triangles that look outwards; in the plane, area inside lines with the body on their left."""
     x = nodes[surface]
@@ -125,4 +152,6 @@ folder = pathlib.Path(sys.argv[1])
 check_model(folder / "single.palpate.hdf", "tet4", "float32")
 for kind in KINDS:
     check_model(folder / f"{kind}.palpate.hdf", kind, "float64")
+for method in ("packed", "modal"):
+    check_dynamics(folder / f"{method}.palpate.hdf")
 check_recording(folder / "recording.h5")

@@ -15,6 +15,11 @@ int main(int count, char** arguments) {
   test::write_sample(temporary / "single", Precision::single_precision, ElementType::tet4, 1);
   test::write_sample(temporary / "double", Precision::double_precision, ElementType::tet4, 1);
   test::write_sample(temporary / "plane", Precision::double_precision, ElementType::quad4, 1);
+  for (const DynamicsMethod method : {DynamicsMethod::packed, DynamicsMethod::modal}) {
+    const std::string name = method == DynamicsMethod::packed ? "packed" : "modal";
+    test::write_swinging_sample(temporary / name, method, Precision::double_precision, ElementType::tri3);
+    test::write_bytes(folder / name, raw + test::read_bytes(temporary / name));
+  }
   const std::string whole = test::read_bytes(temporary / "double");
   test::write_bytes(folder / "single", raw + test::read_bytes(temporary / "single"));
   test::write_bytes(folder / "double", raw + whole);
