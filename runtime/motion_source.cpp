@@ -67,7 +67,12 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
     newmark_.advance();
   } else {
     body_.greens().displacement(job.load.nodes(), job.load.forces(), u_);
-    newmark_.advance(u_);
+    touched_.clear();
+    for (const Index node : job.load.nodes()) {
+      for (std::int64_t axis = 0; axis < body_.dimension(); ++axis)
+        touched_.push_back(std::int64_t{body_.dimension()} * node + axis);
+    }
+    newmark_.advance(u_, touched_);
   }
   if (job.let_go != let_go_done_) let_go(job.release);
   let_go_done_ = job.let_go;

@@ -48,6 +48,7 @@ class MotionSource {
   std::int64_t done_ = 0;          // the last job
   std::int64_t let_go_done_ = 0;   // of the body
   std::vector<double> f_, u_, v_;  // [n] scratch
+  std::vector<std::int64_t> touched_;
   std::atomic<std::int64_t> steps_ = 0;
   std::atomic<double> longest_ = 0.0;
   std::atomic<bool> stop_ = false;

@@ -117,9 +117,29 @@ void PackedNewmark::predict() noexcept {
   product_.multiply(f_bar_, predicted_);
 }
 
-void PackedNewmark::advance(std::span<const double> u) noexcept {
-  const Newmark& h = dynamics_.newmark;
+void PackedNewmark::advance() noexcept {
+  end_step();
+}
+
+void PackedNewmark::advance(std::span<const double> u, std::span<const std::int64_t> touched) noexcept {
   for (std::size_t i = 0; i < u.size(); ++i) predicted_[i] += u[i];
+  const double per_step = 1.0 / dynamics_.newmark.time_step;
+  driven_.clear();
+  for (const std::int64_t dof : touched) {
+    const auto i = static_cast<std::size_t>(dof);
+    driven_.push_back(per_step * (predicted_[i] - u_[i]));
+    driven_.push_back(per_step * (driven_.back() - v_[i]));
+  }
+  end_step();
+  for (std::size_t k = 0; k < touched.size(); ++k) {
+    const auto i = static_cast<std::size_t>(touched[k]);
+    v_[i] = driven_[2 * k];
+    a_[i] = driven_[2 * k + 1];
+  }
+}
+
+void PackedNewmark::end_step() noexcept {
+  const Newmark& h = dynamics_.newmark;
   double largest = 0.0;
   for (std::size_t i = 0; i < u_.size(); ++i) {
     const double a = h.a0() * (predicted_[i] - u_[i]) - h.a2() * v_[i] - h.a3() * a_[i];

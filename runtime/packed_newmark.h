@@ -26,8 +26,12 @@ class PackedNewmark {
 
   /// u at the end of the step if no force acts there: K_bar^-1 f_bar.
   void predict() noexcept;
-  /// Ends the step: `u` [n] is what the forces there add, K_bar^-1 E f; empty without forces.
-  void advance(std::span<const double> u = {}) noexcept;
+  /// Ends the step without forces.
+  void advance() noexcept;
+  /// Ends the step under forces that add u [n] = K_bar^-1 E f. The `touched` dofs, which are driven, not
+  /// free, get velocity and acceleration by backward differences: with Newmark's own, a node that a rigid
+  /// tool strikes bounces off it in every other step.
+  void advance(std::span<const double> u, std::span<const std::int64_t> touched) noexcept;
 
   [[nodiscard]] std::span<const double> u() const noexcept { return u_; }             ///< [n] now [m]
   [[nodiscard]] std::span<const double> velocity() const noexcept { return v_; }      ///< [n] now [m/s]
@@ -37,11 +41,13 @@ class PackedNewmark {
   }  ///< [n] of the step
 
  private:
+  void end_step() noexcept;
   void solve_mass(std::span<double> b) noexcept;
 
   const StoredDynamics& dynamics_;
   PackedProduct product_;
   std::vector<double> u_, v_, a_, predicted_;
+  std::vector<double> driven_;                   // velocity of the touched dofs
   std::vector<double> with_M_, with_C_, f_bar_;  // scratch
 };
 
