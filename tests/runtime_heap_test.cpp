@@ -6,15 +6,19 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "runtime/held_nodes.h"
+#include "runtime/motion_source.h"
 #include "runtime/palpate.h"
 #include "runtime/patch_source.h"
 #include "runtime/step.h"
@@ -239,6 +243,85 @@ TEST_P(Tick, MakesNoSystemCall) {
   expect_no_system_call([&] {
     exercise(body_, state_, held_, u_, poses_);
     return state_.ticks == 1000;
+  });
+#endif
+}
+
+/// A cube that swings, by numbers that need not be its own.
+Model swinging_model(DynamicsMethod method) {
+  Model model = test::unit_model(3, 4, Scope::full, Precision::double_precision);
+  const auto n = static_cast<std::size_t>(model.stored_dofs());
+  StoredDynamics& dynamics = model.dynamics;
+  dynamics.method = method;
+  dynamics.damping = {.mass = 1.0, .stiffness = 0.0};
+  if (method == DynamicsMethod::modal) {
+    dynamics.omega = {20.0, 30.0, 50.0, 80.0};
+    for (std::size_t k = 0; k < 3 * n; ++k)
+      dynamics.shapes.push_back(0.3 * std::sin(0.7 * static_cast<double>(k)));
+  } else {
+    dynamics.inverse = test::pack(
+        1e-7 * Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n)),
+        Precision::double_precision);
+    for (std::size_t dof = 0; dof < n; ++dof) {
+      dynamics.matrices.start.push_back(static_cast<std::int64_t>(dof));
+      dynamics.matrices.row.push_back(static_cast<Index>(dof));
+    }
+    dynamics.matrices.start.push_back(static_cast<std::int64_t>(n));
+    dynamics.matrices.mass.assign(n, 2.0);
+    dynamics.matrices.damping.assign(n, 2.0);
+  }
+  return model;
+}
+
+class MovingTick : public testing::TestWithParam<std::tuple<DynamicsMethod, ContactModel>> {
+ protected:
+  /// Grabs, pulls, lets go and is struck.
+  void exercise_motion() {
+    for (int k = 0; k < 1000; ++k) {
+      ToolPose tool;
+      tool.position = Vec3(0.5, 0.5, 1.05 + 0.001 * (k % 100));
+      tool.grab = k % 100 > 20 && k % 100 < 60;
+      if (source_) source_->receive(state_);
+      step(body_, state_, tool);
+      if (source_) source_->post(state_);
+      if (k % 10 == 0) state_.motion.show(shown_);
+    }
+  }
+
+  Body body_{swinging_model(std::get<0>(GetParam())), {}, 1, std::get<1>(GetParam())};
+  State state_{body_, {.tools = {Tool{.radius = 0.04, .coupling_stiffness = 2.0, .reach = 0.3}}}};
+  ShownMotion shown_{body_};
+  std::optional<MotionSource> source_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Bodies, MovingTick,
+                         testing::Combine(testing::Values(DynamicsMethod::modal, DynamicsMethod::packed),
+                                          testing::Values(ContactModel::quasi_static,
+                                                          ContactModel::dynamic)));
+
+// Beside a thread that steps packed dynamics and takes what memory it likes.
+TEST_P(MovingTick, MakesNoHeapCall) {
+  if (std::get<0>(GetParam()) == DynamicsMethod::packed)
+    source_.emplace(body_, state_, MotionSourceOptions{.in_background = true, .jobs = 2});
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+  counting = true;
+  exercise_motion();
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+#else
+  exercise_motion();
+#endif
+  EXPECT_TRUE(state_.motion.active());
+}
+
+TEST_P(MovingTick, MakesNoSystemCall) {
+#if !PALPATE_OWN_MALLOC
+  GTEST_SKIP() << "sanitizers make system calls";
+#else
+  expect_no_system_call([&] {
+    exercise_motion();
+    return state_.motion.active();
   });
 #endif
 }
