@@ -5,6 +5,7 @@
 
 #include "meshes/error.h"
 #include "runtime/motion_source.h"
+#include "runtime/patch_maker.h"
 #include "tests/dynamics_sample.h"
 #include "tests/runtime_tool.h"
 
@@ -204,6 +205,58 @@ INSTANTIATE_TEST_SUITE_P(Bodies, Release,
                                          ReleaseCase{"PackedSlowTet4", ElementType::tet4, true, 4},
                                          ReleaseCase{"ModalSlowTet4", ElementType::tet4, false, 4}),
                          [](const auto& tested) { return tested.param.name; });
+
+// The overlay's part of the contact goes with the contact: what swings is the body's own mesh, from where it
+// was.
+TEST(OverlayRelease, IsFoldedBackIntoTheBody) {
+  for (const bool is_packed : {true, false}) {
+    const Model model =
+        test::swinging_model(ElementType::tet4, is_packed ? test::packed() : test::all_modes());
+    const Body body(model, {}, 2);
+    const Tool tool = test::plain({.reach = 0.5});
+    State state(body, {.tools = {tool}, .patch_nodes = patch_room(body, 1, 1)});
+    std::optional<MotionSource> source;
+    if (is_packed) source.emplace(body, state, MotionSourceOptions{.in_background = false, .jobs = 1});
+    const Vec3 top = test::top_middle(3), above = top + Vec3(0.0, 0.0, 0.01), far(0.5, 0.5, 3.0);
+    PatchMaker maker(body, 1);
+    const Index centre = body.nearest_surface_node(top).node;
+    state.patch = maker.make({&centre, 1});
+    const auto tick = [&](const ToolPose& at) {
+      if (source) source->receive(state);
+      step(body, state, at);
+      if (source) source->post(state);
+    };
+    tick(pose(above));
+    for (int k = 0; k <= 200; ++k) tick(pose(above + Vec3(0.02, 0.0, 0.04) * (k / 200.0), true));
+    for (int k = 0; k < 50; ++k) tick(pose(above + Vec3(0.02, 0.0, 0.04), true));
+    ASSERT_GT(state.near.load().patch_count, 0);
+    const VectorXd held = test::displacement(body, state);
+    const test::SparseRoute sparse(model);
+    test::NewmarkIntegrator reference = sparse.start(held, VectorXd::Zero(held.size()));
+    tick(pose(far));
+    EXPECT_LT((test::displacement(body, state) - held).norm(), 1e-9 * held.norm());
+    double largest = 0.0;
+    for (int k = 0; k < 300; ++k) {
+      tick(pose(far));
+      reference.step();
+      largest = std::max(largest, (test::displacement(body, state) - sparse.to_stored(reference.u())).norm());
+    }
+    EXPECT_LT(largest, 1e-8 * held.norm()) << (is_packed ? "packed" : "modal");
+    // Fine nodes follow the body's.
+    std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
+    std::vector<Vec3> u(body.surface_rest_positions().size());
+    ShownMotion shown(body);
+    state.motion.show(shown);
+    surface_displacement(body, state.near.load(), stored, u, &shown);
+    for (std::size_t node = 0; node < u.size(); ++node) {
+      const SurfaceParts parts = body.surface_parts(static_cast<Index>(node));
+      Vec3 expected = Vec3::Zero();
+      for (std::size_t k = 0; k < parts.stored.size(); ++k)
+        expected += parts.weights[k] * state.motion.displacement(body, parts.stored[k]);
+      ASSERT_LT((u[node] - expected).norm(), 1e-12);
+    }
+  }
+}
 
 /// A cube with a few modes only.
 Model few_modes(Index count) {
