@@ -211,7 +211,7 @@ void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<dou
     body.modes()->add_projection(load.nodes(), load.forces(), -1.0, g_);
     const std::span<const double> k_bar = modal_->effective_stiffness();
     for (std::size_t i = 0; i < g_.size(); ++i) q_held_[i] = fade_ * q_held_[i] + g_[i] / k_bar[i];
-    for (std::size_t i = 0; i < held_.size(); ++i) held_[i] *= fade_;
+    for (double& u : held_) u *= fade_;
     add(displacement, 1.0, held_);
     fade_ = 1.0;
     since_let_go_ = 0.0;
@@ -222,6 +222,10 @@ void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<dou
     if (pending_.rate.add(last.nodes(), last.forces(), per_second))
       pending_.rate.add(first.nodes(), first.forces(), -per_second);
     add(displacement, 1.0, pending_held_);
+  }
+  for (NodalLoad& before : loads_) {  // what is gone has no past for the next release
+    before.clear();
+    before.add(load.nodes(), load.forces(), 1.0);
   }
   active_ = true;
   std::fill(stamp_.begin(), stamp_.end(), -2);  // what `at` gave holds no longer

@@ -121,6 +121,59 @@ TEST_P(Release, TakesTheVelocityFromTheContact) {
   EXPECT_LT((test::displacement(loop.body, loop.state) - expected).norm(), 1e-6 * (expected - held).norm());
 }
 
+// A touch that is shorter than the time over which velocities are taken knows nothing of the one before.
+TEST_P(Release, ForgetsTheTouchBefore) {
+  if (GetParam().ticks_per_step > 1) GTEST_SKIP() << "the first one is not yet in the motion";
+  const auto press = [&](bool before) {
+    Loop loop(model(), tool_);
+    FreeMotion& motion = loop.state.motion;
+    const Greens& greens = loop.body.greens();
+    std::vector<double> u(static_cast<std::size_t>(greens.order()));
+    SurfaceLoad none(d_, 0, 8, 0), load(d_, 0, 8, 0), far(d_, 0, 8, 0);
+    const std::vector<double> f = {1e-3, -2e-3, 0.5e-3}, large = {1.0, 1.0, 1.0};
+    load.add(3, f.data());
+    far.add(1, large.data());
+    const auto tick = [&](const SurfaceLoad& with, bool let_go) {
+      if (loop.source) loop.source->receive(loop.state);
+      motion.begin_tick(loop.body);
+      if (let_go) motion.let_go(loop.body, with, u);
+      motion.end_tick(loop.body, with);
+    };
+    if (before) {
+      for (int k = 0; k < 20; ++k) tick(far, false);
+      tick(none, true);  // u is zero: only its velocity and energy are gone with it
+    }
+    for (int k = 0; k < 3; ++k) tick(load, false);
+    greens.displacement(load.nodes(), load.forces(), u);
+    tick(none, true);
+    for (int k = 0; k < 5; ++k) tick(none, false);
+    VectorXd shown(greens.order());
+    for (Index node = 0; node < greens.nodes(); ++node)
+      shown.segment(d_ * node, d_) = motion.displacement(loop.body, node).head(d_);
+    return shown;
+  };
+  const auto alone_before = [&] {  // the first touch without the second
+    Loop loop(model(), tool_);
+    FreeMotion& motion = loop.state.motion;
+    std::vector<double> u(static_cast<std::size_t>(loop.body.greens().order()));
+    SurfaceLoad none(d_, 0, 8, 0), far(d_, 0, 8, 0);
+    const std::vector<double> large = {1.0, 1.0, 1.0};
+    far.add(1, large.data());
+    for (int k = 0; k < 30; ++k) {
+      if (loop.source) loop.source->receive(loop.state);
+      motion.begin_tick(loop.body);
+      if (k == 20) motion.let_go(loop.body, none, u);
+      motion.end_tick(loop.body, k < 20 ? far : none);
+    }
+    VectorXd shown(loop.body.greens().order());
+    for (Index node = 0; node < loop.body.greens().nodes(); ++node)
+      shown.segment(d_ * node, d_) = motion.displacement(loop.body, node).head(d_);
+    return shown;
+  };
+  const VectorXd expected = press(false) + alone_before();
+  EXPECT_LT((press(true) - expected).norm(), 1e-9 * expected.norm());
+}
+
 // By superposition, also while it still moves from the last time.
 TEST_P(Release, AddsToWhatMoves) {
   Loop loop(model(), tool_);
