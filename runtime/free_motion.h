@@ -87,8 +87,8 @@ class FreeMotion {
   /// For MotionSource: what is to be done next; the sample that it made.
   [[nodiscard]] const MotionJob& job() const noexcept { return job_; }
   void receive(const MotionSample& sample) noexcept;
-  /// Whether the packed dynamics are behind their time: what is seen waits for them.
-  [[nodiscard]] bool is_late() const noexcept { return job_.step - sample_step_ > 1; }
+  /// Whether the packed dynamics are behind their time, after begin_tick: what is seen waits for them.
+  [[nodiscard]] bool is_late() const noexcept { return ends_step() && job_.step > sample_step_; }
 
  private:
   static constexpr std::size_t history = 8;  // ticks that a velocity is taken over
