@@ -1,16 +1,47 @@
 #include "runtime/packed_product.h"
 
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
+
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 
 namespace palpate {
 namespace {
 
 constexpr std::int64_t columns = 8;  // that share what is loaded of x and y
-constexpr std::int64_t rows = 1024;  // of x and y that stay in the first-level cache
+constexpr std::int64_t ahead = 512;  // bytes of a column that are asked for early: it crosses pages
 constexpr auto patience = std::chrono::microseconds(200);
+
+#ifdef __AVX512F__
+constexpr std::int64_t lanes = 8;
+#elif defined(__AVX__)
+constexpr std::int64_t lanes = 4;
+#else
+constexpr std::int64_t lanes = 2;
+#endif
+template <class T>
+using Lanes [[gnu::vector_size(lanes * sizeof(T))]] = T;
+
+Lanes<double> load(const double* from) noexcept {
+  Lanes<double> value;
+  std::memcpy(&value, from, sizeof value);
+  return value;
+}
+
+Lanes<double> load(const float* from) noexcept {
+#ifdef __AVX512F__  // GCC 12 converts one half after the other
+  return _mm512_cvtps_pd(_mm256_loadu_ps(from));
+#else
+  Lanes<float> value;
+  std::memcpy(&value, from, sizeof value);
+  return __builtin_convertvector(value, Lanes<double>);
+#endif
+}
 
 /// y += A x and the dot products of the columns with x, over rows [first, first + count) below the diagonal
 /// of a group of columns; `a` are their entries there.
@@ -18,38 +49,33 @@ template <class T>
 void multiply_rows(const std::array<const T*, columns>& a, const std::array<double, columns>& by,
                    const double* __restrict x, double* __restrict y, std::array<double, columns>& sums,
                    std::int64_t count) noexcept {
-  const T* __restrict a0 = a[0];
-  const T* __restrict a1 = a[1];
-  const T* __restrict a2 = a[2];
-  const T* __restrict a3 = a[3];
-  const T* __restrict a4 = a[4];
-  const T* __restrict a5 = a[5];
-  const T* __restrict a6 = a[6];
-  const T* __restrict a7 = a[7];
-  double s0 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0, s5 = 0, s6 = 0, s7 = 0;
-#pragma omp simd reduction(+ : s0, s1, s2, s3, s4, s5, s6, s7)
-  for (std::int64_t i = 0; i < count; ++i) {
-    const double e0 = a0[i], e1 = a1[i], e2 = a2[i], e3 = a3[i], e4 = a4[i], e5 = a5[i], e6 = a6[i],
-                 e7 = a7[i];
-    s0 += e0 * x[i];
-    s1 += e1 * x[i];
-    s2 += e2 * x[i];
-    s3 += e3 * x[i];
-    s4 += e4 * x[i];
-    s5 += e5 * x[i];
-    s6 += e6 * x[i];
-    s7 += e7 * x[i];
-    y[i] += ((e0 * by[0] + e1 * by[1]) + (e2 * by[2] + e3 * by[3])) +
-            ((e4 * by[4] + e5 * by[5]) + (e6 * by[6] + e7 * by[7]));
+  constexpr std::int64_t line = 64 / sizeof(T);  // of the cache
+  std::array<Lanes<double>, columns> in_lanes{};
+  std::int64_t i = 0;
+  for (; i + line <= count; i += line) {
+    for (const T* column : a) __builtin_prefetch(column + i + ahead / std::int64_t{sizeof(T)});
+    for (std::int64_t k = i; k < i + line; k += lanes) {
+      const Lanes<double> xk = load(x + k);
+      Lanes<double> even = load(y + k), odd{};
+      for (std::size_t c = 0; c < columns; c += 2) {
+        const Lanes<double> e = load(a[c] + k);
+        const Lanes<double> f = load(a[c + 1] + k);
+        in_lanes[c] += e * xk;
+        in_lanes[c + 1] += f * xk;
+        even += e * by[c];
+        odd += f * by[c + 1];
+      }
+      even += odd;
+      std::memcpy(y + k, &even, sizeof even);
+    }
   }
-  sums[0] += s0;
-  sums[1] += s1;
-  sums[2] += s2;
-  sums[3] += s3;
-  sums[4] += s4;
-  sums[5] += s5;
-  sums[6] += s6;
-  sums[7] += s7;
+  for (std::size_t c = 0; c < columns; ++c) {
+    for (int lane = 0; lane < lanes; ++lane) sums[c] += in_lanes[c][lane];
+    for (std::int64_t k = i; k < count; ++k) {
+      sums[c] += static_cast<double>(a[c][k]) * x[k];
+      y[k] += static_cast<double>(a[c][k]) * by[c];
+    }
+  }
 }
 
 /// Columns [first, last) of the packed triangle: y [rows from first on].
@@ -79,11 +105,10 @@ void multiply_columns(std::span<const T> packed, std::int64_t order, const doubl
     std::array<double, columns> by;
     std::array<double, columns> sums{};
     std::copy_n(x + j, columns, by.begin());
-    for (std::int64_t i = j + columns; i < order; i += rows) {
-      std::array<const T*, columns> a;
-      for (std::int64_t c = 0; c < columns; ++c) a[static_cast<std::size_t>(c)] = entry(i, j + c);
-      multiply_rows<T>(a, by, x + i, y.data() + (i - first), sums, std::min(rows, order - i));
-    }
+    const std::int64_t below = j + columns;
+    std::array<const T*, columns> a;
+    for (std::int64_t c = 0; c < columns; ++c) a[static_cast<std::size_t>(c)] = entry(below, j + c);
+    multiply_rows<T>(a, by, x + below, y.data() + (below - first), sums, order - below);
     for (std::int64_t c = 0; c < columns; ++c)
       y[static_cast<std::size_t>(j + c - first)] += sums[static_cast<std::size_t>(c)];
   }
@@ -135,6 +160,7 @@ void PackedProduct::help(Part& part, const std::stop_token& stop) noexcept {
   while (true) {
     const auto begin = std::chrono::steady_clock::now();
     while (round_ == seen && std::chrono::steady_clock::now() - begin < patience) {
+      std::this_thread::yield();  // where processors are short, to whom it waits for
     }
     round_.wait(seen);
     seen = round_;
