@@ -458,7 +458,6 @@ void time_ticks(benchmark::State& run, Model model, Index count) {
   constexpr double radius = 0.005;
   if (model.dynamics.modes() < count) return run.SkipWithError("the file has fewer modes");
   keep_modes(model, count);
-  model.dynamics.damping = {};
   Model still_model = model;
   still_model.dynamics = {};
   Touched still(still_model, ContactModel::quasi_static, radius),
@@ -494,6 +493,7 @@ scope = "surface"
 [dynamics]
 method = "modal"
 modes = 200
+damping = {ratios = [0.05, 0.05], frequencies = [2.0, 20.0]}
 )";
   const std::filesystem::path file = folder / "block.palpate.hdf";
   bake(read_description(folder / "model.toml"), {.output = file});
