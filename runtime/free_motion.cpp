@@ -13,6 +13,8 @@ namespace palpate {
 namespace {
 
 constexpr double least_fade = 1e-6;
+constexpr double settling = 0.1;          // time in which quasi-static contact stills a body [s]
+constexpr std::size_t least_history = 4;  // ticks of contact that say how fast its forces change
 
 /// Ticks from one step of the file's dynamics to the next.
 std::int64_t count_ticks(const Body& body, double tick) {
@@ -68,6 +70,7 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
     : dimension_(body.dimension()),
       tick_(tick),
       ticks_per_step_(count_ticks(body, tick)),
+      settled_(std::exp(-tick * static_cast<double>(ticks_per_step_) / settling)),
       dynamic_contact_(body.contact_model() == ContactModel::dynamic),
       phase_(ticks_per_step_),
       pending_(make_let_go(dimension_, most_loads)),
@@ -178,7 +181,9 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
   now.add(load.nodes(), load.forces(), 1.0);
   active_ = active_ || (dynamic_contact_ && !now.empty());
   if (!active_ || !ends_step()) return;
+  const bool stills = !dynamic_contact_ && !now.empty();
   if (modal_) {
+    if (stills) modal_->settle(settled_);
     if (!dynamic_contact_) return;
     set_zero(g_);
     body.modes()->add_projection(now.nodes(), now.forces(), 1.0, g_);
@@ -186,6 +191,7 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
     return;
   }
   ++job_.step;
+  job_.left = stills ? settled_ : 1.0;
   job_.load.clear();
   if (dynamic_contact_) job_.load.add(now.nodes(), now.forces(), 1.0);
   if (pending_.force.empty() || held_in_flight_) return;
@@ -199,11 +205,23 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
   held_in_flight_ = true;
 }
 
+/// How fast the forces of the last ticks changed while there was contact: not as it began, when they come
+/// from nothing at once.
+void FreeMotion::add_rate(const NodalLoad& last) noexcept {
+  const auto before = [&](std::size_t ticks) -> const NodalLoad& {
+    return loads_[(static_cast<std::size_t>(ticks_) + history - ticks) % history];
+  };
+  std::size_t count = 1;
+  while (count < history && !before(count + 1).empty()) ++count;
+  if (count < least_history) return;
+  const double per_second = 1.0 / (static_cast<double>(count - 1) * tick_);
+  if (pending_.rate.add(last.nodes(), last.forces(), per_second))
+    pending_.rate.add(before(count).nodes(), before(count).forces(), -per_second);
+}
+
 void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<double> displacement) noexcept {
   if (loads_.empty() || (dynamic_contact_ && !modal_)) return;
   const NodalLoad& last = loads_[static_cast<std::size_t>(ticks_ - 1) % history];
-  const NodalLoad& first = loads_[static_cast<std::size_t>(ticks_) % history];  // the oldest
-  const double per_second = 1.0 / (static_cast<double>(history - 1) * tick_);
   if (last.empty()) return;
   if (dynamic_contact_) {
     set_zero(g_);
@@ -219,8 +237,7 @@ void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<dou
     // Without room for another: its energy is lost.
     if (!pending_.force.add(last.nodes(), last.forces(), 1.0)) return;
     pending_.force.add(load.nodes(), load.forces(), -1.0);
-    if (pending_.rate.add(last.nodes(), last.forces(), per_second))
-      pending_.rate.add(first.nodes(), first.forces(), -per_second);
+    add_rate(last);
     add(displacement, 1.0, pending_held_);
   }
   for (NodalLoad& before : loads_) {  // what is gone has no past for the next release

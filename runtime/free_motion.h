@@ -26,6 +26,7 @@ struct MotionJob {
   std::int64_t let_go = 0;  ///< how many times the body was let go by then
   LetGo release;            ///< the last of them
   NodalLoad load;           ///< dynamic contact: the forces at the step's end
+  double left = 1.0;        ///< quasi-static contact: what it leaves of the motion
 };
 
 /// Its answer.
@@ -51,7 +52,8 @@ void add_motion(const Body& body, const ShownMotion& shown, std::span<double> u)
 
 /// The body's motion on its own: free vibration once it was let go and, with dynamic contact, what inertia
 /// and viscosity make of the forces so far (theory.md section 5). Contact forces of the tick displace the
-/// body from there. Modal dynamics step within the tick; packed ones beside it, by jobs that `MotionSource`
+/// body from there. Quasi-static contact has no inertia to answer with: under it the motion dies away in a
+/// tenth of a second. Modal dynamics step within the tick; packed ones beside it, by jobs that `MotionSource`
 /// does. Copies are complete; calls allocate nothing.
 class FreeMotion {
  public:
@@ -95,11 +97,13 @@ class FreeMotion {
 
   void begin_modal_step(const Body& body) noexcept;
   void fade_held(double omega) noexcept;
+  void add_rate(const NodalLoad& last) noexcept;
   [[nodiscard]] bool ends_step() const noexcept { return phase_ == ticks_per_step_; }
 
   int dimension_;
   double tick_;
   std::int64_t ticks_per_step_ = 1;
+  double settled_;  // what quasi-static contact leaves of the motion in a step
   bool dynamic_contact_;
   bool active_ = false;
   std::int64_t ticks_ = 0;

@@ -54,4 +54,10 @@ void ModalNewmark::advance() noexcept {
   }
 }
 
+void ModalNewmark::settle(double share) noexcept {
+  for (std::vector<double>* motion : {&q_, &v_, &a_}) {
+    for (double& value : *motion) value *= share;
+  }
+}
+
 }  // namespace palpate

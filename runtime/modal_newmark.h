@@ -28,6 +28,9 @@ class ModalNewmark {
   /// The same without forces.
   void advance() noexcept;
 
+  /// Leaves a share of the motion.
+  void settle(double share) noexcept;
+
   [[nodiscard]] std::span<const double> q() const noexcept { return q_; }                  ///< now
   [[nodiscard]] std::span<const double> velocity() const noexcept { return v_; }           ///< now
   [[nodiscard]] std::span<const double> predicted() const noexcept { return predicted_; }  ///< of the step

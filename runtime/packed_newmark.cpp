@@ -61,6 +61,12 @@ void PackedNewmark::rest() noexcept {
     std::fill(motion->begin(), motion->end(), 0.0);
 }
 
+void PackedNewmark::settle(double share) noexcept {
+  for (std::vector<double>* motion : {&u_, &v_, &a_}) {
+    for (double& value : *motion) value *= share;
+  }
+}
+
 void PackedNewmark::let_go(std::span<const double> f, std::span<const double> u,
                            std::span<const double> v) noexcept {
   std::fill(f_bar_.begin(), f_bar_.end(), 0.0);

@@ -20,6 +20,9 @@ class PackedNewmark {
   /// Puts it back to rest.
   void rest() noexcept;
 
+  /// Leaves a share of the motion.
+  void settle(double share) noexcept;
+
   /// By superposition, from now on: the body let go in its static displacement u [n] by forces f [n], at
   /// velocity v [n]; with the consistent acceleration M a = -f - C_d v.
   void let_go(std::span<const double> f, std::span<const double> u, std::span<const double> v) noexcept;

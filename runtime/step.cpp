@@ -58,11 +58,21 @@ void apply_forces(State& state) noexcept {
   }
 }
 
+/// Whether a body that swings is let go: some tool has lost what it touched in the tick before, or holds it
+/// no longer.
+bool lets_go(const Body& body, const State& state) noexcept {
+  if (body.model().dynamics.method == DynamicsMethod::none) return false;
+  return std::any_of(state.tools.begin(), state.tools.end(), [](const ToolState& tool) {
+    return (tool.touched && tool.contacts == 0) || (tool.held && !tool.holding);
+  });
+}
+
 /// A point that slides over the edge of a fold throws the surface from one side of it to the other, and back
 /// in the next tick. Where forces would take the near surface farther than in a step of Newton's method that
-/// can be trusted, only a share of their change is made.
+/// can be trusted, only a share of their change is made. A body that is let go does not leap: it stays where
+/// it is and swings from there.
 void retreat_from_leaps(const Body& body, State& state) noexcept {
-  if (state.near.load().count == 0) return;
+  if (state.near.load().count == 0 || lets_go(body, state)) return;
   double farthest = 0.0;
   for (Index place = 0; place < state.near.count(); ++place) {
     const Index node = state.near.node(place);
@@ -178,10 +188,7 @@ void note_surface_change(const State& state, ToolState& tool, Index number) noex
 
 /// Forces that ended with this tick become free motion.
 void let_go(const Body& body, State& state) noexcept {
-  const bool let_go = std::any_of(state.tools.begin(), state.tools.end(), [](const ToolState& tool) {
-    return (tool.touched && tool.contacts == 0) || (tool.held && !tool.holding);
-  });
-  if (let_go) {
+  if (lets_go(body, state)) {
     state.motion.let_go(body, state.near.load(), state.stored_displacement);
     move_near_surface(body, state);
   }
@@ -279,7 +286,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   bool again = penetration(state) > rough;
   bool valid = solve_contact(body, state);
   const auto easy = [&] { return state.problem.frictionless || state.cone_solver.was_easy(); };
-  for (int pass = 1; again && valid && easy() && pass < most_passes; ++pass) {
+  for (int pass = 1; again && valid && easy() && !lets_go(body, state) && pass < most_passes; ++pass) {
     remember_contacts(state);
     find_contacts(body, state);
     again = penetration(state) > rough;
