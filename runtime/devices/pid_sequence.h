@@ -29,6 +29,7 @@ struct PidRequest {
 ///     while (next().kind != none) { do it; done(); or received(report); or refused(); }
 class PidSequence {
  public:
+  /// Does not own the layout.
   PidSequence(const PidLayout& layout, const PidConstants& constants) noexcept
       : layout_(layout), constants_(constants) {}
 
