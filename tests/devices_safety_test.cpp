@@ -142,6 +142,7 @@ TEST(Safety, LetsThroughWhatIsHarmless) {
 
 TEST(Safety, ClampsForceTorqueAndTheirRates) {
   Bench bench;
+  bench.wanted.local.stiffness = 100.0 * Mat3::Identity();
   bench.press(0.05);
   bench.wanted.wrench.force = Vec3(0, 1e60, 0);
   bench.wanted.wrench.torque = Vec3(1e60, 0, 0);
@@ -189,6 +190,24 @@ TEST(Safety, ADeviceThatFallsSilentFadesThenFaults) {
   }
   expect_nothing(bench.tick());
   EXPECT_EQ(bench.safety.fault(), Fault::device_silent);
+}
+
+/// What the passivity controller takes back is of a velocity that nobody knows any more.
+TEST(Safety, DampingFadesWithASilentDevice) {
+  Bench bench;
+  bench.press(3.0);
+  bench.device.velocity = Vec3(0, 0, 0.3);
+  for (int k = 0; k < 30; ++k) {  // pushed along by more than damping can hold
+    bench.device.pose.position.z() += 0.0003;
+    bench.tick();
+  }
+  bench.wanted.wrench.force.setZero();
+  bench.ticks(10);
+  EXPECT_LT(bench.safety.energy(), 0.0);
+  EXPECT_NEAR(bench.last.wrench.force.z(), -5.0 * 0.3, 1e-9);
+  bench.talks = false;
+  for (int k = 1; k <= 20; ++k)
+    EXPECT_NEAR(bench.tick().wrench.force.z(), -1.5 * std::min(1.0, (20.0 - k) / 15.0), 1e-9) << k;
 }
 
 TEST(Safety, FrozenNumbersFault) {

@@ -109,9 +109,6 @@ void Safety::look_for_faults() noexcept {
 DeviceCommand Safety::nothing() noexcept {
   shown_.setZero();
   share_ = 0.0;
-  force_rate_.reset();
-  torque_rate_.reset();
-  passivity_.show(shown_);
   DeviceCommand command;
   command.local.point = device_.pose.position;
   return command;
