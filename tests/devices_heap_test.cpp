@@ -1,80 +1,118 @@
-// What is decoded and encoded in a tick takes nothing from the heap.
+// Safety takes no memory and makes no system call. A program of its own, as it replaces malloc.
 #include <gtest/gtest.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
-#include <cstddef>
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <limits>
+#include <vector>
 
-#include "runtime/devices/palpate_board.h"
-#include "runtime/devices/pid_sequence.h"
-#include "runtime/devices/space_mouse.h"
-#include "runtime/devices/woodenhaptics_report.h"
-#include "tests/devices_bytes.h"
+#include "runtime/devices/safety.h"
+#include "runtime/devices/workspace.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define PALPATE_OWN_MALLOC 0  // sanitizers have their own
-#else
-#define PALPATE_OWN_MALLOC 1
-#endif
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers have their own malloc
 
 namespace {
-std::size_t allocations = 0;
-}
+thread_local long heap_calls = 0;
+}  // namespace
 
-#if PALPATE_OWN_MALLOC
+// operator new and delete of libstdc++ come here too.
 extern "C" {
-void* __libc_malloc(std::size_t size);  // NOLINT(bugprone-reserved-identifier): glibc's name
+void* __libc_malloc(std::size_t size);  // NOLINT(bugprone-reserved-identifier): glibc's names
+void* __libc_memalign(std::size_t alignment, std::size_t size);  // NOLINT(bugprone-reserved-identifier)
+void __libc_free(void* p);                                       // NOLINT(bugprone-reserved-identifier)
 
-// operator new of libstdc++ comes here too.
 void* malloc(std::size_t size) {
-  ++allocations;
+  ++heap_calls;
   return __libc_malloc(size);
 }
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  ++heap_calls;
+  return __libc_memalign(alignment, size);
 }
-#endif
+void free(void* p) {
+  if (p != nullptr) ++heap_calls;
+  __libc_free(p);
+}
+}
 
 namespace palpate {
 namespace {
 
-TEST(DeviceHeap, TicksTakeNothing) {
-  const Bytes encoders(woodenhaptics_report_bytes, 0);
-  const Bytes cap = bytes("01 5e 01 a2 fe 03 00 04 00 05 00 fa ff");
-  const Bytes stick = bytes("01 ff 01 00 02 00 00 00 05 00 00 00 00");
-  const Bytes loaded = bytes("02 03 01 ff 00");
-  const auto board_report = encode_board_input({1, 6, {1, 2, 3, 4, 5, 6}, 1});
-  const ArmConstants arm{.lengths = Vec3::Ones(),
-                         .capstan_diameters = Vec3::Ones(),
-                         .body_diameters = Vec3::Ones(),
-                         .torque_constants = Vec3::Ones(),
-                         .max_current = 1.0,
-                         .counts_per_turn = {1, 1, 1, 1, 1, 1}};
-  SpaceMouse mouse({}, 0.1);
-  const PidLayout layout =
-      find_pid_layout(parse_report_descriptor(bytes(side_winder_descriptor), "it"), "it");
-  const PidConstants constants{{1, 1}, {1, 1}};
-  PidSequence sequence(layout, constants);
-  const BoardFeature feature{.force_unit = 250};
+constexpr std::int64_t ms_ns = 1'000'000;  // ns
 
-  EXPECT_EQ(allocations > 0, PALPATE_OWN_MALLOC == 1);
-  const std::size_t before = allocations;
-  double sum = 0.0;
-  for (int tick = 0; tick < 10; ++tick) {
-    const auto report = decode_encoders(encoders);
-    sum += arm_state(arm, *report).pose.position.x();
-    const Saturated currents = motor_currents(arm, joint_angles(arm, report->counters), Vec3(1, 2, 3));
-    sum += encode_currents(currents.value)[1];
-    mouse.take(*decode_space_mouse(cap));
-    sum += mouse.advance(1e-3).pose.position.x();
-    sum += pid_state(constants, *decode_pid_input(layout, stick)).pose.position.x();
-    sum += sequence.force(pid_force(constants, Vec3(1, 2, 3)))[0].bytes[0];
-    sum += sequence.next().report.bytes[0];
-    sequence.done();
-    sequence.received(loaded);
-    sum += board_state(*decode_board_input(board_report)).pose.position.x();
-    sum += encode_board_force({1, board_counts(feature, Vec3(1, 2, 3)).counts})[5];
+/// Contact, nonsense, silence, lateness, faults, what follows them, and the end. Returns the ticks with
+/// force.
+int exercise(const Workspace& workspace, Safety& safety) noexcept {
+  int with_force = 0;
+  DeviceState device;
+  std::int64_t now = ms_ns;
+  for (int k = 0; k < 20'000; ++k) {
+    now += k % 4001 == 4000 ? 30 * ms_ns : ms_ns;
+    device.pose.position.z() = 0.002 * std::sin(0.01 * k);
+    device.velocity.z() = 0.02 * std::cos(0.01 * k);
+    if (k % 777 == 0) device.velocity.x() = std::numeric_limits<double>::quiet_NaN();
+    if (k % 777 == 5) device.velocity.x() = 0.0;
+    if (k % 5000 < 4900) ++device.sequence;
+    const DeviceState body = workspace.in_body(device);
+    DeviceCommand wanted;
+    wanted.wrench.force.z() = -500.0 * std::min(body.pose.position.z(), 0.0);
+    wanted.local.force = wanted.wrench.force;
+    wanted.local.point = body.pose.position;
+    wanted.local.stiffness(2, 2) = 500.0;
+    wanted.local.radius = 0.001;
+    const DeviceCommand shown = safety.filter(
+        device, workspace.in_device(wanted),
+        {.now = now, .due = now, .solved = k % 900 < 50 ? 0 : now, .inside_body = k % 1900 == 0});
+    if (shown.wrench.force != Vec3::Zero()) ++with_force;
+    if (k % 1000 == 999) safety.acknowledge();
+    if (k == 15'000) safety.restart();
+    if (k == 19'000) safety.shut_down();
   }
-  EXPECT_EQ(allocations, before);
-  EXPECT_GT(sum, 0.0);
+  return with_force;
+}
+
+SafetyOptions options() {
+  SafetyOptions quick;
+  quick.ramp = 0.1;
+  return quick;
+}
+
+TEST(SafetyTick, MakesNoHeapCall) {
+  heap_calls = 0;
+  { const std::vector<int> proof(100); }
+  ASSERT_EQ(heap_calls, 2) << "the counter does not count";
+  const Workspace workspace({.motion_scale = 2.0});
+  Safety safety(options());
+  heap_calls = 0;
+  const int with_force = exercise(workspace, safety);
+  EXPECT_EQ(heap_calls, 0);
+  EXPECT_GT(with_force, 2000);
+}
+
+/// In a process that the kernel kills at the first system call but write and exit.
+TEST(SafetyTick, MakesNoSystemCall) {
+  const Workspace workspace({.motion_scale = 2.0});
+  Safety safety(options());
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(77);
+    syscall(SYS_exit, exercise(workspace, safety) > 2000 ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 77) GTEST_SKIP() << "no seccomp here";
+  EXPECT_FALSE(WIFSIGNALED(status)) << "signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace
 }  // namespace palpate
+
+#endif

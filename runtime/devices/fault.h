@@ -1,0 +1,54 @@
+// Why there is no force.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <utility>
+
+namespace palpate {
+
+/// What ended the force, until somebody acknowledges it.
+enum class Fault : std::uint8_t {
+  none = 0,
+  too_fast = 1,         ///< the device moved faster than the speed limit, or its position jumped
+  device_silent = 2,    ///< no new report for too long
+  device_frozen = 3,    ///< new reports, always the same numbers
+  deadline_missed = 4,  ///< too many late ticks
+  buzzing = 5,          ///< force or hand chattered until no force was left
+  device_lost = 6,      ///< told from outside: unplugged, or it cannot be read or written
+  input_lost = 7,       ///< told from outside: the viewer that moved the tool is gone
+  stopped = 8,          ///< told from outside: emergency stop
+};
+
+/// The faults and their names, for reports.
+inline constexpr std::array<std::pair<Fault, const char*>, 9> fault_names = {{
+    {Fault::none, "none"},
+    {Fault::too_fast, "too_fast"},
+    {Fault::device_silent, "device_silent"},
+    {Fault::device_frozen, "device_frozen"},
+    {Fault::deadline_missed, "deadline_missed"},
+    {Fault::buzzing, "buzzing"},
+    {Fault::device_lost, "device_lost"},
+    {Fault::input_lost, "input_lost"},
+    {Fault::stopped, "stopped"},
+}};
+
+/// Whether the hand feels anything, and if not, what it waits for.
+enum class SafetyPhase : std::uint8_t {
+  waiting = 0,    ///< for the tool to be clear of the body and the force to be small
+  ramping = 1,    ///< force on its way from zero
+  active = 2,     ///< force as the rules let it through
+  faulted = 3,    ///< no force until acknowledged
+  shut_down = 4,  ///< no force any more
+};
+
+/// And theirs.
+inline constexpr std::array<std::pair<SafetyPhase, const char*>, 5> safety_phase_names = {{
+    {SafetyPhase::waiting, "waiting"},
+    {SafetyPhase::ramping, "ramping"},
+    {SafetyPhase::active, "active"},
+    {SafetyPhase::faulted, "faulted"},
+    {SafetyPhase::shut_down, "shut_down"},
+}};
+
+}  // namespace palpate
