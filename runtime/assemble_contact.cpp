@@ -55,6 +55,18 @@ double unloading(const NearField& near, const ContactRow& row) noexcept {
   return motion;
 }
 
+/// Motion along a tangent of the surface itself since the tick before, which the places where the tick begins
+/// have in them already: what slides is the surface under the tool, by whatever it moves.
+double free_slip(const State& state, const ContactPoint& contact, const Vec3& tangent) noexcept {
+  if (!state.motion.active() || !state.is_first_pass) return 0.0;
+  double motion = 0.0;
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (contact.nodes[n] >= 0)
+      motion += contact.weights[n] * tangent.dot(state.motion.change(contact.nodes[n]));
+  }
+  return motion;
+}
+
 /// The contact of the tick before that is the same one, null when there is none.
 const ContactPoint* same_contact(const State& state, const ContactPoint& contact) noexcept {
   const auto end = state.last_contacts.begin() + state.last_count;
@@ -77,6 +89,7 @@ void add_contact(State& state, const ContactPoint& contact, const ContactPoint* 
     state.rows[at] = contact_row(state.near, contact, direction);
     problem.b[at] = direction.dot(motion) + unloading(state.near, state.rows[at]);
     if (i == first && !contact.held) problem.b[at] += contact.gap;
+    if (i > first && !contact.held) problem.b[at] -= free_slip(state, contact, direction);
     if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
   }
 }

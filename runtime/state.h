@@ -75,6 +75,7 @@ struct State {
   Index contact_count = 0;
   Index held_count = 0;  ///< of contact_points, by grabs
   Index max_contacts;
+  bool is_first_pass = true;           ///< of the tick's Newton steps
   StepStatus status = StepStatus::ok;  ///< of the last tick, all tools
   std::int64_t ticks = 0;              ///< taken so far
 

@@ -284,7 +284,9 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
     state.status |= StepStatus::capacity_full;
   }
   bool again = penetration(state) > rough;
+  state.is_first_pass = true;
   bool valid = solve_contact(body, state);
+  state.is_first_pass = false;
   const auto easy = [&] { return state.problem.frictionless || state.cone_solver.was_easy(); };
   for (int pass = 1; again && valid && easy() && !lets_go(body, state) && pass < most_passes; ++pass) {
     remember_contacts(state);

@@ -1,6 +1,7 @@
 // Let go, and touch again what moves.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -411,6 +412,47 @@ TEST_P(TouchAgain, IsContactWithAMovingSurface) {
   EXPECT_GT(touched, 10);
   EXPECT_GT(free, 100);
   EXPECT_GT(largest, 1e-4);
+}
+
+// A ball that sticks holds the place that it presses on, however the body swings under it.
+TEST_P(TouchAgain, SticksToWhatMoves) {
+  DynamicsOptions options = GetParam() ? test::packed() : test::all_modes();
+  options.damping = {.mass = 0.0, .stiffness = 2e-3};
+  const Body body(test::swinging_model(ElementType::tet4, options));
+  const Tool ball = test::plain({.radius = 0.2, .friction = 50.0});
+  State state(body, {.tools = {ball, test::plain({.reach = 0.5})}});
+  std::optional<MotionSource> source;
+  if (GetParam()) source.emplace(body, state, MotionSourceOptions{.in_background = false, .jobs = 1});
+  const auto tick = [&](const Vec3& at, const Vec3& hand, bool grab) {
+    if (source) source->receive(state);
+    step(body, state, std::array{pose(at), pose(hand, grab)});
+    if (source) source->post(state);
+  };
+  const Vec3 over(0.5, 0.5, 1.21), side(1.01, 0.5, 0.6);
+  tick(over, side, false);
+  for (int k = 0; k <= 200; ++k) tick(over - Vec3(0.0, 0.0, 0.06 * k / 200.0), side, false);
+  const Vec3 in = over - Vec3(0.0, 0.0, 0.06);
+  for (int k = 0; k <= 200; ++k) tick(in, side + Vec3(0.0, 0.15 * k / 200.0, 0.0), true);
+  for (int k = 0; k < 50; ++k) tick(in, side + Vec3(0.0, 0.15, 0.0), true);
+  // The place that it is stuck to, wherever the contact points are.
+  const auto on_ball = [](const ContactPoint& contact) {
+    return contact.tool == 0 && contact.force.norm() > 0.0;
+  };
+  const auto found = std::find_if(state.contacts().begin(), state.contacts().end(), on_ball);
+  ASSERT_NE(found, state.contacts().end());
+  const ContactPoint stuck = *found;
+  const Vec3 place = test::place_now(state, stuck);
+  double swung = 0.0, farthest = 0.0;
+  for (int k = 0; k < 60; ++k) {
+    tick(in, side + Vec3(1.0, 0.15, 0.0), false);
+    ASSERT_GT(state.tools[0].contacts, 0) << k;
+    swung = std::max(
+        swung,
+        std::abs(state.motion.at(body, std::max({stuck.nodes[0], stuck.nodes[1], stuck.nodes[2]})).y()));
+    farthest = std::max(farthest, std::abs(test::place_now(state, stuck).y() - place.y()));
+  }
+  EXPECT_GT(swung, 0.01);
+  EXPECT_LT(farthest, 0.2 * swung);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, TouchAgain, testing::Bool(),
