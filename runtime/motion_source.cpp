@@ -7,6 +7,8 @@ namespace palpate {
 namespace {
 
 constexpr auto pause = std::chrono::microseconds(50);
+constexpr auto long_pause = std::chrono::milliseconds(1);  // while nothing moves
+constexpr int patience = 2000;                             // pauses until then
 
 int processors_beside_the_tick() {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()) - 1);
@@ -45,12 +47,17 @@ void MotionSource::post(const State& state) noexcept {
 }
 
 void MotionSource::work() noexcept {
+  int pauses = 0;
   while (!stop_) {
     const MotionJob& job = jobs_.read();
-    if (job.step == done_) {
+    if (job.step != done_) {
+      do_job(job);
+      pauses = 0;
+    } else if (pauses < patience) {
+      ++pauses;
       std::this_thread::sleep_for(pause);
     } else {
-      do_job(job);
+      std::this_thread::sleep_for(long_pause);
     }
   }
 }

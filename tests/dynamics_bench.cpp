@@ -373,8 +373,10 @@ double packed_step_seconds(const Model& model, Precision precision) {
   const StoredDynamics dynamics = made_up_dynamics(model, precision);
   PackedNewmark newmark(dynamics, 1);
   push(newmark);
+  constexpr int repetitions = 15;
   std::vector<double> times;
-  for (int k = 0; k < 15; ++k) {
+  times.reserve(repetitions);
+  for (int k = 0; k < repetitions; ++k) {
     times.push_back(seconds([&] {
       newmark.predict();
       newmark.advance();
