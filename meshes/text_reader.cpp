@@ -38,6 +38,8 @@ std::string shown(std::string_view word) {
   return word.size() > 40 ? result + "..." : result;
 }
 
+}  // namespace
+
 std::string read_all(const std::filesystem::path& file) {
   const char* const hint = "Check the name, and that it is a file that you may read.";
   std::error_code problem;
@@ -50,8 +52,6 @@ std::string read_all(const std::filesystem::path& file) {
   }
   return text;
 }
-
-}  // namespace
 
 TextReader::TextReader(std::filesystem::path file, char comment)
     : file_(std::move(file)), text_(read_all(file_)), comment_(comment) {

@@ -2,30 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "meshes/error.h"
 
 namespace palpate {
 namespace {
-
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
 
 /// "two numbers".
 std::string some(std::size_t size, const std::string& things) {
@@ -35,32 +18,12 @@ std::string some(std::size_t size, const std::string& things) {
 
 }  // namespace
 
-std::string comma_list(const Keys& keys) {
-  std::string text;
-  for (const std::string_view key : keys) {
-    text += (text.empty() ? "" : ", ") + std::string(key);
-  }
-  return text;
-}
-
 std::string quoted_choice(const Keys& keys) {
   std::string text;
   for (std::size_t i = 0; i < keys.size(); ++i) {
     text += (i == 0 ? "\"" : i + 1 == keys.size() ? " or \"" : ", \"") + std::string(keys[i]) + "\"";
   }
   return text;
-}
-
-std::string_view nearest(std::string_view key, const Keys& known) {
-  return *std::min_element(known.begin(), known.end(), [&](std::string_view a, std::string_view b) {
-    return edit_distance(key, a) < edit_distance(key, b);
-  });
-}
-
-std::string shown(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  return {text.data(), end};
 }
 
 Section::Section(const toml::table& table, std::string title, const std::string& file, const Keys& known)

@@ -8,19 +8,14 @@
 #include <vector>
 
 #include "meshes/mesh.h"
+#include "meshes/words.h"
 
 namespace palpate {
 
 using Keys = std::vector<std::string_view>;
 
-/// "a, b, c".
-std::string comma_list(const Keys& keys);
 /// `"a", "b" or "c"`.
 std::string quoted_choice(const Keys& keys);
-/// The word of `known` with the smallest Levenshtein distance.
-std::string_view nearest(std::string_view key, const Keys& known);
-/// The shortest text that reads back as the same number.
-std::string shown(double value);
 
 /// One table of a TOML file. Its title is as a person would write it, "[mesh]"; that of the whole file is "".
 /// Values that are missing or of another type or range throw Error. Does not own the table.

@@ -37,6 +37,11 @@ std::size_t size_if(bool wanted, std::int64_t size) {
   return wanted ? static_cast<std::size_t>(size) : 0;
 }
 
+/// Nodes to keep forces for: none of a body that does not swing.
+Index room(const Body& body, Index most_loads) {
+  return body.model().dynamics.method != DynamicsMethod::none ? most_loads : 0;
+}
+
 LetGo make_let_go(int dimension, Index most_loads) {
   return {.force = NodalLoad(dimension, 4 * most_loads), .rate = NodalLoad(dimension, 4 * most_loads)};
 }
@@ -73,8 +78,9 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
       settled_(std::exp(-tick * static_cast<double>(ticks_per_step_) / settling)),
       dynamic_contact_(body.contact_model() == ContactModel::dynamic),
       phase_(ticks_per_step_),
-      pending_(make_let_go(dimension_, most_loads)),
-      job_{.release = make_let_go(dimension_, most_loads), .load = NodalLoad(dimension_, most_loads)} {
+      pending_(make_let_go(dimension_, room(body, most_loads))),
+      job_{.release = make_let_go(dimension_, room(body, most_loads)),
+           .load = NodalLoad(dimension_, room(body, most_loads))} {
   const StoredDynamics& dynamics = body.model().dynamics;
   const bool swings = dynamics.method != DynamicsMethod::none;
   const bool packed = dynamics.method == DynamicsMethod::packed;
@@ -122,7 +128,7 @@ void FreeMotion::fade_held(double omega) noexcept {
 }
 
 void FreeMotion::begin_modal_step(const Body& body) noexcept {
-  if (!pending_.force.empty() || !pending_.rate.empty()) {
+  if (!pending_.force.empty()) {
     set_zero(g_);
     set_zero(rate_);
     body.modes()->add_projection(pending_.force.nodes(), pending_.force.forces(), 1.0, g_);

@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <system_error>
 
 #include "meshes/error.h"
+#include "meshes/text_reader.h"
 #include "runtime/devices/palpate_board.h"
 #include "runtime/devices/profile_table.h"
 #include "runtime/devices/woodenhaptics_report.h"
@@ -176,16 +175,7 @@ bool DeviceProfile::fits(const DeviceId& device) const noexcept {
 }
 
 DeviceProfile read_device_profile(const std::filesystem::path& file) {
-  const char* const hint = "check the name, and that it is a file that you may read";
-  std::error_code problem;
-  const auto size = std::filesystem::file_size(file, problem);
-  if (problem) throw Error("cannot read the file: " + problem.message(), file.string(), hint);
-  std::string text(size, '\0');
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream.read(text.data(), static_cast<std::streamsize>(size))) {
-    throw Error("cannot read the file", file.string(), hint);
-  }
-  return parse_device_profile(text, file.string());
+  return parse_device_profile(read_all(file), file.string());
 }
 
 DeviceProfile parse_device_profile(std::string_view text, const std::string& name) {

@@ -1,0 +1,19 @@
+// Words of the messages about what somebody wrote.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate {
+
+/// "a, b, c".
+std::string comma_list(const std::vector<std::string_view>& words);
+
+/// The known word, of at least one, that takes the fewest changes of a letter (Levenshtein's distance).
+std::string_view nearest(std::string_view word, const std::vector<std::string_view>& known);
+
+/// The shortest text that reads back as the same number, whatever the locale.
+std::string shown(double value);
+
+}  // namespace palpate
