@@ -30,6 +30,20 @@ void for_each_tick_field(Visitor&& visit) {
   visit("/ticks/compute_ns", 1, &TickRecord::compute_ns);
   visit("/ticks/grab", 1, &TickRecord::grab);
   visit("/ticks/patch", 1, &TickRecord::patch);
+  visit("/ticks/handle_position", 3, &TickRecord::handle_position);
+  visit("/ticks/handle_orientation", 4, &TickRecord::handle_orientation);
+  visit("/ticks/handle_velocity", 3, &TickRecord::handle_velocity);
+  visit("/ticks/buttons", 1, &TickRecord::buttons);
+  visit("/ticks/sequence", 1, &TickRecord::sequence);
+  visit("/ticks/arrived_ns", 1, &TickRecord::arrived_ns);
+  visit("/ticks/begun_ns", 1, &TickRecord::begun_ns);
+  visit("/ticks/shown_force", 3, &TickRecord::shown_force);
+  visit("/ticks/shown_torque", 3, &TickRecord::shown_torque);
+  visit("/ticks/share", 1, &TickRecord::share);
+  visit("/ticks/phase", 1, &TickRecord::phase);
+  visit("/ticks/fault", 1, &TickRecord::fault);
+  visit("/ticks/event", 1, &TickRecord::event);
+  visit("/ticks/motion_step", 1, &TickRecord::motion_step);
 }
 
 template <class Member>
@@ -79,16 +93,15 @@ void append_rows(const hdf5::File& file, const char* path, int components, const
 }  // namespace
 
 struct RecordingWriter::Impl {
-  Impl(std::filesystem::path to, const std::string& model_path, const std::string& content_hash,
-       const std::string& overlay)
+  Impl(std::filesystem::path to, const SessionInfo& info)
       : path(std::move(to)), partial(with_suffix(path, ".partial")), file(hdf5::File::create(partial)) {
     file.write_attribute("/", "format", std::string(format_name));
     file.write_attribute("/", "version", version);
     file.write_attribute("/", "generator", std::string("palpate " PALPATE_VERSION));
     file.write_attribute("/", "units", std::string("s, m, N, N m, N/m; compute_ns in ns"));
-    file.write_attribute("/", "model", model_path);
-    file.write_attribute("/", "content_hash", content_hash);
-    file.write_attribute("/", "overlay", overlay);
+    file.write_attribute("/", "model", info.model_path);
+    file.write_attribute("/", "content_hash", info.content_hash);
+    file.write_attribute("/", "options", info.options);
     file.make_group("/ticks");
     for_each_tick_field([this]<class Member>(const char* name, int components, Member TickRecord::*) {
       make_extendible(file, name, components, hdf5::element_type<Scalar<Member>>());
@@ -116,12 +129,11 @@ struct RecordingWriter::Impl {
   bool finished = false;
 };
 
-RecordingWriter::RecordingWriter(std::filesystem::path path, const std::string& model_path,
-                                 const std::string& content_hash, const std::string& overlay) {
+RecordingWriter::RecordingWriter(std::filesystem::path path, const SessionInfo& info) {
   const hdf5::Quiet quiet;
   const std::filesystem::path partial = with_suffix(path, ".partial");
   try {
-    impl_ = std::make_unique<Impl>(std::move(path), model_path, content_hash, overlay);
+    impl_ = std::make_unique<Impl>(std::move(path), info);
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(partial, ignored);
@@ -160,9 +172,9 @@ Recording read_recording(const std::filesystem::path& path) {
     throw Error("is a recording of another version", path.string(), "Record the session again.");
 
   Recording recording;
-  recording.model_path = file.text_attribute("/", "model").value_or("");
-  recording.content_hash = file.text_attribute("/", "content_hash").value_or("");
-  recording.overlay = file.text_attribute("/", "overlay").value_or("");
+  recording.info.model_path = file.text_attribute("/", "model").value_or("");
+  recording.info.content_hash = file.text_attribute("/", "content_hash").value_or("");
+  recording.info.options = file.text_attribute("/", "options").value_or("");
   bool first = true;
   for_each_tick_field([&]<class Member>(const char* name, int components, Member TickRecord::*member) {
     const hdf5::Id dataset(H5Dopen2(file.id(), name, H5P_DEFAULT), H5Dclose);

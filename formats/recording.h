@@ -27,6 +27,29 @@ struct TickRecord {
       0;  ///< time that `step` took; 0 in a run without waiting, so that two such runs are equal
   std::uint8_t grab = 0;    ///< grab button
   std::int32_t patch = -1;  ///< mesh node that the overlay lies round, -1: none
+  double handle_position[3] = {};
+  double handle_orientation[4] = {1, 0, 0, 0};
+  double handle_velocity[3] = {};
+  std::uint32_t buttons = 0;
+  std::uint32_t sequence = 0;
+  std::int64_t arrived_ns = 0;
+  std::int64_t begun_ns = 0;
+  double shown_force[3] = {};
+  double shown_torque[3] = {};
+  double share = 1.0;
+  std::uint8_t phase = 0;
+  std::uint8_t fault = 0;
+  std::uint8_t event = 0;
+  std::int64_t motion_step = 0;
+};
+
+/// What a session was.
+struct SessionInfo {
+  std::string model_path;
+  std::string content_hash;  ///< of the model
+  std::string device;
+  std::int64_t rate = 1000;
+  std::string options;
 };
 
 /// Writes a session to HDF5 (`/ticks/time`, `/ticks/tool_position`, ... one extendible dataset a field),
@@ -35,8 +58,7 @@ class RecordingWriter {
  public:
   /// `model_path` and `content_hash` of the model and what overlays there were ("r=3,rings=2", empty: none)
   /// are kept as attributes, with the program's version. Throws Error when PATH cannot be made.
-  RecordingWriter(std::filesystem::path path, const std::string& model_path, const std::string& content_hash,
-                  const std::string& overlay = "");
+  RecordingWriter(std::filesystem::path path, const SessionInfo& info);
   ~RecordingWriter();  ///< without `finish`, removes the temporary file
   RecordingWriter(const RecordingWriter&) = delete;
   RecordingWriter& operator=(const RecordingWriter&) = delete;
@@ -51,9 +73,7 @@ class RecordingWriter {
 
 /// A recorded session.
 struct Recording {
-  std::string model_path;
-  std::string content_hash;  ///< of the model
-  std::string overlay;       ///< "r=3,rings=2", empty: none
+  SessionInfo info;
   std::vector<TickRecord> ticks;
 };
 

@@ -15,11 +15,8 @@ static_assert(ring_size % batch == 0);
 
 }  // namespace
 
-Recorder::Recorder(const std::filesystem::path& path, const std::string& model_path,
-                   const std::string& content_hash, const std::string& overlay)
-    : writer_(path, model_path, content_hash, overlay),
-      ring_(ring_size),
-      thread_([this] { write_ticks(); }) {}
+Recorder::Recorder(const std::filesystem::path& path, const SessionInfo& info)
+    : writer_(path, info), ring_(ring_size), thread_([this] { write_ticks(); }) {}
 
 Recorder::~Recorder() {
   closing_ = true;

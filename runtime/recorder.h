@@ -17,8 +17,7 @@ namespace palpate {
 class Recorder {
  public:
   /// Starts writing to `path` (under a temporary name). Throws Error when it cannot be made.
-  Recorder(const std::filesystem::path& path, const std::string& model_path, const std::string& content_hash,
-           const std::string& overlay = "");
+  Recorder(const std::filesystem::path& path, const SessionInfo& info);
   ~Recorder();  ///< without `finish`, nothing is kept
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;

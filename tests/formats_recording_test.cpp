@@ -41,7 +41,7 @@ bool same(const TickRecord& a, const TickRecord& b) {
 }
 
 void record(const std::filesystem::path& path, std::span<const TickRecord> ticks, std::size_t at_once) {
-  RecordingWriter writer(path, "liver.palpate.hdf", "00ff", "r=3,rings=2");
+  RecordingWriter writer(path, SessionInfo{"liver.palpate.hdf", "00ff", "", 1000, "overlay=r=3,rings=2"});
   for (std::size_t at = 0; at < ticks.size(); at += at_once)
     writer.append(ticks.subspan(at, std::min(at_once, ticks.size() - at)));
   writer.finish();
@@ -74,7 +74,7 @@ TEST(Recording, EqualTicksMakeEqualFiles) {
 TEST(Recording, IsThereOnlyWhenFinished) {
   const Folder folder;
   {
-    RecordingWriter writer(folder / "a.h5", "m", "h");
+    RecordingWriter writer(folder / "a.h5", SessionInfo{"m", "h"});
     writer.append(some_ticks(5000));
     EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
   }
@@ -83,7 +83,9 @@ TEST(Recording, IsThereOnlyWhenFinished) {
 
 TEST(Recording, ThatCannotBeStartedLeavesNothing) {
   const Folder folder;
-  const std::string text = refusal([&] { RecordingWriter(folder / "a.h5", std::string(5000, 'm'), "h"); });
+  const std::string text = refusal([&] {
+    RecordingWriter(folder / "a.h5", SessionInfo{std::string(5000, 'm'), "h"});
+  });
   EXPECT_NE(text.find("model is 5000 bytes long"), std::string::npos) << text;
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
@@ -102,7 +104,9 @@ TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {
 
 TEST(Recording, BadPathsAndOtherFilesAreRefused) {
   const Folder folder;
-  EXPECT_NE(refusal([&] { RecordingWriter(folder / "none" / "a.h5", "m", "h"); }).find("No such file"),
+  EXPECT_NE(refusal([&] {
+              RecordingWriter(folder / "none" / "a.h5", SessionInfo{"m", "h"});
+            }).find("No such file"),
             std::string::npos);
   write_sample(folder / "a.palpate.hdf");
   EXPECT_NE(refusal([&] { read_recording(folder / "a.palpate.hdf"); }).find("is not a recording"),

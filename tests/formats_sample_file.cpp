@@ -20,7 +20,8 @@ int main(int count, char** arguments) {
     palpate::test::write_swinging_sample(folder / "packed.palpate.hdf", palpate::DynamicsMethod::packed,
                                          palpate::Precision::single_precision);
     palpate::test::write_swinging_sample(folder / "modal.palpate.hdf", palpate::DynamicsMethod::modal);
-    palpate::RecordingWriter recording(folder / "recording.h5", "tet4.palpate.hdf", "00ff");
+    palpate::RecordingWriter recording(folder / "recording.h5",
+                                       palpate::SessionInfo{"tet4.palpate.hdf", "00ff"});
     for (int i = 0; i < 5000; ++i) {
       const double x = i;
       recording.append(std::array{palpate::TickRecord{.time = 1e-3 * x,
