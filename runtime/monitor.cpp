@@ -50,14 +50,15 @@ std::string_view remedy(Fault fault) {
 
 std::string histogram_bars(const TimeHistogram& histogram) {
   constexpr std::array<std::string_view, 9> levels = {"·", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  constexpr std::int64_t shortest = 1000;  // ns
+  constexpr int classes = 12;
   std::string bars;
   std::int64_t lower = 0;
-  for (std::int64_t upper = 1000; lower < 2'000'000; upper *= 2) {
-    const bool last = upper > 1'000'000;
-    const std::int64_t count = histogram.total_between(lower, last ? INT64_MAX : upper);
+  for (int k = 0; k < classes; ++k) {
+    const std::int64_t upper = k + 1 < classes ? shortest << k : INT64_MAX;
+    const std::int64_t count = histogram.total_between(lower, upper);
     const auto level = static_cast<std::size_t>(std::bit_width(static_cast<std::uint64_t>(count)));
     bars += levels[std::min(level, levels.size() - 1)];
-    if (last) break;
     lower = upper;
   }
   return bars;
