@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "meshes/error.h"
+#include "runtime/devices_command.h"
 #include "runtime/numbers.h"
 #include "runtime/play.h"
 #include "runtime/probe.h"
@@ -46,6 +47,7 @@ struct Arguments {
   std::string report;
   std::string surface;
   std::string contacts;
+  DevicesOptions devices;
 };
 
 void add_file(CLI::App& command, Arguments& arguments) {
@@ -88,6 +90,19 @@ CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
       "Example: palpate-runtime probe liver.palpate.hdf --at 0.1,0.05,0.12 --displace 0,0,-0.005 --field "
       "liver.vtu");
   return probe;
+}
+
+CLI::App* add_devices(CLI::App& app, Arguments& arguments) {
+  CLI::App* devices = app.add_subcommand("devices", "list the HID devices and the profiles that fit them");
+  devices->add_flag("--json", arguments.devices.json, "print JSON");
+  devices
+      ->add_option("--profile", arguments.devices.profile, "a profile of your own beside the built-in ones")
+      ->type_name("FILE.toml");
+  devices
+      ->add_option("--print-profile", arguments.devices.print_profile,
+                   "print a built-in profile, to copy and edit")
+      ->type_name("NAME");
+  return devices;
 }
 
 void add_tool(CLI::App& play, Arguments& arguments) {
@@ -328,9 +343,11 @@ int run(int argc, char** argv) {
   Arguments arguments;
   const CLI::App* probe_command = add_probe(app, arguments);
   const CLI::App* play_command = add_play(app, arguments);
+  const CLI::App* devices_command = add_devices(app, arguments);
   try {
     app.parse(argc, argv);
-    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe or play");
+    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe, play or devices");
+    if (devices_command->parsed()) return devices(arguments.devices);
     if (play_command->parsed()) return play(read_play(arguments));
     return probe(
         {.file = arguments.file,
