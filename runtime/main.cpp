@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "meshes/error.h"
+#include "runtime/devices_command.h"
 #include "runtime/numbers.h"
 #include "runtime/play_command.h"
 #include "runtime/probe.h"
@@ -28,6 +29,7 @@ struct Arguments {
   std::optional<std::string> overlay;
   std::string field;
   PlayArguments play;
+  DevicesOptions devices;
 };
 
 void add_file(CLI::App& command, Arguments& arguments) {
@@ -70,6 +72,19 @@ CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
       "Example: palpate-runtime probe liver.palpate.hdf --at 0.1,0.05,0.12 --displace 0,0,-0.005 --field "
       "liver.vtu");
   return probe;
+}
+
+CLI::App* add_devices(CLI::App& app, Arguments& arguments) {
+  CLI::App* devices = app.add_subcommand("devices", "list the HID devices and the profiles that fit them");
+  devices->add_flag("--json", arguments.devices.json, "print JSON");
+  devices
+      ->add_option("--profile", arguments.devices.profile, "a profile of your own beside the built-in ones")
+      ->type_name("FILE.toml");
+  devices
+      ->add_option("--print-profile", arguments.devices.print_profile,
+                   "print a built-in profile, to copy and edit")
+      ->type_name("NAME");
+  return devices;
 }
 
 std::vector<double> vector_argument(const std::string& option, const std::string& text) {
@@ -115,9 +130,11 @@ int run(int argc, char** argv) {
   Arguments arguments;
   const CLI::App* probe_command = add_probe(app, arguments);
   const CLI::App* play_command = add_play(app, arguments.play);
+  const CLI::App* devices_command = add_devices(app, arguments);
   try {
     app.parse(argc, argv);
-    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe or play");
+    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe, play or devices");
+    if (devices_command->parsed()) return devices(arguments.devices);
     if (play_command->parsed()) return play(read_play(arguments.play));
     return probe(
         {.file = arguments.file,

@@ -17,6 +17,7 @@
 #include "runtime/last_tick.h"
 #include "runtime/loading.h"
 #include "runtime/loop.h"
+#include "runtime/open_device.h"
 #include "runtime/output.h"
 #include "runtime/play_report.h"
 #include "runtime/real_time.h"
@@ -61,11 +62,7 @@ struct Mover {
   std::int64_t ticks = std::numeric_limits<std::int32_t>::max();
 };
 
-std::unique_ptr<DevicePort> make_port(const DeviceChoice& choice) {
-  throw Error("is not there yet", choice.text, "use script: or replay:");
-}
-
-Mover make_mover(const PlayOptions& options) {
+Mover make_mover(const PlayOptions& options, Guardian* guardian) {
   Mover mover;
   if (options.device.kind == DeviceChoice::Kind::script) {
     auto script = std::make_unique<ScriptDevice>(ScriptDevice::read(options.device.target));
@@ -79,7 +76,7 @@ Mover make_mover(const PlayOptions& options) {
   } else {
     const SafetyOptions safety = options.settings.safety.value_or(SafetyOptions{});
     auto link = std::make_unique<DeviceLink>(
-        make_port(options.device),
+        make_port(options.device, safety, guardian),
         DeviceLinkOptions{
             .max_force = safety.max_force, .max_force_rate = safety.max_force_rate, .stale = safety.stale});
     mover.link = link.get();
@@ -100,11 +97,11 @@ void wait_for(const DeviceLink& link, bool is_bridge) {
   while (!link.has_reported() && !stop_asked) {
     const auto waited = std::chrono::steady_clock::now() - start;
     if (!told && waited > 300ms) {
-      fmt::print(stderr, "waiting for {}\n", link.port().name());
+      fmt::print(stderr, "waiting for {}\n", link.name());
       told = true;
     }
     if (!is_bridge && waited > 5s) {
-      throw Error("it was opened but says nothing", link.port().name(),
+      throw Error("it was opened but says nothing", link.name(),
                   "plug it out and in again, see that it is calibrated and no other program uses it");
     }
     std::this_thread::sleep_for(5ms);
@@ -139,13 +136,13 @@ Settings settle(Settings settings, const DeviceLimits& limits, const Body& body)
   return settings;
 }
 
-void print_device(const DevicePort& port, const Settings& settings) {
+void print_device(const DeviceLink& link, const Settings& settings) {
   const Vec3& at = *settings.origin;
   fmt::print(
       stderr,
       "device: {}; its origin lies at ({:.4g}, {:.4g}, {:.4g}) m, axes along {}; motion x {:g}, force x "
       "{:g}; at most {:g} N and, by the coupling, {:g} N/m on the body's side\n",
-      port.name(), at.x(), at.y(), at.z(), settings.axes, settings.motion_scale, settings.force_scale,
+      link.name(), at.x(), at.y(), at.z(), settings.axes, settings.motion_scale, settings.force_scale,
       settings.safety->max_force, settings.tool.coupling_stiffness);
 }
 
@@ -166,17 +163,19 @@ void warn_of_other_model(const Recording& session, const Body& body) {
 }  // namespace
 
 int play(const PlayOptions& options) {
+  std::optional<Guardian> guardian;  // forks, so it comes before the first thread
+  if (options.device.kind == DeviceChoice::Kind::hid) guardian.emplace();
   stop_on_signals();
   if (options.processor) leave_to_the_loop(*options.processor);
-  const Mover mover = make_mover(options);
+  const Mover mover = make_mover(options, guardian ? &*guardian : nullptr);
   const Body body = load(options);
   if (options.session) warn_of_other_model(*options.session, body);
 
   Settings settings = options.settings;
   if (mover.link != nullptr) {
     wait_for(*mover.link, options.device.kind == DeviceChoice::Kind::bridge);
-    settings = settle(settings, mover.link->port().limits(), body);
-    print_device(mover.link->port(), settings);
+    settings = settle(settings, mover.link->limits(), body);
+    print_device(*mover.link, settings);
   }
   std::optional<Safety> safety;
   if (settings.safety) {

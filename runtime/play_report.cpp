@@ -178,8 +178,8 @@ std::string json_device(const PlayedRun& run) {
     json += fmt::format(
         ", \"description\": {}, \"reports\": {}, \"writes\": {}, \"worst_write_ns\": {}, "
         "\"writes_without_loop\": {}, \"opened_again\": {}",
-        json_string(run.link->port().name()), run.link->reports(), run.link->writes(),
-        run.link->worst_write(), run.link->extrapolated(), run.report.opened_again);
+        json_string(run.link->name()), run.link->reports(), run.link->writes(), run.link->worst_write(),
+        run.link->extrapolated(), run.report.opened_again);
   }
   return json + "}";
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <ctime>
 #include <exception>
 
@@ -32,9 +33,16 @@ DeviceLink::DeviceLink(std::unique_ptr<DevicePort> port, const DeviceLinkOptions
       stale_(options.stale),
       rate_(options.max_force_rate) {
   port_->open();
+  name_ = port_->name();
   sem_init(&is_shown_, 0, 0);
+  // A wait on the wire that a signal interrupts would be taken for a lost device.
+  sigset_t all;
+  sigset_t before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
   reader_ = std::thread([this] { read_reports(); });
   writer_ = std::thread([this] { write_commands(); });
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 DeviceLink::~DeviceLink() {

@@ -41,7 +41,8 @@ class DeviceLink : public Device {
   /// Whether the device has said anything yet, and what.
   [[nodiscard]] bool has_reported() const noexcept { return reports_ > 0; }
   [[nodiscard]] DeviceState first_report() const noexcept { return first_; }
-  [[nodiscard]] const DevicePort& port() const noexcept { return *port_; }
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }  ///< when it was opened first
+  [[nodiscard]] DeviceLimits limits() const { return port_->limits(); }
 
   DeviceNews hear(const TickTime& tick) noexcept override;
   void show(const DeviceCommand& command, const DeviceState& state) noexcept override;
@@ -69,6 +70,7 @@ class DeviceLink : public Device {
 
   std::unique_ptr<DevicePort> port_;
   DeviceLinkOptions options_;
+  std::string name_;
   DeviceState first_;
 
   // From the reader to the loop and the writer.
