@@ -64,7 +64,7 @@ class Loop {
       tick();
     }
     if (parts_.safety != nullptr) parts_.safety->shut_down();
-    parts_.device.show(DeviceCommand{}, news_.state);
+    parts_.device.show(DeviceCommand{}, news_.state, now());
     report_.interrupted = stop;
     return report_;
   }
@@ -89,7 +89,7 @@ class Loop {
     step(parts_.body, parts_.state, in_body_.pose);
     if (parts_.motion != nullptr) parts_.motion->post(parts_.state);
     guard();
-    parts_.device.show(shown_, news_.state);
+    parts_.device.show(shown_, news_.state, tick_.begun);
     const std::int64_t end = now();
 
     compute_ns_ = end - begin;

@@ -29,7 +29,7 @@ class ReplayDevice : public Device {
   }
 
   DeviceNews hear(const TickTime& tick) noexcept override;
-  void show(const DeviceCommand&, const DeviceState&) noexcept override {}
+  void show(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
 
  private:
   const Recording& session_;

@@ -36,7 +36,7 @@ class ScriptDevice : public Device {
 
   /// The pose at the tick's time, and the velocity from the tick before.
   DeviceNews hear(const TickTime& tick) noexcept override;
-  void show(const DeviceCommand&, const DeviceState&) noexcept override {}
+  void show(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
 
  private:
   struct Row {

@@ -149,7 +149,7 @@ TEST_F(Link, HandsReportsToTheLoopAndCommandsToTheDevice) {
 
   DeviceCommand command;
   command.wrench = {.force = {1, 2, 3}, .torque = {4, 5, 6}};
-  link->show(command, news.state);
+  link->show(command, news.state, now());
   wait_for([&] { return !wire_->trace().empty(); });
   const Written first = wire_->trace().front();
   EXPECT_EQ(first.command.wrench.force, Vec3(1, 2, 3));
@@ -180,7 +180,7 @@ TEST_F(Link, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
   wire_->say(at(moved, 1, velocity));
   wait_for([&] { return link->has_reported(); });
   const std::int64_t shown = now();
-  link->show(command, link->hear({}).state);
+  link->show(command, link->hear({}).state, shown);
   wait_for([&] {
     const auto trace = wire_->trace();
     return trace.size() > 20 && trace.back().command.wrench.force.isZero(0.0);
@@ -188,7 +188,6 @@ TEST_F(Link, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
   EXPECT_GT(link->extrapolated(), 10);
 
   const std::vector<Written> trace = wire_->trace();
-  EXPECT_EQ(trace.front().command.wrench.force, command.wrench.force);
   const Vec3 field = command.wrench.force - stiffness * moved - options.stale.damping * velocity;
   int followed = 0;
   for (std::size_t k = 1; k < trace.size(); ++k) {
@@ -196,9 +195,6 @@ TEST_F(Link, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
     const double latest = 1e-9 * static_cast<double>(trace[k].at - shown);
     const double whole = 1.0 - (latest - options.stale.time_to_live) / options.stale.fade;
     ASSERT_LE(force.norm(), field.norm() + 1e-12);
-    if (k > 1) {
-      ASSERT_LE(force.norm(), trace[k - 1].command.wrench.force.norm() + 1e-12) << "it grew";
-    }
     if (force.isApprox(field, 1e-12)) ++followed;
     // Whoever wakes late has more to take away: no moment may have more than its share. The write itself came
     // a little after the force was worked out.
@@ -210,6 +206,22 @@ TEST_F(Link, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
     EXPECT_GT(followed, 0) << "within its time to live the whole field is shown";
   }
   EXPECT_TRUE(trace.back().command.wrench.torque.isZero(0.0));
+}
+
+// What the loop worked out before it hung comes too late: it is the field of then, as far as that still
+// holds.
+TEST_F(Link, ShowsNoOldCommandAsIfItWereNew) {
+  const auto link = make();
+  wire_->say(at({0.0, 0.0, 0.0}, 1));
+  wait_for([&] { return link->has_reported(); });
+  const DeviceCommand command{.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}};
+  link->show(command, link->hear({}).state, now());
+  wait_for([&] { return !wire_->trace().empty() && wire_->trace().back().command.wrench.force.isZero(0.0); });
+  const std::size_t before = wire_->trace().size();
+  link->show(command, link->hear({}).state, now() - 60'000'000);
+  wait_for([&] { return wire_->trace().size() > before + 5; });
+  for (std::size_t k = before; k < wire_->trace().size(); ++k)
+    ASSERT_TRUE(wire_->trace()[k].command.wrench.force.isZero(0.0)) << "a kick";
 }
 
 TEST_F(Link, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
@@ -224,7 +236,7 @@ TEST_F(Link, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
   wire_->say(at({-0.009, 0.0, 0.0}, 1));  // where the field has 46 N
   wait_for([&] { return link->has_reported(); });
   const std::int64_t shown = now();
-  link->show(command, link->hear({}).state);
+  link->show(command, link->hear({}).state, shown);
   wait_for([&] { return link->extrapolated() > 25; });
   const std::vector<Written> trace = wire_->trace();
   for (std::size_t k = 1; k < trace.size(); ++k) {
@@ -249,7 +261,7 @@ TEST_F(Link, TellsOfALostDeviceAndOfItsReturn) {
   EXPECT_EQ(link->hear({}).events, DeviceEvent::none) << "told once";
   EXPECT_EQ(link->hear({}).state.pose.position.x(), 0.1) << "the last state stands";
   const std::size_t before = wire_->trace().size();
-  link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {});
+  link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());
   wire_->is_lost = false;
   wait_for([&] { return (events = link->hear({}).events) != DeviceEvent::none; });
   EXPECT_EQ(events, DeviceEvent::opened_again);
@@ -269,7 +281,7 @@ TEST_F(Link, ADeviceThatTakesNothingIsLost) {
   wait_for([&] { return link->has_reported(); });
   wire_->takes_nothing = true;
   wire_->refusals = 1000;
-  link->show({}, {});
+  link->show({}, {}, now());
   DeviceEvent events = DeviceEvent::none;
   wait_for([&] { return (events = link->hear({}).events) != DeviceEvent::none; });
   EXPECT_EQ(events, DeviceEvent::lost);
@@ -279,7 +291,7 @@ TEST_F(Link, ADeviceThatTakesNothingIsLost) {
 TEST_F(Link, ClosesTheDeviceAtItsEnd) {
   {
     const auto link = make();
-    link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {});
+    link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());
   }
   EXPECT_EQ(wire_->closed, 1);
   const std::size_t written = wire_->trace().size();

@@ -180,8 +180,14 @@ TEST(SilenceWatch, FadesThenIsSilent) {
   }
   watch.hear(report(7), 20 * ms_ns + 1, 0.0);
   EXPECT_TRUE(watch.silent());
-  EXPECT_TRUE(watch.hear(report(8), 21 * ms_ns, 0.0));
+  DeviceState late = report(8);
+  late.arrived = 15 * ms_ns;  // the loop was asleep when it came
+  EXPECT_TRUE(watch.hear(late, 21 * ms_ns, 0.0));
   EXPECT_FALSE(watch.silent());
+  EXPECT_NEAR(watch.share(), 14.0 / 15.0, 1e-12) << "silent for 6 ms";
+  DeviceState early = report(9);
+  early.arrived = 30 * ms_ns;  // while the tick was under way
+  EXPECT_TRUE(watch.hear(early, 22 * ms_ns, 0.0));
   EXPECT_EQ(watch.share(), 1.0);
 }
 

@@ -45,7 +45,7 @@ struct Bench {
   DeviceCommand tick() {
     now += ms_ns;
     if (talks) ++device.sequence;
-    device.arrived = now;
+    device.arrived = now + lateness;
     if (moves) device.pose.position.x() = 1e-6 * std::sin(static_cast<double>(device.sequence));
     if (solves) {
       solved = now;
@@ -263,6 +263,25 @@ TEST(Safety, AStallOfTheLoopFaultsAtOnce) {
   bench.lateness = 50 * ms_ns;
   expect_nothing(bench.tick());
   EXPECT_EQ(bench.safety.fault(), Fault::deadline_missed);
+}
+
+// While the loop hung the device let the force go: what comes after is not measured by what was before.
+TEST(Safety, AfterAGapForceGrowsFromWhatTheDeviceWasLeftWith) {
+  SafetyOptions options = quick();
+  options.deadline.tolerance = 10.0;  // that rule would take it all
+  options.max_force_rate = 100.0;
+  for (const double gap : {0.005, 0.015, 0.020, 0.028}) {
+    Bench bench(options);
+    bench.press(2.0);
+    bench.now += static_cast<std::int64_t>(1e9 * gap) - ms_ns;
+    const double left = std::clamp(1.0 - (gap - 0.010) / 0.020, 0.0, 1.0);
+    EXPECT_NEAR(force_of(bench.tick()), std::min(2.0, 2.0 * left + 0.1), 1e-3) << gap;
+  }
+  Bench bench(options);
+  bench.press(2.0);
+  bench.now += 100 * ms_ns;
+  for (int k = 0; k < 100; ++k) ASSERT_EQ(force_of(bench.tick()), 0.0) << "in contact it must not begin";
+  EXPECT_EQ(bench.safety.phase(), SafetyPhase::waiting);
 }
 
 TEST(Safety, AnOldSolutionIsExtrapolatedThenFadesThenBeginsAnew) {
@@ -527,6 +546,13 @@ class Chaos {
     }
     const double passed =
         std::clamp(1e-9 * (static_cast<double>(timing.now) - static_cast<double>(last_now_)), 0.0, 0.001);
+    // In a gap the device lets the force fade by itself.
+    const double gap =
+        std::max(0.0, 1e-9 * (static_cast<double>(timing.now) - static_cast<double>(last_now_)));
+    const StaleOptions stale;
+    const double left = std::clamp(1.0 - (gap - stale.time_to_live) / stale.fade, 0.0, 1.0);
+    before_.force *= left;
+    before_.torque *= left;
     last_now_ = timing.now;
     if (restarted) before_ = Wrench{};
     const double ramp = safety_.ramp();

@@ -23,7 +23,7 @@ class MadeUpDevice : public Device {
  public:
   explicit MadeUpDevice(std::function<DeviceNews(const TickTime&)> says) : says_(std::move(says)) {}
   DeviceNews hear(const TickTime& tick) noexcept override { return says_(tick); }
-  void show(const DeviceCommand& command, const DeviceState& state) noexcept override {
+  void show(const DeviceCommand& command, const DeviceState& state, std::int64_t) noexcept override {
     shown.push_back(command);
     answered.push_back(state.sequence);
   }

@@ -27,6 +27,9 @@ class RateClamp {
     return value_;
   }
 
+  /// What it follows had a share of the last value meanwhile.
+  void scale(double share) noexcept { value_ *= share; }
+
   void reset() noexcept { value_.setZero(); }
 
  private:

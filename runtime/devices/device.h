@@ -77,8 +77,8 @@ class Device {
   /// What is known of the device now; the same state as before when nothing new was heard.
   virtual DeviceNews hear(const TickTime& tick) noexcept = 0;
 
-  /// What it is to show, which follows from `state`.
-  virtual void show(const DeviceCommand& command, const DeviceState& state) noexcept = 0;
+  /// What it is to show, which follows from `state` in a tick that began at `begun`.
+  virtual void show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept = 0;
 };
 
 }  // namespace palpate

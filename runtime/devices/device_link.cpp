@@ -12,8 +12,8 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t patience = 2'000'000;  // ns without a new command, then the writer goes on by itself
-constexpr std::int64_t wait = 1'000'000;      // ns, for a new command
+constexpr std::int64_t patience = 2'000'000;            // ns that a command may be old
+constexpr std::int64_t wait = 1'000'000;                // ns, for a new command
 constexpr auto retry = std::chrono::milliseconds(250);  // between attempts to open a lost device
 
 std::int64_t now() noexcept {
@@ -65,8 +65,8 @@ DeviceNews DeviceLink::hear(const TickTime&) noexcept {
   return news;
 }
 
-void DeviceLink::show(const DeviceCommand& command, const DeviceState& state) noexcept {
-  shown_.next() = {.command = command, .state = state, .at = now()};
+void DeviceLink::show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept {
+  shown_.next() = {.command = command, .state = state, .begun = begun};
   shown_.publish();
   sem_post(&is_shown_);
 }
@@ -133,28 +133,28 @@ void DeviceLink::write_commands() noexcept {
     }
     const Shown& shown = shown_.read();
     const std::int64_t begin = now();
-    const double elapsed = seconds_between(last_write, begin);
-    if (shown.at != last_shown) {
+    const bool is_old = begin - shown.begun > patience;
+    if (shown.begun == 0 || (shown.begun == last_shown && !is_old)) continue;
+    if (is_old) {
+      const DeviceState& state = heard_by_writer_.read();
+      write(extrapolate(shown, state, begin, seconds_between(last_write, begin)), state);
+      ++extrapolated_;
+    } else {
       stale_.reset();
       constexpr double at_once = 1e9;  // safety has bounded its rate already
       rate_.follow(shown.command.wrench.force, at_once);
       write(shown.command, shown.state);
-    } else if (shown.at != 0 && begin - shown.at > patience) {
-      const DeviceState& state = heard_by_writer_.read();
-      write(extrapolate(shown, state, begin, elapsed), state);
-      ++extrapolated_;
-    } else {
-      continue;
     }
-    last_shown = shown.at;
+    last_shown = shown.begun;
     last_write = begin;
   }
 }
 
 DeviceCommand DeviceLink::extrapolate(const Shown& shown, const DeviceState& state, std::int64_t now,
                                       double elapsed) noexcept {
-  const Vec3 field = stale_.force(shown.command, state.pose.position, state.velocity,
-                                  seconds_between(shown.at, now), elapsed);
+  Vec3 field = stale_.force(shown.command, state.pose.position, state.velocity,
+                            seconds_between(shown.begun, now), elapsed);
+  if (shown.command.wrench.force.isZero(0.0)) field.setZero();  // nor damping, where nothing was to be felt
   DeviceCommand command;
   command.wrench.force = rate_.follow(clamped(stale_.share() * field, options_.max_force), elapsed);
   command.wrench.torque = stale_.share() * shown.command.wrench.torque;

@@ -25,8 +25,8 @@ struct DeviceLinkOptions {
 };
 
 /// A device with a reader and a writer thread. The reader hands over the latest report, and opens the device
-/// again when it was lost and is back. The writer writes what the loop shows as soon as it is there. When the
-/// loop gives nothing new for 2 ms (it may hang), the writer goes on by itself: the last solution as a
+/// again when it was lost and is back. The writer writes what the loop shows as soon as it is there. When
+/// that is older than 2 ms (the loop may hang), the writer goes on by itself: the last solution as a
 /// field, force - K (x - point) - b v at where the device is now, within its radius and time to live, then it
 /// fades; it never holds a force. Both threads ask for real-time scheduling, a little below the loop's.
 class DeviceLink : public Device {
@@ -45,7 +45,7 @@ class DeviceLink : public Device {
   [[nodiscard]] DeviceLimits limits() const { return port_->limits(); }
 
   DeviceNews hear(const TickTime& tick) noexcept override;
-  void show(const DeviceCommand& command, const DeviceState& state) noexcept override;
+  void show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override;
 
   [[nodiscard]] std::int64_t reports() const noexcept { return reports_; }            ///< heard so far
   [[nodiscard]] std::int64_t writes() const noexcept { return writes_; }              ///< done so far
@@ -57,7 +57,7 @@ class DeviceLink : public Device {
   struct Shown {
     DeviceCommand command;
     DeviceState state;
-    std::int64_t at = 0;  // when [ns]
+    std::int64_t begun = 0;  // the tick [ns]
   };
 
   void read_reports() noexcept;

@@ -120,13 +120,10 @@ DeviceCommand Safety::nothing() noexcept {
 
 DeviceCommand Safety::pass(const TickTiming& timing, double elapsed) noexcept {
   const double time = std::min(elapsed, options_.period);  // no leap after a gap
+  bridge_gap(elapsed);
   const Vec3 field = stale_.force(solution_, device_.pose.position, device_.velocity,
                                   std::max(0.0, seconds_between(solved_, timing.now)), elapsed);
-  if (stale_.share() <= 0.0) {
-    gate_.close();
-    ramp_.restart();
-    passivity_.reset();
-  }
+  if (stale_.share() <= 0.0) begin_anew();
   share_ = 0.0;
   if (gate_.pass(field.norm(), timing.inside_body, time))
     share_ = ramp_.advance(time) * deadline_.share() * silence_.share() * stale_.share() * buzz_.share();
@@ -142,6 +139,23 @@ DeviceCommand Safety::pass(const TickTiming& timing, double elapsed) noexcept {
       torque_rate_.follow(clamped(share_ * solution_.wrench.torque, options_.max_torque), time);
   command.local = local_model(scaled, share_);
   return command;
+}
+
+/// After a gap between ticks: the device has gone on by itself and let the force fade, as a stale solution.
+void Safety::bridge_gap(double elapsed) noexcept {
+  const double past = (elapsed - options_.stale.time_to_live) / options_.stale.fade;
+  if (past <= 0.0) return;
+  const double left = std::max(0.0, 1.0 - past);
+  force_rate_.scale(left);
+  torque_rate_.scale(left);
+  if (left <= 0.0) begin_anew();
+}
+
+/// Out of contact, with the ramp.
+void Safety::begin_anew() noexcept {
+  gate_.close();
+  ramp_.restart();
+  passivity_.reset();
 }
 
 LocalModel Safety::local_model(const Vec3& wanted, double share) const noexcept {

@@ -64,8 +64,9 @@ struct TickTiming {
 ///
 /// Whatever comes in: all that comes out is finite, |F| <= max_force, |T| <= max_torque, and from tick to
 /// tick |dF| <= max_force_rate times the shorter of the time that passed and the period - but where a fault,
-/// restart or shut_down makes the force zero, which is at once. No memory, lock or system call; copies are
-/// whole.
+/// restart or shut_down makes the force zero, which is at once, and after a gap between ticks, in which the
+/// device itself let the force fade as a stale solution: there dF is from what that left. No memory, lock or
+/// system call; copies are whole.
 class Safety {
  public:
   /// Throws Error for options that are negative or not a number, or a period of 0.
@@ -102,6 +103,8 @@ class Safety {
   void look_for_faults() noexcept;
   DeviceCommand nothing() noexcept;
   DeviceCommand pass(const TickTiming& timing, double elapsed) noexcept;
+  void bridge_gap(double elapsed) noexcept;
+  void begin_anew() noexcept;
   LocalModel local_model(const Vec3& wanted, double share) const noexcept;
 
   SafetyOptions options_;  // with the device's limits

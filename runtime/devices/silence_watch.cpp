@@ -28,7 +28,7 @@ bool SilenceWatch::hear(const DeviceState& device, std::int64_t now, double show
   const bool is_new = is_plausible(device) && (!heard_anything_ || is_ahead(device.sequence, last_.sequence));
   const bool is_same = heard_anything_ && same_numbers(device, last_);
   if (is_new) {
-    heard_ = now;
+    heard_ = device.arrived;
     heard_anything_ = true;
     last_ = device;
   }
