@@ -283,6 +283,29 @@ TEST(BridgeDatagram, GarbageDoesNotGetThrough) {
   EXPECT_GT(taken, 10'000);
 }
 
+TEST(BridgeDatagram, ExampleShowsNoGarbage) {
+  std::mt19937 random(8);
+  int taken = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    bridge_session session{0x0102030405060708U, 0, 0};
+    bridge_command command{};
+    const Bytes any = random_bytes(random, random() % 200);
+    EXPECT_FALSE(bridge_decode_command(any.data(), static_cast<long>(any.size()), &session, &command));
+    Bytes changed = command_by_hand;
+    for (auto k = random() % 6; k > 0; --k) {
+      changed[8 + random() % 152] = static_cast<std::uint8_t>(random());
+    }
+    if (!bridge_decode_command(changed.data(), static_cast<long>(changed.size()), &session, &command))
+      continue;
+    ++taken;
+    const Vec3 x(0.5, 0.1, 1), v(1, 0, -1);
+    Vec3 force;
+    bridge_force(&command, x.data(), v.data(), 0.015, 8.0, force.data());
+    EXPECT_LE(force.norm(), 8.0 + 1e-9);
+  }
+  EXPECT_GT(taken, 10'000);
+}
+
 constexpr std::uint64_t ms = 1'000'000;  // ns
 
 TEST(BridgeOrder, NumbersMustGoOn) {

@@ -91,6 +91,31 @@ TEST(BridgeForce, NoMoreThanBothMayShow) {
   expect(1, 1.5, 1);
 }
 
+TEST(BridgeForce, TorqueFadesAndIsClamped) {
+  bridge_command command = local_model();
+  command.torque[0] = 0.3;
+  command.torque[2] = -0.4;
+  const auto torque = [&](double age, double most) {
+    Vec3 result;
+    bridge_torque(&command, age, most, result.data());
+    return result;
+  };
+  EXPECT_EQ(torque(0.01, 0.0), Vec3(0.3, 0, -0.4));
+  EXPECT_LT((torque(0.02, 0.0) - Vec3(0.15, 0, -0.2)).norm(), 1e-15);
+  EXPECT_LT((torque(0.01, 0.1) - Vec3(0.06, 0, -0.08)).norm(), 1e-15);
+  EXPECT_EQ(torque(0.04, 0.1), Vec3::Zero());
+  command.torque[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(torque(0.01, 0.1), Vec3::Zero());
+}
+
+TEST(BridgeForce, NoRadiusTheForceAtThePoint) {
+  bridge_command command = local_model();
+  for (const double radius : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    command.radius = radius;
+    EXPECT_EQ(shown(command, point + Vec3(0.1, 0, 0), Vec3::Zero(), 0.0), force_at_point);
+  }
+}
+
 TEST(BridgeForce, NoNumbersNoForce) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(shown(local_model(), Vec3(nan, 0, 0), Vec3::Zero(), 0.0), Vec3::Zero());

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -329,6 +330,7 @@ TEST_F(BridgePortTest, TheNextOneTakesOverAfterSilence) {
   }
   EXPECT_EQ(heard, Heard::lost);
   EXPECT_GE(Clock::now() - silent_since, std::chrono::milliseconds(900));
+  EXPECT_LE(Clock::now() - silent_since, std::chrono::seconds(6));
   EXPECT_GE(port.counts()[Refusal::address], 1U);
   EXPECT_FALSE(second.told()) << "it was answered while the first one was there";
   join(second);
@@ -462,12 +464,39 @@ TEST_F(BridgePortTest, CloseSaysNoForceThreeTimes) {
   port.close();
 }
 
+TEST_F(BridgePortTest, OneThreadReadsAnotherWrites) {
+  Partner partner(port.port());
+  join(partner);
+  std::atomic<bool> done = false;
+  std::thread writer([&] {
+    DeviceCommand command;
+    command.wrench.force.z() = 1.0;
+    while (!done) EXPECT_TRUE(port.write(command, {}));
+  });
+  BridgeState said;
+  for (int k = 1; k <= 2000; ++k) {
+    said.limits.max_force = k;
+    partner.say(said);
+    port.read(state);
+    EXPECT_LE(port.limits().max_force, k);
+  }
+  done = true;
+  writer.join();
+  EXPECT_EQ(port.counts()[Refusal::none], 2001U);
+  EXPECT_EQ(port.limits().max_force, 2000.0);
+  std::uint64_t told = 0;
+  while (partner.told()) ++told;
+  EXPECT_GT(told, 0U);
+  EXPECT_LE(told, port.counts().commands);
+}
+
 /// palpate-bridge-example, until destroyed.
 class Example {
  public:
   explicit Example(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), PALPATE_BINARY_DIR "/runtime/palpate-bridge-example");
     std::vector<char*> pointers;
+    pointers.reserve(arguments.size() + 1);
     for (std::string& argument : arguments) pointers.push_back(argument.data());
     pointers.push_back(nullptr);
     EXPECT_EQ(posix_spawn(&process_, pointers[0], nullptr, nullptr, pointers.data(), environ), 0);

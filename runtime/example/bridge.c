@@ -1,7 +1,7 @@
 /* A device behind a bridge: this process has the device, palpate-runtime the body; they speak by UDP over
  * loopback. As it stands the device is a simulated hand, a mass that a spring and a damper draw to a target.
- * For yours replace the four device_ functions by calls of your SDK, or call bridge_cycle from
- * its servo callback: README, "Your device behind a bridge". Build: cc bridge.c -lm -o bridge
+ * For yours replace the four device_ functions by calls of your SDK, and where it calls you a thousand times
+ * a second, let it call bridge_cycle: README, "Your device behind a bridge". Build: cc bridge.c -lm -o bridge
  * Usage: bridge [--address 127.0.0.1] [--port 4270] [--rate 1000 Hz] [--seconds 10] [--from X,Y,Z m]
  *               [--to X,Y,Z m] [--period 0 s]: the target goes there and back once a period; 0: it stays. */
 #define _POSIX_C_SOURCE 200809L
@@ -81,9 +81,10 @@ static void bridge_cycle(struct bridge_reading* reading, double force[3]) {
     arrived = seconds_now();
     ++commands;
   }
-  const double age = seconds_now() - arrived, share = bridge_share(&command, age);
-  const double torque[3] = {share * command.torque[0], share * command.torque[1], share * command.torque[2]};
+  const double age = seconds_now() - arrived;
+  double torque[3];
   bridge_force(&command, reading->x, reading->v, age, reading->limits[0], force);
+  bridge_torque(&command, age, reading->limits[1], torque);
   device_show(force, torque);
 }
 

@@ -28,31 +28,38 @@ static inline double bridge_share(const struct bridge_command* command, double a
   return late <= 0.0 ? 1.0 : 1.0 - late / command->fade;
 }
 
+/* No longer than `most` (0: not said), and nothing where it is no number. */
+static inline void bridge_clamp(double vector[3], double most) {
+  const double length = sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+  const double share = most > 0.0 && length > most ? most / length : 1.0;
+  for (int k = 0; k < 3; ++k) vector[k] = isfinite(length) ? share * vector[k] : 0.0;
+}
+
 /* The force on the hand at x [m] that moves with v [m/s]: F - K (x - x0) - b v, where x is farther than the
- * radius from x0 with x - x0 cut to it; F alone where there is no model. Never more than the command's and
- * the device's largest force (0: not said), and nothing where it is no number. */
+ * radius from x0 with x - x0 cut to it; F alone where there is no model. */
 static inline void bridge_force(const struct bridge_command* command, const double x[3], const double v[3],
                                 double age, double device_max_force, double force[3]) {
   const double* K = command->stiffness;
   const double share = bridge_share(command, age);
-  double d[3] = {0.0, 0.0, 0.0}, b = 0.0, cut = 1.0, length;
-  int k;
+  double d[3] = {0.0, 0.0, 0.0}, b = 0.0;
   if (command->mode == BRIDGE_LOCAL_MODEL) {
     b = command->damping;
-    for (k = 0; k < 3; ++k) d[k] = x[k] - command->point[k];
-    length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-    if (length > command->radius) cut = command->radius / length;
+    for (int k = 0; k < 3; ++k) d[k] = x[k] - command->point[k];
+    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), radius = fmax(command->radius, 0.0);
+    for (int k = 0; k < 3; ++k) d[k] *= length > radius ? radius / length : 1.0;
   }
-  force[0] = command->force[0] - cut * (K[0] * d[0] + K[3] * d[1] + K[5] * d[2]) - b * v[0];
-  force[1] = command->force[1] - cut * (K[3] * d[0] + K[1] * d[1] + K[4] * d[2]) - b * v[1];
-  force[2] = command->force[2] - cut * (K[5] * d[0] + K[4] * d[1] + K[2] * d[2]) - b * v[2];
-  for (k = 0; k < 3; ++k) force[k] *= share;
+  force[0] = share * (command->force[0] - (K[0] * d[0] + K[3] * d[1] + K[5] * d[2]) - b * v[0]);
+  force[1] = share * (command->force[1] - (K[3] * d[0] + K[1] * d[1] + K[4] * d[2]) - b * v[1]);
+  force[2] = share * (command->force[2] - (K[5] * d[0] + K[4] * d[1] + K[2] * d[2]) - b * v[2]);
+  bridge_clamp(force, command->max_force);
+  bridge_clamp(force, device_max_force);
+}
 
-  length = sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
-  cut = 1.0;
-  if (command->max_force > 0.0 && length > command->max_force) cut = command->max_force / length;
-  if (device_max_force > 0.0 && cut * length > device_max_force) cut = device_max_force / length;
-  for (k = 0; k < 3; ++k) force[k] = isfinite(length) ? cut * force[k] : 0.0;
+/* The torque on the hand [N m]. */
+static inline void bridge_torque(const struct bridge_command* command, double age, double device_max_torque,
+                                 double torque[3]) {
+  for (int k = 0; k < 3; ++k) torque[k] = bridge_share(command, age) * command->torque[k];
+  bridge_clamp(torque, device_max_torque);
 }
 
 #endif
