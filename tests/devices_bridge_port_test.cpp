@@ -480,6 +480,7 @@ TEST_F(BridgePortTest, OneThreadReadsAnotherWrites) {
     port.read(state);
     EXPECT_LE(port.limits().max_force, k);
   }
+  while (port.counts().commands < 10) std::this_thread::yield();  // until the writer had its turn
   done = true;
   writer.join();
   EXPECT_EQ(port.counts()[Refusal::none], 2001U);
