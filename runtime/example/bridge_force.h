@@ -1,0 +1,65 @@
+/* What a device shows of a command, at its own rate. C99 and C++; SI units. */
+#ifndef PALPATE_BRIDGE_FORCE_H
+#define PALPATE_BRIDGE_FORCE_H
+
+#include <math.h>
+#include <stdint.h>
+
+enum { BRIDGE_ZERO = 0, BRIDGE_FORCE = 1, BRIDGE_LOCAL_MODEL = 2 };
+
+/* A command as its datagram says it. */
+struct bridge_command {
+  uint32_t mode;
+  double damping;      /* b [N s/m] */
+  double force[3];     /* F, on the hand with the device at `point` [N] */
+  double point[3];     /* x0 [m] */
+  double torque[3];    /* T, on the hand [N m] */
+  double stiffness[6]; /* K: xx, yy, zz, xy, yz, zx [N/m] */
+  double radius;       /* of what the model knows about x0 [m] */
+  double time_to_live; /* [s] */
+  double fade;         /* [s] */
+  double max_force;    /* 0: not said [N] */
+};
+
+/* What is left of a command `age` after it arrived: all for its time to live, then less and less. */
+static inline double bridge_share(const struct bridge_command* command, double age) {
+  const double late = age - command->time_to_live;
+  if (command->mode == BRIDGE_ZERO || !(late < command->fade || late <= 0.0)) return 0.0;
+  return late <= 0.0 ? 1.0 : 1.0 - late / command->fade;
+}
+
+/* No longer than `most` (0: not said), and nothing where it is no number. */
+static inline void bridge_clamp(double vector[3], double most) {
+  const double length = sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+  const double share = most > 0.0 && length > most ? most / length : 1.0;
+  for (int k = 0; k < 3; ++k) vector[k] = isfinite(length) ? share * vector[k] : 0.0;
+}
+
+/* The force on the hand at x [m] that moves with v [m/s]: F - K (x - x0) - b v, where x is farther than the
+ * radius from x0 with x - x0 cut to it; F alone where there is no model. */
+static inline void bridge_force(const struct bridge_command* command, const double x[3], const double v[3],
+                                double age, double device_max_force, double force[3]) {
+  const double* K = command->stiffness;
+  const double share = bridge_share(command, age);
+  double d[3] = {0.0, 0.0, 0.0}, b = 0.0;
+  if (command->mode == BRIDGE_LOCAL_MODEL) {
+    b = command->damping;
+    for (int k = 0; k < 3; ++k) d[k] = x[k] - command->point[k];
+    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), radius = fmax(command->radius, 0.0);
+    for (int k = 0; k < 3; ++k) d[k] *= length > radius ? radius / length : 1.0;
+  }
+  force[0] = share * (command->force[0] - (K[0] * d[0] + K[3] * d[1] + K[5] * d[2]) - b * v[0]);
+  force[1] = share * (command->force[1] - (K[3] * d[0] + K[1] * d[1] + K[4] * d[2]) - b * v[1]);
+  force[2] = share * (command->force[2] - (K[5] * d[0] + K[4] * d[1] + K[2] * d[2]) - b * v[2]);
+  bridge_clamp(force, command->max_force);
+  bridge_clamp(force, device_max_force);
+}
+
+/* The torque on the hand [N m]. */
+static inline void bridge_torque(const struct bridge_command* command, double age, double device_max_torque,
+                                 double torque[3]) {
+  for (int k = 0; k < 3; ++k) torque[k] = bridge_share(command, age) * command->torque[k];
+  bridge_clamp(torque, device_max_torque);
+}
+
+#endif
