@@ -1,0 +1,275 @@
+"""A hand in the loop: another process as the device, what it feels, sessions that are replayed, killed and refused."""
+
+import json
+import os
+import pathlib
+import signal
+import socket
+import struct
+import subprocess
+import time
+import unittest
+
+import h5py
+import numpy
+
+from programs import BINARY, RUNTIME, ProgramTest, cube_toml, run
+
+BRIDGE = BINARY / "runtime" / "palpate-bridge-example"
+SPRING = 300.0  # of the example's hand [N/m]
+# A cube of 10 cm, as stiff as a soft organ: at its top's middle some 80 N/m to a ball.
+SMALL_CUBE = cube_toml(4).replace("size = [1, 1, 1]", "size = [0.1, 0.1, 0.1]").replace("youngs_modulus = 1.0", "youngs_modulus = 3000")
+# This machine may be busy: late ticks and reports have their own tests.
+PATIENT = "late=10,most_late=1e9,silence=5,silence_fade=4,ramp=0.2,buzz_flips=1000"
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Felt(ProgramTest):
+    """The bridge's example is the hand: it presses on the cube from above."""
+
+    def setUp(self):
+        super().setUp()
+        self.file = self.bake(SMALL_CUBE)
+        self.port = free_port()
+
+    def start(self, program, *arguments):
+        process = subprocess.Popen([str(program), *map(str, arguments)], cwd=self.folder, stdin=subprocess.PIPE,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.stderr.close)
+        self.addCleanup(process.stdin.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def play(self, *arguments):
+        return self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--tool", "sphere:0.01", "--origin",
+                          "0.05,0.05,0.12", "--safety", PATIENT, "--record", "session.h5", "--report", "report.json", *arguments)
+
+    def hand(self, seconds, depth, period=0.0, start=0.0):
+        return self.start(BRIDGE, "--port", self.port, "--seconds", seconds, "--rate", 1000, "--from", f"0,0,{start}", "--to",
+                          f"0,0,{-depth}", "--period", period)
+
+    def finish(self, process, code=0):
+        _, messages = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, code, messages)
+        return messages
+
+    def test_the_hand_rests_where_its_spring_and_the_body_balance(self):
+        """Half a period of 8 s in: the target is 20 mm below touch. Hand and body share it by their stiffnesses."""
+        runtime = self.play("--duration", "4")
+        self.hand(60, 0.03, 8)
+        messages = self.finish(runtime)
+        self.assertIn(f"device: bridge:127.0.0.1:{self.port}", messages)
+        report = json.loads((self.folder / "report.json").read_text())
+        self.assertEqual(report["ticks"], 4000)
+        self.assertGreater(report["ticks_in_contact"], 1000)
+        self.assertEqual(sum(report["safety"]["faults"].values()), 0)
+        with h5py.File(self.folder / "session.h5") as session:
+            ticks = session["ticks"]
+            end = slice(3800, 4000)
+            z, force = ticks["handle_position"][end, 2], ticks["shown_force"][end, 2]
+            shown, computed = ticks["shown_force"][end], ticks["force"][end]
+            t = ticks["arrived_ns"][end] * 1e-9
+        numpy.testing.assert_allclose(shown, -computed, rtol=1e-9, atol=1e-9)
+        self.assertGreater(force.min(), 0.3)
+        # The target of the hand began its way when the bridge was started, a little before the loop: its spring's force
+        # is the shown one, but for damper and mass, which a slow hand hardly feels.
+        def target(t, offset):
+            return -0.03 * (0.5 - 0.5 * numpy.cos(2 * numpy.pi * (t + offset) / 8))
+        offsets = numpy.linspace(-1, 2, 3001)
+        errors = [numpy.abs(SPRING * (target(t, offset) - z) + force).max() for offset in offsets]
+        self.assertLess(min(errors), 0.05 * force.max())
+
+    def test_a_killed_session_opens_and_its_replay_is_the_same_bit_by_bit(self):
+        runtime = self.play("--overlay", "r=2,rings=1")
+        self.hand(60, 0.03, 1.5)
+        deadline = time.monotonic() + 60
+        parts = self.folder / "session.h5.parts"
+        while time.monotonic() < deadline and len(list(parts.glob("ticks*"))) < 7:
+            time.sleep(0.05)
+        started = time.monotonic()
+        runtime.send_signal(signal.SIGKILL)
+        runtime.wait()
+        self.assertLess(time.monotonic() - started, 5)
+        with h5py.File(self.folder / "session.h5") as session:
+            force = session["ticks/force"][:]
+        self.assertGreaterEqual(len(force), 3000)
+        self.assertGreater(numpy.abs(force).max(), 0.1)
+        replay = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--record", "again.h5", cwd=self.folder)
+        self.assertEqual(replay.returncode, 0, replay.stderr)
+        report = json.loads(replay.stdout)
+        self.assertEqual((report["replay"]["ticks"], report["replay"]["different_ticks"]), (len(force), 0), replay.stderr)
+        with h5py.File(self.folder / "again.h5") as again:
+            numpy.testing.assert_array_equal(again["ticks/force"][:], force)
+        # It is a comparison: with another tool it is another session.
+        other = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--tool", "sphere:0.012", cwd=self.folder)
+        self.assertEqual(other.returncode, 3, other.stderr)
+        self.assertGreater(json.loads(other.stdout)["replay"]["different_ticks"], 100)
+
+    def test_a_bridge_that_goes_is_a_fault_and_may_come_back(self):
+        runtime = self.play("--duration", "9")
+        first = self.hand(60, 0.03, 1.0)
+        while not (self.folder / "session.h5.parts").exists():
+            time.sleep(0.05)
+        time.sleep(1.5)
+        first.kill()
+        first.wait()
+        time.sleep(2.0)
+        self.hand(60, 0.03, 1.0)
+        messages = self.finish(runtime)
+        self.assertIn("device_lost", messages)
+        self.assertIn("the device is back", messages)
+        report = json.loads((self.folder / "report.json").read_text())
+        self.assertEqual(report["device"]["opened_again"], 1)
+        with h5py.File(self.folder / "session.h5") as session:
+            shown = numpy.linalg.norm(session["ticks/shown_force"][:], axis=1)
+            fault = session["ticks/fault"][:]
+        gone, = numpy.nonzero(fault)
+        self.assertEqual(shown[gone].max(), 0)
+        self.assertGreater(shown[: gone[0]].max(), 0.1)
+        self.assertGreater(shown[gone[-1]:].max(), 0.1, "force has begun again")
+
+    def test_a_fault_is_latched_until_enter(self):
+        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--origin", "0.05,0.05,0.12", "--safety",
+                             PATIENT + ",max_speed=0.1", "--duration", "6", "--record", "session.h5", "--report", "report.json")
+        self.hand(60, 0.0, 2.0, 0.15)  # 0.24 m/s at most, at half a second: free space all the way
+        while not (self.folder / "session.h5.parts").exists():
+            time.sleep(0.05)
+        time.sleep(3.0)
+        runtime.stdin.write("\n")
+        runtime.stdin.flush()
+        messages = self.finish(runtime)
+        self.assertIn("no force, too_fast: the handle moved faster than max_speed. Press Enter to go on.", messages)
+        self.assertIn("acknowledged; force begins again out of contact", messages)
+        with h5py.File(self.folder / "session.h5") as session:
+            fault, event = session["ticks/fault"][:], session["ticks/event"][:]
+        acknowledged, = numpy.nonzero(event & 4)
+        self.assertEqual(len(acknowledged), 1)
+        self.assertEqual(fault[acknowledged[0] - 1], 1)
+        self.assertEqual(fault[acknowledged[0]], 0)
+
+    def test_signals_leave_no_force_and_a_whole_session(self):
+        for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hand:
+                hand.settimeout(20)
+                runtime = self.play()
+                state = struct.Struct("<4sHHQIIQ3d3d4f f 5f 8x")
+                nonce, last = 0, b""
+                for k in range(1, 100000):
+                    z = -min(0.02, 2e-5 * k)
+                    hand.sendto(state.pack(b"PLPS", 1, 128, nonce, k, 1 << 16, time.monotonic_ns(), 0, 0, z + 1e-6 * (k % 5), 0, 0, 0,
+                                           1, 0, 0, 0, 0, 0, 0, 0, 0, 0), ("127.0.0.1", self.port))
+                    time.sleep(0.001)
+                    hand.setblocking(False)
+                    try:
+                        while True:
+                            last = hand.recv(256)
+                    except OSError:
+                        pass
+                    if last:
+                        nonce = struct.unpack_from("<Q", last, 8)[0]
+                        if struct.unpack_from("<d", last, 56)[0] > 0.2:
+                            break
+                self.assertGreater(struct.unpack_from("<d", last, 56)[0], 0.2, "it was felt")
+                runtime.send_signal(stop)
+                self.finish(runtime, 130)
+                try:
+                    while True:
+                        last = hand.recv(256)
+                except OSError:
+                    pass
+                self.assertEqual(struct.unpack_from("<I", last, 32)[0], 0, "the last word is no force")
+            with h5py.File(self.folder / "session.h5") as session:
+                self.assertGreater(len(session["ticks/time"]), 100)
+
+
+class Choice(ProgramTest):
+    """What is said about devices that are not there, or cannot be what they should be."""
+
+    def test_wrong_choices(self):
+        file = self.bake(cube_toml(2))
+        script = self.write("a.csv", "t,x,y,z\n0,0,0,2\n0.01,0,0,2\n")
+        for arguments, pieces in (
+                (("--device", "mouse-trap"), ("is none of script:FILE.csv, replay:SESSION.h5, hid[:WHICH]",)),
+                (("--device", "script:"), ("is none of",)),
+                (("--device", "hid", "--fast"), ("--fast", "a hand cannot be run ahead of")),
+                (("--device", f"script:{script}", "--profile", "polhem_v1"), ("--profile", "--device hid")),
+                (("--device", f"script:{script}", "--axes", "x,y,-z"), ("--axes", "mirror image")),
+                (("--device", f"script:{script}", "--origin", "1,2,nan"), ("--origin", "not finite numbers")),
+                (("--device", f"script:{script}", "--motion-scale", "0"), ("--motion-scale", "not a positive number")),
+                (("--device", f"script:{script}", "--safety", "max_farce=3"), ("--safety", "no safety option 'max_farce'")),
+                (("--device", f"script:{script}", "--rate", "999"), ("--rate", "from 1000 to 5000")),
+                (("--device", f"script:{script}", "--cpu", "one"), ("--cpu", "not the number of a processor")),
+        ):
+            result = run(RUNTIME, "play", file, *arguments, cwd=self.folder)
+            self.assertEqual(result.returncode, 2, f"{arguments}: {result.stderr}")
+            for piece in pieces:
+                self.assertIn(piece, result.stderr)
+        for device, pieces in (("replay:none.h5", ("none.h5",)), (f"replay:{file}", ("is not a recording",)),
+                               ("bridge:70000", ("70000",)), ("bridge:1.2.3.4:4270", ("1.2.3.4",))):
+            self.assert_refused(run(RUNTIME, "play", file, "--device", device, cwd=self.folder), *pieces)
+        self.assert_refused(run(RUNTIME, "play", file, "--device", f"script:{script}", "--cpu", "4000", cwd=self.folder),
+                            "--cpu", "processor 4000")
+
+    @unittest.skipIf(any(pathlib.Path("/sys/class/hidraw").glob("*")), "there are HID devices")
+    def test_no_device(self):
+        file = self.bake(cube_toml(2))
+        self.assert_refused(run(RUNTIME, "play", file, "--device", "hid", cwd=self.folder), "no HID device is attached", "/dev/hidraw")
+        listed = run(RUNTIME, "devices")
+        self.assertEqual(listed.returncode, 0)
+        self.assertIn("No HID device is attached", listed.stdout)
+
+    def test_two_runtimes_on_one_port(self):
+        file = self.bake(cube_toml(2))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+            taken.bind(("127.0.0.1", 0))
+            port = taken.getsockname()[1]
+            self.assert_refused(run(RUNTIME, "play", file, "--device", f"bridge:{port}", cwd=self.folder), str(port))
+
+
+class Scripted(ProgramTest):
+    """Safety, workspace and rate for a script, in which no hand is."""
+
+    def test_a_faster_loop_finds_the_same_forces(self):
+        file = self.bake(SMALL_CUBE)
+        script = self.write("press.csv", "t,x,y,z\n0,0.05,0.05,0.12\n0.2,0.05,0.05,0.1\n0.3,0.05,0.05,0.1\n")
+        forces = {}
+        for rate in (1000, 5000):
+            result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--rate", rate, "--fast",
+                         "--record", f"{rate}.h5", cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with h5py.File(self.folder / f"{rate}.h5") as session:
+                self.assertEqual(session.attrs["rate"], rate)
+                self.assertEqual(len(session["ticks/time"]), 3 * rate // 10 + 1)
+                forces[rate] = session["ticks/force"][:: rate // 1000]
+        self.assertGreater(numpy.abs(forces[1000]).max(), 0.3)
+        # The path is the same, so it differs by what a tick's motion is in the contact's linearisation.
+        numpy.testing.assert_allclose(forces[5000], forces[1000], atol=0.02 * numpy.abs(forces[1000]).max())
+
+    def test_safety_where_it_is_asked_for(self):
+        file = self.bake(SMALL_CUBE)
+        script = self.write("press.csv", "t,x,y,z\n0,0.05,0.05,0.12\n0.3,0.05,0.05,0.1\n0.8,0.05,0.05,0.1001\n")
+        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.h5")
+        plain = run(*common, cwd=self.folder)
+        self.assertEqual(plain.returncode, 0, plain.stderr)
+        self.assertNotIn("safety", json.loads(plain.stdout))
+        with h5py.File(self.folder / "a.h5") as session:
+            numpy.testing.assert_array_equal(session["ticks/shown_force"][:], -session["ticks/force"][:])
+        guarded = run(*common, "--safety", "max_force=0.2,ramp=0.1,max_damping=0", cwd=self.folder)
+        self.assertEqual(guarded.returncode, 0, guarded.stderr)
+        self.assertAlmostEqual(json.loads(guarded.stdout)["safety"]["largest_shown_N"], 0.2, places=12)
+        with h5py.File(self.folder / "a.h5") as session:
+            computed = numpy.linalg.norm(session["ticks/force"][:], axis=1)
+            shown = numpy.linalg.norm(session["ticks/shown_force"][:], axis=1)
+        self.assertGreater(computed.max(), 0.4)
+        numpy.testing.assert_allclose(shown[200:], numpy.minimum(computed, 0.2)[200:], atol=1e-6)
+
+
+if __name__ == "__main__":
+    unittest.main()
