@@ -178,8 +178,11 @@ class EmulatedDevice {
     while (!stop_) {
       if (talks_) {
         while (const auto report = firmware_->input()) {
-          static_cast<void>(!write(far_end_, report->data(), report->size()));
+          if (said_.size() < 4096) said_.insert(said_.end(), report->begin(), report->end());
         }
+        // What a full terminal does not take comes later: a report must not lose its end.
+        const ssize_t taken = said_.empty() ? 0 : write(far_end_, said_.data(), said_.size());
+        if (taken > 0) said_.erase(said_.begin(), said_.begin() + taken);
       }
       pollfd waiting{far_end_, POLLIN, 0};
       const timespec at_most{0, 200'000};
@@ -212,8 +215,8 @@ class EmulatedDevice {
   int number_;
   UMockdevIoctlBase* ioctls_;
   int far_end_ = -1;
-  int node_ = -1;  // the caller closes it
-  Bytes heard_;
+  int node_ = -1;       // the caller closes it
+  Bytes said_, heard_;  // not yet taken; not yet whole
   std::atomic<bool> stop_ = false, talks_ = false;
   std::thread thread_;
 };

@@ -137,7 +137,6 @@ Vec3 WoodenHapticsFirmware::force_of(const Vec3& currents) const {
 }
 
 std::optional<Bytes> WoodenHapticsFirmware::do_input() {
-  constexpr double watchdog = 0.5;
   if (current_flows_ && now() - told_ > watchdog) {
     current_flows_ = false;
     show(Vec3::Zero());

@@ -83,6 +83,8 @@ class WoodenHapticsFirmware : public Firmware {
  public:
   WoodenHapticsFirmware(const ArmConstants& arm, Hand hand);
 
+  double watchdog = 0.5;  ///< [s]
+
   void press_button(bool down);
   void press_calibrate();  ///< until it is answered
   /// It was switched on elsewhere than in its calibration pose: its counters are off by this.
