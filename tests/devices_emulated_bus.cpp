@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <poll.h>
 #include <sys/ioctl.h>
+#include <termios.h>
 #include <umockdev.h>
 #include <unistd.h>
 
@@ -138,12 +139,13 @@ class EmulatedDevice {
         path_(std::move(path)),
         number_(number),
         ioctls_(umockdev_ioctl_base_new()) {
-    g_signal_connect(ioctls_, "handle-ioctl", G_CALLBACK(on_ioctl), firmware_.get());
-    GError* error = nullptr;
-    check(umockdev_testbed_attach_ioctl(testbed_, path_.c_str(), ioctls_, &error), error);
     far_end_ = umockdev_testbed_get_dev_fd(testbed_, path_.c_str());
     fcntl(far_end_, F_SETFL, fcntl(far_end_, F_GETFL) | O_NONBLOCK);
     node_ = open(path_.c_str(), O_RDWR | O_CLOEXEC | O_NOCTTY);
+    keep_reports_whole();
+    g_signal_connect(ioctls_, "handle-ioctl", G_CALLBACK(on_ioctl), firmware_.get());
+    GError* error = nullptr;
+    check(umockdev_testbed_attach_ioctl(testbed_, path_.c_str(), ioctls_, &error), error);
     thread_ = std::thread([this] { run(); });
   }
 
@@ -174,6 +176,17 @@ class EmulatedDevice {
   [[nodiscard]] int node() const { return node_; }
 
  private:
+  /// A terminal may deliver half a report: it shall wait until it has one (report 1 where they have numbers).
+  void keep_reports_whole() const {
+    const bool numbered = firmware_->reports.numbered;
+    termios settings{};
+    if (tcgetattr(node_, &settings) != 0) throw std::runtime_error("tcgetattr");
+    settings.c_cc[VMIN] = static_cast<cc_t>(
+        firmware_->reports.report_bytes(HidReportType::input, numbered ? 1 : 0) + (numbered ? 1 : 0));
+    settings.c_cc[VTIME] = 0;
+    if (tcsetattr(node_, TCSANOW, &settings) != 0) throw std::runtime_error("tcsetattr");
+  }
+
   void run() {
     while (!stop_) {
       if (talks_) {
@@ -242,7 +255,7 @@ std::string EmulatedBus::plug_in(const std::shared_ptr<Firmware>& firmware, cons
   GError* error = nullptr;
   check(umockdev_testbed_add_from_string(testbed_->testbed, nodes(*firmware, serial, number).c_str(), &error),
         error);
-  const std::string path = "/dev/hidraw" + std::to_string(number);
+  std::string path = "/dev/hidraw" + std::to_string(number);
   devices_[path] = std::make_unique<EmulatedDevice>(testbed_->testbed, firmware, path, number);
   return path;
 }
