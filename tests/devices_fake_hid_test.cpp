@@ -212,6 +212,20 @@ TEST(HidBoard, LimitsNumbersAndForces) {
   }
 }
 
+TEST(HidBoard, TheProfilesLimitsHoldToo) {
+  BoardFeature strong = board_feature;
+  strong.max_force = 9000;
+  strong.max_stiffness = 500;
+  strong.max_damping = 9000;
+  strong.workspace_radius = 0;
+  Bench bench(std::make_shared<BoardFirmware>(strong, circle), "palpate_board");
+  bench.port.open();
+  EXPECT_EQ(bench.port.limits().max_force, 5.0);
+  EXPECT_EQ(bench.port.limits().max_stiffness, 500.0);
+  EXPECT_EQ(bench.port.limits().max_damping, 8.0);
+  EXPECT_TRUE(std::isinf(bench.port.limits().workspace_radius));
+}
+
 TEST(HidBoard, NumbersGrowOnWhenItIsPluggedInAgain) {
   Bench bench(std::make_shared<BoardFirmware>(board_feature, circle, 5000), "palpate_board");
   bench.port.open();

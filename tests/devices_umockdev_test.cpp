@@ -1,4 +1,5 @@
-// HidPort with the system's hidapi, against emulated devices in sysfs and /dev. Run by umockdev-wrapper.
+// HidPort with the system's hidapi, against emulated devices in sysfs and /dev: run by umockdev-wrapper, or
+// by scripts/devices-in-vm against the devices of a real kernel.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -96,19 +97,21 @@ std::string output_of(const std::string& line) {
   return text;
 }
 
-class Umockdev : public ::testing::Test {
+class EmulatedHid : public ::testing::Test {
  protected:
-  void SetUp() override { ASSERT_TRUE(EmulatedBus::is_there()) << "run this by umockdev-wrapper"; }
+  void SetUp() override {
+    ASSERT_TRUE(EmulatedBus::is_there()) << "run this by umockdev-wrapper, or by scripts/devices-in-vm";
+  }
 };
 
-TEST_F(Umockdev, NothingIsAttached) {
+TEST_F(EmulatedHid, NothingIsAttached) {
   const EmulatedBus bus;
   EXPECT_TRUE(attached_devices().empty());
   EXPECT_TRUE(says(message([] { static_cast<void>(choose("")); }), "no HID device is attached"));
   EXPECT_TRUE(says(output_of(PALPATE_BINARY_DIR "/runtime/palpate-runtime devices"), "No HID device"));
 }
 
-TEST_F(Umockdev, WhatIsAttachedIsSeenWithItsProfiles) {
+TEST_F(EmulatedHid, WhatIsAttachedIsSeenWithItsProfiles) {
   EmulatedBus bus;
   bus.plug_in(std::make_shared<WoodenHapticsFirmware>(constants_of<ArmConstants>("woodenhaptics"), resting),
               "");
@@ -121,7 +124,7 @@ TEST_F(Umockdev, WhatIsAttachedIsSeenWithItsProfiles) {
   EXPECT_EQ(attached[1].vendor, 0xCAFE);
   EXPECT_EQ(attached[1].product, 0x4001);
   EXPECT_EQ(attached[1].serial, "B 7");
-  EXPECT_EQ(attached[1].maker, "Emulated");
+  EXPECT_TRUE(attached[1].maker.empty() || attached[1].maker == "Emulated");  // uhid has none
   EXPECT_EQ(attached[1].product_name, "Board");
   EXPECT_EQ(attached[1].descriptor, board_report_descriptor(3));
   EXPECT_EQ(attached[1].access, 0);
@@ -145,14 +148,15 @@ TEST_F(Umockdev, WhatIsAttachedIsSeenWithItsProfiles) {
 
   const std::string program = PALPATE_BINARY_DIR "/runtime/palpate-runtime devices";
   const std::string text = output_of(program);
-  EXPECT_TRUE(says(text, "CAFE:4001 Board (/dev/hidraw1)\n  maker    Emulated\n  serial   B 7\n"));
+  EXPECT_TRUE(says(text, "CAFE:4001 Board (/dev/hidraw1)\n"));
+  EXPECT_TRUE(says(text, "  serial   B 7\n"));
   EXPECT_TRUE(says(text, "  profile  polhem_v1: Polhem v1\n"));
   EXPECT_TRUE(says(text, "  access   yes\n"));
   const std::string json = output_of(program + " --json");
   EXPECT_TRUE(says(json, R"("profiles": ["aluhaptics", "polhem_v1", "woodenhaptics"], "accessible": true)"));
 }
 
-TEST_F(Umockdev, UnknownDevices) {
+TEST_F(EmulatedHid, UnknownDevices) {
   struct Pad : Firmware {
     Pad() : Firmware(0x054C, 0x0CE6, "Pad", bytes(dual_sense_descriptor)) {}
     std::optional<Bytes> do_input() override { return std::nullopt; }
@@ -165,13 +169,13 @@ TEST_F(Umockdev, UnknownDevices) {
   EXPECT_TRUE(says(output_of(PALPATE_BINARY_DIR "/runtime/palpate-runtime devices"), "none fits"));
 }
 
-TEST_F(Umockdev, ANodeThatIsNotThere) {
+TEST_F(EmulatedHid, ANodeThatIsNotThere) {
   EmulatedBus bus;
   bus.remove_node(bus.plug_in(std::make_shared<BoardFirmware>(board_feature, resting)));
   EXPECT_TRUE(says(message([] { static_cast<void>(choose("")); }), "its node is not there"));
 }
 
-TEST_F(Umockdev, BoardAtAThousandReportsASecond) {
+TEST_F(EmulatedHid, BoardAtAThousandReportsASecond) {
   EmulatedBus bus;
   auto firmware = std::make_shared<BoardFirmware>(board_feature, circle);
   const std::string path = bus.plug_in(firmware);
@@ -209,7 +213,7 @@ TEST_F(Umockdev, BoardAtAThousandReportsASecond) {
   EXPECT_EQ(firmware->forces().back().force, Vec3::Zero());
 }
 
-TEST_F(Umockdev, ReportsThatWaitAreDrained) {
+TEST_F(EmulatedHid, ReportsThatWaitAreDrained) {
   EmulatedBus bus;
   auto firmware = std::make_shared<BoardFirmware>(board_feature, circle);
   const std::string path = bus.plug_in(firmware);
@@ -225,7 +229,7 @@ TEST_F(Umockdev, ReportsThatWaitAreDrained) {
   EXPECT_EQ(port.dropped(), 0);
 }
 
-TEST_F(Umockdev, WoodenHapticsByRequestAndResponse) {
+TEST_F(EmulatedHid, WoodenHapticsByRequestAndResponse) {
   EmulatedBus bus;
   const auto arm = constants_of<ArmConstants>("woodenhaptics");
   // Slow, and without a watchdog: a busy machine may hold up both sides.
@@ -253,7 +257,7 @@ TEST_F(Umockdev, WoodenHapticsByRequestAndResponse) {
   EXPECT_EQ(firmware->forces().back().force, Vec3::Zero());
 }
 
-TEST_F(Umockdev, JoystickConversation) {
+TEST_F(EmulatedHid, JoystickConversation) {
   EmulatedBus bus;
   auto firmware = std::make_shared<JoystickFirmware>(
       constants_of<PidConstants>("pid_joystick"),
@@ -277,7 +281,7 @@ TEST_F(Umockdev, JoystickConversation) {
   EXPECT_EQ(firmware->forces().back().force, Vec3::Zero());
 }
 
-TEST_F(Umockdev, SpaceMouseStream) {
+TEST_F(EmulatedHid, SpaceMouseStream) {
   EmulatedBus bus;
   auto firmware = std::make_shared<SpaceMouseFirmware>([](double t) {
     return std::array<std::int16_t, 6>{0, 0, static_cast<std::int16_t>(t < 0.3 ? -350 : 0), 0, 0, 0};
@@ -300,7 +304,7 @@ TEST_F(Umockdev, SpaceMouseStream) {
   EXPECT_LT(state.pose.position.z(), 0.035);
 }
 
-TEST_F(Umockdev, UnpluggedAndPluggedInAgain) {
+TEST_F(EmulatedHid, UnpluggedAndPluggedInAgain) {
   EmulatedBus bus;
   const std::string path = bus.plug_in(std::make_shared<BoardFirmware>(board_feature, circle), "B1");
   HidPort port(choose(""));
@@ -319,7 +323,6 @@ TEST_F(Umockdev, UnpluggedAndPluggedInAgain) {
   const std::uint32_t last = state.sequence;
   auto again = std::make_shared<BoardFirmware>(board_feature, circle);
   const std::string new_path = bus.plug_in(again, "B1");
-  EXPECT_NE(new_path, path);
   port.open();
   bus.talk(new_path);
   ASSERT_EQ(next(port, state), Heard::report);
@@ -329,7 +332,7 @@ TEST_F(Umockdev, UnpluggedAndPluggedInAgain) {
   EXPECT_NEAR(again->forces().back().force.x(), 1.0, 250e-6);
 }
 
-TEST_F(Umockdev, AKilledProcessLeavesNoForce) {
+TEST_F(EmulatedHid, AKilledProcessLeavesNoForce) {
   EmulatedBus bus;
   auto firmware = std::make_shared<JoystickFirmware>(constants_of<PidConstants>("pid_joystick"), resting);
   const std::string path = bus.plug_in(firmware);
