@@ -1,24 +1,28 @@
 #include "runtime/hand_force.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "runtime/state.h"
 
 namespace palpate {
 namespace {
 
-constexpr double fade_ticks = 20.0;
-constexpr double memory = 0.98;  // of the force that was felt, a tick: the measure of a fade
+constexpr double usual_tick = 0.001;  // s
+constexpr double fade_time = 20.0;    // ms
+constexpr double memory = 0.98;       // of the force that was felt, a millisecond: the measure of a fade
 
-void hand_over(ToolState& tool) noexcept {
+void hand_over(ToolState& tool, double tick) noexcept {
+  const double milliseconds = tick / usual_tick;
   const Wrench last = tool.wrench;
   const Wrench& contact = tool.contact_wrench;
   const double size = contact.force.norm();
-  tool.felt = std::max({size, last.force.norm(), memory * tool.felt});
+  tool.felt = std::max({size, last.force.norm(), std::pow(memory, milliseconds) * tool.felt});
   const Vec3 moved = tool.device.position - tool.last_device_position - tool.surface_change;
   const double explained = (tool.local.stiffness * moved).norm();
-  const double handed_over = tool.contacts > 0 ? tool.tool.hand_over * std::max(size, last.force.norm())
-                                               : std::max(tool.tool.hand_over, 1.0 / fade_ticks) * tool.felt;
+  const double handed_over =
+      milliseconds * (tool.contacts > 0 ? tool.tool.hand_over * std::max(size, last.force.norm())
+                                        : std::max(tool.tool.hand_over, 1.0 / fade_time) * tool.felt);
   const double change = (contact.force - last.force).norm();
   if (!(change > explained + handed_over)) {
     tool.wrench = contact;
@@ -42,8 +46,8 @@ void limit(ToolState& tool) noexcept {
 
 }  // namespace
 
-void give_force(ToolState& tool) noexcept {
-  hand_over(tool);
+void give_force(ToolState& tool, double tick) noexcept {
+  hand_over(tool, tick);
   limit(tool);
   tool.local.force = tool.wrench.force;
 }

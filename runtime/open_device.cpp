@@ -9,9 +9,8 @@ namespace palpate {
 std::unique_ptr<DevicePort> make_port(const DeviceChoice& choice, const SafetyOptions& safety,
                                       Guardian* guardian) {
   if (choice.kind == DeviceChoice::Kind::bridge) {
-    return std::make_unique<BridgePort>(BridgeOptions{.listen = parse_bridge_address(choice.text),
-                                                      .max_force = safety.max_force,
-                                                      .stale = safety.stale});
+    return std::make_unique<BridgePort>(BridgeOptions{
+        .listen = parse_bridge_address(choice.text), .max_force = safety.max_force, .stale = safety.stale});
   }
   std::vector<NamedProfile> profiles = known_profiles();
   if (!choice.profile.empty()) profiles = {find_profile(choice.profile)};

@@ -35,7 +35,7 @@ typedef struct palpate_tool {
   double max_force;          /* [N] the largest force that the hand is given; HUGE_VAL: any */
   double friction;           /* Coulomb's coefficient; negative: that of the body's material */
   double reach;              /* [m] a grab that touches nothing holds the nearest surface within this */
-  double hand_over;          /* share of the force that may change in a tick without the tool's motion
+  double hand_over;          /* share of the force that may change in a millisecond without the tool's motion
                               * explaining it; HUGE_VAL: any, then contact that slips is felt as a kick */
 } palpate_tool;
 

@@ -31,7 +31,7 @@ void add_tool(CLI::App& play, PlayArguments& arguments) {
       ->type_name("N");
   play.add_option(
           "--hand-over", arguments.hand_over,
-          "share of the force that may change in a tick without the tool's motion explaining it: less "
+          "share of the force that may change in a millisecond without the tool's motion explaining it: less "
           "is smoother where contact slips; else 0.005; inf for the contact's own force")
       ->type_name("SHARE");
   play.add_option("--reach", arguments.reach,

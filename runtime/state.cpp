@@ -85,6 +85,7 @@ State::State(const Body& body, const StateOptions& options)
     : tools(make_tools(options)),
       contact_points(static_cast<std::size_t>(options.max_contacts)),
       max_contacts(options.max_contacts),
+      tick(options.tick),
       near(body, near_room(options), options.patch_nodes),
       motion(body, options.tick, static_cast<Index>(near.load().node.size())),
       tree(body.simplices(), body.dimension(), body.surface_rest_positions(),

@@ -52,7 +52,7 @@ struct StateOptions {
   std::vector<Tool> tools = {Tool{}};
   Index max_contacts = 32;  ///< contact points of all tools together; beyond, the deepest are kept
   Index patch_nodes = 0;    ///< most nodes g of a patch that is to be used
-  double tick = 0.001;      ///< time from one tick to the next, for bodies that swing [s]
+  double tick = 0.001;      ///< time from one tick to the next [s]
 };
 
 /// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
@@ -75,6 +75,7 @@ struct State {
   Index contact_count = 0;
   Index held_count = 0;  ///< of contact_points, by grabs
   Index max_contacts;
+  double tick;                         ///< time from one tick to the next [s]
   bool is_first_pass = true;           ///< of the tick's Newton steps
   StepStatus status = StepStatus::ok;  ///< of the last tick, all tools
   std::int64_t ticks = 0;              ///< taken so far

@@ -302,7 +302,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
     linearise(state);
     for (std::size_t k = 0; k < state.tools.size(); ++k) {
       note_surface_change(state, state.tools[k], static_cast<Index>(k));
-      give_force(state.tools[k]);
+      give_force(state.tools[k], state.tick);
     }
   }
   let_go(body, state);

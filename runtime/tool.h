@@ -22,7 +22,7 @@ struct Tool {
   double coupling_torsion =
       std::numeric_limits<double>::infinity();  ///< [N m/rad]; infinite: it is turned as the device is
   double max_force = std::numeric_limits<double>::infinity();  ///< the largest that the hand is given [N]
-  double hand_over = 0.005;  ///< what of a force may change in a tick that the tool's motion does not
+  double hand_over = 0.005;  ///< what of a force may change in a millisecond that the tool's motion does not
                              ///< explain: infinite for the contact's own force without any smoothing [-]
   double reach = 0.0;  ///< a grab that touches nothing holds the nearest surface within this distance of the
                        ///< origin [m]

@@ -56,6 +56,11 @@ std::optional<Bytes> Firmware::get_feature(std::uint8_t id) {
   return do_get_feature(id);
 }
 
+bool Firmware::is_ready() const {
+  const std::lock_guard lock(mutex_);
+  return do_is_ready();
+}
+
 std::vector<ShownForce> Firmware::forces() const {
   const std::lock_guard lock(mutex_);
   return forces_;
@@ -132,7 +137,6 @@ Vec3 WoodenHapticsFirmware::force_of(const Vec3& currents) const {
 }
 
 std::optional<Bytes> WoodenHapticsFirmware::do_input() {
-  constexpr double watchdog = 0.5;
   if (current_flows_ && now() - told_ > watchdog) {
     current_flows_ = false;
     show(Vec3::Zero());
@@ -181,6 +185,16 @@ BoardFirmware::BoardFirmware(const BoardFeature& feature, Hand hand, std::uint32
       first_(first_sequence),
       sequence_(first_sequence) {}
 
+std::vector<std::uint32_t> BoardFirmware::answered() const {
+  const std::lock_guard lock(mutex_);
+  return answered_;
+}
+
+std::uint32_t BoardFirmware::sequence() const {
+  const std::lock_guard lock(mutex_);
+  return sequence_;
+}
+
 std::optional<Bytes> BoardFirmware::do_input() {
   if (now() < 1e-3 * static_cast<double>(sequence_ - first_)) return std::nullopt;
   BoardInput input{.sequence = sequence_, .axes = 3};
@@ -215,6 +229,7 @@ JoystickFirmware::JoystickFirmware(const PidConstants& constants, Hand hand)
       layout_(find_pid_layout(reports, name)) {}
 
 std::size_t JoystickFirmware::playing() const {
+  const std::lock_guard lock(mutex_);
   return static_cast<std::size_t>(
       std::ranges::count_if(effects_, [](const auto& effect) { return effect.second.plays; }));
 }

@@ -51,6 +51,8 @@ class Firmware {
   /// Feature reports, id first. False: stalled.
   bool set_feature(std::span<const std::uint8_t> report);
   std::optional<Bytes> get_feature(std::uint8_t id);
+  /// It has had the output reports that must come before a feature report.
+  [[nodiscard]] bool is_ready() const;
 
   /// All that it has shown, and all that it was told.
   [[nodiscard]] std::vector<ShownForce> forces() const;
@@ -61,13 +63,15 @@ class Firmware {
   void show(const Vec3& force);  ///< for `do_...`
   [[nodiscard]] double now() const;
 
+  mutable std::mutex mutex_;  ///< held where `do_...` is called
+
  private:
   virtual std::optional<Bytes> do_input() = 0;
   virtual void do_output(std::span<const std::uint8_t> /*report*/) {}
   virtual bool do_set_feature(std::span<const std::uint8_t> /*report*/) { return false; }
   virtual std::optional<Bytes> do_get_feature(std::uint8_t /*id*/) { return std::nullopt; }
+  [[nodiscard]] virtual bool do_is_ready() const { return true; }
 
-  mutable std::mutex mutex_;
   std::int64_t made_;
   std::vector<ShownForce> forces_;
   std::vector<Bytes> outputs_;
@@ -78,6 +82,8 @@ class Firmware {
 class WoodenHapticsFirmware : public Firmware {
  public:
   WoodenHapticsFirmware(const ArmConstants& arm, Hand hand);
+
+  double watchdog = 0.5;  ///< [s]
 
   void press_button(bool down);
   void press_calibrate();  ///< until it is answered
@@ -106,8 +112,8 @@ class BoardFirmware : public Firmware {
   BoardFirmware(const BoardFeature& feature, Hand hand, std::uint32_t first_sequence = 0);
 
   /// The numbers of the input reports that forces answered.
-  [[nodiscard]] std::vector<std::uint32_t> answered() const { return answered_; }
-  [[nodiscard]] std::uint32_t sequence() const { return sequence_; }  ///< of the next report
+  [[nodiscard]] std::vector<std::uint32_t> answered() const;
+  [[nodiscard]] std::uint32_t sequence() const;  ///< of the next report
 
  private:
   std::optional<Bytes> do_input() override;
@@ -142,6 +148,8 @@ class JoystickFirmware : public Firmware {
   void do_output(std::span<const std::uint8_t> report) override;
   bool do_set_feature(std::span<const std::uint8_t> report) override;
   std::optional<Bytes> do_get_feature(std::uint8_t id) override;
+
+  [[nodiscard]] bool do_is_ready() const override { return enabled_; }
 
   PidConstants constants_;
   Hand hand_;

@@ -1,5 +1,6 @@
 // The guardian: a file stands for the device, to which it may write when a process has died.
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkstemp
 #include <sys/wait.h>
 #include <unistd.h>
@@ -35,29 +36,19 @@ class GuardianTest : public ::testing::Test {
     return {std::istreambuf_iterator<char>(stream), {}};
   }
 
-  /// Runs `life` in a process with a guardian. What comes out of its output ends only when nobody holds it
-  /// any more: the guardian must not.
+  /// Runs `life` in a process with a guardian; how that ended.
   template <typename Life>
   int run(const Life& life) {
-    int ends[2] = {};
-    EXPECT_EQ(pipe(ends), 0);
     const pid_t child = fork();
     if (child == 0) {
-      dup2(ends[1], STDOUT_FILENO);
-      close(ends[0]);
-      close(ends[1]);
       {
         Guardian guardian;
         life(guardian);
       }
       _exit(0);
     }
-    close(ends[1]);
     int status = 0;
     EXPECT_EQ(waitpid(child, &status, 0), child);
-    char byte = 0;
-    EXPECT_EQ(read(ends[0], &byte, 1), 0);
-    close(ends[0]);
     return status;
   }
 
@@ -86,17 +77,53 @@ TEST_F(GuardianTest, TakesTheForceOffAfterEachDeath) {
   }
 }
 
-TEST_F(GuardianTest, SurvivesWhatATerminalSendsToAll) {
+/// The only child of this process.
+pid_t only_child() {
+  std::ifstream children("/proc/self/task/" + std::to_string(getpid()) + "/children");
+  pid_t child = -1;
+  children >> child;
+  return child;
+}
+
+TEST_F(GuardianTest, SurvivesWhatATerminalSends) {
   run([&](Guardian& guardian) {
     guardian.guard(path_, reports);
-    setpgid(0, 0);
     for (const int signal : {SIGINT, SIGHUP, SIGTERM, SIGQUIT}) {
-      std::signal(signal, SIG_IGN);
-      kill(0, signal);
+      kill(only_child(), signal);
     }
     raise(SIGKILL);
   });
   EXPECT_EQ(written_in_the_end(), each_twice);
+}
+
+TEST_F(GuardianTest, HasItsOwnSession) {
+  const int status = run([&](Guardian&) {
+    for (int k = 0; k < 1000 && getsid(only_child()) == getsid(0); ++k) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    if (getsid(only_child()) != only_child()) _exit(7);
+  });
+  EXPECT_EQ(status, 0);
+}
+
+TEST_F(GuardianTest, HoldsNobodysOutput) {
+  int ends[2] = {};
+  ASSERT_EQ(pipe(ends), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    dup2(ends[1], STDOUT_FILENO);
+    const Guardian guardian;
+    close(ends[1]);
+    close(STDOUT_FILENO);
+    while (true) pause();
+  }
+  close(ends[1]);
+  pollfd ending{ends[0], POLLIN, 0};
+  EXPECT_EQ(poll(&ending, 1, 10'000), 1);
+  EXPECT_NE(ending.revents & POLLHUP, 0);
+  close(ends[0]);
+  kill(child, SIGKILL);
+  EXPECT_EQ(waitpid(child, nullptr, 0), child);
 }
 
 TEST_F(GuardianTest, DoesNothingAfterAGoodbye) {

@@ -102,7 +102,7 @@ std::string FakeHid::attach(const std::shared_ptr<Firmware>& firmware, const std
   std::ofstream(device / "report_descriptor", std::ios::binary)
       .write(reinterpret_cast<const char*>(firmware->descriptor.data()),
              static_cast<std::streamsize>(firmware->descriptor.size()));
-  const std::string path = (world->folder / node).string();
+  std::string path = (world->folder / node).string();
   std::ofstream(path, std::ios::binary).flush();
   world->attached[path] = {firmware, serial};
   return path;

@@ -16,14 +16,12 @@
 namespace palpate {
 namespace {
 
-enum class What : std::uint8_t { nothing, device, goodbye };
-
-/// What the child is told, in one piece: a pipe keeps writes of up to PIPE_BUF bytes whole.
+/// What the child is told, in one piece: a pipe keeps writes of up to PIPE_BUF bytes whole. Without reports
+/// there is nothing to do, which is the goodbye, too.
 struct Message {
   static constexpr std::size_t most_reports = 8;
   static constexpr std::size_t room = 64;
 
-  What what = What::nothing;
   std::array<char, 256> path{};
   std::uint8_t count = 0;
   std::array<std::uint8_t, most_reports> sizes{};
@@ -31,7 +29,7 @@ struct Message {
 };
 static_assert(sizeof(Message) <= PIPE_BUF);
 
-void send(int pipe, const Message& message) noexcept {
+void tell(int pipe, const Message& message) noexcept {
   while (write(pipe, &message, sizeof(message)) < 0 && errno == EINTR) {
   }
 }
@@ -62,13 +60,10 @@ void show_no_force(const Message& device) noexcept {
   close(file);
 }
 
-/// Leaves the terminal, the signals and the files of the process that it guards: whoever waits for the end of
-/// that one's output does not wait for the child.
+/// Leaves the terminal and the files of the process that it guards: whoever waits for the end of that one's
+/// output does not wait for the child. Closes the pipe's other end with them.
 void detach(int& pipe) noexcept {
   setsid();
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP}) {
-    std::signal(signal, SIG_IGN);
-  }
   constexpr int own = 3;
   pipe = fcntl(pipe, F_DUPFD, own);  // it may be one of the first three, where the parent had closed them
   const int null = open("/dev/null", O_RDWR);
@@ -90,9 +85,8 @@ void detach(int& pipe) noexcept {
   Message message;
   while (receive(pipe, message)) {
     last = message;
-    if (last.what == What::goodbye) _exit(0);
   }
-  if (last.what == What::device) show_no_force(last);
+  if (last.count > 0) show_no_force(last);
   _exit(0);
 }
 
@@ -103,14 +97,17 @@ Guardian::Guardian() {
   if (pipe2(ends.data(), O_CLOEXEC) != 0) {
     throw Error(std::string("no pipe: ") + std::strerror(errno), "guardian", "close other programs");
   }
+  // The child keeps all signals blocked.
+  sigset_t all;
+  sigset_t before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
   child_ = fork();
-  if (child_ == 0) {
-    close(ends[1]);
-    watch(ends[0]);
-  }
+  if (child_ == 0) watch(ends[0]);
+  const int reason = errno;
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
   close(ends[0]);
   if (child_ < 0) {
-    const int reason = errno;
     close(ends[1]);
     throw Error(std::string("no second process: ") + std::strerror(reason), "guardian",
                 "close other programs");
@@ -119,14 +116,14 @@ Guardian::Guardian() {
 }
 
 Guardian::~Guardian() {
-  send(pipe_, {.what = What::goodbye});
+  release();
   close(pipe_);
   while (waitpid(child_, nullptr, 0) < 0 && errno == EINTR) {
   }
 }
 
 void Guardian::guard(const std::string& path, std::span<const std::vector<std::uint8_t>> reports) noexcept {
-  Message message{.what = reports.empty() ? What::nothing : What::device};
+  Message message;
   if (path.size() >= message.path.size()) return;
   std::ranges::copy(path, message.path.begin());
   for (const std::vector<std::uint8_t>& report : reports) {
@@ -134,11 +131,11 @@ void Guardian::guard(const std::string& path, std::span<const std::vector<std::u
     std::ranges::copy(report, message.reports[message.count].begin());
     message.sizes[message.count++] = static_cast<std::uint8_t>(report.size());
   }
-  send(pipe_, message);
+  tell(pipe_, message);
 }
 
 void Guardian::release() noexcept {
-  send(pipe_, {.what = What::nothing});
+  tell(pipe_, {});
 }
 
 }  // namespace palpate

@@ -12,7 +12,7 @@ namespace palpate {
 
 /// Waits on a pipe that only this process can write to. When the pipe ends without a goodbye, because this
 /// process was killed, crashed or was aborted, it opens the device that it was told of last and writes its
-/// reports of no force. It takes no signal that a terminal sends, and has a session of its own.
+/// reports of no force. It takes no signal but SIGKILL, and has a session of its own.
 ///
 /// What it cannot help against: a process that hangs, and a machine that stops. The device's own watchdog
 /// is for these.

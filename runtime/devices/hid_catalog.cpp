@@ -21,8 +21,8 @@ namespace {
 std::string utf8(const wchar_t* text) {
   std::string result;
   for (; text != nullptr && *text != L'\0'; ++text) {
-    const auto code = static_cast<std::uint32_t>(*text);
-    const auto put = [&](std::uint32_t byte) { result += static_cast<char>(byte); };
+    const auto code = static_cast<char32_t>(*text);
+    const auto put = [&](char32_t byte) { result += static_cast<char>(byte); };
     if (code < 0x80) {
       put(code);
     } else if (code < 0x800) {

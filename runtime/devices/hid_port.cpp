@@ -23,7 +23,7 @@ HidPort::HidPort(HidChoice choice, Guardian* guardian, std::filesystem::path sys
       limits_(choice_.profile.limits) {}
 
 HidPort::~HidPort() {
-  close();
+  HidPort::close();
 }
 
 AttachedDevice HidPort::find_again() const {
