@@ -5,6 +5,8 @@
 #include <cmath>
 #include <ctime>
 
+#include "runtime/devices/fault.h"
+
 namespace palpate {
 namespace {
 
@@ -54,6 +56,13 @@ TickRecord make_record(const Body& body, const State& state, const PatchSource* 
   record.status = static_cast<std::uint32_t>(state.status);
   record.compute_ns = static_cast<std::uint32_t>(std::min<std::int64_t>(compute_ns, UINT32_MAX));
   record.grab = device.grab ? 1 : 0;
+  set(record.handle_position, device.position);
+  set(record.handle_orientation, device.orientation);
+  record.buttons = record.grab;
+  set(record.shown_force, tool.wrench.force);
+  set(record.shown_torque, tool.wrench.torque);
+  record.share = 1.0;
+  record.phase = static_cast<std::uint8_t>(SafetyPhase::active);
   if (overlays != nullptr && overlays->centre() >= 0) record.patch = body.mesh_node(overlays->centre());
   return record;
 }
@@ -90,7 +99,8 @@ std::int64_t count_ticks(const ScriptDevice& device) {
 }
 
 LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
-                    MotionSource* motion, Recorder* recorder, bool fast, const std::atomic<bool>& stop) {
+                    MotionSource* motion, Recorder* recorder, bool fast, const std::atomic<bool>& stop,
+                    SurfaceFrames* frames) {
   LoopReport report;
   const std::int64_t ticks = count_ticks(device);
   const std::int64_t start = now() + period;
@@ -118,8 +128,10 @@ LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, 
 
     if (!fast && end > due + period) ++report.deadline_misses;
     count_step(report, state, force_before, time, end - begin);
+    if (frames != nullptr) frames->post(state, tick, time);
     if (recorder == nullptr) continue;
-    const TickRecord record = make_record(body, state, overlays, pose, time, fast ? 0 : end - begin);
+    TickRecord record = make_record(body, state, overlays, pose, time, fast ? 0 : end - begin);
+    record.begun_ns = fast ? tick * period : begin - start;
     if (fast) {
       recorder->push_waiting(record);
     } else {

@@ -11,6 +11,7 @@
 #include "runtime/recorder.h"
 #include "runtime/script_device.h"
 #include "runtime/step.h"
+#include "runtime/surface_frames.h"
 
 namespace palpate {
 
@@ -38,9 +39,10 @@ struct LoopReport {
 std::int64_t count_ticks(const ScriptDevice& device);
 
 /// Steps through the script at 1 kHz, or as fast as it goes without waiting (`fast`: deterministic).
-/// `state` has one tool. `overlays`, `motion` and `recorder` may be null. Ends early when `stop` becomes
-/// true.
+/// `state` has one tool. `overlays`, `motion`, `recorder` and `frames` may be null. Ends early when `stop`
+/// becomes true.
 LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
-                    MotionSource* motion, Recorder* recorder, bool fast, const std::atomic<bool>& stop);
+                    MotionSource* motion, Recorder* recorder, bool fast, const std::atomic<bool>& stop,
+                    SurfaceFrames* frames = nullptr);
 
 }  // namespace palpate

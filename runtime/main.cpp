@@ -15,6 +15,7 @@
 #include "runtime/numbers.h"
 #include "runtime/play.h"
 #include "runtime/probe.h"
+#include "runtime/session.h"
 
 namespace {
 
@@ -43,6 +44,7 @@ struct Arguments {
   std::string contact = "quasi-static";
   std::optional<std::string> overlay_memory;
   std::string record;
+  std::optional<std::string> record_frames;
   std::string report;
   std::string surface;
   std::string contacts;
@@ -140,6 +142,9 @@ CLI::App* add_play(CLI::App& app, Arguments& arguments) {
   play->add_flag("--fast", arguments.fast,
                  "do not wait for the clock: deterministic, equal runs leave equal recordings");
   play->add_option("--record", arguments.record, "write every tick to this HDF5 file")->type_name("OUT.h5");
+  play->add_option("--record-frames", arguments.record_frames,
+                   "how often the surface is written there; else 60 times a second; 0: never")
+      ->type_name("HZ");
   play->add_option("--report", arguments.report, "write the JSON report here and not to the standard output")
       ->type_name("OUT.json");
   play->add_option("--surface", arguments.surface,
@@ -162,6 +167,15 @@ CLI::App* add_play(CLI::App& app, Arguments& arguments) {
       "--friction 0.5 \\\n"
       "      --coupling 800 --max-force 7.5 --fast --contacts contacts.csv");
   return play;
+}
+
+CLI::App* add_session(CLI::App& app, Arguments& arguments) {
+  CLI::App* session = app.add_subcommand("session", "say what is in a recording of play");
+  session->add_option("SESSION.h5", arguments.file, "recording; one that was killed is made one file")
+      ->required()
+      ->type_name("");
+  session->add_flag("--json", arguments.json, "print JSON");
+  return session;
 }
 
 std::vector<double> vector_argument(const std::string& option, const std::string& text) {
@@ -290,6 +304,14 @@ std::size_t read_overlay_memory(const std::optional<std::string>& text) {
   return static_cast<std::size_t>(*megabytes) << 20;
 }
 
+double read_frame_rate(const std::optional<std::string>& text) {
+  if (!text) return PlayOptions{}.record_frames;
+  const std::optional<double> rate = parse_number(*text);
+  if (!rate || *rate < 0.0)
+    throw CLI::ValidationError("--record-frames", "'" + *text + "' is not a number from 0 on");
+  return *rate;
+}
+
 ContactModel read_contact(const std::string& text) {
   if (text == "quasi-static") return ContactModel::quasi_static;
   if (text == "dynamic") return ContactModel::dynamic;
@@ -313,6 +335,7 @@ PlayOptions read_play(const Arguments& arguments) {
           .overlay_memory = read_overlay_memory(arguments.overlay_memory),
           .fast = arguments.fast,
           .record = arguments.record,
+          .record_frames = read_frame_rate(arguments.record_frames),
           .report = arguments.report,
           .surface = arguments.surface,
           .contacts = arguments.contacts};
@@ -328,10 +351,12 @@ int run(int argc, char** argv) {
   Arguments arguments;
   const CLI::App* probe_command = add_probe(app, arguments);
   const CLI::App* play_command = add_play(app, arguments);
+  const CLI::App* session_command = add_session(app, arguments);
   try {
     app.parse(argc, argv);
-    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe or play");
+    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe, play or session");
     if (play_command->parsed()) return play(read_play(arguments));
+    if (session_command->parsed()) return session(arguments.file, arguments.json);
     return probe(
         {.file = arguments.file,
          .model_toml = arguments.model_toml,

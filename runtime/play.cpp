@@ -16,6 +16,7 @@
 #include "runtime/loop.h"
 #include "runtime/output.h"
 #include "runtime/real_time.h"
+#include "runtime/surface_frames.h"
 
 namespace palpate {
 namespace {
@@ -61,7 +62,8 @@ void print_overlays(const PatchSource& overlays) {
                     overlays.failed()));
 }
 
-void print_report(const LoopReport& report, const PlayOptions& options, std::int64_t dropped) {
+void print_report(const LoopReport& report, const PlayOptions& options, std::int64_t dropped,
+                  std::int64_t dropped_frames) {
   fmt::print(stderr, "{} ticks{}, {} of them in contact, at most {} contact points", report.ticks,
              report.interrupted ? " until interrupted" : "", report.ticks_in_contact, report.most_contacts);
   if (!options.fast) {
@@ -78,7 +80,8 @@ void print_report(const LoopReport& report, const PlayOptions& options, std::int
       fmt::print(stderr, "{}: {} ticks\n", status_names[k].second, report.status_ticks[k]);
   }
   if (!options.record.empty())
-    fmt::print(stderr, "recording {}: {} ticks dropped\n", options.record.string(), dropped);
+    fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", options.record.string(), dropped,
+               dropped_frames);
 }
 
 std::string box_text(const Body& body) {
@@ -244,11 +247,33 @@ void write_surface(const std::filesystem::path& file, const Body& body, const St
 
 /// The loop with the rights it needs, which the threads that were started before do not inherit.
 LoopReport run(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
-               MotionSource* motion, Recorder* recorder, bool fast) {
-  if (fast) return run_loop(body, state, device, overlays, motion, recorder, fast, stop_asked);
+               MotionSource* motion, Recorder* recorder, SurfaceFrames* frames, bool fast) {
+  if (fast) return run_loop(body, state, device, overlays, motion, recorder, fast, stop_asked, frames);
   const RealTimeRights rights;
   if (!rights.refused().empty()) print_warning(rights.refused());
-  return run_loop(body, state, device, overlays, motion, recorder, fast, stop_asked);
+  return run_loop(body, state, device, overlays, motion, recorder, fast, stop_asked, frames);
+}
+
+SessionInfo session_info(const PlayOptions& options, const Body& body, const Tool& tool) {
+  std::string text = fmt::format("tool_radius={}\ntool_length={}\nreach={}\nhand_over={}\n", tool.radius,
+                                 tool.length, tool.reach, tool.hand_over);
+  if (tool.friction) text += fmt::format("friction={}\n", *tool.friction);
+  text += fmt::format("coupling={}\ncoupling_torsion={}\nmax_force={}\n", tool.coupling_stiffness,
+                      tool.coupling_torsion, tool.max_force);
+  text += fmt::format("max_contacts={}\ncontact={}\nfast={}\n", options.max_contacts,
+                      options.contact == ContactModel::dynamic ? "dynamic" : "quasi-static", options.fast);
+  if (options.overlay)
+    text += fmt::format("overlay=r={},rings={}\n", options.overlay->refinement, options.overlay->rings);
+  return {.model = options.file.string(),
+          .content_hash = body.model().content_hash,
+          .device = "script:" + options.script.string(),
+          .rate = ticks_per_second,
+          .options = text};
+}
+
+/// Every how many ticks, for so many frames a second.
+std::int64_t ticks_per_frame(double frames_per_second) {
+  return std::max<std::int64_t>(std::llround(ticks_per_second / frames_per_second), 1);
 }
 
 }  // namespace
@@ -277,19 +302,30 @@ int play(const PlayOptions& options) {
   if (body.model().dynamics.method == DynamicsMethod::packed)
     motion.emplace(body, state, MotionSourceOptions{.in_background = !options.fast});
   std::optional<Recorder> recorder;
-  if (!options.record.empty())
-    recorder.emplace(options.record, options.file.string(), body.model().content_hash,
-                     options.overlay
-                         ? fmt::format("r={},rings={}", options.overlay->refinement, options.overlay->rings)
-                         : "");
+  std::optional<SurfaceFrames> frames;
+  if (!options.record.empty()) {
+    recorder.emplace(options.record, session_info(options, body, tool), recorded_surface(body));
+    if (options.record_frames > 0.0)
+      frames.emplace(body, state,
+                     SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(options.record_frames),
+                                          .in_background = !options.fast},
+                     [&recorder, fast = options.fast](SurfaceFrame frame) {
+                       if (fast) {
+                         recorder->push_frame_waiting(std::move(frame));
+                       } else {
+                         recorder->push_frame(std::move(frame));
+                       }
+                     });
+  }
 
   stop_on_signals();
   const LoopReport report = run(body, state, device, source, motion ? &*motion : nullptr,
-                                recorder ? &*recorder : nullptr, options.fast);
+                                recorder ? &*recorder : nullptr, frames ? &*frames : nullptr, options.fast);
+  frames.reset();  // the last frame is in the recording
   if (recorder) recorder->finish();
 
   const std::int64_t dropped = recorder ? recorder->dropped() : 0;
-  print_report(report, options, dropped);
+  print_report(report, options, dropped, recorder ? recorder->dropped_frames() : 0);
   if (source != nullptr) print_overlays(*source);
   if (motion) {
     fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", motion->steps(),

@@ -22,6 +22,7 @@ struct PlayOptions {
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
   bool fast = false;
   std::filesystem::path record;    ///< empty: nothing is recorded
+  double record_frames = 60.0;     ///< of the surface a second; 0: none
   std::filesystem::path report;    ///< JSON; empty: on the standard output
   std::filesystem::path surface;   ///< grid of the surface after the last tick, .vtu; empty: none
   std::filesystem::path contacts;  ///< CSV of the contact points after the last tick; empty: none

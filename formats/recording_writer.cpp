@@ -1,0 +1,113 @@
+#include <string>
+
+#include "formats/recording_parts.h"
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+/// Parts of one level that are merged into one of the next. A reader opens all parts that there are, and the
+/// system lets it open a thousand files: of a part each half second that is enough for years.
+constexpr std::size_t fan = 16;
+
+struct Level {
+  RecordingPart part;
+  int level = 0;
+};
+
+}  // namespace
+
+struct RecordingWriter::Impl {
+  Impl(std::filesystem::path to, const SessionInfo& info, const RecordedSurface& surface)
+      : path(std::move(to)), head{info, "palpate " PALPATE_VERSION, surface} {
+    std::optional<FileDescriptor> locked = lock_parts(path);
+    if (!locked)
+      throw Error("is being recorded by another program", path.string(), "Wait for it, or record elsewhere.");
+    lock = std::move(*locked);
+    try {
+      write_master(path, head, {});
+    } catch (...) {
+      leave_folder_if_empty();
+      throw;
+    }
+    clear_parts(path);  // of an earlier recording, which nothing names any more
+  }
+
+  void leave_folder_if_empty() const {
+    std::error_code ignored;
+    if (std::filesystem::is_empty(parts_folder(path), ignored)) return;
+    for (const auto& entry : std::filesystem::directory_iterator(parts_folder(path), ignored))
+      if (entry.path().filename() != "lock") return;
+    std::filesystem::remove_all(parts_folder(path), ignored);
+  }
+
+  std::filesystem::path next_file() { return parts_folder(path) / (std::to_string(files++) + ".h5"); }
+
+  void show_parts() {
+    std::vector<RecordingPart> parts;
+    for (const Level& level : levels) parts.push_back(level.part);
+    write_master(path, head, parts);
+  }
+
+  /// The last parts into one, as long as there are enough of one level.
+  void merge_levels() {
+    while (levels.size() >= fan && levels[levels.size() - fan].level == levels.back().level) {
+      std::vector<RecordingPart> parts;
+      for (auto it = levels.end() - fan; it != levels.end(); ++it) parts.push_back(it->part);
+      const int level = levels.back().level + 1;
+      const RecordingPart merged = merge_parts(next_file(), parts, head.surface.nodes.size());
+      levels.resize(levels.size() - fan);
+      levels.push_back({merged, level});
+      for (const RecordingPart& part : parts) replaced.push_back(part.file);
+    }
+  }
+
+  std::filesystem::path path;
+  RecordingHead head;
+  FileDescriptor lock;
+  std::vector<TickRecord> ticks;  // since the last checkpoint
+  std::vector<SurfaceFrame> frames;
+  std::vector<Level> levels;
+  std::vector<std::filesystem::path> replaced;  // by merging, and no longer named by the master
+  std::int64_t files = 0;
+};
+
+RecordingWriter::RecordingWriter(std::filesystem::path path, const SessionInfo& info,
+                                 const RecordedSurface& surface) {
+  const hdf5::Quiet quiet;
+  impl_ = std::make_unique<Impl>(std::move(path), info, surface);
+}
+
+RecordingWriter::~RecordingWriter() = default;
+
+void RecordingWriter::append(std::span<const TickRecord> ticks) {
+  impl_->ticks.insert(impl_->ticks.end(), ticks.begin(), ticks.end());
+}
+
+void RecordingWriter::append(SurfaceFrame frame) {
+  impl_->frames.push_back(std::move(frame));
+}
+
+void RecordingWriter::checkpoint() {
+  const hdf5::Quiet quiet;
+  if (impl_->ticks.empty() && impl_->frames.empty()) return;
+  // Whoever has opened the master before the last one has had the time since then to read.
+  std::vector<std::filesystem::path> to_remove;
+  to_remove.swap(impl_->replaced);
+  impl_->levels.push_back(
+      {write_part(impl_->next_file(), impl_->ticks, impl_->frames, impl_->head.surface.nodes.size())});
+  impl_->merge_levels();
+  impl_->show_parts();
+  impl_->ticks.clear();
+  impl_->frames.clear();
+  std::error_code ignored;
+  for (const std::filesystem::path& file : to_remove) std::filesystem::remove(file, ignored);
+}
+
+void RecordingWriter::finish() {
+  const hdf5::Quiet quiet;
+  checkpoint();
+  merge_recording(impl_->path);
+}
+
+}  // namespace palpate
