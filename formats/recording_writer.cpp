@@ -1,3 +1,4 @@
+#include <iterator>
 #include <string>
 
 #include "formats/recording_parts.h"
@@ -33,12 +34,12 @@ struct RecordingWriter::Impl {
     clear_parts(path);  // of an earlier recording, which nothing names any more
   }
 
+  /// Removes a folder of parts that holds nothing but the lock.
   void leave_folder_if_empty() const {
+    const std::filesystem::path folder = parts_folder(path);
     std::error_code ignored;
-    if (std::filesystem::is_empty(parts_folder(path), ignored)) return;
-    for (const auto& entry : std::filesystem::directory_iterator(parts_folder(path), ignored))
-      if (entry.path().filename() != "lock") return;
-    std::filesystem::remove_all(parts_folder(path), ignored);
+    const std::filesystem::directory_iterator all(folder, ignored);
+    if (std::distance(begin(all), end(all)) <= 1) std::filesystem::remove_all(folder, ignored);
   }
 
   std::filesystem::path next_file() { return parts_folder(path) / (std::to_string(files++) + ".h5"); }

@@ -130,6 +130,9 @@ TEST_F(Loop, StopsWhenAsked) {
   EXPECT_EQ(report.ticks, 0);
 }
 
+const SessionInfo session = {
+    .model = "box.palpate.hdf", .content_hash = "0123", .device = "script:test.csv", .options = ""};
+
 std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
@@ -153,7 +156,7 @@ TEST_F(RecordedLoop, FastRunsLeaveTheSameRecordingToTheLastBit) {
       ScriptDevice::parse("t,x,y,z,grab\n0,0.5,0.5,1,1\n70,0.5,0.4,0.9,1\n", "long.csv");
   for (const char* name : {"one.h5", "two.h5"}) {
     State state(body_, {.tools = {{.reach = 0.01}}});
-    Recorder recorder(folder_ / name, "box.palpate.hdf", "0123");
+    Recorder recorder(folder_ / name, session);
     EXPECT_EQ(run_loop(body_, state, device, nullptr, nullptr, &recorder, true, stop_).ticks, 70001);
     recorder.finish();
     EXPECT_EQ(recorder.dropped(), 0);
@@ -161,7 +164,6 @@ TEST_F(RecordedLoop, FastRunsLeaveTheSameRecordingToTheLastBit) {
   const std::string one = bytes_of(folder_ / "one.h5");
   EXPECT_GT(one.size(), 70001U * 220U);
   EXPECT_TRUE(one == bytes_of(folder_ / "two.h5"));
-  { const Recorder abandoned(folder_ / "three.h5", "box.palpate.hdf", "0123"); }
   std::size_t files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder_))
     files += entry.is_regular_file() ? 1 : 0;
@@ -173,7 +175,7 @@ TEST_F(RecordedLoop, KeepsWhatEachTickGave) {
   State state(body_, {.tools = {finger}});
   State again = state;
   {
-    Recorder recorder(folder_ / "slide.h5", "box.palpate.hdf", "0123");
+    Recorder recorder(folder_ / "slide.h5", session);
     run_loop(body_, state, device, nullptr, nullptr, &recorder, true, stop_);
     recorder.finish();
   }
@@ -229,7 +231,7 @@ TEST(PlaneLoop, IgnoresTheScriptsZ) {
 
 TEST(Recorder, SaysWhereItCannotWrite) {
   try {
-    const Recorder recorder("no/such/folder/out.h5", "box.palpate.hdf", "0123");
+    const Recorder recorder("no/such/folder/out.h5", session);
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(error.where().find("out.h5"), std::string::npos) << error.where();
