@@ -73,10 +73,10 @@ Recording read_recording(const std::filesystem::path& path) {
   recording.generator = std::move(head.generator);
   recording.frames.surface = std::move(head.surface);
   recording.finished = !std::filesystem::exists(parts_folder(path));
-  for (const std::filesystem::path& part : part_files(file, "/ticks/time"))
-    read_ticks(hdf5::File::open_to_read(part), recording.ticks);
-  for (const std::filesystem::path& part : part_files(file, "/frames/time"))
-    append_frames(hdf5::File::open_to_read(part), recording.frames);
+  const std::vector<hdf5::File> parts = open_parts(file, "/ticks/time");
+  const std::vector<hdf5::File> frame_parts = open_parts(file, "/frames/time");
+  for (const hdf5::File& part : parts) read_ticks(part, recording.ticks);
+  for (const hdf5::File& part : frame_parts) append_frames(part, recording.frames);
   return recording;
 }
 
@@ -84,8 +84,7 @@ RecordedFrames read_frames(const std::filesystem::path& path) {
   const hdf5::Quiet quiet;
   const hdf5::File file = hdf5::File::open_to_read(path);
   RecordedFrames frames = {read_head(file).surface, {}, {}};
-  for (const std::filesystem::path& part : part_files(file, "/frames/time"))
-    append_frames(hdf5::File::open_to_read(part), frames);
+  for (const hdf5::File& part : open_parts(file, "/frames/time")) append_frames(part, frames);
   return frames;
 }
 
@@ -96,8 +95,7 @@ std::vector<float> read_displacement(const std::filesystem::path& path, std::int
   const std::size_t nodes = read_head(file).surface.nodes.size();
   std::vector<float> displacement(static_cast<std::size_t>(frames) * nodes * 3);
   std::int64_t before = 0, found = 0;
-  for (const std::filesystem::path& name : part_files(file, "/frames/time")) {
-    const hdf5::File part = hdf5::File::open_to_read(name);
+  for (const hdf5::File& part : open_parts(file, "/frames/time")) {
     const std::int64_t here = count_frames(part, nodes);
     const std::int64_t begin = std::max(first - before, std::int64_t{0});
     const std::int64_t end = std::min(first + frames - before, here);

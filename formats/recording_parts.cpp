@@ -104,6 +104,10 @@ std::int64_t count_rows(std::span<const RecordingPart> parts, const RowField& fi
   return rows;
 }
 
+std::int64_t count_rows(const hdf5::File& part, const char* time) {
+  return part.locate(time, hdf5::element_type<double>(), 1).dims[0];
+}
+
 void write_rows_of(hdf5::File& to, std::span<const RecordingPart> parts, std::size_t surface_nodes) {
   const std::vector<RowField> fields = row_fields(surface_nodes);
   for (const RowField& field : fields)
@@ -125,13 +129,6 @@ void write_rows_of(hdf5::File& to, std::span<const RecordingPart> parts, std::si
       }
     }
   }
-}
-
-/// With its ticks or its frames only.
-RecordingPart measure_part(const std::filesystem::path& path, const std::string& time) {
-  const std::int64_t rows =
-      hdf5::File::open_to_read(path).locate(time, hdf5::element_type<double>(), 1).dims[0];
-  return time == "/ticks/time" ? RecordingPart{path, rows, 0} : RecordingPart{path, 0, rows};
 }
 
 }  // namespace
@@ -193,16 +190,18 @@ RecordingHead read_head(const hdf5::File& file) {
   return head;
 }
 
-std::vector<std::filesystem::path> part_files(const hdf5::File& recording, const char* dataset) {
-  std::vector<std::filesystem::path> files;
+std::vector<hdf5::File> open_parts(const hdf5::File& recording, const char* dataset) {
+  std::vector<hdf5::File> parts;
   for (const std::string& source : recording.virtual_sources(dataset)) {
-    files.push_back(parts_folder(recording.path()) / std::filesystem::path(source).filename());
-    if (!std::filesystem::exists(files.back()))
-      throw Error("its part " + files.back().string() + " is missing", recording.path().string(),
+    const std::filesystem::path file =
+        parts_folder(recording.path()) / std::filesystem::path(source).filename();
+    if (!std::filesystem::exists(file))
+      throw Error("its part " + file.string() + " is missing", recording.path().string(),
                   "Keep the folder of a recording that is not finished beside it, under its own name.");
+    parts.push_back(hdf5::File::open_to_read(file));
   }
-  if (files.empty()) files.push_back(recording.path());
-  return files;
+  if (parts.empty()) parts.push_back(hdf5::File::open_to_read(recording.path()));
+  return parts;
 }
 
 RecordingPart write_part(const std::filesystem::path& path, std::span<const TickRecord> ticks,
@@ -271,10 +270,10 @@ void merge_recording(const std::filesystem::path& path) {
   {
     const hdf5::File master = hdf5::File::open_to_read(path);
     head = read_head(master);
-    for (const char* time : {"/ticks/time", "/frames/time"}) {
-      for (const std::filesystem::path& file : part_files(master, time))
-        parts.push_back(measure_part(file, time));
-    }
+    for (const hdf5::File& part : open_parts(master, "/ticks/time"))
+      parts.push_back({part.path(), count_rows(part, "/ticks/time"), 0});
+    for (const hdf5::File& part : open_parts(master, "/frames/time"))
+      parts.push_back({part.path(), 0, count_rows(part, "/frames/time")});
   }
   write_whole(path, true, [&](hdf5::File& file) {
     write_head(file, head);

@@ -77,9 +77,10 @@ std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording)
 /// Removes everything in the folder of parts but the lock.
 void clear_parts(const std::filesystem::path& recording);
 
-/// The files that hold the rows of a dataset of a recording, in order: itself when it is plain. Throws Error
-/// when one is missing.
-std::vector<std::filesystem::path> part_files(const hdf5::File& recording, const char* dataset);
+/// The files that hold the rows of a dataset of a recording, in order: itself when it is plain. All are open,
+/// as they may be merged and removed while a recording that goes on is read. Throws Error when one is
+/// missing.
+std::vector<hdf5::File> open_parts(const hdf5::File& recording, const char* dataset);
 
 /// Writes a part. Throws Error.
 RecordingPart write_part(const std::filesystem::path& file, std::span<const TickRecord> ticks,
