@@ -87,7 +87,8 @@ class RecordingWriter {
   /// The frame has as many nodes as the surface.
   void append(SurfaceFrame frame);
 
-  /// Puts all that was appended into PATH. Throws Error when that fails, with PATH as it was.
+  /// Puts all that was appended into PATH. Throws Error when that fails, with PATH as it was; then what was
+  /// appended waits for the next one.
   void checkpoint();
 
   /// Makes PATH one plain file, whose bytes depend on what was appended only. Throws Error when that fails,

@@ -70,6 +70,7 @@ struct RecordingWriter::Impl {
   std::vector<SurfaceFrame> frames;
   std::vector<Level> levels;
   std::vector<std::filesystem::path> replaced;  // by merging, and no longer named by the master
+  bool is_behind = false;                       // the master shows fewer parts than there are
   std::int64_t files = 0;
 };
 
@@ -91,16 +92,21 @@ void RecordingWriter::append(SurfaceFrame frame) {
 
 void RecordingWriter::checkpoint() {
   const hdf5::Quiet quiet;
-  if (impl_->ticks.empty() && impl_->frames.empty()) return;
-  // Whoever has opened the master before the last one has had the time since then to read.
+  Impl& self = *impl_;
+  if (!self.ticks.empty() || !self.frames.empty()) {
+    self.levels.push_back(
+        {write_part(self.next_file(), self.ticks, self.frames, self.head.surface.nodes.size())});
+    self.is_behind = true;
+    self.ticks.clear();
+    self.frames.clear();
+  }
+  if (!self.is_behind) return;
+  // Whoever has opened the master before the last one has had the time since then to open their parts.
   std::vector<std::filesystem::path> to_remove;
-  to_remove.swap(impl_->replaced);
-  impl_->levels.push_back(
-      {write_part(impl_->next_file(), impl_->ticks, impl_->frames, impl_->head.surface.nodes.size())});
-  impl_->merge_levels();
-  impl_->show_parts();
-  impl_->ticks.clear();
-  impl_->frames.clear();
+  to_remove.swap(self.replaced);
+  self.merge_levels();
+  self.show_parts();
+  self.is_behind = false;
   std::error_code ignored;
   for (const std::filesystem::path& file : to_remove) std::filesystem::remove(file, ignored);
 }

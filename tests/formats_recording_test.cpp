@@ -294,6 +294,19 @@ TEST(Recording, KeepsWhatThereIsWhenTheDiskIsFull) {
   expect_ticks(read_recording(folder / "a.h5"), 4100);
 }
 
+TEST(Recording, HasEachRowOnceWhenOnlyTheMasterFailed) {
+  const Folder folder;
+  RecordingWriter writer(folder / "a.h5", info, surface);
+  append(writer, some_ticks(10), 10);
+  std::filesystem::create_directories(folder / "a.h5.partial" / "in the way");
+  writer.append(some_ticks(10, 10));
+  EXPECT_NE(refusal([&] { writer.checkpoint(); }).find("cannot make the file"), std::string::npos);
+  expect_ticks(read_recording(folder / "a.h5"), 10);
+  std::filesystem::remove_all(folder / "a.h5.partial");
+  writer.finish();
+  expect_ticks(read_recording(folder / "a.h5"), 20);
+}
+
 TEST(Recording, ThatCannotBeStartedLeavesNothing) {
   const Folder folder;
   SessionInfo too_long = info;
