@@ -139,7 +139,7 @@ TEST_F(RecorderTest, KeepsTicksAndFrames) {
   constexpr int ticks = 40'000;  // more than there is room for
   Recorder recorder(file_, {}, triangle_);
   std::thread beside([&] {
-    for (int k = 0; k < 1000; ++k) recorder.push_frame_waiting(frame(40 * k));
+    for (int k = 0; k < 1000; ++k) recorder.push_frame_waiting(frame(std::int64_t{40} * k));
   });
   for (int k = 0; k < ticks; ++k) {
     recorder.push_waiting({.time = 1e-3 * k});
