@@ -40,11 +40,12 @@ struct TickRecord {
   std::int64_t begun_ns = 0;                    ///< when the tick began, since the start of the run
   double shown_force[3] = {};                   ///< on the hand: what the device was told to show [N]
   double shown_torque[3] = {};                  ///< [N m]
-  double share = 0.0;                           ///< of the force that the safety rules let pass [0, 1]
+  double share = 1.0;                           ///< of the force that the safety rules let pass [0, 1]
   std::uint8_t phase = 0;                       ///< SafetyPhase
   std::uint8_t fault = 0;                       ///< Fault
-  std::uint8_t event = 0;  ///< what safety was told before the tick: 1 restart, 2 device lost, 4
-                           ///< acknowledged, 8 input lost
+  std::uint8_t event = 0;        ///< what safety was told before the tick: 1 restart, 2 device lost, 4
+                                 ///< acknowledged, 8 input lost
+  std::int64_t motion_step = 0;  ///< packed dynamics: the last step whose answer had come
 };
 
 /// The surface of the body at one moment.
@@ -63,7 +64,7 @@ struct RecordedSurface {
 
 /// What was recorded.
 struct SessionInfo {
-  std::string model;         ///< path of the model
+  std::string model_path;
   std::string content_hash;  ///< of the model
   std::string device;        ///< the hand, as text
   std::int64_t rate = 1000;  ///< ticks per second

@@ -61,7 +61,7 @@ void write_head(hdf5::File& file, const RecordingHead& head) {
   file.write_attribute("/", "version", version);
   file.write_attribute("/", "generator", head.generator);
   file.write_attribute("/", "units", std::string(units));
-  file.write_attribute("/", "model", head.info.model);
+  file.write_attribute("/", "model", head.info.model_path);
   file.write_attribute("/", "content_hash", head.info.content_hash);
   file.write_attribute("/", "device", head.info.device);
   file.write_attribute("/", "rate", std::array{head.info.rate});
@@ -163,7 +163,7 @@ RecordingHead read_head(const hdf5::File& file) {
   if (const auto v = file.integer_attribute("/", "version", 2); !v || (*v)[0] != version[0])
     throw Error("is a recording of another version", path, "Record the session again.");
   RecordingHead head;
-  head.info.model = file.text_attribute("/", "model").value_or("");
+  head.info.model_path = file.text_attribute("/", "model").value_or("");
   head.info.content_hash = file.text_attribute("/", "content_hash").value_or("");
   head.info.device = file.text_attribute("/", "device").value_or("");
   const auto rate = file.integer_attribute("/", "rate", 1);

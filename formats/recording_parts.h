@@ -44,6 +44,7 @@ void for_each_tick_field(Visitor&& visit) {
   visit("/ticks/phase", 1, &TickRecord::phase);
   visit("/ticks/fault", 1, &TickRecord::fault);
   visit("/ticks/event", 1, &TickRecord::event);
+  visit("/ticks/motion_step", 1, &TickRecord::motion_step);
 }
 
 /// The number that a field of TickRecord is, or has several of.

@@ -32,7 +32,7 @@ enum ExitCode : int {
   exit_ok = 0,
   exit_input_error = 1,    ///< bad input, bad file, not enough disk or memory: nothing was changed
   exit_usage = 2,          ///< unknown or missing command-line argument
-  exit_not_verified = 3,   ///< `verify` found a difference
+  exit_differs = 3,        ///< `verify` or a replay found a difference
   exit_interrupted = 130,  ///< Ctrl-C or SIGTERM: temporary files were removed
 };
 

@@ -23,7 +23,7 @@ int run_bake(const std::string& model, palpate::BakeOptions options) {
 int run_verify(const std::string& file) {
   const palpate::VerifyReport report = palpate::verify(palpate::load_model(file), file);
   std::fputs(palpate::to_text(report).c_str(), stdout);
-  return report.passed() ? palpate::exit_ok : palpate::exit_not_verified;
+  return report.passed() ? palpate::exit_ok : palpate::exit_differs;
 }
 
 int run_compare(const std::string& a, const std::string& b, const palpate::CompareOptions& options) {

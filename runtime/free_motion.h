@@ -89,6 +89,7 @@ class FreeMotion {
   /// For MotionSource: what is to be done next; the sample that it made.
   [[nodiscard]] const MotionJob& job() const noexcept { return job_; }
   void receive(const MotionSample& sample) noexcept;
+  [[nodiscard]] std::int64_t sample_step() const noexcept { return sample_step_; }  ///< of the last
   /// Whether the packed dynamics are behind their time, after begin_tick: what is seen waits for them.
   [[nodiscard]] bool is_late() const noexcept { return ends_step() && job_.step > sample_step_; }
 

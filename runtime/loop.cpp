@@ -5,13 +5,10 @@
 #include <cmath>
 #include <ctime>
 
-#include "runtime/devices/fault.h"
-
 namespace palpate {
 namespace {
 
-constexpr std::int64_t second = 1'000'000'000;              // ns
-constexpr std::int64_t period = second / ticks_per_second;  // ns
+constexpr std::int64_t second = 1'000'000'000;  // ns
 
 std::int64_t now() noexcept {
   timespec time{};
@@ -40,106 +37,225 @@ void set(double (&symmetric)[6], const Eigen::Matrix3d& value) noexcept {
   std::copy(numbers.begin(), numbers.end(), symmetric);
 }
 
-TickRecord make_record(const Body& body, const State& state, const PatchSource* overlays,
-                       const ToolPose& device, double time, std::int64_t compute_ns) noexcept {
-  const ToolState& tool = state.tools.front();
-  TickRecord record;
-  record.time = time;
-  set(record.device_position, device.position);
-  set(record.device_orientation, device.orientation);
-  set(record.tool_position, tool.pose.position);
-  set(record.tool_orientation, tool.pose.orientation);
-  set(record.force, -tool.wrench.force);
-  set(record.torque, -tool.wrench.torque);
-  set(record.stiffness, tool.local.stiffness);
-  record.contacts = tool.contacts;
-  record.status = static_cast<std::uint32_t>(state.status);
-  record.compute_ns = static_cast<std::uint32_t>(std::min<std::int64_t>(compute_ns, UINT32_MAX));
-  record.grab = device.grab ? 1 : 0;
-  set(record.handle_position, device.position);
-  set(record.handle_orientation, device.orientation);
-  record.buttons = record.grab;
-  set(record.shown_force, tool.wrench.force);
-  set(record.shown_torque, tool.wrench.torque);
-  record.share = 1.0;
-  record.phase = static_cast<std::uint8_t>(SafetyPhase::active);
-  if (overlays != nullptr && overlays->centre() >= 0) record.patch = body.mesh_node(overlays->centre());
-  return record;
-}
-
 void note_largest(double value, double time, double& largest, double& largest_time) noexcept {
   if (!(value > largest)) return;
   largest = value;
   largest_time = time;
 }
 
-/// `force_before`: on the hand in the tick before [N].
-void count_step(LoopReport& report, const State& state, const Vec3& force_before, double time,
-                std::int64_t compute_ns) noexcept {
-  const ToolState& tool = state.tools.front();
-  if (report.ticks_begun_inside == report.ticks && has(state.status, StepStatus::inside_body))
-    ++report.ticks_begun_inside;
-  ++report.ticks;
-  if (tool.contacts > 0) ++report.ticks_in_contact;
-  report.most_contacts = std::max(report.most_contacts, tool.contacts);
-  report.compute.add(compute_ns);
-  const Vec3& force = tool.wrench.force;
-  note_largest(force.stableNorm(), time, report.largest_force, report.largest_force_time);
-  note_largest((force - force_before).stableNorm(), time, report.largest_jump, report.largest_jump_time);
-  for (std::size_t k = 0; k < status_names.size(); ++k) {
-    if (has(state.status, status_names[k].first)) ++report.status_ticks[k];
+/// What the device, the safety rules and a person make of a tick.
+class Loop {
+ public:
+  Loop(const LoopParts& parts, const LoopOptions& options)
+      : parts_(parts), options_(options), start_(options.fast ? 0 : now() + second / options.rate) {
+    report_.rate = options.rate;
   }
-}
+
+  LoopReport run(const std::atomic<bool>& stop) {
+    for (std::int64_t number = 0; number < options_.ticks && !stop; ++number) {
+      tick_.number = number;
+      tick_.due = start_ + number * second / options_.rate;
+      tick_.begun = tick_.due;
+      if (!options_.fast) {
+        sleep_until(tick_.due);
+        if (stop) break;
+        tick_.begun = now();
+      }
+      tick();
+    }
+    if (parts_.safety != nullptr) parts_.safety->shut_down();
+    parts_.device.show(DeviceCommand{}, news_.state);
+    report_.interrupted = stop;
+    return report_;
+  }
+
+ private:
+  [[nodiscard]] double time() const noexcept {
+    return static_cast<double>(tick_.number) / static_cast<double>(options_.rate);
+  }
+
+  void tick() noexcept {
+    const std::int64_t next_due = start_ + (tick_.number + 1) * second / options_.rate;
+    news_ = parts_.device.hear(tick_);
+    if (news_.begun) tick_.begun = *news_.begun;
+    if (parts_.monitor != nullptr && parts_.monitor->acknowledged())
+      news_.events |= DeviceEvent::acknowledged;
+    in_body_ = parts_.workspace.in_body(news_.state);
+    const Vec3 force_before = tool().wrench.force;
+
+    if (options_.fast) serve();  // they do what is missing, untimed
+    const std::int64_t begin = now();
+    if (!options_.fast) serve();
+    step(parts_.body, parts_.state, in_body_.pose);
+    if (parts_.motion != nullptr) parts_.motion->post(parts_.state);
+    guard();
+    parts_.device.show(shown_, news_.state);
+    const std::int64_t end = now();
+
+    compute_ns_ = end - begin;
+    if (!options_.fast && end > next_due) ++report_.deadline_misses;
+    count(force_before);
+    tell();
+    if (parts_.frames != nullptr) parts_.frames->post(parts_.state, tick_.number, time());
+  }
+
+  /// The overlay and the free motion of this tick.
+  void serve() noexcept {
+    const TickRecord* then = nullptr;
+    if (parts_.replayed != nullptr) then = &parts_.replayed->ticks[static_cast<std::size_t>(tick_.number)];
+    if (parts_.overlays != nullptr) {
+      if (then == nullptr) {
+        parts_.overlays->serve(parts_.state);
+      } else {
+        const Index centre = then->patch < 0 ? -1 : parts_.body.stored_node(then->patch);
+        const bool older = has(static_cast<StepStatus>(then->status), StepStatus::older_patch);
+        parts_.overlays->serve(parts_.state, centre, older);
+      }
+    }
+    if (parts_.motion != nullptr) {
+      if (then == nullptr) {
+        parts_.motion->receive(parts_.state);
+      } else {
+        parts_.motion->receive(parts_.state, then->motion_step);
+      }
+    }
+  }
+
+  /// From what was computed to what the hand is shown. Times are given from the loop's start on, so that a
+  /// replay has the same numbers.
+  void guard() noexcept {
+    const DeviceCommand computed = parts_.workspace.in_device({tool().wrench, tool().local});
+    if (parts_.safety == nullptr) {
+      shown_ = computed;
+      return;
+    }
+    tell_safety(*parts_.safety);
+    DeviceState said = news_.state;
+    said.arrived -= start_;
+    const std::int64_t begun = tick_.begun - start_;
+    shown_ = parts_.safety->filter(said, computed,
+                                   {.now = begun,
+                                    .due = tick_.due - start_,
+                                    .solved = begun,
+                                    .inside_body = has(parts_.state.status, StepStatus::inside_body)});
+    const Fault fault = parts_.safety->fault();
+    if (fault != fault_ && fault != Fault::none) ++report_.faults[static_cast<std::size_t>(fault)];
+    fault_ = fault;
+  }
+
+  void tell_safety(Safety& safety) noexcept {
+    if (has(news_.events, DeviceEvent::lost)) safety.fail(Fault::device_lost);
+    if (has(news_.events, DeviceEvent::input_lost)) safety.fail(Fault::input_lost);
+    if (has(news_.events, DeviceEvent::opened_again)) {
+      // Who plugs it in again has seen that it was gone.
+      ++report_.opened_again;
+      const bool was_gone = safety.fault() == Fault::device_lost || safety.fault() == Fault::device_silent;
+      if (was_gone) safety.acknowledge();
+      safety.restart();
+    }
+    if (has(news_.events, DeviceEvent::acknowledged)) safety.acknowledge();
+  }
+
+  void count(const Vec3& force_before) noexcept {
+    const State& state = parts_.state;
+    if (report_.ticks_begun_inside == report_.ticks && has(state.status, StepStatus::inside_body))
+      ++report_.ticks_begun_inside;
+    ++report_.ticks;
+    if (tool().contacts > 0) ++report_.ticks_in_contact;
+    report_.most_contacts = std::max(report_.most_contacts, tool().contacts);
+    report_.compute.add(compute_ns_);
+    if (!options_.fast) report_.lateness.add(tick_.begun - tick_.due);
+    const Vec3& force = tool().wrench.force;
+    note_largest(force.stableNorm(), time(), report_.largest_force, report_.largest_force_time);
+    note_largest((force - force_before).stableNorm(), time(), report_.largest_jump,
+                 report_.largest_jump_time);
+    report_.largest_shown = std::max(report_.largest_shown, shown_.wrench.force.stableNorm());
+    for (std::size_t k = 0; k < status_names.size(); ++k) {
+      if (has(state.status, status_names[k].first)) ++report_.status_ticks[k];
+    }
+  }
+
+  /// The recording and the monitor.
+  void tell() noexcept {
+    if (parts_.monitor != nullptr) {
+      parts_.monitor->push({.number = tick_.number,
+                            .lateness_ns = tick_.begun - tick_.due,
+                            .compute_ns = compute_ns_,
+                            .force = tool().wrench.force.norm(),
+                            .shown = shown_.wrench.force.norm(),
+                            .contacts = tool().contacts,
+                            .phase = phase(),
+                            .fault = fault_,
+                            .events = news_.events});
+    }
+    if (parts_.recorder == nullptr && parts_.replayed == nullptr) return;
+    const TickRecord tick = record();
+    if (parts_.replayed != nullptr)
+      compare(tick, parts_.replayed->ticks[static_cast<std::size_t>(tick_.number)], report_.replay);
+    if (parts_.recorder == nullptr) return;
+    if (options_.fast) {
+      parts_.recorder->push_waiting(tick);
+    } else {
+      parts_.recorder->push(tick);
+    }
+  }
+
+  [[nodiscard]] TickRecord record() const noexcept {
+    TickRecord record;
+    record.time = time();
+    set(record.device_position, in_body_.pose.position);
+    set(record.device_orientation, in_body_.pose.orientation);
+    set(record.tool_position, tool().pose.position);
+    set(record.tool_orientation, tool().pose.orientation);
+    set(record.force, -tool().wrench.force);
+    set(record.torque, -tool().wrench.torque);
+    set(record.stiffness, tool().local.stiffness);
+    record.contacts = tool().contacts;
+    record.status = static_cast<std::uint32_t>(parts_.state.status);
+    const std::int64_t compute = options_.fast ? 0 : compute_ns_;
+    record.compute_ns = static_cast<std::uint32_t>(std::min<std::int64_t>(compute, UINT32_MAX));
+    record.grab = in_body_.pose.grab ? 1 : 0;
+    if (parts_.overlays != nullptr && parts_.overlays->centre() >= 0)
+      record.patch = parts_.body.mesh_node(parts_.overlays->centre());
+    record.motion_step = parts_.state.motion.sample_step();
+
+    set(record.handle_position, news_.state.pose.position);
+    set(record.handle_orientation, news_.state.pose.orientation);
+    set(record.handle_velocity, news_.state.velocity);
+    record.buttons = news_.state.buttons;
+    record.sequence = news_.state.sequence;
+    record.arrived_ns = news_.state.arrived - start_;
+    record.begun_ns = tick_.begun - start_;
+    set(record.shown_force, shown_.wrench.force);
+    set(record.shown_torque, shown_.wrench.torque);
+    record.share = parts_.safety != nullptr ? parts_.safety->share() : 1.0;
+    record.phase = static_cast<std::uint8_t>(phase());
+    record.fault = static_cast<std::uint8_t>(fault_);
+    record.event = static_cast<std::uint8_t>(news_.events);
+    return record;
+  }
+
+  [[nodiscard]] const ToolState& tool() const noexcept { return parts_.state.tools.front(); }
+  [[nodiscard]] SafetyPhase phase() const noexcept {
+    return parts_.safety != nullptr ? parts_.safety->phase() : SafetyPhase::active;
+  }
+
+  LoopParts parts_;
+  LoopOptions options_;
+  LoopReport report_;
+  std::int64_t start_;  // when tick 0 is due [ns]
+  TickTime tick_;
+  DeviceNews news_;
+  DeviceState in_body_;  // what was said, in the body's frame
+  DeviceCommand shown_;
+  std::int64_t compute_ns_ = 0;
+  Fault fault_ = Fault::none;
+};
 
 }  // namespace
 
-std::int64_t count_ticks(const ScriptDevice& device) {
-  constexpr double rounding = 1e-6;  // of a tick: 0.003 s is tick 3 although 0.003 * 1000 is not 3
-  return static_cast<std::int64_t>(std::floor(device.end_time() * ticks_per_second + rounding)) + 1;
-}
-
-LoopReport run_loop(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
-                    MotionSource* motion, Recorder* recorder, bool fast, const std::atomic<bool>& stop,
-                    SurfaceFrames* frames) {
-  LoopReport report;
-  const std::int64_t ticks = count_ticks(device);
-  const std::int64_t start = now() + period;
-  for (std::int64_t tick = 0; tick < ticks && !stop; ++tick) {
-    const std::int64_t due = start + tick * period;
-    if (!fast) {
-      sleep_until(due);
-      if (stop) break;
-      report.worst_lateness = std::max(report.worst_lateness, now() - due);
-    }
-
-    const double time = static_cast<double>(tick) / ticks_per_second;
-    const ToolPose pose = device.pose(time);
-    const Vec3 force_before = state.tools.front().wrench.force;
-    const auto serve = [&] {
-      if (overlays != nullptr) overlays->serve(state);
-      if (motion != nullptr) motion->receive(state);
-    };
-    if (fast) serve();  // they do what is missing, untimed
-    const std::int64_t begin = now();
-    if (!fast) serve();
-    step(body, state, pose);
-    if (motion != nullptr) motion->post(state);
-    const std::int64_t end = now();
-
-    if (!fast && end > due + period) ++report.deadline_misses;
-    count_step(report, state, force_before, time, end - begin);
-    if (frames != nullptr) frames->post(state, tick, time);
-    if (recorder == nullptr) continue;
-    TickRecord record = make_record(body, state, overlays, pose, time, fast ? 0 : end - begin);
-    record.begun_ns = fast ? tick * period : begin - start;
-    if (fast) {
-      recorder->push_waiting(record);
-    } else {
-      recorder->push(record);
-    }
-  }
-  report.interrupted = stop;
-  return report;
+LoopReport run_loop(const LoopParts& parts, const LoopOptions& options, const std::atomic<bool>& stop) {
+  return Loop(parts, options).run(stop);
 }
 
 }  // namespace palpate

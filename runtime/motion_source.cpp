@@ -34,6 +34,10 @@ MotionSource::~MotionSource() {
   if (worker_.joinable()) worker_.join();
 }
 
+void MotionSource::receive(State& state, std::int64_t step) noexcept {
+  if (state.motion.sample_step() < step) receive(state);
+}
+
 void MotionSource::receive(State& state) noexcept {
   if (!state.motion.active()) return;
   if (!in_background_ && state.motion.job().step != done_) do_job(state.motion.job());

@@ -30,6 +30,8 @@ class MotionSource {
   MotionSource& operator=(const MotionSource&) = delete;
 
   void receive(State& state) noexcept;
+  /// For a replay of a tick that had the samples up to `step`; not in the background.
+  void receive(State& state, std::int64_t step) noexcept;
   void post(const State& state) noexcept;
 
   [[nodiscard]] std::int64_t steps() const noexcept { return steps_; }     ///< done so far

@@ -56,6 +56,23 @@ void PatchSource::serve(State& state) noexcept {
   count(state);
 }
 
+void PatchSource::serve(State& state, Index centre, bool older) noexcept {
+  state.patch_is_older = older;
+  if (centre < 0) return;
+  PatchKey key;
+  key.add(centre);
+  ++round_;
+  build(key);
+  receive();
+  const std::shared_ptr<const Patch>* patch = find(key);
+  if (patch != nullptr && !(key == used_ && state.patch != nullptr)) {
+    if (state.patch != nullptr) ++counts_.switches;
+    state.patch = *patch;
+    used_ = key;
+  }
+  count(state);
+}
+
 void PatchSource::count(const State& state) noexcept {
   const bool touches = std::any_of(state.tools.begin(), state.tools.end(),
                                    [](const ToolState& tool) { return tool.contacts > 0; });

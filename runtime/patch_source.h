@@ -46,6 +46,10 @@ class PatchSource {
   /// of the tick before.
   void serve(State& state) noexcept;
 
+  /// For a replay: sets the patch that lies round a stored node, built if need be (-1: none yet), and whether
+  /// it was an older one. Not in the background.
+  void serve(State& state, Index centre, bool older) noexcept;
+
   /// The stored node that the patch which the last tick was given lies round (the first, of several), -1
   /// before there was one.
   [[nodiscard]] Index centre() const noexcept { return used_.centres[0]; }

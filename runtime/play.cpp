@@ -1,21 +1,27 @@
 #include "runtime/play.h"
 
 #include <fmt/core.h>
+#include <unistd.h>
 
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <span>
+#include <limits>
+#include <thread>
 
 #include "meshes/error.h"
-#include "meshes/vtu_writer.h"
+#include "runtime/devices/device_link.h"
+#include "runtime/last_tick.h"
 #include "runtime/loading.h"
 #include "runtime/loop.h"
+#include "runtime/open_device.h"
 #include "runtime/output.h"
+#include "runtime/play_report.h"
 #include "runtime/real_time.h"
+#include "runtime/script_device.h"
 #include "runtime/surface_frames.h"
 
 namespace palpate {
@@ -27,8 +33,7 @@ static_assert(std::atomic<bool>::is_always_lock_free, "it is set by a signal han
 void stop_on_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_asked = true; };
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
 }
 
 void print_loaded(const Body& body, double seconds) {
@@ -42,306 +47,231 @@ void print_loaded(const Body& body, double seconds) {
   }
 }
 
-double microseconds(std::int64_t nanoseconds) {
-  return static_cast<double>(nanoseconds) * 1e-3;
+Body load(const PlayOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const Settings& settings = options.settings;
+  Body body = load_body(options.file, options.model_toml, settings.overlay ? settings.overlay->refinement : 1,
+                        settings.contact);
+  print_loaded(body, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  return body;
 }
 
-void print_overlays(const PatchSource& overlays) {
-  const PatchCounts& counts = overlays.counts();
-  const auto in_contact = static_cast<double>(std::max<std::int64_t>(counts.in_contact, 1));
+/// What moves the tool.
+struct Mover {
+  std::unique_ptr<Device> device;
+  DeviceLink* link = nullptr;  ///< the device, where a hand may be in it
+  std::int64_t ticks = std::numeric_limits<std::int32_t>::max();
+};
+
+Mover make_mover(const PlayOptions& options, Guardian* guardian) {
+  Mover mover;
+  if (options.device.kind == DeviceChoice::Kind::script) {
+    auto script = std::make_unique<ScriptDevice>(ScriptDevice::read(options.device.target));
+    script->set_rate(options.settings.rate);
+    mover.ticks = script->ticks();
+    mover.device = std::move(script);
+  } else if (options.device.kind == DeviceChoice::Kind::replay) {
+    auto replay = std::make_unique<ReplayDevice>(*options.session);
+    mover.ticks = replay->ticks();
+    mover.device = std::move(replay);
+  } else {
+    const SafetyOptions safety = options.settings.safety.value_or(SafetyOptions{});
+    auto link = std::make_unique<DeviceLink>(
+        make_port(options.device, safety, guardian),
+        DeviceLinkOptions{
+            .max_force = safety.max_force, .max_force_rate = safety.max_force_rate, .stale = safety.stale});
+    mover.link = link.get();
+    mover.device = std::move(link);
+  }
+  if (options.duration) {
+    const double ticks = std::ceil(*options.duration * static_cast<double>(options.settings.rate));
+    mover.ticks = std::min(mover.ticks, static_cast<std::int64_t>(std::min(ticks, 1e15)));
+  }
+  return mover;
+}
+
+/// Until the device says where it is.
+void wait_for(const DeviceLink& link, bool is_bridge) {
+  using namespace std::chrono_literals;
+  const auto start = std::chrono::steady_clock::now();
+  bool told = false;
+  while (!link.has_reported() && !stop_asked) {
+    const auto waited = std::chrono::steady_clock::now() - start;
+    if (!told && waited > 300ms) {
+      fmt::print(stderr, "waiting for {}\n", link.name());
+      told = true;
+    }
+    if (!is_bridge && waited > 5s) {
+      throw Error("it was opened but says nothing", link.name(),
+                  "plug it out and in again, see that it is calibrated and no other program uses it");
+    }
+    std::this_thread::sleep_for(5ms);
+  }
+}
+
+/// Where the device's origin lies unless it is said: above the body, so that half of the workspace's radius
+/// takes the tool down to it.
+Vec3 place_above(const Body& body, const Tool& tool, double radius, double motion_scale) {
+  constexpr double usual_radius = 0.1;  // m
+  const double reach = motion_scale * (std::isfinite(radius) ? radius : usual_radius);
+  const int up = body.dimension() - 1;
+  Vec3 place = body.bounds().center();
+  place[up] = body.bounds().max()[up] + tool.radius + 0.5 * reach;
+  return place;
+}
+
+/// What a hand needs beside what was asked for: safety, a place, and a coupling no stiffer than the device
+/// can show.
+Settings settle(Settings settings, const DeviceLimits& limits, const Body& body) {
+  if (!settings.safety) {
+    settings.safety.emplace();
+    // A body that swings gives energy back that nobody made.
+    if (body.model().dynamics.method != DynamicsMethod::none) settings.safety->max_damping = 0.0;
+  }
+  *settings.safety = limited(*settings.safety, limits);
+  settings.tool.coupling_stiffness =
+      std::min(settings.tool.coupling_stiffness,
+               settings.safety->max_stiffness / (settings.motion_scale * settings.force_scale));
+  if (!settings.origin)
+    settings.origin = place_above(body, settings.tool, limits.workspace_radius, settings.motion_scale);
+  return settings;
+}
+
+void print_device(const DeviceLink& link, const Settings& settings) {
+  const Vec3& at = *settings.origin;
   fmt::print(
       stderr,
-      "overlay: {} patches built (longest {:.1f} ms, {:.0f} MB kept), {} switches, {:.2f} % of the ticks in "
-      "contact on an older patch or none\n",
-      overlays.built(), 1e3 * overlays.longest_build(), 1e-6 * static_cast<double>(overlays.bytes()),
-      counts.switches, 100.0 * static_cast<double>(counts.older_in_contact) / in_contact);
-  if (overlays.failed() > 0)
-    print_warning(
-        fmt::format("{} overlays could not be made: the elements there are too flat, or those of the file do "
-                    "not belong to its mesh (precompute it again)",
-                    overlays.failed()));
-}
-
-void print_report(const LoopReport& report, const PlayOptions& options, std::int64_t dropped,
-                  std::int64_t dropped_frames) {
-  fmt::print(stderr, "{} ticks{}, {} of them in contact, at most {} contact points", report.ticks,
-             report.interrupted ? " until interrupted" : "", report.ticks_in_contact, report.most_contacts);
-  if (!options.fast) {
-    fmt::print(stderr, "; {} deadline misses, at most {:.1f} us late", report.deadline_misses,
-               microseconds(report.worst_lateness));
-  }
-  fmt::print(stderr, "\nstep: median {:.2f} us, 99.9 % {:.2f} us, worst {:.2f} us\n",
-             microseconds(report.compute.percentile(0.5)), microseconds(report.compute.percentile(0.999)),
-             microseconds(report.compute.worst()));
-  fmt::print(stderr, "largest force {:.6g} N at {:.3f} s, largest jump between ticks {:.6g} N at {:.3f} s\n",
-             report.largest_force, report.largest_force_time, report.largest_jump, report.largest_jump_time);
-  for (std::size_t k = 0; k < status_names.size(); ++k) {
-    if (report.status_ticks[k] > 0)
-      fmt::print(stderr, "{}: {} ticks\n", status_names[k].second, report.status_ticks[k]);
-  }
-  if (!options.record.empty())
-    fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", options.record.string(), dropped,
-               dropped_frames);
-}
-
-std::string box_text(const Body& body) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& position : body.surface_rest_positions()) box.extend(position);
-  const Vec3 low = box.min();
-  const Vec3 high = box.max();
-  return fmt::format("({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m", low.x(), low.y(), low.z(),
-                     high.x(), high.y(), high.z());
-}
-
-/// What a script gets wrong so that nothing is felt.
-void warn_of_script(const LoopReport& report, const Body& body) {
-  const std::string place = "the body rests in " + box_text(body);
-  if (report.ticks_begun_inside > 0) {
-    const bool all = report.ticks_begun_inside == report.ticks;
-    const double seconds = static_cast<double>(report.ticks_begun_inside) / ticks_per_second;
-    print_warning(fmt::format("the tool began inside the body and felt nothing {}: start outside ({})",
-                              all ? "at all" : fmt::format("until it was out at {} s", seconds), place));
-  } else if (report.ticks_in_contact == 0) {
-    print_warning(fmt::format(
-        "the tool never touched the body: check the script's positions, which are metres, and the "
-        "tool's size ({})",
-        place));
-  }
-}
-
-/// JSON knows no infinity.
-std::string json_number(double value) {
-  return std::isfinite(value) ? fmt::format("{}", value) : "null";
-}
-
-std::string json_tool(const Tool& tool) {
-  return fmt::format(
-      "{{\"radius_m\": {}, \"length_m\": {}, \"reach_m\": {}, \"friction\": {}, \"coupling_N_per_m\": {}, "
-      "\"coupling_torsion_Nm_per_rad\": {}, \"max_force_N\": {}, \"hand_over\": {}}}",
-      tool.radius, tool.length, tool.reach, tool.friction ? json_number(*tool.friction) : "null",
-      json_number(tool.coupling_stiffness), json_number(tool.coupling_torsion), json_number(tool.max_force),
-      json_number(tool.hand_over));
-}
-
-std::string json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
-  const PatchCounts& counts = overlays.counts();
-  return fmt::format(
-      "{{\"refinement\": {}, \"rings\": {}, \"built\": {}, \"failed\": {}, \"longest_build_s\": {}, "
-      "\"bytes\": {}, "
-      "\"switches\": {}, \"ticks_near\": {}, \"older_ticks_near\": {}, \"ticks_in_contact\": {}, "
-      "\"older_ticks_in_contact\": {}}}",
-      options.refinement, options.rings, overlays.built(), overlays.failed(), overlays.longest_build(),
-      overlays.bytes(), counts.switches, counts.ticks, counts.older, counts.in_contact,
-      counts.older_in_contact);
-}
-
-std::string_view name_of(DynamicsMethod method) {
-  if (method == DynamicsMethod::none) return "none";
-  return method == DynamicsMethod::packed ? "packed" : "modal";
-}
-
-std::string json_dynamics(const Body& body, const MotionSource* motion) {
-  const StoredDynamics& dynamics = body.model().dynamics;
-  std::string json = fmt::format("{{\"method\": \"{}\", \"contact\": \"{}\"", name_of(dynamics.method),
-                                 body.contact_model() == ContactModel::dynamic ? "dynamic" : "quasi-static");
-  if (motion != nullptr)
-    json += fmt::format(", \"steps\": {}, \"longest_step_s\": {}", motion->steps(), motion->longest_step());
-  return json + "}";
-}
-
-std::string json_report(const LoopReport& report, const PlayOptions& options, const Body& body,
-                        const Tool& tool, const PatchSource* overlays, const MotionSource* motion,
-                        std::int64_t dropped) {
-  std::string status;
-  for (std::size_t k = 0; k < status_names.size(); ++k) {
-    status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, report.status_ticks[k]);
-  }
-  std::string json = "{\n";
-  json += fmt::format("  \"file\": {},\n  \"model\": {},\n", json_string(options.file.string()),
-                      json_string(body.model().name));
-  json += fmt::format("  \"fast\": {},\n  \"interrupted\": {},\n  \"tool\": {},\n", options.fast,
-                      report.interrupted, json_tool(tool));
-  json += fmt::format("  \"ticks\": {},\n  \"ticks_in_contact\": {},\n  \"ticks_begun_inside\": {},\n",
-                      report.ticks, report.ticks_in_contact, report.ticks_begun_inside);
-  json += fmt::format("  \"most_contacts\": {},\n", report.most_contacts);
-  json += fmt::format("  \"deadline_misses\": {},\n  \"worst_lateness_ns\": {},\n", report.deadline_misses,
-                      report.worst_lateness);
-  json +=
-      fmt::format("  \"compute_ns\": {{\"median\": {}, \"p99_9\": {}, \"worst\": {}}},\n",
-                  report.compute.percentile(0.5), report.compute.percentile(0.999), report.compute.worst());
-  json += fmt::format("  \"largest_force_N\": {},\n  \"largest_force_time_s\": {},\n", report.largest_force,
-                      report.largest_force_time);
-  json += fmt::format("  \"largest_jump_N\": {},\n  \"largest_jump_time_s\": {},\n", report.largest_jump,
-                      report.largest_jump_time);
-  json += fmt::format("  \"status_ticks\": {{{}}},\n", status);
-  if (overlays != nullptr)
-    json += fmt::format("  \"overlay\": {},\n", json_overlays(*overlays, options.overlay.value()));
-  json += fmt::format("  \"dynamics\": {},\n", json_dynamics(body, motion));
-  if (!options.record.empty())
-    json += fmt::format("  \"recording\": {},\n", json_string(options.record.string()));
-  json += fmt::format("  \"dropped_ticks\": {}\n}}\n", dropped);
-  return json;
-}
-
-/// Where the surface is now at a contact.
-Vec3 surface_position(const State& state, const ContactPoint& contact) {
-  Vec3 position = Vec3::Zero();
-  for (std::size_t k = 0; k < contact.nodes.size(); ++k) {
-    if (contact.nodes[k] >= 0) position += contact.weights[k] * state.tree.position(contact.nodes[k]);
-  }
-  return position;
-}
-
-/// Of a simplex as it is now.
-Vec3 outward_normal(const Body& body, const State& state, Index simplex) {
-  const auto d = static_cast<std::size_t>(body.dimension());
-  const std::span<const Index> nodes = body.simplices().subspan(d * static_cast<std::size_t>(simplex), d);
-  const Vec3 a = state.tree.position(nodes[0]);
-  const Vec3 ab = state.tree.position(nodes[1]) - a;
-  if (d == 2) return Vec3(ab.y(), -ab.x(), 0.0).normalized();
-  return ab.cross(state.tree.position(nodes[2]) - a).normalized();
-}
-
-/// The gap that the tick left, to first order: the contact's normal row of r = b + W lambda.
-double gap_after(const ContactProblem& problem, Index contact) {
-  const Index normal = problem.first_row(contact);
-  double gap = problem.b[static_cast<std::size_t>(normal)];
-  for (Index j = 0; j < problem.rows; ++j)
-    gap += problem.w(normal, j) * problem.lambda[static_cast<std::size_t>(j)];
-  return gap;
-}
-
-/// The contact points after the last tick.
-std::string contact_table(const Body& body, const State& state) {
-  std::string table = "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held\n";
-  const std::span<const ContactPoint> contacts = state.contacts();
-  for (std::size_t k = 0; k < contacts.size(); ++k) {
-    const ContactPoint& contact = contacts[k];
-    const Vec3 x = surface_position(state, contact);
-    const Vec3 n = contact.held ? outward_normal(body, state, contact.simplex) : Vec3(contact.frame.col(0));
-    const Vec3 f = Vec3::Zero() - contact.force;
-    const double gap = contact.held ? 0.0 : gap_after(state.problem, static_cast<Index>(k));
-    table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), n.x(), n.y(), n.z(),
-                         f.x(), f.y(), f.z(), gap, contact.simplex, contact.held ? 1 : 0);
-  }
-  return table;
-}
-
-/// The surface after the last tick, undeformed, with u0 + u, which is what is seen.
-void write_surface(const std::filesystem::path& file, const Body& body, const State& state) {
-  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
-  std::vector<Vec3> u(body.surface_rest_positions().size());
-  ShownMotion motion(body);
-  state.motion.show(motion);
-  surface_displacement(body, state.near.load(), stored, u, &motion);
-  const std::vector<Vec3> nodes = body.surface_in_mesh();
-  std::vector<double> total;
-  for (std::size_t node = 0; node < u.size(); ++node) {
-    const Vec3 seen = body.surface_rest_positions()[node] + u[node] - nodes[node];
-    total.insert(total.end(), seen.begin(), seen.end());
-  }
-  const std::vector<NodalField> fields = {{"displacement", 3, total}};
-  write_vtu(file, nodes, body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, body.simplices(),
-            fields);
+      "device: {}; its origin lies at ({:.4g}, {:.4g}, {:.4g}) m, axes along {}; motion x {:g}, force x "
+      "{:g}; at most {:g} N and, by the coupling, {:g} N/m on the body's side\n",
+      link.name(), at.x(), at.y(), at.z(), settings.axes, settings.motion_scale, settings.force_scale,
+      settings.safety->max_force, settings.tool.coupling_stiffness);
 }
 
 /// The loop with the rights it needs, which the threads that were started before do not inherit.
-LoopReport run(const Body& body, State& state, const ScriptDevice& device, PatchSource* overlays,
-               MotionSource* motion, Recorder* recorder, SurfaceFrames* frames, bool fast) {
-  if (fast) return run_loop(body, state, device, overlays, motion, recorder, fast, stop_asked, frames);
-  const RealTimeRights rights;
+LoopReport run(const LoopParts& parts, const LoopOptions& options, std::optional<int> processor) {
+  if (options.fast) return run_loop(parts, options, stop_asked);
+  const RealTimeRights rights(processor);
   if (!rights.refused().empty()) print_warning(rights.refused());
-  return run_loop(body, state, device, overlays, motion, recorder, fast, stop_asked, frames);
+  return run_loop(parts, options, stop_asked);
 }
 
-SessionInfo session_info(const PlayOptions& options, const Body& body, const Tool& tool) {
-  std::string text = fmt::format("tool_radius={}\ntool_length={}\nreach={}\nhand_over={}\n", tool.radius,
-                                 tool.length, tool.reach, tool.hand_over);
-  if (tool.friction) text += fmt::format("friction={}\n", *tool.friction);
-  text += fmt::format("coupling={}\ncoupling_torsion={}\nmax_force={}\n", tool.coupling_stiffness,
-                      tool.coupling_torsion, tool.max_force);
-  text += fmt::format("max_contacts={}\ncontact={}\nfast={}\n", options.max_contacts,
-                      options.contact == ContactModel::dynamic ? "dynamic" : "quasi-static", options.fast);
-  if (options.overlay)
-    text += fmt::format("overlay=r={},rings={}\n", options.overlay->refinement, options.overlay->rings);
-  return {.model = options.file.string(),
-          .content_hash = body.model().content_hash,
-          .device = "script:" + options.script.string(),
-          .rate = ticks_per_second,
-          .options = text};
-}
-
-/// Every how many ticks, for so many frames a second.
-std::int64_t ticks_per_frame(double frames_per_second) {
-  return std::max<std::int64_t>(std::llround(ticks_per_second / frames_per_second), 1);
+void warn_of_other_model(const Recording& session, const Body& body) {
+  if (session.info.content_hash == body.model().content_hash) return;
+  print_warning("the session was recorded with another model or another precomputation of it (" +
+                session.info.model_path + "): forces will differ");
 }
 
 }  // namespace
 
 int play(const PlayOptions& options) {
-  const ScriptDevice device = ScriptDevice::read(options.script);
-  const auto start = std::chrono::steady_clock::now();
-  const Body body = load_body(options.file, options.model_toml,
-                              options.overlay ? options.overlay->refinement : 1, options.contact);
-  print_loaded(body, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  std::optional<Guardian> guardian;  // forks, so it comes before the first thread
+  if (options.device.kind == DeviceChoice::Kind::hid) guardian.emplace();
+  stop_on_signals();
+  if (options.processor) leave_to_the_loop(*options.processor);
+  const Mover mover = make_mover(options, guardian ? &*guardian : nullptr);
+  const Body body = load(options);
+  if (options.session) warn_of_other_model(*options.session, body);
 
-  Tool tool = options.tool;
-  tool.reach = options.reach.value_or(body.longest_surface_edge());
-  State state(body, {.tools = {tool},
-                     .max_contacts = options.max_contacts,
-                     .patch_nodes = options.overlay ? patch_room(body, options.overlay->rings, 1) : 0});
-  std::optional<PatchSource> overlays;
-  if (options.overlay) {
-    overlays.emplace(body, state,
-                     PatchSourceOptions{.rings = options.overlay->rings,
-                                        .memory = options.overlay_memory,
-                                        .in_background = !options.fast});
+  Settings settings = options.settings;
+  if (mover.link != nullptr) {
+    wait_for(*mover.link, options.device.kind == DeviceChoice::Kind::bridge);
+    settings = settle(settings, mover.link->limits(), body);
+    print_device(*mover.link, settings);
   }
-  PatchSource* const source = overlays ? &*overlays : nullptr;
+  std::optional<Safety> safety;
+  if (settings.safety) {
+    settings.safety->period = 1.0 / static_cast<double>(settings.rate);
+    safety.emplace(*settings.safety);
+  }
+
+  Tool tool = settings.tool;
+  tool.reach = settings.reach.value_or(body.longest_surface_edge());
+  State state(body, {.tools = {tool},
+                     .max_contacts = settings.max_contacts,
+                     .patch_nodes = settings.overlay ? patch_room(body, settings.overlay->rings, 1) : 0,
+                     .tick = 1.0 / static_cast<double>(settings.rate)});
+  const bool in_background = !options.fast && !options.session;
+  std::optional<PatchSource> overlays;
+  if (settings.overlay) {
+    overlays.emplace(body, state,
+                     PatchSourceOptions{.rings = settings.overlay->rings,
+                                        .memory = settings.overlay_memory,
+                                        .in_background = in_background});
+  }
   std::optional<MotionSource> motion;
   if (body.model().dynamics.method == DynamicsMethod::packed)
-    motion.emplace(body, state, MotionSourceOptions{.in_background = !options.fast});
+    motion.emplace(body, state, MotionSourceOptions{.in_background = in_background});
   std::optional<Recorder> recorder;
-  std::optional<SurfaceFrames> frames;
   if (!options.record.empty()) {
-    recorder.emplace(options.record, session_info(options, body, tool), recorded_surface(body));
-    if (options.record_frames > 0.0)
-      frames.emplace(body, state,
-                     SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(options.record_frames),
-                                          .in_background = !options.fast},
-                     [&recorder, fast = options.fast](SurfaceFrame frame) {
-                       if (fast) {
-                         recorder->push_frame_waiting(std::move(frame));
-                       } else {
-                         recorder->push_frame(std::move(frame));
-                       }
-                     });
+    recorder.emplace(options.record,
+                     SessionInfo{.model_path = options.file.string(),
+                                 .content_hash = body.model().content_hash,
+                                 .device = options.device.text,
+                                 .rate = settings.rate,
+                                 .options = to_text(settings)},
+                     recorded_surface(body));
+  }
+  std::optional<SurfaceFrames> frames;
+  if (recorder && options.record_frames > 0.0) {
+    const double ticks = static_cast<double>(settings.rate) / options.record_frames;
+    frames.emplace(body, state,
+                   SurfaceFramesOptions{
+                       .ticks_per_frame = std::max<std::int64_t>(std::llround(std::min(ticks, 1e15)), 1),
+                       .in_background = !options.fast},
+                   [&recorder, fast = options.fast](SurfaceFrame frame) {
+                     if (fast) {
+                       recorder->push_frame_waiting(std::move(frame));
+                     } else {
+                       recorder->push_frame(std::move(frame));
+                     }
+                   });
+  }
+  std::optional<Monitor> monitor;
+  if (!options.fast) {
+    monitor.emplace(MonitorOptions{.rate = settings.rate,
+                                   .line = isatty(STDERR_FILENO) != 0,
+                                   .acknowledges = mover.link != nullptr,
+                                   .shows_safety = safety.has_value()});
   }
 
-  stop_on_signals();
-  const LoopReport report = run(body, state, device, source, motion ? &*motion : nullptr,
-                                recorder ? &*recorder : nullptr, frames ? &*frames : nullptr, options.fast);
+  const LoopReport report =
+      run({.body = body,
+           .state = state,
+           .device = *mover.device,
+           .workspace = Workspace(settings.workspace()),
+           .safety = safety ? &*safety : nullptr,
+           .overlays = overlays ? &*overlays : nullptr,
+           .motion = motion ? &*motion : nullptr,
+           .recorder = recorder ? &*recorder : nullptr,
+           .monitor = monitor ? &*monitor : nullptr,
+           .frames = frames ? &*frames : nullptr,
+           .replayed = options.session.get()},
+          {.rate = settings.rate, .ticks = mover.ticks, .fast = options.fast}, options.processor);
+  monitor.reset();
   frames.reset();  // the last frame is in the recording
   if (recorder) recorder->finish();
 
-  const std::int64_t dropped = recorder ? recorder->dropped() : 0;
-  print_report(report, options, dropped, recorder ? recorder->dropped_frames() : 0);
-  if (source != nullptr) print_overlays(*source);
-  if (motion) {
-    fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", motion->steps(),
-               1e3 * body.model().dynamics.newmark.time_step, 1e3 * motion->longest_step());
-  }
-  warn_of_script(report, body);
+  const PlayedRun played{.options = options,
+                         .settings = settings,
+                         .body = body,
+                         .tool = tool,
+                         .report = report,
+                         .overlays = overlays ? &*overlays : nullptr,
+                         .motion = motion ? &*motion : nullptr,
+                         .link = mover.link,
+                         .dropped = recorder ? recorder->dropped() : 0,
+                         .dropped_frames = recorder ? recorder->dropped_frames() : 0};
+  print_report(played);
   if (!options.contacts.empty()) write_text_file(options.contacts, contact_table(body, state));
   if (!options.surface.empty()) write_surface(options.surface, body, state);
-  const std::string json =
-      json_report(report, options, body, tool, source, motion ? &*motion : nullptr, dropped);
+  const std::string json = json_report(played);
   if (options.report.empty()) {
     fmt::print("{}", json);
   } else {
     write_text_file(options.report, json);
   }
-  return report.interrupted ? exit_interrupted : exit_ok;
+  if (report.interrupted) return exit_interrupted;
+  return report.replay.different > 0 ? exit_differs : exit_ok;
 }
 
 }  // namespace palpate

@@ -2,24 +2,40 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
-#include "runtime/patch_source.h"
-#include "runtime/step.h"
+#include "formats/recording.h"
+#include "runtime/settings.h"
 
 namespace palpate {
+
+/// What moves the tool.
+struct DeviceChoice {
+  enum class Kind {
+    script,  ///< a CSV file: `target`
+    replay,  ///< a session
+    hid,     ///< a HID device: `target` says which, empty where there is only one; `profile` how to treat it
+    bridge,  ///< another process, at the address `target`
+  };
+  Kind kind = Kind::script;
+  std::string target;
+  std::string profile;
+  std::string text;  ///< as it was written
+
+  /// Whether a hand may be in it.
+  [[nodiscard]] bool is_live() const noexcept { return kind == Kind::hid || kind == Kind::bridge; }
+};
 
 struct PlayOptions {
   std::filesystem::path file;        ///< baked model
   std::filesystem::path model_toml;  ///< that it must have been made from; empty: not asked
-  std::filesystem::path script;      ///< CSV
-  Tool tool;                         ///< but for its reach
-  std::optional<double> reach;       ///< [m]; else the longest edge of the surface
-  Index max_contacts = StateOptions{}.max_contacts;
-  ContactModel contact = ContactModel::quasi_static;
-  std::optional<OverlayOptions> overlay;                     ///< none: the body's own mesh
-  std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
+  DeviceChoice device;
+  std::shared_ptr<const Recording> session;  ///< that is replayed
+  Settings settings;
+  std::optional<double> duration;  ///< [s]; else to the end of the script or session, or until interrupted
+  std::optional<int> processor;    ///< that the loop is to have for itself
   bool fast = false;
   std::filesystem::path record;    ///< empty: nothing is recorded
   double record_frames = 60.0;     ///< of the surface a second; 0: none
@@ -28,8 +44,8 @@ struct PlayOptions {
   std::filesystem::path contacts;  ///< CSV of the contact points after the last tick; empty: none
 };
 
-/// Runs the script to its end or to SIGINT or SIGTERM, either of which leaves a complete recording, report
-/// and table of contacts. Returns the exit code; throws Error.
+/// Runs to the end or to SIGINT, SIGTERM or SIGHUP, which leave a complete recording, report and table of
+/// contacts, and the device without force. Returns the exit code; throws Error.
 int play(const PlayOptions& options);
 
 }  // namespace palpate

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -150,6 +151,25 @@ ToolPose ScriptDevice::pose(double t) const noexcept {
     pose.orientation = row.pose.orientation.slerp(share, after->pose.orientation);
   }
   return pose;
+}
+
+std::int64_t ScriptDevice::ticks() const noexcept {
+  constexpr double rounding = 1e-6;  // of a tick: 0.003 s is tick 3 although 0.003 * 1000 is not 3
+  return static_cast<std::int64_t>(std::floor(end_time() * static_cast<double>(rate_) + rounding)) + 1;
+}
+
+DeviceNews ScriptDevice::hear(const TickTime& tick) noexcept {
+  const auto rate = static_cast<double>(rate_);
+  DeviceNews news;
+  news.state.pose = pose(static_cast<double>(tick.number) / rate);
+  if (tick.number > 0) {
+    const Vec3 before = pose(static_cast<double>(tick.number - 1) / rate).position;
+    news.state.velocity = rate * (news.state.pose.position - before);
+  }
+  news.state.buttons = news.state.pose.grab ? 1 : 0;
+  news.state.arrived = tick.due;
+  news.state.sequence = static_cast<std::uint32_t>(tick.number + 1);
+  return news;
 }
 
 }  // namespace palpate

@@ -65,7 +65,7 @@ void print_text(const std::filesystem::path& path, const Recording& recording, c
   const SessionInfo& info = recording.info;
   const std::size_t frames = recording.frames.time.size();
   fmt::print("{}: {}, by {}\n", path.string(), ending_names[static_cast<int>(ending)], recording.generator);
-  fmt::print("model            {} ({})\n", info.model, info.content_hash);
+  fmt::print("model            {} ({})\n", info.model_path, info.content_hash);
   fmt::print("device           {}\n", info.device.empty() ? "unknown" : info.device);
   fmt::print("options          {}\n", in_one_line(info.options));
   fmt::print("ticks            {} at {} a second: {:.3f} s, {} missing\n", s.ticks, info.rate, s.seconds,
@@ -100,7 +100,7 @@ void print_json(const std::filesystem::path& path, const Recording& recording, c
              json_string(path.string()), json_string(recording.generator), ending == Ending::merged,
              ending == Ending::going_on);
   fmt::print("  \"model\": {},\n  \"content_hash\": {},\n  \"device\": {},\n  \"options\": {},\n",
-             json_string(info.model), json_string(info.content_hash), json_string(info.device),
+             json_string(info.model_path), json_string(info.content_hash), json_string(info.device),
              json_string(info.options));
   fmt::print("  \"rate\": {},\n  \"ticks\": {},\n  \"missing_ticks\": {},\n  \"seconds\": {},\n", info.rate,
              s.ticks, s.missing, s.seconds);

@@ -47,7 +47,8 @@ TickRecord some_tick(std::size_t i) {
           .share = 1 / (1 + x),
           .phase = static_cast<std::uint8_t>(i % 4),
           .fault = static_cast<std::uint8_t>(i % 9),
-          .event = static_cast<std::uint8_t>(i % 16)};
+          .event = static_cast<std::uint8_t>(i % 16),
+          .motion_step = n / 3};
 }
 
 std::vector<TickRecord> some_ticks(std::size_t count, std::size_t first = 0) {
@@ -74,10 +75,10 @@ bool same(const TickRecord& a, const TickRecord& b) {
          equal(a.handle_velocity, b.handle_velocity) && a.buttons == b.buttons && a.sequence == b.sequence &&
          a.arrived_ns == b.arrived_ns && a.begun_ns == b.begun_ns && equal(a.shown_force, b.shown_force) &&
          equal(a.shown_torque, b.shown_torque) && a.share == b.share && a.phase == b.phase &&
-         a.fault == b.fault && a.event == b.event;
+         a.fault == b.fault && a.event == b.event && a.motion_step == b.motion_step;
 }
 
-const SessionInfo info = {.model = "liver.palpate.hdf",
+const SessionInfo info = {.model_path = "liver.palpate.hdf",
                           .content_hash = "00ff",
                           .device = "script:touch.csv",
                           .rate = 2000,
@@ -132,7 +133,7 @@ TEST_P(Lengths, AreReadBack) {
   const auto ticks = some_ticks(GetParam());
   record(folder / "a.h5", ticks, 1000);
   const Recording read = read_recording(folder / "a.h5");
-  EXPECT_EQ(read.info.model, info.model);
+  EXPECT_EQ(read.info.model_path, info.model_path);
   EXPECT_EQ(read.info.content_hash, info.content_hash);
   EXPECT_EQ(read.info.device, info.device);
   EXPECT_EQ(read.info.rate, info.rate);
@@ -310,7 +311,7 @@ TEST(Recording, HasEachRowOnceWhenOnlyTheMasterFailed) {
 TEST(Recording, ThatCannotBeStartedLeavesNothing) {
   const Folder folder;
   SessionInfo too_long = info;
-  too_long.model = std::string(5000, 'm');
+  too_long.model_path = std::string(5000, 'm');
   const std::string text = refusal([&] { RecordingWriter(folder / "a.h5", too_long); });
   EXPECT_NE(text.find("model is 5000 bytes long"), std::string::npos) << text;
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));

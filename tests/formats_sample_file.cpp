@@ -22,7 +22,7 @@ int main(int count, char** arguments) {
     palpate::test::write_swinging_sample(folder / "modal.palpate.hdf", palpate::DynamicsMethod::modal);
     palpate::RecordingWriter recording(
         folder / "recording.h5",
-        {.model = "tet4.palpate.hdf", .content_hash = "00ff", .device = "none", .options = ""},
+        {.model_path = "tet4.palpate.hdf", .content_hash = "00ff", .device = "none", .options = ""},
         {.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, .corners = 3, .simplices = {0, 1, 2}});
     for (int i = 0; i < 5000; ++i) {
       const double x = i;

@@ -12,7 +12,7 @@ ALLOWED = {
     "libc.so": "LGPL-2.1", "libm.so": "LGPL-2.1", "libstdc++.so": "GPL-3 with runtime exception",
     "libgcc_s.so": "GPL-3 with runtime exception", "ld-linux-x86-64.so": "LGPL-2.1", "libpthread.so": "LGPL-2.1",
     "libhdf5_serial.so": "HDF5 (BSD)", "libxxhash.so": "BSD-2", "libfmt.so": "MIT", "libspdlog.so": "MIT",
-    "libtomlplusplus.so": "MIT",
+    "libtomlplusplus.so": "MIT", "libhidapi-hidraw.so": "BSD-3 (of three licences)", "libudev.so": "LGPL-2.1",
     # HDF5's own needs, named too by linkers that keep what is not used directly
     "libcrypto.so": "Apache-2.0", "libcurl.so": "curl (MIT-like)", "libsz.so": "BSD-2", "libz.so": "zlib",
     "libasan.so": "GPL-3 with runtime exception", "libubsan.so": "GPL-3 with runtime exception",

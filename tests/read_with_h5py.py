@@ -141,7 +141,7 @@ def check_recording(path):
         widths = {"time": 1, "device_position": 3, "device_orientation": 4, "tool_position": 3, "tool_orientation": 4, "force": 3,
                   "torque": 3, "contacts": 1, "stiffness": 6, "status": 1, "compute_ns": 1, "grab": 1, "patch": 1,
                   "handle_position": 3, "handle_orientation": 4, "handle_velocity": 3, "buttons": 1, "sequence": 1, "arrived_ns": 1,
-                  "begun_ns": 1, "shown_force": 3, "shown_torque": 3, "share": 1, "phase": 1, "fault": 1, "event": 1}
+                  "begun_ns": 1, "shown_force": 3, "shown_torque": 3, "share": 1, "phase": 1, "fault": 1, "event": 1, "motion_step": 1}
         expect({name: ticks[name].shape for name in ticks} ==
                {name: (5000,) if width == 1 else (5000, width) for name, width in widths.items()}, "shapes")
         expect(np.array_equal(ticks["time"], 1e-3 * np.arange(5000)), "time")

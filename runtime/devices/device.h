@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "runtime/local_model.h"
 #include "runtime/tool.h"
@@ -33,6 +34,51 @@ struct DeviceState {
 struct DeviceCommand {
   Wrench wrench;     ///< on the hand
   LocalModel local;  ///< of wrench.force
+};
+
+/// What befell a device since the tick before; bits.
+enum class DeviceEvent : std::uint8_t {
+  none = 0,
+  opened_again = 1U << 0,  ///< it was lost and is back
+  lost = 1U << 1,          ///< unplugged, or it cannot be read or written
+  acknowledged = 1U << 2,  ///< a person has seen the fault
+  input_lost = 1U << 3,    ///< the viewer that moved the tool is gone
+};
+
+constexpr DeviceEvent operator|(DeviceEvent a, DeviceEvent b) noexcept {
+  return static_cast<DeviceEvent>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
+}
+constexpr DeviceEvent& operator|=(DeviceEvent& a, DeviceEvent b) noexcept {
+  return a = a | b;
+}
+constexpr bool has(DeviceEvent events, DeviceEvent bit) noexcept {
+  return (static_cast<unsigned>(events) & static_cast<unsigned>(bit)) != 0;
+}
+
+/// A tick of the loop.
+struct TickTime {
+  std::int64_t number = 0;  ///< from 0
+  std::int64_t due = 0;     ///< when it was to begin, by the monotonic clock [ns]
+  std::int64_t begun = 0;   ///< when it did [ns]
+};
+
+/// What a device has to say to a tick.
+struct DeviceNews {
+  DeviceState state;
+  DeviceEvent events = DeviceEvent::none;
+  std::optional<std::int64_t> begun{};  ///< in a replay: when the recorded tick began, in place of now [ns]
+};
+
+/// What the loop drives a tool with. Neither call waits, allocates or throws.
+class Device {
+ public:
+  virtual ~Device() = default;
+
+  /// What is known of the device now; the same state as before when nothing new was heard.
+  virtual DeviceNews hear(const TickTime& tick) noexcept = 0;
+
+  /// What it is to show, which follows from `state`.
+  virtual void show(const DeviceCommand& command, const DeviceState& state) noexcept = 0;
 };
 
 }  // namespace palpate

@@ -17,11 +17,7 @@ void check(double value, const char* name, bool may_be_zero = true) {
               may_be_zero ? "give a finite number, 0 or more" : "give a finite number above 0");
 }
 
-SafetyOptions checked(SafetyOptions options, const DeviceLimits& limits) {
-  options.max_force = std::min(options.max_force, limits.max_force);
-  options.max_torque = std::min(options.max_torque, limits.max_torque);
-  options.max_stiffness = std::min(options.max_stiffness, limits.max_stiffness);
-  options.max_damping = std::min(options.max_damping, limits.max_damping);
+SafetyOptions checked(const SafetyOptions& options) {
   check(options.period, "period", false);
   check(options.max_force, "max_force");
   check(options.max_torque, "max_torque");
@@ -58,8 +54,16 @@ SafetyOptions checked(SafetyOptions options, const DeviceLimits& limits) {
 
 }  // namespace
 
+SafetyOptions limited(SafetyOptions options, const DeviceLimits& limits) noexcept {
+  options.max_force = std::min(options.max_force, limits.max_force);
+  options.max_torque = std::min(options.max_torque, limits.max_torque);
+  options.max_stiffness = std::min(options.max_stiffness, limits.max_stiffness);
+  options.max_damping = std::min(options.max_damping, limits.max_damping);
+  return options;
+}
+
 Safety::Safety(const SafetyOptions& options, const DeviceLimits& limits)
-    : options_(checked(options, limits)),
+    : options_(checked(limited(options, limits))),
       speed_limit_(options_.max_speed, options_.period),
       silence_(options_.silence),
       deadline_(options_.deadline, options_.period),

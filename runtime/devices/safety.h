@@ -37,6 +37,9 @@ struct SafetyOptions {
   BuzzOptions buzz{};
 };
 
+/// With what the device bears where that is lower.
+[[nodiscard]] SafetyOptions limited(SafetyOptions options, const DeviceLimits& limits) noexcept;
+
 /// Of one tick, by the monotonic clock.
 struct TickTiming {
   std::int64_t now = 0;      ///< when the tick is [ns]

@@ -1,0 +1,175 @@
+#include "runtime/devices/device_link.h"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <ctime>
+#include <exception>
+
+#include "runtime/devices/plausible.h"
+#include "runtime/real_time.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t patience = 2'000'000;  // ns without a new command, then the writer goes on by itself
+constexpr std::int64_t wait = 1'000'000;      // ns, for a new command
+constexpr auto retry = std::chrono::milliseconds(250);  // between attempts to open a lost device
+
+std::int64_t now() noexcept {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return time.tv_sec * 1'000'000'000 + time.tv_nsec;
+}
+
+}  // namespace
+
+DeviceLink::DeviceLink(std::unique_ptr<DevicePort> port, const DeviceLinkOptions& options)
+    : port_(std::move(port)),
+      options_(options),
+      heard_(DeviceState{}),
+      heard_by_writer_(DeviceState{}),
+      shown_(Shown{}),
+      stale_(options.stale),
+      rate_(options.max_force_rate) {
+  port_->open();
+  name_ = port_->name();
+  sem_init(&is_shown_, 0, 0);
+  // A wait on the wire that a signal interrupts would be taken for a lost device.
+  sigset_t all;
+  sigset_t before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  reader_ = std::thread([this] { read_reports(); });
+  writer_ = std::thread([this] { write_commands(); });
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+DeviceLink::~DeviceLink() {
+  stop_ = true;
+  reader_.join();
+  writer_.join();
+  port_->close();
+  sem_destroy(&is_shown_);
+}
+
+DeviceNews DeviceLink::hear(const TickTime&) noexcept {
+  DeviceNews news;
+  const std::int64_t losses = losses_;
+  const std::int64_t openings = openings_;
+  if (losses != losses_told_) news.events |= DeviceEvent::lost;
+  if (openings != openings_told_) news.events |= DeviceEvent::opened_again;
+  losses_told_ = losses;
+  openings_told_ = openings;
+  news.state = heard_.read();
+  return news;
+}
+
+void DeviceLink::show(const DeviceCommand& command, const DeviceState& state) noexcept {
+  shown_.next() = {.command = command, .state = state, .at = now()};
+  shown_.publish();
+  sem_post(&is_shown_);
+}
+
+void DeviceLink::read_reports() noexcept {
+  ask_for_priority(wire_priority);
+  bool is_open = true;  // as this thread left it
+  while (!stop_) {
+    if (!is_open) {
+      std::this_thread::sleep_for(retry);
+      try_to_open();
+      const std::lock_guard lock(wire_);
+      is_open = is_open_;
+      continue;
+    }
+    DeviceState state;
+    const DevicePort::Heard heard = port_->read(state);
+    if (heard == DevicePort::Heard::lost || broken_) {
+      lose();
+      is_open = false;
+    } else if (heard == DevicePort::Heard::report) {
+      if (reports_ == 0) first_ = state;
+      heard_.next() = state;
+      heard_.publish();
+      heard_by_writer_.next() = state;
+      heard_by_writer_.publish();
+      ++reports_;
+    }
+  }
+}
+
+void DeviceLink::lose() noexcept {
+  const std::lock_guard lock(wire_);
+  port_->close();
+  is_open_ = false;
+  broken_ = false;
+  ++losses_;
+}
+
+void DeviceLink::try_to_open() noexcept {
+  const std::lock_guard lock(wire_);
+  try {
+    port_->open();
+  } catch (const std::exception&) {
+    return;  // not back yet
+  }
+  is_open_ = true;
+  ++openings_;
+}
+
+void DeviceLink::write_commands() noexcept {
+  ask_for_priority(wire_priority);
+  std::int64_t last_shown = 0;
+  std::int64_t last_write = now();
+  while (!stop_) {
+    timespec until{};
+    clock_gettime(CLOCK_MONOTONIC, &until);
+    until.tv_nsec += wait;
+    until.tv_sec += until.tv_nsec / 1'000'000'000;
+    until.tv_nsec %= 1'000'000'000;
+    if (sem_clockwait(&is_shown_, CLOCK_MONOTONIC, &until) == 0) {
+      while (sem_trywait(&is_shown_) == 0) {
+      }
+    }
+    const Shown& shown = shown_.read();
+    const std::int64_t begin = now();
+    const double elapsed = seconds_between(last_write, begin);
+    if (shown.at != last_shown) {
+      stale_.reset();
+      constexpr double at_once = 1e9;  // safety has bounded its rate already
+      rate_.follow(shown.command.wrench.force, at_once);
+      write(shown.command, shown.state);
+    } else if (shown.at != 0 && begin - shown.at > patience) {
+      const DeviceState& state = heard_by_writer_.read();
+      write(extrapolate(shown, state, begin, elapsed), state);
+      ++extrapolated_;
+    } else {
+      continue;
+    }
+    last_shown = shown.at;
+    last_write = begin;
+  }
+}
+
+DeviceCommand DeviceLink::extrapolate(const Shown& shown, const DeviceState& state, std::int64_t now,
+                                      double elapsed) noexcept {
+  const Vec3 field = stale_.force(shown.command, state.pose.position, state.velocity,
+                                  seconds_between(shown.at, now), elapsed);
+  DeviceCommand command;
+  command.wrench.force = rate_.follow(clamped(stale_.share() * field, options_.max_force), elapsed);
+  command.wrench.torque = stale_.share() * shown.command.wrench.torque;
+  command.local.force = command.wrench.force;
+  command.local.point = state.pose.position;
+  return command;
+}
+
+void DeviceLink::write(const DeviceCommand& command, const DeviceState& state) noexcept {
+  const std::lock_guard lock(wire_);
+  if (!is_open_ || broken_) return;
+  const std::int64_t begin = now();
+  if (!port_->write(command, state)) broken_ = true;
+  worst_write_ = std::max<std::int64_t>(worst_write_, now() - begin);
+  ++writes_;
+}
+
+}  // namespace palpate

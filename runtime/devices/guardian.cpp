@@ -1,0 +1,144 @@
+#include "runtime/devices/guardian.h"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <climits>
+#include <csignal>
+#include <cstring>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+enum class What : std::uint8_t { nothing, device, goodbye };
+
+/// What the child is told, in one piece: a pipe keeps writes of up to PIPE_BUF bytes whole.
+struct Message {
+  static constexpr std::size_t most_reports = 8;
+  static constexpr std::size_t room = 64;
+
+  What what = What::nothing;
+  std::array<char, 256> path{};
+  std::uint8_t count = 0;
+  std::array<std::uint8_t, most_reports> sizes{};
+  std::array<std::array<std::uint8_t, room>, most_reports> reports{};
+};
+static_assert(sizeof(Message) <= PIPE_BUF);
+
+void send(int pipe, const Message& message) noexcept {
+  while (write(pipe, &message, sizeof(message)) < 0 && errno == EINTR) {
+  }
+}
+
+// --- the child: only functions that signal handlers may call, as other threads' locks are not there ---
+
+/// False at the end.
+bool receive(int pipe, Message& message) noexcept {
+  auto* const bytes = reinterpret_cast<unsigned char*>(&message);
+  std::size_t have = 0;
+  while (have < sizeof(message)) {
+    const ssize_t more = read(pipe, bytes + have, sizeof(message) - have);
+    if (more > 0) have += static_cast<std::size_t>(more);
+    if (more == 0 || (more < 0 && errno != EINTR)) return false;
+  }
+  return true;
+}
+
+void show_no_force(const Message& device) noexcept {
+  const int file = open(device.path.data(), O_WRONLY | O_CLOEXEC);
+  if (file < 0) return;
+  for (std::size_t k = 0; k < device.count; ++k) {
+    // Twice, as one may be lost; an error leaves nothing better to do than the next report.
+    for (int time = 0; time < 2; ++time) {
+      if (write(file, device.reports[k].data(), device.sizes[k]) < 0 && errno == EINTR) --time;
+    }
+  }
+  close(file);
+}
+
+/// Leaves the terminal, the signals and the files of the process that it guards: whoever waits for the end of
+/// that one's output does not wait for the child.
+void detach(int& pipe) noexcept {
+  setsid();
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP}) {
+    std::signal(signal, SIG_IGN);
+  }
+  constexpr int own = 3;
+  pipe = fcntl(pipe, F_DUPFD, own);  // it may be one of the first three, where the parent had closed them
+  const int null = open("/dev/null", O_RDWR);
+  for (int file = 0; file < own; ++file) {
+    if (null >= 0) {
+      dup2(null, file);
+    } else {
+      close(file);
+    }
+  }
+  if (pipe != own) pipe = dup2(pipe, own);
+  close_range(own + 1, UINT_MAX, 0);
+  static_cast<void>(!chdir("/"));
+}
+
+[[noreturn]] void watch(int pipe) noexcept {
+  detach(pipe);
+  Message last;
+  Message message;
+  while (receive(pipe, message)) {
+    last = message;
+    if (last.what == What::goodbye) _exit(0);
+  }
+  if (last.what == What::device) show_no_force(last);
+  _exit(0);
+}
+
+}  // namespace
+
+Guardian::Guardian() {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) {
+    throw Error(std::string("no pipe: ") + std::strerror(errno), "guardian", "close other programs");
+  }
+  child_ = fork();
+  if (child_ == 0) {
+    close(ends[1]);
+    watch(ends[0]);
+  }
+  close(ends[0]);
+  if (child_ < 0) {
+    const int reason = errno;
+    close(ends[1]);
+    throw Error(std::string("no second process: ") + std::strerror(reason), "guardian",
+                "close other programs");
+  }
+  pipe_ = ends[1];
+}
+
+Guardian::~Guardian() {
+  send(pipe_, {.what = What::goodbye});
+  close(pipe_);
+  while (waitpid(child_, nullptr, 0) < 0 && errno == EINTR) {
+  }
+}
+
+void Guardian::guard(const std::string& path, std::span<const std::vector<std::uint8_t>> reports) noexcept {
+  Message message{.what = reports.empty() ? What::nothing : What::device};
+  if (path.size() >= message.path.size()) return;
+  std::ranges::copy(path, message.path.begin());
+  for (const std::vector<std::uint8_t>& report : reports) {
+    if (message.count == Message::most_reports || report.size() > Message::room) continue;
+    std::ranges::copy(report, message.reports[message.count].begin());
+    message.sizes[message.count++] = static_cast<std::uint8_t>(report.size());
+  }
+  send(pipe_, message);
+}
+
+void Guardian::release() noexcept {
+  send(pipe_, {.what = What::nothing});
+}
+
+}  // namespace palpate

@@ -1,0 +1,207 @@
+#include "runtime/settings.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "meshes/error.h"
+#include "runtime/numbers.h"
+
+namespace palpate {
+namespace {
+
+/// A part NAME=VALUE.
+struct Part {
+  std::string_view name;
+  std::string_view value;
+};
+
+Part split_part(std::string_view part) {
+  const std::size_t equals = std::min(part.find('='), part.size());
+  return {part.substr(0, equals), part.substr(std::min(equals + 1, part.size()))};
+}
+
+/// Visits each safety option: name, unit, reference to the number.
+template <class Options, class Visitor>
+void for_each_safety_option(Options& o, Visitor&& visit) {
+  visit("max_force", "N", o.max_force);
+  visit("max_torque", "N m", o.max_torque);
+  visit("max_force_rate", "N/s", o.max_force_rate);
+  visit("max_torque_rate", "N m/s", o.max_torque_rate);
+  visit("max_stiffness", "N/m", o.max_stiffness);
+  visit("max_damping", "N s/m", o.max_damping);
+  visit("max_speed", "m/s", o.max_speed);
+  visit("ramp", "s", o.ramp);
+  visit("small_force", "N", o.small_force);
+  visit("calm_time", "s", o.calm_time);
+  visit("late", "s", o.deadline.tolerance);
+  visit("late_fade", "s", o.deadline.fade);
+  visit("late_recovery", "s", o.deadline.recovery);
+  visit("most_late", "ticks", o.deadline.most);
+  visit("forgiveness", "ticks", o.deadline.forgiveness);
+  visit("silence", "s", o.silence.most);
+  visit("silence_fade", "s", o.silence.fade_from);
+  visit("frozen", "s", o.silence.frozen);
+  visit("frozen_force", "N", o.silence.frozen_force);
+  visit("stale", "s", o.stale.fresh);
+  visit("stale_life", "s", o.stale.time_to_live);
+  visit("stale_fade", "s", o.stale.fade);
+  visit("stale_damping", "N s/m", o.stale.damping);
+  visit("buzz_speed", "m/s", o.buzz.speed);
+  visit("buzz_force", "N", o.buzz.force);
+  visit("buzz_mean", "s", o.buzz.mean_time);
+  visit("buzz_window", "s", o.buzz.window);
+  visit("buzz_flips", "", o.buzz.flips);
+  visit("buzz_fade", "s", o.buzz.fade);
+  visit("buzz_recovery", "s", o.buzz.recovery);
+}
+
+std::string shape_text(const Tool& tool) {
+  if (tool.length > 0.0) return fmt::format("capsule:{},{}", tool.radius, tool.length);
+  return tool.radius > 0.0 ? fmt::format("sphere:{}", tool.radius) : "point";
+}
+
+std::string safety_text(const SafetyOptions& options) {
+  std::string text;
+  for_each_safety_option(options, [&](const char* name, const char*, const auto& value) {
+    text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, value);
+  });
+  return text;
+}
+
+}  // namespace
+
+WorkspaceOptions Settings::workspace() const {
+  return {.device_origin = Vec3::Zero(),
+          .body_origin = origin.value_or(Vec3::Zero()),
+          .axes = parse_axes(axes),
+          .motion_scale = motion_scale,
+          .force_scale = force_scale};
+}
+
+std::string to_text(const Settings& settings) {
+  std::string text;
+  const auto add = [&](const char* name, const auto& value) { text += fmt::format("{}={}\n", name, value); };
+  const auto add_finite = [&](const char* name, double value) {
+    if (std::isfinite(value)) add(name, value);
+  };
+  const Tool& tool = settings.tool;
+  add("tool", shape_text(tool));
+  if (tool.friction) add("friction", *tool.friction);
+  add_finite("coupling", tool.coupling_stiffness);
+  add_finite("coupling-torsion", tool.coupling_torsion);
+  add_finite("max-force", tool.max_force);
+  add("hand-over", tool.hand_over);
+  if (settings.reach) add("reach", *settings.reach);
+  add("max-contacts", settings.max_contacts);
+  add("contact", settings.contact == ContactModel::dynamic ? "dynamic" : "quasi-static");
+  if (settings.overlay) {
+    add("overlay", fmt::format("r={},rings={}", settings.overlay->refinement, settings.overlay->rings));
+    add("overlay-memory", settings.overlay_memory >> 20);
+  }
+  add("rate", settings.rate);
+  add("motion-scale", settings.motion_scale);
+  add("force-scale", settings.force_scale);
+  if (settings.origin)
+    add("origin", fmt::format("{},{},{}", settings.origin->x(), settings.origin->y(), settings.origin->z()));
+  add("axes", settings.axes);
+  if (settings.safety) add("safety", safety_text(*settings.safety));
+  return text;
+}
+
+Tool parse_shape(const std::string& text) {
+  Tool tool;
+  if (text == "point") return tool;
+  const std::string_view rest = std::string_view(text).substr(std::min(text.find(':') + 1, text.size()));
+  const std::vector<std::string_view> sizes = split_commas(rest);
+  const bool sphere = text.starts_with("sphere:") && sizes.size() == 1;
+  const bool capsule = text.starts_with("capsule:") && sizes.size() == 2;
+  if (!sphere && !capsule) {
+    throw Error("'" + text + "' is none of point, sphere:RADIUS and capsule:RADIUS,LENGTH", "--tool",
+                "lengths are metres");
+  }
+  const auto size = [&](std::string_view number) {
+    const std::optional<double> metres = parse_number(number);
+    if (metres && *metres > 0.0) return *metres;
+    throw Error(fmt::format("'{}' of '{}' is not a positive number of metres", number, text), "--tool",
+                "write for instance sphere:0.005");
+  };
+  tool.radius = size(sizes[0]);
+  if (capsule) tool.length = size(sizes[1]);
+  return tool;
+}
+
+OverlayOptions parse_overlay(const std::string& text, const std::string& where) {
+  OverlayOptions overlay;
+  for (const std::string_view part : split_commas(text)) {
+    const auto [name, number] = split_part(part);
+    const std::optional<Index> value = parse_index(std::string(number));
+    if (name == "r" && value && *value >= 2 && *value <= 16) {
+      overlay.refinement = *value;
+    } else if (name == "rings" && value && *value >= 1 && *value <= 16) {
+      overlay.rings = *value;
+    } else {
+      throw Error(fmt::format("'{}' is neither r=2 to r=16 nor rings=1 to rings=16", part), where,
+                  "write for instance r=3,rings=2");
+    }
+  }
+  return overlay;
+}
+
+Eigen::Quaterniond parse_axes(const std::string& text) {
+  const std::string hint = "write three of x, y, z, -x, -y, -z, each axis once, for instance x,-z,y";
+  const std::vector<std::string_view> names = split_commas(text);
+  if (names.size() != 3) throw Error("'" + text + "' is not three axes", "--axes", hint);
+  Mat3 axes = Mat3::Zero();
+  for (Eigen::Index column = 0; column < 3; ++column) {
+    std::string_view name = names[static_cast<std::size_t>(column)];
+    const double sign = name.starts_with('-') ? -1.0 : 1.0;
+    if (name.starts_with('-') || name.starts_with('+')) name.remove_prefix(1);
+    if (name.size() != 1 || name[0] < 'x' || name[0] > 'z')
+      throw Error("'" + text + "' is not three axes", "--axes", hint);
+    axes(name[0] - 'x', column) = sign;
+  }
+  const double determinant = axes.determinant();
+  if (determinant < 0.0)
+    throw Error("'" + text + "' is a mirror image", "--axes", "turn the sign of one axis round");
+  if (determinant == 0.0) throw Error("'" + text + "' names an axis twice", "--axes", hint);
+  return Eigen::Quaterniond(axes);
+}
+
+SafetyOptions parse_safety(const std::string& text) {
+  SafetyOptions options;
+  if (text == "default") return options;
+  for (const std::string_view part : split_commas(text)) {
+    const auto [wanted, number] = split_part(part);
+    const std::optional<double> parsed = parse_number(number);
+    if (!parsed || *parsed < 0.0)
+      throw Error(fmt::format("'{}' is not NAME=NUMBER, from 0 on", part), "--safety",
+                  "write max_force=2,ramp=3");
+    bool known = false;
+    for_each_safety_option(options, [&, name_wanted = wanted, value_wanted = *parsed](
+                                        const char* name, const char*, auto& value) {
+      if (name_wanted != name) return;
+      value = static_cast<std::remove_reference_t<decltype(value)>>(value_wanted);
+      known = true;
+    });
+    if (!known)
+      throw Error(fmt::format("there is no safety option '{}'", wanted), "--safety",
+                  "palpate-runtime play --help lists them");
+  }
+  return options;
+}
+
+std::string safety_help() {
+  std::string text;
+  const SafetyOptions defaults;
+  for_each_safety_option(defaults, [&](const char* name, const char* unit, const auto& value) {
+    text += fmt::format("  {:<16} {:>6} {}\n", name, value, unit);
+  });
+  return text;
+}
+
+}  // namespace palpate

@@ -1,0 +1,50 @@
+// What the outcome of a session follows from, beside the model and the hand; as text too.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "runtime/body.h"
+#include "runtime/devices/safety.h"
+#include "runtime/devices/workspace.h"
+#include "runtime/patch_source.h"
+#include "runtime/tool.h"
+
+namespace palpate {
+
+/// Each is an option of `palpate-runtime play`, by whose name it stands in a recording.
+struct Settings {
+  Tool tool;                    ///< but for its reach
+  std::optional<double> reach;  ///< [m]; else the longest edge of the surface
+  Index max_contacts = 32;
+  ContactModel contact = ContactModel::quasi_static;
+  std::optional<OverlayOptions> overlay;                     ///< none: the body's own mesh
+  std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
+  std::int64_t rate = 1000;                                  ///< ticks a second
+  double motion_scale = 1.0;                                 ///< as in WorkspaceOptions
+  double force_scale = 1.0;
+  std::optional<Vec3> origin;           ///< where the device's origin lies in the body's frame [m]
+  std::string axes = "x,y,z";           ///< the body's axes along the device's
+  std::optional<SafetyOptions> safety;  ///< none: off where nobody feels it, else the defaults
+
+  [[nodiscard]] WorkspaceOptions workspace() const;
+};
+
+/// A line NAME=VALUE for each that is not left to its default; numbers read back to the same bits.
+[[nodiscard]] std::string to_text(const Settings& settings);
+
+// Of one option each; they throw Error whose `where` is the option.
+
+/// "point", "sphere:RADIUS" or "capsule:RADIUS,LENGTH" [m].
+[[nodiscard]] Tool parse_shape(const std::string& text);
+/// "r=3,rings=2", either part with its default when it is left out. `where`: the option.
+[[nodiscard]] OverlayOptions parse_overlay(const std::string& text, const std::string& where);
+/// "x,-z,y": the body's axes along which the device's x, y and z point. Gives the rotation.
+[[nodiscard]] Eigen::Quaterniond parse_axes(const std::string& text);
+/// "max_force=5,ramp=0.5": what is not named has its default; "default" changes nothing.
+[[nodiscard]] SafetyOptions parse_safety(const std::string& text);
+/// The names that parse_safety knows, with units and defaults, a line each.
+[[nodiscard]] std::string safety_help();
+
+}  // namespace palpate
