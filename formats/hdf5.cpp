@@ -66,6 +66,35 @@ Id open_existing(const std::filesystem::path& path, unsigned mode) {
   return {H5Fopen(path.c_str(), mode, access.get()), H5Fclose};
 }
 
+/// The library takes % in the names of sources for the beginning of a format; %% is one %.
+std::string doubled_percents(const std::string& text) {
+  std::string doubled;
+  for (const char c : text) doubled.append(c == '%' ? 2 : 1, c);
+  return doubled;
+}
+
+std::string single_percents(std::string text) {
+  for (std::size_t at = text.find("%%"); at != std::string::npos; at = text.find("%%", at + 1))
+    text.erase(at, 1);
+  return text;
+}
+
+struct Rows {
+  Id file, memory;
+};
+
+Rows select_rows(const Id& dataset, std::int64_t first, std::int64_t rows) {
+  Rows selected;
+  selected.file = Id(H5Dget_space(dataset.get()), H5Sclose);
+  std::array<hsize_t, highest_rank> sizes = {}, start = {};
+  const int rank = H5Sget_simple_extent_dims(selected.file.get(), sizes.data(), nullptr);
+  sizes[0] = static_cast<hsize_t>(rows);
+  start[0] = static_cast<hsize_t>(first);
+  H5Sselect_hyperslab(selected.file.get(), H5S_SELECT_SET, start.data(), nullptr, sizes.data(), nullptr);
+  selected.memory = Id(H5Screate_simple(rank, sizes.data(), nullptr), H5Sclose);
+  return selected;
+}
+
 std::string text_of(std::span<const std::int64_t> dims) {
   std::string text;
   for (const std::int64_t dim : dims) text.append(text.empty() ? "" : " x ").append(std::to_string(dim));
@@ -270,6 +299,67 @@ Stored File::locate(const std::string& dataset, const ElementType& type, std::si
            " bytes, more than the file holds (" + std::to_string(file_bytes) + "): the file is truncated");
   stored.offset = static_cast<std::int64_t>(offset);
   return stored;
+}
+
+void File::write_rows(const std::string& dataset, const ElementType& type, std::int64_t first,
+                      std::int64_t rows, const void* data) {
+  const Id opened = open_dataset(dataset);
+  const Rows selected = select_rows(opened, first, rows);
+  if (H5Dwrite(opened.get(), type.id, selected.memory.get(), selected.file.get(), H5P_DEFAULT, data) < 0)
+    fail("write " + dataset);
+}
+
+void File::read_rows(const std::string& dataset, const ElementType& type, std::int64_t first,
+                     std::int64_t rows, void* data) const {
+  const Id opened = open_dataset(dataset);
+  const Rows selected = select_rows(opened, first, rows);
+  if (H5Dread(opened.get(), type.id, selected.memory.get(), selected.file.get(), H5P_DEFAULT, data) < 0)
+    throw Error(dataset + " cannot be read: " + reason(), path_.string(), altered_hint);
+}
+
+void File::write_virtual(const std::string& dataset, const ElementType& type,
+                         std::span<const std::int64_t> row, std::span<const VirtualSource> sources) {
+  make_group(dataset.substr(0, dataset.rfind('/')));
+  std::vector<hsize_t> sizes = {0};
+  sizes.insert(sizes.end(), row.begin(), row.end());
+  for (const VirtualSource& source : sources) sizes[0] += static_cast<hsize_t>(source.rows);
+  const Id space(H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose);
+  const Id creation = timeless(H5P_DATASET_CREATE);
+  H5Pset_layout(creation.get(), H5D_VIRTUAL);
+  if (constexpr double missing = std::numeric_limits<double>::quiet_NaN(); H5Tget_class(type.id) == H5T_FLOAT)
+    H5Pset_fill_value(creation.get(), H5T_NATIVE_DOUBLE, &missing);
+  std::vector<hsize_t> start(sizes.size()), part = sizes;
+  for (const VirtualSource& source : sources) {
+    part[0] = static_cast<hsize_t>(source.rows);
+    const Id of_part(H5Screate_simple(static_cast<int>(part.size()), part.data(), nullptr), H5Sclose);
+    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, part.data(), nullptr);
+    if (H5Pset_virtual(creation.get(), space.get(), doubled_percents(source.file).c_str(), dataset.c_str(),
+                       of_part.get()) < 0)
+      fail("make " + dataset);
+    start[0] += part[0];
+  }
+  H5Sselect_all(space.get());
+  const Id made(
+      H5Dcreate2(id(), dataset.c_str(), type.id, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+      H5Dclose);
+  if (!made.valid()) fail("make " + dataset);
+}
+
+std::vector<std::string> File::virtual_sources(const std::string& dataset) const {
+  const Id opened = open_dataset(dataset);
+  const Id creation(H5Dget_create_plist(opened.get()), H5Pclose);
+  std::size_t count = 0;
+  std::vector<std::string> files;
+  if (H5Pget_layout(creation.get()) != H5D_VIRTUAL || H5Pget_virtual_count(creation.get(), &count) < 0)
+    return files;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::string name(longest_text, '\0');
+    const ssize_t length = H5Pget_virtual_filename(creation.get(), i, name.data(), name.size());
+    if (length < 0 || static_cast<std::size_t>(length) >= name.size())
+      throw Error(dataset + " does not say where its rows are", path_.string(), altered_hint);
+    files.push_back(single_percents(name.substr(0, static_cast<std::size_t>(length))));
+  }
+  return files;
 }
 
 Id File::open_attribute(const std::string& object, const std::string& name) const {

@@ -51,6 +51,12 @@ struct Stored {
   std::int64_t bytes = 0;
 };
 
+/// Rows of a dataset of another file, for a virtual dataset.
+struct VirtualSource {
+  std::string file;  ///< relative to the folder of the file that holds the virtual dataset
+  std::int64_t rows = 0;
+};
+
 /// An HDF5 file. Objects carry no times, so equal calls make equal files. All throw Error (where = the file;
 /// fields are named).
 class File {
@@ -72,12 +78,27 @@ class File {
   /// Contiguous dataset; makes its group. `data` null: only the space is reserved.
   void write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims,
              const void* data);
+  /// Rows [first, first + rows) of a dataset that `write` has reserved.
+  void write_rows(const std::string& dataset, const ElementType& type, std::int64_t first, std::int64_t rows,
+                  const void* data);
+  /// Virtual dataset: all rows of the datasets of the same name in other files, one after the other; a row
+  /// has the shape `row`. Makes its group. Numbers whose file is missing read as not a number where there is
+  /// one.
+  void write_virtual(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> row,
+                     std::span<const VirtualSource> sources);
   void write_attribute(const std::string& object, const std::string& name, const std::string& text);
   void write_attribute(const std::string& object, const std::string& name,
                        std::span<const std::int64_t> values);
 
   /// Finds a dataset and proves that it has this type and rank, lies in one piece, and inside the file.
   [[nodiscard]] Stored locate(const std::string& dataset, const ElementType& type, std::size_t rank) const;
+
+  /// Rows [first, first + rows) of a dataset that `locate` has found.
+  void read_rows(const std::string& dataset, const ElementType& type, std::int64_t first, std::int64_t rows,
+                 void* data) const;
+
+  /// The files of a virtual dataset as `write_virtual` was given them; none where it is another kind.
+  [[nodiscard]] std::vector<std::string> virtual_sources(const std::string& dataset) const;
 
   /// Name of a dataset's element type ("float64"), "another type" where it is none of ours.
   [[nodiscard]] std::string type_name(const std::string& dataset) const;

@@ -1,4 +1,4 @@
-// Recorded sessions: every tick of a run.
+// Recorded sessions: every tick of a run, and pictures of the surface at display rate.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "meshes/mesh.h"
+
 namespace palpate {
 
-/// What is kept of one tick.
+/// What is kept of one tick. What is called device is in the body's frame, what is called handle or shown in
+/// the device's own.
 struct TickRecord {
   double time = 0.0;                            ///< since the start of the run [s]
   double device_position[3] = {};               ///< where the device wanted the tool [m]
@@ -27,57 +30,105 @@ struct TickRecord {
       0;  ///< time that `step` took; 0 in a run without waiting, so that two such runs are equal
   std::uint8_t grab = 0;    ///< grab button
   std::int32_t patch = -1;  ///< mesh node that the overlay lies round, -1: none
-  double handle_position[3] = {};
-  double handle_orientation[4] = {1, 0, 0, 0};
-  double handle_velocity[3] = {};
-  std::uint32_t buttons = 0;
-  std::uint32_t sequence = 0;
-  std::int64_t arrived_ns = 0;
-  std::int64_t begun_ns = 0;
-  double shown_force[3] = {};
-  double shown_torque[3] = {};
-  double share = 1.0;
-  std::uint8_t phase = 0;
-  std::uint8_t fault = 0;
-  std::uint8_t event = 0;
-  std::int64_t motion_step = 0;
+
+  double handle_position[3] = {};               ///< where the device says that its handle is [m]
+  double handle_orientation[4] = {1, 0, 0, 0};  ///< w, x, y, z
+  double handle_velocity[3] = {};               ///< [m/s]
+  std::uint32_t buttons = 0;                    ///< of the device, a bit each
+  std::uint32_t sequence = 0;                   ///< of the device's report
+  std::int64_t arrived_ns = 0;                  ///< when that report arrived, since the start of the run
+  std::int64_t begun_ns = 0;                    ///< when the tick began, since the start of the run
+  double shown_force[3] = {};                   ///< on the hand: what the device was told to show [N]
+  double shown_torque[3] = {};                  ///< [N m]
+  double share = 1.0;                           ///< of the force that the safety rules let pass [0, 1]
+  std::uint8_t phase = 0;                       ///< SafetyPhase
+  std::uint8_t fault = 0;                       ///< Fault
+  std::uint8_t event = 0;        ///< what safety was told before the tick: 1 restart, 2 device lost, 4
+                                 ///< acknowledged, 8 input lost
+  std::int64_t motion_step = 0;  ///< packed dynamics: the last step whose answer had come
 };
 
-/// What a session was.
+/// The surface of the body at one moment.
+struct SurfaceFrame {
+  std::int64_t tick = 0;
+  double time = 0.0;                ///< since the start of the run [s]
+  std::vector<float> displacement;  ///< [S x 3] node + displacement is what is seen [m]
+};
+
+/// The surface that the frames displace.
+struct RecordedSurface {
+  std::vector<Vec3> nodes;       ///< [S] without loads [m]
+  int corners = 3;               ///< d: of a simplex, 3 of a triangle, in the plane 2 of a line
+  std::vector<Index> simplices;  ///< [T x d]
+};
+
+/// What was recorded.
 struct SessionInfo {
   std::string model_path;
   std::string content_hash;  ///< of the model
-  std::string device;
-  std::int64_t rate = 1000;
-  std::string options;
+  std::string device;        ///< the hand, as text
+  std::int64_t rate = 1000;  ///< ticks per second
+  std::string options;       ///< lines "name=value\n"
 };
 
-/// Writes a session to HDF5 (`/ticks/time`, `/ticks/tool_position`, ... one extendible dataset a field),
-/// under a temporary name until `finish`. Not for the tick: a recorder thread calls it.
+/// Writes a session to HDF5. From the first `checkpoint` on PATH is a valid recording at each instant,
+/// however the program ends: it shows the datasets of complete files in PATH.parts as its own (virtual
+/// datasets). `finish` makes it one plain file. Not for the tick: a recorder thread calls it.
 class RecordingWriter {
  public:
-  /// `model_path` and `content_hash` of the model and what overlays there were ("r=3,rings=2", empty: none)
-  /// are kept as attributes, with the program's version. Throws Error when PATH cannot be made.
-  RecordingWriter(std::filesystem::path path, const SessionInfo& info);
-  ~RecordingWriter();  ///< without `finish`, removes the temporary file
+  /// Takes the place of what was recorded to PATH before. Throws Error when PATH cannot be made, or is being
+  /// recorded to.
+  RecordingWriter(std::filesystem::path path, const SessionInfo& info, const RecordedSurface& surface = {});
+  ~RecordingWriter();  ///< without `finish`, what the last `checkpoint` kept is there
   RecordingWriter(const RecordingWriter&) = delete;
   RecordingWriter& operator=(const RecordingWriter&) = delete;
 
+  /// Only into memory, until the next `checkpoint`.
   void append(std::span<const TickRecord> ticks);
-  void finish();  ///< flushes and renames to PATH
+  /// The frame has as many nodes as the surface.
+  void append(SurfaceFrame frame);
+
+  /// Puts all that was appended into PATH. Throws Error when that fails, with PATH as it was; then what was
+  /// appended waits for the next one.
+  void checkpoint();
+
+  /// Makes PATH one plain file, whose bytes depend on what was appended only. Throws Error when that fails,
+  /// with PATH as the last `checkpoint` left it.
+  void finish();
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
+/// The frames of a session but for their displacements, which `read_displacement` reads.
+struct RecordedFrames {
+  RecordedSurface surface;
+  std::vector<std::int64_t> tick;  ///< [F]
+  std::vector<double> time;        ///< [F] since the start of the run [s]
+};
+
 /// A recorded session.
 struct Recording {
   SessionInfo info;
+  std::string generator;  ///< program and version
   std::vector<TickRecord> ticks;
+  RecordedFrames frames;
+  bool finished = true;  ///< else it was killed, or is being recorded: see `finish_recording`
 };
 
-/// Reads a recording back. Throws Error when it is not one or is damaged.
+/// Reads a recording back, also one that was killed. Throws Error when it is not one or is damaged.
 Recording read_recording(const std::filesystem::path& path);
+
+/// Only the frames of it.
+RecordedFrames read_frames(const std::filesystem::path& path);
+
+/// Displacement [frames x S x 3] of some frames [m]. Throws Error when they are not all there.
+std::vector<float> read_displacement(const std::filesystem::path& path, std::int64_t first,
+                                     std::int64_t frames);
+
+/// Makes a recording that was killed one plain file and removes its parts; nothing where that is so already.
+/// False, and nothing happens, while it is being recorded. Throws Error.
+bool finish_recording(const std::filesystem::path& path);
 
 }  // namespace palpate

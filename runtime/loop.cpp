@@ -96,6 +96,7 @@ class Loop {
     if (!options_.fast && end > next_due) ++report_.deadline_misses;
     count(force_before);
     tell();
+    if (parts_.frames != nullptr) parts_.frames->post(parts_.state, tick_.number, time());
   }
 
   /// The overlay and the free motion of this tick.

@@ -15,6 +15,7 @@
 #include "runtime/recorder.h"
 #include "runtime/replay_device.h"
 #include "runtime/step.h"
+#include "runtime/surface_frames.h"
 
 namespace palpate {
 
@@ -32,6 +33,7 @@ struct LoopParts {
   MotionSource* motion = nullptr;
   Recorder* recorder = nullptr;
   Monitor* monitor = nullptr;
+  SurfaceFrames* frames = nullptr;
   const Recording* replayed = nullptr;  ///< session whose overlays and motion come as they came then
 };
 

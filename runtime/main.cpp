@@ -13,6 +13,7 @@
 #include "runtime/numbers.h"
 #include "runtime/play_command.h"
 #include "runtime/probe.h"
+#include "runtime/session.h"
 
 namespace {
 
@@ -87,6 +88,15 @@ CLI::App* add_devices(CLI::App& app, Arguments& arguments) {
   return devices;
 }
 
+CLI::App* add_session(CLI::App& app, Arguments& arguments) {
+  CLI::App* session = app.add_subcommand("session", "say what is in a recording of play");
+  session->add_option("SESSION.h5", arguments.file, "recording; one that was killed is made one file")
+      ->required()
+      ->type_name("");
+  session->add_flag("--json", arguments.json, "print JSON");
+  return session;
+}
+
 std::vector<double> vector_argument(const std::string& option, const std::string& text) {
   const std::optional<std::vector<double>> vector = parse_vector(text);
   if (!vector)
@@ -131,10 +141,12 @@ int run(int argc, char** argv) {
   const CLI::App* probe_command = add_probe(app, arguments);
   const CLI::App* play_command = add_play(app, arguments.play);
   const CLI::App* devices_command = add_devices(app, arguments);
+  const CLI::App* session_command = add_session(app, arguments);
   try {
     app.parse(argc, argv);
-    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe, play or devices");
+    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe, play, session or devices");
     if (devices_command->parsed()) return devices(arguments.devices);
+    if (session_command->parsed()) return session(arguments.file, arguments.json);
     if (play_command->parsed()) return play(read_play(arguments.play));
     return probe(
         {.file = arguments.file,

@@ -22,6 +22,7 @@
 #include "runtime/play_report.h"
 #include "runtime/real_time.h"
 #include "runtime/script_device.h"
+#include "runtime/surface_frames.h"
 
 namespace palpate {
 namespace {
@@ -202,11 +203,28 @@ int play(const PlayOptions& options) {
     motion.emplace(body, state, MotionSourceOptions{.in_background = in_background});
   std::optional<Recorder> recorder;
   if (!options.record.empty()) {
-    recorder.emplace(options.record, SessionInfo{.model_path = options.file.string(),
-                                                 .content_hash = body.model().content_hash,
-                                                 .device = options.device.text,
-                                                 .rate = settings.rate,
-                                                 .options = to_text(settings)});
+    recorder.emplace(options.record,
+                     SessionInfo{.model_path = options.file.string(),
+                                 .content_hash = body.model().content_hash,
+                                 .device = options.device.text,
+                                 .rate = settings.rate,
+                                 .options = to_text(settings)},
+                     recorded_surface(body));
+  }
+  std::optional<SurfaceFrames> frames;
+  if (recorder && options.record_frames > 0.0) {
+    const double ticks = static_cast<double>(settings.rate) / options.record_frames;
+    frames.emplace(body, state,
+                   SurfaceFramesOptions{
+                       .ticks_per_frame = std::max<std::int64_t>(std::llround(std::min(ticks, 1e15)), 1),
+                       .in_background = !options.fast},
+                   [&recorder, fast = options.fast](SurfaceFrame frame) {
+                     if (fast) {
+                       recorder->push_frame_waiting(std::move(frame));
+                     } else {
+                       recorder->push_frame(std::move(frame));
+                     }
+                   });
   }
   std::optional<Monitor> monitor;
   if (!options.fast) {
@@ -226,9 +244,11 @@ int play(const PlayOptions& options) {
            .motion = motion ? &*motion : nullptr,
            .recorder = recorder ? &*recorder : nullptr,
            .monitor = monitor ? &*monitor : nullptr,
+           .frames = frames ? &*frames : nullptr,
            .replayed = options.session.get()},
           {.rate = settings.rate, .ticks = mover.ticks, .fast = options.fast}, options.processor);
   monitor.reset();
+  frames.reset();  // the last frame is in the recording
   if (recorder) recorder->finish();
 
   const PlayedRun played{.options = options,
@@ -239,7 +259,8 @@ int play(const PlayOptions& options) {
                          .overlays = overlays ? &*overlays : nullptr,
                          .motion = motion ? &*motion : nullptr,
                          .link = mover.link,
-                         .dropped = recorder ? recorder->dropped() : 0};
+                         .dropped = recorder ? recorder->dropped() : 0,
+                         .dropped_frames = recorder ? recorder->dropped_frames() : 0};
   print_report(played);
   if (!options.contacts.empty()) write_text_file(options.contacts, contact_table(body, state));
   if (!options.surface.empty()) write_surface(options.surface, body, state);

@@ -38,6 +38,7 @@ struct PlayOptions {
   std::optional<int> processor;    ///< that the loop is to have for itself
   bool fast = false;
   std::filesystem::path record;    ///< empty: nothing is recorded
+  double record_frames = 60.0;     ///< of the surface a second; 0: none
   std::filesystem::path report;    ///< JSON; empty: on the standard output
   std::filesystem::path surface;   ///< grid of the surface after the last tick, .vtu; empty: none
   std::filesystem::path contacts;  ///< CSV of the contact points after the last tick; empty: none

@@ -63,6 +63,9 @@ void add_workspace(CLI::App& play, PlayArguments& arguments) {
 
 void add_outputs(CLI::App& play, PlayArguments& arguments) {
   play.add_option("--record", arguments.record, "write every tick to this HDF5 file")->type_name("OUT.h5");
+  play.add_option("--record-frames", arguments.record_frames,
+                  "how often the surface is written there; else 60 times a second; 0: never")
+      ->type_name("HZ");
   play.add_option("--report", arguments.report, "write the JSON report here and not to the standard output")
       ->type_name("OUT.json");
   play.add_option("--surface", arguments.surface,
@@ -213,6 +216,14 @@ void fill(PlayArguments& arguments, std::string_view options) {
   }
 }
 
+double read_frame_rate(const std::optional<std::string>& text) {
+  if (!text) return PlayOptions{}.record_frames;
+  const std::optional<double> rate = parse_number(*text);
+  if (!rate || *rate < 0.0)
+    throw CLI::ValidationError("--record-frames", "'" + *text + "' is not a number from 0 on");
+  return *rate;
+}
+
 }  // namespace
 
 CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
@@ -315,6 +326,7 @@ PlayOptions read_play(PlayArguments arguments) {
   options.processor = read_processor(arguments.cpu);
   options.fast = arguments.fast;
   options.record = arguments.record;
+  options.record_frames = read_frame_rate(arguments.record_frames);
   options.report = arguments.report;
   options.surface = arguments.surface;
   options.contacts = arguments.contacts;

@@ -36,6 +36,7 @@ struct PlayArguments {
   std::optional<std::string> cpu;
   bool fast = false;
   std::string record;
+  std::optional<std::string> record_frames;
   std::string report;
   std::string surface;
   std::string contacts;

@@ -190,7 +190,8 @@ void print_report(const PlayedRun& run) {
   print_loop(run.report, run.options.fast);
   print_device(run);
   if (!run.options.record.empty())
-    fmt::print(stderr, "recording {}: {} ticks dropped\n", run.options.record.string(), run.dropped);
+    fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),
+               run.dropped, run.dropped_frames);
   if (run.overlays != nullptr) print_overlays(*run.overlays);
   if (run.motion != nullptr) {
     fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),

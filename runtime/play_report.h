@@ -19,7 +19,8 @@ struct PlayedRun {
   const PatchSource* overlays = nullptr;
   const MotionSource* motion = nullptr;
   const DeviceLink* link = nullptr;
-  std::int64_t dropped = 0;  ///< ticks that the recording lacks
+  std::int64_t dropped = 0;         ///< ticks that the recording lacks
+  std::int64_t dropped_frames = 0;  ///< and frames
 };
 
 /// A few lines for a person, and warnings, on the error stream.

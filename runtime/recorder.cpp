@@ -1,22 +1,26 @@
 #include "runtime/recorder.h"
 
-#include <algorithm>
 #include <chrono>
-#include <span>
+
+#include "runtime/session_xdmf.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::size_t ring_size = 65536;  // a minute at 1 kHz
-constexpr std::size_t batch =
-    4096;  // always written whole but for the last, so that equal runs leave equal bytes
+constexpr std::size_t ring_seconds = 16;  // ticks for which there is room
+constexpr std::size_t frame_ring = 256;   // four seconds at 60 Hz
 constexpr auto pause = std::chrono::milliseconds(1);
-static_assert(ring_size % batch == 0);
+constexpr auto interval = std::chrono::milliseconds(500);    // between checkpoints
+constexpr std::size_t most_waiting = std::size_t{32} << 20;  // bytes, for a checkpoint that is not due yet
 
 }  // namespace
 
-Recorder::Recorder(const std::filesystem::path& path, const SessionInfo& info)
-    : writer_(path, info), ring_(ring_size), thread_([this] { write_ticks(); }) {}
+Recorder::Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface)
+    : path_(path),
+      writer_(path, info, surface),
+      ticks_(ring_seconds * static_cast<std::size_t>(info.rate)),
+      frames_(frame_ring),
+      thread_([this] { write(); }) {}
 
 Recorder::~Recorder() {
   closing_ = true;
@@ -24,20 +28,32 @@ Recorder::~Recorder() {
 }
 
 bool Recorder::try_push(const TickRecord& tick) noexcept {
-  const std::size_t pushed = pushed_.load(std::memory_order_relaxed);
-  if (pushed - written_.load(std::memory_order_acquire) == ring_size) return false;
-  ring_[pushed % ring_size] = tick;
-  pushed_.store(pushed + 1, std::memory_order_release);
-  return true;
+  TickRecord copy = tick;
+  return !failed_ && ticks_.push(copy);
+}
+
+bool Recorder::try_push(SurfaceFrame& frame) noexcept {
+  return !failed_ && frames_.push(frame);
 }
 
 void Recorder::push(const TickRecord& tick) noexcept {
   if (!try_push(tick)) ++dropped_;
 }
 
+void Recorder::push_frame(SurfaceFrame frame) noexcept {
+  if (!try_push(frame)) ++dropped_frames_;
+}
+
 void Recorder::push_waiting(const TickRecord& tick) noexcept {
   while (!try_push(tick)) {
-    if (failed_) return;
+    if (failed_) return push(tick);
+    std::this_thread::sleep_for(pause);
+  }
+}
+
+void Recorder::push_frame_waiting(SurfaceFrame frame) noexcept {
+  while (!try_push(frame)) {
+    if (failed_) return push_frame(std::move(frame));
     std::this_thread::sleep_for(pause);
   }
 }
@@ -47,24 +63,40 @@ void Recorder::finish() {
   thread_.join();
   if (failed_) std::rethrow_exception(failure_);
   writer_.finish();
+  write_xdmf(path_);
 }
 
-void Recorder::write_ticks() noexcept {
+/// Bytes that were taken out of the rings.
+std::size_t Recorder::take_all() {
+  std::size_t taken = 0;
+  TickRecord tick;
+  for (; taken < most_waiting && ticks_.pop(tick); taken += sizeof tick) writer_.append({&tick, 1});
+  SurfaceFrame frame;
+  while (taken < most_waiting && frames_.pop(frame)) {
+    taken += sizeof frame + frame.displacement.size() * sizeof(float);
+    writer_.append(std::move(frame));
+  }
+  return taken;
+}
+
+void Recorder::write() noexcept {
   try {
+    auto last = std::chrono::steady_clock::now();
+    std::size_t waiting = 0;
     for (;;) {
-      const bool last = closing_;  // read before `pushed_`: nothing is pushed after closing
-      const std::size_t written = written_.load(std::memory_order_relaxed);
-      const std::size_t waiting = pushed_.load(std::memory_order_acquire) - written;
-      if (waiting >= batch || (last && waiting > 0)) {
-        const std::size_t count = std::min(waiting, batch);
-        writer_.append(std::span(ring_).subspan(written % ring_size, count));
-        written_.store(written + count, std::memory_order_release);
-      } else if (last) {
-        return;
-      } else {
-        std::this_thread::sleep_for(pause);
+      const bool closing = closing_;  // read before the rings: nothing is pushed after closing
+      const std::size_t taken = take_all();
+      waiting += taken;
+      if (closing && taken == 0) break;
+      const auto now = std::chrono::steady_clock::now();
+      if (now - last >= interval || waiting >= most_waiting) {
+        writer_.checkpoint();
+        last = now;
+        waiting = 0;
       }
+      if (taken == 0) std::this_thread::sleep_for(pause);
     }
+    writer_.checkpoint();
   } catch (...) {
     failure_ = std::current_exception();
     failed_ = true;

@@ -1,6 +1,13 @@
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <random>
+#include <thread>
 
 #include "formats/recording.h"
 #include "tests/formats_sample.h"
@@ -9,42 +16,114 @@
 namespace palpate::test {
 namespace {
 
-std::vector<TickRecord> some_ticks(std::size_t count) {
-  std::vector<TickRecord> ticks(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto x = static_cast<double>(i);
-    ticks[i] = {.time = 1e-3 * x,
-                .device_position = {x + 1, x + 2, x + 3},
-                .device_orientation = {0.5, -0.5, 0.5 * x, 1},
-                .tool_position = {x, 2 * x, 3 * x},
-                .tool_orientation = {1, 0, -x, 0.25},
-                .force = {-x, 0.5 * x, 1},
-                .torque = {1e-3 * x, 0, -1e-3 * x},
-                .contacts = static_cast<std::int32_t>(i % 5),
-                .stiffness = {x, 2 * x, 3 * x, -4 * x, 5 * x, 6 * x},
-                .status = static_cast<std::uint32_t>(i % 3),
-                .compute_ns = static_cast<std::uint32_t>(4'000'000'000U - i),
-                .grab = static_cast<std::uint8_t>(i % 2),
-                .patch = static_cast<std::int32_t>(i % 7) - 1};
-  }
+constexpr std::size_t surface_nodes = 4;
+
+/// Numbers that tell ticks and fields apart.
+TickRecord some_tick(std::size_t i) {
+  const auto x = static_cast<double>(i);
+  const auto n = static_cast<std::int64_t>(i);
+  return {.time = 1e-3 * x,
+          .device_position = {x + 1, x + 2, x + 3},
+          .device_orientation = {0.5, -0.5, 0.5 * x, 1},
+          .tool_position = {x, 2 * x, 3 * x},
+          .tool_orientation = {1, 0, -x, 0.25},
+          .force = {-x, 0.5 * x, 1},
+          .torque = {1e-3 * x, 0, -1e-3 * x},
+          .contacts = static_cast<std::int32_t>(i % 5),
+          .stiffness = {x, 2 * x, 3 * x, -4 * x, 5 * x, 6 * x},
+          .status = static_cast<std::uint32_t>(i % 3),
+          .compute_ns = static_cast<std::uint32_t>(4'000'000'000U - i),
+          .grab = static_cast<std::uint8_t>(i % 2),
+          .patch = static_cast<std::int32_t>(i % 7) - 1,
+          .handle_position = {x - 1, x - 2, x - 3},
+          .handle_orientation = {0, x, 0.125, -1},
+          .handle_velocity = {7 * x, -8 * x, 9},
+          .buttons = static_cast<std::uint32_t>(0x80000000U + i),
+          .sequence = static_cast<std::uint32_t>(0xffffffffU - i),
+          .arrived_ns = -5'000'000'000 + n,
+          .begun_ns = 5'000'000'000 + n,
+          .shown_force = {11 * x, 12, -13 * x},
+          .shown_torque = {14, -15 * x, 16 * x},
+          .share = 1 / (1 + x),
+          .phase = static_cast<std::uint8_t>(i % 4),
+          .fault = static_cast<std::uint8_t>(i % 9),
+          .event = static_cast<std::uint8_t>(i % 16),
+          .motion_step = n / 3};
+}
+
+std::vector<TickRecord> some_ticks(std::size_t count, std::size_t first = 0) {
+  std::vector<TickRecord> ticks;
+  for (std::size_t i = first; i < first + count; ++i) ticks.push_back(some_tick(i));
   return ticks;
 }
 
+SurfaceFrame some_frame(std::size_t k) {
+  SurfaceFrame frame = {static_cast<std::int64_t>(17 * k), 0.017 * static_cast<double>(k), {}};
+  for (std::size_t i = 0; i < 3 * surface_nodes; ++i)
+    frame.displacement.push_back(static_cast<float>(100 * k + i));
+  return frame;
+}
+
 bool same(const TickRecord& a, const TickRecord& b) {
-  return a.time == b.time && std::ranges::equal(a.device_position, b.device_position) &&
-         std::ranges::equal(a.device_orientation, b.device_orientation) &&
-         std::ranges::equal(a.tool_position, b.tool_position) &&
-         std::ranges::equal(a.tool_orientation, b.tool_orientation) && std::ranges::equal(a.force, b.force) &&
-         std::ranges::equal(a.torque, b.torque) && a.contacts == b.contacts &&
-         std::ranges::equal(a.stiffness, b.stiffness) && a.status == b.status &&
-         a.compute_ns == b.compute_ns && a.grab == b.grab && a.patch == b.patch;
+  using std::ranges::equal;
+  return a.time == b.time && equal(a.device_position, b.device_position) &&
+         equal(a.device_orientation, b.device_orientation) && equal(a.tool_position, b.tool_position) &&
+         equal(a.tool_orientation, b.tool_orientation) && equal(a.force, b.force) &&
+         equal(a.torque, b.torque) && a.contacts == b.contacts && equal(a.stiffness, b.stiffness) &&
+         a.status == b.status && a.compute_ns == b.compute_ns && a.grab == b.grab && a.patch == b.patch &&
+         equal(a.handle_position, b.handle_position) && equal(a.handle_orientation, b.handle_orientation) &&
+         equal(a.handle_velocity, b.handle_velocity) && a.buttons == b.buttons && a.sequence == b.sequence &&
+         a.arrived_ns == b.arrived_ns && a.begun_ns == b.begun_ns && equal(a.shown_force, b.shown_force) &&
+         equal(a.shown_torque, b.shown_torque) && a.share == b.share && a.phase == b.phase &&
+         a.fault == b.fault && a.event == b.event && a.motion_step == b.motion_step;
+}
+
+const SessionInfo info = {.model_path = "liver.palpate.hdf",
+                          .content_hash = "00ff",
+                          .device = "script:touch.csv",
+                          .rate = 2000,
+                          .options = "overlay=r=3,rings=2\ncontact=dynamic\n"};
+const RecordedSurface surface = {
+    {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}}, 3, {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2}};
+
+void expect_ticks(const Recording& read, std::size_t count) {
+  ASSERT_EQ(read.ticks.size(), count);
+  for (std::size_t i = 0; i < count; ++i) ASSERT_TRUE(same(read.ticks[i], some_tick(i))) << i;
+}
+
+void expect_frames(const std::filesystem::path& path, const Recording& read, std::size_t count) {
+  ASSERT_EQ(read.frames.tick.size(), count);
+  ASSERT_EQ(read.frames.time.size(), count);
+  const std::vector<float> u = read_displacement(path, 0, static_cast<std::int64_t>(count));
+  ASSERT_EQ(u.size(), 3 * surface_nodes * count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const SurfaceFrame frame = some_frame(k);
+    ASSERT_EQ(read.frames.tick[k], frame.tick);
+    ASSERT_EQ(read.frames.time[k], frame.time);
+    ASSERT_TRUE(std::equal(frame.displacement.begin(), frame.displacement.end(),
+                           u.begin() + static_cast<std::ptrdiff_t>(3 * surface_nodes * k)))
+        << k;
+  }
+}
+
+/// One checkpoint after each `at_once` ticks, with a frame before each.
+void append(RecordingWriter& writer, std::span<const TickRecord> ticks, std::size_t at_once) {
+  for (std::size_t at = 0, frame = 0; at < ticks.size(); at += at_once, ++frame) {
+    writer.append(some_frame(frame));
+    writer.append(ticks.subspan(at, std::min(at_once, ticks.size() - at)));
+    writer.checkpoint();
+  }
 }
 
 void record(const std::filesystem::path& path, std::span<const TickRecord> ticks, std::size_t at_once) {
-  RecordingWriter writer(path, SessionInfo{"liver.palpate.hdf", "00ff", "", 1000, "overlay=r=3,rings=2"});
-  for (std::size_t at = 0; at < ticks.size(); at += at_once)
-    writer.append(ticks.subspan(at, std::min(at_once, ticks.size() - at)));
+  RecordingWriter writer(path, info, surface);
+  append(writer, ticks, at_once);
   writer.finish();
+}
+
+std::size_t files_in(const std::filesystem::path& folder) {
+  return static_cast<std::size_t>(
+      std::distance(std::filesystem::directory_iterator(folder), std::filesystem::directory_iterator()));
 }
 
 class Lengths : public testing::TestWithParam<std::size_t> {};
@@ -54,48 +133,202 @@ TEST_P(Lengths, AreReadBack) {
   const auto ticks = some_ticks(GetParam());
   record(folder / "a.h5", ticks, 1000);
   const Recording read = read_recording(folder / "a.h5");
-  EXPECT_EQ(read.model_path, "liver.palpate.hdf");
-  EXPECT_EQ(read.content_hash, "00ff");
-  EXPECT_EQ(read.overlay, "r=3,rings=2");
-  ASSERT_EQ(read.ticks.size(), ticks.size());
-  for (std::size_t i = 0; i < ticks.size(); ++i) ASSERT_TRUE(same(read.ticks[i], ticks[i])) << i;
+  EXPECT_EQ(read.info.model_path, info.model_path);
+  EXPECT_EQ(read.info.content_hash, info.content_hash);
+  EXPECT_EQ(read.info.device, info.device);
+  EXPECT_EQ(read.info.rate, info.rate);
+  EXPECT_EQ(read.info.options, info.options);
+  EXPECT_EQ(read.generator, "palpate " PALPATE_VERSION);
+  EXPECT_TRUE(read.finished);
+  EXPECT_EQ(read.frames.surface.nodes, surface.nodes);
+  EXPECT_EQ(read.frames.surface.corners, surface.corners);
+  EXPECT_EQ(read.frames.surface.simplices, surface.simplices);
+  expect_ticks(read, GetParam());
+  expect_frames(folder / "a.h5", read, (GetParam() + 999) / 1000);
+  EXPECT_EQ(files_in(folder.path()), 1U) << "parts are left";
 }
 
-INSTANTIATE_TEST_SUITE_P(Recording, Lengths, testing::Values(0, 1, 4095, 4096, 4097, 30000));
+INSTANTIATE_TEST_SUITE_P(Recording, Lengths, testing::Values(0, 1, 999, 1000, 1001, 30000));
+
+TEST(Recording, OfALineSurfaceOrNoneIsReadBack) {
+  const Folder folder;
+  RecordingWriter(folder / "line.h5", info, {{{0, 0, 0}, {1, 0, 0}}, 2, {0, 1, 1, 0}}).finish();
+  EXPECT_EQ(read_frames(folder / "line.h5").surface.corners, 2);
+  RecordingWriter none(folder / "none.h5", info);
+  none.append(some_ticks(7));
+  none.append(SurfaceFrame{.tick = 3, .time = 0.5, .displacement = {}});
+  none.finish();
+  const Recording read = read_recording(folder / "none.h5");
+  expect_ticks(read, 7);
+  EXPECT_TRUE(read.frames.surface.nodes.empty());
+  EXPECT_EQ(read.frames.time, std::vector<double>{0.5});
+}
 
 TEST(Recording, EqualTicksMakeEqualFiles) {
   const Folder folder;
-  const auto ticks = some_ticks(9000);
-  record(folder / "a.h5", ticks, 1);
-  record(folder / "b.h5", ticks, 9000);
+  const auto ticks = some_ticks(900);
+  record(folder / "a.h5", ticks, 20);  // 45 checkpoints: two parts of sixteen, and thirteen
+  {
+    RecordingWriter writer(folder / "b.h5", info, surface);
+    for (std::size_t k = 0; k < 45; ++k) writer.append(some_frame(k));
+    writer.append(ticks);
+    writer.finish();
+  }
   EXPECT_EQ(read_bytes(folder / "a.h5"), read_bytes(folder / "b.h5"));
 }
 
-TEST(Recording, IsThereOnlyWhenFinished) {
+TEST(Recording, ThatIsNotFinishedHoldsEachCheckpoint) {
+  const Folder folder;
+  const std::filesystem::path path = folder / "50%b %% 1.h5";  // the library takes % for a format
+  {
+    RecordingWriter writer(path, info, surface);
+    writer.append(some_ticks(1));
+    EXPECT_TRUE(read_recording(path).ticks.empty());
+    writer.checkpoint();
+    expect_ticks(read_recording(path), 1);
+    append(writer, some_ticks(3000, 1), 10);
+    writer.append(some_ticks(5, 3001));
+    writer.append(some_frame(300));
+    const Recording read = read_recording(path);
+    EXPECT_FALSE(read.finished);
+    expect_ticks(read, 3001);
+    expect_frames(path, read, 300);
+    // A reader opens them all: 301 checkpoints are 1 part of 256, 2 of 16 and 13 of one, the last sixteen
+    // that were merged, and the lock.
+    EXPECT_LE(files_in(path.string() + ".parts"), 1U + 2U + 13U + 16U + 1U);
+    EXPECT_FALSE(finish_recording(path)) << "it is being recorded";
+    EXPECT_NE(refusal([&] { RecordingWriter(path, info); }).find("is being recorded by another program"),
+              std::string::npos);
+  }
+  expect_ticks(read_recording(path), 3001);
+  EXPECT_TRUE(finish_recording(path));
+  const Recording read = read_recording(path);
+  EXPECT_TRUE(read.finished);
+  expect_ticks(read, 3001);
+  expect_frames(path, read, 300);
+  EXPECT_EQ(files_in(folder.path()), 1U);
+  EXPECT_TRUE(finish_recording(path)) << "nothing to do";
+}
+
+TEST(Recording, OfFramesAloneAtTheEndKeepsThem) {
   const Folder folder;
   {
-    RecordingWriter writer(folder / "a.h5", SessionInfo{"m", "h"});
-    writer.append(some_ticks(5000));
-    EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
+    RecordingWriter writer(folder / "a.h5", info, surface);
+    writer.append(some_ticks(3));
+    writer.append(some_frame(0));
+    writer.checkpoint();
+    writer.append(some_frame(1));
+    writer.checkpoint();
   }
-  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  expect_frames(folder / "a.h5", read_recording(folder / "a.h5"), 2);
+  finish_recording(folder / "a.h5");
+  expect_ticks(read_recording(folder / "a.h5"), 3);
+  expect_frames(folder / "a.h5", read_recording(folder / "a.h5"), 2);
+}
+
+TEST(Recording, TakesThePlaceOfOneThatWasKilled) {
+  const Folder folder;
+  {
+    RecordingWriter killed(folder / "a.h5", info, surface);
+    append(killed, some_ticks(500, 7000), 10);
+  }
+  RecordingWriter writer(folder / "a.h5", info, surface);
+  EXPECT_TRUE(read_recording(folder / "a.h5").ticks.empty());
+  append(writer, some_ticks(20), 10);
+  const Recording read = read_recording(folder / "a.h5");
+  expect_ticks(read, 20);
+  expect_frames(folder / "a.h5", read, 2);
+  writer.finish();
+  expect_ticks(read_recording(folder / "a.h5"), 20);
+}
+
+TEST(Recording, WithoutOneOfItsPartsIsRefused) {
+  const Folder folder;
+  {
+    RecordingWriter writer(folder / "a.h5", info, surface);
+    append(writer, some_ticks(30), 10);
+  }
+  std::filesystem::remove(folder / "a.h5.parts" / "1.h5");
+  const std::string text = refusal([&] { read_recording(folder / "a.h5"); });
+  EXPECT_NE(text.find("1.h5 is missing"), std::string::npos) << text;
+  EXPECT_NE(refusal([&] { finish_recording(folder / "a.h5"); }).find("1.h5 is missing"), std::string::npos);
+}
+
+/// Files of at most so many bytes, as on a disk that is full.
+class FileLimit {
+ public:
+  explicit FileLimit(rlim_t bytes) : action_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit = {bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, action_);
+  }
+  FileLimit(const FileLimit&) = delete;
+  FileLimit& operator=(const FileLimit&) = delete;
+
+ private:
+  rlimit before_ = {};
+  void (*action_)(int);
+};
+
+TEST(Recording, KeepsWhatThereIsWhenTheDiskIsFull) {
+  const Folder folder;
+  {
+    RecordingWriter writer(folder / "a.h5", info, surface);
+    writer.append(some_ticks(100));
+    writer.checkpoint();
+    writer.append(some_ticks(4000, 100));
+    std::string text;
+    {
+      const FileLimit limit(200'000);
+      text = refusal([&] { writer.finish(); });
+    }
+    EXPECT_NE(text.find("File too large"), std::string::npos) << text;
+    EXPECT_NE(text.find("Check the disk"), std::string::npos) << text;
+    expect_ticks(read_recording(folder / "a.h5"), 100);
+    EXPECT_EQ(files_in(folder / "a.h5.parts"), 2U) << "half of a part is left";
+    writer.finish();  // there is room again
+  }
+  expect_ticks(read_recording(folder / "a.h5"), 4100);
+}
+
+TEST(Recording, HasEachRowOnceWhenOnlyTheMasterFailed) {
+  const Folder folder;
+  RecordingWriter writer(folder / "a.h5", info, surface);
+  append(writer, some_ticks(10), 10);
+  std::filesystem::create_directories(folder / "a.h5.partial" / "in the way");
+  writer.append(some_ticks(10, 10));
+  EXPECT_NE(refusal([&] { writer.checkpoint(); }).find("cannot make the file"), std::string::npos);
+  expect_ticks(read_recording(folder / "a.h5"), 10);
+  std::filesystem::remove_all(folder / "a.h5.partial");
+  writer.finish();
+  expect_ticks(read_recording(folder / "a.h5"), 20);
 }
 
 TEST(Recording, ThatCannotBeStartedLeavesNothing) {
   const Folder folder;
-  const std::string text = refusal([&] {
-    RecordingWriter(folder / "a.h5", SessionInfo{std::string(5000, 'm'), "h"});
-  });
+  SessionInfo too_long = info;
+  too_long.model_path = std::string(5000, 'm');
+  const std::string text = refusal([&] { RecordingWriter(folder / "a.h5", too_long); });
   EXPECT_NE(text.find("model is 5000 bytes long"), std::string::npos) << text;
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  {
+    RecordingWriter killed(folder / "a.h5", info, surface);
+    append(killed, some_ticks(20), 10);
+  }
+  EXPECT_NE(refusal([&] { RecordingWriter(folder / "a.h5", too_long); }), "");
+  expect_ticks(read_recording(folder / "a.h5"), 20);
 }
 
 TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {
   const Folder folder;
   record(folder / "a.h5", some_ticks(3), 3);
-  set_integers(folder / "a.h5", "version", {3, 7});
+  set_integers(folder / "a.h5", "version", {4, 7});
   EXPECT_EQ(read_recording(folder / "a.h5").ticks.size(), 3U);
-  for (const std::int64_t major : {2, 4}) {
+  for (const std::int64_t major : {3, 5}) {
     set_integers(folder / "a.h5", "version", {major, 0});
     const std::string text = refusal([&] { read_recording(folder / "a.h5"); });
     EXPECT_NE(text.find("another version | Record the session again"), std::string::npos) << text;
@@ -104,15 +337,73 @@ TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {
 
 TEST(Recording, BadPathsAndOtherFilesAreRefused) {
   const Folder folder;
-  EXPECT_NE(refusal([&] {
-              RecordingWriter(folder / "none" / "a.h5", SessionInfo{"m", "h"});
-            }).find("No such file"),
+  EXPECT_NE(refusal([&] { RecordingWriter(folder / "none" / "a.h5", info); }).find("No such file"),
             std::string::npos);
   write_sample(folder / "a.palpate.hdf");
   EXPECT_NE(refusal([&] { read_recording(folder / "a.palpate.hdf"); }).find("is not a recording"),
             std::string::npos);
   write_bytes(folder / "text", "text");
   EXPECT_NE(refusal([&] { read_recording(folder / "text"); }), "");
+  record(folder / "a.h5", some_ticks(3), 1);
+  EXPECT_NE(refusal([&] { read_displacement(folder / "a.h5", 1, 3); }).find("has 3 frames"),
+            std::string::npos);
+  EXPECT_EQ(read_displacement(folder / "a.h5", 1, 2)[0], 100.0F);
+}
+
+/// Records as fast as it goes, and says after each checkpoint how many ticks there are.
+[[noreturn]] void record_until_killed(const std::filesystem::path& path, int say) {
+  RecordingWriter writer(path, info, surface);
+  for (std::size_t k = 0;; ++k) {
+    writer.append(some_ticks(10, 10 * k));
+    writer.append(some_frame(k));
+    writer.checkpoint();
+    const std::size_t ticks = 10 * (k + 1);
+    if (write(say, &ticks, sizeof ticks) != sizeof ticks) _exit(1);
+  }
+}
+
+/// The last number that was said.
+std::size_t last_said(int hear) {
+  std::size_t last = 0;
+  for (std::size_t ticks = 0; read(hear, &ticks, sizeof ticks) == sizeof ticks;) last = ticks;
+  return last;
+}
+
+// Each checkpoint and merge is another instant: some thousand of them are met at random.
+TEST(Recording, SurvivesBeingKilledAtAnyMoment) {
+  std::mt19937 random(20240229);  // NOLINT(cert-msc51-cpp): the same moments in each run
+  std::uniform_int_distribution<int> microseconds(1000, 150'000);
+  std::size_t most = 0;
+  for (int run = 0; run < 25; ++run) {
+    const Folder folder;
+    const std::filesystem::path path = folder / "a.h5";
+    int ends[2] = {};
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) record_until_killed(path, ends[1]);
+    close(ends[1]);
+    std::this_thread::sleep_for(std::chrono::microseconds(microseconds(random)));
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    const std::size_t said = last_said(ends[0]);
+    close(ends[0]);
+    most = std::max(most, said);
+    if (!std::filesystem::exists(path)) {
+      ASSERT_EQ(said, 0U);
+      continue;
+    }
+    for (int pass = 0; pass < 2; ++pass) {  // as it was left, then as one file
+      const Recording read = read_recording(path);
+      ASSERT_GE(read.ticks.size(), said);
+      ASSERT_LE(read.ticks.size(), said + 10);
+      expect_ticks(read, read.ticks.size());
+      expect_frames(path, read, read.ticks.size() / 10);
+      ASSERT_TRUE(finish_recording(path));
+      ASSERT_EQ(files_in(folder.path()), 1U);
+    }
+  }
+  EXPECT_GT(most, 160U) << "no parts were merged";
 }
 
 }  // namespace

@@ -20,8 +20,10 @@ int main(int count, char** arguments) {
     palpate::test::write_swinging_sample(folder / "packed.palpate.hdf", palpate::DynamicsMethod::packed,
                                          palpate::Precision::single_precision);
     palpate::test::write_swinging_sample(folder / "modal.palpate.hdf", palpate::DynamicsMethod::modal);
-    palpate::RecordingWriter recording(folder / "recording.h5",
-                                       palpate::SessionInfo{"tet4.palpate.hdf", "00ff"});
+    palpate::RecordingWriter recording(
+        folder / "recording.h5",
+        {.model_path = "tet4.palpate.hdf", .content_hash = "00ff", .device = "none", .options = ""},
+        {.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, .corners = 3, .simplices = {0, 1, 2}});
     for (int i = 0; i < 5000; ++i) {
       const double x = i;
       recording.append(std::array{palpate::TickRecord{.time = 1e-3 * x,
@@ -30,6 +32,9 @@ int main(int count, char** arguments) {
                                                       .contacts = i % 5,
                                                       .stiffness = {1, 2, 3, 4, 5, x},
                                                       .grab = 1}});
+      if (i % 500 == 0)
+        recording.append(palpate::SurfaceFrame{
+            .tick = i, .time = 1e-3 * x, .displacement = {0, 0, static_cast<float>(i), 1, 2, 3, 4, 5, 6}});
     }
     recording.finish();
   } catch (const palpate::Error& error) {

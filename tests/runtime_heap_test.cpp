@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -22,6 +23,7 @@
 #include "runtime/palpate.h"
 #include "runtime/patch_source.h"
 #include "runtime/step.h"
+#include "runtime/surface_frames.h"
 #include "tests/runtime_model.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -168,6 +170,7 @@ class OverlayTick : public Tick {
       touching_ += with_.tools.front().contacts > 0 ? 1 : 0;
       load_ = with_.near.load();
       if (k % 10 == 5) surface_displacement(overlaid_, load_, stored_, surface_);
+      if (frames_) frames_->post(with_, static_cast<std::int64_t>(k), 0.001 * static_cast<double>(k));
     }
   }
 
@@ -182,11 +185,13 @@ class OverlayTick : public Tick {
   std::vector<std::shared_ptr<const Patch>> patches_;
   std::vector<double> stored_ = std::vector<double>(static_cast<std::size_t>(overlaid_.greens().order()));
   std::vector<Vec3> surface_ = std::vector<Vec3>(overlaid_.surface_rest_positions().size());
+  std::optional<SurfaceFrames> frames_;
 };
 
 INSTANTIATE_TEST_SUITE_P(Dimension, OverlayTick, testing::Values(2, 3));
 
 TEST_P(OverlayTick, MakesNoHeapCall) {
+  frames_.emplace(overlaid_, with_, SurfaceFramesOptions{.ticks_per_frame = 1}, [](const SurfaceFrame&) {});
 #if PALPATE_OWN_MALLOC
   heap_calls = 0;
   counting = true;
@@ -284,6 +289,7 @@ class MovingTick : public testing::TestWithParam<std::tuple<DynamicsMethod, Cont
       if (source_) source_->receive(state_);
       step(body_, state_, tool);
       if (source_) source_->post(state_);
+      if (frames_) frames_->post(state_, k, 0.001 * k);
       if (k % 10 == 0) state_.motion.show(shown_);
     }
   }
@@ -292,6 +298,8 @@ class MovingTick : public testing::TestWithParam<std::tuple<DynamicsMethod, Cont
   State state_{body_, {.tools = {Tool{.radius = 0.04, .coupling_stiffness = 2.0, .reach = 0.3}}}};
   ShownMotion shown_{body_};
   std::optional<MotionSource> source_;
+  std::atomic<int> shown_frames_ = 0;
+  std::optional<SurfaceFrames> frames_;
 };
 
 INSTANTIATE_TEST_SUITE_P(Bodies, MovingTick,
@@ -299,8 +307,10 @@ INSTANTIATE_TEST_SUITE_P(Bodies, MovingTick,
                                           testing::Values(ContactModel::quasi_static,
                                                           ContactModel::dynamic)));
 
-// Beside a thread that steps packed dynamics and takes what memory it likes.
+// Beside threads that step packed dynamics and make frames, and take what memory they like.
 TEST_P(MovingTick, MakesNoHeapCall) {
+  frames_.emplace(body_, state_, SurfaceFramesOptions{.ticks_per_frame = 2},
+                  [this](const SurfaceFrame&) { ++shown_frames_; });
   if (std::get<0>(GetParam()) == DynamicsMethod::packed)
     source_.emplace(body_, state_, MotionSourceOptions{.in_background = true, .jobs = 2});
 #if PALPATE_OWN_MALLOC
@@ -313,6 +323,8 @@ TEST_P(MovingTick, MakesNoHeapCall) {
   exercise_motion();
 #endif
   EXPECT_TRUE(state_.motion.active());
+  frames_.reset();
+  EXPECT_GT(shown_frames_, 0);
 }
 
 TEST_P(MovingTick, MakesNoSystemCall) {

@@ -1,0 +1,101 @@
+// What a recording is made of on disk: one plain HDF5 file, or until it is finished several, the parts, which
+// a master file shows as one.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "formats/file_io.h"
+#include "formats/hdf5.h"
+#include "formats/recording.h"
+
+namespace palpate {
+
+/// One dataset a field of TickRecord: path, number of components, member.
+template <class Visitor>
+void for_each_tick_field(Visitor&& visit) {
+  visit("/ticks/time", 1, &TickRecord::time);
+  visit("/ticks/device_position", 3, &TickRecord::device_position);
+  visit("/ticks/device_orientation", 4, &TickRecord::device_orientation);
+  visit("/ticks/tool_position", 3, &TickRecord::tool_position);
+  visit("/ticks/tool_orientation", 4, &TickRecord::tool_orientation);
+  visit("/ticks/force", 3, &TickRecord::force);
+  visit("/ticks/torque", 3, &TickRecord::torque);
+  visit("/ticks/contacts", 1, &TickRecord::contacts);
+  visit("/ticks/stiffness", 6, &TickRecord::stiffness);
+  visit("/ticks/status", 1, &TickRecord::status);
+  visit("/ticks/compute_ns", 1, &TickRecord::compute_ns);
+  visit("/ticks/grab", 1, &TickRecord::grab);
+  visit("/ticks/patch", 1, &TickRecord::patch);
+  visit("/ticks/handle_position", 3, &TickRecord::handle_position);
+  visit("/ticks/handle_orientation", 4, &TickRecord::handle_orientation);
+  visit("/ticks/handle_velocity", 3, &TickRecord::handle_velocity);
+  visit("/ticks/buttons", 1, &TickRecord::buttons);
+  visit("/ticks/sequence", 1, &TickRecord::sequence);
+  visit("/ticks/arrived_ns", 1, &TickRecord::arrived_ns);
+  visit("/ticks/begun_ns", 1, &TickRecord::begun_ns);
+  visit("/ticks/shown_force", 3, &TickRecord::shown_force);
+  visit("/ticks/shown_torque", 3, &TickRecord::shown_torque);
+  visit("/ticks/share", 1, &TickRecord::share);
+  visit("/ticks/phase", 1, &TickRecord::phase);
+  visit("/ticks/fault", 1, &TickRecord::fault);
+  visit("/ticks/event", 1, &TickRecord::event);
+  visit("/ticks/motion_step", 1, &TickRecord::motion_step);
+}
+
+/// The number that a field of TickRecord is, or has several of.
+template <class Member>
+using Scalar = std::remove_all_extents_t<Member>;
+
+/// What the file says beside its rows.
+struct RecordingHead {
+  SessionInfo info;
+  std::string generator;
+  RecordedSurface surface;
+};
+
+/// Throws Error unless the file is a recording of this version.
+RecordingHead read_head(const hdf5::File& file);
+
+/// A plain file with rows.
+struct RecordingPart {
+  std::filesystem::path file;
+  std::int64_t ticks = 0;
+  std::int64_t frames = 0;
+};
+
+/// PATH.parts
+std::filesystem::path parts_folder(const std::filesystem::path& recording);
+
+/// Makes the folder of parts and locks it for this program as long as the result lives; nothing where another
+/// one has it. Throws Error when it cannot be made.
+std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording);
+
+/// Removes everything in the folder of parts but the lock.
+void clear_parts(const std::filesystem::path& recording);
+
+/// The files that hold the rows of a dataset of a recording, in order: itself when it is plain. All are open,
+/// as they may be merged and removed while a recording that goes on is read. Throws Error when one is
+/// missing.
+std::vector<hdf5::File> open_parts(const hdf5::File& recording, const char* dataset);
+
+/// Writes a part. Throws Error.
+RecordingPart write_part(const std::filesystem::path& file, std::span<const TickRecord> ticks,
+                         std::span<const SurfaceFrame> frames, std::size_t surface_nodes);
+
+/// Writes a part with the rows of several. Throws Error.
+RecordingPart merge_parts(const std::filesystem::path& file, std::span<const RecordingPart> parts,
+                          std::size_t surface_nodes);
+
+/// Puts a master in the place of a recording: it shows the rows of the parts as its own. Throws Error.
+void write_master(const std::filesystem::path& recording, const RecordingHead& head,
+                  std::span<const RecordingPart> parts);
+
+/// Puts one plain file in the place of a recording and its parts. Throws Error with the recording as it was.
+void merge_recording(const std::filesystem::path& recording);
+
+}  // namespace palpate

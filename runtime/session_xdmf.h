@@ -1,0 +1,16 @@
+// Recorded frames for ParaView.
+#pragma once
+
+#include <filesystem>
+
+namespace palpate {
+
+/// "touch.h5" becomes "touch.xdmf".
+std::filesystem::path xdmf_path(const std::filesystem::path& recording);
+
+/// Writes a description of a recording's frames beside it: a time series of the surface as it is seen, with
+/// its displacement, by ParaView's XDMF Reader (that of XDMF 2). Where there are no frames, removes one that
+/// is there. Throws Error.
+void write_xdmf(const std::filesystem::path& recording);
+
+}  // namespace palpate

@@ -1,0 +1,251 @@
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+#include <vector>
+
+#include "formats/recording.h"
+#include "meshes/error.h"
+#include "runtime/recorder.h"
+#include "runtime/session.h"
+#include "runtime/session_xdmf.h"
+#include "runtime/step.h"
+#include "runtime/surface_frames.h"
+#include "tests/runtime_model.h"
+
+namespace palpate {
+namespace {
+
+Model loaded_model() {
+  Model model = test::unit_model(3, 4, Scope::surface, Precision::double_precision);
+  test::set_rest(model, 0.01);
+  return model;
+}
+
+class Frames : public testing::Test {
+ protected:
+  /// A ball that presses and slides.
+  [[nodiscard]] static ToolPose pose(int tick) {
+    ToolPose tool;
+    tool.position = Vec3(0.3 + 0.001 * tick, 0.5, 1.2 - 0.001 * std::min(tick, 90));
+    return tool;
+  }
+
+  Body body_{loaded_model()};
+  State state_{body_, {.tools = {Tool{.radius = 0.15}}}};
+};
+
+/// u0 + u of a surface node by columns of the Green's functions.
+Vec3 seen_displacement(const Body& body, const State& state, std::size_t node) {
+  Vec3 u = body.model().rest_displacement[static_cast<std::size_t>(body.surface_mesh_nodes()[node])];
+  const Index stored = body.surface_stored_nodes()[node];
+  if (stored < 0) return u;
+  const SurfaceLoad& load = state.near.load();
+  for (std::size_t k = 0; k < load.nodes().size(); ++k)
+    u += body.greens().block(stored, load.nodes()[k]) * Vec3(load.forces().data() + 3 * k);
+  return u;
+}
+
+TEST_F(Frames, AreTheDisplacementFromTheMesh) {
+  std::vector<SurfaceFrame> frames;
+  SurfaceFrames source(body_, state_, {.ticks_per_frame = 10, .in_background = false},
+                       [&](SurfaceFrame frame) { frames.push_back(std::move(frame)); });
+  const RecordedSurface surface = recorded_surface(body_);
+  ASSERT_EQ(surface.nodes.size(), 98U);  // 5^3 - 3^3
+  EXPECT_EQ(surface.corners, 3);
+  EXPECT_EQ(surface.simplices.size(), 3U * 192U);
+  double largest = 0.0;
+  for (int tick = 0; tick < 100; ++tick) {
+    step(body_, state_, pose(tick));
+    source.post(state_, tick, 1e-3 * tick);
+    ASSERT_EQ(frames.size(), static_cast<std::size_t>(tick / 10 + 1));
+    if (tick % 10 != 0) continue;
+    ASSERT_EQ(frames.back().tick, tick);
+    ASSERT_EQ(frames.back().time, 1e-3 * tick);
+    for (std::size_t node = 0; node < surface.nodes.size(); ++node) {
+      ASSERT_EQ(surface.nodes[node],
+                body_.model().mesh.nodes[static_cast<std::size_t>(body_.surface_mesh_nodes()[node])]);
+      const Vec3 expected = seen_displacement(body_, state_, node);
+      const float* u = frames.back().displacement.data() + 3 * node;
+      ASSERT_LE((Vec3(u[0], u[1], u[2]) - expected).norm(), 1e-7) << tick << ' ' << node;
+      largest = std::max(largest, expected.norm());
+    }
+  }
+  EXPECT_GT(largest, 0.02) << "nothing was pressed";
+}
+
+TEST_F(Frames, OfTheThreadAreTheSame) {
+  std::vector<SurfaceFrame> expected, frames;
+  {
+    State again = state_;
+    SurfaceFrames at_once(body_, again, {.ticks_per_frame = 1, .in_background = false},
+                          [&](SurfaceFrame frame) { expected.push_back(std::move(frame)); });
+    SurfaceFrames beside(body_, state_, {.ticks_per_frame = 3},
+                         [&](SurfaceFrame frame) { frames.push_back(std::move(frame)); });
+    for (int tick = 0; tick < 300; ++tick) {
+      step(body_, state_, pose(tick));
+      step(body_, again, pose(tick));
+      at_once.post(again, tick, 1e-3 * tick);
+      beside.post(state_, tick, 1e-3 * tick);
+      if (tick % 50 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames.back().tick, 297) << "the last one is not left out";
+  std::int64_t before = -1;
+  for (const SurfaceFrame& frame : frames) {
+    EXPECT_EQ(frame.tick % 3, 0);
+    EXPECT_GT(frame.tick, before);
+    before = frame.tick;
+    EXPECT_EQ(frame.displacement, expected[static_cast<std::size_t>(frame.tick)].displacement);
+  }
+}
+
+class RecorderTest : public testing::Test {
+ protected:
+  RecorderTest() {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directory(folder_);
+  }
+  ~RecorderTest() override { std::filesystem::remove_all(folder_); }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / ("palpate_recorder." + std::to_string(getpid()));
+  const std::filesystem::path file_ = folder_ / "a.h5";
+  const RecordedSurface triangle_ = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, 3, {0, 1, 2}};
+};
+
+SurfaceFrame frame(std::int64_t tick) {
+  return {tick, 1e-3 * static_cast<double>(tick), std::vector<float>(9, static_cast<float>(tick))};
+}
+
+TEST_F(RecorderTest, SaysWhereItCannotWrite) {
+  try {
+    const Recorder recorder("no/such/folder/out.h5", {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(error.where().find("out.h5"), std::string::npos) << error.where();
+  }
+}
+
+// Frames come from another thread than ticks.
+TEST_F(RecorderTest, KeepsTicksAndFrames) {
+  constexpr int ticks = 40'000;  // more than there is room for
+  Recorder recorder(file_, {}, triangle_);
+  std::thread beside([&] {
+    for (int k = 0; k < 1000; ++k) recorder.push_frame_waiting(frame(std::int64_t{40} * k));
+  });
+  for (int k = 0; k < ticks; ++k) {
+    recorder.push_waiting({.time = 1e-3 * k});
+    if (k == ticks / 2) std::this_thread::sleep_for(std::chrono::milliseconds(600));  // a checkpoint
+  }
+  beside.join();
+  recorder.finish();
+  EXPECT_EQ(recorder.dropped(), 0);
+  EXPECT_EQ(recorder.dropped_frames(), 0);
+  const Recording recording = read_recording(file_);
+  ASSERT_EQ(recording.ticks.size(), static_cast<std::size_t>(ticks));
+  for (int k = 0; k < ticks; ++k) ASSERT_EQ(recording.ticks[static_cast<std::size_t>(k)].time, 1e-3 * k);
+  ASSERT_EQ(recording.frames.tick.size(), 1000U);
+  const std::vector<float> u = read_displacement(file_, 0, 1000);
+  for (int k = 0; k < 1000; ++k) {
+    ASSERT_EQ(recording.frames.tick[static_cast<std::size_t>(k)], 40 * k);
+    ASSERT_EQ(u[9 * static_cast<std::size_t>(k) + 8], static_cast<float>(40 * k));
+  }
+  EXPECT_TRUE(std::filesystem::exists(xdmf_path(file_)));
+}
+
+TEST_F(RecorderTest, WithoutFinishIsLeftAsIfItWereKilled) {
+  {
+    Recorder recorder(file_, {}, triangle_);
+    for (int k = 0; k < 100; ++k) recorder.push({.time = 1e-3 * k});
+    recorder.push_frame(frame(0));
+  }
+  EXPECT_FALSE(read_recording(file_).finished);
+  EXPECT_EQ(session(file_, true), exit_ok);
+  const Recording recording = read_recording(file_);
+  EXPECT_TRUE(recording.finished);
+  EXPECT_EQ(recording.ticks.size(), 100U);
+  EXPECT_EQ(recording.frames.tick.size(), 1U);
+  EXPECT_TRUE(std::filesystem::exists(xdmf_path(file_)));
+}
+
+TEST_F(RecorderTest, WithoutFramesLeavesNoDescriptionOfThem) {
+  std::ofstream(xdmf_path(file_)) << "of the session before";
+  Recorder recorder(file_, {}, triangle_);
+  recorder.push({});
+  recorder.finish();
+  EXPECT_FALSE(std::filesystem::exists(xdmf_path(file_)));
+}
+
+// A limit on the size of files stands for a full disk.
+TEST_F(RecorderTest, LetsTheRunGoOnWhereTheDiskIsFull) {
+  Recorder recorder(file_, {}, triangle_);
+  rlimit before = {};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit small = {20'000, before.rlim_max};
+  auto* const action = std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &small);
+  std::int64_t pushed = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  while (recorder.dropped() < 100 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(60)) {
+    recorder.push({.time = 1e-3 * static_cast<double>(pushed)});
+    if (recorder.dropped() > 0) recorder.push_frame(frame(pushed));
+    if (++pushed % 10 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  recorder.push_waiting({});  // does not wait for ever
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, action);
+  EXPECT_EQ(recorder.dropped(), 101);
+  EXPECT_EQ(recorder.dropped_frames(), 100);
+  EXPECT_THROW(recorder.finish(), Error);
+  EXPECT_TRUE(read_recording(file_).ticks.empty());
+}
+
+TEST(SessionSummary, CountsWhatTheTicksSay) {
+  Recording recording;
+  recording.info.rate = 500;  // 2 ms
+  const auto add = [&](int k) -> TickRecord& {
+    return recording.ticks.emplace_back(TickRecord{.time = k / 500.0, .begun_ns = 2'000'000L * k});
+  };
+  add(10).compute_ns = 2'000'000;  // in time, just
+  add(11).compute_ns = 2'000'001;
+  TickRecord& late = add(12);
+  late.begun_ns += 1'500'000;
+  late.compute_ns = 600'000;
+  late.force[0] = 3;
+  late.force[2] = -4;
+  late.contacts = 2;
+  add(14).shown_force[1] = -2;  // 13 is missing
+  recording.ticks.back().fault = static_cast<std::uint8_t>(Fault::too_fast);
+  add(15).fault = static_cast<std::uint8_t>(Fault::too_fast);
+  add(16);
+  add(17).fault = static_cast<std::uint8_t>(Fault::device_lost);
+  const SessionSummary summary = summarise(recording);
+  EXPECT_EQ(summary.ticks, 7);
+  EXPECT_EQ(summary.missing, 1);
+  EXPECT_DOUBLE_EQ(summary.seconds, 0.016);
+  EXPECT_EQ(summary.in_contact, 1);
+  EXPECT_DOUBLE_EQ(summary.largest_force, 5);
+  EXPECT_DOUBLE_EQ(summary.largest_force_time, 0.024);
+  EXPECT_DOUBLE_EQ(summary.largest_shown, 2);
+  EXPECT_DOUBLE_EQ(summary.largest_shown_time, 0.028);
+  EXPECT_EQ(summary.deadline_misses, 2);
+  EXPECT_EQ(summary.worst_lateness, 1'500'000);
+  EXPECT_EQ(summary.compute.worst(), 2'000'001);
+  ASSERT_EQ(summary.faults.size(), 2U);
+  EXPECT_EQ(summary.faults[0].fault, Fault::too_fast);
+  EXPECT_DOUBLE_EQ(summary.faults[0].time, 0.028);
+  EXPECT_EQ(summary.faults[1].fault, Fault::device_lost);
+  EXPECT_DOUBLE_EQ(summary.faults[1].time, 0.034);
+  EXPECT_EQ(summarise({}).ticks, 0);
+}
+
+}  // namespace
+}  // namespace palpate
