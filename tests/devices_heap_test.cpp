@@ -58,7 +58,10 @@ int exercise(const Workspace& workspace, Safety& safety) noexcept {
     device.velocity.z() = 0.02 * std::cos(0.01 * k);
     if (k % 777 == 0) device.velocity.x() = std::numeric_limits<double>::quiet_NaN();
     if (k % 777 == 5) device.velocity.x() = 0.0;
-    if (k % 5000 < 4900) ++device.sequence;
+    if (k % 5000 < 4900) {
+      ++device.sequence;
+      device.arrived = now;
+    }
     const DeviceState body = workspace.in_body(device);
     DeviceCommand wanted;
     wanted.wrench.force.z() = -500.0 * std::min(body.pose.position.z(), 0.0);
