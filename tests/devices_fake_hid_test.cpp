@@ -138,7 +138,7 @@ TEST(HidArm, OutOfReachThereIsNoForce) {
 
 TEST(HidArm, CalibrateButtonSetsTheCountersOnce) {
   const Vec3 pose = arm_position(arm(), joint_angles(arm(), arm().calibration));
-  auto firmware = std::make_shared<WoodenHapticsFirmware>(arm(), [pose](double) -> Vec3 { return pose; });
+  auto firmware = std::make_shared<WoodenHapticsFirmware>(arm(), [pose](double) { return Vec3(pose); });
   firmware->misplace({200, -300, 150, 0, 0, 0});
   Bench bench(firmware, "woodenhaptics");
   bench.port.open();

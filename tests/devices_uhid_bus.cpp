@@ -136,7 +136,7 @@ std::string EmulatedBus::plug_in(const std::shared_ptr<Firmware>& firmware, cons
   auto device = std::make_unique<EmulatedDevice>(firmware, serial);
   for (int k = 0; k < 1000; ++k) {
     for (const std::string& name : hidraw_devices()) {
-      const std::string path = "/dev/" + name;
+      std::string path = "/dev/" + name;
       if (before.contains(name) || access(path.c_str(), F_OK) != 0) continue;
       devices_[path] = std::move(device);
       return path;

@@ -34,6 +34,8 @@ class Links(unittest.TestCase):
             with self.subTest(file=file.name):
                 self.assertIn("libhdf5_serial.so", needed)
                 self.assertEqual([name for name in needed if name not in ALLOWED], [])
+                # Devices are the program's: the library is for other people's loops.
+                self.assertEqual("libhidapi-hidraw.so" in needed, file == RUNTIME)
 
     def test_nothing_forbidden_is_loaded(self):
         for file in LINKED:

@@ -1,6 +1,7 @@
 """palpate-runtime as a person meets it: probe, play, and what they refuse."""
 
 import json
+import pathlib
 import re
 import signal
 import subprocess
@@ -579,18 +580,29 @@ class Usage(ProgramTest):
         self.assertIn(piece, result.stderr)
 
     def test_help_and_version(self):
-        for arguments in (("--help",), ("probe", "--help"), ("play", "--help")):
+        for arguments in (("--help",), ("probe", "--help"), ("play", "--help"), ("devices", "--help")):
             result = run(RUNTIME, *arguments)
             self.assertEqual(result.returncode, 0)
             self.assertIn("palpate-runtime", result.stdout)
         self.assertRegex(run(RUNTIME, "--version").stdout, r"^palpate-runtime \d+\.\d+\.\d+\n$")
+
+    def test_devices(self):
+        listing = run(RUNTIME, "devices", "--json")
+        self.assertEqual(listing.returncode, 0)
+        self.assertIsInstance(json.loads(listing.stdout)["devices"], list)
+        profiles = pathlib.Path(__file__).resolve().parent.parent / "runtime" / "devices" / "profiles"
+        for file in profiles.glob("*.toml"):
+            self.assertEqual(run(RUNTIME, "devices", "--print-profile", file.stem).stdout, file.read_text())
+        wrong = run(RUNTIME, "devices", "--print-profile", "nonesuch")
+        self.assertEqual(wrong.returncode, 1)
+        self.assertIn("spacemouse", wrong.stderr)
 
     def test_links_nothing_of_gpl_or_agpl(self):
         section = subprocess.run(["readelf", "--dynamic", RUNTIME], text=True, capture_output=True, check=True).stdout
         needed = set(re.findall(r"\(NEEDED\).*\[(?:lib)?([^.\]]+)", section))
         # HDF5 brings crypto (Apache), curl (MIT-like), sz and z; the rest is ours to answer for.
         allowed = {"hdf5_serial", "crypto", "curl", "sz", "z", "xxhash", "fmt", "stdc++", "m", "gcc_s", "c", "ld-linux-x86-64",
-                   "asan", "ubsan", "tsan"}
+                   "tomlplusplus", "hidapi-hidraw", "udev", "asan", "ubsan", "tsan"}
         self.assertIn("hdf5_serial", needed)
         self.assertEqual(needed - allowed, set())
         program = RUNTIME.read_bytes()
