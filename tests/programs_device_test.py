@@ -1,7 +1,6 @@
 """A hand in the loop: another process as the device, what it feels, sessions that are replayed, killed and refused."""
 
 import json
-import os
 import pathlib
 import signal
 import socket
@@ -18,9 +17,9 @@ from programs import BINARY, RUNTIME, ProgramTest, cube_toml, run
 BRIDGE = BINARY / "runtime" / "palpate-bridge-example"
 SPRING = 300.0  # of the example's hand [N/m]
 # A cube of 10 cm, as stiff as a soft organ: at its top's middle some 80 N/m to a ball.
-SMALL_CUBE = cube_toml(4).replace("size = [1, 1, 1]", "size = [0.1, 0.1, 0.1]").replace("youngs_modulus = 1.0", "youngs_modulus = 3000")
+SMALL_CUBE = cube_toml(4, scope="full").replace("size = [1, 1, 1]", "size = [0.1, 0.1, 0.1]").replace("youngs_modulus = 1.0", "youngs_modulus = 3000")
 # This machine may be busy: late ticks and reports have their own tests.
-PATIENT = "late=10,most_late=1e9,silence=5,silence_fade=4,ramp=0.2,buzz_flips=1000"
+PATIENT = "late=10,most_late=1e9,silence=5,silence_fade=4,frozen=100,ramp=0.2,buzz_flips=1000"
 
 
 def free_port():
@@ -54,6 +53,11 @@ class Felt(ProgramTest):
     def hand(self, seconds, depth, period=0.0, start=0.0):
         return self.start(BRIDGE, "--port", self.port, "--seconds", seconds, "--rate", 1000, "--from", f"0,0,{start}", "--to",
                           f"0,0,{-depth}", "--period", period)
+
+    def wait_for_ticks(self, runtime):
+        while not (self.folder / "session.h5").exists():
+            self.assertIsNone(runtime.poll(), "it has ended")
+            time.sleep(0.02)
 
     def finish(self, process, code=0):
         _, messages = process.communicate(timeout=120)
@@ -89,17 +93,15 @@ class Felt(ProgramTest):
     def test_a_killed_session_opens_and_its_replay_is_the_same_bit_by_bit(self):
         runtime = self.play("--overlay", "r=2,rings=1")
         self.hand(60, 0.03, 1.5)
-        deadline = time.monotonic() + 60
-        parts = self.folder / "session.h5.parts"
-        while time.monotonic() < deadline and len(list(parts.glob("ticks*"))) < 7:
-            time.sleep(0.05)
+        self.wait_for_ticks(runtime)
+        time.sleep(4.0)
         started = time.monotonic()
         runtime.send_signal(signal.SIGKILL)
         runtime.wait()
         self.assertLess(time.monotonic() - started, 5)
         with h5py.File(self.folder / "session.h5") as session:
             force = session["ticks/force"][:]
-        self.assertGreaterEqual(len(force), 3000)
+        self.assertGreaterEqual(len(force), 2500)
         self.assertGreater(numpy.abs(force).max(), 0.1)
         replay = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--record", "again.h5", cwd=self.folder)
         self.assertEqual(replay.returncode, 0, replay.stderr)
@@ -115,8 +117,7 @@ class Felt(ProgramTest):
     def test_a_bridge_that_goes_is_a_fault_and_may_come_back(self):
         runtime = self.play("--duration", "9")
         first = self.hand(60, 0.03, 1.0)
-        while not (self.folder / "session.h5.parts").exists():
-            time.sleep(0.05)
+        self.wait_for_ticks(runtime)
         time.sleep(1.5)
         first.kill()
         first.wait()
@@ -139,8 +140,7 @@ class Felt(ProgramTest):
         runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--origin", "0.05,0.05,0.12", "--safety",
                              PATIENT + ",max_speed=0.1", "--duration", "6", "--record", "session.h5", "--report", "report.json")
         self.hand(60, 0.0, 2.0, 0.15)  # 0.24 m/s at most, at half a second: free space all the way
-        while not (self.folder / "session.h5.parts").exists():
-            time.sleep(0.05)
+        self.wait_for_ticks(runtime)
         time.sleep(3.0)
         runtime.stdin.write("\n")
         runtime.stdin.flush()
