@@ -2,17 +2,21 @@
 // each fault what the hand would have felt, as the firmware was told it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "runtime/devices/device_link.h"
 #include "runtime/devices/hid_port.h"
 #include "runtime/loop.h"
+#include "runtime/real_time.h"
 #include "tests/fake_hidapi.h"
 #include "tests/runtime_model.h"
 
@@ -54,10 +58,19 @@ struct Case {
   double loop_hangs = 0.0;       // [s]
   Fault expected = Fault::none;  // that must be latched; none: no matter
   bool opens_again = false;
+  bool may_latch = false;  ///< some fault
 };
 
 std::ostream& operator<<(std::ostream& stream, const Case& fault) {
   return stream << fault.name;
+}
+
+SafetyOptions safety_options() {
+  SafetyOptions options;
+  options.ramp = 0.2;
+  options.max_force = 2.0;
+  options.deadline.tolerance = 1e9;  // late ticks have their own test
+  return options;
 }
 
 /// Makes the loop hang once.
@@ -91,10 +104,13 @@ void keep_trace(const Case& fault, const std::vector<ShownForce>& trace) {
            << '\n';
 }
 
-class Faults : public testing::TestWithParam<Case> {};
+/// What came of a run.
+struct Felt {
+  LoopReport report;
+  std::vector<ShownForce> trace;
+};
 
-TEST_P(Faults, StayWithinTheClamps) {
-  const Case& fault = GetParam();
+Felt press(const Case& fault) {
   FakeHid hid;
   const NamedProfile profile = find_profile(fault.is_arm ? "woodenhaptics" : "palpate_board");
   std::shared_ptr<Firmware> board;
@@ -104,28 +120,23 @@ TEST_P(Faults, StayWithinTheClamps) {
     board = std::make_shared<BoardFirmware>(board_feature, pressing);
   }
   hid.attach(board);
-  const auto active = [&, begin = board->time()](FakeFault which) {
-    return [&, begin, which](std::int64_t) {
-      const double t = board->time() - begin;
+  const auto active = [&](FakeFault which) {
+    return [&, which](std::int64_t) {
+      const double t = board->time();
       return t >= fault_time && t < fault_time + fault.duration ? which : FakeFault::none;
     };
   };
-
-  SafetyOptions options;
-  options.ramp = 0.2;
-  options.max_force = 2.0;
-  options.deadline.tolerance = 1e9;  // this machine may be busy; late ticks have their own test
   const Body body(test::unit_model(3, 4, Scope::surface, Precision::double_precision));
   State state(body, {.tools = {{.radius = 0.05}}});
-  Safety safety(options);
+  Safety safety(safety_options());
   auto port = std::make_unique<HidPort>(choose_hid_device(attached_devices(hid.sys()), {profile}, ""),
                                         nullptr, hid.sys());
-  DeviceLink link(
-      std::move(port),
-      {.max_force = options.max_force, .max_force_rate = options.max_force_rate, .stale = options.stale});
+  DeviceLink link(std::move(port), {.max_force = safety_options().max_force,
+                                    .max_force_rate = safety_options().max_force_rate,
+                                    .stale = safety_options().stale});
   for (int k = 0; k < 10000 && !link.has_reported(); ++k)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  ASSERT_TRUE(link.has_reported());
+  EXPECT_TRUE(link.has_reported());
   if (fault.on_read != FakeFault::none) hid.on_read(active(fault.on_read));
   if (fault.on_write != FakeFault::none) hid.on_write(active(fault.on_write));
   // A motion of 10, so that a millimetre of the hand is a centimetre of this body; a newton or so on the
@@ -144,44 +155,68 @@ TEST_P(Faults, StayWithinTheClamps) {
     std::this_thread::sleep_for(std::chrono::duration<double>(fault.duration));
     hid.freeze(false);
   });
-  const LoopReport report =
+  const RealTimeRights rights;
+  LoopReport report =
       run_loop({.body = body, .state = state, .device = device, .workspace = workspace, .safety = &safety},
                {.ticks = static_cast<std::int64_t>(1e3 * (end_time - board->time()))}, stop);
   freezer.join();
-  const std::vector<ShownForce> trace = board->forces();
-  keep_trace(fault, trace);
+  return {.report = std::move(report), .trace = board->forces()};
+}
 
-  ASSERT_GT(trace.size(), 100U);
-  double largest_before = 0.0;
+/// Never more than the clamp, and no growth faster than its rate, whatever the machine did.
+void expect_clamps(const Case& fault, const std::vector<ShownForce>& trace) {
+  const SafetyOptions options = safety_options();
   const double rounding = fault.is_arm ? arm_quantum : std::sqrt(3.0) * quantum;
+  ASSERT_GT(trace.size(), 100U);
   for (std::size_t k = 0; k < trace.size(); ++k) {
     const double force = trace[k].force.norm();
     ASSERT_LE(force, options.max_force + rounding) << "at " << trace[k].time << " s";
-    if (trace[k].time < fault_time) largest_before = std::max(largest_before, force);
     if (k < 3 || force <= trace[k - 1].force.norm()) continue;
     // What is written was computed after what was written three before, and grows by no more than the rate.
     const double time = trace[k].time - trace[k - 3].time;
     ASSERT_LE((trace[k].force - trace[k - 1].force).norm(), options.max_force_rate * time + 2.0 * rounding)
         << "at " << trace[k].time << " s";
   }
-  EXPECT_GT(largest_before, 0.3) << "the hand felt something before the fault";
+}
+
+bool has_force(const std::vector<ShownForce>& trace, double from, double to) {
+  return std::any_of(trace.begin(), trace.end(), [&](const ShownForce& shown) {
+    return shown.time >= from && shown.time < to && shown.force.norm() > 0.3;
+  });
+}
+
+class Faults : public testing::TestWithParam<Case> {};
+
+TEST_P(Faults, StayWithinTheClamps) {
+  const Case& fault = GetParam();
+  Felt felt;
+  // A machine that is itself away for longer than a device may be silent shows that, and not this fault.
+  constexpr std::int64_t away = 10'000'000;  // ns
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    felt = press(fault);
+    ASSERT_NO_FATAL_FAILURE(expect_clamps(fault, felt.trace));
+    const auto hang = static_cast<std::int64_t>(1e9 * fault.loop_hangs);
+    if (felt.report.lateness.worst() < away + hang && has_force(felt.trace, 0.0, fault_time)) break;
+  }
+  keep_trace(fault, felt.trace);
+
+  EXPECT_TRUE(has_force(felt.trace, 0.0, fault_time)) << "the hand felt nothing before the fault";
   if (fault.expected != Fault::none) {
-    EXPECT_GE(report.faults[static_cast<std::size_t>(fault.expected)], 1);
-  }
-  if (fault.opens_again) {
-    EXPECT_GE(report.opened_again, 1);
-  }
-  // From the fault until the hand was off the body once, force that is gone stays away.
-  bool is_gone = false;
-  for (const ShownForce& shown : trace) {
-    if (shown.time < fault_time + 0.1 || shown.time > lift_time) continue;
-    is_gone = is_gone || shown.force.isZero(0.0);
-    if (is_gone && fault.expected != Fault::none) {
-      ASSERT_TRUE(shown.force.isZero(0.0)) << "it began again in contact, at " << shown.time << " s";
+    EXPECT_GE(felt.report.faults[static_cast<std::size_t>(fault.expected)], 1);
+    // Until the hand was off the body once, force that is gone stays away.
+    bool is_gone = false;
+    for (const ShownForce& shown : felt.trace) {
+      if (shown.time < fault_time + 0.05 || shown.time > lift_time) continue;
+      is_gone = is_gone || shown.force.isZero(0.0);
+      ASSERT_TRUE(!is_gone || shown.force.isZero(0.0))
+          << "it began again in contact, at " << shown.time << " s";
     }
-  }
-  if (fault.expected != Fault::none) {
     EXPECT_TRUE(is_gone);
+  }
+  EXPECT_GE(felt.report.opened_again, fault.opens_again ? 1 : 0);
+  if (fault.expected == Fault::none || fault.opens_again) {
+    EXPECT_TRUE(has_force(felt.trace, lift_time + 0.5, end_time) || fault.may_latch)
+        << "and when it comes again, it feels again";
   }
 }
 
@@ -196,17 +231,23 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{.name = "garbage",
                          .what = "random bytes for 50 ms",
                          .on_read = FakeFault::garbage,
-                         .duration = 0.05},
+                         .duration = 0.05,
+                         .may_latch = true},
                     Case{.name = "read_error",
-                         .what = "hid_read returns -1; open again after 0.25 s",
+                         .what = "hid_read returns -1; open again after 0.1 s",
                          .on_read = FakeFault::error,
                          .duration = 0.05,
                          .expected = Fault::device_lost,
                          .opens_again = true},
                     Case{.name = "stall_5ms",
-                         .what = "hid_read stalls for 5 ms, again and again",
+                         .what = "hid_read stalls for 5 ms",
                          .on_read = FakeFault::stall_5ms,
-                         .duration = 0.05},
+                         .duration = 0.002},
+                    Case{.name = "stalls_5ms",
+                         .what = "hid_read stalls for 5 ms, for each report that came in 50 ms",
+                         .on_read = FakeFault::stall_5ms,
+                         .duration = 0.05,
+                         .may_latch = true},
                     Case{.name = "stall_50ms",
                          .what = "hid_read stalls for 50 ms",
                          .on_read = FakeFault::stall_50ms,
@@ -228,7 +269,7 @@ INSTANTIATE_TEST_SUITE_P(
                          .on_write = FakeFault::stall_50ms,
                          .duration = 0.001},
                     Case{.name = "write_error",
-                         .what = "hid_write returns -1; open again after 0.25 s",
+                         .what = "hid_write returns -1; open again after 0.1 s",
                          .on_write = FakeFault::error,
                          .duration = 0.05,
                          .expected = Fault::device_lost,

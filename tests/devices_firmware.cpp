@@ -77,7 +77,11 @@ double Firmware::time() const {
 }
 
 void Firmware::show(const Vec3& force) {
-  forces_.push_back({now(), force});
+  show(force, now());
+}
+
+void Firmware::show(const Vec3& force, double time) {
+  forces_.push_back({time, force});
 }
 
 double Firmware::now() const {
@@ -211,6 +215,10 @@ void BoardFirmware::do_output(std::span<const std::uint8_t> report) {
   const auto force = decode_board_force(report);
   if (!force) return;
   answered_.push_back(force->sequence);
+  const double watchdog = 1e-3 * feature_.watchdog;
+  if (shows_ && now() > told_ + watchdog) show(Vec3::Zero(), told_ + watchdog);
+  told_ = now();
+  shows_ = true;
   show(1e-6 * feature_.force_unit * Vec3(force->counts[0], force->counts[1], force->counts[2]));
 }
 

@@ -61,6 +61,7 @@ class Firmware {
 
  protected:
   void show(const Vec3& force);  ///< for `do_...`
+  void show(const Vec3& force, double time);
   [[nodiscard]] double now() const;
 
   mutable std::mutex mutex_;  ///< held where `do_...` is called
@@ -106,7 +107,7 @@ class WoodenHapticsFirmware : public Firmware {
   std::atomic<bool> calibrate_ = false;
 };
 
-/// A report each millisecond, three axes.
+/// A report each millisecond, three axes. Without a force for as long as its watchdog waits it shows none.
 class BoardFirmware : public Firmware {
  public:
   BoardFirmware(const BoardFeature& feature, Hand hand, std::uint32_t first_sequence = 0);
@@ -124,6 +125,8 @@ class BoardFirmware : public Firmware {
   Hand hand_;
   std::uint32_t first_;
   std::uint32_t sequence_;
+  double told_ = 0.0;  // when [s]
+  bool shows_ = false;
   std::vector<std::uint32_t> answered_;
 };
 

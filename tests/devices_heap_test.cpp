@@ -1,4 +1,5 @@
-// Safety takes no memory and makes no system call. A program of its own, as it replaces malloc.
+// Safety takes no memory and makes no system call, the loop takes no memory. A program of its own, as it
+// replaces malloc.
 #include <gtest/gtest.h>
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
@@ -9,11 +10,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
+#include <filesystem>
 #include <limits>
+#include <string>
 #include <vector>
 
+#include "runtime/devices/device_link.h"
 #include "runtime/devices/safety.h"
 #include "runtime/devices/workspace.h"
+#include "runtime/loop.h"
+#include "tests/runtime_model.h"
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers have their own malloc
 
@@ -96,6 +103,91 @@ TEST(SafetyTick, MakesNoHeapCall) {
   const int with_force = exercise(workspace, safety);
   EXPECT_EQ(heap_calls, 0);
   EXPECT_GT(with_force, 2000);
+}
+
+/// A wire that says where it is each millisecond and takes everything.
+class QuietPort : public DevicePort {
+ public:
+  void open() override {}
+  Heard read(DeviceState& state) noexcept override {
+    timespec time{.tv_sec = 0, .tv_nsec = ms_ns};
+    nanosleep(&time, nullptr);
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    ++said_;
+    state.pose.position = Vec3(0.52, 0.5, 1.15 - 0.17 * std::min(1.0, 0.002 * said_) + 1e-6 * (said_ % 7));
+    state.arrived = time.tv_sec * 1'000'000'000 + time.tv_nsec;
+    state.sequence = static_cast<std::uint32_t>(said_);
+    return Heard::report;
+  }
+  bool write(const DeviceCommand& /*command*/, const DeviceState& /*state*/) noexcept override {
+    return true;
+  }
+  void close() noexcept override {}
+  [[nodiscard]] DeviceLimits limits() const override { return {}; }
+  [[nodiscard]] std::string name() const override { return "quiet"; }
+
+ private:
+  int said_ = 0;
+};
+
+/// Counts the heap calls of the loop's thread between the first ticks and the last ones.
+class CountingDevice : public Device {
+ public:
+  explicit CountingDevice(Device& device) : device_(device) {}
+  DeviceNews hear(const TickTime& tick) noexcept override {
+    if (tick.number == 20) heap_calls = 0;
+    if (tick.number == 980) counted = heap_calls;
+    return device_.hear(tick);
+  }
+  void show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override {
+    device_.show(command, state, begun);
+  }
+
+  long counted = -1;
+
+ private:
+  Device& device_;
+};
+
+// All that the loop does in a tick, not only the step: device, safety, recording, frames, monitor.
+TEST(LoopTick, MakesNoHeapCall) {
+  const Body body(test::unit_model(3, 4, Scope::surface, Precision::double_precision));
+  State state(body, {.tools = {{.radius = 0.05}}});
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("palpate_loop_heap." + std::to_string(getpid()));
+  std::filesystem::create_directory(folder);
+  LoopReport report;
+  long counted = -1;
+  {
+    DeviceLink link(std::make_unique<QuietPort>(), {});
+    while (!link.has_reported()) {
+      const timespec pause{.tv_sec = 0, .tv_nsec = ms_ns};
+      nanosleep(&pause, nullptr);
+    }
+    CountingDevice device(link);
+    SafetyOptions patient = options();
+    patient.deadline.tolerance = 1e9;
+    patient.silence.most = 1e9;
+    Safety safety(patient);
+    Recorder recorder(folder / "a.h5", {"box.palpate.hdf", "0123", "quiet", 1000, ""},
+                      recorded_surface(body));
+    SurfaceFrames frames(body, state, {}, [&](SurfaceFrame frame) { recorder.push_frame(std::move(frame)); });
+    Monitor monitor({});
+    const std::atomic<bool> stop = false;
+    report = run_loop({.body = body,
+                       .state = state,
+                       .device = device,
+                       .safety = &safety,
+                       .recorder = &recorder,
+                       .monitor = &monitor,
+                       .frames = &frames},
+                      {.ticks = 1000}, stop);
+    counted = device.counted;
+  }
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(counted, 0);
+  EXPECT_GT(report.ticks_in_contact, 300);
+  EXPECT_GT(report.largest_shown, 0.0);
 }
 
 /// In a process that the kernel kills at the first system call but write and exit.

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::int64_t patience = 2'000'000;            // ns that a command may be old
 constexpr std::int64_t wait = 1'000'000;                // ns, for a new command
-constexpr auto retry = std::chrono::milliseconds(250);  // between attempts to open a lost device
+constexpr auto retry = std::chrono::milliseconds(100);  // between attempts to open a lost device
 
 std::int64_t now() noexcept {
   timespec time{};
