@@ -263,16 +263,19 @@ TEST_F(Link, TellsOfALostDeviceAndOfItsReturn) {
   const std::size_t before = wire_->trace().size();
   link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());
   wire_->is_lost = false;
+  wait_for([&] { return wire_->opened == 2; });
+  std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(link->hear({}).events, DeviceEvent::none) << "it has not said anything yet";
+  wire_->say(at({0.2, 0.0, 0.0}, 1));
   wait_for([&] { return (events = link->hear({}).events) != DeviceEvent::none; });
   EXPECT_EQ(events, DeviceEvent::opened_again);
+  EXPECT_EQ(link->hear({}).state.pose.position.x(), 0.2);
   EXPECT_EQ(wire_->opened, 2);
   for (std::size_t k = before; k < wire_->trace().size(); ++k) {
     EXPECT_GT(wire_->trace()[k].at, 0);
     EXPECT_LT(wire_->trace()[k].command.wrench.force.norm(), 1e-9)
         << "a quarter of a second old: nothing is left of it";
   }
-  wire_->say(at({0.2, 0.0, 0.0}, 1));
-  wait_for([&] { return link->hear({}).state.pose.position.x() == 0.2; });
 }
 
 TEST_F(Link, ADeviceThatTakesNothingIsLost) {

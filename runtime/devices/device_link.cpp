@@ -73,13 +73,14 @@ void DeviceLink::show(const DeviceCommand& command, const DeviceState& state, st
 
 void DeviceLink::read_reports() noexcept {
   ask_for_priority(wire_priority);
-  bool is_open = true;  // as this thread left it
+  bool is_open = true;   // as this thread left it
+  bool is_back = false;  // but has not said anything yet
   while (!stop_) {
     if (!is_open) {
       std::this_thread::sleep_for(retry);
       try_to_open();
       const std::lock_guard lock(wire_);
-      is_open = is_open_;
+      is_open = is_back = is_open_;
       continue;
     }
     DeviceState state;
@@ -94,6 +95,8 @@ void DeviceLink::read_reports() noexcept {
       heard_by_writer_.next() = state;
       heard_by_writer_.publish();
       ++reports_;
+      if (is_back) ++openings_;
+      is_back = false;
     }
   }
 }
@@ -114,7 +117,6 @@ void DeviceLink::try_to_open() noexcept {
     return;  // not back yet
   }
   is_open_ = true;
-  ++openings_;
 }
 
 void DeviceLink::write_commands() noexcept {

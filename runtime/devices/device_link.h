@@ -78,7 +78,7 @@ class DeviceLink : public Device {
   Latest<DeviceState> heard_by_writer_;
   std::atomic<std::int64_t> reports_ = 0;
   std::atomic<std::int64_t> losses_ = 0;
-  std::atomic<std::int64_t> openings_ = 1;
+  std::atomic<std::int64_t> openings_ = 1;  // that a report followed
   // The loop's own.
   std::int64_t losses_told_ = 0;
   std::int64_t openings_told_ = 1;
