@@ -383,8 +383,8 @@ TEST_F(Played, ASpaceMouseMovesTheToolAndShowsNothing) {
   // Frozen numbers are a fault after 0.25 s, but not without a force.
   const std::string safety = "late=10,most_late=1e9,silence=5,silence_fade=4,ramp=0.2,buzz_flips=1000";
   const auto runtime = play({"--origin", "0.05,0.05,0.13"}, safety);
-  ASSERT_TRUE(comes_true([] { return fs::exists(session()) && !read_recording(session()).ticks.empty(); }))
-      << runtime->messages();
+  ASSERT_TRUE(comes_true([] { return fs::exists(session()); })) << runtime->messages();
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));  // the loop begins
   down = true;
   std::this_thread::sleep_for(std::chrono::milliseconds(350));  // 35 mm
   down = false;
