@@ -8,8 +8,11 @@
 #include <thread>
 
 #include "meshes/error.h"
+#include "runtime/devices/hid_joystick.h"
 #include "runtime/devices/hid_port.h"
 #include "runtime/devices/monotonic_clock.h"
+#include "runtime/devices/silence_watch.h"
+#include "runtime/devices/speed_limit.h"
 #include "runtime/devices/woodenhaptics_report.h"
 #include "tests/fake_hidapi.h"
 
@@ -446,6 +449,86 @@ TEST(HidJoystick, EqualForcesAreNotRepeatedTooOften) {
   EXPECT_EQ(write(Vec3(1, 5, 0)), after + 2);
 }
 
+/// Moves for 0.15 s, then rests.
+Vec3 come_to_rest(double t) {
+  return {0.2 * std::min(t, 0.15), 0.0, 0.0};
+}
+
+TEST(HidJoystick, OneThatReportsChangesAndRestsIsToldOn) {
+  auto firmware = std::make_shared<JoystickFirmware>(joystick(), come_to_rest);
+  firmware->on_change = true;
+  Bench bench(firmware, "pid_joystick");
+  bench.port.open();
+  ASSERT_EQ(bench.next(), Heard::report);
+  SilenceWatch silence({.most = 1e3, .fade_from = 0.1, .frozen = 0.2});
+  SpeedLimit speed(0.6, 1e-3);
+  double frozen_at = 0.0;
+  DeviceState last = bench.state;
+  while (firmware->time() < 0.15 || (frozen_at == 0.0 && firmware->time() < 5.0)) {
+    ASSERT_EQ(bench.port.read(bench.state), Heard::report);
+    ASSERT_GT(static_cast<std::int32_t>(bench.state.sequence - last.sequence), 0);
+    last = bench.state;
+    speed.see(bench.state);
+    EXPECT_TRUE(silence.hear(bench.state, bench.state.arrived, 1.0));
+    if (frozen_at == 0.0 && silence.frozen()) frozen_at = firmware->time();
+  }
+  EXPECT_GT(frozen_at, 0.35) << "it rests, and while a force is shown that must not last";
+  EXPECT_LT(frozen_at, 5.0);
+  EXPECT_EQ(bench.state.velocity, Vec3::Zero());
+  EXPECT_NEAR(bench.state.pose.position.x(), 0.03, 5e-4);
+  bench.hid.detach(bench.path);
+  EXPECT_EQ(bench.port.read(bench.state), Heard::lost);
+}
+
+/// A stick that reports each 10 ms: between, its place is told again; its speed is from report to report.
+TEST(HidJoystick, RepetitionsMakeNoSpeed) {
+  const PidConstants constants = joystick();
+  HidJoystick stick(constants, {},
+                    find_pid_layout(parse_report_descriptor(bytes(side_winder_descriptor), ""), ""), "", 7);
+  DeviceState state;
+  EXPECT_FALSE(stick.tell(false, 1, state));
+  SpeedLimit limit(1.0, 1e-3);
+  double fastest = 0.0;
+  for (int ms = 0; ms < 200; ++ms) {
+    const bool reports = ms % 10 == 0;
+    if (!reports && ms % 10 % 3 != 0) continue;
+    if (reports) {
+      // 0.4 m/s from the left stop, in counts of the descriptor.
+      JoystickFirmware firmware(constants, [&](double) { return Vec3(-0.05 + 4e-4 * ms, 0.0, 0.0); });
+      ASSERT_TRUE(stick.take(*firmware.input()));
+    }
+    ASSERT_TRUE(stick.tell(reports, 1'000'000'000 + 1'000'000LL * ms, state));
+    state.arrived = 1'000'000'000 + 1'000'000LL * ms;
+    limit.see(state);
+    if (ms >= 10) fastest = std::max(fastest, limit.speed());
+  }
+  EXPECT_NEAR(fastest, 0.4, 0.02);
+}
+
+TEST(HidJoystick, NothingIsMadeUpForOneThatTakesNoWrites) {
+  auto firmware = std::make_shared<JoystickFirmware>(joystick(), resting);
+  firmware->on_change = true;
+  Bench bench(firmware, "pid_joystick");
+  bench.port.open();
+  ASSERT_EQ(bench.next(), Heard::report);
+  bench.hid.on_write([](std::int64_t) { return FakeFault::stall_50ms; });
+  std::atomic<bool> stop = false;
+  std::thread writer([&] {
+    DeviceState state;
+    for (int k = 1; !stop; ++k) EXPECT_TRUE(bench.port.write(command(Vec3(k % 2, 1, 0)), state));
+  });
+  int told = 0;
+  int kept = 0;
+  for (int k = 0; k < 200; ++k) {
+    ++(bench.port.read(bench.state) == Heard::report ? told : kept);
+  }
+  stop = true;
+  writer.join();
+  // Each write, of one or two reports, lasts 50 or 100 ms: for the first 20 ms of it the place is told.
+  EXPECT_GT(told, 5);
+  EXPECT_GT(kept, 5);
+}
+
 TEST(HidJoystick, SaysWhatItDoesNotDo) {
   {
     auto firmware = std::make_shared<JoystickFirmware>(joystick(), resting);
@@ -471,6 +554,9 @@ TEST(HidSpaceMouse, IntegratesAndGoesOnTellingWhileItIsStill) {
   });
   Bench bench(firmware, "spacemouse");
   bench.port.open();
+  EXPECT_EQ(bench.port.limits().max_force, 0.0);
+  EXPECT_EQ(bench.port.limits().max_torque, 0.0);
+  EXPECT_EQ(bench.port.limits().workspace_radius, 0.1);
   ASSERT_EQ(bench.port.read(bench.state), Heard::report);
   double fastest = 0.0;
   const auto go_on = [&](double until) {

@@ -255,6 +255,8 @@ std::optional<Bytes> JoystickFirmware::do_input() {
     write_element(axis, axis.logical_min + std::llround(0.5 * (1.0 + part) * range),
                   std::span(report).subspan(1));
   }
+  if (on_change && report == said_) return std::nullopt;
+  said_ = report;
   return report;
 }
 

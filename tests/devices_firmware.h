@@ -138,6 +138,7 @@ class JoystickFirmware : public Firmware {
   bool full = false;       ///< no room for effects
   int slow = 0;            ///< so many Block Loads are pending before each effect is there
   bool has_loaded = true;  ///< false: Block Load stalls
+  bool on_change = false;  ///< it reports only what has changed
   [[nodiscard]] std::size_t playing() const;
 
  private:
@@ -160,7 +161,8 @@ class JoystickFirmware : public Firmware {
   std::map<std::int64_t, Effect> effects_;
   bool enabled_ = false;
   int pending_ = 0;
-  std::int64_t sent_ = 0;  // input reports
+  std::int64_t sent_ = 0;  // input reports, or those that were not worth it
+  Bytes said_;             // last
 };
 
 /// A SpaceMouse Wireless: a report each 8 ms while the cap is held, and one when it is let go.

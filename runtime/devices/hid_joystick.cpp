@@ -11,6 +11,8 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t repeat_after = 100'000'000;  // ns
+constexpr std::int64_t still_after = 20'000'000;    // ns; no stick that moves is slower
+constexpr std::int64_t millisecond = 1'000'000;     // ns
 
 /// Of one count of each axis [m].
 Vec3 resolution(const PidLayout& layout, const PidConstants& constants) {
@@ -83,10 +85,19 @@ bool HidJoystick::take(std::span<const std::uint8_t> report) noexcept {
 }
 
 bool HidJoystick::tell(bool heard, std::int64_t now, DeviceState& state) noexcept {
-  if (!heard) return false;
-  state = pid_state(constants_, input_);
-  state.velocity = velocity_.take(state.pose.position, now);
-  state.sequence = ++sequence_;
+  if (!heard && heard_ == 0) return false;
+  const std::int64_t since = now - heard_;
+  if (heard) {
+    sequence_ += static_cast<std::uint32_t>(std::clamp(since, millisecond, still_after) / millisecond);
+    heard_ = now;
+    state_ = pid_state(constants_, input_);
+    state_.velocity = velocity_.take(state_.pose.position, now);
+  } else {
+    ++sequence_;
+    if (since > still_after) state_.velocity.setZero();
+  }
+  state = state_;
+  state.sequence = sequence_;
   return true;
 }
 

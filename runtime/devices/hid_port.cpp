@@ -11,8 +11,9 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t longest_input = 64;  // bytes of a full-speed interrupt transfer
-constexpr int most_drained = 64;           // Linux keeps as many reports
+constexpr std::size_t longest_input = 64;           // bytes of a full-speed interrupt transfer
+constexpr int most_drained = 64;                    // Linux keeps as many reports
+constexpr std::int64_t longest_write = 20'000'000;  // of a device that is well [ns]
 
 }  // namespace
 
@@ -103,6 +104,9 @@ DevicePort::Heard HidPort::read(DeviceState& state) noexcept {
     wait = 0;
   }
   const std::int64_t now = monotonic_now();
+  const std::int64_t writing_since = writing_since_;
+  const bool hangs = writing_since != 0 && now - writing_since > longest_write;
+  if (!heard && hangs) return Heard::nothing;
   if (!protocol_->tell(heard, now, state)) return Heard::nothing;
   state.arrived = now;
   sequence_ = state.sequence;
@@ -113,13 +117,12 @@ bool HidPort::write(const DeviceCommand& command, const DeviceState& state) noex
   if (!device_ || write_failed_) return false;
   OutputReports reports;
   protocol_->encode(command, state, reports);
-  for (std::size_t k = 0; k < reports.size(); ++k) {
-    if (!device_->write(reports[k])) {
-      write_failed_ = true;
-      return false;
-    }
+  writing_since_ = monotonic_now();
+  for (std::size_t k = 0; k < reports.size() && !write_failed_; ++k) {
+    write_failed_ = !device_->write(reports[k]);
   }
-  return true;
+  writing_since_ = 0;
+  return !write_failed_;
 }
 
 void HidPort::close() noexcept {

@@ -31,7 +31,8 @@ class HidPort : public DevicePort {
   HidPort& operator=(const HidPort&) = delete;
 
   void open() override;
-  /// Drains what has come to the newest. Reports that make no sense are dropped and counted.
+  /// Drains what has come to the newest. Reports that make no sense are dropped and counted. While the
+  /// device does not take a write for 20 ms, only what it really says is told.
   Heard read(DeviceState& state) noexcept override;
   bool write(const DeviceCommand& command, const DeviceState& state) noexcept override;
   /// Sends each report of no force twice.
@@ -51,11 +52,12 @@ class HidPort : public DevicePort {
   std::filesystem::path sys_;
   DeviceLimits limits_;
   std::unique_ptr<HidProtocol> protocol_;
-  std::unique_ptr<HidDevice> device_;  // null: closed
-  std::vector<OutputReport> zero_;     // after which there is no force
-  std::uint32_t sequence_ = 0;         // the last that was told
-  bool read_failed_ = false;           // of the thread that reads
-  bool write_failed_ = false;          // of the thread that writes
+  std::unique_ptr<HidDevice> device_;            // null: closed
+  std::vector<OutputReport> zero_;               // after which there is no force
+  std::uint32_t sequence_ = 0;                   // the last that was told
+  bool read_failed_ = false;                     // of the thread that reads
+  bool write_failed_ = false;                    // of the thread that writes
+  std::atomic<std::int64_t> writing_since_ = 0;  // 0: not writing [ns]
   std::atomic<std::int64_t> dropped_ = 0;
 };
 

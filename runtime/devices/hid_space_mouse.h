@@ -7,11 +7,15 @@
 namespace palpate {
 
 /// Silent while its cap rests, which is not a fault: there is a state each millisecond, whether it said
-/// something or not. That it is gone is seen by the read that fails.
+/// something or not. It shows no force, whatever its profile says, so nobody waits for a hand that moves by
+/// it. That it is gone is seen by the read that fails.
 class HidSpaceMouse : public HidProtocol {
  public:
   HidSpaceMouse(const SpaceMouseConstants& constants, const DeviceLimits& limits, std::uint32_t last) noexcept
-      : limits_(limits), sequence_(last), mouse_(constants, limits.workspace_radius) {}
+      : limits_(limits), sequence_(last), mouse_(constants, limits.workspace_radius) {
+    limits_.max_force = 0.0;
+    limits_.max_torque = 0.0;
+  }
 
   [[nodiscard]] std::size_t input_bytes() const noexcept override { return 13; }
   [[nodiscard]] int wait() const noexcept override { return 1; }
