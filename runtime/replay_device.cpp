@@ -1,7 +1,8 @@
 #include "runtime/replay_device.h"
 
-#include <cmath>
-#include <cstring>
+#include <algorithm>
+#include <bit>
+#include <iterator>
 
 namespace palpate {
 
@@ -23,7 +24,12 @@ DeviceNews ReplayDevice::hear(const TickTime& tick) noexcept {
 }
 
 void compare(const TickRecord& now, const TickRecord& then, ReplayDifference& difference) noexcept {
-  const auto same = [](const auto& a, const auto& b) { return std::memcmp(&a, &b, sizeof(a)) == 0; };
+  const auto same_bits = [](double a, double b) {
+    return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+  };
+  const auto same = [&](const double(&a)[3], const double(&b)[3]) {
+    return std::equal(std::begin(a), std::end(a), std::begin(b), same_bits);
+  };
   ++difference.ticks;
   if (same(now.force, then.force) && same(now.torque, then.torque) &&
       same(now.shown_force, then.shown_force) && same(now.shown_torque, then.shown_torque))

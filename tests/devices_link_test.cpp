@@ -25,8 +25,8 @@ std::int64_t now() {
 
 /// What was written, and when.
 struct Written {
-  DeviceCommand command;
   DeviceState state;
+  DeviceCommand command;
   std::int64_t at = 0;
 };
 
@@ -89,7 +89,7 @@ class MadeUpPort : public DevicePort {
     const bool takes = !wire_->takes_nothing;
     if (takes) {
       const std::lock_guard lock(wire_->mutex);
-      wire_->written.push_back({command, state, now()});
+      wire_->written.push_back({state, command, now()});
     }
     --wire_->users;
     return takes;
