@@ -95,12 +95,15 @@ void wait_for(const DeviceLink& link, bool is_bridge) {
   using namespace std::chrono_literals;
   const auto start = std::chrono::steady_clock::now();
   bool told = false;
+  std::string refusals;
   while (!link.has_reported() && !stop_asked) {
     const auto waited = std::chrono::steady_clock::now() - start;
     if (!told && waited > 300ms) {
       fmt::print(stderr, "waiting for {}\n", link.name());
       told = true;
     }
+    // Something speaks, but not as it should.
+    if (refusals.empty() && !(refusals = link.refusals()).empty()) print_warning("refused: " + refusals);
     if (!is_bridge && waited > 5s) {
       throw Error("it was opened but says nothing", link.name(),
                   "plug it out and in again, see that it is calibrated and no other program uses it");

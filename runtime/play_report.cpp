@@ -70,6 +70,8 @@ void print_device(const PlayedRun& run) {
                "opened again {} times\n",
                run.link->reports(), run.link->writes(), 1e-6 * static_cast<double>(run.link->worst_write()),
                run.link->extrapolated(), report.opened_again);
+    const std::string refusals = run.link->refusals();
+    if (!refusals.empty()) print_warning("refused of the device: " + refusals);
   }
 }
 
@@ -180,6 +182,7 @@ std::string json_device(const PlayedRun& run) {
         "\"writes_without_loop\": {}, \"opened_again\": {}",
         json_string(run.link->name()), run.link->reports(), run.link->writes(), run.link->worst_write(),
         run.link->extrapolated(), run.report.opened_again);
+    json += fmt::format(", \"refused\": {}", json_string(run.link->refusals()));
   }
   return json + "}";
 }

@@ -124,6 +124,7 @@ class QuietPort : public DevicePort {
   }
   void close() noexcept override {}
   [[nodiscard]] DeviceLimits limits() const override { return {}; }
+  [[nodiscard]] std::string refusals() const override { return ""; }
   [[nodiscard]] std::string name() const override { return "quiet"; }
 
  private:

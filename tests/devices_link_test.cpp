@@ -101,6 +101,7 @@ class MadeUpPort : public DevicePort {
   }
 
   [[nodiscard]] DeviceLimits limits() const override { return {}; }
+  [[nodiscard]] std::string refusals() const override { return ""; }
   [[nodiscard]] std::string name() const override { return "made up"; }
 
  private:

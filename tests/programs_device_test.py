@@ -154,6 +154,19 @@ class Felt(ProgramTest):
         self.assertEqual(fault[acknowledged[0] - 1], 1)
         self.assertEqual(fault[acknowledged[0]], 0)
 
+    def test_datagrams_that_are_not_taken_are_told(self):
+        runtime = self.play("--duration", "0.2")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hand:
+            for _ in range(5):
+                hand.sendto(b"nonsense", ("127.0.0.1", self.port))
+                time.sleep(0.2)
+        self.hand(60, 0.0, 0.0, 0.1)
+        messages = self.finish(runtime)
+        self.assertIn("waiting for bridge:", messages)
+        self.assertRegex(messages, "refused: [1-5] datagrams by size")
+        report = json.loads((self.folder / "report.json").read_text())
+        self.assertRegex(report["device"]["refused"], "^[1-5] datagrams by size$")
+
     def test_signals_leave_no_force_and_a_whole_session(self):
         for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hand:

@@ -263,6 +263,17 @@ std::uint32_t BridgePort::limit_changes() const noexcept {
   return limit_changes_;
 }
 
+std::string BridgePort::refusals() const {
+  const BridgeCounts all = counts();
+  std::string text;
+  for (const auto& [refusal, name] : refusal_names) {
+    // A bridge that has to be told the nonce is no trouble.
+    if (refusal == Refusal::none || refusal == Refusal::hello || all[refusal] == 0) continue;
+    text += (text.empty() ? "" : ", ") + std::to_string(all[refusal]) + " datagrams by " + name;
+  }
+  return text;
+}
+
 std::string BridgePort::name() const {
   BridgeAddress listen = options_.listen;
   if (port_ != 0) listen.port = port_;

@@ -73,6 +73,8 @@ class BridgePort final : public DevicePort {
   /// neither. From any thread.
   [[nodiscard]] std::uint32_t limit_changes() const noexcept;
 
+  [[nodiscard]] std::string refusals() const override;
+
   /// "bridge:127.0.0.1:4270"; with the port that was taken.
   [[nodiscard]] std::string name() const override;
 

@@ -43,6 +43,7 @@ class DeviceLink : public Device {
   [[nodiscard]] DeviceState first_report() const noexcept { return first_; }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }  ///< when it was opened first
   [[nodiscard]] DeviceLimits limits() const { return port_->limits(); }
+  [[nodiscard]] std::string refusals() const { return port_->refusals(); }
 
   DeviceNews hear(const TickTime& tick) noexcept override;
   void show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override;

@@ -36,6 +36,10 @@ class DevicePort {
   /// What the device can bear; known once it was open.
   [[nodiscard]] virtual DeviceLimits limits() const = 0;
 
+  /// What came and was not taken, for a person: "3 of a wrong size, 1 too old"; empty: nothing. From any
+  /// thread.
+  [[nodiscard]] virtual std::string refusals() const = 0;
+
   /// What a person calls it: profile, ids, path.
   [[nodiscard]] virtual std::string name() const = 0;
 };

@@ -140,4 +140,8 @@ std::string HidPort::name() const {
   return choice_.profile.name + ", " + choice_.device.name();
 }
 
+std::string HidPort::refusals() const {
+  return dropped_ == 0 ? "" : std::to_string(dropped_) + " reports of a wrong length or of nonsense";
+}
+
 }  // namespace palpate

@@ -41,6 +41,8 @@ class HidPort : public DevicePort {
   /// Not while it is being opened.
   [[nodiscard]] std::string name() const override;
 
+  [[nodiscard]] std::string refusals() const override;
+
   /// Reports that were dropped, since the port was made.
   [[nodiscard]] std::int64_t dropped() const noexcept { return dropped_; }
 
