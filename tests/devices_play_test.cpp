@@ -122,6 +122,7 @@ class Program {
  public:
   Program(const std::vector<std::string>& line, const fs::path& folder) : messages_(folder / "messages.txt") {
     std::vector<char*> arguments;
+    arguments.reserve(line.size() + 1);
     for (const std::string& word : line) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
     // Not by fork: umockdev's locks may be held by the threads of emulated devices. And without the far ends
@@ -183,21 +184,11 @@ class Played : public ::testing::Test {
   /// palpate-runtime with the only device.
   [[nodiscard]] static std::unique_ptr<Program> play(std::vector<std::string> arguments,
                                                      const std::string& safety = patient) {
-    std::vector<std::string> line = {PALPATE_BINARY_DIR "/runtime/palpate-runtime",
-                                     "play",
-                                     "cube.palpate.hdf",
-                                     "--device",
-                                     "hid",
-                                     "--tool",
-                                     "sphere:0.01",
-                                     "--safety",
-                                     safety,
-                                     "--record",
-                                     "session.h5",
-                                     "--record-frames",
-                                     "0",
-                                     "--report",
-                                     "report.json"};
+    const std::string program = PALPATE_BINARY_DIR "/runtime/palpate-runtime";
+    std::vector<std::string> line = {program, "play",     "cube.palpate.hdf", "--device",
+                                     "hid",   "--tool",   "sphere:0.01",      "--safety",
+                                     safety,  "--record", "session.h5",       "--record-frames",
+                                     "0",     "--report", "report.json"};
     if (std::ranges::find(arguments, "--origin") == arguments.end()) {
       arguments.emplace_back("--origin");
       arguments.emplace_back(at_touch);
