@@ -34,6 +34,7 @@ struct Written {
 struct Wire {
   std::mutex mutex;
   std::deque<DeviceState> reports;
+  DeviceLimits limits;  // set before it is opened
   std::vector<Written> written;
   std::atomic<bool> is_lost = false;        // reads find it gone
   std::atomic<bool> takes_nothing = false;  // writes fail
@@ -100,8 +101,12 @@ class MadeUpPort : public DevicePort {
     is_open_ = false;
   }
 
+<<<<<<< HEAD
   [[nodiscard]] DeviceLimits limits() const override { return {}; }
   [[nodiscard]] std::string refusals() const override { return ""; }
+=======
+  [[nodiscard]] DeviceLimits limits() const override { return wire_->limits; }
+>>>>>>> hid
   [[nodiscard]] std::string name() const override { return "made up"; }
 
  private:
@@ -247,6 +252,25 @@ TEST_F(Link, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
     const std::int64_t before = k > 1 ? trace[k - 2].at : shown;
     ASSERT_LE(change.norm(), options.max_force_rate * 1e-9 * static_cast<double>(trace[k].at - before));
   }
+}
+
+TEST_F(Link, NeverShowsMoreThanTheDeviceBearsWhenItGoesOnByItself) {
+  wire_->limits.max_force = 0.5;
+  const auto link = make({.max_force = 2.0, .max_force_rate = 1e6});
+  DeviceCommand command;
+  command.wrench.force = Vec3(0.4, 0.0, 0.0);
+  command.local = {.force = command.wrench.force,
+                   .stiffness = 100.0 * Mat3::Identity(),
+                   .point = Vec3::Zero(),
+                   .radius = 0.01};
+  wire_->say(at({-0.005, 0.0, 0.0}, 1));  // where the field is 0.9 N
+  wait_for([&] { return link->has_reported(); });
+  link->show(command, link->hear({}).state, now());
+  wait_for([&] { return link->extrapolated() > 20; });
+  double largest = 0.0;
+  for (const Written& written : wire_->trace())
+    largest = std::max(largest, written.command.wrench.force.norm());
+  EXPECT_LE(largest, 0.5 * (1.0 + 1e-12));
 }
 
 TEST_F(Link, TellsOfALostDeviceAndOfItsReturn) {

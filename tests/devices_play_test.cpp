@@ -2,6 +2,7 @@
 // body, hands that press on it, and what the firmware was told. Run by umockdev-wrapper.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <spawn.h>
 #include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp
 #include <sys/wait.h>
 #include <unistd.h>
@@ -121,20 +122,21 @@ class Program {
  public:
   Program(const std::vector<std::string>& line, const fs::path& folder) : messages_(folder / "messages.txt") {
     std::vector<char*> arguments;
+    arguments.reserve(line.size() + 1);
     for (const std::string& word : line) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
-    child_ = fork();
-    if (child_ == 0) {
-      // Without the far ends of emulated devices: who has one keeps it plugged in.
-      for (int file = 3; file < 1024; ++file) fcntl(file, F_SETFD, FD_CLOEXEC);
-      const int messages = open(messages_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
-      const int nothing = open("/dev/null", O_RDWR);
-      dup2(nothing, STDIN_FILENO);
-      dup2(messages, STDOUT_FILENO);
-      dup2(messages, STDERR_FILENO);
-      if (chdir(folder.c_str()) == 0) execv(arguments[0], arguments.data());
-      _exit(127);
-    }
+    // Not by fork: umockdev's locks may be held by the threads of emulated devices. And without the far ends
+    // of these: who has one keeps its device plugged in.
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
+    posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, messages_.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
+                                     0644);
+    posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+    EXPECT_EQ(posix_spawn(&child_, arguments[0], &actions, nullptr, arguments.data(), environ), 0);
+    posix_spawn_file_actions_destroy(&actions);
   }
   ~Program() {
     if (child_ <= 0) return;
@@ -182,21 +184,11 @@ class Played : public ::testing::Test {
   /// palpate-runtime with the only device.
   [[nodiscard]] static std::unique_ptr<Program> play(std::vector<std::string> arguments,
                                                      const std::string& safety = patient) {
-    std::vector<std::string> line = {PALPATE_BINARY_DIR "/runtime/palpate-runtime",
-                                     "play",
-                                     "cube.palpate.hdf",
-                                     "--device",
-                                     "hid",
-                                     "--tool",
-                                     "sphere:0.01",
-                                     "--safety",
-                                     safety,
-                                     "--record",
-                                     "session.h5",
-                                     "--record-frames",
-                                     "0",
-                                     "--report",
-                                     "report.json"};
+    const std::string program = PALPATE_BINARY_DIR "/runtime/palpate-runtime";
+    std::vector<std::string> line = {program, "play",     "cube.palpate.hdf", "--device",
+                                     "hid",   "--tool",   "sphere:0.01",      "--safety",
+                                     safety,  "--record", "session.h5",       "--record-frames",
+                                     "0",     "--report", "report.json"};
     if (std::ranges::find(arguments, "--origin") == arguments.end()) {
       arguments.emplace_back("--origin");
       arguments.emplace_back(at_touch);

@@ -163,9 +163,9 @@ class Felt(ProgramTest):
         self.hand(60, 0.0, 0.0, 0.1)
         messages = self.finish(runtime)
         self.assertIn("waiting for bridge:", messages)
-        self.assertRegex(messages, "refused: [1-5] datagrams by size")
+        self.assertRegex(messages, "refused: [1-5] datagrams by magic")
         report = json.loads((self.folder / "report.json").read_text())
-        self.assertRegex(report["device"]["refused"], "^[1-5] datagrams by size$")
+        self.assertRegex(report["device"]["refused"], "^[1-5] datagrams by magic$")
 
     def test_signals_leave_no_force_and_a_whole_session(self):
         for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

@@ -33,6 +33,7 @@ DeviceLink::DeviceLink(std::unique_ptr<DevicePort> port, const DeviceLinkOptions
       stale_(options.stale),
       rate_(options.max_force_rate) {
   port_->open();
+  options_.max_force = std::min(options_.max_force, port_->limits().max_force);
   name_ = port_->name();
   sem_init(&is_shown_, 0, 0);
   // A wait on the wire that a signal interrupts would be taken for a lost device.

@@ -19,7 +19,7 @@
 namespace palpate {
 
 struct DeviceLinkOptions {
-  double max_force = 3.0;         ///< of what the writer works out itself [N]
+  double max_force = 3.0;         ///< of what the writer works out itself, where the device bears it [N]
   double max_force_rate = 500.0;  ///< [N/s]
   StaleOptions stale{};           ///< of the loop's solutions, when it gives no new ones
 };
