@@ -101,12 +101,8 @@ class MadeUpPort : public DevicePort {
     is_open_ = false;
   }
 
-<<<<<<< HEAD
-  [[nodiscard]] DeviceLimits limits() const override { return {}; }
-  [[nodiscard]] std::string refusals() const override { return ""; }
-=======
   [[nodiscard]] DeviceLimits limits() const override { return wire_->limits; }
->>>>>>> hid
+  [[nodiscard]] std::string refusals() const override { return ""; }
   [[nodiscard]] std::string name() const override { return "made up"; }
 
  private:
