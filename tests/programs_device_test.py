@@ -19,7 +19,7 @@ SPRING = 300.0  # of the example's hand [N/m]
 # A cube of 10 cm, as stiff as a soft organ: at its top's middle some 80 N/m to a ball.
 SMALL_CUBE = cube_toml(4, scope="full").replace("size = [1, 1, 1]", "size = [0.1, 0.1, 0.1]").replace("youngs_modulus = 1.0", "youngs_modulus = 3000")
 # This machine may be busy: late ticks and reports have their own tests.
-PATIENT = "late=10,most_late=1e9,silence=5,silence_fade=4,frozen=100,ramp=0.2,buzz_flips=1000"
+PATIENT = "late=10,most_late=1e9,stale_life=10,silence=5,silence_fade=4,frozen=100,ramp=0.2,buzz_flips=1000"
 
 
 def free_port():
