@@ -373,7 +373,8 @@ TEST_F(Played, ASpaceMouseMovesTheToolAndShowsNothing) {
   });
   bus.talk(bus.plug_in(firmware));
   // Frozen numbers are a fault after 0.25 s, but not without a force.
-  const std::string safety = "late=10,most_late=1e9,stale_life=10,silence=5,silence_fade=4,ramp=0.2,buzz_flips=1000";
+  const std::string safety =
+      "late=10,most_late=1e9,stale_life=10,silence=5,silence_fade=4,ramp=0.2,buzz_flips=1000";
   const auto runtime = play({"--origin", "0.05,0.05,0.13"}, safety);
   ASSERT_TRUE(comes_true([] { return fs::exists(session()); })) << runtime->messages();
   std::this_thread::sleep_for(std::chrono::milliseconds(500));  // the loop begins
@@ -405,9 +406,9 @@ TEST_F(Played, AJoystickIsFeltAlsoWhileItRests) {
       [](double t) { return Vec3(0.0, 0.01 - 0.02 * std::clamp(t - 2.0, 0.0, 1.0), 0.0); });
   firmware->on_change = true;
   const std::string path = bus.plug_in(firmware);
-  const auto runtime =
-      play({"--axes", "x,z,-y"},
-           "late=10,most_late=1e9,stale_life=10,silence=1.5,silence_fade=1,frozen=100,ramp=0.2,buzz_flips=1000");
+  const auto runtime = play(
+      {"--axes", "x,z,-y"},
+      "late=10,most_late=1e9,stale_life=10,silence=1.5,silence_fade=1,frozen=100,ramp=0.2,buzz_flips=1000");
   ASSERT_TRUE(comes_true([&] { return firmware->playing() == 2; })) << runtime->messages();
   bus.talk(path);
   ASSERT_TRUE(comes_true([&] { return firmware->time() > 6.0; }));
