@@ -1,7 +1,9 @@
 #include "formats/recording.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
+#include <thread>
 
 #include "formats/recording_parts.h"
 #include "meshes/error.h"
@@ -64,7 +66,9 @@ void append_frames(const hdf5::File& part, RecordedFrames& frames) {
 
 }  // namespace
 
-Recording read_recording(const std::filesystem::path& path) {
+namespace {
+
+Recording read_once(const std::filesystem::path& path) {
   const hdf5::Quiet quiet;
   const hdf5::File file = hdf5::File::open_to_read(path);
   RecordingHead head = read_head(file);
@@ -78,6 +82,21 @@ Recording read_recording(const std::filesystem::path& path) {
   for (const hdf5::File& part : parts) read_ticks(part, recording.ticks);
   for (const hdf5::File& part : frame_parts) append_frames(part, recording.frames);
   return recording;
+}
+
+}  // namespace
+
+Recording read_recording(const std::filesystem::path& path) {
+  // While it is recorded its parts are merged under a reader's hands: then what is there now is read.
+  constexpr int attempts = 5;
+  for (int attempt = 1;; ++attempt) {
+    try {
+      return read_once(path);
+    } catch (const Error&) {
+      if (attempt == attempts || !std::filesystem::exists(parts_folder(path))) throw;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
 }
 
 RecordedFrames read_frames(const std::filesystem::path& path) {
