@@ -64,10 +64,6 @@ void append_frames(const hdf5::File& part, RecordedFrames& frames) {
   read_column(part, "/frames/time", count, frames.time);
 }
 
-}  // namespace
-
-namespace {
-
 Recording read_once(const std::filesystem::path& path) {
   const hdf5::Quiet quiet;
   const hdf5::File file = hdf5::File::open_to_read(path);

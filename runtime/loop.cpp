@@ -5,16 +5,12 @@
 #include <cmath>
 #include <ctime>
 
+#include "runtime/devices/monotonic_clock.h"
+
 namespace palpate {
 namespace {
 
 constexpr std::int64_t second = 1'000'000'000;  // ns
-
-std::int64_t now() noexcept {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return time.tv_sec * second + time.tv_nsec;
-}
 
 /// Returns early when a signal comes.
 void sleep_until(std::int64_t due) noexcept {
@@ -47,7 +43,7 @@ void note_largest(double value, double time, double& largest, double& largest_ti
 class Loop {
  public:
   Loop(const LoopParts& parts, const LoopOptions& options)
-      : parts_(parts), options_(options), start_(options.fast ? 0 : now() + second / options.rate) {
+      : parts_(parts), options_(options), start_(options.fast ? 0 : monotonic_now() + second / options.rate) {
     report_.rate = options.rate;
   }
 
@@ -59,12 +55,12 @@ class Loop {
       if (!options_.fast) {
         sleep_until(tick_.due);
         if (stop) break;
-        tick_.begun = now();
+        tick_.begun = monotonic_now();
       }
       tick();
     }
     if (parts_.safety != nullptr) parts_.safety->shut_down();
-    parts_.device.show(DeviceCommand{}, news_.state, now());
+    parts_.device.show(DeviceCommand{}, news_.state, monotonic_now());
     report_.interrupted = stop;
     return report_;
   }
@@ -84,13 +80,13 @@ class Loop {
     const Vec3 force_before = tool().wrench.force;
 
     if (options_.fast) serve();  // they do what is missing, untimed
-    const std::int64_t begin = now();
+    const std::int64_t begin = monotonic_now();
     if (!options_.fast) serve();
     step(parts_.body, parts_.state, in_body_.pose);
     if (parts_.motion != nullptr) parts_.motion->post(parts_.state);
     guard();
     parts_.device.show(shown_, news_.state, tick_.begun);
-    const std::int64_t end = now();
+    const std::int64_t end = monotonic_now();
 
     compute_ns_ = end - begin;
     if (!options_.fast && end > next_due) ++report_.deadline_misses;

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "meshes/error.h"
+#include "runtime/devices/monotonic_clock.h"
 #include "runtime/devices/plausible.h"
 
 namespace palpate {
@@ -27,12 +28,6 @@ constexpr int patience = 10;                    // ms that a read waits
 constexpr int most_at_once = 1024;              // datagrams that a read takes: it ends, whoever floods us
 constexpr int farewells = 3;                    // a datagram may be lost
 constexpr std::int64_t second = 1'000'000'000;  // ns
-
-std::int64_t now() noexcept {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return time.tv_sec * second + time.tv_nsec;
-}
 
 std::uint64_t draw_nonce() {
   std::random_device random;
@@ -160,12 +155,12 @@ DevicePort::Heard BridgePort::read(DeviceState& state) noexcept {
                                   reinterpret_cast<sockaddr*>(&from), &from_size);
     if (size < 0) break;
     const Refusal refusal =
-        take(std::span(buffer).first(static_cast<std::size_t>(size)), as_peer(from), now(), newest);
+        take(std::span(buffer).first(static_cast<std::size_t>(size)), as_peer(from), monotonic_now(), newest);
     datagrams_[static_cast<std::size_t>(refusal)].fetch_add(1, std::memory_order_relaxed);
     heard = heard || refusal == Refusal::none;
   }
   if (!heard) {
-    if (partner_ == 0 || seconds_between(heard_, now()) <= most_silence) return Heard::nothing;
+    if (partner_ == 0 || seconds_between(heard_, monotonic_now()) <= most_silence) return Heard::nothing;
     forget_partner();
     return Heard::lost;
   }
@@ -235,7 +230,7 @@ BridgeCommand BridgePort::no_force() const noexcept {
 
 bool BridgePort::send(BridgeCommand command, Peer to) noexcept {
   command.sequence = ++sequence_;
-  command.time = static_cast<std::uint64_t>(now());
+  command.time = static_cast<std::uint64_t>(monotonic_now());
   const auto datagram = encode_bridge_command(command);
   const sockaddr_in address = as_socket_address(to);
   const ssize_t sent = sendto(socket_, datagram.data(), datagram.size(), MSG_DONTWAIT,

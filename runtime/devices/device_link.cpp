@@ -6,6 +6,7 @@
 #include <ctime>
 #include <exception>
 
+#include "runtime/devices/monotonic_clock.h"
 #include "runtime/devices/plausible.h"
 #include "runtime/real_time.h"
 
@@ -15,12 +16,6 @@ namespace {
 constexpr std::int64_t patience = 2'000'000;            // ns that a command may be old
 constexpr std::int64_t wait = 1'000'000;                // ns, for a new command
 constexpr auto retry = std::chrono::milliseconds(100);  // between attempts to open a lost device
-
-std::int64_t now() noexcept {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return time.tv_sec * 1'000'000'000 + time.tv_nsec;
-}
 
 }  // namespace
 
@@ -123,7 +118,7 @@ void DeviceLink::try_to_open() noexcept {
 void DeviceLink::write_commands() noexcept {
   ask_for_priority(wire_priority);
   std::int64_t last_shown = 0;
-  std::int64_t last_write = now();
+  std::int64_t last_write = monotonic_now();
   while (!stop_) {
     timespec until{};
     clock_gettime(CLOCK_MONOTONIC, &until);
@@ -135,7 +130,7 @@ void DeviceLink::write_commands() noexcept {
       }
     }
     const Shown& shown = shown_.read();
-    const std::int64_t begin = now();
+    const std::int64_t begin = monotonic_now();
     const bool is_old = begin - shown.begun > patience;
     if (shown.begun == 0 || (shown.begun == last_shown && !is_old)) continue;
     if (is_old) {
@@ -169,9 +164,9 @@ DeviceCommand DeviceLink::extrapolate(const Shown& shown, const DeviceState& sta
 void DeviceLink::write(const DeviceCommand& command, const DeviceState& state) noexcept {
   const std::lock_guard lock(wire_);
   if (!is_open_ || broken_) return;
-  const std::int64_t begin = now();
+  const std::int64_t begin = monotonic_now();
   if (!port_->write(command, state)) broken_ = true;
-  worst_write_ = std::max<std::int64_t>(worst_write_, now() - begin);
+  worst_write_ = std::max<std::int64_t>(worst_write_, monotonic_now() - begin);
   ++writes_;
 }
 
