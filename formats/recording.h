@@ -51,8 +51,10 @@ struct TickRecord {
 /// The surface of the body at one moment.
 struct SurfaceFrame {
   std::int64_t tick = 0;
-  double time = 0.0;                ///< since the start of the run [s]
-  std::vector<float> displacement;  ///< [S x 3] node + displacement is what is seen [m]
+  double time = 0.0;                  ///< since the start of the run [s]
+  std::vector<float> displacement{};  ///< [S x 3] node + displacement is what is seen [m]
+  std::vector<float> von_mises{};     ///< [S] stress [Pa]; not a number where it is not known
+  std::vector<float> pressure{};      ///< [S] of the contact [Pa]
 };
 
 /// The surface that the frames displace.

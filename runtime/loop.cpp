@@ -177,7 +177,7 @@ class Loop {
       parts_.monitor->push({.number = tick_.number,
                             .lateness_ns = tick_.begun - tick_.due,
                             .compute_ns = compute_ns_,
-                            .force = tool().wrench.force.norm(),
+                            .force = -tool().wrench.force,
                             .shown = shown_.wrench.force.norm(),
                             .contacts = tool().contacts,
                             .phase = phase(),

@@ -19,8 +19,9 @@ struct TickNote {
   std::int64_t number = 0;
   std::int64_t lateness_ns = 0;  ///< from when it was due to when it began
   std::int64_t compute_ns = 0;
-  double force = 0.0;  ///< computed [N]
-  double shown = 0.0;  ///< that the device was told [N]
+  Vec3 force = Vec3::Zero();  ///< computed, on the body [N]
+  double shown = 0.0;         ///< that the device was told [N]
+  double depth = 0.0;         ///< how far the contacts press the surface in, at most [m]
   std::int32_t contacts = 0;
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;

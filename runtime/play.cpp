@@ -221,11 +221,11 @@ int play(const PlayOptions& options) {
                    SurfaceFramesOptions{
                        .ticks_per_frame = std::max<std::int64_t>(std::llround(std::min(ticks, 1e15)), 1),
                        .in_background = !options.fast},
-                   [&recorder, fast = options.fast](SurfaceFrame frame) {
+                   [&recorder, fast = options.fast](SurfacePicture picture) {
                      if (fast) {
-                       recorder->push_frame_waiting(std::move(frame));
+                       recorder->push_frame_waiting(std::move(picture.frame));
                      } else {
-                       recorder->push_frame(std::move(frame));
+                       recorder->push_frame(std::move(picture.frame));
                      }
                    });
   }

@@ -61,13 +61,16 @@ void SurfaceFrames::work() {
 void SurfaceFrames::compute(const Moment& moment) {
   computed_ = moment.tick;
   surface_displacement(body_, moment.load, stored_, u_, &moment.motion);
-  SurfaceFrame frame = {moment.tick, moment.time, {}};
+  SurfacePicture picture;
+  SurfaceFrame& frame = picture.frame;
+  frame.tick = moment.tick;
+  frame.time = moment.time;
   frame.displacement.reserve(3 * u_.size());
   for (std::size_t node = 0; node < u_.size(); ++node) {
     const Vec3 seen = rest_[node] + u_[node];
     for (const double x : seen) frame.displacement.push_back(static_cast<float>(x));
   }
-  sink_(std::move(frame));
+  sink_(std::move(picture));
 }
 
 RecordedSurface recorded_surface(const Body& body) {

@@ -19,11 +19,34 @@ struct SurfaceFramesOptions {
   bool in_background = true;  ///< else `post` computes the frame itself: equal runs stay equal
 };
 
+/// A contact point as it is seen.
+struct SeenContact {
+  Vec3 position;  ///< of the surface now [m]
+  Vec3 normal;    ///< outward
+  Vec3 force;     ///< on the body [N]
+  bool held = false;
+};
+
+/// What is seen at one moment.
+struct SurfacePicture {
+  SurfaceFrame frame;
+  ToolPose device;  ///< where the hand wants the tool
+  ToolPose tool;    ///< where it is
+  Wrench on_body;   ///< the opposite of what the hand feels
+  StepStatus status = StepStatus::ok;
+  std::vector<SeenContact> contacts;
+  std::shared_ptr<const Patch> patch;  ///< null: no overlay
+  /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
+  /// empty.
+  std::vector<float> plane_displacement;  ///< [N x 3] node + displacement is what is seen [m]
+  std::vector<float> plane_von_mises;     ///< [N] [Pa]
+};
+
 /// Takes a frame each `ticks_per_frame` ticks, from the first one on, and hands it to `sink`. In the
 /// background a thread of its own computes it; where that takes too long, frames are left out.
 class SurfaceFrames {
  public:
-  using Sink = std::function<void(SurfaceFrame)>;
+  using Sink = std::function<void(SurfacePicture)>;
 
   /// `body` must live as long; `state` is one that the loop will use, or a copy. `sink` is called by one
   /// thread and does not throw.

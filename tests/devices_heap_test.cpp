@@ -172,7 +172,8 @@ TEST(LoopTick, MakesNoHeapCall) {
     Safety safety(patient);
     Recorder recorder(folder / "a.h5", {"box.palpate.hdf", "0123", "quiet", 1000, ""},
                       recorded_surface(body));
-    SurfaceFrames frames(body, state, {}, [&](SurfaceFrame frame) { recorder.push_frame(std::move(frame)); });
+    SurfaceFrames frames(body, state, {},
+                         [&](SurfacePicture picture) { recorder.push_frame(std::move(picture.frame)); });
     Monitor monitor({});
     const std::atomic<bool> stop = false;
     report = run_loop({.body = body,

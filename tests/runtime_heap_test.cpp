@@ -191,7 +191,7 @@ class OverlayTick : public Tick {
 INSTANTIATE_TEST_SUITE_P(Dimension, OverlayTick, testing::Values(2, 3));
 
 TEST_P(OverlayTick, MakesNoHeapCall) {
-  frames_.emplace(overlaid_, with_, SurfaceFramesOptions{.ticks_per_frame = 1}, [](const SurfaceFrame&) {});
+  frames_.emplace(overlaid_, with_, SurfaceFramesOptions{.ticks_per_frame = 1}, [](const SurfacePicture&) {});
 #if PALPATE_OWN_MALLOC
   heap_calls = 0;
   counting = true;
@@ -310,7 +310,7 @@ INSTANTIATE_TEST_SUITE_P(Bodies, MovingTick,
 // Beside threads that step packed dynamics and make frames, and take what memory they like.
 TEST_P(MovingTick, MakesNoHeapCall) {
   frames_.emplace(body_, state_, SurfaceFramesOptions{.ticks_per_frame = 2},
-                  [this](const SurfaceFrame&) { ++shown_frames_; });
+                  [this](const SurfacePicture&) { ++shown_frames_; });
   if (std::get<0>(GetParam()) == DynamicsMethod::packed)
     source_.emplace(body_, state_, MotionSourceOptions{.in_background = true, .jobs = 2});
 #if PALPATE_OWN_MALLOC

@@ -1,0 +1,41 @@
+// What a viewer draws of a body.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "runtime/body.h"
+#include "runtime/patch.h"
+#include "runtime/surface_frames.h"
+
+namespace palpate {
+
+/// In space the surface as the elements have it; in the plane all elements, where their displacement is known
+/// (all free nodes are stored), else the boundary.
+struct Scene {
+  std::uint32_t number = 0;  ///< from 1 on
+  int dimension = 3;
+  bool is_plane = false;    ///< nodes are all mesh nodes, not those of the surface
+  std::vector<Vec3> nodes;  ///< [S] without loads [m]
+  std::vector<std::array<Index, 3>> triangles;
+  std::vector<std::array<Index, 2>> edges;
+  std::vector<std::uint8_t> held;  ///< [S] as Model::fixed
+};
+
+/// The finer surface of an overlay, in place of some of a scene's triangles.
+struct ScenePatch {
+  std::vector<Index> surface_nodes;             ///< [m] of Body::simplices, that its own nodes are
+  std::vector<Index> hidden;                    ///< triangles of the scene
+  std::vector<Vec3> nodes;                      ///< [m] without loads [m]
+  std::vector<std::array<Index, 3>> triangles;  ///< of its own nodes
+  std::vector<std::array<Index, 2>> outline;    ///< in the plane: the boundary
+};
+
+Scene make_scene(const Body& body, std::uint32_t number);
+ScenePatch make_scene_patch(const Body& body, const Scene& scene, const Patch& patch);
+/// Of a recording: all of its surface, nothing is known of what is held (but from 4.1 on).
+Scene make_scene(const RecordedSurface& surface, std::uint32_t number);
+
+}  // namespace palpate

@@ -1,0 +1,48 @@
+// Serves the viewer's page, its pictures and its wishes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "runtime/monitor.h"
+#include "runtime/surface_frames.h"
+#include "runtime/viewer/scene.h"
+#include "runtime/viewer/viewed_run.h"
+
+namespace palpate {
+
+struct ViewerOptions {
+  std::string address = "127.0.0.1";  ///< another one than of this machine alone asks for a token
+  std::uint16_t port = 8017;          ///< 0: any that is free
+};
+
+/// HTTP and WebSocket in a thread of its own (web/PROTOCOL.md). The `show` functions may be called by any
+/// thread, one at a time each; they never wait for a page. A page that is slow misses pictures, and holds up
+/// nothing else.
+class ViewerServer {
+ public:
+  /// `run` must live as long. Listens when it returns. Throws Error (port taken, address unknown).
+  ViewerServer(const ViewerOptions& options, ViewedRun& run);
+  ~ViewerServer();  ///< closes all connections
+  ViewerServer(const ViewerServer&) = delete;
+  ViewerServer& operator=(const ViewerServer&) = delete;
+
+  /// What to open: http://127.0.0.1:8017/ with the token where one is asked for.
+  [[nodiscard]] const std::string& url() const noexcept;
+
+  void show_scene(std::shared_ptr<const Scene> scene);
+  void show_picture(SurfacePicture picture);
+  /// Consecutive ticks, `stride` apart.
+  void show_ticks(std::span<const TickNote> ticks, std::int64_t stride = 1);
+  /// The members of the message `state` that are the run's, as a JSON object; the server adds those that are
+  /// each page's.
+  void show_state(std::string json);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate
