@@ -1,0 +1,28 @@
+// The viewer's messages within a page, in place of a socket.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace palpate {
+
+/// Collects messages as web/PROTOCOL.md has them; the page that they are put into plays them by itself. Each
+/// is kept as u32 length, u32 kind (0 text, 1 binary), payload, padded to a multiple of 4 bytes.
+class PageArchive {
+ public:
+  void add_text(std::string_view json) { add(json, 0); }
+  void add_binary(std::string_view bytes) { add(bytes, 1); }
+
+  /// `page` with all messages in it: deflated, as base64, in a script element "palpate-session" that no
+  /// browser runs.
+  [[nodiscard]] std::string page(std::string_view page) const;
+
+ private:
+  void add(std::string_view payload, unsigned kind);
+
+  std::string messages_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,144 @@
+#include "runtime/viewer/session_pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t most_samples = 100'000;
+
+Vec3 vector_of(const double (&v)[3]) {
+  return {v[0], v[1], v[2]};
+}
+
+Eigen::Quaterniond quaternion_of(const double (&wxyz)[4]) {
+  return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
+}
+
+std::int64_t number_of(const TickRecord& tick, std::int64_t rate) {
+  return std::llround(tick.time * static_cast<double>(rate));
+}
+
+/// "a=1\nb=2\n" as {"a":"1","b":"2"}.
+nlohmann::json settings_of(std::string_view options) {
+  nlohmann::json settings = nlohmann::json::object();
+  while (!options.empty()) {
+    const std::size_t end = std::min(options.find('\n'), options.size());
+    const std::string_view line = options.substr(0, end);
+    options.remove_prefix(std::min(end + 1, options.size()));
+    const std::size_t equals = line.find('=');
+    if (equals != std::string_view::npos)
+      settings[std::string(line.substr(0, equals))] = std::string(line.substr(equals + 1));
+  }
+  return settings;
+}
+
+TickNote note_of(const TickRecord& tick, std::int64_t rate) {
+  const std::int64_t number = number_of(tick, rate);
+  const auto due = std::llround(static_cast<double>(number) * 1e9 / static_cast<double>(rate));
+  return {.number = number,
+          .lateness_ns = tick.begun_ns - due,
+          .compute_ns = tick.compute_ns,
+          .force = vector_of(tick.force),
+          .shown = vector_of(tick.shown_force).norm(),
+          .depth = std::numeric_limits<double>::quiet_NaN(),  // is not recorded
+          .contacts = tick.contacts,
+          .phase = static_cast<SafetyPhase>(tick.phase),
+          .fault = static_cast<Fault>(tick.fault)};
+}
+
+}  // namespace
+
+SessionPictures::SessionPictures(std::filesystem::path path)
+    : path_(std::move(path)), recording_(read_recording(path_)) {
+  if (frames() == 0 || recording_.frames.surface.nodes.empty()) {
+    throw Error("has no pictures of the surface", path_.string(),
+                "record it again without --record-frames 0; palpate-runtime session tells what is in it");
+  }
+}
+
+/// The tick with this number, or the last one before it; null where there is none.
+const TickRecord* SessionPictures::tick(std::int64_t number) const {
+  const std::int64_t rate = recording_.info.rate;
+  const auto after =
+      std::upper_bound(recording_.ticks.begin(), recording_.ticks.end(), number,
+                       [&](std::int64_t wanted, const TickRecord& t) { return wanted < number_of(t, rate); });
+  return after == recording_.ticks.begin() ? nullptr : &*std::prev(after);
+}
+
+SurfacePicture SessionPictures::picture(std::int64_t frame) const {
+  SurfacePicture picture{.frame = read_frame(path_, frame)};
+  if (const TickRecord* then = tick(picture.frame.tick)) {
+    picture.device = {.orientation = quaternion_of(then->device_orientation),
+                      .position = vector_of(then->device_position),
+                      .grab = then->grab != 0};
+    picture.tool = {.orientation = quaternion_of(then->tool_orientation),
+                    .position = vector_of(then->tool_position),
+                    .grab = then->grab != 0};
+    picture.on_body = {.force = vector_of(then->force), .torque = vector_of(then->torque)};
+    picture.status = static_cast<StepStatus>(then->status);
+  }
+  return picture;
+}
+
+std::string SessionPictures::state(std::int64_t shown, const std::vector<double>& times) const {
+  using nlohmann::json;
+  const RecordedSurface& surface = recording_.frames.surface;
+  Eigen::AlignedBox3d bounds;
+  for (const Vec3& node : surface.nodes) bounds.extend(node);
+  const auto point = [](const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); };
+  std::string name = std::filesystem::path(recording_.info.model_path).filename().string();
+  if (const std::size_t suffix = name.find(".palpate.hdf"); suffix != std::string::npos) name.resize(suffix);
+  const json state = {{"model",
+                       {{"name", name},
+                        {"file", recording_.info.model_path},
+                        {"dimension", surface.corners},
+                        {"nodes", nullptr},
+                        {"surface_nodes", surface.nodes.size()},
+                        {"elements", nullptr},
+                        {"dofs", nullptr},
+                        {"element", nullptr},
+                        {"size", bounds.diagonal().norm()},
+                        {"bounds", json::array({point(bounds.min()), point(bounds.max())})},
+                        {"moves", false},
+                        {"loads", false}}},
+                      {"device", recording_.info.device},
+                      {"session", path_.filename().string()},
+                      {"rate", recording_.info.rate},
+                      {"ticks", recording_.ticks.size()},
+                      {"paused", false},
+                      {"recording", nullptr},
+                      {"busy", nullptr},
+                      {"locked", "this is a recording"},
+                      {"fault", nullptr},
+                      {"phase", "active"},
+                      {"misses", 0},
+                      {"settings", settings_of(recording_.info.options)},
+                      {"defaults", {{"radius", 0.0}, {"reach", 0.0}, {"friction", 0.0}, {"depth", 0.0}}},
+                      {"frames", times.size()},
+                      {"frame", shown},
+                      {"duration", times.empty() ? 0.0 : times.back()},
+                      {"times", times}};
+  return state.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::vector<TickRun> SessionPictures::ticks() const {
+  const std::int64_t rate = recording_.info.rate;
+  const std::int64_t stride = (std::ssize(recording_.ticks) + most_samples - 1) / most_samples;
+  std::vector<TickRun> runs;
+  for (std::size_t k = 0; k < recording_.ticks.size(); k += static_cast<std::size_t>(stride)) {
+    const TickNote note = note_of(recording_.ticks[k], rate);
+    if (runs.empty() || note.number != runs.back().notes.back().number + stride)
+      runs.push_back({.notes = {}, .stride = stride});
+    runs.back().notes.push_back(note);
+  }
+  return runs;
+}
+
+}  // namespace palpate

@@ -1,0 +1,47 @@
+// A recording as the viewer shows it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "formats/recording.h"
+#include "runtime/monitor.h"
+#include "runtime/surface_frames.h"
+#include "runtime/viewer/scene.h"
+
+namespace palpate {
+
+/// Consecutive samples of a recording's ticks, `stride` apart.
+struct TickRun {
+  std::vector<TickNote> notes;
+  std::int64_t stride = 1;
+};
+
+/// The pictures, plots and words of a recording. Needs no model.
+class SessionPictures {
+ public:
+  /// Reads all but the displacements. Throws Error when it is no recording or has no frames.
+  explicit SessionPictures(std::filesystem::path path);
+
+  [[nodiscard]] Scene scene() const { return make_scene(recording_.frames.surface, 1); }
+  [[nodiscard]] std::int64_t frames() const noexcept { return std::ssize(recording_.frames.tick); }
+  [[nodiscard]] double time(std::int64_t frame) const {  ///< [s]
+    return recording_.frames.time[static_cast<std::size_t>(frame)];
+  }
+  /// Of frame 0 .. frames() - 1, with the tool as it was in its tick. Throws Error when it cannot be read.
+  [[nodiscard]] SurfacePicture picture(std::int64_t frame) const;
+  /// What the message `state` says of some frames, the first of which is shown.
+  [[nodiscard]] std::string state(std::int64_t shown, const std::vector<double>& times) const;
+  /// All ticks, thinned out to some 100 000 samples: a run for each stretch without a gap.
+  [[nodiscard]] std::vector<TickRun> ticks() const;
+
+ private:
+  [[nodiscard]] const TickRecord* tick(std::int64_t number) const;
+
+  std::filesystem::path path_;
+  Recording recording_;
+};
+
+}  // namespace palpate

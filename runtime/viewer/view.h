@@ -1,0 +1,28 @@
+// palpate-runtime view and export: a recording in the viewer, and as a page of its own.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include "runtime/viewer/viewer_server.h"
+
+namespace palpate {
+
+/// Serves a recording until SIGINT or SIGTERM. Returns the exit code; throws Error.
+int view(const std::filesystem::path& recording, const ViewerOptions& options);
+
+/// What of a recording goes into a page.
+struct ExportOptions {
+  std::filesystem::path recording;
+  std::filesystem::path html;
+  double fps = 30.0;              ///< pictures a second at most
+  double from = 0.0;              ///< [s]
+  std::optional<double> to = {};  ///< [s]; else to the end
+};
+
+/// Writes one page with the recording in it, which asks no network and no runtime. Returns the exit code;
+/// throws Error.
+int export_html(const ExportOptions& options);
+
+}  // namespace palpate
