@@ -45,7 +45,6 @@ void PageArchive::add(std::string_view payload, unsigned kind) {
   append_u32(messages_, static_cast<std::uint32_t>(payload.size()));
   append_u32(messages_, kind);
   messages_ += payload;
-  messages_.append((4 - payload.size() % 4) % 4, '\0');
 }
 
 std::string PageArchive::page(std::string_view page) const {

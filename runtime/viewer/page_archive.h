@@ -9,7 +9,7 @@
 namespace palpate {
 
 /// Collects messages as web/PROTOCOL.md has them; the page that they are put into plays them by itself. Each
-/// is kept as u32 length, u32 kind (0 text, 1 binary), payload, padded to a multiple of 4 bytes.
+/// is kept as u32 length, u32 kind (0 text, 1 binary), payload.
 class PageArchive {
  public:
   void add_text(std::string_view json) { add(json, 0); }
