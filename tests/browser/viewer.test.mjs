@@ -44,7 +44,7 @@ async function settled(page) {
 /// The force on the body [N] that displaces the top's node by `d` [m], by the sparse route of its own command.
 async function probe(file, d) {
   const { stdout } = await run(runtime, ['probe', file, '--at', top.join(), '--displace', d.join(), '--json']);
-  return JSON.parse(stdout).places[0].force_N;
+  return JSON.parse(stdout).nodes[0].force;
 }
 
 test('the page comes whole from the runtime and asks nobody else', async (t) => {
@@ -344,7 +344,7 @@ test('a body in the plane lies flat with its mesh, and is pushed from outside', 
   await page.mouse.up();
   assert.ok(felt.force[1] < 0 && felt.force[2] === 0, `force ${felt.force}`);
   const { stdout } = await run(runtime, ['probe', file, '--at', '0.5,1', '--displace', `0,${-felt.depth}`, '--json']);
-  near(felt.force[1], JSON.parse(stdout).places[0].force_N[1], 0.05, 'force');
+  near(felt.force[1], JSON.parse(stdout).nodes[0].force[1], 0.05, 'force');
   assert.deepEqual(page.complaints, []);
 });
 
