@@ -101,13 +101,17 @@ Document make_document(std::span<const Vec3> nodes, ElementType element, std::sp
 
 }  // namespace
 
+void write_vtu(std::ostream& stream, std::span<const Vec3> nodes, ElementType element,
+               std::span<const Index> connectivity, std::span<const NodalField> fields) {
+  make_document(nodes, element, connectivity, fields).write(stream);
+}
+
 void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, ElementType element,
                std::span<const Index> connectivity, std::span<const NodalField> fields) {
-  const Document document = make_document(nodes, element, connectivity, fields);
   std::filesystem::path partial = file;
   partial += ".partial";
   std::ofstream stream(partial, std::ios::binary);
-  document.write(stream);
+  write_vtu(stream, nodes, element, connectivity, fields);
   stream.close();
   std::error_code problem;
   if (stream) std::filesystem::rename(partial, file, problem);

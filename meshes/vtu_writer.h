@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <iosfwd>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,6 +22,10 @@ struct NodalField {
 /// ASCII-free appended raw .vtu; under a temporary name, then renamed. Throws Error when the file cannot be
 /// written.
 void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, ElementType element,
+               std::span<const Index> connectivity, std::span<const NodalField> fields);
+
+/// The same into a stream; whether that could take it, the stream says.
+void write_vtu(std::ostream& stream, std::span<const Vec3> nodes, ElementType element,
                std::span<const Index> connectivity, std::span<const NodalField> fields);
 
 }  // namespace palpate

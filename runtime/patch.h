@@ -21,6 +21,8 @@ class Patch {
 
   /// [m] surface nodes of the body (Body::simplices), ascending.
   [[nodiscard]] std::span<const Index> surface_nodes() const noexcept { return surface_nodes_; }
+  /// Elements of the body that it refines, ascending.
+  [[nodiscard]] std::span<const Index> elements() const noexcept { return elements_; }
   /// [g] stored nodes Q.
   [[nodiscard]] std::span<const Index> stored_nodes() const noexcept { return stored_nodes_; }
 
@@ -43,6 +45,7 @@ class Patch {
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   std::vector<Index> surface_nodes_;
+  std::vector<Index> elements_;
   std::vector<Index> stored_nodes_;
   Rows compliance_;
   Rows response_;

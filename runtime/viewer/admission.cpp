@@ -1,0 +1,103 @@
+#include "runtime/viewer/admission.h"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <sys/random.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::string_view http_port = "80";  // which Host leaves out
+
+bool is_ipv4(const std::string& text) {
+  in_addr address{};
+  return inet_pton(AF_INET, text.c_str(), &address) == 1;
+}
+
+bool is_ipv6(const std::string& text) {
+  in6_addr address{};
+  return inet_pton(AF_INET6, text.c_str(), &address) == 1;
+}
+
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return lower;
+}
+
+}  // namespace
+
+bool is_loopback(const std::string& address) {
+  in_addr v4{};
+  if (inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
+  in6_addr v6{};
+  return inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6) != 0;
+}
+
+bool is_any_address(const std::string& address) {
+  return address == "0.0.0.0" || address == "::";
+}
+
+std::string url_host(const std::string& address) {
+  return is_ipv6(address) ? "[" + address + "]" : address;
+}
+
+bool is_served(std::string_view host, const std::string& address, std::uint16_t port) {
+  const std::size_t bracket = host.rfind(']');  // colons before it are of an IPv6 address
+  const std::size_t colon = host.find(':', bracket == std::string_view::npos ? 0 : bracket);
+  const std::string name = lower_case(host.substr(0, colon));
+  const std::string_view number = colon == std::string_view::npos ? http_port : host.substr(colon + 1);
+  if (number != std::to_string(port)) return false;
+  if (name == "127.0.0.1" || name == "localhost" || name == "[::1]" || name == url_host(address)) return true;
+  const bool in_brackets = name.size() > 2 && name.front() == '[' && name.back() == ']';
+  return is_any_address(address) && (in_brackets ? is_ipv6(name.substr(1, name.size() - 2)) : is_ipv4(name));
+}
+
+bool is_own_page(std::string_view origin, std::string_view host) {
+  return lower_case(origin) == "http://" + lower_case(host);
+}
+
+std::string random_token() {
+  std::array<std::uint8_t, 16> bits{};
+  if (getrandom(bits.data(), bits.size(), 0) != static_cast<ssize_t>(bits.size())) {
+    throw Error("no random numbers: " + std::system_category().message(errno), "getrandom",
+                "serve the viewer on 127.0.0.1, which needs none");
+  }
+  std::string token;
+  for (const std::uint8_t byte : bits) token += fmt::format("{:02x}", byte);
+  return token;
+}
+
+bool is_same_token(std::string_view given, std::string_view token) noexcept {
+  if (given.size() != token.size()) return false;
+  unsigned difference = 0;
+  for (std::size_t k = 0; k < token.size(); ++k)
+    difference |=
+        static_cast<unsigned>(static_cast<unsigned char>(given[k]) ^ static_cast<unsigned char>(token[k]));
+  return difference == 0;
+}
+
+Target split_target(std::string_view target) {
+  const std::size_t question = target.find('?');
+  Target result{target.substr(0, question), {}};
+  if (question == std::string_view::npos) return result;
+  std::string_view rest = target.substr(question + 1);
+  constexpr std::string_view token = "token=";
+  while (!rest.empty()) {
+    const std::size_t end = rest.find('&');
+    const std::string_view part = rest.substr(0, end);
+    if (part.starts_with(token)) result.token = part.substr(token.size());
+    rest = end == std::string_view::npos ? std::string_view{} : rest.substr(end + 1);
+  }
+  return result;
+}
+
+}  // namespace palpate

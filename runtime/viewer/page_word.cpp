@@ -1,0 +1,154 @@
+#include "runtime/viewer/page_word.h"
+
+#include <array>
+#include <cmath>
+#include <initializer_list>
+#include <nlohmann/json.hpp>
+
+namespace palpate {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int deepest = 4;
+constexpr double farthest = 1e6;  // [m]
+constexpr double quaternion_error = 0.01;
+constexpr std::int64_t most_frames = std::int64_t{1} << 53;  // integers that JavaScript has
+
+constexpr std::array<const char*, 9> names = {"point",  "pause",  "step",    "reset", "acknowledge",
+                                              "change", "record", "control", "seek"};
+static_assert(names.size() == std::variant_size_v<PageWord>);
+
+/// What is wrong with a word; only in here.
+struct Problem {
+  std::string text;
+};
+
+/// The object has just `type` and these.
+void expect_members(const Json& object, std::initializer_list<const char*> members) {
+  for (const char* member : members) {
+    if (!object.contains(member)) throw Problem{std::string("has no member ") + member};
+  }
+  if (object.size() != members.size() + 1) throw Problem{"has a member that it should not have"};
+}
+
+bool boolean(const Json& object, const char* member) {
+  const Json& value = object.at(member);
+  if (!value.is_boolean()) throw Problem{std::string(member) + " is neither true nor false"};
+  return value.get<bool>();
+}
+
+template <std::size_t count>
+Eigen::Matrix<double, static_cast<int>(count), 1> numbers(const Json& object, const char* member) {
+  const Json& values = object.at(member);
+  if (!values.is_array() || values.size() != count)
+    throw Problem{std::string(member) + " is not an array of " + std::to_string(count) + " numbers"};
+  Eigen::Matrix<double, static_cast<int>(count), 1> result;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double x = values[k].is_number() ? values[k].get<double>() : std::nan("");
+    if (!(std::abs(x) <= farthest))
+      throw Problem{std::string(member) + " has what is not a number or is larger than 1e6"};
+    result[static_cast<Eigen::Index>(k)] = x;
+  }
+  return result;
+}
+
+PointWord point(const Json& object) {
+  expect_members(object, {"position", "orientation", "grab", "lifted"});
+  PointWord word;
+  word.wanted.pose.position = numbers<3>(object, "position");
+  const Eigen::Vector4d orientation = numbers<4>(object, "orientation");
+  if (!(std::abs(orientation.norm() - 1.0) <= quaternion_error))
+    throw Problem{"orientation is not a quaternion of length 1"};
+  word.wanted.pose.orientation.coeffs() = orientation.normalized();
+  word.wanted.pose.grab = boolean(object, "grab");
+  word.wanted.lifted = boolean(object, "lifted");
+  return word;
+}
+
+ChangeWord change(const Json& object) {
+  expect_members(object, {"settings"});
+  const Json& settings = object.at("settings");
+  if (!settings.is_object()) throw Problem{"settings is not an object"};
+  ChangeWord word;
+  for (const auto& [name, value] : settings.items()) {
+    if (value.is_null()) {
+      word.settings.emplace(name, std::nullopt);
+    } else if (value.is_string()) {
+      word.settings.emplace(name, value.get<std::string>());
+    } else {
+      throw Problem{"settings has a value that is neither text nor null"};
+    }
+  }
+  return word;
+}
+
+SeekWord seek(const Json& object) {
+  expect_members(object, {"frame"});
+  const Json& frame = object.at("frame");
+  if (!frame.is_number_unsigned() || frame.get<std::uint64_t>() > static_cast<std::uint64_t>(most_frames))
+    throw Problem{"frame is not a number of a frame"};
+  return {frame.get<std::int64_t>()};
+}
+
+PageWord word_of(const Json& object) {
+  if (!object.is_object()) throw Problem{"is not a JSON object"};
+  const auto found = object.find("type");
+  if (found == object.end() || !found->is_string()) throw Problem{"has no type"};
+  const auto& type = found->get_ref<const std::string&>();
+  if (type == "point") return point(object);
+  if (type == "change") return change(object);
+  if (type == "seek") return seek(object);
+  if (type == "pause") {
+    expect_members(object, {"paused"});
+    return PauseWord{boolean(object, "paused")};
+  }
+  if (type == "record") {
+    expect_members(object, {"on"});
+    return RecordWord{boolean(object, "on")};
+  }
+  if (type == "control") {
+    expect_members(object, {"take"});
+    return ControlWord{boolean(object, "take")};
+  }
+  if (type == "step" || type == "reset" || type == "acknowledge") {
+    expect_members(object, {});
+    if (type == "step") return StepWord{};
+    if (type == "reset") return ResetWord{};
+    return AcknowledgeWord{};
+  }
+  throw Problem{"has a type that is unknown"};
+}
+
+}  // namespace
+
+const char* name_of(const PageWord& word) noexcept {
+  return names[word.index()];
+}
+
+std::optional<PageWord> parse_page_word(std::string_view text, std::string& problem) {
+  if (text.size() > longest_page_word) {
+    problem = "the message is longer than 16 KiB";
+    return std::nullopt;
+  }
+  bool too_deep = false;
+  const Json object = Json::parse(
+      text,
+      [&too_deep](int depth, Json::parse_event_t, Json&) {
+        too_deep = too_deep || depth > deepest;
+        return !too_deep;
+      },
+      false);
+  if (too_deep || object.is_discarded()) {
+    problem = too_deep ? "the message is nested too deep" : "the message is not JSON";
+    return std::nullopt;
+  }
+  try {
+    return word_of(object);
+  } catch (const Problem& found) {
+    problem = "the message " + found.text;
+    return std::nullopt;
+  }
+}
+
+}  // namespace palpate

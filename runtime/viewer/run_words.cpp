@@ -1,0 +1,65 @@
+#include "runtime/viewer/run_words.h"
+
+#include <algorithm>
+
+namespace palpate {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double usual_rate = 1000.0;
+constexpr double highest_rate = 1e5;
+
+/// File names may be any bytes: what is not UTF-8 is shown as such.
+std::string text(const Json& object) {
+  return object.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+std::string hello_word(bool replay, std::uint64_t page) {
+  return text({{"type", "hello"},
+               {"protocol", 1},
+               {"version", PALPATE_VERSION},
+               {"mode", replay ? "replay" : "live"},
+               {"id", page}});
+}
+
+std::string error_word(const std::string& about, const std::string& message, const std::string& hint) {
+  return text({{"type", "error"}, {"about", about}, {"message", message}, {"hint", hint}});
+}
+
+std::string error_word(const std::string& about, const Error& error) {
+  const std::string where = error.where().empty() ? "" : error.where() + ": ";
+  return error_word(about, where + error.what(), error.hint());
+}
+
+RunState::RunState(const std::string& json) : members_(Json::parse(json, nullptr, false)) {
+  if (!members_.is_object())
+    throw Error("what the run says of itself is not a JSON object", "viewer", "report this as a bug");
+  const auto found = members_.find("times");
+  if (found == members_.end()) return;
+  times_ = std::move(*found);
+  members_.erase(found);
+}
+
+double RunState::rate() const {
+  const auto found = members_.find("rate");
+  if (found == members_.end() || !found->is_number()) return usual_rate;
+  return std::clamp(found->get<double>(), 1.0, highest_rate);
+}
+
+std::string RunState::for_page(std::uint32_t scene, const PageRole& role, const Json& times) const {
+  Json state = members_;
+  state["type"] = "state";
+  state["scene"] = scene;
+  state["you"] = role.is_controller ? "controller" : "watcher";
+  state["controlled"] = role.controlled;
+  state["watchers"] = role.watchers;
+  const auto pointer = members_.find("pointer");
+  state["pointer"] = role.is_controller && pointer != members_.end() && *pointer == true;
+  if (!times.is_null()) state["times"] = times;
+  return text(state);
+}
+
+}  // namespace palpate
