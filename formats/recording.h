@@ -59,9 +59,10 @@ struct SurfaceFrame {
 
 /// The surface that the frames displace.
 struct RecordedSurface {
-  std::vector<Vec3> nodes;       ///< [S] without loads [m]
-  int corners = 3;               ///< d: of a simplex, 3 of a triangle, in the plane 2 of a line
-  std::vector<Index> simplices;  ///< [T x d]
+  std::vector<Vec3> nodes;           ///< [S] without loads [m]
+  int corners = 3;                   ///< d: of a simplex, 3 of a triangle, in the plane 2 of a line
+  std::vector<Index> simplices;      ///< [T x d]
+  std::vector<std::uint8_t> held{};  ///< [S] as Model::fixed; empty where it is not known
 };
 
 /// What was recorded.

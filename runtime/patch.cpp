@@ -44,7 +44,7 @@ MatrixXd overlay_correction(const MatrixXd& G, const MatrixXd& greens) {
 }
 
 Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed)
-    : stored_nodes_(stored_nodes_of(body, mesh)) {
+    : elements_(mesh.elements), stored_nodes_(stored_nodes_of(body, mesh)) {
   const auto d = static_cast<Eigen::Index>(body.dimension());
   const std::vector<Index> numbers = surface_numbers(body, mesh, condensed.surface);
   std::vector<std::size_t> order(numbers.size());
@@ -74,7 +74,7 @@ Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& cond
 std::size_t Patch::bytes() const noexcept {
   return sizeof(double) *
              static_cast<std::size_t>(compliance_.size() + response_.size() + correction_.size()) +
-         sizeof(Index) * (surface_nodes_.size() + stored_nodes_.size());
+         sizeof(Index) * (elements_.size() + surface_nodes_.size() + stored_nodes_.size());
 }
 
 std::size_t Patch::bytes_of(const CondensedPatch& condensed) noexcept {
