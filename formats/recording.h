@@ -88,7 +88,7 @@ class RecordingWriter {
 
   /// Only into memory, until the next `checkpoint`.
   void append(std::span<const TickRecord> ticks);
-  /// The frame has as many nodes as the surface.
+  /// The frame has as many nodes as the surface. Without stress or pressure (empty): not a number, and none.
   void append(SurfaceFrame frame);
 
   /// Puts all that was appended into PATH. Throws Error when that fails, with PATH as it was; then what was
@@ -104,11 +104,13 @@ class RecordingWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The frames of a session but for their displacements, which `read_displacement` reads.
+/// The frames of a session but for their values at the nodes, which `read_displacement` and `read_frame`
+/// read.
 struct RecordedFrames {
   RecordedSurface surface;
   std::vector<std::int64_t> tick;  ///< [F]
   std::vector<double> time;        ///< [F] since the start of the run [s]
+  bool has_stress = true;          ///< and pressure: recordings from 4.1 on
 };
 
 /// A recorded session.
@@ -129,6 +131,10 @@ RecordedFrames read_frames(const std::filesystem::path& path);
 /// Displacement [frames x S x 3] of some frames [m]. Throws Error when they are not all there.
 std::vector<float> read_displacement(const std::filesystem::path& path, std::int64_t first,
                                      std::int64_t frames);
+
+/// One frame. Recordings before 4.1 have neither stress nor pressure: then those are empty. Throws Error when
+/// it is not there.
+SurfaceFrame read_frame(const std::filesystem::path& path, std::int64_t number);
 
 /// Makes a recording that was killed one plain file and removes its parts; nothing where that is so already.
 /// False, and nothing happens, while it is being recorded. Throws Error.
