@@ -64,6 +64,31 @@ void append_frames(const hdf5::File& part, RecordedFrames& frames) {
   read_column(part, "/frames/time", count, frames.time);
 }
 
+/// Values [frames x row] of some frames.
+template <class T>
+std::vector<T> read_some(const hdf5::File& file, std::span<const hdf5::File> parts, const char* name,
+                         const std::vector<std::int64_t>& row, std::int64_t first, std::int64_t frames) {
+  std::size_t width = 1;
+  for (const std::int64_t size : row) width *= static_cast<std::size_t>(size);
+  std::vector<T> values(static_cast<std::size_t>(frames) * width);
+  std::int64_t before = 0, found = 0;
+  for (const hdf5::File& part : parts) {
+    const std::int64_t here = check_rows(part, name, hdf5::element_type<T>(), row);
+    const std::int64_t begin = std::max(first - before, std::int64_t{0});
+    const std::int64_t end = std::min(first + frames - before, here);
+    if (begin < end && width > 0)
+      part.read_rows(name, hdf5::element_type<T>(), begin, end - begin,
+                     values.data() + width * static_cast<std::size_t>(found));
+    found += std::max(end - begin, std::int64_t{0});
+    before += here;
+  }
+  if (first < 0 || found != frames)
+    throw Error("has " + std::to_string(before) + " frames, not " + std::to_string(frames) + " from number " +
+                    std::to_string(first) + " on",
+                file.path().string(), "Ask for frames that are there.");
+  return values;
+}
+
 Recording read_once(const std::filesystem::path& path) {
   const hdf5::Quiet quiet;
   const hdf5::File file = hdf5::File::open_to_read(path);
@@ -72,6 +97,7 @@ Recording read_once(const std::filesystem::path& path) {
   recording.info = std::move(head.info);
   recording.generator = std::move(head.generator);
   recording.frames.surface = std::move(head.surface);
+  recording.frames.has_stress = head.has_stress;
   recording.finished = !std::filesystem::exists(parts_folder(path));
   const std::vector<hdf5::File> parts = open_parts(file, "/ticks/time");
   const std::vector<hdf5::File> frame_parts = open_parts(file, "/frames/time");
@@ -98,7 +124,10 @@ Recording read_recording(const std::filesystem::path& path) {
 RecordedFrames read_frames(const std::filesystem::path& path) {
   const hdf5::Quiet quiet;
   const hdf5::File file = hdf5::File::open_to_read(path);
-  RecordedFrames frames = {read_head(file).surface, {}, {}};
+  RecordingHead head = read_head(file);
+  RecordedFrames frames;
+  frames.surface = std::move(head.surface);
+  frames.has_stress = head.has_stress;
   for (const hdf5::File& part : open_parts(file, "/frames/time")) append_frames(part, frames);
   return frames;
 }
@@ -107,24 +136,26 @@ std::vector<float> read_displacement(const std::filesystem::path& path, std::int
                                      std::int64_t frames) {
   const hdf5::Quiet quiet;
   const hdf5::File file = hdf5::File::open_to_read(path);
-  const std::size_t nodes = read_head(file).surface.nodes.size();
-  std::vector<float> displacement(static_cast<std::size_t>(frames) * nodes * 3);
-  std::int64_t before = 0, found = 0;
-  for (const hdf5::File& part : open_parts(file, "/frames/time")) {
-    const std::int64_t here = count_frames(part, nodes);
-    const std::int64_t begin = std::max(first - before, std::int64_t{0});
-    const std::int64_t end = std::min(first + frames - before, here);
-    if (begin < end && nodes > 0)
-      part.read_rows("/frames/displacement", hdf5::element_type<float>(), begin, end - begin,
-                     displacement.data() + 3 * nodes * static_cast<std::size_t>(found));
-    found += std::max(end - begin, std::int64_t{0});
-    before += here;
+  const std::int64_t nodes = std::ssize(read_head(file).surface.nodes);
+  return read_some<float>(file, open_parts(file, "/frames/time"), "/frames/displacement", {nodes, 3}, first,
+                          frames);
+}
+
+SurfaceFrame read_frame(const std::filesystem::path& path, std::int64_t number) {
+  const hdf5::Quiet quiet;
+  const hdf5::File file = hdf5::File::open_to_read(path);
+  const RecordingHead head = read_head(file);
+  const std::int64_t nodes = std::ssize(head.surface.nodes);
+  const std::vector<hdf5::File> parts = open_parts(file, "/frames/time");
+  SurfaceFrame frame;
+  frame.displacement = read_some<float>(file, parts, "/frames/displacement", {nodes, 3}, number, 1);
+  if (head.has_stress) {
+    frame.von_mises = read_some<float>(file, parts, "/frames/von_mises", {nodes}, number, 1);
+    frame.pressure = read_some<float>(file, parts, "/frames/pressure", {nodes}, number, 1);
   }
-  if (first < 0 || found != frames)
-    throw Error("has " + std::to_string(before) + " frames, not " + std::to_string(frames) + " from number " +
-                    std::to_string(first) + " on",
-                path.string(), "Ask for frames that are there.");
-  return displacement;
+  frame.tick = read_some<std::int64_t>(file, parts, "/frames/tick", {}, number, 1).front();
+  frame.time = read_some<double>(file, parts, "/frames/time", {}, number, 1).front();
+  return frame;
 }
 
 bool finish_recording(const std::filesystem::path& path) {

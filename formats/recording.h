@@ -59,9 +59,10 @@ struct SurfaceFrame {
 
 /// The surface that the frames displace.
 struct RecordedSurface {
-  std::vector<Vec3> nodes;       ///< [S] without loads [m]
-  int corners = 3;               ///< d: of a simplex, 3 of a triangle, in the plane 2 of a line
-  std::vector<Index> simplices;  ///< [T x d]
+  std::vector<Vec3> nodes;           ///< [S] without loads [m]
+  int corners = 3;                   ///< d: of a simplex, 3 of a triangle, in the plane 2 of a line
+  std::vector<Index> simplices;      ///< [T x d]
+  std::vector<std::uint8_t> held{};  ///< [S] as Model::fixed; empty where it is not known
 };
 
 /// What was recorded.
@@ -87,7 +88,7 @@ class RecordingWriter {
 
   /// Only into memory, until the next `checkpoint`.
   void append(std::span<const TickRecord> ticks);
-  /// The frame has as many nodes as the surface.
+  /// The frame has as many nodes as the surface. Without stress or pressure (empty): not a number, and none.
   void append(SurfaceFrame frame);
 
   /// Puts all that was appended into PATH. Throws Error when that fails, with PATH as it was; then what was
@@ -103,11 +104,13 @@ class RecordingWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The frames of a session but for their displacements, which `read_displacement` reads.
+/// The frames of a session but for their values at the nodes, which `read_displacement` and `read_frame`
+/// read.
 struct RecordedFrames {
   RecordedSurface surface;
   std::vector<std::int64_t> tick;  ///< [F]
   std::vector<double> time;        ///< [F] since the start of the run [s]
+  bool has_stress = true;          ///< and pressure: recordings from 4.1 on
 };
 
 /// A recorded session.
@@ -128,6 +131,10 @@ RecordedFrames read_frames(const std::filesystem::path& path);
 /// Displacement [frames x S x 3] of some frames [m]. Throws Error when they are not all there.
 std::vector<float> read_displacement(const std::filesystem::path& path, std::int64_t first,
                                      std::int64_t frames);
+
+/// One frame. Recordings before 4.1 have neither stress nor pressure: then those are empty. Throws Error when
+/// it is not there.
+SurfaceFrame read_frame(const std::filesystem::path& path, std::int64_t number);
 
 /// Makes a recording that was killed one plain file and removes its parts; nothing where that is so already.
 /// False, and nothing happens, while it is being recorded. Throws Error.

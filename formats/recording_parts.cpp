@@ -6,6 +6,7 @@
 #include <array>
 #include <cstring>
 #include <functional>
+#include <limits>
 #include <system_error>
 
 #include "meshes/error.h"
@@ -13,9 +14,9 @@
 namespace palpate {
 namespace {
 
-constexpr std::array<std::int64_t, 2> version = {4, 0};
+constexpr std::int64_t major_version = 4, minor_version = 1;
 constexpr const char* format_name = "palpate-recording";
-constexpr const char* units = "s, m, m/s, N, N m, N/m; names with _ns in ns";
+constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
 constexpr std::int64_t block = std::int64_t{4} << 20;  // bytes that are copied at once
 
 /// A dataset with a row for each tick or frame.
@@ -40,7 +41,8 @@ struct RowField {
   }
 };
 
-std::vector<RowField> row_fields(std::size_t surface_nodes) {
+std::vector<RowField> row_fields(const RecordingHead& head) {
+  const std::int64_t surface_nodes = std::ssize(head.surface.nodes);
   std::vector<RowField> fields;
   for_each_tick_field([&]<class Member>(const char* name, int components, Member TickRecord::*) {
     RowField field = {name, hdf5::element_type<Scalar<Member>>(), {}, false};
@@ -49,16 +51,18 @@ std::vector<RowField> row_fields(std::size_t surface_nodes) {
   });
   fields.push_back({"/frames/tick", hdf5::element_type<std::int64_t>(), {}, true});
   fields.push_back({"/frames/time", hdf5::element_type<double>(), {}, true});
-  fields.push_back({"/frames/displacement",
-                    hdf5::element_type<float>(),
-                    {static_cast<std::int64_t>(surface_nodes), 3},
-                    true});
+  fields.push_back({"/frames/displacement", hdf5::element_type<float>(), {surface_nodes, 3}, true});
+  if (head.has_stress) {
+    for (const char* name : {"/frames/von_mises", "/frames/pressure"})
+      fields.push_back({name, hdf5::element_type<float>(), {surface_nodes}, true});
+  }
   return fields;
 }
 
 void write_head(hdf5::File& file, const RecordingHead& head) {
   file.write_attribute("/", "format", std::string(format_name));
-  file.write_attribute("/", "version", version);
+  file.write_attribute("/", "version",
+                       std::array{major_version, head.has_stress ? minor_version : std::int64_t{0}});
   file.write_attribute("/", "generator", head.generator);
   file.write_attribute("/", "units", std::string(units));
   file.write_attribute("/", "model", head.info.model_path);
@@ -74,6 +78,10 @@ void write_head(hdf5::File& file, const RecordingHead& head) {
   file.write("/surface/simplices", hdf5::element_type<Index>(),
              std::array{std::ssize(surface.simplices) / surface.corners, std::int64_t{surface.corners}},
              surface.simplices.data());
+  if (!head.has_stress) return;
+  std::vector<std::uint8_t> held = surface.held;
+  held.resize(surface.nodes.size());
+  file.write("/surface/held", hdf5::element_type<std::uint8_t>(), std::array{std::ssize(held)}, held.data());
 }
 
 /// Writes a file under a temporary name, then renames it.
@@ -108,8 +116,8 @@ std::int64_t count_rows(const hdf5::File& part, const char* time) {
   return part.locate(time, hdf5::element_type<double>(), 1).dims[0];
 }
 
-void write_rows_of(hdf5::File& to, std::span<const RecordingPart> parts, std::size_t surface_nodes) {
-  const std::vector<RowField> fields = row_fields(surface_nodes);
+void write_rows_of(hdf5::File& to, std::span<const RecordingPart> parts, const RecordingHead& head) {
+  const std::vector<RowField> fields = row_fields(head);
   for (const RowField& field : fields)
     to.write(field.name, field.type, field.dims(count_rows(parts, field)), nullptr);
   std::vector<std::byte> bytes;
@@ -160,9 +168,11 @@ RecordingHead read_head(const hdf5::File& file) {
   const std::string path = file.path().string();
   if (file.text_attribute("/", "format") != format_name)
     throw Error("is not a recording", path, "Give a recording that palpate-runtime has written.");
-  if (const auto v = file.integer_attribute("/", "version", 2); !v || (*v)[0] != version[0])
+  const auto version = file.integer_attribute("/", "version", 2);
+  if (!version || (*version)[0] != major_version)
     throw Error("is a recording of another version", path, "Record the session again.");
   RecordingHead head;
+  head.has_stress = (*version)[1] >= 1;
   head.info.model_path = file.text_attribute("/", "model").value_or("");
   head.info.content_hash = file.text_attribute("/", "content_hash").value_or("");
   head.info.device = file.text_attribute("/", "device").value_or("");
@@ -187,6 +197,14 @@ RecordingHead read_head(const hdf5::File& file) {
   if (!head.surface.simplices.empty())
     file.read_rows("/surface/simplices", hdf5::element_type<Index>(), 0, simplices.dims[0],
                    head.surface.simplices.data());
+  if (head.has_stress) {
+    if (file.locate("/surface/held", hdf5::element_type<std::uint8_t>(), 1).dims[0] != nodes.dims[0])
+      throw Error("/surface/held has another number of nodes", path, "Record the session again.");
+    head.surface.held.resize(head.surface.nodes.size());
+    if (!head.surface.held.empty())
+      file.read_rows("/surface/held", hdf5::element_type<std::uint8_t>(), 0, nodes.dims[0],
+                     head.surface.held.data());
+  }
   return head;
 }
 
@@ -224,18 +242,27 @@ RecordingPart write_part(const std::filesystem::path& path, std::span<const Tick
     const std::int64_t count = std::ssize(frames);
     file.write("/frames/tick", hdf5::element_type<std::int64_t>(), std::array{count}, tick.data());
     file.write("/frames/time", hdf5::element_type<double>(), std::array{count}, time.data());
-    file.write("/frames/displacement", hdf5::element_type<float>(),
-               std::array{count, static_cast<std::int64_t>(surface_nodes), 3L}, nullptr);
-    for (std::int64_t k = 0; k < count && surface_nodes > 0; ++k)
-      file.write_rows("/frames/displacement", hdf5::element_type<float>(), k, 1,
-                      frames[static_cast<std::size_t>(k)].displacement.data());
+    const auto nodes = static_cast<std::int64_t>(surface_nodes);
+    const auto write_nodal = [&](const char* name, std::vector<std::int64_t> dims,
+                                 std::vector<float> SurfaceFrame::*member, float absent) {
+      file.write(name, hdf5::element_type<float>(), dims, nullptr);
+      const std::vector<float> none(surface_nodes, absent);
+      for (std::int64_t k = 0; k < count && nodes > 0; ++k) {
+        const std::vector<float>& values = frames[static_cast<std::size_t>(k)].*member;
+        file.write_rows(name, hdf5::element_type<float>(), k, 1, (values.empty() ? none : values).data());
+      }
+    };
+    write_nodal("/frames/displacement", {count, nodes, 3}, &SurfaceFrame::displacement, 0.0F);
+    write_nodal("/frames/von_mises", {count, nodes}, &SurfaceFrame::von_mises,
+                std::numeric_limits<float>::quiet_NaN());
+    write_nodal("/frames/pressure", {count, nodes}, &SurfaceFrame::pressure, 0.0F);
   });
   return {path, std::ssize(ticks), std::ssize(frames)};
 }
 
 RecordingPart merge_parts(const std::filesystem::path& path, std::span<const RecordingPart> parts,
-                          std::size_t surface_nodes) {
-  write_whole(path, false, [&](hdf5::File& file) { write_rows_of(file, parts, surface_nodes); });
+                          const RecordingHead& head) {
+  write_whole(path, false, [&](hdf5::File& file) { write_rows_of(file, parts, head); });
   RecordingPart merged = {path};
   for (const RecordingPart& part : parts) {
     merged.ticks += part.ticks;
@@ -249,7 +276,7 @@ void write_master(const std::filesystem::path& recording, const RecordingHead& h
   write_whole(recording, false, [&](hdf5::File& file) {
     write_head(file, head);
     const std::string folder = parts_folder(recording).filename().string() + "/";
-    for (const RowField& field : row_fields(head.surface.nodes.size())) {
+    for (const RowField& field : row_fields(head)) {
       std::vector<hdf5::VirtualSource> sources;
       for (const RecordingPart& part : parts) {
         if (field.rows(part) > 0 && field.row_bytes() > 0)
@@ -277,7 +304,7 @@ void merge_recording(const std::filesystem::path& path) {
   }
   write_whole(path, true, [&](hdf5::File& file) {
     write_head(file, head);
-    write_rows_of(file, parts, head.surface.nodes.size());
+    write_rows_of(file, parts, head);
   });
   std::error_code ignored;
   std::filesystem::remove_all(parts_folder(path), ignored);

@@ -53,6 +53,7 @@ using Scalar = std::remove_all_extents_t<Member>;
 
 /// What the file says beside its rows.
 struct RecordingHead {
+  bool has_stress = true;  ///< version 4.1 and later: stress and pressure, and where the surface is held
   SessionInfo info;
   std::string generator;
   RecordedSurface surface;
@@ -89,7 +90,7 @@ RecordingPart write_part(const std::filesystem::path& file, std::span<const Tick
 
 /// Writes a part with the rows of several. Throws Error.
 RecordingPart merge_parts(const std::filesystem::path& file, std::span<const RecordingPart> parts,
-                          std::size_t surface_nodes);
+                          const RecordingHead& head);
 
 /// Puts a master in the place of a recording: it shows the rows of the parts as its own. Throws Error.
 void write_master(const std::filesystem::path& recording, const RecordingHead& head,

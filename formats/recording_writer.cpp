@@ -20,7 +20,7 @@ struct Level {
 
 struct RecordingWriter::Impl {
   Impl(std::filesystem::path to, const SessionInfo& info, const RecordedSurface& surface)
-      : path(std::move(to)), head{info, "palpate " PALPATE_VERSION, surface} {
+      : path(std::move(to)), head{.info = info, .generator = "palpate " PALPATE_VERSION, .surface = surface} {
     std::optional<FileDescriptor> locked = lock_parts(path);
     if (!locked)
       throw Error("is being recorded by another program", path.string(), "Wait for it, or record elsewhere.");
@@ -56,7 +56,7 @@ struct RecordingWriter::Impl {
       std::vector<RecordingPart> parts;
       for (auto it = levels.end() - fan; it != levels.end(); ++it) parts.push_back(it->part);
       const int level = levels.back().level + 1;
-      const RecordingPart merged = merge_parts(next_file(), parts, head.surface.nodes.size());
+      const RecordingPart merged = merge_parts(next_file(), parts, head);
       levels.resize(levels.size() - fan);
       levels.push_back({merged, level});
       for (const RecordingPart& part : parts) replaced.push_back(part.file);

@@ -105,6 +105,21 @@ std::vector<ElementSide> sorted_sides(const Mesh& mesh) {
   return all;
 }
 
+std::vector<ElementSide> boundary_sides(const Mesh& mesh) {
+  std::vector<ElementSide> boundary;
+  const std::vector<ElementSide> sides = sorted_sides(mesh);
+  for (auto side = sides.begin(); side != sides.end();) {
+    const auto end =
+        std::find_if(side, sides.end(), [&](const ElementSide& s) { return s.corners != side->corners; });
+    if (end - side == 1) boundary.push_back(*side);
+    side = end;
+  }
+  std::sort(boundary.begin(), boundary.end(), [](const ElementSide& a, const ElementSide& b) {
+    return a.element < b.element || (a.element == b.element && a.side < b.side);
+  });
+  return boundary;
+}
+
 std::vector<Index> side_nodes(const Mesh& mesh, const ElementSide& side) {
   const SideNodes& local = element_sides(mesh.element)[side.side];
   std::vector<Index> nodes(static_cast<std::size_t>(traits(traits(mesh.element).facet).nodes));

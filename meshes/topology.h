@@ -35,6 +35,9 @@ struct ElementSide {
 /// then of the elements). [E * facets]
 std::vector<ElementSide> sorted_sides(const Mesh& mesh);
 
+/// Sides that belong to one element only: the boundary. In the order of the elements, then of their sides.
+std::vector<ElementSide> boundary_sides(const Mesh& mesh);
+
 /// Node numbers of the side, in the order of element_sides. [nodes of a facet]
 std::vector<Index> side_nodes(const Mesh& mesh, const ElementSide& side);
 

@@ -13,22 +13,6 @@ namespace {
 
 constexpr double no_part = 1e-12;  // of a shape function
 
-/// The sides that belong to one element only, in the order of the elements.
-std::vector<ElementSide> boundary_sides(const Mesh& mesh) {
-  std::vector<ElementSide> boundary;
-  const std::vector<ElementSide> sides = sorted_sides(mesh);
-  for (auto side = sides.begin(); side != sides.end();) {
-    const auto end =
-        std::find_if(side, sides.end(), [&](const ElementSide& s) { return s.corners != side->corners; });
-    if (end - side == 1) boundary.push_back(*side);
-    side = end;
-  }
-  std::sort(boundary.begin(), boundary.end(), [](const ElementSide& a, const ElementSide& b) {
-    return a.element < b.element || (a.element == b.element && a.side < b.side);
-  });
-  return boundary;
-}
-
 class Builder {
  public:
   Builder(const Model& model, int r) : mesh_(model.mesh), cuts_(model.mesh.element, r) {

@@ -2,33 +2,14 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Geometry>
 #include <span>
 #include <vector>
 
 #include "meshes/vtu_writer.h"
+#include "runtime/surface_frames.h"
 
 namespace palpate {
 namespace {
-
-/// Where the surface is now at a contact.
-Vec3 surface_position(const State& state, const ContactPoint& contact) {
-  Vec3 position = Vec3::Zero();
-  for (std::size_t k = 0; k < contact.nodes.size(); ++k) {
-    if (contact.nodes[k] >= 0) position += contact.weights[k] * state.tree.position(contact.nodes[k]);
-  }
-  return position;
-}
-
-/// Of a simplex as it is now.
-Vec3 outward_normal(const Body& body, const State& state, Index simplex) {
-  const auto d = static_cast<std::size_t>(body.dimension());
-  const std::span<const Index> nodes = body.simplices().subspan(d * static_cast<std::size_t>(simplex), d);
-  const Vec3 a = state.tree.position(nodes[0]);
-  const Vec3 ab = state.tree.position(nodes[1]) - a;
-  if (d == 2) return Vec3(ab.y(), -ab.x(), 0.0).normalized();
-  return ab.cross(state.tree.position(nodes[2]) - a).normalized();
-}
 
 /// The gap that the tick left, to first order: the contact's normal row of r = b + W lambda.
 double gap_after(const ContactProblem& problem, Index contact) {
@@ -46,12 +27,10 @@ std::string contact_table(const Body& body, const State& state) {
   const std::span<const ContactPoint> contacts = state.contacts();
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const ContactPoint& contact = contacts[k];
-    const Vec3 x = surface_position(state, contact);
-    const Vec3 n = contact.held ? outward_normal(body, state, contact.simplex) : Vec3(contact.frame.col(0));
-    const Vec3 f = Vec3::Zero() - contact.force;
-    const double gap = contact.held ? 0.0 : gap_after(state.problem, static_cast<Index>(k));
+    const auto [x, n, f, held] = seen_contact(body, state, contact);
+    const double gap = held ? 0.0 : gap_after(state.problem, static_cast<Index>(k));
     table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), n.x(), n.y(), n.z(),
-                         f.x(), f.y(), f.z(), gap, contact.simplex, contact.held ? 1 : 0);
+                         f.x(), f.y(), f.z(), gap, contact.simplex, held ? 1 : 0);
   }
   return table;
 }
@@ -68,7 +47,14 @@ void write_surface(const std::filesystem::path& file, const Body& body, const St
     const Vec3 seen = body.surface_rest_positions()[node] + u[node] - nodes[node];
     total.insert(total.end(), seen.begin(), seen.end());
   }
-  const std::vector<NodalField> fields = {{"displacement", 3, total}};
+  SurfacePicture picture;
+  SurfaceFrames(body, state, {.ticks_per_frame = 1, .in_background = false}, [&](SurfacePicture shown) {
+    picture = std::move(shown);
+  }).post(state, 0, 0.0);
+  const std::vector<double> von_mises(picture.frame.von_mises.begin(), picture.frame.von_mises.end());
+  const std::vector<double> pressure(picture.frame.pressure.begin(), picture.frame.pressure.end());
+  const std::vector<NodalField> fields = {
+      {"displacement", 3, total}, {"von_mises", 1, von_mises}, {"pressure", 1, pressure}};
   write_vtu(file, nodes, body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, body.simplices(),
             fields);
 }

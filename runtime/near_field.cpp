@@ -342,6 +342,10 @@ void NearField::displace() noexcept {
   }
 }
 
+Vec3 NearField::force(Index place) const noexcept {
+  return vector_at(force_, dimension_, place);
+}
+
 Vec3 NearField::displacement(Index place) const noexcept {
   return vector_at(displacement_, dimension_, place);
 }

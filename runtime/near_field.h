@@ -26,6 +26,7 @@ class NearField {
 
   [[nodiscard]] int dimension() const noexcept { return dimension_; }  ///< d
   [[nodiscard]] Index count() const noexcept { return count_; }        ///< m, nodes that are here
+  [[nodiscard]] Index capacity() const noexcept { return capacity_; }  ///< most of them
   /// Place of a surface node, -1 when it is not here. Places change with `add` and `forget`.
   [[nodiscard]] Index place_of(Index surface_node) const noexcept {
     return place_[static_cast<std::size_t>(surface_node)];
@@ -66,6 +67,8 @@ class NearField {
   /// from.
   void displace() noexcept;
 
+  /// Force on the body at a place [N].
+  [[nodiscard]] Vec3 force(Index place) const noexcept;
   /// Displacement at a place by the forces of the last `displace` [m].
   [[nodiscard]] Vec3 displacement(Index place) const noexcept;
   /// The forces of the last `displace`.

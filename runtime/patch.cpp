@@ -74,7 +74,7 @@ Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& cond
 std::size_t Patch::bytes() const noexcept {
   return sizeof(double) *
              static_cast<std::size_t>(compliance_.size() + response_.size() + correction_.size()) +
-         sizeof(Index) * (surface_nodes_.size() + elements_.size() + stored_nodes_.size());
+         sizeof(Index) * (elements_.size() + surface_nodes_.size() + stored_nodes_.size());
 }
 
 std::size_t Patch::bytes_of(const CondensedPatch& condensed) noexcept {

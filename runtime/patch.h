@@ -19,6 +19,8 @@ class Patch {
   /// the file keeps too few layers below the surface.
   Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed);
 
+  /// Elements of the body that it lies over, ascending.
+  [[nodiscard]] std::span<const Index> elements() const noexcept { return elements_; }
   /// [m] surface nodes of the body (Body::simplices), ascending.
   [[nodiscard]] std::span<const Index> surface_nodes() const noexcept { return surface_nodes_; }
   /// Elements of the body that it refines, ascending.
@@ -44,6 +46,7 @@ class Patch {
  private:
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+  std::vector<Index> elements_;
   std::vector<Index> surface_nodes_;
   std::vector<Index> elements_;
   std::vector<Index> stored_nodes_;

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <iterator>
+#include <span>
 #include <string>
 #include <system_error>
 
@@ -36,6 +38,19 @@ std::string escape(const std::string& name) {
   return escaped;
 }
 
+/// Beside displacement.
+struct Scalar {
+  char entity;
+  const char* dataset;
+  const char* name;
+};
+constexpr std::array<Scalar, 2> nodal_scalars = {
+    {{'s', "von_mises", "von Mises stress"}, {'p', "pressure", "contact pressure"}}};
+
+std::span<const Scalar> scalars_of(const RecordedFrames& frames) {
+  return frames.has_stress ? std::span<const Scalar>(nodal_scalars) : std::span<const Scalar>();
+}
+
 }  // namespace
 
 std::filesystem::path xdmf_path(const std::filesystem::path& recording) {
@@ -55,6 +70,12 @@ void write_xdmf(const std::filesystem::path& recording) {
   const std::size_t T = frames.surface.simplices.size() / static_cast<std::size_t>(d);
   const std::string kind =
       d == 3 ? R"(TopologyType="Triangle")" : R"(TopologyType="Polyline" NodesPerElement="2")";
+  std::string scalars;
+  for (const Scalar& scalar : scalars_of(frames))
+    scalars += fmt::format(
+        "<!ENTITY {} '<DataItem Dimensions=\"{} {}\" NumberType=\"Float\" Precision=\"4\" "
+        "Format=\"HDF\">{}:/frames/{}</DataItem>'>\n",
+        scalar.entity, F, S, file, scalar.dataset);
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [\n"
       "<!ENTITY t '<Topology {kind} NumberOfElements=\"{T}\"><DataItem Dimensions=\"{T} {d}\" "
@@ -63,9 +84,10 @@ void write_xdmf(const std::filesystem::path& recording) {
       "Format=\"HDF\">{file}:/surface/nodes</DataItem>'>\n"
       "<!ENTITY u '<DataItem Dimensions=\"{F} {S} 3\" NumberType=\"Float\" Precision=\"4\" "
       "Format=\"HDF\">{file}:/frames/displacement</DataItem>'>\n"
+      "{scalars}"
       "]>\n<Xdmf Version=\"2.0\"><Domain><Grid GridType=\"Collection\" CollectionType=\"Temporal\">\n",
       fmt::arg("kind", kind), fmt::arg("T", T), fmt::arg("d", d), fmt::arg("S", S), fmt::arg("F", F),
-      fmt::arg("file", file));
+      fmt::arg("file", file), fmt::arg("scalars", scalars));
   for (std::size_t k = 0; k < F; ++k) {
     const std::string u = fmt::format(
         "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{0} 3\"><DataItem Dimensions=\"3 3\">{1} 0 0 1 1 1 1 "
@@ -76,8 +98,16 @@ void write_xdmf(const std::filesystem::path& recording) {
     fmt::format_to(std::back_inserter(text),
                    "<Grid><Time Value=\"{}\"/>&t;<Geometry><DataItem ItemType=\"Function\" "
                    "Function=\"$0 + $1\" Dimensions=\"{} 3\"><!--{}-->&x;{}</DataItem></Geometry>"
-                   "<Attribute Name=\"displacement\" AttributeType=\"Vector\">{}</Attribute></Grid>\n",
+                   "<Attribute Name=\"displacement\" AttributeType=\"Vector\">{}</Attribute>",
                    frames.time[k], S, k, u, u);
+    for (const Scalar& scalar : scalars_of(frames)) {
+      fmt::format_to(std::back_inserter(text),
+                     "<Attribute Name=\"{}\" AttributeType=\"Scalar\"><DataItem ItemType=\"HyperSlab\" "
+                     "Dimensions=\"{}\"><DataItem Dimensions=\"3 2\">{} 0 1 1 1 {}</DataItem>&{};</DataItem>"
+                     "</Attribute>",
+                     scalar.name, S, k, S, scalar.entity);
+    }
+    text += "</Grid>\n";
   }
   text += "</Grid></Domain></Xdmf>\n";
   write_text_file(xdmf_path(recording), text);

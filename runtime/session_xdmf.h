@@ -9,8 +9,8 @@ namespace palpate {
 std::filesystem::path xdmf_path(const std::filesystem::path& recording);
 
 /// Writes a description of a recording's frames beside it: a time series of the surface as it is seen, with
-/// its displacement, by ParaView's XDMF Reader (that of XDMF 2). Where there are no frames, removes one that
-/// is there. Throws Error.
+/// its displacement, von Mises stress and contact pressure, by ParaView's XDMF Reader (that of XDMF 2). Where
+/// there are no frames, removes one that is there. Throws Error.
 void write_xdmf(const std::filesystem::path& recording);
 
 }  // namespace palpate

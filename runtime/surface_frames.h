@@ -1,30 +1,27 @@
 // The displacement of the whole surface, at display rate, beside the tick.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
 #include "formats/recording.h"
 #include "runtime/free_motion.h"
 #include "runtime/latest.h"
+#include "runtime/seen_contact.h"
 #include "runtime/state.h"
+#include "runtime/surface_stress.h"
 
 namespace palpate {
 
 struct SurfaceFramesOptions {
   std::int64_t ticks_per_frame = 16;
   bool in_background = true;  ///< else `post` computes the frame itself: equal runs stay equal
-};
-
-/// A contact point as it is seen.
-struct SeenContact {
-  Vec3 position;  ///< of the surface now [m]
-  Vec3 normal;    ///< outward
-  Vec3 force;     ///< on the body [N]
-  bool held = false;
 };
 
 /// What is seen at one moment.
@@ -34,7 +31,7 @@ struct SurfacePicture {
   ToolPose tool;    ///< where it is
   Wrench on_body;   ///< the opposite of what the hand feels
   StepStatus status = StepStatus::ok;
-  std::vector<SeenContact> contacts;
+  std::vector<SeenContact> contacts;   ///< those that are closed
   std::shared_ptr<const Patch> patch;  ///< null: no overlay
   /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
   /// empty.
@@ -59,15 +56,43 @@ class SurfaceFrames {
   void post(const State& state, std::int64_t tick, double time) noexcept;
 
  private:
+  /// A closed contact point, and how its force is spread over surface nodes.
+  struct Touch {
+    SeenContact seen;
+    std::array<Index, 3> nodes{-1, -1, -1};
+    std::array<double, 3> weights{};
+  };
+  struct NodalForce {
+    Index node = -1;  // surface node
+    Vec3 force = Vec3::Zero();
+  };
   struct Moment {
     SurfaceLoad load;
     ShownMotion motion;
+    std::vector<Touch> touches;      // [most contacts] the first `touch_count`
+    std::vector<NodalForce> forces;  // [most nodes near the tools] the first `force_count`
+    std::size_t touch_count = 0;
+    std::size_t force_count = 0;
+    ToolPose device{};
+    ToolPose tool{};
+    Wrench on_body{};
+    StepStatus status = StepStatus::ok;
     std::int64_t tick = -1;
     double time = 0.0;
   };
+  /// The interior of a body in the plane.
+  struct Interior {
+    StressRows rows;
+    std::vector<Vec3> u;         // [N] u0 + u
+    std::vector<Stress> stress;  // [N]
+  };
 
+  void take_contacts(const State& state, Moment& moment) const noexcept;
   void work();
   void compute(const Moment& moment);
+  void show_stress(const Moment& moment, SurfaceFrame& frame);
+  void show_pressure(const Moment& moment, SurfaceFrame& frame) const;
+  void show_interior(SurfacePicture& picture);
 
   const Body& body_;
   SurfaceFramesOptions options_;
@@ -75,8 +100,12 @@ class SurfaceFrames {
   Latest<Moment> moments_;
   std::vector<Vec3> rest_;      // [S] u0
   std::vector<double> stored_;  // [n] scratch
-  std::vector<Vec3> u_;         // [S]
-  std::int64_t computed_ = -1;  // tick of the last frame
+  std::vector<Vec3> u_;         // [S] u, then u0 + u
+  SurfaceStress stress_;
+  std::vector<Vec3> force_;           // [S] of the contacts
+  std::vector<Stress> nodal_stress_;  // [S]
+  std::optional<Interior> interior_;  // in the plane, where all of it is known
+  std::int64_t computed_ = -1;        // tick of the last frame
   std::atomic<bool> stop_ = false;
   std::thread worker_;
 };

@@ -5,10 +5,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <csignal>
+#include <cstring>
+#include <limits>
 #include <random>
 #include <thread>
 
+#include "formats/hdf5.h"
 #include "formats/recording.h"
 #include "tests/formats_sample.h"
 #include "tests/formats_tamper.h"
@@ -58,9 +62,14 @@ std::vector<TickRecord> some_ticks(std::size_t count, std::size_t first = 0) {
 }
 
 SurfaceFrame some_frame(std::size_t k) {
-  SurfaceFrame frame = {static_cast<std::int64_t>(17 * k), 0.017 * static_cast<double>(k), {}};
+  SurfaceFrame frame = {.tick = static_cast<std::int64_t>(17 * k), .time = 0.017 * static_cast<double>(k)};
   for (std::size_t i = 0; i < 3 * surface_nodes; ++i)
     frame.displacement.push_back(static_cast<float>(100 * k + i));
+  for (std::size_t i = 0; i < surface_nodes; ++i) {
+    frame.von_mises.push_back(static_cast<float>(3 * k + i));
+    frame.pressure.push_back(-static_cast<float>(7 * k + i));
+  }
+  frame.von_mises[k % surface_nodes] = std::numeric_limits<float>::quiet_NaN();  // not known
   return frame;
 }
 
@@ -84,11 +93,25 @@ const SessionInfo info = {.model_path = "liver.palpate.hdf",
                           .rate = 2000,
                           .options = "overlay=r=3,rings=2\ncontact=dynamic\n"};
 const RecordedSurface surface = {
-    {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}}, 3, {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2}};
+    {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}}, 3, {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2}, {7, 0, 4, 0}};
 
 void expect_ticks(const Recording& read, std::size_t count) {
   ASSERT_EQ(read.ticks.size(), count);
   for (std::size_t i = 0; i < count; ++i) ASSERT_TRUE(same(read.ticks[i], some_tick(i))) << i;
+}
+
+/// Bit by bit, as not a number differs from itself.
+void expect_floats(const std::vector<float>& a, const std::vector<float>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(float)), 0);
+}
+
+void expect_frame(const SurfaceFrame& read, const SurfaceFrame& expected) {
+  ASSERT_EQ(read.tick, expected.tick);
+  ASSERT_EQ(read.time, expected.time);
+  expect_floats(read.displacement, expected.displacement);
+  expect_floats(read.von_mises, expected.von_mises);
+  expect_floats(read.pressure, expected.pressure);
 }
 
 void expect_frames(const std::filesystem::path& path, const Recording& read, std::size_t count) {
@@ -103,6 +126,7 @@ void expect_frames(const std::filesystem::path& path, const Recording& read, std
     ASSERT_TRUE(std::equal(frame.displacement.begin(), frame.displacement.end(),
                            u.begin() + static_cast<std::ptrdiff_t>(3 * surface_nodes * k)))
         << k;
+    if (k % 7 == 0 || k + 3 > count) expect_frame(read_frame(path, static_cast<std::int64_t>(k)), frame);
   }
 }
 
@@ -143,6 +167,7 @@ TEST_P(Lengths, AreReadBack) {
   EXPECT_EQ(read.frames.surface.nodes, surface.nodes);
   EXPECT_EQ(read.frames.surface.corners, surface.corners);
   EXPECT_EQ(read.frames.surface.simplices, surface.simplices);
+  EXPECT_EQ(read.frames.surface.held, surface.held);
   expect_ticks(read, GetParam());
   expect_frames(folder / "a.h5", read, (GetParam() + 999) / 1000);
   EXPECT_EQ(files_in(folder.path()), 1U) << "parts are left";
@@ -162,6 +187,58 @@ TEST(Recording, OfALineSurfaceOrNoneIsReadBack) {
   expect_ticks(read, 7);
   EXPECT_TRUE(read.frames.surface.nodes.empty());
   EXPECT_EQ(read.frames.time, std::vector<double>{0.5});
+}
+
+TEST(Recording, OfFramesWithoutStressSaysThatItIsNotKnown) {
+  const Folder folder;
+  RecordingWriter writer(folder / "a.h5", info, {surface.nodes, 3, surface.simplices});
+  SurfaceFrame frame = some_frame(1);
+  frame.von_mises.clear();
+  frame.pressure.clear();
+  writer.append(frame);
+  writer.finish();
+  const SurfaceFrame read = read_frame(folder / "a.h5", 0);
+  EXPECT_EQ(read.displacement, frame.displacement);
+  EXPECT_EQ(read.pressure, std::vector<float>(surface_nodes, 0.0F));
+  ASSERT_EQ(read.von_mises.size(), surface_nodes);
+  for (const float stress : read.von_mises) EXPECT_TRUE(std::isnan(stress));
+  EXPECT_EQ(read_frames(folder / "a.h5").surface.held, std::vector<std::uint8_t>(surface_nodes));
+}
+
+/// Makes it one of version 4.0, which had neither stress nor pressure.
+void make_older(const std::filesystem::path& path) {
+  for (const char* name : {"/frames/von_mises", "/frames/pressure", "/surface/held"})
+    remove_object(path, name);
+  set_integers(path, "version", {4, 0});
+}
+
+TEST(Recording, OfVersion40IsReadAsBefore) {
+  const Folder folder;
+  const auto expect_older = [&](std::size_t frames) {
+    EXPECT_EQ(hdf5::File::open_to_read(folder / "a.h5").integer_attribute("/", "version", 2),
+              (std::vector<std::int64_t>{4, 0}));
+    const Recording read = read_recording(folder / "a.h5");
+    expect_ticks(read, 30);
+    EXPECT_FALSE(read.frames.has_stress);
+    EXPECT_TRUE(read.frames.surface.held.empty());
+    for (std::size_t k = 0; k < frames; ++k) {
+      SurfaceFrame expected = some_frame(k);
+      expected.von_mises.clear();
+      expected.pressure.clear();
+      expect_frame(read_frame(folder / "a.h5", static_cast<std::int64_t>(k)), expected);
+    }
+  };
+  record(folder / "a.h5", some_ticks(30), 10);
+  make_older(folder / "a.h5");
+  expect_older(3);
+  {
+    RecordingWriter killed(folder / "a.h5", info, surface);
+    append(killed, some_ticks(30), 10);
+  }
+  make_older(folder / "a.h5");
+  expect_older(3);
+  ASSERT_TRUE(finish_recording(folder / "a.h5"));
+  expect_older(3);
 }
 
 TEST(Recording, EqualTicksMakeEqualFiles) {
@@ -348,6 +425,8 @@ TEST(Recording, BadPathsAndOtherFilesAreRefused) {
   EXPECT_NE(refusal([&] { read_displacement(folder / "a.h5", 1, 3); }).find("has 3 frames"),
             std::string::npos);
   EXPECT_EQ(read_displacement(folder / "a.h5", 1, 2)[0], 100.0F);
+  for (const std::int64_t number : {-1, 3})
+    EXPECT_NE(refusal([&] { read_frame(folder / "a.h5", number); }).find("has 3 frames"), std::string::npos);
 }
 
 /// Records as fast as it goes, and says after each checkpoint how many ticks there are.

@@ -2,6 +2,7 @@
 // kind of element, FOLDER/single.palpate.hdf (tet4 in single precision), FOLDER/packed.palpate.hdf and
 // FOLDER/modal.palpate.hdf (with dynamics) and FOLDER/recording.h5.
 #include <array>
+#include <cmath>
 #include <iostream>
 
 #include "formats/recording.h"
@@ -23,7 +24,10 @@ int main(int count, char** arguments) {
     palpate::RecordingWriter recording(
         folder / "recording.h5",
         {.model_path = "tet4.palpate.hdf", .content_hash = "00ff", .device = "none", .options = ""},
-        {.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, .corners = 3, .simplices = {0, 1, 2}});
+        {.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
+         .corners = 3,
+         .simplices = {0, 1, 2},
+         .held = {7, 0, 0}});
     for (int i = 0; i < 5000; ++i) {
       const double x = i;
       recording.append(std::array{palpate::TickRecord{.time = 1e-3 * x,
@@ -33,8 +37,12 @@ int main(int count, char** arguments) {
                                                       .stiffness = {1, 2, 3, 4, 5, x},
                                                       .grab = 1}});
       if (i % 500 == 0)
-        recording.append(palpate::SurfaceFrame{
-            .tick = i, .time = 1e-3 * x, .displacement = {0, 0, static_cast<float>(i), 1, 2, 3, 4, 5, 6}});
+        recording.append(
+            palpate::SurfaceFrame{.tick = i,
+                                  .time = 1e-3 * x,
+                                  .displacement = {0, 0, static_cast<float>(i), 1, 2, 3, 4, 5, 6},
+                                  .von_mises = {NAN, 1, static_cast<float>(i)},
+                                  .pressure = {0, static_cast<float>(-i), 2}});
     }
     recording.finish();
   } catch (const palpate::Error& error) {

@@ -91,6 +91,12 @@ class Session(ProgramTest):
                 u = vtk_to_numpy(grid.GetPointData().GetArray("displacement"))
                 self.assertGreater(numpy.abs(u).max(), 0.001)
                 numpy.testing.assert_allclose(frames["displacement"][-1], u, rtol=1e-6, atol=1e-9)
+                for name in ("von_mises", "pressure"):
+                    numpy.testing.assert_array_equal(frames[name][-1], vtk_to_numpy(grid.GetPointData().GetArray(name)))
+                held = recording["surface/held"][:] == 2**corners - 1
+                self.assertTrue(numpy.isnan(frames["von_mises"][-1][held]).any())
+                self.assertGreater(numpy.nanmax(frames["von_mises"][-1]), 0)
+                self.assertTrue((numpy.isfinite(frames["von_mises"][-1]) | held).all())
 
     def test_description_for_paraview(self):
         for toml, script, kind in ((cube_toml(3), TOUCH, "Triangle"), (SQUARE, PLANE, "Polyline")):
@@ -109,12 +115,14 @@ class Session(ProgramTest):
                     self.assertEqual((topology.get("TopologyType"), int(topology.get("NumberOfElements"))),
                                      (kind, len(surface["simplices"])))
                     numpy.testing.assert_array_equal(evaluate(topology.find("DataItem"), self.folder), surface["simplices"])
-                    u = evaluate(grid.find("Attribute").find("DataItem"), self.folder)
-                    numpy.testing.assert_array_equal(u, frames["displacement"][k])
+                    attributes = {a.get("Name"): evaluate(a.find("DataItem"), self.folder) for a in grid.findall("Attribute")}
+                    self.assertEqual(sorted(attributes), ["contact pressure", "displacement", "von Mises stress"])
+                    for name, dataset in (("displacement", "displacement"), ("von Mises stress", "von_mises"), ("contact pressure", "pressure")):
+                        numpy.testing.assert_array_equal(attributes[name], frames[dataset][k])
                     x = evaluate(grid.find("Geometry").find("DataItem"), self.folder)
                     numpy.testing.assert_array_equal(x, surface["nodes"][:] + frames["displacement"][k])
             size = path.stat().st_size / len(grids)
-            self.assertLess(size, 700, "bytes a frame")
+            self.assertLess(size, 1200, "bytes a frame")
 
     def test_frames_can_be_left_out(self):
         file = self.bake(cube_toml(3))

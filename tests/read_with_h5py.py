@@ -135,7 +135,7 @@ def enclosed(nodes, surface):
 def check_recording(path):
     with h5py.File(path) as file:
         expect(file.attrs["format"] == b"palpate-recording" and file.attrs["model"] == b"tet4.palpate.hdf", "recording")
-        expect(list(file.attrs["version"]) == [4, 0], "version")
+        expect(list(file.attrs["version"]) == [4, 1], "version")
         expect(file.attrs["rate"] == 1000 and file.attrs["device"] == b"none" and file.attrs["options"] == b"", "attributes")
         ticks = file["/ticks"]
         widths = {"time": 1, "device_position": 3, "device_orientation": 4, "tool_position": 3, "tool_orientation": 4, "force": 3,
@@ -155,6 +155,9 @@ def check_recording(path):
         expect(np.array_equal(frames["time"], 1e-3 * frames["tick"][:]), "time of frames")
         expect(frames["displacement"].dtype == np.float32 and frames["displacement"].shape == (10, 3, 3), "frames")
         expect(np.array_equal(frames["displacement"][9], [[0, 0, 4500], [1, 2, 3], [4, 5, 6]]), "displacement of a frame")
+        expect(np.array_equal(file["/surface/held"], [7, 0, 0]) and file["/surface/held"].dtype == np.uint8, "held")
+        expect(frames["von_mises"].dtype == np.float32 and np.array_equal(frames["von_mises"][9], [np.nan, 1, 4500], equal_nan=True), "stress")
+        expect(frames["pressure"].dtype == np.float32 and np.array_equal(frames["pressure"][9], [0, -4500, 2]), "pressure")
         print(f"{path.name}: 5000 ticks, 10 frames")
 
 
