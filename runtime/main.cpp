@@ -14,6 +14,7 @@
 #include "runtime/play_command.h"
 #include "runtime/probe.h"
 #include "runtime/session.h"
+#include "runtime/view.h"
 
 namespace {
 
@@ -31,6 +32,8 @@ struct Arguments {
   std::string field;
   PlayArguments play;
   DevicesOptions devices;
+  ExportOptions exported;
+  std::string view_address = default_view_address;
 };
 
 void add_file(CLI::App& command, Arguments& arguments) {
@@ -97,6 +100,28 @@ CLI::App* add_session(CLI::App& app, Arguments& arguments) {
   return session;
 }
 
+CLI::App* add_view(CLI::App& app, Arguments& arguments) {
+  CLI::App* view = app.add_subcommand("view", "show a recording of play in a browser");
+  view->add_option("SESSION.h5", arguments.file, "recording")->required()->type_name("");
+  view->add_option("--view-address", arguments.view_address, "where the page is served")
+      ->type_name("[ADDRESS:]PORT")
+      ->capture_default_str();
+  return view;
+}
+
+CLI::App* add_export(CLI::App& app, ExportOptions& options) {
+  CLI::App* exported = app.add_subcommand("export", "write a recording of play as one page for any browser");
+  exported->add_option("SESSION.h5", options.recording, "recording")->required()->type_name("");
+  exported->add_option("--html", options.html, "the page")->required()->type_name("OUT.html");
+  exported->add_option("--fps", options.fps, "pictures a second at most")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  exported->add_option("--from", options.from, "begin there")->type_name("S")->check(CLI::NonNegativeNumber);
+  exported->add_option("--to", options.to, "end there")->type_name("S")->check(CLI::NonNegativeNumber);
+  return exported;
+}
+
 std::vector<double> vector_argument(const std::string& option, const std::string& text) {
   const std::optional<std::vector<double>> vector = parse_vector(text);
   if (!vector)
@@ -142,11 +167,16 @@ int run(int argc, char** argv) {
   const CLI::App* play_command = add_play(app, arguments.play);
   const CLI::App* devices_command = add_devices(app, arguments);
   const CLI::App* session_command = add_session(app, arguments);
+  const CLI::App* view_command = add_view(app, arguments);
+  const CLI::App* export_command = add_export(app, arguments.exported);
   try {
     app.parse(argc, argv);
-    if (app.get_subcommands().empty()) throw CLI::RequiredError("probe, play, session or devices");
+    if (app.get_subcommands().empty())
+      throw CLI::RequiredError("probe, play, view, export, session or devices");
     if (devices_command->parsed()) return devices(arguments.devices);
     if (session_command->parsed()) return session(arguments.file, arguments.json);
+    if (view_command->parsed()) return view(arguments.file, read_view_address(arguments.view_address));
+    if (export_command->parsed()) return export_html(arguments.exported);
     if (play_command->parsed()) return play(read_play(arguments.play));
     return probe(
         {.file = arguments.file,

@@ -19,8 +19,6 @@ class Patch {
   /// the file keeps too few layers below the surface.
   Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed);
 
-  /// Elements of the body that it lies over, ascending.
-  [[nodiscard]] std::span<const Index> elements() const noexcept { return elements_; }
   /// [m] surface nodes of the body (Body::simplices), ascending.
   [[nodiscard]] std::span<const Index> surface_nodes() const noexcept { return surface_nodes_; }
   /// Elements of the body that it refines, ascending.
@@ -48,7 +46,6 @@ class Patch {
 
   std::vector<Index> elements_;
   std::vector<Index> surface_nodes_;
-  std::vector<Index> elements_;
   std::vector<Index> stored_nodes_;
   Rows compliance_;
   Rows response_;

@@ -17,12 +17,9 @@ std::string text(const Json& object) {
 
 }  // namespace
 
-std::string hello_word(bool replay, std::uint64_t page) {
-  return text({{"type", "hello"},
-               {"protocol", 1},
-               {"version", PALPATE_VERSION},
-               {"mode", replay ? "replay" : "live"},
-               {"id", page}});
+std::string hello_word(const char* mode, std::uint64_t page) {
+  return text(
+      {{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", mode}, {"id", page}});
 }
 
 std::string error_word(const std::string& about, const std::string& message, const std::string& hint) {

@@ -16,8 +16,8 @@ struct PageRole {
   std::size_t watchers = 0;
 };
 
-/// The first message of all.
-std::string hello_word(bool replay, std::uint64_t page);
+/// The first message of all. `mode`: live, replay or file.
+std::string hello_word(const char* mode, std::uint64_t page);
 
 /// `about`: the word of the page that could not be.
 std::string error_word(const std::string& about, const std::string& message, const std::string& hint);

@@ -171,7 +171,8 @@ Scene make_scene(const RecordedSurface& surface, std::uint32_t number) {
   scene.number = number;
   scene.dimension = surface.corners;
   scene.nodes = surface.nodes;
-  scene.held.assign(surface.nodes.size(), 0);
+  scene.held = surface.held;
+  scene.held.resize(surface.nodes.size());
   if (surface.corners == 2) {
     scene.edges = grouped<2>(surface.simplices);
   } else {

@@ -42,7 +42,7 @@ Scene make_scene(const Body& body, std::uint32_t number);
 /// Of an overlay of the body that the scene is of. Its number is left 0.
 ScenePatch make_scene_patch(const Body& body, const Scene& scene, const Patch& patch);
 
-/// Of a recording: all of its surface with the edges of its triangles; nothing is known of what is held.
+/// Of a recording: all of its surface with the edges of its triangles.
 Scene make_scene(const RecordedSurface& surface, std::uint32_t number);
 
 }  // namespace palpate

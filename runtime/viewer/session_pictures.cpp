@@ -73,7 +73,8 @@ const TickRecord* SessionPictures::tick(std::int64_t number) const {
 }
 
 SurfacePicture SessionPictures::picture(std::int64_t frame) const {
-  SurfacePicture picture{.frame = read_frame(path_, frame)};
+  SurfacePicture picture;
+  picture.frame = read_frame(path_, frame);
   if (const TickRecord* then = tick(picture.frame.tick)) {
     picture.device = {.orientation = quaternion_of(then->device_orientation),
                       .position = vector_of(then->device_position),

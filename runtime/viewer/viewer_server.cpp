@@ -572,7 +572,7 @@ void Server::join(Page& page) {
   open_.insert(&page);
   if (open_.size() == 1) controller_ = &page;
   show_.touch_state();
-  page.say(hello_word(options_.replay, ++joined_));
+  page.say(hello_word(options_.replay ? "replay" : "live", ++joined_));
   show_all();
 }
 

@@ -1,4 +1,4 @@
-#include "runtime/viewer/view.h"
+#include "runtime/view.h"
 
 #include <fmt/core.h>
 #include <signal.h>
@@ -10,6 +10,7 @@
 #include "runtime/output.h"
 #include "runtime/viewer/page.h"
 #include "runtime/viewer/page_archive.h"
+#include "runtime/viewer/run_words.h"
 #include "runtime/viewer/session_pictures.h"
 #include "runtime/viewer/wire.h"
 
@@ -20,7 +21,7 @@ namespace {
 class SessionView : public ViewedRun {
  public:
   SessionView(const SessionPictures& pictures, const ViewerOptions& options)
-      : pictures_(pictures), server_(options, *this) {
+      : pictures_(pictures), server_(as_replay(options), *this) {
     std::vector<double> times;
     for (std::int64_t k = 0; k < pictures.frames(); ++k) times.push_back(pictures.time(k));
     server_.show_scene(std::make_shared<const Scene>(pictures.scene()));
@@ -44,6 +45,10 @@ class SessionView : public ViewedRun {
   void record(bool) override { refuse(); }
 
  private:
+  static ViewerOptions as_replay(ViewerOptions options) {
+    options.replay = true;
+    return options;
+  }
   [[noreturn]] static void refuse() {
     throw Error("cannot be done with a recording", "palpate-runtime view",
                 "touch the body itself: palpate-runtime play MODEL.palpate.hdf --view");
@@ -95,13 +100,14 @@ int export_html(const ExportOptions& options) {
   for (const std::int64_t frame : chosen) times.push_back(pictures.time(frame));
 
   PageArchive archive;
-  archive.add_text(wire::hello("file", 0));
+  archive.add_text(hello_word("file", 0));
   archive.add_text(pictures.state(0, times));
   const Scene scene = pictures.scene();
-  archive.add_binary(wire::encode(scene));
+  archive.add_binary(encode_scene(scene));
   for (const TickRun& run : pictures.ticks())
-    archive.add_binary(wire::encode_ticks(scene.number, run.notes, run.stride));
-  for (const std::int64_t frame : chosen) archive.add_binary(wire::encode(scene, pictures.picture(frame)));
+    archive.add_binary(encode_ticks(scene.number, run.notes, run.stride));
+  for (const std::int64_t frame : chosen)
+    archive.add_binary(encode_frame(pictures.picture(frame), scene, nullptr));
   const std::string page = archive.page(viewer_page());
   write_text_file(options.html, page);
   fmt::print(stderr, "{}: {} pictures, {:.1f} s, {:.1f} MB\n", options.html.string(), chosen.size(),
