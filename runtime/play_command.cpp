@@ -68,8 +68,10 @@ void add_outputs(CLI::App& play, PlayArguments& arguments) {
       ->type_name("HZ");
   play.add_option("--report", arguments.report, "write the JSON report here and not to the standard output")
       ->type_name("OUT.json");
-  play.add_option("--surface", arguments.surface,
-                  "write the surface after the last tick, as fine as the overlay makes it, for ParaView")
+  play.add_option(
+          "--surface", arguments.surface,
+          "write the surface after the last tick, as fine as the overlay makes it, with displacement, stress "
+          "and contact pressure, for ParaView")
       ->type_name("OUT.vtu");
   play.add_option("--contacts", arguments.contacts, "write the contact points after the last tick")
       ->type_name("OUT.csv");

@@ -35,7 +35,7 @@ def evaluate(item, folder):
         assert item.get("Function") == "$0 + $1" and len(own) == 2, item.attrib
         values = evaluate(own[0], folder) + evaluate(own[1], folder)
     elif kind == "HyperSlab":
-        start, stride, count = numpy.array(own[0].text.split(), int).reshape(3, 3)
+        start, stride, count = numpy.array(own[0].text.split(), int).reshape(3, -1)
         whole = evaluate(own[1], folder)
         values = whole[tuple(slice(s, s + n * by, by) for s, by, n in zip(start, stride, count))]
     else:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -105,6 +106,111 @@ TEST_F(Frames, OfTheThreadAreTheSame) {
     before = frame.tick;
     EXPECT_EQ(frame.displacement, expected[static_cast<std::size_t>(frame.tick)].displacement);
   }
+}
+
+// Contacts, wrench and pressure say the same, and stress is that of the surface as it is seen.
+TEST_F(Frames, ShowWhatTouchesAndWhatThatDoes) {
+  std::vector<SurfacePicture> pictures;
+  SurfaceFrames source(body_, state_, {.ticks_per_frame = 1, .in_background = false},
+                       [&](SurfacePicture picture) { pictures.push_back(std::move(picture)); });
+  SurfaceStress stress(body_);
+  const std::vector<Vec3> nodes = body_.surface_in_mesh();
+  double most_pressure = 0.0;
+  for (int tick = 0; tick < 100; ++tick) {
+    const StepStatus status = step(body_, state_, pose(tick));
+    source.post(state_, tick, 1e-3 * tick);
+    const SurfacePicture& picture = pictures.back();
+    const ToolState& tool = state_.tools.front();
+    ASSERT_EQ(picture.status, status);
+    ASSERT_EQ(picture.device.position, tool.device.position);
+    ASSERT_EQ(picture.tool.position, tool.pose.position);
+    ASSERT_EQ(picture.on_body.force, -tool.wrench.force);
+    ASSERT_EQ(std::ssize(picture.contacts), tool.contacts);
+    ASSERT_TRUE(picture.plane_displacement.empty());
+
+    Vec3 force = Vec3::Zero();
+    std::vector<Vec3> nodal(nodes.size(), Vec3::Zero());
+    std::vector<double> pressure(nodes.size());
+    for (const ContactPoint& contact : state_.contacts()) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (contact.nodes[k] < 0) continue;
+        const auto node = static_cast<std::size_t>(contact.nodes[k]);
+        nodal[node] -= contact.weights[k] * contact.force;
+        pressure[node] += contact.weights[k] * contact.force.dot(contact.frame.col(0)) / stress.areas()[node];
+      }
+    }
+    for (const SeenContact& contact : picture.contacts) {
+      force += contact.force;
+      EXPECT_LE(contact.force.dot(contact.normal), 0.0) << "it presses";
+      EXPECT_NEAR((contact.position - tool.pose.position).norm(), 0.15, 0.002) << "on the ball";
+    }
+    ASSERT_LE((force + tool.contact_wrench.force).norm(), 1e-12);
+    std::vector<Vec3> u;
+    for (std::size_t node = 0; node < nodes.size(); ++node)
+      u.push_back(seen_displacement(body_, state_, node));
+    std::vector<Stress> expected(nodes.size());
+    stress.evaluate(u, nodal, nullptr, expected);
+    for (std::size_t node = 0; node < nodes.size(); ++node) {
+      const double here = von_mises(expected[node]);
+      ASSERT_EQ(std::isnan(picture.frame.von_mises[node]), std::isnan(here));
+      if (!std::isnan(here)) {
+        ASSERT_NEAR(picture.frame.von_mises[node], here, 1e-4 * here + 1e-5);
+      }
+      ASSERT_NEAR(picture.frame.pressure[node], pressure[node], 1e-6 * std::abs(pressure[node]));
+      most_pressure = std::max(most_pressure, pressure[node]);
+    }
+  }
+  EXPECT_GT(most_pressure, 0.01);
+}
+
+// In the plane, where all nodes are stored: the interior too.
+TEST(FramesInThePlane, ShowTheInterior) {
+  for (const Scope scope : {Scope::full, Scope::surface}) {
+    Model model = test::unit_model(ElementType::tri3, 6, scope, Precision::double_precision);
+    test::set_rest(model, 0.01);
+    const Body body(model);
+    State state(body, {.tools = {Tool{.radius = 0.15}}});
+    SurfacePicture picture;
+    SurfaceFrames source(body, state, {.ticks_per_frame = 1, .in_background = false},
+                         [&](SurfacePicture shown) { picture = std::move(shown); });
+    for (int tick = 0; tick < 60; ++tick) {
+      step(body, state, {.position = Vec3(0.5, 1.2 - 0.002 * tick, 0.0)});
+      source.post(state, tick, 1e-3 * tick);
+    }
+    const std::size_t N = model.mesh.nodes.size();
+    if (scope == Scope::surface) {
+      EXPECT_TRUE(picture.plane_displacement.empty() && picture.plane_von_mises.empty());
+      continue;
+    }
+    ASSERT_EQ(picture.plane_displacement.size(), 3 * N);
+    ASSERT_EQ(picture.plane_von_mises.size(), N);
+    double largest = 0.0;
+    for (std::size_t k = 0; k < picture.frame.von_mises.size(); ++k) {  // the same on the surface
+      const auto node = static_cast<std::size_t>(body.surface_mesh_nodes()[k]);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        ASSERT_EQ(picture.plane_displacement[3 * node + axis], picture.frame.displacement[3 * k + axis]);
+    }
+    for (std::size_t node = 0; node < N; ++node) {
+      Vec3 u = model.rest_displacement[node];
+      const SurfaceLoad& load = state.near.load();
+      const Index stored = body.stored_node(static_cast<Index>(node));
+      for (std::size_t k = 0; stored >= 0 && k < load.nodes().size(); ++k)
+        u += body.greens().block(stored, load.nodes()[k]) *
+             Vec3(load.forces()[2 * k], load.forces()[2 * k + 1], 0);
+      for (std::size_t axis = 0; axis < 2; ++axis)
+        ASSERT_NEAR(picture.plane_displacement[3 * node + axis], u[static_cast<Eigen::Index>(axis)], 1e-7);
+      largest = std::max(largest, static_cast<double>(picture.plane_von_mises[node]));
+    }
+    EXPECT_GT(largest, 0.05);
+  }
+}
+
+TEST(FramesInThePlane, RecordWhatIsHeld) {
+  const Body body(test::unit_model(ElementType::quad4, 2, Scope::full, Precision::double_precision), {}, 2);
+  const RecordedSurface surface = recorded_surface(body);
+  ASSERT_EQ(surface.held.size(), surface.nodes.size());
+  for (std::size_t node = 0; node < surface.nodes.size(); ++node)
+    EXPECT_EQ(surface.held[node], surface.nodes[node].y() < 1e-9 ? 3 : 0) << surface.nodes[node].transpose();
 }
 
 class RecorderTest : public testing::Test {
