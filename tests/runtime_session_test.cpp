@@ -55,7 +55,7 @@ Vec3 seen_displacement(const Body& body, const State& state, std::size_t node) {
 TEST_F(Frames, AreTheDisplacementFromTheMesh) {
   std::vector<SurfaceFrame> frames;
   SurfaceFrames source(body_, state_, {.ticks_per_frame = 10, .in_background = false},
-                       [&](SurfaceFrame frame) { frames.push_back(std::move(frame)); });
+                       [&](SurfacePicture picture) { frames.push_back(std::move(picture.frame)); });
   const RecordedSurface surface = recorded_surface(body_);
   ASSERT_EQ(surface.nodes.size(), 98U);  // 5^3 - 3^3
   EXPECT_EQ(surface.corners, 3);
@@ -85,9 +85,9 @@ TEST_F(Frames, OfTheThreadAreTheSame) {
   {
     State again = state_;
     SurfaceFrames at_once(body_, again, {.ticks_per_frame = 1, .in_background = false},
-                          [&](SurfaceFrame frame) { expected.push_back(std::move(frame)); });
+                          [&](SurfacePicture picture) { expected.push_back(std::move(picture.frame)); });
     SurfaceFrames beside(body_, state_, {.ticks_per_frame = 3},
-                         [&](SurfaceFrame frame) { frames.push_back(std::move(frame)); });
+                         [&](SurfacePicture picture) { frames.push_back(std::move(picture.frame)); });
     for (int tick = 0; tick < 300; ++tick) {
       step(body_, state_, pose(tick));
       step(body_, again, pose(tick));

@@ -17,15 +17,18 @@ namespace palpate {
 struct Scene {
   std::uint32_t number = 0;  ///< from 1 on
   int dimension = 3;
-  bool is_plane = false;    ///< nodes are all mesh nodes, not those of the surface
-  std::vector<Vec3> nodes;  ///< [S] without loads [m]
-  std::vector<std::array<Index, 3>> triangles;
-  std::vector<std::array<Index, 2>> edges;
-  std::vector<std::uint8_t> held;  ///< [S] as Model::fixed
+  bool is_plane = false;             ///< nodes are all mesh nodes, not those of the surface
+  std::vector<Index> surface_nodes;  ///< in that case the body's on the surface; else empty: the first are
+  std::vector<Vec3> nodes;           ///< [S] without loads [m]
+  std::vector<std::array<Index, 3>> triangles;  ///< [T]
+  std::vector<Index> elements;                  ///< [T] that each is on; in a recording unknown: empty
+  std::vector<std::array<Index, 2>> edges;      ///< of the elements, each once
+  std::vector<std::uint8_t> held;               ///< [S] as Model::fixed
 };
 
 /// The finer surface of an overlay, in place of some of a scene's triangles.
 struct ScenePatch {
+  std::uint32_t number = 0;                     ///< from 1 on, by who shows it
   std::vector<Index> surface_nodes;             ///< [m] of Body::simplices, that its own nodes are
   std::vector<Index> hidden;                    ///< triangles of the scene
   std::vector<Vec3> nodes;                      ///< [m] without loads [m]
@@ -33,9 +36,13 @@ struct ScenePatch {
   std::vector<std::array<Index, 2>> outline;    ///< in the plane: the boundary
 };
 
+/// Of a body. Throws Error when the model's surface is not that of its mesh.
 Scene make_scene(const Body& body, std::uint32_t number);
+
+/// Of an overlay of the body that the scene is of. Its number is left 0.
 ScenePatch make_scene_patch(const Body& body, const Scene& scene, const Patch& patch);
-/// Of a recording: all of its surface, nothing is known of what is held (but from 4.1 on).
+
+/// Of a recording: all of its surface with the edges of its triangles; nothing is known of what is held.
 Scene make_scene(const RecordedSurface& surface, std::uint32_t number);
 
 }  // namespace palpate

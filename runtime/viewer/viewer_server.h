@@ -16,6 +16,7 @@ namespace palpate {
 struct ViewerOptions {
   std::string address = "127.0.0.1";  ///< another one than of this machine alone asks for a token
   std::uint16_t port = 8017;          ///< 0: any that is free
+  bool replay = false;                ///< of what was recorded: all ticks are kept for pages that come later
 };
 
 /// HTTP and WebSocket in a thread of its own (web/PROTOCOL.md). The `show` functions may be called by any
@@ -32,13 +33,17 @@ class ViewerServer {
   /// What to open: http://127.0.0.1:8017/ with the token where one is asked for.
   [[nodiscard]] const std::string& url() const noexcept;
 
+  /// All that is shown from now on is of this scene.
   void show_scene(std::shared_ptr<const Scene> scene);
-  void show_picture(SurfacePicture picture);
-  /// Consecutive ticks, `stride` apart.
+  /// A picture without values for all nodes of the scene is not shown. `body`, which the scene is of, is used
+  /// during the call only, to draw the picture's overlay: null for none.
+  void show_picture(SurfacePicture picture, const Body* body = nullptr);
+  /// Ticks `stride` apart. Live, pages are sent the last two seconds at most.
   void show_ticks(std::span<const TickNote> ticks, std::int64_t stride = 1);
   /// The members of the message `state` that are the run's, as a JSON object; the server adds those that are
-  /// each page's.
-  void show_state(std::string json);
+  /// each page's (`pointer` says whether the run's device is a pointer). `times` of a replay are kept for
+  /// pages that come later. Throws Error when it is not an object.
+  void show_state(const std::string& json);
 
  private:
   struct Impl;
