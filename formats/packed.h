@@ -44,8 +44,17 @@ class PackedGreens {
   [[nodiscard]] std::int64_t order() const noexcept { return order_; }  ///< number of stored dofs n
   [[nodiscard]] Precision precision() const noexcept { return precision_; }
   [[nodiscard]] const void* data() const noexcept { return data_.get(); }
+  /// The matrix is this times what is stored.
+  [[nodiscard]] double scale() const noexcept { return scale_; }
 
-  /// All packed_size(order()) entries; T (float or double) must be the stored scalar.
+  /// The matrix times `factor`, of the same data.
+  [[nodiscard]] PackedGreens scaled(double factor) const {
+    PackedGreens copy = *this;
+    copy.scale_ *= factor;
+    return copy;
+  }
+
+  /// All packed_size(order()) entries as they are stored; T (float or double) must be the stored scalar.
   template <class T>
   [[nodiscard]] std::span<const T> as() const noexcept {
     return {static_cast<const T*>(data_.get()), static_cast<std::size_t>(packed_size(order_))};
@@ -54,13 +63,15 @@ class PackedGreens {
   /// Entry (i, j) of the symmetric matrix [m/N], either triangle.
   [[nodiscard]] double operator()(std::int64_t i, std::int64_t j) const noexcept {
     const auto k = static_cast<std::size_t>(i >= j ? packed_index(i, j, order_) : packed_index(j, i, order_));
-    return precision_ == Precision::single_precision ? static_cast<double>(as<float>()[k]) : as<double>()[k];
+    return scale_ * (precision_ == Precision::single_precision ? static_cast<double>(as<float>()[k])
+                                                               : as<double>()[k]);
   }
 
  private:
   std::shared_ptr<const void> data_;
   std::int64_t order_ = 0;
   Precision precision_ = Precision::double_precision;
+  double scale_ = 1.0;
 };
 
 }  // namespace palpate

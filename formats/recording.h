@@ -43,8 +43,8 @@ struct TickRecord {
   double share = 1.0;                           ///< of the force that the safety rules let pass [0, 1]
   std::uint8_t phase = 0;                       ///< SafetyPhase
   std::uint8_t fault = 0;                       ///< Fault
-  std::uint8_t event = 0;        ///< what safety was told before the tick: 1 restart, 2 device lost, 4
-                                 ///< acknowledged, 8 input lost
+  std::uint8_t event = 0;        ///< what the loop was told before the tick: 1 restart, 2 device lost, 4
+                                 ///< acknowledged, 8 input lost, 16 lifted, 32 resumed after a pause
   std::int64_t motion_step = 0;  ///< packed dynamics: the last step whose answer had come
 };
 

@@ -46,17 +46,23 @@ std::shared_ptr<void> map_memory(std::int64_t bytes) {
   return {mapping, static_cast<std::byte*>(base) + (aligned - address)};
 }
 
-/// Copies the columns [first, last) of the packed lower triangle to both triangles of the square, tile by
-/// tile.
+/// Copies the columns [first, last) of the packed lower triangle, times `scale`, to both triangles of the
+/// square, tile by tile.
 template <class T>
-void unfold_columns(std::span<const T> packed, std::int64_t order, T* square, std::int64_t stride,
-                    std::int64_t first, std::int64_t last) {
+void unfold_columns(std::span<const T> packed, double scale, std::int64_t order, T* square,
+                    std::int64_t stride, std::int64_t first, std::int64_t last) {
   for (std::int64_t row = first; row < order; row += tile) {
     const std::int64_t row_end = std::min(row + tile, order);
     for (std::int64_t j = first; j < last; ++j) {
       const std::int64_t begin = std::max(row, j);
       const T* column = packed.data() + packed_index(begin, j, order);
-      std::memcpy(square + j * stride + begin, column, static_cast<std::size_t>(row_end - begin) * sizeof(T));
+      T* to = square + j * stride + begin;
+      if (scale == 1.0) {
+        std::memcpy(to, column, static_cast<std::size_t>(row_end - begin) * sizeof(T));
+      } else {
+        std::transform(column, column + (row_end - begin), to,
+                       [scale](T value) { return static_cast<T>(scale * static_cast<double>(value)); });
+      }
     }
     for (std::int64_t i = row; i < row_end; ++i) {
       T* lower = square + i * stride;
@@ -66,11 +72,12 @@ void unfold_columns(std::span<const T> packed, std::int64_t order, T* square, st
 }
 
 template <class T>
-void unfold(std::span<const T> packed, std::int64_t order, T* square, std::int64_t stride, int jobs) {
+void unfold(std::span<const T> packed, double scale, std::int64_t order, T* square, std::int64_t stride,
+            int jobs) {
   std::atomic<std::int64_t> next = 0;
   const auto work = [&] {
     for (std::int64_t j = next.fetch_add(tile); j < order; j = next.fetch_add(tile)) {
-      unfold_columns(packed, order, square, stride, j, std::min(j + tile, order));
+      unfold_columns(packed, scale, order, square, stride, j, std::min(j + tile, order));
     }
   };
   std::vector<std::jthread> helpers;
@@ -128,7 +135,7 @@ void add_rows(const T* rows, std::int64_t stride, const double* f, double* __res
   for (; i < count; ++i) add(i);
 }
 
-/// u = Xi E f from row `first` on.
+/// u = Xi E f from row `first` on; Xi is `scale` times what is stored.
 template <int D, class T>
 void displacement_from_square(const T* square, std::int64_t stride, std::span<const Index> nodes,
                               const double* f, std::int64_t first, std::span<double> u) noexcept {
@@ -144,9 +151,9 @@ void displacement_from_square(const T* square, std::int64_t stride, std::span<co
   }
 }
 
-/// u = Xi E f from row `first` on.
+/// u = Xi E f from row `first` on; Xi is `scale` times what is stored.
 template <class T>
-void displacement_from_packed(std::span<const T> packed, std::int64_t order, int dimension,
+void displacement_from_packed(std::span<const T> packed, double scale, std::int64_t order, int dimension,
                               std::span<const Index> nodes, const double* f, std::int64_t first,
                               std::span<double> u) noexcept {
   const std::int64_t last = first + static_cast<std::int64_t>(u.size());
@@ -154,14 +161,15 @@ void displacement_from_packed(std::span<const T> packed, std::int64_t order, int
   std::fill(u.begin(), u.end(), 0.0);
   for (std::size_t k = 0; k < d * nodes.size(); ++k) {
     const std::int64_t dof = std::int64_t{dimension} * nodes[k / d] + static_cast<std::int64_t>(k % d);
+    const double force = scale * f[k];
     double* out = u.data();
     for (std::int64_t j = first; j < std::min(dof, last); ++j) {
       const auto entry = static_cast<std::size_t>(packed_index(dof, j, order));
-      *out++ += f[k] * static_cast<double>(packed[entry]);
+      *out++ += force * static_cast<double>(packed[entry]);
     }
     const std::int64_t begin = std::max(dof, first);
     const T* column = packed.data() + packed_index(begin, dof, order);
-    for (std::int64_t i = 0; i < last - begin; ++i) out[i] += f[k] * static_cast<double>(column[i]);
+    for (std::int64_t i = 0; i < last - begin; ++i) out[i] += force * static_cast<double>(column[i]);
   }
 }
 
@@ -198,9 +206,9 @@ Greens::Greens(PackedGreens packed, int dimension, const GreensOptions& options)
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int jobs = options.jobs > 0 ? options.jobs : processors;
   if (precision_ == Precision::single_precision) {
-    unfold(packed_.as<float>(), order_, static_cast<float*>(square.get()), stride_, jobs);
+    unfold(packed_.as<float>(), packed_.scale(), order_, static_cast<float*>(square.get()), stride_, jobs);
   } else {
-    unfold(packed_.as<double>(), order_, static_cast<double*>(square.get()), stride_, jobs);
+    unfold(packed_.as<double>(), packed_.scale(), order_, static_cast<double*>(square.get()), stride_, jobs);
   }
   square_ = square;
   packed_ = {};
@@ -237,7 +245,8 @@ void Greens::displace_statically(std::span<const Index> nodes, std::span<const d
   const std::int64_t first = std::int64_t{dimension_} * first_node;
   if (!unfolded()) {
     with_scalars(packed_.data(), precision_, [&]<class T>(const T*) {
-      displacement_from_packed(packed_.as<T>(), order_, dimension_, nodes, f.data(), first, u);
+      displacement_from_packed(packed_.as<T>(), packed_.scale(), order_, dimension_, nodes, f.data(), first,
+                               u);
     });
     return;
   }

@@ -1,5 +1,9 @@
 #include "runtime/loading.h"
 
+#include <fmt/core.h>
+
+#include <chrono>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -8,6 +12,7 @@
 #include "formats/model_file.h"
 #include "meshes/error.h"
 #include "runtime/output.h"
+#include "runtime/scaled_model.h"
 
 namespace palpate {
 namespace {
@@ -22,10 +27,21 @@ std::string read_text(const std::filesystem::path& file) {
   return text;
 }
 
+void print_loaded(const Body& body, double seconds) {
+  fmt::print(stderr, "{}: {} free surface nodes, {} dofs in {} precision, loaded in {:.2f} s\n",
+             body.model().name, body.free_surface_nodes().size(), body.greens().order(),
+             body.greens().precision() == Precision::single_precision ? "single" : "double", seconds);
+  if (!body.greens().unfolded()) {
+    print_warning(
+        "the Green's functions do not fit into half of the free memory as a full square; used packed, which "
+        "is slower");
+  }
+}
+
 }  // namespace
 
-Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml, int refinement,
-               ContactModel contact) {
+Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
+               const BodyOptions& options) {
   Model model = load_model(file);
   if (!model_toml.empty() && read_text(model_toml) != model.model_toml) {
     throw Error("was not made from " + model_toml.string() + ": the description stored in it is another one",
@@ -34,7 +50,18 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   for (const std::string& stale : stale_sources(model, file)) {
     print_warning(file.string() + ": " + stale + " (precompute it again)");
   }
-  return Body(std::move(model), {}, refinement, contact);
+  scale_loads(model, options.load_scale);
+  scale_stiffness(model, options.stiffness_scale);
+  return Body(std::move(model), {}, options.refinement, options.contact);
+}
+
+std::unique_ptr<const Body> load_and_print(const std::filesystem::path& file,
+                                           const std::filesystem::path& model_toml,
+                                           const BodyOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  std::unique_ptr<const Body> body(new Body(load_body(file, model_toml, options)));
+  print_loaded(*body, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  return body;
 }
 
 }  // namespace palpate

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <utility>
 
 #include "runtime/devices/monotonic_clock.h"
 
@@ -48,15 +49,13 @@ class Loop {
   }
 
   LoopReport run(const std::atomic<bool>& stop) {
-    for (std::int64_t number = 0; number < options_.ticks && !stop; ++number) {
+    for (std::int64_t number = 0; number < options_.ticks && !ends(stop); ++number) {
       tick_.number = number;
-      tick_.due = start_ + number * second / options_.rate;
-      tick_.begun = tick_.due;
-      if (!options_.fast) {
-        sleep_until(tick_.due);
-        if (stop) break;
-        tick_.begun = monotonic_now();
-      }
+      set_due();
+      if (!options_.fast) sleep_until(tick_.due);
+      if (is_paused()) wait_paused(stop);
+      if (ends(stop)) break;
+      tick_.begun = options_.fast ? tick_.due : monotonic_now();
       tick();
     }
     if (parts_.safety != nullptr) parts_.safety->shut_down();
@@ -66,6 +65,40 @@ class Loop {
   }
 
  private:
+  [[nodiscard]] bool ends(const std::atomic<bool>& stop) const noexcept {
+    return stop || (parts_.control != nullptr && parts_.control->leave);
+  }
+
+  void set_due() noexcept { tick_.due = start_ + tick_.number * second / options_.rate; }
+
+  [[nodiscard]] bool is_paused() const noexcept {
+    return parts_.control != nullptr && parts_.control->paused;
+  }
+
+  /// Until the pause ends, or a single tick is asked for. The loop's start is moved by as much, so that the
+  /// clock of its ticks stands still.
+  void wait_paused(const std::atomic<bool>& stop) noexcept {
+    LoopControl& control = *parts_.control;
+    if (!was_paused_) show_picture();
+    was_paused_ = true;
+    const DeviceCommand nothing;
+    while (control.paused && !ends(stop)) {
+      if (control.single_ticks > 0) {
+        --control.single_ticks;
+        return;
+      }
+      parts_.device.show(nothing, news_.state, monotonic_now());
+      start_ += second / options_.rate;
+      set_due();
+      sleep_until(tick_.due);
+    }
+  }
+
+  void show_picture() noexcept {
+    if (parts_.viewed != nullptr && report_.ticks > 0)
+      parts_.viewed->post(parts_.state, report_.ticks - 1, shown_time_);
+  }
+
   [[nodiscard]] double time() const noexcept {
     return static_cast<double>(tick_.number) / static_cast<double>(options_.rate);
   }
@@ -74,8 +107,8 @@ class Loop {
     const std::int64_t next_due = start_ + (tick_.number + 1) * second / options_.rate;
     news_ = parts_.device.hear(tick_);
     if (news_.begun) tick_.begun = *news_.begun;
-    if (parts_.monitor != nullptr && parts_.monitor->acknowledged())
-      news_.events |= DeviceEvent::acknowledged;
+    hear_person();
+    lift();
     in_body_ = parts_.workspace.in_body(news_.state);
     const Vec3 force_before = tool().wrench.force;
 
@@ -93,6 +126,32 @@ class Loop {
     count(force_before);
     tell();
     if (parts_.frames != nullptr) parts_.frames->post(parts_.state, tick_.number, time());
+    shown_time_ = time();
+    if (is_paused() || tick_.number % options_.ticks_per_view == 0) show_picture();
+  }
+
+  /// What was said beside the device. A replay has it from its session.
+  void hear_person() noexcept {
+    const bool resumes = std::exchange(was_paused_, is_paused());
+    if (parts_.replayed != nullptr) return;
+    const bool seen = parts_.monitor != nullptr && parts_.monitor->acknowledged();
+    const bool seen_in_viewer = parts_.control != nullptr && parts_.control->acknowledged.exchange(false);
+    if (seen || seen_in_viewer) news_.events |= DeviceEvent::acknowledged;
+    if (resumes) news_.events |= DeviceEvent::resumed;
+  }
+
+  /// A tool that is lifted meets nothing: each tick puts it where the pointer is, and it is felt there only
+  /// once it is clear of the body. Where it is let down it need not be quite clear.
+  void lift() noexcept {
+    ToolState& lifted = parts_.state.tools.front();
+    const bool is_lifted = has(news_.events, DeviceEvent::lifted);
+    if (is_lifted) {
+      lifted.placed = false;
+      lifted.has_been_clear = false;
+    } else if (is_lifted_) {
+      lifted.has_been_clear = true;
+    }
+    is_lifted_ = is_lifted;
   }
 
   /// The overlay and the free motion of this tick.
@@ -150,6 +209,7 @@ class Loop {
       safety.restart();
     }
     if (has(news_.events, DeviceEvent::acknowledged)) safety.acknowledge();
+    if (has(news_.events, DeviceEvent::resumed)) safety.restart();
   }
 
   void count(const Vec3& force_before) noexcept {
@@ -173,16 +233,19 @@ class Loop {
 
   /// The recording and the monitor.
   void tell() noexcept {
-    if (parts_.monitor != nullptr) {
-      parts_.monitor->push({.number = tick_.number,
-                            .lateness_ns = tick_.begun - tick_.due,
-                            .compute_ns = compute_ns_,
-                            .force = -tool().wrench.force,
-                            .shown = shown_.wrench.force.norm(),
-                            .contacts = tool().contacts,
-                            .phase = phase(),
-                            .fault = fault_,
-                            .events = news_.events});
+    if (parts_.monitor != nullptr || parts_.feed != nullptr) {
+      const TickNote note = {.number = tick_.number,
+                             .lateness_ns = tick_.begun - tick_.due,
+                             .compute_ns = compute_ns_,
+                             .force = -tool().wrench.force,
+                             .shown = shown_.wrench.force.norm(),
+                             .depth = parts_.feed != nullptr ? depth() : 0.0,
+                             .contacts = tool().contacts,
+                             .phase = phase(),
+                             .fault = fault_,
+                             .events = news_.events};
+      if (parts_.monitor != nullptr) parts_.monitor->push(note);
+      if (parts_.feed != nullptr) parts_.feed->push(note);
     }
     if (parts_.recorder == nullptr && parts_.replayed == nullptr) return;
     const TickRecord tick = record();
@@ -194,6 +257,25 @@ class Loop {
     } else {
       parts_.recorder->push(tick);
     }
+  }
+
+  /// How far the closed contacts press the surface in, at most [m].
+  [[nodiscard]] double depth() const noexcept {
+    double deepest = 0.0;
+    for (const ContactPoint& contact : parts_.state.contacts()) {
+      if (contact.force.squaredNorm() == 0.0) continue;
+      Vec3 moved = Vec3::Zero();  // inward
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index node = contact.nodes[k];
+        if (node < 0) continue;
+        const Vec3& rest = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)];
+        moved += contact.weights[k] * (rest - parts_.state.tree.position(node));
+      }
+      deepest = std::max(deepest,
+                         moved.dot(contact.held ? outward_normal(parts_.body, parts_.state, contact.simplex)
+                                                : Vec3(contact.frame.col(0))));
+    }
+    return deepest;
   }
 
   [[nodiscard]] TickRecord record() const noexcept {
@@ -246,6 +328,9 @@ class Loop {
   DeviceCommand shown_;
   std::int64_t compute_ns_ = 0;
   Fault fault_ = Fault::none;
+  bool was_paused_ = false;
+  bool is_lifted_ = false;   // in the tick before
+  double shown_time_ = 0.0;  // of the last tick [s]
 };
 
 }  // namespace

@@ -16,11 +16,21 @@
 #include "runtime/replay_device.h"
 #include "runtime/step.h"
 #include "runtime/surface_frames.h"
+#include "runtime/tick_feed.h"
 
 namespace palpate {
 
 inline constexpr std::int64_t default_rate = 1000;  ///< ticks a second
-inline constexpr std::int64_t most_rate = 5000;
+
+/// What a person may ask of a loop that runs, from any thread.
+struct LoopControl {
+  /// Takes no ticks, and shows the device no force: it goes on as if no time had passed, but that force
+  /// begins anew.
+  std::atomic<bool> paused = false;
+  std::atomic<std::int64_t> single_ticks = 0;  ///< to take while paused; nothing is shown of them
+  std::atomic<bool> acknowledged = false;      ///< the fault was seen
+  std::atomic<bool> leave = false;             ///< ends the run
+};
 
 /// What a loop is made of. The pointers may be null.
 struct LoopParts {
@@ -34,6 +44,9 @@ struct LoopParts {
   Recorder* recorder = nullptr;
   Monitor* monitor = nullptr;
   SurfaceFrames* frames = nullptr;
+  LoopControl* control = nullptr;
+  TickFeed* feed = nullptr;             ///< of a viewer
+  SurfaceFrames* viewed = nullptr;      ///< and its pictures, of each tick that it is given
   const Recording* replayed = nullptr;  ///< session whose overlays and motion come as they came then
 };
 
@@ -41,6 +54,7 @@ struct LoopOptions {
   std::int64_t rate = default_rate;  ///< ticks a second
   std::int64_t ticks = 0;            ///< to take
   bool fast = false;                 ///< do not wait: each tick begins when it is due
+  std::int64_t ticks_per_view = 16;  ///< from one picture for `viewed` to the next
 };
 
 /// What is told of a run when it is over.
@@ -67,7 +81,7 @@ struct LoopReport {
 };
 
 /// Steps at the rate of the options, or as fast as it goes without waiting (`fast`: deterministic). Ends
-/// early when `stop` becomes true; the device is shown no force then.
+/// early when `stop` becomes true or the control says `leave`; the device is shown no force then.
 LoopReport run_loop(const LoopParts& parts, const LoopOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace palpate

@@ -21,8 +21,9 @@ double microseconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) * 1e-3;
 }
 
-/// What a person can do about it.
-std::string_view remedy(Fault fault) {
+}  // namespace
+
+std::string_view fault_remedy(Fault fault) {
   switch (fault) {
     case Fault::too_fast:
       return "the handle moved faster than max_speed";
@@ -45,8 +46,6 @@ std::string_view remedy(Fault fault) {
   }
   return "";
 }
-
-}  // namespace
 
 std::string histogram_bars(const TimeHistogram& histogram) {
   constexpr std::array<std::string_view, 9> levels = {"·", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
@@ -97,7 +96,7 @@ void Monitor::take(const TickNote& note) {
     } else {
       const auto& name = fault_names[static_cast<std::size_t>(note.fault)].second;
       say(fmt::format(
-          "{:.3f} s: no force, {}: {}.{}", time, name, remedy(note.fault),
+          "{:.3f} s: no force, {}: {}.{}", time, name, fault_remedy(note.fault),
           options_.acknowledges && note.fault != Fault::device_lost ? " Press Enter to go on." : ""));
     }
   }
@@ -123,7 +122,8 @@ void Monitor::say(const std::string& text) {
 void Monitor::draw() {
   if (lateness_.total() == 0) return;
   const double time = static_cast<double>(last_.number) / static_cast<double>(options_.rate);
-  std::string line = fmt::format("{:7.1f} s  {:6.3f} N  {:2d} contacts", time, last_.force.norm(), last_.contacts);
+  std::string line =
+      fmt::format("{:7.1f} s  {:6.3f} N  {:2d} contacts", time, last_.force.norm(), last_.contacts);
   if (options_.shows_safety) {
     line += fmt::format("  shown {:5.2f} N {}", last_.shown,
                         safety_phase_names[static_cast<std::size_t>(last_.phase)].second);

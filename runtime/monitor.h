@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "runtime/devices/device.h"
@@ -27,6 +28,9 @@ struct TickNote {
   Fault fault = Fault::none;
   DeviceEvent events = DeviceEvent::none;
 };
+
+/// What a person can do about a fault: a sentence without its end.
+[[nodiscard]] std::string_view fault_remedy(Fault fault);
 
 struct MonitorOptions {
   std::int64_t rate = 1000;   ///< ticks a second

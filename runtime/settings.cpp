@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "meshes/error.h"
@@ -73,7 +74,147 @@ std::string safety_text(const SafetyOptions& options) {
   return text;
 }
 
+[[noreturn]] void refuse(const std::string& name, const std::string& what, const std::string& hint) {
+  throw Error(what, "--" + name, hint);
+}
+
+double read_positive(const std::string& name, const std::string& text, const std::string& unit) {
+  const std::optional<double> number = parse_number(text);
+  if (!number || *number <= 0.0)
+    refuse(name, "'" + text + "' is not a positive number of " + unit, "write for instance 2.5");
+  return *number;
+}
+
+double read_from_zero(const std::string& name, const std::string& text) {
+  const std::optional<double> number = parse_number(text);
+  if (!number || *number < 0.0)
+    refuse(name, "'" + text + "' is not a number from 0 on", "write for instance 0.3");
+  return *number;
+}
+
+double read_hand_over(const std::string& text) {
+  if (text == "inf") return std::numeric_limits<double>::infinity();
+  return read_positive("hand-over", text, "the force, or inf");
+}
+
+std::int64_t read_whole(const std::string& name, const std::string& text, Index least, Index most) {
+  const std::optional<Index> number = parse_index(text);
+  if (!number || *number < least || *number > most) {
+    refuse(name, fmt::format("'{}' is not a whole number from {} to {}", text, least, most),
+           fmt::format("write for instance {}", least));
+  }
+  return *number;
+}
+
+std::size_t read_megabytes(const std::string& text) {
+  const std::optional<Index> megabytes = parse_index(text);
+  if (!megabytes || *megabytes < 1)
+    refuse("overlay-memory", "'" + text + "' is not a whole number of megabytes", "write for instance 512");
+  return static_cast<std::size_t>(*megabytes) << 20;
+}
+
+ContactModel read_contact(const std::string& text) {
+  if (text == "dynamic") return ContactModel::dynamic;
+  if (text != "quasi-static")
+    refuse("contact", "'" + text + "' is neither quasi-static nor dynamic", "write one of them");
+  return ContactModel::quasi_static;
+}
+
+Vec3 read_place(const std::string& text) {
+  const std::optional<std::vector<double>> place = parse_vector(text);
+  if (!place) refuse("origin", "'" + text + "' is not finite numbers X,Y,Z", "write for instance 0,0,0.1");
+  return {(*place)[0], (*place)[1], place->size() == 3 ? (*place)[2] : 0.0};
+}
+
+void read_shape(Settings& settings, const std::string& text) {
+  const Tool shape = parse_shape(text);
+  settings.tool.radius = shape.radius;
+  settings.tool.length = shape.length;
+}
+
+void read_axes(Settings& settings, const std::string& text) {
+  static_cast<void>(parse_axes(text));
+  settings.axes = text;
+}
+
+/// How each option is read.
+struct SettingReader {
+  std::string_view name;
+  void (*read)(Settings& settings, const std::string& text);
+};
+
+constexpr Index most_contacts = 1000;  // a factor of so many fits into a gigabyte
+
+constexpr std::array<SettingReader, 19> setting_readers = {{
+    {"tool", read_shape},
+    {"friction", [](Settings& s, const std::string& t) { s.tool.friction = read_from_zero("friction", t); }},
+    {"coupling",
+     [](Settings& s, const std::string& t) {
+       s.tool.coupling_stiffness = read_positive("coupling", t, "N/m");
+     }},
+    {"coupling-torsion",
+     [](Settings& s, const std::string& t) {
+       s.tool.coupling_torsion = read_positive("coupling-torsion", t, "N m/rad");
+     }},
+    {"max-force",
+     [](Settings& s, const std::string& t) { s.tool.max_force = read_positive("max-force", t, "newtons"); }},
+    {"hand-over", [](Settings& s, const std::string& t) { s.tool.hand_over = read_hand_over(t); }},
+    {"reach", [](Settings& s, const std::string& t) { s.reach = read_positive("reach", t, "metres"); }},
+    {"max-contacts",
+     [](Settings& s, const std::string& t) {
+       s.max_contacts = static_cast<Index>(read_whole("max-contacts", t, 1, most_contacts));
+     }},
+    {"contact", [](Settings& s, const std::string& t) { s.contact = read_contact(t); }},
+    {"load-scale", [](Settings& s, const std::string& t) { s.load_scale = read_from_zero("load-scale", t); }},
+    {"stiffness-scale",
+     [](Settings& s, const std::string& t) {
+       s.stiffness_scale = read_positive("stiffness-scale", t, "Young's moduli for one");
+     }},
+    {"overlay", [](Settings& s, const std::string& t) { s.overlay = parse_overlay(t, "--overlay"); }},
+    {"overlay-memory", [](Settings& s, const std::string& t) { s.overlay_memory = read_megabytes(t); }},
+    {"rate",
+     [](Settings& s, const std::string& t) { s.rate = read_whole("rate", t, least_rate, most_rate); }},
+    {"motion-scale",
+     [](Settings& s, const std::string& t) {
+       s.motion_scale = read_positive("motion-scale", t, "metres for one");
+     }},
+    {"force-scale",
+     [](Settings& s,
+        const std::string& t) { s.force_scale = read_positive("force-scale", t, "newtons for one"); }},
+    {"origin", [](Settings& s, const std::string& t) { s.origin = read_place(t); }},
+    {"axes", read_axes},
+    {"safety", [](Settings& s, const std::string& t) { s.safety = parse_safety(t); }},
+}};
+
+bool is_setting(std::string_view name) {
+  return std::any_of(setting_readers.begin(), setting_readers.end(),
+                     [name](const SettingReader& reader) { return reader.name == name; });
+}
+
 }  // namespace
+
+Settings read_settings(const SettingsText& text) {
+  for (const auto& [name, value] : text) {
+    if (!is_setting(name)) refuse(name, "there is no such option", "palpate-runtime play --help lists them");
+  }
+  Settings settings;
+  for (const SettingReader& reader : setting_readers) {
+    const auto found = text.find(std::string(reader.name));
+    if (found != text.end()) reader.read(settings, found->second);
+  }
+  return settings;
+}
+
+SettingsText split_settings(std::string_view lines) {
+  SettingsText settings;
+  while (!lines.empty()) {
+    const std::size_t end = std::min(lines.find('\n'), lines.size());
+    const Part line = split_part(lines.substr(0, end));
+    lines.remove_prefix(std::min(end + 1, lines.size()));
+    if (is_setting(line.name)) settings.emplace(line.name, line.value);
+  }
+  return settings;
+}
 
 WorkspaceOptions Settings::workspace() const {
   return {.device_origin = Vec3::Zero(),
@@ -81,6 +222,13 @@ WorkspaceOptions Settings::workspace() const {
           .axes = parse_axes(axes),
           .motion_scale = motion_scale,
           .force_scale = force_scale};
+}
+
+BodyOptions Settings::body() const {
+  return {.refinement = overlay ? overlay->refinement : 1,
+          .contact = contact,
+          .load_scale = load_scale,
+          .stiffness_scale = stiffness_scale};
 }
 
 std::string to_text(const Settings& settings) {
@@ -99,6 +247,8 @@ std::string to_text(const Settings& settings) {
   if (settings.reach) add("reach", *settings.reach);
   add("max-contacts", settings.max_contacts);
   add("contact", settings.contact == ContactModel::dynamic ? "dynamic" : "quasi-static");
+  if (settings.load_scale != 1.0) add("load-scale", settings.load_scale);
+  if (settings.stiffness_scale != 1.0) add("stiffness-scale", settings.stiffness_scale);
   if (settings.overlay) {
     add("overlay", fmt::format("r={},rings={}", settings.overlay->refinement, settings.overlay->rings));
     add("overlay-memory", settings.overlay_memory >> 20);

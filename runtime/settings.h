@@ -1,6 +1,7 @@
 // What the outcome of a session follows from, beside the model and the hand; as text too.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -8,10 +9,14 @@
 #include "runtime/body.h"
 #include "runtime/devices/safety.h"
 #include "runtime/devices/workspace.h"
+#include "runtime/loading.h"
 #include "runtime/patch_source.h"
 #include "runtime/tool.h"
 
 namespace palpate {
+
+inline constexpr Index least_rate = 1000;  ///< ticks a second
+inline constexpr Index most_rate = 5000;
 
 /// Each is an option of `palpate-runtime play`, by whose name it stands in a recording.
 struct Settings {
@@ -19,6 +24,8 @@ struct Settings {
   std::optional<double> reach;  ///< [m]; else the longest edge of the surface
   Index max_contacts = 32;
   ContactModel contact = ContactModel::quasi_static;
+  double load_scale = 1.0;                                   ///< of the file's loads
+  double stiffness_scale = 1.0;                              ///< of all Young's moduli
   std::optional<OverlayOptions> overlay;                     ///< none: the body's own mesh
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
   std::int64_t rate = 1000;                                  ///< ticks a second
@@ -29,10 +36,21 @@ struct Settings {
   std::optional<SafetyOptions> safety;  ///< none: off where nobody feels it, else the defaults
 
   [[nodiscard]] WorkspaceOptions workspace() const;
+  [[nodiscard]] BodyOptions body() const;
 };
 
 /// A line NAME=VALUE for each that is not left to its default; numbers read back to the same bits.
 [[nodiscard]] std::string to_text(const Settings& settings);
+
+/// Options by name, as they are written.
+using SettingsText = std::map<std::string, std::string>;
+
+/// What they mean; what is left out has its default. Throws Error whose `where` is the option, also for one
+/// that there is not.
+[[nodiscard]] Settings read_settings(const SettingsText& text);
+
+/// The lines of `to_text` that are options; others, of a later version, are left out.
+[[nodiscard]] SettingsText split_settings(std::string_view lines);
 
 // Of one option each; they throw Error whose `where` is the option.
 

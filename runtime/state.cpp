@@ -1,5 +1,6 @@
 #include "runtime/state.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -106,5 +107,14 @@ State::State(const Body& body, const StateOptions& options)
       force_change(rows.size()),
       far_displacement(static_cast<std::size_t>(body.dimension() * most_far_nodes)),
       stored_displacement(static_cast<std::size_t>(body.greens().order())) {}
+
+Vec3 outward_normal(const Body& body, const State& state, Index simplex) noexcept {
+  const auto d = static_cast<std::size_t>(body.dimension());
+  const std::span<const Index> nodes = body.simplices().subspan(d * static_cast<std::size_t>(simplex), d);
+  const Vec3 a = state.tree.position(nodes[0]);
+  const Vec3 ab = state.tree.position(nodes[1]) - a;
+  if (d == 2) return Vec3(ab.y(), -ab.x(), 0.0).normalized();
+  return ab.cross(state.tree.position(nodes[2]) - a).normalized();
+}
 
 }  // namespace palpate

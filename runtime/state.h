@@ -119,4 +119,7 @@ inline Vec3 unloaded_position(const Body& body, State& state, Index surface_node
          state.motion.at(body, surface_node);
 }
 
+/// Of a simplex of the surface as it is now.
+Vec3 outward_normal(const Body& body, const State& state, Index simplex) noexcept;
+
 }  // namespace palpate

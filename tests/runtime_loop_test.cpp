@@ -2,12 +2,17 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <limits>
+#include <span>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "formats/recording.h"
@@ -137,6 +142,101 @@ TEST_F(Loop, StopsWhenAsked) {
   EXPECT_EQ(report.ticks, 0);
 }
 
+/// A device that asks the loop for something in some of its ticks, and keeps what it was shown.
+class Asking : public ScriptDevice {
+ public:
+  Asking(const ScriptDevice& script, std::function<void(std::int64_t)> ask)
+      : ScriptDevice(script), ask_(std::move(ask)) {}
+  DeviceNews hear(const TickTime& tick) noexcept override {
+    heard.push_back(tick);
+    ask_(tick.number);
+    return ScriptDevice::hear(tick);
+  }
+  void show(const DeviceCommand& command, const DeviceState&, std::int64_t) noexcept override {
+    shown.push_back(command.wrench.force.norm());
+  }
+  std::vector<TickTime> heard;
+  std::vector<double> shown;
+
+ private:
+  std::function<void(std::int64_t)> ask_;
+};
+
+// A thread lets it take three single ticks, then go on.
+TEST_F(Loop, StandsStillWhilePausedAndGoesOnWithoutAGap) {
+  LoopControl control;
+  const ScriptDevice script = ScriptDevice::parse("t,x,y,z\n0,0.5,0.5,0.9\n0.2,0.5,0.5,0.9\n", "rest.csv");
+  Asking device(script, [&](std::int64_t k) {
+    if (k == 50) control.paused = true;
+  });
+  std::thread person([&] {
+    while (!control.paused) std::this_thread::yield();
+    std::this_thread::sleep_for(std::chrono::milliseconds(40));
+    control.single_ticks = 3;
+    while (control.single_ticks > 0) std::this_thread::yield();
+    std::this_thread::sleep_for(std::chrono::milliseconds(40));
+    control.paused = false;
+  });
+  Safety safety({.ramp = 0.0, .calm_time = 0.0, .deadline = {.tolerance = 1e9}, .silence = {.most = 1e9}});
+  std::vector<std::int64_t> told;
+  {
+    TickFeed feed([&](std::span<const TickNote> notes) {
+      for (const TickNote& note : notes) told.push_back(note.number);
+    });
+    const LoopReport report = run_loop({.body = body_,
+                                        .state = state_,
+                                        .device = device,
+                                        .safety = &safety,
+                                        .control = &control,
+                                        .feed = &feed},
+                                       {.ticks = 101}, stop_);
+    EXPECT_EQ(report.ticks, 101);
+  }
+  person.join();
+  ASSERT_EQ(device.heard.size(), 101U);
+  ASSERT_EQ(told.size(), 101U);
+  std::vector<std::int64_t> waits;  // ms, of those that are longer than a tick
+  for (std::size_t k = 1; k < 101; ++k) {
+    EXPECT_EQ(told[k], told[k - 1] + 1);
+    const std::int64_t wait = device.heard[k].due - device.heard[k - 1].due;
+    EXPECT_EQ(wait % 1'000'000, 0);
+    if (wait > 1'000'000) waits.push_back(wait / 1'000'000);
+  }
+  ASSERT_GE(waits.size(), 2U);
+  EXPECT_GE(waits.front(), 39);
+  EXPECT_GE(waits.back(), 39);
+  EXPECT_GE(device.shown.size(), 101U + 78U) << "no force while it is paused";
+}
+
+TEST_F(Loop, LeavesWithoutBeingInterrupted) {
+  LoopControl control;
+  Asking device(ScriptDevice::parse(pull, "pull.csv"), [&](std::int64_t k) { control.leave = k == 20; });
+  const LoopReport report = run_loop({.body = body_, .state = state_, .device = device, .control = &control},
+                                     {.ticks = 301, .fast = true}, stop_);
+  EXPECT_EQ(report.ticks, 21);
+  EXPECT_FALSE(report.interrupted);
+}
+
+// A node that is held moves with the tool: it is pressed in by what the tool went down since.
+TEST_F(Loop, TellsHowFarTheSurfaceIsPressedIn) {
+  const char* const lightly =
+      "t,x,y,z,grab\n0,0.5,0.5,1.5,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.999,1\n0.3,0.5,0.5,1.0,0\n";
+  ScriptDevice device = ScriptDevice::parse(lightly, "lightly.csv");
+  std::vector<double> depth;
+  {
+    TickFeed feed([&](std::span<const TickNote> notes) {
+      for (const TickNote& note : notes) depth.push_back(note.depth);
+    });
+    run_loop({.body = body_, .state = state_, .device = device, .feed = &feed}, {.ticks = 301, .fast = true},
+             stop_);
+  }
+  ASSERT_EQ(depth.size(), 301U);
+  EXPECT_EQ(depth[50], 0.0) << "it touches nothing yet";
+  const double down = device.pose(0.098).position.z() - device.pose(0.2).position.z();
+  EXPECT_NEAR(depth[200], down, 1e-3 * down) << "but for the tilt of the surface";
+  EXPECT_EQ(depth[300], 0.0) << "let go";
+}
+
 std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
@@ -153,6 +253,33 @@ class RecordedLoop : public Loop {
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) / ("palpate_recordings." + std::to_string(getpid()));
 };
+
+// The event that begins force anew is of those ticks alone that come after a pause.
+TEST_F(RecordedLoop, RecordsWhereItWentOn) {
+  LoopControl control;
+  const ScriptDevice script = ScriptDevice::parse("t,x,y,z\n0,0.5,0.5,0.9\n0.1,0.5,0.5,0.9\n", "rest.csv");
+  Asking device(script, [&](std::int64_t k) {
+    if (k != 50) return;
+    control.single_ticks = 2;
+    control.paused = true;
+  });
+  std::thread person([&] {
+    while (!control.paused || control.single_ticks > 0) std::this_thread::yield();
+    control.paused = false;
+  });
+  Recorder recorder(folder_ / "paused.h5", session_info);
+  run_loop({.body = body_, .state = state_, .device = device, .recorder = &recorder, .control = &control},
+           {.ticks = 101}, stop_);
+  person.join();
+  recorder.finish();
+  const Recording recording = read_recording(folder_ / "paused.h5");
+  ASSERT_EQ(recording.ticks.size(), 101U);
+  for (std::size_t k = 0; k < 101; ++k) {
+    const auto event = static_cast<DeviceEvent>(recording.ticks[k].event);
+    if (k == 53) continue;  // the pause may end before or after tick 52
+    EXPECT_EQ(event, k == 51 || k == 52 ? DeviceEvent::resumed : DeviceEvent::none) << k;
+  }
+}
 
 // 70 s: more ticks than the recorder's ring holds.
 TEST_F(RecordedLoop, FastRunsLeaveTheSameRecordingToTheLastBit) {

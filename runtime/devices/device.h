@@ -43,6 +43,9 @@ enum class DeviceEvent : std::uint8_t {
   lost = 1U << 1,          ///< unplugged, or it cannot be read or written
   acknowledged = 1U << 2,  ///< a person has seen the fault
   input_lost = 1U << 3,    ///< the viewer that moved the tool is gone
+  lifted = 1U << 4,   ///< the tool hovers: it is put down where it is let down, and nothing is felt of the
+                      ///< way there
+  resumed = 1U << 5,  ///< the loop goes on after a pause: force begins anew
 };
 
 constexpr DeviceEvent operator|(DeviceEvent a, DeviceEvent b) noexcept {

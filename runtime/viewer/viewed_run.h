@@ -6,15 +6,9 @@
 #include <optional>
 #include <string>
 
-#include "runtime/tool.h"
+#include "runtime/pointer_pose.h"
 
 namespace palpate {
-
-/// Where the pointer wants the tool.
-struct PointerPose {
-  ToolPose pose;
-  bool lifted = false;  ///< it hovers: nothing is felt of the way to where it is let down
-};
 
 /// Options of play by name, as text; nothing: the default.
 using SettingsChange = std::map<std::string, std::optional<std::string>>;

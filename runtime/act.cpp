@@ -1,0 +1,153 @@
+#include "runtime/act.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "runtime/last_tick.h"
+#include "runtime/output.h"
+#include "runtime/play_report.h"
+#include "runtime/real_time.h"
+
+namespace palpate {
+namespace {
+
+constexpr double views_a_second = 60.0;
+
+std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) {
+  const double ticks = static_cast<double>(rate) / frames_a_second;
+  return std::max<std::int64_t>(std::llround(std::min(ticks, 1e15)), 1);
+}
+
+Tool tool_of(const Settings& settings, const Body& body) {
+  Tool tool = settings.tool;
+  tool.reach = settings.reach.value_or(body.longest_surface_edge());
+  return tool;
+}
+
+State state_of(const Settings& settings, const Body& body, const Tool& tool) {
+  return State(body, {.tools = {tool},
+                      .max_contacts = settings.max_contacts,
+                      .patch_nodes = settings.overlay ? patch_room(body, settings.overlay->rings, 1) : 0,
+                      .tick = 1.0 / static_cast<double>(settings.rate)});
+}
+
+}  // namespace
+
+Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActViewer& viewer)
+    : options_(std::move(options)),
+      body_(body),
+      mover_(mover),
+      control_(viewer.control),
+      tool_(tool_of(options_.settings, body)),
+      state_(state_of(options_.settings, body, tool_)) {
+  Settings& settings = options_.settings;
+  if (settings.safety) {
+    settings.safety->period = 1.0 / static_cast<double>(settings.rate);
+    safety_.emplace(*settings.safety);
+  }
+  const bool in_background = !options_.fast && !options_.session;
+  if (settings.overlay) {
+    overlays_.emplace(body, state_,
+                      PatchSourceOptions{.rings = settings.overlay->rings,
+                                         .memory = settings.overlay_memory,
+                                         .in_background = in_background});
+  }
+  if (body.model().dynamics.method == DynamicsMethod::packed)
+    motion_.emplace(body, state_, MotionSourceOptions{.in_background = in_background});
+  if (!options_.record.empty()) {
+    recorder_.emplace(options_.record,
+                      SessionInfo{.model_path = options_.file.string(),
+                                  .content_hash = body.model().content_hash,
+                                  .device = options_.device.text,
+                                  .rate = settings.rate,
+                                  .options = to_text(settings)},
+                      recorded_surface(body));
+  }
+  if (recorder_ && options_.record_frames > 0.0) {
+    frames_.emplace(
+        body, state_,
+        SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(settings.rate, options_.record_frames),
+                             .in_background = !options_.fast},
+        [this](SurfacePicture picture) {
+          if (options_.fast) {
+            recorder_->push_frame_waiting(std::move(picture.frame));
+          } else {
+            recorder_->push_frame(std::move(picture.frame));
+          }
+        });
+  }
+  if (viewer.pictures)
+    viewed_.emplace(body, state_, SurfaceFramesOptions{.ticks_per_frame = 1}, viewer.pictures);
+  if (viewer.ticks) feed_.emplace(viewer.ticks);
+  if (!options_.fast) {
+    monitor_.emplace(MonitorOptions{.rate = settings.rate,
+                                    .line = isatty(STDERR_FILENO) != 0,
+                                    .acknowledges = mover.link != nullptr,
+                                    .shows_safety = safety_.has_value()});
+  }
+}
+
+const LoopReport& Act::run(const std::atomic<bool>& stop) {
+  report_ = run_with_rights(stop);
+  monitor_.reset();
+  feed_.reset();
+  viewed_.reset();
+  frames_.reset();  // the last frame is in the recording
+  if (recorder_) recorder_->finish();
+  return report_;
+}
+
+/// The loop with the rights it needs, which the threads that were started before do not inherit.
+LoopReport Act::run_with_rights(const std::atomic<bool>& stop) {
+  const auto pointer = [](auto& part) { return part ? &*part : nullptr; };
+  const LoopParts parts = {.body = body_,
+                           .state = state_,
+                           .device = *mover_.device,
+                           .workspace = Workspace(options_.settings.workspace()),
+                           .safety = pointer(safety_),
+                           .overlays = pointer(overlays_),
+                           .motion = pointer(motion_),
+                           .recorder = pointer(recorder_),
+                           .monitor = pointer(monitor_),
+                           .frames = pointer(frames_),
+                           .control = control_,
+                           .feed = pointer(feed_),
+                           .viewed = pointer(viewed_),
+                           .replayed = options_.session.get()};
+  const LoopOptions loop = {.rate = options_.settings.rate,
+                            .ticks = mover_.ticks,
+                            .fast = options_.fast,
+                            .ticks_per_view = ticks_per_frame(options_.settings.rate, views_a_second)};
+  if (options_.fast) return run_loop(parts, loop, stop);
+  const RealTimeRights rights(options_.processor);
+  if (!rights.refused().empty()) print_warning(rights.refused());
+  return run_loop(parts, loop, stop);
+}
+
+void Act::tell() const {
+  const PlayedRun played{.options = options_,
+                         .settings = options_.settings,
+                         .body = body_,
+                         .tool = tool_,
+                         .report = report_,
+                         .overlays = overlays_ ? &*overlays_ : nullptr,
+                         .motion = motion_ ? &*motion_ : nullptr,
+                         .link = mover_.link,
+                         .dropped = recorder_ ? recorder_->dropped() : 0,
+                         .dropped_frames = recorder_ ? recorder_->dropped_frames() : 0};
+  print_report(played);
+  if (!options_.contacts.empty()) write_text_file(options_.contacts, contact_table(body_, state_));
+  if (!options_.surface.empty()) write_surface(options_.surface, body_, state_);
+  const std::string json = json_report(played);
+  if (options_.report.empty()) {
+    fmt::print("{}", json);
+  } else {
+    write_text_file(options_.report, json);
+  }
+}
+
+}  // namespace palpate

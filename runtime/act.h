@@ -1,0 +1,59 @@
+// One run of the loop, from the untouched body to its report.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "runtime/body.h"
+#include "runtime/loop.h"
+#include "runtime/mover.h"
+#include "runtime/play.h"
+
+namespace palpate {
+
+/// Who looks on, and may steer it. Without a viewer nothing is set.
+struct ActViewer {
+  LoopControl* control = nullptr;
+  TickFeed::Sink ticks;
+  SurfaceFrames::Sink pictures;
+};
+
+/// Everything that works beside the loop in one run: overlays, motion, recording, frames, monitor.
+class Act {
+ public:
+  /// `options` with the settings and the recording of this act, settled for the mover; `body` and `mover`
+  /// must live as long. Throws Error.
+  Act(PlayOptions options, const Body& body, const Mover& mover, const ActViewer& viewer = {});
+  Act(const Act&) = delete;
+  Act& operator=(const Act&) = delete;
+
+  /// To the end, to `stop` or until the viewer's control says `leave`. What was recorded is one plain file
+  /// then, else it throws Error.
+  const LoopReport& run(const std::atomic<bool>& stop);
+
+  /// The report, and the files that the options ask for. Throws Error.
+  void tell() const;
+
+ private:
+  LoopReport run_with_rights(const std::atomic<bool>& stop);
+
+  PlayOptions options_;
+  const Body& body_;
+  const Mover& mover_;
+  LoopControl* control_;
+  Tool tool_;
+  State state_;
+  std::optional<Safety> safety_;
+  std::optional<PatchSource> overlays_;
+  std::optional<MotionSource> motion_;
+  std::optional<Recorder> recorder_;
+  std::optional<SurfaceFrames> frames_;
+  std::optional<SurfaceFrames> viewed_;
+  std::optional<TickFeed> feed_;
+  std::optional<Monitor> monitor_;
+  LoopReport report_;
+};
+
+}  // namespace palpate

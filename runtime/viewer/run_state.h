@@ -1,0 +1,41 @@
+// What a viewer's page is told of a run beside its pictures.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "runtime/body.h"
+#include "runtime/devices/fault.h"
+#include "runtime/settings.h"
+
+namespace palpate {
+
+/// The run's members of the message `state` (web/PROTOCOL.md).
+struct RunState {
+  std::uint32_t scene = 0;
+  std::string model;     ///< JSON, of describe_model
+  std::string defaults;  ///< JSON, of describe_defaults
+  std::string device;    ///< what moves the tool
+  bool pointer = false;  ///< it is a page's pointer
+  std::int64_t rate = 1000;
+  std::int64_t ticks = 0;   ///< since the act began
+  std::int64_t misses = 0;  ///< of deadlines
+  bool paused = false;
+  std::optional<std::string> recording;  ///< file
+  std::optional<std::string> busy;       ///< what is being made, or why a wish could not be met
+  std::optional<std::string> locked;     ///< why settings cannot be changed
+  SafetyPhase phase = SafetyPhase::active;
+  Fault fault = Fault::none;
+  SettingsText settings;
+};
+
+[[nodiscard]] std::string to_json(const RunState& state);
+
+/// Name, file, size and kind of a model.
+[[nodiscard]] std::string describe_model(const Body& body, const std::string& file);
+
+/// What suits it: radius of a tool, reach of a grab, friction, and how deep to press.
+[[nodiscard]] std::string describe_defaults(const Body& body);
+
+}  // namespace palpate

@@ -1,0 +1,298 @@
+#include "runtime/viewer/viewed_play.h"
+
+#include <fmt/chrono.h>
+#include <fmt/core.h>
+
+#include <chrono>
+#include <ctime>
+#include <thread>
+#include <utility>
+
+#include "meshes/error.h"
+#include "runtime/loading.h"
+#include "runtime/output.h"
+#include "runtime/viewer/scene.h"
+
+namespace palpate {
+namespace {
+
+constexpr auto state_period = std::chrono::milliseconds(500);
+constexpr auto pause_for_wishes = std::chrono::milliseconds(20);
+
+/// FILE-STEM-YYYYmmdd-HHMMSS.h5 in the working directory; with a number where that is there already.
+std::filesystem::path name_recording(const std::filesystem::path& model) {
+  std::filesystem::path stem = model.stem();  // without .hdf
+  if (stem.extension() == ".palpate") stem = stem.stem();
+  const std::string name =
+      fmt::format("{}-{:%Y%m%d-%H%M%S}", stem.string(), fmt::localtime(std::time(nullptr)));
+  std::filesystem::path path = name + ".h5";
+  for (int k = 2; std::filesystem::exists(path); ++k) path = fmt::format("{}-{}.h5", name, k);
+  return path;
+}
+
+std::string sentence(const std::exception& error) {
+  const auto* known = dynamic_cast<const Error*>(&error);
+  if (known == nullptr) return error.what();
+  return known->where() + ": " + known->what() + " (" + known->hint() + ")";
+}
+
+}  // namespace
+
+ViewedPlay::ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body)
+    : options_(std::move(options)),
+      mover_(mover),
+      body_(std::move(body)),
+      body_options_(options_.settings.body()),
+      can_move_(body_->model().dynamics.method != DynamicsMethod::none),
+      wished_{.text = options_.settings_text, .settings = options_.settings, .record = options_.record} {
+  if (options_.device.kind == DeviceChoice::Kind::mouse) add_mouse(mover_, options_, *body_);
+  state_.device = options_.device.text;
+  state_.pointer = mover_.mouse != nullptr;
+  state_.rate = options_.settings.rate;
+  if (options_.session) state_.locked = "a replay is as its session was";
+}
+
+LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
+  ViewerServer server(*options_.view, *this);
+  server_ = &server;
+  fmt::print(stderr, "open {} in a browser\n", server.url());
+  show_body();
+  const std::jthread teller([this](const std::stop_token& over) { tell_states(over); });
+
+  std::optional<Plan> good;  // that could be met
+  for (;;) {
+    const Plan plan = next_plan();
+    try {
+      const std::unique_ptr<Act> act = begin_act(plan);
+      good = plan;
+      const LoopReport report = run_act(*act, stop);
+      const bool over = options_.duration && report.ticks >= mover_.ticks;
+      if (stop || over || !wait_for_wish(stop)) {
+        act->tell();
+        return report;
+      }
+    } catch (const std::exception& error) {
+      if (!good || !take_back(plan, *good, sentence(error))) throw;
+    }
+  }
+}
+
+ViewedPlay::Plan ViewedPlay::next_plan() {
+  const std::lock_guard lock(mutex_);
+  control_.leave = false;
+  control_.single_ticks = control_.paused ? 1 : 0;  // it shows the body as it is then
+  return wished_;
+}
+
+/// The state that pages see is that of the new act from here on.
+std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
+  load(plan.settings);
+  PlayOptions options = options_;
+  options.settings_text = plan.text;
+  options.settings = settle(plan.settings, mover_, *body_);
+  options.record = plan.record;
+  print_device(mover_, options.settings);
+  auto act = std::make_unique<Act>(
+      std::move(options), *body_, mover_,
+      ActViewer{
+          .control = &control_,
+          .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
+          .pictures =
+              [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); }});
+  const std::lock_guard lock(mutex_);
+  state_.settings = plan.text;
+  state_.ticks = 0;
+  state_.misses = 0;
+  state_.recording.reset();
+  if (!plan.record.empty()) state_.recording = plan.record.string();
+  if (!options_.session) {
+    state_.locked.reset();
+    if (state_.recording) state_.locked = "a recording is being made";
+  }
+  changed_ = true;
+  tell_.notify_all();
+  return act;
+}
+
+/// Another body where the settings need one; the old one goes first, as it is large.
+void ViewedPlay::load(const Settings& settings) {
+  if (body_ != nullptr && body_options_ == settings.body()) return;
+  set_busy("the model is being loaded");
+  body_.reset();
+  body_ = load_and_print(options_.file, options_.model_toml, settings.body());
+  body_options_ = settings.body();
+  show_body();
+  set_busy(std::nullopt);
+}
+
+void ViewedPlay::show_body() {
+  std::uint32_t number = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    number = ++state_.scene;
+    state_.model = describe_model(*body_, options_.file.string());
+    state_.defaults = describe_defaults(*body_);
+    changed_ = true;
+  }
+  server_->show_scene(std::make_shared<const Scene>(make_scene(*body_, number)));
+  tell_.notify_all();
+}
+
+LoopReport ViewedPlay::run_act(Act& act, const std::atomic<bool>& stop) {
+  try {
+    return act.run(stop);
+  } catch (const Error& error) {  // of the recording: the run goes on without it
+    if (stop || options_.duration) throw;
+    print_warning(sentence(error));
+    set_busy(sentence(error));
+    const std::lock_guard lock(mutex_);
+    wished_.record.clear();
+    return {};
+  }
+}
+
+/// A script or a session is over: what it left is shown. False when it is to stop.
+bool ViewedPlay::wait_for_wish(const std::atomic<bool>& stop) const {
+  while (!control_.leave && !stop) std::this_thread::sleep_for(pause_for_wishes);
+  return !stop;
+}
+
+/// Back to what could be met, unless that is what failed.
+bool ViewedPlay::take_back(const Plan& failed, const Plan& good, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  if (failed.text == good.text && failed.record.empty()) return false;
+  print_warning(why);
+  wished_ = good;
+  wished_.record.clear();
+  state_.busy = why;
+  changed_ = true;
+  tell_.notify_all();
+  return true;
+}
+
+void ViewedPlay::point(const PointerPose& wanted) {
+  if (mover_.mouse != nullptr) mover_.mouse->point(wanted);
+}
+
+void ViewedPlay::lose_pointer() {
+  if (mover_.mouse != nullptr) mover_.mouse->lose();
+}
+
+void ViewedPlay::pause(bool paused) {
+  const std::lock_guard lock(mutex_);
+  control_.single_ticks = 0;
+  control_.paused = paused;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+void ViewedPlay::step_once() {
+  if (control_.paused) ++control_.single_ticks;
+}
+
+void ViewedPlay::acknowledge() {
+  control_.acknowledged = true;
+}
+
+void ViewedPlay::reset() {
+  const std::lock_guard lock(mutex_);
+  if (wished_.record.empty()) return end_act();
+  throw Error("a recording is being made, which begins with the untouched body", "reset",
+              "end the recording first");
+}
+
+void ViewedPlay::change(const SettingsChange& settings) {
+  const std::lock_guard lock(mutex_);
+  refuse_while_locked();
+  Plan plan = wished_;
+  for (const auto& [name, value] : settings) {
+    for (const char* fixed : {"rate", "motion-scale", "force-scale", "origin", "axes"}) {
+      if (name == fixed)
+        throw Error("it stays as it is in a run", "--" + name,
+                    "start palpate-runtime play anew with another one");
+    }
+    if (value) {
+      plan.text[name] = *value;
+    } else {
+      plan.text.erase(name);
+    }
+  }
+  plan.settings = read_settings(plan.text);
+  check(plan.settings);
+  wished_ = std::move(plan);
+  end_act();
+}
+
+void ViewedPlay::record(bool on) {
+  const std::lock_guard lock(mutex_);
+  if (on == !wished_.record.empty()) return;
+  if (options_.session) throw Error("a replay is recorded already", "record", "copy the session's file");
+  wished_.record = on ? name_recording(options_.file) : std::filesystem::path();
+  end_act();
+}
+
+void ViewedPlay::seek(std::int64_t) {
+  throw Error("the loop goes through all ticks of the session, one after the other", "seek",
+              "reset it to see it from its beginning");
+}
+
+/// With the mutex held, as those below.
+void ViewedPlay::refuse_while_locked() const {
+  if (options_.session)
+    throw Error("a replay is as its session was", "change", "play without --device replay");
+  if (!wished_.record.empty())
+    throw Error("a recording is being made, of one group of settings", "change", "end the recording first");
+}
+
+/// What can be seen without loading.
+void ViewedPlay::check(const Settings& settings) const {
+  if (settings.contact == ContactModel::dynamic && !can_move_) {
+    throw Error("the file has no dynamics, which dynamic contact needs", "--contact",
+                "add [dynamics] to its model.toml and precompute it again");
+  }
+}
+
+void ViewedPlay::end_act() {
+  state_.busy.reset();
+  control_.leave = true;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+void ViewedPlay::set_busy(std::optional<std::string> sentence) {
+  const std::lock_guard lock(mutex_);
+  state_.busy = std::move(sentence);
+  changed_ = true;
+  tell_.notify_all();
+}
+
+void ViewedPlay::take_ticks(std::span<const TickNote> notes) {
+  server_->show_ticks(notes);
+  const std::lock_guard lock(mutex_);
+  const std::int64_t period = 1'000'000'000 / state_.rate;
+  for (const TickNote& note : notes) state_.misses += note.lateness_ns + note.compute_ns > period ? 1 : 0;
+  const TickNote& last = notes.back();
+  state_.ticks = last.number + 1;
+  const bool other = state_.phase != last.phase || state_.fault != last.fault;
+  state_.phase = last.phase;
+  state_.fault = last.fault;
+  if (!other) return;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+/// The thread that tells pages how it is, twice a second and when something changed.
+void ViewedPlay::tell_states(const std::stop_token& over) {
+  std::unique_lock lock(mutex_);
+  while (!over.stop_requested()) {
+    state_.paused = control_.paused;
+    changed_ = false;
+    const std::string json = to_json(state_);
+    lock.unlock();
+    server_->show_state(json);
+    lock.lock();
+    tell_.wait_for(lock, over, state_period, [this] { return changed_; });
+  }
+}
+
+}  // namespace palpate

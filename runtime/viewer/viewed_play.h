@@ -1,0 +1,81 @@
+// A run that is shown in a browser and steered from there.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <string>
+
+#include "runtime/act.h"
+#include "runtime/viewer/run_state.h"
+#include "runtime/viewer/viewed_run.h"
+#include "runtime/viewer/viewer_server.h"
+
+namespace palpate {
+
+/// Runs one act after the other: what a page asks for that cannot be had within an act - the untouched body,
+/// other settings, a recording - ends it and begins the next one, on the same loaded body where that will do.
+/// A wish that cannot be met is told to the page, and the act before begins again.
+class ViewedPlay : public ViewedRun {
+ public:
+  /// `mover` as make_mover left it, `body` as the options ask for it.
+  ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body);
+
+  /// Opens the viewer, and goes on until `stop` or the end of a duration that the options give. Tells of the
+  /// last act, whose report it returns. Throws Error.
+  LoopReport run(const std::atomic<bool>& stop);
+
+  void point(const PointerPose& wanted) override;
+  void lose_pointer() override;
+  void pause(bool paused) override;
+  void step_once() override;
+  void reset() override;
+  void acknowledge() override;
+  void change(const SettingsChange& settings) override;
+  void record(bool on) override;
+  void seek(std::int64_t frame) override;
+
+ private:
+  /// What an act is to be.
+  struct Plan {
+    SettingsText text;
+    Settings settings;
+    std::filesystem::path record;  ///< empty: nothing
+  };
+
+  std::unique_ptr<Act> begin_act(const Plan& plan);
+  void load(const Settings& settings);
+  void show_body();
+  LoopReport run_act(Act& act, const std::atomic<bool>& stop);
+  bool wait_for_wish(const std::atomic<bool>& stop) const;
+  Plan next_plan();
+  bool take_back(const Plan& failed, const Plan& good, const std::string& why);
+
+  void refuse_while_locked() const;
+  void check(const Settings& settings) const;
+  void end_act();
+  void set_busy(std::optional<std::string> sentence);
+  void take_ticks(std::span<const TickNote> notes);
+  void tell_states(const std::stop_token& over);
+
+  PlayOptions options_;
+  Mover& mover_;
+  std::unique_ptr<const Body> body_;
+  BodyOptions body_options_;
+  bool can_move_;  // the file has dynamics
+  ViewerServer* server_ = nullptr;
+  LoopControl control_;
+
+  mutable std::mutex mutex_;  // of what follows; the loop takes it never
+  Plan wished_;               // of the next act
+  RunState state_;
+  bool changed_ = true;  // since pages were told
+  std::condition_variable_any tell_;
+};
+
+}  // namespace palpate
