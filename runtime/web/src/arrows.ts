@@ -18,7 +18,7 @@ class ArrowSet {
     colour: number,
     private readonly thickness_: number,
   ) {
-    const material = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.95, depthTest: false });
+    const material = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 1, depthTest: false });
     this.shafts_ = new InstancedMesh(new CylinderGeometry(1, 1, 1 - head, 10).translate(0, (1 - head) / 2, 0), material, most);
     this.heads_ = new InstancedMesh(new ConeGeometry(2.6, head, 14).translate(0, 1 - head / 2, 0), material, most);
     for (const part of [this.shafts_, this.heads_]) {
@@ -37,7 +37,7 @@ class ArrowSet {
     const length = along.length();
     if (this.count_ === most || !(length > 1e-4 * body_size)) return;
     const turn = new Quaternion().setFromUnitVectors(up, along.clone().divideScalar(length));
-    const thick = Math.min(this.thickness_ * body_size, 0.12 * length);
+    const thick = Math.min(this.thickness_ * body_size, 0.07 * length);
     const matrix = new Matrix4().compose(from, turn, new Vector3(thick, length, thick));
     for (const part of [this.shafts_, this.heads_]) {
       part.setMatrixAt(this.count_, matrix);

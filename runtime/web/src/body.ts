@@ -38,6 +38,7 @@ interface BodyUniforms {
   range: { value: Vector2 };
   coloured: { value: number };
   hatch: { value: number };
+  evenness: { value: number };
 }
 
 /** Looks up the colour by the vertex's number, and hatches where all corners are held. */
@@ -47,8 +48,8 @@ function coloured_material(uniforms: BodyUniforms): MeshStandardMaterial {
     roughness: 0.62,
     metalness: 0,
     polygonOffset: true,
-    polygonOffsetFactor: 1,
-    polygonOffsetUnits: 1,
+    polygonOffsetFactor: 2,
+    polygonOffsetUnits: 4,
   });
   material.onBeforeCompile = (shader) => {
     Object.assign(shader.uniforms, uniforms);
@@ -58,7 +59,7 @@ function coloured_material(uniforms: BodyUniforms): MeshStandardMaterial {
     shader.fragmentShader = shader.fragmentShader
       .replace(
         '#include <common>',
-        '#include <common>\nvarying vec3 v_shown;\nuniform sampler2D colour_map;\nuniform vec2 range;\nuniform float coloured, hatch;',
+        '#include <common>\nvarying vec3 v_shown;\nuniform sampler2D colour_map;\nuniform vec2 range;\nuniform float coloured, hatch, evenness;',
       )
       .replace(
         '#include <color_fragment>',
@@ -72,7 +73,9 @@ function coloured_material(uniforms: BodyUniforms): MeshStandardMaterial {
           float stripe = step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0));
           diffuseColor.rgb *= 0.45 + 0.25 * stripe;
         }`,
-      );
+      )
+      // Colours that are to be read off a bar are not to be darkened by light that falls from the side.
+      .replace('#include <opaque_fragment>', 'outgoingLight = mix(outgoingLight, diffuseColor.rgb, evenness);\n#include <opaque_fragment>');
   };
   return material;
 }
@@ -103,6 +106,7 @@ export class Body {
     range: { value: new Vector2(0, 1) },
     coloured: { value: 0 },
     hatch: { value: 1 },
+    evenness: { value: 0 },
   };
   private readonly material_ = coloured_material(this.uniforms_);
   private readonly mesh_ = new Mesh(new BufferGeometry(), this.material_);
@@ -113,7 +117,7 @@ export class Body {
   private readonly outline_ = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0xffb454 }));
   private readonly held_ = new Points(
     new BufferGeometry(),
-    new PointsMaterial({ color: 0x7d8ba1, size: 4, sizeAttenuation: false }),
+    new PointsMaterial({ color: 0x7d8ba1, size: 5, sizeAttenuation: false }),
   );
 
   constructor() {
@@ -198,6 +202,7 @@ export class Body {
     this.uniforms_.coloured.value = this.field === 'none' ? 0 : 1;
     this.uniforms_.colour_map.value = this.maps_[field_traits[this.field].map];
     this.uniforms_.range.value.set(low, high);
+    this.uniforms_.evenness.value = this.scene_?.dimension === 2 ? 1 : this.field === 'none' ? 0 : 0.45;
   }
 
   /** The surface as it is now, for as long as a press lasts. */

@@ -1,7 +1,7 @@
 // The bar beside the picture that says what colours mean.
 import { field_traits, map_colour, type Field } from './colours';
 import { part, write } from './dom';
-import { format_number, nice_ticks, si_prefix } from './format';
+import { nice_ticks, short_number, si_prefix } from './format';
 
 /** What a bar shows; null: nothing is coloured. */
 export interface Scale {
@@ -16,7 +16,7 @@ export function make_scale(field: Field, low: number, high: number): Scale | nul
   const [factor, prefix] = si_prefix(Math.max(Math.abs(low), Math.abs(high)));
   const ticks = nice_ticks(low / factor, high / factor).map((value) => ({
     share: high > low ? (value * factor - low) / (high - low) : 0,
-    text: format_number(Math.abs(value) < 1e-9 ? 0 : value).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, ''),
+    text: short_number(Math.abs(value) < 1e-9 ? 0 : value),
   }));
   const colours = Array.from({ length: 21 }, (_, i) => `rgb(${map_colour(traits.map, i / 20).join(' ')})`);
   return { title: `${traits.label} [${prefix}${traits.unit}]`, ticks, colours };

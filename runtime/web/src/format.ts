@@ -21,9 +21,15 @@ export function si_prefix(largest: number): [number, string] {
 export function format_number(value: number, digits = 3): string {
   if (!Number.isFinite(value)) return '–';
   if (value === 0) return '0';
-  const exponent = Math.floor(Math.log10(Math.abs(value)));
+  const exponent = Number(value.toExponential(digits - 1).split('e')[1]); // after rounding
   if (exponent < -4 || exponent > 6) return value.toExponential(digits - 1);
   return value.toFixed(Math.max(0, Math.min(12, digits - 1 - exponent)));
+}
+
+/** Without zeros at the end: −2.5, 10. */
+export function short_number(value: number, digits = 3): string {
+  const text = format_number(value, digits);
+  return (text.includes('e') || !text.includes('.') ? text : text.replace(/\.?0+$/, '')).replace('-', '−');
 }
 
 /** "1.23 kPa". */
@@ -53,6 +59,6 @@ export function nice_ticks(low: number, high: number, wanted = 5): number[] {
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = power * ([1, 2, 2.5, 5, 10].find((one) => one * power >= raw * (1 - 1e-9)) ?? 10);
   const ticks: number[] = [];
-  for (let i = Math.ceil(low / step - 1e-6); i * step <= high + 1e-6 * step; ++i) ticks.push(i * step);
+  for (let i = Math.ceil(low / step - 1e-6); i * step <= high + 1e-6 * step; ++i) ticks.push(i * step + 0); // no -0
   return ticks;
 }

@@ -6,7 +6,7 @@ import { ColourBar } from './colour_bar';
 import { field_traits, Range } from './colours';
 import { button, input, part, save, show_value, toast, write } from './dom';
 import { FileSource, stored_session } from './file_source';
-import { format_number, format_si, format_time } from './format';
+import { format_si, format_time, short_number } from './format';
 import { History } from './history';
 import { on_keys } from './keyboard';
 import { LiveSource, socket_url } from './live_source';
@@ -154,7 +154,7 @@ class Page implements Listener {
     }
     if (this.depth_for_ !== state.model.file) {
       this.depth_for_ = state.model.file;
-      input('depth').value = format_number(1000 * state.defaults.depth, 2);
+      input('depth').value = short_number(1000 * state.defaults.depth, 2);
     }
     this.run_.show(state, this.mode_);
     part('hand').hidden = !this.is_hand();
@@ -195,7 +195,7 @@ class Page implements Listener {
   private listen(): void {
     input('depth').addEventListener('change', () => {
       if (typed_number(input('depth').value, 0) === null && this.state_) {
-        show_value(input('depth'), format_number(1000 * this.state_.defaults.depth, 2));
+        show_value(input('depth'), short_number(1000 * this.state_.defaults.depth, 2));
       }
       input('depth').blur();
     });
@@ -324,7 +324,7 @@ class Page implements Listener {
       `depth ${format_si(felt.depth, 'm')}  contacts ${felt.contacts}`,
       `tick ${felt.tick}  time ${format_time(time)}`,
     ];
-    if (this.body_.scale !== 1) lines.push(`displacements × ${format_number(this.body_.scale, 2)}`);
+    if (this.body_.scale !== 1) lines.push(`displacements × ${short_number(this.body_.scale, 2)}`);
     try {
       this.draw_body();
       const title = state?.model?.name ?? 'Palpate';

@@ -1,7 +1,7 @@
 // Force and depth over time, and how long ticks took.
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
-import { format_number, si_prefix } from './format';
+import { short_number, si_prefix } from './format';
 import { log_classes, quantile, type Column, type History } from './history';
 
 const shown_seconds = 10;
@@ -54,8 +54,8 @@ class TimePlot {
         select: { show: true, left: 0, top: 0, width: 0, height: 0 },
         scales: { x: { time: false, auto: false, range: (_, low, high) => [low, high] }, y: { range: (_, low, high) => padded(low, high) } },
         axes: [
-          { ...axis, size: 22, gap: 2, values: (_, ticks) => ticks.map((tick) => `${format_number(tick, 5).replace(/(\.\d*?)0+$/, '$1').replace(/\.$/, '')}`) },
-          { ...axis, size: 46, gap: 3, space: 26, values: (_, ticks) => ticks.map((tick) => format_number(tick / this.prefix_[0], 3).replace(/\.0+$/, '')) },
+          { ...axis, size: 18, gap: 1, values: (_, ticks) => ticks.map((tick) => short_number(tick, 5)) },
+          { ...axis, size: 46, gap: 3, space: 22, values: (_, ticks) => ticks.map((tick) => short_number(tick / this.prefix_[0])) },
         ],
         series: [
           {},
@@ -107,7 +107,7 @@ function padded(low: number | null, high: number | null): [number, number] {
   const bottom = Math.min(0, low ?? 0);
   const top = Math.max(0, high ?? 0);
   const room = 0.08 * (top - bottom);
-  if (room === 0) return [0, 1e-3];
+  if (room === 0) return [0, 1];
   return [bottom < 0 ? bottom - room : 0, top > 0 ? top + room : 0];
 }
 
@@ -224,9 +224,9 @@ export class Plots {
       element.addEventListener('dblclick', () => zoom(null));
       return new TimePlot(element, lines, unit, height, () => this.cursor, zoom, on_seek);
     };
-    this.force_ = plot(elements_.force, force_lines, 'N', 136);
-    this.depth_ = plot(elements_.depth, depth_lines, 'm', 96);
-    this.timing_ = new TimingPlot(elements_.timing, 74);
+    this.force_ = plot(elements_.force, force_lines, 'N', 164);
+    this.depth_ = plot(elements_.depth, depth_lines, 'm', 112);
+    this.timing_ = new TimingPlot(elements_.timing, 84);
     elements_.live.addEventListener('click', () => zoom(null));
   }
 

@@ -55,12 +55,12 @@ export class View {
     this.canvas.dataset.testid = 'view';
     element.prepend(this.canvas);
 
-    const key = new DirectionalLight(0xffffff, 1.9);
+    const key = new DirectionalLight(0xffffff, 2.1);
     key.position.set(-0.6, 0.9, 1);
     const fill = new DirectionalLight(0xbfd4ff, 0.55);
     fill.position.set(0.9, -0.5, 0.4);
     this.lamp_.add(key, key.target, fill, fill.target);
-    this.scene.add(new AmbientLight(0xffffff, 1.15), this.lamp_);
+    this.scene.add(new AmbientLight(0xffffff, 0.95), this.lamp_);
     axis_colours.forEach((colour, axis) => {
       const along = new Vector3().setComponent(axis, 1);
       const arrow = new ArrowHelper(along, new Vector3(), 0.95, colour, 0.3, 0.2);
@@ -113,9 +113,8 @@ export class View {
       camera.zoom = 1;
     } else {
       camera.up.set(0, 0, 1);
-      const half = (Math.min(camera.fov, camera.fov * camera.aspect) * Math.PI) / 360;
-      const away = radius / Math.sin(half);
-      camera.position.copy(centre).addScaledVector(new Vector3(0.62, -1, 0.6).normalize(), 0.92 * away);
+      const towards = new Vector3(0.62, -1, 0.6).normalize();
+      camera.position.copy(centre).addScaledVector(towards, this.fitting_distance(towards));
     }
     camera.near = 0.02 * radius;
     camera.far = 60 * radius;
@@ -198,6 +197,23 @@ export class View {
     return controls;
   }
 
+  /** From how far along `towards` all corners of the bounds are in view, with room for what stands over the picture. */
+  private fitting_distance(towards: Vector3): number {
+    const centre = this.box_.getCenter(new Vector3());
+    const right = new Vector3(0, 0, 1).cross(towards).normalize();
+    const up = towards.clone().cross(right);
+    const slope = 0.8 * Math.tan((this.perspective_.fov * Math.PI) / 360);
+    let away = 0;
+    for (let corner = 0; corner < 8; ++corner) {
+      const [x, y, z] = [1, 2, 4].map((bit) => (corner & bit ? this.box_.max : this.box_.min));
+      const place = new Vector3(x!.x, y!.y, z!.z).sub(centre);
+      const wide = Math.abs(place.dot(right)) / (slope * Math.min(this.perspective_.aspect, 4));
+      const high = Math.abs(place.dot(up)) / slope;
+      away = Math.max(away, Math.max(wide, high) + place.dot(towards));
+    }
+    return away;
+  }
+
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.element;
     if (width === 0 || height === 0) return;
@@ -227,8 +243,9 @@ export class View {
     this.triad_camera_.quaternion.copy(this.camera_.quaternion);
     renderer.clearDepth();
     renderer.setScissorTest(true);
-    renderer.setViewport(8, 8, triad_pixels, triad_pixels);
-    renderer.setScissor(8, 8, triad_pixels, triad_pixels);
+    const bottom = this.element.clientWidth < 700 ? 56 : 8; // above what stands there on a small screen
+    renderer.setViewport(8, bottom, triad_pixels, triad_pixels);
+    renderer.setScissor(8, bottom, triad_pixels, triad_pixels);
     renderer.render(this.triad_, this.triad_camera_);
     renderer.setScissorTest(false);
     renderer.setViewport(0, 0, this.element.clientWidth, this.element.clientHeight);

@@ -1,7 +1,7 @@
 // How the body is drawn, as the person wants it.
 import { field_traits, fields, type Field } from './colours';
 import { button, input, part, select, write } from './dom';
-import { format_number, si_prefix } from './format';
+import { format_number, short_number, si_prefix } from './format';
 
 const most_scaled = 20;
 
@@ -82,10 +82,10 @@ export class ViewControls {
   tell(): void {
     const drawn = this.drawn;
     part('range-label').hidden = drawn.field === 'none';
-    write(part('scale-value'), format_number(drawn.scale, drawn.scale < 10 ? 2 : 3));
+    write(part('scale-value'), short_number(drawn.scale, 2));
     const note = part('scaled-note');
     note.hidden = drawn.scale === 1;
-    write(note, `Displacements × ${format_number(drawn.scale, 2)}: to touch the body, draw it true to scale (× 1)`);
+    write(note, `Displacements × ${short_number(drawn.scale, 2)}: to touch the body, draw it true to scale (× 1)`);
     this.changed_(drawn);
   }
 
