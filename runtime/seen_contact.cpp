@@ -1,7 +1,5 @@
 #include "runtime/seen_contact.h"
 
-#include <Eigen/Geometry>
-
 namespace palpate {
 namespace {
 
@@ -12,16 +10,6 @@ Vec3 surface_position(const State& state, const ContactPoint& contact) noexcept 
     if (contact.nodes[k] >= 0) position += contact.weights[k] * state.tree.position(contact.nodes[k]);
   }
   return position;
-}
-
-/// Of a simplex as it is now.
-Vec3 outward_normal(const Body& body, const State& state, Index simplex) noexcept {
-  const auto d = static_cast<std::size_t>(body.dimension());
-  const std::span<const Index> nodes = body.simplices().subspan(d * static_cast<std::size_t>(simplex), d);
-  const Vec3 a = state.tree.position(nodes[0]);
-  const Vec3 ab = state.tree.position(nodes[1]) - a;
-  if (d == 2) return Vec3(ab.y(), -ab.x(), 0.0).normalized();
-  return ab.cross(state.tree.position(nodes[2]) - a).normalized();
 }
 
 }  // namespace

@@ -11,13 +11,21 @@ fail() {
   exit 1
 }
 
+# Whether Node.js is there with an npm, from wherever: where it does not come from Debian, Debian's npm conflicts with it.
+has_node() {
+  command -v npm >/dev/null && [ "$(node -p 'process.versions.node.split(".")[0] >= 18' 2>/dev/null)" = true ]
+}
+
 # Installs what scripts/packages.txt names and is not there yet.
 install_packages() {
   local wanted missing
   wanted=$(grep -v '^#' "$root/scripts/packages.txt")
   # shellcheck disable=SC2086
   missing=$(comm -23 <(printf '%s\n' $wanted | sort) \
-    <(dpkg-query -W -f '${db:Status-Abbrev} ${Package}\n' $wanted 2>/dev/null | sed -n 's/^ii *//p' | sort))
+    <({
+      dpkg-query -W -f '${db:Status-Abbrev} ${Package}\n' $wanted 2>/dev/null | sed -n 's/^ii *//p'
+      if has_node; then printf 'nodejs\nnpm\n'; fi
+    } | sort -u))
   if [ -z "$missing" ]; then
     say "all packages are installed"
     return

@@ -1,0 +1,53 @@
+// Elements of the page.
+
+/** The element with this data-testid, of the kind that is expected. */
+export function by_id<E extends HTMLElement>(id: string, kind: new () => E): E {
+  const element = document.querySelector(`[data-testid="${id}"]`);
+  if (!(element instanceof kind)) throw new Error(`the page has no ${kind.name} named ${id}`);
+  return element;
+}
+
+export const button = (id: string) => by_id(id, HTMLButtonElement);
+export const input = (id: string) => by_id(id, HTMLInputElement);
+export const select = (id: string) => by_id(id, HTMLSelectElement);
+export const part = (id: string) => by_id(id, HTMLElement);
+
+/** Sets a text only when it is another: that is cheap, and leaves what is selected alone. */
+export function write(element: HTMLElement, text: string): void {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Shows what the runtime has, unless somebody is typing there. */
+export function show_value(element: HTMLInputElement | HTMLSelectElement, value: string): void {
+  if (document.activeElement !== element && element.value !== value) element.value = value;
+}
+
+/** Lets a file be saved. */
+export function save(blob: Blob, name: string): void {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** A sentence that goes away by itself. */
+export function toast(message: string, hint = '', kind: 'error' | 'note' = 'error'): void {
+  const element = document.createElement('div');
+  element.className = `toast ${kind}`;
+  element.setAttribute('role', kind === 'error' ? 'alert' : 'status');
+  const text = document.createElement('strong');
+  text.textContent = message;
+  element.append(text);
+  if (hint) {
+    const line = document.createElement('span');
+    line.textContent = hint;
+    element.append(line);
+  }
+  const place = part('toasts');
+  for (const old of place.children) if (old.textContent === element.textContent) old.remove();
+  place.append(element);
+  while (place.children.length > 4) place.firstElementChild?.remove();
+  element.addEventListener('click', () => element.remove());
+  setTimeout(() => element.remove(), kind === 'error' ? 9000 : 4000);
+}

@@ -1,0 +1,60 @@
+// Nodal displacements and the number by which each node is coloured.
+import type { Field } from './colours';
+import type { Topology } from './topology';
+import { unknown_stress, type Frame } from './wire';
+
+/** Displacements [3 N] in metres of the scene's nodes and the patch's; those of a patch that the frame does not have stay 0. */
+export function displacements(frame: Frame, topology: Topology, out: Float32Array): void {
+  const scene = Math.min(frame.u.length, 3 * topology.scene_nodes);
+  for (let i = 0; i < scene; ++i) out[i] = frame.u[i]! * frame.unit_u;
+  const from = 3 * topology.scene_nodes;
+  const patch = Math.min(frame.patch_u.length, out.length - from);
+  for (let i = 0; i < patch; ++i) out[from + i] = frame.patch_u[i]! * frame.unit_u;
+  for (let i = 0; i < patch / 3; ++i) {
+    const node = topology.welded[i]!;
+    if (node >= 0) for (let k = 0; k < 3; ++k) out[3 * node + k] = out[from + 3 * i + k]!;
+  }
+}
+
+function fill_stress(frame: Frame, topology: Topology, value: Float32Array, known: Float32Array): void {
+  const take = (stress: Uint16Array, from: number, count: number) => {
+    for (let i = 0; i < count; ++i) {
+      known[from + i] = stress[i] === unknown_stress ? 0 : 1;
+      value[from + i] = known[from + i]! * stress[i]! * frame.unit_stress;
+    }
+  };
+  take(frame.stress, 0, Math.min(frame.stress.length, topology.scene_nodes));
+  take(frame.patch_stress, topology.scene_nodes, Math.min(frame.patch_stress.length, topology.nodes - topology.scene_nodes));
+}
+
+/**
+ * Values [N] of `field`, and 1 where it is known, else 0; `u` as displacements() gives it. The result is the largest absolute value.
+ */
+export function fill_field(field: Field, frame: Frame, topology: Topology, u: Float32Array, value: Float32Array, known: Float32Array): number {
+  known.fill(1);
+  value.fill(0);
+  const component = field === 'x' ? 0 : field === 'y' ? 1 : 2;
+  if (field === 'magnitude') {
+    for (let i = 0; i < topology.nodes; ++i) value[i] = Math.sqrt(u[3 * i]! ** 2 + u[3 * i + 1]! ** 2 + u[3 * i + 2]! ** 2);
+  } else if (field === 'von-mises') {
+    fill_stress(frame, topology, value, known);
+  } else if (field === 'pressure') {
+    for (let i = 0; i < frame.pressure_node.length; ++i) {
+      const node = frame.pressure_node[i]!;
+      if (node < topology.nodes) value[node] = frame.pressure[i]!;
+    }
+  } else if (field !== 'none') {
+    for (let i = 0; i < topology.nodes; ++i) value[i] = u[3 * i + component]!;
+  }
+  if (field === 'von-mises' || field === 'pressure') {
+    topology.welded.forEach((node, i) => {
+      const own = topology.scene_nodes + i;
+      if (node < 0 || (field === 'pressure' && value[own] === 0)) return;
+      value[node] = value[own]!;
+      known[node] = known[own]!;
+    });
+  }
+  let largest = 0;
+  for (let i = 0; i < topology.nodes; ++i) largest = Math.max(largest, Math.abs(value[i]!));
+  return largest;
+}

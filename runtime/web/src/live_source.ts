@@ -1,0 +1,65 @@
+// A run at the other end of a WebSocket, connected anew when it was lost.
+import type { Listener, Source } from './source';
+import { decode, type Scene } from './wire';
+import type { Said, Word } from './words';
+
+const first_wait = 0.25; // [s]
+const longest_wait = 5;
+const most_waiting = 1 << 16; // bytes in the socket's buffer: what comes on top is old when it arrives
+
+export class LiveSource implements Source {
+  private socket_: WebSocket | null = null;
+  private scene_: Scene | null = null;
+  private wait_ = first_wait;
+
+  constructor(
+    private readonly url_: string,
+    private readonly listener_: Listener,
+  ) {
+    this.connect();
+  }
+
+  send(word: Word): void {
+    const socket = this.socket_;
+    if (socket?.readyState !== WebSocket.OPEN) return;
+    if (word.type === 'point' && socket.bufferedAmount > most_waiting) return;
+    socket.send(JSON.stringify(word));
+  }
+
+  private connect(): void {
+    const socket = new WebSocket(this.url_, 'palpate.1');
+    socket.binaryType = 'arraybuffer';
+    this.socket_ = socket;
+    socket.onopen = () => {
+      this.wait_ = first_wait;
+      this.scene_ = null;
+      this.listener_.connected(true, '');
+    };
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.take(event.data);
+    socket.onclose = (event) => {
+      const why = event.reason ? `: ${event.reason}` : '';
+      this.listener_.connected(false, `not connected${why}; trying again`);
+      setTimeout(() => this.connect(), this.wait_ * 1000);
+      this.wait_ = Math.min(this.wait_ * 1.7, longest_wait);
+    };
+  }
+
+  private take(data: string | ArrayBuffer): void {
+    try {
+      if (typeof data === 'string') {
+        this.listener_.said(JSON.parse(data) as Said);
+        return;
+      }
+      const picture = decode(data, this.scene_);
+      if (picture?.kind === 'scene') this.scene_ = picture;
+      if (picture) this.listener_.pictured(picture);
+    } catch (error) {
+      this.listener_.said({ type: 'error', about: 'message', message: String(error) });
+    }
+  }
+}
+
+/** The socket beside this page, with the token that is in its address. */
+export function socket_url(page: Location): string {
+  return `${page.protocol === 'https:' ? 'wss' : 'ws'}://${page.host}/socket${page.search}`;
+}

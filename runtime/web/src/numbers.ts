@@ -1,0 +1,30 @@
+// The numbers beside the plots.
+import { part, write } from './dom';
+import { format_si } from './format';
+import type { Timing } from './plots';
+
+export interface Felt {
+  force: [number, number, number]; // on the body [N]
+  depth: number; // [m]
+  contacts: number;
+  tick: number;
+}
+
+const signed = (value: number): string => (value < 0 ? format_si(value, 'N').replace('-', '−') : format_si(value, 'N'));
+
+export function show_felt(felt: Felt): void {
+  write(part('force'), format_si(Math.hypot(...felt.force), 'N'));
+  (['x', 'y', 'z'] as const).forEach((axis, i) => write(part(`force-${axis}`), signed(felt.force[i]!)));
+  write(part('depth-felt'), format_si(felt.depth, 'm'));
+  write(part('contacts'), felt.contacts >= 255 ? '255+' : String(felt.contacts));
+}
+
+const pair = ([median, most]: [number, number]): string =>
+  Number.isFinite(median) ? `${median.toFixed(0)} / ${most.toFixed(0)} µs` : '–';
+
+export function show_timing(timing: Timing, misses: number, ticks: number): void {
+  write(part('compute'), pair(timing.compute));
+  write(part('late'), pair(timing.late));
+  write(part('misses'), misses.toLocaleString('en').replaceAll(',', ' '));
+  write(part('ticks'), ticks.toLocaleString('en').replaceAll(',', ' '));
+}

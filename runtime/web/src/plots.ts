@@ -1,0 +1,260 @@
+// Force and depth over time, and how long ticks took.
+import uPlot from 'uplot';
+import 'uplot/dist/uPlot.min.css';
+import { short_number, si_prefix } from './format';
+import { log_classes, quantile, type Column, type History } from './history';
+
+const shown_seconds = 10;
+const ink = '#8b98a9';
+const grid = '#1d2530';
+
+interface Line {
+  column: Column;
+  label: string;
+  colour: string;
+  width?: number;
+}
+
+const force_lines: Line[] = [
+  { column: 'norm', label: '|f|', colour: '#f2f5f9', width: 1.6 },
+  { column: 'x', label: 'x', colour: '#ff6b6b' },
+  { column: 'y', label: 'y', colour: '#69db7c' },
+  { column: 'z', label: 'z', colour: '#74a9ff' },
+];
+const depth_lines: Line[] = [{ column: 'depth', label: 'depth', colour: '#ffb454', width: 1.4 }];
+
+/** Seconds that are shown: all plots share them. */
+interface Window {
+  from: number;
+  to: number;
+}
+
+/** One plot of columns over time, drawn from what is left of the samples a pixel. */
+class TimePlot {
+  private readonly plot_: uPlot;
+  private prefix_: [number, string] = [1, ''];
+
+  constructor(
+    private readonly element_: HTMLElement,
+    private readonly lines_: Line[],
+    private readonly unit_: string,
+    height: number,
+    cursor: () => number | null,
+    on_select: (window: Window) => void,
+    on_click: (time: number) => void,
+  ) {
+    const axis = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { show: false }, font: '11px system-ui, sans-serif' };
+    this.plot_ = new uPlot(
+      {
+        width: Math.max(50, element_.clientWidth),
+        height,
+        padding: [8, 8, 0, 0],
+        legend: { show: false },
+        cursor: { drag: { x: true, y: false, setScale: false, dist: 5 }, points: { show: false }, y: false, sync: { key: 'time' } },
+        select: { show: true, left: 0, top: 0, width: 0, height: 0 },
+        scales: { x: { time: false, auto: false, range: (_, low, high) => [low, high] }, y: { range: (_, low, high) => padded(low, high) } },
+        axes: [
+          { ...axis, size: 18, gap: 1, values: (_, ticks) => ticks.map((tick) => short_number(tick, 5)) },
+          { ...axis, size: 46, gap: 3, space: 22, values: (_, ticks) => ticks.map((tick) => short_number(tick / this.prefix_[0])) },
+        ],
+        series: [
+          {},
+          ...lines_.map((line) => ({ label: line.label, stroke: line.colour, width: line.width ?? 1, points: { show: false }, spanGaps: false })),
+        ],
+        hooks: {
+          setSelect: [
+            (plot) => {
+              const { left, width } = plot.select;
+              if (width < 5) return;
+              on_select({ from: plot.posToVal(left, 'x'), to: plot.posToVal(left + width, 'x') });
+              plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+            },
+          ],
+          draw: [(plot) => draw_cursor(plot, cursor())],
+        },
+      },
+      [[0], ...lines_.map(() => [null])] as uPlot.AlignedData,
+      element_,
+    );
+    this.plot_.over.addEventListener('click', (event) => {
+      if (this.plot_.select.width < 5) on_click(this.plot_.posToVal(event.offsetX, 'x'));
+    });
+    new ResizeObserver(() => this.plot_.setSize({ width: Math.max(50, element_.clientWidth), height })).observe(element_);
+  }
+
+  /** The prefix of the axis' unit, as "kN". */
+  get unit(): string {
+    return `${this.prefix_[1]}${this.unit_}`;
+  }
+
+  draw(history: History, rate: number, window: Window): void {
+    if (this.element_.offsetParent === null) return; // folded away
+    const columns = this.lines_.map((line) => line.column);
+    const data = history.decimate(window.from * rate, window.to * rate, this.plot_.width, columns);
+    data[0] = data[0]!.map((tick) => tick! / rate);
+    if (data[0].length === 0) data.forEach((row, k) => row.push(k === 0 ? window.from : null));
+    let largest = 0;
+    for (const row of data.slice(1)) for (const value of row) largest = Math.max(largest, Math.abs(value ?? 0));
+    this.prefix_ = si_prefix(largest);
+    this.plot_.batch(() => {
+      this.plot_.setData(data as uPlot.AlignedData, false);
+      this.plot_.setScale('x', { min: window.from, max: window.to });
+    });
+  }
+}
+
+function padded(low: number | null, high: number | null): [number, number] {
+  const bottom = Math.min(0, low ?? 0);
+  const top = Math.max(0, high ?? 0);
+  const room = 0.08 * (top - bottom);
+  if (room === 0) return [0, 1];
+  return [bottom < 0 ? bottom - room : 0, top > 0 ? top + room : 0];
+}
+
+function draw_cursor(plot: uPlot, time: number | null): void {
+  if (time === null) return;
+  const x = plot.valToPos(time, 'x', true);
+  const { ctx, bbox } = plot;
+  if (!(x >= bbox.left && x <= bbox.left + bbox.width)) return;
+  ctx.save();
+  ctx.strokeStyle = '#6cb6ff';
+  ctx.lineWidth = devicePixelRatio;
+  ctx.beginPath();
+  ctx.moveTo(x, bbox.top);
+  ctx.lineTo(x, bbox.top + bbox.height);
+  ctx.stroke();
+  ctx.restore();
+}
+
+const per_decade = 6;
+
+/** Two histograms over each other, logarithmic from 1 us to 10 ms. */
+class TimingPlot {
+  private readonly canvas_ = document.createElement('canvas');
+
+  constructor(element: HTMLElement, height: number) {
+    this.canvas_.style.cssText = `width:100%;height:${height}px;display:block`;
+    this.canvas_.setAttribute('role', 'img');
+    this.canvas_.setAttribute('aria-label', 'Histogram of compute time and lateness');
+    element.append(this.canvas_);
+  }
+
+  draw(compute: Float32Array, late: Float32Array): void {
+    const canvas = this.canvas_;
+    if (canvas.offsetParent === null) return;
+    const ratio = devicePixelRatio;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    const context = canvas.getContext('2d')!;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    const [left, bottom, top] = [8, height - 16, 6];
+    const span = width - 16;
+    context.font = '11px system-ui, sans-serif';
+    context.fillStyle = ink;
+    context.strokeStyle = grid;
+    context.textAlign = 'center';
+    const classes = 4 * per_decade + 2;
+    ['1 µs', '10 µs', '100 µs', '1 ms', '10 ms'].forEach((text, decade) => {
+      const x = left + (span * (1 + decade * per_decade)) / classes;
+      context.beginPath();
+      context.moveTo(x, top);
+      context.lineTo(x, bottom);
+      context.stroke();
+      context.fillText(text, Math.min(width - 18, Math.max(14, x)), height - 3);
+    });
+    const bars = (values: Float32Array, colour: string) => {
+      const counts = log_classes(values, per_decade);
+      const most = Math.log1p(Math.max(1, ...counts));
+      context.fillStyle = colour;
+      counts.forEach((count, k) => {
+        if (count === 0) return;
+        const size = Math.max(1.5, ((bottom - top) * Math.log1p(count)) / most);
+        context.fillRect(left + (span * k) / classes + 0.5, bottom - size, span / classes - 1, size);
+      });
+    };
+    bars(late, 'rgba(255, 180, 84, 0.6)');
+    bars(compute, 'rgba(108, 182, 255, 0.6)');
+    context.strokeStyle = '#38445a';
+    context.beginPath();
+    context.moveTo(left, bottom + 0.5);
+    context.lineTo(left + span, bottom + 0.5);
+    context.stroke();
+  }
+}
+
+/** Medians and 99.9 % of what is shown [us]. */
+export interface Timing {
+  compute: [number, number];
+  late: [number, number];
+}
+
+export interface PlotElements {
+  force: HTMLElement;
+  depth: HTMLElement;
+  timing: HTMLElement;
+  force_unit: HTMLElement;
+  depth_unit: HTMLElement;
+  live: HTMLElement; // a button that ends a zoom
+}
+
+/** All plots over the same window of time: the last ten seconds, all of a replay, or what was dragged over. */
+export class Plots {
+  timing: Timing = { compute: [NaN, NaN], late: [NaN, NaN] };
+  /** In a replay: what is shown now [s]. */
+  cursor: number | null = null;
+  private readonly force_: TimePlot;
+  private readonly depth_: TimePlot;
+  private readonly timing_: TimingPlot;
+  private zoom_: Window | null = null;
+
+  constructor(
+    private readonly elements_: PlotElements,
+    on_seek: (time: number) => void,
+  ) {
+    const zoom = (window: Window | null) => {
+      this.zoom_ = window;
+      elements_.live.hidden = window === null;
+      this.changed();
+    };
+    const plot = (element: HTMLElement, lines: Line[], unit: string, height: number) => {
+      element.addEventListener('dblclick', () => zoom(null));
+      return new TimePlot(element, lines, unit, height, () => this.cursor, zoom, on_seek);
+    };
+    this.force_ = plot(elements_.force, force_lines, 'N', 164);
+    this.depth_ = plot(elements_.depth, depth_lines, 'm', 112);
+    this.timing_ = new TimingPlot(elements_.timing, 84);
+    elements_.live.addEventListener('click', () => zoom(null));
+  }
+
+  /** Something else than the samples has changed: the caller draws again. */
+  changed: () => void = () => undefined;
+
+  draw(history: History, rate: number, shows_all: boolean): void {
+    const last = Math.max(0, history.last) / rate;
+    let window: Window = { from: last - shown_seconds, to: last };
+    if (shows_all && history.count > 0) window = { from: history.tick(0) / rate, to: Math.max(last, 1e-3) };
+    if (last < shown_seconds && !shows_all) window = { from: 0, to: shown_seconds };
+    if (this.zoom_) window = this.zoom_;
+    this.force_.draw(history, rate, window);
+    this.depth_.draw(history, rate, window);
+    this.elements_.force_unit.textContent = this.force_.unit;
+    this.elements_.depth_unit.textContent = this.depth_.unit;
+  }
+
+  /** Some twice a second: sorting is not for each picture. */
+  draw_timing(history: History, rate: number, shows_all: boolean): void {
+    const to = history.last + 1;
+    const from = shows_all ? 0 : to - shown_seconds * rate;
+    const compute = history.sorted('compute', from, to);
+    const late = history.sorted('late', from, to);
+    this.timing = {
+      compute: [quantile(compute, 0.5), quantile(compute, 0.999)],
+      late: [quantile(late, 0.5), quantile(late, 0.999)],
+    };
+    this.timing_.draw(compute, late);
+  }
+}

@@ -1,0 +1,247 @@
+// The pointer as the hand: presses, pushes and grabs what is under it.
+import type { Body } from './body';
+import { pick_boundary, pick_surface, type Hit, type Surface } from './pick';
+import { minus, plus, pressed_position, ray_meets_plane, turn_onto, turned_depth, type ToolShape } from './pose';
+import type { View } from './view';
+import type { Point, Quaternion, Vec3 } from './words';
+
+export const pointer_modes = ['press', 'push', 'grab'] as const;
+export type PointerMode = (typeof pointer_modes)[number];
+
+const least_wait = 8; // [ms] from one word to the next
+const longest_wait = 250; // while pressed: the runtime gives up a pointer that is silent for a second
+const reach_in_plane = 24; // pixels from the boundary that still touch it
+
+export interface HandSettings {
+  mode: PointerMode;
+  depth: number; // [m] where a press begins
+  unit_depth: number; // [m] a wheel's notch is a tenth of it
+  clearance: number; // [m] of a tool that hovers
+  shape: ToolShape;
+}
+
+interface Press {
+  id: number; // of the pointer
+  mode: PointerMode;
+  start: Hit;
+  now: Hit;
+  orientation: Quaternion;
+  surface: Surface; // as it was when the press began: the tool slides along it
+  depth: number;
+  pushed: number; // [m] of the wheel, into the picture
+  client: { x: number; y: number };
+  plane_start: Vec3; // where the ray met the screen's plane at the start
+  pinch: { id: number; x: number; y: number; distance: number; depth: number; pushed: number } | null;
+}
+
+export class Hand {
+  private press_: Press | null = null;
+  private hover_: { x: number; y: number } | null = null;
+  private hovering_ = false;
+  private word_: Point | null = null; // what is wanted and was not said
+  private last_: Point | null = null;
+  private last_at_ = -Infinity;
+
+  /**
+   * `settings` gives null where the pointer is no hand now, or a sentence that says what keeps it from being one. `send` says a
+   * word to the runtime, `changed` tells of depth and press.
+   */
+  constructor(
+    private readonly view_: View,
+    private readonly body_: Body,
+    private readonly settings_: () => HandSettings | string | null,
+    private readonly send_: (word: Point) => void,
+    private readonly changed_: (depth: number | null) => void,
+    private readonly hint_: (text: string) => void,
+  ) {
+    const area = view_.element;
+    const on = (name: string, take: (event: PointerEvent) => void) =>
+      area.addEventListener(name, (event) => take(event as PointerEvent), { capture: true });
+    on('pointerdown', (event) => this.down(event));
+    on('pointermove', (event) => this.move(event));
+    on('pointerup', (event) => this.up(event));
+    on('pointercancel', (event) => this.up(event));
+    on('pointerleave', () => (this.hover_ = null));
+    area.addEventListener('wheel', (event) => this.wheel(event), { capture: true, passive: false });
+    area.addEventListener('contextmenu', (event) => event.preventDefault());
+    window.addEventListener('blur', () => this.release());
+    const beat = () => {
+      this.beat(performance.now());
+      requestAnimationFrame(beat);
+    };
+    requestAnimationFrame(beat);
+  }
+
+  get is_pressed(): boolean {
+    return this.press_ !== null;
+  }
+
+  /** Lets go, as when the pointer is lifted. */
+  release(): void {
+    const press = this.press_;
+    if (!press) return;
+    this.press_ = null;
+    this.changed_(null);
+    this.view_.canvas.style.cursor = '';
+    const settings = this.settings_();
+    if (settings && typeof settings !== 'string') this.want_hover(settings, press.now, press.orientation);
+  }
+
+  private down(event: PointerEvent): void {
+    if (event.target !== this.view_.canvas) return;
+    if (this.press_) {
+      this.begin_pinch(event);
+      event.stopPropagation();
+      return;
+    }
+    if (event.button !== 0 || !event.isPrimary) return;
+    const settings = this.settings_();
+    if (settings === null) return;
+    const hit = this.hit(event.clientX, event.clientY, this.body_.surface);
+    if (!hit) return;
+    if (typeof settings === 'string') {
+      this.hint_(settings);
+      return;
+    }
+    event.stopPropagation();
+    event.preventDefault();
+    this.view_.canvas.setPointerCapture(event.pointerId);
+    this.view_.canvas.style.cursor = 'grabbing';
+    this.view_.canvas.focus({ preventScroll: true });
+    this.press_ = {
+      id: event.pointerId,
+      mode: settings.mode,
+      start: hit,
+      now: hit,
+      orientation: turn_onto(hit.normal, this.dimension()),
+      surface: this.body_.snapshot(),
+      depth: settings.depth,
+      pushed: 0,
+      client: { x: event.clientX, y: event.clientY },
+      plane_start: this.on_screen_plane(event.clientX, event.clientY, hit.point) ?? hit.point,
+      pinch: null,
+    };
+    this.want_press(settings);
+  }
+
+  private move(event: PointerEvent): void {
+    const press = this.press_;
+    if (!press) {
+      if (event.pointerType === 'touch' || event.buttons !== 0) this.hover_ = null;
+      else this.hover_ = event.target === this.view_.canvas ? { x: event.clientX, y: event.clientY } : null;
+      return;
+    }
+    event.stopPropagation();
+    const settings = this.settings_();
+    if (!settings || typeof settings === 'string') {
+      this.release();
+      return;
+    }
+    if (press.pinch?.id === event.pointerId) {
+      this.pinch(event, settings);
+    } else if (press.id === event.pointerId) {
+      press.client = { x: event.clientX, y: event.clientY };
+      if (press.mode === 'press') press.now = this.hit(event.clientX, event.clientY, press.surface) ?? press.now;
+    }
+    this.want_press(settings);
+  }
+
+  private up(event: PointerEvent): void {
+    const press = this.press_;
+    if (!press) return;
+    if (press.pinch?.id === event.pointerId) press.pinch = null;
+    else if (press.id === event.pointerId) this.release();
+    else return;
+    event.stopPropagation();
+  }
+
+  private wheel(event: WheelEvent): void {
+    const press = this.press_;
+    const settings = this.settings_();
+    if (!press || !settings || typeof settings === 'string') return;
+    event.preventDefault();
+    event.stopPropagation();
+    const pixels = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : 33 * event.deltaY;
+    if (press.mode === 'press') press.depth = turned_depth(press.depth, pixels, settings.unit_depth);
+    else press.pushed -= (pixels / 100) * 0.1 * settings.unit_depth;
+    this.want_press(settings);
+  }
+
+  private begin_pinch(event: PointerEvent): void {
+    const press = this.press_!;
+    if (press.pinch) return;
+    const distance = Math.hypot(event.clientX - press.client.x, event.clientY - press.client.y);
+    press.pinch = { id: event.pointerId, x: event.clientX, y: event.clientY, distance, depth: press.depth, pushed: press.pushed };
+  }
+
+  private pinch(event: PointerEvent, settings: HandSettings): void {
+    const press = this.press_!;
+    const pinch = press.pinch!;
+    const closer = pinch.distance - Math.hypot(event.clientX - press.client.x, event.clientY - press.client.y);
+    press.depth = turned_depth(pinch.depth, -5 * closer, settings.unit_depth);
+    press.pushed = pinch.pushed + (closer / 20) * 0.1 * settings.unit_depth;
+  }
+
+  private dimension(): 2 | 3 {
+    return this.body_.scene?.dimension ?? 3;
+  }
+
+  private hit(x: number, y: number, surface: Surface): Hit | null {
+    if (this.dimension() === 2) {
+      const place = this.view_.place_in_plane(x, y);
+      return pick_boundary(surface.position, this.body_.boundary, place, reach_in_plane * this.view_.metres_of_pixel());
+    }
+    const { origin, direction } = this.view_.ray(x, y);
+    return pick_surface(surface, origin, direction);
+  }
+
+  private on_screen_plane(x: number, y: number, through: Vec3): Vec3 | null {
+    if (this.dimension() === 2) return this.view_.place_in_plane(x, y);
+    const { origin, direction } = this.view_.ray(x, y);
+    return ray_meets_plane(origin, direction, through, this.view_.looking());
+  }
+
+  private want_press(settings: HandSettings): void {
+    const press = this.press_!;
+    const { radius } = settings.shape;
+    let position: Vec3;
+    if (press.mode === 'press') {
+      position = pressed_position(press.now.point, press.now.normal, radius, press.depth);
+      this.changed_(press.depth);
+    } else {
+      const now = this.on_screen_plane(press.client.x, press.client.y, press.start.point) ?? press.plane_start;
+      const away: Vec3 = this.dimension() === 2 ? [0, 0, 0] : this.view_.looking();
+      const way = plus(minus(now, press.plane_start), away, press.pushed);
+      const from = press.mode === 'grab' ? press.start.point : pressed_position(press.start.point, press.start.normal, radius, 0);
+      position = plus(from, way);
+      press.now = { point: plus(press.start.point, way), normal: press.start.normal };
+    }
+    this.word_ = { type: 'point', position, orientation: press.orientation, grab: press.mode === 'grab', lifted: false };
+  }
+
+  private want_hover(settings: HandSettings, hit: Hit, orientation: Quaternion): void {
+    const position = pressed_position(hit.point, hit.normal, settings.shape.radius, -settings.clearance);
+    this.word_ = { type: 'point', position, orientation, grab: false, lifted: true };
+  }
+
+  private follow_hover(): void {
+    const at = this.hover_;
+    if (!at) return;
+    this.hover_ = null;
+    const settings = this.settings_();
+    const hit = settings === null ? null : this.hit(at.x, at.y, this.body_.surface);
+    this.hovering_ = hit !== null;
+    this.view_.canvas.style.cursor = this.hovering_ ? 'pointer' : '';
+    if (hit && settings && typeof settings !== 'string') this.want_hover(settings, hit, turn_onto(hit.normal, this.dimension()));
+  }
+
+  private beat(now: number): void {
+    if (!this.press_) this.follow_hover();
+    if (this.press_ && !this.word_ && now - this.last_at_ > longest_wait) this.word_ = this.last_;
+    if (!this.word_ || now - this.last_at_ < least_wait) return;
+    this.send_(this.word_);
+    this.last_ = this.word_;
+    this.last_at_ = now;
+    this.word_ = null;
+  }
+}

@@ -1,0 +1,108 @@
+// Moves through the frames of a session.
+import { button, input, part, select, show_value, write } from './dom';
+import { format_time } from './format';
+
+/** The last of ascending times that is not after `time`, 0 where there is none. */
+export function frame_at(times: number[], time: number): number {
+  let low = 0;
+  let high = times.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (times[middle]! <= time) low = middle + 1;
+    else high = middle;
+  }
+  return Math.max(0, low - 1);
+}
+
+export class ReplayBar {
+  private times_: number[] = [];
+  private time_ = 0;
+  private asked_ = -1; // the last frame that was sought
+  private last_beat_: number | null = null; // while playing
+
+  constructor(private readonly seek_: (frame: number) => void) {
+    button('replay-play').addEventListener('click', () => this.toggle());
+    button('replay-back').addEventListener('click', () => this.move(-1));
+    button('replay-forward').addEventListener('click', () => this.move(1));
+    input('scrub').addEventListener('input', () => {
+      this.stop();
+      this.go(Number(input('scrub').value));
+    });
+  }
+
+  get is_shown(): boolean {
+    return this.times_.length > 0;
+  }
+
+  /** The times of all frames [s], and which is shown. */
+  show(times: number[], frame: number): void {
+    this.times_ = times;
+    part('replay').hidden = times.length === 0;
+    input('scrub').max = String(Math.max(0, times.length - 1));
+    if (this.last_beat_ === null && this.asked_ < 0) this.time_ = times[frame] ?? 0;
+    if (this.asked_ === frame) this.asked_ = -1;
+    this.write();
+  }
+
+  seek_time(time: number): void {
+    if (this.is_shown) this.go(frame_at(this.times_, time));
+  }
+
+  move(by: number): void {
+    if (!this.is_shown) return;
+    this.stop();
+    this.go(this.frame() + by);
+  }
+
+  toggle(): void {
+    if (this.last_beat_ !== null) {
+      this.stop();
+      return;
+    }
+    if (this.frame() >= this.times_.length - 1) this.go(0);
+    this.last_beat_ = performance.now();
+    this.write();
+    requestAnimationFrame((now) => this.beat(now));
+  }
+
+  private frame(): number {
+    return frame_at(this.times_, this.time_ + 1e-9);
+  }
+
+  private stop(): void {
+    this.last_beat_ = null;
+    this.write();
+  }
+
+  private go(frame: number): void {
+    const wanted = Math.max(0, Math.min(this.times_.length - 1, frame));
+    this.time_ = this.times_[wanted] ?? 0;
+    this.ask(wanted);
+  }
+
+  private ask(frame: number): void {
+    this.asked_ = frame;
+    this.seek_(frame);
+    this.write();
+  }
+
+  private beat(now: number): void {
+    if (this.last_beat_ === null) return;
+    const before = this.frame();
+    this.time_ += ((now - this.last_beat_) / 1000) * Number(select('replay-speed').value);
+    this.last_beat_ = now;
+    const frame = this.frame();
+    if (frame !== before) this.ask(frame);
+    if (frame >= this.times_.length - 1) this.stop();
+    else requestAnimationFrame((next) => this.beat(next));
+  }
+
+  private write(): void {
+    const plays = this.last_beat_ !== null;
+    write(button('replay-play'), plays ? 'Pause' : 'Play');
+    button('replay-play').setAttribute('aria-pressed', String(plays));
+    input('scrub').value = String(this.frame());
+    show_value(input('scrub'), String(this.frame()));
+    write(part('replay-time'), `${format_time(this.time_)} / ${format_time(this.times_.at(-1) ?? 0)}`);
+  }
+}

@@ -1,0 +1,174 @@
+// The run and its settings: what the runtime has is shown, what the person wants is asked for.
+import { button, input, part, select, show_value, toast, write } from './dom';
+import { format_number } from './format';
+import { parse_tool, tool_text } from './pose';
+import type { Mode, State, Word } from './words';
+
+/** A number as typed, with a point or a comma; null where it is none or below `least`. */
+export function typed_number(text: string, least: number): number | null {
+  const value = Number(text.trim().replace(',', '.'));
+  return text.trim() !== '' && Number.isFinite(value) && value >= least ? value : null;
+}
+
+/** Metres from typed millimetres, as short as it can be written. */
+export const metres = (millimetres: number): number => Number((millimetres / 1000).toPrecision(9));
+const millimetres = (value: number): string => String(Number((value * 1000).toPrecision(6)));
+
+export class RunControls {
+  private state_: State | null = null;
+
+  constructor(private readonly send_: (word: Word) => void) {
+    const on = (id: string, word: () => Word) => button(id).addEventListener('click', () => send_(word()));
+    on('pause', () => ({ type: 'pause', paused: !this.state_?.paused }));
+    on('step', () => ({ type: 'step' }));
+    on('reset', () => ({ type: 'reset' }));
+    on('record', () => ({ type: 'record', on: !this.state_?.recording }));
+    on('control', () => ({ type: 'control', take: this.state_?.you !== 'controller' }));
+    on('acknowledge', () => ({ type: 'acknowledge' }));
+
+    select('tool-kind').addEventListener('change', () => this.change_tool());
+    input('radius').addEventListener('change', () => this.change_tool());
+    input('length').addEventListener('change', () => this.change_tool());
+    this.on_number('friction', 'friction', 0);
+    this.on_number('load-scale', 'load-scale', -Infinity);
+    this.on_number('stiffness-scale', 'stiffness-scale', 1e-9);
+    select('contact').addEventListener('change', () => this.change('contact', select('contact').value));
+    for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).addEventListener('change', () => this.change_overlay(id));
+  }
+
+  toggle_pause(): void {
+    if (!button('pause').disabled) button('pause').click();
+  }
+  step(): void {
+    if (!button('step').disabled) button('step').click();
+  }
+  reset(): void {
+    if (!button('reset').disabled) button('reset').click();
+  }
+
+  show(state: State, mode: Mode): void {
+    this.state_ = state;
+    const steers = mode === 'live' && state.you === 'controller';
+    write(part('model'), state.model.name);
+    document.title = `${state.model.name} – Palpate`;
+    part('role').hidden = mode === 'file';
+    write(part('role'), mode === 'replay' ? `replay, ${state.you}` : steers ? `controller, ${state.device}` : 'watcher');
+    part('watchers').hidden = mode === 'file' || state.watchers < 2;
+    write(part('watchers'), `${state.watchers} pages`);
+    part('phase').hidden = mode !== 'live' || !state.phase || state.phase === 'active';
+    write(part('phase'), state.phase ?? '');
+
+    this.show_transport(state, steers);
+    this.show_settings(state, steers);
+    part('fault').hidden = !state.fault;
+    write(part('fault-name'), (state.fault?.name ?? '').replaceAll('_', ' '));
+    write(part('fault-remedy'), state.fault?.remedy ?? '');
+    button('acknowledge').disabled = !steers;
+    part('busy').hidden = !state.busy;
+    write(part('busy-text'), state.busy ?? '');
+    part('locked').hidden = !state.locked;
+    write(part('locked'), state.locked ?? '');
+    this.show_facts(state);
+  }
+
+  private show_transport(state: State, steers: boolean): void {
+    for (const id of ['pause', 'reset', 'record']) button(id).disabled = !steers;
+    button('step').disabled = !steers || !state.paused;
+    button('pause').setAttribute('aria-pressed', String(state.paused));
+    write(button('pause'), state.paused ? 'Go on' : 'Pause');
+    button('record').setAttribute('aria-pressed', String(Boolean(state.recording)));
+    write(part('record-label'), state.recording ? state.recording.split('/').at(-1)! : 'Record');
+    button('record').title = state.recording
+      ? `Finish ${state.recording}`
+      : 'Begin anew from the untouched body, and write every tick to a file';
+    button('control').disabled = state.you !== 'controller' && state.controlled;
+    write(button('control'), state.you === 'controller' ? 'Leave control' : state.controlled ? 'Controlled elsewhere' : 'Take control');
+  }
+
+  private show_settings(state: State, steers: boolean): void {
+    const { settings, model, defaults } = state;
+    (part('settings') as HTMLFieldSetElement).disabled = !steers || Boolean(state.locked) || Boolean(state.busy);
+    const kind = (settings.tool ?? 'point').split(':')[0]!;
+    const shape = parse_tool(settings.tool);
+    show_value(select('tool-kind'), kind);
+    part('radius-label').hidden = kind === 'point';
+    part('length-label').hidden = kind !== 'capsule';
+    show_value(input('radius'), millimetres(shape.radius || defaults.radius));
+    show_value(input('length'), millimetres(shape.length || 4 * defaults.radius));
+    show_value(input('friction'), settings.friction ?? '');
+    input('friction').placeholder = format_number(defaults.friction, 2);
+    show_value(select('contact'), settings.contact ?? 'quasi-static');
+    select('contact').disabled = !model.moves;
+    select('contact').title = model.moves ? 'Dynamic: the body swings' : 'This model has no dynamics: the body cannot swing';
+    input('overlay').checked = settings.overlay !== undefined;
+    const overlay = /^(?:r=(\d+))?,?(?:rings=(\d+))?/.exec(settings.overlay ?? '');
+    if (overlay?.[1]) show_value(input('overlay-r'), overlay[1]);
+    if (overlay?.[2]) show_value(input('overlay-rings'), overlay[2]);
+    show_value(input('stiffness-scale'), settings['stiffness-scale'] ?? '1');
+    show_value(input('load-scale'), settings['load-scale'] ?? '1');
+    input('load-scale').disabled = !model.loads;
+    input('load-scale').title = model.loads ? 'Gravity and other loads of the model, times this' : 'This model has no loads';
+  }
+
+  private show_facts(state: State): void {
+    const { model } = state;
+    const facts: [string, string][] = [
+      ['Model', model.file],
+      ['Mesh', `${model.nodes} nodes, ${model.elements} ${model.element}`],
+      ['Surface', `${model.surface_nodes} nodes, ${model.dofs} dofs`],
+      ['Size', `${format_number(model.size * 1000)} mm`],
+      ['Moved by', state.device],
+      ['Rate', `${state.rate} /s`],
+    ];
+    const key = JSON.stringify(facts);
+    if (part('facts').dataset.shown === key) return;
+    part('facts').dataset.shown = key;
+    part('facts').replaceChildren(
+      ...facts.flatMap(([name, value]) => {
+        const term = document.createElement('dt');
+        term.textContent = name;
+        const what = document.createElement('dd');
+        what.textContent = value;
+        return [term, what];
+      }),
+    );
+  }
+
+  private change(name: string, value: string | null): void {
+    this.send_({ type: 'change', settings: { [name]: value } });
+  }
+
+  /** Empty is the default. */
+  private on_number(id: string, name: string, least: number): void {
+    const field = input(id);
+    field.addEventListener('change', () => {
+      const value = typed_number(field.value, least);
+      if (value === null && field.value.trim() !== '') {
+        toast(`${field.value} is not a number${least > -Infinity ? ` from ${least} on` : ''}`, 'Nothing was changed.');
+        if (this.state_) field.value = this.state_.settings[name] ?? '';
+        return;
+      }
+      this.change(name, value === null ? null : String(value));
+      field.blur();
+    });
+  }
+
+  private change_tool(): void {
+    const kind = select('tool-kind').value;
+    const defaults = this.state_?.defaults;
+    const radius = typed_number(input('radius').value, 1e-9);
+    const length = typed_number(input('length').value, 1e-9);
+    if (kind !== 'point' && (radius === null || (kind === 'capsule' && length === null))) {
+      toast('Radius and length are numbers above 0', 'In millimetres.');
+      return;
+    }
+    this.change('tool', tool_text(kind, radius ? metres(radius) : (defaults?.radius ?? 0), length ? metres(length) : 0));
+    select('tool-kind').blur();
+  }
+
+  private change_overlay(id: string): void {
+    if (id !== 'overlay') input('overlay').checked = true;
+    const [r, rings] = ['overlay-r', 'overlay-rings'].map((one) => Math.max(1, Math.round(Number(input(one).value)) || 1));
+    this.change('overlay', input('overlay').checked ? `r=${r},rings=${rings}` : null);
+  }
+}

@@ -1,0 +1,83 @@
+// The JSON messages of PROTOCOL.md.
+
+export type Vec3 = [number, number, number];
+export type Quaternion = [number, number, number, number];
+export type Mode = 'live' | 'replay' | 'file';
+
+export interface Hello {
+  type: 'hello';
+  protocol: number;
+  version: string;
+  mode: Mode;
+  id?: number;
+}
+
+export interface Model {
+  name: string;
+  file: string;
+  dimension: 2 | 3;
+  nodes: number;
+  surface_nodes: number;
+  elements: number;
+  dofs: number;
+  element: string;
+  size: number;
+  bounds: [Vec3, Vec3];
+  moves: boolean;
+  loads: boolean;
+}
+
+/** How the run is. What a message leaves out is as it was. */
+export interface State {
+  scene: number;
+  you: 'controller' | 'watcher';
+  controlled: boolean;
+  watchers: number;
+  model: Model;
+  device: string;
+  pointer: boolean;
+  rate: number;
+  ticks: number;
+  paused: boolean;
+  recording: string | null;
+  busy: string | null;
+  locked: string | null;
+  fault: { name: string; remedy: string } | null;
+  phase: string;
+  misses: number;
+  settings: Record<string, string>;
+  defaults: { radius: number; reach: number; friction: number; depth: number };
+  frames?: number;
+  frame?: number;
+  duration?: number;
+  times?: number[];
+}
+
+export interface Problem {
+  type: 'error';
+  about?: string;
+  message: string;
+  hint?: string;
+}
+
+export type Said = Hello | (Partial<State> & { type: 'state' }) | Problem;
+
+/** Where the tool is wanted. */
+export interface Point {
+  type: 'point';
+  position: Vec3;
+  orientation: Quaternion;
+  grab: boolean;
+  lifted: boolean;
+}
+
+export type Word =
+  | Point
+  | { type: 'pause'; paused: boolean }
+  | { type: 'step' }
+  | { type: 'reset' }
+  | { type: 'acknowledge' }
+  | { type: 'change'; settings: Record<string, string | null> }
+  | { type: 'record'; on: boolean }
+  | { type: 'control'; take: boolean }
+  | { type: 'seek'; frame: number };

@@ -1,0 +1,113 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { displacements, fill_field } from '../src/field';
+import { make_topology, vertex_normals } from '../src/topology';
+import type { Frame, Patch, Scene } from '../src/wire';
+
+// The unit cube, each face two triangles.
+const corners = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [i & 1, (i >> 1) & 1, i >> 2]);
+const facets = [
+  [0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5],
+].flatMap(([a, b, c, d]) => [a!, b!, c!, a!, c!, d!]);
+const cube: Scene = {
+  kind: 'scene',
+  number: 1,
+  dimension: 3,
+  position: Float32Array.from(corners),
+  triangle: Uint32Array.from(facets),
+  edge: Uint32Array.from([0, 1, 4, 5, 0, 4, 4, 6]),
+  held: new Uint8Array(8),
+};
+// The top, whose triangles are 2 and 3, by four triangles about its middle.
+const patch: Patch = {
+  kind: 'patch',
+  scene: 1,
+  number: 1,
+  hidden: Uint32Array.from([2, 3]),
+  position: Float32Array.from([0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1, 0.5, 0.5, 1]),
+  triangle: Uint32Array.from([0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4]),
+  outline: Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]),
+};
+
+test('each side of a cube has its own normals', () => {
+  const topology = make_topology(cube, null);
+  assert.equal(topology.node.length, 24);
+  assert.deepEqual([...topology.node.slice(0, 8)], [0, 1, 2, 3, 4, 5, 6, 7]);
+  const position = Float32Array.from([...topology.node].flatMap((i) => [...cube.position.slice(3 * i, 3 * i + 3)]));
+  const normal = new Float32Array(position.length);
+  vertex_normals(position, topology.triangle, normal);
+  for (let i = 0; i < normal.length; i += 3) {
+    const sizes = [...normal.slice(i, i + 3)].map(Math.abs).sort();
+    assert.deepEqual(sizes, [0, 0, 1]);
+  }
+  for (let t = 0; t < topology.triangle.length; ++t) assert.equal(topology.node[topology.triangle[t]!], topology.corner[t]);
+});
+
+/** Of closed triangles, by the theorem of Gauss. */
+function volume(position: Float32Array, corner: Uint32Array): number {
+  let sum = 0;
+  for (let t = 0; t < corner.length; t += 3) {
+    const [a, b, c] = [0, 1, 2].map((i) => [...position.slice(3 * corner[t + i]!, 3 * corner[t + i]! + 3)]) as [number[], number[], number[]];
+    sum += a[0]! * (b[1]! * c[2]! - b[2]! * c[1]!) + a[1]! * (b[2]! * c[0]! - b[0]! * c[2]!) + a[2]! * (b[0]! * c[1]! - b[1]! * c[0]!);
+  }
+  return sum / 6;
+}
+
+test('a patch closes the hole of what it hides', () => {
+  const topology = make_topology(cube, patch);
+  assert.equal(topology.corner.length / 3, 12 - 2 + 4);
+  assert.ok(Math.abs(volume(topology.rest, topology.corner) - 1) < 1e-6);
+  assert.deepEqual([...topology.welded], [4, 5, 7, 6, -1]);
+  const sides = new Map<string, number>(); // each edge once in either sense: no gap, nothing twice
+  for (let t = 0; t < topology.corner.length; t += 3) {
+    for (let i = 0; i < 3; ++i) {
+      const [a, b] = [topology.corner[t + i]!, topology.corner[t + ((i + 1) % 3)]!];
+      sides.set(`${a},${b}`, (sides.get(`${a},${b}`) ?? 0) + 1);
+    }
+  }
+  for (const [edge, count] of sides) {
+    assert.equal(count, 1);
+    assert.equal(sides.get(edge.split(',').reverse().join(',')), 1);
+  }
+});
+
+const frame: Frame = {
+  kind: 'frame', scene: 1, tick: 1, time: 0, patch: 1, status: 0,
+  tool: new Float32Array(7), device: new Float32Array(7), force: new Float32Array(3), torque: new Float32Array(3),
+  unit_u: 0.5, unit_stress: 10,
+  contact: new Float32Array(0),
+  pressure_node: Uint32Array.from([1, 8 + 1, 8 + 4]), pressure: Float32Array.from([7, 30, 20]),
+  u: Int16Array.from({ length: 24 }, (_, i) => i),
+  stress: Uint16Array.from([1, 2, 3, 65535, 5, 6, 7, 8]),
+  patch_u: Int16Array.from({ length: 15 }, (_, i) => -i),
+  patch_stress: Uint16Array.from([50, 65535, 52, 53, 54]),
+};
+
+test('numbers of a welded node are the patch’s', () => {
+  const topology = make_topology(cube, patch);
+  const [u, value, known] = [new Float32Array(39), new Float32Array(13), new Float32Array(13)];
+  displacements(frame, topology, u);
+  assert.deepEqual([...u.slice(3, 6)], [1.5, 2, 2.5]); // node 1
+  assert.deepEqual([...u.slice(15, 18)], [-1.5, -2, -2.5]); // node 5 is the patch's 1
+  assert.deepEqual([...u.slice(36, 39)], [-6, -6.5, -7]);
+
+  assert.equal(fill_field('von-mises', frame, topology, u, value, known), 540);
+  assert.deepEqual([value[0], value[4], value[12]], [10, 500, 540]);
+  assert.deepEqual([known[0], known[3], known[5], known[12]], [1, 0, 0, 1]);
+
+  assert.equal(fill_field('pressure', frame, topology, u, value, known), 30);
+  assert.deepEqual([value[0], value[1], value[5], value[12]], [0, 7, 30, 20]);
+
+  assert.equal(fill_field('y', frame, topology, u, value, known), 6.5); // of the patch's middle
+  assert.equal(value[3], 5);
+  assert.equal(value[7], -3.5);
+});
+
+test('magnitudes', () => {
+  const topology = make_topology(cube, null);
+  const [u, value, known] = [new Float32Array(24), new Float32Array(8), new Float32Array(8)];
+  displacements(frame, topology, u);
+  const largest = fill_field('magnitude', frame, topology, u, value, known);
+  assert.ok(Math.abs(largest - 0.5 * Math.hypot(21, 22, 23)) < 1e-4);
+  assert.ok(Math.abs(value[1]! - 0.5 * Math.hypot(3, 4, 5)) < 1e-5);
+});
