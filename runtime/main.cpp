@@ -33,7 +33,7 @@ struct Arguments {
   PlayArguments play;
   DevicesOptions devices;
   ExportOptions exported;
-  std::string view_address = default_view_address;
+  std::string view_address = "127.0.0.1:8017";
 };
 
 void add_file(CLI::App& command, Arguments& arguments) {

@@ -130,18 +130,6 @@ DeviceChoice read_device(const std::string& text, const std::string& profile) {
                                              "bridge[:[ADDRESS:]PORT] and, with --view, mouse");
 }
 
-/// "PORT" or "ADDRESS:PORT".
-ViewerOptions read_view_address(const std::string& text) {
-  ViewerOptions viewer;
-  const std::size_t colon = text.rfind(':');
-  if (colon != std::string::npos) viewer.address = text.substr(0, colon);
-  const std::optional<Index> port = parse_index(colon == std::string::npos ? text : text.substr(colon + 1));
-  if (!port || *port > UINT16_MAX || viewer.address.empty())
-    throw CLI::ValidationError("--view-address", "'" + text + "' is not [ADDRESS:]PORT");
-  viewer.port = static_cast<std::uint16_t>(*port);
-  return viewer;
-}
-
 /// What shows it, and what moves the tool then.
 void read_view(PlayArguments& arguments, PlayOptions& options) {
   if (arguments.view) options.view = read_view_address(arguments.view_address.value_or("8017"));
@@ -173,6 +161,17 @@ double read_frame_rate(const std::optional<std::string>& text) {
 }
 
 }  // namespace
+
+ViewerOptions read_view_address(const std::string& text) {
+  ViewerOptions viewer;
+  const std::size_t colon = text.rfind(':');
+  if (colon != std::string::npos) viewer.address = text.substr(0, colon);
+  const std::optional<Index> port = parse_index(colon == std::string::npos ? text : text.substr(colon + 1));
+  if (!port || *port > UINT16_MAX || viewer.address.empty())
+    throw CLI::ValidationError("--view-address", "'" + text + "' is not [ADDRESS:]PORT");
+  viewer.port = static_cast<std::uint16_t>(*port);
+  return viewer;
+}
 
 CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
   CLI::App* play = app.add_subcommand("play", "run the haptic loop with a tool and report on it");
