@@ -307,7 +307,8 @@ class Page implements Listener {
 
   private show_timing(): void {
     this.plots_.draw_timing(this.history_, this.state_?.rate ?? 1000, this.mode_ !== 'live');
-    show_timing(this.plots_.timing, this.state_?.misses ?? 0, this.state_?.ticks ?? 0);
+    const ticks = this.mode_ === 'live' ? this.state_?.ticks : this.history_.last + 1;
+    show_timing(this.plots_.timing, this.state_?.misses ?? 0, ticks ?? 0);
   }
 
   private async save_picture(): Promise<void> {
