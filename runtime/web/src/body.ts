@@ -117,7 +117,7 @@ export class Body {
   private readonly outline_ = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0xffb454 }));
   private readonly held_ = new Points(
     new BufferGeometry(),
-    new PointsMaterial({ color: 0x7d8ba1, size: 5, sizeAttenuation: false }),
+    new PointsMaterial({ color: 0x7d8ba1, size: 4, sizeAttenuation: false }),
   );
 
   constructor() {

@@ -140,6 +140,7 @@ class Page implements Listener {
     if (mode !== this.mode_ || mode !== 'live') this.history_ = new History(live_samples, mode !== 'live');
     this.mode_ = mode;
     document.body.classList.toggle('live', mode === 'live');
+    document.body.classList.toggle('served', mode !== 'file');
   }
 
   private take_state(state: State): void {
@@ -158,7 +159,7 @@ class Page implements Listener {
     }
     this.run_.show(state, this.mode_);
     part('hand').hidden = !this.is_hand();
-    if (this.mode_ !== 'live') this.replay_.show(state.times ?? [], state.frame ?? 0);
+    if (this.mode_ !== 'live') this.replay_.show(state.times ?? [], state.frame ?? 0, this.mode_ === 'file' || state.you === 'controller');
   }
 
   // --- to the run ---
@@ -230,7 +231,7 @@ class Page implements Listener {
       f: () => this.view_.fit(),
       p: toggle_panel,
       '?': () => show_help(part('help-text').hidden),
-      Escape: () => show_help(false),
+      Escape: () => part('help-text').hidden || show_help(false),
       ArrowLeft: () => this.replay_.move(-1),
       ArrowRight: () => this.replay_.move(1),
       ...fields,
@@ -291,7 +292,6 @@ class Page implements Listener {
 
   private felt(): Felt {
     const frame = this.body_.frame;
-    if (this.mode_ === 'live' && this.history_.count > 0 && this.frames_ === 0) return this.felt_at(this.history_.count - 1);
     const sample = frame ? Math.max(0, Math.min(this.history_.count - 1, this.history_.from(frame.tick))) : 0;
     return {
       force: frame ? [frame.force[0]!, frame.force[1]!, frame.force[2]!] : [0, 0, 0],
@@ -301,18 +301,14 @@ class Page implements Listener {
     };
   }
 
-  private felt_at(sample: number): Felt {
-    const at = (column: 'x' | 'y' | 'z' | 'depth' | 'contacts') => this.history_.value(column, sample);
-    return { force: [at('x'), at('y'), at('z')], depth: at('depth'), contacts: at('contacts'), tick: this.history_.tick(sample) };
-  }
-
   private show_numbers(): void {
     show_felt(this.felt());
   }
 
   private show_timing(): void {
     this.plots_.draw_timing(this.history_, this.state_?.rate ?? 1000, this.mode_ !== 'live');
-    show_timing(this.plots_.timing, this.state_?.misses ?? 0, this.state_?.ticks ?? 0);
+    const ticks = this.mode_ === 'live' ? this.state_?.ticks : this.history_.last + 1;
+    show_timing(this.plots_.timing, this.state_?.misses ?? 0, ticks ?? 0);
   }
 
   private async save_picture(): Promise<void> {

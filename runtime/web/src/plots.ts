@@ -54,7 +54,7 @@ class TimePlot {
         select: { show: true, left: 0, top: 0, width: 0, height: 0 },
         scales: { x: { time: false, auto: false, range: (_, low, high) => [low, high] }, y: { range: (_, low, high) => padded(low, high) } },
         axes: [
-          { ...axis, size: 18, gap: 1, values: (_, ticks) => ticks.map((tick) => short_number(tick, 5)) },
+          { ...axis, size: 20, gap: 4, values: (_, ticks) => ticks.map((tick) => short_number(tick, 5)) },
           { ...axis, size: 46, gap: 3, space: 22, values: (_, ticks) => ticks.map((tick) => short_number(tick / this.prefix_[0])) },
         ],
         series: [

@@ -1,5 +1,5 @@
 // Moves through the frames of a session.
-import { button, input, part, select, show_value, write } from './dom';
+import { button, input, part, select, write } from './dom';
 import { format_time } from './format';
 
 /** The last of ascending times that is not after `time`, 0 where there is none. */
@@ -17,6 +17,7 @@ export function frame_at(times: number[], time: number): number {
 export class ReplayBar {
   private times_: number[] = [];
   private time_ = 0;
+  private may_seek_ = false;
   private asked_ = -1; // the last frame that was sought
   private last_beat_: number | null = null; // while playing
 
@@ -25,18 +26,23 @@ export class ReplayBar {
     button('replay-back').addEventListener('click', () => this.move(-1));
     button('replay-forward').addEventListener('click', () => this.move(1));
     input('scrub').addEventListener('input', () => {
+      const frame = Number(input('scrub').value);
       this.stop();
-      this.go(Number(input('scrub').value));
+      this.go(frame);
     });
   }
 
-  get is_shown(): boolean {
-    return this.times_.length > 0;
+  private get can_move(): boolean {
+    return this.may_seek_ && this.times_.length > 0;
   }
 
-  /** The times of all frames [s], and which is shown. */
-  show(times: number[], frame: number): void {
+  /** The times of all frames [s], which is shown, and whether this page may choose another. */
+  show(times: number[], frame: number, may_seek: boolean): void {
     this.times_ = times;
+    this.may_seek_ = may_seek;
+    for (const id of ['replay-play', 'replay-back', 'replay-forward']) button(id).disabled = !may_seek;
+    input('scrub').disabled = !may_seek;
+    if (!may_seek) this.last_beat_ = null;
     part('replay').hidden = times.length === 0;
     input('scrub').max = String(Math.max(0, times.length - 1));
     if (this.last_beat_ === null && this.asked_ < 0) this.time_ = times[frame] ?? 0;
@@ -45,16 +51,17 @@ export class ReplayBar {
   }
 
   seek_time(time: number): void {
-    if (this.is_shown) this.go(frame_at(this.times_, time));
+    if (this.can_move) this.go(frame_at(this.times_, time));
   }
 
   move(by: number): void {
-    if (!this.is_shown) return;
+    if (!this.can_move) return;
     this.stop();
     this.go(this.frame() + by);
   }
 
   toggle(): void {
+    if (!this.can_move) return;
     if (this.last_beat_ !== null) {
       this.stop();
       return;
@@ -102,7 +109,6 @@ export class ReplayBar {
     write(button('replay-play'), plays ? 'Pause' : 'Play');
     button('replay-play').setAttribute('aria-pressed', String(plays));
     input('scrub').value = String(this.frame());
-    show_value(input('scrub'), String(this.frame()));
     write(part('replay-time'), `${format_time(this.time_)} / ${format_time(this.times_.at(-1) ?? 0)}`);
   }
 }

@@ -55,12 +55,12 @@ export class View {
     this.canvas.dataset.testid = 'view';
     element.prepend(this.canvas);
 
-    const key = new DirectionalLight(0xffffff, 2.1);
-    key.position.set(-0.6, 0.9, 1);
-    const fill = new DirectionalLight(0xbfd4ff, 0.55);
-    fill.position.set(0.9, -0.5, 0.4);
+    const key = new DirectionalLight(0xfff4e6, 2.5);
+    key.position.set(-1, 1, 0.75);
+    const fill = new DirectionalLight(0xbfd4ff, 0.8);
+    fill.position.set(1, -0.4, 0.5);
     this.lamp_.add(key, key.target, fill, fill.target);
-    this.scene.add(new AmbientLight(0xffffff, 0.95), this.lamp_);
+    this.scene.add(new AmbientLight(0xdfe8ff, 0.5), this.lamp_);
     axis_colours.forEach((colour, axis) => {
       const along = new Vector3().setComponent(axis, 1);
       const arrow = new ArrowHelper(along, new Vector3(), 0.95, colour, 0.3, 0.2);
