@@ -175,6 +175,9 @@ TEST(LoopTick, MakesNoHeapCall) {
     SurfaceFrames frames(body, state, {},
                          [&](SurfacePicture picture) { recorder.push_frame(std::move(picture.frame)); });
     Monitor monitor({});
+    LoopControl control;
+    TickFeed feed([](std::span<const TickNote>) {});
+    SurfaceFrames viewed(body, state, {.ticks_per_frame = 1}, [](const SurfacePicture&) {});
     const std::atomic<bool> stop = false;
     report = run_loop({.body = body,
                        .state = state,
@@ -182,7 +185,10 @@ TEST(LoopTick, MakesNoHeapCall) {
                        .safety = &safety,
                        .recorder = &recorder,
                        .monitor = &monitor,
-                       .frames = &frames},
+                       .frames = &frames,
+                       .control = &control,
+                       .feed = &feed,
+                       .viewed = &viewed},
                       {.ticks = 1000}, stop);
     counted = device.counted;
   }

@@ -209,6 +209,14 @@ class Choice(ProgramTest):
         file = self.bake(cube_toml(2))
         script = self.write("a.csv", "t,x,y,z\n0,0,0,2\n0.01,0,0,2\n")
         for arguments, pieces in (
+                ((), ("--device", "--view")),
+                (("--device", "mouse"), ("'mouse' is the pointer in a browser", "--view")),
+                (("--view", "--fast"), ("--fast", "keeps the clock")),
+                (("--view", "--view-address", "1:2:70000"), ("'1:2:70000' is not [ADDRESS:]PORT",)),
+                (("--device", f"script:{script}", "--view-address", "8017"), ("--view-address", "--view")),
+                (("--view", "--origin", "0,0,1"), ("--origin", "in the body's frame")),
+                (("--device", f"script:{script}", "--load-scale", "-1"), ("--load-scale", "not a number from 0 on")),
+                (("--device", f"script:{script}", "--stiffness-scale", "0"), ("--stiffness-scale", "not a positive number")),
                 (("--device", "mouse-trap"), ("is none of script:FILE.csv, replay:SESSION.h5, hid[:WHICH]",)),
                 (("--device", "script:"), ("is none of",)),
                 (("--device", "hid", "--fast"), ("--fast", "a hand cannot be run ahead of")),

@@ -239,6 +239,8 @@ TEST(Settings, ReadBackAsTheyWere) {
   settings.safety->max_force = 10.0 / 3.0;
   settings.safety->buzz.flips = 7;
   settings.safety->silence.most = 0.1 / 3.0;
+  settings.load_scale = 0.1 / 3.0;
+  settings.stiffness_scale = 20.0 / 3.0;
   const std::string text = to_text(settings);
   const auto value = [&](const std::string& name) {
     const std::size_t begin = ("\n" + text).find("\n" + name + "=") + name.size() + 1;
@@ -255,6 +257,10 @@ TEST(Settings, ReadBackAsTheyWere) {
   EXPECT_EQ(safety.silence.most, settings.safety->silence.most);
   EXPECT_EQ(safety.ramp, SafetyOptions{}.ramp);
   EXPECT_EQ(text.find("friction"), std::string::npos) << "what was not said is not said";
+  const Settings again = read_settings(split_settings(text + "later=1\n"));
+  EXPECT_EQ(to_text(again), text);
+  EXPECT_EQ(again.load_scale, settings.load_scale);
+  EXPECT_EQ(again.stiffness_scale, settings.stiffness_scale);
 }
 
 TEST(Settings, AxesAreRotations) {

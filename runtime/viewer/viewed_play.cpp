@@ -101,6 +101,7 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
               [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); }});
   const std::lock_guard lock(mutex_);
   state_.settings = plan.text;
+  state_.busy = refusal_;
   state_.ticks = 0;
   state_.misses = 0;
   state_.recording.reset();
@@ -117,12 +118,18 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
 /// Another body where the settings need one; the old one goes first, as it is large.
 void ViewedPlay::load(const Settings& settings) {
   if (body_ != nullptr && body_options_ == settings.body()) return;
-  set_busy("the model is being loaded");
+  begin_loading();
   body_.reset();
   body_ = load_and_print(options_.file, options_.model_toml, settings.body());
   body_options_ = settings.body();
   show_body();
-  set_busy(std::nullopt);
+}
+
+void ViewedPlay::begin_loading() {
+  const std::lock_guard lock(mutex_);
+  state_.busy = "the model is being loaded";
+  changed_ = true;
+  tell_.notify_all();
 }
 
 void ViewedPlay::show_body() {
@@ -143,10 +150,9 @@ LoopReport ViewedPlay::run_act(Act& act, const std::atomic<bool>& stop) {
     return act.run(stop);
   } catch (const Error& error) {  // of the recording: the run goes on without it
     if (stop || options_.duration) throw;
-    print_warning(sentence(error));
-    set_busy(sentence(error));
     const std::lock_guard lock(mutex_);
     wished_.record.clear();
+    refuse(sentence(error));
     return {};
   }
 }
@@ -161,13 +167,17 @@ bool ViewedPlay::wait_for_wish(const std::atomic<bool>& stop) const {
 bool ViewedPlay::take_back(const Plan& failed, const Plan& good, const std::string& why) {
   const std::lock_guard lock(mutex_);
   if (failed.text == good.text && failed.record.empty()) return false;
-  print_warning(why);
   wished_ = good;
   wished_.record.clear();
-  state_.busy = why;
-  changed_ = true;
-  tell_.notify_all();
+  refuse(why);
   return true;
+}
+
+RunState ViewedPlay::state() const {
+  const std::lock_guard lock(mutex_);
+  RunState state = state_;
+  state.paused = control_.paused;
+  return state;
 }
 
 void ViewedPlay::point(const PointerPose& wanted) {
@@ -253,15 +263,16 @@ void ViewedPlay::check(const Settings& settings) const {
 }
 
 void ViewedPlay::end_act() {
-  state_.busy.reset();
+  refusal_.reset();
   control_.leave = true;
   changed_ = true;
   tell_.notify_all();
 }
 
-void ViewedPlay::set_busy(std::optional<std::string> sentence) {
-  const std::lock_guard lock(mutex_);
-  state_.busy = std::move(sentence);
+/// The page is told until its next wish.
+void ViewedPlay::refuse(const std::string& why) {
+  print_warning(why);
+  refusal_ = state_.busy = why;
   changed_ = true;
   tell_.notify_all();
 }
@@ -285,10 +296,9 @@ void ViewedPlay::take_ticks(std::span<const TickNote> notes) {
 void ViewedPlay::tell_states(const std::stop_token& over) {
   std::unique_lock lock(mutex_);
   while (!over.stop_requested()) {
-    state_.paused = control_.paused;
     changed_ = false;
-    const std::string json = to_json(state_);
     lock.unlock();
+    const std::string json = to_json(state());
     server_->show_state(json);
     lock.lock();
     tell_.wait_for(lock, over, state_period, [this] { return changed_; });

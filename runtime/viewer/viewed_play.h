@@ -30,6 +30,9 @@ class ViewedPlay : public ViewedRun {
   /// last act, whose report it returns. Throws Error.
   LoopReport run(const std::atomic<bool>& stop);
 
+  /// As pages are told.
+  [[nodiscard]] RunState state() const;
+
   void point(const PointerPose& wanted) override;
   void lose_pointer() override;
   void pause(bool paused) override;
@@ -59,7 +62,8 @@ class ViewedPlay : public ViewedRun {
   void refuse_while_locked() const;
   void check(const Settings& settings) const;
   void end_act();
-  void set_busy(std::optional<std::string> sentence);
+  void begin_loading();
+  void refuse(const std::string& why);
   void take_ticks(std::span<const TickNote> notes);
   void tell_states(const std::stop_token& over);
 
@@ -74,7 +78,8 @@ class ViewedPlay : public ViewedRun {
   mutable std::mutex mutex_;  // of what follows; the loop takes it never
   Plan wished_;               // of the next act
   RunState state_;
-  bool changed_ = true;  // since pages were told
+  std::optional<std::string> refusal_;  // why the last wish could not be met
+  bool changed_ = true;                 // since pages were told
   std::condition_variable_any tell_;
 };
 
