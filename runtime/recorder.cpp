@@ -73,7 +73,8 @@ std::size_t Recorder::take_all() {
   for (; taken < most_waiting && ticks_.pop(tick); taken += sizeof tick) writer_.append({&tick, 1});
   SurfaceFrame frame;
   while (taken < most_waiting && frames_.pop(frame)) {
-    taken += sizeof frame + frame.displacement.size() * sizeof(float);
+    const std::size_t numbers = frame.displacement.size() + frame.von_mises.size() + frame.pressure.size();
+    taken += sizeof frame + numbers * sizeof(float);
     writer_.append(std::move(frame));
   }
   return taken;

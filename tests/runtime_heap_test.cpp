@@ -24,6 +24,7 @@
 #include "runtime/patch_source.h"
 #include "runtime/step.h"
 #include "runtime/surface_frames.h"
+#include "runtime/surface_stress.h"
 #include "tests/runtime_model.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -169,7 +170,10 @@ class OverlayTick : public Tick {
       step(overlaid_, with_, poses_[k]);
       touching_ += with_.tools.front().contacts > 0 ? 1 : 0;
       load_ = with_.near.load();
-      if (k % 10 == 5) surface_displacement(overlaid_, load_, stored_, surface_);
+      if (k % 10 == 5) {
+        surface_displacement(overlaid_, load_, stored_, surface_);
+        surface_stress_.evaluate(surface_, force_, load_.patch.get(), stress_);
+      }
       if (frames_) frames_->post(with_, static_cast<std::int64_t>(k), 0.001 * static_cast<double>(k));
     }
   }
@@ -185,6 +189,9 @@ class OverlayTick : public Tick {
   std::vector<std::shared_ptr<const Patch>> patches_;
   std::vector<double> stored_ = std::vector<double>(static_cast<std::size_t>(overlaid_.greens().order()));
   std::vector<Vec3> surface_ = std::vector<Vec3>(overlaid_.surface_rest_positions().size());
+  SurfaceStress surface_stress_{overlaid_};
+  std::vector<Vec3> force_ = std::vector<Vec3>(surface_.size(), Vec3(0.1, 0.2, 0.0));
+  std::vector<Stress> stress_ = std::vector<Stress>(surface_.size());
   std::optional<SurfaceFrames> frames_;
 };
 
