@@ -131,6 +131,10 @@ std::optional<PageWord> parse_page_word(std::string_view text, std::string& prob
     problem = "the message is longer than 16 KiB";
     return std::nullopt;
   }
+  if (text.find('\0') != std::string_view::npos) {  // which the parser takes for the end
+    problem = "the message is not JSON";
+    return std::nullopt;
+  }
   bool too_deep = false;
   const Json object = Json::parse(
       text,

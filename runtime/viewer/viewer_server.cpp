@@ -111,10 +111,10 @@ class Show {
                   replay ? most_recorded_ticks : static_cast<std::size_t>(seconds_of_ticks * rate));
   }
   void set_state(RunState state) {
-    if (!state.times().is_null()) times_ = state.times();
     state_ = std::move(state);
     touch_state();
   }
+  void set_times(nlohmann::json times) { times_ = std::move(times); }
   /// Pages are to be sent the state again.
   void touch_state() {
     ++states_;
@@ -186,6 +186,7 @@ struct Mailbox {
   std::optional<ShownPicture> picture;
   std::deque<Ticks> ticks;
   std::optional<RunState> state;
+  nlohmann::json times;  // of the last state that had them
 };
 
 class Server;
@@ -557,6 +558,7 @@ void Server::take() {
     show_.set_scene(std::move(mail.scene));
     show_.touch_state();
   }
+  if (!mail.times.is_null()) show_.set_times(std::move(mail.times));
   if (mail.state) show_.set_state(std::move(*mail.state));
   if (mail.picture) show_.set_picture(std::move(*mail.picture));
   for (const Mailbox::Ticks& ticks : mail.ticks) show_.add_ticks(ticks.notes, ticks.stride, options_.replay);
@@ -786,7 +788,10 @@ void ViewerServer::show_ticks(std::span<const TickNote> ticks, std::int64_t stri
 
 void ViewerServer::show_state(const std::string& json) {
   RunState state(json);
-  impl_->server.post([&](Mailbox& mailbox) { mailbox.state = std::move(state); });
+  impl_->server.post([&](Mailbox& mailbox) {
+    if (!state.times().is_null()) mailbox.times = state.times();
+    mailbox.state = std::move(state);
+  });
 }
 
 }  // namespace palpate
