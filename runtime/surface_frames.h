@@ -67,18 +67,18 @@ class SurfaceFrames {
     Vec3 force = Vec3::Zero();
   };
   struct Moment {
+    ToolPose device{};
+    ToolPose tool{};
     SurfaceLoad load;
     ShownMotion motion;
     std::vector<Touch> touches;      // [most contacts] the first `touch_count`
     std::vector<NodalForce> forces;  // [most nodes near the tools] the first `force_count`
     std::size_t touch_count = 0;
     std::size_t force_count = 0;
-    ToolPose device{};
-    ToolPose tool{};
     Wrench on_body{};
-    StepStatus status = StepStatus::ok;
     std::int64_t tick = -1;
     double time = 0.0;
+    StepStatus status = StepStatus::ok;
   };
   /// The interior of a body in the plane.
   struct Interior {
