@@ -94,7 +94,7 @@ export class RunControls {
     part('radius-label').hidden = kind === 'point';
     part('length-label').hidden = kind !== 'capsule';
     show_value(input('radius'), millimetres(shape.radius || defaults.radius));
-    show_value(input('length'), millimetres(shape.length || 4 * defaults.radius));
+    show_value(input('length'), millimetres(shape.length || Number((4 * defaults.radius).toPrecision(3))));
     show_value(input('friction'), settings.friction ?? '');
     input('friction').placeholder = format_number(defaults.friction, 2);
     show_value(select('contact'), settings.contact ?? 'quasi-static');

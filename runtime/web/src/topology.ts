@@ -19,16 +19,31 @@ export interface Topology {
   rest: Float32Array; // [3 N]
 }
 
-/** Pairs each node of the patch with the scene's at the same place. */
+/** Pairs each node of the patch with the scene's at the same place, to the last bit. */
 function weld(scene: Scene, patch: Patch): Int32Array {
   const count = patch.position.length / 3;
   const welded = new Int32Array(count).fill(-1);
-  const bits = (values: Float32Array, i: number) => `${values[3 * i]},${values[3 * i + 1]},${values[3 * i + 2]}`;
-  const places = new Map<string, number>();
-  const candidates = new Set<number>();
-  for (const t of patch.hidden) for (let i = 0; i < 3; ++i) candidates.add(scene.triangle[3 * t + i]!);
-  for (const i of candidates) places.set(bits(scene.position, i), i);
-  for (let i = 0; i < count; ++i) welded[i] = places.get(bits(patch.position, i)) ?? -1;
+  const scene_bits = new Uint32Array(scene.position.buffer, scene.position.byteOffset, scene.position.length);
+  const patch_bits = new Uint32Array(patch.position.buffer, patch.position.byteOffset, patch.position.length);
+  const hash = (bits: Uint32Array, i: number) =>
+    Math.imul(bits[3 * i]!, 73856093) ^ Math.imul(bits[3 * i + 1]!, 19349663) ^ Math.imul(bits[3 * i + 2]!, 83492791);
+  const places = new Map<number, number[]>();
+  const is_listed = new Uint8Array(scene.held.length);
+  for (const t of patch.hidden) {
+    for (let i = 3 * t; i < 3 * t + 3; ++i) {
+      const node = scene.triangle[i];
+      if (node === undefined || is_listed[node]) continue;
+      is_listed[node] = 1;
+      const key = hash(scene_bits, node);
+      const here = places.get(key);
+      if (here) here.push(node);
+      else places.set(key, [node]);
+    }
+  }
+  for (let i = 0; i < count; ++i) {
+    const same = places.get(hash(patch_bits, i))?.find((node) => [0, 1, 2].every((k) => scene_bits[3 * node + k] === patch_bits[3 * i + k]));
+    if (same !== undefined) welded[i] = same;
+  }
   return welded;
 }
 
@@ -51,83 +66,91 @@ function facet_normals(rest: Float32Array, corner: Uint32Array): Float32Array {
 function split_at_creases(rest: Float32Array, corner: Uint32Array, nodes: number): { vertex: Uint32Array; node: Uint32Array } {
   const normal = facet_normals(rest, corner);
   const vertex = new Uint32Array(corner.length);
-  const node = Array.from({ length: nodes }, (_, i) => i);
-  const groups: { vertex: number; x: number; y: number; z: number }[][] = Array.from({ length: nodes }, () => []);
+  const node = new Uint32Array(nodes + corner.length);
+  const sum = new Float32Array(3 * node.length); // of each group's facet normals
+  const next = new Int32Array(node.length).fill(-1); // group of the same node
+  let count = nodes;
+  for (let i = 0; i < nodes; ++i) node[i] = i;
   for (let at = 0; at < corner.length; ++at) {
     const t = at - (at % 3);
     const x = normal[t]!, y = normal[t + 1]!, z = normal[t + 2]!;
-    const here = groups[corner[at]!]!;
-    let group = here.find((g) => g.x * x + g.y * y + g.z * z > crease * Math.hypot(g.x, g.y, g.z));
-    if (!group) {
-      group = { vertex: here.length === 0 ? corner[at]! : node.push(corner[at]!) - 1, x: 0, y: 0, z: 0 };
-      here.push(group);
+    let group = corner[at]!;
+    for (;;) {
+      const a = sum[3 * group]!, b = sum[3 * group + 1]!, c = sum[3 * group + 2]!;
+      const size = Math.sqrt(a * a + b * b + c * c);
+      if (size === 0 || a * x + b * y + c * z > crease * size) break;
+      if (next[group]! < 0) {
+        node[count] = corner[at]!;
+        next[group] = count++;
+      }
+      group = next[group]!;
     }
-    group.x += x;
-    group.y += y;
-    group.z += z;
-    vertex[at] = group.vertex;
+    sum[3 * group]! += x;
+    sum[3 * group + 1]! += y;
+    sum[3 * group + 2]! += z;
+    vertex[at] = group;
   }
-  return { vertex, node: Uint32Array.from(node) };
+  return { vertex, node: node.slice(0, count) };
 }
 
-const edge_key = (a: number, b: number, nodes: number): number => Math.min(a, b) * nodes + Math.max(a, b);
+const beside = new WeakMap<Scene, Int32Array>();
+
+/** Of each edge of the scene the two triangles beside it, -1 where there is none: made once, patches come often. */
+function triangles_beside(scene: Scene): Int32Array {
+  const known = beside.get(scene);
+  if (known) return known;
+  const nodes = scene.held.length;
+  const key = (a: number, b: number) => Math.min(a, b) * nodes + Math.max(a, b);
+  const edges = new Map<number, number>();
+  for (let e = 0; e < scene.edge.length; e += 2) edges.set(key(scene.edge[e]!, scene.edge[e + 1]!), e);
+  const triangles = new Int32Array(scene.edge.length).fill(-1);
+  for (let at = 0; at < scene.triangle.length; ++at) {
+    const t = at - (at % 3);
+    const e = edges.get(key(scene.triangle[at]!, scene.triangle[t + ((at + 1) % 3)]!));
+    if (e !== undefined) triangles[triangles[e]! < 0 ? e : e + 1] = t / 3;
+  }
+  beside.set(scene, triangles);
+  return triangles;
+}
 
 /** Of a scene and the patch in it, if any. */
 export function make_topology(scene: Scene, patch: Patch | null): Topology {
   const scene_nodes = scene.held.length;
-  const patch_nodes = patch ? patch.position.length / 3 : 0;
-  const nodes = scene_nodes + patch_nodes;
+  const nodes = scene_nodes + (patch ? patch.position.length / 3 : 0);
   const rest = new Float32Array(3 * nodes);
   rest.set(scene.position);
   if (patch) rest.set(patch.position, scene.position.length);
   const welded = patch ? weld(scene, patch) : new Int32Array(0);
   const drawn = (i: number) => (welded[i]! >= 0 ? welded[i]! : scene_nodes + i);
 
-  const hides = patch !== null && patch.triangle.length > 0;
+  const fine = patch?.triangle ?? new Uint32Array(0);
   const hidden = new Uint8Array(scene.triangle.length / 3);
-  if (hides) for (const t of patch.hidden) hidden[t] = 1;
-  const corner: number[] = [];
-  const bare = new Set<number>(); // edges of hidden triangles
-  const seen = new Set<number>(); // edges of those that are drawn
+  if (patch && fine.length > 0) for (const t of patch.hidden) hidden[t] = 1;
+  const corner = new Uint32Array(scene.triangle.length + fine.length);
+  let corners = 0;
   for (let t = 0; t < hidden.length; ++t) {
-    const of_edges = hidden[t] ? bare : seen;
-    const [a, b, c] = [scene.triangle[3 * t]!, scene.triangle[3 * t + 1]!, scene.triangle[3 * t + 2]!];
-    if (!hidden[t]) corner.push(a, b, c);
-    if (hides) of_edges.add(edge_key(a, b, nodes)).add(edge_key(b, c, nodes)).add(edge_key(c, a, nodes));
+    if (hidden[t]) continue;
+    for (let i = 0; i < 3; ++i) corner[corners++] = scene.triangle[3 * t + i]!;
   }
-  const edge: number[] = [];
+  for (let i = 0; i < fine.length; ++i) corner[corners++] = drawn(fine[i]!);
+
+  const outline = Uint32Array.from(patch?.outline ?? [], drawn);
+  const edge: number[] = fine.length > 0 ? [...outline] : [];
+  const sides = triangles_beside(scene);
   for (let e = 0; e < scene.edge.length; e += 2) {
-    const key = edge_key(scene.edge[e]!, scene.edge[e + 1]!, nodes);
-    if (!bare.has(key) || seen.has(key)) edge.push(scene.edge[e]!, scene.edge[e + 1]!);
+    const [a, b] = [sides[e]!, sides[e + 1]!];
+    const is_hidden = a >= 0 && hidden[a] === 1 && (b < 0 || hidden[b] === 1);
+    if (!is_hidden) edge.push(scene.edge[e]!, scene.edge[e + 1]!);
   }
-  const outline: number[] = [];
-  if (patch) {
-    const fine = new Set<number>();
-    for (let t = 0; t < patch.triangle.length; t += 3) {
-      const three = [0, 1, 2].map((i) => drawn(patch.triangle[t + i]!));
-      corner.push(...three);
-      for (let i = 0; i < 3; ++i) {
-        const [a, b] = [three[i]!, three[(i + 1) % 3]!];
-        const key = edge_key(a, b, nodes);
-        if (!fine.has(key)) edge.push(a, b);
-        fine.add(key);
-      }
-    }
-    for (const i of patch.outline) outline.push(drawn(i));
+  // An edge within the patch is met once in either sense; the others are its outline.
+  for (let at = 0; at < fine.length; ++at) {
+    const a = fine[at]!;
+    const b = fine[at - (at % 3) + ((at + 1) % 3)]!;
+    if (a < b) edge.push(drawn(a), drawn(b));
   }
-  const corners = Uint32Array.from(corner);
-  const { vertex, node } = split_at_creases(rest, corners, nodes);
-  return {
-    nodes,
-    scene_nodes,
-    node,
-    triangle: vertex,
-    corner: corners,
-    edge: Uint32Array.from(edge),
-    outline: Uint32Array.from(outline),
-    welded,
-    rest,
-  };
+  const all = corner.slice(0, corners);
+  const { vertex, node } = split_at_creases(rest, all, nodes);
+  return { nodes, scene_nodes, node, triangle: vertex, corner: all, edge: Uint32Array.from(edge), outline, welded, rest };
 }
 
 /** Vertex normals [3 V] of length 1: means of the triangles' by their areas. */

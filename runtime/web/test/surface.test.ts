@@ -71,6 +71,16 @@ test('a patch closes the hole of what it hides', () => {
   }
 });
 
+test('edges that only hidden triangles have are not drawn', () => {
+  const diagonal: Scene = { ...cube, edge: Uint32Array.from([4, 5, 4, 7, 0, 4]) }; // 4-7 lies within the top
+  const { edge } = make_topology(diagonal, patch);
+  const drawn = new Set<string>();
+  for (let e = 0; e < edge.length; e += 2) drawn.add([edge[e]!, edge[e + 1]!].sort((a, b) => a - b).join());
+  // The outline on the scene's own nodes, the four spokes to the patch's middle, and what is left of the scene.
+  assert.deepEqual([...drawn].sort(), ['0,4', '4,12', '4,5', '4,6', '5,12', '5,7', '6,12', '6,7', '7,12'].sort());
+  assert.deepEqual([...make_topology(diagonal, null).edge], [4, 5, 4, 7, 0, 4]);
+});
+
 const frame: Frame = {
   kind: 'frame', scene: 1, tick: 1, time: 0, patch: 1, status: 0,
   tool: new Float32Array(7), device: new Float32Array(7), force: new Float32Array(3), torque: new Float32Array(3),
