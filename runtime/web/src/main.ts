@@ -338,7 +338,8 @@ class Page implements Listener {
         return structuredClone(page.state_);
       },
       get lastFrame() {
-        return page.body_.frame ? page.felt() : null;
+        const frame = page.body_.frame;
+        return frame ? { ...page.felt(), tool: [...frame.tool], device: [...frame.device] } : null;
       },
       get frames() {
         return page.frames_;
