@@ -38,11 +38,11 @@ State state_of(const Settings& settings, const Body& body, const Tool& tool) {
 }  // namespace
 
 Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActViewer& viewer)
-    : options_(std::move(options)),
-      body_(body),
+    : body_(body),
       mover_(mover),
       control_(viewer.control),
-      tool_(tool_of(options_.settings, body)),
+      tool_(tool_of(options.settings, body)),
+      options_(std::move(options)),
       state_(state_of(options_.settings, body, tool_)) {
   Settings& settings = options_.settings;
   if (settings.safety) {
