@@ -72,8 +72,8 @@ Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActVie
         body, state_,
         SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(settings.rate, options_.record_frames),
                              .in_background = !options_.fast},
-        [this](SurfacePicture picture) {
-          if (options_.fast) {
+        [this, fast = options_.fast](SurfacePicture picture) {
+          if (fast) {
             recorder_->push_frame_waiting(std::move(picture.frame));
           } else {
             recorder_->push_frame(std::move(picture.frame));
