@@ -38,11 +38,11 @@ State state_of(const Settings& settings, const Body& body, const Tool& tool) {
 }  // namespace
 
 Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActViewer& viewer)
-    : options_(std::move(options)),
-      body_(body),
+    : body_(body),
       mover_(mover),
       control_(viewer.control),
-      tool_(tool_of(options_.settings, body)),
+      tool_(tool_of(options.settings, body)),
+      options_(std::move(options)),
       state_(state_of(options_.settings, body, tool_)) {
   Settings& settings = options_.settings;
   if (settings.safety) {
@@ -72,8 +72,8 @@ Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActVie
         body, state_,
         SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(settings.rate, options_.record_frames),
                              .in_background = !options_.fast},
-        [this](SurfacePicture picture) {
-          if (options_.fast) {
+        [this, fast = options_.fast](SurfacePicture picture) {
+          if (fast) {
             recorder_->push_frame_waiting(std::move(picture.frame));
           } else {
             recorder_->push_frame(std::move(picture.frame));

@@ -39,21 +39,21 @@ class Act {
  private:
   LoopReport run_with_rights(const std::atomic<bool>& stop);
 
-  PlayOptions options_;
+  std::optional<Safety> safety_;
   const Body& body_;
   const Mover& mover_;
   LoopControl* control_;
   Tool tool_;
-  State state_;
-  std::optional<Safety> safety_;
-  std::optional<PatchSource> overlays_;
-  std::optional<MotionSource> motion_;
-  std::optional<Recorder> recorder_;
-  std::optional<SurfaceFrames> frames_;
-  std::optional<SurfaceFrames> viewed_;
   std::optional<TickFeed> feed_;
+  std::optional<Recorder> recorder_;
   std::optional<Monitor> monitor_;
   LoopReport report_;
+  std::optional<SurfaceFrames> frames_;  // after the recorder, which it feeds to its end
+  std::optional<SurfaceFrames> viewed_;
+  PlayOptions options_;
+  std::optional<MotionSource> motion_;
+  std::optional<PatchSource> overlays_;
+  State state_;
 };
 
 }  // namespace palpate
