@@ -248,7 +248,7 @@ TEST_F(Viewer, OnlyTheControllerIsObeyed) {
   const Json state = second.hear("state");
   EXPECT_EQ(state.at("you"), "watcher");
   EXPECT_EQ(state.at("controlled"), true);
-  EXPECT_EQ(state.at("watchers"), 1);
+  EXPECT_EQ(state.at("watchers"), 2);
   EXPECT_EQ(state.at("pointer"), false);
 
   second.say(step);

@@ -3,7 +3,7 @@
 
 namespace palpate {
 
-std::string_view viewer_page() {
+std::string_view viewer_page() noexcept {
   return "<!doctype html><title>Palpate</title><p>This build has no viewer's page.</p>\n";
 }
 
