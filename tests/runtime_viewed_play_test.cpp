@@ -208,13 +208,13 @@ TEST_F(Viewed, GoesOnAsBeforeWhereLoadingShowsThatItCannotBe) {
   ASSERT_TRUE(wait_for_ticks(50));
   play_->change({{"stiffness-scale", "2"}, {"tool", "sphere:0.2"}});
   ASSERT_TRUE(wait_for([](const RunState& state) {
-    return state.busy && state.busy->find("prescribed displacements") != std::string::npos;
+    return state.refused && state.refused->find("prescribed displacements") != std::string::npos;
   }));
   ASSERT_TRUE(wait_for_ticks(50));
   EXPECT_EQ(play_->state().settings, (SettingsText{{"tool", "sphere:0.1"}}));
   play_->change({{"stiffness-scale", "2"}, {"load-scale", "0"}});
   ASSERT_TRUE(
-      wait_for([](const RunState& state) { return state.settings.contains("load-scale") && !state.busy; }));
+      wait_for([](const RunState& state) { return state.settings.contains("load-scale") && !state.refused; }));
   EXPECT_TRUE(wait_for_ticks(50));
 }
 
@@ -223,7 +223,7 @@ TEST_F(Viewed, GoesOnWhereARecordingCannotBeMade) {
   ASSERT_TRUE(wait_for_ticks(50));
   std::filesystem::remove_all(folder_);  // the working directory is gone
   play_->record(true);
-  ASSERT_TRUE(wait_for([](const RunState& state) { return state.busy.has_value(); }));
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.refused.has_value(); }));
   EXPECT_TRUE(wait_for_ticks(50));
   EXPECT_FALSE(play_->state().recording);
   EXPECT_EQ(where_it_is_refused([&] { play_->change({{"friction", "0.1"}}); }), "") << "it is not locked";

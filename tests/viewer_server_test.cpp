@@ -248,7 +248,7 @@ TEST_F(Viewer, OnlyTheControllerIsObeyed) {
   const Json state = second.hear("state");
   EXPECT_EQ(state.at("you"), "watcher");
   EXPECT_EQ(state.at("controlled"), true);
-  EXPECT_EQ(state.at("watchers"), 1);
+  EXPECT_EQ(state.at("watchers"), 2);
   EXPECT_EQ(state.at("pointer"), false);
 
   second.say(step);
@@ -362,7 +362,8 @@ TEST_F(Viewer, RefusesWhatIsNoRequest) {
 /// A scene whose pictures fill a slow page's buffers soon.
 class SlowPages : public Viewer {
  protected:
-  static constexpr std::size_t nodes = 50'000;
+  static constexpr std::size_t nodes = 20'000;
+  static constexpr std::int64_t ticks_a_picture = 32;
 
   SlowPages() {
     Scene large;
@@ -377,14 +378,15 @@ class SlowPages : public Viewer {
     next.frame.tick = tick;
     next.frame.displacement.assign(3 * nodes, 0.001F);
     server_->show_picture(std::move(next));
-    std::vector<TickNote> notes(16);
-    for (std::size_t k = 0; k < notes.size(); ++k) notes[k].number = 16 * tick + static_cast<std::int64_t>(k);
+    std::vector<TickNote> notes(ticks_a_picture);
+    for (std::size_t k = 0; k < notes.size(); ++k)
+      notes[k].number = ticks_a_picture * tick + static_cast<std::int64_t>(k);
     server_->show_ticks(notes);
   }
 };
 
 TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
-  constexpr std::int64_t pictures = 200;  // of 0.4 MB
+  constexpr std::int64_t pictures = 100;  // of 0.16 MB
   Client slow = client();
   slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
   Client quick = client();
@@ -398,7 +400,7 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
   std::int64_t most_ticks = 0;
   std::int64_t last_tick = -1;
   double last = -1.0;
-  while (last != pictures - 1 || last_tick != 16 * pictures - 1) {
+  while (last != pictures - 1 || last_tick != ticks_a_picture * pictures - 1) {
     const Client::Said said = slow.hear();
     if (said.kind() == 3) {
       const double tick = tick_of(said.bytes);
@@ -419,6 +421,7 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
 TEST_F(SlowPages, AreClosedWhenTheyDoNotReadForTenSeconds) {
   server_->show_state("{}");
   Client slow = client();
+  slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
   slow.hear("state", is_controller);
   test::asio::io_context context;
   test::tcp::socket half_a_request(context);

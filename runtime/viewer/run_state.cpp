@@ -48,8 +48,9 @@ std::string to_json(const RunState& state) {
   json += fmt::format(R"(, "device": {}, "pointer": {}, "rate": {}, "ticks": {}, "misses": {}, "paused": {})",
                       json_string(state.device), state.pointer, state.rate, state.ticks, state.misses,
                       state.paused);
-  json += fmt::format(R"(, "recording": {}, "busy": {}, "locked": {})", text_or_null(state.recording),
-                      text_or_null(state.busy), text_or_null(state.locked));
+  json += fmt::format(R"(, "recording": {}, "busy": {}, "refused": {}, "locked": {})",
+                      text_or_null(state.recording), text_or_null(state.busy), text_or_null(state.refused),
+                      text_or_null(state.locked));
   json += fmt::format(R"(, "fault": {}, "phase": {}}})", fault_json(state.fault),
                       json_string(name_of(safety_phase_names, static_cast<std::size_t>(state.phase))));
   return json;

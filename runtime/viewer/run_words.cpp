@@ -52,7 +52,7 @@ std::string RunState::for_page(std::uint32_t scene, const PageRole& role, const 
   state["scene"] = scene;
   state["you"] = role.is_controller ? "controller" : "watcher";
   state["controlled"] = role.controlled;
-  state["watchers"] = role.watchers;
+  state["watchers"] = role.pages;
   const auto pointer = members_.find("pointer");
   state["pointer"] = role.is_controller && pointer != members_.end() && *pointer == true;
   if (!times.is_null()) state["times"] = times;

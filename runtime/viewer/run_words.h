@@ -13,7 +13,7 @@ namespace palpate {
 struct PageRole {
   bool is_controller = false;
   bool controlled = false;  ///< whether any page is
-  std::size_t watchers = 0;
+  std::size_t pages = 0;    ///< all that watch
 };
 
 /// The first message of all. `mode`: live, replay or file.

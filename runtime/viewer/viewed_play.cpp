@@ -101,7 +101,7 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
               [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); }});
   const std::lock_guard lock(mutex_);
   state_.settings = plan.text;
-  state_.busy = refusal_;
+  state_.busy.reset();
   state_.ticks = 0;
   state_.misses = 0;
   state_.recording.reset();
@@ -263,7 +263,7 @@ void ViewedPlay::check(const Settings& settings) const {
 }
 
 void ViewedPlay::end_act() {
-  refusal_.reset();
+  state_.refused.reset();
   control_.leave = true;
   changed_ = true;
   tell_.notify_all();
@@ -272,7 +272,7 @@ void ViewedPlay::end_act() {
 /// The page is told until its next wish.
 void ViewedPlay::refuse(const std::string& why) {
   print_warning(why);
-  refusal_ = state_.busy = why;
+  state_.refused = why;
   changed_ = true;
   tell_.notify_all();
 }

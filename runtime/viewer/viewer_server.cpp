@@ -273,8 +273,7 @@ class Server {
   }
   [[nodiscard]] std::optional<Response> refusal(const Request& request) const;
   [[nodiscard]] PageRole role(const Page& page) const {
-    const std::size_t controllers = controller_ == nullptr ? 0 : 1;
-    return {controller_ == &page, controllers == 1, open_.size() - controllers};
+    return {controller_ == &page, controller_ != nullptr, open_.size()};
   }
   void join(Page& page);
   void leave(Page& page);

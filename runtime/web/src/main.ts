@@ -144,6 +144,7 @@ class Page implements Listener {
   }
 
   private take_state(state: State): void {
+    if (state.refused && state.refused !== this.state_?.refused) toast(state.refused);
     this.state_ = state;
     if (!state.model) return;
     this.view_.take_bounds(state.model.bounds, state.model.dimension);
@@ -185,6 +186,7 @@ class Page implements Listener {
       depth: typed === null ? state.defaults.depth : metres(typed),
       unit_depth: state.defaults.depth,
       clearance: 0.25 * shape.radius + 0.008 * state.model.size,
+      contact: 1e-4 * state.model.size,
       shape,
     };
   }

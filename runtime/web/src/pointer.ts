@@ -17,6 +17,7 @@ export interface HandSettings {
   depth: number; // [m] where a press begins
   unit_depth: number; // [m] a wheel's notch is a tenth of it
   clearance: number; // [m] of a tool that hovers
+  contact: number; // [m] of one that all but touches
   shape: ToolShape;
 }
 
@@ -84,7 +85,7 @@ export class Hand {
     this.changed_(null);
     this.view_.canvas.style.cursor = '';
     const settings = this.settings_();
-    if (settings && typeof settings !== 'string') this.want_hover(settings, press.now, press.orientation);
+    if (settings && typeof settings !== 'string') this.want_hover(settings, press.now, press.orientation, settings.clearance);
   }
 
   private down(event: PointerEvent): void {
@@ -121,6 +122,9 @@ export class Hand {
       plane_start: this.on_screen_plane(event.clientX, event.clientY, hit.point) ?? hit.point,
       pinch: null,
     };
+    // The tool comes to where it touches, not through the body: a finger has not hovered, and a grab holds on from there.
+    this.want_hover(settings, hit, this.press_.orientation, settings.mode === 'grab' ? settings.contact : settings.clearance);
+    this.say();
     this.want_press(settings);
   }
 
@@ -212,15 +216,15 @@ export class Hand {
       const now = this.on_screen_plane(press.client.x, press.client.y, press.start.point) ?? press.plane_start;
       const away: Vec3 = this.dimension() === 2 ? [0, 0, 0] : this.view_.looking();
       const way = plus(minus(now, press.plane_start), away, press.pushed);
-      const from = press.mode === 'grab' ? press.start.point : pressed_position(press.start.point, press.start.normal, radius, 0);
+      const from = pressed_position(press.start.point, press.start.normal, radius, 0);
       position = plus(from, way);
       press.now = { point: plus(press.start.point, way), normal: press.start.normal };
     }
     this.word_ = { type: 'point', position, orientation: press.orientation, grab: press.mode === 'grab', lifted: false };
   }
 
-  private want_hover(settings: HandSettings, hit: Hit, orientation: Quaternion): void {
-    const position = pressed_position(hit.point, hit.normal, settings.shape.radius, -settings.clearance);
+  private want_hover(settings: HandSettings, hit: Hit, orientation: Quaternion, clearance: number): void {
+    const position = pressed_position(hit.point, hit.normal, settings.shape.radius, -clearance);
     this.word_ = { type: 'point', position, orientation, grab: false, lifted: true };
   }
 
@@ -232,16 +236,20 @@ export class Hand {
     const hit = settings === null ? null : this.hit(at.x, at.y, this.body_.surface);
     this.hovering_ = hit !== null;
     this.view_.canvas.style.cursor = this.hovering_ ? 'pointer' : '';
-    if (hit && settings && typeof settings !== 'string') this.want_hover(settings, hit, turn_onto(hit.normal, this.dimension()));
+    if (hit && settings && typeof settings !== 'string') this.want_hover(settings, hit, turn_onto(hit.normal, this.dimension()), settings.clearance);
   }
 
   private beat(now: number): void {
     if (!this.press_) this.follow_hover();
     if (this.press_ && !this.word_ && now - this.last_at_ > longest_wait) this.word_ = this.last_;
-    if (!this.word_ || now - this.last_at_ < least_wait) return;
+    if (now - this.last_at_ >= least_wait) this.say();
+  }
+
+  private say(): void {
+    if (!this.word_) return;
     this.send_(this.word_);
     this.last_ = this.word_;
-    this.last_at_ = now;
+    this.last_at_ = performance.now();
     this.word_ = null;
   }
 }

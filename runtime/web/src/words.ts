@@ -41,6 +41,7 @@ export interface State {
   paused: boolean;
   recording: string | null;
   busy: string | null;
+  refused: string | null;
   locked: string | null;
   fault: { name: string; remedy: string } | null;
   phase: string;
