@@ -229,7 +229,11 @@ TEST(TickHistory, ForgetsTheOldest) {
   history.clear();
   EXPECT_EQ(history.end(), 10);
   EXPECT_TRUE(history.run_from(0).ticks.empty());
+  EXPECT_FALSE(history.has_from(0)) << "none is kept";
   history.append(ticks_from(0, 1), 1, 4);
+  EXPECT_TRUE(history.has_from(0));
+  EXPECT_TRUE(history.has_from(10));
+  EXPECT_FALSE(history.has_from(11));
   EXPECT_EQ(history.run_from(5).ticks.front().number, 0);
 }
 
