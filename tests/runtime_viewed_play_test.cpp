@@ -19,6 +19,7 @@
 #include "runtime/act.h"
 #include "runtime/loading.h"
 #include "runtime/mover.h"
+#include "runtime/viewer/run_words.h"
 #include "runtime/viewer/viewed_play.h"
 #include "tests/runtime_model.h"
 
@@ -249,13 +250,14 @@ TEST(RunState, IsJsonWhateverAFileIsCalled) {
   RunState state;
   state.device = "a \"hand\"\n";
   state.recording = "caf\xe9.h5";  // of a file system that knows no UTF-8
-  const auto json = nlohmann::json::parse(to_json(state));
+  const nlohmann::json json = nlohmann::json::parse(json_text(to_json(state)));
   EXPECT_EQ(json.at("device"), state.device);
   EXPECT_EQ(json.at("recording"), "caf\xef\xbf\xbd.h5");
   EXPECT_TRUE(json.at("settings").is_object());
   EXPECT_TRUE(json.at("fault").is_null());
   state.fault = Fault::too_fast;
-  EXPECT_EQ(nlohmann::json::parse(to_json(state)).at("fault").at("remedy"), fault_remedy(Fault::too_fast));
+  EXPECT_EQ(nlohmann::json::parse(json_text(to_json(state))).at("fault").at("remedy"),
+            fault_remedy(Fault::too_fast));
 }
 
 class Settled : public testing::TestWithParam<double> {};

@@ -6,7 +6,6 @@
 
 #include "meshes/element_type.h"
 #include "runtime/monitor.h"
-#include "runtime/viewer/run_words.h"
 
 namespace palpate {
 namespace {
@@ -40,23 +39,23 @@ bool has_loads(const Model& model) {
 
 }  // namespace
 
-std::string to_json(const RunState& state) {
-  return json_text({{"scene", state.scene},
-                    {"model", state.model},
-                    {"defaults", state.defaults},
-                    {"settings", state.settings},
-                    {"device", state.device},
-                    {"pointer", state.pointer},
-                    {"rate", state.rate},
-                    {"ticks", state.ticks},
-                    {"misses", state.misses},
-                    {"paused", state.paused},
-                    {"recording", text_or_null(state.recording)},
-                    {"busy", text_or_null(state.busy)},
-                    {"refused", text_or_null(state.refused)},
-                    {"locked", text_or_null(state.locked)},
-                    {"fault", fault_or_null(state.fault)},
-                    {"phase", name_of(safety_phase_names, static_cast<std::size_t>(state.phase))}});
+nlohmann::json to_json(const RunState& state) {
+  return {{"scene", state.scene},
+          {"model", state.model},
+          {"defaults", state.defaults},
+          {"settings", state.settings},
+          {"device", state.device},
+          {"pointer", state.pointer},
+          {"rate", state.rate},
+          {"ticks", state.ticks},
+          {"misses", state.misses},
+          {"paused", state.paused},
+          {"recording", text_or_null(state.recording)},
+          {"busy", text_or_null(state.busy)},
+          {"refused", text_or_null(state.refused)},
+          {"locked", text_or_null(state.locked)},
+          {"fault", fault_or_null(state.fault)},
+          {"phase", name_of(safety_phase_names, static_cast<std::size_t>(state.phase))}};
 }
 
 nlohmann::json describe_model(const Body& body, const std::string& file) {

@@ -32,8 +32,7 @@ struct RunState {
   SettingsText settings;
 };
 
-/// As text.
-[[nodiscard]] std::string to_json(const RunState& state);
+[[nodiscard]] nlohmann::json to_json(const RunState& state);
 
 /// Name, file, size and kind of a model.
 [[nodiscard]] nlohmann::json describe_model(const Body& body, const std::string& file);

@@ -7,6 +7,7 @@
 
 #include "meshes/error.h"
 #include "runtime/settings.h"
+#include "runtime/viewer/run_state.h"
 
 namespace palpate {
 namespace {
@@ -82,37 +83,31 @@ nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
   const auto point = [](const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); };
   std::string name = std::filesystem::path(recording_.info.model_path).filename().string();
   if (const std::size_t suffix = name.find(".palpate.hdf"); suffix != std::string::npos) name.resize(suffix);
-  return {{"model",
-           {{"name", name},
-            {"file", recording_.info.model_path},
-            {"dimension", surface.corners},
-            {"nodes", nullptr},
-            {"surface_nodes", surface.nodes.size()},
-            {"elements", nullptr},
-            {"dofs", nullptr},
-            {"element", nullptr},
-            {"size", bounds.diagonal().norm()},
-            {"bounds", json::array({point(bounds.min()), point(bounds.max())})},
-            {"moves", false},
-            {"loads", false}}},
-          {"device", recording_.info.device},
-          {"session", path_.filename().string()},
-          {"rate", recording_.info.rate},
-          {"ticks", recording_.ticks.size()},
-          {"paused", false},
-          {"recording", nullptr},
-          {"busy", nullptr},
-          {"refused", nullptr},
-          {"locked", "this is a recording"},
-          {"fault", nullptr},
-          {"phase", "active"},
-          {"misses", 0},
-          {"settings", split_settings(recording_.info.options)},
-          {"defaults", {{"radius", 0.0}, {"reach", 0.0}, {"friction", 0.0}, {"depth", 0.0}}},
-          {"frames", times.size()},
-          {"frame", 0},
-          {"duration", times.empty() ? 0.0 : times.back()},
-          {"times", times}};
+  RunState state;
+  state.model = {{"name", name},
+                 {"file", recording_.info.model_path},
+                 {"dimension", surface.corners},
+                 {"nodes", nullptr},
+                 {"surface_nodes", surface.nodes.size()},
+                 {"elements", nullptr},
+                 {"dofs", nullptr},
+                 {"element", nullptr},
+                 {"size", bounds.diagonal().norm()},
+                 {"bounds", {point(bounds.min()), point(bounds.max())}},
+                 {"moves", false},
+                 {"loads", false}};
+  state.defaults = {{"radius", 0.0}, {"reach", 0.0}, {"friction", 0.0}, {"depth", 0.0}};
+  state.device = recording_.info.device;
+  state.rate = recording_.info.rate;
+  state.ticks = std::ssize(recording_.ticks);
+  state.locked = "this is a recording";
+  state.settings = split_settings(recording_.info.options);
+  json told = to_json(state);
+  told.update({{"frames", times.size()},
+               {"frame", 0},
+               {"duration", times.empty() ? 0.0 : times.back()},
+               {"times", times}});
+  return told;
 }
 
 std::vector<TickRun> SessionPictures::ticks() const {

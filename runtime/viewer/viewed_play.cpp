@@ -12,6 +12,7 @@
 #include "meshes/error.h"
 #include "runtime/loading.h"
 #include "runtime/output.h"
+#include "runtime/viewer/run_words.h"
 #include "runtime/viewer/scene.h"
 
 namespace palpate {
@@ -306,7 +307,7 @@ void ViewedPlay::tell_states(const std::stop_token& over) {
   while (!over.stop_requested()) {
     changed_ = false;
     lock.unlock();
-    const std::string json = to_json(state());
+    const std::string json = json_text(to_json(state()));
     server_->show_state(json);
     lock.lock();
     tell_.wait_for(lock, over, state_period, [this] { return changed_; });
