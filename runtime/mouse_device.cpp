@@ -36,7 +36,7 @@ DeviceNews MouseDevice::hear(const TickTime& tick) noexcept {
     heard_at_ = tick.begun;
   }
   const bool is_pressed = !word.pointer.lifted;
-  const bool lost = is_gone_ || (is_pressed && tick.begun - heard_at_ > most_silence);
+  const bool lost = is_pressed && (is_gone_ || tick.begun - heard_at_ > most_silence);
   // It may have been lifted and let down since the last tick.
   const bool lands = lost || !is_pressed || word.lifts != heard_lifts_;
   heard_lifts_ = word.lifts;

@@ -48,18 +48,22 @@ TEST(Mouse, IsLostWithItsViewerAndComesBack) {
   EXPECT_EQ(tick(mouse, 1).events, DeviceEvent::lifted);
   EXPECT_EQ(tick(mouse, 5000).events, DeviceEvent::lifted) << "lifted, a pointer may rest";
   mouse.lose();
-  EXPECT_EQ(tick(mouse, 5001).events, lost_and_lifted);
-  EXPECT_EQ(tick(mouse, 5002).events, DeviceEvent::lifted) << "told once";
+  EXPECT_EQ(tick(mouse, 5001).events, DeviceEvent::lifted) << "nothing was pressed";
+  mouse.point({.pose = {.position = below}});
+  EXPECT_EQ(tick(mouse, 5002).events, DeviceEvent::none);
+  mouse.lose();
+  EXPECT_EQ(tick(mouse, 5003).events, lost_and_lifted);
+  EXPECT_EQ(tick(mouse, 5004).events, DeviceEvent::lifted) << "told once";
   mouse.point({.pose = {.position = below, .grab = true}});
-  EXPECT_EQ(tick(mouse, 5003).events, DeviceEvent::acknowledged);
-  EXPECT_EQ(tick(mouse, 6003).events, DeviceEvent::none);
-  EXPECT_TRUE(tick(mouse, 6003).state.pose.grab);
-  const DeviceNews silent = tick(mouse, 6004);
+  EXPECT_EQ(tick(mouse, 5005).events, DeviceEvent::acknowledged);
+  EXPECT_EQ(tick(mouse, 6005).events, DeviceEvent::none);
+  EXPECT_TRUE(tick(mouse, 6005).state.pose.grab);
+  const DeviceNews silent = tick(mouse, 6006);
   EXPECT_EQ(silent.events, lost_and_lifted) << "let down for more than a second without a word";
   EXPECT_EQ(silent.state.pose.position, above) << "where it was lifted last";
   EXPECT_FALSE(silent.state.pose.grab);
   mouse.point({.pose = {.position = below}});
-  EXPECT_EQ(tick(mouse, 6005).events, DeviceEvent::acknowledged);
+  EXPECT_EQ(tick(mouse, 6007).events, DeviceEvent::acknowledged);
 }
 
 TEST(Mouse, TakesWordsFromAnotherThread) {
