@@ -418,6 +418,26 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
   EXPECT_EQ(most_ticks, 2000);  // two seconds in one message
 }
 
+TEST_F(SlowPages, MissTheTicksOfTheBodyBefore) {
+  Client slow = client();
+  slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
+  slow.hear(1);
+  Client quick = client();
+  quick.hear(1);
+  for (std::int64_t tick = 0; tick < 30; ++tick) {  // until ticks wait
+    show(tick);
+    hear_frame(quick, tick);
+  }
+  Scene other = *scene_;
+  other.number = 2;
+  server_->show_scene(std::make_shared<const Scene>(other));
+  EXPECT_EQ(test::decode_scene(quick.hear(1)).scene, 2U);
+  while (test::decode_scene(slow.hear(1)).scene != 2) {
+  }
+  show(30);
+  hear_frame(slow, 30);
+}
+
 TEST_F(SlowPages, AreClosedWhenTheyDoNotReadForTenSeconds) {
   server_->show_state("{}");
   Client slow = client();

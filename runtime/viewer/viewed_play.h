@@ -78,7 +78,7 @@ class ViewedPlay : public ViewedRun {
   mutable std::mutex mutex_;  // of what follows; the loop takes it never
   Plan wished_;               // of the next act
   RunState state_;
-  bool changed_ = true;                 // since pages were told
+  bool changed_ = true;  // since pages were told
   std::condition_variable_any tell_;
 };
 
