@@ -344,9 +344,11 @@ TEST_F(Viewer, ClosesOnlyThePageThatTalksNonsense) {
 }
 
 TEST_F(Viewer, RefusesWhatIsNoRequest) {
-  for (const std::string& bytes : {std::string("GARBAGE\r\n\r\n"), std::string(100, '\0'),
-                                   "GET / HTTP/1.1\r\nX: " + std::string(20000, 'x') + "\r\n\r\n",
-                                   std::string("GET / HTTP/1.1\r\n\r\n")}) {
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(port()) + "\r\n";
+  for (const std::string& bytes :
+       {std::string("GARBAGE\r\n\r\n"), std::string(100, '\0'),
+        "GET / HTTP/1.1\r\n" + host + "X: " + std::string(20000, 'x') + "\r\n\r\n",
+        std::string("GET / HTTP/1.1\r\n\r\n"), "GET / HTTP/1.1\r\n" + host + "Host: evil.example\r\n\r\n"}) {
     test::asio::io_context context;
     test::tcp::socket socket(context);
     socket.connect(test::local(port()));
@@ -454,7 +456,10 @@ TEST_F(SlowPages, AreClosedWhenTheyDoNotReadForTenSeconds) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
   });
+  const auto begun = std::chrono::steady_clock::now();
   run_.wait_for("lose_pointer");
+  // Else it is the pings that end it, after half a minute.
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(25));
   done = true;
   shows.join();
   std::string answer;
