@@ -120,6 +120,7 @@ class Page implements Listener {
       this.latest_ = null;
       this.range_.forget();
       this.body_.take_scene(picture);
+      this.view_.take_body(picture);
       this.view_.draw();
     } else if (picture.kind === 'patch') {
       if (picture.number !== 0) this.patches_.set(picture.number, picture);
@@ -147,7 +148,6 @@ class Page implements Listener {
     if (state.refused && state.refused !== this.state_?.refused) toast(state.refused);
     this.state_ = state;
     if (!state.model) return;
-    this.view_.take_bounds(state.model.bounds, state.model.dimension);
     const shape = `${state.settings.tool} ${state.model.size} ${state.model.dimension}`;
     if (shape !== this.shape_) {
       this.shape_ = shape;
@@ -159,6 +159,7 @@ class Page implements Listener {
       input('depth').value = short_number(1000 * state.defaults.depth, 2);
     }
     this.run_.show(state, this.mode_);
+    this.drawing_.show_dimension(state.model.dimension);
     part('hand').hidden = !this.is_hand();
     if (this.mode_ !== 'live') this.replay_.show(state.times ?? [], state.frame ?? 0, this.mode_ === 'file' || state.you === 'controller');
   }
@@ -185,7 +186,8 @@ class Page implements Listener {
       mode,
       depth: typed === null ? state.defaults.depth : metres(typed),
       unit_depth: state.defaults.depth,
-      clearance: 0.25 * shape.radius + 0.008 * state.model.size,
+      // A body that swings has moved on since it was drawn.
+      clearance: 0.25 * shape.radius + (state.model.moves ? 0.025 : 0.008) * state.model.size,
       contact: 1e-4 * state.model.size,
       shape,
     };
@@ -269,14 +271,14 @@ class Page implements Listener {
       this.tool_.show(last.tool, last.device);
       this.arrows_.show(last, this.state_?.model?.size ?? 1);
     }
-    this.tool_.group.visible = is_seen && drawn.tool;
+    this.tool_.group.visible = is_seen && drawn.tool && (!this.is_hand() || this.hand_.has_moved); // until then it waits far from the body
     this.arrows_.group.visible = is_seen && drawn.arrows;
 
-    const automatic = this.range_.follow(this.body_.shown.largest, performance.now() / 1000);
+    const automatic = this.range_.follow(this.body_.shown.usual, performance.now() / 1000);
     const high = drawn.range ?? automatic;
     const low = field_traits[drawn.field].map === 'diverging' ? -high : 0;
     this.body_.show_range(low, high);
-    this.bar_.show(drawn.field, low, high);
+    this.bar_.show(drawn.field, low, high, this.body_.shown.largest);
     this.drawing_.show_range_unit(automatic);
   }
 

@@ -76,6 +76,10 @@ export class Hand {
   get is_pressed(): boolean {
     return this.press_ !== null;
   }
+  /** Whether it has been at the body. */
+  get has_moved(): boolean {
+    return this.last_ !== null;
+  }
 
   /** Lets go, as when the pointer is lifted. */
   release(): void {
