@@ -145,7 +145,12 @@ class Page implements Listener {
   }
 
   private take_state(state: State): void {
-    if (state.refused && state.refused !== this.state_?.refused) toast(state.refused);
+    if (state.refused && state.refused !== this.state_?.refused) {
+      const [, what = state.refused, hint = ''] = /^(.*) \((.*)\)$/.exec(state.refused) ?? [];
+      toast(what, hint);
+    }
+    const recorded = this.state_?.recording;
+    if (recorded && !state.recording && state.model && !state.refused) toast(`Recorded ${recorded}`, `palpate-runtime view ${recorded}`, 'note');
     this.state_ = state;
     if (!state.model) return;
     const shape = `${state.settings.tool} ${state.model.size} ${state.model.dimension}`;
@@ -221,7 +226,7 @@ class Page implements Listener {
     const show_help = (on: boolean) => {
       part('help-text').hidden = !on;
       button('help').setAttribute('aria-expanded', String(on));
-      (on ? button('help-close') : button('help')).focus();
+      (on ? part('help-text') : button('help')).focus();
     };
     button('toggle-panel').addEventListener('click', toggle_panel);
     button('help').addEventListener('click', () => show_help(part('help-text').hidden));
@@ -300,12 +305,20 @@ class Page implements Listener {
     return {
       force: frame ? [frame.force[0]!, frame.force[1]!, frame.force[2]!] : [0, 0, 0],
       depth: this.history_.count > 0 ? this.history_.value('depth', sample) : 0,
-      contacts: frame ? frame.contact.length / floats_of_contact : 0,
+      contacts: this.felt_contacts(frame, sample),
       tick: frame?.tick ?? 0,
     };
   }
 
+  /** Recordings have no contact points, but how many there were. */
+  private felt_contacts(frame: Frame | null, sample: number): number {
+    const drawn = frame ? frame.contact.length / floats_of_contact : 0;
+    return this.mode_ === 'live' || this.history_.count === 0 ? drawn : this.history_.value('contacts', sample);
+  }
+
   private show_numbers(): void {
+    const has_depth = this.mode_ === 'live' || this.history_.count === 0 || Number.isFinite(this.history_.value('depth', 0));
+    part('depth-plot').hidden = part('depth-number').hidden = !has_depth; // a recording does not have it
     show_felt(this.felt());
   }
 

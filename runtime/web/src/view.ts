@@ -49,6 +49,7 @@ export class View {
   private towards_: Vec3 = [0, -1, 0];
   private flat_ = false;
   private is_wanted_ = false;
+  private is_fitted_ = true; // the person has not turned or moved it since
 
   constructor(readonly element: HTMLElement) {
     this.renderer_ = new WebGLRenderer({ antialias: true, alpha: true });
@@ -72,7 +73,7 @@ export class View {
     });
 
     this.controls_ = this.make_controls();
-    new ResizeObserver(() => this.resize()).observe(element);
+    new ResizeObserver(() => (this.is_fitted_ ? this.fit() : this.resize())).observe(element);
     this.resize();
   }
 
@@ -110,6 +111,7 @@ export class View {
 
   /** The whole body in view, from where people look. */
   fit(): void {
+    this.is_fitted_ = true;
     const centre = this.box_.getCenter(new Vector3());
     const radius = Math.max(1e-9, this.box_.getSize(new Vector3()).length() / 2);
     const camera = this.camera_;
@@ -203,6 +205,7 @@ export class View {
       ? { LEFT: MOUSE.PAN, MIDDLE: MOUSE.PAN, RIGHT: MOUSE.PAN }
       : { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.PAN, RIGHT: MOUSE.ROTATE };
     controls.touches = this.flat_ ? { ONE: TOUCH.PAN, TWO: TOUCH.DOLLY_PAN } : { ONE: TOUCH.ROTATE, TWO: TOUCH.DOLLY_PAN };
+    controls.addEventListener('start', () => (this.is_fitted_ = false));
     controls.addEventListener('change', () => this.draw());
     return controls;
   }
@@ -226,7 +229,7 @@ export class View {
     this.perspective_.updateProjectionMatrix();
     const size = this.box_.getSize(new Vector3());
     const opening = this.opening();
-    const half = (0.53 * height * Math.max(size.y / opening.height, size.x / opening.width)) || 1e-9;
+    const half = (0.58 * height * Math.max(size.y / opening.height, size.x / opening.width)) || 1e-9;
     for (const camera of [this.perspective_, this.orthographic_]) camera.setViewOffset(width, height, -opening.right, -opening.below, width, height);
     Object.assign(this.orthographic_, { left: -half * aspect, right: half * aspect, top: half, bottom: -half });
     this.orthographic_.near = 0.01;
