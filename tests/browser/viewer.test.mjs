@@ -186,6 +186,7 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   near((await push()) / once, 2, 0.03, 'force with twice the stiffness');
   await part(page, 'stiffness-scale').fill('1');
   await part(page, 'stiffness-scale').press('Enter');
+  await until(page, () => window.palpate.state.settings['stiffness-scale'] === '1' && !window.palpate.state.busy);
   await part(page, 'overlay').click(); // it is checked once the runtime has taken it
   await until(page, () => window.palpate.state.settings.overlay !== undefined && !window.palpate.state.busy);
   const softer = await push();
