@@ -6,7 +6,7 @@ namespace palpate {
 namespace {
 
 constexpr double follow_time = 0.015;                 // s
-constexpr std::int64_t most_silence = 1'000'000'000;  // ns, while something is held
+constexpr std::int64_t most_silence = 1'000'000'000;  // ns, of a pointer that is let down
 
 }  // namespace
 
@@ -35,8 +35,10 @@ DeviceNews MouseDevice::hear(const TickTime& tick) noexcept {
     heard_ = word.number;
     heard_at_ = tick.begun;
   }
+  const bool is_pressed = !word.pointer.lifted;
+  const bool lost = is_pressed && (is_gone_ || tick.begun - heard_at_ > most_silence);
   // It may have been lifted and let down since the last tick.
-  const bool lands = word.pointer.lifted || word.lifts != heard_lifts_;
+  const bool lands = lost || !is_pressed || word.lifts != heard_lifts_;
   heard_lifts_ = word.lifts;
   if (lands) {
     land(word.landing);
@@ -46,7 +48,6 @@ DeviceNews MouseDevice::hear(const TickTime& tick) noexcept {
   state_.arrived = tick.begun;
   ++state_.sequence;
 
-  const bool lost = is_gone_ || (state_.pose.grab && tick.begun - heard_at_ > most_silence);
   DeviceNews news{.state = state_};
   if (lands) news.events |= DeviceEvent::lifted;
   if (lost && !is_lost_) news.events |= DeviceEvent::input_lost;

@@ -42,20 +42,28 @@ TEST(Mouse, FollowsAStepWithoutAJumpAndWithoutOvershoot) {
 }
 
 TEST(Mouse, IsLostWithItsViewerAndComesBack) {
-  MouseDevice mouse({}, 1000);
-  mouse.point({.pose = {.position = {0.0, 0.0, 0.01}}});
-  EXPECT_EQ(tick(mouse, 1).events, DeviceEvent::none);
-  EXPECT_EQ(tick(mouse, 5000).events, DeviceEvent::none) << "without a button a pointer may rest";
+  const Vec3 above(0.0, 0.0, 0.01), below(0.0, 0.0, -0.01);
+  const DeviceEvent lost_and_lifted = DeviceEvent::lifted | DeviceEvent::input_lost;
+  MouseDevice mouse({.pose = {.position = above}, .lifted = true}, 1000);
+  EXPECT_EQ(tick(mouse, 1).events, DeviceEvent::lifted);
+  EXPECT_EQ(tick(mouse, 5000).events, DeviceEvent::lifted) << "lifted, a pointer may rest";
   mouse.lose();
-  EXPECT_EQ(tick(mouse, 5001).events, DeviceEvent::input_lost);
-  EXPECT_EQ(tick(mouse, 5002).events, DeviceEvent::none) << "told once";
-  mouse.point({.pose = {.position = {0.0, 0.0, 0.01}, .grab = true}});
-  EXPECT_EQ(tick(mouse, 5003).events, DeviceEvent::acknowledged);
-  EXPECT_EQ(tick(mouse, 6003).events, DeviceEvent::none);
-  EXPECT_EQ(tick(mouse, 6004).events, DeviceEvent::input_lost)
-      << "held for more than a second without a word";
-  mouse.point({.pose = {.grab = true}});
-  EXPECT_EQ(tick(mouse, 6005).events, DeviceEvent::acknowledged);
+  EXPECT_EQ(tick(mouse, 5001).events, DeviceEvent::lifted) << "nothing was pressed";
+  mouse.point({.pose = {.position = below}});
+  EXPECT_EQ(tick(mouse, 5002).events, DeviceEvent::none);
+  mouse.lose();
+  EXPECT_EQ(tick(mouse, 5003).events, lost_and_lifted);
+  EXPECT_EQ(tick(mouse, 5004).events, DeviceEvent::lifted) << "told once";
+  mouse.point({.pose = {.position = below, .grab = true}});
+  EXPECT_EQ(tick(mouse, 5005).events, DeviceEvent::acknowledged);
+  EXPECT_EQ(tick(mouse, 6005).events, DeviceEvent::none);
+  EXPECT_TRUE(tick(mouse, 6005).state.pose.grab);
+  const DeviceNews silent = tick(mouse, 6006);
+  EXPECT_EQ(silent.events, lost_and_lifted) << "let down for more than a second without a word";
+  EXPECT_EQ(silent.state.pose.position, above) << "where it was lifted last";
+  EXPECT_FALSE(silent.state.pose.grab);
+  mouse.point({.pose = {.position = below}});
+  EXPECT_EQ(tick(mouse, 6007).events, DeviceEvent::acknowledged);
 }
 
 TEST(Mouse, TakesWordsFromAnotherThread) {

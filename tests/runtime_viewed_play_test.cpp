@@ -318,7 +318,7 @@ TEST_P(Settled, AMouseIsShownAllForceAndNoFault) {
   const LoopReport report = run_loop({.body = body, .state = state, .device = device, .safety = &safety},
                                      {.ticks = 800, .fast = true}, std::atomic<bool>(false));
   EXPECT_GT(report.largest_force, 0.001 * GetParam());
-  EXPECT_EQ(report.largest_shown, report.largest_force);
+  EXPECT_DOUBLE_EQ(report.largest_shown, report.largest_force);
   EXPECT_EQ(safety.fault(), Fault::none);
   EXPECT_EQ(safety.share(), 1.0);
   // What is left to its default is told, and read back.

@@ -118,6 +118,7 @@ void PageServer::work() {
   // Its starter may be the loop's thread.
   const sched_param ordinary{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
+  pthread_setname_np(pthread_self(), "viewer");
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), niceness);
   context_.run();
 }

@@ -100,6 +100,7 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
   options.settings = settle(plan.settings, mover_, *body_);
   options.record = plan.record;
   print_device(mover_, options.settings);
+  if (options.settings.overlay) begin_making("the overlay is being made");
   auto act = std::make_unique<Act>(
       std::move(options), *body_, mover_,
       ActViewer{
@@ -127,16 +128,17 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
 void ViewedPlay::load(const Settings& settings) {
   if (body_ != nullptr && body_options_ == settings.body()) return;
   expect_file(options_.file);
-  begin_loading();
+  begin_making("the model is being loaded");
   body_.reset();
   body_ = load_and_print(options_.file, options_.model_toml, settings.body());
   body_options_ = settings.body();
   show_body();
 }
 
-void ViewedPlay::begin_loading() {
+/// Pages are told what they wait for.
+void ViewedPlay::begin_making(const char* what) {
   const std::lock_guard lock(mutex_);
-  state_.busy = "the model is being loaded";
+  state_.busy = what;
   changed_ = true;
   tell_.notify_all();
 }

@@ -62,7 +62,7 @@ class ViewedPlay : public ViewedRun {
   void refuse_while_locked() const;
   void check(const Settings& settings) const;
   void end_act();
-  void begin_loading();
+  void begin_making(const char* what);
   void refuse(const std::string& why);
   void take_ticks(std::span<const TickNote> notes);
   void tell_states(const std::stop_token& over);

@@ -20,7 +20,7 @@ import {
   Vector2,
 } from 'three';
 import { field_traits, map_texels, type Field, type MapName } from './colours';
-import { displacements, fill_field } from './field';
+import { displacements, fill_field, usual_largest } from './field';
 import { boundary_edges, type Surface } from './pick';
 import { make_topology, vertex_normals, type Topology } from './topology';
 import type { Frame, Patch, Scene } from './wire';
@@ -38,7 +38,8 @@ interface BodyUniforms {
   range: { value: Vector2 };
   coloured: { value: number };
   hatch: { value: number };
-  evenness: { value: number };
+  even: { value: number };
+  shading: { value: number };
 }
 
 /** Looks up the colour by the vertex's number, and hatches where all corners are held. */
@@ -59,7 +60,7 @@ function coloured_material(uniforms: BodyUniforms): MeshStandardMaterial {
     shader.fragmentShader = shader.fragmentShader
       .replace(
         '#include <common>',
-        '#include <common>\nvarying vec3 v_shown;\nuniform sampler2D colour_map;\nuniform vec2 range;\nuniform float coloured, hatch, evenness;',
+        '#include <common>\nvarying vec3 v_shown;\nuniform sampler2D colour_map;\nuniform vec2 range;\nuniform float coloured, hatch, even, shading;',
       )
       .replace(
         '#include <color_fragment>',
@@ -74,16 +75,22 @@ function coloured_material(uniforms: BodyUniforms): MeshStandardMaterial {
           diffuseColor.rgb *= 0.45 + 0.25 * stripe;
         }`,
       )
-      // Colours that are to be read off a bar are not to be darkened by light that falls from the side.
-      .replace('#include <opaque_fragment>', 'outgoingLight = mix(outgoingLight, diffuseColor.rgb, evenness);\n#include <opaque_fragment>');
+      // Colours that are to be read off a bar are those of the bar where the light falls, and a little darker on the far side: shape is seen.
+      .replace(
+        '#include <opaque_fragment>',
+        `float away = 0.5 - 0.5 * dot(normalize(normal), normalize(vec3(-0.4, 0.5, 0.8)));
+        float rim = shading * pow(1.0 - abs(normalize(normal).z), 3.0);
+        if (even > 0.5) outgoingLight = diffuseColor.rgb * (1.0 - shading * away) + 0.12 * rim;
+        #include <opaque_fragment>`,
+      );
   };
   return material;
 }
 
 export class Body {
   readonly group = new Group();
-  /** Shown values are from `low` to `high`. */
-  readonly shown = { low: 0, high: 0, largest: 0 };
+  /** The largest absolute value of what is shown, and that of all but a few hot spots. */
+  readonly shown = { largest: 0, usual: 0 };
   /** Seen is rest + scale * u. */
   scale = 1;
   field: Field = 'none';
@@ -106,7 +113,8 @@ export class Body {
     range: { value: new Vector2(0, 1) },
     coloured: { value: 0 },
     hatch: { value: 1 },
-    evenness: { value: 0 },
+    even: { value: 0 },
+    shading: { value: 0 },
   };
   private readonly material_ = coloured_material(this.uniforms_);
   private readonly mesh_ = new Mesh(new BufferGeometry(), this.material_);
@@ -173,11 +181,13 @@ export class Body {
     if (!topology || !this.scene_) return;
     if (this.frame_) {
       displacements(this.frame_, topology, this.u_);
-      this.shown.largest = fill_field(this.field, this.frame_, topology, this.u_, this.value_, this.known_);
+      const largest = fill_field(this.field, this.frame_, topology, this.u_, this.value_, this.known_);
+      this.shown.largest = largest;
+      this.shown.usual = usual_largest(this.value_, this.known_, topology.area, largest, field_traits[this.field].cut);
     } else {
       this.u_.fill(0);
       this.known_.fill(this.field === 'none' ? 1 : 0);
-      this.shown.largest = 0;
+      this.shown.largest = this.shown.usual = 0;
     }
     const position = this.attribute('position');
     const values = this.attribute('shown');
@@ -197,12 +207,12 @@ export class Body {
 
   /** Colours by the numbers from `low` to `high`. */
   show_range(low: number, high: number): void {
-    this.shown.low = low;
-    this.shown.high = high;
     this.uniforms_.coloured.value = this.field === 'none' ? 0 : 1;
     this.uniforms_.colour_map.value = this.maps_[field_traits[this.field].map];
-    this.uniforms_.range.value.set(low, high);
-    this.uniforms_.evenness.value = this.scene_?.dimension === 2 ? 1 : this.field === 'none' ? 0 : 0.45;
+    this.uniforms_.range.value.set(high > 0 ? low : -Number(low < 0), high > 0 ? high : 1); // where all is 0, 0 has its colour too
+    const flat = this.scene_?.dimension === 2;
+    this.uniforms_.even.value = flat || this.field !== 'none' ? 1 : 0;
+    this.uniforms_.shading.value = flat ? 0 : 0.6; // linear light: a fifth of what is seen
   }
 
   /** The surface as it is now, for as long as a press lasts. */

@@ -6,11 +6,13 @@ import { nice_ticks, short_number, si_prefix } from './format';
 /** What a bar shows; null: nothing is coloured. */
 export interface Scale {
   title: string;
+  largest: string; // in the picture
+  is_cut: boolean; // some numbers are beyond the colours
   ticks: { share: number; text: string }[]; // from the bottom up
   colours: string[]; // from the bottom up, at equal distances
 }
 
-export function make_scale(field: Field, low: number, high: number): Scale | null {
+export function make_scale(field: Field, low: number, high: number, largest: number): Scale | null {
   if (field === 'none') return null;
   const traits = field_traits[field];
   const [factor, prefix] = si_prefix(Math.max(Math.abs(low), Math.abs(high)));
@@ -19,20 +21,32 @@ export function make_scale(field: Field, low: number, high: number): Scale | nul
     text: short_number(Math.abs(value) < 1e-9 ? 0 : value),
   }));
   const colours = Array.from({ length: 21 }, (_, i) => `rgb(${map_colour(traits.map, i / 20).join(' ')})`);
-  return { title: `${traits.label} [${prefix}${traits.unit}]`, ticks, colours };
+  return {
+    title: `${traits.label} [${prefix}${traits.unit}]`,
+    largest: `${low < 0 ? 'largest ±' : 'largest '}${short_number(largest / factor)}`,
+    is_cut: largest > high * (1 + 1e-6),
+    ticks,
+    colours,
+  };
 }
 
 export class ColourBar {
   scale: Scale | null = null;
   private shown_ = '';
 
-  show(field: Field, low: number, high: number): void {
+  /** `largest` absolute value in the picture, which may be beyond `high`. */
+  show(field: Field, low: number, high: number, largest: number): void {
+    this.scale = make_scale(field, low, high, largest);
+    part('colour-bar').hidden = this.scale === null;
+    if (!this.scale) return;
+    write(part('colour-largest'), this.scale.largest);
+    part('colour-bar').classList.toggle('cut', this.scale.is_cut);
+    part('colour-bar').classList.toggle('both', this.scale.is_cut && low < 0);
     const key = `${field} ${low} ${high}`;
     if (key === this.shown_) return;
     this.shown_ = key;
-    this.scale = make_scale(field, low, high);
-    part('colour-bar').hidden = this.scale === null;
-    if (!this.scale) return;
+    part('colour-bar').style.setProperty('--top', this.scale.colours.at(-1)!);
+    part('colour-bar').style.setProperty('--bottom', this.scale.colours[0]!);
     write(part('colour-title'), this.scale.title);
     part('colour-gradient').style.background = `linear-gradient(to top, ${this.scale.colours.join(', ')})`;
     part('colour-ticks').replaceChildren(

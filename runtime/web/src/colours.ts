@@ -38,21 +38,24 @@ export interface FieldTraits {
   label: string;
   unit: string;
   map: MapName;
+  cut: number; // share of the surface whose numbers may be above the range
 }
 
+const few = 0.004; // what is under a finger tip
+
 export const field_traits: Record<Field, FieldTraits> = {
-  none: { label: 'Plain', unit: '', map: 'sequential' },
-  magnitude: { label: 'Displacement', unit: 'm', map: 'sequential' },
-  'von-mises': { label: 'Von Mises stress', unit: 'Pa', map: 'sequential' },
-  pressure: { label: 'Contact pressure', unit: 'Pa', map: 'sequential' },
-  x: { label: 'Displacement along x', unit: 'm', map: 'diverging' },
-  y: { label: 'Displacement along y', unit: 'm', map: 'diverging' },
-  z: { label: 'Displacement along z', unit: 'm', map: 'diverging' },
+  none: { label: 'Plain', unit: '', map: 'sequential', cut: 0 },
+  magnitude: { label: 'Displacement', unit: 'm', map: 'sequential', cut: few },
+  'von-mises': { label: 'Von Mises stress', unit: 'Pa', map: 'sequential', cut: few },
+  pressure: { label: 'Contact pressure', unit: 'Pa', map: 'sequential', cut: 0 },
+  x: { label: 'Displacement along x', unit: 'm', map: 'diverging', cut: few },
+  y: { label: 'Displacement along y', unit: 'm', map: 'diverging', cut: few },
+  z: { label: 'Displacement along z', unit: 'm', map: 'diverging', cut: few },
 };
 
 const patience = 1.5; // [s] that numbers are small before the range follows
 
-/** The largest number that is shown: grows at once, in round steps, and shrinks only after a while. */
+/** The number where the colours end: grows at once, in round steps, and shrinks only after a while. */
 export class Range {
   private high_ = 0;
   private small_since_ = Infinity;

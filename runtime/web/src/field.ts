@@ -58,3 +58,29 @@ export function fill_field(field: Field, frame: Frame, topology: Topology, u: Fl
   for (let i = 0; i < topology.nodes; ++i) largest = Math.max(largest, Math.abs(value[i]!));
   return largest;
 }
+
+const per_octave = 16;
+const octaves = 20;
+
+/**
+ * The absolute value that is exceeded on the share `cut` of the area where it is known and not 0, to some per cent: a few hot nodes under a
+ * tool do not set it. `largest` is the largest absolute value.
+ */
+export function usual_largest(value: Float32Array, known: Float32Array, area: Float32Array, largest: number, cut: number): number {
+  if (!(largest > 0)) return 0;
+  const classes = new Float64Array(per_octave * octaves);
+  let whole = 0;
+  for (let i = 0; i < area.length; ++i) {
+    const size = Math.abs(value[i]!);
+    if (size === 0 || known[i] === 0) continue;
+    const below = Math.floor(per_octave * Math.log2(largest / size));
+    classes[Math.min(classes.length - 1, below)]! += area[i]!;
+    whole += area[i]!;
+  }
+  let above = 0;
+  for (let k = 0; k < classes.length; ++k) {
+    above += classes[k]!;
+    if (above > cut * whole) return largest * 2 ** (-k / per_octave);
+  }
+  return largest;
+}

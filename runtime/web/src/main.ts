@@ -120,6 +120,7 @@ class Page implements Listener {
       this.latest_ = null;
       this.range_.forget();
       this.body_.take_scene(picture);
+      this.view_.take_body(picture);
       this.view_.draw();
     } else if (picture.kind === 'patch') {
       if (picture.number !== 0) this.patches_.set(picture.number, picture);
@@ -144,10 +145,14 @@ class Page implements Listener {
   }
 
   private take_state(state: State): void {
-    if (state.refused && state.refused !== this.state_?.refused) toast(state.refused);
+    if (state.refused && state.refused !== this.state_?.refused) {
+      const [, what = state.refused, hint = ''] = /^(.*) \((.*)\)$/.exec(state.refused) ?? [];
+      toast(what, hint);
+    }
+    const recorded = this.state_?.recording;
+    if (recorded && !state.recording && state.model && !state.refused) toast(`Recorded ${recorded}`, `palpate-runtime view ${recorded}`, 'note');
     this.state_ = state;
     if (!state.model) return;
-    this.view_.take_bounds(state.model.bounds, state.model.dimension);
     const shape = `${state.settings.tool} ${state.model.size} ${state.model.dimension}`;
     if (shape !== this.shape_) {
       this.shape_ = shape;
@@ -159,6 +164,7 @@ class Page implements Listener {
       input('depth').value = short_number(1000 * state.defaults.depth, 2);
     }
     this.run_.show(state, this.mode_);
+    this.drawing_.show_dimension(state.model.dimension);
     part('hand').hidden = !this.is_hand();
     if (this.mode_ !== 'live') this.replay_.show(state.times ?? [], state.frame ?? 0, this.mode_ === 'file' || state.you === 'controller');
   }
@@ -185,7 +191,8 @@ class Page implements Listener {
       mode,
       depth: typed === null ? state.defaults.depth : metres(typed),
       unit_depth: state.defaults.depth,
-      clearance: 0.25 * shape.radius + 0.008 * state.model.size,
+      // A body that swings has moved on since it was drawn.
+      clearance: 0.25 * shape.radius + (state.model.moves ? 0.025 : 0.008) * state.model.size,
       contact: 1e-4 * state.model.size,
       shape,
     };
@@ -219,7 +226,7 @@ class Page implements Listener {
     const show_help = (on: boolean) => {
       part('help-text').hidden = !on;
       button('help').setAttribute('aria-expanded', String(on));
-      (on ? button('help-close') : button('help')).focus();
+      (on ? part('help-text') : button('help')).focus();
     };
     button('toggle-panel').addEventListener('click', toggle_panel);
     button('help').addEventListener('click', () => show_help(part('help-text').hidden));
@@ -269,14 +276,14 @@ class Page implements Listener {
       this.tool_.show(last.tool, last.device);
       this.arrows_.show(last, this.state_?.model?.size ?? 1);
     }
-    this.tool_.group.visible = is_seen && drawn.tool;
+    this.tool_.group.visible = is_seen && drawn.tool && (!this.is_hand() || this.hand_.has_moved); // until then it waits far from the body
     this.arrows_.group.visible = is_seen && drawn.arrows;
 
-    const automatic = this.range_.follow(this.body_.shown.largest, performance.now() / 1000);
+    const automatic = this.range_.follow(this.body_.shown.usual, performance.now() / 1000);
     const high = drawn.range ?? automatic;
     const low = field_traits[drawn.field].map === 'diverging' ? -high : 0;
     this.body_.show_range(low, high);
-    this.bar_.show(drawn.field, low, high);
+    this.bar_.show(drawn.field, low, high, this.body_.shown.largest);
     this.drawing_.show_range_unit(automatic);
   }
 
@@ -298,12 +305,20 @@ class Page implements Listener {
     return {
       force: frame ? [frame.force[0]!, frame.force[1]!, frame.force[2]!] : [0, 0, 0],
       depth: this.history_.count > 0 ? this.history_.value('depth', sample) : 0,
-      contacts: frame ? frame.contact.length / floats_of_contact : 0,
+      contacts: this.felt_contacts(frame, sample),
       tick: frame?.tick ?? 0,
     };
   }
 
+  /** Recordings have no contact points, but how many there were. */
+  private felt_contacts(frame: Frame | null, sample: number): number {
+    const drawn = frame ? frame.contact.length / floats_of_contact : 0;
+    return this.mode_ === 'live' || this.history_.count === 0 ? drawn : this.history_.value('contacts', sample);
+  }
+
   private show_numbers(): void {
+    const has_depth = this.mode_ === 'live' || this.history_.count === 0 || Number.isFinite(this.history_.value('depth', 0));
+    part('depth-plot').hidden = part('depth-number').hidden = !has_depth; // a recording does not have it
     show_felt(this.felt());
   }
 

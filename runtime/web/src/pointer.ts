@@ -76,6 +76,10 @@ export class Hand {
   get is_pressed(): boolean {
     return this.press_ !== null;
   }
+  /** Whether it has been at the body. */
+  get has_moved(): boolean {
+    return this.last_ !== null;
+  }
 
   /** Lets go, as when the pointer is lifted. */
   release(): void {
@@ -216,7 +220,7 @@ export class Hand {
       const now = this.on_screen_plane(press.client.x, press.client.y, press.start.point) ?? press.plane_start;
       const away: Vec3 = this.dimension() === 2 ? [0, 0, 0] : this.view_.looking();
       const way = plus(minus(now, press.plane_start), away, press.pushed);
-      const from = pressed_position(press.start.point, press.start.normal, radius, 0);
+      const from = pressed_position(press.start.point, press.start.normal, radius, press.mode === 'push' ? press.depth : 0);
       position = plus(from, way);
       press.now = { point: plus(press.start.point, way), normal: press.start.normal };
     }

@@ -112,14 +112,14 @@ export class RunControls {
 
   private show_facts(state: State): void {
     const { model } = state;
-    const facts: [string, string][] = [
-      ['Model', model.file],
-      ['Mesh', `${model.nodes} nodes, ${model.elements} ${model.element}`],
-      ['Surface', `${model.surface_nodes} nodes, ${model.dofs} dofs`],
+    const facts: [string, string][] = [['Model', model.file]];
+    if (model.nodes) facts.push(['Mesh', `${model.nodes} nodes, ${model.elements} ${model.element}`]); // a recording does not know
+    facts.push(
+      ['Surface', `${model.surface_nodes} nodes${model.dofs ? `, ${model.dofs} dofs` : ''}`],
       ['Size', `${format_number(model.size * 1000)} mm`],
       ['Moved by', state.device],
       ['Rate', `${state.rate} /s`],
-    ];
+    );
     const key = JSON.stringify(facts);
     if (part('facts').dataset.shown === key) return;
     part('facts').dataset.shown = key;
@@ -144,7 +144,8 @@ export class RunControls {
     field.addEventListener('change', () => {
       const value = typed_number(field.value, least);
       if (value === null && field.value.trim() !== '') {
-        toast(`${field.value} is not a number${least > -Infinity ? ` from ${least} on` : ''}`, 'Nothing was changed.');
+        const bound = least > 0 ? ' above 0' : least === 0 ? ', 0 or more' : '';
+        toast(`${field.value} is not a number${bound}`, 'Nothing was changed.');
         if (this.state_) field.value = this.state_.settings[name] ?? '';
         return;
       }
@@ -170,5 +171,6 @@ export class RunControls {
     if (id !== 'overlay') input('overlay').checked = true;
     const [r, rings] = ['overlay-r', 'overlay-rings'].map((one) => Math.max(1, Math.round(Number(input(one).value)) || 1));
     this.change('overlay', input('overlay').checked ? `r=${r},rings=${rings}` : null);
+    if (id !== 'overlay') input(id).blur();
   }
 }

@@ -36,10 +36,19 @@ export function compose(view: HTMLCanvasElement, caption: Caption): Promise<Blob
     scale.colours.forEach((colour, i) => gradient.addColorStop(i / (scale.colours.length - 1), colour));
     context.fillStyle = gradient;
     context.fillRect(x, y, 14, bar_height);
+    if (scale.is_cut) {
+      context.fillStyle = scale.colours.at(-1)!;
+      context.beginPath();
+      context.moveTo(x, y - 2);
+      context.lineTo(x + 14, y - 2);
+      context.lineTo(x + 7, y - 10);
+      context.fill();
+    }
     context.fillStyle = '#c3cedb';
     context.font = '12px system-ui, sans-serif';
     context.textAlign = 'right';
-    context.fillText(scale.title, width - 12, y - 24);
+    context.fillText(scale.title, width - 12, y - 48);
+    context.fillText(scale.largest, width - 12, y - 30);
     context.textAlign = 'left';
     context.textBaseline = 'middle';
     for (const { share, text } of scale.ticks) context.fillText(text, x + 20, y + bar_height * (1 - share));

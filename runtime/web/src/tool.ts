@@ -15,7 +15,7 @@ export class ToolView {
   readonly group = new Group();
   private readonly tool_ = new Mesh<BufferGeometry, MeshStandardMaterial>(
     new SphereGeometry(1),
-    new MeshStandardMaterial({ color: 0xdfe7f2, roughness: 0.3, metalness: 0.35, transparent: true, opacity: 0.62 }),
+    new MeshStandardMaterial({ color: 0xdfe7f2, roughness: 0.3, metalness: 0.35, transparent: true, opacity: 0.45 }),
   );
   private readonly ghost_ = new Mesh<BufferGeometry, MeshStandardMaterial>(
     this.tool_.geometry,

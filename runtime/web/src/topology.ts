@@ -1,5 +1,7 @@
 // Which vertices are drawn for the nodes of a scene and a patch: pure index work.
+import { cross, norm } from './pose';
 import type { Patch, Scene } from './wire';
+import type { Vec3 } from './words';
 
 const crease = Math.cos((40 * Math.PI) / 180);
 
@@ -17,6 +19,7 @@ export interface Topology {
   outline: Uint32Array; // [2 O] nodes
   welded: Int32Array; // [m] the scene's node in the place of the patch's, or -1
   rest: Float32Array; // [3 N]
+  area: Float32Array; // [N] of the surface that a node stands for; in the plane without an inside, length
 }
 
 /** Pairs each node of the patch with the scene's at the same place, to the last bit. */
@@ -113,6 +116,23 @@ function triangles_beside(scene: Scene): Int32Array {
   return triangles;
 }
 
+/** A third of each triangle's area is its corner's, or half of each edge's length where there are no triangles. */
+function node_areas(rest: Float32Array, corner: Uint32Array, edge: Uint32Array, nodes: number): Float32Array {
+  const area = new Float32Array(nodes);
+  const way = (a: number, b: number) => [0, 1, 2].map((k) => rest[3 * b + k]! - rest[3 * a + k]!) as Vec3;
+  for (let t = 0; t < corner.length; t += 3) {
+    const [a, b, c] = [corner[t]!, corner[t + 1]!, corner[t + 2]!];
+    const share = norm(cross(way(a, b), way(a, c))) / 6;
+    for (const node of [a, b, c]) area[node]! += share;
+  }
+  for (let e = 0; corner.length === 0 && e < edge.length; e += 2) {
+    const half = norm(way(edge[e]!, edge[e + 1]!)) / 2;
+    area[edge[e]!]! += half;
+    area[edge[e + 1]!]! += half;
+  }
+  return area;
+}
+
 /** Of a scene and the patch in it, if any. */
 export function make_topology(scene: Scene, patch: Patch | null): Topology {
   const scene_nodes = scene.held.length;
@@ -150,7 +170,9 @@ export function make_topology(scene: Scene, patch: Patch | null): Topology {
   }
   const all = corner.slice(0, corners);
   const { vertex, node } = split_at_creases(rest, all, nodes);
-  return { nodes, scene_nodes, node, triangle: vertex, corner: all, edge: Uint32Array.from(edge), outline, welded, rest };
+  const edges = Uint32Array.from(edge);
+  const area = node_areas(rest, all, edges, nodes);
+  return { nodes, scene_nodes, node, triangle: vertex, corner: all, edge: edges, outline, welded, rest, area };
 }
 
 /** Vertex normals [3 V] of length 1: means of the triangles' by their areas. */

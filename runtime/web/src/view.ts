@@ -18,6 +18,8 @@ import {
   TOUCH,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { first_direction, fit_places } from './outlook';
+import type { Scene as SceneMessage } from './wire';
 import type { Vec3 } from './words';
 
 const axis_colours = [0xff6b6b, 0x69db7c, 0x74a9ff];
@@ -43,8 +45,11 @@ export class View {
   private readonly triad_ = new Scene();
   private readonly triad_camera_ = new OrthographicCamera(-1.25, 1.25, 1.25, -1.25, 0.1, 10);
   private box_ = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
+  private places_: Float32Array = new Float32Array(0);
+  private towards_: Vec3 = [0, -1, 0];
   private flat_ = false;
   private is_wanted_ = false;
+  private is_fitted_ = true; // the person has not turned or moved it since
 
   constructor(readonly element: HTMLElement) {
     this.renderer_ = new WebGLRenderer({ antialias: true, alpha: true });
@@ -68,7 +73,7 @@ export class View {
     });
 
     this.controls_ = this.make_controls();
-    new ResizeObserver(() => this.resize()).observe(element);
+    new ResizeObserver(() => (this.is_fitted_ ? this.fit() : this.resize())).observe(element);
     this.resize();
   }
 
@@ -88,11 +93,13 @@ export class View {
   }
 
   /** Another body: in the plane it is seen from +z, and not turned. */
-  take_bounds(bounds: [Vec3, Vec3], dimension: 2 | 3): void {
-    const box = new Box3(new Vector3(...bounds[0]), new Vector3(...bounds[1]));
-    const flat = dimension === 2;
+  take_body(body: SceneMessage): void {
+    const box = new Box3().setFromArray(Array.from(body.position));
+    const flat = body.dimension === 2;
+    this.places_ = body.position;
     if (box.equals(this.box_) && flat === this.flat_) return;
     this.box_ = box;
+    this.towards_ = first_direction(body);
     if (flat !== this.flat_) {
       this.flat_ = flat;
       this.camera_ = flat ? this.orthographic_ : this.perspective_;
@@ -104,6 +111,7 @@ export class View {
 
   /** The whole body in view, from where people look. */
   fit(): void {
+    this.is_fitted_ = true;
     const centre = this.box_.getCenter(new Vector3());
     const radius = Math.max(1e-9, this.box_.getSize(new Vector3()).length() / 2);
     const camera = this.camera_;
@@ -113,8 +121,12 @@ export class View {
       camera.zoom = 1;
     } else {
       camera.up.set(0, 0, 1);
-      const towards = new Vector3(0.62, -1, 0.6).normalize();
-      camera.position.copy(centre).addScaledVector(towards, this.fitting_distance(towards));
+      const slope = Math.tan((camera.fov * Math.PI) / 360);
+      const opening = this.opening();
+      const shares = { wide: (opening.width / this.element.clientHeight) * 0.94, high: (opening.height / this.element.clientHeight) * 0.94 };
+      const { target, away } = fit_places(this.places_, this.towards_, [0, 0, 1], slope, shares);
+      centre.set(...target);
+      camera.position.copy(centre).addScaledVector(new Vector3(...this.towards_), away);
     }
     camera.near = 0.02 * radius;
     camera.far = 60 * radius;
@@ -193,25 +205,18 @@ export class View {
       ? { LEFT: MOUSE.PAN, MIDDLE: MOUSE.PAN, RIGHT: MOUSE.PAN }
       : { LEFT: MOUSE.ROTATE, MIDDLE: MOUSE.PAN, RIGHT: MOUSE.ROTATE };
     controls.touches = this.flat_ ? { ONE: TOUCH.PAN, TWO: TOUCH.DOLLY_PAN } : { ONE: TOUCH.ROTATE, TWO: TOUCH.DOLLY_PAN };
+    controls.addEventListener('start', () => (this.is_fitted_ = false));
     controls.addEventListener('change', () => this.draw());
     return controls;
   }
 
-  /** From how far along `towards` all corners of the bounds are in view, with room for what stands over the picture. */
-  private fitting_distance(towards: Vector3): number {
-    const centre = this.box_.getCenter(new Vector3());
-    const right = new Vector3(0, 0, 1).cross(towards).normalize();
-    const up = towards.clone().cross(right);
-    const slope = 0.8 * Math.tan((this.perspective_.fov * Math.PI) / 360);
-    let away = 0;
-    for (let corner = 0; corner < 8; ++corner) {
-      const [x, y, z] = [1, 2, 4].map((bit) => (corner & bit ? this.box_.max : this.box_.min));
-      const place = new Vector3(x!.x, y!.y, z!.z).sub(centre);
-      const wide = Math.abs(place.dot(right)) / (slope * Math.min(this.perspective_.aspect, 4));
-      const high = Math.abs(place.dot(up)) / slope;
-      away = Math.max(away, Math.max(wide, high) + place.dot(towards));
-    }
-    return away;
+  /** What is free of controls: its size and by how much its middle is right of and below the picture's [pixels]. */
+  private opening(): { width: number; height: number; right: number; below: number } {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const [top, bottom] = [92, 66]; // controls above and below
+    const side = width < 700 ? 8 : 24;
+    const bar = this.flat_ || width < 700 ? 64 : 84; // the colour bar
+    return { width: width - side - bar, height: Math.max(0.4 * height, height - top - bottom), right: (side - bar) / 2, below: (top - bottom) / 2 };
   }
 
   private resize(): void {
@@ -223,7 +228,9 @@ export class View {
     this.perspective_.aspect = aspect;
     this.perspective_.updateProjectionMatrix();
     const size = this.box_.getSize(new Vector3());
-    const half = 0.62 * Math.max(size.y, size.x / aspect, 1e-9);
+    const opening = this.opening();
+    const half = (0.58 * height * Math.max(size.y / opening.height, size.x / opening.width)) || 1e-9;
+    for (const camera of [this.perspective_, this.orthographic_]) camera.setViewOffset(width, height, -opening.right, -opening.below, width, height);
     Object.assign(this.orthographic_, { left: -half * aspect, right: half * aspect, top: half, bottom: -half });
     this.orthographic_.near = 0.01;
     this.orthographic_.updateProjectionMatrix();

@@ -56,10 +56,17 @@ export class ViewControls {
     this.tell();
   }
 
+  /** In the plane nothing moves along z. */
+  show_dimension(dimension: 2 | 3): void {
+    const along_z = [...select('field').options].find((option) => option.value === 'z')!;
+    along_z.hidden = along_z.disabled = dimension === 2;
+    if (dimension === 2 && select('field').value === 'z') this.set_field('magnitude');
+  }
+
   /** By its number from 1 on. */
   choose(number: number): void {
     const field = fields[number - 1];
-    if (field) this.set_field(field);
+    if (field && ![...select('field').options].find((option) => option.value === field)?.disabled) this.set_field(field);
   }
 
   toggle(name: (typeof toggles)[number]): void {
