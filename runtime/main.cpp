@@ -109,6 +109,11 @@ CLI::App* add_view(CLI::App& app, Arguments& arguments) {
   return view;
 }
 
+/// CLI::PositiveNumber lets nan pass.
+std::string check_number(const std::string& text) {
+  return parse_number(text) ? "" : "'" + text + "' is not a finite number";
+}
+
 CLI::App* add_export(CLI::App& app, ExportOptions& options) {
   CLI::App* exported = app.add_subcommand("export", "write a recording of play as one page for any browser");
   exported->add_option("SESSION.h5", options.recording, "recording")->required()->type_name("");
@@ -116,9 +121,16 @@ CLI::App* add_export(CLI::App& app, ExportOptions& options) {
   exported->add_option("--fps", options.fps, "pictures a second at most")
       ->type_name("N")
       ->check(CLI::PositiveNumber)
+      ->check(check_number)
       ->capture_default_str();
-  exported->add_option("--from", options.from, "begin there")->type_name("S")->check(CLI::NonNegativeNumber);
-  exported->add_option("--to", options.to, "end there")->type_name("S")->check(CLI::NonNegativeNumber);
+  exported->add_option("--from", options.from, "begin there")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber)
+      ->check(check_number);
+  exported->add_option("--to", options.to, "end there")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber)
+      ->check(check_number);
   return exported;
 }
 

@@ -1,5 +1,7 @@
 #include "runtime/surface_frames.h"
 
+#include <pthread.h>
+
 #include <chrono>
 
 #include "runtime/element_stress.h"
@@ -101,6 +103,7 @@ void SurfaceFrames::take_contacts(const State& state, Moment& moment) const noex
 }
 
 void SurfaceFrames::work() {
+  pthread_setname_np(pthread_self(), "pictures");
   for (;;) {
     const bool last = stop_;  // read before the moment: nothing is posted after stopping
     const Moment& moment = moments_.read();

@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <mutex>
 #include <vector>
 
 #include "meshes/error.h"
@@ -17,15 +18,22 @@
 namespace palpate {
 namespace {
 
+/// Of all frames.
+std::vector<double> times_of(const SessionPictures& pictures) {
+  std::vector<double> times;
+  for (std::int64_t k = 0; k < pictures.frames(); ++k) times.push_back(pictures.time(k));
+  return times;
+}
+
 /// A recording that the viewer's page leafs through.
 class SessionView : public ViewedRun {
  public:
   SessionView(const SessionPictures& pictures, const ViewerOptions& options)
-      : pictures_(pictures), server_(as_replay(options), *this) {
-    std::vector<double> times;
-    for (std::int64_t k = 0; k < pictures.frames(); ++k) times.push_back(pictures.time(k));
+      : pictures_(pictures), state_(pictures.state(times_of(pictures))), server_(as_replay(options), *this) {
+    const std::lock_guard lock(mutex_);  // a page may seek already
     server_.show_scene(std::make_shared<const Scene>(pictures.scene()));
-    server_.show_state(pictures.state(0, times));
+    server_.show_state(json_text(state_));
+    state_.erase("times");  // which the server keeps
     for (const TickRun& run : pictures.ticks()) server_.show_ticks(run.notes, run.stride);
     server_.show_picture(pictures.picture(0));
   }
@@ -33,7 +41,11 @@ class SessionView : public ViewedRun {
   [[nodiscard]] const std::string& url() const noexcept { return server_.url(); }
 
   void seek(std::int64_t frame) override {
-    server_.show_picture(pictures_.picture(std::clamp<std::int64_t>(frame, 0, pictures_.frames() - 1)));
+    const std::lock_guard lock(mutex_);
+    const std::int64_t shown = std::clamp<std::int64_t>(frame, 0, pictures_.frames() - 1);
+    server_.show_picture(pictures_.picture(shown));
+    state_["frame"] = shown;
+    server_.show_state(json_text(state_));
   }
   void point(const PointerPose&) override {}
   void lose_pointer() override {}
@@ -55,6 +67,8 @@ class SessionView : public ViewedRun {
   }
 
   const SessionPictures& pictures_;
+  std::mutex mutex_;
+  nlohmann::json state_;
   ViewerServer server_;
 };
 
@@ -101,8 +115,9 @@ int export_html(const ExportOptions& options) {
 
   PageArchive archive;
   archive.add_text(hello_word("file", 0));
-  archive.add_text(pictures.state(0, times));
   const Scene scene = pictures.scene();
+  const StateWord state(json_text(pictures.state(times)));
+  archive.add_text(state.for_page(scene.number, {}, state.times()));
   archive.add_binary(encode_scene(scene));
   for (const TickRun& run : pictures.ticks())
     archive.add_binary(encode_ticks(scene.number, run.notes, run.stride));

@@ -580,7 +580,7 @@ class Usage(ProgramTest):
         self.assertIn(piece, result.stderr)
 
     def test_help_and_version(self):
-        for arguments in (("--help",), ("probe", "--help"), ("play", "--help"), ("devices", "--help")):
+        for arguments in (("--help",), ("probe", "--help"), ("play", "--help"), ("view", "--help"), ("export", "--help"), ("devices", "--help")):
             result = run(RUNTIME, *arguments)
             self.assertEqual(result.returncode, 0)
             self.assertIn("palpate-runtime", result.stdout)
@@ -611,7 +611,7 @@ class Usage(ProgramTest):
 
     def test_wrong_arguments(self):
         place = ("--at", "0,0,1", "--displace", "0,0,1")
-        self.assert_usage("probe, play, session or devices")
+        self.assert_usage("probe, play, view, export, session or devices")
         self.assert_usage("bogus", "bogus")
         self.assert_usage("FILE", "probe", *place)
         self.assert_usage("--bogus", "probe", "x.palpate.hdf", *place, "--bogus")

@@ -213,8 +213,22 @@ TEST_F(Viewed, GoesOnAsBeforeWhereLoadingShowsThatItCannotBe) {
   ASSERT_TRUE(wait_for_ticks(50));
   EXPECT_EQ(play_->state().settings, (SettingsText{{"tool", "sphere:0.1"}}));
   play_->change({{"stiffness-scale", "2"}, {"load-scale", "0"}});
-  ASSERT_TRUE(
-      wait_for([](const RunState& state) { return state.settings.contains("load-scale") && !state.refused; }));
+  ASSERT_TRUE(wait_for(
+      [](const RunState& state) { return state.settings.contains("load-scale") && !state.refused; }));
+  EXPECT_TRUE(wait_for_ticks(50));
+}
+
+TEST_F(Viewed, GoesOnWithTheLoadedBodyWhereItsFileIsGone) {
+  std::filesystem::copy_file(cube, folder_ / "gone.palpate.hdf");
+  start(options_of(folder_ / "gone.palpate.hdf"));
+  ASSERT_TRUE(wait_for_ticks(50));
+  std::filesystem::remove(folder_ / "gone.palpate.hdf");
+  play_->change({{"stiffness-scale", "2"}});
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.refused.has_value(); }));
+  EXPECT_NE(play_->state().refused->find("gone.palpate.hdf: cannot be read"), std::string::npos);
+  ASSERT_TRUE(wait_for_ticks(50));
+  play_->reset();
+  ASSERT_TRUE(wait_for([](const RunState& state) { return !state.refused; }));
   EXPECT_TRUE(wait_for_ticks(50));
 }
 
@@ -229,6 +243,19 @@ TEST_F(Viewed, GoesOnWhereARecordingCannotBeMade) {
   EXPECT_EQ(where_it_is_refused([&] { play_->change({{"friction", "0.1"}}); }), "") << "it is not locked";
   std::filesystem::create_directory(folder_);  // for the report
   std::filesystem::current_path(folder_);
+}
+
+TEST(RunState, IsJsonWhateverAFileIsCalled) {
+  RunState state;
+  state.device = "a \"hand\"\n";
+  state.recording = "caf\xe9.h5";  // of a file system that knows no UTF-8
+  const auto json = nlohmann::json::parse(to_json(state));
+  EXPECT_EQ(json.at("device"), state.device);
+  EXPECT_EQ(json.at("recording"), "caf\xef\xbf\xbd.h5");
+  EXPECT_TRUE(json.at("settings").is_object());
+  EXPECT_TRUE(json.at("fault").is_null());
+  state.fault = Fault::too_fast;
+  EXPECT_EQ(nlohmann::json::parse(to_json(state)).at("fault").at("remedy"), fault_remedy(Fault::too_fast));
 }
 
 class Settled : public testing::TestWithParam<double> {};

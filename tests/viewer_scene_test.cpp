@@ -181,11 +181,14 @@ TEST(Scene, PatchOfAPlateIsItsFineBoundary) {
 
 TEST(Scene, OfARecordingHasAllItsSurface) {
   const Body body = cube(ElementType::tet4, 2, 2);
-  const RecordedSurface recorded = recorded_surface(body);
+  RecordedSurface recorded = recorded_surface(body);
   const Scene scene = make_scene(recorded, 3);
   EXPECT_EQ(scene.number, 3U);
   EXPECT_EQ(scene.nodes.size(), recorded.nodes.size());
-  EXPECT_EQ(scene.held, std::vector<std::uint8_t>(recorded.nodes.size(), 0));
+  for (std::size_t k = 0; k < scene.nodes.size(); ++k)
+    EXPECT_EQ(scene.held[k], scene.nodes[k].z() == 0.0 ? 7 : 0) << "the cube stands on what is held";
+  recorded.held.clear();  // of a recording before 4.1
+  EXPECT_EQ(make_scene(recorded, 3).held, std::vector<std::uint8_t>(recorded.nodes.size(), 0));
   EXPECT_NEAR(volume(scene.nodes, scene.triangles), 1.0, 1e-12);
   EXPECT_EQ(scene.edges.size(), scene.triangles.size() * 3 / 2);
   EXPECT_EQ(make_scene(recorded_surface(cube(ElementType::quad4, 2)), 1).edges.size(), 8U);

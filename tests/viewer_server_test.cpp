@@ -344,9 +344,11 @@ TEST_F(Viewer, ClosesOnlyThePageThatTalksNonsense) {
 }
 
 TEST_F(Viewer, RefusesWhatIsNoRequest) {
-  for (const std::string& bytes : {std::string("GARBAGE\r\n\r\n"), std::string(100, '\0'),
-                                   "GET / HTTP/1.1\r\nX: " + std::string(20000, 'x') + "\r\n\r\n",
-                                   std::string("GET / HTTP/1.1\r\n\r\n")}) {
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(port()) + "\r\n";
+  for (const std::string& bytes :
+       {std::string("GARBAGE\r\n\r\n"), std::string(100, '\0'),
+        "GET / HTTP/1.1\r\n" + host + "X: " + std::string(20000, 'x') + "\r\n\r\n",
+        std::string("GET / HTTP/1.1\r\n\r\n"), "GET / HTTP/1.1\r\n" + host + "Host: evil.example\r\n\r\n"}) {
     test::asio::io_context context;
     test::tcp::socket socket(context);
     socket.connect(test::local(port()));
@@ -418,6 +420,26 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
   EXPECT_EQ(most_ticks, 2000);  // two seconds in one message
 }
 
+TEST_F(SlowPages, MissTheTicksOfTheBodyBefore) {
+  Client slow = client();
+  slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
+  slow.hear(1);
+  Client quick = client();
+  quick.hear(1);
+  for (std::int64_t tick = 0; tick < 30; ++tick) {  // until ticks wait
+    show(tick);
+    hear_frame(quick, tick);
+  }
+  Scene other = *scene_;
+  other.number = 2;
+  server_->show_scene(std::make_shared<const Scene>(other));
+  EXPECT_EQ(test::decode_scene(quick.hear(1)).scene, 2U);
+  while (test::decode_scene(slow.hear(1)).scene != 2) {
+  }
+  show(30);
+  hear_frame(slow, 30);
+}
+
 TEST_F(SlowPages, AreClosedWhenTheyDoNotReadForTenSeconds) {
   server_->show_state("{}");
   Client slow = client();
@@ -434,7 +456,10 @@ TEST_F(SlowPages, AreClosedWhenTheyDoNotReadForTenSeconds) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
   });
+  const auto begun = std::chrono::steady_clock::now();
   run_.wait_for("lose_pointer");
+  // Else it is the pings that end it, after half a minute.
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(25));
   done = true;
   shows.join();
   std::string answer;

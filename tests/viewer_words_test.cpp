@@ -120,18 +120,18 @@ RC_GTEST_PROP(PageWord, BrokenWordsNeitherCrashNorAreObeyed, ()) {
 }
 
 TEST(RunWords, HelloAndErrors) {
-  const Json hello = Json::parse(hello_word(false, 7));
+  const Json hello = Json::parse(hello_word("live", 7));
   EXPECT_EQ(
       hello,
       (Json{{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", "live"}, {"id", 7}}));
-  EXPECT_EQ(Json::parse(hello_word(true, 1)).at("mode"), "replay");
+  EXPECT_EQ(Json::parse(hello_word("replay", 1)).at("mode"), "replay");
   EXPECT_EQ(Json::parse(error_word("change", Error("what", "where", "hint"))),
             (Json{{"type", "error"}, {"about", "change"}, {"message", "where: what"}, {"hint", "hint"}}));
   EXPECT_EQ(Json::parse(error_word("change", "a file \xff", "")).at("message"), "a file \xef\xbf\xbd");
 }
 
 TEST(RunWords, StateIsTheRunsAndThePages) {
-  const RunState state(R"({"rate":4000,"pointer":true,"times":[0,1],"you":"nobody"})");
+  const StateWord state(R"({"rate":4000,"pointer":true,"times":[0,1],"you":"nobody"})");
   EXPECT_EQ(state.rate(), 4000.0);
   EXPECT_EQ(state.times(), Json({0, 1}));
   const Json controller = Json::parse(state.for_page(3, {true, true, 2}, state.times()));
@@ -147,9 +147,9 @@ TEST(RunWords, StateIsTheRunsAndThePages) {
   EXPECT_EQ(watcher.at("you"), "watcher");
   EXPECT_EQ(watcher.at("pointer"), false);
   EXPECT_FALSE(watcher.contains("times"));
-  EXPECT_EQ(RunState("{}").rate(), 1000.0);
-  EXPECT_THROW(RunState("[]"), Error);
-  EXPECT_THROW(RunState("{"), Error);
+  EXPECT_EQ(StateWord("{}").rate(), 1000.0);
+  EXPECT_THROW(StateWord("[]"), Error);
+  EXPECT_THROW(StateWord("{"), Error);
 }
 
 TEST(Admission, HostIsTheAddressServed) {
@@ -229,7 +229,11 @@ TEST(TickHistory, ForgetsTheOldest) {
   history.clear();
   EXPECT_EQ(history.end(), 10);
   EXPECT_TRUE(history.run_from(0).ticks.empty());
+  EXPECT_FALSE(history.has_from(0)) << "none is kept";
   history.append(ticks_from(0, 1), 1, 4);
+  EXPECT_TRUE(history.has_from(0));
+  EXPECT_TRUE(history.has_from(10));
+  EXPECT_FALSE(history.has_from(11));
   EXPECT_EQ(history.run_from(5).ticks.front().number, 0);
 }
 

@@ -1,21 +1,24 @@
 #include "runtime/viewer/run_state.h"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <string_view>
-#include <utility>
 
 #include "meshes/element_type.h"
 #include "runtime/monitor.h"
-#include "runtime/output.h"
+#include "runtime/viewer/run_words.h"
 
 namespace palpate {
 namespace {
 
-std::string text_or_null(const std::optional<std::string>& text) {
-  return text ? json_string(*text) : "null";
+using Json = nlohmann::json;
+
+Json text_or_null(const std::optional<std::string>& text) {
+  return text ? Json(*text) : Json();
+}
+
+Json vector(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
 }
 
 /// The name of a numbered constant.
@@ -24,11 +27,9 @@ std::string_view name_of(const Names& names, std::size_t number) {
   return names[std::min(number, names.size() - 1)].second;
 }
 
-std::string fault_json(Fault fault) {
-  if (fault == Fault::none) return "null";
-  return fmt::format(R"({{"name": {}, "remedy": {}}})",
-                     json_string(name_of(fault_names, static_cast<std::size_t>(fault))),
-                     json_string(fault_remedy(fault)));
+Json fault_or_null(Fault fault) {
+  if (fault == Fault::none) return {};
+  return {{"name", name_of(fault_names, static_cast<std::size_t>(fault))}, {"remedy", fault_remedy(fault)}};
 }
 
 bool has_loads(const Model& model) {
@@ -40,39 +41,47 @@ bool has_loads(const Model& model) {
 }  // namespace
 
 std::string to_json(const RunState& state) {
-  std::string settings;
-  for (const auto& [name, value] : state.settings)
-    settings += (settings.empty() ? "" : ", ") + json_string(name) + ": " + json_string(value);
-  std::string json = fmt::format(R"({{"scene": {}, "model": {}, "defaults": {}, "settings": {{{}}})",
-                                 state.scene, state.model, state.defaults, settings);
-  json += fmt::format(R"(, "device": {}, "pointer": {}, "rate": {}, "ticks": {}, "misses": {}, "paused": {})",
-                      json_string(state.device), state.pointer, state.rate, state.ticks, state.misses,
-                      state.paused);
-  json += fmt::format(R"(, "recording": {}, "busy": {}, "refused": {}, "locked": {})",
-                      text_or_null(state.recording), text_or_null(state.busy), text_or_null(state.refused),
-                      text_or_null(state.locked));
-  json += fmt::format(R"(, "fault": {}, "phase": {}}})", fault_json(state.fault),
-                      json_string(name_of(safety_phase_names, static_cast<std::size_t>(state.phase))));
-  return json;
+  return json_text({{"scene", state.scene},
+                    {"model", state.model},
+                    {"defaults", state.defaults},
+                    {"settings", state.settings},
+                    {"device", state.device},
+                    {"pointer", state.pointer},
+                    {"rate", state.rate},
+                    {"ticks", state.ticks},
+                    {"misses", state.misses},
+                    {"paused", state.paused},
+                    {"recording", text_or_null(state.recording)},
+                    {"busy", text_or_null(state.busy)},
+                    {"refused", text_or_null(state.refused)},
+                    {"locked", text_or_null(state.locked)},
+                    {"fault", fault_or_null(state.fault)},
+                    {"phase", name_of(safety_phase_names, static_cast<std::size_t>(state.phase))}});
 }
 
-std::string describe_model(const Body& body, const std::string& file) {
+nlohmann::json describe_model(const Body& body, const std::string& file) {
   const Model& model = body.model();
-  return fmt::format(
-      R"({{"name": {}, "file": {}, "dimension": {}, "nodes": {}, "surface_nodes": {}, "elements": {}, )"
-      R"("dofs": {}, "element": {}, "size": {}, "bounds": [{}, {}], "moves": {}, "loads": {}}})",
-      json_string(model.name), json_string(file), model.dimension(), model.mesh.nodes.size(),
-      body.surface_mesh_nodes().size(), model.mesh.elements(), body.greens().order(),
-      json_string(traits(model.mesh.element).name), body.bounds().diagonal().norm(),
-      json_vector(body.bounds().min()), json_vector(body.bounds().max()),
-      model.dynamics.method != DynamicsMethod::none, has_loads(model));
+  return {{"name", model.name},
+          {"file", file},
+          {"dimension", model.dimension()},
+          {"nodes", model.mesh.nodes.size()},
+          {"surface_nodes", body.surface_mesh_nodes().size()},
+          {"elements", model.mesh.elements()},
+          {"dofs", body.greens().order()},
+          {"element", traits(model.mesh.element).name},
+          {"size", body.bounds().diagonal().norm()},
+          {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
+          {"moves", model.dynamics.method != DynamicsMethod::none},
+          {"loads", has_loads(model)}};
 }
 
-std::string describe_defaults(const Body& body) {
+nlohmann::json describe_defaults(const Body& body) {
   const double size = body.bounds().diagonal().norm();
   const double radius = std::clamp(body.mean_surface_edge(), 0.03 * size, 0.1 * size);
-  return fmt::format(R"({{"radius": {}, "reach": {}, "friction": {}, "depth": {}}})", radius,
-                     body.longest_surface_edge(), body.surface_friction().front(), 0.05 * size);
+  return {{"radius", radius},
+          {"reach", body.longest_surface_edge()},
+          {"friction", body.surface_friction().front()},
+          {"depth", 0.05 * size}};
 }
 
 }  // namespace palpate

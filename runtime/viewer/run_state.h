@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -14,10 +15,10 @@ namespace palpate {
 /// The run's members of the message `state` (web/PROTOCOL.md).
 struct RunState {
   std::uint32_t scene = 0;
-  std::string model;     ///< JSON, of describe_model
-  std::string defaults;  ///< JSON, of describe_defaults
-  std::string device;    ///< what moves the tool
-  bool pointer = false;  ///< it is a page's pointer
+  nlohmann::json model;     ///< of describe_model
+  nlohmann::json defaults;  ///< of describe_defaults
+  std::string device;       ///< what moves the tool
+  bool pointer = false;     ///< it is a page's pointer
   std::int64_t rate = 1000;
   std::int64_t ticks = 0;   ///< since the act began
   std::int64_t misses = 0;  ///< of deadlines
@@ -31,12 +32,13 @@ struct RunState {
   SettingsText settings;
 };
 
+/// As text.
 [[nodiscard]] std::string to_json(const RunState& state);
 
 /// Name, file, size and kind of a model.
-[[nodiscard]] std::string describe_model(const Body& body, const std::string& file);
+[[nodiscard]] nlohmann::json describe_model(const Body& body, const std::string& file);
 
 /// What suits it: radius of a tool, reach of a grab, friction, and how deep to press.
-[[nodiscard]] std::string describe_defaults(const Body& body);
+[[nodiscard]] nlohmann::json describe_defaults(const Body& body);
 
 }  // namespace palpate

@@ -7,23 +7,21 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double usual_rate = 1000.0;
 constexpr double highest_rate = 1e5;
-
-/// File names may be any bytes: what is not UTF-8 is shown as such.
-std::string text(const Json& object) {
-  return object.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
 
 }  // namespace
 
+std::string json_text(const Json& value) {
+  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 std::string hello_word(const char* mode, std::uint64_t page) {
-  return text(
+  return json_text(
       {{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", mode}, {"id", page}});
 }
 
 std::string error_word(const std::string& about, const std::string& message, const std::string& hint) {
-  return text({{"type", "error"}, {"about", about}, {"message", message}, {"hint", hint}});
+  return json_text({{"type", "error"}, {"about", about}, {"message", message}, {"hint", hint}});
 }
 
 std::string error_word(const std::string& about, const Error& error) {
@@ -31,7 +29,7 @@ std::string error_word(const std::string& about, const Error& error) {
   return error_word(about, where + error.what(), error.hint());
 }
 
-RunState::RunState(const std::string& json) : members_(Json::parse(json, nullptr, false)) {
+StateWord::StateWord(const std::string& json) : members_(Json::parse(json, nullptr, false)) {
   if (!members_.is_object())
     throw Error("what the run says of itself is not a JSON object", "viewer", "report this as a bug");
   const auto found = members_.find("times");
@@ -40,13 +38,13 @@ RunState::RunState(const std::string& json) : members_(Json::parse(json, nullptr
   members_.erase(found);
 }
 
-double RunState::rate() const {
+double StateWord::rate() const {
   const auto found = members_.find("rate");
   if (found == members_.end() || !found->is_number()) return usual_rate;
   return std::clamp(found->get<double>(), 1.0, highest_rate);
 }
 
-std::string RunState::for_page(std::uint32_t scene, const PageRole& role, const Json& times) const {
+std::string StateWord::for_page(std::uint32_t scene, const PageRole& role, const Json& times) const {
   Json state = members_;
   state["type"] = "state";
   state["scene"] = scene;
@@ -56,7 +54,7 @@ std::string RunState::for_page(std::uint32_t scene, const PageRole& role, const 
   const auto pointer = members_.find("pointer");
   state["pointer"] = role.is_controller && pointer != members_.end() && *pointer == true;
   if (!times.is_null()) state["times"] = times;
-  return text(state);
+  return json_text(state);
 }
 
 }  // namespace palpate

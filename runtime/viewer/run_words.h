@@ -16,6 +16,9 @@ struct PageRole {
   std::size_t pages = 0;    ///< all that watch
 };
 
+/// As text. File names may be any bytes: what is not UTF-8 is shown as such.
+std::string json_text(const nlohmann::json& value);
+
 /// The first message of all. `mode`: live, replay or file.
 std::string hello_word(const char* mode, std::uint64_t page);
 
@@ -23,15 +26,18 @@ std::string hello_word(const char* mode, std::uint64_t page);
 std::string error_word(const std::string& about, const std::string& message, const std::string& hint);
 std::string error_word(const std::string& about, const Error& error);
 
-/// The members of the message `state` that are the run's.
-class RunState {
+/// Ticks a second where a run does not say.
+inline constexpr double usual_rate = 1000.0;
+
+/// The message `state`: the members that are the run's, to which those of each page are added.
+class StateWord {
  public:
   /// Throws Error when the text is not a JSON object.
-  explicit RunState(const std::string& json);
+  explicit StateWord(const std::string& json);
 
   /// `times` of a replay's frames, which a page needs once, null without; the state itself is without.
   [[nodiscard]] const nlohmann::json& times() const noexcept { return times_; }
-  [[nodiscard]] double rate() const;  ///< ticks a second; 1000 where it is not said
+  [[nodiscard]] double rate() const;  ///< ticks a second
 
   /// With the page's own members. The pointer is this page's where the run has one and the page controls.
   [[nodiscard]] std::string for_page(std::uint32_t scene, const PageRole& role,

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "meshes/error.h"
+#include "runtime/settings.h"
 
 namespace palpate {
 namespace {
@@ -23,20 +23,6 @@ Eigen::Quaterniond quaternion_of(const double (&wxyz)[4]) {
 
 std::int64_t number_of(const TickRecord& tick, std::int64_t rate) {
   return std::llround(tick.time * static_cast<double>(rate));
-}
-
-/// "a=1\nb=2\n" as {"a":"1","b":"2"}.
-nlohmann::json settings_of(std::string_view options) {
-  nlohmann::json settings = nlohmann::json::object();
-  while (!options.empty()) {
-    const std::size_t end = std::min(options.find('\n'), options.size());
-    const std::string_view line = options.substr(0, end);
-    options.remove_prefix(std::min(end + 1, options.size()));
-    const std::size_t equals = line.find('=');
-    if (equals != std::string_view::npos)
-      settings[std::string(line.substr(0, equals))] = std::string(line.substr(equals + 1));
-  }
-  return settings;
 }
 
 TickNote note_of(const TickRecord& tick, std::int64_t rate) {
@@ -88,7 +74,7 @@ SurfacePicture SessionPictures::picture(std::int64_t frame) const {
   return picture;
 }
 
-std::string SessionPictures::state(std::int64_t shown, const std::vector<double>& times) const {
+nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
   using nlohmann::json;
   const RecordedSurface& surface = recording_.frames.surface;
   Eigen::AlignedBox3d bounds;
@@ -96,37 +82,37 @@ std::string SessionPictures::state(std::int64_t shown, const std::vector<double>
   const auto point = [](const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); };
   std::string name = std::filesystem::path(recording_.info.model_path).filename().string();
   if (const std::size_t suffix = name.find(".palpate.hdf"); suffix != std::string::npos) name.resize(suffix);
-  const json state = {{"model",
-                       {{"name", name},
-                        {"file", recording_.info.model_path},
-                        {"dimension", surface.corners},
-                        {"nodes", nullptr},
-                        {"surface_nodes", surface.nodes.size()},
-                        {"elements", nullptr},
-                        {"dofs", nullptr},
-                        {"element", nullptr},
-                        {"size", bounds.diagonal().norm()},
-                        {"bounds", json::array({point(bounds.min()), point(bounds.max())})},
-                        {"moves", false},
-                        {"loads", false}}},
-                      {"device", recording_.info.device},
-                      {"session", path_.filename().string()},
-                      {"rate", recording_.info.rate},
-                      {"ticks", recording_.ticks.size()},
-                      {"paused", false},
-                      {"recording", nullptr},
-                      {"busy", nullptr},
-                      {"locked", "this is a recording"},
-                      {"fault", nullptr},
-                      {"phase", "active"},
-                      {"misses", 0},
-                      {"settings", settings_of(recording_.info.options)},
-                      {"defaults", {{"radius", 0.0}, {"reach", 0.0}, {"friction", 0.0}, {"depth", 0.0}}},
-                      {"frames", times.size()},
-                      {"frame", shown},
-                      {"duration", times.empty() ? 0.0 : times.back()},
-                      {"times", times}};
-  return state.dump(-1, ' ', false, json::error_handler_t::replace);
+  return {{"model",
+           {{"name", name},
+            {"file", recording_.info.model_path},
+            {"dimension", surface.corners},
+            {"nodes", nullptr},
+            {"surface_nodes", surface.nodes.size()},
+            {"elements", nullptr},
+            {"dofs", nullptr},
+            {"element", nullptr},
+            {"size", bounds.diagonal().norm()},
+            {"bounds", json::array({point(bounds.min()), point(bounds.max())})},
+            {"moves", false},
+            {"loads", false}}},
+          {"device", recording_.info.device},
+          {"session", path_.filename().string()},
+          {"rate", recording_.info.rate},
+          {"ticks", recording_.ticks.size()},
+          {"paused", false},
+          {"recording", nullptr},
+          {"busy", nullptr},
+          {"refused", nullptr},
+          {"locked", "this is a recording"},
+          {"fault", nullptr},
+          {"phase", "active"},
+          {"misses", 0},
+          {"settings", split_settings(recording_.info.options)},
+          {"defaults", {{"radius", 0.0}, {"reach", 0.0}, {"friction", 0.0}, {"depth", 0.0}}},
+          {"frames", times.size()},
+          {"frame", 0},
+          {"duration", times.empty() ? 0.0 : times.back()},
+          {"times", times}};
 }
 
 std::vector<TickRun> SessionPictures::ticks() const {

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <string>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "formats/recording.h"
@@ -32,8 +32,9 @@ class SessionPictures {
   }
   /// Of frame 0 .. frames() - 1, with the tool as it was in its tick. Throws Error when it cannot be read.
   [[nodiscard]] SurfacePicture picture(std::int64_t frame) const;
-  /// What the message `state` says of some frames, the first of which is shown.
-  [[nodiscard]] std::string state(std::int64_t shown, const std::vector<double>& times) const;
+  /// The members of the message `state` that are the run's, for frames at these times, the first of which is
+  /// shown.
+  [[nodiscard]] nlohmann::json state(const std::vector<double>& times) const;
   /// All ticks, thinned out to some 100 000 samples: a run for each stretch without a gap.
   [[nodiscard]] std::vector<TickRun> ticks() const;
 

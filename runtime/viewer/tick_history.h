@@ -25,6 +25,10 @@ class TickHistory {
   }
 
   [[nodiscard]] std::int64_t end() const noexcept { return first_ + std::ssize(samples_); }
+  /// Whether any that is kept is at a place or later.
+  [[nodiscard]] bool has_from(std::int64_t place) const noexcept {
+    return !samples_.empty() && place < end();
+  }
 
   /// Ticks without a gap.
   struct Run {

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <ctime>
+#include <fstream>
 #include <thread>
 #include <utility>
 
@@ -28,6 +29,12 @@ std::filesystem::path name_recording(const std::filesystem::path& model) {
   std::filesystem::path path = name + ".h5";
   for (int k = 2; std::filesystem::exists(path); ++k) path = fmt::format("{}-{}.h5", name, k);
   return path;
+}
+
+/// What can be seen of a file that is gone before the body that came of it goes too.
+void expect_file(const std::filesystem::path& file) {
+  if (std::ifstream(file)) return;
+  throw Error("cannot be read any more", file.string(), "put it back, or start palpate-runtime play anew");
 }
 
 std::string sentence(const std::exception& error) {
@@ -119,6 +126,7 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
 /// Another body where the settings need one; the old one goes first, as it is large.
 void ViewedPlay::load(const Settings& settings) {
   if (body_ != nullptr && body_options_ == settings.body()) return;
+  expect_file(options_.file);
   begin_making("the model is being loaded");
   body_.reset();
   body_ = load_and_print(options_.file, options_.model_toml, settings.body());

@@ -20,8 +20,7 @@ struct ViewerOptions {
 };
 
 /// HTTP and WebSocket in a thread of its own (web/PROTOCOL.md). The `show` functions may be called by any
-/// thread, one at a time each; they never wait for a page. A page that is slow misses pictures, and holds up
-/// nothing else.
+/// thread; they never wait for a page. A page that is slow misses pictures, and holds up nothing else.
 class ViewerServer {
  public:
   /// `run` must live as long. Listens when it returns. Throws Error (port taken, address unknown).

@@ -186,6 +186,7 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   near((await push()) / once, 2, 0.03, 'force with twice the stiffness');
   await part(page, 'stiffness-scale').fill('1');
   await part(page, 'stiffness-scale').press('Enter');
+  await until(page, () => window.palpate.state.settings['stiffness-scale'] === '1' && !window.palpate.state.busy);
   await part(page, 'overlay').click(); // it is checked once the runtime has taken it
   await until(page, () => window.palpate.state.settings.overlay !== undefined && !window.palpate.state.busy);
   const softer = await push();
@@ -245,7 +246,9 @@ test('pictures and shapes can be saved', async (t) => {
 test('one steers, any number watch, and control goes on', async (t) => {
   const { page, served } = await open_cube(t);
   const watcher = await ready(await visit(t, served.url));
-  await until(page, () => window.palpate.state.watchers === 2);
+  const other = await ready(await visit(t, served.url));
+  await until(page, () => window.palpate.state.watchers === 3);
+  assert.equal((await told(other, 'state')).you, 'watcher');
   assert.equal((await told(watcher, 'state')).you, 'watcher');
   assert.ok(await part(watcher, 'pause').isDisabled());
   const { x, y } = await project(page, top);
@@ -257,8 +260,10 @@ test('one steers, any number watch, and control goes on', async (t) => {
   await page.mouse.move(x, y);
   await page.mouse.down();
   await settled(page);
-  const seen = await settled(watcher); // the same is seen by both
-  assert.ok(seen.force[2] < 0);
+  for (const one of [watcher, other]) {
+    const seen = await settled(one); // the same is seen by all
+    assert.ok(seen.force[2] < 0);
+  }
   await page.context().close(); // the pressing hand is gone
   await until(watcher, () => window.palpate.lastFrame.contacts === 0 && !window.palpate.state.controlled);
   await part(watcher, 'control').click();
@@ -328,8 +333,7 @@ test('malformed and huge messages end their own connection and nothing else', as
   }
   await until(page, (count) => window.palpate.ticks > count + 500, before);
   assert.equal((await told(page, 'state')).you, 'controller');
-  const { misses } = await told(page, 'state');
-  assert.ok(misses < 0.05 * (await told(page, 'state')).ticks, `${misses} misses`);
+  assert.equal(await part(page, 'connection').innerText(), 'connected');
 });
 
 test('a body in the plane lies flat with its mesh, and is pushed from outside', async (t) => {

@@ -1,0 +1,114 @@
+#include "runtime/viewer/http_answers.h"
+
+#include <fmt/format.h>
+
+#include <boost/beast/websocket.hpp>
+#include <string_view>
+#include <utility>
+
+#include "meshes/error.h"
+#include "runtime/viewer/admission.h"
+#include "runtime/viewer/page.h"
+#include "runtime/viewer/seen_surface.h"
+
+namespace palpate {
+namespace {
+
+namespace beast = boost::beast;
+namespace http = beast::http;
+
+constexpr unsigned http_version = 11;  // 1.1
+
+std::string_view view(beast::string_view text) {
+  return {text.data(), text.size()};
+}
+
+Target target_of(const Request& request) {
+  return split_target(view(request.target()));
+}
+
+Response plain(http::status status, const std::string& text) {
+  Response response(status, http_version);
+  response.set(http::field::content_type, "text/plain; charset=utf-8");
+  response.body() = text + "\n";
+  return response;
+}
+
+/// What every answer has: nothing of it is for other pages, and the token in the address stays here.
+Response guarded(Response response) {
+  response.keep_alive(false);
+  response.set(http::field::cache_control, "no-store");
+  response.set("X-Content-Type-Options", "nosniff");
+  response.set("Referrer-Policy", "no-referrer");
+  response.set("Cross-Origin-Resource-Policy", "same-origin");
+  return response;
+}
+
+Response page(std::string_view host) {
+  Response response(http::status::ok, http_version);
+  response.set(http::field::content_type, "text/html; charset=utf-8");
+  response.set("Content-Security-Policy",
+               fmt::format("default-src 'none'; script-src 'unsafe-inline' blob:; worker-src blob:; "
+                           "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; "
+                           "connect-src 'self' ws://{} blob: data:; base-uri 'none'; form-action 'none'; "
+                           "frame-ancestors 'none'",
+                           host));
+  response.body() = viewer_page();
+  return response;
+}
+
+Response surface_file(bool is_stl, const ShownPicture& shown) {
+  try {
+    Response response(http::status::ok, http_version);
+    response.set(http::field::content_type, is_stl ? "model/stl" : "application/octet-stream");
+    response.set(http::field::content_disposition,
+                 fmt::format("attachment; filename=\"surface-tick-{}.{}\"", shown.picture.frame.tick,
+                             is_stl ? "stl" : "vtu"));
+    const auto file = is_stl ? surface_stl : surface_vtu;
+    response.body() = file(shown.picture, *shown.scene, shown.patch.get());
+    return response;
+  } catch (const Error& error) {
+    return plain(http::status::not_found, to_text(error));
+  }
+}
+
+}  // namespace
+
+bool wants_socket(const Request& request) {
+  return target_of(request).path == "/socket" && beast::websocket::is_upgrade(request);
+}
+
+std::optional<Response> refusal(const Request& request, const ServedAddress& served) {
+  const std::string_view host = view(request[http::field::host]);
+  if (request.count(http::field::host) != 1 || !is_served(host, served.address, served.port))
+    return guarded(
+        plain(http::status::forbidden, "Open the viewer at the address that the runtime printed."));
+  if (request.count(http::field::origin) > 0 && !is_own_page(view(request[http::field::origin]), host))
+    return guarded(plain(http::status::forbidden, "Pages of other addresses may not ask."));
+  if (request.method() != http::verb::get && request.method() != http::verb::head) {
+    Response response = guarded(plain(http::status::method_not_allowed, "Only GET and HEAD are answered."));
+    response.set(http::field::allow, "GET, HEAD");
+    return response;
+  }
+  if (!served.token.empty() && !is_same_token(target_of(request).token, served.token))
+    return guarded(
+        plain(http::status::forbidden, "Open the whole address that the runtime printed, with its token."));
+  if (wants_socket(request)) {
+    const auto offered = request.find(http::field::sec_websocket_protocol);
+    if (offered != request.end() && !http::token_list(offered->value()).exists(subprotocol))
+      return guarded(plain(http::status::bad_request, "The socket speaks palpate.1 only."));
+  }
+  return std::nullopt;
+}
+
+Response answer(const Request& request, const std::optional<ShownPicture>& shown) {
+  const std::string_view path = target_of(request).path;
+  if (path == "/") return guarded(page(view(request[http::field::host])));
+  const bool is_stl = path == "/surface.stl";
+  if (!is_stl && path != "/surface.vtu")
+    return guarded(plain(http::status::not_found, "There is no such page."));
+  if (!shown) return guarded(plain(http::status::not_found, "There is nothing to see yet."));
+  return guarded(surface_file(is_stl, *shown));
+}
+
+}  // namespace palpate

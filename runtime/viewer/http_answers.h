@@ -1,0 +1,35 @@
+// What a viewer answers by HTTP.
+#pragma once
+
+#include <boost/beast/http.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "runtime/viewer/show.h"
+
+namespace palpate {
+
+using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+using Response = boost::beast::http::response<boost::beast::http::string_body>;
+
+/// Of the WebSocket.
+inline constexpr const char* subprotocol = "palpate.1";
+
+/// Where a viewer is.
+struct ServedAddress {
+  std::string address;
+  std::uint16_t port = 0;
+  std::string token;  ///< empty: none is asked for
+};
+
+/// Why a request is not answered at all: its host, page, method, token or subprotocol.
+std::optional<Response> refusal(const Request& request, const ServedAddress& served);
+
+/// Whether it wants to go on as a WebSocket.
+bool wants_socket(const Request& request);
+
+/// To all other requests that are not refused: the page, the surface as it is seen, or that it is not there.
+Response answer(const Request& request, const std::optional<ShownPicture>& shown);
+
+}  // namespace palpate

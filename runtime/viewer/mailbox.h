@@ -1,0 +1,51 @@
+// How what is shown comes to the viewer's thread.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "runtime/viewer/show.h"
+
+namespace palpate {
+
+/// What has been shown since the viewer's thread last looked.
+struct Mail {
+  struct Ticks {
+    std::vector<TickNote> notes;
+    std::int64_t stride = 1;
+  };
+
+  std::shared_ptr<const Scene> scene;
+  std::optional<ShownPicture> picture;
+  std::deque<Ticks> ticks;
+  std::optional<StateWord> state;
+  nlohmann::json times;  ///< of the last state that had them
+};
+
+class Mailbox {
+ public:
+  /// Calls `put` with the mail, by any thread. True where it was empty: the viewer's thread is to be woken.
+  template <class Put>
+  [[nodiscard]] bool post(Put&& put) {
+    const std::lock_guard lock(mutex_);
+    put(mail_);
+    return !std::exchange(is_posted_, true);
+  }
+  [[nodiscard]] Mail take() {
+    const std::lock_guard lock(mutex_);
+    is_posted_ = false;
+    return std::exchange(mail_, {});
+  }
+
+ private:
+  std::mutex mutex_;
+  Mail mail_;
+  bool is_posted_ = false;
+};
+
+}  // namespace palpate

@@ -1,0 +1,194 @@
+#include "runtime/viewer/page_connection.h"
+
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <utility>
+
+#include "runtime/viewer/page_server.h"
+#include "runtime/viewer/page_word.h"
+
+namespace palpate {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+constexpr std::uint32_t longest_request = 8192;  // header [bytes]
+constexpr auto request_time = 10s;               // for a header to be said
+constexpr auto response_time = 30s;              // for an answer to be taken
+constexpr auto idle_time = 30s;                  // half of it: a ping
+constexpr auto stall_time = 10s;                 // that a message may wait for its page to read
+constexpr std::size_t most_unread = 32U << 20U;  // [bytes] of what a page must not miss
+constexpr int send_buffer = 256 << 10;           // small, so that a slow page sees what is, not what was
+constexpr std::size_t longest_reason = 120;      // that a closing frame has room for
+
+}  // namespace
+
+void PageConnection::start() {
+  ErrorCode ignored;
+  stream_.socket().set_option(tcp::no_delay(true), ignored);
+  stream_.socket().set_option(asio::socket_base::send_buffer_size(send_buffer), ignored);
+  parser_.emplace();
+  parser_->header_limit(longest_request);
+  stream_.expires_after(request_time);
+  http::async_read_header(stream_, buffer_, *parser_,
+                          [self = shared_from_this()](const ErrorCode& problem, std::size_t) {
+                            if (problem) return self->server_.leave(*self);
+                            self->answer_request();
+                          });
+}
+
+void PageConnection::answer_request() {
+  const Request& request = parser_->get();
+  if (std::optional<Response> refused = refusal(request, server_.served())) {
+    respond(std::move(*refused));
+  } else if (wants_socket(request)) {
+    open_socket();
+  } else {
+    respond(answer(request, server_.show().picture()));
+  }
+}
+
+void PageConnection::respond(Response response) {
+  stream_.expires_after(response_time);
+  const auto done = [self = shared_from_this()](const ErrorCode&, std::size_t) {
+    ErrorCode ignored;
+    self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    self->server_.leave(*self);
+  };
+  if (parser_->get().method() == http::verb::head) {
+    header_.emplace(std::move(response.base()));
+    header_->content_length(response.body().size());
+    http::async_write(stream_, *header_, done);
+  } else {
+    response_.emplace(std::move(response));
+    response_->prepare_payload();
+    http::async_write(stream_, *response_, done);
+  }
+}
+
+void PageConnection::open_socket() {
+  const Request& request = parser_->get();
+  const bool offers = request.count(http::field::sec_websocket_protocol) > 0;
+  stream_.expires_never();  // the socket has its own times
+  socket_.emplace(std::move(stream_));
+  websocket::stream_base::timeout times{};
+  times.handshake_timeout = request_time;
+  times.idle_timeout = idle_time;
+  times.keep_alive_pings = true;
+  socket_->set_option(times);
+  socket_->set_option(websocket::stream_base::decorator([offers](websocket::response_type& response) {
+    if (offers) response.set(http::field::sec_websocket_protocol, subprotocol);
+  }));
+  socket_->read_message_max(longest_page_word);
+  socket_->auto_fragment(false);
+  buffer_.clear();
+  socket_->async_accept(request, [self = shared_from_this()](const ErrorCode& problem) {
+    if (problem) return self->server_.leave(*self);
+    self->is_open_ = true;
+    self->ticks_ = self->server_.is_replay() ? 0 : self->server_.show().ticks().end();
+    self->server_.join(*self);
+    self->read();
+  });
+}
+
+void PageConnection::read() {
+  socket_->async_read(
+      buffer_, [self = shared_from_this()](const ErrorCode& problem, std::size_t) { self->hear(problem); });
+}
+
+void PageConnection::hear(const ErrorCode& problem) {
+  if (problem) return server_.leave(*this);
+  if (!is_open_) return;
+  if (!socket_->got_text()) return close(websocket::close_code::unknown_data, "only text is read");
+  const auto bytes = buffer_.data();
+  std::string reason;
+  const std::optional<PageWord> word =
+      parse_page_word({static_cast<const char*>(bytes.data()), bytes.size()}, reason);
+  if (!word) return close(websocket::close_code::bad_payload, reason);
+  buffer_.consume(bytes.size());
+  server_.obey(*this, *word);
+  if (is_open_) read();
+}
+
+void PageConnection::close(websocket::close_code code, std::string reason) {
+  if (!is_open_) return;
+  is_open_ = false;
+  server_.leave(*this);
+  reason.resize(std::min(reason.size(), longest_reason));
+  socket_->async_close(websocket::close_reason(code, reason),
+                       [self = shared_from_this()](const ErrorCode&) {});
+}
+
+void PageConnection::cut() noexcept {
+  is_open_ = false;
+  if (socket_) {
+    beast::get_lowest_layer(*socket_).close();
+  } else {
+    stream_.close();
+  }
+}
+
+bool PageConnection::is_stalled() const {
+  return writing_ && Clock::now() - writing_since_ > stall_time;
+}
+
+void PageConnection::say(std::string text) {
+  said_bytes_ += text.size();
+  said_.push_back(std::move(text));
+  if (said_bytes_ > most_unread) return close(websocket::close_code::policy_error, "too much is unread");
+  show();
+}
+
+void PageConnection::show() {
+  if (!is_open_ || writing_) return;
+  writing_ = next_message();
+  if (!writing_) return;
+  writing_since_ = Clock::now();
+  socket_->text(writing_.is_text);
+  socket_->async_write(asio::buffer(*writing_.bytes),
+                       [self = shared_from_this()](const ErrorCode& problem, std::size_t) {
+                         self->writing_ = {};
+                         if (problem) return self->server_.leave(*self);
+                         self->show();
+                       });
+}
+
+Message PageConnection::next_message() {
+  Show& shown = server_.show();
+  if (!said_.empty()) {
+    Message message = text_message(std::move(said_.front()));
+    said_bytes_ -= message.bytes->size();
+    said_.pop_front();
+    return message;
+  }
+  if (states_ != shown.states()) {
+    const bool is_first = states_ == 0;
+    states_ = shown.states();
+    return shown.state_message(server_.role(*this), is_first);
+  }
+  if (scenes_ != shown.scenes()) {
+    scenes_ = shown.scenes();
+    patch_ = 0;
+    return shown.scene_message();
+  }
+  const bool has_ticks = shown.ticks().has_from(ticks_);
+  if (shown.picture() && pictures_ != shown.pictures() && !(has_ticks && ticks_first_)) {
+    const ScenePatch* patch = shown.picture()->patch.get();
+    const std::uint32_t number = patch == nullptr ? 0 : patch->number;
+    if (std::exchange(patch_, number) != number && number != 0) return shown.patch_message();
+    pictures_ = shown.pictures();
+    ticks_first_ = true;
+    return shown.frame_message();
+  }
+  if (!has_ticks) return {};
+  ticks_first_ = false;
+  return shown.ticks_message(ticks_);
+}
+
+}  // namespace palpate

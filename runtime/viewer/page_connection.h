@@ -1,0 +1,72 @@
+// One connection to a viewer.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "runtime/viewer/http_answers.h"
+#include "runtime/viewer/show.h"
+
+namespace palpate {
+
+class PageServer;
+
+/// One request, and where that asks for it a socket from then on: a page. For the server's thread.
+class PageConnection : public std::enable_shared_from_this<PageConnection> {
+ public:
+  /// `server` must live as long.
+  PageConnection(boost::asio::ip::tcp::socket socket, PageServer& server)
+      : stream_(std::move(socket)), server_(server) {}
+
+  void start();
+  /// Without a word.
+  void cut() noexcept;
+  /// Sends what there is that the page has not been sent, one message after the other.
+  void show();
+  /// A text that it must not miss.
+  void say(std::string text);
+  /// It does not read.
+  [[nodiscard]] bool is_stalled() const;
+
+ private:
+  using ErrorCode = boost::system::error_code;
+
+  void answer_request();
+  void respond(Response response);
+  void open_socket();
+  void read();
+  void hear(const ErrorCode& problem);
+  void close(boost::beast::websocket::close_code code, std::string reason);
+  Message next_message();
+
+  boost::beast::tcp_stream stream_;
+  std::optional<boost::beast::websocket::stream<boost::beast::tcp_stream>> socket_;
+  PageServer& server_;
+  boost::beast::flat_buffer buffer_;
+  std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
+  std::optional<Response> response_;
+  std::optional<boost::beast::http::response<boost::beast::http::empty_body>> header_;
+
+  bool is_open_ = false;
+  std::deque<std::string> said_;
+  std::size_t said_bytes_ = 0;
+  Message writing_;
+  std::chrono::steady_clock::time_point writing_since_;
+  // What it has been sent.
+  std::int64_t scenes_ = 0;
+  std::int64_t pictures_ = 0;
+  std::int64_t states_ = 0;
+  std::int64_t ticks_ = 0;
+  std::uint32_t patch_ = 0;
+  bool ticks_first_ = true;  // else pictures
+};
+
+}  // namespace palpate

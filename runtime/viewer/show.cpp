@@ -1,0 +1,91 @@
+#include "runtime/viewer/show.h"
+
+#include <utility>
+
+#include "runtime/viewer/wire.h"
+
+namespace palpate {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto state_period = std::chrono::milliseconds(500);
+constexpr double seconds_of_ticks = 2.0;  // that a slow page is sent
+constexpr std::size_t most_recorded_ticks = 1U << 18U;
+
+Message binary_message(std::string bytes) {
+  return {std::make_shared<const std::string>(std::move(bytes)), false};
+}
+
+}  // namespace
+
+Message text_message(std::string text) {
+  return {std::make_shared<const std::string>(std::move(text)), true};
+}
+
+void Show::set_scene(std::shared_ptr<const Scene> scene) {
+  scene_ = std::move(scene);
+  scene_message_ = binary_message(encode_scene(*scene_));
+  picture_.reset();
+  frame_ = {};
+  ticks_.clear();
+  ++scenes_;
+  touch_state();  // which has the scene's number
+}
+
+void Show::set_picture(ShownPicture picture) {
+  if (picture.scene != scene_) return;  // of the body before
+  if (!picture_ || picture_->patch != picture.patch) patch_message_ = {};
+  picture_ = std::move(picture);
+  frame_ = {};
+  ++pictures_;
+}
+
+void Show::add_ticks(const std::vector<TickNote>& ticks, std::int64_t stride, bool replay) {
+  const double rate = state_ ? state_->rate() : usual_rate;
+  ticks_.append(ticks, stride,
+                replay ? most_recorded_ticks : static_cast<std::size_t>(seconds_of_ticks * rate));
+}
+
+void Show::set_state(StateWord state) {
+  state_ = std::move(state);
+  touch_state();
+}
+
+void Show::touch_state() {
+  ++states_;
+  state_touched_ = Clock::now();
+}
+
+void Show::repeat_state() {
+  if (state_ && Clock::now() - state_touched_ >= state_period) touch_state();
+}
+
+const Message& Show::patch_message() {
+  if (!patch_message_) patch_message_ = binary_message(encode_patch(scene_->number, *picture_->patch));
+  return patch_message_;
+}
+
+const Message& Show::frame_message() {
+  if (!frame_) frame_ = binary_message(encode_frame(picture_->picture, *scene_, picture_->patch.get()));
+  return frame_;
+}
+
+Message Show::ticks_message(std::int64_t& place) {
+  if (!run_message_ || run_begin_ != place || run_last_ != ticks_.end()) {
+    const TickHistory::Run run = ticks_.run_from(place);
+    run_begin_ = place;
+    run_last_ = ticks_.end();
+    run_end_ = run.end;
+    run_message_ = binary_message(encode_ticks(scene_ ? scene_->number : 0, run.ticks, run.stride));
+  }
+  place = run_end_;
+  return run_message_;
+}
+
+Message Show::state_message(const PageRole& role, bool is_first) const {
+  return text_message(
+      state_->for_page(scene_ ? scene_->number : 0, role, is_first ? times_ : nlohmann::json()));
+}
+
+}  // namespace palpate
