@@ -2,7 +2,6 @@
 import {
   BufferAttribute,
   BufferGeometry,
-  Color,
   DataTexture,
   DoubleSide,
   DynamicDrawUsage,
@@ -159,8 +158,6 @@ export class Body {
     const flat = scene.dimension === 2;
     this.material_.side = flat ? DoubleSide : FrontSide;
     this.material_.needsUpdate = true;
-    this.edges_.material.opacity = flat ? 0.7 : 0.45;
-    this.edges_.material.color = new Color(flat && scene.triangle.length === 0 ? 0xc9b8a8 : 0x0a0d12);
     this.rebuild();
   }
 
@@ -208,11 +205,21 @@ export class Body {
   /** Colours by the numbers from `low` to `high`. */
   show_range(low: number, high: number): void {
     this.uniforms_.coloured.value = this.field === 'none' ? 0 : 1;
+    this.colour_edges();
     this.uniforms_.colour_map.value = this.maps_[field_traits[this.field].map];
     this.uniforms_.range.value.set(high > 0 ? low : -Number(low < 0), high > 0 ? high : 1); // where all is 0, 0 has its colour too
     const flat = this.scene_?.dimension === 2;
     this.uniforms_.even.value = flat || this.field !== 'none' ? 1 : 0;
     this.uniforms_.shading.value = flat ? 0 : 0.6; // linear light: a fifth of what is seen
+  }
+
+  /** Light on dark colours and dark on light ones; alone where the inside is not known. */
+  private colour_edges(): void {
+    const flat = this.scene_?.dimension === 2;
+    const is_alone = flat && this.scene_?.triangle.length === 0;
+    const is_dark = this.field !== 'none' && field_traits[this.field].map === 'sequential';
+    this.edges_.material.color.set(is_alone ? 0xc9b8a8 : is_dark ? 0xe6edf5 : 0x0a0d12);
+    this.edges_.material.opacity = is_alone ? 1 : (flat ? 0.7 : 0.45) * (is_dark ? 0.6 : 1);
   }
 
   /** The surface as it is now, for as long as a press lasts. */

@@ -41,7 +41,7 @@ class Page implements Listener {
   private ticks_ = 0;
   private plots_wanted_ = false;
   private shape_ = ''; // of the tool that is drawn, with the body that it is drawn for
-  private depth_for_ = ''; // the model that the depth suits
+  private depth_for_ = ''; // the model and tool that the depth suits
 
   private readonly view_ = new View(part('stage'));
   private readonly body_ = new Body();
@@ -159,9 +159,10 @@ class Page implements Listener {
       this.tool_.take_shape(parse_tool(state.settings.tool), state.model.size, state.model.dimension);
       this.view_.draw();
     }
-    if (this.depth_for_ !== state.model.file) {
-      this.depth_for_ = state.model.file;
-      input('depth').value = short_number(1000 * state.defaults.depth, 2);
+    const suits = `${state.model.file} ${state.settings.tool}`;
+    if (this.depth_for_ !== suits) {
+      this.depth_for_ = suits;
+      show_value(input('depth'), short_number(1000 * this.usual_depth(), 2));
     }
     this.run_.show(state, this.mode_);
     this.drawing_.show_dimension(state.model.dimension);
@@ -180,6 +181,13 @@ class Page implements Listener {
     return this.mode_ === 'live' && state?.you === 'controller' && state.pointer;
   }
 
+  /** Where a press begins: as the body suggests, but no deeper than the tool is round. */
+  private usual_depth(): number {
+    const suggested = this.state_?.defaults.depth ?? 0;
+    const { radius } = parse_tool(this.state_?.settings.tool);
+    return radius > 0 ? Math.min(radius, suggested) : suggested;
+  }
+
   private hand_settings(): HandSettings | string | null {
     const state = this.state_;
     if (!state?.model || !this.is_hand() || state.busy) return null;
@@ -189,8 +197,8 @@ class Page implements Listener {
     const typed = typed_number(input('depth').value, 0);
     return {
       mode,
-      depth: typed === null ? state.defaults.depth : metres(typed),
-      unit_depth: state.defaults.depth,
+      depth: typed === null ? this.usual_depth() : metres(typed),
+      unit_depth: this.usual_depth(),
       // A body that swings has moved on since it was drawn.
       clearance: 0.25 * shape.radius + (state.model.moves ? 0.025 : 0.008) * state.model.size,
       contact: 1e-4 * state.model.size,
@@ -205,7 +213,7 @@ class Page implements Listener {
   private listen(): void {
     input('depth').addEventListener('change', () => {
       if (typed_number(input('depth').value, 0) === null && this.state_) {
-        show_value(input('depth'), short_number(1000 * this.state_.defaults.depth, 2));
+        show_value(input('depth'), short_number(1000 * this.usual_depth(), 2));
       }
       input('depth').blur();
     });

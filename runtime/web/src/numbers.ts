@@ -13,8 +13,10 @@ export interface Felt {
 const signed = (value: number): string => (value < 0 ? format_si(value, 'N').replace('-', '−') : format_si(value, 'N'));
 
 export function show_felt(felt: Felt): void {
-  write(part('force'), format_si(Math.hypot(...felt.force), 'N'));
-  (['x', 'y', 'z'] as const).forEach((axis, i) => write(part(`force-${axis}`), signed(felt.force[i]!)));
+  const norm = Math.hypot(...felt.force);
+  write(part('force'), format_si(norm, 'N'));
+  // What is rounding beside the whole is 0.
+  (['x', 'y', 'z'] as const).forEach((axis, i) => write(part(`force-${axis}`), signed(Math.abs(felt.force[i]!) > 1e-6 * norm ? felt.force[i]! : 0)));
   write(part('depth-felt'), format_si(felt.depth, 'm'));
   write(part('contacts'), felt.contacts >= 255 ? '255+' : String(felt.contacts));
 }

@@ -32,17 +32,16 @@ function weld(scene: Scene, patch: Patch): Int32Array {
     Math.imul(bits[3 * i]!, 73856093) ^ Math.imul(bits[3 * i + 1]!, 19349663) ^ Math.imul(bits[3 * i + 2]!, 83492791);
   const places = new Map<number, number[]>();
   const is_listed = new Uint8Array(scene.held.length);
-  for (const t of patch.hidden) {
-    for (let i = 3 * t; i < 3 * t + 3; ++i) {
-      const node = scene.triangle[i];
-      if (node === undefined || is_listed[node]) continue;
-      is_listed[node] = 1;
-      const key = hash(scene_bits, node);
-      const here = places.get(key);
-      if (here) here.push(node);
-      else places.set(key, [node]);
-    }
-  }
+  const list = (node: number | undefined) => {
+    if (node === undefined || is_listed[node]) return;
+    is_listed[node] = 1;
+    const key = hash(scene_bits, node);
+    const here = places.get(key);
+    if (here) here.push(node);
+    else places.set(key, [node]);
+  };
+  for (const t of patch.hidden) for (let i = 3 * t; i < 3 * t + 3; ++i) list(scene.triangle[i]);
+  if (scene.dimension === 2) for (let i = 0; i < is_listed.length; ++i) list(i); // any may be on the patch's boundary
   for (let i = 0; i < count; ++i) {
     const same = places.get(hash(patch_bits, i))?.find((node) => [0, 1, 2].every((k) => scene_bits[3 * node + k] === patch_bits[3 * i + k]));
     if (same !== undefined) welded[i] = same;
@@ -116,6 +115,51 @@ function triangles_beside(scene: Scene): Int32Array {
   return triangles;
 }
 
+/**
+ * In the plane a patch is a finer boundary alone: triangles with an edge that it cuts become fans of triangles, so that the body ends
+ * where its boundary is. `corner` are nodes of triangles, `outline` edges of which nodes from `scene_nodes` on are the patch's; gives
+ * the new corners and the edges that were cut, as keys of `edge_key`.
+ */
+function follow_boundary(corner: Uint32Array, outline: Uint32Array, scene_nodes: number, edge_key: (a: number, b: number) => number) {
+  const beside = new Map<number, number[]>();
+  for (let e = 0; e < outline.length; e += 2) {
+    for (const [a, b] of [[outline[e]!, outline[e + 1]!], [outline[e + 1]!, outline[e]!]] as const) beside.set(a, [...(beside.get(a) ?? []), b]);
+  }
+  /** The patch's nodes from a to b, none where the way does not lead there. */
+  const way = (a: number, b: number): number[] => {
+    for (const start of beside.get(a) ?? []) {
+      const passed: number[] = [];
+      let [before, at] = [a, start];
+      while (at >= scene_nodes && passed.length < beside.size) {
+        passed.push(at);
+        const next = beside.get(at)!.find((node) => node !== before);
+        if (next === undefined) break;
+        [before, at] = [at, next];
+      }
+      if (at === b) return passed;
+    }
+    return [];
+  };
+  const cut = new Set<number>();
+  const made: number[] = [];
+  const waiting: [number, number, number][] = [];
+  for (let t = 0; t < corner.length; t += 3) waiting.push([corner[t]!, corner[t + 1]!, corner[t + 2]!]);
+  for (let triangle = waiting.pop(); triangle; triangle = waiting.pop()) {
+    const turns = [0, 1, 2].map((k) => [triangle![k]!, triangle![(k + 1) % 3]!, triangle![(k + 2) % 3]!] as const);
+    const found = turns.map(([a, b]) => (a < scene_nodes && b < scene_nodes ? way(a, b) : []));
+    const k = found.findIndex((passed) => passed.length > 0);
+    if (k < 0) {
+      made.push(...triangle);
+      continue;
+    }
+    const [a, b, apex] = turns[k]!;
+    cut.add(edge_key(a, b));
+    const chain = [a, ...found[k]!, b];
+    for (let i = 1; i < chain.length; ++i) waiting.push([chain[i - 1]!, chain[i]!, apex]);
+  }
+  return { corner: Uint32Array.from(made), cut };
+}
+
 /** A third of each triangle's area is its corner's, or half of each edge's length where there are no triangles. */
 function node_areas(rest: Float32Array, corner: Uint32Array, edge: Uint32Array, nodes: number): Float32Array {
   const area = new Float32Array(nodes);
@@ -155,12 +199,17 @@ export function make_topology(scene: Scene, patch: Patch | null): Topology {
   for (let i = 0; i < fine.length; ++i) corner[corners++] = drawn(fine[i]!);
 
   const outline = Uint32Array.from(patch?.outline ?? [], drawn);
-  const edge: number[] = fine.length > 0 ? [...outline] : [];
+  let all = corner.slice(0, corners);
+  let cut = new Set<number>();
+  const edge_key = (a: number, b: number) => Math.min(a, b) * nodes + Math.max(a, b);
+  const is_plane = scene.dimension === 2 && corners > 0;
+  if (is_plane && outline.length > 0) ({ corner: all, cut } = follow_boundary(all, outline, scene_nodes, edge_key));
+  const edge: number[] = fine.length > 0 || is_plane ? [...outline] : [];
   const sides = triangles_beside(scene);
   for (let e = 0; e < scene.edge.length; e += 2) {
     const [a, b] = [sides[e]!, sides[e + 1]!];
     const is_hidden = a >= 0 && hidden[a] === 1 && (b < 0 || hidden[b] === 1);
-    if (!is_hidden) edge.push(scene.edge[e]!, scene.edge[e + 1]!);
+    if (!is_hidden && !cut.has(edge_key(scene.edge[e]!, scene.edge[e + 1]!))) edge.push(scene.edge[e]!, scene.edge[e + 1]!);
   }
   // An edge within the patch is met once in either sense; the others are its outline.
   for (let at = 0; at < fine.length; ++at) {
@@ -168,7 +217,6 @@ export function make_topology(scene: Scene, patch: Patch | null): Topology {
     const b = fine[at - (at % 3) + ((at + 1) % 3)]!;
     if (a < b) edge.push(drawn(a), drawn(b));
   }
-  const all = corner.slice(0, corners);
   const { vertex, node } = split_at_creases(rest, all, nodes);
   const edges = Uint32Array.from(edge);
   const area = node_areas(rest, all, edges, nodes);

@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { displacements, fill_field } from '../src/field';
+import { boundary_edges } from '../src/pick';
 import { make_topology, vertex_normals } from '../src/topology';
 import type { Frame, Patch, Scene } from '../src/wire';
 
@@ -111,6 +112,28 @@ test('numbers of a welded node are the patch’s', () => {
   assert.equal(fill_field('y', frame, topology, u, value, known), 6.5); // of the patch's middle
   assert.equal(value[3], 5);
   assert.equal(value[7], -3.5);
+});
+
+test('in the plane the body ends where a patch has its boundary', () => {
+  const square: Scene = {
+    kind: 'scene', number: 1, dimension: 2,
+    position: Float32Array.from([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0]),
+    triangle: Uint32Array.from([0, 1, 2, 0, 2, 3]), edge: Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]), held: new Uint8Array(4),
+  };
+  const upper: Patch = {
+    kind: 'patch', scene: 1, number: 1, hidden: new Uint32Array(0), triangle: new Uint32Array(0),
+    position: Float32Array.from([1, 1, 0, 0.7, 1, 0, 0.3, 1, 0, 0, 1, 0, 0, 0.5, 0, 0, 0, 0]), // from the right upper corner, left and down
+    outline: Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 4, 4, 5]),
+  };
+  const { corner, edge, area } = make_topology(square, upper);
+  const boundary = boundary_edges(corner, 10);
+  const next = new Map(Array.from({ length: boundary.length / 2 }, (_, e) => [boundary[2 * e]!, boundary[2 * e + 1]!]));
+  const round = [0];
+  while (round.length < 9 && next.get(round.at(-1)!) !== 0) round.push(next.get(round.at(-1)!)!);
+  assert.deepEqual(round, [0, 1, 2, 5, 6, 3, 8]);
+  assert.ok(Math.abs(area.reduce((sum, one) => sum + one, 0) - 1) < 1e-6);
+  const drawn = Array.from({ length: edge.length / 2 }, (_, e) => [edge[2 * e]!, edge[2 * e + 1]!].sort((a, b) => a - b).join()).sort();
+  assert.deepEqual(drawn, ['0,1', '1,2', '2,5', '5,6', '3,6', '3,8', '0,8'].sort());
 });
 
 test('magnitudes', () => {
