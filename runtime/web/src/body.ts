@@ -78,7 +78,7 @@ function coloured_material(uniforms: BodyUniforms): MeshStandardMaterial {
       .replace(
         '#include <opaque_fragment>',
         `float away = 0.5 - 0.5 * dot(normalize(normal), normalize(vec3(-0.4, 0.5, 0.8)));
-        float rim = shading * pow(1.0 - abs(normalize(normal).z), 3.0);
+        float rim = shading * pow(1.0 - abs(normalize(normal).z), 6.0);
         if (even > 0.5) outgoingLight = diffuseColor.rgb * (1.0 - shading * away) + 0.12 * rim;
         #include <opaque_fragment>`,
       );
