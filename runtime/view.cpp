@@ -18,18 +18,11 @@
 namespace palpate {
 namespace {
 
-/// Of all frames.
-std::vector<double> times_of(const SessionPictures& pictures) {
-  std::vector<double> times;
-  for (std::int64_t k = 0; k < pictures.frames(); ++k) times.push_back(pictures.time(k));
-  return times;
-}
-
 /// A recording that the viewer's page leafs through.
 class SessionView : public ViewedRun {
  public:
   SessionView(const SessionPictures& pictures, const ViewerOptions& options)
-      : pictures_(pictures), state_(pictures.state(times_of(pictures))), server_(as_replay(options), *this) {
+      : pictures_(pictures), state_(pictures.state(pictures.times())), server_(as_replay(options), *this) {
     const std::lock_guard lock(mutex_);  // a page may seek already
     server_.show_scene(std::make_shared<const Scene>(pictures.scene()));
     server_.show_state(json_text(state_));
@@ -111,6 +104,7 @@ int export_html(const ExportOptions& options) {
   const SessionPictures pictures(options.recording);
   const std::vector<std::int64_t> chosen = choose(pictures, options);
   std::vector<double> times;
+  times.reserve(chosen.size());
   for (const std::int64_t frame : chosen) times.push_back(pictures.time(frame));
 
   PageArchive archive;

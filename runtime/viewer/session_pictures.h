@@ -27,6 +27,8 @@ class SessionPictures {
 
   [[nodiscard]] Scene scene() const { return make_scene(recording_.frames.surface, 1); }
   [[nodiscard]] std::int64_t frames() const noexcept { return std::ssize(recording_.frames.tick); }
+  /// Of all frames [s].
+  [[nodiscard]] const std::vector<double>& times() const noexcept { return recording_.frames.time; }
   [[nodiscard]] double time(std::int64_t frame) const {  ///< [s]
     return recording_.frames.time[static_cast<std::size_t>(frame)];
   }

@@ -73,7 +73,7 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
     try {
       const std::unique_ptr<Act> act = begin_act(plan);
       good = plan;
-      const LoopReport report = run_act(*act, stop);
+      LoopReport report = run_act(*act, stop);
       const bool over = options_.duration && report.ticks >= mover_.ticks;
       if (stop || over || !wait_for_wish(stop)) {
         act->tell();
