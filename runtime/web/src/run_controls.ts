@@ -169,7 +169,11 @@ export class RunControls {
 
   private change_overlay(id: string): void {
     if (id !== 'overlay') input('overlay').checked = true;
-    const [r, rings] = ['overlay-r', 'overlay-rings'].map((one) => Math.max(1, Math.round(Number(input(one).value)) || 1));
+    // Larger ones than the fields take would keep the page waiting for minutes.
+    const [r, rings] = ['overlay-r', 'overlay-rings'].map((one) => {
+      const { min, max, value } = input(one);
+      return Math.min(Number(max), Math.max(Number(min), Math.round(Number(value)) || Number(min)));
+    });
     this.change('overlay', input('overlay').checked ? `r=${r},rings=${rings}` : null);
     if (id !== 'overlay') input(id).blur();
   }
