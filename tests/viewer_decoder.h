@@ -50,9 +50,9 @@ inline DecodedScene decode_scene(const std::string& message) {
   DecodedScene scene{};
   scene.scene = bytes.u32();
   scene.dimension = bytes.u32();
-  const std::uint32_t S = bytes.u32();
-  const std::uint32_t T = bytes.u32();
-  const std::uint32_t E = bytes.u32();
+  const std::size_t S = bytes.u32();
+  const std::size_t T = bytes.u32();
+  const std::size_t E = bytes.u32();
   scene.position = bytes.array<float>(3 * S);
   scene.triangle = bytes.array<std::uint32_t>(3 * T);
   scene.edge = bytes.array<std::uint32_t>(2 * E);
@@ -74,10 +74,10 @@ inline DecodedPatch decode_patch(const std::string& message) {
   DecodedPatch patch{};
   patch.scene = bytes.u32();
   patch.patch = bytes.u32();
-  const std::uint32_t H = bytes.u32();
-  const std::uint32_t m = bytes.u32();
-  const std::uint32_t t = bytes.u32();
-  const std::uint32_t o = bytes.u32();
+  const std::size_t H = bytes.u32();
+  const std::size_t m = bytes.u32();
+  const std::size_t t = bytes.u32();
+  const std::size_t o = bytes.u32();
   patch.hidden = bytes.array<std::uint32_t>(H);
   patch.position = bytes.array<float>(3 * m);
   patch.triangle = bytes.array<std::uint32_t>(3 * t);
@@ -116,7 +116,7 @@ inline DecodedFrame decode_frame(const std::string& message, std::size_t scene_n
   frame.contacts = bytes.u32();
   frame.patch = bytes.u32();
   frame.patch_nodes = bytes.u32();
-  const std::uint32_t q = bytes.u32();
+  const std::size_t q = bytes.u32();
   frame.contact = bytes.array<float>(std::size_t{10} * frame.contacts);
   frame.pressure_node = bytes.array<std::uint32_t>(q);
   frame.pressure = bytes.array<float>(q);

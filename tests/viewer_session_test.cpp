@@ -150,6 +150,7 @@ class Recorded : public testing::Test {
          .options = "tool=sphere:0.005\nfriction=0.5\n"},
         {.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, .simplices = {0, 1, 2}, .held = {7, 0, 0}});
     std::vector<TickRecord> records;
+    records.reserve(ticks.size());
     for (const std::int64_t number : ticks) records.push_back(tick_record(number));
     writer.append(records);
     for (const std::int64_t tick : frames) {
@@ -308,10 +309,9 @@ class Export : public Recorded {
   }
 };
 
-std::vector<double> ticks(double first, double last, double step) {
-  std::vector<double> all;
-  for (double k = first; k <= last; k += step) all.push_back(k);
-  return all;
+std::vector<double> ticks(std::int64_t first, std::int64_t last, std::int64_t step) {
+  const std::vector<std::int64_t> all = numbers(first, last + 1, step);
+  return {all.begin(), all.end()};
 }
 
 TEST_F(Export, HasAllThatWasRecorded) {
