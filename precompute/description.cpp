@@ -1,10 +1,9 @@
 #include "precompute/description.h"
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 #include "precompute/description_parts.h"
 
 namespace palpate {
@@ -76,14 +75,6 @@ std::string read_name(const Section& root) {
   return name;
 }
 
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in || std::filesystem::is_directory(file)) {
-    throw Error("cannot read the model description", file.string(), "give the path of a model.toml");
-  }
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 toml::table parse(const std::string& text, const std::string& file) {
   try {
     return toml::parse(text, file);
@@ -109,7 +100,7 @@ Description read_description(const std::filesystem::path& path) {
   const std::string file = path.string();
   Description result;
   result.file = path;
-  result.text = read_text(path);
+  result.text = read_all(path, "Give the path of a model.toml.");
   const toml::table table = parse(result.text, file);
   const toml::table empty;
   const Section root(table, "", file,

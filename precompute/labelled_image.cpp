@@ -10,6 +10,7 @@
 #include <span>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 #include "precompute/child_process.h"
 
 namespace palpate {
@@ -106,9 +107,7 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image) {
 VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                               std::vector<std::string>& notes) {
   const std::string where = image.file.string();
-  if (!std::filesystem::is_regular_file(image.file)) {
-    throw Error("there is no such image file", where, "check image = \"...\" in [geometry]");
-  }
+  check_regular_file(image.file, "Check image = \"...\" in [geometry].");
   // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
   const std::string path = std::filesystem::absolute(image.file).string();
   const ChildResult read =

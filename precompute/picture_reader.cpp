@@ -5,11 +5,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <fstream>
-#include <iterator>
 #include <string_view>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 
 namespace palpate {
 namespace {
@@ -154,12 +153,7 @@ class PbmReader {
 
 PixelBody read_picture(const std::filesystem::path& file) {
   const std::string where = file.string();
-  std::ifstream stream(file, std::ios::binary);
-  if (!std::filesystem::is_regular_file(file) || !stream) {
-    throw Error("there is no such picture, or it may not be read", where,
-                "check picture = \"...\" in [geometry]");
-  }
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  const std::string bytes = read_all(file, "Check picture = \"...\" in [geometry].");
   if (bytes.starts_with(png_signature)) {
     return read_png(bytes, where);
   }

@@ -26,6 +26,7 @@
 #include <sstream>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 
 namespace palpate {
 namespace {
@@ -54,9 +55,7 @@ std::string shown(const Point& p) {
 }
 
 Soup read_soup(const std::filesystem::path& file) {
-  if (!std::filesystem::is_regular_file(file)) {
-    throw Error("there is no such surface file", file.string(), "check surface = \"...\" in [geometry]");
-  }
+  check_regular_file(file, "Check surface = \"...\" in [geometry].");
   Soup soup;
   bool read = false;
   try {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "meshes/error.h"
-#include "meshes/text_reader.h"
+#include "meshes/regular_file.h"
 #include "runtime/devices/palpate_board.h"
 #include "runtime/devices/profile_table.h"
 #include "runtime/devices/woodenhaptics_report.h"
