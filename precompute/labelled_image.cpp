@@ -9,8 +9,8 @@
 #include <map>
 #include <span>
 
+#include "formats/child_process.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 
 namespace palpate {
 namespace {
