@@ -9,8 +9,8 @@
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/make_mesh_3.h>
 
+#include "formats/child_process.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 #include "precompute/mesh3.h"
 
 namespace palpate {

@@ -12,9 +12,9 @@
 #include <array>
 #include <map>
 
+#include "formats/child_process.h"
 #include "meshes/element.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 #include "precompute/distance_field.h"
 #include "precompute/interface_crossings.h"
 #include "precompute/labelled_image.h"

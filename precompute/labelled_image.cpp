@@ -9,9 +9,11 @@
 #include <map>
 #include <span>
 
+#include "formats/child_process.h"
+#include "meshes/error.h"
+#include "formats/child_process.h"
 #include "meshes/error.h"
 #include "meshes/regular_file.h"
-#include "precompute/child_process.h"
 
 namespace palpate {
 namespace {

@@ -20,8 +20,8 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "formats/child_process.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 #include "precompute/polygon_check.h"
 
 namespace palpate {

@@ -8,9 +8,9 @@
 #include <cstddef>
 #include <set>
 
+#include "formats/child_process.h"
 #include "meshes/check.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 
 /// Takes the place of TetGen's own function of this name: that of 1.5.0 frees its memory, throws, and frees
 /// it again, so that every error becomes a crash.

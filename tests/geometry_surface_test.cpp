@@ -193,7 +193,7 @@ TEST_F(SurfaceInput, SelfIntersection) {
 
 TEST_F(SurfaceInput, UnreadableFiles) {
   expect_mentions(error_of([&] { read_surface(folder_.path() / "none.off", {}, notes_); }),
-                  {"none.off", "no such"});
+                  {"none.off", "No such file", "surface ="});
   for (const std::string name : {"a.off", "a.obj", "a.stl", "a.ply", "a.xyz"}) {
     expect_mentions(error_of([&] { read(name, "this is no surface\n"); }), {name, "cannot read a surface"});
     expect_mentions(error_of([&] { read(name, ""); }), {name, "cannot read a surface"});

@@ -6,9 +6,9 @@
 #include <csignal>
 #include <stdexcept>
 
+#include "formats/child_process.h"
 #include "meshes/check.h"
 #include "meshes/surface.h"
-#include "precompute/child_process.h"
 #include "precompute/tetgen_mesh.h"
 #include "tests/geometry_shapes.h"
 
