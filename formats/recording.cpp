@@ -7,6 +7,7 @@
 
 #include "formats/recording_parts.h"
 #include "meshes/error.h"
+#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {
@@ -158,8 +159,9 @@ SurfaceFrame read_frame(const std::filesystem::path& path, std::int64_t number) 
   return frame;
 }
 
-bool finish_recording(const std::filesystem::path& path) {
+bool finish_recording(const std::filesystem::path& recording) {
   const hdf5::Quiet quiet;
+  const std::filesystem::path path = link_target(recording);
   read_head(hdf5::File::open_to_read(path));
   if (!std::filesystem::exists(parts_folder(path))) return true;
   const std::optional<FileDescriptor> lock = lock_parts(path);
