@@ -13,7 +13,6 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <numbers>
 #include <set>
 #include <sstream>
@@ -250,8 +249,17 @@ TEST_F(Played, ABoardIsFeltAsTheSessionSays) {
   const std::string path = bus.plug_in(board);
   const auto runtime = play({});
   bus.talk(path);
-  EXPECT_TRUE(comes_true([&] { return board->output_count() > 4000; })) << runtime->messages();
+  // The number of a report that was answered as soon as it was made, once this machine comes to that.
+  std::uint32_t begin = 0, end = 0;
+  const auto prompt = [&](std::uint32_t least, std::uint32_t& number) {
+    const auto answered = board->answered();
+    number = answered.empty() ? 0 : answered.back() + 1;
+    return number > least && 1e3 * board->time() - number < 20.0;
+  };
+  EXPECT_TRUE(comes_true([&] { return prompt(0, begin); })) << runtime->messages();
+  EXPECT_TRUE(comes_true([&] { return board->answered().size() > 4000; })) << runtime->messages();
   EXPECT_TRUE(comes_true([&] { return last_force(*board) > 0.9 * max_force; })) << runtime->messages();
+  EXPECT_TRUE(comes_true([&] { return prompt(begin + 2000, end); })) << runtime->messages();
   runtime->signal(SIGINT);
   ASSERT_EQ(runtime->wait(), 130) << runtime->messages();
   EXPECT_TRUE(says(runtime->messages(), "Home-made board, CAFE:4001 Board (/dev/hidraw0)"));
@@ -276,16 +284,12 @@ TEST_F(Played, ABoardIsFeltAsTheSessionSays) {
     EXPECT_EQ(tick.fault, 0);
   }
   EXPECT_TRUE(std::ranges::is_sorted(ticks, {}, &TickRecord::sequence));
-  EXPECT_GT(heard.size(), 1000U);
-  // A report each millisecond: the one that was on its way for the shortest time says so, in both halves.
-  const auto quickest = [&](std::size_t first, std::size_t last) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = first; k < last; ++k)
-      least = std::min(least, 1e-9 * static_cast<double>(ticks[k].arrived_ns) - 1e-3 * ticks[k].sequence);
-    return least;
+  EXPECT_GT(heard.size(), 200U);
+  const auto arrival = [&](std::uint32_t number) {
+    return 1e-9 * static_cast<double>(
+                      std::ranges::lower_bound(ticks, number, {}, &TickRecord::sequence)->arrived_ns);
   };
-  const std::size_t half = ticks.size() / 2;
-  EXPECT_NEAR(quickest(0, half), quickest(half, ticks.size()), 0.05 * 1e-3 * static_cast<double>(half));
+  EXPECT_NEAR((end - begin) / (arrival(end) - arrival(begin)), 1000.0, 50.0);
   EXPECT_NEAR(largest, max_force, 1e-9) << "the board's own limit";
   EXPECT_GT(reported("ticks_in_contact"), 1000);
 
@@ -323,7 +327,7 @@ TEST_F(Played, WoodenHapticsIsFeltAsTheSessionSays) {
     EXPECT_EQ(tick.fault, 0);
   }
   EXPECT_GT(largest, 0.4) << "contact was felt";
-  EXPECT_GT(heard.size(), 1000U);
+  EXPECT_GT(heard.size(), 200U);
   expect_all_told(firmware->outputs(), computed);
   double felt = 0.0;
   for (const ShownForce& shown : firmware->forces()) felt = std::max(felt, shown.force.norm());
