@@ -29,6 +29,8 @@ namespace palpate {
 namespace {
 
 constexpr int probe_count = 4;
+constexpr std::int64_t large_file =
+    4'000'000'000;  // [byte] more than many computers can load beside all else
 
 void print_plan(const Plan& plan, const Model& model, const Description& description,
                 const BakeOptions& options, Progress& progress) {
@@ -47,6 +49,18 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
   progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {:.1f} s with {} job{}",
                             static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9, plan.seconds,
                             options.jobs, options.jobs == 1 ? "" : "s"));
+}
+
+/// What makes a large file smaller.
+std::string size_advice(const Description& description) {
+  const MeshOptions& mesh = description.mesh;
+  const bool keeps_boundary = std::holds_alternative<SurfaceGeometry>(description.geometry) &&
+                              mesh.mesher == Mesher::tetgen && !mesh.remesh;
+  std::string advice = keeps_boundary     ? "set remesh = true with a larger edge_length in [mesh]"
+                       : mesh.edge_length ? "use a larger edge_length in [mesh]"
+                                          : "use a coarser mesh";
+  if (description.scope != Scope::surface) advice += ", or scope = \"surface\" in [storage]";
+  return advice;
 }
 
 /// Mesh node of each stored node, in the order of the columns, which comes from the factor.
@@ -203,6 +217,13 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   }
   Plan plan = make_plan(model.mesh, *factor, solver, description.precision, options.jobs);
   print_plan(plan, model, description, options, progress);
+  if (plan.file_bytes > large_file) {
+    progress.line(
+        fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with, and grow with "
+                    "the square of the "
+                    "stored dofs: {}",
+                    static_cast<double>(plan.file_bytes) * 1e-9, size_advice(description)));
+  }
   OverlayPlan overlays;
   if (description.overlay) {
     overlays = plan_overlays(model, *description.overlay, description.file.string());
