@@ -161,7 +161,7 @@ RecordingFile::RecordingFile(const std::filesystem::path& path) {
   constexpr int attempts = 5;
   for (int attempt = 1;; ++attempt) {
     try {
-      files_ = std::make_shared<const RecordingFiles>(open_recording(path));
+      files_ = std::make_shared<const RecordingFiles>(open_recording(hdf5::Contents::read(path)));
       recording_ = read_once(path, *files_);
       return;
     } catch (const Error&) {
@@ -197,7 +197,7 @@ bool finish_recording(const std::filesystem::path& path) {
   if (!std::filesystem::exists(parts_folder(path))) return true;
   const std::optional<FileDescriptor> lock = lock_parts(path);
   if (!lock) return false;
-  const RecordingFiles files = open_recording(path);
+  const RecordingFiles files = open_recording(hdf5::Contents::read(path));
   const hdf5::Quiet quiet;
   merge_recording(path, parts_of(files), files.head);
   return true;

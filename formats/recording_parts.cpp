@@ -306,9 +306,9 @@ void clear_parts(const std::filesystem::path& recording) {
   }
 }
 
-RecordingFiles open_recording(const std::filesystem::path& path) {
+RecordingFiles open_recording(hdf5::Contents master) {
+  const std::filesystem::path path = master.path();
   RecordingFiles recording;
-  hdf5::Contents master = hdf5::Contents::read(path);
   recording.head = read_head(master);
   std::vector<std::filesystem::path> names = {path};
   recording.tick_files = name_parts(master, "/ticks/time", names);

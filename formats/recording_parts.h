@@ -84,9 +84,9 @@ struct RecordingFiles {
   std::vector<std::size_t> frame_files;  ///< those with frames
 };
 
-/// Opens a recording and reads what it says beside its rows. Throws Error unless it is one of this version,
-/// with all its parts.
-RecordingFiles open_recording(const std::filesystem::path& recording);
+/// Reads what a recording says beside its rows, and opens its parts. Throws Error unless it is one of this
+/// version, with all its parts.
+RecordingFiles open_recording(hdf5::Contents recording);
 
 /// Proves that all datasets have the shapes that belong together, and the bytes that were written (where
 /// there are checksums). Throws Error naming file and dataset.

@@ -15,6 +15,7 @@
 
 #include "formats/hdf5_contents.h"
 #include "formats/recording.h"
+#include "formats/recording_parts.h"
 #include "tests/formats_sample.h"
 #include "tests/formats_tamper.h"
 
@@ -298,6 +299,34 @@ TEST(Recording, ThatIsNotFinishedHoldsEachCheckpoint) {
   expect_frames(path, read, 300);
   EXPECT_EQ(files_in(folder.path()), 1U);
   EXPECT_TRUE(finish_recording(path)) << "nothing to do";
+}
+
+// A reader opens the master first, then its parts. In between the writer may merge them: what an opened
+// master names stays until the writer's next checkpoint.
+TEST(Recording, ThatIsMergedIsStillReadByWhoHasOpenedIt) {
+  const Folder folder;
+  const std::filesystem::path path = folder / "a.h5", parts = folder / "a.h5.parts";
+  const auto append_one = [](RecordingWriter& writer, std::size_t k) {
+    writer.append(some_ticks(10, 10 * k));
+    writer.checkpoint();
+  };
+  RecordingWriter writer(path, info, surface);
+  for (std::size_t k = 0; k < 15; ++k) append_one(writer, k);
+  {
+    hdf5::Contents opened = hdf5::Contents::read(path);
+    append_one(writer, 15);
+    ASSERT_EQ(open_recording(hdf5::Contents::read(path)).tick_files.size(), 1U) << "16 are one now";
+    const RecordingFiles before = open_recording(std::move(opened));
+    ASSERT_EQ(before.tick_files.size(), 15U);
+    for (std::size_t k = 0; k < 15; ++k) {
+      double time = 0.0;
+      before.files[before.tick_files[k]].read_rows("/ticks/time", hdf5::element_type<double>(), 3, 1, &time);
+      EXPECT_EQ(time, some_tick(10 * k + 3).time);
+    }
+  }
+  append_one(writer, 16);
+  EXPECT_EQ(files_in(parts), 1U + 1U + 1U) << "the merged one, the new one and the lock";
+  expect_ticks(read_recording(path), 170);
 }
 
 TEST(Recording, OfFramesAloneAtTheEndKeepsThem) {
@@ -605,21 +634,22 @@ TEST(Recording, BadPathsAndOtherFilesAreRefused) {
   }
 }
 
-/// The last number that is said, at most the one after `checkpoints` others.
-std::size_t last_said(int hear, int checkpoints) {
+/// The last number that was said, of the next `at_most` ones.
+std::size_t last_said(int hear, std::size_t at_most) {
   std::size_t last = 0;
-  for (std::size_t ticks = 0; checkpoints >= 0 && read(hear, &ticks, sizeof ticks) == sizeof ticks;
-       --checkpoints)
+  for (std::size_t k = 0, ticks = 0; k < at_most && read(hear, &ticks, sizeof ticks) == sizeof ticks; ++k)
     last = ticks;
   return last;
 }
 
-// Each checkpoint and merge is another instant: some thousand of them are met at random.
+// Each checkpoint and merge is another instant. It is killed some moments after a checkpoint: after the
+// first ones, and around the 16th and 17th, which merge parts and remove those that were merged, more often.
 TEST(Recording, SurvivesBeingKilledAtAnyMoment) {
-  std::mt19937 random(20240229);  // NOLINT(cert-msc51-cpp): the same moments in each run
-  std::uniform_int_distribution<int> checkpoints(-1, 40), microseconds(0, 10'000);
+  std::mt19937 random(20240229);  // NOLINT(cert-msc51-cpp): the same checkpoints in each run
+  std::uniform_int_distribution<std::size_t> any(0, 40);
+  std::uniform_int_distribution<int> microseconds(0, 5000);
   std::size_t most = 0;
-  for (int run = 0; run < 25; ++run) {
+  for (std::size_t run = 0; run < 40; ++run) {
     const Folder folder;
     const std::filesystem::path path = folder / "a.h5";
     int ends[2] = {};
@@ -628,11 +658,13 @@ TEST(Recording, SurvivesBeingKilledAtAnyMoment) {
     ASSERT_GE(child, 0);
     if (child == 0) record_until_killed(path, ends[1]);
     close(ends[1]);
-    const std::size_t said_before = last_said(ends[0], checkpoints(random));
+    const std::size_t checkpoints = run < 25 ? any(random) : 14 + run % 4;
+    const std::size_t heard = last_said(ends[0], checkpoints);
+    ASSERT_EQ(heard, 10 * checkpoints);
     std::this_thread::sleep_for(std::chrono::microseconds(microseconds(random)));
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
-    const std::size_t said = std::max(said_before, last_said(ends[0], std::numeric_limits<int>::max()));
+    const std::size_t said = std::max(heard, last_said(ends[0], std::numeric_limits<std::size_t>::max()));
     close(ends[0]);
     most = std::max(most, said);
     if (!std::filesystem::exists(path)) {
@@ -649,7 +681,7 @@ TEST(Recording, SurvivesBeingKilledAtAnyMoment) {
       ASSERT_EQ(files_in(folder.path()), 1U);
     }
   }
-  EXPECT_GT(most, 160U) << "no parts were merged";
+  ASSERT_GT(most, 320U) << "parts were merged twice";
 }
 
 }  // namespace
