@@ -60,9 +60,18 @@ class ModelWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Loads a file: maps the packed matrices, reads the rest, and proves every size, range, index, finite
-/// value and checksum once. Throws Error naming the field that is wrong.
-Model load_model(const std::filesystem::path& path);
+/// How a model is loaded.
+struct LoadOptions {
+  /// Bytes of a packed matrix that are at most read into memory; -1: half of what is available. A larger one
+  /// is mapped: the file must stay as it is for as long as the model lives, as a mapped file that is cut off
+  /// ends the program (SIGBUS).
+  std::int64_t most_in_memory = -1;
+};
+
+/// Loads a file and proves every size, range, index, finite value and checksum once. Throws Error naming the
+/// field that is wrong. Starts a child process for a moment (see hdf5::Contents); signals and children of the
+/// caller are left alone.
+Model load_model(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// The sources of a loaded model that are no longer what they were: a sentence for each ("model.toml changed
 /// since …", "… is gone"). `model_path` is the baked file; empty when nothing is stale.

@@ -10,6 +10,7 @@
 #include "formats/dynamics_fields.h"
 #include "formats/file_io.h"
 #include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "formats/journal.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
@@ -121,6 +122,7 @@ struct ModelWriter::Impl {
 
   [[nodiscard]] JournalFrame examine(const Model& model);
   bool resume();
+  [[nodiscard]] bool is_ours(const JournalContents& left) const;
   void start(const Model& model);
   void write_body(const Model& model);
   template <class T>
@@ -192,6 +194,7 @@ bool ModelWriter::Impl::resume() {
   if (!left || left->frame.key != frame.key || left->frame.packed_at.size() != matrices.size() ||
       !std::filesystem::exists(partial))
     return false;
+  if (!is_ours(*left)) return false;
   data = open_file(partial, OpenMode::write);
   const bool inside =
       std::all_of(left->frame.packed_at.begin(), left->frame.packed_at.end(),
@@ -214,6 +217,23 @@ bool ModelWriter::Impl::resume() {
     whole.push_back(range);
   }
   journal.write({frame, whole});
+  return true;
+}
+
+/// Whether the HDF5 library can be given what a killed run left, and its packed matrices lie where the
+/// journal says.
+bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
+  const bool single = header.precision == Precision::single_precision;
+  const hdf5::ElementType scalar = single ? hdf5::element_type<float>() : hdf5::element_type<double>();
+  try {
+    const hdf5::Contents contents = hdf5::Contents::read(partial);
+    for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
+      const hdf5::Stored stored = contents.locate(matrices[matrix].path, scalar, 1);
+      if (stored.offset != left.frame.packed_at[matrix] || stored.bytes != packed_bytes()) return false;
+    }
+  } catch (const Error&) {
+    return false;
+  }
   return true;
 }
 
@@ -241,8 +261,7 @@ void ModelWriter::Impl::write_body(const Model& model) {
   for_each_known_field(model, [&](const auto& field) { write_field(file, field, model, counts); });
   write_vtk_view(file);
   for (const Streamed& matrix : matrices) {
-    file.write(matrix.path, scalar, std::array{entries}, nullptr);
-    frame.packed_at.push_back(file.locate(matrix.path, scalar, 1).offset);
+    frame.packed_at.push_back(file.write(matrix.path, scalar, std::array{entries}, nullptr));
   }
   file.close();
 }

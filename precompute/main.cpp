@@ -5,7 +5,9 @@
 #include <thread>
 
 #include "formats/model_file.h"
+#include "formats/shrunk_file.h"
 #include "meshes/error.h"
+#include "meshes/printable.h"
 #include "precompute/bake.h"
 #include "precompute/compare.h"
 #include "precompute/inspect.h"
@@ -36,6 +38,7 @@ int run_compare(const std::string& a, const std::string& b, const palpate::Compa
 }  // namespace
 
 int main(int argc, char** argv) {
+  palpate::end_with_an_error_on_shrunk_files();
   CLI::App app{
       "Meshes a body, assembles its stiffness and stores the Green's functions that palpate-runtime feels "
       "with."};
@@ -106,7 +109,7 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     std::fprintf(stderr,
                  "error: palpate-precompute: %s\nhint: This is a defect of Palpate; please report it.\n",
-                 error.what());
+                 palpate::printable_lines(error.what(), "  ").c_str());
   }
   return palpate::exit_input_error;
 }

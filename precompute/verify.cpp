@@ -7,6 +7,7 @@
 #include <random>
 
 #include "formats/model_file.h"
+#include "meshes/printable.h"
 #include "precompute/assembly.h"
 #include "precompute/factor.h"
 #include "precompute/verify_dynamics.h"
@@ -215,7 +216,7 @@ std::string to_text(const VerifyReport& report) {
     text += fmt::format("{:10} {:6} largest relative error {:.2e}, bound {:.0e}\n", check.name,
                         check.passed() ? "ok" : "FAILED", check.error, check.bound);
   }
-  for (const std::string& sentence : report.stale) text += "STALE      " + sentence + "\n";
+  for (const std::string& sentence : report.stale) text += "STALE      " + printable(sentence) + "\n";
   text += report.passed() ? "verified\n" : "NOT verified\n";
   return text;
 }
