@@ -22,6 +22,7 @@
 #include "precompute/loads.h"
 #include "precompute/overlay_regions.h"
 #include "precompute/plan.h"
+#include "precompute/precision.h"
 #include "precompute/progress.h"
 #include "precompute/scope.h"
 
@@ -42,10 +43,14 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
       fmt::format("angles {:.1f} to {:.1f} degrees, worst shape {:.3f} at ({:.4g}, {:.4g}, {:.4g}) m",
                   quality.min_angle, quality.max_angle, quality.min_shape, quality.worst_centroid.x(),
                   quality.worst_centroid.y(), quality.worst_centroid.z()));
-  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision",
+  const std::string precision =
+      description.precision
+          ? fmt::format("{} precision", name_of(*description.precision))
+          : fmt::format("in single or split precision, or {:.1f} MB in double: decided once K is factorised",
+                        static_cast<double>(plan.file_bytes) * 2e-6);
+  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {}",
                             static_cast<double>(plan.factor_entries) * 1e-6,
-                            static_cast<double>(plan.file_bytes) * 1e-6,
-                            description.precision == Precision::single_precision ? "single" : "double"));
+                            static_cast<double>(plan.file_bytes) * 1e-6, precision));
   progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {:.1f} s with {} job{}",
                             static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9, plan.seconds,
                             options.jobs, options.jobs == 1 ? "" : "s"));
@@ -173,13 +178,51 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
   return true;
 }
 
+SparseMatrix stiffness_of_step(const ElasticBody& body, const Stiffness& stiffness,
+                               const DynamicsOptions& options) {
+  return effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped), options.damping,
+                             options.newmark);
+}
+
+/// Decides for the precision of all packed matrices and puts their smooth parts and force errors into the
+/// model.
+Precision decide_precision(const Description& description, const ElasticBody& body,
+                           const Stiffness& stiffness, const Factor& factor,
+                           const std::vector<std::int64_t>& stored_dofs, Model& model, Progress& progress) {
+  std::vector<PrecisionStudy> studies;
+  studies.emplace_back(model, factor, stiffness.K, stored_dofs);
+  if (model.dynamics.method == DynamicsMethod::packed) {
+    const SparseMatrix K_bar = stiffness_of_step(body, stiffness, *description.dynamics);
+    Factor factor_bar(K_bar, stiffness.node_start);
+    factor_bar.factorize();
+    studies.emplace_back(model, factor_bar, K_bar, stored_dofs);
+  }
+  const PrecisionChoice choice = choose_precision(studies, description.precision);
+  const auto smooth = [&](const PrecisionStudy& study) {
+    return choice.precision == Precision::split_precision ? study.smooth(choice.terms) : nullptr;
+  };
+  const std::int64_t n = model.stored_dofs();
+  model.greens = PackedGreens(nullptr, n, choice.precision, smooth(studies.front()));
+  model.force_errors = choice.errors.front();
+  if (studies.size() > 1) {
+    model.dynamics.inverse = PackedGreens(nullptr, n, choice.precision, smooth(studies.back()));
+    model.dynamics.force_errors = choice.errors.back();
+  }
+  progress.line(fmt::format(
+      "precision: {}{}; force errors: {}", name_of(choice.precision),
+      model.greens.smooth() == nullptr ? "" : fmt::format(", {} smooth terms", model.greens.smooth()->terms),
+      errors_text(choice.errors)));
+  if (const std::string warning = precision_warning(model, choice.precision); !warning.empty())
+    progress.line("warning: " + warning);
+  return choice.precision;
+}
+
 /// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
 bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const DynamicsOptions& options,
                    const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
                    const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
                    const InterruptGuard& interrupt) {
-  const SparseMatrix K_bar = effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped),
-                                                 options.damping, options.newmark);
+  const SparseMatrix K_bar = stiffness_of_step(body, stiffness, options);
   Factor factor(K_bar, stiffness.node_start);
   const GreensSolver solver(factor, stored, stiffness.free_dofs, body.mesh.dimension());
   if (solver.stored_dofs() != stored_dofs) {
@@ -236,13 +279,15 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   DynamicsPlan dynamics;
   if (description.dynamics) {
     dynamics = plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
-                             description.precision);
+                             description.precision.value_or(Precision::single_precision));
     const std::string method =
         dynamics.method == DynamicsMethod::packed ? "packed" : fmt::format("modal, {} modes", dynamics.modes);
     progress.line(fmt::format("dynamics: {}, {:.1f} MB, {:.2f} GB of memory ({})", method,
                               static_cast<double>(dynamics.file_bytes) * 1e-6,
                               static_cast<double>(dynamics.memory_bytes) * 1e-9, dynamics.reason));
     plan.dynamics_bytes = dynamics.memory_bytes;
+    if (dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
+      plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   }
   check_memory(plan);
   if (options.dry_run) return BakeResult::planned;
@@ -271,7 +316,9 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
                                        *factor, stored_dofs);
     if (dynamics.method == DynamicsMethod::modal) progress.line("modes found");
   }
-  ModelWriter writer(options.output, model, description.precision);
+  const Precision precision =
+      decide_precision(description, elastic, stiffness, *factor, stored_dofs, model, progress);
+  ModelWriter writer(options.output, model, precision);
   model.overlay = {};  // written by now
   model.dynamics = {};
   bool whole = solve_columns(solver, plan, options.jobs, writer, PackedMatrix::greens, progress, interrupt);
