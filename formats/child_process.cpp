@@ -3,16 +3,21 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cinttypes>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <new>
+#include <optional>
 
 #include "meshes/error.h"
 
@@ -21,8 +26,21 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int exit_sent = 17;    // a status that a library's exit(0) or exit(1) does not give
-constexpr int exit_thrown = 18;  // the work threw
+/// Where the limits on foreign readers are stated. Measured on whole files with the slowest of them, surfaces
+/// and their checks: 0.5 s and 20 MB per MB.
+constexpr std::chrono::seconds reading_time{5};
+constexpr std::chrono::seconds reading_time_per_megabyte{20};
+constexpr std::int64_t reading_memory = 512LL << 20;
+constexpr std::int64_t reading_memory_per_byte = 100;
+constexpr int clock_per_processor = 12;
+
+/// What stands before the bytes that a child sends.
+struct AnswerHeader {
+  enum class Kind : std::int32_t { result, error, exception, no_memory };
+  Kind kind = Kind::result;
+  std::int32_t status = 0;
+  std::uint64_t size = 0;
+};
 
 /// A pipe whose ends are closed when it goes.
 struct Pipe {
@@ -59,11 +77,50 @@ bool write_all(int file, const void* data, std::size_t size) {
   return true;
 }
 
-/// The child's life: signals as a fresh program has them, no output, death with its parent.
-[[noreturn]] void be_child(int pipe, pid_t parent, const std::function<ChildResult()>& work) {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGABRT, SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGPIPE}) {
+bool send(int pipe, AnswerHeader header, const Bytes& bytes) {
+  header.size = bytes.size();
+  return write_all(pipe, &header, sizeof(header)) && write_all(pipe, bytes.data(), bytes.size());
+}
+
+void append_text(Bytes& bytes, const std::string& text) {
+  append_array(bytes, std::span<const char>(text));
+}
+
+/// [byte] of address space that this process has; 0 where the kernel does not say.
+std::int64_t address_space() {
+  std::int64_t pages = 0;
+  if (std::FILE* file = std::fopen("/proc/self/statm", "re")) {
+    if (std::fscanf(file, "%" SCNd64, &pages) != 1) pages = 0;
+    std::fclose(file);
+  }
+  return pages * ::sysconf(_SC_PAGESIZE);
+}
+
+void lower_limit(decltype(RLIMIT_AS) resource, std::int64_t to) {
+  rlimit limit{};
+  getrlimit(resource, &limit);
+  limit.rlim_cur = std::min(limit.rlim_cur, static_cast<rlim_t>(to));
+  setrlimit(resource, &limit);
+}
+
+void set_limits(const ChildLimits& limits) {
+  lower_limit(RLIMIT_CORE, 0);
+  lower_limit(RLIMIT_CPU, limits.processor.count());
+  if (const std::int64_t present = address_space(); present != 0) {
+    lower_limit(RLIMIT_AS, present + limits.memory);
+  }
+}
+
+/// The child's life: signals as a fresh program has them, no output, limits, death with its parent.
+[[noreturn]] void be_child(int pipe, pid_t parent, const ChildLimits& limits,
+                           const std::function<ChildResult()>& work) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGABRT, SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGPIPE,
+                           SIGXCPU, SIGALRM, SIGCHLD}) {
     std::signal(signal, SIG_DFL);
   }
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) {
     _exit(EXIT_FAILURE);  // it went before prctl
@@ -74,24 +131,33 @@ bool write_all(int file, const void* data, std::size_t size) {
   if (chdir("/proc/self") != 0) {
     _exit(EXIT_FAILURE);
   }
+  set_limits(limits);
+  using Kind = AnswerHeader::Kind;
+  Bytes bytes;
   try {
     const ChildResult result = work();
-    const bool sent = write_all(pipe, &result.status, sizeof(result.status)) &&
-                      write_all(pipe, result.bytes.data(), result.bytes.size());
-    _exit(sent ? exit_sent : EXIT_FAILURE);
+    _exit(send(pipe, {Kind::result, result.status}, result.bytes) ? EXIT_SUCCESS : EXIT_FAILURE);
+  } catch (const Error& error) {
+    for (const std::string& text : {std::string(error.what()), error.where(), error.hint()}) {
+      append_text(bytes, text);
+    }
+    send(pipe, {Kind::error}, bytes);
+  } catch (const std::bad_alloc&) {
+    send(pipe, {Kind::no_memory}, bytes);
   } catch (const std::exception& error) {
-    const std::string text = error.what();
-    write_all(pipe, text.data(), text.size());
+    append_text(bytes, error.what());
+    send(pipe, {Kind::exception}, bytes);
   } catch (...) {
-    write_all(pipe, "unknown exception", 17);
+    append_text(bytes, "unknown exception");
+    send(pipe, {Kind::exception}, bytes);
   }
-  _exit(exit_thrown);
+  _exit(EXIT_FAILURE);
 }
 
 enum class WaitEnd { closed, late, interrupted };
 
 /// Reads until the child closes its end of the pipe.
-WaitEnd read_until_closed(int pipe, Clock::time_point deadline, Bytes& bytes) {
+WaitEnd read_until_closed(int pipe, Clock::time_point deadline, bool stop_at_signals, Bytes& bytes) {
   std::array<std::byte, 65536> chunk{};
   for (;;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
@@ -100,10 +166,10 @@ WaitEnd read_until_closed(int pipe, Clock::time_point deadline, Bytes& bytes) {
     }
     pollfd wait_for{pipe, POLLIN, 0};
     const int ready = poll(&wait_for, 1, static_cast<int>(std::min<long long>(left, 60'000)));
-    if (ready < 0) {
+    if (ready < 0 && stop_at_signals) {
       return WaitEnd::interrupted;
     }
-    if (ready == 0) {
+    if (ready <= 0) {
       continue;
     }
     const ssize_t size = read(pipe, chunk.data(), chunk.size());
@@ -116,120 +182,149 @@ WaitEnd read_until_closed(int pipe, Clock::time_point deadline, Bytes& bytes) {
   }
 }
 
-int wait_for_end(pid_t child) {
+/// How the child ended; nothing where the host program has taken that from us.
+std::optional<int> wait_for_end(pid_t child) {
   int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  while (waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) return std::nullopt;
   }
   return status;
 }
 
-std::string as_text(const Bytes& bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+std::string take_text(std::span<const std::byte>& bytes) {
+  const std::vector<char> text = take_array<char>(bytes);
+  return {text.begin(), text.end()};
 }
 
 const char* const interrupted_hint = "start it again; nothing was written";
 
-[[noreturn]] void report_end(const std::string& name, const std::string& where, int status,
-                             const Bytes& bytes) {
-  if (WIFSIGNALED(status)) {
-    const int signal = WTERMSIG(status);
-    if (signal == SIGINT || signal == SIGTERM) {
-      throw Error(name + " was interrupted", where, interrupted_hint);
-    }
-    const std::string memory = signal == SIGKILL ? "; SIGKILL is often the lack of memory" : "";
-    throw Error(name + " crashed (signal " + std::to_string(signal) + ", " + strsignal(signal) + ")", where,
-                "simplify, repair or remesh the input" + memory);
+[[noreturn]] void fail_on_time(const ChildTask& task, std::chrono::seconds limit, const char* of) {
+  throw Error(task.name + " did not finish within " + std::to_string(limit.count()) + " s" + of, task.where,
+              task.hint);
+}
+
+[[noreturn]] void fail_on_memory(const ChildTask& task) {
+  throw Error(
+      task.name + " needs more than " + std::to_string(task.limits.memory / 1'000'000) + " MB of memory",
+      task.where, task.hint);
+}
+
+/// The child ended without an answer.
+[[noreturn]] void report_end(const ChildTask& task, std::optional<int> status) {
+  if (!status) {
+    throw Error(task.name + " crashed", task.where, task.hint);
   }
-  if (WEXITSTATUS(status) == exit_thrown) {
-    throw Error(name + " failed: " + as_text(bytes), where, "simplify, repair or remesh the input");
+  if (!WIFSIGNALED(*status)) {
+    throw Error(task.name + " gave up (exit status " + std::to_string(WEXITSTATUS(*status)) + ")", task.where,
+                task.hint);
   }
-  throw Error(name + " gave up (exit status " + std::to_string(WEXITSTATUS(status)) + ")", where,
-              "simplify, repair or remesh the input");
+  const int signal = WTERMSIG(*status);
+  if (signal == SIGINT || signal == SIGTERM) {
+    throw Error(task.name + " was interrupted", task.where, interrupted_hint);
+  }
+  if (signal == SIGXCPU) {
+    fail_on_time(task, task.limits.processor, " of the processor");
+  }
+  throw Error(task.name + " crashed (signal " + std::to_string(signal) + ", " + strsignal(signal) + ")",
+              task.where, task.hint + (signal == SIGKILL ? "; SIGKILL is often the lack of memory" : ""));
+}
+
+/// The answer, where the child has sent a whole one.
+std::optional<AnswerHeader> whole_answer(const Bytes& bytes) {
+  AnswerHeader header;
+  if (bytes.size() < sizeof(header)) return std::nullopt;
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  if (bytes.size() - sizeof(header) != header.size) return std::nullopt;
+  return header;
 }
 
 }  // namespace
 
-ChildResult run_in_child(const std::string& name, const std::string& where, std::chrono::seconds limit,
-                         const std::function<ChildResult()>& work) {
+ChildLimits child_limits(std::chrono::seconds processor, std::int64_t memory) {
+  return {processor, clock_per_processor * processor, memory};
+}
+
+ChildLimits reading_limits(std::int64_t bytes) {
+  return child_limits(reading_time + bytes / 1'000'000 * reading_time_per_megabyte,
+                      reading_memory + reading_memory_per_byte * bytes);
+}
+
+ChildResult run_in_child(const ChildTask& task, const std::function<ChildResult()>& work) {
   Pipe pipe;
   if (pipe2(pipe.ends.data(), O_CLOEXEC) != 0) {
-    throw Error(std::string("cannot make a pipe: ") + strerror(errno), where,
+    throw Error(std::string("cannot make a pipe: ") + strerror(errno), task.where,
                 "close other programs and try again");
   }
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child < 0) {
-    throw Error(std::string("cannot start a process: ") + strerror(errno), where,
+    throw Error(std::string("cannot start a process: ") + strerror(errno), task.where,
                 "close other programs and try again");
   }
   if (child == 0) {
-    be_child(pipe.ends[1], parent, work);
+    be_child(pipe.ends[1], parent, task.limits, work);
   }
   pipe.close_end(1);
 
   Bytes bytes;
-  const WaitEnd end = read_until_closed(pipe.ends[0], Clock::now() + limit, bytes);
+  const WaitEnd end =
+      read_until_closed(pipe.ends[0], Clock::now() + task.limits.clock, task.stop_at_signals, bytes);
   if (end != WaitEnd::closed) {
     kill(child, SIGKILL);
   }
-  const int status = wait_for_end(child);
+  const std::optional<int> status = wait_for_end(child);
   if (end == WaitEnd::interrupted) {
-    throw Error(name + " was interrupted", where, interrupted_hint);
+    throw Error(task.name + " was interrupted", task.where, interrupted_hint);
   }
   if (end == WaitEnd::late) {
-    throw Error(name + " did not finish within " + std::to_string(limit.count()) + " s", where,
-                "use a coarser surface or a larger edge_length, or relax radius_edge and min_dihedral");
+    fail_on_time(task, task.limits.clock, "");
   }
-  ChildResult result;
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != exit_sent || bytes.size() < sizeof(result.status)) {
-    report_end(name, where, status, bytes);
+  const std::optional<AnswerHeader> answer = whole_answer(bytes);
+  if (!answer) {
+    report_end(task, status);
   }
-  std::memcpy(&result.status, bytes.data(), sizeof(result.status));
-  result.bytes.assign(bytes.begin() + sizeof(result.status), bytes.end());
-  return result;
+  std::span<const std::byte> rest = std::span(bytes).subspan(sizeof(AnswerHeader));
+  switch (answer->kind) {
+    case AnswerHeader::Kind::result:
+      break;
+    case AnswerHeader::Kind::error: {
+      const std::string what = take_text(rest), where = take_text(rest);
+      throw Error(what, where, take_text(rest));
+    }
+    case AnswerHeader::Kind::exception:
+      throw Error(task.name + " failed: " + take_text(rest), task.where, task.hint);
+    case AnswerHeader::Kind::no_memory:
+      fail_on_memory(task);
+  }
+  return {answer->status, Bytes(rest.begin(), rest.end())};
 }
 
-namespace {
-
-template <typename T>
-void append_array(Bytes& bytes, const std::vector<T>& values) {
-  const std::size_t size = values.size();
-  append_bytes(bytes, std::span<const std::size_t>(&size, 1));
-  append_bytes(bytes, std::span<const T>(values));
+void fail_on_answer() {
+  throw Error("what a child process sent is damaged", "palpate", "repair or remesh the input");
 }
-
-/// Takes an array from the front of `bytes`.
-template <typename T>
-void take_array(std::span<const std::byte>& bytes, std::vector<T>& values) {
-  std::size_t size = 0;
-  std::memcpy(&size, bytes.data(), sizeof(size));
-  bytes = bytes.subspan(sizeof(size));
-  values.resize(size);
-  std::copy_n(bytes.data(), size * sizeof(T), reinterpret_cast<std::byte*>(values.data()));
-  bytes = bytes.subspan(size * sizeof(T));
-}
-
-}  // namespace
 
 Bytes pack(const Mesh& mesh) {
-  Bytes bytes = {static_cast<std::byte>(mesh.element)};
-  append_array(bytes, mesh.nodes);
-  append_array(bytes, mesh.connectivity);
-  append_array(bytes, mesh.regions);
-  append_array(bytes, mesh.tagged_facets);
-  append_array(bytes, mesh.facet_tags);
+  Bytes bytes;
+  append_array(bytes, std::span(&mesh.element, 1));
+  append_array(bytes, std::span(mesh.nodes));
+  append_array(bytes, std::span(mesh.connectivity));
+  append_array(bytes, std::span(mesh.regions));
+  append_array(bytes, std::span(mesh.tagged_facets));
+  append_array(bytes, std::span(mesh.facet_tags));
   return bytes;
 }
 
 Mesh unpack_mesh(const Bytes& bytes) {
+  std::span<const std::byte> rest = bytes;
   Mesh mesh;
-  mesh.element = static_cast<ElementType>(bytes.at(0));
-  std::span<const std::byte> rest = std::span(bytes).subspan(1);
-  take_array(rest, mesh.nodes);
-  take_array(rest, mesh.connectivity);
-  take_array(rest, mesh.regions);
-  take_array(rest, mesh.tagged_facets);
-  take_array(rest, mesh.facet_tags);
+  const std::vector<ElementType> element = take_array<ElementType>(rest);
+  if (element.size() != 1) fail_on_answer();
+  mesh.element = element[0];
+  mesh.nodes = take_array<Vec3>(rest);
+  mesh.connectivity = take_array<Index>(rest);
+  mesh.regions = take_array<Index>(rest);
+  mesh.tagged_facets = take_array<Index>(rest);
+  mesh.facet_tags = take_array<Index>(rest);
   return mesh;
 }
 

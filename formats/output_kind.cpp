@@ -3,15 +3,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
 #include <optional>
-#include <span>
 #include <string>
 
-#include "formats/child_process.h"
-#include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "meshes/error.h"
 
 namespace palpate {
@@ -31,20 +27,10 @@ std::optional<std::string> first_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-/// The attribute `format` of an HDF5 file, read by a child: the file may be a stranger's.
+/// The attribute `format` of an HDF5 file, which may be a stranger's.
 std::string hdf5_format(const std::filesystem::path& file) {
-  constexpr std::chrono::seconds limit(10);
-  const std::filesystem::path whole_path = std::filesystem::absolute(file);  // the child is in another folder
   try {
-    const ChildResult result = run_in_child("HDF5", file.string(), limit, [&] {
-      const hdf5::Quiet quiet;
-      const std::string format =
-          hdf5::File::open_to_read(whole_path).text_attribute("/", "format").value_or("");
-      ChildResult read;
-      append_bytes(read.bytes, std::as_bytes(std::span(format)));
-      return read;
-    });
-    return {reinterpret_cast<const char*>(result.bytes.data()), result.bytes.size()};
+    return hdf5::Contents::read(file).text_attribute("/", "format").value_or("");
   } catch (const Error&) {
     return "";
   }

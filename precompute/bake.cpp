@@ -23,6 +23,7 @@
 #include "precompute/loads.h"
 #include "precompute/overlay_regions.h"
 #include "precompute/plan.h"
+#include "precompute/precision.h"
 #include "precompute/progress.h"
 #include "precompute/scope.h"
 
@@ -30,6 +31,8 @@ namespace palpate {
 namespace {
 
 constexpr int probe_count = 4;
+constexpr std::int64_t large_file =
+    4'000'000'000;  // [byte] more than many computers can load beside all else
 
 void print_plan(const Plan& plan, const Model& model, const Description& description,
                 const BakeOptions& options, Progress& progress) {
@@ -41,13 +44,29 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
       fmt::format("angles {:.1f} to {:.1f} degrees, worst shape {:.3f} at ({:.4g}, {:.4g}, {:.4g}) m",
                   quality.min_angle, quality.max_angle, quality.min_shape, quality.worst_centroid.x(),
                   quality.worst_centroid.y(), quality.worst_centroid.z()));
-  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision",
+  const std::string precision =
+      description.precision
+          ? fmt::format("{} precision", name_of(*description.precision))
+          : fmt::format("in single or split precision, or {:.1f} MB in double: decided once K is factorised",
+                        static_cast<double>(plan.file_bytes) * 2e-6);
+  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {}",
                             static_cast<double>(plan.factor_entries) * 1e-6,
-                            static_cast<double>(plan.file_bytes) * 1e-6,
-                            description.precision == Precision::single_precision ? "single" : "double"));
+                            static_cast<double>(plan.file_bytes) * 1e-6, precision));
   progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {:.1f} s with {} job{}",
                             static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9, plan.seconds,
                             options.jobs, options.jobs == 1 ? "" : "s"));
+}
+
+/// What makes a large file smaller.
+std::string size_advice(const Description& description) {
+  const MeshOptions& mesh = description.mesh;
+  const bool keeps_boundary = std::holds_alternative<SurfaceGeometry>(description.geometry) &&
+                              mesh.mesher == Mesher::tetgen && !mesh.remesh;
+  std::string advice = keeps_boundary     ? "set remesh = true with a larger edge_length in [mesh]"
+                       : mesh.edge_length ? "use a larger edge_length in [mesh]"
+                                          : "use a coarser mesh";
+  if (description.scope != Scope::surface) advice += ", or scope = \"surface\" in [storage]";
+  return advice;
 }
 
 /// Mesh node of each stored node, in the order of the columns, which comes from the factor.
@@ -160,13 +179,51 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
   return true;
 }
 
+SparseMatrix stiffness_of_step(const ElasticBody& body, const Stiffness& stiffness,
+                               const DynamicsOptions& options) {
+  return effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped), options.damping,
+                             options.newmark);
+}
+
+/// Decides for the precision of all packed matrices and puts their smooth parts and force errors into the
+/// model.
+Precision decide_precision(const Description& description, const ElasticBody& body,
+                           const Stiffness& stiffness, const Factor& factor,
+                           const std::vector<std::int64_t>& stored_dofs, Model& model, Progress& progress) {
+  std::vector<PrecisionStudy> studies;
+  studies.emplace_back(model, factor, stiffness.K, stored_dofs);
+  if (model.dynamics.method == DynamicsMethod::packed) {
+    const SparseMatrix K_bar = stiffness_of_step(body, stiffness, *description.dynamics);
+    Factor factor_bar(K_bar, stiffness.node_start);
+    factor_bar.factorize();
+    studies.emplace_back(model, factor_bar, K_bar, stored_dofs);
+  }
+  const PrecisionChoice choice = choose_precision(studies, description.precision);
+  const auto smooth = [&](const PrecisionStudy& study) {
+    return choice.precision == Precision::split_precision ? study.smooth(choice.terms) : nullptr;
+  };
+  const std::int64_t n = model.stored_dofs();
+  model.greens = PackedGreens(nullptr, n, choice.precision, smooth(studies.front()));
+  model.force_errors = choice.errors.front();
+  if (studies.size() > 1) {
+    model.dynamics.inverse = PackedGreens(nullptr, n, choice.precision, smooth(studies.back()));
+    model.dynamics.force_errors = choice.errors.back();
+  }
+  progress.line(fmt::format(
+      "precision: {}{}; force errors: {}", name_of(choice.precision),
+      model.greens.smooth() == nullptr ? "" : fmt::format(", {} smooth terms", model.greens.smooth()->terms),
+      errors_text(choice.errors)));
+  if (const std::string warning = precision_warning(model, choice.precision); !warning.empty())
+    progress.line("warning: " + warning);
+  return choice.precision;
+}
+
 /// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
 bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const DynamicsOptions& options,
                    const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
                    const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
                    const InterruptGuard& interrupt) {
-  const SparseMatrix K_bar = effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped),
-                                                 options.damping, options.newmark);
+  const SparseMatrix K_bar = stiffness_of_step(body, stiffness, options);
   Factor factor(K_bar, stiffness.node_start);
   const GreensSolver solver(factor, stored, stiffness.free_dofs, body.mesh.dimension());
   if (solver.stored_dofs() != stored_dofs) {
@@ -214,6 +271,13 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
   }
   Plan plan = make_plan(model.mesh, *factor, solver, description.precision, options.jobs);
   print_plan(plan, model, description, options, progress);
+  if (plan.file_bytes > large_file) {
+    progress.line(
+        fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with, and grow with "
+                    "the square of the "
+                    "stored dofs: {}",
+                    static_cast<double>(plan.file_bytes) * 1e-9, size_advice(description)));
+  }
   OverlayPlan overlays;
   if (description.overlay) {
     overlays = plan_overlays(model, *description.overlay, description.file.string());
@@ -226,13 +290,15 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
   DynamicsPlan dynamics;
   if (description.dynamics) {
     dynamics = plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
-                             description.precision);
+                             description.precision.value_or(Precision::single_precision));
     const std::string method =
         dynamics.method == DynamicsMethod::packed ? "packed" : fmt::format("modal, {} modes", dynamics.modes);
     progress.line(fmt::format("dynamics: {}, {:.1f} MB, {:.2f} GB of memory ({})", method,
                               static_cast<double>(dynamics.file_bytes) * 1e-6,
                               static_cast<double>(dynamics.memory_bytes) * 1e-9, dynamics.reason));
     plan.dynamics_bytes = dynamics.memory_bytes;
+    if (dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
+      plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   }
   check_memory(plan);
   if (options.dry_run) return BakeResult::planned;
@@ -261,7 +327,9 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
                                        *factor, stored_dofs);
     if (dynamics.method == DynamicsMethod::modal) progress.line("modes found");
   }
-  ModelWriter writer(options.output, model, description.precision);
+  const Precision precision =
+      decide_precision(description, elastic, stiffness, *factor, stored_dofs, model, progress);
+  ModelWriter writer(options.output, model, precision);
   model.overlay = {};  // written by now
   model.dynamics = {};
   bool whole = solve_columns(solver, plan, options.jobs, writer, PackedMatrix::greens, progress, interrupt);

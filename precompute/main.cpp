@@ -5,7 +5,9 @@
 #include <thread>
 
 #include "formats/model_file.h"
+#include "formats/shrunk_file.h"
 #include "meshes/error.h"
+#include "meshes/printable.h"
 #include "meshes/standard_output.h"
 #include "precompute/bake.h"
 #include "precompute/compare.h"
@@ -106,7 +108,7 @@ int run(int argc, char** argv) {
   } catch (const std::exception& error) {
     std::fprintf(stderr,
                  "error: palpate-precompute: %s\nhint: This is a defect of Palpate; please report it.\n",
-                 error.what());
+                 palpate::printable_lines(error.what(), "  ").c_str());
   }
   return palpate::exit_input_error;
 }
@@ -115,5 +117,6 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   palpate::prepare_output();
+  palpate::end_with_an_error_on_shrunk_files();
   return palpate::finish_output(run(argc, argv));
 }

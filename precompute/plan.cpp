@@ -42,15 +42,16 @@ std::int64_t choose_block_columns(std::int64_t free_dofs) {
 
 }  // namespace
 
-Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision,
-               int jobs) {
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver,
+               std::optional<Precision> precision, int jobs) {
   Plan plan;
   plan.nodes = static_cast<std::int64_t>(mesh.nodes.size());
   plan.elements = mesh.elements();
   plan.free_dofs = factor.order();
   plan.stored_dofs = solver.order();
   plan.factor_entries = factor.entries();
-  plan.file_bytes = packed_size(plan.stored_dofs) * bytes_per_scalar(precision);
+  plan.file_bytes =
+      packed_size(plan.stored_dofs) * bytes_per_scalar(precision.value_or(Precision::single_precision));
   plan.block_columns = choose_block_columns(plan.free_dofs);
   plan.memory_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) +
                       jobs * solver.workspace_bytes(plan.block_columns);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 
 #include "formats/packed.h"
 #include "precompute/greens.h"
@@ -24,8 +25,8 @@ struct Plan {
   double seconds = 0.0;             ///< estimate of the column solves with all jobs, from a measured rate
 };
 
-Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision,
-               int jobs);
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver,
+               std::optional<Precision> precision, int jobs);
 
 /// Throws Error with the numbers when the plan needs more memory than is free.
 void check_memory(const Plan& plan);

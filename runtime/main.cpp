@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "formats/shrunk_file.h"
 #include "meshes/error.h"
+#include "meshes/printable.h"
 #include "meshes/standard_output.h"
 #include "runtime/devices_command.h"
 #include "runtime/numbers.h"
@@ -207,7 +209,8 @@ int run(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const std::string command =
         app.get_subcommands().empty() ? "" : app.get_subcommands().front()->get_name() + " ";
-    fmt::print(stderr, "error: {}\nhint: See palpate-runtime {}--help\n", error.what(), command);
+    fmt::print(stderr, "error: {}\nhint: See palpate-runtime {}--help\n", printable_lines(error.what(), "  "),
+               command);
     return exit_usage;
   }
 }
@@ -224,7 +227,8 @@ int run_and_tell(int argc, char** argv) {
                "surface nodes\n");
   } catch (const std::exception& error) {
     if (std::ferror(stdout) == 0)  // else finish_output says it
-      fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n", error.what());
+      fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n",
+                 palpate::printable_lines(error.what(), "  "));
   }
   return palpate::exit_input_error;
 }
@@ -233,5 +237,6 @@ int run_and_tell(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   palpate::prepare_output();
+  palpate::end_with_an_error_on_shrunk_files();
   return palpate::finish_output(run_and_tell(argc, argv));
 }

@@ -5,6 +5,8 @@
 
 #include <cstdio>
 
+#include "meshes/printable.h"
+
 namespace palpate {
 
 std::string json_string(std::string_view text) {
@@ -32,7 +34,7 @@ std::string in_one_line(const Error& error) {
 
 void print_warning(std::string_view text) {
   const char* over_the_line = isatty(STDERR_FILENO) != 0 ? "\r\x1b[K" : "";
-  const std::string line = fmt::format("{}warning: {}\n", over_the_line, text);
+  const std::string line = fmt::format("{}warning: {}\n", over_the_line, printable(text));
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 

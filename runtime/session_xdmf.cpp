@@ -8,7 +8,6 @@
 #include <string>
 #include <system_error>
 
-#include "formats/recording.h"
 #include "meshes/write_file.h"
 
 namespace palpate {
@@ -64,8 +63,7 @@ std::filesystem::path add_recording(OutputPaths& paths, const std::filesystem::p
   return file;
 }
 
-void write_xdmf(const std::filesystem::path& recording) {
-  const RecordedFrames frames = read_frames(recording);
+void write_xdmf(const std::filesystem::path& recording, const RecordedFrames& frames) {
   if (frames.time.empty()) {
     std::error_code ignored;
     std::filesystem::remove(xdmf_path(recording), ignored);
