@@ -13,6 +13,7 @@ struct BakeOptions {
   std::filesystem::path output;  ///< file to write
   int jobs = 1;                  ///< threads
   bool dry_run = false;          ///< stop after the plan is printed
+  bool force = false;            ///< the output may take the place of any file that is not read
 };
 
 /// How a bake ended.

@@ -8,6 +8,7 @@
 #include "formats/shrunk_file.h"
 #include "meshes/error.h"
 #include "meshes/printable.h"
+#include "meshes/standard_output.h"
 #include "precompute/bake.h"
 #include "precompute/compare.h"
 #include "precompute/inspect.h"
@@ -35,10 +36,7 @@ int run_compare(const std::string& a, const std::string& b, const palpate::Compa
   return palpate::exit_ok;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  palpate::end_with_an_error_on_shrunk_files();
+int run(int argc, char** argv) {
   CLI::App app{
       "Meshes a body, assembles its stiffness and stores the Green's functions that palpate-runtime feels "
       "with."};
@@ -59,6 +57,7 @@ int main(int argc, char** argv) {
   CLI::Option* model_option = app.add_option("model", model, "description of the body (model.toml)");
   app.add_option("-o,--output", options.output, "file to write (default: NAME.palpate.hdf here)");
   app.add_option("-j,--jobs", options.jobs, "threads")->capture_default_str()->check(CLI::Range(1, 1024));
+  app.add_flag("--force", options.force, "let the output take the place of any other file");
   app.add_flag("--dry-run", options.dry_run, "say what it would take (dofs, bytes, time) and stop");
   CLI::App* inspect_command = app.add_subcommand("inspect", "print what is in a file");
   CLI::App* verify_command = app.add_subcommand(
@@ -112,4 +111,12 @@ int main(int argc, char** argv) {
                  palpate::printable_lines(error.what(), "  ").c_str());
   }
   return palpate::exit_input_error;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  palpate::prepare_output();
+  palpate::end_with_an_error_on_shrunk_files();
+  return palpate::finish_output(run(argc, argv));
 }

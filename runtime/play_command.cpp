@@ -70,8 +70,9 @@ void add_outputs(CLI::App& play, PlayArguments& arguments) {
   play.add_option("--record-frames", arguments.record_frames,
                   "how often the surface is written there; else 60 times a second; 0: never")
       ->type_name("HZ");
-  play.add_option("--report", arguments.report, "write the JSON report here and not to the standard output")
-      ->type_name("OUT.json");
+  play.add_option("--report", arguments.report,
+                  "write a report in JSON, to the standard output where this is -")
+      ->type_name("OUT.json|-");
   play.add_option(
           "--surface", arguments.surface,
           "write the surface after the last tick, as fine as the overlay makes it, with displacement, stress "
@@ -79,6 +80,7 @@ void add_outputs(CLI::App& play, PlayArguments& arguments) {
       ->type_name("OUT.vtu");
   play.add_option("--contacts", arguments.contacts, "write the contact points after the last tick")
       ->type_name("OUT.csv");
+  play.add_flag("--force", arguments.force, force_help);
 }
 
 /// What `read` gives; its Error is one of the arguments.
@@ -274,6 +276,7 @@ PlayOptions read_play(PlayArguments arguments) {
   options.report = arguments.report;
   options.surface = arguments.surface;
   options.contacts = arguments.contacts;
+  options.force = arguments.force;
   return options;
 }
 
