@@ -117,7 +117,7 @@ struct Streamed {
 }  // namespace
 
 struct ModelWriter::Impl {
-  Impl(std::filesystem::path to, const Model& model, Precision precision);
+  Impl(std::filesystem::path to, const Model& model, Precision precision, Leftovers leftovers);
 
   [[nodiscard]] JournalFrame examine(const Model& model);
   bool resume();
@@ -145,7 +145,8 @@ struct ModelWriter::Impl {
   std::vector<Streamed> matrices;
 };
 
-ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision)
+ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision,
+                        Leftovers leftovers)
     : path(std::move(to)),
       partial(with_suffix(path, ".partial")),
       header{precision},
@@ -158,7 +159,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
   matrices.push_back({greens_path, "the Green's functions", none});
   if (model.dynamics.method == DynamicsMethod::packed)
     matrices.push_back({inverse_path, "the inverse of K_bar", none});
-  if (resume()) return;
+  if (leftovers == Leftovers::resume && resume()) return;
   try {
     start(model);
   } catch (...) {
@@ -335,8 +336,9 @@ void ModelWriter::Impl::discard() noexcept {
   journal.remove();
 }
 
-ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision)
-    : impl_(std::make_unique<Impl>(std::move(path), model, precision)) {}
+ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+                         Leftovers leftovers)
+    : impl_(std::make_unique<Impl>(std::move(path), model, precision, leftovers)) {}
 
 ModelWriter::~ModelWriter() = default;
 
