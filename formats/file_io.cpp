@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 
 namespace palpate {
 namespace {
@@ -47,13 +48,13 @@ std::filesystem::path folder_of(const std::filesystem::path& path) {
 int flags_of(OpenMode mode) {
   switch (mode) {
     case OpenMode::read:
-      return O_RDONLY | O_CLOEXEC;
+      return O_RDONLY;
     case OpenMode::write:
-      return O_RDWR | O_CLOEXEC;
+      return O_RDWR;
     case OpenMode::read_append:
       break;
   }
-  return O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC;
+  return O_RDWR | O_CREAT | O_APPEND;
 }
 
 std::int64_t megabytes(std::int64_t bytes) {
@@ -77,13 +78,7 @@ void FileDescriptor::close() noexcept {
 }
 
 FileDescriptor open_file(const std::filesystem::path& path, OpenMode mode) {
-  const int fd = ::open(path.c_str(), flags_of(mode), 0666);
-  if (fd < 0) fail("open the file", path, errno);
-  FileDescriptor file(fd, path);
-  struct stat status = {};
-  if (::fstat(fd, &status) != 0) fail("read the file", path, errno);
-  if (!S_ISREG(status.st_mode)) throw Error("is not a file", path.string(), "Check the path.");
-  return file;
+  return {open_regular_file(path, flags_of(mode)), path};
 }
 
 std::int64_t file_size(const FileDescriptor& file) {

@@ -34,7 +34,7 @@ enum class OpenMode : std::uint8_t {
   read_append,  ///< made when missing; reads anywhere, writes at the end
 };
 
-/// Throws Error with the system's reason.
+/// Opens a regular file and nothing else, without waiting. Throws Error with the reason.
 FileDescriptor open_file(const std::filesystem::path& path, OpenMode mode);
 
 /// [byte]

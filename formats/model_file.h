@@ -14,7 +14,7 @@
 namespace palpate {
 
 inline constexpr int format_major = 3;  ///< another major version is refused: "precompute it again"
-inline constexpr int format_minor = 2;  ///< newer minor versions are read, what they add is ignored
+inline constexpr int format_minor = 3;  ///< newer minor versions are read, what they add is ignored
 
 /// A packed matrix that is streamed to disk.
 enum class PackedMatrix : std::uint8_t {
@@ -33,7 +33,8 @@ enum class Leftovers : std::uint8_t { resume, discard };
 /// existing PATH is untouched until the rename.
 class ModelWriter {
  public:
-  /// `model.greens`, `model.dynamics.inverse` and `model.probes` are ignored. Continues PATH.partial when its
+  /// `model.probes` is ignored, and of `model.greens` and `model.dynamics.inverse` all but the smooth part,
+  /// which split precision needs. Continues PATH.partial when its
   /// journal has the same key (a hash of all fields but those, and of format and precision) and each
   /// journalled range still has its checksum, unless leftovers are to be discarded. Throws Error when the
   /// file cannot be created or the disk cannot hold it (with the numbers).
@@ -48,7 +49,8 @@ class ModelWriter {
                                  PackedMatrix matrix = PackedMatrix::greens) const;
 
   /// Stores columns [first, first + count) of the lower triangle: `packed` holds their entries one column
-  /// after the other, column j from its diagonal down. Converts to the stored precision, subnormal
+  /// after the other, column j from its diagonal down; in split precision of the matrix, from which W W^T is
+  /// taken off here. Converts to the stored precision, subnormal
   /// numbers to 0: a tick would take many times as long with them. Thread-safe for disjoint ranges.
   void write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed,
                      PackedMatrix matrix = PackedMatrix::greens);
@@ -64,9 +66,18 @@ class ModelWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Loads a file: maps the packed matrices, reads the rest, and proves every size, range, index, finite
-/// value and checksum once. Throws Error naming the field that is wrong.
-Model load_model(const std::filesystem::path& path);
+/// How a model is loaded.
+struct LoadOptions {
+  /// Bytes of a packed matrix that are at most read into memory; -1: half of what is available. A larger one
+  /// is mapped: the file must stay as it is for as long as the model lives, as a mapped file that is cut off
+  /// ends the program (SIGBUS).
+  std::int64_t most_in_memory = -1;
+};
+
+/// Loads a file and proves every size, range, index, finite value and checksum once. Throws Error naming the
+/// field that is wrong. Starts a child process for a moment (see hdf5::Contents); signals and children of the
+/// caller are left alone.
+Model load_model(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// The sources of a loaded model that are no longer what they were: a sentence for each ("model.toml changed
 /// since …", "… is gone"). `model_path` is the baked file; empty when nothing is stale.

@@ -22,6 +22,7 @@
 #include "precompute/loads.h"
 #include "precompute/overlay_regions.h"
 #include "precompute/plan.h"
+#include "precompute/precision.h"
 #include "precompute/progress.h"
 #include "precompute/scope.h"
 
@@ -29,6 +30,8 @@ namespace palpate {
 namespace {
 
 constexpr int probe_count = 4;
+constexpr std::int64_t large_file =
+    4'000'000'000;  // [byte] more than many computers can load beside all else
 
 void print_plan(const Plan& plan, const Model& model, const Description& description,
                 const BakeOptions& options, Progress& progress) {
@@ -40,10 +43,14 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
       fmt::format("angles {:.1f} to {:.1f} degrees, worst shape {:.3f} at ({:.4g}, {:.4g}, {:.4g}) m",
                   quality.min_angle, quality.max_angle, quality.min_shape, quality.worst_centroid.x(),
                   quality.worst_centroid.y(), quality.worst_centroid.z()));
-  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision",
+  const std::string precision =
+      description.precision
+          ? fmt::format("{} precision", name_of(*description.precision))
+          : fmt::format("in single or split precision, or {:.1f} MB in double: decided once K is factorised",
+                        static_cast<double>(plan.file_bytes) * 2e-6);
+  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {}",
                             static_cast<double>(plan.factor_entries) * 1e-6,
-                            static_cast<double>(plan.file_bytes) * 1e-6,
-                            description.precision == Precision::single_precision ? "single" : "double"));
+                            static_cast<double>(plan.file_bytes) * 1e-6, precision));
   progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {} with {} job{}",
                             static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9,
                             duration_text(plan.seconds), options.jobs, options.jobs == 1 ? "" : "s"));
@@ -52,6 +59,7 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
 constexpr const char* factor_stage = "factorising K";
 constexpr const char* overlay_stage = "overlays";
 constexpr const char* modes_stage = "looking for modes";
+constexpr const char* precision_stage = "choosing the precision";
 constexpr const char* inverse_factor_stage = "factorising K_bar";
 constexpr const char* write_stage = "writing the file";
 
@@ -67,13 +75,28 @@ std::vector<Stage> stages_of(const Plan& plan, const OverlayPlan& overlays, cons
     stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs)});
   if (dynamics.method == DynamicsMethod::modal)
     stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
+  const bool packed = dynamics.method == DynamicsMethod::packed;
+  stages.push_back({precision_stage, plan.precision_seconds * (packed ? 2.0 : 1.0) +
+                                         plan.factor_seconds * (packed ? 1.0 : 0.0)});
   stages.push_back({column_stage(PackedMatrix::greens), plan.seconds});
-  if (dynamics.method == DynamicsMethod::packed) {
+  if (packed) {
     stages.push_back({inverse_factor_stage, plan.factor_seconds});
     stages.push_back({column_stage(PackedMatrix::inverse), plan.seconds});
   }
   stages.push_back({write_stage, plan.write_seconds});
   return stages;
+}
+
+/// What makes a large file smaller.
+std::string size_advice(const Description& description) {
+  const MeshOptions& mesh = description.mesh;
+  const bool keeps_boundary = std::holds_alternative<SurfaceGeometry>(description.geometry) &&
+                              mesh.mesher == Mesher::tetgen && !mesh.remesh;
+  std::string advice = keeps_boundary     ? "set remesh = true with a larger edge_length in [mesh]"
+                       : mesh.edge_length ? "use a larger edge_length in [mesh]"
+                                          : "use a coarser mesh";
+  if (description.scope != Scope::surface) advice += ", or scope = \"surface\" in [storage]";
+  return advice;
 }
 
 /// Mesh node of each stored node, in the order of the columns, which comes from the factor.
@@ -205,13 +228,51 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
   return !interrupt.requested();
 }
 
+SparseMatrix stiffness_of_step(const ElasticBody& body, const Stiffness& stiffness,
+                               const DynamicsOptions& options) {
+  return effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped), options.damping,
+                             options.newmark);
+}
+
+/// Decides for the precision of all packed matrices and puts their smooth parts and force errors into the
+/// model.
+Precision decide_precision(const Description& description, const ElasticBody& body,
+                           const Stiffness& stiffness, const Factor& factor,
+                           const std::vector<std::int64_t>& stored_dofs, Model& model, Progress& progress) {
+  std::vector<PrecisionStudy> studies;
+  studies.emplace_back(model, factor, stiffness.K, stored_dofs);
+  if (model.dynamics.method == DynamicsMethod::packed) {
+    const SparseMatrix K_bar = stiffness_of_step(body, stiffness, *description.dynamics);
+    Factor factor_bar(K_bar, stiffness.node_start);
+    factor_bar.factorize();
+    studies.emplace_back(model, factor_bar, K_bar, stored_dofs);
+  }
+  const PrecisionChoice choice = choose_precision(studies, description.precision);
+  const auto smooth = [&](const PrecisionStudy& study) {
+    return choice.precision == Precision::split_precision ? study.smooth(choice.terms) : nullptr;
+  };
+  const std::int64_t n = model.stored_dofs();
+  model.greens = PackedGreens(nullptr, n, choice.precision, smooth(studies.front()));
+  model.force_errors = choice.errors.front();
+  if (studies.size() > 1) {
+    model.dynamics.inverse = PackedGreens(nullptr, n, choice.precision, smooth(studies.back()));
+    model.dynamics.force_errors = choice.errors.back();
+  }
+  progress.line(fmt::format(
+      "precision: {}{}; force errors: {}", name_of(choice.precision),
+      model.greens.smooth() == nullptr ? "" : fmt::format(", {} smooth terms", model.greens.smooth()->terms),
+      errors_text(choice.errors)));
+  if (const std::string warning = precision_warning(model, choice.precision); !warning.empty())
+    progress.warn(warning);
+  return choice.precision;
+}
+
 /// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
 bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const DynamicsOptions& options,
                    const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
                    const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
                    const InterruptGuard& interrupt) {
-  const SparseMatrix K_bar = effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped),
-                                                 options.damping, options.newmark);
+  const SparseMatrix K_bar = stiffness_of_step(body, stiffness, options);
   Factor factor(K_bar, stiffness.node_start);
   const GreensSolver solver(factor, stored, stiffness.free_dofs, body.mesh.dimension());
   if (solver.stored_dofs() != stored_dofs) {
@@ -252,6 +313,13 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   }
   Plan plan = make_plan(model.mesh, *factor, solver, description.precision, options.jobs);
   print_plan(plan, model, description, options, progress);
+  if (plan.file_bytes > large_file) {
+    progress.line(
+        fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with, and grow with "
+                    "the square of the "
+                    "stored dofs: {}",
+                    static_cast<double>(plan.file_bytes) * 1e-9, size_advice(description)));
+  }
   OverlayPlan overlays;
   if (description.overlay) {
     overlays = plan_overlays(model, *description.overlay, description.file.string());
@@ -264,13 +332,15 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   DynamicsPlan dynamics;
   if (description.dynamics) {
     dynamics = plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
-                             description.precision);
+                             description.precision.value_or(Precision::single_precision));
     const std::string method =
         dynamics.method == DynamicsMethod::packed ? "packed" : fmt::format("modal, {} modes", dynamics.modes);
     progress.line(fmt::format("dynamics: {}, {:.1f} MB, {:.2f} GB of memory ({})", method,
                               static_cast<double>(dynamics.file_bytes) * 1e-6,
                               static_cast<double>(dynamics.memory_bytes) * 1e-9, dynamics.reason));
     plan.dynamics_bytes = dynamics.memory_bytes;
+    if (dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
+      plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   }
   if (!warning.empty()) progress.warn(warning);
   check_memory(plan);
@@ -302,7 +372,10 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
                                        assemble_mass(elastic, stiffness, description.dynamics->lumped),
                                        *factor, stored_dofs);
   }
-  ModelWriter writer(options.output, model, description.precision,
+  progress.begin(precision_stage);
+  const Precision precision =
+      decide_precision(description, elastic, stiffness, *factor, stored_dofs, model, progress);
+  ModelWriter writer(options.output, model, precision,
                      options.discard ? Leftovers::discard : Leftovers::resume);
   model.overlay = {};  // written by now
   model.dynamics = {};

@@ -55,6 +55,7 @@ struct MeshOptions {
   /// polygons and pictures; what the file has).
   std::optional<ElementType> element;
   Mesher mesher = Mesher::tetgen;  ///< surfaces and images; images: cgal unless told otherwise
+  bool mesher_chosen = false;      ///< model.toml names it: another one does not take its place
   /// Target at the boundary [m]. Required for images, polygons, pictures and with remesh; otherwise the mean
   /// edge of the surface.
   std::optional<double> edge_length;
@@ -136,7 +137,7 @@ struct Description {
   std::vector<Load> loads;
   Scope scope = Scope::layers;
   Index layers = 1;
-  Precision precision = Precision::single_precision;
+  std::optional<Precision> precision;  ///< empty: the first that is good enough (precision.h)
   std::optional<OverlayRegions> overlay;
   std::optional<DynamicsOptions> dynamics;
 };
@@ -144,5 +145,8 @@ struct Description {
 /// Reads and checks model.toml. Relative files are taken from its folder. Throws Error with file, line and
 /// column; an unknown key names the nearest known one.
 Description read_description(const std::filesystem::path& file);
+
+/// The same of a text in the place of the file's: of a description that is stored.
+Description parse_description(const std::string& text, const std::filesystem::path& file);
 
 }  // namespace palpate

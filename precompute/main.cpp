@@ -7,8 +7,10 @@
 #include <thread>
 
 #include "formats/model_file.h"
+#include "formats/shrunk_file.h"
 #include "meshes/command_line.h"
 #include "meshes/error.h"
+#include "meshes/printable.h"
 #include "meshes/spelling.h"
 #include "precompute/bake.h"
 #include "precompute/compare.h"
@@ -181,6 +183,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  palpate::end_with_an_error_on_shrunk_files();
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {
@@ -193,7 +196,7 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     std::fprintf(stderr,
                  "error: palpate-precompute: %s\nhint: This is a defect of Palpate; please report it.\n",
-                 error.what());
+                 palpate::printable_lines(error.what(), "  ").c_str());
   }
   return palpate::exit_input_error;
 }

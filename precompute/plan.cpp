@@ -18,10 +18,11 @@ constexpr std::int64_t max_block_columns = 192;
 constexpr std::int64_t max_block_bytes = 512LL << 20;
 constexpr double sweep_efficiency =
     0.4;  // of the sweeps against products alone: gathers and small supernodes (measured)
-constexpr double factor_efficiency = 0.5;  // of CHOLMOD's factorisation against them (measured)
-constexpr double checksum_rate = 1e9;      // while the file is read back [byte/s]
-constexpr double solve_rate = 3.5e9;       // of one right-hand side [flop/s] (measured)
-constexpr double solves_at_the_end = 4;    // of the probes
+constexpr double factor_efficiency = 0.5;     // of CHOLMOD's factorisation against them (measured)
+constexpr double checksum_rate = 1e9;         // while the file is read back [byte/s]
+constexpr double solve_rate = 3.5e9;          // of one right-hand side [flop/s] (measured)
+constexpr double solves_for_precision = 900;  // of eight places of 30 nodes, and of the smooth part
+constexpr double solves_at_the_end = 4;       // of the probes
 constexpr double solves_per_mode = 6;  // of Lanczos' method, its products of vectors among them (measured)
 constexpr double overlay_seconds_per_byte = 1e-8;  // of patches of two rings (measured)
 
@@ -54,15 +55,16 @@ int working(int jobs) {
 
 }  // namespace
 
-Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision,
-               int jobs) {
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver,
+               std::optional<Precision> precision, int jobs) {
   Plan plan;
   plan.nodes = static_cast<std::int64_t>(mesh.nodes.size());
   plan.elements = mesh.elements();
   plan.free_dofs = factor.order();
   plan.stored_dofs = solver.order();
   plan.factor_entries = factor.entries();
-  plan.file_bytes = packed_size(plan.stored_dofs) * bytes_per_scalar(precision);
+  plan.file_bytes =
+      packed_size(plan.stored_dofs) * bytes_per_scalar(precision.value_or(Precision::single_precision));
   plan.block_columns = choose_block_columns(plan.free_dofs);
   plan.memory_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) +
                       jobs * solver.workspace_bytes(plan.block_columns);
@@ -72,6 +74,7 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
   const double rate = measured_flops_per_second();
   plan.seconds = plan.flops / (sweep_efficiency * rate * working(jobs));
   plan.factor_seconds = factor.flops() / (factor_efficiency * rate);
+  plan.precision_seconds = solves_for_precision * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
   plan.write_seconds = static_cast<double>(plan.file_bytes) / checksum_rate +
                        solves_at_the_end * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
   return plan;

@@ -11,6 +11,7 @@
 #include "runtime/output.h"
 #include "runtime/play_report.h"
 #include "runtime/real_time.h"
+#include "runtime/session_check.h"
 
 namespace palpate {
 namespace {
@@ -51,6 +52,7 @@ Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActVie
   }
   const bool in_background = !options_.fast && !options_.session;
   if (settings.overlay) {
+    if (options_.session) check_overlays(*options_.session, body);
     overlays_.emplace(body, state_,
                       PatchSourceOptions{.rings = settings.overlay->rings,
                                          .memory = settings.overlay_memory,

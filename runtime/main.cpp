@@ -9,8 +9,10 @@
 #include <string_view>
 #include <vector>
 
+#include "formats/shrunk_file.h"
 #include "meshes/command_line.h"
 #include "meshes/error.h"
+#include "meshes/printable.h"
 #include "meshes/spelling.h"
 #include "runtime/devices_command.h"
 #include "runtime/numbers.h"
@@ -254,7 +256,8 @@ int run(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const bool of_command = !app.get_subcommands().empty() && !help_command->parsed();
     const std::string command = of_command ? app.get_subcommands().front()->get_name() + " " : "";
-    fmt::print(stderr, "error: {}\nhint: See palpate-runtime {}--help\n", error.what(), command);
+    fmt::print(stderr, "error: {}\nhint: See palpate-runtime {}--help\n", printable_lines(error.what(), "  "),
+               command);
     return exit_usage;
   }
 }
@@ -262,6 +265,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  palpate::end_with_an_error_on_shrunk_files();
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {
@@ -271,7 +275,8 @@ int main(int argc, char** argv) {
                "error: there is not enough memory\nhint: Close other programs, or precompute with fewer "
                "surface nodes\n");
   } catch (const std::exception& error) {
-    fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n", error.what());
+    fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n",
+               palpate::printable_lines(error.what(), "  "));
   }
   return palpate::exit_input_error;
 }

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "meshes/error.h"
+#include "meshes/printable.h"
 
 namespace palpate {
 
@@ -51,7 +52,7 @@ void write_text_file(const std::filesystem::path& file, std::string_view text) {
 }
 
 void print_warning(std::string_view text) {
-  fmt::print(stderr, "warning: {}\n", text);
+  fmt::print(stderr, "warning: {}\n", printable(text));
 }
 
 }  // namespace palpate

@@ -11,6 +11,7 @@
 #include "meshes/error.h"
 #include "runtime/loop.h"
 #include "runtime/numbers.h"
+#include "runtime/session_check.h"
 
 namespace palpate {
 namespace {
@@ -298,7 +299,7 @@ PlayOptions read_play(PlayArguments arguments) {
   if (options.device.kind == DeviceChoice::Kind::replay) {
     if (arguments.settings.contains("rate"))
       throw CLI::ValidationError("--rate", "a session is replayed at its own rate");
-    options.session = std::make_shared<const Recording>(read_recording(options.device.target));
+    options.session = std::make_shared<const Recording>(read_session(options.device.target));
     arguments.settings.merge(split_settings(options.session->info.options));
     arguments.settings["rate"] = std::to_string(options.session->info.rate);
   }

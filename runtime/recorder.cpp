@@ -63,7 +63,7 @@ void Recorder::finish() {
   thread_.join();
   if (failed_) std::rethrow_exception(failure_);
   writer_.finish();
-  write_xdmf(path_);
+  write_xdmf(path_, writer_.frames());
 }
 
 /// Bytes that were taken out of the rings.

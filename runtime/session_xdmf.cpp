@@ -8,7 +8,6 @@
 #include <string>
 #include <system_error>
 
-#include "formats/recording.h"
 #include "runtime/output.h"
 
 namespace palpate {
@@ -57,8 +56,7 @@ std::filesystem::path xdmf_path(const std::filesystem::path& recording) {
   return std::filesystem::path(recording).replace_extension(".xdmf");
 }
 
-void write_xdmf(const std::filesystem::path& recording) {
-  const RecordedFrames frames = read_frames(recording);
+void write_xdmf(const std::filesystem::path& recording, const RecordedFrames& frames) {
   if (frames.time.empty()) {
     std::error_code ignored;
     std::filesystem::remove(xdmf_path(recording), ignored);

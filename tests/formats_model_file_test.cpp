@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "formats/checksum.h"
-#include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "formats/model_file.h"
 #include "tests/formats_sample.h"
 #include "tests/formats_tamper.h"
@@ -108,7 +108,7 @@ INSTANTIATE_TEST_SUITE_P(ModelFile, BothPrecisions,
 TEST(ModelFile, GreensFunctionsStartOnAPage) {
   const Folder folder;
   const Model model = write_sample(folder / "a.palpate.hdf");
-  const hdf5::File file = hdf5::File::open_to_read(folder / "a.palpate.hdf");
+  const auto file = hdf5::Contents::read(folder / "a.palpate.hdf");
   const hdf5::Stored greens = file.locate("/greens/packed", hdf5::element_type<double>(), 1);
   EXPECT_EQ(greens.offset % 4096, 0);
   EXPECT_EQ(greens.dims, std::vector<std::int64_t>{packed_size(model.stored_dofs())});
@@ -117,7 +117,7 @@ TEST(ModelFile, GreensFunctionsStartOnAPage) {
 TEST(ModelFile, NoObjectHasATime) {
   const Folder folder;
   write_sample(folder / "a.palpate.hdf");
-  const hdf5::File file = hdf5::File::open_to_read(folder / "a.palpate.hdf");
+  const auto file = hdf5::File::open_to_change(folder / "a.palpate.hdf");
   const auto visit = [](hid_t, const char*, const H5O_info_t* info, void* objects) -> herr_t {
     ++*static_cast<int*>(objects);
     return info->ctime == 0 && info->mtime == 0 && info->atime == 0 && info->btime == 0 ? 0 : 1;

@@ -272,7 +272,7 @@ class Waiting(ProgramTest):
     """What is seen meanwhile."""
 
     STAGES = ["generating the mesh", "checking the mesh", "assembling K", "ordering K", "factorising K", "overlays",
-              "Green's functions", "writing the file"]
+              "choosing the precision", "Green's functions", "writing the file"]
     OVERLAY = "[overlay]\n[[overlay.region]]\nsphere = {center = [0.5, 0.5, 1], radius = 0.3}\n"
 
     def check(self, said):

@@ -104,7 +104,7 @@ class Library(unittest.TestCase):
         project.mkdir()
         shutil.copy(self.folder / "own_loop.c", project)
         (project / "CMakeLists.txt").write_text(FIND_PACKAGE)
-        done("cmake", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}",
+        done("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}",
              f"-DCMAKE_C_FLAGS={' '.join(sanitizers())}")
         done("cmake", "--build", project / "build")
         self.check_feel(project / "build" / "own_loop")
@@ -121,7 +121,7 @@ class Library(unittest.TestCase):
         project.mkdir()
         shutil.copy(self.folder / "own_loop.c", project)
         (project / "CMakeLists.txt").write_text(FIND_PACKAGE.replace("palpate 0.1", "palpate 0.2"))
-        result = run("cmake", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}")
+        result = run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}")
         self.assertNotEqual(result.returncode, 0)
         self.assertIn("palpate", result.stderr)
 

@@ -5,11 +5,11 @@
 
 #include <chrono>
 #include <ctime>
-#include <fstream>
 #include <thread>
 #include <utility>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 #include "runtime/loading.h"
 #include "runtime/output.h"
 #include "runtime/viewer/run_words.h"
@@ -34,8 +34,7 @@ std::filesystem::path name_recording(const std::filesystem::path& model) {
 
 /// What can be seen of a file that is gone before the body that came of it goes too.
 void expect_file(const std::filesystem::path& file) {
-  if (std::ifstream(file)) return;
-  throw Error("cannot be read any more", file.string(), "put it back, or start palpate-runtime play anew");
+  check_regular_file(file, "put it back, or start palpate-runtime play anew");
 }
 
 std::string sentence(const std::exception& error) {
