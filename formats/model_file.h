@@ -83,6 +83,9 @@ Model load_model(const std::filesystem::path& path, const LoadOptions& options =
 /// since …", "… is gone"). `model_path` is the baked file; empty when nothing is stale.
 std::vector<std::string> stale_sources(const Model& model, const std::filesystem::path& model_path);
 
+/// Where a source of the model at `model_path` is.
+std::filesystem::path source_path(const SourceFile& source, const std::filesystem::path& model_path);
+
 /// A SourceFile entry for `file`, its path relative to the folder of `model_path`.
 SourceFile describe_source(const std::string& role, const std::filesystem::path& file,
                            const std::filesystem::path& model_path);

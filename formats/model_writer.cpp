@@ -258,6 +258,7 @@ void ModelWriter::Impl::start(const Model& model) {
   journal.empty();
   data.close();
   check_free_space(partial, frame.file_bytes);
+  make_anew(partial);
   write_body(model);
   data = open_file(partial, OpenMode::write);
   for (const std::int64_t at : frame.packed_at) reserve_space(data, at, packed_bytes());

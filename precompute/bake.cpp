@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "formats/model_file.h"
+#include "formats/output_paths.h"
 #include "meshes/error.h"
 #include "meshes/quality.h"
 #include "precompute/body.h"
@@ -283,9 +284,19 @@ bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const Dy
   return solve_columns(solver, plan, jobs, writer, PackedMatrix::inverse, progress, interrupt);
 }
 
+/// Where the model may be written; before any work.
+std::filesystem::path check_output(const Description& description, const BakeOptions& options) {
+  OutputPaths paths(options.force);
+  paths.add_input(description.file, "the description");
+  for (const auto& file : input_files(description)) paths.add_input(file, "the geometry");
+  return paths.add(options.output, OutputKind::model, "--output");
+}
+
 }  // namespace
 
-BakeResult bake(const Description& description, const BakeOptions& options) {
+BakeResult bake(const Description& description, const BakeOptions& asked) {
+  BakeOptions options = asked;
+  if (!options.dry_run) options.output = check_output(description, asked);
   Progress progress;
   MeshedBody body = mesh_body(description, [&](const std::string& text) { progress.begin(text); });
   for (const std::string& note : body.notes) progress.line("note: " + note);

@@ -14,6 +14,7 @@ struct BakeOptions {
   int jobs = 1;                  ///< threads
   bool dry_run = false;          ///< stop after the plan is printed
   bool discard = false;          ///< begin anew where an earlier run was interrupted
+  bool force = false;            ///< the output may take the place of any file that is not read
 };
 
 /// How a bake ended.

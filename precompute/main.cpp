@@ -12,6 +12,7 @@
 #include "meshes/error.h"
 #include "meshes/printable.h"
 #include "meshes/spelling.h"
+#include "meshes/standard_output.h"
 #include "precompute/bake.h"
 #include "precompute/compare.h"
 #include "precompute/inspect.h"
@@ -69,6 +70,7 @@ void add_bake(CLI::App& app, Arguments& arguments) {
       ->option_text("N")
       ->check(CLI::Range(1, 1024));
   app.add_flag("--dry-run", options.dry_run, "say what it would take (dofs, bytes, time) and stop");
+  app.add_flag("--force", options.force, "let the output take the place of any other file");
   app.add_flag("--discard", options.discard,
                "begin anew; else a run that was interrupted or killed goes on with the columns that it has");
   app.footer(
@@ -167,7 +169,7 @@ int run(int argc, char** argv) {
                             CLI::ExitCodes::ExtrasError);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    std::fprintf(stderr, "error: %s\nhint: %s\n", error.what(),
+    std::fprintf(stderr, "error: %s\nhint: %s\n", palpate::printable_lines(error.what(), "  ").c_str(),
                  usage_hint(app, argc > 1 ? argv[1] : "").c_str());
     return palpate::exit_usage;
   }
@@ -180,10 +182,8 @@ int run(int argc, char** argv) {
   return run_bake(arguments.model, arguments.bake);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  palpate::end_with_an_error_on_shrunk_files();
+/// Errors in words.
+int run_and_tell(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {
@@ -199,4 +199,12 @@ int main(int argc, char** argv) {
                  palpate::printable_lines(error.what(), "  ").c_str());
   }
   return palpate::exit_input_error;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  palpate::prepare_output();
+  palpate::end_with_an_error_on_shrunk_files();
+  return palpate::finish_output(run_and_tell(argc, argv));
 }

@@ -48,6 +48,11 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   return Body(std::move(model), {}, options.refinement, options.contact);
 }
 
+void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file) {
+  for (const SourceFile& source : model.sources)
+    paths.add_input(source_path(source, file), "what the model was made from (" + source.role + ")");
+}
+
 std::unique_ptr<const Body> load_and_print(const std::filesystem::path& file,
                                            const std::filesystem::path& model_toml,
                                            const BodyOptions& options) {

@@ -14,6 +14,7 @@
 #include "meshes/error.h"
 #include "meshes/printable.h"
 #include "meshes/spelling.h"
+#include "meshes/standard_output.h"
 #include "runtime/devices_command.h"
 #include "runtime/numbers.h"
 #include "runtime/play_command.h"
@@ -33,6 +34,7 @@ struct Arguments {
   std::vector<std::string> node;
   std::vector<std::string> displace;
   bool json = false;
+  bool force = false;
   std::optional<std::string> overlay;
   std::string field;
   PlayArguments play;
@@ -76,6 +78,7 @@ CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
           "write the displacement at rest and by the probe: a table of the stored nodes, or a grid for "
           "ParaView")
       ->type_name("OUT.csv|OUT.vtu");
+  probe->add_flag("--force", arguments.force, force_help);
   probe->footer(
       "Forces are those on the body, in newtons; the hand feels the opposite. Displacements are relative to\n"
       "the body as it rests under its loads. For a body in the plane give X,Y and DX,DY.\n"
@@ -108,6 +111,7 @@ CLI::App* add_session(CLI::App& app, Arguments& arguments) {
       ->required()
       ->type_name("");
   session->add_flag("--json", arguments.json, "print JSON");
+  session->add_flag("--force", arguments.force, force_help);
   session->footer(
       "Example:\n"
       "  palpate-runtime session touch.h5");
@@ -136,6 +140,7 @@ CLI::App* add_export(CLI::App& app, ExportOptions& options) {
   CLI::App* exported = app.add_subcommand("export", "write a recording of play as one page for any browser");
   exported->add_option("SESSION.h5", options.recording, "recording")->required()->type_name("");
   exported->add_option("--html", options.html, "the page")->required()->type_name("OUT.html");
+  exported->add_flag("--force", options.force, force_help);
   exported->add_option("--fps", options.fps, "pictures a second at most; else 30")
       ->option_text("N")
       ->check(CLI::PositiveNumber)
@@ -230,7 +235,8 @@ int run(int argc, char** argv) {
   const CLI::App* help_command = add_help_command(app, arguments.about);
   const std::string first_word = argc > 1 ? argv[1] : "";
   if (const std::string hint = meant_by(app, first_word); !hint.empty()) {
-    fmt::print(stderr, "error: '{}' is no command\nhint: {} See palpate-runtime --help\n", first_word, hint);
+    fmt::print(stderr, "error: '{}' is no command\nhint: {} See palpate-runtime --help\n",
+               printable(first_word), printable(hint));
     return exit_usage;
   }
   try {
@@ -241,7 +247,7 @@ int run(int argc, char** argv) {
       return exit_ok;
     }
     if (devices_command->parsed()) return devices(arguments.devices);
-    if (session_command->parsed()) return session(arguments.file, arguments.json);
+    if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.force);
     if (view_command->parsed()) return view(arguments.file, read_view_address(arguments.view_address));
     if (export_command->parsed()) return export_html(arguments.exported);
     if (play_command->parsed()) return play_and_name_next(read_play(arguments.play));
@@ -251,7 +257,8 @@ int run(int argc, char** argv) {
          .places = read_places(*probe_command, arguments),
          .overlay = arguments.overlay ? std::optional(read_overlay(*arguments.overlay)) : std::nullopt,
          .json = arguments.json,
-         .field = arguments.field});
+         .field = arguments.field,
+         .force = arguments.force});
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const bool of_command = !app.get_subcommands().empty() && !help_command->parsed();
@@ -262,10 +269,8 @@ int run(int argc, char** argv) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  palpate::end_with_an_error_on_shrunk_files();
+/// Errors in words.
+int run_and_tell(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const palpate::Error& error) {
@@ -275,8 +280,17 @@ int main(int argc, char** argv) {
                "error: there is not enough memory\nhint: Close other programs, or precompute with fewer "
                "surface nodes\n");
   } catch (const std::exception& error) {
-    fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n",
-               palpate::printable_lines(error.what(), "  "));
+    if (std::ferror(stdout) == 0)  // else finish_output says it
+      fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n",
+                 palpate::printable_lines(error.what(), "  "));
   }
   return palpate::exit_input_error;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  palpate::prepare_output();
+  palpate::end_with_an_error_on_shrunk_files();
+  return palpate::finish_output(run_and_tell(argc, argv));
 }

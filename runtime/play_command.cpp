@@ -123,8 +123,9 @@ void add_outputs(CLI::App& play, PlayArguments& arguments) {
                   "how often the surface is written there; else 60 times a second; 0: never")
       ->type_name("HZ")
       ->group(output_group);
-  play.add_option("--report", arguments.report, "write the JSON report here and not to the standard output")
-      ->type_name("OUT.json")
+  play.add_option("--report", arguments.report,
+                  "write a report in JSON, to the standard output where this is -")
+      ->type_name("OUT.json|-")
       ->group(output_group);
   play.add_option(
           "--surface", arguments.surface,
@@ -135,6 +136,7 @@ void add_outputs(CLI::App& play, PlayArguments& arguments) {
   play.add_option("--contacts", arguments.contacts, "write the contact points after the last tick")
       ->type_name("OUT.csv")
       ->group(output_group);
+  play.add_flag("--force", arguments.force, force_help)->group(output_group);
 }
 
 void add_workspace(CLI::App& play, PlayArguments& arguments) {
@@ -316,6 +318,7 @@ PlayOptions read_play(PlayArguments arguments) {
   options.report = arguments.report;
   options.surface = arguments.surface;
   options.contacts = arguments.contacts;
+  options.force = arguments.force;
   return options;
 }
 
