@@ -62,7 +62,11 @@ void check_superblock(const FileDescriptor& file) {
 /// Proves that this is our format in a version that we read.
 std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
   const std::string where = file.path().string();
-  if (file.text_attribute("/", "format") != "palpate")
+  const auto format = file.text_attribute("/", "format");
+  if (format == "palpate-recording")
+    throw Error("is a recording, not a model", where,
+                "palpate-runtime view " + where + " shows it; a model is a NAME.palpate.hdf.");
+  if (format != "palpate")
     throw Error("is an HDF5 file, but not a Palpate file", where,
                 "Give a NAME.palpate.hdf that palpate-precompute has written.");
   const auto version = file.integer_attribute("/", "version", 2);
