@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -16,6 +17,7 @@
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
+#include "formats/precision_fields.h"
 #include "meshes/error.h"
 
 namespace palpate {
@@ -60,7 +62,11 @@ void check_superblock(const FileDescriptor& file) {
 /// Proves that this is our format in a version that we read.
 std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
   const std::string where = file.path().string();
-  if (file.text_attribute("/", "format") != "palpate")
+  const auto format = file.text_attribute("/", "format");
+  if (format == "palpate-recording")
+    throw Error("is a recording, not a model", where,
+                "palpate-runtime view " + where + " shows it; a model is a NAME.palpate.hdf.");
+  if (format != "palpate")
     throw Error("is an HDF5 file, but not a Palpate file", where,
                 "Give a NAME.palpate.hdf that palpate-precompute has written.");
   const auto version = file.integer_attribute("/", "version", 2);
@@ -86,7 +92,7 @@ class Reader {
   void read_attribute(const Attribute<T>& attribute);
   template <class T>
   void read_field(const Field<T>& field);
-  [[nodiscard]] PackedGreens read_packed(const std::string& path);
+  [[nodiscard]] PackedGreens read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth);
   [[nodiscard]] std::shared_ptr<std::byte> room_for(const hdf5::Stored& packed) const;
   void check_content(const std::vector<std::int64_t>& version);
   void check_stored_checksum(const std::string& path, const std::string& found);
@@ -112,9 +118,16 @@ Model Reader::read() {
   }
   if (file_.has(dynamics_group))
     for_each_dynamics_field(model_, [this](const auto& field) { read_field(field); });
+  if (header_.precision == Precision::split_precision)
+    for_each_smooth_field(model_, [this](const auto& field) { read_field(field); });
+  if (file_.has(greens_errors_path)) visit_greens_errors([this](const auto& field) { read_field(field); });
+  if (model_.dynamics.method == DynamicsMethod::packed && file_.has(inverse_errors_path))
+    visit_inverse_errors([this](const auto& field) { read_field(field); });
   check_model(model_, where_);
-  model_.greens = read_packed(greens_path);
-  if (model_.dynamics.method == DynamicsMethod::packed) model_.dynamics.inverse = read_packed(inverse_path);
+  check_precision(model_, header_.precision, where_);
+  model_.greens = read_packed(greens_path, model_.greens.smooth());
+  if (model_.dynamics.method == DynamicsMethod::packed)
+    model_.dynamics.inverse = read_packed(inverse_path, model_.dynamics.inverse.smooth());
   check_content(version);
   return std::move(model_);
 }
@@ -201,9 +214,9 @@ std::shared_ptr<std::byte> Reader::room_for(const hdf5::Stored& packed) const {
 }
 
 /// Reads or maps a packed matrix of the stored dofs and proves its values.
-PackedGreens Reader::read_packed(const std::string& path) {
+PackedGreens Reader::read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth) {
   const std::int64_t order = model_.stored_dofs();
-  const bool single = header_.precision == Precision::single_precision;
+  const bool single = has_float_entries(header_.precision);
   const hdf5::Stored stored =
       file_.locate(path, single ? hdf5::element_type<float>() : hdf5::element_type<double>(), 1);
   if (stored.dims[0] != packed_size(order))
@@ -224,12 +237,12 @@ PackedGreens Reader::read_packed(const std::string& path) {
 
   const std::shared_ptr<const void> data =
       memory != nullptr ? memory : map_file(file_.file(), stored.offset, stored.bytes);
-  PackedGreens matrix(data, order, header_.precision);
+  PackedGreens matrix(data, order, header_.precision, std::move(smooth));
   for (std::int64_t i = 0; i < order; ++i) {
     const Index node = model_.stored_nodes[static_cast<std::size_t>(i / model_.dimension())];
     const bool held = (model_.fixed[static_cast<std::size_t>(node)] >> i % model_.dimension() & 1) != 0;
     const double entry = matrix(i, i);
-    if (held ? entry != 0.0 : !(entry > 0.0))
+    if (held ? entry != 0.0 : !(entry > 0.0) || std::isinf(entry))
       refuse(where_, path + ": diagonal entry " + std::to_string(i) + " is not " +
                          (held ? "zero, though its dof is held" : "positive"));
   }

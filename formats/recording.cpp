@@ -8,6 +8,7 @@
 
 #include "formats/recording_parts.h"
 #include "meshes/error.h"
+#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {
@@ -193,7 +194,8 @@ Recording read_recording(const std::filesystem::path& path) {
   return RecordingFile(path).recording();
 }
 
-bool finish_recording(const std::filesystem::path& path) {
+bool finish_recording(const std::filesystem::path& recording) {
+  const std::filesystem::path path = link_target(recording);
   if (!std::filesystem::exists(parts_folder(path))) return true;
   const std::optional<FileDescriptor> lock = lock_parts(path);
   if (!lock) return false;

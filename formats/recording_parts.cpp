@@ -6,12 +6,14 @@
 #include <array>
 #include <cstring>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <system_error>
 #include <utility>
 
 #include "formats/checksum.h"
 #include "meshes/error.h"
+#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {
@@ -20,6 +22,8 @@ constexpr std::int64_t major_version = 4, minor_version = 2;
 constexpr std::int64_t highest_rate = 1'000'000;  // ticks a second
 constexpr const char* format_name = "palpate-recording";
 constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
+constexpr const char* lock_name = "lock";
+constexpr const char* master_name = "master.partial";
 constexpr const char* altered_hint = "Copy the file again, or record the session again.";
 constexpr std::int64_t block = std::int64_t{4} << 20;  // bytes that are copied at once
 
@@ -101,9 +105,9 @@ void write_head(hdf5::File& file, const RecordingHead& head) {
 }
 
 /// Writes a file under a temporary name, then renames it.
-void write_whole(const std::filesystem::path& path, bool durably,
+void write_whole(const std::filesystem::path& path, const std::filesystem::path& partial, bool durably,
                  const std::function<void(hdf5::File&)>& fill) {
-  const std::filesystem::path partial = with_suffix(path, ".partial");
+  make_anew(partial);
   try {
     hdf5::File file = hdf5::File::create(partial);
     fill(file);
@@ -111,15 +115,29 @@ void write_whole(const std::filesystem::path& path, bool durably,
     if (durably) {
       rename_durably(partial, path);
     } else {
-      std::error_code failed;
-      std::filesystem::rename(partial, path, failed);
-      if (failed) throw Error("cannot make the file: " + failed.message(), path.string(), "Check the path.");
+      rename_file(partial, path);
     }
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(partial, ignored);
     throw;
   }
+}
+
+/// Where the recording itself is written before it is renamed: in the folder of parts, which is ours.
+std::filesystem::path unfinished_master(const std::filesystem::path& recording) {
+  return parts_folder(recording) / master_name;
+}
+
+/// lock, master.partial, 12.h5, 12.h5.partial
+bool is_of_a_recording(const std::filesystem::directory_entry& entry) {
+  std::error_code failed;
+  if (entry.symlink_status(failed).type() != std::filesystem::file_type::regular) return false;
+  std::string name = entry.path().filename().string();
+  if (name == lock_name || name == master_name) return true;
+  const std::size_t digits = name.find_first_not_of("0123456789");
+  return digits != 0 && digits != std::string::npos &&
+         (name.substr(digits) == ".h5" || name.substr(digits) == ".h5.partial");
 }
 
 std::int64_t count_rows(std::span<const RecordingPart> parts, const RowField& field) {
@@ -245,7 +263,11 @@ std::vector<T> read_surface(const hdf5::Contents& file, const char* name, const 
 /// Throws Error unless the file is a recording of this version.
 RecordingHead read_head(const hdf5::Contents& file) {
   const std::string path = file.path().string();
-  if (file.text_attribute("/", "format") != format_name)
+  const auto format = file.text_attribute("/", "format");
+  if (format == "palpate")
+    throw Error("is a model, not a recording", path,
+                "palpate-runtime play " + path + " --view shows it and lets you push it.");
+  if (format != format_name)
     throw Error("is not a recording", path, "Give a recording that palpate-runtime has written.");
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version || (*version)[0] != major_version)
@@ -284,17 +306,34 @@ RecordingHead read_head(const hdf5::Contents& file) {
 }  // namespace
 
 std::filesystem::path parts_folder(const std::filesystem::path& recording) {
-  return with_suffix(recording, ".parts");
+  return with_suffix(link_target(recording), ".parts");
+}
+
+void expect_own_parts(const std::filesystem::path& recording) {
+  const std::filesystem::path folder = parts_folder(recording);
+  const auto refuse = [&](const std::string& what) {
+    throw Error("is in the way: " + what, folder.string(), "Remove it, or record elsewhere.");
+  };
+  std::error_code failed;
+  const std::filesystem::file_type type = std::filesystem::symlink_status(folder, failed).type();
+  if (type == std::filesystem::file_type::not_found) return;
+  if (type != std::filesystem::file_type::directory) refuse("it is no folder of a recording");
+  for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
+    if (!is_of_a_recording(entry))
+      refuse("it holds " + entry.path().filename().string() + ", which is of no recording");
+  }
+  if (failed) refuse("it cannot be read: " + failed.message());
 }
 
 std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording) {
   const std::filesystem::path folder = parts_folder(recording);
+  expect_own_parts(recording);
   std::error_code failed;
   std::filesystem::create_directory(folder, failed);
   if (failed)
     throw Error("cannot make the folder: " + failed.message(), folder.string(),
                 "Check the path and the permissions of its folder.");
-  FileDescriptor lock = open_file(folder / "lock", OpenMode::read_append);
+  FileDescriptor lock = open_file(folder / lock_name, OpenMode::read_append);
   if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) return std::nullopt;
   return lock;
 }
@@ -302,8 +341,19 @@ std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording)
 void clear_parts(const std::filesystem::path& recording) {
   std::error_code ignored;  // what stays is in nobody's way: no master names it
   for (const auto& entry : std::filesystem::directory_iterator(parts_folder(recording), ignored)) {
-    if (entry.path().filename() != "lock") std::filesystem::remove(entry.path(), ignored);
+    if (entry.path().filename() != lock_name && is_of_a_recording(entry))
+      std::filesystem::remove(entry.path(), ignored);
   }
+}
+
+void remove_parts(const std::filesystem::path& recording) {
+  clear_parts(recording);
+  std::error_code ignored;  // a folder stays where it holds what is not ours
+  const std::filesystem::path folder = parts_folder(recording);
+  const std::filesystem::directory_iterator all(folder, ignored);
+  if (std::distance(begin(all), end(all)) > 1) return;
+  std::filesystem::remove(folder / lock_name, ignored);
+  std::filesystem::remove(folder, ignored);
 }
 
 RecordingFiles open_recording(hdf5::Contents master) {
@@ -370,7 +420,7 @@ void check_rows(const RecordingFiles& recording) {
 RecordingPart write_part(const std::filesystem::path& path, std::span<const TickRecord> ticks,
                          std::span<const SurfaceFrame> frames, const RecordingHead& head) {
   RecordingPart part = {path, std::ssize(ticks), std::ssize(frames)};
-  write_whole(path, false, [&](hdf5::File& file) {
+  write_whole(path, with_suffix(path, ".partial"), false, [&](hdf5::File& file) {
     part.fields.clear();
     for_each_tick_field([&]<class Member>(const char* name, int components, Member TickRecord::*member) {
       std::vector<Scalar<Member>> values(ticks.size() * static_cast<std::size_t>(components));
@@ -416,7 +466,8 @@ RecordingPart write_part(const std::filesystem::path& path, std::span<const Tick
 RecordingPart merge_parts(const std::filesystem::path& path, std::span<const RecordingPart> parts,
                           const RecordingHead& head) {
   RecordingPart merged = {path};
-  write_whole(path, false, [&](hdf5::File& file) { merged.fields = write_rows_of(file, parts, head); });
+  write_whole(path, with_suffix(path, ".partial"), false,
+              [&](hdf5::File& file) { merged.fields = write_rows_of(file, parts, head); });
   for (const RecordingPart& part : parts) {
     merged.ticks += part.ticks;
     merged.frames += part.frames;
@@ -426,7 +477,7 @@ RecordingPart merge_parts(const std::filesystem::path& path, std::span<const Rec
 
 void write_master(const std::filesystem::path& recording, const RecordingHead& head,
                   std::span<const RecordingPart> parts) {
-  write_whole(recording, false, [&](hdf5::File& file) {
+  write_whole(recording, unfinished_master(recording), false, [&](hdf5::File& file) {
     write_head(file, head);
     const std::string folder = parts_folder(recording).filename().string() + "/";
     for (const RowField& field : row_fields(head)) {
@@ -447,12 +498,11 @@ void write_master(const std::filesystem::path& recording, const RecordingHead& h
 
 void merge_recording(const std::filesystem::path& path, std::span<const RecordingPart> parts,
                      const RecordingHead& head) {
-  write_whole(path, true, [&](hdf5::File& file) {
+  write_whole(path, unfinished_master(path), true, [&](hdf5::File& file) {
     write_head(file, head);
     write_rows_of(file, parts, head);
   });
-  std::error_code ignored;
-  std::filesystem::remove_all(parts_folder(path), ignored);
+  remove_parts(path);
 }
 
 }  // namespace palpate

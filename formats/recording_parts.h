@@ -92,15 +92,22 @@ RecordingFiles open_recording(hdf5::Contents recording);
 /// there are checksums). Throws Error naming file and dataset.
 void check_rows(const RecordingFiles& recording);
 
-/// PATH.parts
+/// PATH.parts, beside the file itself where PATH is a symbolic link.
 std::filesystem::path parts_folder(const std::filesystem::path& recording);
 
+/// Throws Error where PATH.parts is there and is not the folder of parts of a recording that was killed: a
+/// link, or with files in it that no recording leaves.
+void expect_own_parts(const std::filesystem::path& recording);
+
 /// Makes the folder of parts and locks it for this program as long as the result lives; nothing where another
-/// one has it. Throws Error when it cannot be made.
+/// one has it. Throws Error when it cannot be made, or is another's.
 std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording);
 
-/// Removes everything in the folder of parts but the lock.
+/// Removes the files of a recording in the folder of parts, but the lock.
 void clear_parts(const std::filesystem::path& recording);
+
+/// Removes the folder of parts with the files of a recording in it; what else is in it stays.
+void remove_parts(const std::filesystem::path& recording);
 
 /// Writes a part. Throws Error.
 RecordingPart write_part(const std::filesystem::path& file, std::span<const TickRecord> ticks,

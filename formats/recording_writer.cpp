@@ -37,10 +37,9 @@ struct RecordingWriter::Impl {
 
   /// Removes a folder of parts that holds nothing but the lock.
   void leave_folder_if_empty() const {
-    const std::filesystem::path folder = parts_folder(path);
     std::error_code ignored;
-    const std::filesystem::directory_iterator all(folder, ignored);
-    if (std::distance(begin(all), end(all)) <= 1) std::filesystem::remove_all(folder, ignored);
+    const std::filesystem::directory_iterator all(parts_folder(path), ignored);
+    if (std::distance(begin(all), end(all)) <= 1) remove_parts(path);
   }
 
   std::filesystem::path next_file() { return parts_folder(path) / (std::to_string(files++) + ".h5"); }

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "meshes/printable.h"
+#include "precompute/precision.h"
 
 namespace palpate {
 namespace {
@@ -63,6 +64,21 @@ std::string materials_text(const Model& model) {
       text += fmt::format("    initial strain  {:g}\n", fmt::join(strain, ", "));
     }
   }
+  return text;
+}
+
+/// The smooth part and the force errors that were measured.
+std::string precision_text(const Model& model) {
+  std::string text;
+  if (const SmoothPart* smooth = model.greens.smooth().get(); smooth != nullptr)
+    text += fmt::format("    smooth part     {} terms, {:.1f} MB in double\n", smooth->terms,
+                        8e-6 * static_cast<double>(smooth->rows.size()));
+  std::vector<ForceErrors> errors = {model.force_errors};
+  if (model.dynamics.method == DynamicsMethod::packed) errors.push_back(model.dynamics.force_errors);
+  const std::string measured = errors_text(errors);
+  text += fmt::format("    force errors    {}\n", measured.empty() ? "not measured" : measured);
+  if (const std::string warning = precision_warning(model, model.greens.precision()); !warning.empty())
+    text += "    WARNING         " + warning + "\n";
   return text;
 }
 
@@ -128,7 +144,6 @@ std::string rest_text(const Model& model) {
 
 std::string inspect(const Model& model) {
   const QualityReport& q = model.quality;
-  const bool single = model.greens.precision() == Precision::single_precision;
   const bool plane = model.dimension() == 2;
   const auto held =
       std::count_if(model.fixed.begin(), model.fixed.end(), [](auto mask) { return mask != 0; });
@@ -145,9 +160,10 @@ std::string inspect(const Model& model) {
   text += rest_text(model);
   text += fmt::format(
       "  Green's functions {}: {} nodes, {} dofs, {} precision, {:.1f} MB packed\n", scope_text(model),
-      model.stored_nodes.size(), model.stored_dofs(), single ? "single" : "double",
+      model.stored_nodes.size(), model.stored_dofs(), name_of(model.greens.precision()),
       static_cast<double>(packed_size(model.stored_dofs()) * bytes_per_scalar(model.greens.precision())) *
           1e-6);
+  text += precision_text(model);
   text += overlay_text(model);
   text += dynamics_text(model);
   text += fmt::format("  probes            {}\n", model.probes.size());

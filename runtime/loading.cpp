@@ -20,7 +20,7 @@ namespace {
 void print_loaded(const Body& body, double seconds) {
   fmt::print(stderr, "{}: {} free surface nodes, {} dofs in {} precision, loaded in {:.2f} s\n",
              printable(body.model().name), body.free_surface_nodes().size(), body.greens().order(),
-             body.greens().precision() == Precision::single_precision ? "single" : "double", seconds);
+             name_of(body.greens().precision()), seconds);
   if (!body.greens().unfolded()) {
     print_warning(
         "the Green's functions do not fit into half of the free memory as a full square; used packed, which "
@@ -41,9 +41,16 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   for (const std::string& stale : stale_sources(model, file)) {
     print_warning(file.string() + ": " + stale + " (precompute it again)");
   }
+  if (const std::string warning = precision_warning(model, model.greens.precision()); !warning.empty())
+    print_warning(file.string() + ": " + warning);
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
   return Body(std::move(model), {}, options.refinement, options.contact);
+}
+
+void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file) {
+  for (const SourceFile& source : model.sources)
+    paths.add_input(source_path(source, file), "what the model was made from (" + source.role + ")");
 }
 
 std::unique_ptr<const Body> load_and_print(const std::filesystem::path& file,

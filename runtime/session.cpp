@@ -9,6 +9,7 @@
 
 #include "meshes/error.h"
 #include "meshes/printable.h"
+#include "meshes/write_file.h"
 #include "runtime/output.h"
 #include "runtime/session_check.h"
 #include "runtime/session_xdmf.h"
@@ -54,8 +55,9 @@ enum class Ending { finished, merged, going_on };
 
 constexpr std::string_view ending_names[] = {"finished", "killed, now one file", "being recorded"};
 
-Ending finish(const std::filesystem::path& path, const Recording& recording) {
+Ending finish(const std::filesystem::path& path, const Recording& recording, bool force) {
   if (recording.finished) return Ending::finished;
+  OutputPaths(force).add(xdmf_path(path), OutputKind::frames, "session");
   if (!finish_recording(path)) return Ending::going_on;
   write_xdmf(path, recording.frames);
   return Ending::merged;
@@ -150,9 +152,10 @@ SessionSummary summarise(const Recording& recording) {
   return summary;
 }
 
-int session(const std::filesystem::path& path, bool json) {
+int session(const std::filesystem::path& file, bool json, bool force) {
+  const std::filesystem::path path = link_target(file);
   const Recording recording = read_session(path);
-  const Ending ending = finish(path, recording);
+  const Ending ending = finish(path, recording, force);
   const SessionSummary summary = summarise(recording);
   if (json) {
     print_json(path, recording, summary, ending);

@@ -325,6 +325,8 @@ TEST(ModelFile, AJournalCutInItsLastLineKeepsTheOthers) {
   EXPECT_FALSE(writer.has_columns(30, 5));
 }
 
+constexpr std::string_view first_word = "palpate-progress ";  // of a journal
+
 TEST(ModelFile, AnyCutOrFlippedJournalIsHarmless) {
   const Model model = sample_model();
   for (std::size_t at = 0; at < 190; at += 7) {
@@ -332,11 +334,28 @@ TEST(ModelFile, AnyCutOrFlippedJournalIsHarmless) {
     const std::filesystem::path journal = folder / "a.palpate.hdf.progress";
     const auto writer = after_kill(folder, model, Precision::double_precision, [&] {
       std::string text = read_bytes(journal);
-      text.at(at) = static_cast<char>(text.at(at) ^ 5);
-      write_bytes(journal, at % 2 == 0 ? text : text.substr(0, at));
+      if (at >= first_word.size()) text.at(at) = static_cast<char>(text.at(at) ^ 5);
+      write_bytes(journal, at % 2 == 0 && at >= first_word.size() ? text : text.substr(0, at));
     });
     EXPECT_FALSE(writer.has_columns(10, 1));
     EXPECT_FALSE(writer.has_columns(0, 35));
+  }
+}
+
+TEST(ModelFile, AJournalThatIsNoneIsAnothersFile) {
+  for (std::size_t at = 0; at < first_word.size(); ++at) {
+    const Folder folder;
+    const std::filesystem::path journal = folder / "a.palpate.hdf.progress";
+    std::string text;
+    const std::string refused = refusal([&] {
+      after_kill(folder, sample_model(), Precision::double_precision, [&] {
+        text = read_bytes(journal);
+        text.at(at) = static_cast<char>(text.at(at) ^ 5);
+        write_bytes(journal, text);
+      });
+    });
+    EXPECT_NE(refused.find("is in the way"), std::string::npos) << refused;
+    EXPECT_EQ(read_bytes(journal), text);
   }
 }
 

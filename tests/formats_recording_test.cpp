@@ -418,11 +418,11 @@ TEST(Recording, HasEachRowOnceWhenOnlyTheMasterFailed) {
   const Folder folder;
   RecordingWriter writer(folder / "a.h5", info, surface);
   append(writer, some_ticks(10), 10);
-  std::filesystem::create_directories(folder / "a.h5.partial" / "in the way");
+  std::filesystem::create_directories(folder / "a.h5.parts" / "master.partial" / "in the way");
   writer.append(some_ticks(10, 10));
-  EXPECT_NE(refusal([&] { writer.checkpoint(); }).find("cannot make the file"), std::string::npos);
+  EXPECT_NE(refusal([&] { writer.checkpoint(); }).find("is in the way"), std::string::npos);
   expect_ticks(read_recording(folder / "a.h5"), 10);
-  std::filesystem::remove_all(folder / "a.h5.partial");
+  std::filesystem::remove_all(folder / "a.h5.parts" / "master.partial");
   writer.finish();
   expect_ticks(read_recording(folder / "a.h5"), 20);
 }
