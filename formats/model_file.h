@@ -22,25 +22,29 @@ enum class PackedMatrix : std::uint8_t {
   inverse,  ///< StoredDynamics::inverse, of models whose dynamics is packed
 };
 
+/// What becomes of a PATH.partial that an interrupted run of the same model has left.
+enum class Leftovers : std::uint8_t { resume, discard };
+
 /// Streams a model to disk. Everything but packed matrices and probes is written by the constructor to
 /// PATH.partial, with the space of the packed matrices reserved (contiguous, page-aligned); columns then
 /// arrive in any order from any thread; `finish` adds probes, checksums and content hash and renames
 /// PATH.partial to PATH. Which columns are done is journalled (with their checksums) in PATH.progress, so a
-/// killed run is continued by constructing the writer again with an equal model. An existing PATH is
-/// untouched until the rename.
+/// run that was killed or interrupted is continued by constructing the writer again with an equal model. An
+/// existing PATH is untouched until the rename.
 class ModelWriter {
  public:
   /// `model.probes` is ignored, and of `model.greens` and `model.dynamics.inverse` all but the smooth part,
   /// which split precision needs. Continues PATH.partial when its
   /// journal has the same key (a hash of all fields but those, and of format and precision) and each
-  /// journalled range still has its checksum. Throws Error when the file cannot be created or the disk cannot
-  /// hold it (with the numbers).
-  ModelWriter(std::filesystem::path path, const Model& model, Precision precision);
+  /// journalled range still has its checksum, unless leftovers are to be discarded. Throws Error when the
+  /// file cannot be created or the disk cannot hold it (with the numbers).
+  ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+              Leftovers leftovers = Leftovers::resume);
   ~ModelWriter();
   ModelWriter(const ModelWriter&) = delete;
   ModelWriter& operator=(const ModelWriter&) = delete;
 
-  /// Whether columns [first, first + count) were written by an earlier, killed run.
+  /// Whether columns [first, first + count) were written, by this run or an earlier one.
   [[nodiscard]] bool has_columns(std::int64_t first, std::int64_t count,
                                  PackedMatrix matrix = PackedMatrix::greens) const;
 
@@ -54,7 +58,7 @@ class ModelWriter {
   /// Adds the probes, seals and renames. All columns of all matrices must have been written.
   void finish(const std::vector<Probe>& probes);
 
-  /// Removes PATH.partial and PATH.progress (Ctrl-C: nothing half-written stays behind).
+  /// Removes PATH.partial and PATH.progress.
   void discard() noexcept;
 
  private:

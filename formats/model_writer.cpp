@@ -133,7 +133,7 @@ struct Streamed {
 }  // namespace
 
 struct ModelWriter::Impl {
-  Impl(std::filesystem::path to, const Model& model, Precision precision);
+  Impl(std::filesystem::path to, const Model& model, Precision precision, Leftovers leftovers);
 
   [[nodiscard]] JournalFrame examine(const Model& model);
   bool resume();
@@ -162,7 +162,8 @@ struct ModelWriter::Impl {
   std::vector<Streamed> matrices;
 };
 
-ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision)
+ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision,
+                        Leftovers leftovers)
     : path(std::move(to)),
       partial(with_suffix(path, ".partial")),
       header{precision},
@@ -175,7 +176,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
   matrices.push_back({greens_path, "the Green's functions", none, model.greens.smooth()});
   if (model.dynamics.method == DynamicsMethod::packed)
     matrices.push_back({inverse_path, "the inverse of K_bar", none, model.dynamics.inverse.smooth()});
-  if (resume()) return;
+  if (leftovers == Leftovers::resume && resume()) return;
   try {
     start(model);
   } catch (...) {
@@ -371,8 +372,9 @@ void ModelWriter::Impl::discard() noexcept {
   journal.remove();
 }
 
-ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision)
-    : impl_(std::make_unique<Impl>(std::move(path), model, precision)) {}
+ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+                         Leftovers leftovers)
+    : impl_(std::make_unique<Impl>(std::move(path), model, precision, leftovers)) {}
 
 ModelWriter::~ModelWriter() = default;
 

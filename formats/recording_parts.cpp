@@ -263,7 +263,11 @@ std::vector<T> read_surface(const hdf5::Contents& file, const char* name, const 
 /// Throws Error unless the file is a recording of this version.
 RecordingHead read_head(const hdf5::Contents& file) {
   const std::string path = file.path().string();
-  if (file.text_attribute("/", "format") != format_name)
+  const auto format = file.text_attribute("/", "format");
+  if (format == "palpate")
+    throw Error("is a model, not a recording", path,
+                "palpate-runtime play " + path + " --view shows it and lets you push it.");
+  if (format != format_name)
     throw Error("is not a recording", path, "Give a recording that palpate-runtime has written.");
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version || (*version)[0] != major_version)
