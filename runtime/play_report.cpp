@@ -93,8 +93,8 @@ std::string box_text(const Body& body) {
                      high.x(), high.y(), high.z());
 }
 
-/// What a script gets wrong so that nothing is felt.
-void warn_of_script(const PlayedRun& run) {
+/// What is wrong with where the tool was, so that nothing is felt.
+void warn_of_places(const PlayedRun& run) {
   const LoopReport& report = run.report;
   const std::string place = "the body rests in " + box_text(run.body);
   if (report.ticks_begun_inside > 0) {
@@ -102,11 +102,14 @@ void warn_of_script(const PlayedRun& run) {
     const double seconds = static_cast<double>(report.ticks_begun_inside) / static_cast<double>(report.rate);
     print_warning(fmt::format("the tool began inside the body and felt nothing {}: start outside ({})",
                               all ? "at all" : fmt::format("until it was out at {} s", seconds), place));
-  } else if (report.ticks_in_contact == 0) {
-    print_warning(fmt::format(
-        "the tool never touched the body: check the script's positions, which are metres, and the "
-        "tool's size ({})",
-        place));
+  } else if (report.ticks > 0 && report.ticks_in_contact == 0) {
+    const Vec3& end = run.tool_end;
+    const char* advice = run.link != nullptr
+                             ? "move the device on, or the body to it (--origin, --motion-scale)"
+                             : "check the script's positions, which are metres, and the tool's size";
+    print_warning(
+        fmt::format("the tool never touched the body: {} (the tool ended at ({:.4g}, {:.4g}, {:.4g}) m; {})",
+                    advice, end.x(), end.y(), end.z(), place));
   }
 }
 
@@ -202,7 +205,7 @@ void print_report(const PlayedRun& run) {
                1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
   }
   if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
-  if (run.options.device.kind == DeviceChoice::Kind::script) warn_of_script(run);
+  if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
 }
 
 std::string json_report(const PlayedRun& run) {
