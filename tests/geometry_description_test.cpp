@@ -35,6 +35,18 @@ TEST(Description, ReadsDefaults) {
   EXPECT_EQ(d.analysis, Analysis::solid);
   EXPECT_EQ(d.thickness, 1.0);
   EXPECT_FALSE(d.mesh.element);
+  EXPECT_EQ(d.mesh.mesher, Mesher::tetgen);
+  EXPECT_FALSE(d.mesh.edge_length);
+  EXPECT_FALSE(d.mesh.remesh);
+  EXPECT_EQ(d.mesh.grading, 0.5);
+  EXPECT_EQ(d.mesh.radius_edge, 2.0);
+  EXPECT_EQ(d.mesh.min_dihedral, 10.0);
+  EXPECT_EQ(d.mesh.facet_distance, 0.0);
+  EXPECT_EQ(d.mesh.feature_angle, 60.0);
+  EXPECT_FALSE(d.mesh.odt);
+  EXPECT_FALSE(d.mesh.lloyd);
+  EXPECT_TRUE(d.mesh.perturb);
+  EXPECT_TRUE(d.mesh.exude);
   ASSERT_EQ(d.materials.size(), 1U);
   EXPECT_EQ(d.materials[0].material.youngs_modulus, 1e4);
   EXPECT_EQ(d.materials[0].material.density, 1000.0);
@@ -764,7 +776,7 @@ const BadCase bad_cases[] = {
     {"DynamicsModesOfPacked",
      with_storage("scope = \"full\"\n[dynamics]\nmethod = \"packed\"\nmodes = 7"),
      {"model.toml:13:9", "modes applies to method \"modal\" only"}},
-    {"BadPrecision", with_storage("precision = \"half\""), {"\"half\"", "\"single\""}},
+    {"BadPrecision", with_storage("precision = \"half\""), {"\"half\"", "\"auto\"", "\"single\""}},
 };
 
 INSTANTIATE_TEST_SUITE_P(Cases, BadDescription, ::testing::ValuesIn(bad_cases),
