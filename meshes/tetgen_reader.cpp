@@ -82,7 +82,8 @@ Mesh read_tetgen(const std::filesystem::path& stem) {
   MeshFile mesh;
   const std::int64_t first = read_nodes(with_ending(stem, ".node"), mesh);
   const std::filesystem::path faces = with_ending(stem, ".face");
-  if (std::filesystem::exists(faces)) read_faces(faces, first, mesh);
+  std::error_code none;
+  if (std::filesystem::exists(faces, none)) read_faces(faces, first, mesh);
   return read_elements(with_ending(stem, ".ele"), first, std::move(mesh));
 }
 

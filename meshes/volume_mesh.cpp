@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <system_error>
+
 #include "meshes/error.h"
 #include "meshes/volume_mesh_readers.h"
+#include "meshes/words.h"
 
 namespace palpate {
 namespace {
@@ -21,8 +24,9 @@ Mesh read_volume_mesh(const std::filesystem::path& file) {
   if (extension == ".vtk") return read_vtk_legacy(file);
   if (extension == ".node" || extension == ".ele")
     return read_tetgen(std::filesystem::path(file).replace_extension());
-  if (std::filesystem::exists(with_ending(file, ".node"))) return read_tetgen(file);
-  throw Error(fmt::format("the extension '{}' is not one of a volume mesh that can be read", extension),
+  std::error_code none;  // a name that is too long is no file
+  if (std::filesystem::exists(with_ending(file, ".node"), none)) return read_tetgen(file);
+  throw Error(fmt::format("the extension '{}' is not one of a volume mesh that can be read", shortened(extension)),
               file.string(),
               "Known are .msh (Gmsh 2.2 or 4.1), .mesh (Medit), .node and .ele (TetGen), .vtk (legacy), all "
               "as text.");

@@ -267,5 +267,12 @@ TEST(Plane, SecondOrderTrianglesAreRefused) {
   EXPECT_TRUE(contains(error.hint(), "tri3 or quad4")) << error.hint();
 }
 
+TEST(VolumeMesh, NamesThatNoFileCanHaveAreRefused) {
+  const std::string name = "body." + std::string(300, 'x');
+  const Error error = error_of([&] { read_volume_mesh(name); });
+  EXPECT_TRUE(contains(error.what(), "extension '.xxx")) << error.what();
+  EXPECT_LT(std::string(error.what()).size(), 200U);
+}
+
 }  // namespace
 }  // namespace palpate

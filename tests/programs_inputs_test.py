@@ -6,7 +6,7 @@ import re
 import tarfile
 import unittest
 
-from programs import PRECOMPUTE, ProgramTest, run
+from programs import PRECOMPUTE, SOURCE, ProgramTest, run
 
 BODY = '[material]\nyoungs_modulus = 5e3\npoissons_ratio = 0.4\n[[fixed]]\nlowest = {axis = "y", percent = 10}\n'
 CGAL_DATA = pathlib.Path("/usr/share/doc/libcgal-dev/data.tar.gz")  # of Debian's libcgal-demo
@@ -79,6 +79,14 @@ class Surfaces(ProgramTest):
         planned = run(PRECOMPUTE, "model.toml", "--dry-run", "--jobs", "1", cwd=self.folder)
         self.assertRegex(planned.stderr, r"note: Green's functions of \d+\.\d GB")
         self.assertIn("use a coarser mesh, or scope = \"surface\" in [storage]", planned.stderr)
+
+
+class Fuzzed(ProgramTest):
+    """The first of the files of scripts/fuzz-programs: the same ones every time."""
+
+    def test_surfaces_images_and_descriptions(self):
+        result = run(SOURCE / "scripts" / "fuzz-programs", "--kinds", "obj,ply,off,stl,inr,toml", "--runs", "60", "--no-memory-limit")
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 
 
 if __name__ == "__main__":
