@@ -10,6 +10,7 @@
 #include "formats/dynamics_fields.h"
 #include "formats/file_io.h"
 #include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "formats/journal.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
@@ -132,10 +133,11 @@ struct Streamed {
 }  // namespace
 
 struct ModelWriter::Impl {
-  Impl(std::filesystem::path to, const Model& model, Precision precision);
+  Impl(std::filesystem::path to, const Model& model, Precision precision, Leftovers leftovers);
 
   [[nodiscard]] JournalFrame examine(const Model& model);
   bool resume();
+  [[nodiscard]] bool is_ours(const JournalContents& left) const;
   void start(const Model& model);
   void write_body(const Model& model);
   template <class T>
@@ -160,7 +162,8 @@ struct ModelWriter::Impl {
   std::vector<Streamed> matrices;
 };
 
-ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision)
+ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision,
+                        Leftovers leftovers)
     : path(std::move(to)),
       partial(with_suffix(path, ".partial")),
       header{precision},
@@ -173,7 +176,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
   matrices.push_back({greens_path, "the Green's functions", none, model.greens.smooth()});
   if (model.dynamics.method == DynamicsMethod::packed)
     matrices.push_back({inverse_path, "the inverse of K_bar", none, model.dynamics.inverse.smooth()});
-  if (resume()) return;
+  if (leftovers == Leftovers::resume && resume()) return;
   try {
     start(model);
   } catch (...) {
@@ -208,6 +211,7 @@ bool ModelWriter::Impl::resume() {
   if (!left || left->frame.key != frame.key || left->frame.packed_at.size() != matrices.size() ||
       !std::filesystem::exists(partial))
     return false;
+  if (!is_ours(*left)) return false;
   data = open_file(partial, OpenMode::write);
   const bool inside =
       std::all_of(left->frame.packed_at.begin(), left->frame.packed_at.end(),
@@ -233,10 +237,28 @@ bool ModelWriter::Impl::resume() {
   return true;
 }
 
+/// Whether the HDF5 library can be given what a killed run left, and its packed matrices lie where the
+/// journal says.
+bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
+  const bool single = header.precision == Precision::single_precision;
+  const hdf5::ElementType scalar = single ? hdf5::element_type<float>() : hdf5::element_type<double>();
+  try {
+    const hdf5::Contents contents = hdf5::Contents::read(partial);
+    for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
+      const hdf5::Stored stored = contents.locate(matrices[matrix].path, scalar, 1);
+      if (stored.offset != left.frame.packed_at[matrix] || stored.bytes != packed_bytes()) return false;
+    }
+  } catch (const Error&) {
+    return false;
+  }
+  return true;
+}
+
 void ModelWriter::Impl::start(const Model& model) {
   journal.empty();
   data.close();
   check_free_space(partial, frame.file_bytes);
+  make_anew(partial);
   write_body(model);
   data = open_file(partial, OpenMode::write);
   for (const std::int64_t at : frame.packed_at) reserve_space(data, at, packed_bytes());
@@ -257,8 +279,7 @@ void ModelWriter::Impl::write_body(const Model& model) {
   for_each_known_field(model, [&](const auto& field) { write_field(file, field, model, counts); });
   write_vtk_view(file);
   for (const Streamed& matrix : matrices) {
-    file.write(matrix.path, scalar, std::array{entries}, nullptr);
-    frame.packed_at.push_back(file.locate(matrix.path, scalar, 1).offset);
+    frame.packed_at.push_back(file.write(matrix.path, scalar, std::array{entries}, nullptr));
   }
   file.close();
 }
@@ -351,8 +372,9 @@ void ModelWriter::Impl::discard() noexcept {
   journal.remove();
 }
 
-ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision)
-    : impl_(std::make_unique<Impl>(std::move(path), model, precision)) {}
+ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+                         Leftovers leftovers)
+    : impl_(std::make_unique<Impl>(std::move(path), model, precision, leftovers)) {}
 
 ModelWriter::~ModelWriter() = default;
 

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <system_error>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 
 namespace palpate {
 namespace {
@@ -39,19 +39,6 @@ std::string shown(std::string_view word) {
 }
 
 }  // namespace
-
-std::string read_all(const std::filesystem::path& file) {
-  const char* const hint = "Check the name, and that it is a file that you may read.";
-  std::error_code problem;
-  const auto size = std::filesystem::file_size(file, problem);
-  if (problem) throw Error("cannot read the file: " + problem.message(), file.string(), hint);
-  std::string text(size, '\0');
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream.read(text.data(), static_cast<std::streamsize>(size))) {
-    throw Error("cannot read the file", file.string(), hint);
-  }
-  return text;
-}
 
 TextReader::TextReader(std::filesystem::path file, char comment)
     : file_(std::move(file)), text_(read_all(file_)), comment_(comment) {

@@ -10,9 +10,6 @@
 
 namespace palpate {
 
-/// All bytes of a file. Throws Error when it cannot be read.
-std::string read_all(const std::filesystem::path& file);
-
 /// Reads a text file word by word. Every function that reads throws Error (where = "file:line") when what is
 /// there is not what was asked for; `what` says in the message what that was, e.g. "a node number".
 class TextReader {

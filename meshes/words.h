@@ -1,6 +1,7 @@
 // Words of the messages about what somebody wrote.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +10,9 @@ namespace palpate {
 
 /// "a, b, c".
 std::string comma_list(const std::vector<std::string_view>& words);
+
+/// At most `most` bytes of what a file says, for a message: "..." stands for the rest.
+std::string shortened(std::string_view text, std::size_t most = 60);
 
 /// The known word, of at least one, that takes the fewest changes of a letter (Levenshtein's distance).
 std::string_view nearest(std::string_view word, const std::vector<std::string_view>& known);

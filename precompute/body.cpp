@@ -1,5 +1,9 @@
 #include "precompute/body.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
 #include "meshes/check.h"
 #include "meshes/error.h"
 #include "meshes/volume_mesh.h"
@@ -15,6 +19,8 @@
 namespace palpate {
 namespace {
 
+constexpr double unnoticed_difference = 0.1;  // of edge lengths
+
 /// The options with lengths in the geometry's own unit.
 MeshOptions in_file_units(MeshOptions options, double scale) {
   if (options.edge_length) {
@@ -27,6 +33,7 @@ MeshOptions in_file_units(MeshOptions options, double scale) {
 /// Meshes each kind of geometry, in the geometry's own unit.
 struct MeshGeometry {
   const MeshOptions& options;
+  double scale;  ///< [m] of the geometry's unit
   const std::string& where;
   const ProgressText& progress;
   std::vector<std::string>& notes;
@@ -35,11 +42,48 @@ struct MeshGeometry {
 
   Mesh operator()(const SurfaceGeometry& surface) const {
     progress("reading the surface " + surface.file.filename().string());
-    const auto remesh_to = options.remesh ? options.edge_length : std::nullopt;
-    const TriangleSurface triangles = read_surface(surface.file, remesh_to, notes);
-    progress(std::string("meshing with ") + mesher());
-    return options.mesher == Mesher::cgal ? mesh_surface_with_cgal(triangles, options, where)
-                                          : mesh_surface(triangles, options, where);
+    TriangleSurface triangles = read_surface(surface.file, notes);
+    if (options.mesher == Mesher::cgal || (options.remesh && !remesh(surface.file, triangles))) {
+      progress("meshing with CGAL");
+      return mesh_surface_with_cgal(triangles, options, where);
+    }
+    note_kept_boundary(triangles);
+    progress("meshing with TetGen");
+    return mesh_surface(triangles, options, where);
+  }
+
+  /// False where CGAL's mesher is to make boundary and inside in one, as remeshing spoils the surface.
+  [[nodiscard]] bool remesh(const std::filesystem::path& file, TriangleSurface& triangles) const {
+    progress("remeshing the surface");
+    Remeshing remeshed = remesh_surface(file, triangles, *options.edge_length);
+    if (remeshed.problem.empty()) {
+      triangles = std::move(remeshed.surface);
+      return true;
+    }
+    const std::string what = "remeshed to edge_length, the surface " + remeshed.problem;
+    if (options.mesher_chosen) {
+      throw Error(
+          what, where,
+          "set mesher = \"cgal\" in [mesh] and remove remesh: CGAL's mesher makes a boundary of its own; "
+          "or use another edge_length");
+    }
+    notes.push_back(what + "; CGAL's mesher was used on the surface as it is (mesher = \"cgal\")");
+    return false;
+  }
+
+  /// Tells whom an edge_length does not do what it seems to.
+  void note_kept_boundary(const TriangleSurface& triangles) const {
+    if (!options.edge_length || options.remesh) {
+      return;
+    }
+    const double kept = mean_edge_length(triangles);
+    if (std::abs(kept / *options.edge_length - 1.0) > unnoticed_difference) {
+      notes.push_back(
+          fmt::format("the boundary keeps the file's triangles, of edge {:.3g} m in the mean; edge_length = "
+                      "{:.3g} m is for "
+                      "the inside alone: set remesh = true in [mesh] to have it on the boundary too",
+                      kept * scale, *options.edge_length * scale));
+    }
   }
 
   Mesh operator()(const ImageGeometry& image) const {
@@ -113,7 +157,8 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   const std::filesystem::path file = geometry_file(description.geometry);
   const std::string where = file.empty() ? toml : file.string();
   const MeshOptions options = in_file_units(description.mesh, description.scale);
-  body.mesh = std::visit(MeshGeometry{options, where, progress, body.notes}, description.geometry);
+  body.mesh =
+      std::visit(MeshGeometry{options, description.scale, where, progress, body.notes}, description.geometry);
   for (Vec3& x : body.mesh.nodes) {
     x *= description.scale;
   }
@@ -136,9 +181,7 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   body.fixed = std::move(held.axes);
   body.prescribed = std::move(held.displacement);
   check_held(body.mesh, body.fixed, toml);
-  if (const std::string warning = scale_warning(body.mesh); !warning.empty()) {
-    body.notes.push_back(warning);
-  }
+  body.warning = scale_warning(body.mesh, description.scale);
   return body;
 }
 

@@ -9,9 +9,10 @@
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/make_mesh_3.h>
 
+#include "formats/child_process.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 #include "precompute/mesh3.h"
+#include "precompute/mesh_size.h"
 
 namespace palpate {
 namespace {
@@ -78,7 +79,12 @@ Complex make_complex(const TriangleSurface& surface, const MeshOptions& options)
 
 Mesh mesh_surface_with_cgal(const TriangleSurface& surface, const MeshOptions& options,
                             const std::string& where) {
-  const ChildResult result = run_in_child("CGAL's mesher", where, mesh3::time_limit, [&] {
+  const ChildTask task = {
+      .name = "CGAL's mesher",
+      .where = where,
+      .limits = meshing_limits(expected_size(surface, options), options, where),
+      .hint = "use a larger edge_length or facet_distance in [mesh], or a simpler surface"};
+  const ChildResult result = run_in_child(task, [&] {
     try {
       Mesh mesh = mesh3::export_mesh(make_complex(surface, options), [](int) { return 0; });
       mesh.tagged_facets.clear();

@@ -1,10 +1,10 @@
 #include "precompute/description.h"
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
+#include "meshes/toml_text.h"
 #include "precompute/description_parts.h"
 
 namespace palpate {
@@ -74,29 +74,10 @@ std::string read_name(const Section& root) {
   const bool printable =
       std::all_of(name.begin(), name.end(), [](unsigned char c) { return c > 31 && c != '/'; });
   if (name.empty() || name[0] == '.' || !printable) {
-    root.fail("name", "name \"" + name + "\" cannot be the name of a file",
+    root.fail("name", "name \"" + shortened(name) + "\" cannot be the name of a file",
               "use letters, digits, - and _; the baked file is called NAME.palpate.hdf");
   }
   return name;
-}
-
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in || std::filesystem::is_directory(file)) {
-    throw Error("cannot read the model description", file.string(), "give the path of a model.toml");
-  }
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
-toml::table parse(const std::string& text, const std::string& file) {
-  try {
-    return toml::parse(text, file);
-  } catch (const toml::parse_error& error) {
-    const toml::source_position at = error.source().begin;
-    throw Error("not valid TOML: " + std::string(error.description()),
-                file + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
-                "see https://toml.io for the syntax");
-  }
 }
 
 /// The image's labels stay apart in the mesh where materials need them.
@@ -110,7 +91,7 @@ void keep_regions(Geometry& geometry, const std::vector<MaterialPart>& materials
 }  // namespace
 
 Description read_description(const std::filesystem::path& path) {
-  return parse_description(read_text(path), path);
+  return parse_description(read_all(path, "Give the path of a model.toml."), path);
 }
 
 Description parse_description(const std::string& text, const std::filesystem::path& path) {
@@ -118,7 +99,7 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   Description result;
   result.file = path;
   result.text = text;
-  const toml::table table = parse(result.text, file);
+  const toml::table table = parse_toml(result.text, file);
   const toml::table empty;
   const Section root(table, "", file,
                      {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load",

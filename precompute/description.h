@@ -55,6 +55,7 @@ struct MeshOptions {
   /// polygons and pictures; what the file has).
   std::optional<ElementType> element;
   Mesher mesher = Mesher::tetgen;  ///< surfaces and images; images: cgal unless told otherwise
+  bool mesher_chosen = false;      ///< model.toml names it: another one does not take its place
   /// Target at the boundary [m]. Required for images, polygons, pictures and with remesh; otherwise the mean
   /// edge of the surface.
   std::optional<double> edge_length;

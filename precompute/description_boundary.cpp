@@ -22,7 +22,7 @@ std::uint8_t read_axes(const Section& entry, int dimension) {
     bits = static_cast<std::uint8_t>(bits | 1U << axis);
   }
   if (bits == 0) {
-    entry.fail("axes", entry.name_of("axes") + " is \"" + axes + "\"",
+    entry.fail("axes", entry.name_of("axes") + " is \"" + shortened(axes) + "\"",
                "use some of the letters of \"" + letters + "\", such as \"x\"");
   }
   return bits;

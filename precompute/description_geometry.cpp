@@ -7,6 +7,12 @@
 namespace palpate {
 namespace {
 
+constexpr std::size_t longest_path = 4095;  // Linux
+
+bool is_control(char c) {
+  return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+}
+
 /// Six elements a cell must stay within the 32-bit element numbers.
 void check_cells(const Section& shape, std::string_view key, double cells) {
   if (6.0 * cells > std::numeric_limits<Index>::max()) {
@@ -72,7 +78,14 @@ bool is_plane(std::string_view geometry_kind) {
 }
 
 Geometry read_geometry(const Section& geometry, std::string_view kind, const std::filesystem::path& folder) {
-  const auto file = [&] { return (folder / geometry.text(kind)).lexically_normal(); };
+  const auto file = [&] {
+    const std::string name = geometry.text(kind);
+    if (name.size() > longest_path || std::any_of(name.begin(), name.end(), is_control)) {
+      geometry.fail(kind, geometry.name_of(kind) + " is no name of a file: \"" + shortened(name) + "\"",
+                    "give the path of a file, without control characters");
+    }
+    return (folder / name).lexically_normal();
+  };
   if (kind != "image" && geometry.has("labels")) {
     geometry.fail("labels", "[geometry] labels apply to images only, this geometry is a " + std::string(kind),
                   "remove labels");

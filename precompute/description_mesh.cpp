@@ -109,10 +109,12 @@ MeshOptions read_mesh_options(const Section& mesh, std::string_view kind) {
 
   MeshOptions options;
   options.mesher = mesher == "cgal" ? Mesher::cgal : Mesher::tetgen;
+  options.mesher_chosen = mesh.has("mesher");
   if (mesh.has("element")) {
     const std::string name = mesh.text("element");
     if (!holds(elements_of(kind), name)) {
-      mesh.fail("element", "[mesh] element \"" + name + "\" is not for geometry of kind " + std::string(kind),
+      mesh.fail("element",
+                "[mesh] element \"" + shortened(name) + "\" is not for geometry of kind " + std::string(kind),
                 "use " + quoted_choice(elements_of(kind)));
     }
     options.element = element_named(name);

@@ -12,14 +12,15 @@
 #include <array>
 #include <map>
 
+#include "formats/child_process.h"
 #include "meshes/element.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 #include "precompute/distance_field.h"
 #include "precompute/interface_crossings.h"
 #include "precompute/labelled_image.h"
 #include "precompute/mesh3.h"
 #include "precompute/mesh_parts.h"
+#include "precompute/mesh_size.h"
 #include "precompute/tetgen_mesh.h"
 
 namespace palpate {
@@ -123,7 +124,11 @@ Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& fi
 /// Meshes with Mesh_3, `hollow` for the surfaces alone, in a child process.
 Mesh run_mesh3(const VoxelBody& body, const LabelField& field, const MeshOptions& options,
                const std::string& where, bool hollow) {
-  const ChildResult result = run_in_child("CGAL's mesher", where, mesh3::time_limit, [&] {
+  const ChildTask task = {.name = "CGAL's mesher",
+                          .where = where,
+                          .limits = meshing_limits(expected_size(body, options), options, where),
+                          .hint = "use a larger edge_length or facet_distance in [mesh]"};
+  const ChildResult result = run_in_child(task, [&] {
     try {
       const Domain domain = make_domain(body, field);
       Complex complex = refine(domain, body, field, options, hollow);
@@ -148,13 +153,14 @@ Mesh run_mesh3(const VoxelBody& body, const LabelField& field, const MeshOptions
   return mesh;
 }
 
-Mesh fill_with_tetgen(const Mesh& hollow, const MeshOptions& options, const std::string& where) {
+Mesh fill_with_tetgen(const Mesh& hollow, const MeshOptions& options, const MeshSize& size,
+                      const std::string& where) {
   TriangleSurface walls{hollow.nodes, {}};
   for (Index t = 0; t < static_cast<Index>(hollow.facet_tags.size()); ++t) {
     const auto corners = hollow.tagged_facet(t);
     walls.triangles.push_back({corners[0], corners[1], corners[2]});
   }
-  return mesh_regions(walls, region_points(hollow), options, where);
+  return mesh_regions(walls, region_points(hollow), options, size, where);
 }
 
 /// What became of each label.
@@ -184,7 +190,7 @@ Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vec
   const bool by_tetgen = options.mesher == Mesher::tetgen;
   Mesh mesh = run_mesh3(body, field, options, where, by_tetgen);
   if (by_tetgen) {
-    mesh = fill_with_tetgen(mesh, options, where);
+    mesh = fill_with_tetgen(mesh, options, expected_size(body, options), where);
   }
   mesh.tagged_facets.clear();
   mesh.facet_tags.clear();

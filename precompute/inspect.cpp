@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "meshes/printable.h"
 #include "precompute/precision.h"
 
 namespace palpate {
@@ -147,8 +148,8 @@ std::string inspect(const Model& model) {
   const auto held =
       std::count_if(model.fixed.begin(), model.fixed.end(), [](auto mask) { return mask != 0; });
   std::string text;
-  text += fmt::format("{}, written by {}\n", model.name, model.generator);
-  text += fmt::format("  content hash      {}\n", model.content_hash);
+  text += fmt::format("{}, written by {}\n", printable(model.name), printable(model.generator));
+  text += fmt::format("  content hash      {}\n", printable(model.content_hash));
   text +=
       fmt::format("  mesh              {} nodes ({} held), {} {} elements, {} surface {}, {} {:.4g} {}\n",
                   model.mesh.nodes.size(), held, model.mesh.elements(), traits(model.mesh.element).name,
@@ -176,8 +177,8 @@ std::string inspect(const Model& model) {
   text += "  angles of all elements\n" + histogram_text(q);
   text += "  made from\n";
   for (const SourceFile& source : model.sources) {
-    text +=
-        fmt::format("    {:9} {} ({} bytes, {})\n", source.role, source.path, source.bytes, source.checksum);
+    text += fmt::format("    {:9} {} ({} bytes, {})\n", printable(source.role), printable(source.path),
+                        source.bytes, printable(source.checksum));
   }
   return text;
 }

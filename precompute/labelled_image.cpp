@@ -2,6 +2,7 @@
 
 #define CGAL_USE_ZLIB 1  // .inr.gz
 #include <CGAL/Image_3.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +10,19 @@
 #include <map>
 #include <span>
 
+#include "formats/child_process.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
+#include "meshes/regular_file.h"
+#include "meshes/words.h"
+#include "precompute/inr_header.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::chrono::seconds read_time_limit{600};
+constexpr double largest_spacing_ratio = 100.0;  // slices of 5 mm with pixels of 0.1 mm have 50
+constexpr double voxels_per_edge = 20.0;
+const char* const complete_file =
+    "use a complete INR file (.inr, .inr.gz) with one label a voxel and positive VX, VY, VZ";
 constexpr std::size_t smallest_speck = 8;  // [voxels] less would be smoothed away
 
 enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
@@ -51,23 +58,47 @@ ChildResult read_labels(const std::string& file) {
     }
   }
   ChildResult result;
-  append_bytes(result.bytes, std::span<const ImageHeader>(&header, 1));
-  append_bytes(result.bytes, std::span<const std::int32_t>(labels));
+  append_array(result.bytes, std::span<const ImageHeader>(&header, 1));
+  append_array(result.bytes, std::span<const std::int32_t>(labels));
   return result;
+}
+
+/// Refuses voxel sides and an origin that no image has.
+void check_geometry(const VoxelGrid& grid, const std::string& where) {
+  const double smallest = grid.spacing.minCoeff(), largest = grid.spacing.maxCoeff();
+  if (!(smallest > 1e-30 && largest < 1e30 && largest <= largest_spacing_ratio * smallest)) {
+    throw Error(fmt::format("the voxels' sides VX, VY, VZ are {}, {}, {}", shown(grid.spacing[0]),
+                            shown(grid.spacing[1]), shown(grid.spacing[2])),
+                where,
+                fmt::format("they must be positive, and none more than {} times another: correct the header",
+                            largest_spacing_ratio));
+  }
+  if (!(grid.origin.cwiseAbs().maxCoeff() < 1e12 * largest)) {
+    throw Error(fmt::format("the image's origin TX, TY, TZ is ({}, {}, {})", shown(grid.origin[0]),
+                            shown(grid.origin[1]), shown(grid.origin[2])),
+                where, "correct the header");
+  }
 }
 
 /// Marks the voxels that carry one of the labels (all but 0 where none are listed).
 VoxelBody select(const Bytes& bytes, const ImageGeometry& image) {
   const std::string where = image.file.string();
   const std::vector<int>& wanted = image.labels;
-  ImageHeader header;
-  std::memcpy(&header, bytes.data(), sizeof(header));
+  std::span<const std::byte> rest = bytes;
+  const std::vector<ImageHeader> headers = take_array<ImageHeader>(rest);
+  std::vector<std::int32_t> labels = take_array<std::int32_t>(rest);
+  if (headers.size() != 1) {
+    fail_on_answer();
+  }
+  const ImageHeader& header = headers[0];
   VoxelBody body;
   body.size = header.size;
   body.spacing = Vec3(header.spacing[0], header.spacing[1], header.spacing[2]);
   body.origin = Vec3(header.origin[0], header.origin[1], header.origin[2]);
-  std::vector<std::int32_t> labels((bytes.size() - sizeof(header)) / sizeof(std::int32_t));
-  std::memcpy(labels.data(), bytes.data() + sizeof(header), labels.size() * sizeof(std::int32_t));
+  if (labels.size() != body.voxels()) {
+    fail_on_answer();
+  }
+  check_geometry(body, where);
 
   std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
   body.inside.reserve(labels.size());
@@ -106,19 +137,28 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image) {
 VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                               std::vector<std::string>& notes) {
   const std::string where = image.file.string();
-  if (!std::filesystem::is_regular_file(image.file)) {
-    throw Error("there is no such image file", where, "check image = \"...\" in [geometry]");
-  }
+  check_regular_file(image.file, "Check image = \"...\" in [geometry].");
   // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
   const std::string path = std::filesystem::absolute(image.file).string();
-  const ChildResult read =
-      run_in_child("the image reader", where, read_time_limit, [&] { return read_labels(path); });
+  const ChildTask task = {.name = "the image reader",
+                          .where = where,
+                          .limits = reading_limits(check_inr_header(image.file)),
+                          .hint = complete_file};
+  const ChildResult read = run_in_child(task, [&] { return read_labels(path); });
   if (read.status != read_ok) {
     throw Error(
         read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
-        where, "use a complete INR file (.inr, .inr.gz) with one label a voxel and positive VX, VY, VZ");
+        where, complete_file);
   }
   VoxelBody body = crop(select(read.bytes, image), 2);
+  if (edge_length * voxels_per_edge < body.spacing.minCoeff()) {
+    throw Error(
+        fmt::format("edge_length is {} of the image's units, its voxels are {} x {} x {}", shown(edge_length),
+                    shown(body.spacing[0]), shown(body.spacing[1]), shown(body.spacing[2])),
+        where,
+        "an image says nothing about lengths below its voxels: use a larger edge_length in [mesh], or "
+        "check scale in [geometry]");
+  }
   keep_one_part(body, where, notes);
   if (const std::size_t filled = join_across_edges(body); filled != 0) {
     notes.push_back("filled " + std::to_string(filled) +

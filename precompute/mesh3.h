@@ -6,7 +6,6 @@
 #include <CGAL/odt_optimize_mesh_3.h>
 #include <CGAL/perturb_mesh_3.h>
 
-#include <chrono>
 #include <unordered_map>
 
 #include "meshes/mesh.h"
@@ -25,7 +24,6 @@ constexpr double hollow_facet_size_per_edge = 0.77;
 constexpr double radius_per_edge = 0.73;
 /// Of a global optimisation; most converge earlier.
 constexpr int most_iterations = 50;
-constexpr std::chrono::seconds time_limit{3600};
 
 /// Moves the nodes of a refined complex for better elements, as far as the options ask for it. CGAL's own
 /// limits on time would give another mesh every run: 0 is none.

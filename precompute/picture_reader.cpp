@@ -4,12 +4,14 @@
 #include <png.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
-#include <fstream>
-#include <iterator>
+#include <span>
 #include <string_view>
 
+#include "formats/child_process.h"
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 
 namespace palpate {
 namespace {
@@ -61,6 +63,31 @@ PixelBody read_png(const std::string& bytes, const std::string& where) {
   check(png_image_finish_read(&png.image, &black, grey.data(), upwards, nullptr));
   std::transform(grey.begin(), grey.end(), body.inside.begin(),
                  [](unsigned char value) { return static_cast<std::uint8_t>(value >= first_white); });
+  return body;
+}
+
+/// Reads a PNG in a child, as libpng is foreign code.
+PixelBody read_png_in_child(const std::string& bytes, const std::string& where) {
+  const ChildTask task = {.name = "libpng",
+                          .where = where,
+                          .limits = reading_limits(static_cast<std::int64_t>(bytes.size())),
+                          .hint = save_again};
+  const ChildResult result = run_in_child(task, [&] {
+    const PixelBody body = read_png(bytes, where);
+    ChildResult answer;
+    append_array(answer.bytes, std::span<const Index>(std::array{body.width, body.height}));
+    append_array(answer.bytes, std::span(body.inside));
+    return answer;
+  });
+  std::span<const std::byte> rest = result.bytes;
+  const std::vector<Index> size = take_array<Index>(rest);
+  if (size.size() != 2) {
+    fail_on_answer();
+  }
+  PixelBody body{size[0], size[1], take_array<std::uint8_t>(rest)};
+  if (body.inside.size() != static_cast<std::size_t>(body.width) * static_cast<std::size_t>(body.height)) {
+    fail_on_answer();
+  }
   return body;
 }
 
@@ -154,14 +181,9 @@ class PbmReader {
 
 PixelBody read_picture(const std::filesystem::path& file) {
   const std::string where = file.string();
-  std::ifstream stream(file, std::ios::binary);
-  if (!std::filesystem::is_regular_file(file) || !stream) {
-    throw Error("there is no such picture, or it may not be read", where,
-                "check picture = \"...\" in [geometry]");
-  }
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  const std::string bytes = read_all(file, "Check picture = \"...\" in [geometry].");
   if (bytes.starts_with(png_signature)) {
-    return read_png(bytes, where);
+    return read_png_in_child(bytes, where);
   }
   if (bytes.starts_with("P1")) {
     return PbmReader(bytes, where).plain();

@@ -20,8 +20,8 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "formats/child_process.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 #include "precompute/polygon_check.h"
 
 namespace palpate {
@@ -55,8 +55,9 @@ using VertexHandle = Triangulation::Vertex_handle;
 using FaceHandle = Triangulation::Face_handle;
 using Line = std::vector<Point>;  // closed
 
-constexpr std::chrono::seconds time_limit{3600};
 constexpr std::size_t max_nodes = 2'000'000;
+constexpr double time_per_node = 1e-3;    // [s] 25 times what is measured, smoothing included
+constexpr double memory_per_node = 4e3;   // [byte]
 constexpr double wanted_angle = 20.0;     // [degree] refinement ends for bounds up to 20.7 (Shewchuk)
 constexpr double radius_per_edge = 0.73;  // measured: the mean edge is then the one asked for
 constexpr int lloyd_iterations = 20;      // with many more, graded meshes drift away from their sizes
@@ -313,6 +314,20 @@ ChildResult make_mesh(const std::vector<Line>& lines, const MeshOptions& options
   }
 }
 
+/// Limits for as many nodes as the lines and the area inside them ask for; refinement stops at max_nodes.
+ChildLimits refinement_limits(const std::vector<Line>& lines, double edge_length) {
+  double area = 0.0, given = 0.0;
+  for (const Line& line : lines) {
+    area += CGAL::polygon_area_2(line.begin(), line.end(), Kernel());
+    given += static_cast<double>(line.size());
+  }
+  const double per_area = 2.0 / std::sqrt(3.0);  // nodes of regular triangles of edge 1
+  const double nodes =
+      std::min(10.0 * given + per_area * area / (edge_length * edge_length), static_cast<double>(max_nodes));
+  return child_limits(std::chrono::seconds(5 + static_cast<int>(nodes * time_per_node)),
+                      (512LL << 20) + static_cast<std::int64_t>(nodes * memory_per_node));
+}
+
 }  // namespace
 
 Mesh mesh_polygon(const PolygonGeometry& polygon, const MeshOptions& options, const std::string& where,
@@ -325,8 +340,11 @@ Mesh mesh_polygon(const PolygonGeometry& polygon, const MeshOptions& options, co
   std::vector<Line> lines = lines_around(polygon);
   note_sharp_corners(lines, notes);
   lines = divided(lines, *options.edge_length, where);
-  const ChildResult result =
-      run_in_child("CGAL's mesher", where, time_limit, [&] { return make_mesh(lines, options); });
+  const ChildTask task = {.name = "CGAL's mesher",
+                          .where = where,
+                          .limits = refinement_limits(lines, *options.edge_length),
+                          .hint = "use a larger edge_length in [mesh], or simplify the polygon"};
+  const ChildResult result = run_in_child(task, [&] { return make_mesh(lines, options); });
   if (result.status == too_many_nodes) {
     throw_too_many(where);
   }

@@ -16,8 +16,11 @@
 #include <CGAL/Polygon_mesh_processing/shape_predicates.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
 #include <CGAL/Surface_mesh.h>
+#include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -25,7 +28,9 @@
 #include <set>
 #include <sstream>
 
+#include "formats/child_process.h"
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 
 namespace palpate {
 namespace {
@@ -39,6 +44,10 @@ using Polygon = std::vector<std::size_t>;
 
 constexpr double sharp_edge_degrees = 60.0;
 constexpr int remesh_iterations = 5;
+constexpr double largest_coordinate = 1e30;
+constexpr double remesh_time = 1e-3;    // [s] for a triangle: 20 times what is measured
+constexpr double remesh_memory = 4e3;   // [byte] for a triangle: 4 times what is measured
+constexpr double most_triangles = 2e7;  // after remeshing; a body's boundary has some 1e5 at most
 
 /// Polygons that share points by number, as a file gives them.
 struct Soup {
@@ -53,10 +62,29 @@ std::string shown(const Point& p) {
   return text.str();
 }
 
-Soup read_soup(const std::filesystem::path& file) {
-  if (!std::filesystem::is_regular_file(file)) {
-    throw Error("there is no such surface file", file.string(), "check surface = \"...\" in [geometry]");
+/// What CGAL's readers leave to others.
+void check_soup(const Soup& soup, const std::string& where) {
+  for (const Point& p : soup.points) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(std::abs(p[axis]) <= largest_coordinate)) {
+        throw Error("a coordinate is not a finite number or beyond all measure: " + shown(p), where,
+                    "export the surface again");
+      }
+    }
   }
+  for (std::size_t i = 0; i < soup.polygons.size(); ++i) {
+    for (const std::size_t corner : soup.polygons[i]) {
+      if (corner >= soup.points.size()) {
+        throw Error("polygon " + std::to_string(i + 1) + " of " + std::to_string(soup.polygons.size()) +
+                        " has a corner that is none of the file's " + std::to_string(soup.points.size()) +
+                        " points",
+                    where, "the file is damaged: export the surface again");
+      }
+    }
+  }
+}
+
+Soup read_soup(const std::filesystem::path& file, const std::string& where) {
   Soup soup;
   bool read = false;
   try {
@@ -66,14 +94,10 @@ Soup read_soup(const std::filesystem::path& file) {
     read = false;
   }
   if (!read || soup.polygons.empty()) {
-    throw Error("cannot read a surface from this file", file.string(),
+    throw Error("cannot read a surface from this file", where,
                 "it must be a complete .off, .obj, .stl or .ply with triangles or polygons");
   }
-  for (const Point& p : soup.points) {
-    if (!CGAL::is_finite(p.x()) || !CGAL::is_finite(p.y()) || !CGAL::is_finite(p.z())) {
-      throw Error("a coordinate is not a finite number", file.string(), "export the surface again");
-    }
-  }
+  check_soup(soup, where);
   return soup;
 }
 
@@ -208,16 +232,28 @@ void orient_outwards(SurfaceMesh& mesh, std::vector<std::string>& notes) {
 }
 
 using FacePair = std::pair<Face, Face>;
+using Corners = std::array<Vec3, 3>;
 
-std::filesystem::path write_bad_faces(const SurfaceMesh& mesh, const std::vector<FacePair>& pairs,
-                                      const std::string& stem) {
+std::vector<Corners> corners_of(const SurfaceMesh& mesh, const std::vector<FacePair>& pairs) {
   std::vector<Face> faces;
   for (const auto& [a, b] : pairs) {
     faces.insert(faces.end(), {a, b});
   }
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  std::vector<Corners> result;
+  for (const Face face : faces) {
+    Corners& corners = result.emplace_back();
+    std::size_t i = 0;
+    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
+      const Point& p = mesh.point(vertex);
+      corners.at(i++) = Vec3(p.x(), p.y(), p.z());
+    }
+  }
+  return result;
+}
 
+std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const std::string& stem) {
   std::filesystem::path file = stem + ".bad-faces.off";
   const std::filesystem::path partial = file.string() + ".partial";
   {
@@ -225,9 +261,8 @@ std::filesystem::path write_bad_faces(const SurfaceMesh& mesh, const std::vector
     out.imbue(std::locale::classic());
     out.precision(17);
     out << "OFF\n" << 3 * faces.size() << " " << faces.size() << " 0\n";
-    for (const Face face : faces) {
-      for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
-        const Point& p = mesh.point(vertex);
+    for (const Corners& corners : faces) {
+      for (const Vec3& p : corners) {
         out << p.x() << " " << p.y() << " " << p.z() << "\n";
       }
     }
@@ -248,22 +283,22 @@ Point center(const SurfaceMesh& mesh, Face face) {
                         mesh.point(mesh.target(mesh.next(h))));
 }
 
-void check_self_intersections(const SurfaceMesh& mesh, const std::filesystem::path& file,
-                              const std::string& after) {
+/// Where and how often a surface goes through itself.
+struct SelfIntersections {
+  std::string problem;  // empty: nowhere
+  std::vector<Corners> triangles;
+};
+
+SelfIntersections find_self_intersections(const SurfaceMesh& mesh) {
   std::vector<FacePair> pairs;
   PMP::self_intersections(mesh, std::back_inserter(pairs));
   if (pairs.empty()) {
-    return;
+    return {};
   }
   std::sort(pairs.begin(), pairs.end());
-  const std::filesystem::path bad_faces = write_bad_faces(mesh, pairs, file.stem().string());
-  throw Error("the surface intersects itself" + after + ": " + std::to_string(pairs.size()) +
-                  " pair(s) of triangles, the first near " + shown(center(mesh, pairs.front().first)) +
-                  " (file units)",
-              file.string(),
-              bad_faces.empty()
-                  ? "repair it in a mesh editor"
-                  : "repair it in a mesh editor; the triangles were written to " + bad_faces.string());
+  return {"intersects itself: " + std::to_string(pairs.size()) + " pair(s) of triangles, the first near " +
+              shown(center(mesh, pairs.front().first)) + " (file units)",
+          corners_of(mesh, pairs)};
 }
 
 void remesh(SurfaceMesh& mesh, double edge_length) {
@@ -294,25 +329,150 @@ TriangleSurface export_surface(const SurfaceMesh& mesh) {
   return surface;
 }
 
-}  // namespace
+/// What a child sends.
+struct Answer {
+  TriangleSurface surface;
+  std::vector<std::string> notes;
+  SelfIntersections crossings;
+};
 
-TriangleSurface read_surface(const std::filesystem::path& file, std::optional<double> remesh_edge_length,
-                             std::vector<std::string>& notes) {
-  const std::string where = file.string();
-  Soup soup = read_soup(file);
+void append_text(Bytes& bytes, const std::string& text) {
+  append_array(bytes, std::span<const char>(text));
+}
+
+std::string take_text(std::span<const std::byte>& bytes) {
+  const std::vector<char> text = take_array<char>(bytes);
+  return {text.begin(), text.end()};
+}
+
+Bytes pack(const Answer& answer) {
+  Bytes bytes;
+  append_array(bytes, std::span(answer.surface.nodes));
+  append_array(bytes, std::span(answer.surface.triangles));
+  append_text(bytes, answer.crossings.problem);
+  append_array(bytes, std::span(answer.crossings.triangles));
+  for (const std::string& note : answer.notes) {
+    append_text(bytes, note);
+  }
+  return bytes;
+}
+
+Answer unpack(std::span<const std::byte> bytes) {
+  Answer answer;
+  answer.surface.nodes = take_array<Vec3>(bytes);
+  answer.surface.triangles = take_array<Triangle>(bytes);
+  answer.crossings.problem = take_text(bytes);
+  answer.crossings.triangles = take_array<Corners>(bytes);
+  while (!bytes.empty()) {
+    answer.notes.push_back(take_text(bytes));
+  }
+  return answer;
+}
+
+/// The surface of a file, whole and turned outwards; it may still intersect itself.
+SurfaceMesh read_mesh(const std::filesystem::path& file, const std::string& where,
+                      std::vector<std::string>& notes) {
+  Soup soup = read_soup(file, where);
   weld(soup);
   check_edges(soup, where);
   SurfaceMesh mesh = connect(soup, where, notes);
   check_triangles(mesh, where);
   check_one_part(mesh, where);
   orient_outwards(mesh, notes);
-  check_self_intersections(mesh, file, "");
-  if (remesh_edge_length) {
-    remesh(mesh, *remesh_edge_length);
-    check_triangles(mesh, where);
-    check_self_intersections(mesh, file, " after remeshing");
+  return mesh;
+}
+
+Answer read_in_child(const std::filesystem::path& file, const ChildLimits& limits, const char* hint,
+                     const std::function<void(SurfaceMesh&, Answer&)>& finish) {
+  const std::string where = file.string();
+  const std::filesystem::path path = std::filesystem::absolute(file);  // the child is elsewhere
+  const ChildResult result =
+      run_in_child({.name = "CGAL", .where = where, .limits = limits, .hint = hint}, [&] {
+        Answer answer;
+        try {
+          SurfaceMesh mesh = read_mesh(path, where, answer.notes);
+          finish(mesh, answer);
+        } catch (const CGAL::Failure_exception&) {
+          throw Error("CGAL cannot make a surface of what is in the file", where, hint);
+        }
+        return ChildResult{0, pack(answer)};
+      });
+  return unpack(result.bytes);
+}
+
+std::int64_t size_of(const std::filesystem::path& file) {
+  check_regular_file(file, "Check surface = \"...\" in [geometry].");
+  return static_cast<std::int64_t>(std::filesystem::file_size(file));
+}
+
+}  // namespace
+
+TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes) {
+  Answer answer = read_in_child(file, reading_limits(size_of(file)),
+                                "repair the surface in a mesh editor, or export it again",
+                                [](SurfaceMesh& mesh, Answer& into) {
+                                  into.crossings = find_self_intersections(mesh);
+                                  into.surface = export_surface(mesh);
+                                });
+  if (!answer.crossings.problem.empty()) {
+    const std::filesystem::path bad_faces = write_bad_faces(answer.crossings.triangles, file.stem().string());
+    throw Error("the surface " + answer.crossings.problem, file.string(),
+                bad_faces.empty()
+                    ? "repair it in a mesh editor"
+                    : "repair it in a mesh editor; the triangles were written to " + bad_faces.string());
   }
-  return export_surface(mesh);
+  notes.insert(notes.end(), answer.notes.begin(), answer.notes.end());
+  return std::move(answer.surface);
+}
+
+Remeshing remesh_surface(const std::filesystem::path& file, const TriangleSurface& surface,
+                         double edge_length) {
+  const double triangles = area(surface) / (std::sqrt(0.1875) * edge_length * edge_length);
+  if (!(triangles <= most_triangles)) {
+    throw Error(fmt::format("remeshed to this edge_length the surface has some {:.2g} triangles", triangles),
+                file.string(), "use a larger edge_length in [mesh], or check scale in [geometry]");
+  }
+  ChildLimits limits = reading_limits(size_of(file));
+  limits = child_limits(limits.processor + std::chrono::seconds(static_cast<int>(triangles * remesh_time)),
+                        limits.memory + static_cast<std::int64_t>(triangles * remesh_memory));
+  Answer answer =
+      read_in_child(file, limits, R"(use another edge_length, or mesher = "cgal" without remesh in [mesh])",
+                    [&](SurfaceMesh& mesh, Answer& into) {
+                      remesh(mesh, edge_length);
+                      try {
+                        check_triangles(mesh, file.string());
+                      } catch (const Error& error) {
+                        into.crossings.problem = std::string("is degenerate: ") + error.what();
+                        return;
+                      }
+                      into.crossings = find_self_intersections(mesh);
+                      into.surface = export_surface(mesh);
+                    });
+  return {std::move(answer.surface), std::move(answer.crossings.problem)};
+}
+
+double area(const TriangleSurface& surface) {
+  double sum = 0.0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vec3& x = surface.nodes[static_cast<std::size_t>(a)];
+    sum += (surface.nodes[static_cast<std::size_t>(b)] - x)
+               .cross(surface.nodes[static_cast<std::size_t>(c)] - x)
+               .norm() /
+           2.0;
+  }
+  return sum;
+}
+
+double enclosed_volume(const TriangleSurface& surface) {
+  const Vec3 origin = surface.nodes.empty() ? Vec3(Vec3::Zero()) : surface.nodes.front();
+  double sum = 0.0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const auto from_origin = [&](Index i) -> Vec3 {
+      return surface.nodes[static_cast<std::size_t>(i)] - origin;
+    };
+    sum += from_origin(a).cross(from_origin(b)).dot(from_origin(c)) / 6.0;
+  }
+  return sum;
 }
 
 double mean_edge_length(const TriangleSurface& surface) {

@@ -18,13 +18,30 @@ struct TriangleSurface {
   std::vector<Triangle> triangles;
 };
 
-/// Reads OFF, OBJ, STL (ASCII and binary) or PLY by the file's extension, splits polygons into triangles,
-/// turns triangles outwards, and remeshes isotropically to `remesh_edge_length` (file units) if that is
-/// given, edges sharper than 60 degrees kept. Repairs are told in `notes`. Throws Error with the coordinates
-/// when the surface is open, not manifold, flat, in several parts, or intersects itself; the intersecting
-/// triangles are then written to NAME.bad-faces.off in the working directory.
-TriangleSurface read_surface(const std::filesystem::path& file, std::optional<double> remesh_edge_length,
-                             std::vector<std::string>& notes);
+/// Reads OFF, OBJ, STL (ASCII and binary) or PLY by the file's extension, splits polygons into triangles and
+/// turns triangles outwards. Repairs are told in `notes`. Throws Error with the coordinates when the surface
+/// is open, not manifold, flat, in several parts, or intersects itself; the intersecting triangles are then
+/// written to NAME.bad-faces.off in the working directory. File and surface are read by foreign code in a
+/// child process, which has the limits of reading_limits.
+TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes);
+
+/// A remeshed surface, or what is wrong with it.
+struct Remeshing {
+  TriangleSurface surface;
+  std::string problem;  ///< empty where the surface can be meshed; else the rest of "the surface ..."
+};
+
+/// Remeshes the surface of a file isotropically to `edge_length` (file units), edges sharper than 60 degrees
+/// kept, in a child process. `surface` is what read_surface made of the same file. Throws Error when
+/// there would be too many triangles, and as read_surface does.
+Remeshing remesh_surface(const std::filesystem::path& file, const TriangleSurface& surface,
+                         double edge_length);
+
+/// Area of the triangles.
+double area(const TriangleSurface& surface);
+
+/// Volume inside, positive where the triangles are turned outwards.
+double enclosed_volume(const TriangleSurface& surface);
 
 /// Mean length of the triangles' edges.
 double mean_edge_length(const TriangleSurface& surface);

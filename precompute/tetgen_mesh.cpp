@@ -8,9 +8,9 @@
 #include <cstddef>
 #include <set>
 
+#include "formats/child_process.h"
 #include "meshes/check.h"
 #include "meshes/error.h"
-#include "precompute/child_process.h"
 
 /// Takes the place of TetGen's own function of this name: that of 1.5.0 frees its memory, throws, and frees
 /// it again, so that every error becomes a crash.
@@ -21,8 +21,6 @@ void stop_tetgen(tetgenmesh* /*mesh*/, int code) {
 
 namespace palpate {
 namespace {
-
-constexpr std::chrono::seconds tetgen_time_limit{3600};
 
 /// What TetGen's callback looks at; it has no user argument. Set in the child only.
 const std::function<double(const Vec3&)>* target_edge = nullptr;
@@ -134,23 +132,29 @@ std::string meaning(int code) {
 }  // namespace
 
 Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, const std::string& where) {
-  return mesh_regions(surface, {}, options, where);
+  return mesh_regions(surface, {}, options, expected_size(surface, options), where);
 }
 
 Mesh mesh_regions(const TriangleSurface& walls, const std::vector<RegionPoint>& points,
-                  const MeshOptions& options, const std::string& where) {
+                  const MeshOptions& options, const MeshSize& size, const std::string& where) {
   const double surface_edge = options.edge_length.value_or(mean_edge_length(walls));
   const auto distance = distance_to(walls);
   const std::function<double(const Vec3&)> edge_at = [&](const Vec3& x) {
     return options.grading == 0.0 ? surface_edge : surface_edge + options.grading * distance(x);
   };
-  const ChildResult result = run_in_child("TetGen", where, tetgen_time_limit,
-                                          [&] { return tetrahedralise(walls, points, options, edge_at); });
+  const ChildTask task = {
+      .name = "TetGen",
+      .where = where,
+      .limits = meshing_limits(size, options, where),
+      .hint =
+          "use a larger edge_length, relax radius_edge and min_dihedral, or set mesher = \"cgal\" in [mesh]"};
+  const ChildResult result =
+      run_in_child(task, [&] { return tetrahedralise(walls, points, options, edge_at); });
   if (result.status != 0) {
-    throw Error("TetGen stopped with code " + std::to_string(result.status) + ": " + meaning(result.status),
-                where,
-                "repair or remesh the surface (edge_length and remesh = true in [mesh]); of an image, change "
-                "edge_length");
+    throw Error(
+        "TetGen stopped with code " + std::to_string(result.status) + ": " + meaning(result.status), where,
+        "repair or remesh the surface (edge_length and remesh = true in [mesh]), or set mesher = \"cgal\"; "
+        "of an image, change edge_length");
   }
   Mesh mesh = unpack_mesh(result.bytes);
   if (mesh.connectivity.empty()) {

@@ -7,6 +7,7 @@
 #include "meshes/mesh.h"
 #include "precompute/description.h"
 #include "precompute/mesh_parts.h"
+#include "precompute/mesh_size.h"
 #include "precompute/surface_input.h"
 
 namespace palpate {
@@ -18,8 +19,8 @@ namespace palpate {
 Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, const std::string& where);
 
 /// The same for walls that enclose several parts, which may share walls: the elements of a part get the
-/// region of the point in it; a part without a point is left empty.
+/// region of the point in it; a part without a point is left empty. `size` is what is expected of the mesh.
 Mesh mesh_regions(const TriangleSurface& walls, const std::vector<RegionPoint>& points,
-                  const MeshOptions& options, const std::string& where);
+                  const MeshOptions& options, const MeshSize& size, const std::string& where);
 
 }  // namespace palpate

@@ -31,10 +31,11 @@ Section::Section(const toml::table& table, std::string title, const std::string&
   for (const auto& [key, value] : table_) {
     if (std::find(known.begin(), known.end(), key.str()) == known.end()) {
       const toml::source_position at = key.source().begin;
-      throw Error("unknown key \"" + std::string(key.str()) + "\"" + (title_.empty() ? "" : " in " + title_),
-                  file_ + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
-                  "the nearest known key is \"" + std::string(nearest(key.str(), known)) + "\" of " +
-                      comma_list(known));
+      const std::string word = shortened(key.str());
+      throw Error(
+          "unknown key \"" + word + "\"" + (title_.empty() ? "" : " in " + title_),
+          file_ + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
+          "the nearest known key is \"" + std::string(nearest(word, known)) + "\" of " + comma_list(known));
     }
   }
 }
@@ -121,7 +122,7 @@ std::string Section::text(std::string_view key) const {
 std::string Section::choice(std::string_view key, const Keys& choices) const {
   std::string value = text(key);
   if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
-    fail(key, name_of(key) + " is \"" + value + "\"", "use " + quoted_choice(choices));
+    fail(key, name_of(key) + " is \"" + shortened(value) + "\"", "use " + quoted_choice(choices));
   }
   return value;
 }
@@ -134,10 +135,11 @@ std::vector<std::string> Section::choices(std::string_view key, const Keys& choi
       wrong_type(node, key, "[a list of texts]");
     }
     if (std::find(choices.begin(), choices.end(), *value) == choices.end()) {
-      throw Error(name_of(key) + " holds \"" + *value + "\"", place(node),
-                  choices.size() == 1 ? "it can hold " + quoted_choice(choices) + " only"
-                                      : "the nearest known is \"" + std::string(nearest(*value, choices)) +
-                                            "\" of " + comma_list(choices));
+      throw Error(name_of(key) + " holds \"" + shortened(*value) + "\"", place(node),
+                  choices.size() == 1
+                      ? "it can hold " + quoted_choice(choices) + " only"
+                      : "the nearest known is \"" + std::string(nearest(shortened(*value), choices)) +
+                            "\" of " + comma_list(choices));
     }
     result.push_back(*value);
   }

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "formats/model_file.h"
+#include "meshes/printable.h"
 #include "precompute/assembly.h"
 #include "precompute/dynamics.h"
 #include "precompute/factor.h"
@@ -227,9 +228,10 @@ std::string to_text(const VerifyReport& report) {
     text += fmt::format("{:15} {:6} largest relative error {:.2e}, bound {:.0e}\n", check.name,
                         check.passed() ? "ok" : "FAILED", check.error, check.bound);
   }
-  for (const std::string& sentence : report.warnings) text += "WARNING         " + sentence + "\n";
-  for (const std::string& sentence : report.differences) text += "DIFFERS         " + sentence + "\n";
-  for (const std::string& sentence : report.stale) text += "STALE           " + sentence + "\n";
+  for (const std::string& sentence : report.warnings) text += "WARNING         " + printable(sentence) + "\n";
+  for (const std::string& sentence : report.differences)
+    text += "DIFFERS         " + printable(sentence) + "\n";
+  for (const std::string& sentence : report.stale) text += "STALE           " + printable(sentence) + "\n";
   text += report.passed() ? "verified\n" : "NOT verified\n";
   return text;
 }

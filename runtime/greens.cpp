@@ -1,7 +1,5 @@
 #include "runtime/greens.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -21,7 +19,6 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t cache_line = 64;
-constexpr std::int64_t huge_page = std::int64_t{1} << 21;
 constexpr std::int64_t tile = 64;  // scalars: two tiles of doubles fit into the first-level cache
 constexpr std::int64_t u_chunk =
     2048;  // doubles of u that stay in the first-level cache while all rows pass by
@@ -32,20 +29,6 @@ constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is
 std::int64_t padded_row(std::int64_t order, std::int64_t scalar_bytes) {
   const std::int64_t lines = (order * scalar_bytes + cache_line - 1) / cache_line;
   return (lines | 1) * cache_line / scalar_bytes;
-}
-
-/// Zeroed memory on huge pages where the kernel gives them: the tick touches few bytes on each of many rows.
-/// Null when there is none.
-std::shared_ptr<void> map_memory(std::int64_t bytes) {
-  const auto size = static_cast<std::size_t>((bytes + 2 * huge_page - 1) / huge_page * huge_page);
-  void* base =
-      mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-  if (base == MAP_FAILED) return nullptr;
-  madvise(base, size, MADV_HUGEPAGE);
-  const auto address = reinterpret_cast<std::uintptr_t>(base);
-  const std::uintptr_t aligned = (address + huge_page - 1) / huge_page * huge_page;
-  const std::shared_ptr<void> mapping(base, [size](void* p) { munmap(p, size); });
-  return {mapping, static_cast<std::byte*>(base) + (aligned - address)};
 }
 
 /// Copies the columns [first, last) of the packed lower triangle, times `scale`, to both triangles of the

@@ -195,6 +195,7 @@ void print_report(const PlayedRun& run) {
   if (!run.options.record.empty())
     fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),
                run.dropped, run.dropped_frames);
+  if (run.recording_failure) print_warning("the recording failed: " + *run.recording_failure);
   if (run.overlays != nullptr) print_overlays(*run.overlays);
   if (run.motion != nullptr) {
     fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
@@ -210,7 +211,7 @@ std::string json_report(const PlayedRun& run) {
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, report.status_ticks[k]);
   }
-  std::string json = "{\n";
+  std::string json = "{\n  \"generator\": \"palpate-runtime " PALPATE_VERSION "\",\n";
   json += fmt::format("  \"file\": {},\n  \"model\": {},\n", json_string(run.options.file.string()),
                       json_string(run.body.model().name));
   json += fmt::format("  \"fast\": {},\n  \"interrupted\": {},\n  \"tool\": {},\n", run.options.fast,
@@ -238,7 +239,9 @@ std::string json_report(const PlayedRun& run) {
     json += fmt::format("  \"overlay\": {},\n", json_overlays(*run.overlays, run.settings.overlay.value()));
   json += fmt::format("  \"dynamics\": {},\n", json_dynamics(run.body, run.motion));
   if (!run.options.record.empty())
-    json += fmt::format("  \"recording\": {},\n", json_string(run.options.record.string()));
+    json += fmt::format("  \"recording\": {},\n  \"recording_failed\": {},\n",
+                        json_string(run.options.record.string()),
+                        run.recording_failure ? json_string(*run.recording_failure) : "null");
   json += fmt::format("  \"dropped_ticks\": {}\n}}\n", run.dropped);
   return json;
 }

@@ -1,6 +1,7 @@
 // What is told of a run when it is over.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "runtime/devices/device_link.h"
@@ -19,8 +20,9 @@ struct PlayedRun {
   const PatchSource* overlays = nullptr;
   const MotionSource* motion = nullptr;
   const DeviceLink* link = nullptr;
-  std::int64_t dropped = 0;         ///< ticks that the recording lacks
-  std::int64_t dropped_frames = 0;  ///< and frames
+  std::int64_t dropped = 0;                           ///< ticks that the recording lacks
+  std::int64_t dropped_frames = 0;                    ///< and frames
+  std::optional<std::string> recording_failure = {};  ///< why it is not whole
 };
 
 /// A few lines for a person, and warnings, on the error stream.

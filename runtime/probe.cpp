@@ -176,7 +176,15 @@ int probe(const ProbeOptions& options) {
     throw Error("is neither a .csv nor a .vtu file", options.field.string(),
                 "name the field by what it should be, e.g. out.vtu");
   }
+  OutputPaths paths(options.force);
+  paths.add_input(options.file, "the model");
+  if (!options.model_toml.empty()) paths.add_input(options.model_toml, "the model's description");
+  const std::filesystem::path field =
+      options.field.empty()
+          ? options.field
+          : paths.add(options.field, extension == ".csv" ? OutputKind::field : OutputKind::grid, "--field");
   const Body body = load_body(options.file, options.model_toml);
+  add_sources(paths, body.model(), options.file);
   std::vector<Answer> answers = read_questions(body, options);
   std::optional<Overlay> overlay;
   if (options.overlay) overlay.emplace(make_overlay(body, answers, *options.overlay));
@@ -186,7 +194,7 @@ int probe(const ProbeOptions& options) {
   if (!options.field.empty()) {
     std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
     contact.displace(body, u);
-    write_field(options.field, body, overlay ? &*overlay : nullptr, u);
+    write_field(field, body, overlay ? &*overlay : nullptr, u);
   }
   if (options.json) {
     print_json(answers, options);

@@ -8,7 +8,10 @@
 #include <string_view>
 
 #include "meshes/error.h"
+#include "meshes/printable.h"
+#include "meshes/write_file.h"
 #include "runtime/output.h"
+#include "runtime/session_check.h"
 #include "runtime/session_xdmf.h"
 
 namespace palpate {
@@ -52,10 +55,11 @@ enum class Ending { finished, merged, going_on };
 
 constexpr std::string_view ending_names[] = {"finished", "killed, now one file", "being recorded"};
 
-Ending finish(const std::filesystem::path& path, const Recording& recording) {
+Ending finish(const std::filesystem::path& path, const Recording& recording, bool force) {
   if (recording.finished) return Ending::finished;
+  OutputPaths(force).add(xdmf_path(path), OutputKind::frames, "session");
   if (!finish_recording(path)) return Ending::going_on;
-  write_xdmf(path);
+  write_xdmf(path, recording.frames);
   return Ending::merged;
 }
 
@@ -64,10 +68,11 @@ void print_text(const std::filesystem::path& path, const Recording& recording, c
   const auto microseconds = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
   const SessionInfo& info = recording.info;
   const std::size_t frames = recording.frames.time.size();
-  fmt::print("{}: {}, by {}\n", path.string(), ending_names[static_cast<int>(ending)], recording.generator);
-  fmt::print("model            {} ({})\n", info.model_path, info.content_hash);
-  fmt::print("device           {}\n", info.device.empty() ? "unknown" : info.device);
-  fmt::print("options          {}\n", in_one_line(info.options));
+  fmt::print("{}: {}, by {}\n", printable(path.string()), ending_names[static_cast<int>(ending)],
+             printable(recording.generator));
+  fmt::print("model            {} ({})\n", printable(info.model_path), printable(info.content_hash));
+  fmt::print("device           {}\n", info.device.empty() ? "unknown" : printable(info.device));
+  fmt::print("options          {}\n", printable(in_one_line(info.options)));
   fmt::print("ticks            {} at {} a second: {:.3f} s, {} missing\n", s.ticks, info.rate, s.seconds,
              s.missing);
   fmt::print("in contact       {} ticks, {:.3f} s\n", s.in_contact,
@@ -147,9 +152,10 @@ SessionSummary summarise(const Recording& recording) {
   return summary;
 }
 
-int session(const std::filesystem::path& path, bool json) {
-  const Recording recording = read_recording(path);
-  const Ending ending = finish(path, recording);
+int session(const std::filesystem::path& file, bool json, bool force) {
+  const std::filesystem::path path = link_target(file);
+  const Recording recording = read_session(path);
+  const Ending ending = finish(path, recording, force);
   const SessionSummary summary = summarise(recording);
   if (json) {
     print_json(path, recording, summary, ending);

@@ -37,7 +37,7 @@ struct SessionSummary {
 SessionSummary summarise(const Recording& recording);
 
 /// Prints what is in a recording, on the standard output; one that was killed is made one file first, with
-/// its description for ParaView. Returns the exit code; throws Error.
-int session(const std::filesystem::path& recording, bool json);
+/// its description for ParaView, over another file only by `force`. Returns the exit code; throws Error.
+int session(const std::filesystem::path& recording, bool json, bool force);
 
 }  // namespace palpate

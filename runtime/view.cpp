@@ -7,8 +7,10 @@
 #include <mutex>
 #include <vector>
 
+#include "formats/output_paths.h"
+#include "formats/recording_parts.h"
 #include "meshes/error.h"
-#include "runtime/output.h"
+#include "meshes/write_file.h"
 #include "runtime/viewer/page.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
@@ -101,6 +103,10 @@ int view(const std::filesystem::path& recording, const ViewerOptions& options) {
 }
 
 int export_html(const ExportOptions& options) {
+  OutputPaths paths(options.force);
+  paths.add_input(options.recording, "the recording");
+  paths.add_input(parts_folder(options.recording), "the recording's parts");
+  const std::filesystem::path html = paths.add(options.html, OutputKind::page, "--html");
   const SessionPictures pictures(options.recording);
   const std::vector<std::int64_t> chosen = choose(pictures, options);
   std::vector<double> times;
@@ -118,7 +124,7 @@ int export_html(const ExportOptions& options) {
   for (const std::int64_t frame : chosen)
     archive.add_binary(encode_frame(pictures.picture(frame), scene, nullptr));
   const std::string page = archive.page(viewer_page());
-  write_text_file(options.html, page);
+  write_file(html, page);
   fmt::print(stderr, "{}: {} pictures, {:.1f} s, {:.1f} MB\n", options.html.string(), chosen.size(),
              times.back() - times.front(), 1e-6 * static_cast<double>(page.size()));
   return exit_ok;

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <poll.h>
+#include <pthread.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 #include <umockdev.h>
@@ -188,6 +189,9 @@ class EmulatedDevice {
   }
 
   void run() {
+    // A device does not wait for a processor of this machine: where the system allows it, this one neither.
+    const sched_param priority{.sched_priority = 70};
+    static_cast<void>(pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority));
     while (!stop_) {
       if (talks_) {
         while (const auto report = firmware_->input()) {

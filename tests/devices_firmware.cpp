@@ -71,6 +71,11 @@ std::vector<Bytes> Firmware::outputs() const {
   return outputs_;
 }
 
+std::size_t Firmware::output_count() const {
+  const std::lock_guard lock(mutex_);
+  return outputs_.size();
+}
+
 double Firmware::time() const {
   const std::lock_guard lock(mutex_);
   return now();

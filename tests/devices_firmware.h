@@ -57,6 +57,7 @@ class Firmware {
   /// All that it has shown, and all that it was told.
   [[nodiscard]] std::vector<ShownForce> forces() const;
   [[nodiscard]] std::vector<Bytes> outputs() const;
+  [[nodiscard]] std::size_t output_count() const;
   [[nodiscard]] double time() const;  ///< [s]
 
  protected:

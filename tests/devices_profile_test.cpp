@@ -154,6 +154,17 @@ TEST(DeviceProfile, RefusesWhatMakesNoSense) {
   EXPECT_THROW(static_cast<void>(read_device_profile(folder)), Error);
 }
 
+TEST(DeviceProfile, RefusesWhatWouldOverflowTheParser) {
+  const std::string name = "name = \"A\"";
+  std::string deep;
+  for (int i = 0; i < 100'000; ++i) {
+    deep += "a.";
+  }
+  EXPECT_NE(told(name, deep + "a = 1").find("more than 16 parts"), std::string::npos);
+  EXPECT_NE(told(name, "a = " + std::string(100'000, '[')).find("more than 32 deep"), std::string::npos);
+  EXPECT_LT(told(name, std::string(70'000, 'a') + " = 1").size(), 500U);
+}
+
 TEST(DeviceProfile, RefusesArmsThatCannotBe) {
   std::string arm;
   {

@@ -7,6 +7,7 @@
 
 #include "meshes/error.h"
 #include "runtime/motion_source.h"
+#include "runtime/node_vectors.h"
 #include "runtime/patch_maker.h"
 #include "tests/dynamics_sample.h"
 #include "tests/runtime_tool.h"
@@ -239,6 +240,49 @@ TEST_P(Release, AddsToWhatMoves) {
   }
   EXPECT_GT(size, 0.0);
   EXPECT_LT(largest, 1e-8 * size);
+}
+
+// Where the surface is in the tick of a release is what the body's displacement says, also while it still
+// moves from the last time: the nodes that the tick has asked for by then have moved.
+TEST_P(Release, MovesTheSurfaceThatTheTickHasAskedFor) {
+  Loop loop(model(), tool_);
+  const Body& body = loop.body;
+  FreeMotion& motion = loop.state.motion;
+  SurfaceLoad none(d_, 0, 8, 0), load(d_, 0, 8, 0);
+  const std::vector<double> f = {1e-3, -2e-3, 0.5e-3};
+  load.add(3, f.data());
+  std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
+  for (int touch = 0; touch < 3; ++touch) {
+    const auto tick = [&](const SurfaceLoad& with) {
+      if (loop.source) loop.source->receive(loop.state);
+      motion.begin_tick(body);
+      motion.end_tick(body, with);
+      if (loop.source) loop.source->post(loop.state);
+    };
+    for (int k = 0; k < 20; ++k) tick(load);
+    if (loop.source) loop.source->receive(loop.state);
+    motion.begin_tick(body);
+    const Index nodes = static_cast<Index>(body.surface_rest_positions().size());
+    std::vector<Vec3> before;
+    for (Index node = 0; node < nodes; ++node) before.push_back(motion.at(body, node));
+    body.greens().displacement(load.nodes(), load.forces(), u);
+    const std::vector<double> gone = u;
+    motion.let_go(body, none, u);
+    double moved = 0.0;
+    for (Index node = 0; node < nodes; ++node) {
+      const SurfaceParts parts = body.surface_parts(node);
+      Vec3 expected = Vec3::Zero();
+      for (std::size_t k = 0; k < parts.stored.size(); ++k)
+        expected += parts.weights[k] * vector_at(gone, d_, parts.stored[k]);
+      moved = std::max(moved, expected.norm());
+      const Vec3 change = motion.at(body, node) - before[static_cast<std::size_t>(node)];
+      EXPECT_LT((change - expected).norm(), 1e-12) << "touch " << touch << ", surface node " << node;
+    }
+    EXPECT_GT(moved, 1e-3);
+    motion.end_tick(body, none);
+    if (loop.source) loop.source->post(loop.state);
+    for (int k = 0; k < 30; ++k) tick(none);
+  }
 }
 
 // However far it was taken, and though another tool goes on touching the body.

@@ -35,6 +35,18 @@ TEST(Description, ReadsDefaults) {
   EXPECT_EQ(d.analysis, Analysis::solid);
   EXPECT_EQ(d.thickness, 1.0);
   EXPECT_FALSE(d.mesh.element);
+  EXPECT_EQ(d.mesh.mesher, Mesher::tetgen);
+  EXPECT_FALSE(d.mesh.edge_length);
+  EXPECT_FALSE(d.mesh.remesh);
+  EXPECT_EQ(d.mesh.grading, 0.5);
+  EXPECT_EQ(d.mesh.radius_edge, 2.0);
+  EXPECT_EQ(d.mesh.min_dihedral, 10.0);
+  EXPECT_EQ(d.mesh.facet_distance, 0.0);
+  EXPECT_EQ(d.mesh.feature_angle, 60.0);
+  EXPECT_FALSE(d.mesh.odt);
+  EXPECT_FALSE(d.mesh.lloyd);
+  EXPECT_TRUE(d.mesh.perturb);
+  EXPECT_TRUE(d.mesh.exude);
   ASSERT_EQ(d.materials.size(), 1U);
   EXPECT_EQ(d.materials[0].material.youngs_modulus, 1e4);
   EXPECT_EQ(d.materials[0].material.density, 1000.0);
@@ -773,8 +785,25 @@ INSTANTIATE_TEST_SUITE_P(Cases, BadDescription, ::testing::ValuesIn(bad_cases),
 TEST(Description, MissingFile) {
   const TempFolder folder;
   expect_mentions(error_of([&] { read_description(folder.path() / "none.toml"); }),
-                  {"none.toml", "cannot read"});
-  expect_mentions(error_of([&] { read_description(folder.path()); }), {"cannot read"});
+                  {"none.toml", "No such file", "path of a model.toml"});
+  expect_mentions(error_of([&] { read_description(folder.path()); }), {"is a folder"});
+}
+
+TEST(Description, LongTextsAreQuotedInShort) {
+  const TempFolder folder;
+  const std::string huge(70'000, 'x');
+  for (const std::string& text :
+       {"name = \"a\"\n" + huge + " = 1\n" + box + material + fixed,
+        "name = \"" + huge + "/\"\n" + box + material + fixed,
+        "name = \"a\"\n" + box + "[mesh]\nelement = \"" + huge + "\"\n" + material + fixed,
+        "name = \"a\"\n[geometry]\nsurface = \"" + huge + "\"\n" + material + fixed,
+        "name = \"a\"\n[geometry]\nsurface = \"a\\u0000.off\"\n" + material + fixed,
+        "name = \"a\"\n" + box + material + fixed + "axes = \"" + huge + "\"\n",
+        "name = \"a\"\n" + box + material + fixed + "[storage]\nscope = \"" + huge + "\"\n"}) {
+    const std::string error = error_of([&] { read(folder, text); });
+    expect_mentions(error, {"model.toml"});
+    EXPECT_LT(error.size(), 600U) << error;
+  }
 }
 
 }  // namespace

@@ -312,7 +312,7 @@ TEST_F(ImageMesh, UnreadableFiles) {
   const auto error = [&](const std::string& name) {
     return error_of([&] { mesh_image({folder_.path() / name, {}, false}, edges(5.0), notes_); });
   };
-  expect_mentions(error("none.inr"), {"none.inr", "no such image"});
+  expect_mentions(error("none.inr"), {"none.inr", "No such file", "image ="});
   const std::string whole = ball_image().inr();
   std::string several = whole;
   several.replace(several.find("VDIM=1"), 6, "VDIM=2");

@@ -252,8 +252,9 @@ TEST_F(Picture, BadBodies) {
 TEST_F(Picture, UnreadableFiles) {
   const Bytes good = drawing(40, 30, [](double x, double y) { return x + y < 35; });
   const auto error = [&](const Bytes& file) { return error_of([&] { read(file); }); };
-  expect_mentions(error_of([&] { read_picture(folder_.path() / "none.png"); }), {"none.png", "no such"});
-  expect_mentions(error_of([&] { read_picture(folder_.path()); }), {"no such picture"});
+  expect_mentions(error_of([&] { read_picture(folder_.path() / "none.png"); }),
+                  {"none.png", "No such file", "picture ="});
+  expect_mentions(error_of([&] { read_picture(folder_.path()); }), {"is a folder"});
   for (const Bytes& file : {Bytes(), Bytes("hello"), Bytes("P5 1 1 255\n\xff"), Bytes("\xff\xd8\xff\xe0")}) {
     expect_mentions(error(file), {"read", "neither a PNG nor a PBM"});
   }

@@ -82,8 +82,8 @@ std::string binary_stl(const TriangleSurface& s) {
 
 class SurfaceInput : public ::testing::Test {
  protected:
-  TriangleSurface read(const std::string& name, const std::string& text, std::optional<double> edge = {}) {
-    return read_surface(folder_.write(name, text), edge, notes_);
+  TriangleSurface read(const std::string& name, const std::string& text) {
+    return read_surface(folder_.write(name, text), notes_);
   }
 
   /// What a person is told about a bad surface.
@@ -192,8 +192,8 @@ TEST_F(SurfaceInput, SelfIntersection) {
 }
 
 TEST_F(SurfaceInput, UnreadableFiles) {
-  expect_mentions(error_of([&] { read_surface(folder_.path() / "none.off", {}, notes_); }),
-                  {"none.off", "no such"});
+  expect_mentions(error_of([&] { read_surface(folder_.path() / "none.off", notes_); }),
+                  {"none.off", "No such file", "surface ="});
   for (const std::string name : {"a.off", "a.obj", "a.stl", "a.ply", "a.xyz"}) {
     expect_mentions(error_of([&] { read(name, "this is no surface\n"); }), {name, "cannot read a surface"});
     expect_mentions(error_of([&] { read(name, ""); }), {name, "cannot read a surface"});
@@ -202,7 +202,10 @@ TEST_F(SurfaceInput, UnreadableFiles) {
 }
 
 TEST_F(SurfaceInput, RemeshesAndKeepsSharpEdges) {
-  const TriangleSurface result = read("cube.off", off(cube()), 0.2);
+  const TriangleSurface given = read("cube.off", off(cube()));
+  const Remeshing remeshing = remesh_surface(folder_.path() / "cube.off", given, 0.2);
+  ASSERT_EQ(remeshing.problem, "");
+  const TriangleSurface& result = remeshing.surface;
   EXPECT_NEAR(mean_edge_length(result), 0.2, 0.04);
   EXPECT_NEAR(volume(result), 1.0, 1e-9);  // no edge was rounded
 }

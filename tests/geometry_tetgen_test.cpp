@@ -1,121 +1,19 @@
-// TetGen in its child process.
+// TetGen in its child process, on whole and damaged surfaces.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-
-#include <cerrno>
-#include <csignal>
-#include <stdexcept>
 
 #include "meshes/check.h"
 #include "meshes/surface.h"
-#include "precompute/child_process.h"
 #include "precompute/tetgen_mesh.h"
 #include "tests/geometry_shapes.h"
 
 namespace palpate {
 namespace {
 
-using namespace std::chrono_literals;
 using testing::at;
 using testing::ball;
 using testing::error_of;
 using testing::expect_mentions;
 using testing::volume;
-
-std::string child_error(const std::function<ChildResult()>& work, std::chrono::seconds limit = 20s) {
-  std::string text = error_of([&] { run_in_child("TetGen", "organ.off", limit, work); });
-  EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1) << "a child was left";
-  EXPECT_EQ(errno, ECHILD);
-  return text;
-}
-
-TEST(ChildProcess, HandsBackALargeResult) {
-  Bytes bytes(3'000'001);
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    bytes[i] = static_cast<std::byte>(i * 2654435761U >> 13);
-  }
-  const ChildResult result = run_in_child("test", "here", 20s, [&] { return ChildResult{7, bytes}; });
-  EXPECT_EQ(result.status, 7);
-  EXPECT_EQ(result.bytes, bytes);
-}
-
-TEST(ChildProcess, CrashIsAnError) {
-  expect_mentions(child_error([]() -> ChildResult { std::abort(); }),
-                  {"organ.off: TetGen crashed (signal 6"});
-  expect_mentions(child_error([]() -> ChildResult {
-                    raise(SIGKILL);
-                    return {};
-                  }),
-                  {"TetGen crashed (signal 9", "memory"});
-}
-
-TEST(ChildProcess, ExitIsAnError) {
-  expect_mentions(child_error([]() -> ChildResult { _exit(0); }), {"TetGen gave up (exit status 0)"});
-  expect_mentions(child_error([]() -> ChildResult { _exit(3); }), {"exit status 3"});
-}
-
-TEST(ChildProcess, ExceptionIsAnError) {
-  expect_mentions(child_error([]() -> ChildResult { throw std::runtime_error("flat facet 12"); }),
-                  {"flat facet 12"});
-  expect_mentions(child_error([]() -> ChildResult { throw 3; }), {"TetGen failed"});
-}
-
-TEST(ChildProcess, EndlessWorkIsKilled) {
-  expect_mentions(child_error(
-                      []() -> ChildResult {
-                        for (;;) {
-                          pause();
-                        }
-                      },
-                      1s),
-                  {"did not finish within 1 s"});
-}
-
-TEST(ChildProcess, TerminatedChildIsAnInterruption) {
-  expect_mentions(child_error([]() -> ChildResult {
-                    raise(SIGINT);
-                    return {};
-                  }),
-                  {"interrupted"});
-}
-
-TEST(ChildProcess, ASignalToTheParentKillsTheChild) {
-  const pid_t parent = getpid();
-  struct sigaction handler {
-  }, before{};
-  handler.sa_handler = [](int) {};  // as a program that notes Ctrl-C and goes on
-  handler.sa_flags = SA_RESTART;
-  sigaction(SIGUSR1, &handler, &before);
-  const std::string text = child_error([parent]() -> ChildResult {
-    usleep(100'000);
-    kill(parent, SIGUSR1);
-    for (;;) {
-      pause();
-    }
-  });
-  sigaction(SIGUSR1, &before, nullptr);
-  expect_mentions(text, {"interrupted"});
-}
-
-TEST(ChildProcess, CannotLeaveFiles) {
-  const ChildResult result = run_in_child("test", "here", 20s, [] {
-    std::ofstream dump("dump-of-a-library");
-    return ChildResult{dump ? 1 : 0, {}};
-  });
-  EXPECT_EQ(result.status, 0);
-}
-
-TEST(ChildProcess, MeshSurvivesPacking) {
-  const Mesh mesh{ElementType::tet4, {{1, 2, 3}, {4, 5, 6}},      {0, 1, 0, 1, 1, 0, 1, 0},
-                  {7, -2},           {0, 1, 1, 1, 0, 0, 0, 0, 1}, {3, 4, 5}};
-  const Mesh back = unpack_mesh(pack(mesh));
-  EXPECT_EQ(back.element, mesh.element);
-  EXPECT_EQ(back.nodes, mesh.nodes);
-  EXPECT_EQ(back.connectivity, mesh.connectivity);
-  EXPECT_EQ(back.regions, mesh.regions);
-  EXPECT_EQ(back.tagged_facets, mesh.tagged_facets);
-  EXPECT_EQ(back.facet_tags, mesh.facet_tags);
-}
 
 /// Mean length of the elements' edges whose middle is at most (inside) or at least (otherwise) `radius` from
 /// the origin.
@@ -176,7 +74,7 @@ TEST(TetGen, EdgeLengthIsTheTargetInside) {
 TEST(TetGen, PartsTakeTheRegionsOfTheirPoints) {
   TriangleSurface walls = testing::joined(testing::fine_cube(1, 4.0), testing::cube(), {1.5, 1.5, 1.5});
   const std::vector<RegionPoint> points = {{{0.5, 0.5, 0.5}, 127}, {{2, 2, 2}, -3}};
-  const Mesh both = mesh_regions(walls, points, {}, "boxes");
+  const Mesh both = mesh_regions(walls, points, {}, expected_size(walls, {}), "boxes");
   double inner = 0.0;
   for (Index e = 0; e < both.elements(); ++e) {
     ASSERT_TRUE(both.regions[at(e)] == 127 || both.regions[at(e)] == -3);
@@ -185,7 +83,8 @@ TEST(TetGen, PartsTakeTheRegionsOfTheirPoints) {
   EXPECT_NEAR(inner, 1.0, 1e-12);
   EXPECT_NEAR(volume(both), 64.0, 1e-12);
 
-  const Mesh hollow = mesh_regions(walls, {points[0]}, {}, "boxes");  // no point: left empty
+  const Mesh hollow =
+      mesh_regions(walls, {points[0]}, {}, expected_size(walls, {}), "boxes");  // no point: left empty
   EXPECT_NEAR(volume(hollow), 63.0, 1e-12);
   EXPECT_EQ(std::count(hollow.regions.begin(), hollow.regions.end(), 127), hollow.elements());
 }

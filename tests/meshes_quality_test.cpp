@@ -133,6 +133,22 @@ TEST(Quality, SkewedHexahedron) {
   }
 }
 
+/// A cube with one corner drawn out along z, by as much as its edge: three of its faces are warped. At the
+/// four edges of the top the half planes open by 90 degrees at one end; at the other by arccos(1 / sqrt 3) at
+/// the two that meet in the corner, by 135 degrees at the two that do not. Each counts by its mean.
+TEST(Quality, WarpedHexahedron) {
+  Mesh mesh = generate(BoxShape{Vec3::Zero(), Vec3(1, 1, 1), {1, 1, 1}}, ElementType::hex8);
+  for (Vec3& x : mesh.nodes) {
+    if (x == Vec3(1, 1, 1)) x.z() = 2.0;
+  }
+  const QualityReport report = measure_quality(mesh);
+  EXPECT_NEAR(report.min_angle, 0.5 * (90.0 + std::acos(1.0 / std::sqrt(3.0)) / degree), 1e-12);
+  EXPECT_NEAR(report.max_angle, 0.5 * (90.0 + 135.0), 1e-12);
+  EXPECT_EQ(report.angle_histogram[7], 2);
+  EXPECT_EQ(report.angle_histogram[9], 8);
+  EXPECT_EQ(report.angle_histogram[11], 2);
+}
+
 /// A frustum: the sides of the square lean by the same angle; its faces are plane, so both ends agree.
 TEST(Quality, FrustumAndWorstHexahedron) {
   Mesh mesh = generate(BoxShape{Vec3(-1, -1, 0), Vec3(2, 2, 4), {1, 1, 2}}, ElementType::hex8);

@@ -44,13 +44,17 @@ Body clamped_block() {
   return Body(test::ElasticCase(block_mesh(), soft).hold(at_bottom, 7));
 }
 
-/// Xi of the stored dofs by blocks of `width` columns, as a full matrix in the solver's order.
-Eigen::MatrixXd greens(const GreensSolver& solver, std::int64_t width) {
+enum class Blocks { ascending, descending };
+
+/// Xi of the stored dofs by blocks of `width` columns with one workspace, as a full matrix in the solver's
+/// order.
+Eigen::MatrixXd greens(const GreensSolver& solver, std::int64_t width, Blocks blocks = Blocks::ascending) {
   const std::int64_t n = solver.order();
   Eigen::MatrixXd Xi(n, n);
   GreensSolver::Workspace workspace;
   std::vector<double> packed;
-  for (std::int64_t first = 0; first < n; first += width) {
+  for (std::int64_t k = 0, last = (n - 1) / width; k <= last; ++k) {
+    const std::int64_t first = width * (blocks == Blocks::ascending ? k : last - k);
     const std::int64_t count = std::min(width, n - first);
     solver.columns(first, count, workspace, packed);
     const double* entry = packed.data();
@@ -82,10 +86,13 @@ void expect_inverse(const Body& body, Scope scope, Index layers, std::int64_t wi
   const GreensSolver solver(factor, body.marks(scope, layers), body.stiffness.free_dofs,
                             body.elastic.mesh.dimension());
   factor.factorize();
-  const Eigen::MatrixXd Xi = greens(solver, width),
-                        reference = dense_inverse(body.stiffness.K, solver.stored_dofs());
-  EXPECT_LT((Xi - reference).lpNorm<Eigen::Infinity>(), 1e-11 * reference.lpNorm<Eigen::Infinity>())
-      << "scope " << static_cast<int>(scope) << ", " << layers << " layers, blocks of " << width;
+  const Eigen::MatrixXd reference = dense_inverse(body.stiffness.K, solver.stored_dofs());
+  for (const Blocks blocks : {Blocks::ascending, Blocks::descending}) {
+    const Eigen::MatrixXd Xi = greens(solver, width, blocks);
+    EXPECT_LT((Xi - reference).lpNorm<Eigen::Infinity>(), 1e-11 * reference.lpNorm<Eigen::Infinity>())
+        << "scope " << static_cast<int>(scope) << ", " << layers << " layers, blocks of " << width
+        << (blocks == Blocks::ascending ? "" : ", the last one first");
+  }
 }
 
 TEST(Greens, EqualTheDenseInverseForEveryScopeAndBlockWidth) {

@@ -85,6 +85,20 @@ TEST_F(Verify, FindsAnotherLoad) {
   EXPECT_EQ(failures(), std::vector<std::string>{"rest state"});
 }
 
+// Single precision rounds by 6e-8 per entry: a probe that is wrong by a thousandth is no rounding.
+TEST_F(Verify, FindsAProbeThatIsWrongByAThousandth) {
+  for (const char* precision : {"\"single\"", "\"double\""}) {
+    std::string text = loaded_block;
+    text.replace(text.find("\"double\""), 8, precision);
+    bake_block(text);
+    ASSERT_EQ(failures(), std::vector<std::string>());
+    for (Probe& probe : model_.probes) {
+      for (double& u : probe.displacement) u *= 1.001;
+    }
+    EXPECT_EQ(failures(), (std::vector<std::string>{"probes", "energy"})) << precision;
+  }
+}
+
 /// The block with all nodes stored, or those of the surface, and [dynamics].
 std::string swinging_block(const std::string& scope, const std::string& dynamics) {
   std::string text = loaded_block;

@@ -103,14 +103,14 @@ class Felt(ProgramTest):
             force = session["ticks/force"][:]
         self.assertGreaterEqual(len(force), 2500)
         self.assertGreater(numpy.abs(force).max(), 0.1)
-        replay = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--record", "again.h5", cwd=self.folder)
+        replay = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--record", "again.h5", "--report", "-", cwd=self.folder)
         self.assertEqual(replay.returncode, 0, replay.stderr)
         report = json.loads(replay.stdout)
         self.assertEqual((report["replay"]["ticks"], report["replay"]["different_ticks"]), (len(force), 0), replay.stderr)
         with h5py.File(self.folder / "again.h5") as again:
             numpy.testing.assert_array_equal(again["ticks/force"][:], force)
         # It is a comparison: with another tool it is another session.
-        other = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--tool", "sphere:0.012", cwd=self.folder)
+        other = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--tool", "sphere:0.012", "--report", "-", cwd=self.folder)
         self.assertEqual(other.returncode, 3, other.stderr)
         self.assertGreater(json.loads(other.stdout)["replay"]["different_ticks"], 100)
 
@@ -276,7 +276,7 @@ class Scripted(ProgramTest):
     def test_safety_where_it_is_asked_for(self):
         file = self.bake(SMALL_CUBE)
         script = self.write("press.csv", "t,x,y,z\n0,0.05,0.05,0.12\n0.3,0.05,0.05,0.1\n0.8,0.05,0.05,0.1001\n")
-        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.h5")
+        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.h5", "--report", "-")
         plain = run(*common, cwd=self.folder)
         self.assertEqual(plain.returncode, 0, plain.stderr)
         self.assertNotIn("safety", json.loads(plain.stdout))

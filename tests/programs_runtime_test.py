@@ -298,7 +298,7 @@ class Play(ProgramTest):
         file = self.bake(cube_toml(4))
         script = self.write("touch.csv", TOUCH)
         for name in ("one.h5", "two.h5"):
-            result = self.play(file, "--device", f"script:{script}", "--fast", "--record", name)
+            result = self.play(file, "--device", f"script:{script}", "--fast", "--record", name, "--report", "-")
             self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual((self.folder / "one.h5").read_bytes(), (self.folder / "two.h5").read_bytes())
 
@@ -342,7 +342,7 @@ class Play(ProgramTest):
         file = self.bake(cube_toml(4))
         script = self.write("long.csv", "t,x,y,z\n0,0.5,0.5,1\n600,0.5,0.5,0.9\n")
         for stop in (signal.SIGINT, signal.SIGTERM):
-            process = subprocess.Popen([RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.h5"],
+            process = subprocess.Popen([RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.h5", "--report", "-"],
                                        cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             time.sleep(1.0)
             process.send_signal(stop)
@@ -383,7 +383,7 @@ class Play(ProgramTest):
                               ("0,0.52,0.5,0.9515\n0.1,0.52,0.5,1.0515\n0.2,0.52,0.5,0.9\n",
                                "began inside the body and felt nothing until it was out at 0.049 s: start outside")):
             script = self.write("touch.csv", "t,x,y,z\n" + rows)
-            result = self.play(file, "--device", f"script:{script}", "--fast")
+            result = self.play(file, "--device", f"script:{script}", "--fast", "--report", "-")
             self.assertEqual(result.returncode, 0)
             warnings = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
             self.assertEqual(len(warnings), 1, result.stderr)
@@ -466,7 +466,7 @@ class Tools(ProgramTest):
 
     def play(self, file, script, *arguments):
         script = self.write("script.csv", script)
-        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", "--contacts", "out.csv",
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", "--contacts", "out.csv", "--report", "-",
                      *arguments, cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         with h5py.File(self.folder / "out.h5") as recording:

@@ -82,7 +82,7 @@ class PlayView(ViewTest):
     PLAY = ("play", CUBE, "--view")
 
     def test_shows_itself_until_it_is_stopped(self):
-        with self.started(*self.PLAY, "--view-address", "0", "--tool", "sphere:0.1") as (process, url):
+        with self.started(*self.PLAY, "--view-address", "0", "--tool", "sphere:0.1", "--report", "-") as (process, url):
             self.assertRegex(url, r"^http://127\.0\.0\.1:\d+/$")
             self.assertEqual(status_of(url), 200)
             code, output = self.end(process, signal.SIGTERM)
@@ -90,7 +90,7 @@ class PlayView(ViewTest):
             self.assertEqual(json.loads(output)["ticks_in_contact"], 0)
 
     def test_a_duration_ends_it(self):
-        with self.started(*self.PLAY, "--view-address", "0", "--duration", "0.2") as (process, _):
+        with self.started(*self.PLAY, "--view-address", "0", "--duration", "0.2", "--report", "-") as (process, _):
             output, _ = process.communicate(timeout=60)
             self.assertEqual((process.returncode, json.loads(output)["ticks"]), (0, 200))
 

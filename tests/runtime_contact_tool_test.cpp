@@ -127,6 +127,101 @@ TEST_P(Tools, ACapsuleLyingFlatIsPushedUpAtThePressuresCentre) {
       << "without friction it does not roll";
 }
 
+// What is held stands still on a tool that is turned, and touches far from its origin.
+TEST_P(Tools, ATurnedToolHoldsThePlaceThatItTouches) {
+  const double radius = 0.5 * edge_;
+  const double length = 2.2 * edge_;
+  const double depth = 0.2 * radius;
+  ToolPose lie = pose(at(0.5, 0.5, 1.0 + radius - depth) - at(0.5 * length, 0.0, 0.0));
+  lie.orientation = lying(GetParam());
+  State state(body_, {.tools = {plain({.radius = radius, .length = length})}});
+  go(body_, state, lie.position + at(0.0, 0.0, 1.5 * depth), lie, 40);
+  hold(body_, state, lie, 100);
+  const Vec3 before = state.tools[0].wrench.force;
+  ASSERT_GT(before.norm(), 0.0);
+  const auto held_places = [&] {
+    std::vector<Vec3> places;
+    for (const ContactPoint& contact : state.contacts()) {
+      if (contact.held) places.push_back(place_now(state, contact));
+    }
+    return places;
+  };
+
+  lie.grab = true;
+  step(body_, state, lie);
+  ASSERT_TRUE(state.tools[0].holding);
+  EXPECT_LT((state.tools[0].wrench.force - before).norm(), 1e-8 * before.norm()) << "without a kick";
+  const std::vector<Vec3> grabbed = held_places();
+  ASSERT_GT(grabbed.size(), 1U);
+
+  const ToolPose from = lie;
+  const Vec3 motion = at(0.3 * depth, 0.0, 2.0 * depth);
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.02, GetParam() == 3 ? Vec3::UnitY() : Vec3::UnitZ()));
+  for (int k = 1; k <= 100; ++k) {
+    lie.position = from.position + 0.01 * k * motion;
+    lie.orientation = Eigen::Quaterniond::Identity().slerp(0.01 * k, turn) * from.orientation;
+    step(body_, state, lie);
+  }
+  const std::vector<Vec3> carried = held_places();
+  ASSERT_EQ(carried.size(), grabbed.size());
+  for (std::size_t k = 0; k < carried.size(); ++k) {
+    const Vec3 expected = from.position + motion + turn * (grabbed[k] - from.position);
+    EXPECT_LT((carried[k] - expected).norm(), 1e-6 * depth)
+        << "held place " << k << " moves as the tool does";
+  }
+}
+
+// A force that is cut no longer depends on where the device is.
+TEST_P(Tools, AForceAtItsLimitHasNoStiffness) {
+  const double depth = 0.3 * radius_;
+  const State free = touching(plain({.radius = radius_}), on_top(), depth);
+  const double whole = free.tools[0].wrench.force.norm();
+  EXPECT_GT(free.tools[0].local.stiffness.norm(), 0.0);
+  EXPECT_FALSE(has(free.status, StepStatus::force_limited));
+  for (const double share : {0.9, 0.25}) {
+    const State state =
+        touching(plain({.radius = radius_, .max_force = share * whole, .friction = 0.3}), on_top(), depth);
+    const ToolState& tool = state.tools[0];
+    EXPECT_TRUE(has(state.status, StepStatus::force_limited));
+    EXPECT_NEAR(tool.wrench.force.norm(), share * whole, 1e-12 * whole);
+    EXPECT_GT(tool.wrench.force.normalized().dot(tool.contact_wrench.force.normalized()), 1.0 - 1e-12);
+    EXPECT_EQ(tool.local.force, tool.wrench.force);
+    EXPECT_EQ(tool.local.stiffness, Eigen::Matrix3d::Zero());
+  }
+}
+
+/// What a tool in contact may move per tick: a quarter of the mean edge or of its radius, whichever is more.
+TEST_P(Tools, InContactADeviceIsFollowedByAQuarterOfTheEdgeOrTheRadiusPerTick) {
+  for (const double radius : {0.5 * edge_, 1.7 * edge_}) {
+    const double most = 0.25 * std::max(edge_, radius);
+    State start(body_, {.tools = {plain({.radius = radius})}});
+    const Vec3 place = at(0.47, 0.53, 1.0 + 0.9 * radius);
+    go(body_, start, place + at(0.0, 0.0, 0.2 * radius), pose(place), 60);
+    hold(body_, start, pose(place), 20);
+    ASSERT_GT(start.tools[0].contacts, 0);
+
+    for (const double share : {0.999, 1.001, 20.0}) {
+      const Vec3 wanted = place + share * most * at(0.6, 0.0, -0.8);
+      State state = start;
+      const StepStatus status = step(body_, state, pose(wanted));
+      EXPECT_EQ(has(status, StepStatus::pose_limited), share > 1.0);
+      EXPECT_LT((state.tools[0].device.position - (place + std::min(share, 1.0) * most * at(0.6, 0.0, -0.8)))
+                    .norm(),
+                1e-12 * most);
+    }
+    for (const double share : {0.999, 1.001, 3.0}) {  // a turn on the spot moves the sphere's rim
+      const double angle = share * most / radius;
+      ToolPose turned = pose(place);
+      turned.orientation = Eigen::AngleAxisd(angle, Vec3::UnitZ());
+      State state = start;
+      const StepStatus status = step(body_, state, turned);
+      EXPECT_EQ(has(status, StepStatus::pose_limited), share > 1.0);
+      EXPECT_NEAR(state.tools[0].device.orientation.angularDistance(Eigen::Quaterniond::Identity()),
+                  std::min(share, 1.0) * most / radius, 1e-12);
+    }
+  }
+}
+
 TEST_P(Tools, ACapsuleOnASoftTorsionTurnsAwayFromTheTorque) {
   const double radius = 0.5 * edge_;
   const double length = 2.2 * edge_;

@@ -154,9 +154,11 @@ class Asking : public ScriptDevice {
   }
   void show(const DeviceCommand& command, const DeviceState&, std::int64_t) noexcept override {
     shown.push_back(command.wrench.force.norm());
+    ++shows;
   }
   std::vector<TickTime> heard;
   std::vector<double> shown;
+  std::atomic<std::size_t> shows = 0;
 
  private:
   std::function<void(std::int64_t)> ask_;
@@ -169,12 +171,17 @@ TEST_F(Loop, StandsStillWhilePausedAndGoesOnWithoutAGap) {
   Asking device(script, [&](std::int64_t k) {
     if (k == 50) control.paused = true;
   });
+  // Paused, it shows no force once per period: so many that there are 40 of the pause and some of single ticks.
+  const auto wait_for_shows = [&] {
+    const std::size_t begin = device.shows;
+    while (device.shows < begin + 44) std::this_thread::yield();
+  };
   std::thread person([&] {
     while (!control.paused) std::this_thread::yield();
-    std::this_thread::sleep_for(std::chrono::milliseconds(40));
+    wait_for_shows();
     control.single_ticks = 3;
     while (control.single_ticks > 0) std::this_thread::yield();
-    std::this_thread::sleep_for(std::chrono::milliseconds(40));
+    wait_for_shows();
     control.paused = false;
   });
   Safety safety({.ramp = 0.0, .calm_time = 0.0, .deadline = {.tolerance = 1e9}, .silence = {.most = 1e9}});

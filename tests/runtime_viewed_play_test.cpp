@@ -246,6 +246,28 @@ TEST_F(Viewed, GoesOnWhereARecordingCannotBeMade) {
   std::filesystem::current_path(folder_);
 }
 
+TEST_F(Viewed, TellsAtOnceOfARecordingThatFailsAndGoesOn) {
+  start(options_of(cube));
+  ASSERT_TRUE(wait_for_ticks(50));
+  play_->record(true);
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording && state.ticks > 0; }));
+  const std::filesystem::path file = *play_->state().recording;
+  EXPECT_FALSE(play_->state().recording_failed);
+  std::filesystem::remove_all(file.string() + ".parts");
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording_failed.has_value(); }));
+  EXPECT_EQ(play_->state().recording, file) << "the page says of which";
+  EXPECT_NE(play_->state().recording_failed->find("No such file"), std::string::npos);
+  EXPECT_TRUE(wait_for_ticks(50)) << "the loop goes on";
+  play_->record(false);
+  ASSERT_TRUE(wait_for([](const RunState& state) { return !state.recording && state.ticks > 0; }));
+  EXPECT_FALSE(play_->state().recording_failed);
+  EXPECT_TRUE(play_->state().refused);
+  play_->record(true);  // another one can be made
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording && state.ticks > 0; }));
+  finish();
+  EXPECT_TRUE(play_->recording_failed()) << "the exit status tells it";
+}
+
 TEST(RunState, IsJsonWhateverAFileIsCalled) {
   RunState state;
   state.device = "a \"hand\"\n";

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "meshes/error.h"
-#include "meshes/text_reader.h"
+#include "meshes/regular_file.h"
+#include "meshes/toml_text.h"
+#include "meshes/words.h"
 #include "runtime/devices/palpate_board.h"
 #include "runtime/devices/profile_table.h"
 #include "runtime/devices/woodenhaptics_report.h"
@@ -133,17 +135,6 @@ struct Kind {
 constexpr std::array kinds = {Kind{"woodenhaptics", "arm"}, Kind{"spacemouse", "spacemouse"},
                               Kind{"pid", "joystick"}, Kind{"palpate_board", ""}};
 
-toml::table parse(std::string_view text, const std::string& name) {
-  try {
-    return toml::parse(text, name);
-  } catch (const toml::parse_error& error) {
-    const toml::source_position at = error.source().begin;
-    throw Error("not valid TOML: " + std::string(error.description()),
-                name + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
-                "see https://toml.io for the syntax");
-  }
-}
-
 const Kind& read_kind(const toml::table& root, const std::string& name) {
   Keys known = {"name", "kind", "match", "reports", "limits"};
   for (const Kind& kind : kinds) {
@@ -154,7 +145,7 @@ const Kind& read_kind(const toml::table& root, const std::string& name) {
   const auto found =
       std::find_if(kinds.begin(), kinds.end(), [&](const Kind& kind) { return kind.name == text; });
   if (found == kinds.end()) {
-    table.fail("kind", "kind is \"" + text + "\"",
+    table.fail("kind", "kind is \"" + shortened(text) + "\"",
                R"(use "woodenhaptics", "spacemouse", "pid" or "palpate_board")");
   }
   return *found;
@@ -179,7 +170,7 @@ DeviceProfile read_device_profile(const std::filesystem::path& file) {
 }
 
 DeviceProfile parse_device_profile(std::string_view text, const std::string& name) {
-  const toml::table root = parse(text, name);
+  const toml::table root = parse_toml(text, name);
   const Kind& kind = read_kind(root, name);
   Keys known = {"name", "kind", "match", "reports", "limits"};
   if (!kind.table.empty()) known.push_back(kind.table);

@@ -15,12 +15,13 @@ ProfileTable::ProfileTable(const toml::table& table, std::string title, const st
   for (const auto& [key, value] : table_) {
     if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
     const toml::source_position at = key.source().begin;
+    const std::string word = shortened(key.str());
     const std::string in = title_.empty() ? "" : " in " + title_;
-    throw Error("unknown key \"" + std::string(key.str()) + "\"" + in,
+    throw Error("unknown key \"" + word + "\"" + in,
                 file_ + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
                 known.empty() ? "remove it"
-                              : "the nearest known key is \"" + std::string(nearest(key.str(), known)) +
-                                    "\" of " + comma_list(known));
+                              : "the nearest known key is \"" + std::string(nearest(word, known)) + "\" of " +
+                                    comma_list(known));
   }
 }
 

@@ -51,6 +51,7 @@ nlohmann::json to_json(const RunState& state) {
           {"misses", state.misses},
           {"paused", state.paused},
           {"recording", text_or_null(state.recording)},
+          {"recording_failed", text_or_null(state.recording_failed)},
           {"busy", text_or_null(state.busy)},
           {"refused", text_or_null(state.refused)},
           {"locked", text_or_null(state.locked)},

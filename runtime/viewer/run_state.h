@@ -23,10 +23,11 @@ struct RunState {
   std::int64_t ticks = 0;   ///< since the act began
   std::int64_t misses = 0;  ///< of deadlines
   bool paused = false;
-  std::optional<std::string> recording;  ///< file
-  std::optional<std::string> busy;       ///< what is being made
-  std::optional<std::string> refused;    ///< why the last wish could not be met
-  std::optional<std::string> locked;     ///< why settings cannot be changed
+  std::optional<std::string> recording;         ///< file
+  std::optional<std::string> recording_failed;  ///< why nothing is kept in it any more
+  std::optional<std::string> busy;              ///< what is being made
+  std::optional<std::string> refused;           ///< why the last wish could not be met
+  std::optional<std::string> locked;            ///< why settings cannot be changed
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
   SettingsText settings;

@@ -5,13 +5,14 @@
 
 #include <chrono>
 #include <ctime>
-#include <fstream>
 #include <thread>
 #include <utility>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 #include "runtime/loading.h"
 #include "runtime/output.h"
+#include "runtime/session_xdmf.h"
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/scene.h"
 
@@ -34,14 +35,13 @@ std::filesystem::path name_recording(const std::filesystem::path& model) {
 
 /// What can be seen of a file that is gone before the body that came of it goes too.
 void expect_file(const std::filesystem::path& file) {
-  if (std::ifstream(file)) return;
-  throw Error("cannot be read any more", file.string(), "put it back, or start palpate-runtime play anew");
+  check_regular_file(file, "put it back, or start palpate-runtime play anew");
 }
 
 std::string sentence(const std::exception& error) {
   const auto* known = dynamic_cast<const Error*>(&error);
   if (known == nullptr) return error.what();
-  return known->where() + ": " + known->what() + " (" + known->hint() + ")";
+  return in_one_line(*known);
 }
 
 }  // namespace
@@ -70,17 +70,20 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
   std::optional<Plan> good;  // that could be met
   for (;;) {
     const Plan plan = next_plan();
+    std::unique_ptr<Act> act;
+    LoopReport report;
     try {
-      const std::unique_ptr<Act> act = begin_act(plan);
+      act = begin_act(plan);
       good = plan;
-      LoopReport report = run_act(*act, stop);
-      const bool over = options_.duration && report.ticks >= mover_.ticks;
-      if (stop || over || !wait_for_wish(stop)) {
-        act->tell();
-        return report;
-      }
+      report = run_act(*act, stop);
     } catch (const std::exception& error) {
       if (!good || !take_back(plan, *good, sentence(error))) throw;
+      continue;
+    }
+    const bool over = options_.duration && report.ticks >= mover_.ticks;
+    if (stop || over || !wait_for_wish(stop)) {
+      act->tell();
+      return report;
     }
   }
 }
@@ -99,15 +102,24 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
   options.settings_text = plan.text;
   options.settings = settle(plan.settings, mover_, *body_);
   options.record = plan.record;
+  if (!plan.record.empty() && plan.record != options_.record) {  // which was looked at before
+    OutputPaths paths(false);
+    add_recording(paths, plan.record, "record");
+  }
   print_device(mover_, options.settings);
   if (options.settings.overlay) begin_making("the overlay is being made");
+  {
+    const std::lock_guard lock(mutex_);
+    state_.recording_failed.reset();
+  }
   auto act = std::make_unique<Act>(
       std::move(options), *body_, mover_,
       ActViewer{
           .control = &control_,
           .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
           .pictures =
-              [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); }});
+              [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); },
+          .recording_failed = [this](const std::string& reason) { take_recording_failure(reason); }});
   const std::lock_guard lock(mutex_);
   state_.settings = plan.text;
   state_.busy.reset();
@@ -157,15 +169,14 @@ void ViewedPlay::show_body() {
 }
 
 LoopReport ViewedPlay::run_act(Act& act, const std::atomic<bool>& stop) {
-  try {
-    return act.run(stop);
-  } catch (const Error& error) {  // of the recording: the run goes on without it
-    if (stop || options_.duration) throw;
-    const std::lock_guard lock(mutex_);
-    wished_.record.clear();
-    refuse(sentence(error));
-    return {};
-  }
+  const LoopReport& report = act.run(stop);
+  if (!act.recording_failure()) return report;
+  recording_failed_ = true;
+  if (stop) return report;
+  const std::lock_guard lock(mutex_);  // the next one is without it
+  wished_.record.clear();
+  refuse("the recording failed: " + *act.recording_failure());
+  return report;
 }
 
 /// A script or a session is over: what it left is shown. False when it is to stop.
@@ -284,6 +295,14 @@ void ViewedPlay::end_act() {
 void ViewedPlay::refuse(const std::string& why) {
   print_warning(why);
   state_.refused = why;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+/// By the recorder's thread.
+void ViewedPlay::take_recording_failure(const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  state_.recording_failed = reason;
   changed_ = true;
   tell_.notify_all();
 }

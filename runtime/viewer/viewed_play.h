@@ -30,6 +30,9 @@ class ViewedPlay : public ViewedRun {
   /// last act, whose report it returns. Throws Error.
   LoopReport run(const std::atomic<bool>& stop);
 
+  /// Whether a recording of the run is not whole.
+  [[nodiscard]] bool recording_failed() const noexcept { return recording_failed_; }
+
   /// As pages are told.
   [[nodiscard]] RunState state() const;
 
@@ -64,6 +67,7 @@ class ViewedPlay : public ViewedRun {
   void end_act();
   void begin_making(const char* what);
   void refuse(const std::string& why);
+  void take_recording_failure(const std::string& reason);
   void take_ticks(std::span<const TickNote> notes);
   void tell_states(const std::stop_token& over);
 
@@ -74,6 +78,7 @@ class ViewedPlay : public ViewedRun {
   bool can_move_;  // the file has dynamics
   ViewerServer* server_ = nullptr;
   LoopControl control_;
+  bool recording_failed_ = false;
 
   mutable std::mutex mutex_;  // of what follows; the loop takes it never
   Plan wished_;               // of the next act

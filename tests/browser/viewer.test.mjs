@@ -1,7 +1,7 @@
 // The viewer's page in a real browser, against the real runtime.
 import assert from 'node:assert/strict';
 import { createServer, request } from 'node:http';
-import { readFile, writeFile } from 'node:fs/promises';
+import { readFile, rm, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, test } from 'node:test';
 import { bake, close, cube, folder, near, open, project, ready, run, runtime, serve, source, told, until, visit } from './harness.mjs';
@@ -220,6 +220,22 @@ test('a recording begins and ends with the button, and is whole', async (t) => {
   await run(runtime, ['play', model, '--device', `replay:${file}`, '--fast', '--report', path.join(at, 'replay.json')]);
   const replay = JSON.parse(await readFile(path.join(at, 'replay.json'), 'utf8'));
   assert.equal(replay.replay.different_ticks, 0);
+});
+
+test('a recording that fails says so at once', async (t) => {
+  const { page, at } = await open_cube(t);
+  await part(page, 'record').click();
+  await until(page, () => window.palpate.state.recording && window.palpate.state.ticks > 0);
+  const { recording } = await told(page, 'state');
+  await rm(path.resolve(at, `${recording}.parts`), { recursive: true });
+  await until(page, () => window.palpate.state.recording_failed);
+  await page.getByText('Recording failed').waitFor();
+  await page.getByText(/The recording failed, and the run goes on without it: .*No such file/).first().waitFor();
+  const before = await told(page, 'state');
+  await page.waitForFunction((ticks) => window.palpate.state.ticks > ticks + 100, before.ticks);
+  await part(page, 'record').click();
+  await until(page, () => !window.palpate.state.recording);
+  assert.equal(await part(page, 'record-label').textContent(), 'Record');
 });
 
 test('pictures and shapes can be saved', async (t) => {

@@ -149,6 +149,10 @@ class Page implements Listener {
       const [, what = state.refused, hint = ''] = /^(.*) \((.*)\)$/.exec(state.refused) ?? [];
       toast(what, hint);
     }
+    if (state.recording_failed && state.recording_failed !== this.state_?.recording_failed) {
+      const [, what = state.recording_failed, hint = ''] = /^(.*) \((.*)\)$/.exec(state.recording_failed) ?? [];
+      toast(`The recording failed, and the run goes on without it: ${what}`, hint);
+    }
     const recorded = this.state_?.recording;
     if (recorded && !state.recording && state.model && !state.refused) toast(`Recorded ${recorded}`, `palpate-runtime view ${recorded}`, 'note');
     this.state_ = state;

@@ -77,8 +77,12 @@ export class RunControls {
     button('pause').setAttribute('aria-pressed', String(state.paused));
     write(button('pause'), state.paused ? 'Go on' : 'Pause');
     button('record').setAttribute('aria-pressed', String(Boolean(state.recording)));
-    write(part('record-label'), state.recording ? state.recording.split('/').at(-1)! : 'Record');
-    button('record').title = state.recording
+    const failed = state.recording && state.recording_failed;
+    button('record').classList.toggle('failed', Boolean(failed));
+    write(part('record-label'), failed ? 'Recording failed' : state.recording ? state.recording.split('/').at(-1)! : 'Record');
+    button('record').title = failed
+      ? `${failed}\nWhat was kept is in ${state.recording}. Press to go on without.`
+      : state.recording
       ? `Finish ${state.recording}`
       : 'Begin anew from the untouched body, and write every tick to a file';
     button('control').disabled = state.you !== 'controller' && state.controlled;

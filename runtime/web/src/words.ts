@@ -40,6 +40,7 @@ export interface State {
   ticks: number;
   paused: boolean;
   recording: string | null;
+  recording_failed: string | null;
   busy: string | null;
   refused: string | null;
   locked: string | null;
