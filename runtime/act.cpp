@@ -152,6 +152,7 @@ void Act::tell() const {
                          .settings = options_.settings,
                          .body = body_,
                          .tool = tool_,
+                         .tool_end = state_.tools.front().pose.position,
                          .report = report_,
                          .overlays = overlays_ ? &*overlays_ : nullptr,
                          .motion = motion_ ? &*motion_ : nullptr,

@@ -34,6 +34,13 @@ class Act {
   Act(const Act&) = delete;
   Act& operator=(const Act&) = delete;
 
+  /// Begins with a fault that was latched before and that nobody has acknowledged yet. Before `run`.
+  void latch(Fault fault) noexcept {
+    if (safety_) safety_->fail(fault);
+  }
+  /// What is latched, none without safety rules. Not during `run`.
+  [[nodiscard]] Fault fault() const noexcept { return safety_ ? safety_->fault() : Fault::none; }
+
   /// To the end, to `stop` or until the viewer's control says `leave`. What was recorded is one plain file
   /// then, unless that failed.
   const LoopReport& run(const std::atomic<bool>& stop);

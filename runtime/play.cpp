@@ -10,7 +10,9 @@
 #include "formats/recording_parts.h"
 #include "meshes/error.h"
 #include "runtime/act.h"
+#include "runtime/fitting_tool.h"
 #include "runtime/loading.h"
+#include "runtime/monitor.h"
 #include "runtime/mover.h"
 #include "runtime/output.h"
 #include "runtime/real_time.h"
@@ -70,7 +72,10 @@ int play(PlayOptions options) {
   std::optional<Guardian> guardian;  // forks, so it comes before the first thread
   if (options.device.kind == DeviceChoice::Kind::hid) guardian.emplace();
   stop_on_signals();
+  block_acknowledging_signal();
   if (options.processor) leave_to_the_loop(*options.processor);
+  std::optional<ViewerPort> port;
+  if (options.view) port.emplace(*options.view);
   Mover mover = make_mover(options, guardian ? &*guardian : nullptr);
   std::unique_ptr<const Body> body =
       load_and_print(options.file, options.model_toml, options.settings.body());
@@ -78,12 +83,13 @@ int play(PlayOptions options) {
   if (options.session) warn_of_other_model(*options.session, *body);
   if (mover.link != nullptr)
     wait_for(*mover.link, options.device.kind == DeviceChoice::Kind::bridge, stop_asked);
-  if (options.view) {
-    ViewedPlay viewed(options, mover, std::move(body));
+  if (port) {
+    ViewedPlay viewed(options, mover, std::move(body), std::move(*port));
     const LoopReport report = viewed.run(stop_asked);
     return exit_code(report, viewed.recording_failed());
   }
 
+  settle_tool(options, *body);
   options.settings = settle(options.settings, mover, *body);
   print_device(mover, options.settings);
   Act act(options, *body, mover);

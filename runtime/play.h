@@ -8,7 +8,7 @@
 
 #include "formats/recording.h"
 #include "runtime/settings.h"
-#include "runtime/viewer/viewer_server.h"
+#include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
 

@@ -60,7 +60,8 @@ void add_tool(CLI::App& play, PlayArguments& arguments) {
   const auto add = [&](const char* name, const char* help, const char* type) {
     add_setting(play, arguments, name, help)->type_name(type)->group(tool_group);
   };
-  add("tool", "its shape [m]; else a point", "point|sphere:RADIUS|capsule:RADIUS,LENGTH");
+  add("tool", "its shape [m]; else a ball that suits the body, in scripts a point",
+      "point|sphere:RADIUS|capsule:RADIUS,LENGTH");
   add("friction", "Coulomb's coefficient, in place of the materials'", "MU");
   add("coupling",
       "stiffness of the spring between the device and the tool; else the tool is where the device is",
@@ -275,7 +276,7 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
       "Lengths are metres.\n"
       "A capsule reaches from the tool's origin along its own z axis (in the plane y). On a body in "
       "the plane z is\n"
-      "ignored. Ctrl-C ends a run, with no force; Enter acknowledges a fault of a device.\n"
+      "ignored. Ctrl-C ends a run, with no force; Enter or SIGUSR1 acknowledges a fault.\n"
       "\nExamples:\n"
       "  palpate-runtime play liver.palpate.hdf --view --tool sphere:0.008\n"
       "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool sphere:0.005 --record "

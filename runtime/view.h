@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "runtime/viewer/viewer_server.h"
+#include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
 

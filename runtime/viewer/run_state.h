@@ -19,6 +19,7 @@ struct RunState {
   nlohmann::json defaults;  ///< of describe_defaults
   std::string device;       ///< what moves the tool
   bool pointer = false;     ///< it is a page's pointer
+  bool hand = false;        ///< a hand is in it, whose safety is not a page's to change
   std::int64_t rate = 1000;
   std::int64_t ticks = 0;   ///< since the act began
   std::int64_t misses = 0;  ///< of deadlines
