@@ -14,7 +14,7 @@ using Vector = Eigen::VectorXd;
 constexpr int vectors = 4;          // of random signs
 constexpr double deviations = 8.0;  // of a sum of roundings: exceeded once in 10^13
 constexpr double solver_safety = 100.0;
-constexpr double sum_rounding = 1e-13;  // of the products, relative to the largest
+constexpr double sum_rounding = 1e-13;  // of sums of products, relative to the largest
 constexpr double touch_safety = 4.0;
 using Signs = Eigen::Array<double, vectors, 1>;
 
@@ -91,7 +91,8 @@ Check check_rows(const PackedGreens& stored, const Factor& factor, const SparseM
 Check check_columns(const PackedGreens& stored, const Factor& factor, const SparseMatrix& K,
                     std::span<const std::int64_t> stored_dofs, double solver, const std::string& name,
                     int samples) {
-  Check columns{name + "columns", 0.0, 2.0 * unit_roundoff(stored.precision()) + solver_safety * solver};
+  Check columns{name + "columns", 0.0,
+                2.0 * unit_roundoff(stored.precision()) + sum_rounding + solver_safety * solver};
   std::mt19937_64 random(7);
   for (int sample = 0; sample < samples; ++sample) {
     const std::uint64_t j = random() % stored_dofs.size();

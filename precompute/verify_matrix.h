@@ -21,7 +21,8 @@ double solver_error(const Factor& factor, const SparseMatrix& K, std::span<const
 
 /// Checks of A, as stored, against K^-1 with `factor` of K. Refined solves (refined_solve.h) stand for K^-1;
 /// `solver`: see solver_error. Named NAME "columns", NAME "rows", NAME "touches":
-/// - columns: `samples` columns, |A e - x|_max / |x|_max against two roundings and a hundred times `solver`;
+/// - columns: `samples` columns, |A e - x|_max / |x|_max against two roundings, 1e-13 and a hundred times
+/// `solver`;
 /// - rows: y = A r for four vectors r of random signs against x = K^-1 r. If each entry is wrong by its
 ///   rounding alone, |y - x| of row i exceeds 8 times the rounding of |A_i|, its length, once in 10^13
 ///   (Hoeffding). The error is the largest |y - x| in units of that (and of what the solver and the sums are

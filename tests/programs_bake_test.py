@@ -38,7 +38,7 @@ class Bake(ProgramTest):
             self.assertIn(piece, inspected.stdout)
         verified = run(PRECOMPUTE, "verify", file)
         self.assertEqual(verified.returncode, 0, verified.stdout)
-        for check in ("checksums", "probes", "energy", "columns", "residual", "rest state"):
+        for check in ("checksums", "probes", "energy", "columns", "rows", "touches", "residual", "rest state"):
             self.assertIn(check, verified.stdout)
 
     def test_inspect_shows_the_friction_of_each_material(self):
@@ -96,7 +96,7 @@ class Dynamics(ProgramTest):
         self.assertRegex(inspected, r"Newmark +time step 0\.5 s, alpha = 0\.25, delta = 0\.5; lumped mass, damping 0\.000228")
         verified = run(PRECOMPUTE, "verify", file)
         self.assertEqual(verified.returncode, 0, verified.stdout)
-        for check in ("mass", "damping", "inverse"):
+        for check in ("mass", "damping", "inverse columns", "inverse rows", "inverse touches"):
             self.assertRegex(verified.stdout, rf"\n{check} +ok ")
 
     def test_modal(self):
