@@ -7,6 +7,8 @@
 #include <array>
 #include <atomic>
 #include <cstring>
+#include <exception>
+#include <mutex>
 #include <thread>
 
 #include "formats/file_io.h"
@@ -33,17 +35,54 @@ XXH128_canonical_t canonical(XXH128_hash_t hash) {
   return digest;
 }
 
-XXH128_hash_t hash_of_chunk(std::size_t first_byte, std::span<const std::byte> bytes,
+/// Bytes [first, first + size) of an array, as they are or read from a file.
+using Take = std::function<std::span<const std::byte>(std::size_t first, std::size_t size,
+                                                      std::span<std::byte> buffer)>;
+
+/// Hash of bytes [first, first + size), which `inspect` sees block by block.
+XXH128_hash_t hash_of_chunk(std::size_t first, std::size_t size, const Take& take,
                             const ChunkedChecksum::Inspect& inspect) {
-  if (!inspect) return XXH3_128bits(bytes.data(), bytes.size());
   alignas(64) XXH3_state_t state;
   XXH3_128bits_reset(&state);
-  for (std::size_t at = 0; at < bytes.size(); at += block_bytes) {
-    const auto block = bytes.subspan(at, std::min(block_bytes, bytes.size() - at));
+  std::vector<std::byte> buffer(block_bytes);
+  for (std::size_t at = first; at < first + size; at += block_bytes) {
+    const auto block = take(at, std::min(block_bytes, first + size - at), buffer);
     XXH3_128bits_update(&state, block.data(), block.size());
-    inspect(first_byte + at, block);
+    if (inspect) inspect(at, block);
   }
   return XXH3_128bits_digest(&state);
+}
+
+/// Digests of the chunks of bytes [first, first + size), by all processors.
+std::vector<std::byte> digests_of(std::size_t first, std::size_t size, const Take& take,
+                                  const ChunkedChecksum::Inspect& inspect) {
+  constexpr std::size_t chunk = ChunkedChecksum::chunk;
+  const std::size_t chunks = (size + chunk - 1) / chunk;
+  std::vector<std::byte> digests(chunks * digest_bytes);
+  std::atomic<std::size_t> next{0};
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    try {
+      for (std::size_t i = next++; i < chunks; i = next++) {
+        const std::size_t at = i * chunk;
+        const auto digest = canonical(hash_of_chunk(first + at, std::min(chunk, size - at), take, inspect));
+        std::memcpy(&digests[i * digest_bytes], digest.digest, digest_bytes);
+      }
+    } catch (...) {
+      next = chunks;
+      const std::scoped_lock lock(mutex);
+      failure = std::current_exception();
+    }
+  };
+  {
+    std::vector<std::jthread> helpers;
+    for (std::size_t i = 1; i < std::min<std::size_t>(chunks, std::thread::hardware_concurrency()); ++i)
+      helpers.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
+  return digests;
 }
 
 }  // namespace
@@ -86,33 +125,76 @@ std::string RunningChecksum::digits() const {
   return hexadecimal(canonical(XXH3_128bits_digest(&state_->hash)));
 }
 
-void ChunkedChecksum::append(std::span<const std::byte> bytes, const Inspect& inspect) {
-  const std::size_t chunks = (bytes.size() + chunk - 1) / chunk;
-  const std::size_t first_digest = digests_.size();
-  digests_.resize(first_digest + chunks * digest_bytes);
+struct ChunkedChecksum::Open {
+  RunningChecksum::State state;
+  std::size_t bytes = 0;
+};
 
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < chunks; i = next++) {
-      const auto part = bytes.subspan(i * chunk, std::min(chunk, bytes.size() - i * chunk));
-      const auto digest = canonical(hash_of_chunk(bytes_ + i * chunk, part, inspect));
-      std::memcpy(&digests_[first_digest + i * digest_bytes], digest.digest, digest_bytes);
-    }
-  };
-  {
-    std::vector<std::jthread> helpers;
-    for (std::size_t i = 1; i < std::min<std::size_t>(chunks, std::thread::hardware_concurrency()); ++i)
-      helpers.emplace_back(work);
-    work();
+ChunkedChecksum::ChunkedChecksum() : open_(std::make_unique<Open>()) {
+  XXH3_128bits_reset(&open_->state.hash);
+}
+
+ChunkedChecksum::~ChunkedChecksum() = default;
+
+void ChunkedChecksum::append(std::span<const std::byte> bytes, const Inspect& inspect) {
+  if (open_->bytes == 0 && bytes.size() >= chunk) {
+    const std::span<const std::byte> whole = bytes.first(bytes.size() / chunk * chunk);
+    const Take take = [&](std::size_t first, std::size_t size, std::span<std::byte>) {
+      return whole.subspan(first - bytes_, size);
+    };
+    const std::vector<std::byte> digests = digests_of(bytes_, whole.size(), take, inspect);
+    digests_.insert(digests_.end(), digests.begin(), digests.end());
+    bytes_ += whole.size();
+    bytes = bytes.subspan(whole.size());
   }
-  bytes_ += bytes.size();
+  while (!bytes.empty()) {
+    const auto part = bytes.first(std::min({bytes.size(), chunk - open_->bytes, block_bytes}));
+    XXH3_128bits_update(&open_->state.hash, part.data(), part.size());
+    if (inspect) inspect(bytes_ + open_->bytes, part);
+    open_->bytes += part.size();
+    bytes = bytes.subspan(part.size());
+    if (open_->bytes == chunk) close_chunk();
+  }
+}
+
+void ChunkedChecksum::close_chunk() {
+  const auto digest = canonical(XXH3_128bits_digest(&open_->state.hash));
+  const auto bytes = std::as_bytes(std::span(digest.digest));
+  digests_.insert(digests_.end(), bytes.begin(), bytes.end());
+  bytes_ += open_->bytes;
+  open_->bytes = 0;
+  XXH3_128bits_reset(&open_->state.hash);
+}
+
+void ChunkedChecksum::append_file(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes,
+                                  std::byte* into, const Inspect& inspect) {
+  const std::size_t before = bytes_;
+  const auto size = static_cast<std::size_t>(bytes);
+  const std::size_t whole = size / chunk * chunk;
+  const Take take = [&](std::size_t first, std::size_t count, std::span<std::byte> buffer) {
+    const std::size_t at = first - before;
+    const std::span<std::byte> block = into != nullptr ? std::span(into + at, count) : buffer.first(count);
+    read_exactly(file, block, offset + static_cast<std::int64_t>(at));
+    return std::span<const std::byte>(block);
+  };
+  const std::vector<std::byte> digests = digests_of(before, whole, take, inspect);
+  digests_.insert(digests_.end(), digests.begin(), digests.end());
+  bytes_ += whole;
+  std::vector<std::byte> buffer(block_bytes);
+  for (std::size_t at = whole; at < size; at += block_bytes)
+    append(take(before + at, std::min(block_bytes, size - at), buffer), inspect);
 }
 
 std::string ChunkedChecksum::digits() const {
-  if (digests_.size() != digest_bytes) return checksum(digests_);
-  XXH128_canonical_t digest;
-  std::memcpy(digest.digest, digests_.data(), digest_bytes);
-  return hexadecimal(digest);
+  const auto digest = canonical(XXH3_128bits_digest(&open_->state.hash));
+  const auto rest = std::as_bytes(std::span(digest.digest));
+  if (digests_.empty()) return hexadecimal(digest);
+  std::vector<std::byte> all = digests_;
+  if (open_->bytes > 0) all.insert(all.end(), rest.begin(), rest.end());
+  if (all.size() != digest_bytes) return checksum(all);
+  XXH128_canonical_t only;
+  std::memcpy(only.digest, all.data(), digest_bytes);
+  return hexadecimal(only);
 }
 
 }  // namespace palpate

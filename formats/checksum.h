@@ -14,6 +14,8 @@
 
 namespace palpate {
 
+class FileDescriptor;
+
 /// 32 hexadecimal digits.
 std::string checksum(std::span<const std::byte> bytes);
 
@@ -32,6 +34,7 @@ class RunningChecksum {
   [[nodiscard]] std::string digits() const;  ///< 32 hexadecimal digits of all bytes so far
 
  private:
+  friend class ChunkedChecksum;
   struct State;
   std::unique_ptr<State> state_;
 };
@@ -42,17 +45,29 @@ class ChunkedChecksum {
  public:
   static constexpr std::size_t chunk = std::size_t{16} << 20;  ///< [byte]
 
-  /// Looks at a block while it is in the cache; called by several threads at once. Blocks start at multiples
-  /// of 64 KiB.
+  /// Looks at a block while it is in the cache; called by several threads at once. Where what was appended
+  /// before is a multiple of 64 KiB, so are the places where blocks start.
   using Inspect = std::function<void(std::size_t first_byte, std::span<const std::byte> block)>;
 
-  /// Every call but the last brings a multiple of `chunk` bytes.
+  ChunkedChecksum();
+  ~ChunkedChecksum();
+
+  /// Pieces of any size; what is a multiple of `chunk` at a multiple of `chunk` is shared among processors.
   void append(std::span<const std::byte> bytes, const Inspect& inspect = {});
-  [[nodiscard]] std::string digits() const;  ///< 32 hexadecimal digits
+
+  /// Reads `bytes` bytes of a file at `offset` and appends them. They are left at `into`, which may be null.
+  /// Comes first, or after multiples of `chunk`. Throws Error when they cannot be read.
+  void append_file(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes, std::byte* into,
+                   const Inspect& inspect = {});
+
+  [[nodiscard]] std::string digits() const;  ///< 32 hexadecimal digits of all bytes so far
 
  private:
-  std::vector<std::byte> digests_;  ///< 16 a chunk
-  std::size_t bytes_ = 0;
+  struct Open;
+  void close_chunk();
+  std::vector<std::byte> digests_;  ///< 16 per whole chunk
+  std::size_t bytes_ = 0;           ///< in whole chunks
+  std::unique_ptr<Open> open_;      ///< the chunk that is not whole yet
 };
 
 }  // namespace palpate

@@ -41,6 +41,14 @@ const char* hint_for(int error) {
   throw Error("cannot " + doing + ": " + reason(error), path.string(), hint_for(error));
 }
 
+/// Something that no run of ours can have left has the name of a file that we write on the way.
+[[noreturn]] void refuse_stranger(const std::filesystem::path& path) {
+  throw Error(
+      std::string("is in the way: it is ") +
+          (std::filesystem::is_symlink(path) ? "a symbolic link, which is not followed" : "not a file"),
+      path.string(), "Remove it, or write elsewhere.");
+}
+
 std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
@@ -50,11 +58,11 @@ int flags_of(OpenMode mode) {
     case OpenMode::read:
       return O_RDONLY;
     case OpenMode::write:
-      return O_RDWR;
+      return O_RDWR | O_NOFOLLOW;
     case OpenMode::read_append:
       break;
   }
-  return O_RDWR | O_CREAT | O_APPEND;
+  return O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW;
 }
 
 std::int64_t megabytes(std::int64_t bytes) {
@@ -78,6 +86,7 @@ void FileDescriptor::close() noexcept {
 }
 
 FileDescriptor open_file(const std::filesystem::path& path, OpenMode mode) {
+  if (mode != OpenMode::read && std::filesystem::is_symlink(path)) refuse_stranger(path);
   return {open_regular_file(path, flags_of(mode)), path};
 }
 
@@ -152,12 +161,27 @@ void reserve_space(const FileDescriptor& file, std::int64_t offset, std::int64_t
   fail("reserve " + std::to_string(megabytes(bytes)) + " MB", file.path(), errno);
 }
 
+void make_anew(const std::filesystem::path& temporary) {
+  struct stat status = {};
+  if (::lstat(temporary.c_str(), &status) == 0) {
+    if (!S_ISREG(status.st_mode)) refuse_stranger(temporary);
+    if (::unlink(temporary.c_str()) != 0) fail("remove what an earlier run left", temporary, errno);
+  }
+  const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  if (fd < 0) fail("make the file", temporary, errno);
+  ::close(fd);
+}
+
+void rename_file(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (std::rename(from.c_str(), to.c_str()) != 0) fail("rename " + from.string(), to, errno);
+}
+
 void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to) {
   {
     const FileDescriptor file = open_file(from, OpenMode::write);
     if (::fsync(file.get()) != 0) fail("write the file to the disk", from, errno);
   }
-  if (std::rename(from.c_str(), to.c_str()) != 0) fail("rename " + from.string(), to, errno);
+  rename_file(from, to);
   const int folder = ::open(folder_of(to).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder < 0) return;  // the file is complete; only the rename's place on the disk is left to the system
   ::fsync(folder);

@@ -30,8 +30,8 @@ class FileDescriptor {
 
 enum class OpenMode : std::uint8_t {
   read,         ///< must exist
-  write,        ///< must exist; reads too
-  read_append,  ///< made when missing; reads anywhere, writes at the end
+  write,        ///< must exist and be no symbolic link; reads too
+  read_append,  ///< made when missing, no symbolic link; reads anywhere, writes at the end
 };
 
 /// Opens a regular file and nothing else, without waiting. Throws Error with the reason.
@@ -63,6 +63,13 @@ void check_free_space(const std::filesystem::path& path, std::int64_t needed);
 /// Takes the disk space of [offset, offset + bytes) now, where the file system can. Throws Error when it is
 /// full.
 void reserve_space(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
+
+/// Makes an empty file, in the place of what a killed run may have left under the same temporary name. Throws
+/// Error where something that is not a regular file has that name, which is neither followed nor removed.
+void make_anew(const std::filesystem::path& temporary);
+
+/// Renames. Throws Error with the system's reason.
+void rename_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Flushes `from` to the disk, then renames it. Throws Error.
 void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to);

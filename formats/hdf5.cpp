@@ -18,35 +18,6 @@ constexpr std::size_t highest_rank = 4;
 /// disk).
 [[maybe_unused]] const herr_t no_exit_handler = H5dont_atexit();
 
-const char* const altered_hint = "Copy the file again, or precompute it again.";
-
-/// The deepest reason that the library gives for its last failure; the system's own words where it has any.
-std::string reason() {
-  std::string text;
-  const auto first = [](unsigned, const H5E_error2_t* error, void* data) -> herr_t {
-    if (error->desc != nullptr) *static_cast<std::string*>(data) = error->desc;
-    return 1;
-  };
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, first, &text);
-  constexpr std::string_view before = "error message = '";
-  if (const std::size_t at = text.find(before); at != std::string::npos)
-    text = text.substr(at + before.size(), text.find('\'', at + before.size()) - at - before.size());
-  return text.empty() ? "no reason given" : text;
-}
-
-Id access_properties(std::int64_t align_from) {
-  Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_fapl_sec2(access.get());
-  H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
-  // 1.10's format has a checksum in every piece of metadata; the older ones have none.
-  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
-  // Finished files never change and half-written ones are locked by their journal; HDF5's own lock fails on
-  // some network disks.
-  H5Pset_file_locking(access.get(), false, true);
-  if (align_from > 0) H5Pset_alignment(access.get(), static_cast<hsize_t>(align_from), alignment);
-  return access;
-}
-
 Id text_type(std::size_t length, H5T_cset_t characters) {
   Id type(H5Tcopy(H5T_C_S1), H5Tclose);
   H5Tset_size(type.get(), length > 0 ? length : 1);
@@ -61,22 +32,11 @@ bool is_ascii(const std::string& text) {
   return true;
 }
 
-Id open_existing(const std::filesystem::path& path, unsigned mode) {
-  const Id access = access_properties(0);
-  return {H5Fopen(path.c_str(), mode, access.get()), H5Fclose};
-}
-
 /// The library takes % in the names of sources for the beginning of a format; %% is one %.
 std::string doubled_percents(const std::string& text) {
   std::string doubled;
   for (const char c : text) doubled.append(c == '%' ? 2 : 1, c);
   return doubled;
-}
-
-std::string single_percents(std::string text) {
-  for (std::size_t at = text.find("%%"); at != std::string::npos; at = text.find("%%", at + 1))
-    text.erase(at, 1);
-  return text;
 }
 
 struct Rows {
@@ -93,12 +53,6 @@ Rows select_rows(const Id& dataset, std::int64_t first, std::int64_t rows) {
   H5Sselect_hyperslab(selected.file.get(), H5S_SELECT_SET, start.data(), nullptr, sizes.data(), nullptr);
   selected.memory = Id(H5Screate_simple(rank, sizes.data(), nullptr), H5Sclose);
   return selected;
-}
-
-std::string text_of(std::span<const std::int64_t> dims) {
-  std::string text;
-  for (const std::int64_t dim : dims) text.append(text.empty() ? "" : " x ").append(std::to_string(dim));
-  return text.empty() ? "a scalar" : text;
 }
 
 }  // namespace
@@ -145,6 +99,32 @@ ElementType element_type<double>() {
   return {"float64", 8, H5T_IEEE_F64LE};
 }
 
+std::string reason() {
+  std::string text;
+  const auto first = [](unsigned, const H5E_error2_t* error, void* data) -> herr_t {
+    if (error->desc != nullptr) *static_cast<std::string*>(data) = error->desc;
+    return 1;
+  };
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, first, &text);
+  constexpr std::string_view before = "error message = '";
+  if (const std::size_t at = text.find(before); at != std::string::npos)
+    text = text.substr(at + before.size(), text.find('\'', at + before.size()) - at - before.size());
+  return text.empty() ? "no reason given" : text;
+}
+
+Id access_properties(std::int64_t align_from) {
+  Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_fapl_sec2(access.get());
+  H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
+  // 1.10's format has a checksum in every piece of metadata; the older ones have none.
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V110, H5F_LIBVER_V110);
+  // Finished files never change and half-written ones are locked by their journal; HDF5's own lock fails on
+  // some network disks.
+  H5Pset_file_locking(access.get(), false, true);
+  if (align_from > 0) H5Pset_alignment(access.get(), static_cast<hsize_t>(align_from), alignment);
+  return access;
+}
+
 Id timeless(hid_t kind) {
   Id properties(H5Pcreate(kind), H5Pclose);
   H5Pset_obj_track_times(properties.get(), false);
@@ -164,15 +144,9 @@ File File::create(const std::filesystem::path& path, std::int64_t align_from) {
   return file;
 }
 
-File File::open_to_read(const std::filesystem::path& path) {
-  File file(open_existing(path, H5F_ACC_RDONLY), path);
-  if (!file.file_.valid())
-    throw Error("is not a readable HDF5 file: " + reason(), path.string(), altered_hint);
-  return file;
-}
-
 File File::open_to_change(const std::filesystem::path& path) {
-  File file(open_existing(path, H5F_ACC_RDWR), path);
+  const Id access = access_properties();
+  File file(Id(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.get()), H5Fclose), path);
   if (!file.file_.valid()) file.fail("open the file");
   return file;
 }
@@ -200,8 +174,8 @@ void File::make_link(const std::string& link, const std::string& target) {
     fail("make the link " + link);
 }
 
-void File::write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims,
-                 const void* data) {
+std::int64_t File::write(const std::string& dataset, const ElementType& type,
+                         std::span<const std::int64_t> dims, const void* data) {
   make_group(dataset.substr(0, dataset.rfind('/')));
   const std::vector<hsize_t> sizes(dims.begin(), dims.end());
   const Id space(H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose);
@@ -215,6 +189,7 @@ void File::write(const std::string& dataset, const ElementType& type, std::span<
   if (!made.valid()) fail("make " + dataset);
   if (data != nullptr && H5Dwrite(made.get(), type.id, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
     fail("write " + dataset);
+  return static_cast<std::int64_t>(H5Dget_offset(made.get()));
 }
 
 void File::write_attribute(const std::string& object, const std::string& name, const std::string& text) {
@@ -243,62 +218,9 @@ void File::write_attribute(const std::string& object, const std::string& name,
 }
 
 Id File::open_dataset(const std::string& dataset) const {
-  if (!has(dataset)) throw Error(dataset + " is missing", path_.string(), altered_hint);
   Id opened(H5Dopen2(id(), dataset.c_str(), H5P_DEFAULT), H5Dclose);
-  if (!opened.valid()) throw Error(dataset + " is not a readable dataset", path_.string(), altered_hint);
+  if (!opened.valid()) fail("open " + dataset);
   return opened;
-}
-
-std::string File::type_name(const std::string& dataset) const {
-  const Id opened = open_dataset(dataset);
-  const Id type(H5Dget_type(opened.get()), H5Tclose);
-  const std::array known = {element_type<std::uint8_t>(), element_type<std::uint32_t>(),
-                            element_type<std::int32_t>(), element_type<std::int64_t>(),
-                            element_type<float>(),        element_type<double>()};
-  for (const ElementType& candidate : known)
-    if (H5Tequal(type.get(), candidate.id) > 0) return candidate.name;
-  return "another type";
-}
-
-Stored File::locate(const std::string& dataset, const ElementType& type, std::size_t rank) const {
-  const auto refuse = [&](const std::string& what) {
-    throw Error(dataset + " " + what, path_.string(), altered_hint);
-  };
-  const Id opened = open_dataset(dataset);
-
-  const std::string stored_type = type_name(dataset);
-  if (stored_type != type.name) refuse("holds " + stored_type + ", " + type.name + " is expected");
-
-  const Id creation(H5Dget_create_plist(opened.get()), H5Pclose);
-  if (H5Pget_layout(creation.get()) != H5D_CONTIGUOUS || H5Pget_external_count(creation.get()) != 0)
-    refuse("is not stored in one piece");
-
-  const Id space(H5Dget_space(opened.get()), H5Sclose);
-  const int stored_rank = H5Sget_simple_extent_ndims(space.get());
-  if (H5Sget_simple_extent_type(space.get()) != H5S_SIMPLE || stored_rank != static_cast<int>(rank))
-    refuse("has " + std::to_string(stored_rank) + " dimensions, " + std::to_string(rank) + " are expected");
-
-  std::array<hsize_t, highest_rank> sizes = {};
-  H5Sget_simple_extent_dims(space.get(), sizes.data(), nullptr);
-  Stored stored;
-  stored.bytes = static_cast<std::int64_t>(type.bytes);
-  hsize_t file_bytes = 0;
-  H5Fget_filesize(id(), &file_bytes);
-  for (std::size_t i = 0; i < rank; ++i) {
-    stored.dims.push_back(static_cast<std::int64_t>(sizes[i]));
-    if (sizes[i] > static_cast<hsize_t>(std::numeric_limits<std::int64_t>::max()) ||
-        __builtin_mul_overflow(stored.bytes, stored.dims.back(), &stored.bytes))
-      refuse("has impossible sizes: " + text_of(stored.dims));
-  }
-  if (stored.bytes == 0) return stored;
-
-  const haddr_t offset = H5Dget_offset(opened.get());
-  if (offset == HADDR_UNDEF || offset > file_bytes ||
-      static_cast<hsize_t>(stored.bytes) > file_bytes - offset)
-    refuse("(" + text_of(stored.dims) + ") needs " + std::to_string(stored.bytes) +
-           " bytes, more than the file holds (" + std::to_string(file_bytes) + "): the file is truncated");
-  stored.offset = static_cast<std::int64_t>(offset);
-  return stored;
 }
 
 void File::write_rows(const std::string& dataset, const ElementType& type, std::int64_t first,
@@ -307,14 +229,6 @@ void File::write_rows(const std::string& dataset, const ElementType& type, std::
   const Rows selected = select_rows(opened, first, rows);
   if (H5Dwrite(opened.get(), type.id, selected.memory.get(), selected.file.get(), H5P_DEFAULT, data) < 0)
     fail("write " + dataset);
-}
-
-void File::read_rows(const std::string& dataset, const ElementType& type, std::int64_t first,
-                     std::int64_t rows, void* data) const {
-  const Id opened = open_dataset(dataset);
-  const Rows selected = select_rows(opened, first, rows);
-  if (H5Dread(opened.get(), type.id, selected.memory.get(), selected.file.get(), H5P_DEFAULT, data) < 0)
-    throw Error(dataset + " cannot be read: " + reason(), path_.string(), altered_hint);
 }
 
 void File::write_virtual(const std::string& dataset, const ElementType& type,
@@ -343,56 +257,6 @@ void File::write_virtual(const std::string& dataset, const ElementType& type,
       H5Dcreate2(id(), dataset.c_str(), type.id, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
       H5Dclose);
   if (!made.valid()) fail("make " + dataset);
-}
-
-std::vector<std::string> File::virtual_sources(const std::string& dataset) const {
-  const Id opened = open_dataset(dataset);
-  const Id creation(H5Dget_create_plist(opened.get()), H5Pclose);
-  std::size_t count = 0;
-  std::vector<std::string> files;
-  if (H5Pget_layout(creation.get()) != H5D_VIRTUAL || H5Pget_virtual_count(creation.get(), &count) < 0)
-    return files;
-  for (std::size_t i = 0; i < count; ++i) {
-    std::string name(longest_text, '\0');
-    const ssize_t length = H5Pget_virtual_filename(creation.get(), i, name.data(), name.size());
-    if (length < 0 || static_cast<std::size_t>(length) >= name.size())
-      throw Error(dataset + " does not say where its rows are", path_.string(), altered_hint);
-    files.push_back(single_percents(name.substr(0, static_cast<std::size_t>(length))));
-  }
-  return files;
-}
-
-Id File::open_attribute(const std::string& object, const std::string& name) const {
-  if (object != "/" && !has(object)) return {};
-  const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);
-  if (!holder.valid() || H5Aexists(holder.get(), name.c_str()) <= 0) return {};
-  return {H5Aopen(holder.get(), name.c_str(), H5P_DEFAULT), H5Aclose};
-}
-
-std::optional<std::string> File::text_attribute(const std::string& object, const std::string& name) const {
-  const Id attribute = open_attribute(object, name);
-  if (!attribute.valid()) return {};
-  const Id type(H5Aget_type(attribute.get()), H5Tclose);
-  const Id space(H5Aget_space(attribute.get()), H5Sclose);
-  if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) != 0) return {};
-  if (H5Sget_simple_extent_npoints(space.get()) != 1 || H5Tget_size(type.get()) > longest_text) return {};
-  std::string text(H5Tget_size(type.get()), '\0');
-  if (H5Aread(attribute.get(), type.get(), text.data()) < 0) return {};
-  return text.substr(0, text.find('\0'));
-}
-
-std::optional<std::vector<std::int64_t>> File::integer_attribute(const std::string& object,
-                                                                 const std::string& name,
-                                                                 std::size_t count) const {
-  const Id attribute = open_attribute(object, name);
-  if (!attribute.valid()) return {};
-  const Id type(H5Aget_type(attribute.get()), H5Tclose);
-  const Id space(H5Aget_space(attribute.get()), H5Sclose);
-  if (H5Tget_class(type.get()) != H5T_INTEGER) return {};
-  if (H5Sget_simple_extent_npoints(space.get()) != static_cast<hssize_t>(count)) return {};
-  std::vector<std::int64_t> values(count);
-  if (H5Aread(attribute.get(), H5T_NATIVE_INT64, values.data()) < 0) return {};
-  return values;
 }
 
 void File::close() {

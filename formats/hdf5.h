@@ -1,5 +1,5 @@
-// A thin layer over the HDF5 C library: identifiers that close themselves, failures as Error, no error
-// printing.
+// A thin layer over the HDF5 C library for what we write: identifiers that close themselves, failures as
+// Error, no error printing.
 #pragma once
 
 #include <hdf5.h>
@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,40 +43,32 @@ struct ElementType {
 template <class T>
 ElementType element_type();
 
-/// Where a dataset lies in the file.
-struct Stored {
-  std::vector<std::int64_t> dims;
-  std::int64_t offset = 0;  ///< of its first byte
-  std::int64_t bytes = 0;
-};
-
 /// Rows of a dataset of another file, for a virtual dataset.
 struct VirtualSource {
   std::string file;  ///< relative to the folder of the file that holds the virtual dataset
   std::int64_t rows = 0;
 };
 
-/// An HDF5 file. Objects carry no times, so equal calls make equal files. All throw Error (where = the file;
-/// fields are named).
+/// An HDF5 file that we write: what is in others' files is read by Contents. Objects carry no times, so equal
+/// calls make equal files. All throw Error (where = the file; fields are named).
 class File {
  public:
   /// A new file (an old one is emptied). Objects of at least `align_from` bytes (0: none) start at multiples
   /// of 4096 bytes.
   static File create(const std::filesystem::path& path, std::int64_t align_from = 0);
-  static File open_to_read(const std::filesystem::path& path);
+  /// A file that this program has written, or whose Contents have been read without a mistake.
   static File open_to_change(const std::filesystem::path& path);
 
   [[nodiscard]] hid_t id() const noexcept { return file_.get(); }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  [[nodiscard]] bool has(
-      const std::string& object) const;  ///< a dataset or group of the file itself, not behind a link
 
   void make_group(const std::string& group);  ///< with its parents; nothing where it exists
   void make_link(const std::string& link, const std::string& target);  ///< soft link
 
-  /// Contiguous dataset; makes its group. `data` null: only the space is reserved.
-  void write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims,
-             const void* data);
+  /// Contiguous dataset; makes its group. `data` null: only the space is reserved. Returns where its first
+  /// byte lies in the file.
+  std::int64_t write(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> dims,
+                     const void* data);
   /// Rows [first, first + rows) of a dataset that `write` has reserved.
   void write_rows(const std::string& dataset, const ElementType& type, std::int64_t first, std::int64_t rows,
                   const void* data);
@@ -90,39 +81,24 @@ class File {
   void write_attribute(const std::string& object, const std::string& name,
                        std::span<const std::int64_t> values);
 
-  /// Finds a dataset and proves that it has this type and rank, lies in one piece, and inside the file.
-  [[nodiscard]] Stored locate(const std::string& dataset, const ElementType& type, std::size_t rank) const;
-
-  /// Rows [first, first + rows) of a dataset that `locate` has found.
-  void read_rows(const std::string& dataset, const ElementType& type, std::int64_t first, std::int64_t rows,
-                 void* data) const;
-
-  /// The files of a virtual dataset as `write_virtual` was given them; none where it is another kind.
-  [[nodiscard]] std::vector<std::string> virtual_sources(const std::string& dataset) const;
-
-  /// Name of a dataset's element type ("float64"), "another type" where it is none of ours.
-  [[nodiscard]] std::string type_name(const std::string& dataset) const;
-
-  /// Value of a fixed-length text attribute; nothing where it is missing or of another kind.
-  [[nodiscard]] std::optional<std::string> text_attribute(const std::string& object,
-                                                          const std::string& name) const;
-  /// `count` values of an integer attribute; nothing where it is missing or of another kind.
-  [[nodiscard]] std::optional<std::vector<std::int64_t>> integer_attribute(const std::string& object,
-                                                                           const std::string& name,
-                                                                           std::size_t count) const;
-
   /// Writes everything out. Throws Error when that fails (full disk); the destructor would not say.
   void close();
 
  private:
   File(Id file, std::filesystem::path path) : file_(std::move(file)), path_(std::move(path)) {}
+  [[nodiscard]] bool has(const std::string& object) const;
   [[nodiscard]] Id open_dataset(const std::string& dataset) const;
-  [[nodiscard]] Id open_attribute(const std::string& object, const std::string& name) const;
   [[noreturn]] void fail(const std::string& doing) const;
 
   Id file_;
   std::filesystem::path path_;
 };
+
+/// The deepest reason that the library gives for its last failure; the system's own words where it has any.
+std::string reason();
+
+/// How our files are opened.
+Id access_properties(std::int64_t align_from = 0);
 
 /// Object creation properties without times, for kinds such as H5P_DATASET_CREATE.
 Id timeless(hid_t kind);

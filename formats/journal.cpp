@@ -9,11 +9,13 @@
 #include <charconv>
 #include <string_view>
 
+#include "formats/output_kind.h"
 #include "meshes/error.h"
 
 namespace palpate {
 namespace {
 
+constexpr std::string_view first_word = "palpate-progress ";
 constexpr std::string_view first_line = "palpate-progress 2";
 
 /// The words of a line.
@@ -55,7 +57,36 @@ bool is_still_there(const FileDescriptor& file) {
          opened.st_ino == named.st_ino;
 }
 
+/// Whether a regular file stands there. Throws Error where something else does.
+bool is_there(const std::filesystem::path& file) {
+  struct stat status = {};
+  if (::lstat(file.c_str(), &status) != 0) return false;
+  if (!S_ISREG(status.st_mode))
+    throw Error("is in the way: it is no file of palpate-precompute's", file.string(),
+                "Remove it, or choose another place with --output.");
+  return true;
+}
+
+/// What a killed run has left: a journal, or nothing yet.
+void expect_journal(const FileDescriptor& file) {
+  std::string start(first_word.size(), '\0');
+  start.resize(read_some(file, std::as_writable_bytes(std::span(start)), 0));
+  if (!first_word.starts_with(start))  // which a kill may have cut off
+    throw Error("is in the way: it is not what palpate-precompute writes there", file.path().string(),
+                "Remove it, or choose another place with --output.");
+}
+
 }  // namespace
+
+void expect_own_journal(const std::filesystem::path& model) {
+  const std::filesystem::path progress = with_suffix(model, ".progress"),
+                              partial = with_suffix(model, ".partial");
+  const bool has_journal = is_there(progress);
+  if (has_journal) expect_journal(open_file(progress, OpenMode::read));
+  if (is_there(partial) && !has_journal && !is_ours(partial, OutputKind::model))
+    throw Error("is in the way: it is not what palpate-precompute writes there", partial.string(),
+                "Remove it, or choose another place with --output.");
+}
 
 Journal::Journal(const std::filesystem::path& path) {
   do {
@@ -64,6 +95,7 @@ Journal::Journal(const std::filesystem::path& path) {
       throw Error("another palpate-precompute is writing this file", path.string(),
                   "Wait for it, or choose another place with --output.");
   } while (!is_still_there(file_));
+  expect_journal(file_);
 }
 
 std::optional<JournalContents> Journal::read() const {

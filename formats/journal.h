@@ -32,10 +32,14 @@ struct JournalContents {
   std::vector<JournalRange> ranges;
 };
 
+/// Throws Error where PATH.partial or PATH.progress, beside the model PATH, is something that no killed run
+/// of ours can have left: another's file, a link.
+void expect_own_journal(const std::filesystem::path& model);
+
 /// An open journal, held by one process at a time.
 class Journal {
  public:
-  /// Opens or makes it. Throws Error when another process holds it.
+  /// Opens or makes it. Throws Error when another process holds it, or it is another's file.
   explicit Journal(const std::filesystem::path& path);
 
   /// What a killed run left; nothing when there is no complete frame. A line that was cut off by the kill

@@ -1,6 +1,7 @@
 // The baked model: everything that NAME.palpate.hdf holds.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -36,6 +37,27 @@ struct Probe {
   std::vector<double> displacement;  ///< [n] of the stored dofs [m], by a sparse solve with K
 };
 
+/// Worst relative error of the forces of touches with a packed matrix stored in each Precision, measured when
+/// it was computed (README, "Precision"); infinity where a capacitance matrix is not positive definite.
+struct ForceErrors {
+  static constexpr double not_measured = -1.0;
+  std::array<double, 3> of_precision = {not_measured, not_measured, not_measured};
+
+  [[nodiscard]] double operator[](Precision precision) const noexcept {
+    return of_precision[static_cast<std::size_t>(precision)];
+  }
+  [[nodiscard]] double& operator[](Precision precision) noexcept {
+    return of_precision[static_cast<std::size_t>(precision)];
+  }
+  /// Whether anything was measured: not in files before format 3.3.
+  [[nodiscard]] bool any() const noexcept {
+    return of_precision[0] >= 0.0 || of_precision[1] >= 0.0 || of_precision[2] >= 0.0;
+  }
+};
+
+/// Force errors above it are warned of, and are not chosen by precision "auto" where another form has less.
+inline constexpr double good_force_error = 1e-4;
+
 /// What overlays can be.
 inline constexpr int least_refinement = 2, most_refinement = 16, most_rings = 16;
 
@@ -70,6 +92,7 @@ struct StoredDynamics {
   Rayleigh damping;
   MassAndDamping matrices;     ///< packed
   PackedGreens inverse;        ///< packed: K_bar^-1 of the stored dofs [m/N]
+  ForceErrors force_errors;    ///< packed: of the inverse
   std::vector<double> omega;   ///< modal: [k + 1] angular frequencies [rad/s], ascending; the last is that of
                                ///< the first mode that is not kept (infinity when all are)
   std::vector<double> shapes;  ///< modal: [k x n] the modes at the stored dofs, phi^T M phi = 1 [1/sqrt(kg)]
@@ -107,6 +130,7 @@ struct Model {
   StoredOverlay overlay;
   StoredDynamics dynamics;
   PackedGreens greens;       ///< Xi of the stored dofs [m/N]
+  ForceErrors force_errors;  ///< of greens
   std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
 
   /// d, dofs a node: 2 in the plane, 3 in space.
@@ -115,5 +139,9 @@ struct Model {
     return dimension() * static_cast<std::int64_t>(stored_nodes.size());
   }
 };
+
+/// A warning where the stored precision makes forces wrong by more than good_force_error, with the figure;
+/// empty where it does not, or where nothing was measured.
+std::string precision_warning(const Model& model, Precision precision);
 
 }  // namespace palpate

@@ -21,6 +21,7 @@ std::int64_t smallest(Count count) {
     case Count::stored_nodes:
     case Count::patches:
     case Count::modes:
+    case Count::smooth_terms:
       return 1;
     case Count::nodes:
       return 3;
@@ -152,6 +153,8 @@ Counts Counts::of(const Model& model, std::string where) {
     set(Count::matrix_entries, model.dynamics.matrices.row.size(), "/dynamics/matrices/row");
   if (model.dynamics.method == DynamicsMethod::modal)
     counts.set(Count::modes, model.dynamics.modes(), "/dynamics/modes/omega");
+  if (model.greens.smooth() != nullptr)
+    counts.set(Count::smooth_terms, model.greens.smooth()->terms, "/greens/smooth");
   return counts;
 }
 

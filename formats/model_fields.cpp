@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::array analyses = {"solid", "plane_stress", "plane_strain"};
 constexpr std::array scopes = {"surface", "layers", "full"};
-constexpr std::array precisions = {"float32", "float64"};
+// A reader that does not know the second refuses it, and does not take R for Xi.
+constexpr std::array precisions = {"float32", "float32+smooth", "float64"};
 
 /// Cuts the text before the next separator off the front.
 std::string_view cut(std::string_view& rest, char separator) {
@@ -111,9 +112,10 @@ Scope scope_from(const std::string& text) {
 }
 
 Precision precision_from(const std::string& text) {
-  for (const Precision precision : {Precision::single_precision, Precision::double_precision})
+  for (const Precision precision :
+       {Precision::single_precision, Precision::split_precision, Precision::double_precision})
     if (text == text_of(precision)) return precision;
-  throw Unreadable{"is '" + text + "', not float32 or float64"};
+  throw Unreadable{"is '" + text + "', not float32, float32+smooth or float64"};
 }
 
 std::vector<double> flat(const std::vector<Vec3>& rows) {

@@ -29,9 +29,10 @@ enum class Count : std::uint8_t {
   patch_transfer_entries,
   patch_compliance_entries,
   matrix_entries,  // of M and C_d
-  modes
+  modes,
+  smooth_terms
 };
-inline constexpr std::size_t number_of_counts = 16;
+inline constexpr std::size_t number_of_counts = 17;
 
 /// One dimension of a field: factor * count + plus.
 struct Extent {

@@ -14,7 +14,7 @@
 namespace palpate {
 
 inline constexpr int format_major = 3;  ///< another major version is refused: "precompute it again"
-inline constexpr int format_minor = 2;  ///< newer minor versions are read, what they add is ignored
+inline constexpr int format_minor = 3;  ///< newer minor versions are read, what they add is ignored
 
 /// A packed matrix that is streamed to disk.
 enum class PackedMatrix : std::uint8_t {
@@ -22,29 +22,35 @@ enum class PackedMatrix : std::uint8_t {
   inverse,  ///< StoredDynamics::inverse, of models whose dynamics is packed
 };
 
+/// What becomes of a PATH.partial that an interrupted run of the same model has left.
+enum class Leftovers : std::uint8_t { resume, discard };
+
 /// Streams a model to disk. Everything but packed matrices and probes is written by the constructor to
 /// PATH.partial, with the space of the packed matrices reserved (contiguous, page-aligned); columns then
 /// arrive in any order from any thread; `finish` adds probes, checksums and content hash and renames
 /// PATH.partial to PATH. Which columns are done is journalled (with their checksums) in PATH.progress, so a
-/// killed run is continued by constructing the writer again with an equal model. An existing PATH is
-/// untouched until the rename.
+/// run that was killed or interrupted is continued by constructing the writer again with an equal model. An
+/// existing PATH is untouched until the rename.
 class ModelWriter {
  public:
-  /// `model.greens`, `model.dynamics.inverse` and `model.probes` are ignored. Continues PATH.partial when its
+  /// `model.probes` is ignored, and of `model.greens` and `model.dynamics.inverse` all but the smooth part,
+  /// which split precision needs. Continues PATH.partial when its
   /// journal has the same key (a hash of all fields but those, and of format and precision) and each
-  /// journalled range still has its checksum. Throws Error when the file cannot be created or the disk cannot
-  /// hold it (with the numbers).
-  ModelWriter(std::filesystem::path path, const Model& model, Precision precision);
+  /// journalled range still has its checksum, unless leftovers are to be discarded. Throws Error when the
+  /// file cannot be created or the disk cannot hold it (with the numbers).
+  ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+              Leftovers leftovers = Leftovers::resume);
   ~ModelWriter();
   ModelWriter(const ModelWriter&) = delete;
   ModelWriter& operator=(const ModelWriter&) = delete;
 
-  /// Whether columns [first, first + count) were written by an earlier, killed run.
+  /// Whether columns [first, first + count) were written, by this run or an earlier one.
   [[nodiscard]] bool has_columns(std::int64_t first, std::int64_t count,
                                  PackedMatrix matrix = PackedMatrix::greens) const;
 
   /// Stores columns [first, first + count) of the lower triangle: `packed` holds their entries one column
-  /// after the other, column j from its diagonal down. Converts to the stored precision, subnormal
+  /// after the other, column j from its diagonal down; in split precision of the matrix, from which W W^T is
+  /// taken off here. Converts to the stored precision, subnormal
   /// numbers to 0: a tick would take many times as long with them. Thread-safe for disjoint ranges.
   void write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed,
                      PackedMatrix matrix = PackedMatrix::greens);
@@ -52,7 +58,7 @@ class ModelWriter {
   /// Adds the probes, seals and renames. All columns of all matrices must have been written.
   void finish(const std::vector<Probe>& probes);
 
-  /// Removes PATH.partial and PATH.progress (Ctrl-C: nothing half-written stays behind).
+  /// Removes PATH.partial and PATH.progress.
   void discard() noexcept;
 
  private:
@@ -60,13 +66,25 @@ class ModelWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Loads a file: maps the packed matrices, reads the rest, and proves every size, range, index, finite
-/// value and checksum once. Throws Error naming the field that is wrong.
-Model load_model(const std::filesystem::path& path);
+/// How a model is loaded.
+struct LoadOptions {
+  /// Bytes of a packed matrix that are at most read into memory; -1: half of what is available. A larger one
+  /// is mapped: the file must stay as it is for as long as the model lives, as a mapped file that is cut off
+  /// ends the program (SIGBUS).
+  std::int64_t most_in_memory = -1;
+};
+
+/// Loads a file and proves every size, range, index, finite value and checksum once. Throws Error naming the
+/// field that is wrong. Starts a child process for a moment (see hdf5::Contents); signals and children of the
+/// caller are left alone.
+Model load_model(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// The sources of a loaded model that are no longer what they were: a sentence for each ("model.toml changed
 /// since …", "… is gone"). `model_path` is the baked file; empty when nothing is stale.
 std::vector<std::string> stale_sources(const Model& model, const std::filesystem::path& model_path);
+
+/// Where a source of the model at `model_path` is.
+std::filesystem::path source_path(const SourceFile& source, const std::filesystem::path& model_path);
 
 /// A SourceFile entry for `file`, its path relative to the folder of `model_path`.
 SourceFile describe_source(const std::string& role, const std::filesystem::path& file,

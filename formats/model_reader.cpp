@@ -1,65 +1,42 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <type_traits>
+#include <utility>
 
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
 #include "formats/dynamics_fields.h"
 #include "formats/file_io.h"
-#include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
+#include "formats/memory.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
+#include "formats/precision_fields.h"
+#include "formats/superblock.h"
 #include "meshes/error.h"
 
 namespace palpate {
 namespace {
 
-constexpr const char* precompute_again = "Precompute it again: palpate-precompute model.toml.";
+constexpr const char* precompute_again =
+    "Copy the file again, or precompute it again: palpate-precompute model.toml.";
 
-std::uint64_t little_endian(std::span<const unsigned char> bytes) {
-  std::uint64_t value = 0;
-  for (std::size_t i = bytes.size(); i-- > 0;) value = (value << 8U) | bytes[i];
-  return value;
-}
-
-/// Looks at HDF5's superblock before HDF5 does: says what is not a file of ours, and what is cut off. Version
-/// 3 has checksums in all of its metadata; files of older versions, which other programs write, are not
-/// handed to the library.
-void check_superblock(const FileDescriptor& file) {
-  constexpr std::array<unsigned char, 12> start = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n', 3, 8, 8, 0};
-  constexpr std::size_t signature_bytes = 8, end_at = 28, superblock_bytes = 48;
-  const std::string where = file.path().string();
-  const std::int64_t size = file_size(file);
-  if (size == 0) throw Error("the file is empty", where, precompute_again);
-
-  std::array<unsigned char, superblock_bytes> superblock = {};
-  const std::size_t got = read_some(file, std::as_writable_bytes(std::span(superblock)), 0);
-  if (std::memcmp(superblock.data(), start.data(), std::min(got, signature_bytes)) != 0)
-    throw Error("is not a Palpate file", where,
-                "Give a NAME.palpate.hdf that palpate-precompute has written.");
-  if (got < superblock_bytes)
-    throw Error("the file is truncated: it ends after " + std::to_string(size) + " bytes", where,
-                precompute_again);
-  if (std::memcmp(superblock.data(), start.data(), start.size()) != 0)
-    throw Error("is an HDF5 file, but not a Palpate file", where,
-                "Give a NAME.palpate.hdf that palpate-precompute has written.");
-  const std::uint64_t end = little_endian(std::span(superblock).subspan(end_at, 8));
-  if (end > static_cast<std::uint64_t>(size))
-    throw Error(
-        "the file is truncated: it has " + std::to_string(size) + " of " + std::to_string(end) + " bytes",
-        where, "Copy the file again, or precompute it again.");
-}
+constexpr const char* give_a_model = "Give a NAME.palpate.hdf that palpate-precompute has written.";
 
 /// Proves that this is our format in a version that we read.
-std::vector<std::int64_t> read_version(const hdf5::File& file) {
+std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
   const std::string where = file.path().string();
-  if (file.text_attribute("/", "format") != "palpate")
-    throw Error("is an HDF5 file, but not a Palpate file", where,
-                "Give a NAME.palpate.hdf that palpate-precompute has written.");
+  const auto format = file.text_attribute("/", "format");
+  if (format == "palpate-recording")
+    throw Error("is a recording, not a model", where,
+                "palpate-runtime view " + where + " shows it; a model is a NAME.palpate.hdf.");
+  if (format != "palpate") throw Error("is an HDF5 file, but not a Palpate file", where, give_a_model);
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version) refuse(where, "the attribute version is missing");
   if ((*version)[0] != format_major)
@@ -73,8 +50,8 @@ std::vector<std::int64_t> read_version(const hdf5::File& file) {
 
 class Reader {
  public:
-  explicit Reader(const hdf5::File& file, const FileDescriptor& bytes)
-      : file_(file), bytes_(bytes), where_(file.path().string()), counts_(where_) {}
+  Reader(const hdf5::Contents& file, const LoadOptions& options)
+      : file_(file), options_(options), where_(file.path().string()), counts_(where_) {}
 
   Model read();
 
@@ -83,14 +60,15 @@ class Reader {
   void read_attribute(const Attribute<T>& attribute);
   template <class T>
   void read_field(const Field<T>& field);
-  [[nodiscard]] PackedGreens map_packed(const std::string& path);
+  [[nodiscard]] PackedGreens read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth);
+  [[nodiscard]] std::shared_ptr<std::byte> room_for(const hdf5::Stored& packed) const;
   void check_content(const std::vector<std::int64_t>& version);
   void check_stored_checksum(const std::string& path, const std::string& found);
   template <class T>
   ChunkedChecksum::Inspect first_not_finite(std::atomic<std::size_t>& first) const;
 
-  const hdf5::File& file_;
-  const FileDescriptor& bytes_;
+  const hdf5::Contents& file_;
+  LoadOptions options_;
   std::string where_;
   Counts counts_;
   FileHeader header_;
@@ -108,9 +86,16 @@ Model Reader::read() {
   }
   if (file_.has(dynamics_group))
     for_each_dynamics_field(model_, [this](const auto& field) { read_field(field); });
+  if (header_.precision == Precision::split_precision)
+    for_each_smooth_field(model_, [this](const auto& field) { read_field(field); });
+  if (file_.has(greens_errors_path)) visit_greens_errors([this](const auto& field) { read_field(field); });
+  if (model_.dynamics.method == DynamicsMethod::packed && file_.has(inverse_errors_path))
+    visit_inverse_errors([this](const auto& field) { read_field(field); });
   check_model(model_, where_);
-  model_.greens = map_packed(greens_path);
-  if (model_.dynamics.method == DynamicsMethod::packed) model_.dynamics.inverse = map_packed(inverse_path);
+  check_precision(model_, header_.precision, where_);
+  model_.greens = read_packed(greens_path, model_.greens.smooth());
+  if (model_.dynamics.method == DynamicsMethod::packed)
+    model_.dynamics.inverse = read_packed(inverse_path, model_.dynamics.inverse.smooth());
   check_content(version);
   return std::move(model_);
 }
@@ -142,7 +127,7 @@ void Reader::read_field(const Field<T>& field) {
   counts_.match(field.path, field.shape, stored.dims);
 
   std::vector<T> values(static_cast<std::size_t>(stored.bytes) / sizeof(T));
-  read_exactly(bytes_, std::as_writable_bytes(std::span(values)), stored.offset);
+  read_exactly(file_.file(), std::as_writable_bytes(std::span(values)), stored.offset);
   ChunkedChecksum found;
   found.append(std::as_bytes(std::span(values)));
   check_stored_checksum(field.path, found.digits());
@@ -189,10 +174,17 @@ ChunkedChecksum::Inspect Reader::first_not_finite(std::atomic<std::size_t>& firs
   };
 }
 
-/// Maps a packed matrix of the stored dofs and proves its values.
-PackedGreens Reader::map_packed(const std::string& path) {
+/// Memory for a packed matrix; null where it takes too much.
+std::shared_ptr<std::byte> Reader::room_for(const hdf5::Stored& packed) const {
+  const std::int64_t most = options_.most_in_memory < 0 ? available_memory() / 2 : options_.most_in_memory;
+  const std::shared_ptr<void> memory = packed.bytes <= most ? map_memory(packed.bytes) : nullptr;
+  return {memory, static_cast<std::byte*>(memory.get())};
+}
+
+/// Reads or maps a packed matrix of the stored dofs and proves its values.
+PackedGreens Reader::read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth) {
   const std::int64_t order = model_.stored_dofs();
-  const bool single = header_.precision == Precision::single_precision;
+  const bool single = has_float_entries(header_.precision);
   const hdf5::Stored stored =
       file_.locate(path, single ? hdf5::element_type<float>() : hdf5::element_type<double>(), 1);
   if (stored.dims[0] != packed_size(order))
@@ -201,22 +193,24 @@ PackedGreens Reader::map_packed(const std::string& path) {
   if (stored.offset % bytes_per_scalar(header_.precision) != 0)
     refuse(where_, path + " does not start at a multiple of its scalar's size");
 
-  const std::shared_ptr<const void> mapped = map_file(bytes_, stored.offset, stored.bytes);
-  PackedGreens matrix(mapped, order, header_.precision);
-
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   std::atomic<std::size_t> bad{none};
   ChunkedChecksum found;
-  found.append({static_cast<const std::byte*>(mapped.get()), static_cast<std::size_t>(stored.bytes)},
-               single ? first_not_finite<float>(bad) : first_not_finite<double>(bad));
+  const std::shared_ptr<std::byte> memory = room_for(stored);
+  found.append_file(file_.file(), stored.offset, stored.bytes, memory.get(),
+                    single ? first_not_finite<float>(bad) : first_not_finite<double>(bad));
   check_stored_checksum(path, found.digits());
   if (bad != none)
     refuse(where_, path + " holds a value that is not finite (entry " + std::to_string(bad) + ")");
+
+  const std::shared_ptr<const void> data =
+      memory != nullptr ? memory : map_file(file_.file(), stored.offset, stored.bytes);
+  PackedGreens matrix(data, order, header_.precision, std::move(smooth));
   for (std::int64_t i = 0; i < order; ++i) {
     const Index node = model_.stored_nodes[static_cast<std::size_t>(i / model_.dimension())];
     const bool held = (model_.fixed[static_cast<std::size_t>(node)] >> i % model_.dimension() & 1) != 0;
     const double entry = matrix(i, i);
-    if (held ? entry != 0.0 : !(entry > 0.0))
+    if (held ? entry != 0.0 : !(entry > 0.0) || std::isinf(entry))
       refuse(where_, path + ": diagonal entry " + std::to_string(i) + " is not " +
                          (held ? "zero, though its dof is held" : "positive"));
   }
@@ -237,12 +231,10 @@ void Reader::check_content(const std::vector<std::int64_t>& version) {
 
 }  // namespace
 
-Model load_model(const std::filesystem::path& path) {
-  const FileDescriptor bytes = open_file(path, OpenMode::read);
-  check_superblock(bytes);
-  const hdf5::Quiet quiet;
-  const hdf5::File file = hdf5::File::open_to_read(path);
-  return Reader(file, bytes).read();
+Model load_model(const std::filesystem::path& path, const LoadOptions& options) {
+  FileDescriptor bytes = open_file(path, OpenMode::read);
+  check_superblock(bytes, {"a Palpate file", give_a_model, precompute_again});
+  return Reader(hdf5::Contents::read(std::move(bytes)), options).read();
 }
 
 }  // namespace palpate

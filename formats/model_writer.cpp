@@ -10,10 +10,12 @@
 #include "formats/dynamics_fields.h"
 #include "formats/file_io.h"
 #include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "formats/journal.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
+#include "formats/precision_fields.h"
 #include "meshes/error.h"
 
 namespace palpate {
@@ -51,6 +53,9 @@ void for_each_known_field(const Model& model, Visitor&& visit) {
   for_each_body_field(model.mesh.element, visit);
   if (model.overlay.refinement != 0) for_each_overlay_field(visit);
   if (model.dynamics.method != DynamicsMethod::none) for_each_dynamics_field(model, visit);
+  if (model.greens.smooth() != nullptr) for_each_smooth_field(model, visit);
+  if (model.force_errors.any()) visit_greens_errors(visit);
+  if (model.dynamics.force_errors.any()) visit_inverse_errors(visit);
 }
 
 void write_attributes(hdf5::File& file, const Model& model, const FileHeader& header) {
@@ -107,20 +112,32 @@ std::string checksum_around(const FileDescriptor& file, std::vector<std::int64_t
   return running.digits();
 }
 
+/// Columns of the lower triangle from `first` on, W W^T taken off.
+std::vector<double> without(const SmoothPart& smooth, std::int64_t first, std::int64_t order,
+                            std::span<const double> packed) {
+  std::vector<double> remainder(packed.begin(), packed.end());
+  auto entry = remainder.begin();
+  for (std::int64_t j = first; entry != remainder.end(); ++j)
+    for (std::int64_t i = j; i < order; ++i) *entry++ -= smooth(i, j);
+  return remainder;
+}
+
 /// A packed matrix that arrives by columns.
 struct Streamed {
   const char* path;
   const char* name;
   std::vector<bool> done;  ///< [n] columns
+  std::shared_ptr<const SmoothPart> smooth;
 };
 
 }  // namespace
 
 struct ModelWriter::Impl {
-  Impl(std::filesystem::path to, const Model& model, Precision precision);
+  Impl(std::filesystem::path to, const Model& model, Precision precision, Leftovers leftovers);
 
   [[nodiscard]] JournalFrame examine(const Model& model);
   bool resume();
+  [[nodiscard]] bool is_ours(const JournalContents& left) const;
   void start(const Model& model);
   void write_body(const Model& model);
   template <class T>
@@ -145,7 +162,8 @@ struct ModelWriter::Impl {
   std::vector<Streamed> matrices;
 };
 
-ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision)
+ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision,
+                        Leftovers leftovers)
     : path(std::move(to)),
       partial(with_suffix(path, ".partial")),
       header{precision},
@@ -155,10 +173,10 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
       frame(examine(model)),
       journal(with_suffix(path, ".progress")) {
   const std::vector<bool> none(static_cast<std::size_t>(order), false);
-  matrices.push_back({greens_path, "the Green's functions", none});
+  matrices.push_back({greens_path, "the Green's functions", none, model.greens.smooth()});
   if (model.dynamics.method == DynamicsMethod::packed)
-    matrices.push_back({inverse_path, "the inverse of K_bar", none});
-  if (resume()) return;
+    matrices.push_back({inverse_path, "the inverse of K_bar", none, model.dynamics.inverse.smooth()});
+  if (leftovers == Leftovers::resume && resume()) return;
   try {
     start(model);
   } catch (...) {
@@ -171,6 +189,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
 /// anything on the disk is touched, so that a mistake does not cost an earlier run's columns.
 JournalFrame ModelWriter::Impl::examine(const Model& model) {
   add_attributes(content, model, header, version);
+  check_precision(model, header.precision, path.string());
   std::int64_t bytes = 0;
   for_each_known_field(model, [&](const auto& field) {
     const auto values = field.take(model);
@@ -192,6 +211,7 @@ bool ModelWriter::Impl::resume() {
   if (!left || left->frame.key != frame.key || left->frame.packed_at.size() != matrices.size() ||
       !std::filesystem::exists(partial))
     return false;
+  if (!is_ours(*left)) return false;
   data = open_file(partial, OpenMode::write);
   const bool inside =
       std::all_of(left->frame.packed_at.begin(), left->frame.packed_at.end(),
@@ -217,10 +237,28 @@ bool ModelWriter::Impl::resume() {
   return true;
 }
 
+/// Whether the HDF5 library can be given what a killed run left, and its packed matrices lie where the
+/// journal says.
+bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
+  const bool single = header.precision == Precision::single_precision;
+  const hdf5::ElementType scalar = single ? hdf5::element_type<float>() : hdf5::element_type<double>();
+  try {
+    const hdf5::Contents contents = hdf5::Contents::read(partial);
+    for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
+      const hdf5::Stored stored = contents.locate(matrices[matrix].path, scalar, 1);
+      if (stored.offset != left.frame.packed_at[matrix] || stored.bytes != packed_bytes()) return false;
+    }
+  } catch (const Error&) {
+    return false;
+  }
+  return true;
+}
+
 void ModelWriter::Impl::start(const Model& model) {
   journal.empty();
   data.close();
   check_free_space(partial, frame.file_bytes);
+  make_anew(partial);
   write_body(model);
   data = open_file(partial, OpenMode::write);
   for (const std::int64_t at : frame.packed_at) reserve_space(data, at, packed_bytes());
@@ -232,7 +270,7 @@ void ModelWriter::Impl::start(const Model& model) {
 /// Everything but what `finish` brings.
 void ModelWriter::Impl::write_body(const Model& model) {
   const hdf5::Quiet quiet;
-  const bool single = header.precision == Precision::single_precision;
+  const bool single = has_float_entries(header.precision);
   const hdf5::ElementType scalar = single ? hdf5::element_type<float>() : hdf5::element_type<double>();
   const std::int64_t entries = packed_size(order);
 
@@ -241,8 +279,7 @@ void ModelWriter::Impl::write_body(const Model& model) {
   for_each_known_field(model, [&](const auto& field) { write_field(file, field, model, counts); });
   write_vtk_view(file);
   for (const Streamed& matrix : matrices) {
-    file.write(matrix.path, scalar, std::array{entries}, nullptr);
-    frame.packed_at.push_back(file.locate(matrix.path, scalar, 1).offset);
+    frame.packed_at.push_back(file.write(matrix.path, scalar, std::array{entries}, nullptr));
   }
   file.close();
 }
@@ -335,8 +372,9 @@ void ModelWriter::Impl::discard() noexcept {
   journal.remove();
 }
 
-ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision)
-    : impl_(std::make_unique<Impl>(std::move(path), model, precision)) {}
+ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+                         Leftovers leftovers)
+    : impl_(std::make_unique<Impl>(std::move(path), model, precision, leftovers)) {}
 
 ModelWriter::~ModelWriter() = default;
 
@@ -361,7 +399,9 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
                     std::to_string(n),
                 impl_->path.string(), "This is a mistake in the program; please report it.");
   try {
-    if (impl_->header.precision == Precision::single_precision)
+    if (const SmoothPart* smooth = impl_->matrices[which].smooth.get(); smooth != nullptr)
+      impl_->store<float>(which, first, count, without(*smooth, first, n, packed));
+    else if (has_float_entries(impl_->header.precision))
       impl_->store<float>(which, first, count, packed);
     else
       impl_->store<double>(which, first, count, packed);

@@ -74,6 +74,14 @@ struct SessionInfo {
   std::string options;       ///< lines "name=value\n"
 };
 
+/// The frames of a session except for their values at the nodes, which RecordingFile reads.
+struct RecordedFrames {
+  RecordedSurface surface;
+  std::vector<std::int64_t> tick;  ///< [F]
+  std::vector<double> time;        ///< [F] since the start of the run [s]
+  bool has_stress = true;          ///< and pressure: recordings from 4.1 on
+};
+
 /// Writes a session to HDF5. From the first `checkpoint` on PATH is a valid recording at each instant,
 /// however the program ends: it shows the datasets of complete files in PATH.parts as its own (virtual
 /// datasets). `finish` makes it one plain file. Not for the tick: a recorder thread calls it.
@@ -99,18 +107,12 @@ class RecordingWriter {
   /// with PATH as the last `checkpoint` left it.
   void finish();
 
+  /// The frames that were appended.
+  [[nodiscard]] const RecordedFrames& frames() const noexcept;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
-};
-
-/// The frames of a session but for their values at the nodes, which `read_displacement` and `read_frame`
-/// read.
-struct RecordedFrames {
-  RecordedSurface surface;
-  std::vector<std::int64_t> tick;  ///< [F]
-  std::vector<double> time;        ///< [F] since the start of the run [s]
-  bool has_stress = true;          ///< and pressure: recordings from 4.1 on
 };
 
 /// A recorded session.
@@ -122,19 +124,34 @@ struct Recording {
   bool finished = true;  ///< else it was killed, or is being recorded: see `finish_recording`
 };
 
-/// Reads a recording back, also one that was killed. Throws Error when it is not one or is damaged.
+/// Reads a recording back, also one that was killed, and proves all of it: checksums (from version 4.2 on),
+/// sizes that belong together, places, times and counts that can be. Throws Error (the field is named) when
+/// it is not one or is damaged. Starts a child process for a moment (see hdf5::Contents).
 Recording read_recording(const std::filesystem::path& path);
 
-/// Only the frames of it.
-RecordedFrames read_frames(const std::filesystem::path& path);
+struct RecordingFiles;
 
-/// Displacement [frames x S x 3] of some frames [m]. Throws Error when they are not all there.
-std::vector<float> read_displacement(const std::filesystem::path& path, std::int64_t first,
-                                     std::int64_t frames);
+/// A recording whose frames are read as they are needed. It stays whole for as long as this lives, also while
+/// it is still being recorded.
+class RecordingFile {
+ public:
+  /// Reads and proves it as `read_recording` does. Throws Error.
+  explicit RecordingFile(const std::filesystem::path& path);
 
-/// One frame. Recordings before 4.1 have neither stress nor pressure: then those are empty. Throws Error when
-/// it is not there.
-SurfaceFrame read_frame(const std::filesystem::path& path, std::int64_t number);
+  /// Everything except the frames' values at the nodes.
+  [[nodiscard]] const Recording& recording() const noexcept { return recording_; }
+
+  /// One frame. Recordings before 4.1 have neither stress nor pressure: then those are empty. Throws Error
+  /// when it is not there.
+  [[nodiscard]] SurfaceFrame frame(std::int64_t number) const;
+
+  /// Displacement [frames x S x 3] of some frames [m]. Throws Error when they are not all there.
+  [[nodiscard]] std::vector<float> displacement(std::int64_t first, std::int64_t frames) const;
+
+ private:
+  std::shared_ptr<const RecordingFiles> files_;
+  Recording recording_;
+};
 
 /// Makes a recording that was killed one plain file and removes its parts; nothing where that is so already.
 /// False, and nothing happens, while it is being recorded. Throws Error.

@@ -6,17 +6,25 @@
 #include <array>
 #include <cstring>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <system_error>
+#include <utility>
 
+#include "formats/checksum.h"
 #include "meshes/error.h"
+#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::int64_t major_version = 4, minor_version = 1;
+constexpr std::int64_t major_version = 4, minor_version = 2;
+constexpr std::int64_t highest_rate = 1'000'000;  // ticks a second
 constexpr const char* format_name = "palpate-recording";
 constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
+constexpr const char* lock_name = "lock";
+constexpr const char* master_name = "master.partial";
+constexpr const char* altered_hint = "Copy the file again, or record the session again.";
 constexpr std::int64_t block = std::int64_t{4} << 20;  // bytes that are copied at once
 
 /// A dataset with a row for each tick or frame.
@@ -59,6 +67,18 @@ std::vector<RowField> row_fields(const RecordingHead& head) {
   return fields;
 }
 
+/// Writes a dataset with its checksum.
+template <class T>
+StoredRows write_checked(hdf5::File& file, const char* name, std::span<const std::int64_t> dims,
+                         const std::vector<T>& values) {
+  ChunkedChecksum running;
+  running.append(std::as_bytes(std::span(values)));
+  const StoredRows stored = {file.write(name, hdf5::element_type<T>(), dims, values.data()),
+                             running.digits()};
+  file.write_attribute(name, "xxh3", stored.checksum);
+  return stored;
+}
+
 void write_head(hdf5::File& file, const RecordingHead& head) {
   file.write_attribute("/", "format", std::string(format_name));
   file.write_attribute("/", "version",
@@ -73,21 +93,21 @@ void write_head(hdf5::File& file, const RecordingHead& head) {
   const RecordedSurface& surface = head.surface;
   std::vector<double> nodes;
   for (const Vec3& node : surface.nodes) nodes.insert(nodes.end(), node.begin(), node.end());
-  file.write("/surface/nodes", hdf5::element_type<double>(), std::array{std::ssize(surface.nodes), 3L},
-             nodes.data());
-  file.write("/surface/simplices", hdf5::element_type<Index>(),
-             std::array{std::ssize(surface.simplices) / surface.corners, std::int64_t{surface.corners}},
-             surface.simplices.data());
+  write_checked<double>(file, "/surface/nodes", std::array{std::ssize(surface.nodes), 3L}, nodes);
+  write_checked<Index>(
+      file, "/surface/simplices",
+      std::array{std::ssize(surface.simplices) / surface.corners, std::int64_t{surface.corners}},
+      surface.simplices);
   if (!head.has_stress) return;
   std::vector<std::uint8_t> held = surface.held;
   held.resize(surface.nodes.size());
-  file.write("/surface/held", hdf5::element_type<std::uint8_t>(), std::array{std::ssize(held)}, held.data());
+  write_checked<std::uint8_t>(file, "/surface/held", std::array{std::ssize(held)}, held);
 }
 
 /// Writes a file under a temporary name, then renames it.
-void write_whole(const std::filesystem::path& path, bool durably,
+void write_whole(const std::filesystem::path& path, const std::filesystem::path& partial, bool durably,
                  const std::function<void(hdf5::File&)>& fill) {
-  const std::filesystem::path partial = with_suffix(path, ".partial");
+  make_anew(partial);
   try {
     hdf5::File file = hdf5::File::create(partial);
     fill(file);
@@ -95,9 +115,7 @@ void write_whole(const std::filesystem::path& path, bool durably,
     if (durably) {
       rename_durably(partial, path);
     } else {
-      std::error_code failed;
-      std::filesystem::rename(partial, path, failed);
-      if (failed) throw Error("cannot make the file: " + failed.message(), path.string(), "Check the path.");
+      rename_file(partial, path);
     }
   } catch (...) {
     std::error_code ignored;
@@ -106,78 +124,162 @@ void write_whole(const std::filesystem::path& path, bool durably,
   }
 }
 
+/// Where the recording itself is written before it is renamed: in the folder of parts, which is ours.
+std::filesystem::path unfinished_master(const std::filesystem::path& recording) {
+  return parts_folder(recording) / master_name;
+}
+
+/// lock, master.partial, 12.h5, 12.h5.partial
+bool is_of_a_recording(const std::filesystem::directory_entry& entry) {
+  std::error_code failed;
+  if (entry.symlink_status(failed).type() != std::filesystem::file_type::regular) return false;
+  std::string name = entry.path().filename().string();
+  if (name == lock_name || name == master_name) return true;
+  const std::size_t digits = name.find_first_not_of("0123456789");
+  return digits != 0 && digits != std::string::npos &&
+         (name.substr(digits) == ".h5" || name.substr(digits) == ".h5.partial");
+}
+
 std::int64_t count_rows(std::span<const RecordingPart> parts, const RowField& field) {
   std::int64_t rows = 0;
   for (const RecordingPart& part : parts) rows += field.rows(part);
   return rows;
 }
 
-std::int64_t count_rows(const hdf5::File& part, const char* time) {
-  return part.locate(time, hdf5::element_type<double>(), 1).dims[0];
+void expect_checksum(const std::filesystem::path& file, const std::string& dataset, const std::string& found,
+                     const std::string& stored) {
+  if (found != stored)
+    throw Error(dataset + " was altered: its checksum is " + found + ", not " + stored, file.string(),
+                altered_hint);
 }
 
-void write_rows_of(hdf5::File& to, std::span<const RecordingPart> parts, const RecordingHead& head) {
-  const std::vector<RowField> fields = row_fields(head);
-  for (const RowField& field : fields)
-    to.write(field.name, field.type, field.dims(count_rows(parts, field)), nullptr);
+std::string stored_checksum(const hdf5::Contents& file, const std::string& dataset) {
+  const auto stored = file.text_attribute(dataset, "xxh3");
+  if (!stored) throw Error(dataset + " has no checksum", file.path().string(), altered_hint);
+  return *stored;
+}
+
+/// Copies the rows of a field of a part to `first` and on of that of `to`, and proves their checksum. Returns
+/// their number.
+std::int64_t copy_rows(hdf5::File& to, std::int64_t first, const FileDescriptor& from,
+                       const RecordingPart& part, const RowField& field, const StoredRows& stored,
+                       ChunkedChecksum& written) {
+  const std::int64_t rows = field.rows(part), row_bytes = field.row_bytes();
+  if (row_bytes == 0) return 0;
+  const std::int64_t at_once = std::max<std::int64_t>(block / row_bytes, 1);
   std::vector<std::byte> bytes;
+  ChunkedChecksum found;
+  for (std::int64_t done = 0; done < rows; done += at_once) {
+    const std::int64_t now = std::min(at_once, rows - done);
+    bytes.resize(static_cast<std::size_t>(now * row_bytes));
+    read_exactly(from, bytes, stored.offset + done * row_bytes);
+    to.write_rows(field.name, field.type, first + done, now, bytes.data());
+    found.append(bytes);
+    written.append(bytes);
+  }
+  if (!stored.checksum.empty()) expect_checksum(part.file, field.name, found.digits(), stored.checksum);
+  return rows;
+}
+
+std::vector<StoredRows> write_rows_of(hdf5::File& to, std::span<const RecordingPart> parts,
+                                      const RecordingHead& head) {
+  const std::vector<RowField> fields = row_fields(head);
+  std::vector<StoredRows> stored(fields.size());
+  for (std::size_t k = 0; k < fields.size(); ++k)
+    stored[k].offset =
+        to.write(fields[k].name, fields[k].type, fields[k].dims(count_rows(parts, fields[k])), nullptr);
   std::vector<std::int64_t> written(fields.size());
+  std::vector<ChunkedChecksum> running(fields.size());
   for (const RecordingPart& part : parts) {
-    const hdf5::File from = hdf5::File::open_to_read(part.file);
-    for (std::size_t k = 0; k < fields.size(); ++k) {
-      const RowField& field = fields[k];
-      if (field.row_bytes() == 0) continue;
-      const std::int64_t at_once = std::max<std::int64_t>(block / field.row_bytes(), 1);
-      for (std::int64_t first = 0; first < field.rows(part); first += at_once) {
-        const std::int64_t rows = std::min(at_once, field.rows(part) - first);
-        bytes.resize(static_cast<std::size_t>(rows * field.row_bytes()));
-        from.read_rows(field.name, field.type, first, rows, bytes.data());
-        to.write_rows(field.name, field.type, written[k], rows, bytes.data());
-        written[k] += rows;
-      }
-    }
+    const FileDescriptor from = open_file(part.file, OpenMode::read);
+    for (std::size_t k = 0; k < fields.size(); ++k)
+      if (fields[k].rows(part) > 0)
+        written[k] += copy_rows(to, written[k], from, part, fields[k], part.fields[k], running[k]);
   }
-}
-
-}  // namespace
-
-std::filesystem::path parts_folder(const std::filesystem::path& recording) {
-  return with_suffix(recording, ".parts");
-}
-
-std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording) {
-  const std::filesystem::path folder = parts_folder(recording);
-  std::error_code failed;
-  std::filesystem::create_directory(folder, failed);
-  if (failed)
-    throw Error("cannot make the folder: " + failed.message(), folder.string(),
-                "Check the path and the permissions of its folder.");
-  FileDescriptor lock = open_file(folder / "lock", OpenMode::read_append);
-  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) return std::nullopt;
-  return lock;
-}
-
-void clear_parts(const std::filesystem::path& recording) {
-  std::error_code ignored;  // what stays is in nobody's way: no master names it
-  for (const auto& entry : std::filesystem::directory_iterator(parts_folder(recording), ignored)) {
-    if (entry.path().filename() != "lock") std::filesystem::remove(entry.path(), ignored);
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    stored[k].checksum = running[k].digits();
+    to.write_attribute(fields[k].name, "xxh3", stored[k].checksum);
   }
+  return stored;
 }
 
-RecordingHead read_head(const hdf5::File& file) {
+/// Where a plain file has the rows of a field, and how many. Throws Error unless all of it is there.
+std::pair<StoredRows, std::int64_t> locate_rows(const hdf5::Contents& file, const RowField& field,
+                                                bool has_checksums) {
+  const hdf5::Stored stored = file.locate(field.name, field.type, 1 + field.row.size());
+  if (!std::equal(field.row.begin(), field.row.end(), stored.dims.begin() + 1))
+    throw Error(std::string(field.name) + " has rows of another size", file.path().string(), altered_hint);
+  return {{stored.offset, has_checksums ? stored_checksum(file, field.name) : ""}, stored.dims[0]};
+}
+
+/// All of one kind of field have as many rows.
+std::vector<StoredRows> locate_fields(const hdf5::Contents& file, std::span<const RowField> fields,
+                                      bool of_frame, bool has_checksums, std::int64_t& rows) {
+  std::vector<StoredRows> located;
+  const RowField* first = nullptr;
+  for (const RowField& field : fields) {
+    if (field.of_frame != of_frame) continue;
+    auto [stored, here] = locate_rows(file, field, has_checksums);
+    if (first == nullptr) rows = here;
+    if (here != rows)
+      throw Error(std::string(field.name) + " has " + std::to_string(here) + " rows, " + first->name +
+                      " has " + std::to_string(rows),
+                  file.path().string(), altered_hint);
+    if (first == nullptr) first = &field;
+    located.push_back(std::move(stored));
+  }
+  return located;
+}
+
+/// The files that hold a dataset's rows, by their places in `names`, to which new ones are added.
+std::vector<std::size_t> name_parts(const hdf5::Contents& master, const char* dataset,
+                                    std::vector<std::filesystem::path>& names) {
+  std::vector<std::size_t> which;
+  for (const std::string& source : master.virtual_sources(dataset)) {
+    const std::filesystem::path file = parts_folder(master.path()) / std::filesystem::path(source).filename();
+    const auto found = std::find(names.begin(), names.end(), file);
+    const auto number = static_cast<std::size_t>(found - names.begin());
+    if (std::find(which.begin(), which.end(), number) != which.end())
+      throw Error(std::string(dataset) + " names its part " + file.string() + " twice",
+                  master.path().string(), altered_hint);
+    which.push_back(number);
+    if (found == names.end()) names.push_back(file);
+  }
+  if (which.empty()) which.push_back(0);
+  return which;
+}
+
+template <class T>
+std::vector<T> read_surface(const hdf5::Contents& file, const char* name, const hdf5::Stored& stored,
+                            bool has_checksums) {
+  std::vector<T> values(static_cast<std::size_t>(stored.bytes) / sizeof(T));
+  file.read_rows(name, hdf5::element_type<T>(), 0, stored.dims[0], values.data());
+  ChunkedChecksum found;
+  found.append(std::as_bytes(std::span(values)));
+  if (has_checksums) expect_checksum(file.path(), name, found.digits(), stored_checksum(file, name));
+  return values;
+}
+
+/// Throws Error unless the file is a recording of this version.
+RecordingHead read_head(const hdf5::Contents& file) {
   const std::string path = file.path().string();
-  if (file.text_attribute("/", "format") != format_name)
+  const auto format = file.text_attribute("/", "format");
+  if (format == "palpate")
+    throw Error("is a model, not a recording", path,
+                "palpate-runtime play " + path + " --view shows it and lets you push it.");
+  if (format != format_name)
     throw Error("is not a recording", path, "Give a recording that palpate-runtime has written.");
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version || (*version)[0] != major_version)
     throw Error("is a recording of another version", path, "Record the session again.");
   RecordingHead head;
   head.has_stress = (*version)[1] >= 1;
+  head.has_checksums = (*version)[1] >= 2;
   head.info.model_path = file.text_attribute("/", "model").value_or("");
   head.info.content_hash = file.text_attribute("/", "content_hash").value_or("");
   head.info.device = file.text_attribute("/", "device").value_or("");
   const auto rate = file.integer_attribute("/", "rate", 1);
-  if (!rate || (*rate)[0] < 1)
+  if (!rate || (*rate)[0] < 1 || (*rate)[0] > highest_rate)
     throw Error("does not say how many ticks a second has", path, "Record the session again.");
   head.info.rate = (*rate)[0];
   head.info.options = file.text_attribute("/", "options").value_or("");
@@ -187,51 +289,146 @@ RecordingHead read_head(const hdf5::File& file) {
   const auto simplices = file.locate("/surface/simplices", hdf5::element_type<Index>(), 2);
   if (nodes.dims[1] != 3 || simplices.dims[1] < 2 || simplices.dims[1] > 3)
     throw Error("/surface is neither of triangles nor of lines", path, "Record the session again.");
-  head.surface.corners = static_cast<int>(simplices.dims[1]);
-  head.surface.nodes.resize(static_cast<std::size_t>(nodes.dims[0]));
-  head.surface.simplices.resize(static_cast<std::size_t>(simplices.dims[0] * simplices.dims[1]));
-  static_assert(sizeof(Vec3) == 3 * sizeof(double));
-  if (!head.surface.nodes.empty())
-    file.read_rows("/surface/nodes", hdf5::element_type<double>(), 0, nodes.dims[0],
-                   head.surface.nodes.data());
-  if (!head.surface.simplices.empty())
-    file.read_rows("/surface/simplices", hdf5::element_type<Index>(), 0, simplices.dims[0],
-                   head.surface.simplices.data());
-  if (head.has_stress) {
-    if (file.locate("/surface/held", hdf5::element_type<std::uint8_t>(), 1).dims[0] != nodes.dims[0])
-      throw Error("/surface/held has another number of nodes", path, "Record the session again.");
-    head.surface.held.resize(head.surface.nodes.size());
-    if (!head.surface.held.empty())
-      file.read_rows("/surface/held", hdf5::element_type<std::uint8_t>(), 0, nodes.dims[0],
-                     head.surface.held.data());
-  }
+  RecordedSurface& surface = head.surface;
+  surface.corners = static_cast<int>(simplices.dims[1]);
+  const auto numbers = read_surface<double>(file, "/surface/nodes", nodes, head.has_checksums);
+  for (std::size_t i = 0; i < numbers.size(); i += 3)
+    surface.nodes.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+  surface.simplices = read_surface<Index>(file, "/surface/simplices", simplices, head.has_checksums);
+  if (!head.has_stress) return head;
+  const auto held = file.locate("/surface/held", hdf5::element_type<std::uint8_t>(), 1);
+  if (held.dims[0] != nodes.dims[0])
+    throw Error("/surface/held has another number of nodes", path, "Record the session again.");
+  surface.held = read_surface<std::uint8_t>(file, "/surface/held", held, head.has_checksums);
   return head;
 }
 
-std::vector<hdf5::File> open_parts(const hdf5::File& recording, const char* dataset) {
-  std::vector<hdf5::File> parts;
-  for (const std::string& source : recording.virtual_sources(dataset)) {
-    const std::filesystem::path file =
-        parts_folder(recording.path()) / std::filesystem::path(source).filename();
-    if (!std::filesystem::exists(file))
-      throw Error("its part " + file.string() + " is missing", recording.path().string(),
-                  "Keep the folder of a recording that is not finished beside it, under its own name.");
-    parts.push_back(hdf5::File::open_to_read(file));
+}  // namespace
+
+std::filesystem::path parts_folder(const std::filesystem::path& recording) {
+  return with_suffix(link_target(recording), ".parts");
+}
+
+void expect_own_parts(const std::filesystem::path& recording) {
+  const std::filesystem::path folder = parts_folder(recording);
+  const auto refuse = [&](const std::string& what) {
+    throw Error("is in the way: " + what, folder.string(), "Remove it, or record elsewhere.");
+  };
+  std::error_code failed;
+  const std::filesystem::file_type type = std::filesystem::symlink_status(folder, failed).type();
+  if (type == std::filesystem::file_type::not_found) return;
+  if (type != std::filesystem::file_type::directory) refuse("it is no folder of a recording");
+  for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
+    if (!is_of_a_recording(entry))
+      refuse("it holds " + entry.path().filename().string() + ", which is of no recording");
   }
-  if (parts.empty()) parts.push_back(hdf5::File::open_to_read(recording.path()));
+  if (failed) refuse("it cannot be read: " + failed.message());
+}
+
+std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording) {
+  const std::filesystem::path folder = parts_folder(recording);
+  expect_own_parts(recording);
+  std::error_code failed;
+  std::filesystem::create_directory(folder, failed);
+  if (failed)
+    throw Error("cannot make the folder: " + failed.message(), folder.string(),
+                "Check the path and the permissions of its folder.");
+  FileDescriptor lock = open_file(folder / lock_name, OpenMode::read_append);
+  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) return std::nullopt;
+  return lock;
+}
+
+void clear_parts(const std::filesystem::path& recording) {
+  std::error_code ignored;  // what stays is in nobody's way: no master names it
+  for (const auto& entry : std::filesystem::directory_iterator(parts_folder(recording), ignored)) {
+    if (entry.path().filename() != lock_name && is_of_a_recording(entry))
+      std::filesystem::remove(entry.path(), ignored);
+  }
+}
+
+void remove_parts(const std::filesystem::path& recording) {
+  clear_parts(recording);
+  std::error_code ignored;  // a folder stays where it holds what is not ours
+  const std::filesystem::path folder = parts_folder(recording);
+  const std::filesystem::directory_iterator all(folder, ignored);
+  if (std::distance(begin(all), end(all)) > 1) return;
+  std::filesystem::remove(folder / lock_name, ignored);
+  std::filesystem::remove(folder, ignored);
+}
+
+RecordingFiles open_recording(hdf5::Contents master) {
+  const std::filesystem::path path = master.path();
+  RecordingFiles recording;
+  recording.head = read_head(master);
+  std::vector<std::filesystem::path> names = {path};
+  recording.tick_files = name_parts(master, "/ticks/time", names);
+  recording.frame_files = name_parts(master, "/frames/time", names);
+  std::vector<FileDescriptor> parts;
+  for (std::size_t k = 1; k < names.size(); ++k) {
+    if (!std::filesystem::exists(names[k]))
+      throw Error("its part " + names[k].string() + " is missing", path.string(),
+                  "Keep the folder of a recording that is not finished beside it, under its own name.");
+    parts.push_back(open_file(names[k], OpenMode::read));
+  }
+  recording.files.push_back(std::move(master));
+  for (hdf5::Contents& part : hdf5::Contents::read(std::move(parts)))
+    recording.files.push_back(std::move(part));
+  return recording;
+}
+
+std::vector<RecordingPart> parts_of(const RecordingFiles& recording) {
+  const std::vector<RowField> fields = row_fields(recording.head);
+  const auto frame_fields = std::count_if(fields.begin(), fields.end(), [](auto& f) { return f.of_frame; });
+  const auto tick_fields = std::ssize(fields) - frame_fields;
+  std::vector<RecordingPart> parts;
+  const auto add = [&](std::size_t file, bool of_frame) {
+    const hdf5::Contents& contents = recording.files[file];
+    RecordingPart part = {contents.path()};
+    std::vector<StoredRows> located = locate_fields(contents, fields, of_frame, recording.head.has_checksums,
+                                                    of_frame ? part.frames : part.ticks);
+    part.fields.resize(static_cast<std::size_t>(of_frame ? tick_fields : 0));
+    part.fields.insert(part.fields.end(), located.begin(), located.end());
+    part.fields.resize(fields.size());
+    parts.push_back(std::move(part));
+  };
+  for (const std::size_t file : recording.tick_files) add(file, false);
+  for (const std::size_t file : recording.frame_files) add(file, true);
   return parts;
 }
 
+void check_rows(const RecordingFiles& recording) {
+  const std::vector<RowField> fields = row_fields(recording.head);
+  const auto check = [&](std::size_t which, bool of_frame) {
+    const hdf5::Contents& file = recording.files[which];
+    std::int64_t rows = 0;
+    const std::vector<StoredRows> located =
+        locate_fields(file, fields, of_frame, recording.head.has_checksums, rows);
+    auto at = located.begin();
+    for (const RowField& field : fields) {
+      if (field.of_frame != of_frame) continue;
+      const StoredRows& stored = *at++;
+      if (stored.checksum.empty()) continue;
+      ChunkedChecksum found;
+      found.append_file(file.file(), stored.offset, rows * field.row_bytes(), nullptr);
+      expect_checksum(file.path(), field.name, found.digits(), stored.checksum);
+    }
+  };
+  for (const std::size_t file : recording.tick_files) check(file, false);
+  for (const std::size_t file : recording.frame_files) check(file, true);
+}
+
 RecordingPart write_part(const std::filesystem::path& path, std::span<const TickRecord> ticks,
-                         std::span<const SurfaceFrame> frames, std::size_t surface_nodes) {
-  write_whole(path, false, [&](hdf5::File& file) {
+                         std::span<const SurfaceFrame> frames, const RecordingHead& head) {
+  RecordingPart part = {path, std::ssize(ticks), std::ssize(frames)};
+  write_whole(path, with_suffix(path, ".partial"), false, [&](hdf5::File& file) {
+    part.fields.clear();
     for_each_tick_field([&]<class Member>(const char* name, int components, Member TickRecord::*member) {
       std::vector<Scalar<Member>> values(ticks.size() * static_cast<std::size_t>(components));
       for (std::size_t i = 0; i < ticks.size(); ++i)
         std::memcpy(&values[i * static_cast<std::size_t>(components)], &(ticks[i].*member), sizeof(Member));
       std::vector<std::int64_t> dims = {std::ssize(ticks)};
       if (components > 1) dims.push_back(components);
-      file.write(name, hdf5::element_type<Scalar<Member>>(), dims, values.data());
+      part.fields.push_back(write_checked(file, name, dims, values));
     });
     std::vector<std::int64_t> tick;
     std::vector<double> time;
@@ -239,31 +436,38 @@ RecordingPart write_part(const std::filesystem::path& path, std::span<const Tick
       tick.push_back(frame.tick);
       time.push_back(frame.time);
     }
-    const std::int64_t count = std::ssize(frames);
-    file.write("/frames/tick", hdf5::element_type<std::int64_t>(), std::array{count}, tick.data());
-    file.write("/frames/time", hdf5::element_type<double>(), std::array{count}, time.data());
+    part.fields.push_back(write_checked(file, "/frames/tick", std::array{part.frames}, tick));
+    part.fields.push_back(write_checked(file, "/frames/time", std::array{part.frames}, time));
+    const std::size_t surface_nodes = head.surface.nodes.size();
     const auto nodes = static_cast<std::int64_t>(surface_nodes);
     const auto write_nodal = [&](const char* name, std::vector<std::int64_t> dims,
                                  std::vector<float> SurfaceFrame::*member, float absent) {
-      file.write(name, hdf5::element_type<float>(), dims, nullptr);
+      StoredRows stored = {file.write(name, hdf5::element_type<float>(), dims, nullptr), {}};
+      ChunkedChecksum running;
       const std::vector<float> none(surface_nodes, absent);
-      for (std::int64_t k = 0; k < count && nodes > 0; ++k) {
+      for (std::int64_t k = 0; k < part.frames && nodes > 0; ++k) {
         const std::vector<float>& values = frames[static_cast<std::size_t>(k)].*member;
-        file.write_rows(name, hdf5::element_type<float>(), k, 1, (values.empty() ? none : values).data());
+        const std::vector<float>& row = values.empty() ? none : values;
+        file.write_rows(name, hdf5::element_type<float>(), k, 1, row.data());
+        running.append(std::as_bytes(std::span(row)));
       }
+      stored.checksum = running.digits();
+      file.write_attribute(name, "xxh3", stored.checksum);
+      part.fields.push_back(std::move(stored));
     };
-    write_nodal("/frames/displacement", {count, nodes, 3}, &SurfaceFrame::displacement, 0.0F);
-    write_nodal("/frames/von_mises", {count, nodes}, &SurfaceFrame::von_mises,
+    write_nodal("/frames/displacement", {part.frames, nodes, 3}, &SurfaceFrame::displacement, 0.0F);
+    write_nodal("/frames/von_mises", {part.frames, nodes}, &SurfaceFrame::von_mises,
                 std::numeric_limits<float>::quiet_NaN());
-    write_nodal("/frames/pressure", {count, nodes}, &SurfaceFrame::pressure, 0.0F);
+    write_nodal("/frames/pressure", {part.frames, nodes}, &SurfaceFrame::pressure, 0.0F);
   });
-  return {path, std::ssize(ticks), std::ssize(frames)};
+  return part;
 }
 
 RecordingPart merge_parts(const std::filesystem::path& path, std::span<const RecordingPart> parts,
                           const RecordingHead& head) {
-  write_whole(path, false, [&](hdf5::File& file) { write_rows_of(file, parts, head); });
   RecordingPart merged = {path};
+  write_whole(path, with_suffix(path, ".partial"), false,
+              [&](hdf5::File& file) { merged.fields = write_rows_of(file, parts, head); });
   for (const RecordingPart& part : parts) {
     merged.ticks += part.ticks;
     merged.frames += part.frames;
@@ -273,7 +477,7 @@ RecordingPart merge_parts(const std::filesystem::path& path, std::span<const Rec
 
 void write_master(const std::filesystem::path& recording, const RecordingHead& head,
                   std::span<const RecordingPart> parts) {
-  write_whole(recording, false, [&](hdf5::File& file) {
+  write_whole(recording, unfinished_master(recording), false, [&](hdf5::File& file) {
     write_head(file, head);
     const std::string folder = parts_folder(recording).filename().string() + "/";
     for (const RowField& field : row_fields(head)) {
@@ -284,6 +488,7 @@ void write_master(const std::filesystem::path& recording, const RecordingHead& h
       }
       if (sources.empty()) {
         file.write(field.name, field.type, field.dims(count_rows(parts, field)), nullptr);
+        file.write_attribute(field.name, "xxh3", ChunkedChecksum().digits());
       } else {
         file.write_virtual(field.name, field.type, field.row, sources);
       }
@@ -291,23 +496,13 @@ void write_master(const std::filesystem::path& recording, const RecordingHead& h
   });
 }
 
-void merge_recording(const std::filesystem::path& path) {
-  std::vector<RecordingPart> parts;
-  RecordingHead head;
-  {
-    const hdf5::File master = hdf5::File::open_to_read(path);
-    head = read_head(master);
-    for (const hdf5::File& part : open_parts(master, "/ticks/time"))
-      parts.push_back({part.path(), count_rows(part, "/ticks/time"), 0});
-    for (const hdf5::File& part : open_parts(master, "/frames/time"))
-      parts.push_back({part.path(), 0, count_rows(part, "/frames/time")});
-  }
-  write_whole(path, true, [&](hdf5::File& file) {
+void merge_recording(const std::filesystem::path& path, std::span<const RecordingPart> parts,
+                     const RecordingHead& head) {
+  write_whole(path, unfinished_master(path), true, [&](hdf5::File& file) {
     write_head(file, head);
     write_rows_of(file, parts, head);
   });
-  std::error_code ignored;
-  std::filesystem::remove_all(parts_folder(path), ignored);
+  remove_parts(path);
 }
 
 }  // namespace palpate

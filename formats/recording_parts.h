@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,7 +11,7 @@
 #include <vector>
 
 #include "formats/file_io.h"
-#include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "formats/recording.h"
 
 namespace palpate {
@@ -53,40 +54,64 @@ using Scalar = std::remove_all_extents_t<Member>;
 
 /// What the file says beside its rows.
 struct RecordingHead {
-  bool has_stress = true;  ///< version 4.1 and later: stress and pressure, and where the surface is held
+  bool has_stress = true;     ///< version 4.1 and later: stress and pressure, and where the surface is held
+  bool has_checksums = true;  ///< version 4.2 and later
   SessionInfo info;
   std::string generator;
   RecordedSurface surface;
 };
 
-/// Throws Error unless the file is a recording of this version.
-RecordingHead read_head(const hdf5::File& file);
+/// Where a plain file has the rows of a dataset.
+struct StoredRows {
+  std::int64_t offset = 0;  ///< of the first byte
+  std::string checksum;     ///< empty where none is stored
+};
 
 /// A plain file with rows.
 struct RecordingPart {
   std::filesystem::path file;
   std::int64_t ticks = 0;
   std::int64_t frames = 0;
+  std::vector<StoredRows> fields{};  ///< of each dataset with rows, in the order of `row_fields`
 };
 
-/// PATH.parts
+/// A recording that is open: one plain file, or a master and its parts. All are open, as they may be merged
+/// and removed while a recording that goes on is read.
+struct RecordingFiles {
+  RecordingHead head;
+  std::vector<hdf5::Contents> files;     ///< that of the recording's name first
+  std::vector<std::size_t> tick_files;   ///< those with ticks, in order
+  std::vector<std::size_t> frame_files;  ///< those with frames
+};
+
+/// Reads what a recording says beside its rows, and opens its parts. Throws Error unless it is one of this
+/// version, with all its parts.
+RecordingFiles open_recording(hdf5::Contents recording);
+
+/// Proves that all datasets have the shapes that belong together, and the bytes that were written (where
+/// there are checksums). Throws Error naming file and dataset.
+void check_rows(const RecordingFiles& recording);
+
+/// PATH.parts, beside the file itself where PATH is a symbolic link.
 std::filesystem::path parts_folder(const std::filesystem::path& recording);
 
+/// Throws Error where PATH.parts is there and is not the folder of parts of a recording that was killed: a
+/// link, or with files in it that no recording leaves.
+void expect_own_parts(const std::filesystem::path& recording);
+
 /// Makes the folder of parts and locks it for this program as long as the result lives; nothing where another
-/// one has it. Throws Error when it cannot be made.
+/// one has it. Throws Error when it cannot be made, or is another's.
 std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording);
 
-/// Removes everything in the folder of parts but the lock.
+/// Removes the files of a recording in the folder of parts, but the lock.
 void clear_parts(const std::filesystem::path& recording);
 
-/// The files that hold the rows of a dataset of a recording, in order: itself when it is plain. All are open,
-/// as they may be merged and removed while a recording that goes on is read. Throws Error when one is
-/// missing.
-std::vector<hdf5::File> open_parts(const hdf5::File& recording, const char* dataset);
+/// Removes the folder of parts with the files of a recording in it; what else is in it stays.
+void remove_parts(const std::filesystem::path& recording);
 
 /// Writes a part. Throws Error.
 RecordingPart write_part(const std::filesystem::path& file, std::span<const TickRecord> ticks,
-                         std::span<const SurfaceFrame> frames, std::size_t surface_nodes);
+                         std::span<const SurfaceFrame> frames, const RecordingHead& head);
 
 /// Writes a part with the rows of several. Throws Error.
 RecordingPart merge_parts(const std::filesystem::path& file, std::span<const RecordingPart> parts,
@@ -97,6 +122,10 @@ void write_master(const std::filesystem::path& recording, const RecordingHead& h
                   std::span<const RecordingPart> parts);
 
 /// Puts one plain file in the place of a recording and its parts. Throws Error with the recording as it was.
-void merge_recording(const std::filesystem::path& recording);
+void merge_recording(const std::filesystem::path& recording, std::span<const RecordingPart> parts,
+                     const RecordingHead& head);
+
+/// The parts of an open recording, for `merge_recording`.
+std::vector<RecordingPart> parts_of(const RecordingFiles& recording);
 
 }  // namespace palpate

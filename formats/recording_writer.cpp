@@ -21,6 +21,7 @@ struct Level {
 struct RecordingWriter::Impl {
   Impl(std::filesystem::path to, const SessionInfo& info, const RecordedSurface& surface)
       : path(std::move(to)), head{.info = info, .generator = "palpate " PALPATE_VERSION, .surface = surface} {
+    shown.surface = surface;
     std::optional<FileDescriptor> locked = lock_parts(path);
     if (!locked)
       throw Error("is being recorded by another program", path.string(), "Wait for it, or record elsewhere.");
@@ -36,18 +37,17 @@ struct RecordingWriter::Impl {
 
   /// Removes a folder of parts that holds nothing but the lock.
   void leave_folder_if_empty() const {
-    const std::filesystem::path folder = parts_folder(path);
     std::error_code ignored;
-    const std::filesystem::directory_iterator all(folder, ignored);
-    if (std::distance(begin(all), end(all)) <= 1) std::filesystem::remove_all(folder, ignored);
+    const std::filesystem::directory_iterator all(parts_folder(path), ignored);
+    if (std::distance(begin(all), end(all)) <= 1) remove_parts(path);
   }
 
   std::filesystem::path next_file() { return parts_folder(path) / (std::to_string(files++) + ".h5"); }
 
-  void show_parts() {
-    std::vector<RecordingPart> parts;
-    for (const Level& level : levels) parts.push_back(level.part);
-    write_master(path, head, parts);
+  [[nodiscard]] std::vector<RecordingPart> parts() const {
+    std::vector<RecordingPart> all;
+    for (const Level& level : levels) all.push_back(level.part);
+    return all;
   }
 
   /// The last parts into one, as long as there are enough of one level.
@@ -65,6 +65,7 @@ struct RecordingWriter::Impl {
 
   std::filesystem::path path;
   RecordingHead head;
+  RecordedFrames shown;  // surface and times of all frames
   FileDescriptor lock;
   std::vector<TickRecord> ticks;  // since the last checkpoint
   std::vector<SurfaceFrame> frames;
@@ -87,6 +88,8 @@ void RecordingWriter::append(std::span<const TickRecord> ticks) {
 }
 
 void RecordingWriter::append(SurfaceFrame frame) {
+  impl_->shown.tick.push_back(frame.tick);
+  impl_->shown.time.push_back(frame.time);
   impl_->frames.push_back(std::move(frame));
 }
 
@@ -94,8 +97,7 @@ void RecordingWriter::checkpoint() {
   const hdf5::Quiet quiet;
   Impl& self = *impl_;
   if (!self.ticks.empty() || !self.frames.empty()) {
-    self.levels.push_back(
-        {write_part(self.next_file(), self.ticks, self.frames, self.head.surface.nodes.size())});
+    self.levels.push_back({write_part(self.next_file(), self.ticks, self.frames, self.head)});
     self.is_behind = true;
     self.ticks.clear();
     self.frames.clear();
@@ -105,7 +107,7 @@ void RecordingWriter::checkpoint() {
   std::vector<std::filesystem::path> to_remove;
   to_remove.swap(self.replaced);
   self.merge_levels();
-  self.show_parts();
+  write_master(self.path, self.head, self.parts());
   self.is_behind = false;
   std::error_code ignored;
   for (const std::filesystem::path& file : to_remove) std::filesystem::remove(file, ignored);
@@ -114,7 +116,11 @@ void RecordingWriter::checkpoint() {
 void RecordingWriter::finish() {
   const hdf5::Quiet quiet;
   checkpoint();
-  merge_recording(impl_->path);
+  merge_recording(impl_->path, impl_->parts(), impl_->head);
+}
+
+const RecordedFrames& RecordingWriter::frames() const noexcept {
+  return impl_->shown;
 }
 
 }  // namespace palpate

@@ -5,8 +5,9 @@
 namespace palpate {
 namespace {
 
+/// Of the file itself where `file` is a symbolic link.
 std::filesystem::path folder_of(const std::filesystem::path& file) {
-  return std::filesystem::absolute(file).parent_path();
+  return std::filesystem::weakly_canonical(std::filesystem::absolute(file)).parent_path();
 }
 
 /// What became of a source; empty when it is as it was.
@@ -30,11 +31,14 @@ std::string change_of(const SourceFile& source, const std::filesystem::path& fil
 
 }  // namespace
 
+std::filesystem::path source_path(const SourceFile& source, const std::filesystem::path& model_path) {
+  return folder_of(model_path) / source.path;
+}
+
 std::vector<std::string> stale_sources(const Model& model, const std::filesystem::path& model_path) {
   std::vector<std::string> changes;
   for (const SourceFile& source : model.sources) {
-    std::string change =
-        change_of(source, folder_of(model_path) / source.path, model_path.filename().string());
+    std::string change = change_of(source, source_path(source, model_path), model_path.filename().string());
     if (!change.empty()) changes.push_back(std::move(change));
   }
   return changes;

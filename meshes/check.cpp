@@ -286,13 +286,24 @@ void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const 
               "Add a [[fixed]] region, or an axis to one, that holds nodes elsewhere against it.");
 }
 
-std::string scale_warning(const Mesh& mesh) {
+std::string scale_warning(const Mesh& mesh, double scale) {
   Eigen::AlignedBox3d box;
   for (const Vec3& x : mesh.nodes) box.extend(x);
   const double size = box.sizes().maxCoeff();
-  if (size <= 10.0 && size >= 1e-3) return {};
-  return fmt::format("the body is {:.3g} m long; is geometry.scale (metres per unit of the file) right?",
-                     size);
+  if (size > 10.0) {
+    return fmt::format(
+        "the body is {:.4g} m long: if its numbers are millimetres, write scale = {:.3g} under [geometry], "
+        "which makes it {:.4g} m",
+        size, 0.001 * scale, 0.001 * size);
+  }
+  if (size < 1e-3) {
+    return fmt::format(
+        "the body is {:.4g} m long: if its numbers are metres, write scale = 1 under [geometry] (now "
+        "{:.3g}), "
+        "which makes it {:.4g} m",
+        size, scale, size / scale);
+  }
+  return {};
 }
 
 }  // namespace palpate

@@ -29,8 +29,9 @@ void check_connected(const Mesh& mesh, const std::string& where);
 /// `fixed` [N]: bit `axis` is set where the node is held along it.
 void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const std::string& where);
 
-/// A warning when the body is larger than 10 m or smaller than 1 mm (probably a missing unit scale), else
-/// empty.
-std::string scale_warning(const Mesh& mesh);
+/// A warning when the body is larger than 10 m or smaller than 1 mm (probably a missing unit scale), with its
+/// length in metres and the geometry.scale to try; else empty. `scale`: metres per unit of the file, already
+/// applied.
+std::string scale_warning(const Mesh& mesh, double scale);
 
 }  // namespace palpate

@@ -2,6 +2,8 @@
 
 #include <cctype>
 
+#include "meshes/printable.h"
+
 namespace palpate {
 
 std::string to_text(const Error& error) {
@@ -12,7 +14,8 @@ std::string to_text(const Error& error) {
     hint[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(hint[0])));
   }
   if (!hint.empty() && std::isalnum(static_cast<unsigned char>(hint.back())) != 0) hint += '.';
-  return "error: " + error.where() + ": " + error.what() + "\nhint: " + hint + "\n";
+  return "error: " + printable(error.where()) + ": " + printable_lines(error.what(), "  ") +
+         "\nhint: " + printable_lines(hint) + "\n";
 }
 
 }  // namespace palpate

@@ -3,11 +3,8 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <cerrno>
-#include <fstream>
-#include <system_error>
 
-#include "meshes/error.h"
+#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {
@@ -29,10 +26,8 @@ class Document {
   }
   void add(const std::string& xml) { xml_ += xml; }
 
-  void write(std::ostream& stream) const {
-    stream << xml_ << "<AppendedData encoding=\"raw\">\n_";
-    stream.write(raw_.data(), static_cast<std::streamsize>(raw_.size()));
-    stream << "\n</AppendedData>\n</VTKFile>\n";
+  [[nodiscard]] std::string text() const {
+    return xml_ + "<AppendedData encoding=\"raw\">\n_" + raw_ + "\n</AppendedData>\n</VTKFile>\n";
   }
 
  private:
@@ -79,10 +74,10 @@ void add_cells(Document& document, ElementType element, std::span<const Index> c
 Document make_document(std::span<const Vec3> nodes, ElementType element, std::span<const Index> connectivity,
                        std::span<const NodalField> fields) {
   Document document;
-  document.add(
-      "<?xml version=\"1.0\"?>\n"
-      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
-      "header_type=\"UInt64\">\n");
+  document.add("<?xml version=\"1.0\"?>\n<!-- palpate " PALPATE_VERSION
+               " -->\n"
+               "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
+               "header_type=\"UInt64\">\n");
   document.add(fmt::format("<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
                            nodes.size(),
                            connectivity.size() / static_cast<std::size_t>(traits(element).nodes)));
@@ -101,25 +96,14 @@ Document make_document(std::span<const Vec3> nodes, ElementType element, std::sp
 
 }  // namespace
 
-void write_vtu(std::ostream& stream, std::span<const Vec3> nodes, ElementType element,
-               std::span<const Index> connectivity, std::span<const NodalField> fields) {
-  make_document(nodes, element, connectivity, fields).write(stream);
+std::string vtu_text(std::span<const Vec3> nodes, ElementType element, std::span<const Index> connectivity,
+                     std::span<const NodalField> fields) {
+  return make_document(nodes, element, connectivity, fields).text();
 }
 
 void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, ElementType element,
                std::span<const Index> connectivity, std::span<const NodalField> fields) {
-  std::filesystem::path partial = file;
-  partial += ".partial";
-  std::ofstream stream(partial, std::ios::binary);
-  write_vtu(stream, nodes, element, connectivity, fields);
-  stream.close();
-  std::error_code problem;
-  if (stream) std::filesystem::rename(partial, file, problem);
-  if (stream && !problem) return;
-  const std::string reason = problem ? problem.message() : std::system_category().message(errno);
-  std::filesystem::remove(partial, problem);
-  throw Error("cannot write the file: " + reason, file.string(),
-              "Check the folder, your right to write there and the free space.");
+  write_file(file, vtu_text(nodes, element, connectivity, fields));
 }
 
 }  // namespace palpate

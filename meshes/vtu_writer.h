@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <iosfwd>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,14 +17,13 @@ struct NodalField {
   std::span<const double> values;
 };
 
-/// Writes elements of one kind (`connectivity`: [E * nodes an element] node numbers) with nodal fields as
-/// ASCII-free appended raw .vtu; under a temporary name, then renamed. Throws Error when the file cannot be
-/// written.
-void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, ElementType element,
-               std::span<const Index> connectivity, std::span<const NodalField> fields);
+/// Elements of one kind (`connectivity`: [E * nodes an element] node numbers) with nodal fields as the bytes
+/// of a .vtu file: XML with raw little-endian numbers appended.
+[[nodiscard]] std::string vtu_text(std::span<const Vec3> nodes, ElementType element,
+                                   std::span<const Index> connectivity, std::span<const NodalField> fields);
 
-/// The same into a stream; whether that could take it, the stream says.
-void write_vtu(std::ostream& stream, std::span<const Vec3> nodes, ElementType element,
+/// Writes the same to a file by `write_file`. Throws Error when it cannot be written.
+void write_vtu(const std::filesystem::path& file, std::span<const Vec3> nodes, ElementType element,
                std::span<const Index> connectivity, std::span<const NodalField> fields);
 
 }  // namespace palpate

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "formats/model_file.h"
+#include "formats/output_paths.h"
 #include "meshes/error.h"
 #include "meshes/quality.h"
 #include "precompute/body.h"
@@ -22,6 +23,7 @@
 #include "precompute/loads.h"
 #include "precompute/overlay_regions.h"
 #include "precompute/plan.h"
+#include "precompute/precision.h"
 #include "precompute/progress.h"
 #include "precompute/scope.h"
 
@@ -42,13 +44,48 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
       fmt::format("angles {:.1f} to {:.1f} degrees, worst shape {:.3f} at ({:.4g}, {:.4g}, {:.4g}) m",
                   quality.min_angle, quality.max_angle, quality.min_shape, quality.worst_centroid.x(),
                   quality.worst_centroid.y(), quality.worst_centroid.z()));
-  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {} precision",
+  const std::string precision =
+      description.precision
+          ? fmt::format("{} precision", name_of(*description.precision))
+          : fmt::format("in single or split precision, or {:.1f} MB in double: decided once K is factorised",
+                        static_cast<double>(plan.file_bytes) * 2e-6);
+  progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {}",
                             static_cast<double>(plan.factor_entries) * 1e-6,
-                            static_cast<double>(plan.file_bytes) * 1e-6,
-                            description.precision == Precision::single_precision ? "single" : "double"));
-  progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {:.1f} s with {} job{}",
-                            static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9, plan.seconds,
-                            options.jobs, options.jobs == 1 ? "" : "s"));
+                            static_cast<double>(plan.file_bytes) * 1e-6, precision));
+  progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {} with {} job{}",
+                            static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9,
+                            duration_text(plan.seconds), options.jobs, options.jobs == 1 ? "" : "s"));
+}
+
+constexpr const char* factor_stage = "factorising K";
+constexpr const char* overlay_stage = "overlays";
+constexpr const char* modes_stage = "looking for modes";
+constexpr const char* precision_stage = "choosing the precision";
+constexpr const char* inverse_factor_stage = "factorising K_bar";
+constexpr const char* write_stage = "writing the file";
+
+constexpr const char* column_stage(PackedMatrix matrix) {
+  return matrix == PackedMatrix::greens ? "Green's functions" : "inverse of K_bar";
+}
+
+/// What follows the plan.
+std::vector<Stage> stages_of(const Plan& plan, const OverlayPlan& overlays, const DynamicsPlan& dynamics,
+                             int jobs) {
+  std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
+  if (!overlays.centres.empty())
+    stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs)});
+  if (dynamics.method == DynamicsMethod::modal)
+    stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
+  const bool packed = dynamics.method == DynamicsMethod::packed;
+  stages.push_back({precision_stage, plan.precision_seconds * (packed ? 2.0 : 1.0) +
+                                         plan.factor_seconds * (packed ? 1.0 : 0.0)});
+  stages.push_back({column_stage(PackedMatrix::greens), plan.seconds});
+  if (packed) {
+    stages.push_back({inverse_factor_stage, plan.factor_seconds});
+    stages.push_back({column_stage(PackedMatrix::inverse), plan.seconds});
+  }
+  stages.push_back({write_stage, plan.write_seconds});
+  return stages;
 }
 
 /// What makes a large file smaller.
@@ -124,18 +161,44 @@ std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int6
   return probes;
 }
 
+/// How many columns an earlier, unfinished run has left, and what the others take.
+struct Kept {
+  std::int64_t columns = 0;
+  double flops = 0.0;  ///< of the columns that are still to be solved
+};
+
+Kept kept_columns(const GreensSolver& solver, const Plan& plan, const ModelWriter& writer,
+                  PackedMatrix matrix) {
+  Kept kept;
+  for (std::int64_t first = 0; first < plan.stored_dofs; first += plan.block_columns) {
+    const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
+    if (writer.has_columns(first, count, matrix)) {
+      kept.columns += count;
+    } else {
+      kept.flops += solver.flops(first, count);
+    }
+  }
+  return kept;
+}
+
 /// Computes all blocks of columns of a packed matrix that the file does not have yet, `jobs` at a time. False
 /// when interrupted.
 bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, ModelWriter& writer,
                    PackedMatrix matrix, Progress& progress, const InterruptGuard& interrupt) {
-  const std::string name = matrix == PackedMatrix::greens ? "Green's functions" : "inverse of K_bar";
+  const std::string name = column_stage(matrix);
   const std::int64_t blocks = (plan.stored_dofs + plan.block_columns - 1) / plan.block_columns;
+  const Kept kept = kept_columns(solver, plan, writer, matrix);
+  if (kept.columns > 0) {
+    progress.line(fmt::format("{}: {} of {} columns were kept from an earlier, unfinished run", name,
+                              kept.columns, plan.stored_dofs));
+    progress.expect(name, plan.seconds * kept.flops / plan.flops);
+  }
+  progress.begin(name);
   std::atomic<std::int64_t> next{0};
   std::atomic<bool> failed{false};
   std::exception_ptr failure;
   double done_flops = 0.0;
-  std::int64_t reused = 0;
-  std::mutex mutex;  // progress, counters and failure
+  std::mutex mutex;  // progress, its counter and failure
 
   const auto work = [&] {
     GreensSolver::Workspace workspace;
@@ -144,16 +207,13 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
       for (std::int64_t block = next++; block < blocks && !failed && !interrupt.requested(); block = next++) {
         const std::int64_t first = block * plan.block_columns;
         const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
-        const bool have = writer.has_columns(first, count, matrix);
-        if (!have) {
-          solver.columns(first, count, workspace, packed);
-          writer.write_columns(first, count, packed, matrix);
-        }
+        if (writer.has_columns(first, count, matrix)) continue;
+        solver.columns(first, count, workspace, packed);
+        writer.write_columns(first, count, packed, matrix);
         const double flops = solver.flops(first, count);
         const std::scoped_lock lock(mutex);
-        reused += have ? count : 0;
         done_flops += flops;
-        progress.step(name, done_flops / plan.flops);
+        progress.reach(done_flops / kept.flops);
       }
     } catch (...) {
       const std::scoped_lock lock(mutex);
@@ -166,11 +226,46 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
     work();
   }
   if (failure) std::rethrow_exception(failure);
-  if (interrupt.requested()) return false;
-  if (reused > 0)
-    progress.line(fmt::format("{}: {} of {} columns were kept from an earlier, unfinished run", name, reused,
-                              plan.stored_dofs));
-  return true;
+  return !interrupt.requested();
+}
+
+SparseMatrix stiffness_of_step(const ElasticBody& body, const Stiffness& stiffness,
+                               const DynamicsOptions& options) {
+  return effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped), options.damping,
+                             options.newmark);
+}
+
+/// Decides for the precision of all packed matrices and puts their smooth parts and force errors into the
+/// model.
+Precision decide_precision(const Description& description, const ElasticBody& body,
+                           const Stiffness& stiffness, const Factor& factor,
+                           const std::vector<std::int64_t>& stored_dofs, Model& model, Progress& progress) {
+  std::vector<PrecisionStudy> studies;
+  studies.emplace_back(model, factor, stiffness.K, stored_dofs);
+  if (model.dynamics.method == DynamicsMethod::packed) {
+    const SparseMatrix K_bar = stiffness_of_step(body, stiffness, *description.dynamics);
+    Factor factor_bar(K_bar, stiffness.node_start);
+    factor_bar.factorize();
+    studies.emplace_back(model, factor_bar, K_bar, stored_dofs);
+  }
+  const PrecisionChoice choice = choose_precision(studies, description.precision);
+  const auto smooth = [&](const PrecisionStudy& study) {
+    return choice.precision == Precision::split_precision ? study.smooth(choice.terms) : nullptr;
+  };
+  const std::int64_t n = model.stored_dofs();
+  model.greens = PackedGreens(nullptr, n, choice.precision, smooth(studies.front()));
+  model.force_errors = choice.errors.front();
+  if (studies.size() > 1) {
+    model.dynamics.inverse = PackedGreens(nullptr, n, choice.precision, smooth(studies.back()));
+    model.dynamics.force_errors = choice.errors.back();
+  }
+  progress.line(fmt::format(
+      "precision: {}{}; force errors: {}", name_of(choice.precision),
+      model.greens.smooth() == nullptr ? "" : fmt::format(", {} smooth terms", model.greens.smooth()->terms),
+      errors_text(choice.errors)));
+  if (const std::string warning = precision_warning(model, choice.precision); !warning.empty())
+    progress.warn(warning);
+  return choice.precision;
 }
 
 /// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
@@ -178,25 +273,36 @@ bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const Dy
                    const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
                    const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
                    const InterruptGuard& interrupt) {
-  const SparseMatrix K_bar = effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped),
-                                                 options.damping, options.newmark);
+  const SparseMatrix K_bar = stiffness_of_step(body, stiffness, options);
   Factor factor(K_bar, stiffness.node_start);
   const GreensSolver solver(factor, stored, stiffness.free_dofs, body.mesh.dimension());
   if (solver.stored_dofs() != stored_dofs) {
     throw std::logic_error("K_bar and K, of one pattern, have different elimination orders");
   }
+  progress.begin(inverse_factor_stage);
   factor.factorize();
-  progress.line("K_bar factorised");
   return solve_columns(solver, plan, jobs, writer, PackedMatrix::inverse, progress, interrupt);
+}
+
+/// Where the model may be written; before any work.
+std::filesystem::path check_output(const Description& description, const BakeOptions& options) {
+  OutputPaths paths(options.force);
+  paths.add_input(description.file, "the description");
+  for (const auto& file : input_files(description)) paths.add_input(file, "the geometry");
+  return paths.add(options.output, OutputKind::model, "--output");
 }
 
 }  // namespace
 
-BakeResult bake(const Description& description, const BakeOptions& options) {
+BakeResult bake(const Description& description, const BakeOptions& asked) {
+  BakeOptions options = asked;
+  if (!options.dry_run) options.output = check_output(description, asked);
   Progress progress;
-  MeshedBody body = mesh_body(description, [&](const std::string& text) { progress.line(text); });
+  MeshedBody body = mesh_body(description, [&](const std::string& text) { progress.begin(text); });
   for (const std::string& note : body.notes) progress.line("note: " + note);
+  const std::string warning = body.warning;
 
+  progress.begin("assembling K");
   const std::vector<Vec3> loads = nodal_loads(description, body);
   const std::vector<Vec3> prescribed = body.prescribed;
   const Surface surface = body.surface;
@@ -206,6 +312,7 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   const Stiffness stiffness = assemble_stiffness(elastic);
   openblas_set_num_threads(
       1);  // the blocks of columns are the parallel work, and the bytes do not depend on the jobs
+  progress.begin("ordering K");
   auto factor = std::make_unique<Factor>(stiffness.K, stiffness.node_start);
   const std::vector<std::uint8_t> stored =
       stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers);
@@ -236,27 +343,32 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   DynamicsPlan dynamics;
   if (description.dynamics) {
     dynamics = plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
-                             description.precision);
+                             description.precision.value_or(Precision::single_precision));
     const std::string method =
         dynamics.method == DynamicsMethod::packed ? "packed" : fmt::format("modal, {} modes", dynamics.modes);
     progress.line(fmt::format("dynamics: {}, {:.1f} MB, {:.2f} GB of memory ({})", method,
                               static_cast<double>(dynamics.file_bytes) * 1e-6,
                               static_cast<double>(dynamics.memory_bytes) * 1e-9, dynamics.reason));
     plan.dynamics_bytes = dynamics.memory_bytes;
+    if (dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
+      plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   }
+  if (!warning.empty()) progress.warn(warning);
   check_memory(plan);
   if (options.dry_run) return BakeResult::planned;
 
+  progress.plan(stages_of(plan, overlays, dynamics, options.jobs));
+  progress.begin(factor_stage);
   factor->factorize();
-  progress.line("K factorised");
   model.stored_nodes = stored_nodes(solver, stiffness, model.dimension());
   model.rest_force = loads;
   model.rest_displacement = rest_displacement(*factor, stiffness, loads, prescribed, model.dimension());
   const InterruptGuard interrupt;
   if (description.overlay) {
+    progress.begin(overlay_stage);
     model.overlay =
         condense_overlays(model, *description.overlay, overlays.centres, options.jobs, [&](double share) {
-          progress.step("overlays", share);
+          progress.reach(share);
           return !interrupt.requested();
         });
     if (interrupt.requested()) {
@@ -266,12 +378,16 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
   }
   const std::vector<std::int64_t> stored_dofs = solver.stored_dofs();
   if (description.dynamics) {
+    if (dynamics.method == DynamicsMethod::modal) progress.begin(modes_stage);
     model.dynamics = describe_dynamics(*description.dynamics, dynamics, stiffness.K,
                                        assemble_mass(elastic, stiffness, description.dynamics->lumped),
                                        *factor, stored_dofs);
-    if (dynamics.method == DynamicsMethod::modal) progress.line("modes found");
   }
-  ModelWriter writer(options.output, model, description.precision);
+  progress.begin(precision_stage);
+  const Precision precision =
+      decide_precision(description, elastic, stiffness, *factor, stored_dofs, model, progress);
+  ModelWriter writer(options.output, model, precision,
+                     options.discard ? Leftovers::discard : Leftovers::resume);
   model.overlay = {};  // written by now
   model.dynamics = {};
   bool whole = solve_columns(solver, plan, options.jobs, writer, PackedMatrix::greens, progress, interrupt);
@@ -283,12 +399,16 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
                           writer, progress, interrupt);
   }
   if (!whole) {
-    writer.discard();
-    progress.line("interrupted: nothing was written");
+    progress.line(fmt::format(
+        "interrupted: the columns that are done are kept in {}.partial; the same command goes on from there, "
+        "with --discard it begins anew",
+        options.output.string()));
     return BakeResult::interrupted;
   }
+  progress.begin(write_stage);
   writer.finish(probes);
   progress.line(fmt::format("{} written", options.output.string()));
+  if (!warning.empty()) progress.warn(warning);
   return BakeResult::done;
 }
 

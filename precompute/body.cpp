@@ -181,9 +181,7 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   body.fixed = std::move(held.axes);
   body.prescribed = std::move(held.displacement);
   check_held(body.mesh, body.fixed, toml);
-  if (const std::string warning = scale_warning(body.mesh); !warning.empty()) {
-    body.notes.push_back(warning);
-  }
+  body.warning = scale_warning(body.mesh, description.scale);
   return body;
 }
 

@@ -20,8 +20,8 @@ struct MeshedBody {
   std::vector<Index> material_of_element;  ///< [E] number in Description::materials
   std::vector<std::uint8_t> fixed;         ///< [N] bit `axis` is set where held along it
   std::vector<Vec3> prescribed;            ///< [N] displacement along the held axes [m]; zero along others
-  std::vector<std::string>
-      notes;  ///< what a person should know: repairs, dropped voxels, warnings about the scale
+  std::vector<std::string> notes;          ///< what a person should know: repairs, dropped voxels
+  std::string warning;                     ///< what is probably a mistake (the scale), empty: nothing
 };
 
 /// Reports what is being done ("reading liver.inr.gz", "meshing", ...).

@@ -58,10 +58,14 @@ Index read_layers(const Section& storage, Scope scope) {
   return 0;
 }
 
-Precision read_precision(const Section& storage) {
-  const bool is_double =
-      storage.has("precision") && storage.choice("precision", {"single", "double"}) == "double";
-  return is_double ? Precision::double_precision : Precision::single_precision;
+/// Empty for "auto".
+std::optional<Precision> read_precision(const Section& storage) {
+  if (!storage.has("precision")) return std::nullopt;
+  const std::string name = storage.choice("precision", {"auto", "single", "split", "double"});
+  for (const Precision precision :
+       {Precision::single_precision, Precision::split_precision, Precision::double_precision})
+    if (name == name_of(precision)) return precision;
+  return std::nullopt;
 }
 
 /// The name becomes a file name.
@@ -87,10 +91,14 @@ void keep_regions(Geometry& geometry, const std::vector<MaterialPart>& materials
 }  // namespace
 
 Description read_description(const std::filesystem::path& path) {
+  return parse_description(read_all(path, "Give the path of a model.toml."), path);
+}
+
+Description parse_description(const std::string& text, const std::filesystem::path& path) {
   const std::string file = path.string();
   Description result;
   result.file = path;
-  result.text = read_all(path, "Give the path of a model.toml.");
+  result.text = text;
   const toml::table table = parse_toml(result.text, file);
   const toml::table empty;
   const Section root(table, "", file,

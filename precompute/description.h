@@ -137,7 +137,7 @@ struct Description {
   std::vector<Load> loads;
   Scope scope = Scope::layers;
   Index layers = 1;
-  Precision precision = Precision::single_precision;
+  std::optional<Precision> precision;  ///< empty: the first that is good enough (precision.h)
   std::optional<OverlayRegions> overlay;
   std::optional<DynamicsOptions> dynamics;
 };
@@ -145,5 +145,8 @@ struct Description {
 /// Reads and checks model.toml. Relative files are taken from its folder. Throws Error with file, line and
 /// column; an unknown key names the nearest known one.
 Description read_description(const std::filesystem::path& file);
+
+/// The same of a text in the place of the file's: of a description that is stored.
+Description parse_description(const std::string& text, const std::filesystem::path& file);
 
 }  // namespace palpate

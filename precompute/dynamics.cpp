@@ -158,8 +158,8 @@ StoredDynamics make_dynamics(const Model& model, const DynamicsOptions& options,
   Factor factor_bar(K_bar, stiffness.node_start);
   factor_bar.factorize();
   result.inverse =
-      PackedGreens(precision == Precision::single_precision ? packed_inverse<float>(factor_bar, stored_dofs)
-                                                            : packed_inverse<double>(factor_bar, stored_dofs),
+      PackedGreens(has_float_entries(precision) ? packed_inverse<float>(factor_bar, stored_dofs)
+                                                : packed_inverse<double>(factor_bar, stored_dofs),
                    model.stored_dofs(), precision);
   return result;
 }

@@ -119,6 +119,18 @@ std::int64_t Factor::entries() const noexcept {
   return static_cast<std::int64_t>(factor_->xsize);
 }
 
+double Factor::flops() const noexcept {
+  const auto* first = static_cast<const std::int64_t*>(factor_->super);
+  const auto* rows = static_cast<const std::int64_t*>(factor_->pi);
+  double total = 0.0;
+  for (std::size_t s = 0; s < factor_->nsuper; ++s) {
+    const auto columns = static_cast<double>(first[s + 1] - first[s]);
+    const double below = static_cast<double>(rows[s + 1] - rows[s]) - columns;
+    total += columns * (columns * columns / 3.0 + below * (columns + below));  // factor, solve, update
+  }
+  return total;
+}
+
 std::span<const std::int64_t> Factor::permutation() const noexcept {
   return {static_cast<const std::int64_t*>(factor_->Perm), factor_->n};
 }

@@ -31,6 +31,7 @@ class Factor {
 
   [[nodiscard]] std::int64_t order() const noexcept { return K_.rows(); }  ///< n
   [[nodiscard]] std::int64_t entries() const noexcept;                     ///< stored entries of L
+  [[nodiscard]] double flops() const noexcept;  ///< multiplications and additions of `factorize`
   [[nodiscard]] std::span<const std::int64_t> permutation()
       const noexcept;  ///< dof of K at each position of L
   [[nodiscard]] const cholmod_factor& supernodal() const noexcept { return *factor_; }

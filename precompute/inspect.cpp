@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <numbers>
 
+#include "meshes/printable.h"
+#include "precompute/precision.h"
+
 namespace palpate {
 namespace {
 
@@ -61,6 +64,21 @@ std::string materials_text(const Model& model) {
       text += fmt::format("    initial strain  {:g}\n", fmt::join(strain, ", "));
     }
   }
+  return text;
+}
+
+/// The smooth part and the force errors that were measured.
+std::string precision_text(const Model& model) {
+  std::string text;
+  if (const SmoothPart* smooth = model.greens.smooth().get(); smooth != nullptr)
+    text += fmt::format("    smooth part     {} terms, {:.1f} MB in double\n", smooth->terms,
+                        8e-6 * static_cast<double>(smooth->rows.size()));
+  std::vector<ForceErrors> errors = {model.force_errors};
+  if (model.dynamics.method == DynamicsMethod::packed) errors.push_back(model.dynamics.force_errors);
+  const std::string measured = errors_text(errors);
+  text += fmt::format("    force errors    {}\n", measured.empty() ? "not measured" : measured);
+  if (const std::string warning = precision_warning(model, model.greens.precision()); !warning.empty())
+    text += "    WARNING         " + warning + "\n";
   return text;
 }
 
@@ -126,13 +144,12 @@ std::string rest_text(const Model& model) {
 
 std::string inspect(const Model& model) {
   const QualityReport& q = model.quality;
-  const bool single = model.greens.precision() == Precision::single_precision;
   const bool plane = model.dimension() == 2;
   const auto held =
       std::count_if(model.fixed.begin(), model.fixed.end(), [](auto mask) { return mask != 0; });
   std::string text;
-  text += fmt::format("{}, written by {}\n", model.name, model.generator);
-  text += fmt::format("  content hash      {}\n", model.content_hash);
+  text += fmt::format("{}, written by {}\n", printable(model.name), printable(model.generator));
+  text += fmt::format("  content hash      {}\n", printable(model.content_hash));
   text +=
       fmt::format("  mesh              {} nodes ({} held), {} {} elements, {} surface {}, {} {:.4g} {}\n",
                   model.mesh.nodes.size(), held, model.mesh.elements(), traits(model.mesh.element).name,
@@ -143,9 +160,10 @@ std::string inspect(const Model& model) {
   text += rest_text(model);
   text += fmt::format(
       "  Green's functions {}: {} nodes, {} dofs, {} precision, {:.1f} MB packed\n", scope_text(model),
-      model.stored_nodes.size(), model.stored_dofs(), single ? "single" : "double",
+      model.stored_nodes.size(), model.stored_dofs(), name_of(model.greens.precision()),
       static_cast<double>(packed_size(model.stored_dofs()) * bytes_per_scalar(model.greens.precision())) *
           1e-6);
+  text += precision_text(model);
   text += overlay_text(model);
   text += dynamics_text(model);
   text += fmt::format("  probes            {}\n", model.probes.size());
@@ -159,8 +177,8 @@ std::string inspect(const Model& model) {
   text += "  angles of all elements\n" + histogram_text(q);
   text += "  made from\n";
   for (const SourceFile& source : model.sources) {
-    text +=
-        fmt::format("    {:9} {} ({} bytes, {})\n", source.role, source.path, source.bytes, source.checksum);
+    text += fmt::format("    {:9} {} ({} bytes, {})\n", printable(source.role), printable(source.path),
+                        source.bytes, printable(source.checksum));
   }
   return text;
 }

@@ -5,8 +5,8 @@
 
 namespace palpate {
 
-/// While it lives, SIGINT and SIGTERM are noted instead of ending the process, so that temporary files can be
-/// removed. Before and after they end it at once. One at a time.
+/// While it lives, SIGINT and SIGTERM are noted instead of ending the process, so that a block of columns is
+/// written whole and the person is told how to go on. Before and after they end it at once. One at a time.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -2,28 +2,48 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
+#include <string>
 #include <thread>
 
 #include "formats/model_file.h"
+#include "formats/shrunk_file.h"
+#include "meshes/command_line.h"
 #include "meshes/error.h"
+#include "meshes/printable.h"
+#include "meshes/spelling.h"
+#include "meshes/standard_output.h"
 #include "precompute/bake.h"
 #include "precompute/compare.h"
 #include "precompute/inspect.h"
+#include "precompute/not_a_description.h"
 #include "precompute/verify.h"
 
 namespace {
 
 int run_bake(const std::string& model, palpate::BakeOptions options) {
+  palpate::check_is_description(model);
   const palpate::Description description = palpate::read_description(model);
   if (options.output.empty()) options.output = description.name + ".palpate.hdf";
-  const bool stopped = palpate::bake(description, options) == palpate::BakeResult::interrupted;
-  return stopped ? palpate::exit_interrupted : palpate::exit_ok;
+  switch (palpate::bake(description, options)) {
+    case palpate::BakeResult::interrupted:
+      return palpate::exit_interrupted;
+    case palpate::BakeResult::done:
+      std::fprintf(stderr, "next: palpate-precompute verify %s\n      palpate-runtime play %s --view\n",
+                   options.output.c_str(), options.output.c_str());
+      break;
+    case palpate::BakeResult::planned:
+      break;
+  }
+  return palpate::exit_ok;
 }
 
 int run_verify(const std::string& file) {
   const palpate::VerifyReport report = palpate::verify(palpate::load_model(file), file);
   std::fputs(palpate::to_text(report).c_str(), stdout);
-  return report.passed() ? palpate::exit_ok : palpate::exit_differs;
+  if (!report.passed()) return palpate::exit_differs;
+  std::fprintf(stderr, "next: palpate-runtime play %s --view\n", file.c_str());
+  return palpate::exit_ok;
 }
 
 int run_compare(const std::string& a, const std::string& b, const palpate::CompareOptions& options) {
@@ -33,69 +53,139 @@ int run_compare(const std::string& a, const std::string& b, const palpate::Compa
   return palpate::exit_ok;
 }
 
-}  // namespace
+/// As they were written.
+struct Arguments {
+  std::string model, file, other_file, about;
+  palpate::BakeOptions bake;
+  palpate::CompareOptions compare;
+};
 
-int main(int argc, char** argv) {
-  CLI::App app{
-      "Meshes a body, assembles its stiffness and stores the Green's functions that palpate-runtime feels "
-      "with."};
-  app.set_version_flag("--version", "palpate-precompute " PALPATE_VERSION);
+void add_bake(CLI::App& app, Arguments& arguments) {
+  palpate::BakeOptions& options = arguments.bake;
+  options.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  app.add_option("MODEL.toml", arguments.model, "description of the body")->type_name("");
+  app.add_option("-o,--output", options.output, "file to write; else NAME.palpate.hdf in this folder")
+      ->type_name("FILE");
+  app.add_option("-j,--jobs", options.jobs, "threads; else as many as there are processors")
+      ->option_text("N")
+      ->check(CLI::Range(1, 1024));
+  app.add_flag("--dry-run", options.dry_run, "say what it would take (dofs, bytes, time) and stop");
+  app.add_flag("--force", options.force, "let the output take the place of any other file");
+  app.add_flag("--discard", options.discard,
+               "begin anew; else a run that was interrupted or killed goes on with the columns that it has");
   app.footer(
       "Examples:\n"
-      "  palpate-precompute meshes/models/cube/model.toml\n"
-      "  palpate-precompute inspect cube.palpate.hdf\n"
-      "  palpate-precompute verify cube.palpate.hdf\n"
-      "  palpate-precompute compare coarse.palpate.hdf fine.palpate.hdf\n"
-      "Exit status: 0 done, 1 bad input or no room (nothing was changed), 2 usage, 3 not verified, 130 "
-      "interrupted.");
-  app.require_subcommand(0, 1);
+      "  palpate-precompute meshes/models/cube/model.toml    writes cube.palpate.hdf\n"
+      "  palpate-precompute help verify                      more about a command\n"
+      "Then: palpate-runtime play cube.palpate.hdf --view\n"
+      "Ctrl-C keeps the columns that are done in FILE.partial and FILE.progress; the same command goes on.\n"
+      "Exit status: 0 done, 1 bad input or no room, 2 wrong arguments, 3 not verified, 130 interrupted.");
+}
 
-  std::string model, file;
-  palpate::BakeOptions options;
-  options.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  CLI::Option* model_option = app.add_option("model", model, "description of the body (model.toml)");
-  app.add_option("-o,--output", options.output, "file to write (default: NAME.palpate.hdf here)");
-  app.add_option("-j,--jobs", options.jobs, "threads")->capture_default_str()->check(CLI::Range(1, 1024));
-  app.add_flag("--dry-run", options.dry_run, "say what it would take (dofs, bytes, time) and stop");
-  CLI::App* inspect_command = app.add_subcommand("inspect", "print what is in a file");
-  CLI::App* verify_command = app.add_subcommand(
+CLI::App* add_inspect(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("inspect", "print what is in a file");
+  command->add_option("FILE", arguments.file, "NAME.palpate.hdf")->required()->type_name("");
+  command->footer(
+      "Material, mesh and its quality, what is held and stored, overlays, dynamics, sources.\n"
+      "Example:\n"
+      "  palpate-precompute inspect cube.palpate.hdf");
+  return command;
+}
+
+CLI::App* add_verify(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand(
       "verify",
       "check a file: checksums, probes, sampled columns against K, and whether its sources have changed");
-  for (CLI::App* command : {inspect_command, verify_command}) {
-    command->add_option("file", file, "NAME.palpate.hdf")->required();
-  }
+  command->add_option("FILE", arguments.file, "NAME.palpate.hdf")->required()->type_name("");
+  command->footer(
+      "One line a check, with the measured error and its bound. Exit status 3 where one fails.\n"
+      "Example:\n"
+      "  palpate-precompute verify cube.palpate.hdf && palpate-runtime play cube.palpate.hdf --view");
+  return command;
+}
 
-  CLI::App* compare_command = app.add_subcommand(
+CLI::App* add_compare(CLI::App& app, Arguments& arguments) {
+  palpate::CompareOptions& options = arguments.compare;
+  CLI::App* command = app.add_subcommand(
       "compare",
       "press the same finger tip on two files of one body and print how force and displacement differ");
-  std::string file_b;
-  palpate::CompareOptions compare_options;
-  compare_command->add_option("A", file, "NAME.palpate.hdf")->required();
-  compare_command->add_option("B", file_b, "NAME.palpate.hdf")->required();
-  compare_command->add_option("--touches", compare_options.touches, "places, spread over the boundary")
-      ->capture_default_str()
+  command->add_option("A", arguments.file, "NAME.palpate.hdf")->required()->type_name("");
+  command->add_option("B", arguments.other_file, "another, the finer one as a rule")
+      ->required()
+      ->type_name("");
+  command->add_option("--touches", options.touches, "places, spread over the boundary; else 20")
+      ->option_text("N")
       ->check(CLI::Range(1, 10000));
-  compare_command
-      ->add_option("--radius", compare_options.radius,
-                   "of the finger tip [m]; 0 is a single node; default: three mean edges of the coarser file")
+  command
+      ->add_option("--radius", options.radius,
+                   "of the finger tip [m]; 0 is a single node; else three mean edges of the coarser file")
+      ->option_text("METRES")
       ->check(CLI::NonNegativeNumber);
+  command->footer(
+      "Shows what a mesh, an element or a precision costs: bake the body twice and compare.\n"
+      "Examples:\n"
+      "  palpate-precompute compare coarse.palpate.hdf fine.palpate.hdf\n"
+      "  palpate-precompute compare tet4.palpate.hdf tet10.palpate.hdf --touches 50 --radius 0.01");
+  return command;
+}
 
+/// What to do instead, where a usage error shows it.
+std::string usage_hint(const CLI::App& app, const std::string& first_word) {
+  const bool of_help = app.got_subcommand("help");
+  if (!app.get_subcommands().empty() && !of_help) {
+    return "See palpate-precompute " + app.get_subcommands().front()->get_name() + " --help";
+  }
+  const auto command = palpate::meant(first_word, {"inspect", "verify", "compare", "help"});
+  if (command && !std::filesystem::exists(first_word))
+    return "Did you mean palpate-precompute " + *command + "? See palpate-precompute --help";
+  return "See palpate-precompute --help";
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{
+      "Meshes a body, assembles its stiffness and stores the Green's functions that palpate-runtime feels "
+      "with.",
+      "palpate-precompute"};
+  app.formatter(std::make_shared<palpate::HelpFormatter>());
+  app.set_version_flag("--version", "palpate-precompute " PALPATE_VERSION);
+  app.require_subcommand(0, 1);
+  Arguments arguments;
+  add_bake(app, arguments);
+  const CLI::App* inspect_command = add_inspect(app, arguments);
+  const CLI::App* verify_command = add_verify(app, arguments);
+  const CLI::App* compare_command = add_compare(app, arguments);
+  const CLI::App* help_command = palpate::add_help_command(app, arguments.about);
   try {
     app.parse(argc, argv);
-    if (app.get_subcommands().empty() && model_option->count() == 0) {
-      throw CLI::RequiredError("model.toml, `inspect FILE`, `verify FILE` or `compare A B`");
-    }
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? palpate::exit_ok : palpate::exit_usage;
-  }
-
-  try {
-    if (inspect_command->parsed()) {
-      std::fputs(palpate::inspect(palpate::load_model(file)).c_str(), stdout);
+    if (help_command->parsed()) {
+      std::fputs(palpate::help_page(app, arguments.about).c_str(), stdout);
       return palpate::exit_ok;
     }
-    if (compare_command->parsed()) return run_compare(file, file_b, compare_options);
-    return verify_command->parsed() ? run_verify(file) : run_bake(model, options);
+    if (app.get_subcommands().empty() && arguments.model.empty())
+      throw CLI::RequiredError("MODEL.toml, `inspect FILE`, `verify FILE` or `compare A B`");
+    if (const auto command = palpate::meant(arguments.model, {"inspect", "verify", "compare"});
+        command && !std::filesystem::exists(arguments.model))
+      throw CLI::ParseError("there is no command '" + arguments.model + "' and no such file",
+                            CLI::ExitCodes::ExtrasError);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::fprintf(stderr, "error: %s\nhint: %s\n", palpate::printable_lines(error.what(), "  ").c_str(),
+                 usage_hint(app, argc > 1 ? argv[1] : "").c_str());
+    return palpate::exit_usage;
+  }
+  if (inspect_command->parsed()) {
+    std::fputs(palpate::inspect(palpate::load_model(arguments.file)).c_str(), stdout);
+    return palpate::exit_ok;
+  }
+  if (compare_command->parsed()) return run_compare(arguments.file, arguments.other_file, arguments.compare);
+  if (verify_command->parsed()) return run_verify(arguments.file);
+  return run_bake(arguments.model, arguments.bake);
+}
+
+/// Errors in words.
+int run_and_tell(int argc, char** argv) {
+  try {
+    return run(argc, argv);
   } catch (const palpate::Error& error) {
     std::fputs(palpate::to_text(error).c_str(), stderr);
   } catch (const std::bad_alloc&) {
@@ -106,7 +196,15 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     std::fprintf(stderr,
                  "error: palpate-precompute: %s\nhint: This is a defect of Palpate; please report it.\n",
-                 error.what());
+                 palpate::printable_lines(error.what(), "  ").c_str());
   }
   return palpate::exit_input_error;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  palpate::prepare_output();
+  palpate::end_with_an_error_on_shrunk_files();
+  return palpate::finish_output(run_and_tell(argc, argv));
 }

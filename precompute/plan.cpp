@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "formats/memory.h"
@@ -17,6 +18,13 @@ constexpr std::int64_t max_block_columns = 192;
 constexpr std::int64_t max_block_bytes = 512LL << 20;
 constexpr double sweep_efficiency =
     0.4;  // of the sweeps against products alone: gathers and small supernodes (measured)
+constexpr double factor_efficiency = 0.5;     // of CHOLMOD's factorisation against them (measured)
+constexpr double checksum_rate = 1e9;         // while the file is read back [byte/s]
+constexpr double solve_rate = 3.5e9;          // of one right-hand side [flop/s] (measured)
+constexpr double solves_for_precision = 900;  // of eight places of 30 nodes, and of the smooth part
+constexpr double solves_at_the_end = 4;       // of the probes
+constexpr double solves_per_mode = 6;  // of Lanczos' method, its products of vectors among them (measured)
+constexpr double overlay_seconds_per_byte = 1e-8;  // of patches of two rings (measured)
 
 /// Multiply-adds a second of one thread in products shaped as the sweeps are.
 double measured_flops_per_second() {
@@ -40,25 +48,45 @@ std::int64_t choose_block_columns(std::int64_t free_dofs) {
   return std::clamp<std::int64_t>(fits / 24 * 24, 24, max_block_columns);
 }
 
+/// Of so many threads, those that have a processor.
+int working(int jobs) {
+  return std::min(jobs, std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+}
+
 }  // namespace
 
-Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision,
-               int jobs) {
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver,
+               std::optional<Precision> precision, int jobs) {
   Plan plan;
   plan.nodes = static_cast<std::int64_t>(mesh.nodes.size());
   plan.elements = mesh.elements();
   plan.free_dofs = factor.order();
   plan.stored_dofs = solver.order();
   plan.factor_entries = factor.entries();
-  plan.file_bytes = packed_size(plan.stored_dofs) * bytes_per_scalar(precision);
+  plan.file_bytes =
+      packed_size(plan.stored_dofs) * bytes_per_scalar(precision.value_or(Precision::single_precision));
   plan.block_columns = choose_block_columns(plan.free_dofs);
   plan.memory_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) +
                       jobs * solver.workspace_bytes(plan.block_columns);
   for (std::int64_t first = 0; first < plan.stored_dofs; first += plan.block_columns) {
     plan.flops += solver.flops(first, std::min(plan.block_columns, plan.stored_dofs - first));
   }
-  plan.seconds = plan.flops / (sweep_efficiency * measured_flops_per_second() * jobs);
+  const double rate = measured_flops_per_second();
+  plan.seconds = plan.flops / (sweep_efficiency * rate * working(jobs));
+  plan.factor_seconds = factor.flops() / (factor_efficiency * rate);
+  plan.precision_seconds = solves_for_precision * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
+  plan.write_seconds = static_cast<double>(plan.file_bytes) / checksum_rate +
+                       solves_at_the_end * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
   return plan;
+}
+
+double overlay_seconds(std::int64_t bytes, int jobs) {
+  return overlay_seconds_per_byte * static_cast<double>(bytes) / working(jobs);
+}
+
+double modes_seconds(const Plan& plan, std::int64_t modes) {
+  const double solves = solves_per_mode * static_cast<double>(modes);
+  return solves * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
 }
 
 void check_memory(const Plan& plan) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 
 #include "formats/packed.h"
 #include "precompute/greens.h"
@@ -22,10 +23,19 @@ struct Plan {
   std::int64_t block_columns = 0;   ///< right-hand sides solved at a time; the same for any number of jobs
   double flops = 0.0;               ///< of the column solves
   double seconds = 0.0;             ///< estimate of the column solves with all jobs, from a measured rate
+  double factor_seconds = 0.0;      ///< of the factorisation, which one thread does
+  double precision_seconds = 0.0;   ///< of the touches from which the precision is chosen
+  double write_seconds = 0.0;       ///< of checksums and probes once the columns are there
 };
 
-Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver, Precision precision,
-               int jobs);
+Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver,
+               std::optional<Precision> precision, int jobs);
+
+/// What overlays of so many bytes take, condensed by `jobs` threads [s].
+double overlay_seconds(std::int64_t bytes, int jobs);
+
+/// What Lanczos' method takes for so many modes [s].
+double modes_seconds(const Plan& plan, std::int64_t modes);
 
 /// Throws Error with the numbers when the plan needs more memory than is free.
 void check_memory(const Plan& plan);

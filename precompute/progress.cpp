@@ -1,52 +1,147 @@
 #include "precompute/progress.h"
 
 #include <fmt/format.h>
+#include <signal.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include <algorithm>
+#include <cmath>
+#include <string_view>
 
 namespace palpate {
 namespace {
 
-constexpr double seconds_between_lines = 5.0;  // where lines cannot be rewritten
+constexpr double seconds_between_lines = 5.0;  // where lines cannot be rewritten ...
+constexpr double share_between_lines = 0.1;    // ... and of what the stage took so far
+constexpr double seconds_between_rewrites = 1.0;
+
+/// Not by stdio, whose lock a child that is forked meanwhile would inherit.
+void print(std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
+    if (written <= 0) return;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+/// Signals are for the main thread, where they interrupt what waits.
+template <class Work>
+std::jthread without_signals(Work&& work) {
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  std::jthread thread(std::forward<Work>(work));
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  return thread;
+}
 
 }  // namespace
 
-Progress::Progress() : start_(Clock::now()), step_start_(start_), terminal_(isatty(STDERR_FILENO) != 0) {}
+std::string duration_text(double seconds) {
+  const auto upwards = [&](long long unit) {
+    return unit * static_cast<long long>(std::ceil(seconds / static_cast<double>(unit)));
+  };
+  if (upwards(1) < 60) return fmt::format("{} s", upwards(1));
+  const long long tens = upwards(10), minutes = upwards(60) / 60;
+  if (tens < 600 && tens % 60 != 0) return fmt::format("{} min {} s", tens / 60, tens % 60);
+  if (minutes < 60) return fmt::format("{} min", minutes);
+  return fmt::format("{} h {} min", minutes / 60, minutes % 60);
+}
 
-double Progress::seconds() const {
+Progress::Progress() : terminal_(isatty(STDERR_FILENO) != 0) {
+  ticker_ = without_signals([this](const std::stop_token& stop) { tick(stop); });
+}
+
+Progress::~Progress() {
+  ticker_.request_stop();
+  ticker_.join();
+  end_stage();
+}
+
+double Progress::now() const {
   return std::chrono::duration<double>(Clock::now() - start_).count();
 }
 
 void Progress::line(const std::string& text) {
-  if (open_line_) std::fputc('\n', stderr);
-  open_line_ = false;
-  fmt::print(stderr, "[{:7.1f} s] {}\n", seconds(), text);
+  const std::scoped_lock lock(mutex_);
+  end_stage();
+  write_line(text);
 }
 
-void Progress::step(const std::string& name, double share) {
-  if (name != step_name_) {
-    step_name_ = name;
-    step_start_ = Clock::now();
-    last_percent_ = -1;
-    next_line_ = seconds_between_lines;
-  }
-  const int percent = static_cast<int>(100.0 * share);
-  const double spent = std::chrono::duration<double>(Clock::now() - step_start_).count();
-  if (percent == last_percent_ || (!terminal_ && percent < 100 && spent < next_line_)) return;
-  last_percent_ = percent;
-  next_line_ = spent + seconds_between_lines;
-  const std::string left = share > 0.0 ? fmt::format(", {:.0f} s left", spent * (1.0 - share) / share) : "";
-  const std::string text = fmt::format("{}: {} %{}", name, percent, left);
+void Progress::warn(const std::string& text) {
+  const std::scoped_lock lock(mutex_);
+  end_stage();
+  print("\nwarning: " + text + "\n\n");
+}
+
+void Progress::plan(std::vector<Stage> stages) {
+  const std::scoped_lock lock(mutex_);
+  time_left_.plan(std::move(stages));
+}
+
+void Progress::expect(std::string_view stage, double seconds) {
+  const std::scoped_lock lock(mutex_);
+  time_left_.expect(stage, seconds);
+}
+
+void Progress::begin(const std::string& stage) {
+  const std::scoped_lock lock(mutex_);
+  end_stage();
+  stage_ = stage;
+  begun_ = now();
+  time_left_.begin(stage, begun_);
+  show(time_left_.known() ? stage_text() : stage);
+}
+
+void Progress::reach(double share) {
+  const std::scoped_lock lock(mutex_);
+  share_ = share;
+  time_left_.reach(share, now());
+}
+
+std::string Progress::stage_text() const {
+  std::string text = stage_;
+  if (share_ >= 0.0) text += fmt::format(": {} %", static_cast<int>(100.0 * share_));
+  if (!time_left_.known()) return text + ", time left not known yet";
+  return text + fmt::format(", {}{} left", time_left_.measured() ? "" : "about ",
+                            duration_text(time_left_.seconds(now())));
+}
+
+void Progress::write_line(const std::string& text) {
+  shown_ = now();
+  print(fmt::format("{}[{:7.1f} s] {}\n", line_open_ ? "\r\033[K" : "", shown_, text));
+  line_open_ = false;
+}
+
+void Progress::show(const std::string& text) {
   if (!terminal_) {
-    line(text);
+    write_line(text);
     return;
   }
-  fmt::print(stderr, "\r\033[K[{:7.1f} s] {}", seconds(), text);
-  open_line_ = true;
-  if (percent >= 100) {
-    std::fputc('\n', stderr);
-    open_line_ = false;
+  shown_ = now();
+  print(fmt::format("\r\033[K[{:7.1f} s] {}", shown_, text));
+  line_open_ = true;
+}
+
+void Progress::end_stage() {
+  const bool said_share = share_ >= 0.0;
+  if (line_open_ || said_share)
+    write_line(said_share ? fmt::format("{}: {} %", stage_, static_cast<int>(100.0 * share_)) : stage_);
+  stage_.clear();
+  share_ = -1.0;
+}
+
+double Progress::next_showing() const {
+  if (terminal_) return shown_ + seconds_between_rewrites;
+  return shown_ + std::max(seconds_between_lines, share_between_lines * (shown_ - begun_));
+}
+
+void Progress::tick(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (!stop.stop_requested()) {
+    const double wait = stage_.empty() ? seconds_between_rewrites : std::max(0.0, next_showing() - now());
+    wake_.wait_for(lock, stop, std::chrono::duration<double>(wait), [] { return false; });
+    if (!stop.stop_requested() && !stage_.empty() && now() >= next_showing()) show(stage_text());
   }
 }
 

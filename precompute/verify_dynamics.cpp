@@ -3,11 +3,11 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "precompute/dynamics.h"
 #include "precompute/factor.h"
 #include "precompute/modes.h"
+#include "precompute/verify_matrix.h"
 
 namespace palpate {
 namespace {
@@ -40,31 +40,15 @@ std::vector<Check> check_matrices(const Model& model, const Stiffness& stiffness
   return {mass, damping};
 }
 
-Check check_inverse(const Model& model, const Stiffness& stiffness, const SparseMatrix& M, double bound,
-                    int samples) {
+std::vector<Check> check_inverse(const Model& model, const Stiffness& stiffness, const SparseMatrix& M,
+                                 int samples) {
   const SparseMatrix K_bar =
       effective_stiffness(stiffness.K, M, model.dynamics.damping, model.dynamics.newmark);
   Factor factor(K_bar, stiffness.node_start);
   factor.factorize();
   const std::vector<std::int64_t> stored_dofs = stored_dofs_of(model, stiffness);
-  Check inverse{"inverse", 0.0, bound};
-  std::mt19937_64 random(11);
-  for (int sample = 0; sample < samples; ++sample) {
-    const auto j = static_cast<std::int64_t>(random() % stored_dofs.size());
-    const std::int64_t loaded = stored_dofs[static_cast<std::size_t>(j)];
-    std::vector<double> e(static_cast<std::size_t>(factor.order()), 0.0);
-    if (loaded >= 0) e[static_cast<std::size_t>(loaded)] = 1.0;
-    const std::vector<double> x = factor.solve(e);
-    double largest = loaded < 0 ? 1.0 : 0.0, difference = 0.0;
-    for (std::size_t i = 0; i < stored_dofs.size(); ++i) {
-      const double solved = stored_dofs[i] < 0 ? 0.0 : x[static_cast<std::size_t>(stored_dofs[i])];
-      largest = std::max(largest, std::abs(solved));
-      difference =
-          std::max(difference, std::abs(model.dynamics.inverse(static_cast<std::int64_t>(i), j) - solved));
-    }
-    inverse.error = std::max(inverse.error, difference / largest);
-  }
-  return inverse;
+  return verify_matrix(model, model.dynamics.inverse, model.dynamics.force_errors, factor, K_bar, stored_dofs,
+                       solver_error(factor, K_bar, stored_dofs, samples), "inverse ", samples);
 }
 
 /// Shapes at all dofs of K, from those at the stored ones.
@@ -143,12 +127,12 @@ std::vector<Check> check_modes(const Model& model, const Stiffness& stiffness, c
 
 }  // namespace
 
-std::vector<Check> verify_dynamics(const Model& model, const Stiffness& stiffness, double column_bound,
-                                   int samples) {
+std::vector<Check> verify_dynamics(const Model& model, const Stiffness& stiffness, int samples) {
   const SparseMatrix M = assemble_mass(elastic_body(model), stiffness, model.dynamics.lumped);
   if (model.dynamics.method == DynamicsMethod::modal) return check_modes(model, stiffness, M);
   std::vector<Check> checks = check_matrices(model, stiffness, M);
-  checks.push_back(check_inverse(model, stiffness, M, column_bound, samples));
+  const std::vector<Check> inverse = check_inverse(model, stiffness, M, samples);
+  checks.insert(checks.end(), inverse.begin(), inverse.end());
   return checks;
 }
 

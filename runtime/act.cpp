@@ -5,12 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
+#include "meshes/error.h"
+#include "meshes/write_file.h"
 #include "runtime/last_tick.h"
 #include "runtime/output.h"
 #include "runtime/play_report.h"
 #include "runtime/real_time.h"
+#include "runtime/session_check.h"
 
 namespace palpate {
 namespace {
@@ -51,6 +55,7 @@ Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActVie
   }
   const bool in_background = !options_.fast && !options_.session;
   if (settings.overlay) {
+    if (options_.session) check_overlays(*options_.session, body);
     overlays_.emplace(body, state_,
                       PatchSourceOptions{.rings = settings.overlay->rings,
                                          .memory = settings.overlay_memory,
@@ -65,7 +70,11 @@ Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActVie
                                   .device = options_.device.text,
                                   .rate = settings.rate,
                                   .options = to_text(settings)},
-                      recorded_surface(body));
+                      recorded_surface(body),
+                      [tell_viewer = viewer.recording_failed](const std::string& reason) {
+                        print_warning("the recording failed, and the run goes on without it: " + reason);
+                        if (tell_viewer) tell_viewer(reason);
+                      });
   }
   if (recorder_ && options_.record_frames > 0.0) {
     frames_.emplace(
@@ -97,8 +106,18 @@ const LoopReport& Act::run(const std::atomic<bool>& stop) {
   feed_.reset();
   viewed_.reset();
   frames_.reset();  // the last frame is in the recording
-  if (recorder_) recorder_->finish();
+  if (recorder_) finish_recording();
   return report_;
+}
+
+void Act::finish_recording() {
+  try {
+    recorder_->finish();
+  } catch (const Error& error) {
+    recording_failure_ = in_one_line(error);
+  } catch (const std::exception& error) {
+    recording_failure_ = error.what();
+  }
 }
 
 /// The loop with the rights it needs, which the threads that were started before do not inherit.
@@ -133,21 +152,38 @@ void Act::tell() const {
                          .settings = options_.settings,
                          .body = body_,
                          .tool = tool_,
+                         .tool_end = state_.tools.front().pose.position,
                          .report = report_,
                          .overlays = overlays_ ? &*overlays_ : nullptr,
                          .motion = motion_ ? &*motion_ : nullptr,
                          .link = mover_.link,
                          .dropped = recorder_ ? recorder_->dropped() : 0,
-                         .dropped_frames = recorder_ ? recorder_->dropped_frames() : 0};
+                         .dropped_frames = recorder_ ? recorder_->dropped_frames() : 0,
+                         .recording_failure = recording_failure_};
   print_report(played);
-  if (!options_.contacts.empty()) write_text_file(options_.contacts, contact_table(body_, state_));
-  if (!options_.surface.empty()) write_surface(options_.surface, body_, state_);
-  const std::string json = json_report(played);
-  if (options_.report.empty()) {
-    fmt::print("{}", json);
-  } else {
-    write_text_file(options_.report, json);
-  }
+  std::optional<Error> first;
+  const auto attempt = [&first](const std::filesystem::path& file, auto&& write) {
+    if (file.empty()) return;
+    try {
+      write(file);
+    } catch (const Error& error) {
+      if (first) {
+        print_warning(in_one_line(error));
+      } else {
+        first = error;
+      }
+    }
+  };
+  attempt(options_.contacts, [&](const auto& file) { write_file(file, contact_table(body_, state_)); });
+  attempt(options_.surface, [&](const auto& file) { write_surface(file, body_, state_); });
+  attempt(options_.report, [&](const auto& file) {
+    if (file == standard_output) {
+      std::fputs(json_report(played).c_str(), stdout);  // main sees whether it arrived
+    } else {
+      write_file(file, json_report(played));
+    }
+  });
+  if (first) throw Error(*first);
 }
 
 }  // namespace palpate

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "runtime/state.h"
+#include "runtime/vector_loops.h"
 
 namespace palpate {
 namespace {
@@ -168,6 +169,18 @@ void assemble_body_compliance(State& state) noexcept {
   }
 }
 
+/// Which contacts press on what the body does not give way at, or hold it. Before the couplings are in W.
+void note_rigid_contacts(State& state) noexcept {
+  for (Index k = 0; k < state.contact_count; ++k) {
+    ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+    const Index first = state.problem.first_row(k);
+    const Index rows = contact.held ? state.problem.rows_of(k) : 1;
+    contact.rigid = false;
+    for (Index i = first; i < first + rows; ++i)
+      contact.rigid = contact.rigid || state.problem.w(i, i) < state.least_compliance;
+  }
+}
+
 /// What the couplings give way: W += J_tool C_tool J_tool^T.
 void add_coupling_compliance(State& state) noexcept {
   ContactProblem& problem = state.problem;
@@ -185,20 +198,47 @@ void add_coupling_compliance(State& state) noexcept {
   }
 }
 
+/// The part of a row's own compliance that is in double where precision is split: e^T left right^T e.
+double exact_compliance(const Body& body, const State& state, const ContactRow& row) noexcept {
+  const Greens& greens = body.greens();
+  if (!greens.split()) return 0.0;
+  const auto terms = static_cast<std::ptrdiff_t>(greens.exact_terms());
+  std::array<double, most_exact_terms> left, right;
+  std::fill_n(left.begin(), terms, 0.0);
+  std::fill_n(right.begin(), terms, 0.0);
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] < 0) continue;
+    const SurfaceParts parts = body.surface_parts(state.near.node(row.places[n]));
+    for (std::size_t k = 0; k < parts.stored.size(); ++k) {
+      for (int axis = 0; axis < greens.dimension(); ++axis) {
+        const std::int64_t dof = std::int64_t{greens.dimension()} * parts.stored[k] + axis;
+        const double factor = parts.weights[k] * row.body[n][axis];
+        add(greens.exact_left(dof), factor, left.data(), terms);
+        add(greens.exact_right(dof), factor, right.data(), terms);
+      }
+    }
+  }
+  return dot(left.data(), right.data(), terms);
+}
+
+constexpr double exact_rounding = std::numeric_limits<double>::epsilon();
+
 /// Contact points that nearly coincide make W nearly singular; the rounding of Xi must not make it
-/// indefinite. What that gives way along a tangent it gives from the force of the tick before: friction that
-/// sticks would creep by it in every tick.
+/// indefinite. Where next to nothing gives way a rigid tool would be given a force beyond all measure: there
+/// it presses on a wall that gives way a little. What all that gives way along a tangent it gives from the
+/// force of the tick before: friction that sticks would creep by it in every tick.
 void regularise(const Body& body, State& state, std::span<const double> spring) noexcept {
-  const double rounding = body.greens().precision() == Precision::single_precision
-                              ? double{std::numeric_limits<float>::epsilon()}
-                              : std::numeric_limits<double>::epsilon();
+  const double rounding = body.greens().rounding();
   ContactProblem& problem = state.problem;
   for (Index k = 0; k < problem.contacts; ++k) {
     const Index first = problem.first_row(k);
     for (Index i = first; i < first + problem.rows_of(k); ++i) {
       const auto row = static_cast<std::size_t>(i);
       double& w = problem.w(i, i);
-      const double give = 4.0 * rounding * w + state.rigid_compliance;
+      const double exact = exact_compliance(body, state, state.rows[row]);
+      double give = 4.0 * (rounding * std::max(w - exact, 0.0) + exact_rounding * std::abs(exact)) +
+                    state.rigid_compliance;
+      if (k < state.contact_count) give = std::max(give, state.least_compliance - w);
       w += give + spring[row];
       if (i > first && problem.held[static_cast<std::size_t>(k)] == 0)
         problem.b[row] -= give * problem.lambda[row];
@@ -225,6 +265,7 @@ void assemble_contact(const Body& body, State& state) noexcept {
   } else {
     assemble_body_compliance<2>(state);
   }
+  note_rigid_contacts(state);
   add_coupling_compliance(state);
   regularise(body, state, spring);
 }

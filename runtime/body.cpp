@@ -97,7 +97,7 @@ Body::Body(Model model, const GreensOptions& options, int refinement, ContactMod
     modes_ = std::make_shared<const Modes>(model_);
     model_.dynamics.shapes = {};
     if (contact == ContactModel::dynamic)
-      greens_.add_modes(modes_, dynamic_weights(*modes_, model_.dynamics));
+      greens_.add_modes(*modes_, dynamic_weights(*modes_, model_.dynamics));
   }
   stored_of_mesh_.assign(model_.mesh.nodes.size(), -1);
   for (std::size_t k = 0; k < model_.stored_nodes.size(); ++k) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "meshes/error.h"
+#include "meshes/printable.h"
 #include "runtime/devices/builtin_profiles.h"
 #include "runtime/devices/hid_choice.h"
 #include "runtime/output.h"
@@ -21,15 +22,15 @@ std::string indented(std::string text) {
 
 void print_device(const AttachedDevice& device, const std::vector<NamedProfile>& profiles) {
   fmt::print("{}\n", device.name());
-  if (!device.maker.empty()) fmt::print("  maker    {}\n", device.maker);
-  if (!device.serial.empty()) fmt::print("  serial   {}\n", device.serial);
+  if (!device.maker.empty()) fmt::print("  maker    {}\n", printable(device.maker));
+  if (!device.serial.empty()) fmt::print("  serial   {}\n", printable(device.serial));
   const auto fitting = fitting_profiles(device, profiles);
   if (fitting.empty()) {
     fmt::print("  profile  none fits{}\n",
-               device.descriptor_problem.empty() ? "" : ": " + device.descriptor_problem);
+               device.descriptor_problem.empty() ? "" : ": " + printable(device.descriptor_problem));
   }
   for (const NamedProfile* profile : fitting) {
-    fmt::print("  profile  {}: {}\n", profile->key, profile->profile.name);
+    fmt::print("  profile  {}: {}\n", printable(profile->key), printable(profile->profile.name));
   }
   // Nobody wants rules for the keyboard.
   if (fitting.empty()) return;

@@ -1,11 +1,11 @@
 #include "runtime/greens.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <thread>
 #include <utility>
@@ -19,7 +19,6 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t cache_line = 64;
-constexpr std::int64_t huge_page = std::int64_t{1} << 21;
 constexpr std::int64_t tile = 64;  // scalars: two tiles of doubles fit into the first-level cache
 constexpr std::int64_t u_chunk =
     2048;  // doubles of u that stay in the first-level cache while all rows pass by
@@ -30,20 +29,6 @@ constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is
 std::int64_t padded_row(std::int64_t order, std::int64_t scalar_bytes) {
   const std::int64_t lines = (order * scalar_bytes + cache_line - 1) / cache_line;
   return (lines | 1) * cache_line / scalar_bytes;
-}
-
-/// Zeroed memory on huge pages where the kernel gives them: the tick touches few bytes on each of many rows.
-/// Null when there is none.
-std::shared_ptr<void> map_memory(std::int64_t bytes) {
-  const auto size = static_cast<std::size_t>((bytes + 2 * huge_page - 1) / huge_page * huge_page);
-  void* base =
-      mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-  if (base == MAP_FAILED) return nullptr;
-  madvise(base, size, MADV_HUGEPAGE);
-  const auto address = reinterpret_cast<std::uintptr_t>(base);
-  const std::uintptr_t aligned = (address + huge_page - 1) / huge_page * huge_page;
-  const std::shared_ptr<void> mapping(base, [size](void* p) { munmap(p, size); });
-  return {mapping, static_cast<std::byte*>(base) + (aligned - address)};
 }
 
 /// Copies the columns [first, last) of the packed lower triangle, times `scale`, to both triangles of the
@@ -103,7 +88,7 @@ void gather_from_packed(const PackedGreens& packed, int dimension, Index row, st
   const std::int64_t d = dimension;
   for (std::int64_t axis = 0; axis < d; ++axis) {
     for (const Index column : columns) {
-      for (std::int64_t k = 0; k < d; ++k) *blocks++ = packed(d * row + axis, d * column + k);
+      for (std::int64_t k = 0; k < d; ++k) *blocks++ = packed.stored(d * row + axis, d * column + k);
     }
   }
 }
@@ -176,7 +161,7 @@ void displacement_from_packed(std::span<const T> packed, double scale, std::int6
 /// Calls f with the scalars for what they are.
 template <class F>
 void with_scalars(const void* scalars, Precision precision, const F& f) noexcept {
-  if (precision == Precision::single_precision) {
+  if (has_float_entries(precision)) {
     f(static_cast<const float*>(scalars));
   } else {
     f(static_cast<const double*>(scalars));
@@ -190,11 +175,19 @@ Greens::Greens(PackedGreens packed, int dimension, const GreensOptions& options)
       order_(packed_.order()),
       dimension_(dimension),
       nodes_(static_cast<Index>(order_ / dimension)),
-      precision_(packed_.precision()) {
+      precision_(packed_.precision()),
+      split_(packed_.smooth() != nullptr) {
   if (order_ <= 0 || order_ % dimension != 0) {
     throw Error("the Green's functions have " + std::to_string(order_) + " dofs, which is not " +
                     std::to_string(dimension) + " for each of some nodes",
                 "Green's functions", "precompute the model again");
+  }
+  if (const SmoothPart* smooth = packed_.smooth().get(); smooth != nullptr) {
+    terms_ = smooth->terms;
+    const std::shared_ptr<double[]> rows(new double[smooth->rows.size()]);
+    std::transform(smooth->rows.begin(), smooth->rows.end(), rows.get(),
+                   [root = std::sqrt(packed_.scale())](double w) { return root * w; });
+    left_ = right_ = rows;
   }
   const std::int64_t scalar_bytes = bytes_per_scalar(precision_);
   stride_ = padded_row(order_, scalar_bytes);
@@ -205,7 +198,7 @@ Greens::Greens(PackedGreens packed, int dimension, const GreensOptions& options)
 
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int jobs = options.jobs > 0 ? options.jobs : processors;
-  if (precision_ == Precision::single_precision) {
+  if (has_float_entries(precision_)) {
     unfold(packed_.as<float>(), packed_.scale(), order_, static_cast<float*>(square.get()), stride_, jobs);
   } else {
     unfold(packed_.as<double>(), packed_.scale(), order_, static_cast<double*>(square.get()), stride_, jobs);
@@ -259,25 +252,38 @@ void Greens::displace_statically(std::span<const Index> nodes, std::span<const d
   });
 }
 
-void Greens::add_modes(std::shared_ptr<const Modes> modes, std::span<const double> weights) {
-  modes_ = std::move(modes);
-  const std::size_t k = weights.size();
-  weighted_.resize(static_cast<std::size_t>(order_) * k);
+void Greens::add_modes(const Modes& modes, std::span<const double> weights) {
+  const auto k = static_cast<std::int64_t>(modes.count()), terms = terms_ + k;
+  const auto entries = static_cast<std::size_t>(order_ * terms);
+  const std::shared_ptr<double[]> left(new double[entries]), right(new double[entries]);
   for (std::int64_t dof = 0; dof < order_; ++dof) {
-    for (std::size_t i = 0; i < k; ++i)
-      weighted_[static_cast<std::size_t>(dof) * k + i] = weights[i] * modes_->row(dof)[i];
+    double *to_left = left.get() + dof * terms, *to_right = right.get() + dof * terms;
+    std::copy_n(left_.get() + dof * terms_, terms_, to_left);
+    std::copy_n(right_.get() + dof * terms_, terms_, to_right);
+    const double* row = modes.row(dof);
+    std::copy_n(row, k, to_right + terms_);
+    for (std::int64_t i = 0; i < k; ++i) to_left[terms_ + i] = weights[static_cast<std::size_t>(i)] * row[i];
   }
+  terms_ = terms;
+  left_ = left;
+  right_ = right;
+}
+
+double Greens::rounding() const noexcept {
+  return has_float_entries(precision_) ? double{std::numeric_limits<float>::epsilon()}
+                                       : std::numeric_limits<double>::epsilon();
 }
 
 void Greens::gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
   gather_static(row, columns, blocks);
-  if (modes_ == nullptr) return;
-  const std::int64_t d = dimension_, k = modes_->count();
+  if (terms_ == 0) return;
+  const std::int64_t d = dimension_;
   double* block = blocks.data();
   for (std::int64_t axis = 0; axis < d; ++axis) {
-    const double* by = weighted_.data() + (d * row + axis) * k;
+    const double* by = left_.get() + (d * row + axis) * terms_;
     for (const Index column : columns) {
-      for (std::int64_t j = 0; j < d; ++j) *block++ += dot(by, modes_->row(d * column + j), k);
+      for (std::int64_t j = 0; j < d; ++j)
+        *block++ += dot(by, right_.get() + (d * column + j) * terms_, terms_);
     }
   }
 }
@@ -285,16 +291,19 @@ void Greens::gather(Index row, std::span<const Index> columns, std::span<double>
 void Greens::displacement(std::span<const Index> nodes, std::span<const double> f, Index first_node,
                           std::span<double> u) const noexcept {
   displace_statically(nodes, f, first_node, u);
-  if (modes_ == nullptr) return;
-  const std::int64_t d = dimension_, k = modes_->count();
-  std::array<double, most_modes> modal;
-  std::fill_n(modal.begin(), k, 0.0);
+  if (terms_ == 0) return;
+  const std::int64_t d = dimension_;
+  std::array<double, most_exact_terms> sum;
+  std::fill_n(sum.begin(), terms_, 0.0);
   for (std::size_t i = 0; i < f.size(); ++i) {
     const std::int64_t dof = d * nodes[i / static_cast<std::size_t>(d)] + static_cast<std::int64_t>(i) % d;
-    add(weighted_.data() + dof * k, f[i], modal.data(), k);
+    add(left_.get() + dof * terms_, f[i], sum.data(), terms_);
   }
-  for (std::size_t i = 0; i < u.size(); ++i)
-    u[i] += dot(modes_->row(d * first_node + static_cast<std::int64_t>(i)), modal.data(), k);
+  const double* row = right_.get() + d * first_node * terms_;
+  for (double& ui : u) {
+    ui += dot(row, sum.data(), terms_);
+    row += terms_;
+  }
 }
 
 }  // namespace palpate

@@ -13,6 +13,9 @@
 
 namespace palpate {
 
+/// Most terms that come on top of the stored entries.
+inline constexpr std::int64_t most_exact_terms = most_modes + most_smooth_terms;
+
 /// How `Greens` is laid out in memory.
 struct GreensOptions {
   int jobs = 0;  ///< threads that unfold; 0: one for each processor
@@ -33,12 +36,25 @@ class Greens {
   /// From now on Xi + sum_i weights_i phi_i phi_i^T: with weights 1 / k_bar_i - 1 / omega_i^2 that is
   /// K_bar^-1 of the modes, and of what they do not carry the static response (theory.md section 5, modal
   /// form with static correction). Modes of the same dofs.
-  void add_modes(std::shared_ptr<const Modes> modes, std::span<const double> weights);
+  void add_modes(const Modes& modes, std::span<const double> weights);
 
   [[nodiscard]] std::int64_t order() const noexcept { return order_; }  ///< n, number of stored dofs
   [[nodiscard]] int dimension() const noexcept { return dimension_; }   ///< d, dofs a node
   [[nodiscard]] Index nodes() const noexcept { return nodes_; }
   [[nodiscard]] Precision precision() const noexcept { return precision_; }
+  /// Rounding of a stored entry, relative to it [-].
+  [[nodiscard]] double rounding() const noexcept;
+  /// Whether the precision is split: then some terms of Xi are in double beside the stored entries.
+  [[nodiscard]] bool split() const noexcept { return split_; }
+  /// Terms that come in double on top of the stored entries: W W^T and those of modes.
+  [[nodiscard]] std::int64_t exact_terms() const noexcept { return terms_; }
+  /// [exact_terms] Rows of a dof: the sum of their products is what comes on top of entry (row, column).
+  [[nodiscard]] const double* exact_left(std::int64_t row) const noexcept {
+    return left_.get() + row * terms_;
+  }
+  [[nodiscard]] const double* exact_right(std::int64_t column) const noexcept {
+    return right_.get() + column * terms_;
+  }
   [[nodiscard]] bool unfolded() const noexcept {
     return square_ != nullptr;
   }  ///< false: used packed, much slower
@@ -73,8 +89,10 @@ class Greens {
   int dimension_ = 3;
   Index nodes_ = 0;
   Precision precision_ = Precision::double_precision;
-  std::shared_ptr<const Modes> modes_;
-  std::vector<double> weighted_;  // [n x k] rows of the modes times their weights
+  // left right^T comes on top of what is stored: W W^T of split precision, then the weighted modes.
+  bool split_;
+  std::int64_t terms_ = 0;
+  std::shared_ptr<const double[]> left_, right_;  // [n x terms_] one and the same for W alone
 };
 
 }  // namespace palpate

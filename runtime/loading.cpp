@@ -4,33 +4,23 @@
 
 #include <chrono>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <utility>
 
 #include "formats/model_file.h"
 #include "meshes/error.h"
+#include "meshes/printable.h"
+#include "meshes/regular_file.h"
 #include "runtime/output.h"
 #include "runtime/scaled_model.h"
 
 namespace palpate {
 namespace {
 
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (!stream.is_open() || stream.bad()) {
-    throw Error("cannot be read", file.string(),
-                "give the model.toml that the file should have been made from");
-  }
-  return text;
-}
-
 void print_loaded(const Body& body, double seconds) {
   fmt::print(stderr, "{}: {} free surface nodes, {} dofs in {} precision, loaded in {:.2f} s\n",
-             body.model().name, body.free_surface_nodes().size(), body.greens().order(),
-             body.greens().precision() == Precision::single_precision ? "single" : "double", seconds);
+             printable(body.model().name), body.free_surface_nodes().size(), body.greens().order(),
+             name_of(body.greens().precision()), seconds);
   if (!body.greens().unfolded()) {
     print_warning(
         "the Green's functions do not fit into half of the free memory as a full square; used packed, which "
@@ -43,16 +33,24 @@ void print_loaded(const Body& body, double seconds) {
 Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
                const BodyOptions& options) {
   Model model = load_model(file);
-  if (!model_toml.empty() && read_text(model_toml) != model.model_toml) {
+  const char* const if_missing = "give the model.toml that the file should have been made from";
+  if (!model_toml.empty() && read_all(model_toml, if_missing) != model.model_toml) {
     throw Error("was not made from " + model_toml.string() + ": the description stored in it is another one",
                 file.string(), "precompute it again: palpate-precompute " + model_toml.string());
   }
   for (const std::string& stale : stale_sources(model, file)) {
     print_warning(file.string() + ": " + stale + " (precompute it again)");
   }
+  if (const std::string warning = precision_warning(model, model.greens.precision()); !warning.empty())
+    print_warning(file.string() + ": " + warning);
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
   return Body(std::move(model), {}, options.refinement, options.contact);
+}
+
+void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file) {
+  for (const SourceFile& source : model.sources)
+    paths.add_input(source_path(source, file), "what the model was made from (" + source.role + ")");
 }
 
 std::unique_ptr<const Body> load_and_print(const std::filesystem::path& file,

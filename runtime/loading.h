@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "formats/output_paths.h"
 #include "runtime/body.h"
 
 namespace palpate {
@@ -27,5 +28,8 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
 std::unique_ptr<const Body> load_and_print(const std::filesystem::path& file,
                                            const std::filesystem::path& model_toml,
                                            const BodyOptions& options);
+
+/// What a model was made from, as inputs of a run: it must not be lost either. Throws Error.
+void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file);
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 #include <poll.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,7 +22,25 @@ double microseconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) * 1e-3;
 }
 
+sigset_t acknowledging_signal() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGUSR1);
+  return signals;
+}
+
+/// Who reads from its terminal in the background is stopped.
+bool may_read_input() {
+  const pid_t foreground = tcgetpgrp(STDIN_FILENO);  // below 0: it is not our terminal
+  return foreground < 0 || foreground == getpgrp();
+}
+
 }  // namespace
+
+void block_acknowledging_signal() {
+  const sigset_t signals = acknowledging_signal();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+}
 
 std::string_view fault_remedy(Fault fault) {
   switch (fault) {
@@ -95,15 +114,20 @@ void Monitor::take(const TickNote& note) {
       say(fmt::format("{:.3f} s: acknowledged; force begins again out of contact", time));
     } else {
       const auto& name = fault_names[static_cast<std::size_t>(note.fault)].second;
-      say(fmt::format(
-          "{:.3f} s: no force, {}: {}.{}", time, name, fault_remedy(note.fault),
-          options_.acknowledges && note.fault != Fault::device_lost ? " Press Enter to go on." : ""));
+      say(fmt::format("{:.3f} s: no force, {}: {}.{}", time, name, fault_remedy(note.fault),
+                      options_.acknowledges && note.fault != Fault::device_lost
+                          ? fmt::format(" Press Enter to go on, or: kill -USR1 {}", getpid())
+                          : ""));
     }
   }
   last_ = note;
 }
 
 void Monitor::ask() {
+  const sigset_t signals = acknowledging_signal();
+  const timespec at_once{};
+  if (sigtimedwait(&signals, nullptr, &at_once) == SIGUSR1) acknowledged_ = true;
+  if (!may_read_input()) return;
   pollfd input{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
   if (!asks_ || poll(&input, 1, 0) <= 0) return;
   char text[256];
@@ -122,8 +146,8 @@ void Monitor::say(const std::string& text) {
 void Monitor::draw() {
   if (lateness_.total() == 0) return;
   const double time = static_cast<double>(last_.number) / static_cast<double>(options_.rate);
-  std::string line =
-      fmt::format("{:7.1f} s  {:6.3f} N  {:2d} contacts", time, last_.force.norm(), last_.contacts);
+  std::string line = fmt::format("{:7.1f} s  {:6.3f} N  {:2d} contacts{}", time, last_.force.norm(),
+                                 last_.contacts, last_.rigid ? " on what is held" : "");
   if (options_.shows_safety) {
     line += fmt::format("  shown {:5.2f} N {}", last_.shown,
                         safety_phase_names[static_cast<std::size_t>(last_.phase)].second);

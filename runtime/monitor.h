@@ -24,6 +24,7 @@ struct TickNote {
   double shown = 0.0;         ///< that the device was told [N]
   double depth = 0.0;         ///< how far the contacts press the surface in, at most [m]
   std::int32_t contacts = 0;
+  bool rigid = false;  ///< the tool presses on what cannot move
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
   DeviceEvent events = DeviceEvent::none;
@@ -35,13 +36,13 @@ struct TickNote {
 struct MonitorOptions {
   std::int64_t rate = 1000;   ///< ticks a second
   bool line = false;          ///< a line on the error stream that is renewed twice a second
-  bool acknowledges = false;  ///< a line on the standard input acknowledges a fault
+  bool acknowledges = false;  ///< a line on the standard input acknowledges a fault, and so does SIGUSR1
   bool shows_safety = false;  ///< the phase and what the hand is shown
 };
 
 /// A line on the last half second: time, force, contacts, lateness and compute time (median, 99.9 %, worst)
 /// and how they are spread from 1 us to 1 ms; and a line for each fault and each device that went or came.
-/// From a thread of its own.
+/// From a thread of its own, which takes SIGUSR1 where all threads block it (block_acknowledging_signal).
 class Monitor {
  public:
   explicit Monitor(const MonitorOptions& options);
@@ -76,6 +77,9 @@ class Monitor {
   bool drawn_ = false;
   std::thread thread_;
 };
+
+/// For the calling thread and those that it starts.
+void block_acknowledging_signal();
 
 /// Eight-level bars of how durations are spread over twelve classes, each twice as long as the one before:
 /// below 1 us, 1 to 2 us, ..., from 1 ms on. The scale is logarithmic, one sample shows.

@@ -1,14 +1,11 @@
 #include "runtime/output.h"
 
 #include <fmt/core.h>
+#include <unistd.h>
 
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <fstream>
-#include <system_error>
 
-#include "meshes/error.h"
+#include "meshes/printable.h"
 
 namespace palpate {
 
@@ -31,27 +28,14 @@ std::string json_vector(const Vec3& v) {
   return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z());
 }
 
-void write_text_file(const std::filesystem::path& file, std::string_view text) {
-  const std::filesystem::path partial = file.string() + ".partial";
-  std::ofstream stream(partial, std::ios::binary);
-  stream.write(text.data(), static_cast<std::streamsize>(text.size()));
-  stream.close();
-  std::error_code failed;
-  std::string reason;
-  if (stream) {
-    std::filesystem::rename(partial, file, failed);
-    if (!failed) return;
-    reason = failed.message();
-  } else {
-    reason = std::strerror(errno);
-  }
-  std::filesystem::remove(partial, failed);
-  throw Error(fmt::format("cannot be written: {}", reason), file.string(),
-              "check the folder, its rights and the free space");
+std::string in_one_line(const Error& error) {
+  return error.where() + ": " + error.what() + " (" + error.hint() + ")";
 }
 
 void print_warning(std::string_view text) {
-  fmt::print(stderr, "warning: {}\n", text);
+  const char* over_the_line = isatty(STDERR_FILENO) != 0 ? "\r\x1b[K" : "";
+  const std::string line = fmt::format("{}warning: {}\n", over_the_line, printable(text));
+  std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
 }  // namespace palpate

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "runtime/vector_loops.h"
+
 namespace palpate {
 namespace {
 
@@ -116,7 +118,9 @@ void multiply_columns(std::span<const T> packed, std::int64_t order, const doubl
 
 }  // namespace
 
-PackedProduct::PackedProduct(const PackedGreens& matrix, int jobs) : matrix_(matrix) {
+PackedProduct::PackedProduct(const PackedGreens& matrix, int jobs)
+    : matrix_(matrix),
+      by_smooth_(matrix.smooth() == nullptr ? 0 : static_cast<std::size_t>(matrix.smooth()->terms)) {
   // As many entries each: those of the columns from j on are (n - j)^2 / 2.
   const std::int64_t n = matrix.order();
   std::int64_t first = 0;
@@ -145,10 +149,21 @@ void PackedProduct::multiply(std::span<const double> x, std::span<double> y) noe
   work(parts_.front());
   while (working_ != 0) std::this_thread::yield();
   add_up(y);
+  if (!by_smooth_.empty()) add_smooth(x, y);
+}
+
+/// y += W W^T x
+void PackedProduct::add_smooth(std::span<const double> x, std::span<double> y) noexcept {
+  const SmoothPart& smooth = *matrix_.smooth();
+  std::fill(by_smooth_.begin(), by_smooth_.end(), 0.0);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    add(smooth.row(static_cast<std::int64_t>(i)), x[i], by_smooth_.data(), smooth.terms);
+  for (std::size_t i = 0; i < y.size(); ++i)
+    y[i] += dot(smooth.row(static_cast<std::int64_t>(i)), by_smooth_.data(), smooth.terms);
 }
 
 void PackedProduct::work(Part& part) noexcept {
-  if (matrix_.precision() == Precision::single_precision) {
+  if (has_float_entries(matrix_.precision())) {
     multiply_columns(matrix_.as<float>(), matrix_.order(), x_, part.first, part.last, part.y);
   } else {
     multiply_columns(matrix_.as<double>(), matrix_.order(), x_, part.first, part.last, part.y);

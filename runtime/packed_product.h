@@ -37,9 +37,11 @@ class PackedProduct {
   void work(Part& part) noexcept;
   void help(Part& part, const std::stop_token& stop) noexcept;
   void add_up(std::span<double> y) const noexcept;
+  void add_smooth(std::span<const double> x, std::span<double> y) noexcept;
 
   const PackedGreens& matrix_;
   std::vector<Part> parts_;
+  std::vector<double> by_smooth_;  // [k] W^T x of split precision
   const double* x_ = nullptr;
   std::atomic<std::uint32_t> round_ = 0;    // of products
   std::atomic<std::uint32_t> working_ = 0;  // helpers that are not done with this round

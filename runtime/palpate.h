@@ -62,7 +62,8 @@ enum {
   PALPATE_FORCE_LIMITED = 1 << 9,     /* a force was cut to max_force */
   PALPATE_HANDING_OVER = 1 << 10,     /* a force is on its way to the contact's, so as not to kick */
   PALPATE_OLDER_PATCH = 1 << 11,      /* the overlay for this place was not there yet */
-  PALPATE_LATE_MOTION = 1 << 12       /* the body's free motion was not there in time */
+  PALPATE_LATE_MOTION = 1 << 12,      /* the body's free motion was not there in time */
+  PALPATE_RIGID_CONTACT = 1 << 13     /* a tool presses on what cannot move: only its coupling gives way */
 };
 
 /* "capacity_full" and so on; NULL for what is not one bit of these. Real-time safe. */
@@ -70,7 +71,8 @@ const char* palpate_status_name(uint32_t bit) PALPATE_NOEXCEPT;
 
 /* Loads a baked file (NAME.palpate.hdf) and makes a session with `tool_count` tools and room for
  * `max_contacts` contact points of all tools together, 1 to 256 (32 suits a finger tip). Takes from a tenth
- * of a second to seconds, and several threads for unfolding.
+ * of a second to seconds, and several threads for unfolding. The file's structure is looked at by a child
+ * process, as crafted files crash the HDF5 library: forks once, and waits for that child alone.
  *
  * Returns NULL where that cannot be done; `error`, unless NULL, then says why and what to do about it: a line
  * "error: ..." and a line "hint: ...", cut to `error_size` bytes with the zero at its end. It is empty where

@@ -8,7 +8,7 @@
 
 #include "formats/recording.h"
 #include "runtime/settings.h"
-#include "runtime/viewer/viewer_server.h"
+#include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
 
@@ -45,9 +45,10 @@ struct PlayOptions {
   std::optional<ViewerOptions> view;  ///< where it is shown in a browser
   std::filesystem::path record;       ///< empty: nothing is recorded
   double record_frames = 60.0;        ///< of the surface a second; 0: none
-  std::filesystem::path report;       ///< JSON; empty: on the standard output
+  std::filesystem::path report;       ///< JSON; "-": on the standard output; empty: none
   std::filesystem::path surface;      ///< grid of the surface after the last tick, .vtu; empty: none
   std::filesystem::path contacts;     ///< CSV of the contact points after the last tick; empty: none
+  bool force = false;                 ///< these may take the place of any files that are not read
 };
 
 /// Runs to the end or to SIGINT, SIGTERM or SIGHUP, which leave a complete recording, report and table of

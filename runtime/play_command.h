@@ -26,7 +26,10 @@ struct PlayArguments {
   std::string report;
   std::string surface;
   std::string contacts;
+  bool force = false;
 };
+
+constexpr const char* force_help = "let the files that are written take the place of any others";
 
 /// Adds the subcommand.
 CLI::App* add_play(CLI::App& app, PlayArguments& arguments);

@@ -54,6 +54,19 @@ void print_loop(const LoopReport& report, bool fast) {
   }
 }
 
+/// A force that is not the body's.
+void warn_of_rigid_contact(const PlayedRun& run) {
+  const auto bit = std::find_if(status_names.begin(), status_names.end(),
+                                [](const auto& status) { return status.first == StepStatus::rigid_contact; });
+  const std::int64_t ticks = run.report.status_ticks[static_cast<std::size_t>(bit - status_names.begin())];
+  if (ticks == 0) return;
+  const bool has_coupling = std::isfinite(run.tool.coupling_stiffness);
+  print_warning(fmt::format("in {} ticks the tool pressed on what is held, or hardly moves: {}", ticks,
+                            has_coupling ? "what is felt there is its coupling alone"
+                                         : "the force there is that of a wall and not the body's; give the "
+                                           "tool a --coupling, and a --max-force"));
+}
+
 void print_device(const PlayedRun& run) {
   const LoopReport& report = run.report;
   if (run.settings.safety) {
@@ -93,8 +106,8 @@ std::string box_text(const Body& body) {
                      high.x(), high.y(), high.z());
 }
 
-/// What a script gets wrong so that nothing is felt.
-void warn_of_script(const PlayedRun& run) {
+/// What is wrong with where the tool was, so that nothing is felt.
+void warn_of_places(const PlayedRun& run) {
   const LoopReport& report = run.report;
   const std::string place = "the body rests in " + box_text(run.body);
   if (report.ticks_begun_inside > 0) {
@@ -102,11 +115,14 @@ void warn_of_script(const PlayedRun& run) {
     const double seconds = static_cast<double>(report.ticks_begun_inside) / static_cast<double>(report.rate);
     print_warning(fmt::format("the tool began inside the body and felt nothing {}: start outside ({})",
                               all ? "at all" : fmt::format("until it was out at {} s", seconds), place));
-  } else if (report.ticks_in_contact == 0) {
-    print_warning(fmt::format(
-        "the tool never touched the body: check the script's positions, which are metres, and the "
-        "tool's size ({})",
-        place));
+  } else if (report.ticks > 0 && report.ticks_in_contact == 0) {
+    const Vec3& end = run.tool_end;
+    const char* advice = run.link != nullptr
+                             ? "move the device on, or the body to it (--origin, --motion-scale)"
+                             : "check the script's positions, which are metres, and the tool's size";
+    print_warning(
+        fmt::format("the tool never touched the body: {} (the tool ended at ({:.4g}, {:.4g}, {:.4g}) m; {})",
+                    advice, end.x(), end.y(), end.z(), place));
   }
 }
 
@@ -191,17 +207,19 @@ std::string json_device(const PlayedRun& run) {
 
 void print_report(const PlayedRun& run) {
   print_loop(run.report, run.options.fast);
+  warn_of_rigid_contact(run);
   print_device(run);
   if (!run.options.record.empty())
     fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),
                run.dropped, run.dropped_frames);
+  if (run.recording_failure) print_warning("the recording failed: " + *run.recording_failure);
   if (run.overlays != nullptr) print_overlays(*run.overlays);
   if (run.motion != nullptr) {
     fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
                1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
   }
   if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
-  if (run.options.device.kind == DeviceChoice::Kind::script) warn_of_script(run);
+  if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
 }
 
 std::string json_report(const PlayedRun& run) {
@@ -210,7 +228,7 @@ std::string json_report(const PlayedRun& run) {
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, report.status_ticks[k]);
   }
-  std::string json = "{\n";
+  std::string json = "{\n  \"generator\": \"palpate-runtime " PALPATE_VERSION "\",\n";
   json += fmt::format("  \"file\": {},\n  \"model\": {},\n", json_string(run.options.file.string()),
                       json_string(run.body.model().name));
   json += fmt::format("  \"fast\": {},\n  \"interrupted\": {},\n  \"tool\": {},\n", run.options.fast,
@@ -238,7 +256,9 @@ std::string json_report(const PlayedRun& run) {
     json += fmt::format("  \"overlay\": {},\n", json_overlays(*run.overlays, run.settings.overlay.value()));
   json += fmt::format("  \"dynamics\": {},\n", json_dynamics(run.body, run.motion));
   if (!run.options.record.empty())
-    json += fmt::format("  \"recording\": {},\n", json_string(run.options.record.string()));
+    json += fmt::format("  \"recording\": {},\n  \"recording_failed\": {},\n",
+                        json_string(run.options.record.string()),
+                        run.recording_failure ? json_string(*run.recording_failure) : "null");
   json += fmt::format("  \"dropped_ticks\": {}\n}}\n", run.dropped);
   return json;
 }

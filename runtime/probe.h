@@ -25,6 +25,7 @@ struct ProbeOptions {
   bool json = false;
   std::filesystem::path field;  ///< .csv or .vtu for the whole displacement, at rest and by the probe, the
                                 ///< overlay's too; empty: none
+  bool force = false;           ///< `field` may take the place of any file that is not read
 };
 
 /// Prints the forces that hold the nodes displaced, and writes the field. Returns the exit code; throws

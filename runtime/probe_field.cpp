@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "meshes/vtu_writer.h"
+#include "meshes/write_file.h"
 #include "runtime/node_vectors.h"
-#include "runtime/output.h"
 #include "runtime/surface_numbering.h"
 
 namespace palpate {
@@ -72,7 +72,7 @@ void write_csv(const std::filesystem::path& file, const Body& body, const Overla
       if (node.node < 0) add(node);
     }
   }
-  write_text_file(file, csv);
+  write_file(file, csv);
 }
 
 /// Elements of one kind.

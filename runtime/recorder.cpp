@@ -1,7 +1,10 @@
 #include "runtime/recorder.h"
 
 #include <chrono>
+#include <utility>
 
+#include "meshes/error.h"
+#include "runtime/output.h"
 #include "runtime/session_xdmf.h"
 
 namespace palpate {
@@ -15,8 +18,10 @@ constexpr std::size_t most_waiting = std::size_t{32} << 20;  // bytes, for a che
 
 }  // namespace
 
-Recorder::Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface)
+Recorder::Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface,
+                   OnFailure on_failure)
     : path_(path),
+      on_failure_(std::move(on_failure)),
       writer_(path, info, surface),
       ticks_(ring_seconds * static_cast<std::size_t>(info.rate)),
       frames_(frame_ring),
@@ -63,7 +68,7 @@ void Recorder::finish() {
   thread_.join();
   if (failed_) std::rethrow_exception(failure_);
   writer_.finish();
-  write_xdmf(path_);
+  write_xdmf(path_, writer_.frames());
 }
 
 /// Bytes that were taken out of the rings.
@@ -98,10 +103,18 @@ void Recorder::write() noexcept {
       if (taken == 0) std::this_thread::sleep_for(pause);
     }
     writer_.checkpoint();
-  } catch (...) {
+  } catch (const Error& error) {
     failure_ = std::current_exception();
-    failed_ = true;
+    fail(in_one_line(error));
+  } catch (const std::exception& error) {
+    failure_ = std::current_exception();
+    fail(error.what());
   }
+}
+
+void Recorder::fail(const std::string& reason) noexcept {
+  failed_ = true;
+  if (on_failure_) on_failure_(reason);
 }
 
 }  // namespace palpate

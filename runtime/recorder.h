@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <functional>
+#include <string>
 #include <thread>
 
 #include "formats/recording.h"
@@ -14,12 +16,16 @@ namespace palpate {
 
 /// A thread that writes a session to an HDF5 recording, fed through bounded lock-free rings: of ticks by one
 /// other thread, of frames by one too. Every half second all of it is put into the recording, so that no more
-/// is lost however the program ends. Where that fails (a full disk) nothing is kept any more, and the run
-/// goes on.
+/// is lost however the program ends. Where that fails (a full disk) nothing is kept any more, the reason is
+/// told at once, and the run goes on.
 class Recorder {
  public:
+  /// Takes the reason why nothing is kept any more; called once at most, by the recorder's thread.
+  using OnFailure = std::function<void(const std::string& reason)>;
+
   /// Starts writing to `path`, in the place of what was there. Throws Error when it cannot be made.
-  Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface = {});
+  Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface = {},
+           OnFailure on_failure = {});
   ~Recorder();  ///< without `finish`, the recording is left as if the program had been killed
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
@@ -48,9 +54,11 @@ class Recorder {
   bool try_push(const TickRecord& tick) noexcept;
   bool try_push(SurfaceFrame& frame) noexcept;
   void write() noexcept;
+  void fail(const std::string& reason) noexcept;
   std::size_t take_all();
 
   std::filesystem::path path_;
+  OnFailure on_failure_;
   RecordingWriter writer_;
   Ring<TickRecord> ticks_;
   Ring<SurfaceFrame> frames_;

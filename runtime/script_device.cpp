@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <span>
 #include <string>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
 #include "runtime/numbers.h"
 
 namespace palpate {
@@ -90,11 +89,7 @@ ToolPose read_pose(std::span<const double> values, const Columns& columns, const
 }  // namespace
 
 ScriptDevice ScriptDevice::read(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (!stream.is_open() || stream.bad())
-    throw Error("cannot be read", file.string(), "check the name after 'script:'");
-  return parse(text, file.string());
+  return parse(read_all(file, "check the name after 'script:'"), file.string());
 }
 
 ScriptDevice ScriptDevice::parse(std::string_view text, const std::string& name) {

@@ -8,7 +8,10 @@
 #include <string_view>
 
 #include "meshes/error.h"
+#include "meshes/printable.h"
+#include "meshes/write_file.h"
 #include "runtime/output.h"
+#include "runtime/session_check.h"
 #include "runtime/session_xdmf.h"
 
 namespace palpate {
@@ -47,15 +50,26 @@ std::string faults_text(const SessionSummary& summary) {
   return text.empty() ? "none" : text;
 }
 
+std::string status_text(const SessionSummary& summary) {
+  std::string text;
+  for (std::size_t k = 0; k < status_names.size(); ++k) {
+    if (summary.status_ticks[k] > 0)
+      text += fmt::format("{}{} in {} ticks", text.empty() ? "" : ", ", status_names[k].second,
+                          summary.status_ticks[k]);
+  }
+  return text.empty() ? "none" : text;
+}
+
 /// How it ended.
 enum class Ending { finished, merged, going_on };
 
 constexpr std::string_view ending_names[] = {"finished", "killed, now one file", "being recorded"};
 
-Ending finish(const std::filesystem::path& path, const Recording& recording) {
+Ending finish(const std::filesystem::path& path, const Recording& recording, bool force) {
   if (recording.finished) return Ending::finished;
+  OutputPaths(force).add(xdmf_path(path), OutputKind::frames, "session");
   if (!finish_recording(path)) return Ending::going_on;
-  write_xdmf(path);
+  write_xdmf(path, recording.frames);
   return Ending::merged;
 }
 
@@ -64,10 +78,11 @@ void print_text(const std::filesystem::path& path, const Recording& recording, c
   const auto microseconds = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
   const SessionInfo& info = recording.info;
   const std::size_t frames = recording.frames.time.size();
-  fmt::print("{}: {}, by {}\n", path.string(), ending_names[static_cast<int>(ending)], recording.generator);
-  fmt::print("model            {} ({})\n", info.model_path, info.content_hash);
-  fmt::print("device           {}\n", info.device.empty() ? "unknown" : info.device);
-  fmt::print("options          {}\n", in_one_line(info.options));
+  fmt::print("{}: {}, by {}\n", printable(path.string()), ending_names[static_cast<int>(ending)],
+             printable(recording.generator));
+  fmt::print("model            {} ({})\n", printable(info.model_path), printable(info.content_hash));
+  fmt::print("device           {}\n", info.device.empty() ? "unknown" : printable(info.device));
+  fmt::print("options          {}\n", printable(in_one_line(info.options)));
   fmt::print("ticks            {} at {} a second: {:.3f} s, {} missing\n", s.ticks, info.rate, s.seconds,
              s.missing);
   fmt::print("in contact       {} ticks, {:.3f} s\n", s.in_contact,
@@ -80,6 +95,7 @@ void print_text(const std::filesystem::path& path, const Recording& recording, c
   fmt::print("deadline misses  {}, at most {:.1f} us late\n", s.deadline_misses,
              microseconds(s.worst_lateness));
   fmt::print("faults           {}\n", faults_text(s));
+  fmt::print("status           {}\n", status_text(s));
   if (frames == 0) {
     fmt::print("frames           none\n");
   } else {
@@ -95,6 +111,9 @@ void print_json(const std::filesystem::path& path, const Recording& recording, c
   for (const SessionFault& fault : s.faults)
     faults += fmt::format("{}{{\"fault\": \"{}\", \"time_s\": {}}}", faults.empty() ? "" : ", ",
                           fault_name(fault.fault), fault.time);
+  std::string status;
+  for (std::size_t k = 0; k < status_names.size(); ++k)
+    status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, s.status_ticks[k]);
   const SessionInfo& info = recording.info;
   fmt::print("{{\n  \"recording\": {},\n  \"generator\": {},\n  \"was_killed\": {},\n  \"going_on\": {},\n",
              json_string(path.string()), json_string(recording.generator), ending == Ending::merged,
@@ -113,6 +132,7 @@ void print_json(const std::filesystem::path& path, const Recording& recording, c
              s.compute.percentile(0.5), s.compute.percentile(0.999), s.compute.worst());
   fmt::print("  \"deadline_misses\": {},\n  \"worst_lateness_ns\": {},\n  \"faults\": [{}],\n",
              s.deadline_misses, s.worst_lateness, faults);
+  fmt::print("  \"status_ticks\": {{{}}},\n", status);
   fmt::print("  \"frames\": {},\n  \"surface_nodes\": {}\n}}\n", recording.frames.time.size(),
              recording.frames.surface.nodes.size());
 }
@@ -132,6 +152,9 @@ SessionSummary summarise(const Recording& recording) {
   for (const TickRecord& tick : recording.ticks) {
     const std::int64_t k = number(tick);
     if (tick.contacts > 0) ++summary.in_contact;
+    for (std::size_t bit = 0; bit < status_names.size(); ++bit) {
+      if (has(static_cast<StepStatus>(tick.status), status_names[bit].first)) ++summary.status_ticks[bit];
+    }
     note_largest(length(tick.force), tick.time, summary.largest_force, summary.largest_force_time);
     note_largest(length(tick.shown_force), tick.time, summary.largest_shown, summary.largest_shown_time);
     summary.worst_lateness = std::max(summary.worst_lateness, tick.begun_ns - due(k));
@@ -147,9 +170,10 @@ SessionSummary summarise(const Recording& recording) {
   return summary;
 }
 
-int session(const std::filesystem::path& path, bool json) {
-  const Recording recording = read_recording(path);
-  const Ending ending = finish(path, recording);
+int session(const std::filesystem::path& file, bool json, bool force) {
+  const std::filesystem::path path = link_target(file);
+  const Recording recording = read_session(path);
+  const Ending ending = finish(path, recording, force);
   const SessionSummary summary = summarise(recording);
   if (json) {
     print_json(path, recording, summary, ending);

@@ -8,8 +8,7 @@
 #include <string>
 #include <system_error>
 
-#include "formats/recording.h"
-#include "runtime/output.h"
+#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {
@@ -57,8 +56,14 @@ std::filesystem::path xdmf_path(const std::filesystem::path& recording) {
   return std::filesystem::path(recording).replace_extension(".xdmf");
 }
 
-void write_xdmf(const std::filesystem::path& recording) {
-  const RecordedFrames frames = read_frames(recording);
+std::filesystem::path add_recording(OutputPaths& paths, const std::filesystem::path& recording,
+                                    const std::string& option) {
+  const std::filesystem::path file = paths.add(recording, OutputKind::recording, option);
+  paths.add(xdmf_path(file), OutputKind::frames, option);
+  return file;
+}
+
+void write_xdmf(const std::filesystem::path& recording, const RecordedFrames& frames) {
   if (frames.time.empty()) {
     std::error_code ignored;
     std::filesystem::remove(xdmf_path(recording), ignored);
@@ -77,7 +82,8 @@ void write_xdmf(const std::filesystem::path& recording) {
         "Format=\"HDF\">{}:/frames/{}</DataItem>'>\n",
         scalar.entity, F, S, file, scalar.dataset);
   std::string text = fmt::format(
-      "<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [\n"
+      "<?xml version=\"1.0\"?>\n<!-- palpate " PALPATE_VERSION
+      " -->\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [\n"
       "<!ENTITY t '<Topology {kind} NumberOfElements=\"{T}\"><DataItem Dimensions=\"{T} {d}\" "
       "NumberType=\"Int\" Format=\"HDF\">{file}:/surface/simplices</DataItem></Topology>'>\n"
       "<!ENTITY x '<DataItem Dimensions=\"{S} 3\" NumberType=\"Float\" Precision=\"8\" "
@@ -110,7 +116,7 @@ void write_xdmf(const std::filesystem::path& recording) {
     text += "</Grid>\n";
   }
   text += "</Grid></Domain></Xdmf>\n";
-  write_text_file(xdmf_path(recording), text);
+  write_file(xdmf_path(recording), text);
 }
 
 }  // namespace palpate

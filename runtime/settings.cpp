@@ -26,39 +26,40 @@ Part split_part(std::string_view part) {
   return {part.substr(0, equals), part.substr(std::min(equals + 1, part.size()))};
 }
 
-/// Visits each safety option: name, unit, reference to the number.
+/// Visits each safety option: name, unit, meaning, reference to the number.
 template <class Options, class Visitor>
 void for_each_safety_option(Options& o, Visitor&& visit) {
-  visit("max_force", "N", o.max_force);
-  visit("max_torque", "N m", o.max_torque);
-  visit("max_force_rate", "N/s", o.max_force_rate);
-  visit("max_torque_rate", "N m/s", o.max_torque_rate);
-  visit("max_stiffness", "N/m", o.max_stiffness);
-  visit("max_damping", "N s/m", o.max_damping);
-  visit("max_speed", "m/s", o.max_speed);
-  visit("ramp", "s", o.ramp);
-  visit("small_force", "N", o.small_force);
-  visit("calm_time", "s", o.calm_time);
-  visit("late", "s", o.deadline.tolerance);
-  visit("late_fade", "s", o.deadline.fade);
-  visit("late_recovery", "s", o.deadline.recovery);
-  visit("most_late", "ticks", o.deadline.most);
-  visit("forgiveness", "ticks", o.deadline.forgiveness);
-  visit("silence", "s", o.silence.most);
-  visit("silence_fade", "s", o.silence.fade_from);
-  visit("frozen", "s", o.silence.frozen);
-  visit("frozen_force", "N", o.silence.frozen_force);
-  visit("stale", "s", o.stale.fresh);
-  visit("stale_life", "s", o.stale.time_to_live);
-  visit("stale_fade", "s", o.stale.fade);
-  visit("stale_damping", "N s/m", o.stale.damping);
-  visit("buzz_speed", "m/s", o.buzz.speed);
-  visit("buzz_force", "N", o.buzz.force);
-  visit("buzz_mean", "s", o.buzz.mean_time);
-  visit("buzz_window", "s", o.buzz.window);
-  visit("buzz_flips", "", o.buzz.flips);
-  visit("buzz_fade", "s", o.buzz.fade);
-  visit("buzz_recovery", "s", o.buzz.recovery);
+  visit("max_force", "N", "largest force on the hand", o.max_force);
+  visit("max_torque", "N m", "largest torque on the hand", o.max_torque);
+  visit("max_force_rate", "N/s", "how fast the force may change", o.max_force_rate);
+  visit("max_torque_rate", "N m/s", "how fast the torque may change", o.max_torque_rate);
+  visit("max_stiffness", "N/m", "largest stiffness of the local model", o.max_stiffness);
+  visit("max_damping", "N s/m", "most that the passivity controller adds; 0: it only observes",
+        o.max_damping);
+  visit("max_speed", "m/s", "of the device; faster is a fault", o.max_speed);
+  visit("ramp", "s", "from no to whole force, at the start and after a fault", o.ramp);
+  visit("small_force", "N", "force begins only where it was below this", o.small_force);
+  visit("calm_time", "s", "for so long", o.calm_time);
+  visit("late", "s", "a tick that begins so much late is a miss", o.deadline.tolerance);
+  visit("late_fade", "s", "from whole to no force while ticks are late", o.deadline.fade);
+  visit("late_recovery", "s", "and back, while they are in time", o.deadline.recovery);
+  visit("most_late", "ticks", "misses that are a fault", o.deadline.most);
+  visit("forgiveness", "ticks", "misses that a tick in time makes good", o.deadline.forgiveness);
+  visit("silence", "s", "without a report of the device: a fault", o.silence.most);
+  visit("silence_fade", "s", "the force fades from here on, to nothing at silence", o.silence.fade_from);
+  visit("frozen", "s", "with the same numbers in every report: a fault", o.silence.frozen);
+  visit("frozen_force", "N", "but only while the force is above this", o.silence.frozen_force);
+  visit("stale", "s", "up to this age a solution is of this tick", o.stale.fresh);
+  visit("stale_life", "s", "up to this age an older one is extrapolated", o.stale.time_to_live);
+  visit("stale_fade", "s", "then from whole to no force", o.stale.fade);
+  visit("stale_damping", "N s/m", "damping of a solution that is not fresh", o.stale.damping);
+  visit("buzz_speed", "m/s", "amplitude of the device's speed that counts as buzzing", o.buzz.speed);
+  visit("buzz_force", "N", "amplitude of the force about its mean that counts", o.buzz.force);
+  visit("buzz_mean", "s", "of that mean", o.buzz.mean_time);
+  visit("buzz_window", "s", "in which changes of sign are counted", o.buzz.window);
+  visit("buzz_flips", "", "so many in the window are buzzing", o.buzz.flips);
+  visit("buzz_fade", "s", "from whole to no force while it buzzes; then a fault", o.buzz.fade);
+  visit("buzz_recovery", "s", "and back, while it does not", o.buzz.recovery);
 }
 
 std::string shape_text(const Tool& tool) {
@@ -68,7 +69,7 @@ std::string shape_text(const Tool& tool) {
 
 std::string safety_text(const SafetyOptions& options) {
   std::string text;
-  for_each_safety_option(options, [&](const char* name, const char*, const auto& value) {
+  for_each_safety_option(options, [&](const char* name, const char*, const char*, const auto& value) {
     text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, value);
   });
   return text;
@@ -333,7 +334,7 @@ SafetyOptions parse_safety(const std::string& text) {
                   "write max_force=2,ramp=3");
     bool known = false;
     for_each_safety_option(options, [&, name_wanted = wanted, value_wanted = *parsed](
-                                        const char* name, const char*, auto& value) {
+                                        const char* name, const char*, const char*, auto& value) {
       if (name_wanted != name) return;
       value = static_cast<std::remove_reference_t<decltype(value)>>(value_wanted);
       known = true;
@@ -348,9 +349,10 @@ SafetyOptions parse_safety(const std::string& text) {
 std::string safety_help() {
   std::string text;
   const SafetyOptions defaults;
-  for_each_safety_option(defaults, [&](const char* name, const char* unit, const auto& value) {
-    text += fmt::format("  {:<16} {:>6} {}\n", name, value, unit);
-  });
+  for_each_safety_option(defaults,
+                         [&](const char* name, const char* unit, const char* meaning, const auto& value) {
+                           text += fmt::format("    {:<16} {:>7} {:<6} {}\n", name, value, unit, meaning);
+                         });
   return text;
 }
 

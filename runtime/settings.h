@@ -62,7 +62,7 @@ using SettingsText = std::map<std::string, std::string>;
 [[nodiscard]] Eigen::Quaterniond parse_axes(const std::string& text);
 /// "max_force=5,ramp=0.5": what is not named has its default; "default" changes nothing.
 [[nodiscard]] SafetyOptions parse_safety(const std::string& text);
-/// The names that parse_safety knows, with units and defaults, a line each.
+/// The names that parse_safety knows, with defaults, units and meanings, a line each.
 [[nodiscard]] std::string safety_help();
 
 }  // namespace palpate

@@ -3,9 +3,11 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "meshes/element.h"
+#include "meshes/surface.h"
 #include "meshes/topology.h"
 
 namespace palpate {
@@ -67,9 +69,10 @@ struct FacetLaw {
   double ratio;
 };
 
-/// Integrals of the shape functions of a tri6 are zero at its corners, and so are its corners' forces under
-/// an even pressure. Middles give a part to the ends of their edges, so that an even pressure has even
-/// quotients: those of the linear simplices that a tri6 is cut into.
+/// Integrals of the shape functions of a tri6 are zero at its corners, and so
+/// are its corners' forces under an even pressure. Middles give a part to the
+/// ends of their edges, so that an even pressure has even quotients: those of
+/// the linear simplices that a tri6 is cut into.
 template <class T, class At>
 void spread_middles(std::span<const Index> nodes, std::vector<std::uint8_t>& done, const At& at) {
   for (std::size_t k = 3; k < nodes.size(); ++k) {
@@ -97,6 +100,7 @@ SurfaceStress::SurfaceStress(const Body& body)
   number_facets();
   measure();
   find_traction_of_loads();
+  if (body.refinement() > 1) refine_sides();
   make_rows();
 }
 
@@ -139,32 +143,39 @@ void SurfaceStress::number_facets() {
   simplices_of_facet_ = body_.surface_friction().size() / facets();
 }
 
-void SurfaceStress::measure() {
-  const Model& model = body_.model();
-  const auto d = static_cast<std::size_t>(model.dimension());
-  const ElementType type = d == 3 ? ElementType::tri3 : ElementType::line2;
-  const auto areas = [&](std::span<const Index> simplices, std::size_t count, const auto& position) {
-    std::vector<double> area(count);
-    for (std::size_t at = 0; at < simplices.size(); at += d) {
-      ElementNodes x(static_cast<Eigen::Index>(d), 3);
-      for (std::size_t k = 0; k < d; ++k)
-        x.row(static_cast<Eigen::Index>(k)) = position(simplices[at + k]).transpose();
-      const ShapeValues shares = facet_shape_integrals(type, x, model.thickness);
-      for (std::size_t k = 0; k < d; ++k)
-        area[static_cast<std::size_t>(simplices[at + k])] += shares[static_cast<Eigen::Index>(k)];
-    }
-    return area;
-  };
-  area_ = areas(body_.simplices(), position_.size(),
-                [&](Index node) { return position_[static_cast<std::size_t>(node)]; });
-  const std::vector<double> of_mesh = areas(model.surface, model.mesh.nodes.size(), [&](Index node) {
-    return model.mesh.nodes[static_cast<std::size_t>(node)];
-  });
-  for (const Index node : body_.surface_mesh_nodes())
-    body_area_.push_back(of_mesh[static_cast<std::size_t>(node)]);
+Vec3 SurfaceStress::normal_of(const Facet& facet) const noexcept {
+  const std::span<const Vec3> at = reference_nodes(facet.type);
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& xi : at) middle += xi / static_cast<double>(at.size());
+  return tangent_at(facet.type, positions_of(facet.nodes), middle).normal;
 }
 
-void SurfaceStress::find_traction_of_loads() {
+/// [simplices x d] what each gives to the area of its nodes.
+std::vector<double> SurfaceStress::simplex_areas(std::span<const Index> simplices) const {
+  const auto d = static_cast<std::size_t>(body_.dimension());
+  const ElementType type = d == 3 ? ElementType::tri3 : ElementType::line2;
+  std::vector<double> areas;
+  areas.reserve(simplices.size());
+  for (std::size_t k = 0; k < simplices.size(); k += d) {
+    const ShapeValues shares =
+        facet_shape_integrals(type, positions_of(simplices.subspan(k, d)), body_.model().thickness);
+    areas.insert(areas.end(), shares.begin(), shares.end());
+  }
+  return areas;
+}
+
+void SurfaceStress::measure() {
+  const std::vector<double> areas = simplex_areas(body_.simplices());
+  area_.assign(position_.size(), 0.0);
+  for (std::size_t k = 0; k < areas.size(); ++k)
+    area_[static_cast<std::size_t>(body_.simplices()[k])] += areas[k];
+  std::vector<Vec3> normals;
+  for (std::size_t f = 0; f < facets(); ++f) normals.push_back(normal_of(facet(f)));
+  sides_.emplace(body_nodes(), facet_nodes_, normals);
+}
+
+/// What the loads pull at the surface's nodes with [N].
+std::vector<Vec3> SurfaceStress::nodal_forces_of_loads() const {
   const Model& model = body_.model();
   const int d = model.dimension();
   const ElementType type = model.mesh.element;
@@ -194,47 +205,86 @@ void SurfaceStress::find_traction_of_loads() {
     inside += mass[node] * mass[node];
   }
   const Vec3 acceleration = inside > 0.0 ? Vec3(weight / inside) : Vec3(Vec3::Zero());
-  std::vector<Vec3> traction;
+  std::vector<Vec3> of_surface;
   for (const Index node : body_.surface_mesh_nodes())
-    traction.push_back(force[static_cast<std::size_t>(node)] -
-                       mass[static_cast<std::size_t>(node)] * acceleration);
+    of_surface.push_back(force[static_cast<std::size_t>(node)] -
+                         mass[static_cast<std::size_t>(node)] * acceleration);
+  return of_surface;
+}
 
-  std::vector<double> area(body_nodes());
+void SurfaceStress::find_traction_of_loads() {
+  const Model& model = body_.model();
+  std::vector<Vec3> force = nodal_forces_of_loads();
+  std::vector<double> areas;
   std::vector<std::uint8_t> done(body_nodes()), none;
   for (std::size_t f = 0; f < facets(); ++f) {
-    if (known_[f] == 0) continue;
     const Facet facet = this->facet(f);
-    const ElementNodes x = positions_of(facet.nodes);
-    ShapeValues shares = facet_shape_integrals(facet.type, x, model.thickness);
-    if (facet.type == ElementType::tri6) {
+    ShapeValues shares = facet_shape_integrals(facet.type, positions_of(facet.nodes), model.thickness);
+    if (known_[f] == 0) shares.setZero();
+    if (facet.type == ElementType::tri6 && known_[f] != 0) {
       spread_middles<double>(facet.nodes, none,
                              [&](std::size_t k) -> double& { return shares[static_cast<Eigen::Index>(k)]; });
       spread_middles<Vec3>(facet.nodes, done, [&](std::size_t k) -> Vec3& {
-        return traction[static_cast<std::size_t>(facet.nodes[k])];
+        return force[static_cast<std::size_t>(facet.nodes[k])];
       });
     }
-    for (std::size_t k = 0; k < facet.nodes.size(); ++k)
-      area[static_cast<std::size_t>(facet.nodes[k])] += shares[static_cast<Eigen::Index>(k)];
+    areas.insert(areas.end(), shares.begin(), shares.end());
   }
-  for (std::size_t node = 0; node < traction.size(); ++node) {
-    if (area[node] > 0.0) {
-      traction[node] /= area[node];
-    } else {
-      traction[node].setZero();
-    }
-  }
+  const SideTractions tractions(*sides_, areas);
+  for (std::size_t place = 0; place < sides_->places(); ++place)
+    load_traction_.push_back(tractions.at(static_cast<Index>(place), force));
+}
+
+/// The sides of the refined surface, and the loads' tractions there as the
+/// facets' shape functions say.
+void SurfaceStress::refine_sides() {
+  const auto d = static_cast<std::size_t>(body_.dimension());
+  const std::span<const Index> simplices = body_.simplices();
   const FineSurface& fine = body_.fine_surface();
-  load_traction_.assign(position_.size(), Vec3::Zero());
-  for (std::size_t node = 0; node < position_.size(); ++node) {
-    for (auto k = static_cast<std::size_t>(fine.first[node]);
-         k < static_cast<std::size_t>(fine.first[node + 1]); ++k)
-      load_traction_[node] += fine.weights[k] * traction[static_cast<std::size_t>(parents_[k])];
+  std::vector<Vec3> normals;
+  for (std::size_t k = 0; k < simplices.size() / d; ++k)
+    normals.push_back(normal_of(simplex(k, k / simplices_of_facet_)));
+  fine_sides_.emplace(position_.size(), simplices, normals);
+  fine_tractions_.emplace(*fine_sides_, simplex_areas(simplices));
+  fine_load_traction_.assign(fine_sides_->places(), Vec3::Zero());
+  const std::size_t width = sides_->width();
+  for (std::size_t k = 0; k < simplices.size(); ++k) {
+    const auto node = static_cast<std::size_t>(simplices[k]);
+    Vec3& traction = fine_load_traction_[static_cast<std::size_t>(fine_sides_->places_of_facets()[k])];
+    traction.setZero();  // each simplex of a side says the same
+    const std::size_t of_facet = width * (k / (d * simplices_of_facet_));
+    const auto nodes = std::span(facet_nodes_).subspan(of_facet, width);
+    for (auto j = static_cast<std::size_t>(fine.first[node]);
+         j < static_cast<std::size_t>(fine.first[node + 1]); ++j) {
+      const auto found = std::find(nodes.begin(), nodes.end(), parents_[j]);
+      if (found == nodes.end()) continue;
+      const Index place =
+          sides_->places_of_facets()[of_facet + static_cast<std::size_t>(found - nodes.begin())];
+      traction += fine.weights[j] * load_traction_[static_cast<std::size_t>(place)];
+    }
   }
 }
 
 void SurfaceStress::make_rows() {
+  // Contact forces are on the nodes of the simplices that the facets are cut
+  // into.
+  const auto d = static_cast<std::size_t>(body_.dimension());
+  const std::size_t width = sides_->width();
+  const std::vector<Index> simplices =
+      surface_simplices({.facet = facet_type_, .facets = facet_nodes_, .nodes = {}});
+  const std::vector<double> of_simplices = simplex_areas(simplices);
+  std::vector<double> areas(facet_nodes_.size());
+  const std::size_t cut = simplices.size() / d / facets();  // simplices of a facet
+  for (std::size_t k = 0; k < simplices.size(); ++k) {
+    const std::size_t first = width * (k / (d * cut));
+    const auto nodes = std::span(facet_nodes_).subspan(first, width);
+    const auto found = std::find(nodes.begin(), nodes.end(), simplices[k]);
+    areas[first + static_cast<std::size_t>(found - nodes.begin())] += of_simplices[k];
+  }
+  const SideTractions tractions(*sides_, areas);
+
   StressMean mean(body_nodes());
-  by_traction_.assign(body_nodes(), StressBlock::Zero());
+  std::vector<std::map<Index, StressBlock>> by_force(body_nodes());  // of each node: stress of which by it
   std::vector<double> weight(body_nodes());
   std::vector<StressBlock> blocks;
   for (std::size_t f = 0; f < facets(); ++f) {
@@ -249,15 +299,27 @@ void SurfaceStress::make_rows() {
       for (std::size_t j = 0; j < facet.nodes.size(); ++j)
         blocks.push_back(
             law.by_displacement(tangent.gradients.row(static_cast<Eigen::Index>(j)).transpose()));
-      const auto node = static_cast<std::size_t>(facet.nodes[p]);
-      mean.add(facet.nodes[p], area, facet.nodes, blocks,
-               law.constant() + law.by_traction() * load_traction_[node]);
-      by_traction_[node] += area * law.by_traction();
-      weight[node] += area;
+      const Index node = facet.nodes[p];
+      const Index place = sides_->places_of_facets()[width * f + p];
+      mean.add(node, area, facet.nodes, blocks,
+               law.constant() + law.by_traction() * load_traction_[static_cast<std::size_t>(place)]);
+      tractions.for_each(place, [&](Index of, const Mat3& matrix) {
+        const auto [found, is_new] =
+            by_force[static_cast<std::size_t>(of)].emplace(node, StressBlock::Zero());
+        found->second += area * law.by_traction() * matrix;
+      });
+      weight[static_cast<std::size_t>(node)] += area;
     }
   }
-  for (std::size_t node = 0; node < weight.size(); ++node) by_traction_[node] /= weight[node];
   rows_ = mean.rows();
+  first_of_force_.push_back(0);
+  for (const std::map<Index, StressBlock>& of_node : by_force) {
+    for (const auto& [row, block] : of_node) {
+      row_of_force_.push_back(row);
+      by_force_.emplace_back(block / weight[static_cast<std::size_t>(row)]);
+    }
+    first_of_force_.push_back(row_of_force_.size());
+  }
 }
 
 void SurfaceStress::evaluate(std::span<const Vec3> u, std::span<const Vec3> contact_force, const Patch* patch,
@@ -273,8 +335,9 @@ void SurfaceStress::evaluate(std::span<const Vec3> u, std::span<const Vec3> cont
   }
   rows_.apply(u, stress);
   for (std::size_t node = 0; node < nodes; ++node) {
-    if (!body_force_[node].isZero(0.0))
-      stress[node].noalias() += by_traction_[node] * (body_force_[node] / body_area_[node]);
+    if (body_force_[node].isZero(0.0)) continue;
+    for (std::size_t k = first_of_force_[node]; k < first_of_force_[node + 1]; ++k)
+      stress[static_cast<std::size_t>(row_of_force_[k])].noalias() += by_force_[k] * body_force_[node];
   }
   for (std::size_t node = nodes; node < position_.size(); ++node) {
     stress[node].setZero();
@@ -297,11 +360,17 @@ void SurfaceStress::evaluate_patch(std::span<const Vec3> u, std::span<const Vec3
   for (std::size_t f = 0; f < facets(); ++f) {
     if (known_[f] == 0) continue;
     if (in_patch_[static_cast<std::size_t>(element_[f])] == 0) {
-      add(facet(f), u, contact_force, stress);
+      const Facet facet = this->facet(f);
+      add(
+          facet, [&](std::size_t p) { return place_on_patch(f, facet.nodes[p]); }, u, contact_force, stress);
       continue;
     }
-    for (std::size_t k = 0; k < simplices_of_facet_; ++k)
-      add(simplex(f * simplices_of_facet_ + k, f), u, contact_force, stress);
+    for (std::size_t k = f * simplices_of_facet_; k < (f + 1) * simplices_of_facet_; ++k) {
+      const auto places = fine_sides_->places_of_facets().subspan(fine_sides_->width() * k);
+      add(
+          simplex(k, f), [&](std::size_t p) { return static_cast<std::size_t>(places[p]); }, u, contact_force,
+          stress);
+    }
   }
   for (const Index node : patch.surface_nodes()) {
     const auto at = static_cast<std::size_t>(node);
@@ -311,9 +380,20 @@ void SurfaceStress::evaluate_patch(std::span<const Vec3> u, std::span<const Vec3
   for (const Index element : patch.elements()) in_patch_[static_cast<std::size_t>(element)] = 0;
 }
 
+/// Of a node of a facet on the refined surface.
+std::size_t SurfaceStress::place_on_patch(std::size_t facet, Index node) const noexcept {
+  if (!fine_sides_->is_creased(node)) return static_cast<std::size_t>(node);
+  const std::size_t count = fine_sides_->width() * simplices_of_facet_;
+  const auto nodes = fine_sides_->facet_nodes().subspan(count * facet, count);
+  const auto found = std::find(nodes.begin(), nodes.end(), node);
+  return static_cast<std::size_t>(
+      fine_sides_->places_of_facets()[count * facet + static_cast<std::size_t>(found - nodes.begin())]);
+}
+
 /// Adds what a facet says at those of its nodes that are on the patch.
-void SurfaceStress::add(const Facet& facet, std::span<const Vec3> u, std::span<const Vec3> contact_force,
-                        std::span<Stress> sum) noexcept {
+template <class PlaceOf>
+void SurfaceStress::add(const Facet& facet, const PlaceOf& place_of, std::span<const Vec3> u,
+                        std::span<const Vec3> contact_force, std::span<Stress> sum) noexcept {
   const auto on_patch = [&](Index node) { return on_patch_[static_cast<std::size_t>(node)] != 0; };
   if (std::none_of(facet.nodes.begin(), facet.nodes.end(), on_patch)) return;
   const ElementNodes x = positions_of(facet.nodes);
@@ -329,7 +409,9 @@ void SurfaceStress::add(const Facet& facet, std::span<const Vec3> u, std::span<c
     for (std::size_t j = 0; j < facet.nodes.size(); ++j)
       here.noalias() += law.by_displacement(tangent.gradients.row(static_cast<Eigen::Index>(j)).transpose()) *
                         u[static_cast<std::size_t>(facet.nodes[j])];
-    here.noalias() += law.by_traction() * (load_traction_[node] + contact_force[node] / area_[node]);
+    const std::size_t place = place_of(p);
+    here.noalias() += law.by_traction() * (fine_load_traction_[place] +
+                                           fine_tractions_->at(static_cast<Index>(place), contact_force));
     sum[node] += area * here;
     weight_[node] += area;
   }

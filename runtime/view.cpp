@@ -5,14 +5,18 @@
 
 #include <algorithm>
 #include <mutex>
+#include <utility>
 #include <vector>
 
+#include "formats/output_paths.h"
+#include "formats/recording_parts.h"
 #include "meshes/error.h"
-#include "runtime/output.h"
+#include "meshes/write_file.h"
 #include "runtime/viewer/page.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/session_pictures.h"
+#include "runtime/viewer/viewer_server.h"
 #include "runtime/viewer/wire.h"
 
 namespace palpate {
@@ -21,8 +25,8 @@ namespace {
 /// A recording that the viewer's page leafs through.
 class SessionView : public ViewedRun {
  public:
-  SessionView(const SessionPictures& pictures, const ViewerOptions& options)
-      : pictures_(pictures), state_(pictures.state(pictures.times())), server_(as_replay(options), *this) {
+  SessionView(const SessionPictures& pictures, ViewerPort port)
+      : pictures_(pictures), state_(pictures.state(pictures.times())), server_(std::move(port), *this, true) {
     const std::lock_guard lock(mutex_);  // a page may seek already
     server_.show_scene(std::make_shared<const Scene>(pictures.scene()));
     server_.show_state(json_text(state_));
@@ -50,10 +54,6 @@ class SessionView : public ViewedRun {
   void record(bool) override { refuse(); }
 
  private:
-  static ViewerOptions as_replay(ViewerOptions options) {
-    options.replay = true;
-    return options;
-  }
   [[noreturn]] static void refuse() {
     throw Error("cannot be done with a recording", "palpate-runtime view",
                 "touch the body itself: palpate-runtime play MODEL.palpate.hdf --view");
@@ -91,8 +91,9 @@ int view(const std::filesystem::path& recording, const ViewerOptions& options) {
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+  ViewerPort port(options);
   const SessionPictures pictures(recording);
-  const SessionView session(pictures, options);
+  const SessionView session(pictures, std::move(port));
   fmt::print(stderr, "{}: {} pictures, {:.3f} s\nopen {} in a browser; Ctrl-C ends\n", recording.string(),
              pictures.frames(), pictures.time(pictures.frames() - 1), session.url());
   int signal = 0;
@@ -101,6 +102,10 @@ int view(const std::filesystem::path& recording, const ViewerOptions& options) {
 }
 
 int export_html(const ExportOptions& options) {
+  OutputPaths paths(options.force);
+  paths.add_input(options.recording, "the recording");
+  paths.add_input(parts_folder(options.recording), "the recording's parts");
+  const std::filesystem::path html = paths.add(options.html, OutputKind::page, "--html");
   const SessionPictures pictures(options.recording);
   const std::vector<std::int64_t> chosen = choose(pictures, options);
   std::vector<double> times;
@@ -118,7 +123,7 @@ int export_html(const ExportOptions& options) {
   for (const std::int64_t frame : chosen)
     archive.add_binary(encode_frame(pictures.picture(frame), scene, nullptr));
   const std::string page = archive.page(viewer_page());
-  write_text_file(options.html, page);
+  write_file(html, page);
   fmt::print(stderr, "{}: {} pictures, {:.1f} s, {:.1f} MB\n", options.html.string(), chosen.size(),
              times.back() - times.front(), 1e-6 * static_cast<double>(page.size()));
   return exit_ok;

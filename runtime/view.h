@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "runtime/viewer/viewer_server.h"
+#include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
 
@@ -19,6 +19,7 @@ struct ExportOptions {
   double fps = 30.0;              ///< pictures a second at most
   double from = 0.0;              ///< [s]
   std::optional<double> to = {};  ///< [s]; else to the end
+  bool force = false;             ///< `html` may take the place of any file that is not read
 };
 
 /// Writes one page with the recording in it, which asks no network and no runtime. Returns the exit code;

@@ -14,6 +14,10 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <random>
@@ -38,10 +42,38 @@ BridgeOptions any_port() {
   return options;
 }
 
+/// Where this process and the example keep keys.
+const std::filesystem::path keys = [] {
+  const std::filesystem::path folder = testing::TempDir() + "/palpate_keys." + std::to_string(getpid());
+  std::filesystem::create_directory(folder);
+  setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);
+  return folder;
+}();
+
+class KeysAreRemoved : public testing::Environment {
+  void TearDown() override { std::filesystem::remove_all(keys); }
+};
+const auto* const remover = testing::AddGlobalTestEnvironment(new KeysAreRemoved);
+
+/// As a bridge reads it.
+BridgeKey read_key(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::string text;
+  EXPECT_TRUE(std::getline(stream, text)) << file;
+  EXPECT_EQ(text.size(), 32U);
+  BridgeKey key{};
+  for (std::size_t k = 0; k < key.size(); ++k)
+    key[k] = static_cast<std::uint8_t>(std::stoul(text.substr(2 * k, 2), nullptr, 16));
+  return key;
+}
+
 /// A bridge that says what it is told to say.
 class Partner {
  public:
-  explicit Partner(std::uint16_t port) : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
+  explicit Partner(const BridgePort& port) : Partner(port, read_key(port.key_file())) {}
+  Partner(const BridgePort& of, const BridgeKey& key_given)
+      : key(key_given), socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
+    const std::uint16_t port = of.port();
     sockaddr_in runtime{};
     runtime.sin_family = AF_INET;
     runtime.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -58,7 +90,12 @@ class Partner {
     state.nonce = nonce;
     state.device.sequence = ++sequence;
     state.time = 1'000'000'000ULL * sequence;
-    say_bytes(as_bytes(encode_bridge_state(state)));
+    say_sealed(as_bytes(encode_bridge_state(state)));
+  }
+  void say_sealed(Bytes bytes) {
+    if (bytes.size() > 8) seal(key, bytes);
+    said.push_back(bytes);
+    say_bytes(bytes);
   }
   void say_bytes(const Bytes& bytes) {
     EXPECT_EQ(send(socket_, bytes.data(), bytes.size(), 0), static_cast<ssize_t>(bytes.size()));
@@ -72,13 +109,16 @@ class Partner {
     const ssize_t size = recv(socket_, buffer.data(), buffer.size(), MSG_DONTWAIT);
     BridgeCommand command;
     if (size < 0) return std::nullopt;
+    EXPECT_TRUE(is_sealed(key, std::span(buffer).first(static_cast<std::size_t>(size))));
     EXPECT_EQ(decode_bridge_command(std::span(buffer).first(static_cast<std::size_t>(size)), command),
               Refusal::none);
     return command;
   }
 
+  BridgeKey key;
   std::uint64_t nonce = 0;
   std::uint32_t sequence = 0;
+  std::vector<Bytes> said;
 
  private:
   int socket_;
@@ -164,7 +204,7 @@ TEST_F(BridgePortTest, AnAddressThatIsTakenOrNotOurs) {
 }
 
 TEST_F(BridgePortTest, HandshakeThenReports) {
-  Partner partner(port.port());
+  Partner partner(port);
   shake_hands(partner);
   EXPECT_EQ(port.counts()[Refusal::hello], 1U);
   EXPECT_EQ(port.counts()[Refusal::none], 0U);
@@ -189,11 +229,11 @@ TEST_F(BridgePortTest, HandshakeThenReports) {
 }
 
 TEST_F(BridgePortTest, EachPortHasItsOwnSession) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   BridgePort other(any_port());
   other.open();
-  Partner stale(other.port());
+  Partner stale(other);
   stale.nonce = partner.nonce;
   stale.say({});
   EXPECT_EQ(other.read(state), Heard::nothing);
@@ -208,7 +248,7 @@ TEST_F(BridgePortTest, EachPortHasItsOwnSession) {
 }
 
 TEST_F(BridgePortTest, TakesTheNewestOfWhatWaits) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   for (int k = 1; k <= 20; ++k) {
     BridgeState said;
@@ -223,7 +263,7 @@ TEST_F(BridgePortTest, TakesTheNewestOfWhatWaits) {
 }
 
 TEST_F(BridgePortTest, RefusesByReason) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   const DeviceState before = state;
   BridgeState said;
@@ -234,7 +274,7 @@ TEST_F(BridgePortTest, RefusesByReason) {
   const auto changed = [&](std::size_t at, const Bytes& to) {
     Bytes bad = good;
     std::copy(to.begin(), to.end(), bad.begin() + static_cast<std::ptrdiff_t>(at));
-    partner.say_bytes(bad);
+    partner.say_sealed(bad);
   };
   partner.say_bytes(Bytes(good.begin(), good.end() - 1));
   expect_refused(Refusal::size);
@@ -244,7 +284,7 @@ TEST_F(BridgePortTest, RefusesByReason) {
   expect_refused(Refusal::size);
   changed(0, {'X'});
   expect_refused(Refusal::magic);
-  changed(4, {2});
+  changed(4, {1});
   expect_refused(Refusal::version);
   changed(32 + 6, {0xF8, 0x7F});  // NaN
   expect_refused(Refusal::not_finite);
@@ -262,36 +302,43 @@ TEST_F(BridgePortTest, RefusesByReason) {
   expect_refused(Refusal::hello);
   changed(8, Bytes(8, 1));
   expect_refused(Refusal::wrong_nonce);
-  Partner other(port.port());
-  other.say_bytes(good);
+  partner.say_bytes(good);
+  expect_refused(Refusal::seal);
+  Bytes resealed = good;
+  seal(partner.key, resealed);
+  resealed[40] ^= 1U;
+  partner.say_bytes(resealed);
+  expect_refused(Refusal::seal);
+  Partner other(port);
+  other.say_sealed(good);
   expect_refused(Refusal::address);
   EXPECT_EQ(state.sequence, before.sequence);
   EXPECT_EQ(state.arrived, before.arrived);
 
-  partner.say_bytes(good);
+  partner.say_sealed(good);
   EXPECT_EQ(port.read(state), Heard::report);
   EXPECT_EQ(state.sequence, 10U);
   EXPECT_EQ(port.counts().skipped, 7U);  // 3 to 9
 }
 
 TEST_F(BridgePortTest, TooLongOnItsWay) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   BridgeState said;
   said.nonce = partner.nonce;
   said.device.sequence = 3;
   said.time = 3'000'000'000;
-  partner.say_bytes(as_bytes(encode_bridge_state(said)));
+  partner.say_sealed(as_bytes(encode_bridge_state(said)));
   ASSERT_EQ(port.read(state), Heard::report);
   std::this_thread::sleep_for(std::chrono::milliseconds(40));
   said.device.sequence = 4;
   said.time += 1'000'000;  // by its clock it was said 1 ms later
-  partner.say_bytes(as_bytes(encode_bridge_state(said)));
+  partner.say_sealed(as_bytes(encode_bridge_state(said)));
   expect_refused(Refusal::age);
 }
 
 TEST_F(BridgePortTest, RandomDatagramsDoNotGetThrough) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   std::mt19937 random(11);
   for (int i = 0; i < 100'000; ++i) {
@@ -301,6 +348,7 @@ TEST_F(BridgePortTest, RandomDatagramsDoNotGetThrough) {
       said.device.sequence = static_cast<std::uint32_t>(random());
       any = as_bytes(encode_bridge_state(said));
       for (std::size_t k = 8; k < 16; ++k) any[k] = static_cast<std::uint8_t>(random());
+      if (i % 4 == 0) seal(partner.key, any);
     }
     partner.say_bytes(any);
     if (i % 50 == 0) {
@@ -309,7 +357,8 @@ TEST_F(BridgePortTest, RandomDatagramsDoNotGetThrough) {
   }
   EXPECT_NE(port.read(state), Heard::report);
   EXPECT_EQ(port.counts()[Refusal::none], 1U);
-  EXPECT_GT(port.counts()[Refusal::wrong_nonce], 10'000U);
+  EXPECT_GT(port.counts()[Refusal::wrong_nonce], 5'000U);
+  EXPECT_GT(port.counts()[Refusal::seal], 5'000U);
 }
 
 TEST_F(BridgePortTest, NobodyIsNotLost) {
@@ -319,9 +368,9 @@ TEST_F(BridgePortTest, NobodyIsNotLost) {
 }
 
 TEST_F(BridgePortTest, TheNextOneTakesOverAfterSilence) {
-  Partner first(port.port());
+  Partner first(port);
   join(first);
-  Partner second(port.port());
+  Partner second(port);
   const auto silent_since = Clock::now();
   Heard heard = Heard::nothing;
   while (heard == Heard::nothing && Clock::now() - silent_since < std::chrono::seconds(20)) {
@@ -339,7 +388,7 @@ TEST_F(BridgePortTest, TheNextOneTakesOverAfterSilence) {
 }
 
 TEST_F(BridgePortTest, LostAndOpenedAgainItWaits) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   EXPECT_EQ(hear(port, state), Heard::lost);
   port.close();
@@ -347,14 +396,88 @@ TEST_F(BridgePortTest, LostAndOpenedAgainItWaits) {
   EXPECT_FALSE(port.write({}, state));
   port.open();
   EXPECT_EQ(port.read(state), Heard::nothing);
-  Partner again(port.port());
-  again.nonce = partner.nonce;  // the session is the port's
+  Partner again(port);
+  EXPECT_EQ(again.key, partner.key) << "it is the port's";
+  again.nonce = partner.nonce;
+  again.say({});
+  EXPECT_EQ(port.read(state), Heard::nothing) << "what was said before does not count any more";
+  const auto answer = again.told();
+  ASSERT_TRUE(answer);
+  again.nonce = answer->nonce;
   again.say({});
   EXPECT_EQ(port.read(state), Heard::report);
 }
 
+/// Until the port has given its partner up; `meanwhile` is called all the time.
+void lose(BridgePort& port, const std::function<void()>& meanwhile) {
+  DeviceState state;
+  const auto end = Clock::now() + std::chrono::seconds(20);
+  Heard heard = Heard::nothing;
+  while (heard == Heard::nothing && Clock::now() < end) {
+    meanwhile();
+    heard = port.read(state);
+  }
+  EXPECT_EQ(heard, Heard::lost);
+}
+
+TEST_F(BridgePortTest, AStrangerNeverBecomesThePartner) {
+  BridgeKey guess{};
+  guess.back() = 1;
+  Partner stranger(port, guess);
+  const auto expect_ignored = [&] {
+    const std::uint64_t before = port.counts()[Refusal::seal];
+    stranger.say({});
+    stranger.say_bytes(as_bytes(encode_bridge_state({})));  // not even sealed
+    EXPECT_EQ(port.read(state), Heard::nothing);
+    EXPECT_EQ(port.counts()[Refusal::seal], before + 2);
+    EXPECT_FALSE(stranger.told()) << "it was answered";
+  };
+  expect_ignored();
+  Partner honest(port);
+  join(honest);
+  stranger.nonce = honest.nonce;  // even if it knew
+  lose(port, [&] { stranger.say({}); });
+  stranger.nonce = 0;
+  expect_ignored();
+  stranger.nonce = honest.nonce;
+  expect_ignored();
+  honest.nonce = 0;
+  join(honest);  // it is taken again
+  EXPECT_EQ(port.counts()[Refusal::none], 2U);
+}
+
+TEST_F(BridgePortTest, WhatWasSaidOnceDoesNotCountAgain) {
+  Partner honest(port);
+  join(honest);
+  for (int k = 0; k < 3; ++k) {
+    honest.say({});
+    EXPECT_EQ(port.read(state), Heard::report);
+  }
+  Partner thief(port);  // it has heard all, and has no key
+  const auto replay = [&] {
+    for (const Bytes& bytes : honest.said) {
+      thief.say_bytes(bytes);
+      EXPECT_NE(port.read(state), Heard::report);
+    }
+  };
+  replay();
+  lose(port, [] {});
+  replay();
+  port.close();
+  port.open();
+  const std::uint64_t taken = port.counts()[Refusal::none];
+  Partner later(port);
+  for (const Bytes& bytes : honest.said) {
+    later.say_bytes(bytes);
+    EXPECT_EQ(port.read(state), Heard::nothing);
+  }
+  EXPECT_EQ(port.counts()[Refusal::none], taken);
+  Partner back(port);
+  join(back);
+}
+
 TEST_F(BridgePortTest, FaultOfTheDeviceIsLost) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   const DeviceState before = state;
   BridgeState said;
@@ -368,7 +491,7 @@ TEST_F(BridgePortTest, FaultOfTheDeviceIsLost) {
 TEST_F(BridgePortTest, LimitsAreWhatWasSaidLast) {
   EXPECT_EQ(port.limits().max_force, infinity);
   EXPECT_EQ(port.limit_changes(), 0U);
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   EXPECT_EQ(port.limit_changes(), 0U);  // it said none
   BridgeState said;
@@ -392,7 +515,7 @@ TEST_F(BridgePortTest, LimitsAreWhatWasSaidLast) {
 }
 
 TEST_F(BridgePortTest, CommandsByMode) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   DeviceCommand command;
   const auto mode = [&] {
@@ -420,7 +543,7 @@ TEST_F(BridgePortTest, CommandsByMode) {
 }
 
 TEST_F(BridgePortTest, CommandSaysAllThatABridgeNeeds) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   DeviceCommand command;
   command.wrench = {Vec3(0, 0.5, 2), Vec3(0.125, 0, 0)};
@@ -448,7 +571,7 @@ TEST_F(BridgePortTest, CommandSaysAllThatABridgeNeeds) {
 }
 
 TEST_F(BridgePortTest, CloseSaysNoForceThreeTimes) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   DeviceCommand command;
   command.wrench.force.z() = 1.0;
@@ -465,7 +588,7 @@ TEST_F(BridgePortTest, CloseSaysNoForceThreeTimes) {
 }
 
 TEST_F(BridgePortTest, OneThreadReadsAnotherWrites) {
-  Partner partner(port.port());
+  Partner partner(port);
   join(partner);
   std::atomic<bool> done = false;
   std::thread writer([&] {
@@ -520,8 +643,8 @@ TEST(BridgeExample, TheHandIsPushedToWhereForcesBalance) {
   options.stale.time_to_live = 1.0;  // this machine may be busy
   BridgePort port(options);
   port.open();
-  const Example example(
-      {"--port", std::to_string(port.port()), "--rate", "2000", "--seconds", "60", "--from", "0.01,0,-0.02"});
+  const Example example({"--port", std::to_string(port.port()), "--rate", "2000", "--seconds", "60", "--from",
+                         "0.01,0,-0.02", "--to", "0.01,0,-0.02"});
   const Vec3 start(0.01, 0, -0.02);
   DeviceCommand command;
   command.wrench.force = Vec3(0.3, -0.6, 0.9);
@@ -560,6 +683,7 @@ TEST(BridgeExample, TheHandIsPushedToWhereForcesBalance) {
   BridgePort second(options);
   second.open();
   EXPECT_EQ(hear(second, state, 20.0), Heard::report);
+  EXPECT_GE(second.counts()[Refusal::seal], 1U) << "it had the first one's key";
   EXPECT_GE(second.counts()[Refusal::wrong_nonce], 1U);
 }
 

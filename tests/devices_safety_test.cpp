@@ -256,6 +256,48 @@ TEST(Safety, LateTicksFadeThenFault) {
   EXPECT_EQ(bench.safety.fault(), Fault::deadline_missed);
 }
 
+/// On a busy machine the beginning is where ticks and reports are late, and nobody has felt anything.
+TEST(Safety, BeforeAnythingIsFeltWhatIsLateBeginsTheStartAnew) {
+  Bench bench;
+  bench.ticks(120);
+  EXPECT_EQ(bench.safety.phase(), SafetyPhase::active);
+  bench.lateness = ms_ns;
+  bench.ticks(12);
+  EXPECT_EQ(bench.safety.fault(), Fault::none);
+  EXPECT_EQ(bench.safety.phase(), SafetyPhase::waiting);
+  bench.lateness = 0;
+  bench.ticks(120);
+  bench.talks = false;
+  bench.ticks(30);
+  EXPECT_EQ(bench.safety.fault(), Fault::none);
+  EXPECT_EQ(bench.safety.phase(), SafetyPhase::waiting);
+  bench.wanted.wrench.force = Vec3(0, 0, 2);  // it is heard of again in contact
+  bench.talks = true;
+  for (int k = 0; k < 200; ++k) expect_nothing(bench.tick());
+  bench.wanted.wrench.force.setZero();
+  bench.press(2.0);
+  bench.talks = false;
+  bench.ticks(30);
+  EXPECT_EQ(bench.safety.fault(), Fault::device_silent);
+}
+
+TEST(Safety, AfterAnAcknowledgementNothingHasBeenFeltYet) {
+  Bench bench;
+  bench.press(2.0);
+  bench.lateness = ms_ns;
+  bench.ticks(12);
+  EXPECT_EQ(bench.safety.fault(), Fault::deadline_missed);
+  bench.safety.acknowledge();
+  bench.wanted.wrench.force.setZero();
+  bench.ticks(30);
+  EXPECT_EQ(bench.safety.fault(), Fault::none);
+  bench.lateness = 0;
+  bench.press(2.0);
+  bench.lateness = ms_ns;
+  bench.ticks(12);
+  EXPECT_EQ(bench.safety.fault(), Fault::deadline_missed);
+}
+
 /// A stall of 50 ms, after which the loop goes on: one gap, one fault, no force.
 TEST(Safety, AStallOfTheLoopFaultsAtOnce) {
   Bench bench;

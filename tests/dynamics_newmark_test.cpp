@@ -59,7 +59,8 @@ std::vector<ProductCase> product_cases() {
   std::vector<ProductCase> cases;
   for (const Eigen::Index order : {1, 2, 7, 8, 9, 64, 201, 1500}) {
     for (const int jobs : {1, 2, 5}) {
-      for (const Precision precision : {Precision::single_precision, Precision::double_precision})
+      for (const Precision precision :
+           {Precision::single_precision, Precision::split_precision, Precision::double_precision})
         cases.push_back({order, jobs, precision});
     }
   }
@@ -68,8 +69,7 @@ std::vector<ProductCase> product_cases() {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Product, testing::ValuesIn(product_cases()), [](const auto& tested) {
   const ProductCase& c = tested.param;
-  return "Order" + std::to_string(c.order) + "Jobs" + std::to_string(c.jobs) +
-         (c.precision == Precision::single_precision ? "Single" : "Double");
+  return "Order" + std::to_string(c.order) + "Jobs" + std::to_string(c.jobs) + name_of(c.precision);
 });
 
 /// A body let go in the displacement by a few forces, and at that by others as velocity.

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "formats/checksum.h"
-#include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "formats/model_file.h"
 #include "tests/formats_sample.h"
 #include "tests/formats_tamper.h"
@@ -108,7 +108,7 @@ INSTANTIATE_TEST_SUITE_P(ModelFile, BothPrecisions,
 TEST(ModelFile, GreensFunctionsStartOnAPage) {
   const Folder folder;
   const Model model = write_sample(folder / "a.palpate.hdf");
-  const hdf5::File file = hdf5::File::open_to_read(folder / "a.palpate.hdf");
+  const auto file = hdf5::Contents::read(folder / "a.palpate.hdf");
   const hdf5::Stored greens = file.locate("/greens/packed", hdf5::element_type<double>(), 1);
   EXPECT_EQ(greens.offset % 4096, 0);
   EXPECT_EQ(greens.dims, std::vector<std::int64_t>{packed_size(model.stored_dofs())});
@@ -117,7 +117,7 @@ TEST(ModelFile, GreensFunctionsStartOnAPage) {
 TEST(ModelFile, NoObjectHasATime) {
   const Folder folder;
   write_sample(folder / "a.palpate.hdf");
-  const hdf5::File file = hdf5::File::open_to_read(folder / "a.palpate.hdf");
+  const auto file = hdf5::File::open_to_change(folder / "a.palpate.hdf");
   const auto visit = [](hid_t, const char*, const H5O_info_t* info, void* objects) -> herr_t {
     ++*static_cast<int*>(objects);
     return info->ctime == 0 && info->mtime == 0 && info->atime == 0 && info->btime == 0 ? 0 : 1;
@@ -325,6 +325,8 @@ TEST(ModelFile, AJournalCutInItsLastLineKeepsTheOthers) {
   EXPECT_FALSE(writer.has_columns(30, 5));
 }
 
+constexpr std::string_view first_word = "palpate-progress ";  // of a journal
+
 TEST(ModelFile, AnyCutOrFlippedJournalIsHarmless) {
   const Model model = sample_model();
   for (std::size_t at = 0; at < 190; at += 7) {
@@ -332,11 +334,28 @@ TEST(ModelFile, AnyCutOrFlippedJournalIsHarmless) {
     const std::filesystem::path journal = folder / "a.palpate.hdf.progress";
     const auto writer = after_kill(folder, model, Precision::double_precision, [&] {
       std::string text = read_bytes(journal);
-      text.at(at) = static_cast<char>(text.at(at) ^ 5);
-      write_bytes(journal, at % 2 == 0 ? text : text.substr(0, at));
+      if (at >= first_word.size()) text.at(at) = static_cast<char>(text.at(at) ^ 5);
+      write_bytes(journal, at % 2 == 0 && at >= first_word.size() ? text : text.substr(0, at));
     });
     EXPECT_FALSE(writer.has_columns(10, 1));
     EXPECT_FALSE(writer.has_columns(0, 35));
+  }
+}
+
+TEST(ModelFile, AJournalThatIsNoneIsAnothersFile) {
+  for (std::size_t at = 0; at < first_word.size(); ++at) {
+    const Folder folder;
+    const std::filesystem::path journal = folder / "a.palpate.hdf.progress";
+    std::string text;
+    const std::string refused = refusal([&] {
+      after_kill(folder, sample_model(), Precision::double_precision, [&] {
+        text = read_bytes(journal);
+        text.at(at) = static_cast<char>(text.at(at) ^ 5);
+        write_bytes(journal, text);
+      });
+    });
+    EXPECT_NE(refused.find("is in the way"), std::string::npos) << refused;
+    EXPECT_EQ(read_bytes(journal), text);
   }
 }
 

@@ -8,11 +8,12 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <random>
 #include <thread>
 
-#include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "formats/recording.h"
 #include "formats/recording_parts.h"
 #include "tests/formats_sample.h"
@@ -118,7 +119,8 @@ void expect_frame(const SurfaceFrame& read, const SurfaceFrame& expected) {
 void expect_frames(const std::filesystem::path& path, const Recording& read, std::size_t count) {
   ASSERT_EQ(read.frames.tick.size(), count);
   ASSERT_EQ(read.frames.time.size(), count);
-  const std::vector<float> u = read_displacement(path, 0, static_cast<std::int64_t>(count));
+  const RecordingFile file(path);
+  const std::vector<float> u = file.displacement(0, static_cast<std::int64_t>(count));
   ASSERT_EQ(u.size(), 3 * surface_nodes * count);
   for (std::size_t k = 0; k < count; ++k) {
     const SurfaceFrame frame = some_frame(k);
@@ -127,7 +129,7 @@ void expect_frames(const std::filesystem::path& path, const Recording& read, std
     ASSERT_TRUE(std::equal(frame.displacement.begin(), frame.displacement.end(),
                            u.begin() + static_cast<std::ptrdiff_t>(3 * surface_nodes * k)))
         << k;
-    if (k % 7 == 0 || k + 3 > count) expect_frame(read_frame(path, static_cast<std::int64_t>(k)), frame);
+    if (k % 7 == 0 || k + 3 > count) expect_frame(file.frame(static_cast<std::int64_t>(k)), frame);
   }
 }
 
@@ -144,6 +146,17 @@ void record(const std::filesystem::path& path, std::span<const TickRecord> ticks
   RecordingWriter writer(path, info, surface);
   append(writer, ticks, at_once);
   writer.finish();
+}
+
+/// Flips one of a dataset's bits.
+void flip_bit(const std::filesystem::path& path, const std::string& dataset, std::uint64_t number) {
+  std::string bytes = read_bytes(path);
+  const auto file = hdf5::File::open_to_change(path);
+  const hdf5::Id opened(H5Dopen2(file.id(), dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  const std::uint64_t bit = number % (8 * H5Dget_storage_size(opened.get()));
+  char& byte = bytes.at(H5Dget_offset(opened.get()) + bit / 8);
+  byte = static_cast<char>(static_cast<unsigned char>(byte) ^ (1U << bit % 8));
+  write_bytes(path, bytes);
 }
 
 std::size_t files_in(const std::filesystem::path& folder) {
@@ -179,7 +192,7 @@ INSTANTIATE_TEST_SUITE_P(Recording, Lengths, testing::Values(0, 1, 999, 1000, 10
 TEST(Recording, OfALineSurfaceOrNoneIsReadBack) {
   const Folder folder;
   RecordingWriter(folder / "line.h5", info, {{{0, 0, 0}, {1, 0, 0}}, 2, {0, 1, 1, 0}}).finish();
-  EXPECT_EQ(read_frames(folder / "line.h5").surface.corners, 2);
+  EXPECT_EQ(read_recording(folder / "line.h5").frames.surface.corners, 2);
   RecordingWriter none(folder / "none.h5", info);
   none.append(some_ticks(7));
   none.append(SurfaceFrame{.tick = 3, .time = 0.5, .displacement = {}});
@@ -198,12 +211,12 @@ TEST(Recording, OfFramesWithoutStressSaysThatItIsNotKnown) {
   frame.pressure.clear();
   writer.append(frame);
   writer.finish();
-  const SurfaceFrame read = read_frame(folder / "a.h5", 0);
+  const SurfaceFrame read = RecordingFile(folder / "a.h5").frame(0);
   EXPECT_EQ(read.displacement, frame.displacement);
   EXPECT_EQ(read.pressure, std::vector<float>(surface_nodes, 0.0F));
   ASSERT_EQ(read.von_mises.size(), surface_nodes);
   for (const float stress : read.von_mises) EXPECT_TRUE(std::isnan(stress));
-  EXPECT_EQ(read_frames(folder / "a.h5").surface.held, std::vector<std::uint8_t>(surface_nodes));
+  EXPECT_EQ(read_recording(folder / "a.h5").frames.surface.held, std::vector<std::uint8_t>(surface_nodes));
 }
 
 /// Makes it one of version 4.0, which had neither stress nor pressure.
@@ -216,7 +229,7 @@ void make_older(const std::filesystem::path& path) {
 TEST(Recording, OfVersion40IsReadAsBefore) {
   const Folder folder;
   const auto expect_older = [&](std::size_t frames) {
-    EXPECT_EQ(hdf5::File::open_to_read(folder / "a.h5").integer_attribute("/", "version", 2),
+    EXPECT_EQ(hdf5::Contents::read(folder / "a.h5").integer_attribute("/", "version", 2),
               (std::vector<std::int64_t>{4, 0}));
     const Recording read = read_recording(folder / "a.h5");
     expect_ticks(read, 30);
@@ -226,7 +239,7 @@ TEST(Recording, OfVersion40IsReadAsBefore) {
       SurfaceFrame expected = some_frame(k);
       expected.von_mises.clear();
       expected.pressure.clear();
-      expect_frame(read_frame(folder / "a.h5", static_cast<std::int64_t>(k)), expected);
+      expect_frame(RecordingFile(folder / "a.h5").frame(static_cast<std::int64_t>(k)), expected);
     }
   };
   record(folder / "a.h5", some_ticks(30), 10);
@@ -300,14 +313,14 @@ TEST(Recording, ThatIsMergedIsStillReadByWhoHasOpenedIt) {
   RecordingWriter writer(path, info, surface);
   for (std::size_t k = 0; k < 15; ++k) append_one(writer, k);
   {
-    const hdf5::File opened = hdf5::File::open_to_read(path);
+    hdf5::Contents opened = hdf5::Contents::read(path);
     append_one(writer, 15);
-    ASSERT_EQ(open_parts(hdf5::File::open_to_read(path), "/ticks/time").size(), 1U) << "16 are one now";
-    const std::vector<hdf5::File> before = open_parts(opened, "/ticks/time");
-    ASSERT_EQ(before.size(), 15U);
+    ASSERT_EQ(open_recording(hdf5::Contents::read(path)).tick_files.size(), 1U) << "16 are one now";
+    const RecordingFiles before = open_recording(std::move(opened));
+    ASSERT_EQ(before.tick_files.size(), 15U);
     for (std::size_t k = 0; k < 15; ++k) {
       double time = 0.0;
-      before[k].read_rows("/ticks/time", hdf5::element_type<double>(), 3, 1, &time);
+      before.files[before.tick_files[k]].read_rows("/ticks/time", hdf5::element_type<double>(), 3, 1, &time);
       EXPECT_EQ(time, some_tick(10 * k + 3).time);
     }
   }
@@ -405,11 +418,11 @@ TEST(Recording, HasEachRowOnceWhenOnlyTheMasterFailed) {
   const Folder folder;
   RecordingWriter writer(folder / "a.h5", info, surface);
   append(writer, some_ticks(10), 10);
-  std::filesystem::create_directories(folder / "a.h5.partial" / "in the way");
+  std::filesystem::create_directories(folder / "a.h5.parts" / "master.partial" / "in the way");
   writer.append(some_ticks(10, 10));
-  EXPECT_NE(refusal([&] { writer.checkpoint(); }).find("cannot make the file"), std::string::npos);
+  EXPECT_NE(refusal([&] { writer.checkpoint(); }).find("is in the way"), std::string::npos);
   expect_ticks(read_recording(folder / "a.h5"), 10);
-  std::filesystem::remove_all(folder / "a.h5.partial");
+  std::filesystem::remove_all(folder / "a.h5.parts" / "master.partial");
   writer.finish();
   expect_ticks(read_recording(folder / "a.h5"), 20);
 }
@@ -427,6 +440,152 @@ TEST(Recording, ThatCannotBeStartedLeavesNothing) {
   }
   EXPECT_NE(refusal([&] { RecordingWriter(folder / "a.h5", too_long); }), "");
   expect_ticks(read_recording(folder / "a.h5"), 20);
+}
+
+// One flipped bit anywhere in the data is noticed, and the dataset named.
+TEST(Recording, NamesTheDatasetInWhichABitIsFlipped) {
+  const Folder folder;
+  record(folder / "good.h5", some_ticks(40), 10);
+  std::mt19937 random(20261122);  // NOLINT(cert-msc51-cpp): the same bits in each run
+  const std::vector<std::string> datasets = checked_datasets(folder / "good.h5");
+  EXPECT_EQ(datasets.size(), 35U);
+  for (const std::string& dataset : datasets) {
+    std::filesystem::copy_file(folder / "good.h5", folder / "a.h5",
+                               std::filesystem::copy_options::overwrite_existing);
+    flip_bit(folder / "a.h5", dataset, random());
+    const std::string text = refusal([&] { read_recording(folder / "a.h5"); });
+    EXPECT_NE(text.find(dataset + " was altered"), std::string::npos) << dataset << ": " << text;
+    EXPECT_NE(text.find("a.h5"), std::string::npos) << text;
+  }
+}
+
+TEST(Recording, NamesThePartInWhichABitIsFlipped) {
+  const Folder folder;
+  {
+    RecordingWriter killed(folder / "a.h5", info, surface);
+    append(killed, some_ticks(200), 10);  // 20 parts, 16 of them merged into one
+  }
+  std::filesystem::copy(folder / "a.h5.parts", folder / "good");
+  for (const auto& part : std::filesystem::directory_iterator(folder / "good")) {
+    if (part.path().extension() != ".h5") continue;
+    for (const char* dataset : {"/ticks/force", "/ticks/patch", "/frames/displacement", "/frames/tick"}) {
+      const std::filesystem::path altered = folder / "a.h5.parts" / part.path().filename();
+      flip_bit(altered, dataset, 77);
+      for (const auto& reader : {std::function<void()>([&] { read_recording(folder / "a.h5"); }),
+                                 std::function<void()>([&] { finish_recording(folder / "a.h5"); })}) {
+        const std::string text = refusal(reader);
+        EXPECT_NE(text.find(std::string(dataset) + " was altered"), std::string::npos) << text;
+        EXPECT_NE(text.find(altered.string()), std::string::npos) << text;
+      }
+      std::filesystem::copy_file(part.path(), altered, std::filesystem::copy_options::overwrite_existing);
+    }
+  }
+  expect_ticks(read_recording(folder / "a.h5"), 200);
+  EXPECT_TRUE(finish_recording(folder / "a.h5"));
+  expect_ticks(read_recording(folder / "a.h5"), 200);
+}
+
+TEST(Recording, DoesNotMergeAPartThatWasAlteredMeanwhile) {
+  const Folder folder;
+  RecordingWriter writer(folder / "a.h5", info, surface);
+  append(writer, some_ticks(150), 10);
+  flip_bit(folder / "a.h5.parts" / "3.h5", "/ticks/share", 12);
+  writer.append(some_ticks(10, 150));
+  EXPECT_NE(refusal([&] { writer.checkpoint(); }).find("/ticks/share was altered"), std::string::npos);
+}
+
+/// What a recording's checks refuse although its checksums are right.
+struct Impossible {
+  const char* name;
+  void (*apply)(const std::filesystem::path&);
+  const char* says;
+};
+
+const Impossible impossible[] = {
+    {"Patch", [](const std::filesystem::path& p) { set_entry<std::int32_t>(p, "/ticks/patch", 7, -2); },
+     "/ticks/patch, row 7, holds -2"},
+    {"Contacts", [](const std::filesystem::path& p) { set_entry<std::int32_t>(p, "/ticks/contacts", 1, -1); },
+     "/ticks/contacts, row 1, holds -1"},
+    {"Grab", [](const std::filesystem::path& p) { set_entry<std::uint8_t>(p, "/ticks/grab", 3, 2); },
+     "/ticks/grab, row 3, holds 2"},
+    {"TimeBackwards", [](const std::filesystem::path& p) { set_entry<double>(p, "/ticks/time", 9, 1e-3); },
+     "/ticks/time, row 9"},
+    {"TimeNotFinite",
+     [](const std::filesystem::path& p) { set_entry<double>(p, "/ticks/time", 29, HUGE_VAL); },
+     "/ticks/time, row 29, holds inf"},
+    {"Arrived",
+     [](const std::filesystem::path& p) {
+       set_entry<std::int64_t>(p, "/ticks/arrived_ns", 2, std::numeric_limits<std::int64_t>::min());
+     },
+     "/ticks/arrived_ns, row 2"},
+    {"FrameTick", [](const std::filesystem::path& p) { set_entry<std::int64_t>(p, "/frames/tick", 2, -1); },
+     "/frames/tick, row 2, holds -1"},
+    {"FrameTime", [](const std::filesystem::path& p) { set_entry<double>(p, "/frames/time", 1, NAN); },
+     "/frames/time, row 1"},
+    {"Simplex",
+     [](const std::filesystem::path& p) { set_entry<std::int32_t>(p, "/surface/simplices", 4, 4); },
+     "/surface/simplices, row 1, holds 4"},
+    {"SimplexNegative",
+     [](const std::filesystem::path& p) { set_entry<std::int32_t>(p, "/surface/simplices", 11, -1); },
+     "/surface/simplices, row 3, holds -1"},
+    {"Node", [](const std::filesystem::path& p) { set_entry<double>(p, "/surface/nodes", 3, NAN); },
+     "/surface/nodes, row 1"},
+    {"Held", [](const std::filesystem::path& p) { set_entry<std::uint8_t>(p, "/surface/held", 2, 8); },
+     "/surface/held, row 2, holds 8"},
+    {"RowsOfTicks", [](const std::filesystem::path& p) { replace(p, "/ticks/phase", H5T_STD_U8LE, {29}); },
+     "/ticks/phase has 29 rows, /ticks/time has 30"},
+    {"RowsOfFrames",
+     [](const std::filesystem::path& p) {
+       replace(p, "/frames/pressure", H5T_IEEE_F32LE, {4, surface_nodes});
+     },
+     "/frames/pressure has 4 rows, /frames/tick has 3"},
+    {"SizeOfRows",
+     [](const std::filesystem::path& p) {
+       replace(p, "/frames/displacement", H5T_IEEE_F32LE, {3, surface_nodes + 1, 3});
+     },
+     "/frames/displacement has rows of another size"},
+    {"Chunked",
+     [](const std::filesystem::path& p) {
+       replace(p, "/ticks/force", H5T_IEEE_F64LE, {30, 3}, nullptr, true);
+     },
+     "/ticks/force is not stored in one piece"},
+    {"NoChecksum", [](const std::filesystem::path& p) { remove_attribute(p, "/ticks/force", "xxh3"); },
+     "/ticks/force has no checksum"},
+};
+
+void PrintTo(const Impossible& edit, std::ostream* out) {
+  *out << edit.name;
+}
+
+class RecordingHostile : public testing::TestWithParam<Impossible> {};
+TEST_P(RecordingHostile, IsRefusedByName) {
+  const Folder folder;
+  record(folder / "a.h5", some_ticks(30), 10);
+  GetParam().apply(folder / "a.h5");
+  reseal(folder / "a.h5");
+  const std::string text = refusal([&] { read_recording(folder / "a.h5"); });
+  EXPECT_NE(text.find(GetParam().says), std::string::npos) << text;
+}
+INSTANTIATE_TEST_SUITE_P(Recording, RecordingHostile, testing::ValuesIn(impossible),
+                         [](const auto& edit) { return std::string(edit.param.name); });
+
+TEST(Recording, OfVersion41IsReadWithoutChecksumsAndFinishedWithThem) {
+  const Folder folder;
+  {
+    RecordingWriter killed(folder / "a.h5", info, surface);
+    append(killed, some_ticks(30), 10);
+  }
+  set_integers(folder / "a.h5", "version", {4, 1});
+  for (const auto& part : std::filesystem::directory_iterator(folder / "a.h5.parts"))
+    if (part.path().extension() == ".h5")
+      for (const std::string& dataset : checked_datasets(part.path()))
+        remove_attribute(part.path(), dataset, "xxh3");
+  expect_ticks(read_recording(folder / "a.h5"), 30);
+  EXPECT_TRUE(finish_recording(folder / "a.h5"));
+  expect_ticks(read_recording(folder / "a.h5"), 30);
+  flip_bit(folder / "a.h5", "/ticks/torque", 5);
+  EXPECT_NE(refusal([&] { read_recording(folder / "a.h5"); }).find("/ticks/torque was altered"),
+            std::string::npos);
 }
 
 TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {
@@ -451,11 +610,16 @@ TEST(Recording, BadPathsAndOtherFilesAreRefused) {
   write_bytes(folder / "text", "text");
   EXPECT_NE(refusal([&] { read_recording(folder / "text"); }), "");
   record(folder / "a.h5", some_ticks(3), 1);
-  EXPECT_NE(refusal([&] { read_displacement(folder / "a.h5", 1, 3); }).find("has 3 frames"),
+  EXPECT_NE(refusal([&] {
+              static_cast<void>(RecordingFile(folder / "a.h5").displacement(1, 3));
+            }).find("has 3 frames"),
             std::string::npos);
-  EXPECT_EQ(read_displacement(folder / "a.h5", 1, 2)[0], 100.0F);
+  EXPECT_EQ(RecordingFile(folder / "a.h5").displacement(1, 2)[0], 100.0F);
   for (const std::int64_t number : {-1, 3})
-    EXPECT_NE(refusal([&] { read_frame(folder / "a.h5", number); }).find("has 3 frames"), std::string::npos);
+    EXPECT_NE(refusal([&] {
+                static_cast<void>(RecordingFile(folder / "a.h5").frame(number));
+              }).find("has 3 frames"),
+              std::string::npos);
 }
 
 /// Records as fast as it goes, and says after each checkpoint how many ticks there are.

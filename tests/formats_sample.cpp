@@ -226,6 +226,44 @@ Model write_swinging_sample(const std::filesystem::path& path, DynamicsMethod me
   return model;
 }
 
+SmoothPart sample_smooth(const Model& model) {
+  const std::int64_t d = model.dimension();
+  SmoothPart smooth{.terms = 3, .rows = {}};
+  for (std::int64_t dof = 0; dof < model.stored_dofs(); ++dof) {
+    const Index node = model.stored_nodes[static_cast<std::size_t>(dof / d)];
+    const bool held = (model.fixed[static_cast<std::size_t>(node)] >> dof % d & 1) != 0;
+    for (int k = 1; k <= 3; ++k)
+      smooth.rows.push_back(held ? 0.0 : 1e-2 * std::cos(0.1 * static_cast<double>(k * dof)));
+  }
+  return smooth;
+}
+
+Model split_sample(DynamicsMethod method) {
+  Model model = method == DynamicsMethod::none ? sample_model() : swinging_sample(method);
+  const auto with_smooth = [&] {
+    return PackedGreens(nullptr, model.stored_dofs(), Precision::split_precision,
+                        std::make_shared<const SmoothPart>(sample_smooth(model)));
+  };
+  model.greens = with_smooth();
+  model.force_errors = {{1e-2, 3e-6, ForceErrors::not_measured}};
+  if (method == DynamicsMethod::packed) {
+    model.dynamics.inverse = with_smooth();
+    model.dynamics.force_errors = {{std::numeric_limits<double>::infinity(), 2e-5, 0.0}};
+  }
+  return model;
+}
+
+Model write_split_sample(const std::filesystem::path& path, DynamicsMethod method) {
+  Model model = split_sample(method);
+  const std::int64_t n = model.stored_dofs();
+  ModelWriter writer(path, model, Precision::split_precision);
+  writer.write_columns(0, n, sample_columns(0, n, n));
+  if (method == DynamicsMethod::packed)
+    writer.write_columns(0, n, sample_inverse_columns(0, n, n), PackedMatrix::inverse);
+  writer.finish(model.probes);
+  return model;
+}
+
 Folder::Folder() {
   std::string name = (std::filesystem::temp_directory_path() / "palpate_test_XXXXXX").string();
   if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no folder for tests");

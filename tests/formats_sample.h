@@ -22,6 +22,15 @@ double sample_entry(std::int64_t i, std::int64_t j);
 /// Columns [first, first + count) of the lower triangle, as write_columns takes them.
 std::vector<double> sample_columns(std::int64_t first, std::int64_t count, std::int64_t order);
 
+/// A smooth part of `dofs` rows and three terms, made up; those of dofs that the sample holds are zero.
+SmoothPart sample_smooth(const Model& model);
+
+/// The sample with a smooth part and force errors, and with dynamics where `method` says so.
+Model split_sample(DynamicsMethod method);
+
+/// Writes the whole of `split_sample`.
+Model write_split_sample(const std::filesystem::path& path, DynamicsMethod method = DynamicsMethod::none);
+
 /// Writes the whole of `sample_model` and returns what was written.
 Model write_sample(const std::filesystem::path& path, Precision precision = Precision::double_precision,
                    ElementType element = ElementType::tet4, int cells = 2);

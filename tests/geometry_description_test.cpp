@@ -776,7 +776,7 @@ const BadCase bad_cases[] = {
     {"DynamicsModesOfPacked",
      with_storage("scope = \"full\"\n[dynamics]\nmethod = \"packed\"\nmodes = 7"),
      {"model.toml:13:9", "modes applies to method \"modal\" only"}},
-    {"BadPrecision", with_storage("precision = \"half\""), {"\"half\"", "\"single\""}},
+    {"BadPrecision", with_storage("precision = \"half\""), {"\"half\"", "\"auto\"", "\"single\""}},
 };
 
 INSTANTIATE_TEST_SUITE_P(Cases, BadDescription, ::testing::ValuesIn(bad_cases),

@@ -342,14 +342,17 @@ TEST(Held, AgreesWithTheStiffness) {
 }
 
 TEST(Check, ScaleWarning) {
-  const auto warning = [](double size) {
-    return scale_warning(generate(BoxShape{Vec3::Zero(), Vec3::Constant(size), {1, 1, 1}}));
+  const auto warning = [](double size, double scale = 1.0) {
+    return scale_warning(generate(BoxShape{Vec3::Zero(), Vec3::Constant(size), {1, 1, 1}}), scale);
   };
   EXPECT_TRUE(warning(0.2).empty());
   EXPECT_TRUE(warning(10.0).empty());
   EXPECT_TRUE(warning(1e-3).empty());
-  EXPECT_TRUE(contains(warning(200.0), "200"));
-  EXPECT_TRUE(contains(warning(2e-4), "0.0002"));
+  EXPECT_TRUE(contains(warning(200.0), "is 200 m long"));
+  EXPECT_TRUE(contains(warning(200.0), "scale = 0.001 under [geometry], which makes it 0.2 m"));
+  EXPECT_TRUE(contains(warning(20.0, 0.01), "scale = 1e-05"));
+  EXPECT_TRUE(contains(warning(2e-4, 0.001), "is 0.0002 m long"));
+  EXPECT_TRUE(contains(warning(2e-4, 0.001), "scale = 1 under [geometry] (now 0.001), which makes it 0.2 m"));
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 // .vtu files as VTK itself reads them, legacy .vtk files as VTK itself writes them, and quality as VTK
 // measures it.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <random>
 #include <sstream>
@@ -170,13 +172,19 @@ TEST(Vtu, NothingIsLeftBehindWhenItCannotBeWritten) {
   std::filesystem::create_directory(folder.path() / "b.vtu");  // cannot be replaced by a file
   EXPECT_THROW(write_vtu(folder.path() / "b.vtu", mesh.nodes, mesh.element, mesh.connectivity, {}), Error);
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "b.vtu.partial"));
-  if (std::filesystem::exists("/dev/full")) {
-    std::filesystem::create_symlink("/dev/full", folder.path() / "c.vtu.partial");
-    const Error full = error_of(
-        [&] { write_vtu(folder.path() / "c.vtu", mesh.nodes, mesh.element, mesh.connectivity, {}); });
-    EXPECT_TRUE(contains(full.what(), "No space left")) << full.what();
-    EXPECT_FALSE(std::filesystem::exists(folder.path() / "c.vtu"));
-  }
+  rlimit before = {};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit small = before;
+  small.rlim_cur = 100;  // bytes, as on a full disk
+  setrlimit(RLIMIT_FSIZE, &small);
+  const auto action = std::signal(SIGXFSZ, SIG_IGN);
+  const Error full =
+      error_of([&] { write_vtu(folder.path() / "c.vtu", mesh.nodes, mesh.element, mesh.connectivity, {}); });
+  std::signal(SIGXFSZ, action);
+  setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_TRUE(contains(full.what(), "File too large")) << full.what();
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "c.vtu"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "c.vtu.partial"));
 }
 
 TEST(VtkLegacy, FilesThatVtkWritesInBothLayoutsAreRead) {

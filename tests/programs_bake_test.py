@@ -1,5 +1,6 @@
 """palpate-precompute as a person meets it: what it writes, what it refuses, what is left when it is stopped."""
 
+import json
 import os
 import re
 import resource
@@ -7,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import time
+import tomllib
 import unittest
 
 from programs import MODELS, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
@@ -24,7 +26,7 @@ class Bake(ProgramTest):
         result = run(PRECOMPUTE, model, "--dry-run", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         # 343 nodes, 49 clamped; 218 on the surface, 49 of them clamped; 507 * 508 / 2 * 8 bytes = 1.03 MB.
-        for piece in ("343 nodes", "1296 elements", "882 free dofs", "507 stored dofs", "1.0 MB", "about"):
+        for piece in ("343 nodes", "1296 elements", "882 free dofs", "507 stored dofs", "1.0 MB", "about 1 s with"):
             self.assertIn(piece, result.stderr)
         self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
 
@@ -199,12 +201,17 @@ class Stopped(ProgramTest):
         self.assertEqual(run(PRECOMPUTE, model, "-o", straight).returncode, 0)
         self.assertEqual(output.read_bytes(), straight.read_bytes())
 
-    def test_interrupt_in_the_inverse_of_dynamics_leaves_nothing(self):
+    def test_interrupt_in_the_inverse_of_dynamics_keeps_both_matrices(self):
         model = self.write("model.toml", cube_toml(11, scope="full") + '[dynamics]\nmethod = "packed"\n')
-        process = self.start_and_wait_for_columns(model, self.folder / "x.palpate.hdf", matrix=1)
+        output = self.folder / "x.palpate.hdf"
+        process = self.start_and_wait_for_columns(model, output, matrix=1)
         process.send_signal(signal.SIGINT)
         self.assertEqual(process.wait(), 130)
-        self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
+        self.assertFalse(output.exists())
+        result = run(PRECOMPUTE, model, "-o", output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("Green's functions: 4752 of 4752 columns were kept", result.stderr)
+        self.assertRegex(result.stderr, r"inverse of K_bar: [1-9]\d* of 4752 columns were kept")
 
     def test_killed_at_any_moment_again_and_again(self):
         model = self.write("model.toml", cube_toml(12, scope="full"))
@@ -225,7 +232,7 @@ class Stopped(ProgramTest):
         self.assertEqual(output.read_bytes(), straight.read_bytes())
         self.assertEqual(len(list(self.folder.iterdir())), 3)
 
-    def test_interrupt_leaves_nothing_half_written_and_the_old_file_whole(self):
+    def test_interrupt_keeps_what_is_done_and_the_old_file_whole(self):
         old = self.bake(cube_toml(3))
         before = old.read_bytes()
         model = self.write("model.toml", cube_toml(18))
@@ -233,8 +240,93 @@ class Stopped(ProgramTest):
             process = self.start_and_wait_for_columns(model, old)
             process.send_signal(stop)
             self.assertEqual(process.wait(), 130)
-            self.assertEqual(sorted(p.name for p in self.folder.iterdir()), ["model.palpate.hdf", "model.toml"])
+            self.assertEqual(sorted(p.name for p in self.folder.iterdir()),
+                             ["model.palpate.hdf", "model.palpate.hdf.partial", "model.palpate.hdf.progress", "model.toml"])
             self.assertEqual(old.read_bytes(), before)
+        straight = self.folder / "straight.palpate.hdf"
+        self.assertEqual(run(PRECOMPUTE, model, "-o", straight).returncode, 0)
+        result = run(PRECOMPUTE, model, "-o", old)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"[1-9]\d* of \d+ columns were kept")
+        self.assertEqual(old.read_bytes(), straight.read_bytes())
+
+    def test_interrupt_says_how_to_go_on_and_discard_begins_anew(self):
+        model = self.write("model.toml", cube_toml(18))
+        output = self.folder / "x.palpate.hdf"
+        self.start_and_wait_for_columns(model, output).kill()
+        process = subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.PIPE, text=True)
+        for line in process.stderr:
+            if "were kept" in line:
+                process.send_signal(signal.SIGINT)
+                break
+        said = process.stderr.read()
+        process.stderr.close()
+        self.assertEqual(process.wait(), 130, said)
+        for piece in ("interrupted", "x.palpate.hdf.partial", "the same command goes on", "--discard"):
+            self.assertIn(piece, said)
+        result = run(PRECOMPUTE, model, "-o", output, "--discard")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertNotIn("were kept", result.stderr)
+        self.assertEqual(sorted(p.name for p in self.folder.iterdir()), ["model.toml", "x.palpate.hdf"])
+
+
+class Waiting(ProgramTest):
+    """What is seen meanwhile."""
+
+    STAGES = ["generating the mesh", "checking the mesh", "assembling K", "ordering K", "factorising K", "overlays",
+              "choosing the precision", "Green's functions", "writing the file"]
+    OVERLAY = "[overlay]\n[[overlay.region]]\nsphere = {center = [0.5, 0.5, 1], radius = 0.3}\n"
+
+    def check(self, said):
+        at = [said.index(f"] {stage}") for stage in self.STAGES]
+        self.assertEqual(at, sorted(at))
+        # From the first number that follows from the mesh: of all that is to come, and that it is not measured yet.
+        self.assertRegex(said, r"\] factorising K, about [1-9]\d* (s|min)")
+        for stage in self.STAGES[5:]:
+            self.assertRegex(said, rf"\] {stage}(: \d+ %)?, (about )?\d+ (s|min)[^\n]* left")
+        self.assertIn("Green's functions: 100 %\n", said)
+
+    def test_each_stage_says_what_is_left_of_the_whole(self):
+        model = self.write("model.toml", cube_toml(8, scope="layers").replace('"layers"', '"layers"\nlayers = 2') + self.OVERLAY)
+        result = run(PRECOMPUTE, model, cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.check(result.stderr)
+        self.assertNotIn("\r", result.stderr)
+
+    def test_a_terminal_has_one_line_that_is_rewritten(self):
+        model = self.write("model.toml", cube_toml(8, scope="layers").replace('"layers"', '"layers"\nlayers = 2') + self.OVERLAY)
+        master, slave = os.openpty()
+        with subprocess.Popen([PRECOMPUTE, model], cwd=self.folder, stderr=slave) as process:
+            os.close(slave)
+            said = b""
+            while True:
+                try:
+                    piece = os.read(master, 1 << 16)
+                except OSError:  # the other side is closed
+                    break
+                if not piece:
+                    break
+                said += piece
+            os.close(master)
+            self.assertEqual(process.wait(), 0)
+        said = said.decode().replace("\r\n", "\n")
+        self.check(said)
+        for stage in self.STAGES:
+            self.assertRegex(said, rf"\r\x1b\[K\[ *\d+\.\d s\] {stage}")
+        # Each rewritten line is closed before another begins.
+        self.assertNotRegex(re.sub(r"\r\x1b\[K\[[^\n\r]*", "", said), r"[^\n]\[ ")
+
+    def test_an_error_begins_a_line_of_its_own(self):
+        model = self.write("model.toml", cube_toml(8).replace("half_space = { point = [0, 0, 0], normal = [0, 0, -1] }", "nodes = [0]"))
+        master, slave = os.openpty()
+        with subprocess.Popen([PRECOMPUTE, model], cwd=self.folder, stderr=slave) as process:
+            os.close(slave)
+            said = b""
+            while b"hint" not in said:
+                said += os.read(master, 1 << 16)
+            os.close(master)
+            self.assertEqual(process.wait(), 1)
+        self.assertIn(b"\nerror: ", said)
 
 
 class Stale(ProgramTest):
@@ -304,11 +396,15 @@ class BadDescriptions(ProgramTest):
     def test_everything_fixed(self):
         self.refuse(cube_toml(2).replace("normal = [0, 0, -1]", "normal = [0, 0, 1]"), "fixed")
 
-    def test_wrong_scale_is_a_warning(self):
+    def test_wrong_scale_is_a_warning_that_stands_out(self):
         model = self.write("model.toml", cube_toml(2).replace("size = [1, 1, 1]", "size = [100, 100, 100]"))
         result = run(PRECOMPUTE, model, cwd=self.folder)
         self.assertEqual(result.returncode, 0)
-        self.assertIn("scale", result.stderr)
+        # With the plan and as the last word of the run, on a line of its own each time.
+        warning = "\n\nwarning: the body is 100 m long: if its numbers are millimetres, write scale = 0.001 under [geometry], " \
+                  "which makes it 0.1 m\n\n"
+        self.assertEqual(result.stderr.count(warning), 2)
+        self.assertGreater(result.stderr.rindex(warning), result.stderr.index("palpate.hdf written"))
 
 
 class Models(ProgramTest):
@@ -323,6 +419,22 @@ class Models(ProgramTest):
         planned = run(PRECOMPUTE, MODELS / "nodule" / "model.toml", "--dry-run", cwd=self.folder)
         self.assertEqual(planned.returncode, 0, planned.stderr)
         self.assertIn("12288 elements (hex8)", planned.stderr)
+
+    def test_the_demo_s_liver_takes_overlays(self):
+        model = MODELS / "liver" / "model.toml"
+        storage = tomllib.loads(model.read_text())["storage"]
+        self.assertEqual((storage["scope"], storage["layers"]), ("layers", 2))  # as many as the overlay has rings
+        image = model.with_name("liver.inr.gz")
+        if not image.exists():
+            self.skipTest("scripts/demo fetches the liver's image")
+        shutil.copy(image, self.folder)
+        coarse = self.write("model.toml", re.sub("edge_length = [0-9.]+", "edge_length = 0.012", model.read_text()))
+        self.assertEqual(run(PRECOMPUTE, coarse, cwd=self.folder).returncode, 0)
+        touch = self.write("touch.csv", "t,x,y,z,grab\n0,0.155,0.0,0.117,0\n0.2,0.155,0.03,0.117,0\n")
+        played = run(RUNTIME, "play", self.folder / "liver.palpate.hdf", "--device", f"script:{touch}", "--fast", "--tool",
+                     "sphere:0.008", "--overlay", "r=3,rings=2", "--report", self.folder / "report.json")
+        self.assertEqual(played.returncode, 0, played.stderr)
+        self.assertGreater(json.loads((self.folder / "report.json").read_text())["largest_force_N"], 0.0)
 
     def test_the_liver_keeps_its_labels(self):
         image = MODELS / "liver" / "liver.inr.gz"

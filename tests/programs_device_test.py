@@ -1,5 +1,6 @@
 """A hand in the loop: another process as the device, what it feels, sessions that are replayed, killed and refused."""
 
+import contextlib
 import json
 import pathlib
 import signal
@@ -12,6 +13,7 @@ import unittest
 import h5py
 import numpy
 
+from bridge_key import key_file, read_key, seal
 from programs import BINARY, RUNTIME, ProgramTest, cube_toml, recorded, run
 
 BRIDGE = BINARY / "runtime" / "palpate-bridge-example"
@@ -102,14 +104,14 @@ class Felt(ProgramTest):
             force = session["ticks/force"][:]
         self.assertGreaterEqual(len(force), 2500)
         self.assertGreater(numpy.abs(force).max(), 0.1)
-        replay = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--record", "again.h5", cwd=self.folder)
+        replay = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--record", "again.h5", "--report", "-", cwd=self.folder)
         self.assertEqual(replay.returncode, 0, replay.stderr)
         report = json.loads(replay.stdout)
         self.assertEqual((report["replay"]["ticks"], report["replay"]["different_ticks"]), (len(force), 0), replay.stderr)
         with h5py.File(self.folder / "again.h5") as again:
             numpy.testing.assert_array_equal(again["ticks/force"][:], force)
         # It is a comparison: with another tool it is another session.
-        other = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--tool", "sphere:0.012", cwd=self.folder)
+        other = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--tool", "sphere:0.012", "--report", "-", cwd=self.folder)
         self.assertEqual(other.returncode, 3, other.stderr)
         self.assertGreater(json.loads(other.stdout)["replay"]["different_ticks"], 100)
 
@@ -138,15 +140,25 @@ class Felt(ProgramTest):
         self.assertGreater(shown[gone[-1]:].max(), 0.1, "force has begun again")
 
     def test_a_fault_is_latched_until_enter(self):
+        def press_enter(runtime):
+            with contextlib.suppress(BrokenPipeError):  # it has ended
+                runtime.stdin.write("\n")
+                runtime.stdin.flush()
+        self.fault_is_acknowledged(press_enter)
+
+    def test_a_fault_is_latched_until_the_signal(self):
+        """As for a run in the background, which has no terminal to press Enter at."""
+        self.fault_is_acknowledged(lambda runtime: runtime.send_signal(signal.SIGUSR1))
+
+    def fault_is_acknowledged(self, acknowledge):
         runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--origin", "0.05,0.05,0.12", "--safety",
                              PATIENT + ",max_speed=0.1", "--record", "session.h5", "--report", "report.json")
         self.hand(600, 0.0, 3.5, 0.15)  # 0.13 m/s at most, at 0.9 s: free space all the way, slow for half of the time
         self.wait_for(lambda: numpy.any(self.recorded("ticks/fault")), runtime)
 
         def acknowledged_for_long():
-            """Enter, which must come while the hand is slow."""
-            runtime.stdin.write("\n")
-            runtime.stdin.flush()
+            """It must come while the hand is slow."""
+            acknowledge(runtime)
             time.sleep(0.3)
             fault, event = self.recorded("ticks/fault"), self.recorded("ticks/event")
             return any(len(fault) >= k + 400 and not fault[k : k + 400].any() for k in numpy.flatnonzero(numpy.bitwise_and(event, 4)))
@@ -154,13 +166,16 @@ class Felt(ProgramTest):
         self.wait_for(acknowledged_for_long, runtime)
         runtime.send_signal(signal.SIGINT)
         messages = self.finish(runtime, 130)
-        self.assertIn("no force, too_fast: the handle moved faster than max_speed. Press Enter to go on.", messages)
+        self.assertIn("no force, too_fast: the handle moved faster than max_speed. Press Enter to go on, or: kill -USR1 "
+                      f"{runtime.pid}", messages)
         self.assertIn("acknowledged; force begins again out of contact", messages)
         with h5py.File(self.folder / "session.h5") as session:
             fault, event = session["ticks/fault"][:], session["ticks/event"][:]
+        acknowledged, latched = numpy.flatnonzero(event & 4), numpy.flatnonzero(fault)
+        self.assertEqual(set(fault[latched[0] : acknowledged[0]]), {1}, "nothing else ends it")
         ended = 1 + numpy.flatnonzero((fault[:-1] == 1) & (fault[1:] == 0))
         self.assertGreater(len(ended), 0)
-        self.assertTrue((event[ended] & 4 != 0).all(), "a fault ends by Enter alone")
+        self.assertTrue((event[ended] & 4 != 0).all(), "nothing else ends it")
 
     def test_datagrams_that_are_not_taken_are_told(self):
         runtime = self.play("--duration", "0.2")
@@ -184,8 +199,10 @@ class Felt(ProgramTest):
                 nonce, last = 0, b""
                 for k in range(1, 100000):
                     z = -min(0.02, 2e-5 * k)
-                    hand.sendto(state.pack(b"PLPS", 1, 128, nonce, k, 1 << 16, time.monotonic_ns(), 0, 0, z + 1e-6 * (k % 5), 0, 0, 0,
-                                           1, 0, 0, 0, 0, 0, 0, 0, 0, 0), ("127.0.0.1", self.port))
+                    said = state.pack(b"PLPS", 2, 128, nonce, k, 1 << 16, time.monotonic_ns(), 0, 0, z + 1e-6 * (k % 5), 0, 0, 0,
+                                      1, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+                    if key_file(self.port).exists():
+                        hand.sendto(seal(read_key(self.port), said), ("127.0.0.1", self.port))
                     time.sleep(0.001)
                     hand.setblocking(False)
                     try:
@@ -208,6 +225,47 @@ class Felt(ProgramTest):
                 self.assertEqual(struct.unpack_from("<I", last, 32)[0], 0, "the last word is no force")
             with h5py.File(self.folder / "session.h5") as session:
                 self.assertGreater(len(session["ticks/time"]), 100)
+
+    def test_the_example_finds_the_body_by_itself(self):
+        """README's two commands: without --to the hand goes down until it feels something."""
+        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--safety", PATIENT, "--duration", "6",
+                             "--report", "report.json")
+        hand = self.start(BRIDGE, "--port", self.port, "--rate", 2000, "--seconds", 60)
+        messages = self.finish(runtime)
+        self.assertNotIn("never touched", messages)
+        report = json.loads((self.folder / "report.json").read_text())
+        self.assertGreater(report["ticks_in_contact"], 100)
+        self.assertGreater(report["largest_force_N"], 0.3)
+        self.assertGreater(report["tool"]["radius_m"], 0, "a ball that suits the body")
+        hand.terminate()
+        said, _ = hand.communicate(timeout=60)
+        self.assertNotIn("no force was ever felt", said)
+
+    def test_who_never_touches_is_told(self):
+        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--safety", PATIENT, "--duration", "0.5",
+                             "--report", "report.json")
+        hand = self.start(BRIDGE, "--port", self.port, "--seconds", 60, "--to", "0,0,0.02")
+        messages = self.finish(runtime)
+        self.assertRegex(messages, r"the tool never touched the body: move the device on.*the tool ended at \(.*\) m; the body rests in \(0, 0, 0\)")
+        hand.terminate()
+        self.assertIn("no force was ever felt", hand.communicate(timeout=60)[0])
+
+    def test_a_stranger_is_told_where_the_key_is(self):
+        runtime = self.play("--duration", "0.2")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.settimeout(0.2)
+            while not key_file(self.port).exists():
+                time.sleep(0.02)
+            hello = struct.pack("<4sHHQIIQ3d3d4f f 5f 8x", b"PLPS", 2, 128, 0, 1, 0, 1, *[0.0] * 6, 1.0, *[0.0] * 9)
+            for _ in range(3):
+                stranger.sendto(hello, ("127.0.0.1", self.port))
+                with self.assertRaises(TimeoutError):
+                    stranger.recv(256)
+        self.assertEqual(key_file(self.port).stat().st_mode & 0o777, 0o600)
+        self.hand(60, 0.0, 0.0, 0.1)
+        messages = self.finish(runtime)
+        self.assertIn(f"3 datagrams by seal (the key is in {key_file(self.port)})", messages)
+        self.assertFalse(key_file(self.port).exists(), "it is gone with the runtime")
 
 
 class Choice(ProgramTest):
@@ -284,7 +342,7 @@ class Scripted(ProgramTest):
     def test_safety_where_it_is_asked_for(self):
         file = self.bake(SMALL_CUBE)
         script = self.write("press.csv", "t,x,y,z\n0,0.05,0.05,0.12\n0.3,0.05,0.05,0.1\n0.8,0.05,0.05,0.1001\n")
-        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.h5")
+        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.h5", "--report", "-")
         plain = run(*common, cwd=self.folder)
         self.assertEqual(plain.returncode, 0, plain.stderr)
         self.assertNotIn("safety", json.loads(plain.stdout))

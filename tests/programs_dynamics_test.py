@@ -60,7 +60,7 @@ def read_grid(file):
 class Swing(ProgramTest):
     def play(self, file, script, *arguments):
         path = self.write("touch.csv", script)
-        result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", "--reach", "0.02", *arguments, cwd=self.folder)
+        result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", "--reach", "0.02", "--report", "-", *arguments, cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         return json.loads(result.stdout), result.stderr
 
@@ -98,7 +98,7 @@ class Swing(ProgramTest):
     def test_in_real_time_it_is_in_time(self):
         file = self.bake(PACKED)
         script = self.write("touch.csv", pull_and_let_go(0.5))
-        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--reach", "0.02", cwd=self.folder)
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--reach", "0.02", "--report", "-", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         report = json.loads(result.stdout)
         self.assertGreater(report["dynamics"]["steps"], 100)

@@ -96,8 +96,8 @@ class Library(unittest.TestCase):
             self.assertAlmostEqual(up * self.compliance(x) / depth, 1.0, delta=0.005)
             self.assertAlmostEqual(stiffness * self.compliance(x), 1.0, delta=0.01)
             self.assertLess(abs(side), 0.02 * up, "frictionless")
-        for before, after in zip(rows, rows[1:]):
-            self.assertAlmostEqual(after[0] - before[0], 200 * 0.00002, delta=1.1e-4)
+        self.assertGreater(max(row[0] for row in rows) - min(row[0] for row in rows), 0.001, "it is rubbed")
+        self.assertLess(max(row[0] for row in rows), 0.5 + 0.0032)
 
     def test_found_by_cmake(self):
         project = self.folder / "project"
@@ -108,6 +108,13 @@ class Library(unittest.TestCase):
              f"-DCMAKE_C_FLAGS={' '.join(sanitizers())}")
         done("cmake", "--build", project / "build")
         self.check_feel(project / "build" / "own_loop")
+
+    def test_the_example_stays_on_what_is_round(self):
+        ball = self.folder / "sphere.palpate.hdf"
+        done(PRECOMPUTE, SOURCE / "meshes" / "models" / "sphere" / "model.toml", "-o", ball)
+        forces = [float(LINE.match(line).group(7)) for line in done(self.build_by_pkg_config(), ball).splitlines()]
+        self.assertEqual(len(forces), 10)
+        self.assertGreater(min(forces), 0.5 * max(forces))
 
     def test_another_minor_version_is_not_found(self):
         project = self.folder / "other"
@@ -125,6 +132,22 @@ class Library(unittest.TestCase):
         result = run(self.build_by_pkg_config(), "missing.palpate.hdf", cwd=self.folder)
         self.assertEqual(result.returncode, 1)
         self.assertRegex(result.stderr, r"^error: missing\.palpate\.hdf: .+\nhint: .+\n$")
+
+    def test_licence_models_examples_and_plot_are_installed(self):
+        share = self.prefix / "share"
+        documents = share / "doc" / "palpate"
+        self.assertEqual((documents / "LICENSE").read_text(), (SOURCE / "LICENSE").read_text())
+        for link in re.findall(r"\]\((?!http)([^)#]+)\)", (documents / "README.md").read_text()):
+            self.assertTrue((documents / link).exists(), link)
+        models = share / "palpate" / "models"
+        self.assertEqual({model.parent.name for model in models.glob("*/model.toml")},
+                         {model.parent.name for model in (SOURCE / "meshes" / "models").glob("*/model.toml")})
+        self.assertEqual(list(models.glob("*/*.gz")), [], "the liver's image is not ours to give")
+        done(next(self.prefix.glob("bin*/palpate-precompute")), models / "cube" / "model.toml", "-o", self.folder / "cube.palpate.hdf")
+        examples = share / "palpate" / "examples"
+        for example in ("own_loop.c", "bridge.c"):
+            done("cc", "-std=c11", *WARNINGS, "-fsyntax-only", *self.pkg_config("--cflags"), examples / example)
+        self.assertIn("plot force", done(share / "palpate" / "scripts" / "plot", "--help"))
 
     def test_header_is_c99_and_cpp(self):
         (self.folder / "header.c").write_text("#include <palpate.h>\n")

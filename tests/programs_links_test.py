@@ -1,10 +1,10 @@
-"""palpate-runtime and libpalpate.so link nothing of GPL or AGPL (README, Licence)."""
+"""What the programs and libpalpate.so are linked with: nothing of GPL or AGPL in two of them (README, Licence), from nowhere but the system."""
 
 import re
 import subprocess
 import unittest
 
-from programs import BINARY, RUNTIME
+from programs import BINARY, PRECOMPUTE, RUNTIME
 
 LINKED = (RUNTIME, BINARY / "runtime" / "libpalpate.so")
 # What they themselves ask the linker for, with the licence of each.
@@ -52,6 +52,38 @@ class Links(unittest.TestCase):
             with self.subTest(piece=piece):
                 self.assertIn(piece, program)
                 self.assertNotIn(piece, library)
+
+
+def built():
+    """Every program and shared library of the build."""
+    for folder in ("meshes", "formats", "precompute", "runtime", "tests"):
+        for file in sorted((BINARY / folder).glob("*")):
+            if file.is_file() and not file.is_symlink() and file.suffix in ("", ".so", ".0") and file.open("rb").read(4) == b"\x7fELF":
+                yield file
+
+
+def dynamic(file):
+    return subprocess.run(["readelf", "-dW", file], capture_output=True, text=True, check=True).stdout
+
+
+class Hardening(unittest.TestCase):
+    def test_libraries_are_sought_in_absolute_folders_only(self):
+        """An empty or relative part of a RUNPATH is the folder that the program is started in: anybody's library would run."""
+        files = list(built())
+        self.assertLess({RUNTIME, PRECOMPUTE}, set(files))
+        for file in files:
+            for path in re.findall(r"\((?:RUNPATH|RPATH)\).*\[(.*)\]", dynamic(file)):
+                with self.subTest(file=file.name):
+                    self.assertEqual([part for part in path.split(":") if not part.startswith("/")], [])
+
+    def test_programs_lie_anywhere_and_what_the_loader_writes_is_locked(self):
+        for file in built():
+            with self.subTest(file=file.name):
+                header = subprocess.run(["readelf", "-hlW", file], capture_output=True, text=True, check=True).stdout
+                self.assertRegex(header, r"Type: +DYN")
+                self.assertIn("GNU_RELRO", header)
+                self.assertRegex(header, r"GNU_STACK .* RW +0x")
+                self.assertRegex(dynamic(file), r"BIND_NOW|\(FLAGS_1\).*NOW")
 
 
 if __name__ == "__main__":

@@ -59,7 +59,7 @@ class Session(ProgramTest):
 
     def test_says_what_is_in_it(self):
         file = self.bake(cube_toml(4, scope="full"))
-        report = json.loads(self.play(file, "--fast", "--record", "out.h5", "--overlay", "r=2,rings=1").stdout)
+        report = json.loads(self.play(file, "--fast", "--record", "out.h5", "--overlay", "r=2,rings=1", "--report", "-").stdout)
         told = json.loads(self.session("out.h5", "--json"))
         for name in ("ticks", "ticks_in_contact", "largest_force_N", "largest_force_time_s"):
             self.assertEqual(told[name], report[name], name)
@@ -176,7 +176,7 @@ class Session(ProgramTest):
     def test_while_it_is_recorded(self):
         file = self.bake(cube_toml(4))
         script = self.write("long.csv", "t,x,y,z\n0,0.5,0.5,1.3\n600,0.5,0.5,1.18\n")
-        play = [RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.h5"]
+        play = [RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.h5", "--report", "-"]
         process = subprocess.Popen(play, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
             for _ in range(600):

@@ -63,12 +63,21 @@ class ViewTest(ProgramTest):
             port = taken.getsockname()[1]
             result = run(RUNTIME, *arguments, "--view-address", port, cwd=self.folder)
         self.assert_refused(result, f"127.0.0.1:{port}: cannot listen", "Choose another port")
+        self.assertNotIn("loaded in", result.stderr, "the port is looked at first")
+        self.assertNotIn("open http", result.stderr)
 
     def assert_asks_for_token(self, *arguments):
-        with self.started(*arguments, "--view-address", "0.0.0.0:0") as (_, url):
-            self.assertRegex(url, r"^http://127\.0\.0\.1:\d+/\?token=[0-9a-f]{32}$")
-            self.assertEqual(status_of(url), 200)
-            self.assertEqual(status_of(url.split("?")[0]), 403)
+        tokens = set()
+        for address in ("127.0.0.1:0", "0.0.0.0:0"):
+            with self.started(*arguments, "--view-address", address) as (_, url):
+                self.assertRegex(url, r"^http://127\.0\.0\.1:\d+/\?token=[0-9a-f]{32}$")
+                bare, token = url.split("?")
+                tokens.add(token)
+                self.assertEqual(status_of(url), 200)
+                self.assertEqual(status_of(bare), 403)
+                self.assertEqual(status_of(bare + "surface.stl"), 403)
+                self.assertEqual(status_of(f"{bare}?token={32 * '0'}"), 403)
+        self.assertEqual(len(tokens), 2)
 
     def assert_wrong_addresses(self, *arguments):
         for text in ("bogus", "127.0.0.1:", ":8017", "65536", "127.0.0.1:-1"):
@@ -82,15 +91,44 @@ class PlayView(ViewTest):
     PLAY = ("play", CUBE, "--view")
 
     def test_shows_itself_until_it_is_stopped(self):
-        with self.started(*self.PLAY, "--view-address", "0", "--tool", "sphere:0.1") as (process, url):
-            self.assertRegex(url, r"^http://127\.0\.0\.1:\d+/$")
+        with self.started(*self.PLAY, "--view-address", "0", "--tool", "sphere:0.1", "--report", "-") as (process, url):
             self.assertEqual(status_of(url), 200)
             code, output = self.end(process, signal.SIGTERM)
             self.assertEqual(code, 130)
             self.assertEqual(json.loads(output)["ticks_in_contact"], 0)
 
+    def test_says_where_only_when_it_can_be_seen(self):
+        """What is refused is refused before anybody opens a page for it."""
+        self.write("broken.palpate.hdf", "nothing")
+        for arguments in (("play", "broken.palpate.hdf", "--view"), (*self.PLAY, "--overlay", "r=3,rings=1"),
+                          (*self.PLAY, "--contact", "dynamic"), (*self.PLAY, "--record", "none/out.h5")):
+            with self.subTest(arguments=arguments):
+                result = run(RUNTIME, *arguments, "--view-address", "0", "--duration", "0.1", cwd=self.folder)
+                if arguments[-1] == "r=3,rings=1" and result.returncode == 0:
+                    continue
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertNotIn("open http", result.stderr)
+                self.assertRegex(result.stderr, "error: .*\nhint: ")
+
+    def test_the_tool_where_none_is_given(self):
+        for arguments, tool in (((), {"radius_m": 0.17}), (("--tool", "point"), {"radius_m": 0}), (("--tool", "sphere:0.05"), {"radius_m": 0.05})):
+            result = run(RUNTIME, *self.PLAY, "--view-address", "0", "--duration", "0.05", "--report", "-", *arguments, cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            told = json.loads(result.stdout)["tool"]
+            self.assertEqual({name: told[name] for name in tool}, tool)
+            self.assertEqual("tool: sphere:0.17, which suits the body" in result.stderr, not arguments, result.stderr)
+        self.write("touch.csv", TOUCH)
+        script = run(RUNTIME, "play", CUBE, "--device", "script:touch.csv", "--fast", "--report", "-", cwd=self.folder)
+        self.assertEqual(json.loads(script.stdout)["tool"]["radius_m"], 0, "what a script does depends on no mesh")
+
+    def test_a_tool_larger_than_the_body_is_told(self):
+        for tool, is_large in (("sphere:0.86", False), ("sphere:0.87", True), ("sphere:8", True)):
+            result = run(RUNTIME, *self.PLAY, "--view-address", "0", "--duration", "0.05", "--tool", tool, cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual("m long, and the whole body 1.732 m: lengths are metres" in result.stderr, is_large, result.stderr)
+
     def test_a_duration_ends_it(self):
-        with self.started(*self.PLAY, "--view-address", "0", "--duration", "0.2") as (process, _):
+        with self.started(*self.PLAY, "--view-address", "0", "--duration", "0.2", "--report", "-") as (process, _):
             output, _ = process.communicate(timeout=60)
             self.assertEqual((process.returncode, json.loads(output)["ticks"]), (0, 200))
 
@@ -115,7 +153,7 @@ class View(ViewTest):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.started("view", "touch.h5", "--view-address", "0") as (process, url):
                 self.assertEqual(status_of(url), 200)
-                self.assertEqual(status_of(url + "surface.vtu"), 200)
+                self.assertEqual(status_of(url.replace("/?", "/surface.vtu?")), 200)
                 self.assertEqual(self.end(process, number), (0, ""))
 
     def test_address(self):

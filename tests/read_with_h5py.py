@@ -37,7 +37,7 @@ def check_model(path, element, scalar):
     with h5py.File(path) as file:
         attributes = file.attrs
         expect(attributes["format"] == b"palpate", "format")
-        expect(list(attributes["version"]) == [3, 2], "version")
+        expect(list(attributes["version"]) == [3, 3], "version")
         expect(attributes["units"] == b"m, N, Pa, kg, s", "units")
         expect(attributes["scalar"].decode() == scalar, "scalar")
         expect(attributes["element"].decode() == element and attributes["dimension"] == dimension, "element")

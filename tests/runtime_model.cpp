@@ -18,13 +18,14 @@ namespace palpate::test {
 namespace {
 
 template <class T>
-PackedGreens pack_as(const Eigen::MatrixXd& matrix, Precision precision) {
+PackedGreens pack_as(const Eigen::MatrixXd& matrix, Precision precision,
+                     std::shared_ptr<const SmoothPart> smooth = nullptr) {
   auto packed = std::make_shared<std::vector<T>>();
   packed->reserve(static_cast<std::size_t>(packed_size(matrix.rows())));
   for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
     for (Eigen::Index i = j; i < matrix.rows(); ++i) packed->push_back(static_cast<T>(matrix(i, j)));
   }
-  return {std::shared_ptr<const void>(packed, packed->data()), matrix.rows(), precision};
+  return {std::shared_ptr<const void>(packed, packed->data()), matrix.rows(), precision, std::move(smooth)};
 }
 
 std::vector<Eigen::Index> dofs_of(int dimension, std::span<const Index> nodes) {
@@ -62,8 +63,17 @@ Eigen::MatrixXd assemble_stiffness(const Model& model) {
 }
 
 PackedGreens pack(const Eigen::MatrixXd& matrix, Precision precision) {
-  return precision == Precision::single_precision ? pack_as<float>(matrix, precision)
-                                                  : pack_as<double>(matrix, precision);
+  if (precision == Precision::single_precision) return pack_as<float>(matrix, precision);
+  if (precision == Precision::double_precision) return pack_as<double>(matrix, precision);
+  auto smooth = std::make_shared<SmoothPart>();
+  smooth->terms = 11;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> entry(-0.5, 0.5);
+  for (Eigen::Index k = 0; k < smooth->terms * matrix.rows(); ++k) smooth->rows.push_back(entry(random));
+  Eigen::MatrixXd remainder = matrix;
+  for (Eigen::Index j = 0; j < matrix.cols(); ++j)
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i) remainder(i, j) -= (*smooth)(i, j);
+  return pack_as<float>(remainder, precision, smooth);
 }
 
 Eigen::MatrixXd random_definite(Eigen::Index order, unsigned seed) {

@@ -12,7 +12,7 @@ namespace palpate::test {
 /// K [dN x dN] of all nodes, dense, without boundary conditions [N/m].
 Eigen::MatrixXd assemble_stiffness(const Model& model);
 
-/// The lower triangle of a symmetric matrix.
+/// The lower triangle of a symmetric matrix; with split precision beside a made-up smooth part.
 PackedGreens pack(const Eigen::MatrixXd& matrix, Precision precision);
 
 /// A symmetric positive definite matrix with a dominant diagonal, the same for the same seed.

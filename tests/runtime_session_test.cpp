@@ -262,7 +262,7 @@ TEST_F(RecorderTest, KeepsTicksAndFrames) {
   ASSERT_EQ(recording.ticks.size(), static_cast<std::size_t>(ticks));
   for (int k = 0; k < ticks; ++k) ASSERT_EQ(recording.ticks[static_cast<std::size_t>(k)].time, 1e-3 * k);
   ASSERT_EQ(recording.frames.tick.size(), 1000U);
-  const std::vector<float> u = read_displacement(file_, 0, 1000);
+  const std::vector<float> u = RecordingFile(file_).displacement(0, 1000);
   for (int k = 0; k < 1000; ++k) {
     ASSERT_EQ(recording.frames.tick[static_cast<std::size_t>(k)], 40 * k);
     ASSERT_EQ(u[9 * static_cast<std::size_t>(k) + 8], static_cast<float>(40 * k));

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <vector>
@@ -262,6 +264,147 @@ TEST(SurfaceStress, OfAPressureOnAllSidesIsExact) {
   }
 }
 
+/// Nodal forces [N] of the nodes of a mesh by an even stress inside, on all of its surface that is not held.
+enum class Acts { by_facets, by_simplices };  // as a load does, or as contact
+std::vector<Vec3> forces_of(const Model& of, const Mat3& stress, Acts acts) {
+  std::vector<Vec3> force(of.mesh.nodes.size(), Vec3::Zero());
+  const auto add = [&](ElementType type, std::span<const Index> nodes) {
+    const ShapeValues shares = facet_shape_integrals(type, positions(of.mesh, nodes), of.thickness);
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      force[static_cast<std::size_t>(nodes[k])] +=
+          shares[static_cast<Eigen::Index>(k)] * stress * normal_of(of.mesh, nodes);
+  };
+  const Surface surface = extract_surface(of.mesh);
+  const auto d = static_cast<std::size_t>(of.dimension());
+  const std::size_t cut = of.surface.size() / d / static_cast<std::size_t>(surface.count());
+  for (Index f = 0; f < surface.count(); ++f) {
+    unsigned held = ~0U;
+    for (const Index node : surface.facet_nodes(f)) held &= of.fixed[static_cast<std::size_t>(node)];
+    if (held != 0) continue;
+    if (acts == Acts::by_facets) {
+      add(surface.facet, surface.facet_nodes(f));
+      continue;
+    }
+    for (std::size_t k = 0; k < cut; ++k)
+      add(d == 3 ? ElementType::tri3 : ElementType::line2,
+          std::span(of.surface).subspan(d * (cut * static_cast<std::size_t>(f) + k), d));
+  }
+  return force;
+}
+
+/// Largest error of the stress at any node, edges and corners too, of its size.
+double error_of_even_stress(Model of, const Mat3& strain, Acts acts) {
+  if (of.dimension() == 3) of.analysis = Analysis::solid;
+  const Mat3 stress = stress_of_strain(of.materials[0], of.analysis, strain);
+  const std::vector<Vec3> force = forces_of(of, stress, acts);
+  if (acts == Acts::by_facets) of.rest_force = force;
+  const Body body(of);
+  SurfaceStress surface(body);
+  std::vector<Vec3> u, contact;
+  for (const Index node : body.surface_mesh_nodes()) {
+    u.push_back(strain * of.mesh.nodes[static_cast<std::size_t>(node)]);
+    contact.push_back(acts == Acts::by_facets ? Vec3(Vec3::Zero()) : force[static_cast<std::size_t>(node)]);
+  }
+  std::vector<Stress> result(u.size());
+  surface.evaluate(u, contact, nullptr, result);
+  double error = 0.0;
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    if (result[k].allFinite()) error = std::max(error, (result[k] - stress_of(stress)).norm());
+  }
+  return error / stress.norm();
+}
+
+/// Strains of an even stress: along one direction, from all sides, shear, and all that together.
+std::vector<Mat3> even_strains(int dimension) {
+  Mat3 along, shear, all;
+  along << 0.1, 0, 0, 0, -0.04, 0, 0, 0, -0.04;
+  shear << 0, 0.1, 0, 0.1, 0, 0, 0, 0, 0;
+  all << 0.02, -0.07, 0.03, -0.07, -0.04, 0.06, 0.03, 0.06, 0.09;
+  std::vector<Mat3> strains = {along, -0.1 * Mat3::Identity(), shear, all};
+  for (Mat3& strain : strains) {
+    if (dimension == 2) strain.row(2) = strain.col(2).transpose() = Vec3::Zero().transpose();
+  }
+  return strains;
+}
+
+// At the edges where sides meet that are pulled at differently, and at the corners: a node's force is that of
+// all of them.
+TEST(SurfaceStress, OfAnEvenStressIsExactAtEdgesAndCorners) {
+  for (const ElementType element :
+       {ElementType::tri3, ElementType::quad4, ElementType::tet4, ElementType::tet10, ElementType::hex8}) {
+    for (const Acts acts : {Acts::by_facets, Acts::by_simplices}) {
+      for (const int cells : {2, 3, 5}) {
+        const Model of = without_greens(turned_box(element, cells));
+        for (const Mat3& strain : even_strains(of.dimension()))
+          EXPECT_LT(error_of_even_stress(of, strain, acts), 1e-11)
+              << traits(element).name << ", " << cells << " cells, "
+              << (acts == Acts::by_facets ? "load" : "contact") << '\n'
+              << strain;
+      }
+    }
+  }
+}
+
+// Beside a side whose traction nobody knows.
+TEST(SurfaceStress, OfAnEvenStressIsExactAtTheEdgesOfWhatIsHeld) {
+  for (const unsigned held : {7U, 2U}) {
+    Model of = without_greens(box(ElementType::tet10, 3), [](const Vec3& x) { return x.y() < 1e-9; });
+    for (std::uint8_t& axes : of.fixed) axes = axes != 0 ? static_cast<std::uint8_t>(held) : std::uint8_t{0};
+    for (const Mat3& strain : even_strains(3))
+      EXPECT_LT(error_of_even_stress(of, strain, Acts::by_facets), 1e-11) << strain;
+  }
+}
+
+// Of a sheet one element thick all nodes of the rim are at edges, of a bar of one element all nodes are.
+TEST(SurfaceStress, OfAnEvenStressIsFoundOnThinBodies) {
+  for (const ElementType element : {ElementType::tet4, ElementType::hex8}) {
+    for (const std::array<int, 3>& cells : {std::array{4, 5, 1}, std::array{5, 1, 1}}) {
+      const BoxShape shape{.size = {1.3, 0.8, 0.2}, .cells = cells};
+      const Model of =
+          without_greens(element == ElementType::hex8 ? generate(shape, element)
+                                                      : with_elements(generate(shape), element, "box"));
+      const bool is_bar = cells[1] == 1;
+      const std::vector<Mat3> strains = even_strains(3);
+      for (std::size_t k = 0; k < strains.size(); ++k) {
+        // With no node inside any side shear cannot be told from pressure on the side beside.
+        if (is_bar && k > 1) continue;
+        EXPECT_LT(error_of_even_stress(of, strains[k], Acts::by_facets), is_bar ? 0.05 : 1e-11)
+            << traits(element).name << ' ' << cells[1] << '\n'
+            << strains[k];
+      }
+    }
+  }
+}
+
+// What presses on one side alone is that side's, also at its edge, whatever is round the corner.
+TEST(SurfaceStress, OfAPressureAtAnEdgeIsThatOfThePressedSide) {
+  const Model of = without_greens(box(ElementType::tet4, 4));
+  const Body body(of);
+  SurfaceStress surface(body);
+  const std::size_t S = body.surface_mesh_nodes().size();
+  std::vector<Vec3> u(S, Vec3::Zero()), force(S, Vec3::Zero());
+  std::vector<Stress> result(S);
+  std::size_t pressed = 0;
+  for (std::size_t k = 0; k < S; ++k) {
+    const Vec3& x = of.mesh.nodes[static_cast<std::size_t>(body.surface_mesh_nodes()[k])];
+    if ((x - Vec3(0.65, 0.8, 1.0)).norm() < 1e-9) pressed = k;  // in the middle of an edge of the top
+  }
+  force[pressed] = Vec3(0.0, 0.0, -1.0);
+  surface.evaluate(u, force, nullptr, result);
+  // Half of the node's facets, by area, are on the top, where all the force is; the mean is of both sides.
+  double top = 0.0, beside = 0.0;
+  const Surface facets = extract_surface(of.mesh);
+  for (Index f = 0; f < facets.count(); ++f) {
+    const auto nodes = facets.facet_nodes(f);
+    const Index node = body.surface_mesh_nodes()[pressed];
+    if (std::find(nodes.begin(), nodes.end(), node) == nodes.end()) continue;
+    const double area = facet_shape_integrals(facets.facet, positions(of.mesh, nodes), 1.0).sum();
+    (normal_of(of.mesh, nodes).z() > 0.5 ? top : beside) += area;
+  }
+  const double pressure = 1.0 / (top / 3.0);
+  EXPECT_NEAR(result[pressed][2], -pressure * top / (top + beside), 0.03 * pressure);
+}
+
 TEST(SurfaceStress, IsNotKnownWhereAllIsHeld) {
   const auto bottom = [](const Vec3& x) { return x.z() < 1e-9; };
   Model of = without_greens(box(ElementType::tet4, 3), bottom);
@@ -485,6 +628,63 @@ TEST(ElementStress, IsTheVolumeMean) {
     element_stress(of).apply(std::vector<Vec3>(u.size(), Vec3::Zero()), result);
     const Stress initial = stress_of(stress_of_strain(of.materials[0], analysis, Mat3::Zero()));
     ASSERT_LE((result[0] - initial).norm(), 1e-13);
+  }
+}
+
+// With an overlay at an edge of the body: on the patch as on the body's own elements.
+TEST(SurfaceStress, OfAnEvenStressIsExactAtTheEdgesOfARefinedSurface) {
+  for (const ElementType element : {ElementType::tri3, ElementType::tet4, ElementType::hex8}) {
+    for (const Acts acts : {Acts::by_facets, Acts::by_simplices}) {
+      if (acts == Acts::by_simplices && element == ElementType::hex8)
+        continue;  // see the last lines of the next
+      Model model = test::unit_model(element, 4, Scope::full, Precision::double_precision);
+      const int d = model.dimension();
+      for (const Mat3& strain : even_strains(d)) {
+        const Mat3 expected = stress_of_strain(model.materials[0], model.analysis, strain);
+        if (acts == Acts::by_facets) model.rest_force = forces_of(model, expected, acts);
+        const Body body(model, {}, 3);
+        const Index centre = body.nearest_surface_node(test::upright(d, 1.0, 1.0, 1.0)).node;
+        const auto patch = PatchMaker(body, 2).make({&centre, 1});
+        SurfaceStress surface(body);
+        const std::vector<Vec3> x = body.surface_in_mesh();
+        std::vector<Vec3> u, force(x.size(), Vec3::Zero());
+        for (const Vec3& at : x) u.push_back(strain * at);
+        if (acts == Acts::by_simplices) {
+          const auto corners = static_cast<std::size_t>(d);
+          for (std::size_t at = 0; at < body.simplices().size(); at += corners) {
+            const auto nodes = body.simplices().subspan(at, corners);
+            ElementNodes place(d, 3);
+            bool is_bottom = true;
+            for (std::size_t k = 0; k < corners; ++k) {
+              place.row(static_cast<Eigen::Index>(k)) = x[static_cast<std::size_t>(nodes[k])].transpose();
+              is_bottom = is_bottom && x[static_cast<std::size_t>(nodes[k])][d - 1] < 1e-9;
+            }
+            if (is_bottom) continue;
+            const Vec3 along = place.row(1) - place.row(0);
+            const Vec3 normal = d == 2 ? Vec3(along.y(), -along.x(), 0.0).normalized()
+                                       : Vec3(along.cross(Vec3(place.row(2) - place.row(0)))).normalized();
+            const ShapeValues shares = facet_shape_integrals(d == 3 ? ElementType::tri3 : ElementType::line2,
+                                                             place, model.thickness);
+            for (std::size_t k = 0; k < corners; ++k)
+              force[static_cast<std::size_t>(nodes[k])] +=
+                  shares[static_cast<Eigen::Index>(k)] * expected * normal;
+          }
+        }
+        std::vector<Stress> result(x.size());
+        surface.evaluate(u, force, patch.get(), result);
+        int at_edges = 0;
+        for (const Index node : patch->surface_nodes()) {
+          const auto k = static_cast<std::size_t>(node);
+          if (x[k][d - 1] < 0.25) continue;  // where the sides end at what is held
+          int on = 0;
+          for (int axis = 0; axis < d; ++axis) on += x[k][axis] > 1 - 1e-9 ? 1 : 0;
+          at_edges += on > 1 ? 1 : 0;
+          ASSERT_LE((result[k] - stress_of(expected)).norm(), 1e-11 * expected.norm())
+              << traits(element).name << ' ' << x[k].transpose() << ": " << result[k].transpose();
+        }
+        EXPECT_GE(at_edges, d == 2 ? 1 : 10);
+      }
+    }
   }
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -17,8 +18,12 @@
 #include "formats/recording.h"
 #include "meshes/error.h"
 #include "runtime/act.h"
+#include "runtime/devices/device_link.h"
+#include "runtime/fitting_tool.h"
 #include "runtime/loading.h"
 #include "runtime/mover.h"
+#include "runtime/overlay_rings.h"
+#include "runtime/patch_maker.h"
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/viewed_play.h"
 #include "tests/runtime_model.h"
@@ -56,7 +61,8 @@ class Viewed : public testing::Test {
 
   void start(const PlayOptions& options) {
     play_ = std::make_unique<ViewedPlay>(options, mover_,
-                                         load_and_print(options.file, "", options.settings.body()));
+                                         load_and_print(options.file, "", options.settings.body()),
+                                         ViewerPort(*options.view));
     thread_ = std::thread([this] { report_ = play_->run(stop_); });
   }
   LoopReport finish() {
@@ -174,6 +180,182 @@ TEST_F(Viewed, BeginsAnewWithOtherSettings) {
   EXPECT_TRUE(finish().interrupted);
 }
 
+/// A device that a hand holds: where it is said to be, each millisecond.
+class HeldPort : public DevicePort {
+ public:
+  explicit HeldPort(const std::atomic<double>& height) : height_(height) {}
+
+  void open() override {}
+  Heard read(DeviceState& state) noexcept override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    state.pose.position = Vec3(0.0, 0.0, height_);
+    state.arrived = std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+    ++sequence_;
+    state.sequence = sequence_;
+    return Heard::report;
+  }
+  bool write(const DeviceCommand&, const DeviceState&) noexcept override { return true; }
+  void close() noexcept override {}
+  [[nodiscard]] DeviceLimits limits() const override { return {}; }
+  [[nodiscard]] std::string refusals() const override { return ""; }
+  [[nodiscard]] std::string name() const override { return "held"; }
+
+ private:
+  const std::atomic<double>& height_;
+  std::uint32_t sequence_ = 0;
+};
+
+/// A run whose device has a hand in it. This machine may be busy: late ticks and reports are no faults here.
+class Held : public Viewed {
+ protected:
+  void start_held() {
+    auto link = std::make_unique<DeviceLink>(std::make_unique<HeldPort>(height_), DeviceLinkOptions{});
+    mover_.link = link.get();
+    mover_.device = std::move(link);
+    while (!mover_.link->has_reported()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    PlayOptions options = options_of(cube);
+    options.device.kind = DeviceChoice::Kind::bridge;
+    options.device.text = "bridge";
+    options.settings_text["safety"] = "late=10,most_late=1e9,stale_life=10,silence=5,silence_fade=4";
+    options.settings = read_settings(options.settings_text);
+    start(options);
+    ASSERT_TRUE(wait_for_ticks(50));
+  }
+  void TearDown() override {
+    Viewed::TearDown();
+    mover_.device.reset();  // before the height
+  }
+
+  std::atomic<double> height_ = 0.1;  // [m]
+};
+
+TEST_F(Held, NoPageChangesWhatProtectsAHand) {
+  start_held();
+  EXPECT_TRUE(play_->state().hand);
+  const auto refused = [](const std::function<void()>& wish) {
+    try {
+      wish();
+    } catch (const PageError& error) {
+      EXPECT_EQ(error.reason(), PageRefusal::hand);
+      EXPECT_FALSE(error.hint().empty());
+      return error.where();
+    }
+    return std::string();
+  };
+  for (const auto& [name, value] : {std::pair("safety", "max_force=1000"),
+                                    {"coupling", "1e9"},
+                                    {"coupling-torsion", "1e9"},
+                                    {"max-force", "1000"},
+                                    {"hand-over", "inf"}}) {
+    EXPECT_EQ(refused([&, n = name, v = value] {
+                play_->change({{n, v}, {"friction", "0.1"}});
+              }),
+              std::string("--") + name);
+    EXPECT_EQ(refused([&, n = name] { play_->change({{n, std::nullopt}}); }), std::string("--") + name);
+  }
+  EXPECT_EQ(refused([&] { play_->acknowledge(); }), "acknowledge");
+  ASSERT_TRUE(wait_for_ticks(50));
+  EXPECT_EQ(play_->state().settings.count("friction"), 0U) << "all of a change, or none";
+  play_->change({{"friction", "0.1"}, {"tool", "sphere:0.2"}, {"stiffness-scale", "2"}});
+  EXPECT_TRUE(wait_for([](const RunState& state) { return state.settings.contains("friction"); }));
+}
+
+TEST_F(Held, AFaultOutlivesWhatAPageBegins) {
+  start_held();
+  height_ = 0.5;  // nobody moves so fast
+  const auto is_latched = [](const RunState& state) {
+    return state.fault == Fault::too_fast && state.ticks > 20;
+  };
+  ASSERT_TRUE(wait_for(is_latched));
+  ASSERT_TRUE(wait_for_ticks(2000));  // so that it is seen that they begin anew
+  const std::int64_t before = play_->state().ticks;
+  play_->reset();
+  ASSERT_TRUE(wait_for([&](const RunState& state) { return state.ticks < before; }));
+  EXPECT_TRUE(wait_for(is_latched));
+  play_->change({{"friction", "0.1"}});
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.settings.contains("friction"); }));
+  EXPECT_TRUE(wait_for(is_latched));
+  play_->pause(true);
+  play_->pause(false);
+  ASSERT_TRUE(wait_for_ticks(100));
+  EXPECT_EQ(play_->state().fault, Fault::too_fast);
+  EXPECT_EQ(play_->state().phase, SafetyPhase::faulted);
+  play_->record(true);  // which would not be what a replay has
+  EXPECT_TRUE(wait_for([](const RunState& state) {
+    return state.refused && state.refused->find("acknowledge the fault first") != std::string::npos;
+  }));
+  EXPECT_TRUE(wait_for(is_latched));
+  EXPECT_FALSE(play_->state().recording);
+}
+
+TEST_F(Viewed, NobodyIsInAPointer) {
+  start(options_of(cube));
+  ASSERT_TRUE(wait_for_ticks(50));
+  EXPECT_FALSE(play_->state().hand);
+  play_->acknowledge();
+  play_->change({{"safety", "max_force=1"}, {"coupling", "100"}});
+  EXPECT_TRUE(wait_for([](const RunState& state) { return state.settings.contains("safety"); }));
+}
+
+TEST_F(Viewed, ABallSuitsTheBodyWhereNoToolIsGiven) {
+  PlayOptions options = options_of(cube);
+  options.settings_text.clear();
+  options.settings = read_settings({});
+  start(options);
+  ASSERT_TRUE(wait_for_ticks(50));
+  EXPECT_EQ(play_->state().settings.at("tool"), "sphere:0.17") << "a tenth of the diagonal, sqrt(3) m";
+  EXPECT_EQ(play_->state().defaults.at("radius"), 0.17);
+  EXPECT_EQ(play_->state().defaults.at("depth"), 0.05 * std::sqrt(3.0));
+  play_->change({{"tool", "point"}});
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.settings.at("tool") == "point"; }));
+  play_->change({{"tool", std::nullopt}});
+  EXPECT_TRUE(wait_for([](const RunState& state) { return state.settings.at("tool") == "sphere:0.17"; }));
+}
+
+TEST_F(Viewed, RefusesAToolThatIsLargerThanTheBody) {
+  start(options_of(cube));
+  const auto refused = [&](const char* tool) {
+    return where_it_is_refused([&] { play_->change({{"tool", tool}}); });
+  };
+  EXPECT_EQ(refused("sphere:0.87"), "--tool");
+  EXPECT_EQ(refused("capsule:0.1,1.54"), "--tool");
+  EXPECT_EQ(refused("sphere:0.86"), "");
+  EXPECT_EQ(refused("capsule:0.1,1.53"), "");
+}
+
+TEST(FittingTool, IsAsLargeAsTheSurfacesEdgesWithinBounds) {
+  const auto radius = [](int cells) {
+    return fitting_radius(
+        Body(test::unit_model(ElementType::hex8, cells, Scope::surface, Precision::double_precision)));
+  };
+  EXPECT_EQ(radius(2), 0.17) << "no more than a tenth of the diagonal";
+  // Edges of 1/8, and the diagonals of its squares, of which there are half as many.
+  EXPECT_NEAR(radius(8), (2.0 + std::sqrt(2.0)) / 3.0 / 8.0, 0.005);
+}
+
+/// A block of some layers, all nodes stored but those deeper than `layers` cells below its surface.
+class OverlayRings : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Layers, OverlayRings, testing::Values(0, 1, 2));
+
+TEST_P(OverlayRings, AreAsManyAsTheFileKeepsLayersFor) {
+  Model model = test::unit_model(2, 8, Scope::full, Precision::double_precision);
+  std::vector<Index> stored;
+  for (const Index node : model.stored_nodes) {
+    const Vec3& x = model.mesh.nodes[static_cast<std::size_t>(node)];
+    const double below = 8.0 * std::min({x.x(), 1.0 - x.x(), 1.0 - x.y()});
+    if (below <= GetParam() + 1e-9) stored.push_back(node);
+  }
+  model.stored_nodes = stored;  // which is all that counts here
+  model.greens = test::pack(test::random_definite(2 * std::ssize(stored), 3), Precision::double_precision);
+  const Body body(std::move(model));
+  const int rings = overlay_rings(body);
+  EXPECT_EQ(rings, GetParam());
+  if (rings > 0) {
+    EXPECT_GT(patch_room(body, rings, 1), 0);
+  }
+  EXPECT_THROW(static_cast<void>(patch_room(body, rings + 1, 1)), Error);
+}
+
 TEST_F(Viewed, RefusesAtOnceWhatCannotBe) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
@@ -244,6 +426,28 @@ TEST_F(Viewed, GoesOnWhereARecordingCannotBeMade) {
   EXPECT_EQ(where_it_is_refused([&] { play_->change({{"friction", "0.1"}}); }), "") << "it is not locked";
   std::filesystem::create_directory(folder_);  // for the report
   std::filesystem::current_path(folder_);
+}
+
+TEST_F(Viewed, TellsAtOnceOfARecordingThatFailsAndGoesOn) {
+  start(options_of(cube));
+  ASSERT_TRUE(wait_for_ticks(50));
+  play_->record(true);
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording && state.ticks > 0; }));
+  const std::filesystem::path file = *play_->state().recording;
+  EXPECT_FALSE(play_->state().recording_failed);
+  std::filesystem::remove_all(file.string() + ".parts");
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording_failed.has_value(); }));
+  EXPECT_EQ(play_->state().recording, file) << "the page says of which";
+  EXPECT_NE(play_->state().recording_failed->find("No such file"), std::string::npos);
+  EXPECT_TRUE(wait_for_ticks(50)) << "the loop goes on";
+  play_->record(false);
+  ASSERT_TRUE(wait_for([](const RunState& state) { return !state.recording && state.ticks > 0; }));
+  EXPECT_FALSE(play_->state().recording_failed);
+  EXPECT_TRUE(play_->state().refused);
+  play_->record(true);  // another one can be made
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording && state.ticks > 0; }));
+  finish();
+  EXPECT_TRUE(play_->recording_failed()) << "the exit status tells it";
 }
 
 TEST(RunState, IsJsonWhateverAFileIsCalled) {

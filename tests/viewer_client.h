@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 namespace palpate::test {
@@ -25,13 +26,30 @@ inline tcp::endpoint local(std::uint16_t port) {
   return {asio::ip::make_address("127.0.0.1"), port};
 }
 
+/// Where a viewer is, as its URL says.
+struct Served {
+  explicit Served(const std::string& url) {
+    const std::size_t colon = url.rfind(':');
+    port = static_cast<std::uint16_t>(std::stoi(url.substr(colon + 1)));
+    const std::size_t question = url.find('?');
+    if (question != std::string::npos) query = url.substr(question);
+  }
+  std::uint16_t port = 0;
+  std::string query;  ///< with the token
+};
+
 /// What makes a request one of a page that is served, or not.
 struct Asking {
   std::string target = "/socket";
-  std::string host{};    ///< else 127.0.0.1 with the port
-  std::string origin{};  ///< else none is sent
+  std::optional<std::string> query{};  ///< else that of the address
+  std::string host{};                  ///< else 127.0.0.1 with the port
+  std::string origin{};                ///< else none is sent
   std::string subprotocol = "palpate.1";
 };
+
+inline std::string target_of(const Served& served, const Asking& asking) {
+  return asking.target + asking.query.value_or(served.query);
+}
 
 inline std::string host_of(const Asking& asking, std::uint16_t port) {
   return asking.host.empty() ? "127.0.0.1:" + std::to_string(port) : asking.host;
@@ -39,13 +57,13 @@ inline std::string host_of(const Asking& asking, std::uint16_t port) {
 
 using Answer = http::response<http::string_body>;
 
-inline Answer ask(std::uint16_t port, const Asking& asking, http::verb method = http::verb::get,
+inline Answer ask(const Served& served, const Asking& asking, http::verb method = http::verb::get,
                   bool for_socket = false) {
   asio::io_context context;
   tcp::socket socket(context);
-  socket.connect(local(port));
-  http::request<http::empty_body> request(method, asking.target, 11);
-  request.set(http::field::host, host_of(asking, port));
+  socket.connect(local(served.port));
+  http::request<http::empty_body> request(method, target_of(served, asking), 11);
+  request.set(http::field::host, host_of(asking, served.port));
   if (!asking.origin.empty()) request.set(http::field::origin, asking.origin);
   if (for_socket) {
     request.set(http::field::connection, "upgrade");
@@ -79,8 +97,8 @@ class Client {
     }
   };
 
-  explicit Client(std::uint16_t port, const Asking& asking = {}) {
-    beast::get_lowest_layer(socket_).connect(local(port));
+  explicit Client(const Served& served, const Asking& asking = {}) {
+    beast::get_lowest_layer(socket_).connect(local(served.port));
     socket_.set_option(websocket::stream_base::decorator([&](websocket::request_type& request) {
       if (!asking.origin.empty()) request.set(http::field::origin, asking.origin);
       if (!asking.subprotocol.empty()) request.set(http::field::sec_websocket_protocol, asking.subprotocol);
@@ -88,9 +106,9 @@ class Client {
     socket_.read_message_max(64U << 20U);
     websocket::response_type response;
     beast::error_code refused;
-    socket_.handshake(response, host_of(asking, port), asking.target, refused);
+    socket_.handshake(response, host_of(asking, served.port), target_of(served, asking), refused);
     // Beast does not tell what a refusal said.
-    status = refused ? ask(port, asking, http::verb::get, true).result_int() : response.result_int();
+    status = refused ? ask(served, asking, http::verb::get, true).result_int() : response.result_int();
     const auto spoken = response[http::field::sec_websocket_protocol];
     subprotocol = {spoken.data(), spoken.size()};
   }

@@ -39,6 +39,7 @@ class Asked : public ViewedRun {
   void acknowledge() override { note("acknowledge"); }
   void change(const SettingsChange& settings) override {
     if (settings.contains("friction")) throw Error("friction is -1", "--friction", "give a positive one");
+    if (settings.contains("safety")) throw PageError(PageRefusal::hand, "a hand", "--safety", "no");
     note("change " + std::to_string(settings.size()));
   }
   void record(bool on) override { note(on ? "record" : "record no more"); }
@@ -73,14 +74,16 @@ constexpr const char* give_control = R"({"type":"control","take":false})";
 class Viewer : public testing::Test {
  protected:
   Asked run_;
-  std::unique_ptr<ViewerServer> server_ = std::make_unique<ViewerServer>(ViewerOptions{.port = 0}, run_);
+  std::unique_ptr<ViewerServer> server_ = serve({.port = 0});
   Body body_{test::unit_model(ElementType::tet4, 3, Scope::full, Precision::double_precision), {}, 2};
   std::shared_ptr<const Scene> scene_ = std::make_shared<const Scene>(make_scene(body_, 1));
 
-  [[nodiscard]] std::uint16_t port() const {
-    return static_cast<std::uint16_t>(std::stoi(server_->url().substr(server_->url().rfind(':') + 1)));
+  [[nodiscard]] std::unique_ptr<ViewerServer> serve(const ViewerOptions& options, bool is_replay = false) {
+    return std::make_unique<ViewerServer>(ViewerPort(options), run_, is_replay);
   }
-  [[nodiscard]] Client client() const { return Client(port()); }
+  [[nodiscard]] test::Served served() const { return test::Served(server_->url()); }
+  [[nodiscard]] std::uint16_t port() const { return served().port; }
+  [[nodiscard]] Client client(const Asking& asking = {}) const { return Client(served(), asking); }
 
   [[nodiscard]] SurfacePicture picture(std::int64_t tick) const {
     SurfacePicture picture;
@@ -103,8 +106,8 @@ bool is_controller(const Json& state) {
 }
 
 TEST_F(Viewer, ServesItsPageAndNothingElse) {
-  EXPECT_EQ(server_->url(), "http://127.0.0.1:" + std::to_string(port()) + "/");
-  const test::Answer page = test::ask(port(), {.target = "/"});
+  EXPECT_EQ(server_->url(), "http://127.0.0.1:" + std::to_string(port()) + "/" + served().query);
+  const test::Answer page = test::ask(served(), {.target = "/"});
   EXPECT_EQ(page.result_int(), 200U);
   EXPECT_EQ(page.body(), viewer_page());
   EXPECT_EQ(page[http::field::content_type], "text/html; charset=utf-8");
@@ -114,15 +117,15 @@ TEST_F(Viewer, ServesItsPageAndNothingElse) {
   EXPECT_EQ(page.count("Access-Control-Allow-Origin"), 0U);
   EXPECT_TRUE(page["Content-Security-Policy"].starts_with("default-src 'none';"));
 
-  const test::Answer header = test::ask(port(), {.target = "/"}, http::verb::head);
+  const test::Answer header = test::ask(served(), {.target = "/"}, http::verb::head);
   EXPECT_EQ(header.result_int(), 200U);
   EXPECT_TRUE(header.body().empty());
   EXPECT_EQ(header[http::field::content_length], std::to_string(viewer_page().size()));
 
   for (const char* target : {"/index.html", "/../etc/passwd", "/surface.stl", "/surface.vtu", "//"})
-    EXPECT_EQ(test::ask(port(), {.target = target}).result_int(), 404U) << target;
-  EXPECT_EQ(test::ask(port(), {.target = "/socket"}).result_int(), 404U);  // without an upgrade
-  const test::Answer post = test::ask(port(), {.target = "/"}, http::verb::post);
+    EXPECT_EQ(test::ask(served(), {.target = target}).result_int(), 404U) << target;
+  EXPECT_EQ(test::ask(served(), {.target = "/socket"}).result_int(), 404U);  // without an upgrade
+  const test::Answer post = test::ask(served(), {.target = "/"}, http::verb::post);
   EXPECT_EQ(post.result_int(), 405U);
   EXPECT_EQ(post[http::field::allow], "GET, HEAD");
 }
@@ -130,48 +133,52 @@ TEST_F(Viewer, ServesItsPageAndNothingElse) {
 TEST_F(Viewer, RefusesForeignHostsAndPages) {
   const std::string own = "127.0.0.1:" + std::to_string(port());
   const std::string foreign = "evil.example:" + std::to_string(port());
-  EXPECT_EQ(test::ask(port(), {.target = "/", .host = foreign}).result_int(), 403U);
-  EXPECT_EQ(test::ask(port(), {.target = "/", .host = "127.0.0.1"}).result_int(), 403U);
-  EXPECT_EQ(test::ask(port(), {.target = "/", .origin = "http://evil.example"}).result_int(), 403U);
-  EXPECT_EQ(Client(port(), {.host = foreign, .origin = "http://" + foreign}).status, 403U);
-  EXPECT_EQ(Client(port(), {.origin = "http://evil.example"}).status, 403U);
-  EXPECT_EQ(Client(port(), {.origin = "null"}).status, 403U);
-  EXPECT_EQ(Client(port(), {.origin = "http://" + own}).status, 101U);
+  EXPECT_EQ(test::ask(served(), {.target = "/", .host = foreign}).result_int(), 403U);
+  EXPECT_EQ(test::ask(served(), {.target = "/", .host = "127.0.0.1"}).result_int(), 403U);
+  EXPECT_EQ(test::ask(served(), {.target = "/", .origin = "http://evil.example"}).result_int(), 403U);
+  EXPECT_EQ(Client(served(), {.host = foreign, .origin = "http://" + foreign}).status, 403U);
+  EXPECT_EQ(Client(served(), {.origin = "http://evil.example"}).status, 403U);
+  EXPECT_EQ(Client(served(), {.origin = "null"}).status, 403U);
+  EXPECT_EQ(Client(served(), {.origin = "http://" + own}).status, 101U);
   const std::string name = "localhost:" + std::to_string(port());
-  EXPECT_EQ(Client(port(), {.host = name, .origin = "http://" + name}).status, 101U);
-  EXPECT_EQ(Client(port(), {.target = "/other"}).status, 404U);
-  EXPECT_EQ(Client(port(), {.subprotocol = "palpate.2"}).status, 400U);
-  EXPECT_EQ(Client(port(), {.subprotocol = "palpate.2, palpate.1"}).subprotocol, "palpate.1");
-  EXPECT_EQ(Client(port(), {.subprotocol = ""}).status, 101U);
+  EXPECT_EQ(Client(served(), {.host = name, .origin = "http://" + name}).status, 101U);
+  EXPECT_EQ(Client(served(), {.target = "/other"}).status, 404U);
+  EXPECT_EQ(Client(served(), {.subprotocol = "palpate.2"}).status, 400U);
+  EXPECT_EQ(Client(served(), {.subprotocol = "palpate.2, palpate.1"}).subprotocol, "palpate.1");
+  EXPECT_EQ(Client(served(), {.subprotocol = ""}).status, 101U);
 }
 
-TEST_F(Viewer, AsksForATokenWhereOthersReachIt) {
-  server_ = std::make_unique<ViewerServer>(ViewerOptions{.address = "0.0.0.0", .port = 0}, run_);
-  const std::string& url = server_->url();
-  ASSERT_EQ(url.substr(0, 17), "http://127.0.0.1:");
-  const std::size_t question = url.find("?token=");
-  ASSERT_NE(question, std::string::npos);
-  const auto served = static_cast<std::uint16_t>(std::stoi(url.substr(17)));
-  const std::string token = url.substr(question);
-  EXPECT_EQ(token.size(), 7U + 32U);
-  server_->show_scene(scene_);
-  server_->show_picture(picture(0));
-  for (const char* path : {"/", "/surface.stl", "/nothing"}) {
-    EXPECT_EQ(test::ask(served, {.target = path}).result_int(), 403U) << path;
-    EXPECT_EQ(test::ask(served, {.target = path + ("?token=" + std::string(32, '0'))}).result_int(), 403U);
+TEST_F(Viewer, AsksForATokenWhereverItIs) {
+  std::string before;
+  for (const char* address : {"127.0.0.1", "0.0.0.0"}) {
+    server_ = serve({.address = address, .port = 0});
+    const std::string& url = server_->url();
+    ASSERT_EQ(url.substr(0, 17), "http://127.0.0.1:");
+    const std::string token = served().query;
+    EXPECT_EQ(token.size(), 7U + 32U);
+    EXPECT_NE(token, before) << "it is another one each time";
+    before = token;
+    server_->show_scene(scene_);
+    server_->show_picture(picture(0));
+    Client page = client();
+    hear_frame(page, 0);
+    const std::string wrong = "?token=" + std::string(32, '0');
+    for (const char* path : {"/", "/surface.stl", "/surface.vtu", "/nothing", "/socket"}) {
+      for (const std::string& query : {std::string(), wrong, token + "0", token.substr(0, token.size() - 1)})
+        EXPECT_EQ(test::ask(served(), {.target = path, .query = query}).result_int(), 403U) << path << query;
+    }
+    for (const char* path : {"/", "/surface.stl", "/surface.vtu"})
+      EXPECT_EQ(test::ask(served(), {.target = path}).result_int(), 200U) << path;
+    for (const std::string& query : {std::string(), wrong}) EXPECT_EQ(client({.query = query}).status, 403U);
+    EXPECT_EQ(client().status, 101U);
   }
-  EXPECT_EQ(test::ask(served, {.target = "/" + token}).result_int(), 200U);
-  EXPECT_EQ(test::ask(served, {.target = "/surface.stl" + token}).result_int(), 200U);
-  EXPECT_EQ(Client(served).status, 403U);
-  EXPECT_EQ(Client(served, {.target = "/socket?token=" + std::string(32, '0')}).status, 403U);
-  EXPECT_EQ(Client(served, {.target = "/socket" + token}).status, 101U);
 }
 
 TEST_F(Viewer, SaysHelloThenStateSceneAndPicture) {
   server_->show_state(R"({"ticks":5})");
   server_->show_scene(scene_);
   server_->show_picture(picture(42));
-  hear_frame(*std::make_unique<Client>(port()), 42);  // all has arrived
+  hear_frame(*std::make_unique<Client>(served()), 42);  // all has arrived
   Client page = client();
   const Json hello = Json::parse(page.hear().bytes);
   EXPECT_EQ(hello.at("type"), "hello");
@@ -252,7 +259,9 @@ TEST_F(Viewer, OnlyTheControllerIsObeyed) {
   EXPECT_EQ(state.at("pointer"), false);
 
   second.say(step);
-  EXPECT_EQ(second.hear("error").at("about"), "step");
+  const Json refused = second.hear("error");
+  EXPECT_EQ(refused.at("about"), "step");
+  EXPECT_EQ(refused.at("reason"), "control");
   second.say(take_control);
   EXPECT_EQ(second.hear("error").at("about"), "control");
   for (const char* word :
@@ -308,8 +317,11 @@ TEST_F(Viewer, TellsThePageWhatCannotBe) {
   page.say(R"({"type":"change","settings":{"friction":"-1"}})");
   EXPECT_EQ(page.hear("error"), (Json{{"type", "error"},
                                       {"about", "change"},
+                                      {"reason", "value"},
                                       {"message", "--friction: friction is -1"},
                                       {"hint", "give a positive one"}}));
+  page.say(R"({"type":"change","settings":{"safety":"max_force=9"}})");
+  EXPECT_EQ(page.hear("error").at("reason"), "hand");
   page.say(step);
   run_.wait_for("step");
 }
@@ -470,7 +482,7 @@ TEST_F(SlowPages, AreClosedWhenTheyDoNotReadForTenSeconds) {
 }
 
 TEST_F(Viewer, ReplayKeepsTicksAndTimesForLaterPages) {
-  server_ = std::make_unique<ViewerServer>(ViewerOptions{.port = 0, .replay = true}, run_);
+  server_ = serve({.port = 0}, true);
   std::vector<TickNote> notes(5000);
   for (std::size_t k = 0; k < notes.size(); ++k) notes[k].number = 4 * static_cast<std::int64_t>(k);
   server_->show_state(R"({"frames":2,"times":[0,0.5]})");
@@ -489,23 +501,52 @@ TEST_F(Viewer, ReplayKeepsTicksAndTimesForLaterPages) {
   }
 }
 
-TEST_F(Viewer, ServesThirtyTwoAtMost) {
-  test::asio::io_context context;
-  std::vector<test::tcp::socket> sockets;
-  for (int k = 0; k < 32; ++k) {
-    sockets.emplace_back(context);
-    sockets.back().connect(test::local(port()));
-  }
-  EXPECT_THROW((void)test::ask(port(), {.target = "/"}), boost::system::system_error);
-  sockets.clear();
-  for (;;) {  // until it has noticed
-    try {
-      EXPECT_EQ(test::ask(port(), {.target = "/"}).result_int(), 200U);
-      break;
-    } catch (const boost::system::system_error&) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+/// Connections that say nothing, or nothing that is enough.
+class Held {
+ public:
+  Held(std::uint16_t port, int count, const std::string& said) {
+    for (int k = 0; k < count; ++k) {
+      sockets_.emplace_back(context_);
+      sockets_.back().connect(test::local(port));
+      test::asio::write(sockets_.back(), test::asio::buffer(said));
     }
   }
+
+ private:
+  test::asio::io_context context_;
+  std::vector<test::tcp::socket> sockets_;
+};
+
+TEST_F(Viewer, HeldConnectionsGiveWay) {
+  server_->show_state("{}");
+  Client before = client();
+  before.hear("state", is_controller);
+  const std::string request = "GET / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port()) + "\r\n";
+  for (const std::string& said : {std::string(), std::string("GET / HT"), request, request + "\r\n"}) {
+    const Held held(port(), 40, said);
+    EXPECT_EQ(test::ask(served(), {.target = "/"}).result_int(), 200U) << said;
+    Client page = client();
+    EXPECT_EQ(page.status, 101U) << said;
+    page.hear("state");
+  }
+  before.say(step);  // who is in stays in
+  run_.wait_for("step");
+}
+
+TEST_F(Viewer, PagesThatAreOpenAreNotCutForFurtherOnes) {
+  server_->show_state("{}");
+  std::vector<std::unique_ptr<Client>> pages;
+  for (int k = 0; k < 32; ++k) {
+    pages.push_back(std::make_unique<Client>(served()));
+    ASSERT_EQ(pages.back()->status, 101U) << k;
+  }
+  EXPECT_EQ(client().status, 503U);
+  EXPECT_EQ(test::ask(served(), {.target = "/"}).result_int(), 503U);
+  EXPECT_EQ(test::ask(served(), {.target = "/", .query = ""}).result_int(), 403U);
+  for (const auto& page : pages) EXPECT_EQ(page->hear("state").at("type"), "state");
+  pages.pop_back();
+  while (client().status != 101U)  // until it has noticed
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
 TEST_F(Viewer, SurfaceCanBeSaved) {
@@ -516,7 +557,7 @@ TEST_F(Viewer, SurfaceCanBeSaved) {
   server_->show_picture(std::move(seen));
   Client page = client();
   hear_frame(page, 8);
-  const test::Answer stl = test::ask(port(), {.target = "/surface.stl"});
+  const test::Answer stl = test::ask(served(), {.target = "/surface.stl"});
   EXPECT_EQ(stl.result_int(), 200U);
   EXPECT_EQ(stl[http::field::content_disposition], "attachment; filename=\"surface-tick-8.stl\"");
   test::Bytes bytes(stl.body().substr(80));
@@ -529,7 +570,7 @@ TEST_F(Viewer, SurfaceCanBeSaved) {
     volume += corners.determinant() / 6.0;
   }
   EXPECT_NEAR(volume, 2.0, 1e-6);
-  const test::Answer vtu = test::ask(port(), {.target = "/surface.vtu"});
+  const test::Answer vtu = test::ask(served(), {.target = "/surface.vtu"});
   EXPECT_EQ(vtu.result_int(), 200U);
   EXPECT_TRUE(vtu.body().starts_with("<?xml"));
 }
@@ -538,26 +579,26 @@ TEST_F(Viewer, PagesComeBackAfterARestartOnThePort) {
   server_->show_state("{}");
   Client page = client();
   page.hear("hello");
-  const std::uint16_t served = port();
+  const std::uint16_t taken = port();
   server_.reset();
   run_.wait_for("lose_pointer");
   (void)page.hear_end();
-  server_ = std::make_unique<ViewerServer>(ViewerOptions{.port = served}, run_);
-  EXPECT_EQ(port(), served);
+  server_ = serve({.port = taken});
+  EXPECT_EQ(port(), taken);
   Client again = client();
   EXPECT_EQ(again.hear("hello").at("id"), 1);
 }
 
 TEST_F(Viewer, SaysWhyItCannotListen) {
   try {
-    const ViewerServer second(ViewerOptions{.port = port()}, run_);
+    const ViewerPort second({.port = port()});
     FAIL() << "two have one port";
   } catch (const Error& error) {
     EXPECT_EQ(error.where(), "127.0.0.1:" + std::to_string(port()));
     EXPECT_FALSE(error.hint().empty());
   }
-  EXPECT_THROW(ViewerServer(ViewerOptions{.address = "elsewhere", .port = 0}, run_), Error);
-  EXPECT_THROW(ViewerServer(ViewerOptions{.address = "192.0.2.1", .port = 0}, run_), Error);
+  EXPECT_THROW(ViewerPort({.address = "elsewhere", .port = 0}), Error);
+  EXPECT_THROW(ViewerPort({.address = "192.0.2.1", .port = 0}), Error);
 }
 
 TEST_F(Viewer, RefusesAStateThatIsNone) {

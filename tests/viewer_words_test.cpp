@@ -128,8 +128,16 @@ TEST(RunWords, HelloAndErrors) {
       (Json{{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", "live"}, {"id", 7}}));
   EXPECT_EQ(Json::parse(hello_word("replay", 1)).at("mode"), "replay");
   EXPECT_EQ(Json::parse(error_word("change", Error("what", "where", "hint"))),
-            (Json{{"type", "error"}, {"about", "change"}, {"message", "where: what"}, {"hint", "hint"}}));
-  EXPECT_EQ(Json::parse(error_word("change", "a file \xff", "")).at("message"), "a file \xef\xbf\xbd");
+            (Json{{"type", "error"},
+                  {"about", "change"},
+                  {"reason", "value"},
+                  {"message", "where: what"},
+                  {"hint", "hint"}}));
+  EXPECT_EQ(
+      Json::parse(error_word("change", PageError(PageRefusal::hand, "what", "where", "hint"))).at("reason"),
+      "hand");
+  EXPECT_EQ(Json::parse(error_word("change", PageRefusal::value, "a file \xff", "")).at("message"),
+            "a file \xef\xbf\xbd");
 }
 
 TEST(RunWords, StateIsTheRunsAndThePages) {
@@ -178,12 +186,6 @@ TEST(Admission, OriginIsThePageServed) {
 }
 
 TEST(Admission, TokensAndAddresses) {
-  EXPECT_TRUE(is_loopback("127.0.0.1"));
-  EXPECT_TRUE(is_loopback("127.8.0.1"));
-  EXPECT_TRUE(is_loopback("::1"));
-  EXPECT_FALSE(is_loopback("0.0.0.0"));
-  EXPECT_FALSE(is_loopback("::"));
-  EXPECT_FALSE(is_loopback("192.168.1.5"));
   const std::string token = random_token();
   EXPECT_EQ(token.size(), 32U);
   EXPECT_NE(token, random_token());

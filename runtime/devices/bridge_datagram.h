@@ -4,7 +4,7 @@
 //     state, device to runtime, 128 bytes        command, runtime to device, 160 bytes
 //     byte type  what                             byte type  what
 //       0  4 u8  "PLPS"                             0  4 u8  "PLPC"
-//       4  u16   version, 1                         4  u16   version, 1
+//       4  u16   version, 2                         4  u16   version, 2
 //       6  u16   size, 128                          6  u16   size, 160
 //       8  u64   nonce; 0: hello                    8  u64   nonce
 //      16  u32   sequence                          16  u32   sequence
@@ -20,9 +20,11 @@
 //     108  f32   largest stiffness [N/m]          128  u16   time to live [ms]
 //     112  f32   largest damping [N s/m]          130  u16   then to no force in [ms]
 //     116  f32   radius of the workspace [m]      132  f32   largest force [N]
-//     120  8 u8  0                                136  24 u8 0
+//     120  8 u8  seal                             136  16 u8 0
+//                                                  152  8 u8  seal
 //
-// A limit of 0 is not said.
+// A limit of 0 is not said. The seal is that of bridge_key.h; the encoders leave it 0, the decoders don't
+// look at it.
 #pragma once
 
 #include <array>
@@ -37,7 +39,7 @@ namespace palpate {
 
 constexpr std::size_t bridge_state_bytes = 128;
 constexpr std::size_t bridge_command_bytes = 160;
-constexpr std::uint16_t bridge_version = 1;
+constexpr std::uint16_t bridge_version = 2;
 
 /// Why a datagram is not taken. The first six are said by the decoders, the others by who listens.
 enum class Refusal : std::uint8_t {
@@ -54,10 +56,11 @@ enum class Refusal : std::uint8_t {
   order = 10,       ///< its number is not ahead of the last one's
   time = 11,        ///< its time stands still or goes back
   age = 12,         ///< it was too long on its way
+  seal = 13,        ///< from somebody without the key: it is not answered
 };
 
 /// The refusals and their names, for reports.
-inline constexpr std::array<std::pair<Refusal, const char*>, 13> refusal_names = {{
+inline constexpr std::array<std::pair<Refusal, const char*>, 14> refusal_names = {{
     {Refusal::none, "none"},
     {Refusal::size, "size"},
     {Refusal::magic, "magic"},
@@ -71,6 +74,7 @@ inline constexpr std::array<std::pair<Refusal, const char*>, 13> refusal_names =
     {Refusal::order, "order"},
     {Refusal::time, "time"},
     {Refusal::age, "age"},
+    {Refusal::seal, "seal"},
 }};
 
 /// What a bridge says.

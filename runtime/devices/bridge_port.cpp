@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -14,12 +15,12 @@
 #include <ctime>
 #include <limits>
 #include <optional>
-#include <random>
 #include <utility>
 
 #include "meshes/error.h"
 #include "runtime/devices/monotonic_clock.h"
 #include "runtime/devices/plausible.h"
+#include "runtime/random_bytes.h"
 
 namespace palpate {
 namespace {
@@ -29,13 +30,9 @@ constexpr int most_at_once = 1024;              // datagrams that a read takes: 
 constexpr int farewells = 3;                    // a datagram may be lost
 constexpr std::int64_t second = 1'000'000'000;  // ns
 
+/// Not 0, and no later one is.
 std::uint64_t draw_nonce() {
-  std::random_device random;
-  std::uint64_t nonce = 0;
-  while (nonce == 0) {
-    nonce = static_cast<std::uint64_t>(random()) << 32U | random();
-  }
-  return nonce;
+  return (std::bit_cast<std::uint64_t>(random_bytes<sizeof(std::uint64_t)>()) >> 1U) + 1;
 }
 
 std::uint16_t milliseconds(double time) noexcept {
@@ -109,7 +106,8 @@ BridgeAddress parse_bridge_address(std::string_view text) {
   return result;
 }
 
-BridgePort::BridgePort(BridgeOptions options) : options_(std::move(options)), nonce_(draw_nonce()) {
+BridgePort::BridgePort(BridgeOptions options)
+    : options_(std::move(options)), key_(random_bytes<std::tuple_size_v<BridgeKey>>()), nonce_(draw_nonce()) {
   for (std::atomic<double>& limit : limits_) {
     limit = std::numeric_limits<double>::infinity();
   }
@@ -117,6 +115,7 @@ BridgePort::BridgePort(BridgeOptions options) : options_(std::move(options)), no
 
 BridgePort::~BridgePort() {
   close();
+  if (!key_file_.empty()) unlink(key_file_.c_str());
 }
 
 void BridgePort::open() {
@@ -139,6 +138,14 @@ void BridgePort::open() {
                 way_out(error));
   }
   port_ = ntohs(here.sin_port);
+  try {
+    const std::filesystem::path file = bridge_key_file(port_);
+    write_bridge_key(file, key_);
+    if (file != key_file_) key_file_ = file;
+  } catch (...) {
+    close();
+    throw;
+  }
 }
 
 DevicePort::Heard BridgePort::read(DeviceState& state) noexcept {
@@ -177,6 +184,7 @@ Refusal BridgePort::take(std::span<const std::uint8_t> datagram, Peer from, std:
   if (const Refusal refusal = decode_bridge_state(datagram, said); refusal != Refusal::none) return refusal;
   const Peer partner = partner_;
   if (partner != 0 && from != partner) return Refusal::address;
+  if (!is_sealed(key_, datagram)) return Refusal::seal;
   if (said.nonce != nonce_) {
     send(no_force(), from);
     return said.nonce == 0 ? Refusal::hello : Refusal::wrong_nonce;
@@ -214,6 +222,7 @@ void BridgePort::close() noexcept {
 }
 
 void BridgePort::forget_partner() noexcept {
+  if (partner_ != 0) ++nonce_;
   partner_ = 0;
   order_.reset();
 }
@@ -231,7 +240,8 @@ BridgeCommand BridgePort::no_force() const noexcept {
 bool BridgePort::send(BridgeCommand command, Peer to) noexcept {
   command.sequence = ++sequence_;
   command.time = static_cast<std::uint64_t>(monotonic_now());
-  const auto datagram = encode_bridge_command(command);
+  auto datagram = encode_bridge_command(command);
+  seal(key_, datagram);
   const sockaddr_in address = as_socket_address(to);
   const ssize_t sent = sendto(socket_, datagram.data(), datagram.size(), MSG_DONTWAIT,
                               reinterpret_cast<const sockaddr*>(&address), sizeof address);
@@ -265,6 +275,7 @@ std::string BridgePort::refusals() const {
     // A bridge that has to be told the nonce is no trouble.
     if (refusal == Refusal::none || refusal == Refusal::hello || all[refusal] == 0) continue;
     text += (text.empty() ? "" : ", ") + std::to_string(all[refusal]) + " datagrams by " + name;
+    if (refusal == Refusal::seal) text += " (the key is in " + key_file_.string() + ")";
   }
   return text;
 }

@@ -1,13 +1,15 @@
-// Another process as a device, by datagrams over loopback.
+// Another process of the same user as a device, by datagrams over loopback.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
 #include "runtime/devices/bridge_datagram.h"
+#include "runtime/devices/bridge_key.h"
 #include "runtime/devices/bridge_order.h"
 #include "runtime/devices/device_port.h"
 #include "runtime/devices/stale_solution.h"
@@ -40,9 +42,11 @@ struct BridgeCounts {
   }
 };
 
-/// A session is a nonce that the port draws. A bridge that does not say it is told it by a command without
-/// force. Who says it first is the partner, and all others are refused until the partner was silent for
-/// `most_silence`; then it is lost, and the next one may come.
+/// All datagrams are sealed with a key that the port draws and keeps in a file of this user's; what is not is
+/// neither answered nor taken. A session is a nonce that the port draws. A bridge that does not say it is
+/// told it by a command without force. Who says it first is the partner, and all others are refused until the
+/// partner was silent for `most_silence`; then it is lost, the nonce is another one, so that nothing said
+/// before counts, and the next bridge may come, or the same one again.
 class BridgePort final : public DevicePort {
  public:
   static constexpr double most_silence = 1.0;  ///< [s]
@@ -52,7 +56,8 @@ class BridgePort final : public DevicePort {
   BridgePort(const BridgePort&) = delete;
   BridgePort& operator=(const BridgePort&) = delete;
 
-  /// Takes the address; waits for nobody. Throws Error where the address is not this machine's or is taken.
+  /// Takes the address and writes the key; waits for nobody. Throws Error where the address is not this
+  /// machine's or is taken, or there is no place for the key.
   void open() override;
 
   /// Lost: the partner was silent for too long, or it says that its device has a fault. Nothing, and not
@@ -83,6 +88,8 @@ class BridgePort final : public DevicePort {
 
   /// While it is open.
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
+  /// Where its key stands, which is gone with the port. Once it was open.
+  [[nodiscard]] const std::filesystem::path& key_file() const noexcept { return key_file_; }
 
  private:
   using Peer = std::uint64_t;  // address and port in one word, that both threads see it whole; 0: none
@@ -97,15 +104,17 @@ class BridgePort final : public DevicePort {
   bool send(BridgeCommand command, Peer to) noexcept;  // numbers it and sets its time
 
   BridgeOptions options_;
-  std::uint64_t nonce_;
+  BridgeKey key_;
   int socket_ = -1;
   std::uint16_t port_ = 0;
+  std::filesystem::path key_file_;
 
   // Of the thread that reads.
   BridgeOrder order_;
   std::int64_t heard_ = 0;  // when something was taken [ns]
 
   // Of both threads and of who asks.
+  std::atomic<std::uint64_t> nonce_;
   std::atomic<Peer> partner_ = 0;
   std::atomic<std::uint32_t> sequence_ = 0;  // of commands
   std::array<std::atomic<double>, 5> limits_;

@@ -13,6 +13,7 @@
 #include <iterator>
 
 #include "meshes/error.h"
+#include "meshes/printable.h"
 
 namespace palpate {
 namespace {
@@ -73,8 +74,8 @@ std::string usage_text(HidUsage usage) {
 }  // namespace
 
 std::string AttachedDevice::name() const {
-  return fmt::format("{:04X}:{:04X}{}{} ({})", vendor, product, product_name.empty() ? "" : " ", product_name,
-                     path);
+  return fmt::format("{:04X}:{:04X}{}{} ({})", vendor, product, product_name.empty() ? "" : " ",
+                     printable(product_name), path);
 }
 
 std::vector<AttachedDevice> attached_devices(const std::filesystem::path& sys) {

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "meshes/error.h"
+#include "meshes/printable.h"
 #include "runtime/devices/monotonic_clock.h"
 
 namespace palpate {
@@ -137,7 +138,7 @@ void HidPort::close() noexcept {
 }
 
 std::string HidPort::name() const {
-  return choice_.profile.name + ", " + choice_.device.name();
+  return printable(choice_.profile.name) + ", " + choice_.device.name();
 }
 
 std::string HidPort::refusals() const {

@@ -104,6 +104,11 @@ void Safety::take(const DeviceState& device, const DeviceCommand& wanted, const 
 
 void Safety::look_for_faults() noexcept {
   if (speed_limit_.failed()) fail(Fault::too_fast);
+  if (!felt_ && (silence_.silent() || deadline_.failed())) {
+    begin_anew();
+    deadline_.reset();
+    return;
+  }
   if (silence_.silent()) fail(Fault::device_silent);
   if (silence_.frozen()) fail(Fault::device_frozen);
   if (deadline_.failed()) fail(Fault::deadline_missed);
@@ -132,6 +137,7 @@ DeviceCommand Safety::pass(const TickTiming& timing, double elapsed) noexcept {
   if (gate_.open()) scaled = passivity_.control(share_ * field, silence_.share() * device_.velocity);
   shown_ = force_rate_.follow(clamped(scaled, options_.max_force), time);
   passivity_.show(shown_);
+  felt_ = felt_ || !shown_.isZero(0.0);
 
   DeviceCommand command;
   command.wrench.force = shown_;
@@ -185,6 +191,7 @@ void Safety::restart() noexcept {
   shown_.setZero();
   share_ = 0.0;
   started_ = false;
+  felt_ = false;
 }
 
 void Safety::fail(Fault fault) noexcept {

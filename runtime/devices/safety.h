@@ -53,7 +53,9 @@ struct TickTiming {
 ///   1. no force after shut_down or while a fault is latched
 ///   2. what was said: a report that is new and of plausible numbers, else the last one stands; a command
 ///      of plausible numbers, else the last one stands and ages
-///   3. faults: speed, silence, frozen numbers, deadline, buzz; the first is latched, and there is no force
+///   3. faults: speed, silence, frozen numbers, deadline, buzz; the first is latched, and there is no force.
+///   As
+///      long as nothing has been felt since the start, silence and late ticks begin the start anew instead
 ///   4. the local stiffness is limited; the solution is a field about its point, which fades when it is too
 ///      old or too far
 ///   5. the gate: no force begins in the body or in contact; then the ramp from zero. A solution that faded
@@ -111,6 +113,7 @@ class Safety {
   Fault fault_ = Fault::none;
   bool shut_down_ = false;
   bool started_ = false;
+  bool felt_ = false;  // some force since the start
   std::int64_t last_now_ = 0;
   double share_ = 0.0;
 

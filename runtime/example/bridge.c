@@ -2,8 +2,11 @@
  * loopback. As it stands the device is a simulated hand, a mass that a spring and a damper draw to a target.
  * For yours replace the four device_ functions by calls of your SDK, and where it calls you a thousand times
  * a second, let it call bridge_cycle: README, "Your device behind a bridge". Build: cc bridge.c -lm -o bridge
- * Usage: bridge [--address 127.0.0.1] [--port 4270] [--rate 1000 Hz] [--seconds 10] [--from X,Y,Z m]
- *               [--to X,Y,Z m] [--period 0 s]: the target goes there and back once a period; 0: it stays. */
+ * Usage: bridge [--address 127.0.0.1] [--port 4270] [--key FILE] [--rate 1000 Hz] [--seconds 10]
+ *               [--from X,Y,Z m] [--to X,Y,Z m] [--period 0 s]
+ * The target goes from `from` to `to` and back once a period (0: it stays). Without --to it goes straight
+ * down until the hand feels 0.5 N, at most to the workspace's end, and up again. The runtime writes the key
+ * into a file of its user's, where we find it ourselves if we are the same user's, on the same machine. */
 #define _POSIX_C_SOURCE 200809L
 #include <arpa/inet.h>
 #include <errno.h>
@@ -25,7 +28,20 @@ static double seconds_now(void) {
 /* --- the device; yours goes here --- */
 
 static double from[3] = {0.0, 0.0, 0.0}, to[3] = {0.0, 0.0, 0.0}, period = 0.0;
-static struct { double x[3], v[3], force[3], start, last; } hand;
+static int has_to = 0;
+static struct {
+  double x[3], v[3], force[3], start, last, down;
+  int rises;
+} hand;
+static const float limits[5] = {8.0f, 0.0f, 2000.0f, 20.0f, 0.15f};
+
+/* How far below `from` the target is that looks for a body [m]. */
+static double probing_depth(double dt) {
+  const double speed = 0.04, enough = 0.5, most = (double)limits[4]; /* m/s, N, m */
+  if (hand.down >= most || hand.force[2] >= enough) hand.rises = 1;
+  if (hand.down <= 0.0) hand.rises = 0;
+  return hand.down = fmin(fmax(hand.down + (hand.rises ? -speed : speed) * dt, 0.0), most);
+}
 
 /* Not 0: there is none. */
 static int device_open(void) {
@@ -38,11 +54,13 @@ static void device_read(struct bridge_reading* reading) {
   const double mass = 0.15, damper = 8.0, spring = 300.0; /* kg, N s/m, N/m: a relaxed hand */
   const double now = seconds_now(), dt = fmin(now - hand.last, 0.005);
   const double way = period > 0.0 ? 0.5 - 0.5 * cos(2.0 * acos(-1.0) * (now - hand.start) / period) : 0.0;
-  *reading = (struct bridge_reading){.orientation = {1.0f, 0.0f, 0.0f, 0.0f},
-                                     .limits = {8.0f, 0.0f, 2000.0f, 20.0f, 0.15f},
-                                     .flags = BRIDGE_IN_USE};
+  const double target[3] = {has_to ? from[0] + way * (to[0] - from[0]) : from[0],
+                            has_to ? from[1] + way * (to[1] - from[1]) : from[1],
+                            has_to ? from[2] + way * (to[2] - from[2]) : from[2] - probing_depth(dt)};
+  *reading = (struct bridge_reading){.orientation = {1.0f, 0.0f, 0.0f, 0.0f}, .flags = BRIDGE_IN_USE};
+  memcpy(reading->limits, limits, sizeof limits);
   for (int k = 0; k < 3; ++k) {
-    const double pull = spring * (from[k] + way * (to[k] - from[k]) - hand.x[k]) - damper * hand.v[k];
+    const double pull = spring * (target[k] - hand.x[k]) - damper * hand.v[k];
     hand.v[k] += dt * (pull + hand.force[k]) / mass;
     hand.x[k] += dt * hand.v[k];
     reading->x[k] = hand.x[k];
@@ -62,6 +80,31 @@ static void device_close(void) {
 }
 
 /* --- the bridge --- */
+
+/* palpate/bridge-PORT.key in the first of these folders that is set, as the runtime has it; not 0: not there.
+ */
+static int read_key(const char* file, unsigned port, uint8_t key[BRIDGE_KEY_BYTES]) {
+  const char *runtime = getenv("XDG_RUNTIME_DIR"), *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
+  const char* folder = runtime != NULL && *runtime == '/' ? runtime
+                       : state != NULL && *state == '/'   ? state
+                                                          : home;
+  char found[4096];
+  if (file == NULL) {
+    snprintf(found, sizeof found, "%s%s/palpate/bridge-%u.key", folder != NULL ? folder : "",
+             folder == home ? "/.local/state" : "", port);
+    file = found;
+  }
+  FILE* stream = fopen(file, "r");
+  if (stream == NULL) return -1;
+  unsigned byte = 0;
+  int bad = 0;
+  for (int k = 0; k < BRIDGE_KEY_BYTES; ++k) {
+    bad |= fscanf(stream, "%2x", &byte) != 1;
+    key[k] = (uint8_t)byte;
+  }
+  fclose(stream);
+  return bad;
+}
 
 static int wire;
 static struct bridge_session session;
@@ -97,6 +140,7 @@ static void stop(int number) {
 int main(int argc, char** argv) {
   struct sockaddr_in runtime = {.sin_family = AF_INET, .sin_port = htons(4270)};
   double rate = 1000.0, seconds = 10.0;
+  const char* key_file = NULL;
   int bad = argc % 2 == 0 || inet_pton(AF_INET, "127.0.0.1", &runtime.sin_addr) != 1;
   for (int k = 1; k + 1 < argc; k += 2) {
     const char *option = argv[k], *value = argv[k + 1];
@@ -105,10 +149,13 @@ int main(int argc, char** argv) {
                      : strcmp(option, "--seconds") == 0 ? &seconds
                      : strcmp(option, "--period") == 0  ? &period
                                                         : NULL;
+    has_to |= place == to;
     if (place != NULL)
       bad |= sscanf(value, "%lf,%lf,%lf", &place[0], &place[1], &place[2]) != 3;
     else if (number != NULL)
       *number = atof(value);
+    else if (strcmp(option, "--key") == 0)
+      key_file = value;
     else if (strcmp(option, "--address") == 0)
       bad |= inet_pton(AF_INET, value, &runtime.sin_addr) != 1;
     else if (strcmp(option, "--port") == 0)
@@ -125,11 +172,16 @@ int main(int argc, char** argv) {
   signal(SIGTERM, stop);
 
   const double start = seconds_now();
-  double now = start, due = start, said = start, largest = 0.0, late = 0.0, latest = 0.0;
+  double now = start, due = start, said = start, asked = 0.0, largest = 0.0, late = 0.0, latest = 0.0;
   unsigned long cycles = 0;
   while (!stopped && now - start < seconds) {
     struct bridge_reading reading;
     double force[3];
+    if (now - fmax(arrived, asked) >
+        0.2) { /* nobody speaks to us: perhaps a runtime with another key has begun */
+      read_key(key_file, ntohs(runtime.sin_port), session.key);
+      asked = now;
+    }
     bridge_cycle(&reading, force);
     largest = fmax(largest, sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]));
     ++cycles;
@@ -147,6 +199,13 @@ int main(int argc, char** argv) {
     fflush(stdout);
   }
   device_close();
+  if (commands == 0)
+    printf(
+        "no runtime answered: is one there (palpate-runtime play MODEL --device bridge), of the same user, "
+        "on port %u?\n",
+        (unsigned)ntohs(runtime.sin_port));
+  else if (!(largest > 0.0))
+    printf("no force was ever felt: the tool did not touch the body, or the runtime holds a fault\n");
   printf("rate %.1f Hz, largest force %.3f N, late by %.1f us (mean), %.1f us (most), %lu commands\n",
          (double)cycles / (now - start), largest, 1e6 * late / (double)cycles, 1e6 * latest, commands);
   return close(wire);

@@ -5,8 +5,9 @@
 #include <string.h>
 
 #include "bridge_force.h"
+#include "bridge_seal.h"
 
-enum { BRIDGE_VERSION = 1, BRIDGE_STATE_BYTES = 128, BRIDGE_COMMAND_BYTES = 160 };
+enum { BRIDGE_VERSION = 2, BRIDGE_STATE_BYTES = 128, BRIDGE_COMMAND_BYTES = 160 };
 enum { BRIDGE_IN_USE = 1 << 16, BRIDGE_DEVICE_FAULT = 1 << 17 };
 
 /* What a device says: x right, y from the user, z up. */
@@ -18,8 +19,9 @@ struct bridge_reading {
   uint32_t flags;  /* bits 0-15 buttons (0 grabs), BRIDGE_IN_USE, BRIDGE_DEVICE_FAULT */
 };
 
-/* Which session we are in: all 0 to begin with. */
+/* Which session we are in: all 0 to begin with, but for the key. */
 struct bridge_session {
+  uint8_t key[BRIDGE_KEY_BYTES]; /* that the runtime has written for us */
   uint64_t nonce;
   uint32_t said, heard; /* numbers of the last state and of the last command */
 };
@@ -79,14 +81,17 @@ static inline void bridge_encode_state(uint8_t at[BRIDGE_STATE_BYTES], const str
   for (int k = 0; k < 4; ++k) bridge_put_float(at + 80 + 4 * k, reading->orientation[k]);
   bridge_put_float(at + 96, reading->gripper);
   for (int k = 0; k < 5; ++k) bridge_put_float(at + 100 + 4 * k, reading->limits[k]);
+  bridge_seal(session->key, at, BRIDGE_STATE_BYTES);
 }
 
-/* Fills `command` with one of our session that is ahead of the last one; otherwise returns 0. A command
- * without force of another session is that of a runtime that has just begun: we join it. */
+/* Fills `command` with one of our session that is ahead of the last one, and from the runtime that wrote our
+ * key; otherwise returns 0. A command without force of another session is that of a runtime that has just
+ * begun, or has given us up: we join it. */
 static inline int bridge_decode_command(const uint8_t* at, long size, struct bridge_session* session,
                                         struct bridge_command* command) {
   if (size != BRIDGE_COMMAND_BYTES || memcmp(at, "PLPC", 4) != 0 || bridge_get(at + 4, 2) != BRIDGE_VERSION ||
-      bridge_get(at + 6, 2) != BRIDGE_COMMAND_BYTES)
+      bridge_get(at + 6, 2) != BRIDGE_COMMAND_BYTES ||
+      !bridge_is_sealed(session->key, at, BRIDGE_COMMAND_BYTES))
     return 0;
   const uint64_t nonce = bridge_get(at + 8, 8);
   const uint32_t number = (uint32_t)bridge_get(at + 16, 4), mode = (uint32_t)bridge_get(at + 32, 4);

@@ -1,5 +1,5 @@
-/* Palpate in somebody else's loop: lowers a sphere of 5 mm onto the body, presses it 3 mm deep and drags it
- * along x, a thousand times a second for two seconds. Usage: own_loop NAME.palpate.hdf */
+/* Palpate in somebody else's loop: lowers a sphere of 5 mm onto the body, presses it 3 mm deep and rubs it to
+ * and fro along x by 3 mm, a thousand times a second for two seconds. Usage: own_loop NAME.palpate.hdf */
 #define _POSIX_C_SOURCE 200809L
 #include <palpate.h>
 #include <stdio.h>
@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
 
   palpate_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}, 0}; /* yours comes from the device */
   place_above(session, tool.radius, pose.position);
-  double pressed = 0.0;
+  double pressed = 0.0, rubbed = 0.0, stride = 0.00002; /* 20 mm/s */
   struct timespec due;
   clock_gettime(CLOCK_MONOTONIC, &due);
   for (int tick = 1; tick <= 2000; ++tick) {
@@ -58,7 +58,11 @@ int main(int argc, char** argv) {
     if (tick % 200 == 0) print(tick, &pose, &felt, status);
 
     if (pressed < 0.003) pose.position[2] -= 0.00005;
-    if (pressed >= 0.003) pose.position[0] += 0.00002;
+    if (pressed >= 0.003) {
+      pose.position[0] += stride;
+      rubbed += stride;
+      if (rubbed > 0.003 || rubbed < 0.0) stride = -stride;
+    }
     if (felt.contacts > 0) pressed += 0.00005;
   }
   palpate_destroy(session);

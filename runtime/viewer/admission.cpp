@@ -2,14 +2,10 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
-#include <sys/random.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <system_error>
 
-#include "meshes/error.h"
+#include "runtime/random_bytes.h"
 
 namespace palpate {
 namespace {
@@ -35,13 +31,6 @@ std::string lower_case(std::string_view text) {
 
 }  // namespace
 
-bool is_loopback(const std::string& address) {
-  in_addr v4{};
-  if (inet_pton(AF_INET, address.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
-  in6_addr v6{};
-  return inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6) != 0;
-}
-
 bool is_any_address(const std::string& address) {
   return address == "0.0.0.0" || address == "::";
 }
@@ -66,13 +55,8 @@ bool is_own_page(std::string_view origin, std::string_view host) {
 }
 
 std::string random_token() {
-  std::array<std::uint8_t, 16> bits{};
-  if (getrandom(bits.data(), bits.size(), 0) != static_cast<ssize_t>(bits.size())) {
-    throw Error("no random numbers: " + std::system_category().message(errno), "getrandom",
-                "serve the viewer on 127.0.0.1, which needs none");
-  }
   std::string token;
-  for (const std::uint8_t byte : bits) token += fmt::format("{:02x}", byte);
+  for (const std::uint8_t byte : random_bytes<16>()) token += fmt::format("{:02x}", byte);
   return token;
 }
 

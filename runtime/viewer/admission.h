@@ -7,8 +7,6 @@
 
 namespace palpate {
 
-/// Whether only this machine reaches an IP address. `address` is one.
-bool is_loopback(const std::string& address);
 bool is_any_address(const std::string& address);  ///< 0.0.0.0 or ::
 /// As in a URL: IPv6 in brackets.
 std::string url_host(const std::string& address);

@@ -90,7 +90,7 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
     response.set(http::field::allow, "GET, HEAD");
     return response;
   }
-  if (!served.token.empty() && !is_same_token(target_of(request).token, served.token))
+  if (!is_same_token(target_of(request).token, served.token))
     return guarded(
         plain(http::status::forbidden, "Open the whole address that the runtime printed, with its token."));
   if (wants_socket(request)) {
@@ -99,6 +99,11 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
       return guarded(plain(http::status::bad_request, "The socket speaks palpate.1 only."));
   }
   return std::nullopt;
+}
+
+Response full_house() {
+  return guarded(plain(http::status::service_unavailable,
+                       "Too many pages are open: close one, then load this one anew."));
 }
 
 Response answer(const Request& request, const std::optional<ShownPicture>& shown) {

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <boost/beast/http.hpp>
-#include <cstdint>
 #include <optional>
 #include <string>
 
 #include "runtime/viewer/show.h"
+#include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
 
@@ -16,15 +16,11 @@ using Response = boost::beast::http::response<boost::beast::http::string_body>;
 /// Of the WebSocket.
 inline constexpr const char* subprotocol = "palpate.1";
 
-/// Where a viewer is.
-struct ServedAddress {
-  std::string address;
-  std::uint16_t port = 0;
-  std::string token;  ///< empty: none is asked for
-};
-
 /// Why a request is not answered at all: its host, page, method, token or subprotocol.
 std::optional<Response> refusal(const Request& request, const ServedAddress& served);
+
+/// What is said to a request that may be answered, but there are too many of them.
+Response full_house();
 
 /// Whether it wants to go on as a WebSocket.
 bool wants_socket(const Request& request);

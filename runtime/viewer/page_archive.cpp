@@ -51,6 +51,10 @@ std::string PageArchive::page(std::string_view page) const {
   const std::string data = "<script type=\"application/octet-stream\" id=\"palpate-session\">" +
                            base64(deflated(messages_)) + "</script>\n";
   std::string whole(page);
+  constexpr std::string_view head = "<head>";
+  if (const std::size_t at = whole.find(head); at != std::string::npos)
+    whole.insert(at + head.size(),
+                 "\n<meta name=\"generator\" content=\"palpate-runtime " PALPATE_VERSION "\">");
   const std::size_t end = whole.rfind("</body>");
   whole.insert(end == std::string::npos ? whole.size() : end, data);
   return whole;

@@ -46,8 +46,11 @@ void PageConnection::start() {
 void PageConnection::answer_request() {
   const Request& request = parser_->get();
   if (std::optional<Response> refused = refusal(request, server_.served())) {
-    respond(std::move(*refused));
-  } else if (wants_socket(request)) {
+    return respond(std::move(*refused));
+  }
+  if (!server_.has_room()) return respond(full_house());
+  is_admitted_ = true;
+  if (wants_socket(request)) {
     open_socket();
   } else {
     respond(answer(request, server_.show().picture()));

@@ -33,6 +33,8 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   void show();
   /// A text that it must not miss.
   void say(std::string text);
+  /// It has shown the token, and there is room for it.
+  [[nodiscard]] bool is_admitted() const noexcept { return is_admitted_; }
   /// It does not read.
   [[nodiscard]] bool is_stalled() const;
 
@@ -55,6 +57,7 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   std::optional<Response> response_;
   std::optional<boost::beast::http::response<boost::beast::http::empty_body>> header_;
 
+  bool is_admitted_ = false;
   bool is_open_ = false;
   std::deque<std::string> said_;
   std::size_t said_bytes_ = 0;

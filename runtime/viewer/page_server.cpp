@@ -1,15 +1,14 @@
 #include "runtime/viewer/page_server.h"
 
-#include <fmt/format.h>
 #include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <variant>
 
 #include "meshes/error.h"
-#include "runtime/viewer/admission.h"
 #include "runtime/viewer/page_connection.h"
 #include "runtime/viewer/run_words.h"
 
@@ -20,7 +19,8 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::size_t most_connections = 32;
+constexpr std::ptrdiff_t most_strangers = 32;  // connections that have not shown the token
+constexpr std::ptrdiff_t most_admitted = 32;   // and that have
 constexpr auto tick_period = std::chrono::milliseconds(500);
 constexpr int niceness = 5;
 
@@ -38,16 +38,20 @@ struct Ask {
   void operator()(const SeekWord& word) const { run.seek(word.frame); }
 };
 
-std::string seen_from_here(const std::string& address) {
-  if (!is_any_address(address)) return url_host(address);
-  return address == "::" ? "[::1]" : "127.0.0.1";
+tcp protocol_of(const std::string& address) {
+  return asio::ip::make_address(address).is_v6() ? tcp::v6() : tcp::v4();
 }
 
 }  // namespace
 
-PageServer::PageServer(const ViewerOptions& options, ViewedRun& run)
-    : run_(run), is_replay_(options.replay), acceptor_(context_), timer_(context_), retry_(context_) {
-  listen(options);
+PageServer::PageServer(ViewerPort port, ViewedRun& run, bool is_replay)
+    : run_(run),
+      is_replay_(is_replay),
+      served_(port.served()),
+      url_(port.url()),
+      acceptor_(context_, protocol_of(served_.address), port.release()),
+      timer_(context_),
+      retry_(context_) {
   accept();
   tick();
   thread_ = std::thread([this] { work(); });
@@ -58,31 +62,6 @@ PageServer::~PageServer() {
   thread_.join();
 }
 
-void PageServer::listen(const ViewerOptions& options) {
-  error_code problem;
-  const asio::ip::address address = asio::ip::make_address(options.address, problem);
-  if (problem) {
-    throw Error("'" + options.address + "' is not an IP address", "viewer",
-                "give one of this machine, such as 127.0.0.1, or 0.0.0.0 for all of them");
-  }
-  const tcp::endpoint wanted(address, options.port);
-  acceptor_.open(wanted.protocol(), problem);
-  if (!problem) acceptor_.set_option(asio::socket_base::reuse_address(true), problem);
-  if (!problem) acceptor_.bind(wanted, problem);
-  if (!problem) acceptor_.listen(asio::socket_base::max_listen_connections, problem);
-  if (problem) {
-    throw Error(
-        "cannot listen: " + problem.message(), fmt::format("{}:{}", url_host(options.address), options.port),
-        problem == asio::error::address_in_use ? "choose another port, or end the program that has it"
-                                               : "choose an address of this machine and another port");
-  }
-  served_ = {.address = options.address,
-             .port = acceptor_.local_endpoint().port(),
-             .token = is_loopback(options.address) ? "" : random_token()};
-  url_ = fmt::format("http://{}:{}/{}{}", seen_from_here(served_.address), served_.port,
-                     served_.token.empty() ? "" : "?token=", served_.token);
-}
-
 void PageServer::accept() {
   acceptor_.async_accept([this](const error_code& problem, tcp::socket socket) {
     if (!acceptor_.is_open()) return;
@@ -91,13 +70,25 @@ void PageServer::accept() {
       retry_.async_wait([this](const error_code&) { accept(); });
       return;
     }
-    if (connections_.size() < most_connections) {
-      const auto page = std::make_shared<PageConnection>(std::move(socket), *this);
-      connections_.insert(page);
-      page->start();
-    }
+    make_room();
+    connections_.push_back(std::make_shared<PageConnection>(std::move(socket), *this));
+    connections_.back()->start();
     accept();
   });
+}
+
+/// Else strangers that hold connections would keep all others out.
+void PageServer::make_room() {
+  const auto is_stranger = [](const auto& page) { return !page->is_admitted(); };
+  if (std::count_if(connections_.begin(), connections_.end(), is_stranger) < most_strangers) return;
+  const std::shared_ptr<PageConnection> oldest =
+      *std::find_if(connections_.begin(), connections_.end(), is_stranger);
+  cut(*oldest);
+}
+
+bool PageServer::has_room() const {
+  return std::count_if(connections_.begin(), connections_.end(),
+                       [](const auto& page) { return page->is_admitted(); }) < most_admitted;
 }
 
 void PageServer::tick() {
@@ -170,7 +161,7 @@ void PageServer::leave(PageConnection& page) {
       show_state_anew();
     }
   }
-  connections_.erase(page.shared_from_this());
+  std::erase(connections_, page.shared_from_this());
 }
 
 void PageServer::release() {
@@ -186,7 +177,8 @@ void PageServer::hand_over(PageConnection& page, bool take) {
     controller_ = &page;
     show_state_anew();
   } else if (controller_ != &page) {
-    page.say(error_word("control", "another page has control", "ask for it when that page has given it up"));
+    page.say(error_word("control", PageRefusal::control, "another page has control",
+                        "ask for it when that page has given it up"));
   }
 }
 
@@ -194,7 +186,7 @@ void PageServer::obey(PageConnection& page, const PageWord& word) {
   if (const auto* control = std::get_if<ControlWord>(&word)) return hand_over(page, control->take);
   const char* name = name_of(word);
   if (controller_ != &page) {
-    page.say(error_word(name, "this page only watches",
+    page.say(error_word(name, PageRefusal::control, "this page only watches",
                         controller_ == nullptr ? "take control first" : "another page has control"));
     return;
   }
@@ -203,7 +195,7 @@ void PageServer::obey(PageConnection& page, const PageWord& word) {
   } catch (const Error& error) {
     page.say(error_word(name, error));
   } catch (const std::exception& error) {  // no memory, say: the run goes on
-    page.say(error_word(name, error.what(), ""));
+    page.say(error_word(name, PageRefusal::value, error.what(), ""));
   }
 }
 

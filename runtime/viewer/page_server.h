@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "runtime/viewer/http_answers.h"
 #include "runtime/viewer/mailbox.h"
@@ -22,11 +23,15 @@ namespace palpate {
 
 class PageConnection;
 
-/// Listens, knows all connections and which page controls, and takes what is posted to the pages.
+/// Accepts connections, knows all of them and which page controls, and takes what is posted to the pages.
+///
+/// Connections that have not shown the token are few, and give way: when there is no room for another one,
+/// the oldest of them is cut. So nobody without the token keeps out who has it, and all who have it are this
+/// user's: they are told when there are too many of them.
 class PageServer {
  public:
   /// As ViewerServer.
-  PageServer(const ViewerOptions& options, ViewedRun& run);
+  PageServer(ViewerPort port, ViewedRun& run, bool is_replay);
   ~PageServer();  ///< closes all connections
   PageServer(const PageServer&) = delete;
   PageServer& operator=(const PageServer&) = delete;
@@ -46,6 +51,8 @@ class PageServer {
   [[nodiscard]] PageRole role(const PageConnection& page) const {
     return {controller_ == &page, controller_ != nullptr, open_.size()};
   }
+  /// Whether another connection that has shown the token may be answered.
+  [[nodiscard]] bool has_room() const;
   /// It is a socket now: the only one of all has control.
   void join(PageConnection& page);
   /// It is gone, and its control with it.
@@ -54,8 +61,8 @@ class PageServer {
   void obey(PageConnection& page, const PageWord& word);
 
  private:
-  void listen(const ViewerOptions& options);
   void accept();
+  void make_room();
   void tick();
   void work();
   void stop();
@@ -75,8 +82,8 @@ class PageServer {
   boost::asio::steady_timer timer_;
   boost::asio::steady_timer retry_;
   Show show_;
-  std::set<std::shared_ptr<PageConnection>> connections_;
-  std::set<PageConnection*> open_;  // those that are sockets
+  std::vector<std::shared_ptr<PageConnection>> connections_;  // as they came
+  std::set<PageConnection*> open_;                            // those that are sockets
   PageConnection* controller_ = nullptr;
   std::uint64_t joined_ = 0;
   Mailbox mailbox_;

@@ -5,7 +5,9 @@
 #include <string_view>
 
 #include "meshes/element_type.h"
+#include "runtime/fitting_tool.h"
 #include "runtime/monitor.h"
+#include "runtime/overlay_rings.h"
 
 namespace palpate {
 namespace {
@@ -46,11 +48,13 @@ nlohmann::json to_json(const RunState& state) {
           {"settings", state.settings},
           {"device", state.device},
           {"pointer", state.pointer},
+          {"hand", state.hand},
           {"rate", state.rate},
           {"ticks", state.ticks},
           {"misses", state.misses},
           {"paused", state.paused},
           {"recording", text_or_null(state.recording)},
+          {"recording_failed", text_or_null(state.recording_failed)},
           {"busy", text_or_null(state.busy)},
           {"refused", text_or_null(state.refused)},
           {"locked", text_or_null(state.locked)},
@@ -71,16 +75,19 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
           {"size", body.bounds().diagonal().norm()},
           {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
           {"moves", model.dynamics.method != DynamicsMethod::none},
-          {"loads", has_loads(model)}};
+          {"loads", has_loads(model)},
+          {"overlay_rings", overlay_rings(body)}};
 }
 
 nlohmann::json describe_defaults(const Body& body) {
-  const double size = body.bounds().diagonal().norm();
-  const double radius = std::clamp(body.mean_surface_edge(), 0.03 * size, 0.1 * size);
-  return {{"radius", radius},
+  constexpr double share = 0.05;           // of the body's diagonal
+  constexpr double share_of_least = 0.25;  // of its least extent
+  const Vec3 extent = body.bounds().diagonal();
+  const double least = extent.head(body.dimension()).minCoeff();
+  return {{"radius", fitting_radius(body)},
           {"reach", body.longest_surface_edge()},
           {"friction", body.surface_friction().front()},
-          {"depth", 0.05 * size}};
+          {"depth", std::min(share * extent.norm(), share_of_least * least)}};
 }
 
 }  // namespace palpate

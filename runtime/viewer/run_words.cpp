@@ -20,13 +20,20 @@ std::string hello_word(const char* mode, std::uint64_t page) {
       {{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", mode}, {"id", page}});
 }
 
-std::string error_word(const std::string& about, const std::string& message, const std::string& hint) {
-  return json_text({{"type", "error"}, {"about", about}, {"message", message}, {"hint", hint}});
+std::string error_word(const std::string& about, PageRefusal reason, const std::string& message,
+                       const std::string& hint) {
+  return json_text({{"type", "error"},
+                    {"about", about},
+                    {"reason", page_refusal_names[static_cast<std::size_t>(reason)].second},
+                    {"message", message},
+                    {"hint", hint}});
 }
 
 std::string error_word(const std::string& about, const Error& error) {
   const std::string where = error.where().empty() ? "" : error.where() + ": ";
-  return error_word(about, where + error.what(), error.hint());
+  const auto* typed = dynamic_cast<const PageError*>(&error);
+  return error_word(about, typed != nullptr ? typed->reason() : PageRefusal::value, where + error.what(),
+                    error.hint());
 }
 
 StateWord::StateWord(const std::string& json) : members_(Json::parse(json, nullptr, false)) {

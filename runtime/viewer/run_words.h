@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "meshes/error.h"
+#include "runtime/viewer/viewed_run.h"
 
 namespace palpate {
 
@@ -23,7 +23,9 @@ std::string json_text(const nlohmann::json& value);
 std::string hello_word(const char* mode, std::uint64_t page);
 
 /// `about`: the word of the page that could not be.
-std::string error_word(const std::string& about, const std::string& message, const std::string& hint);
+std::string error_word(const std::string& about, PageRefusal reason, const std::string& message,
+                       const std::string& hint);
+/// The same of an Error, with its kind where it is a PageError.
 std::string error_word(const std::string& about, const Error& error);
 
 /// Ticks a second where a run does not say.

@@ -90,9 +90,7 @@ std::string surface_vtu(const SurfacePicture& picture, const Scene& scene, const
   }
   const std::array<NodalField, 3> fields = {
       {{"displacement", 3, displacement}, {"von_mises", 1, von_mises}, {"contact_pressure", 1, pressure}}};
-  std::ostringstream stream;
-  write_vtu(stream, positions, element, cells, fields);
-  return std::move(stream).str();
+  return vtu_text(positions, element, cells, fields);
 }
 
 }  // namespace palpate

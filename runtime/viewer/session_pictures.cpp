@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include "meshes/error.h"
+#include "runtime/session_check.h"
 #include "runtime/settings.h"
 #include "runtime/viewer/run_state.h"
 
@@ -42,26 +42,26 @@ TickNote note_of(const TickRecord& tick, std::int64_t rate) {
 
 }  // namespace
 
-SessionPictures::SessionPictures(std::filesystem::path path)
-    : path_(std::move(path)), recording_(read_recording(path_)) {
-  if (frames() == 0 || recording_.frames.surface.nodes.empty()) {
-    throw Error("has no pictures of the surface", path_.string(),
+SessionPictures::SessionPictures(const std::filesystem::path& path) : file_(path) {
+  check_session(recording(), path);
+  if (frames() == 0 || recording().frames.surface.nodes.empty()) {
+    throw Error("has no pictures of the surface", path.string(),
                 "record it again without --record-frames 0; palpate-runtime session tells what is in it");
   }
 }
 
 /// The tick with this number, or the last one before it; null where there is none.
 const TickRecord* SessionPictures::tick(std::int64_t number) const {
-  const std::int64_t rate = recording_.info.rate;
+  const std::int64_t rate = recording().info.rate;
   const auto after =
-      std::upper_bound(recording_.ticks.begin(), recording_.ticks.end(), number,
+      std::upper_bound(recording().ticks.begin(), recording().ticks.end(), number,
                        [&](std::int64_t wanted, const TickRecord& t) { return wanted < number_of(t, rate); });
-  return after == recording_.ticks.begin() ? nullptr : &*std::prev(after);
+  return after == recording().ticks.begin() ? nullptr : &*std::prev(after);
 }
 
 SurfacePicture SessionPictures::picture(std::int64_t frame) const {
   SurfacePicture picture;
-  picture.frame = read_frame(path_, frame);
+  picture.frame = file_.frame(frame);
   if (const TickRecord* then = tick(picture.frame.tick)) {
     picture.device = {.orientation = quaternion_of(then->device_orientation),
                       .position = vector_of(then->device_position),
@@ -77,15 +77,15 @@ SurfacePicture SessionPictures::picture(std::int64_t frame) const {
 
 nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
   using nlohmann::json;
-  const RecordedSurface& surface = recording_.frames.surface;
+  const RecordedSurface& surface = recording().frames.surface;
   Eigen::AlignedBox3d bounds;
   for (const Vec3& node : surface.nodes) bounds.extend(node);
   const auto point = [](const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); };
-  std::string name = std::filesystem::path(recording_.info.model_path).filename().string();
+  std::string name = std::filesystem::path(recording().info.model_path).filename().string();
   if (const std::size_t suffix = name.find(".palpate.hdf"); suffix != std::string::npos) name.resize(suffix);
   RunState state;
   state.model = {{"name", name},
-                 {"file", recording_.info.model_path},
+                 {"file", recording().info.model_path},
                  {"dimension", surface.corners},
                  {"nodes", nullptr},
                  {"surface_nodes", surface.nodes.size()},
@@ -97,11 +97,11 @@ nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
                  {"moves", false},
                  {"loads", false}};
   state.defaults = {{"radius", 0.0}, {"reach", 0.0}, {"friction", 0.0}, {"depth", 0.0}};
-  state.device = recording_.info.device;
-  state.rate = recording_.info.rate;
-  state.ticks = std::ssize(recording_.ticks);
+  state.device = recording().info.device;
+  state.rate = recording().info.rate;
+  state.ticks = std::ssize(recording().ticks);
   state.locked = "this is a recording";
-  state.settings = split_settings(recording_.info.options);
+  state.settings = split_settings(recording().info.options);
   json told = to_json(state);
   told.update({{"frames", times.size()},
                {"frame", 0},
@@ -111,11 +111,11 @@ nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
 }
 
 std::vector<TickRun> SessionPictures::ticks() const {
-  const std::int64_t rate = recording_.info.rate;
-  const std::int64_t stride = (std::ssize(recording_.ticks) + most_samples - 1) / most_samples;
+  const std::int64_t rate = recording().info.rate;
+  const std::int64_t stride = (std::ssize(recording().ticks) + most_samples - 1) / most_samples;
   std::vector<TickRun> runs;
-  for (std::size_t k = 0; k < recording_.ticks.size(); k += static_cast<std::size_t>(stride)) {
-    const TickNote note = note_of(recording_.ticks[k], rate);
+  for (std::size_t k = 0; k < recording().ticks.size(); k += static_cast<std::size_t>(stride)) {
+    const TickNote note = note_of(recording().ticks[k], rate);
     if (runs.empty() || note.number != runs.back().notes.back().number + stride)
       runs.push_back({.notes = {}, .stride = stride});
     runs.back().notes.push_back(note);

@@ -22,15 +22,15 @@ struct TickRun {
 /// The pictures, plots and words of a recording. Needs no model.
 class SessionPictures {
  public:
-  /// Reads all but the displacements. Throws Error when it is no recording or has no frames.
-  explicit SessionPictures(std::filesystem::path path);
+  /// Reads all except the frames' values. Throws Error when it is no recording or has no frames.
+  explicit SessionPictures(const std::filesystem::path& path);
 
-  [[nodiscard]] Scene scene() const { return make_scene(recording_.frames.surface, 1); }
-  [[nodiscard]] std::int64_t frames() const noexcept { return std::ssize(recording_.frames.tick); }
+  [[nodiscard]] Scene scene() const { return make_scene(recording().frames.surface, 1); }
+  [[nodiscard]] std::int64_t frames() const noexcept { return std::ssize(recording().frames.tick); }
   /// Of all frames [s].
-  [[nodiscard]] const std::vector<double>& times() const noexcept { return recording_.frames.time; }
+  [[nodiscard]] const std::vector<double>& times() const noexcept { return recording().frames.time; }
   [[nodiscard]] double time(std::int64_t frame) const {  ///< [s]
-    return recording_.frames.time[static_cast<std::size_t>(frame)];
+    return recording().frames.time[static_cast<std::size_t>(frame)];
   }
   /// Of frame 0 .. frames() - 1, with the tool as it was in its tick. Throws Error when it cannot be read.
   [[nodiscard]] SurfacePicture picture(std::int64_t frame) const;
@@ -43,8 +43,9 @@ class SessionPictures {
  private:
   [[nodiscard]] const TickRecord* tick(std::int64_t number) const;
 
-  std::filesystem::path path_;
-  Recording recording_;
+  [[nodiscard]] const Recording& recording() const noexcept { return file_.recording(); }
+
+  RecordingFile file_;
 };
 
 }  // namespace palpate

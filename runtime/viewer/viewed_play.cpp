@@ -3,15 +3,21 @@
 #include <fmt/chrono.h>
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <ctime>
-#include <fstream>
+#include <string_view>
 #include <thread>
 #include <utility>
 
 #include "meshes/error.h"
+#include "meshes/regular_file.h"
+#include "runtime/fitting_tool.h"
 #include "runtime/loading.h"
 #include "runtime/output.h"
+#include "runtime/overlay_rings.h"
+#include "runtime/session_xdmf.h"
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/scene.h"
 
@@ -19,6 +25,10 @@ namespace palpate {
 namespace {
 
 constexpr auto state_period = std::chrono::milliseconds(500);
+/// Settings that decide how strong and how sudden the force on a hand may be.
+constexpr std::array<std::string_view, 5> settings_of_the_hand = {"safety", "coupling", "coupling-torsion",
+                                                                  "max-force", "hand-over"};
+
 constexpr auto pause_for_wishes = std::chrono::milliseconds(20);
 
 /// FILE-STEM-YYYYmmdd-HHMMSS.h5 in the working directory; with a number where that is there already.
@@ -34,53 +44,60 @@ std::filesystem::path name_recording(const std::filesystem::path& model) {
 
 /// What can be seen of a file that is gone before the body that came of it goes too.
 void expect_file(const std::filesystem::path& file) {
-  if (std::ifstream(file)) return;
-  throw Error("cannot be read any more", file.string(), "put it back, or start palpate-runtime play anew");
+  check_regular_file(file, "put it back, or start palpate-runtime play anew");
 }
 
 std::string sentence(const std::exception& error) {
   const auto* known = dynamic_cast<const Error*>(&error);
   if (known == nullptr) return error.what();
-  return known->where() + ": " + known->what() + " (" + known->hint() + ")";
+  return in_one_line(*known);
 }
 
 }  // namespace
 
-ViewedPlay::ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body)
+ViewedPlay::ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body, ViewerPort port)
     : options_(std::move(options)),
       mover_(mover),
       body_(std::move(body)),
       body_options_(options_.settings.body()),
       can_move_(body_->model().dynamics.method != DynamicsMethod::none),
+      most_rings_(overlay_rings(*body_)),
+      size_(body_->bounds().diagonal().norm()),
+      port_(std::move(port)),
       wished_{.text = options_.settings_text, .settings = options_.settings, .record = options_.record} {
   if (options_.device.kind == DeviceChoice::Kind::mouse) add_mouse(mover_, options_, *body_);
   state_.device = options_.device.text;
   state_.pointer = mover_.mouse != nullptr;
+  state_.hand = has_hand();
   state_.rate = options_.settings.rate;
   if (options_.session) state_.locked = "a replay is as its session was";
 }
 
 LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
-  ViewerServer server(*options_.view, *this);
+  ViewerServer server(std::move(port_), *this);
   server_ = &server;
-  fmt::print(stderr, "open {} in a browser\n", server.url());
   show_body();
   const std::jthread teller([this](const std::stop_token& over) { tell_states(over); });
 
   std::optional<Plan> good;  // that could be met
   for (;;) {
     const Plan plan = next_plan();
+    std::unique_ptr<Act> act;
+    LoopReport report;
     try {
-      const std::unique_ptr<Act> act = begin_act(plan);
+      act = begin_act(plan);
+      if (!good) fmt::print(stderr, "open {} in a browser\n", server.url());
       good = plan;
-      LoopReport report = run_act(*act, stop);
-      const bool over = options_.duration && report.ticks >= mover_.ticks;
-      if (stop || over || !wait_for_wish(stop)) {
-        act->tell();
-        return report;
-      }
+      report = run_act(*act, stop);
+      if (has_hand()) latched_ = act->fault();
     } catch (const std::exception& error) {
       if (!good || !take_back(plan, *good, sentence(error))) throw;
+      continue;
+    }
+    const bool over = options_.duration && report.ticks >= mover_.ticks;
+    if (stop || over || !wait_for_wish(stop)) {
+      act->tell();
+      return report;
     }
   }
 }
@@ -94,22 +111,39 @@ ViewedPlay::Plan ViewedPlay::next_plan() {
 
 /// The state that pages see is that of the new act from here on.
 std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
+  if (latched_ != Fault::none && !plan.record.empty()) {
+    throw Error("there is no force until the fault is acknowledged, and a recording begins without one",
+                "record", "acknowledge the fault first");
+  }
   load(plan.settings);
   PlayOptions options = options_;
   options.settings_text = plan.text;
-  options.settings = settle(plan.settings, mover_, *body_);
+  options.settings = plan.settings;
+  settle_tool(options, *body_);
+  options.settings = settle(options.settings, mover_, *body_);
   options.record = plan.record;
+  if (!plan.record.empty() && plan.record != options_.record) {  // which was looked at before
+    OutputPaths paths(false);
+    add_recording(paths, plan.record, "record");
+  }
   print_device(mover_, options.settings);
   if (options.settings.overlay) begin_making("the overlay is being made");
+  const SettingsText settled = options.settings_text;
+  {
+    const std::lock_guard lock(mutex_);
+    state_.recording_failed.reset();
+  }
   auto act = std::make_unique<Act>(
       std::move(options), *body_, mover_,
       ActViewer{
           .control = &control_,
           .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
           .pictures =
-              [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); }});
+              [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); },
+          .recording_failed = [this](const std::string& reason) { take_recording_failure(reason); }});
+  act->latch(latched_);
   const std::lock_guard lock(mutex_);
-  state_.settings = plan.text;
+  state_.settings = settled;
   state_.busy.reset();
   state_.ticks = 0;
   state_.misses = 0;
@@ -157,15 +191,14 @@ void ViewedPlay::show_body() {
 }
 
 LoopReport ViewedPlay::run_act(Act& act, const std::atomic<bool>& stop) {
-  try {
-    return act.run(stop);
-  } catch (const Error& error) {  // of the recording: the run goes on without it
-    if (stop || options_.duration) throw;
-    const std::lock_guard lock(mutex_);
-    wished_.record.clear();
-    refuse(sentence(error));
-    return {};
-  }
+  const LoopReport& report = act.run(stop);
+  if (!act.recording_failure()) return report;
+  recording_failed_ = true;
+  if (stop) return report;
+  const std::lock_guard lock(mutex_);  // the next one is without it
+  wished_.record.clear();
+  refuse("the recording failed: " + *act.recording_failure());
+  return report;
 }
 
 /// A script or a session is over: what it left is shown. False when it is to stop.
@@ -212,18 +245,24 @@ void ViewedPlay::step_once() {
 }
 
 void ViewedPlay::acknowledge() {
+  if (has_hand()) {
+    throw PageError(PageRefusal::hand, "a hand is in the device, and no page may give it force again",
+                    "acknowledge",
+                    "who holds it presses Enter where palpate-runtime was started, or sends it SIGUSR1");
+  }
   control_.acknowledged = true;
 }
 
 void ViewedPlay::reset() {
   const std::lock_guard lock(mutex_);
   if (wished_.record.empty()) return end_act();
-  throw Error("a recording is being made, which begins with the untouched body", "reset",
-              "end the recording first");
+  throw PageError(PageRefusal::locked, "a recording is being made, which begins with the untouched body",
+                  "reset", "end the recording first");
 }
 
 void ViewedPlay::change(const SettingsChange& settings) {
   const std::lock_guard lock(mutex_);
+  refuse_to_hand(settings);
   refuse_while_locked();
   Plan plan = wished_;
   for (const auto& [name, value] : settings) {
@@ -247,7 +286,9 @@ void ViewedPlay::change(const SettingsChange& settings) {
 void ViewedPlay::record(bool on) {
   const std::lock_guard lock(mutex_);
   if (on == !wished_.record.empty()) return;
-  if (options_.session) throw Error("a replay is recorded already", "record", "copy the session's file");
+  if (options_.session) {
+    throw PageError(PageRefusal::locked, "a replay is recorded already", "record", "copy the session's file");
+  }
   wished_.record = on ? name_recording(options_.file) : std::filesystem::path();
   end_act();
 }
@@ -260,9 +301,23 @@ void ViewedPlay::seek(std::int64_t) {
 /// With the mutex held, as those below.
 void ViewedPlay::refuse_while_locked() const {
   if (options_.session)
-    throw Error("a replay is as its session was", "change", "play without --device replay");
-  if (!wished_.record.empty())
-    throw Error("a recording is being made, of one group of settings", "change", "end the recording first");
+    throw PageError(PageRefusal::locked, "a replay is as its session was", "change",
+                    "play without --device replay");
+  if (!wished_.record.empty()) {
+    throw PageError(PageRefusal::locked, "a recording is being made, of one group of settings", "change",
+                    "end the recording first");
+  }
+}
+
+/// What a page may change while a hand is in the device begins an act of its own: no force at once, then the
+/// same safety rules from their start, out of contact.
+void ViewedPlay::refuse_to_hand(const SettingsChange& settings) const {
+  if (!has_hand()) return;
+  for (const std::string_view name : settings_of_the_hand) {
+    if (!settings.contains(std::string(name))) continue;
+    throw PageError(PageRefusal::hand, "a hand is in the device, and no page may change what protects it",
+                    "--" + std::string(name), "start palpate-runtime play anew with another one");
+  }
 }
 
 /// What can be seen without loading.
@@ -271,6 +326,17 @@ void ViewedPlay::check(const Settings& settings) const {
     throw Error("the file has no dynamics, which dynamic contact needs", "--contact",
                 "add [dynamics] to its model.toml and precompute it again");
   }
+  if (settings.overlay && settings.overlay->rings > most_rings_) {
+    throw Error(most_rings_ == 0
+                    ? "the file keeps no layers below the surface, which overlays need"
+                    : fmt::format("the file keeps layers below the surface for at most {} rings, not {}",
+                                  most_rings_, settings.overlay->rings),
+                "--overlay",
+                fmt::format("{}precompute it with [storage] layers = {}",
+                            most_rings_ == 0 ? "" : "take fewer rings, or ", settings.overlay->rings));
+  }
+  const std::string problem = too_large(settings.tool, size_);
+  if (!problem.empty()) throw Error(problem, "--tool", "take a smaller one");
 }
 
 void ViewedPlay::end_act() {
@@ -284,6 +350,14 @@ void ViewedPlay::end_act() {
 void ViewedPlay::refuse(const std::string& why) {
   print_warning(why);
   state_.refused = why;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+/// By the recorder's thread.
+void ViewedPlay::take_recording_failure(const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  state_.recording_failed = reason;
   changed_ = true;
   tell_.notify_all();
 }

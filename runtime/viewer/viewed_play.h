@@ -23,12 +23,16 @@ namespace palpate {
 /// A wish that cannot be met is told to the page, and the act before begins again.
 class ViewedPlay : public ViewedRun {
  public:
-  /// `mover` as make_mover left it, `body` as the options ask for it.
-  ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body);
+  /// `mover` as make_mover left it, `body` as the options ask for it; `port`: where it is shown.
+  ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body, ViewerPort port);
 
-  /// Opens the viewer, and goes on until `stop` or the end of a duration that the options give. Tells of the
-  /// last act, whose report it returns. Throws Error.
+  /// Serves the pages, says where once the first act could begin, and goes on until `stop` or the end of a
+  /// duration that the options give. Tells of the last act, whose report it returns. Throws Error. To be
+  /// called once.
   LoopReport run(const std::atomic<bool>& stop);
+
+  /// Whether a recording of the run is not whole.
+  [[nodiscard]] bool recording_failed() const noexcept { return recording_failed_; }
 
   /// As pages are told.
   [[nodiscard]] RunState state() const;
@@ -59,11 +63,14 @@ class ViewedPlay : public ViewedRun {
   Plan next_plan();
   bool take_back(const Plan& failed, const Plan& good, const std::string& why);
 
+  [[nodiscard]] bool has_hand() const noexcept { return mover_.link != nullptr; }
+  void refuse_to_hand(const SettingsChange& settings) const;
   void refuse_while_locked() const;
   void check(const Settings& settings) const;
   void end_act();
   void begin_making(const char* what);
   void refuse(const std::string& why);
+  void take_recording_failure(const std::string& reason);
   void take_ticks(std::span<const TickNote> notes);
   void tell_states(const std::stop_token& over);
 
@@ -71,9 +78,15 @@ class ViewedPlay : public ViewedRun {
   Mover& mover_;
   std::unique_ptr<const Body> body_;
   BodyOptions body_options_;
-  bool can_move_;  // the file has dynamics
+  bool can_move_;   // the file has dynamics
+  int most_rings_;  // that overlays of it may have
+  double size_;     // of the body [m]
+  ViewerPort port_;
   ViewerServer* server_ = nullptr;
   LoopControl control_;
+  bool recording_failed_ = false;
+
+  Fault latched_ = Fault::none;  // of the act before, where a hand is in the device
 
   mutable std::mutex mutex_;  // of what follows; the loop takes it never
   Plan wished_;               // of the next act

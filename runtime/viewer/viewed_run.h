@@ -1,17 +1,48 @@
 // What a person at the viewer's page may ask of a run.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "meshes/error.h"
 #include "runtime/pointer_pose.h"
 
 namespace palpate {
 
 /// Options of play by name, as text; nothing: the default.
 using SettingsChange = std::map<std::string, std::optional<std::string>>;
+
+/// Why what a page asks for is not done.
+enum class PageRefusal : std::uint8_t {
+  value,    ///< it cannot be: a number out of its bounds, an option that does not exist
+  control,  ///< another page steers, or none
+  hand,     ///< a hand is in the device, and this is not a page's to change
+  locked,   ///< not now: a recording is being made, or a session replayed
+};
+
+/// The refusals and their names in messages.
+inline constexpr std::array<std::pair<PageRefusal, const char*>, 4> page_refusal_names = {{
+    {PageRefusal::value, "value"},
+    {PageRefusal::control, "control"},
+    {PageRefusal::hand, "hand"},
+    {PageRefusal::locked, "locked"},
+}};
+
+/// An Error of which the page is told the kind; any other Error is of kind `value`.
+class PageError : public Error {
+ public:
+  PageError(PageRefusal reason, const std::string& what, std::string where, std::string hint)
+      : Error(what, std::move(where), std::move(hint)), reason_(reason) {}
+
+  [[nodiscard]] PageRefusal reason() const noexcept { return reason_; }
+
+ private:
+  PageRefusal reason_;
+};
 
 /// Called by the server's thread; no call waits for the loop. Those that can be wrong throw Error, whose text
 /// the page is shown.

@@ -14,7 +14,7 @@ constexpr std::size_t most_waiting = 1024;  // calls of show_ticks that nobody h
 }  // namespace
 
 struct ViewerServer::Impl {
-  Impl(const ViewerOptions& options, ViewedRun& run) : server(options, run) {}
+  Impl(ViewerPort port, ViewedRun& run, bool is_replay) : server(std::move(port), run, is_replay) {}
 
   std::mutex mutex;  // of what follows but the server
   std::shared_ptr<const Scene> scene;
@@ -27,8 +27,8 @@ struct ViewerServer::Impl {
   PageServer server;
 };
 
-ViewerServer::ViewerServer(const ViewerOptions& options, ViewedRun& run)
-    : impl_(std::make_unique<Impl>(options, run)) {}
+ViewerServer::ViewerServer(ViewerPort port, ViewedRun& run, bool is_replay)
+    : impl_(std::make_unique<Impl>(std::move(port), run, is_replay)) {}
 
 ViewerServer::~ViewerServer() = default;
 

@@ -10,26 +10,22 @@
 #include "runtime/surface_frames.h"
 #include "runtime/viewer/scene.h"
 #include "runtime/viewer/viewed_run.h"
+#include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
-
-struct ViewerOptions {
-  std::string address = "127.0.0.1";  ///< another one than of this machine alone asks for a token
-  std::uint16_t port = 8017;          ///< 0: any that is free
-  bool replay = false;                ///< of what was recorded: all ticks are kept for pages that come later
-};
 
 /// HTTP and WebSocket in a thread of its own (web/PROTOCOL.md). The `show` functions may be called by any
 /// thread; they never wait for a page. A page that is slow misses pictures, and holds up nothing else.
 class ViewerServer {
  public:
-  /// `run` must live as long. Listens when it returns. Throws Error (port taken, address unknown).
-  ViewerServer(const ViewerOptions& options, ViewedRun& run);
+  /// Serves who waits at the port and who comes later. `run` must live as long. `is_replay`: of what was
+  /// recorded, where all ticks are kept for pages that come later.
+  ViewerServer(ViewerPort port, ViewedRun& run, bool is_replay = false);
   ~ViewerServer();  ///< closes all connections
   ViewerServer(const ViewerServer&) = delete;
   ViewerServer& operator=(const ViewerServer&) = delete;
 
-  /// What to open: http://127.0.0.1:8017/ with the token where one is asked for.
+  /// As ViewerPort.
   [[nodiscard]] const std::string& url() const noexcept;
 
   /// All that is shown from now on is of this scene.

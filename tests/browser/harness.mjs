@@ -10,6 +10,7 @@ import { promisify } from 'node:util';
 const { chromium } = createRequire(path.join(process.env.PALPATE_BROWSER_MODULES, 'package.json'))('playwright-core');
 const binary = process.env.PALPATE_BINARY_DIR;
 const precompute = path.join(binary, 'precompute/palpate-precompute');
+export const example = path.join(binary, 'runtime/palpate-bridge-example');
 export const runtime = path.join(binary, 'runtime/palpate-runtime');
 export const source = path.resolve(import.meta.dirname ?? path.dirname(new URL(import.meta.url).pathname), '../..');
 
@@ -44,9 +45,40 @@ half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
 ${more}`;
 }
 
+/// A block of 1 m with a shelf, 0.1 m thick, from x = 1 to 2 along its top (z = 1): the description, its surface written beside it.
+export async function shelf(into) {
+  const steps = { x: [0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.75, 2], y: [0, 0.25, 0.5, 0.75, 1], z: [0, 0.3, 0.6, 0.9, 1] };
+  const solid = (i, k) => i < 4 || k === 3;
+  const nodes = new Map();
+  const node = (i, j, k) => {
+    const key = `${i},${j},${k}`;
+    if (!nodes.has(key)) nodes.set(key, { number: nodes.size + 1, at: [steps.x[i], steps.y[j], steps.z[k]] });
+    return nodes.get(key).number;
+  };
+  const hexahedra = [];
+  for (let i = 0; i < 8; ++i)
+    for (let j = 0; j < 4; ++j)
+      for (let k = 0; k < 4; ++k)
+        if (solid(i, k)) hexahedra.push([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]].map(([a, b, c]) => node(i + a, j + b, k + c)));
+  const lines = (list) => list.map((one) => one.join(' ')).join('\n');
+  await writeFile(
+    path.join(into, 'shelf.mesh'),
+    `MeshVersionFormatted 2\nDimension 3\nVertices\n${nodes.size}\n${lines([...nodes.values()].map(({ at }) => [...at, 0]))}\nHexahedra\n${hexahedra.length}\n${lines(hexahedra.map((one) => [...one, 1]))}\nEnd\n`,
+  );
+  return `name = "shelf"
+[geometry]
+volume = "shelf.mesh"
+[material]
+youngs_modulus = 1.0
+poissons_ratio = 0.3
+[[fixed]]
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+`;
+}
+
 /// palpate-runtime with a page: { url, port, child, output(), stop() }. Stopped after the test.
-export async function serve(t, args, cwd) {
-  const child = spawn(runtime, args, { cwd, stdio: ['ignore', 'pipe', 'pipe'] });
+export async function serve(t, args, cwd, options = {}) {
+  const child = spawn(runtime, args, { cwd, stdio: ['ignore', 'pipe', 'pipe'], ...options });
   let text = '';
   const ended = new Promise((resolve) => child.on('close', (code, signal) => resolve(code ?? signal)));
   const url = await new Promise((resolve, reject) => {
@@ -84,7 +116,7 @@ export async function close() {
 }
 
 /// A page of its own context, which notes what goes wrong in it: errors of scripts, and requests to anywhere but the runtime.
-export async function visit(t, url, options = {}) {
+export async function visit(t, url, options = {}, before = null) {
   const context = await (await open()).newContext({ viewport: { width: 1280, height: 800 }, ...options });
   t.after(() => context.close());
   const page = await context.newPage();
@@ -95,6 +127,7 @@ export async function visit(t, url, options = {}) {
     const to = new URL(request.url());
     if (['http:', 'https:', 'ws:', 'wss:'].includes(to.protocol) && to.host !== new URL(url).host) page.complaints.push(`asks ${to}`);
   });
+  if (before) await page.addInitScript(before);
   await page.goto(url);
   return page;
 }

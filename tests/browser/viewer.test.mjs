@@ -1,17 +1,18 @@
 // The viewer's page in a real browser, against the real runtime.
 import assert from 'node:assert/strict';
 import { createServer, request } from 'node:http';
-import { readFile, writeFile } from 'node:fs/promises';
+import { spawn } from 'node:child_process';
+import { readFile, rm, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { bake, close, cube, folder, near, open, project, ready, run, runtime, serve, source, told, until, visit } from './harness.mjs';
+import { bake, close, cube, example, folder, near, open, project, ready, run, runtime, serve, shelf, source, told, until, visit } from './harness.mjs';
 
 after(close);
 
 const top = [0.5, 0.5, 1]; // a node of the cube, which its 6 cells an edge have there
 
 /// The cube with a page, in a folder of its own: { at, file, page, served }.
-async function open_cube(t, { cells = 6, args = [], toml = '' } = {}) {
+async function open_cube(t, { cells = 6, args = ['--tool', 'point'], toml = '' } = {}) {
   const at = await folder(t);
   const file = await bake(at, cube(cells, toml));
   const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', ...args], at);
@@ -222,6 +223,22 @@ test('a recording begins and ends with the button, and is whole', async (t) => {
   assert.equal(replay.replay.different_ticks, 0);
 });
 
+test('a recording that fails says so at once', async (t) => {
+  const { page, at } = await open_cube(t);
+  await part(page, 'record').click();
+  await until(page, () => window.palpate.state.recording && window.palpate.state.ticks > 0);
+  const { recording } = await told(page, 'state');
+  await rm(path.resolve(at, `${recording}.parts`), { recursive: true });
+  await until(page, () => window.palpate.state.recording_failed);
+  await page.getByText('Recording failed').waitFor();
+  await page.getByText(/The recording failed, and the run goes on without it: .*No such file/).first().waitFor();
+  const before = await told(page, 'state');
+  await page.waitForFunction((ticks) => window.palpate.state.ticks > ticks + 100, before.ticks);
+  await part(page, 'record').click();
+  await until(page, () => !window.palpate.state.recording);
+  assert.equal(await part(page, 'record-label').textContent(), 'Record');
+});
+
 test('pictures and shapes can be saved', async (t) => {
   const { page } = await open_cube(t);
   const save = async (id) => {
@@ -270,27 +287,165 @@ test('one steers, any number watch, and control goes on', async (t) => {
   await until(watcher, () => window.palpate.state.you === 'controller');
 });
 
-test('the page comes back by itself when the runtime does', async (t) => {
+test('the page comes back by itself when its connection is lost, and after a reload', async (t) => {
+  const { served } = await open_cube(t);
+  const page = await visit(t, served.url, {}, () => {
+    window.sockets = [];
+    window.WebSocket = class extends WebSocket {
+      constructor(...args) {
+        super(...args);
+        window.sockets.push(this);
+      }
+    };
+  });
+  await ready(page);
+  await page.evaluate(() => window.sockets.at(-1).close());
+  await until(page, () => window.sockets.length > 1 && document.querySelector('[data-testid="connection"]').dataset.state === 'live');
+  const count = await told(page, 'frames');
+  await until(page, (before) => window.palpate.frames > before + 5, count);
+  await page.reload();
+  await ready(page);
+  assert.equal(await part(page, 'connection').innerText(), 'connected');
+  const [download] = await Promise.all([page.waitForEvent('download'), part(page, 'save-stl').click()]);
+  assert.ok((await readFile(await download.path())).length > 84);
+});
+
+test('a program that was started anew has another address, which the page says', async (t) => {
   const { page, served, file, at } = await open_cube(t);
   await served.stop();
   await until(page, () => document.querySelector('[data-testid="connection"]').dataset.state === 'lost');
-  await serve(t, ['play', file, '--view', '--view-address', `127.0.0.1:${served.port}`], at);
-  await until(page, () => document.querySelector('[data-testid="connection"]').dataset.state === 'live');
-  const count = await told(page, 'frames');
-  await until(page, (before) => window.palpate.frames > before + 5, count);
+  const again = await serve(t, ['play', file, '--view', '--view-address', `127.0.0.1:${served.port}`], at);
+  await page.getByText('the program was started anew: open the address that it printed').waitFor();
+  await page.goto(again.url);
+  await ready(page);
+});
+
+test('without a tool it is a ball that suits the body, and presses no deeper than the body is thick', async (t) => {
+  const at = await folder(t);
+  const file = await bake(at, `name = "slab"
+[geometry]
+box = { origin = [0, 0, 0], size = [1, 1, 0.1], cells = [8, 8, 1] }
+[material]
+youngs_modulus = 1.0
+poissons_ratio = 0.3
+[[fixed]]
+box = { min = [-1, -1, -1], max = [0.01, 2, 2] }
+`, 'slab');
+  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0'], at);
+  const page = await ready(await visit(t, served.url));
+  const { settings, defaults } = await told(page, 'state');
+  assert.match(settings.tool, /^sphere:0\.1/); // between 3 and 10 % of 1.42 m
+  near(defaults.depth, 0.025, 1e-6, 'a quarter of the least extent');
+  assert.equal(await part(page, 'depth').inputValue(), '25');
+  assert.equal(await part(page, 'tool-kind').inputValue(), 'sphere');
+  // A ball as large as the body's diagonal is none to feel it with.
+  await part(page, 'radius').fill('5000');
+  await part(page, 'radius').press('Enter');
+  await page.getByText(/the tool is 10 m long, and the whole body 1\.418 m/).first().waitFor();
+  assert.ok(await part(page, 'refused').isVisible(), 'it stands beside the settings');
+  assert.equal((await told(page, 'state')).settings.tool, settings.tool);
+  await part(page, 'radius').fill('60');
+  await part(page, 'radius').press('Enter');
+  await until(page, () => window.palpate.state.settings.tool === 'sphere:0.06');
+  assert.ok(await part(page, 'refused').isHidden());
+  assert.deepEqual(page.complaints, []);
+});
+
+test('a press begins no deeper than a quarter of the thickness, unless it was typed', async (t) => {
+  const at = await folder(t);
+  // A block with a thin shelf: the box around it is thick.
+  const file = await bake(at, await shelf(at), 'shelf');
+  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', '--tool', 'sphere:0.1'], at);
+  const page = await ready(await visit(t, served.url));
+  const begins = async () => {
+    const { x, y } = await project(page, [1.5, 0.5, 1]);
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await until(page, () => /mm$/.test(document.querySelector('[data-testid="depth-now"]').innerText));
+    const depth = parseFloat(await part(page, 'depth-now').innerText());
+    await page.mouse.up();
+    return depth;
+  };
+  near(await begins(), 25, 0.05, 'a quarter of 0.1 m');
+  await choose(page, 'press', 0.08);
+  near(await begins(), 80, 1e-6, 'as typed');
+});
+
+test('overlays are offered as far as the file has layers', async (t) => {
+  const { page } = await open_cube(t, { toml: '[storage]\nscope = "layers"\nlayers = 1\n' });
+  assert.equal((await told(page, 'state')).model.overlay_rings, 1);
+  assert.equal(await part(page, 'overlay-rings').getAttribute('max'), '1');
+  assert.equal(await part(page, 'overlay-rings').inputValue(), '1');
+  await part(page, 'overlay').click();
+  await until(page, () => window.palpate.state.settings.overlay === 'r=3,rings=1' && !window.palpate.state.busy);
+  await page.evaluate(() => {
+    const rings = document.querySelector('[data-testid="overlay-rings"]');
+    rings.max = '3'; // as an old page would
+    rings.value = '3';
+    rings.dispatchEvent(new Event('change'));
+  });
+  await page.getByText(/layers below the surface for at most 1 rings?, not 3/).first().waitFor();
+  assert.ok(await part(page, 'refused').isVisible());
+  const none = await open_cube(t, { toml: '[storage]\nscope = "surface"\n' });
+  assert.equal(await part(none.page, 'overlay').isDisabled(), true);
+  assert.ok(await part(none.page, 'overlay-note').isVisible());
+  assert.match(await part(none.page, 'overlay-note').innerText(), /keeps no layers below the surface/);
+  assert.equal(await part(none.page, 'show-outline').locator('xpath=..').innerText(), 'outline');
+});
+
+test('with a hand in the device its faults and its safety are not the page\'s', async (t) => {
+  const at = await folder(t);
+  const file = await bake(at, cube(4));
+  const port = 20000 + (process.pid % 20000);
+  const keys = { ...process.env, XDG_RUNTIME_DIR: at };
+  const bridge = spawn(example, ['--port', String(port), '--seconds', '600', '--from', '0,0,0.1', '--to', '0,0,0.1'], { env: keys, stdio: 'ignore' });
+  t.after(() => bridge.kill('SIGKILL'));
+  const safety = 'late=10,most_late=1e9,stale_life=10,silence=5,silence_fade=4';
+  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', '--device', `bridge:${port}`, '--safety', safety], at, { env: keys });
+  const page = await ready(await visit(t, served.url));
+  assert.equal((await told(page, 'state')).hand, true);
+  assert.ok(await part(page, 'hand-note').isVisible());
+  bridge.kill('SIGSTOP'); // the partner is silent: it is lost
+  await until(page, () => window.palpate.state.fault !== null);
+  assert.ok(await part(page, 'acknowledge').isHidden());
+  assert.match(await part(page, 'fault').innerText(), /presses Enter/);
+  const answer = await page.evaluate(
+    (url) =>
+      new Promise((resolve) => {
+        const socket = new WebSocket(url, 'palpate.1');
+        const told = [];
+        const wanted = [{ type: 'acknowledge' }, { type: 'change', settings: { safety: 'max_force=1000' } }, { type: 'change', settings: { coupling: '1e9' } }];
+        socket.onmessage = (event) => {
+          if (typeof event.data !== 'string') return;
+          const word = JSON.parse(event.data);
+          if (word.type === 'state' && word.you !== 'controller' && !word.controlled) socket.send(JSON.stringify({ type: 'control', take: true }));
+          if (word.type === 'state' && word.you === 'controller' && told.length === 0) for (const one of wanted) socket.send(JSON.stringify(one));
+          if (word.type === 'error' && told.push(word) >= wanted.length) resolve(told.slice(0, wanted.length));
+        };
+        document.querySelector('[data-testid="control"]').click(); // the page leaves control
+      }),
+    served.url.replace('http', 'ws').replace('/?', '/socket?'),
+  );
+  assert.deepEqual(
+    answer.map(({ about, reason }) => [about, reason]),
+    [['acknowledge', 'hand'], ['change', 'hand'], ['change', 'hand']],
+  );
 });
 
 test('foreign pages are refused', async (t) => {
   const { served } = await open_cube(t);
-  const status = (headers) =>
+  const { search } = new URL(served.url);
+  const status = (headers, query = search) =>
     new Promise((resolve, reject) => {
-      const asked = request({ host: '127.0.0.1', port: served.port, path: '/socket', headers: { Connection: 'Upgrade', Upgrade: 'websocket', 'Sec-WebSocket-Version': '13', 'Sec-WebSocket-Key': 'AAAAAAAAAAAAAAAAAAAAAA==', 'Sec-WebSocket-Protocol': 'palpate.1', ...headers } });
+      const asked = request({ host: '127.0.0.1', port: served.port, path: `/socket${query}`, headers: { Connection: 'Upgrade', Upgrade: 'websocket', 'Sec-WebSocket-Version': '13', 'Sec-WebSocket-Key': 'AAAAAAAAAAAAAAAAAAAAAA==', 'Sec-WebSocket-Protocol': 'palpate.1', ...headers } });
       asked.on('upgrade', (response, socket) => (socket.destroy(), resolve(response.statusCode)));
       asked.on('response', (response) => resolve(response.statusCode));
       asked.on('error', reject);
       asked.end();
     });
   assert.equal(await status({ Origin: `http://127.0.0.1:${served.port}` }), 101);
+  assert.equal(await status({}, ''), 403);
+  assert.equal(await status({}, `?token=${'0'.repeat(32)}`), 403);
   assert.equal(await status({ Origin: 'http://example.org' }), 403);
   assert.equal(await status({ Host: `example.org:${served.port}` }), 403);
   // As a browser does it: a page of another origin on this very machine.
@@ -308,7 +463,7 @@ test('foreign pages are refused', async (t) => {
         socket.onopen = () => resolve('open');
         socket.onerror = () => resolve('refused');
       }),
-    `ws://127.0.0.1:${served.port}/socket`,
+    `ws://127.0.0.1:${served.port}/socket${search}`,
   );
   assert.equal(outcome, 'refused');
 });
@@ -324,7 +479,7 @@ test('malformed and huge messages end their own connection and nothing else', as
           socket.onopen = () => socket.send(said.repeat ? said : new Uint8Array(said));
           socket.onclose = (event) => resolve({ code: event.code, reason: event.reason });
         }),
-      [`ws://127.0.0.1:${served.port}/socket`, text],
+      [`ws://127.0.0.1:${served.port}/socket${new URL(served.url).search}`, text],
     );
   const before = await told(page, 'ticks');
   for (const text of ['{', '[]', '{"type":"fly"}', '{"type":"point","position":[0,0]}', '['.repeat(10_000), 'x'.repeat(1_000_000), [1, 2, 3]]) {

@@ -39,9 +39,22 @@ export class LiveSource implements Source {
     socket.onclose = (event) => {
       const why = event.reason ? `: ${event.reason}` : '';
       this.listener_.connected(false, `not connected${why}; trying again`);
+      void this.ask_why();
       setTimeout(() => this.connect(), this.wait_ * 1000);
       this.wait_ = Math.min(this.wait_ * 1.7, longest_wait);
     };
+  }
+
+  /** A socket that is refused does not say why, but the same address asked for as a page does. */
+  private async ask_why(): Promise<void> {
+    try {
+      const { status } = await fetch(this.url_.replace(/^ws/, 'http'), { cache: 'no-store' });
+      if (this.socket_?.readyState === WebSocket.OPEN) return;
+      if (status === 403) this.listener_.connected(false, 'the program was started anew: open the address that it printed');
+      if (status === 503) this.listener_.connected(false, 'too many pages are open; trying again');
+    } catch {
+      // it is not there
+    }
   }
 
   private take(data: string | ArrayBuffer): void {

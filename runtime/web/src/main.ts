@@ -30,6 +30,8 @@ const numbers_wait = 100;
 const timing_wait = 500;
 const kept_patches = 4;
 
+const sentence = (hint: string): string => `${hint.charAt(0).toUpperCase()}${hint.slice(1)}.`;
+
 class Page implements Listener {
   private mode_: Mode = 'live';
   private state_: State | null = null;
@@ -42,6 +44,7 @@ class Page implements Listener {
   private plots_wanted_ = false;
   private shape_ = ''; // of the tool that is drawn, with the body that it is drawn for
   private depth_for_ = ''; // the model and tool that the depth suits
+  private typed_depth_ = false;
 
   private readonly view_ = new View(part('stage'));
   private readonly body_ = new Body();
@@ -108,7 +111,12 @@ class Page implements Listener {
       this.take_mode(message.mode);
       write(part('version'), message.version);
     } else if (message.type === 'error') {
-      toast(message.message, message.hint);
+      if (message.about === 'change') {
+        this.run_.show_refused(message.hint ? `${message.message}. ${sentence(message.hint)}` : message.message);
+        if (this.state_?.model) this.run_.show(this.state_, this.mode_); // what was typed is not what is
+      } else {
+        toast(message.message, message.hint);
+      }
     } else {
       this.take_state({ ...this.state_, ...message } as State);
     }
@@ -148,6 +156,11 @@ class Page implements Listener {
     if (state.refused && state.refused !== this.state_?.refused) {
       const [, what = state.refused, hint = ''] = /^(.*) \((.*)\)$/.exec(state.refused) ?? [];
       toast(what, hint);
+      this.run_.show_refused(hint ? `${what}. ${sentence(hint)}` : what);
+    }
+    if (state.recording_failed && state.recording_failed !== this.state_?.recording_failed) {
+      const [, what = state.recording_failed, hint = ''] = /^(.*) \((.*)\)$/.exec(state.recording_failed) ?? [];
+      toast(`The recording failed, and the run goes on without it: ${what}`, hint);
     }
     const recorded = this.state_?.recording;
     if (recorded && !state.recording && state.model && !state.refused) toast(`Recorded ${recorded}`, `palpate-runtime view ${recorded}`, 'note');
@@ -162,6 +175,7 @@ class Page implements Listener {
     const suits = `${state.model.file} ${state.settings.tool}`;
     if (this.depth_for_ !== suits) {
       this.depth_for_ = suits;
+      this.typed_depth_ = false;
       show_value(input('depth'), short_number(1000 * this.usual_depth(), 2));
     }
     this.run_.show(state, this.mode_);
@@ -194,10 +208,11 @@ class Page implements Listener {
     if (this.body_.scale !== 1) return 'The body is touched where it is: draw displacements true to scale (× 1)';
     const shape = parse_tool(state.settings.tool);
     const mode = pointer_modes.find((one) => input(`mode-${one}`).checked) ?? ('press' as PointerMode);
-    const typed = typed_number(input('depth').value, 0);
+    const typed = this.typed_depth_ ? typed_number(input('depth').value, 0) : null;
     return {
       mode,
       depth: typed === null ? this.usual_depth() : metres(typed),
+      share_of_thickness: typed === null ? 0.25 : Infinity,
       unit_depth: this.usual_depth(),
       // A body that swings has moved on since it was drawn.
       clearance: 0.25 * shape.radius + (state.model.moves ? 0.025 : 0.008) * state.model.size,
@@ -212,7 +227,8 @@ class Page implements Listener {
 
   private listen(): void {
     input('depth').addEventListener('change', () => {
-      if (typed_number(input('depth').value, 0) === null && this.state_) {
+      this.typed_depth_ = typed_number(input('depth').value, 0) !== null;
+      if (!this.typed_depth_ && this.state_) {
         show_value(input('depth'), short_number(1000 * this.usual_depth(), 2));
       }
       input('depth').blur();

@@ -18,8 +18,15 @@ const same_side = Math.cos((35 * Math.PI) / 180); // beyond it a vertex normal i
 
 const at = (values: ArrayLike<number>, i: number): Vec3 => [values[3 * i]!, values[3 * i + 1]!, values[3 * i + 2]!];
 
-/** The first triangle of `surface` that the ray enters from outside; null: none. */
-export function pick_surface(surface: Surface, origin: Vec3, direction: Vec3): Hit | null {
+interface Crossing {
+  way: number; // [lengths of the direction]
+  triangle: number; // its place in the list
+  weight_b: number;
+  weight_c: number;
+}
+
+/** The first triangle that the ray crosses inwards (`side` 1) or outwards (-1); null: none. */
+function first_crossing(surface: Surface, origin: Vec3, direction: Vec3, side: 1 | -1): Crossing | null {
   const { position: p, triangle } = surface;
   const [dx, dy, dz] = direction;
   let nearest = Infinity;
@@ -35,9 +42,9 @@ export function pick_surface(surface: Surface, origin: Vec3, direction: Vec3): H
     const ux = p[b]! - ax, uy = p[b + 1]! - ay, uz = p[b + 2]! - az;
     const vx = p[c]! - ax, vy = p[c + 1]! - ay, vz = p[c + 2]! - az;
     const hx = dy * vz - dz * vy, hy = dz * vx - dx * vz, hz = dx * vy - dy * vx;
-    const determinant = ux * hx + uy * hy + uz * hz;
-    if (determinant <= 1e-30) continue; // seen from behind
-    const sx = origin[0] - ax, sy = origin[1] - ay, sz = origin[2] - az;
+    const determinant = side * (ux * hx + uy * hy + uz * hz);
+    if (determinant <= 1e-30) continue; // seen from the other side
+    const sx = side * (origin[0] - ax), sy = side * (origin[1] - ay), sz = side * (origin[2] - az);
     const beta = sx * hx + sy * hy + sz * hz;
     if (beta < 0 || beta > determinant) continue;
     const qx = sy * uz - sz * uy, qy = sz * ux - sx * uz, qz = sx * uy - sy * ux;
@@ -50,12 +57,25 @@ export function pick_surface(surface: Surface, origin: Vec3, direction: Vec3): H
     weight_b = beta / determinant;
     weight_c = gamma / determinant;
   }
-  if (found < 0) return null;
-  const [a, b, c] = [triangle[found]!, triangle[found + 1]!, triangle[found + 2]!];
+  return found < 0 ? null : { way: nearest, triangle: found, weight_b, weight_c };
+}
+
+/** The first triangle of `surface` that the ray enters from outside; null: none. */
+export function pick_surface(surface: Surface, origin: Vec3, direction: Vec3): Hit | null {
+  const crossing = first_crossing(surface, origin, direction, 1);
+  if (!crossing) return null;
+  const { position: p, triangle } = surface;
+  const { triangle: t, weight_b, weight_c } = crossing;
+  const [a, b, c] = [triangle[t]!, triangle[t + 1]!, triangle[t + 2]!];
   const facet = normalised(cross(minus(at(p, b), at(p, a)), minus(at(p, c), at(p, a))));
   const n = surface.normal;
   const smooth = normalised(plus(plus(plus([0, 0, 0], at(n, a), 1 - weight_b - weight_c), at(n, b), weight_b), at(n, c), weight_c));
-  return { point: plus(origin, direction, nearest), normal: dot(smooth, facet) > same_side ? smooth : facet };
+  return { point: plus(origin, direction, crossing.way), normal: dot(smooth, facet) > same_side ? smooth : facet };
+}
+
+/** How far it is from a point of the surface through the body, against its normal; Infinity where there is no other side. */
+export function thickness_below(surface: Surface, hit: Hit): number {
+  return first_crossing(surface, hit.point, plus([0, 0, 0], hit.normal, -1), -1)?.way ?? Infinity;
 }
 
 /**

@@ -1,6 +1,6 @@
 // The pointer as the hand: presses, pushes and grabs what is under it.
 import type { Body } from './body';
-import { pick_boundary, pick_surface, type Hit, type Surface } from './pick';
+import { pick_boundary, pick_surface, thickness_below, type Hit, type Surface } from './pick';
 import { minus, plus, pressed_position, ray_meets_plane, turn_onto, turned_depth, type ToolShape } from './pose';
 import type { View } from './view';
 import type { Point, Quaternion, Vec3 } from './words';
@@ -14,7 +14,8 @@ const reach_in_plane = 24; // pixels from the boundary that still touch it
 
 export interface HandSettings {
   mode: PointerMode;
-  depth: number; // [m] where a press begins
+  depth: number; // [m] where a press begins ...
+  share_of_thickness: number; // ... and no more than this of how thick the body is there
   unit_depth: number; // [m] a wheel's notch is a tenth of it
   clearance: number; // [m] of a tool that hovers
   contact: number; // [m] of one that all but touches
@@ -120,7 +121,7 @@ export class Hand {
       now: hit,
       orientation: turn_onto(hit.normal, this.dimension()),
       surface: this.body_.snapshot(),
-      depth: settings.depth,
+      depth: Math.min(settings.depth, settings.share_of_thickness * this.thickness(hit)),
       pushed: 0,
       client: { x: event.clientX, y: event.clientY },
       plane_start: this.on_screen_plane(event.clientX, event.clientY, hit.point) ?? hit.point,
@@ -201,6 +202,11 @@ export class Hand {
     }
     const { origin, direction } = this.view_.ray(x, y);
     return pick_surface(surface, origin, direction);
+  }
+
+  /** How thick the body is below a point of its surface [m]. In the plane it is not asked. */
+  private thickness(hit: Hit): number {
+    return this.dimension() === 2 ? Infinity : thickness_below(this.body_.surface, hit);
   }
 
   private on_screen_plane(x: number, y: number, through: Vec3): Vec3 | null {

@@ -1,5 +1,5 @@
 // The run and its settings: what the runtime has is shown, what the person wants is asked for.
-import { button, input, part, select, show_value, toast, write } from './dom';
+import { button, input, part, select, show_value, write } from './dom';
 import { format_number } from './format';
 import { parse_tool, tool_text } from './pose';
 import type { Mode, State, Word } from './words';
@@ -13,6 +13,8 @@ export function typed_number(text: string, least: number): number | null {
 /** Metres from typed millimetres, as short as it can be written. */
 export const metres = (millimetres: number): number => Number((millimetres / 1000).toPrecision(9));
 const millimetres = (value: number): string => String(Number((value * 1000).toPrecision(6)));
+
+const most_rings = 4; // that the page offers: with more it would wait for minutes
 
 export class RunControls {
   private state_: State | null = null;
@@ -46,6 +48,12 @@ export class RunControls {
     if (!button('reset').disabled) button('reset').click();
   }
 
+  /** What was asked for and not done; empty: nothing. */
+  show_refused(text: string): void {
+    write(part('refused'), text);
+    part('refused').hidden = text === '';
+  }
+
   show(state: State, mode: Mode): void {
     this.state_ = state;
     const steers = mode === 'live' && state.you === 'controller';
@@ -64,6 +72,8 @@ export class RunControls {
     write(part('fault-name'), (state.fault?.name ?? '').replaceAll('_', ' '));
     write(part('fault-remedy'), state.fault?.remedy ?? '');
     button('acknowledge').disabled = !steers;
+    button('acknowledge').hidden = Boolean(state.hand); // a hand's faults are not a page's to acknowledge
+    part('fault-hand').hidden = part('hand-note').hidden = !state.hand;
     part('busy').hidden = !state.busy;
     write(part('busy-text'), state.busy ?? '');
     part('locked').hidden = !state.locked;
@@ -77,8 +87,12 @@ export class RunControls {
     button('pause').setAttribute('aria-pressed', String(state.paused));
     write(button('pause'), state.paused ? 'Go on' : 'Pause');
     button('record').setAttribute('aria-pressed', String(Boolean(state.recording)));
-    write(part('record-label'), state.recording ? state.recording.split('/').at(-1)! : 'Record');
-    button('record').title = state.recording
+    const failed = state.recording && state.recording_failed;
+    button('record').classList.toggle('failed', Boolean(failed));
+    write(part('record-label'), failed ? 'Recording failed' : state.recording ? state.recording.split('/').at(-1)! : 'Record');
+    button('record').title = failed
+      ? `${failed}\nWhat was kept is in ${state.recording}. Press to go on without.`
+      : state.recording
       ? `Finish ${state.recording}`
       : 'Begin anew from the untouched body, and write every tick to a file';
     button('control').disabled = state.you !== 'controller' && state.controlled;
@@ -100,6 +114,7 @@ export class RunControls {
     show_value(select('contact'), settings.contact ?? 'quasi-static');
     select('contact').disabled = !model.moves;
     select('contact').title = model.moves ? 'Dynamic: the body swings' : 'This model has no dynamics: the body cannot swing';
+    this.show_overlay_limits(model.overlay_rings ?? most_rings);
     input('overlay').checked = settings.overlay !== undefined;
     const overlay = /^(?:r=(\d+))?,?(?:rings=(\d+))?/.exec(settings.overlay ?? '');
     if (overlay?.[1]) show_value(input('overlay-r'), overlay[1]);
@@ -108,6 +123,19 @@ export class RunControls {
     show_value(input('load-scale'), settings['load-scale'] ?? '1');
     input('load-scale').disabled = !model.loads;
     input('load-scale').title = model.loads ? 'Gravity and other loads of the model, times this' : 'This model has no loads';
+  }
+
+  /** No more is offered than the file has layers for. */
+  private show_overlay_limits(rings: number): void {
+    const most = Math.min(rings, most_rings);
+    for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).disabled = most === 0;
+    const field = input('overlay-rings');
+    field.max = String(Math.max(most, 1));
+    if (Number(field.value) > Number(field.max)) field.value = field.max;
+    const why = `This file keeps ${rings === 0 ? 'no layers' : `layers for ${rings} ${rings === 1 ? 'ring' : 'rings'}`} below the surface; precomputed with more [storage] layers it would have more`;
+    write(part('overlay-note'), `${why}.`);
+    part('overlay-note').hidden = most > 0;
+    field.title = rings < most_rings ? why : 'How many elements around the tool';
   }
 
   private show_facts(state: State): void {
@@ -135,6 +163,7 @@ export class RunControls {
   }
 
   private change(name: string, value: string | null): void {
+    this.show_refused('');
     this.send_({ type: 'change', settings: { [name]: value } });
   }
 
@@ -145,7 +174,7 @@ export class RunControls {
       const value = typed_number(field.value, least);
       if (value === null && field.value.trim() !== '') {
         const bound = least > 0 ? ' above 0' : least === 0 ? ', 0 or more' : '';
-        toast(`${field.value} is not a number${bound}`, 'Nothing was changed.');
+        this.show_refused(`${field.value} is not a number${bound}: nothing was changed`);
         if (this.state_) field.value = this.state_.settings[name] ?? '';
         return;
       }
@@ -160,7 +189,7 @@ export class RunControls {
     const radius = typed_number(input('radius').value, 1e-9);
     const length = typed_number(input('length').value, 1e-9);
     if (kind !== 'point' && (radius === null || (kind === 'capsule' && length === null))) {
-      toast('Radius and length are numbers above 0', 'In millimetres.');
+      this.show_refused('Radius and length are numbers above 0, in millimetres');
       return;
     }
     this.change('tool', tool_text(kind, radius ? metres(radius) : (defaults?.radius ?? 0), length ? metres(length) : 0));
@@ -169,7 +198,6 @@ export class RunControls {
 
   private change_overlay(id: string): void {
     if (id !== 'overlay') input('overlay').checked = true;
-    // Larger ones than the fields take would keep the page waiting for minutes.
     const [r, rings] = ['overlay-r', 'overlay-rings'].map((one) => {
       const { min, max, value } = input(one);
       return Math.min(Number(max), Math.max(Number(min), Math.round(Number(value)) || Number(min)));

@@ -25,6 +25,7 @@ export interface Model {
   bounds: [Vec3, Vec3];
   moves: boolean;
   loads: boolean;
+  overlay_rings?: number; // the most that an overlay may have; 0: none may be
 }
 
 /** How the run is. What a message leaves out is as it was. */
@@ -36,10 +37,12 @@ export interface State {
   model: Model;
   device: string;
   pointer: boolean;
+  hand?: boolean; // a hand is in the device
   rate: number;
   ticks: number;
   paused: boolean;
   recording: string | null;
+  recording_failed: string | null;
   busy: string | null;
   refused: string | null;
   locked: string | null;
@@ -57,6 +60,7 @@ export interface State {
 export interface Problem {
   type: 'error';
   about?: string;
+  reason?: 'value' | 'control' | 'hand' | 'locked';
   message: string;
   hint?: string;
 }

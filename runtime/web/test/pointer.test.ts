@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { boundary_edges, pick_boundary, pick_surface } from '../src/pick';
+import { boundary_edges, pick_boundary, pick_surface, thickness_below } from '../src/pick';
 import { dot, minus, norm, normalised, parse_tool, plus, pressed_position, ray_meets_plane, tool_text, turn_onto, turned_depth } from '../src/pose';
 import { frame_at } from '../src/replay_bar';
 import { scale_of } from '../src/view_controls';
@@ -63,6 +63,19 @@ test('a ray finds the nearest triangle that it enters from outside', () => {
   assert.equal(pick_surface(two_faces, [0.7, 0.3, -5], [0, 0, 1]), null); // from behind
   assert.equal(pick_surface(two_faces, [1.7, 0.3, 5], [0, 0, -1]), null);
   assert.equal(pick_surface(two_faces, [0.7, 0.3, 0.5], [0, 0, -1]), null); // behind the eye
+});
+
+test('how thick the body is below a point of its surface', () => {
+  // A wedge: its top is z = 1, its bottom z = x / 2, over 0 < x < 2, 0 < y < 1.
+  const wedge = {
+    position: [0, 0, 1, 2, 0, 1, 2, 1, 1, 0, 1, 1, 0, 0, 0, 2, 0, 1, 2, 1, 1, 0, 1, 0],
+    normal: [],
+    triangle: [0, 1, 2, 0, 2, 3, 4, 6, 5, 4, 7, 6],
+  };
+  for (const x of [0.1, 0.5, 1, 1.9]) close([thickness_below(wedge, { point: [x, 0.3, 1], normal: [0, 0, 1] })], [1 - x / 2]);
+  const slope = normalised([1, 0, -2]);
+  close([thickness_below(wedge, { point: [1, 0.6, 0.5], normal: slope })], [Math.hypot(0.25, 0.5)]);
+  assert.equal(thickness_below(wedge, { point: [3, 0.3, 1], normal: [0, 0, 1] }), Infinity);
 });
 
 test('beside a sharp edge the normal is the facet’s', () => {

@@ -1,0 +1,128 @@
+#include "formats/output_kind.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <optional>
+#include <sstream>
+#include <string>
+
+#include "formats/hdf5_contents.h"
+#include "meshes/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t beginning = 4096;  // bytes that tell what a file is
+
+/// At most so many bytes of a file; nothing where it cannot be read.
+std::optional<std::string> first_bytes(const std::filesystem::path& file) {
+  const int fd = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (fd < 0) return std::nullopt;
+  std::string bytes(beginning, '\0');
+  const ssize_t got = ::pread(fd, bytes.data(), bytes.size(), 0);
+  ::close(fd);
+  if (got < 0) return std::nullopt;
+  bytes.resize(static_cast<std::size_t>(got));
+  return bytes;
+}
+
+/// The attribute `format` of an HDF5 file, which may be a stranger's.
+std::string hdf5_format(const std::filesystem::path& file) {
+  try {
+    return hdf5::Contents::read(file).text_attribute("/", "format").value_or("");
+  } catch (const Error&) {
+    return "";
+  }
+}
+
+bool contains(std::string_view text, std::string_view piece) {
+  return text.find(piece) != std::string_view::npos;
+}
+
+/// A file of XML is ours by the comment that we begin it with, or as versions before that comment began it.
+bool is_our_xml(std::string_view text, std::string_view before_there_was_a_mark) {
+  constexpr std::string_view head = "<?xml version=\"1.0\"?>\n";
+  if (!text.starts_with(head)) return false;
+  text.remove_prefix(head.size());
+  return text.starts_with("<!-- palpate ") || text.starts_with(before_there_was_a_mark);
+}
+
+bool is_our_report(std::string_view text) {
+  if (text.starts_with("{\n  \"generator\": \"palpate-runtime ")) return true;
+  return text.starts_with("{\n  \"file\": ") && contains(text, "\n  \"fast\": ") &&
+         contains(text, "\n  \"tool\": ");
+}
+
+/// An OFF file of triangles that share no corners.
+bool is_loose_triangles(const std::string& text) {
+  std::istringstream words(text);
+  std::string head;
+  std::size_t corners = 0, triangles = 0;
+  return words >> head >> corners >> triangles && head == "OFF" && triangles > 0 && corners == 3 * triangles;
+}
+
+}  // namespace
+
+std::string_view name_of(OutputKind kind) noexcept {
+  switch (kind) {
+    case OutputKind::model:
+      return "model";
+    case OutputKind::recording:
+      return "recording";
+    case OutputKind::frames:
+      return "recording's description for ParaView";
+    case OutputKind::report:
+      return "report";
+    case OutputKind::contacts:
+      return "table of contact points";
+    case OutputKind::field:
+      return "table of displacements";
+    case OutputKind::grid:
+      return "grid for ParaView";
+    case OutputKind::page:
+      return "page";
+    case OutputKind::faces:
+      return "list of triangles";
+  }
+  return "";
+}
+
+bool needs_regular_file(OutputKind kind) noexcept {
+  return kind == OutputKind::model || kind == OutputKind::recording || kind == OutputKind::frames;
+}
+
+bool is_ours(const std::filesystem::path& file, OutputKind kind) {
+  const std::optional<std::string> bytes = first_bytes(file);
+  if (!bytes) return false;
+  const std::string_view text = *bytes;
+  if (text.empty()) return true;
+  switch (kind) {
+    case OutputKind::model:
+    case OutputKind::recording:
+      return text.starts_with("\x89HDF\r\n\x1a\n") &&
+             hdf5_format(file) == (kind == OutputKind::model ? "palpate" : "palpate-recording");
+    case OutputKind::frames:
+      return is_our_xml(text, "<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [\n<!ENTITY t '<Topology ");
+    case OutputKind::report:
+      return is_our_report(text);
+    case OutputKind::contacts:
+      return text.starts_with("x,y,z,nx,ny,nz,fx,fy,fz,gap,");
+    case OutputKind::field:
+      return text.starts_with("node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n");
+    case OutputKind::grid:
+      return is_our_xml(text,
+                        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
+                        "header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=");
+    case OutputKind::page:
+      return text.starts_with("<!doctype html>") &&
+             (contains(text, "<meta name=\"generator\" content=\"palpate-runtime ") ||
+              contains(text, "<title>Palpate</title>"));
+    case OutputKind::faces:
+      return is_loose_triangles(*bytes);
+  }
+  return false;
+}
+
+}  // namespace palpate

@@ -1,0 +1,33 @@
+// The kinds of files that the programs write, and how one is known again by its content.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+
+namespace palpate {
+
+enum class OutputKind : std::uint8_t {
+  model,      ///< NAME.palpate.hdf
+  recording,  ///< HDF5
+  frames,     ///< a recording's frames for ParaView, .xdmf
+  report,     ///< of a run, JSON
+  contacts,   ///< table of contact points, CSV
+  field,      ///< table of displacements, CSV
+  grid,       ///< for ParaView, .vtu
+  page,       ///< a recording as HTML
+  faces,      ///< triangles that are wrong, .off
+};
+
+/// "table of contact points"
+[[nodiscard]] std::string_view name_of(OutputKind kind) noexcept;
+
+/// Whether the programs can only write it to a regular file, and not to a pipe.
+[[nodiscard]] bool needs_regular_file(OutputKind kind) noexcept;
+
+/// Whether a regular file is of this kind and ours, which replacing it loses nothing of anyone else's; an
+/// empty one is. By its content; HDF5 reads it in a child process, which it cannot take down with it. False
+/// for what cannot be read.
+[[nodiscard]] bool is_ours(const std::filesystem::path& file, OutputKind kind);
+
+}  // namespace palpate

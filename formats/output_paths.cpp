@@ -1,0 +1,116 @@
+#include "formats/output_paths.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+
+#include "formats/journal.h"
+#include "formats/recording_parts.h"
+#include "meshes/error.h"
+#include "meshes/write_file.h"
+
+namespace palpate {
+namespace {
+
+bool same_file(const std::optional<struct stat>& a, const std::optional<struct stat>& b) {
+  return a && b && a->st_dev == b->st_dev && a->st_ino == b->st_ino;
+}
+
+/// Whether `path` is `folder` or in it.
+bool is_inside(const std::filesystem::path& path, const std::filesystem::path& folder) {
+  const auto [end, ignored] = std::mismatch(folder.begin(), folder.end(), path.begin(), path.end());
+  return end == folder.end();
+}
+
+/// What stands there may be replaced.
+void check_existing(const std::filesystem::path& file, OutputKind kind, bool force) {
+  if (force || ::access(file.c_str(), F_OK) != 0) return;
+  const std::string elsewhere = "write to another file, or replace this one with --force";
+  if (::access(file.c_str(), W_OK) != 0 && errno == EACCES)
+    throw Error("is there and write-protected", file.string(), elsewhere);
+  if (!is_ours(file, kind))
+    throw Error("is there already and is not a " + std::string(name_of(kind)) + " of Palpate's",
+                file.string(), elsewhere);
+}
+
+}  // namespace
+
+OutputPaths::Known OutputPaths::known(const std::filesystem::path& path, const std::string& what) {
+  std::error_code failed;
+  std::filesystem::path absolute = std::filesystem::absolute(path, failed);
+  if (failed) absolute = path;  // the working directory is gone
+  Known result{.path = std::filesystem::weakly_canonical(absolute, failed), .status = {}, .what = what};
+  if (failed) result.path = absolute;
+  struct stat status {};
+  if (::stat(path.c_str(), &status) == 0 && (S_ISREG(status.st_mode) || S_ISDIR(status.st_mode)))
+    result.status = status;
+  return result;
+}
+
+void OutputPaths::refuse_inputs(const Known& output) const {
+  for (const Known& input : inputs_) {
+    if (!is_inside(output.path, input.path) && !same_file(output.status, input.status)) continue;
+    throw Error("is " + input.what + ", which this run reads: it would be lost", output.path.string(),
+                "write " + output.what + " to another file");
+  }
+}
+
+void OutputPaths::refuse_outputs(const Known& output) const {
+  for (const Known& other : outputs_) {
+    if (!is_inside(output.path, other.path) && !is_inside(other.path, output.path) &&
+        !same_file(output.status, other.status))
+      continue;
+    throw Error("is both " + other.what + " and " + output.what, output.path.string(),
+                "give each a file of its own");
+  }
+}
+
+void OutputPaths::add_input(const std::filesystem::path& path, const std::string& what) {
+  Known input = known(path, what);
+  if (!input.status) return;
+  inputs_.push_back(std::move(input));
+  for (const Known& output : outputs_) refuse_inputs(output);
+}
+
+std::filesystem::path OutputPaths::add(const std::filesystem::path& path, OutputKind kind,
+                                       const std::string& option) {
+  if (path.empty()) throw Error("is an empty file name", option, "give the name of a file");
+  const std::string what = "the " + std::string(name_of(kind)) + " (" + option + ")";
+  const WriteTarget target = write_target(path);
+  if (target != WriteTarget::regular) {
+    if (needs_regular_file(kind))
+      throw Error("is not a regular file, and " + what + " needs one", path.string(),
+                  "give the name of a file");
+    if (target == WriteTarget::stream) pipes_.emplace_back(open_stream(path), path);
+    return path;
+  }
+  const std::filesystem::path file = link_target(path);
+  Known output = known(file, what);
+  refuse_inputs(output);
+  refuse_outputs(output);
+  outputs_.push_back(std::move(output));
+  check_existing(file, kind, force_);
+  if (kind == OutputKind::model) {
+    add_beside(with_suffix(file, ".partial"), what);
+    add_beside(with_suffix(file, ".progress"), what);
+    expect_own_journal(file);
+  }
+  if (kind == OutputKind::recording) {
+    add_beside(parts_folder(file), what);
+    expect_own_parts(file);
+  }
+  expect_writable_folder(file);
+  return file;
+}
+
+/// What is written on the way to an output.
+void OutputPaths::add_beside(const std::filesystem::path& path, const std::string& what) {
+  Known beside = known(path, what + "'s unfinished part");
+  refuse_inputs(beside);
+  refuse_outputs(beside);
+  outputs_.push_back(std::move(beside));
+}
+
+}  // namespace palpate

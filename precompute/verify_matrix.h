@@ -1,0 +1,37 @@
+// What `verify` asks of a packed matrix.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "precompute/precision.h"
+#include "precompute/verify.h"
+
+namespace palpate {
+
+/// Rounding of one stored entry, relative to what is stored (R with split precision).
+double unit_roundoff(Precision precision) noexcept;
+
+/// How far plain solves with K are from refined ones, relative to the largest entry of each: what the columns
+/// of the file can be wrong by, whatever they are stored in. `samples` columns of the stored dofs.
+double solver_error(const Factor& factor, const SparseMatrix& K, std::span<const std::int64_t> stored_dofs,
+                    int samples);
+
+/// Checks of A, as stored, against K^-1 with `factor` of K. Refined solves (refined_solve.h) stand for K^-1;
+/// `solver`: see solver_error. Named NAME "columns", NAME "rows", NAME "touches":
+/// - columns: `samples` columns, |A e - x|_max / |x|_max against two roundings and a hundred times `solver`;
+/// - rows: y = A r for four vectors r of random signs against x = K^-1 r. If each entry is wrong by its
+///   rounding alone, |y - x| of row i exceeds 8 times the rounding of |A_i|, its length, once in 10^13
+///   (Hoeffding). The error is the largest |y - x| in units of that (and of what the solver and the sums are
+///   wrong by). One entry that is wrong by more than twice the bound of its row or of its column is found for
+///   certain, several in one row are missed with a chance of at most 1/16;
+/// - touches: force_error against `measured`, what the file says of it, four times; at least
+///   good_force_error.
+std::vector<Check> verify_matrix(const Model& model, const PackedGreens& stored, const ForceErrors& measured,
+                                 const Factor& factor, const SparseMatrix& K,
+                                 std::span<const std::int64_t> stored_dofs, double solver,
+                                 const std::string& name, int samples);
+
+}  // namespace palpate

@@ -1,0 +1,44 @@
+// Where a viewer is served.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace palpate {
+
+/// Where a viewer is to be served.
+struct ViewerOptions {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 8017;  ///< 0: any that is free
+};
+
+/// Where it is served, and the secret that each request must show.
+struct ServedAddress {
+  std::string address;
+  std::uint16_t port = 0;
+  std::string token;  ///< 128 random bits as hexadecimal digits
+};
+
+/// An address that is taken, so that what comes next cannot fail for it: who connects waits until a
+/// ViewerServer serves the port, and is turned away when the port is destroyed instead.
+class ViewerPort {
+ public:
+  /// Takes the address and draws the token. Throws Error (port in use, address unknown).
+  explicit ViewerPort(const ViewerOptions& options);
+  ~ViewerPort();
+  ViewerPort(ViewerPort&& other) noexcept;
+  ViewerPort(const ViewerPort&) = delete;
+  ViewerPort& operator=(const ViewerPort&) = delete;
+
+  [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
+  /// What to open in a browser of this machine: http://127.0.0.1:8017/?token=...
+  [[nodiscard]] std::string url() const;
+  /// The listening socket, which is the caller's from now on.
+  [[nodiscard]] int release() noexcept;
+
+ private:
+  ServedAddress served_;
+  int socket_ = -1;
+};
+
+}  // namespace palpate

@@ -1,0 +1,168 @@
+"""Models, recordings, scripts and profiles that are damaged, crafted, or no files at all."""
+
+import os
+import signal
+import subprocess
+import time
+
+import h5py
+
+from programs import PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
+
+TOUCH = "t,x,y,z\n0,0.4,0.5,1.3\n0.1,0.4,0.5,1.1\n0.2,0.4,0.5,1.3\n"
+TOOL = ("--tool", "sphere:0.15")
+
+
+class FilesTest(ProgramTest):
+    def record(self, *arguments):
+        """A baked cube and a recording of a touch."""
+        self.write("touch.csv", TOUCH)
+        file = self.bake(cube_toml(3, scope="full"))
+        self.play(file, "--device", "script:touch.csv", *TOOL, "--record", "touch.h5", *arguments)
+        return file, self.folder / "touch.h5"
+
+    def play(self, file, *arguments):
+        result = run(RUNTIME, "play", file, "--fast", *arguments, cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result
+
+    def expect_refused(self, words, *command, status=1):
+        """One error line with these words and one hint line, fit for a terminal."""
+        result = run(*command, cwd=self.folder)
+        self.assertEqual(result.returncode, status, (command, result.stderr))
+        self.assertRegex(result.stderr, r"\Aerror: [^\n]+\n(  [^\n]*\n)*hint: [^\n]+\n\Z")
+        for word in words:
+            self.assertIn(word, result.stderr)
+        self.assertFalse([c for c in result.stderr if ord(c) < 32 and c != "\n"])
+
+
+def readers(model, recording):
+    """All that read a recording."""
+    return ((RUNTIME, "session", recording), (RUNTIME, "export", recording, "--html", "page.html"), (RUNTIME, "view", recording, "--view-address", "0"),
+            (RUNTIME, "play", model, "--device", f"replay:{recording}", "--fast"))
+
+
+class Recordings(FilesTest):
+    def test_a_flipped_bit_is_named_by_all_that_read_it(self):
+        model, recording = self.record("--overlay", "r=2,rings=1")
+        whole = recording.read_bytes()
+        with h5py.File(recording) as file:
+            places = {name: file[name].id.get_offset() for name in ("/ticks/patch", "/ticks/force", "/frames/displacement", "/surface/nodes")}
+        for name, offset in places.items():
+            damaged = bytearray(whole)
+            damaged[offset + 402] ^= 0x40
+            recording.write_bytes(damaged)
+            for command in readers(model, recording):
+                self.expect_refused([f"{name} was altered", "touch.h5"], *command)
+
+    def test_a_node_that_the_body_does_not_have_is_refused(self):
+        model, recording = self.record("--overlay", "r=2,rings=1")
+        for node, says in ((1_000_000_000, "holds 1000000000"), (64, "holds 64"), (21, "holds 21")):  # 21 is inside, with one of 3 x 3 x 3 cells around
+            self.set_tick(recording, "patch", 30, node)
+            self.expect_refused(["/ticks/patch, row 30, ", says], RUNTIME, "play", model, "--device", f"replay:{recording}", "--fast")
+
+    def set_tick(self, recording, name, row, value):
+        """A recording of version 4.1, which had no checksums."""
+        with h5py.File(recording, "r+", libver=("v110", "v110")) as file:
+            file["/ticks/" + name][row] = value
+            del file.attrs["version"]
+            file.attrs["version"] = [4, 1]
+
+    def test_numbers_that_mean_nothing_are_refused(self):
+        model, recording = self.record()
+        whole = recording.read_bytes()
+        for name, value in (("phase", 5), ("fault", 9), ("event", 64), ("status", 1 << 31), ("grab", 2), ("contacts", -1), ("time", -1.0)):
+            recording.write_bytes(whole)
+            self.set_tick(recording, name, 30, value)
+            for command in readers(model, recording):
+                self.expect_refused([f"/ticks/{name}, row 30, holds"], *command)
+
+    def test_of_version_41_are_replayed(self):
+        model, recording = self.record()
+        with h5py.File(recording) as file:
+            phase = file["/ticks/phase"][30]
+        self.set_tick(recording, "phase", 30, phase)
+        self.assertIn("bit by bit", self.play(model, "--device", f"replay:{recording}").stderr)
+
+
+class NoFiles(FilesTest):
+    def test_are_refused_at_once(self):
+        self.write("touch.csv", TOUCH)
+        file = self.bake(cube_toml(2))
+        os.mkfifo(self.folder / "fifo")
+        (self.folder / "folder").mkdir()
+        for name in ("fifo", "folder", "/dev/zero", "/dev/null", "none"):
+            for command in ((RUNTIME, "probe", name, "--node", "20", "--displace", "0,0,0"),
+                            (RUNTIME, "probe", file, "--model", name, "--node", "20", "--displace", "0,0,0"),
+                            (RUNTIME, "play", file, "--fast", "--device", f"script:{name}", *TOOL),
+                            (RUNTIME, "play", file, "--fast", "--device", f"replay:{name}"),
+                            (RUNTIME, "session", name), (RUNTIME, "view", name), (RUNTIME, "export", name, "--html", "page.html"),
+                            (RUNTIME, "devices", "--profile", name),
+                            (PRECOMPUTE, "inspect", name), (PRECOMPUTE, "verify", name), (PRECOMPUTE, "compare", name, file)):
+                with self.subTest(command=command):
+                    self.expect_refused([name], *command)
+
+
+class CleanText(FilesTest):
+    ESCAPE = "\x1b]0;owned\x07\x1b[2J\u202e"
+    SHOWN = "\\x1b]0;owned\\x07\\x1b[2J\\u202e"
+
+    def test_of_a_recordings_attributes(self):
+        model, recording = self.record()
+        with h5py.File(recording, "r+", libver=("v110", "v110")) as file:
+            for name in ("generator", "model", "content_hash", "device"):
+                del file.attrs[name]
+                file.attrs.create(name, (name + self.ESCAPE).encode(), dtype="S80")
+        result = run(RUNTIME, "session", recording)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for name in ("generator", "model", "content_hash", "device"):
+            self.assertIn(name + self.SHOWN, result.stdout)
+        self.assertNotIn("\x1b", result.stdout)
+        replay = self.play(model, "--device", f"replay:{recording}")
+        self.assertIn("model" + self.SHOWN, replay.stderr)  # in the warning that it is another
+        self.assertNotIn("\x1b", replay.stderr)
+
+    def test_of_a_description(self):
+        file = self.bake(cube_toml(2).replace('name = "cube"', 'name = "cube\\u001b[2J"'))
+        for command in ((PRECOMPUTE, "inspect", file), (RUNTIME, "probe", file, "--node", "20", "--displace", "0,0,0")):
+            result = run(*command)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertNotIn("\x1b", result.stdout + result.stderr)
+        self.assertIn("cube\\x1b[2J, written by", run(PRECOMPUTE, "inspect", file).stdout)
+
+    def test_of_a_script(self):
+        file = self.bake(cube_toml(2))
+        self.write("touch.csv", "t,x,y,z\n0,0,0," + self.ESCAPE + 70_000 * "1x" + "\n")
+        self.expect_refused(["'" + self.SHOWN + "1x", "…"], RUNTIME, "play", file, "--fast", "--device", "script:touch.csv", *TOOL)
+
+
+class Truncated(FilesTest):
+    def test_while_it_is_in_use_does_nothing(self):
+        self.write("touch.csv", TOUCH.replace("0.2,", "30,"))
+        file = self.bake(cube_toml(3))
+        process = subprocess.Popen([RUNTIME, "play", file, "--device", "script:touch.csv", *TOOL], cwd=self.folder, stdin=subprocess.DEVNULL,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.kill)
+        while "loaded in" not in process.stderr.readline():
+            self.assertIsNone(process.poll())
+        os.truncate(file, 0)
+        time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(), 130, process.stderr.read())
+        process.communicate()
+
+    def test_during_the_load_is_an_error(self):
+        file = self.bake(cube_toml(3))
+        whole = file.read_bytes()
+        for size in range(0, len(whole), len(whole) // 40):
+            file.write_bytes(whole[:size])
+            self.expect_refused(["model.palpate.hdf"], RUNTIME, "probe", file, "--node", "20", "--displace", "0,0,0")
+
+
+class Fuzzed(ProgramTest):
+    """The first of the files of scripts/fuzz-programs: the same ones every time."""
+
+    def test_metadata(self):
+        result = run(SOURCE / "scripts" / "fuzz-programs", "--kinds", "hdf5-model,hdf5-recording", "--runs", "40", "--seed", "3",
+                     "--no-memory-limit")
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)

@@ -1,0 +1,219 @@
+"""The command line as a newcomer meets it: wrong words, wrong files, help pages, what comes next."""
+
+import gzip
+import re
+import struct
+import unittest
+import zlib
+
+from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
+
+# A cube of 10 in its own units, outwards.
+OFF = """OFF
+8 12 0
+0 0 0
+10 0 0
+10 10 0
+0 10 0
+0 0 10
+10 0 10
+10 10 10
+0 10 10
+3 0 2 1
+3 0 3 2
+3 4 5 6
+3 4 6 7
+3 0 1 5
+3 0 5 4
+3 1 2 6
+3 1 6 5
+3 2 3 7
+3 2 7 6
+3 3 0 4
+3 3 4 7
+"""
+MEDIT = """MeshVersionFormatted 2
+Dimension 3
+Vertices
+5
+0 0 0 0
+10 0 0 0
+0 10 0 0
+0 0 10 0
+10 10 10 0
+Tetrahedra
+2
+1 2 3 4 1
+2 3 4 5 1
+End
+"""
+
+
+def png(width, height):
+    """A white picture."""
+    def chunk(name, data):
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+    rows = (b"\0" + b"\xff" * width) * height
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)) + \
+        chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+
+
+def inr(size):
+    """A ball of label 1."""
+    head = f"#INRIMAGE-4#{{\nXDIM={size}\nYDIM={size}\nZDIM={size}\nVDIM=1\nTYPE=unsigned fixed\nPIXSIZE=8 bits\nCPU=decm\nVX=1\nVY=1\nVZ=1\n"
+    head += "\n" * (256 - 4 - len(head)) + "##}\n"
+    middle, radius = (size - 1) / 2, size / 2 - 2
+    inside = bytes(int((x - middle) ** 2 + (y - middle) ** 2 + (z - middle) ** 2 < radius ** 2)
+                   for z in range(size) for y in range(size) for x in range(size))
+    return head.encode() + inside
+
+
+class Usage(ProgramTest):
+    def assert_usage(self, result, *pieces):
+        """Exit status 2, and exactly `error:` and `hint:`."""
+        self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
+        self.assertRegex(result.stderr, r"^error: [^\n]+\nhint: [^\n]+\n$")
+        for piece in pieces:
+            self.assertIn(piece, result.stderr)
+
+    def test_precompute_says_what_is_wrong_and_what_helps(self):
+        for arguments, pieces in (((), ("MODEL.toml", "--help")), (("--bogus",), ("--bogus", "palpate-precompute --help")),
+                                  (("verify",), ("FILE", "palpate-precompute verify --help")),
+                                  (("compare", "a.palpate.hdf"), ("B", "compare --help")),
+                                  (("--jobs", "0", "x.toml"), ("--jobs", "--help")),
+                                  (("verfy", "x.palpate.hdf"), ("palpate-precompute verify?",)),
+                                  (("inspekt",), ("palpate-precompute inspect?",)),
+                                  (("help", "bogus"), ("there is no command 'bogus'",))):
+            with self.subTest(arguments=arguments):
+                self.assert_usage(run(PRECOMPUTE, *arguments, cwd=self.folder), *pieces)
+
+    def test_runtime_names_the_command_that_is_meant(self):
+        for word, piece in (("liver.palpate.hdf", "palpate-runtime play liver.palpate.hdf --view"),
+                            ("touch.h5", "palpate-runtime view touch.h5"), ("model.toml", "palpate-precompute model.toml"),
+                            ("pley", "palpate-runtime play?"), ("sesion", "palpate-runtime session?"),
+                            ("bogus", "play, view, probe, session, export or devices")):
+            with self.subTest(word=word):
+                self.assert_usage(run(RUNTIME, word), f"'{word}'", piece)
+
+    def test_help_is_a_command_too(self):
+        for program, commands in ((PRECOMPUTE, ("inspect", "verify", "compare")),
+                                  (RUNTIME, ("play", "view", "probe", "session", "export", "devices"))):
+            whole = run(program, "help")
+            self.assertEqual((whole.returncode, whole.stderr), (0, ""))
+            self.assertEqual(whole.stdout, run(program, "--help").stdout)
+            for command in commands:
+                self.assertRegex(whole.stdout, rf"\n  {command} +\w")
+                page = run(program, "help", command)
+                self.assertEqual((page.returncode, page.stderr), (0, ""))
+                self.assertEqual(page.stdout, run(program, command, "--help").stdout)
+
+    def test_each_page_has_examples_of_its_own(self):
+        for program, commands in ((PRECOMPUTE, ("inspect", "verify", "compare")),
+                                  (RUNTIME, ("play", "view", "probe", "session", "export", "devices"))):
+            for command in commands:
+                with self.subTest(command=command):
+                    page = run(program, command, "--help").stdout
+                    examples = page[page.index("Example"):].splitlines()[1:]
+                    self.assertTrue(examples)
+                    named = re.findall(rf"{program.name} (\w+)", "\n".join(examples))
+                    self.assertEqual(set(named), {command})
+
+    def test_pages_fit_a_terminal(self):
+        for program, commands in ((PRECOMPUTE, ("", "inspect", "verify", "compare")),
+                                  (RUNTIME, ("", "play", "view", "probe", "session", "export", "devices"))):
+            for command in commands:
+                page = run(program, *[command][: len(command)], "--help").stdout
+                self.assertEqual([line for line in page.splitlines() if len(line) > 110], [])
+
+    def test_options_of_play_stand_in_groups_in_the_order_of_use(self):
+        page = run(RUNTIME, "play", "--help").stdout
+        headings = re.findall(r"^([A-Z][^\n]*):$", page, re.MULTILINE)
+        self.assertEqual(headings, ["Arguments", "What moves the tool", "In a browser", "The tool", "The body", "The loop",
+                                    "What is written", "Where the device is in the body's frame", "Safety of the hand", "Examples"])
+        groups = dict(re.findall(r"^([A-Z][^\n]*):\n(.*?)(?=^[A-Z][^\n]*:$|\Z)", page, re.MULTILINE | re.DOTALL))
+        for option, heading in (("--device", "What moves the tool"), ("--view", "In a browser"), ("--tool", "The tool"),
+                                ("--overlay", "The body"), ("--rate", "The loop"), ("--record", "What is written"),
+                                ("--origin", "Where the device is in the body's frame"), ("--safety", "Safety of the hand")):
+            self.assertRegex(groups[heading], rf"(?m)^  {option} ")
+        bounds = re.findall(r"^    (\w+) +([\d.e-]+) (.{6}) (\w.*)$", groups["Safety of the hand"], re.MULTILINE)
+        self.assertEqual(len(bounds), 30)
+        self.assertIn(("max_force", "3", "N     ", "largest force on the hand"), bounds)
+        for name, _, unit, meaning in bounds:
+            self.assertTrue(unit.strip() or name == "buzz_flips", name)
+            self.assertGreater(len(meaning.split()), 2, name)
+
+
+class NotADescription(ProgramTest):
+    def starter(self, result, name, what):
+        """The model.toml that the hint shows."""
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn(f"{name}: is {what}, not a model.toml", result.stderr)
+        text = result.stderr[result.stderr.index("to begin with:\n") + len("to begin with:\n"):]
+        return re.sub("(?m)^    ", "", text)
+
+    def test_geometry_gets_a_model_toml_that_works(self):
+        for name, content, what in (("cube.off", OFF.encode(), "a surface"), ("Two Tets.mesh", MEDIT.encode(), "a volume mesh"),
+                                    ("sheet.png", png(40, 20), "a picture"), ("ball.inr", inr(40), "an image"),
+                                    ("ball2.inr.gz", gzip.compress(inr(40)), "an image")):
+            with self.subTest(name=name):
+                (self.folder / name).write_bytes(content)
+                model = self.write("model.toml", self.starter(run(PRECOMPUTE, name, cwd=self.folder), name, what))
+                result = run(PRECOMPUTE, model, cwd=self.folder)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertTrue((self.folder / (name.split(".")[0] + ".palpate.hdf")).exists())
+
+    def test_files_of_ours_and_folders(self):
+        file = self.bake(cube_toml(2), name="cube.toml")
+        self.assert_refused(run(PRECOMPUTE, file), "is a baked model already", f"palpate-runtime play {file} --view", "inspect")
+        recording = self.write("touch.h5", "")
+        self.assert_refused(run(PRECOMPUTE, recording), "is a recording", f"palpate-runtime view {recording}")
+        self.write("model.toml", cube_toml(2))
+        self.assert_refused(run(PRECOMPUTE, self.folder), "is a folder", f"palpate-precompute {self.folder / 'model.toml'}")
+
+
+class Next(ProgramTest):
+    def test_the_next_command_is_named(self):
+        model = self.write("model.toml", cube_toml(2))
+        baked = run(PRECOMPUTE, model, cwd=self.folder)
+        self.assertIn("next: palpate-precompute verify cube.palpate.hdf", baked.stderr)
+        self.assertIn("palpate-runtime play cube.palpate.hdf --view", baked.stderr)
+        verified = run(PRECOMPUTE, "verify", "cube.palpate.hdf", cwd=self.folder)
+        self.assertIn("next: palpate-runtime play cube.palpate.hdf --view", verified.stderr)
+        self.write("touch.csv", "t,x,y,z,grab\n0,0.5,0.5,1.2,0\n0.1,0.5,0.5,0.9,0\n")
+        played = run(RUNTIME, "play", "cube.palpate.hdf", "--device", "script:touch.csv", "--fast", "--tool", "sphere:0.1",
+                     "--record", "touch.h5", cwd=self.folder)
+        self.assertEqual(played.returncode, 0, played.stderr)
+        self.assertIn("next: palpate-runtime view touch.h5", played.stderr)
+        without = run(RUNTIME, "play", "cube.palpate.hdf", "--device", "script:touch.csv", "--fast", cwd=self.folder)
+        self.assertNotIn("next:", without.stderr)
+
+
+class WrongKind(ProgramTest):
+    def test_a_model_is_no_recording_and_the_reverse(self):
+        file = self.bake(cube_toml(2), name="cube.toml")
+        touch = self.write("touch.csv", "t,x,y,z,grab\n0,0.5,0.5,1.2,0\n0.1,0.5,0.5,0.9,0\n")
+        recording = self.folder / "touch.h5"
+        self.assertEqual(run(RUNTIME, "play", file, "--device", f"script:{touch}", "--fast", "--record", recording).returncode, 0)
+        for arguments in (("view", file), ("session", file), ("export", file, "--html", self.folder / "x.html")):
+            with self.subTest(command=arguments[0]):
+                self.assert_refused(run(RUNTIME, *arguments), "is a model, not a recording", f"palpate-runtime play {file} --view")
+        for arguments in (("play", recording, "--device", f"script:{touch}"), ("probe", recording, "--node", "1", "--displace", "0,0,1")):
+            with self.subTest(command=arguments[0]):
+                self.assert_refused(run(RUNTIME, *arguments), "is a recording, not a model", f"palpate-runtime view {recording}")
+
+    def test_a_broken_recording_gets_its_reason(self):
+        file = self.bake(cube_toml(2), name="cube.toml")
+        touch = self.write("touch.csv", "t,x,y,z,grab\n0,0.5,0.5,1.2,0\n0.1,0.5,0.5,0.9,0\n")
+        recording = self.folder / "touch.h5"
+        self.assertEqual(run(RUNTIME, "play", file, "--device", f"script:{touch}", "--fast", "--record", recording).returncode, 0)
+        whole = recording.read_bytes()
+        for broken, reason in ((b"", "empty"), (b"hello", "not"), (whole[: len(whole) // 2], "truncated"), (whole[:20], "truncated")):
+            recording.write_bytes(broken)
+            for command in ("session", "view"):
+                result = run(RUNTIME, command, recording)
+                self.assert_refused(result, "touch.h5", reason)
+                self.assertNotIn("no reason given", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
