@@ -88,12 +88,16 @@ struct LetGoBody {
   VectorXd f, u, v, g_rate;
 };
 
+/// The usual parameters, of which some coefficients are zero or equal, and others.
+constexpr Newmark usual{}, damping{.alpha = 0.3025, .delta = 0.6};
+
 class NewmarkSteps : public testing::TestWithParam<ElementType> {};
 
 TEST_P(NewmarkSteps, PackedIsTheSparseSolveOverAThousandSteps) {
   for (const bool lumped : {false, true}) {
     DynamicsOptions options = test::packed();
     options.lumped = lumped;
+    options.newmark = lumped ? damping : usual;
     const Model model = test::swinging_model(GetParam(), options);
     const LetGoBody body(model);
     const test::SparseRoute sparse(model);
@@ -168,21 +172,25 @@ struct ModalRun {
 };
 
 TEST_P(NewmarkSteps, ModalWithAllModesIsThePackedOne) {
-  Model model = test::swinging_model(GetParam(), test::packed());
-  const LetGoBody body(model);
-  PackedNewmark packed(model.dynamics, 1);
-  packed.let_go(span(body.f), span(body.u), span(body.v));
-  const Model modal_model = test::swinging_model(GetParam(), test::all_modes());
-  ASSERT_EQ(modal_model.dynamics.modes(), static_cast<Index>(model.stored_dofs()));
-  EXPECT_TRUE(std::isinf(modal_model.dynamics.omega.back()));
-  ModalRun modal(modal_model, body);
-  modal.count = static_cast<Index>(model.stored_nodes.size());
-  for (int step = 0; step < 1000; ++step) {
-    packed.predict();
-    packed.advance();
-    modal.step();
-    if (step % 50 == 0) {
-      ASSERT_LT((modal.u() - vector(packed.u())).norm(), 1e-9 * body.u.norm()) << "step " << step;
+  for (const Newmark& newmark : {usual, damping}) {
+    DynamicsOptions of_packed = test::packed(), of_modal = test::all_modes();
+    of_packed.newmark = of_modal.newmark = newmark;
+    const Model model = test::swinging_model(GetParam(), of_packed);
+    const LetGoBody body(model);
+    PackedNewmark packed(model.dynamics, 1);
+    packed.let_go(span(body.f), span(body.u), span(body.v));
+    const Model modal_model = test::swinging_model(GetParam(), of_modal);
+    ASSERT_EQ(modal_model.dynamics.modes(), static_cast<Index>(model.stored_dofs()));
+    EXPECT_TRUE(std::isinf(modal_model.dynamics.omega.back()));
+    ModalRun modal(modal_model, body);
+    modal.count = static_cast<Index>(model.stored_nodes.size());
+    for (int step = 0; step < 1000; ++step) {
+      packed.predict();
+      packed.advance();
+      modal.step();
+      if (step % 50 == 0) {
+        ASSERT_LT((modal.u() - vector(packed.u())).norm(), 1e-9 * body.u.norm()) << "step " << step;
+      }
     }
   }
 }

@@ -5,7 +5,11 @@ import os
 import pathlib
 import subprocess
 import tempfile
+import time
 import unittest
+
+import h5py
+import numpy
 
 SOURCE = pathlib.Path(__file__).resolve().parent.parent
 BINARY = pathlib.Path(os.environ["PALPATE_BINARY_DIR"])
@@ -18,6 +22,19 @@ def run(program, *arguments, cwd=None, **options):
     """The finished process, with its output as text."""
     return subprocess.run([str(program), *map(str, arguments)], cwd=cwd, text=True, capture_output=True,
                           timeout=240, check=False, **options)
+
+
+def recorded(file, field):
+    """A field of a recording that goes on, as far as it is; nothing where there is none yet."""
+    for _ in range(100):  # it may just be replaced
+        try:
+            with h5py.File(file) as session:
+                return session[field][:]
+        except FileNotFoundError:
+            break
+        except (OSError, KeyError):
+            time.sleep(0.02)
+    return numpy.array([], dtype=int)
 
 
 def cube_toml(cells, scope="surface", precision="double", name="cube"):
@@ -44,6 +61,16 @@ class ProgramTest(unittest.TestCase):
         temporary = tempfile.TemporaryDirectory()
         self.addCleanup(temporary.cleanup)
         self.folder = pathlib.Path(temporary.name)
+
+    def wait_for(self, condition, process=None):
+        """Waits for what a process brings about. Two minutes without it, or the process's end, are a failure."""
+        for _ in range(6000):
+            if condition():
+                return
+            if process is not None:
+                self.assertIsNone(process.poll(), "it has ended")
+            time.sleep(0.02)
+        self.fail("it has not come")
 
     def write(self, name, text):
         path = self.folder / name

@@ -14,14 +14,14 @@ import h5py
 import numpy
 
 from bridge_key import key_file, read_key, seal
-from programs import BINARY, RUNTIME, ProgramTest, cube_toml, run
+from programs import BINARY, RUNTIME, ProgramTest, cube_toml, recorded, run
 
 BRIDGE = BINARY / "runtime" / "palpate-bridge-example"
 SPRING = 300.0  # of the example's hand [N/m]
 # A cube of 10 cm, as stiff as a soft organ: at its top's middle some 80 N/m to a ball.
 SMALL_CUBE = cube_toml(4, scope="full").replace("size = [1, 1, 1]", "size = [0.1, 0.1, 0.1]").replace("youngs_modulus = 1.0", "youngs_modulus = 3000")
 # This machine may be busy: late ticks and reports have their own tests.
-PATIENT = "late=10,most_late=1e9,stale_life=10,silence=5,silence_fade=4,frozen=100,ramp=0.2,buzz_flips=1000"
+PATIENT = "late=10,most_late=1e9,stale_life=10,silence=30,silence_fade=20,frozen=100,ramp=0.2,buzz_flips=1000"
 
 
 def free_port():
@@ -56,10 +56,12 @@ class Felt(ProgramTest):
         return self.start(BRIDGE, "--port", self.port, "--seconds", seconds, "--rate", 1000, "--from", f"0,0,{start}", "--to",
                           f"0,0,{-depth}", "--period", period)
 
-    def wait_for_ticks(self, runtime):
-        while not (self.folder / "session.h5").exists():
-            self.assertIsNone(runtime.poll(), "it has ended")
-            time.sleep(0.02)
+    def recorded(self, field):
+        return recorded(self.folder / "session.h5", field)
+
+    def shown(self):
+        """The size of the force on the hand in each tick up to now."""
+        return numpy.linalg.norm(numpy.reshape(self.recorded("ticks/shown_force"), (-1, 3)), axis=1)
 
     def finish(self, process, code=0):
         _, messages = process.communicate(timeout=120)
@@ -95,12 +97,9 @@ class Felt(ProgramTest):
     def test_a_killed_session_opens_and_its_replay_is_the_same_bit_by_bit(self):
         runtime = self.play("--overlay", "r=2,rings=1")
         self.hand(60, 0.03, 1.5)
-        self.wait_for_ticks(runtime)
-        time.sleep(4.0)
-        started = time.monotonic()
+        self.wait_for(lambda: len(force := self.recorded("ticks/force")) >= 2500 and numpy.abs(force).max() > 0.1, runtime)
         runtime.send_signal(signal.SIGKILL)
         runtime.wait()
-        self.assertLess(time.monotonic() - started, 5)
         with h5py.File(self.folder / "session.h5") as session:
             force = session["ticks/force"][:]
         self.assertGreaterEqual(len(force), 2500)
@@ -117,15 +116,17 @@ class Felt(ProgramTest):
         self.assertGreater(json.loads(other.stdout)["replay"]["different_ticks"], 100)
 
     def test_a_bridge_that_goes_is_a_fault_and_may_come_back(self):
-        runtime = self.play("--duration", "9")
-        first = self.hand(60, 0.03, 1.0)
-        self.wait_for_ticks(runtime)
-        time.sleep(1.5)
+        runtime = self.play()
+        first = self.hand(600, 0.03, 1.0)
+        self.wait_for(lambda: (self.shown() > 0.1).any(), runtime)
         first.kill()
         first.wait()
-        time.sleep(2.0)
-        self.hand(60, 0.03, 1.0)
-        messages = self.finish(runtime)
+        self.wait_for(lambda: numpy.any(self.recorded("ticks/fault")), runtime)
+        self.hand(600, 0.03, 1.0)
+        gone = numpy.nonzero(self.recorded("ticks/fault"))[0][0]
+        self.wait_for(lambda: (self.shown()[gone:] > 0.1).any(), runtime)
+        runtime.send_signal(signal.SIGINT)
+        messages = self.finish(runtime, 130)
         self.assertIn("device_lost", messages)
         self.assertIn("the device is back", messages)
         report = json.loads((self.folder / "report.json").read_text())
@@ -151,25 +152,30 @@ class Felt(ProgramTest):
 
     def fault_is_acknowledged(self, acknowledge):
         runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--origin", "0.05,0.05,0.12", "--safety",
-                             PATIENT + ",max_speed=0.1", "--duration", "6", "--record", "session.h5", "--report", "report.json")
-        self.hand(60, 0.0, 2.0, 0.15)  # 0.24 m/s at most, at half a second: free space all the way
-        self.wait_for_ticks(runtime)
-        time.sleep(2.0)
-        while runtime.poll() is None:  # it may be too fast again at that moment
+                             PATIENT + ",max_speed=0.1", "--record", "session.h5", "--report", "report.json")
+        self.hand(600, 0.0, 3.5, 0.15)  # 0.13 m/s at most, at 0.9 s: free space all the way, slow for half of the time
+        self.wait_for(lambda: numpy.any(self.recorded("ticks/fault")), runtime)
+
+        def acknowledged_for_long():
+            """It must come while the hand is slow."""
             acknowledge(runtime)
-            time.sleep(0.05)
-        messages = self.finish(runtime)
+            time.sleep(0.3)
+            fault, event = self.recorded("ticks/fault"), self.recorded("ticks/event")
+            return any(len(fault) >= k + 400 and not fault[k : k + 400].any() for k in numpy.flatnonzero(numpy.bitwise_and(event, 4)))
+
+        self.wait_for(acknowledged_for_long, runtime)
+        runtime.send_signal(signal.SIGINT)
+        messages = self.finish(runtime, 130)
         self.assertIn("no force, too_fast: the handle moved faster than max_speed. Press Enter to go on, or: kill -USR1 "
                       f"{runtime.pid}", messages)
         self.assertIn("acknowledged; force begins again out of contact", messages)
         with h5py.File(self.folder / "session.h5") as session:
             fault, event = session["ticks/fault"][:], session["ticks/event"][:]
-        acknowledged, = numpy.nonzero(event & 4)
-        latched, = numpy.nonzero(fault)
-        self.assertEqual(set(fault[latched[0]: acknowledged[0]]), {1}, "nothing else ends it")
-        ended, = numpy.nonzero((fault[:-1] == 1) & (fault[1:] == 0))
+        acknowledged, latched = numpy.flatnonzero(event & 4), numpy.flatnonzero(fault)
+        self.assertEqual(set(fault[latched[0] : acknowledged[0]]), {1}, "nothing else ends it")
+        ended = 1 + numpy.flatnonzero((fault[:-1] == 1) & (fault[1:] == 0))
         self.assertGreater(len(ended), 0)
-        self.assertTrue(set(ended + 1) <= set(acknowledged))
+        self.assertTrue((event[ended] & 4 != 0).all(), "nothing else ends it")
 
     def test_datagrams_that_are_not_taken_are_told(self):
         runtime = self.play("--duration", "0.2")

@@ -13,7 +13,7 @@ import numpy
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
+from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, recorded, run
 
 TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
 HANDING_OVER = 1 << 10  # runtime/status.h
@@ -395,9 +395,10 @@ class Play(ProgramTest):
         file = self.bake(cube_toml(4))
         script = self.write("long.csv", "t,x,y,z\n0,0.5,0.5,1\n600,0.5,0.5,0.9\n")
         for stop in (signal.SIGINT, signal.SIGTERM):
+            (self.folder / "out.h5").unlink(missing_ok=True)
             process = subprocess.Popen([RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.h5", "--report", "-"],
                                        cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-            time.sleep(1.0)
+            self.wait_for(lambda: len(recorded(self.folder / "out.h5", "ticks/time")) > 0, process)
             process.send_signal(stop)
             output, messages = process.communicate(timeout=60)
             self.assertEqual(process.returncode, 130, messages)

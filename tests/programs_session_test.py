@@ -12,7 +12,7 @@ import numpy
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-from programs import RUNTIME, SOURCE, ProgramTest, cube_toml, run
+from programs import RUNTIME, SOURCE, ProgramTest, cube_toml, recorded, run
 
 TOUCH = "t,x,y,z,grab\n0,0.4,0.5,1.3,0\n0.1,0.4,0.5,1.15,0\n0.4,0.6,0.5,1.15,1\n0.5,0.6,0.5,1.3,1\n"
 PLANE = "t,x,y,z\n0,0.5,1.3,0\n0.2,0.5,1.1,0\n"
@@ -156,13 +156,14 @@ class Session(ProgramTest):
         out = self.folder / "out.h5"
         chance, most = random.Random(1), 0
         for _ in range(6):
+            out.unlink(missing_ok=True)
             process = subprocess.Popen([RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.h5"],
                                        cwd=self.folder, stderr=subprocess.PIPE)
-            time.sleep(chance.uniform(0.3, 2.5))
+            ticks = chance.randrange(2500)
+            self.wait_for(lambda: out.exists() and len(recorded(out, "ticks/time")) >= ticks, process)
+            time.sleep(chance.uniform(0.0, 0.6))  # a checkpoint each half second
             process.send_signal(signal.SIGKILL)
             process.communicate()
-            if not out.exists():
-                continue  # it was loading
             rows, frames = self.check_killed(out)
             most = max(most, rows)
             told = json.loads(self.session("out.h5", "--json"))

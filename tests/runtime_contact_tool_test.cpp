@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/hand_force.h"
 #include "runtime/node_vectors.h"
 #include "runtime/step.h"
 #include "tests/runtime_model.h"
@@ -335,6 +336,36 @@ TEST_P(Local, ModelIsTheDerivativeOfTheForce) {
     EXPECT_LT(error, 0.02) << "within its radius";
   }
   EXPECT_GE(useful, 3) << "of 4 depths";
+}
+
+// Beyond a share of the tool's radius its normals turn too much, however far contacts are from a change.
+TEST_P(Tools, ALocalModelReachesATenthOfTheRadiusAtMost) {
+  const double radius = 0.05 * edge_;
+  const Vec3 place = at(0.47, 0.53, 1.0 + radius);
+  State state(body_, {.tools = {plain({.radius = radius})}});
+  double largest = 0.0;
+  for (int k = 0; k <= 200; ++k) {
+    step(body_, state, pose(place + at(0.0, 0.0, (0.2 - 0.01 * std::min(k, 150)) * radius)));
+    largest = std::max(largest, state.tools[0].local.radius);
+  }
+  ASSERT_GT(state.tools[0].contacts, 0);
+  EXPECT_GT(largest, 0.09 * radius);
+  EXPECT_LE(largest, 0.1 * radius * (1.0 + 1e-12));
+}
+
+// dF/dt = -felt / 20 ms, and what was felt is forgotten by 2 % a millisecond: gone after 25.6 ms.
+TEST_P(Tools, AForceThatIsLostFadesInTheSameTimeAtAnyRate) {
+  const double a = -std::log(0.98);  // 1/ms
+  const double expected = -std::log(1.0 - 20.0 * a) / a;
+  EXPECT_NEAR(expected, 25.6, 0.05);
+  for (const double tick : {1e-3, 5e-4, 2e-4}) {
+    const State state(body_, {.tools = {Tool{.radius = radius_}}, .tick = tick});
+    ToolState tool = state.tools[0];
+    tool.wrench.force = at(0.0, 0.0, 2.0);
+    int ticks = 0;
+    for (; tool.wrench.force.norm() > 0.0 && ticks < 1000; ++ticks) give_force(tool, tick);
+    EXPECT_NEAR(1e3 * tick * ticks, expected, 1.5e3 * tick + 0.5) << tick << " s";
+  }
 }
 
 TEST_P(Tools, TheWrenchIsThatOfTheForcesOnTheBody) {

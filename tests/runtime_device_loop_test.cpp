@@ -5,10 +5,13 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "meshes/error.h"
 #include "runtime/loop.h"
+#include "runtime/replay_device.h"
 #include "runtime/script_device.h"
 #include "runtime/settings.h"
 #include "tests/runtime_model.h"
@@ -279,6 +282,82 @@ TEST(Settings, RefusesBoundsThatItDoesNotKnow) {
   for (const char* wrong :
        {"max_farce=5", "max_force", "max_force=-1", "max_force=nan", "=3", "", "ramp=1;2"})
     EXPECT_THROW(static_cast<void>(parse_safety(wrong)), Error) << wrong;
+}
+
+// Each name means its own number; told by 30 different ones.
+TEST(Settings, BoundsHaveTheirNames) {
+  SafetyOptions o;
+  const std::vector<std::pair<const char*, double*>> names = {{"max_force", &o.max_force},
+                                                              {"max_torque", &o.max_torque},
+                                                              {"max_force_rate", &o.max_force_rate},
+                                                              {"max_torque_rate", &o.max_torque_rate},
+                                                              {"max_stiffness", &o.max_stiffness},
+                                                              {"max_damping", &o.max_damping},
+                                                              {"max_speed", &o.max_speed},
+                                                              {"ramp", &o.ramp},
+                                                              {"small_force", &o.small_force},
+                                                              {"calm_time", &o.calm_time},
+                                                              {"late", &o.deadline.tolerance},
+                                                              {"late_fade", &o.deadline.fade},
+                                                              {"late_recovery", &o.deadline.recovery},
+                                                              {"most_late", &o.deadline.most},
+                                                              {"forgiveness", &o.deadline.forgiveness},
+                                                              {"silence", &o.silence.most},
+                                                              {"silence_fade", &o.silence.fade_from},
+                                                              {"frozen", &o.silence.frozen},
+                                                              {"frozen_force", &o.silence.frozen_force},
+                                                              {"stale", &o.stale.fresh},
+                                                              {"stale_life", &o.stale.time_to_live},
+                                                              {"stale_fade", &o.stale.fade},
+                                                              {"stale_damping", &o.stale.damping},
+                                                              {"buzz_speed", &o.buzz.speed},
+                                                              {"buzz_force", &o.buzz.force},
+                                                              {"buzz_mean", &o.buzz.mean_time},
+                                                              {"buzz_window", &o.buzz.window},
+                                                              {"buzz_fade", &o.buzz.fade},
+                                                              {"buzz_recovery", &o.buzz.recovery}};
+  std::string text;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    text += std::string(k > 0 ? "," : "") + names[k].first + "=" + std::to_string(100 + k);
+  o = parse_safety(text);
+  for (std::size_t k = 0; k < names.size(); ++k)
+    EXPECT_EQ(*names[k].second, 100.0 + static_cast<double>(k)) << names[k].first;
+}
+
+TEST(Settings, FrictionMayBeZeroAndAStiffnessMayNot) {
+  EXPECT_EQ(read_settings({{"friction", "0"}}).tool.friction, 0.0);
+  EXPECT_EQ(read_settings({{"friction", "0.3"}}).tool.friction, 0.3);
+  for (const char* wrong : {"-0.1", "nan", "inf", "", "x"})
+    EXPECT_THROW(static_cast<void>(read_settings({{"friction", wrong}})), Error) << wrong;
+  EXPECT_EQ(read_settings({{"coupling", "250"}}).tool.coupling_stiffness, 250.0);
+  for (const char* wrong : {"0", "-1", "nan", ""})
+    EXPECT_THROW(static_cast<void>(read_settings({{"coupling", wrong}})), Error) << wrong;
+}
+
+TEST(ReplayDifference, IsOfAnyBitOfAnyForce) {
+  TickRecord then{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto x = static_cast<double>(axis);
+    then.force[axis] = 1.0 + x;
+    then.torque[axis] = 4.0 + x;
+    then.shown_force[axis] = 7.0 + x;
+    then.shown_torque[axis] = 10.0 + x;
+  }
+  ReplayDifference difference;
+  compare(then, then, difference);
+  EXPECT_EQ(difference.ticks, 1);
+  EXPECT_EQ(difference.different, 0);
+  std::int64_t different = 0;
+  for (const auto member :
+       {&TickRecord::force, &TickRecord::torque, &TickRecord::shown_force, &TickRecord::shown_torque}) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      TickRecord now = then;
+      (now.*member)[axis] = std::nextafter((now.*member)[axis], 100.0);
+      compare(now, then, difference);
+      EXPECT_EQ(difference.different, ++different) << "component " << axis;
+    }
+  }
+  EXPECT_EQ(difference.ticks, 13);
 }
 
 TEST(Monitor, DrawsHowDurationsAreSpread) {

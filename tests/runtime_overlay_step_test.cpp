@@ -223,7 +223,7 @@ TEST_P(Sliding, BuildsAheadInTheBackground) {
   PatchSource source(body_, state, {});
   const int all = GetParam() == 2 ? 3 : 7;  // its own, and those of the neighbours
   // A tool that waits over the body has its patch, and those round it, before it touches.
-  for (int tick = 0; tick < 20000 && (state.patch == nullptr || source.built() < all); ++tick) {
+  for (int tick = 0; tick < 600'000 && (state.patch == nullptr || source.built() < all); ++tick) {
     source.serve(state);
     step(body_, state, pose(0.3, -0.1));
     std::this_thread::sleep_for(std::chrono::microseconds(100));
@@ -274,7 +274,7 @@ TEST_P(Sliding, RestsWhenItsMemoryIsFull) {
   }
   State again = this->state();
   PatchSource source(body_, again, {.memory = one + one / 2});
-  for (int tick = 0; tick < 20000 && again.patch == nullptr; ++tick) {
+  for (int tick = 0; tick < 600'000 && again.patch == nullptr; ++tick) {
     source.serve(again);
     step(body_, again, pose(0.3, -0.1));
     std::this_thread::sleep_for(std::chrono::microseconds(100));

@@ -89,6 +89,8 @@ TEST(PageWord, NothingElseIs) {
            R"({"type":"point",)" + pose,
            R"({"type":"point","position":[0,0,0],"orientation":[0,0,0,0],"grab":false,"lifted":false})",
            R"({"type":"point","position":[0,0,0],"orientation":[0,0,0,2],"grab":false,"lifted":false})",
+           R"({"type":"point","position":[0,0,0],"orientation":[0,0,0,1.02],"grab":false,"lifted":false})",
+           R"({"type":"point","position":[0,0,0],"orientation":[0,0.98,0,0],"grab":false,"lifted":false})",
            R"({"type":"point","position":[0,0,0],"orientation":[0,0,1],"grab":false,"lifted":false})",
            R"({"type":"point","position":[0,0,0],"orientation":[0,0,0,1],"grab":0,"lifted":false})",
            "{\"type\":\"st\xff\xfe\"}",
@@ -163,9 +165,9 @@ TEST(RunWords, StateIsTheRunsAndThePages) {
 TEST(Admission, HostIsTheAddressServed) {
   for (const char* host : {"127.0.0.1:8017", "localhost:8017", "LocalHost:8017", "[::1]:8017"})
     EXPECT_TRUE(is_served(host, "127.0.0.1", 8017)) << host;
-  for (const char* host :
-       {"", "127.0.0.1", "127.0.0.1:8018", "127.0.0.1:80170", "127.0.0.1:8017:8017", "evil.example:8017",
-        "localhost.evil.example:8017", "192.168.1.5:8017", "[::1:8017", "::1:8017", ":8017", "[]:8017"})
+  for (const char* host : {"", "127.0.0.1", "127.0.0.1:8018", "127.0.0.1:80170", "127.0.0.1:8017:8017",
+                           "evil.example:8017", "localhost.evil.example:8017", "192.168.1.5:8017",
+                           "[::1:8017", "::1:8017", ":8017", "[]:8017", "[fe80::1]:8017"})
     EXPECT_FALSE(is_served(host, "127.0.0.1", 8017)) << host;
   EXPECT_TRUE(is_served("192.168.1.5:8017", "192.168.1.5", 8017));
   EXPECT_FALSE(is_served("192.168.1.6:8017", "192.168.1.5", 8017));
