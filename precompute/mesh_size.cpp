@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-constexpr double most_elements = 5e7;  // no machine of today factorises their stiffness
+constexpr double most_elements = 5e7;  // against mistakes of scale
 
 // Estimates meant to be far above what a mesher takes, not measurements. What it makes beyond the expected is
 // at small details of the boundary, of which there are no more than facets.
