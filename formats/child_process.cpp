@@ -26,8 +26,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Where the limits on foreign readers are stated. Measured on whole files with the slowest of them, surfaces
-/// and their checks: 0.5 s and 20 MB per MB.
+/// Where the limits on foreign readers are stated: estimates meant to be far above what a whole file takes (a
+/// surface, with its checks, is the slowest), not measurements.
 constexpr std::chrono::seconds reading_time{5};
 constexpr std::chrono::seconds reading_time_per_megabyte{20};
 constexpr std::int64_t reading_memory = 512LL << 20;

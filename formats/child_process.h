@@ -36,8 +36,8 @@ struct ChildLimits {
 /// Limits of `processor` seconds and `memory` bytes, and twelve times as long by the clock.
 ChildLimits child_limits(std::chrono::seconds processor, std::int64_t memory);
 
-/// Limits for reading foreign files of `bytes` altogether and checking what is in them: many times what whole
-/// files take.
+/// Limits for reading foreign files of `bytes` altogether and checking what is in them: meant to be far above
+/// what whole files take.
 ChildLimits reading_limits(std::int64_t bytes);
 
 /// Who runs in a child, and what is said when it fails.

@@ -26,10 +26,11 @@ Mesh read_volume_mesh(const std::filesystem::path& file) {
     return read_tetgen(std::filesystem::path(file).replace_extension());
   std::error_code none;  // a name that is too long is no file
   if (std::filesystem::exists(with_ending(file, ".node"), none)) return read_tetgen(file);
-  throw Error(fmt::format("the extension '{}' is not one of a volume mesh that can be read", shortened(extension)),
-              file.string(),
-              "Known are .msh (Gmsh 2.2 or 4.1), .mesh (Medit), .node and .ele (TetGen), .vtk (legacy), all "
-              "as text.");
+  throw Error(
+      fmt::format("the extension '{}' is not one of a volume mesh that can be read", shortened(extension)),
+      file.string(),
+      "Known are .msh (Gmsh 2.2 or 4.1), .mesh (Medit), .node and .ele (TetGen), .vtk (legacy), all "
+      "as text.");
 }
 
 }  // namespace palpate

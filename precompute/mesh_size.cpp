@@ -11,10 +11,10 @@
 namespace palpate {
 namespace {
 
-constexpr double most_elements = 5e7;  // their factor alone takes some 400 GB
+constexpr double most_elements = 5e7;  // against mistakes of scale
 
-// A mesher makes 20 000 to 200 000 tetrahedra a second, and takes 0.5 to 1 kB for each. What it makes beyond
-// the expected is at small details of the boundary, of which there are no more than facets.
+// Estimates meant to be far above what a mesher takes, not measurements. What it makes beyond the expected is
+// at small details of the boundary, of which there are no more than facets.
 constexpr double elements_per_facet = 10.0;
 constexpr std::chrono::seconds least_time{5};
 constexpr double time_per_element = 2e-3;  // [s]

@@ -24,7 +24,7 @@ double expected_elements(double volume, double area, double edge_length, double 
 MeshSize expected_size(const TriangleSurface& surface, const MeshOptions& options);
 MeshSize expected_size(const VoxelBody& body, const MeshOptions& options);
 
-/// Limits on a mesher: many times what is measured for a mesh of that size, and some seconds. Throws Error
+/// Limits on a mesher, meant to be far above what a mesh of that size takes. Throws Error
 /// when the mesh would have more elements than can be computed with (where = `where`).
 ChildLimits meshing_limits(const MeshSize& size, const MeshOptions& options, const std::string& where);
 

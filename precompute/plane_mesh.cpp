@@ -56,7 +56,7 @@ using FaceHandle = Triangulation::Face_handle;
 using Line = std::vector<Point>;  // closed
 
 constexpr std::size_t max_nodes = 2'000'000;
-constexpr double time_per_node = 1e-3;    // [s] 25 times what is measured, smoothing included
+constexpr double time_per_node = 1e-3;    // [s] meant to be far too much, smoothing included
 constexpr double memory_per_node = 4e3;   // [byte]
 constexpr double wanted_angle = 20.0;     // [degree] refinement ends for bounds up to 20.7 (Shewchuk)
 constexpr double radius_per_edge = 0.73;  // measured: the mean edge is then the one asked for

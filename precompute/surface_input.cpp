@@ -46,8 +46,8 @@ using Polygon = std::vector<std::size_t>;
 constexpr double sharp_edge_degrees = 60.0;
 constexpr int remesh_iterations = 5;
 constexpr double largest_coordinate = 1e30;
-constexpr double remesh_time = 1e-3;    // [s] for a triangle: 20 times what is measured
-constexpr double remesh_memory = 4e3;   // [byte] for a triangle: 4 times what is measured
+constexpr double remesh_time = 1e-3;    // [s] for a triangle, meant to be far too much
+constexpr double remesh_memory = 4e3;   // [byte] for a triangle, likewise
 constexpr double most_triangles = 2e7;  // after remeshing; a body's boundary has some 1e5 at most
 
 /// Polygons that share points by number, as a file gives them.
