@@ -13,8 +13,7 @@ constexpr double same_place = 1e-4;       // of the mean edge: nearer contact po
 constexpr double same_held_place = 0.05;  // of the mean edge: nearer to a held place nothing else is touched
 constexpr double same_direction = 1e-6;   // 1 - cos of their normals
 constexpr double deepest_inside = 0.25;   // of the mean edge: deeper, the tool is lost in the body
-constexpr double flat_radius = 1000.0;    // of the mean edge: corners tell all that a larger sphere touches
-constexpr double smooth_radius = 6.0;     // the same on the surface of an overlay
+constexpr double smooth_radius = 6.0;  // of a simplex's mean edge: a larger sphere touches its corners alone
 constexpr double on_surface =
     1e-6;  // of the mean edge: nearer, the face tells the normal and not the distance
 
@@ -36,6 +35,15 @@ Vec3 outward_normal(const SurfaceTree& tree, const std::array<Index, 3>& nodes) 
   }
   const double length = normal.norm();
   return length > 0.0 ? Vec3(normal / length) : Vec3::Zero();
+}
+
+/// Mean length of a simplex's edges at rest [m].
+double mean_edge(const Body& body, const std::array<Index, 3>& nodes) noexcept {
+  const auto at = [&](std::size_t k) {
+    return body.surface_rest_positions()[static_cast<std::size_t>(nodes[k])];
+  };
+  const double first = (at(1) - at(0)).norm();
+  return nodes[2] < 0 ? first : (first + (at(2) - at(1)).norm() + (at(0) - at(2)).norm()) / 3.0;
 }
 
 NearestPoint nearest_on_simplex(const SurfaceTree& tree, const std::array<Index, 3>& nodes,
@@ -329,10 +337,11 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
   // On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
   // now at the other: all corners under it are contact points, and under a segment the edges.
   const bool is_segment = tool.tool.length > 0.0;
-  // Between the nodes of an overlay the surface is smooth: its triangles are chords of a sphere that is large
-  // against them, and would hold it out by edge^2 / 6 R.
-  const double large = body.refinement() > 1 ? smooth_radius : flat_radius;
-  const bool is_flat = !is_segment && tool.tool.radius > large * edge;
+  // Between its nodes the surface is smooth: its triangles are chords of a sphere that is large against them,
+  // and would hold it out by edge^2 / 6 R.
+  const auto is_chord = [&](Index simplex) {
+    return !is_segment && tool.tool.radius > smooth_radius * mean_edge(body, nodes_of(body, simplex));
+  };
   const auto touch_corners = [&](Index simplex) {
     const std::array<Index, 3> nodes = nodes_of(body, simplex);
     const std::size_t corners = nodes[2] < 0 ? 2 : 3;
@@ -345,13 +354,14 @@ void find_candidates(const Body& body, State& state, Index tool_number, double m
   for (Index k = 0; k < usable; ++k) {
     const Index simplex = state.found[static_cast<std::size_t>(k)];
     TouchingPair pair = state.pairs[static_cast<std::size_t>(k)];
-    if (!is_flat) touch(pair);
+    const bool chord = is_chord(simplex);
+    if (!chord) touch(pair);
     if (is_segment) {
       touch(pair_of_end(simplex, 1));
       pair = make_pair(simplex, 2, nearest_to_core(state.tree, nodes_of(body, simplex), core));
       touch(pair);
     }
-    if ((is_segment || tool.tool.radius > edge) && pair.distance - tool.tool.radius <= margin)
+    if ((is_segment || chord || tool.tool.radius > edge) && pair.distance - tool.tool.radius <= margin)
       touch_corners(simplex);
   }
 }

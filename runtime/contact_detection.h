@@ -33,7 +33,8 @@ Vec3 device_motion(const ToolPose& from, const ToolPose& to, const Vec3& arm) no
 /// Fills state.contact_points: held ones first, then for each engaged tool the nearest points of the surface
 /// within the tool's margin, of each triangle (line) and core end one, of a segment and a large sphere also
 /// those of corners and of a segment those of edges, without duplicates, the deepest where there are more
-/// than max_contacts. Nodes of all contacts are in state.near.
+/// than max_contacts. A sphere of over six edges in radius touches corners alone. Nodes of all contacts are
+/// in state.near.
 void find_contacts(const Body& body, State& state) noexcept;
 
 /// Whether a tool's core is outside of the body at a pose.

@@ -107,8 +107,8 @@ void FreeMotion::begin_tick(const Body& body) noexcept {
   const bool begins_step = ends_step();
   phase_ = phase_ % ticks_per_step_ + 1;
   if (modal_) {
-    fade_held(body.modes()->first_dropped_omega());
     if (begins_step) begin_modal_step(body);
+    fade_held(body.modes()->first_dropped_omega());  // from the step's beginning on, as the modes go on
     const double share = static_cast<double>(phase_) / static_cast<double>(ticks_per_step_);
     const std::span<const double> q = dynamic_contact_ ? modal_->predicted() : modal_->q();
     for (std::size_t i = 0; i < shown_.size(); ++i)

@@ -426,6 +426,56 @@ TEST(FewModes, LoseNothingAtOnce) {
   EXPECT_LT(residual.norm(), 1e-6 * held.norm());
 }
 
+// In closed form: the modes by Newmark from where the contact held them, and (1 + omega t) e^(-omega t) of
+// the rest, both from the same moment on.
+TEST(FewModes, FadeTheRestInStepWithTheModes) {
+  for (const int ticks_per_step : {1, 4}) {
+    DynamicsOptions options = test::all_modes();
+    options.modes = 6;
+    options.newmark.time_step = ticks_per_step * test::tick;
+    Loop loop(test::swinging_model(ElementType::tet4, options), test::plain({.reach = 0.5}));
+    const Vec3 top = test::top_middle(3), above = top + Vec3(0.0, 0.0, 0.01), far(0.5, 0.5, 3.0);
+    for (int k = 0; k <= 200; ++k) loop.step(pose(above + Vec3(0.0, 0.0, 0.05 * k / 200.0), k > 0));
+    for (int k = 0; k < 50; ++k) loop.step(pose(above + Vec3(0.0, 0.0, 0.05), true));
+    const VectorXd held = test::displacement(loop.body, loop.state);
+    const Modes& modes = *loop.body.modes();
+    const std::span<const double> omega = modes.omega();
+    std::vector<double> g(omega.size()), rate(omega.size());
+    const SurfaceLoad& load = loop.state.near.load();
+    modes.add_projection(load.nodes(), load.forces(), 1.0, g);
+    ModalNewmark reference(omega, options.damping, options.newmark);
+    reference.let_go(g, rate);
+    Eigen::MatrixXd Phi(held.size(), modes.count());
+    for (Eigen::Index dof = 0; dof < held.size(); ++dof)
+      Phi.row(dof) = Eigen::Map<const Eigen::RowVectorXd>(modes.row(dof), modes.count());
+    const auto by_modes = [&] {
+      return VectorXd(Phi * Eigen::Map<const VectorXd>(reference.q().data(), modes.count()));
+    };
+    VectorXd before = by_modes();
+    const VectorXd rest = held - before;
+    ASSERT_GT(rest.norm(), 0.1 * held.norm());
+
+    loop.step(pose(far));
+    for (int k = 0; k < 5 && (test::displacement(loop.body, loop.state) - held).norm() < 1e-9 * held.norm();
+         ++k)
+      loop.step(pose(far));
+    for (int k = 0; k < 100; ++k) {
+      reference.predict();
+      reference.advance();
+      const VectorXd after = by_modes();
+      for (int j = 1; j <= ticks_per_step; ++j) {
+        const double angle = modes.first_dropped_omega() * (k * ticks_per_step + j) * test::tick;
+        const VectorXd expected =
+            before + (after - before) * j / ticks_per_step + (1.0 + angle) * std::exp(-angle) * rest;
+        ASSERT_LT((test::displacement(loop.body, loop.state) - expected).norm(), 1e-5 * held.norm())
+            << ticks_per_step << ' ' << k << ' ' << j;
+        loop.step(pose(far));
+      }
+      before = after;
+    }
+  }
+}
+
 class TouchAgain : public testing::TestWithParam<bool> {};
 
 // A ball that waits beside a swinging body is struck by it: pushed away, and never inside. The force changes

@@ -4,6 +4,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -220,6 +222,103 @@ TEST_P(Tools, InContactADeviceIsFollowedByAQuarterOfTheEdgeOrTheRadiusPerTick) {
       EXPECT_NEAR(state.tools[0].device.orientation.angularDistance(Eigen::Quaterniond::Identity()),
                   std::min(share, 1.0) * most / radius, 1e-12);
     }
+  }
+}
+
+// Edges and faces between the nodes are chords of such a sphere: they would hold it out.
+TEST_P(Tools, ASphereThatIsLargeAgainstTheEdgesTouchesNodesAlone) {
+  for (const double edges : {8.0, 20.0}) {
+    const double radius = edges * edge_;
+    const Vec3 place = at(0.47, 0.53, 1.0 + radius - 0.1 * edge_);
+    State state(body_, {.tools = {plain({.radius = radius, .friction = 0.0})}});
+    go(body_, state, place + at(0.0, 0.0, 0.15 * edge_), pose(place), 60);
+    hold(body_, state, pose(place), 200);
+    int closed = 0;
+    for (const ContactPoint& contact : state.contacts()) {
+      if (!(test::normal_force(contact) > 0.0)) continue;
+      ++closed;
+      EXPECT_EQ(
+          std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; }), 1);
+    }
+    EXPECT_GE(closed, GetParam());
+    for (Index node = 0; node < std::ssize(body_.surface_rest_positions()); ++node)
+      EXPECT_GT((state.tree.position(node) - place).norm(), radius - 1e-6 * edge_);
+  }
+}
+
+// The bottom is clamped: no force is right there, but one that is finite and told of.
+TEST_P(Tools, PressedOnWhatIsHeldATellsThatItIsRigid) {
+  const double depth = 0.1 * radius_;
+  const Vec3 below = at(0.47, 0.53, -radius_);
+  const double soft =
+      touching({.radius = radius_, .friction = 0.0}, on_top(), depth).tools[0].wrench.force.norm();
+  for (const double friction : {0.0, 0.3}) {
+    for (const double coupling : {std::numeric_limits<double>::infinity(), 20.0 * soft / depth}) {
+      State state(
+          body_,
+          {.tools = {plain({.radius = radius_, .coupling_stiffness = coupling, .friction = friction})}});
+      go(body_, state, below - at(0.0, 0.0, 0.2 * depth), pose(below - at(0.0, 0.0, 0.01 * depth)), 20);
+      EXPECT_FALSE(has(state.status, StepStatus::rigid_contact)) << "it does not touch yet";
+      go(body_, state, below, pose(below + at(0.0, 0.0, depth)), 30);
+      hold(body_, state, pose(below + at(0.0, 0.0, depth)), 100);
+      const ToolState& tool = state.tools[0];
+      EXPECT_TRUE(has(state.status, StepStatus::rigid_contact));
+      EXPECT_TRUE(has(tool.status, StepStatus::rigid_contact));
+      EXPECT_LT(up(tool.wrench.force), 0.0);
+      if (std::isinf(coupling)) {
+        EXPECT_GT(tool.wrench.force.norm(), 30.0 * soft);
+        EXPECT_LT(tool.wrench.force.norm(), 2000.0 * soft) << "a wall, and nothing beyond all measure";
+      } else {
+        EXPECT_NEAR(tool.wrench.force.norm(), coupling * depth, 1e-6 * coupling * depth) << "the coupling's";
+      }
+    }
+  }
+}
+
+    }
+  }
+}
+
+TEST_P(Tools, PressedOnWhatIsHeldGivesNoMoreThanItsLargestForce) {
+  const double depth = 0.1 * radius_;
+  const double most = 1e-3;
+  const Vec3 below = at(0.47, 0.53, -radius_);
+  State state(body_, {.tools = {plain({.radius = radius_, .max_force = most})}});
+  go(body_, state, below - at(0.0, 0.0, 0.2 * depth), pose(below + at(0.0, 0.0, depth)), 50);
+  EXPECT_NEAR(state.tools[0].wrench.force.norm(), most, 1e-12 * most);
+  EXPECT_TRUE(has(state.status, StepStatus::rigid_contact));
+  EXPECT_TRUE(has(state.status, StepStatus::force_limited));
+}
+
+// From the free side down to the edge of the clamped one: it is told of before the force leaves all measure.
+TEST_P(Tools, IsToldToBeRigidWhereTheSurfaceHardlyMoves) {
+  const double depth = 0.05 * radius_;
+  State state(body_, {.tools = {plain({.radius = radius_, .friction = 0.0})}});
+  const auto beside = [&](double z) { return at(1.0 + radius_ - depth, 0.53, z); };
+  go(body_, state, at(1.0 + 1.1 * radius_, 0.53, 0.5), pose(beside(0.5)), 50);
+  const double soft = state.tools[0].wrench.force.norm();
+  EXPECT_EQ(state.status, StepStatus::ok);
+  int rigid = 0;
+  for (int k = 0; k <= 2000; ++k) {
+    step(body_, state, pose(beside(0.5 * (1.0 - k / 2000.0))));
+    const double force = state.tools[0].wrench.force.norm();
+    ASSERT_LT(force, 2000.0 * soft) << k;
+    if (has(state.status, StepStatus::rigid_contact)) ++rigid;
+    if (force > 200.0 * soft) {
+      ASSERT_TRUE(has(state.status, StepStatus::rigid_contact)) << k;
+    }
+  }
+  EXPECT_GT(rigid, 2);
+  // Pressed in by depth it reaches the bottom's edge from sqrt(2 radius depth) above.
+  EXPECT_LT(rigid, 1.1 * 2000 / 0.5 * std::sqrt(2.0 * radius_ * depth));
+}
+
+// A body that moves tells of nothing, wherever it is touched.
+TEST_P(Tools, IsNotToldToBeRigidWhereTheSurfaceMoves) {
+  for (double x = 0.05; x < 1.0; x += 0.07) {
+    const double depth = 0.2 * radius_;
+    EXPECT_FALSE(has(touching({.radius = radius_}, on_top(x, 0.4), depth).status, StepStatus::rigid_contact))
+        << x;
   }
 }
 

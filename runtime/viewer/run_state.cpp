@@ -82,8 +82,8 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
 nlohmann::json describe_defaults(const Body& body) {
   constexpr double share = 0.05;           // of the body's diagonal
   constexpr double share_of_least = 0.25;  // of its least extent
-  const Vec3 extent = body.bounds().diagonal();
-  const double least = extent.head(body.dimension()).minCoeff();
+  const Vec3 extent = body.bounds().max() - body.bounds().min();
+  const double least = body.dimension() == 2 ? std::min(extent.x(), extent.y()) : extent.minCoeff();
   return {{"radius", fitting_radius(body)},
           {"reach", body.longest_surface_edge()},
           {"friction", body.surface_friction().front()},
