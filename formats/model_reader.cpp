@@ -18,46 +18,16 @@
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
 #include "formats/precision_fields.h"
+#include "formats/superblock.h"
 #include "meshes/error.h"
 
 namespace palpate {
 namespace {
 
-constexpr const char* precompute_again = "Precompute it again: palpate-precompute model.toml.";
+constexpr const char* precompute_again =
+    "Copy the file again, or precompute it again: palpate-precompute model.toml.";
 
-std::uint64_t little_endian(std::span<const unsigned char> bytes) {
-  std::uint64_t value = 0;
-  for (std::size_t i = bytes.size(); i-- > 0;) value = (value << 8U) | bytes[i];
-  return value;
-}
-
-/// Looks at HDF5's superblock before HDF5 does: says what is not a file of ours, and what is cut off. Version
-/// 3 has checksums in all of its metadata; files of older versions, which other programs write, are not
-/// handed to the library.
-void check_superblock(const FileDescriptor& file) {
-  constexpr std::array<unsigned char, 12> start = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n', 3, 8, 8, 0};
-  constexpr std::size_t signature_bytes = 8, end_at = 28, superblock_bytes = 48;
-  const std::string where = file.path().string();
-  const std::int64_t size = file_size(file);
-  if (size == 0) throw Error("the file is empty", where, precompute_again);
-
-  std::array<unsigned char, superblock_bytes> superblock = {};
-  const std::size_t got = read_some(file, std::as_writable_bytes(std::span(superblock)), 0);
-  if (std::memcmp(superblock.data(), start.data(), std::min(got, signature_bytes)) != 0)
-    throw Error("is not a Palpate file", where,
-                "Give a NAME.palpate.hdf that palpate-precompute has written.");
-  if (got < superblock_bytes)
-    throw Error("the file is truncated: it ends after " + std::to_string(size) + " bytes", where,
-                precompute_again);
-  if (std::memcmp(superblock.data(), start.data(), start.size()) != 0)
-    throw Error("is an HDF5 file, but not a Palpate file", where,
-                "Give a NAME.palpate.hdf that palpate-precompute has written.");
-  const std::uint64_t end = little_endian(std::span(superblock).subspan(end_at, 8));
-  if (end > static_cast<std::uint64_t>(size))
-    throw Error(
-        "the file is truncated: it has " + std::to_string(size) + " of " + std::to_string(end) + " bytes",
-        where, "Copy the file again, or precompute it again.");
-}
+constexpr const char* give_a_model = "Give a NAME.palpate.hdf that palpate-precompute has written.";
 
 /// Proves that this is our format in a version that we read.
 std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
@@ -66,9 +36,7 @@ std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
   if (format == "palpate-recording")
     throw Error("is a recording, not a model", where,
                 "palpate-runtime view " + where + " shows it; a model is a NAME.palpate.hdf.");
-  if (format != "palpate")
-    throw Error("is an HDF5 file, but not a Palpate file", where,
-                "Give a NAME.palpate.hdf that palpate-precompute has written.");
+  if (format != "palpate") throw Error("is an HDF5 file, but not a Palpate file", where, give_a_model);
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version) refuse(where, "the attribute version is missing");
   if ((*version)[0] != format_major)
@@ -265,7 +233,7 @@ void Reader::check_content(const std::vector<std::int64_t>& version) {
 
 Model load_model(const std::filesystem::path& path, const LoadOptions& options) {
   FileDescriptor bytes = open_file(path, OpenMode::read);
-  check_superblock(bytes);
+  check_superblock(bytes, {"a Palpate file", give_a_model, precompute_again});
   return Reader(hdf5::Contents::read(std::move(bytes)), options).read();
 }
 

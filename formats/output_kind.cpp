@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <sstream>
 #include <string>
 
 #include "formats/hdf5_contents.h"
@@ -54,6 +55,14 @@ bool is_our_report(std::string_view text) {
          contains(text, "\n  \"tool\": ");
 }
 
+/// An OFF file of triangles that share no corners.
+bool is_loose_triangles(const std::string& text) {
+  std::istringstream words(text);
+  std::string head;
+  std::size_t corners = 0, triangles = 0;
+  return words >> head >> corners >> triangles && head == "OFF" && triangles > 0 && corners == 3 * triangles;
+}
+
 }  // namespace
 
 std::string_view name_of(OutputKind kind) noexcept {
@@ -74,6 +83,8 @@ std::string_view name_of(OutputKind kind) noexcept {
       return "grid for ParaView";
     case OutputKind::page:
       return "page";
+    case OutputKind::faces:
+      return "list of triangles";
   }
   return "";
 }
@@ -108,6 +119,8 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
       return text.starts_with("<!doctype html>") &&
              (contains(text, "<meta name=\"generator\" content=\"palpate-runtime ") ||
               contains(text, "<title>Palpate</title>"));
+    case OutputKind::faces:
+      return is_loose_triangles(*bytes);
   }
   return false;
 }

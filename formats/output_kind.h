@@ -16,6 +16,7 @@ enum class OutputKind : std::uint8_t {
   field,      ///< table of displacements, CSV
   grid,       ///< for ParaView, .vtu
   page,       ///< a recording as HTML
+  faces,      ///< triangles that are wrong, .off
 };
 
 /// "table of contact points"

@@ -39,7 +39,8 @@ void check_existing(const std::filesystem::path& file, OutputKind kind, bool for
 
 OutputPaths::Known OutputPaths::known(const std::filesystem::path& path, const std::string& what) {
   std::error_code failed;
-  const std::filesystem::path absolute = std::filesystem::absolute(path, failed);
+  std::filesystem::path absolute = std::filesystem::absolute(path, failed);
+  if (failed) absolute = path;  // the working directory is gone
   Known result{.path = std::filesystem::weakly_canonical(absolute, failed), .status = {}, .what = what};
   if (failed) result.path = absolute;
   struct stat status {};

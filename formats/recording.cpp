@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "formats/recording_parts.h"
+#include "formats/superblock.h"
 #include "meshes/error.h"
 #include "meshes/write_file.h"
 
@@ -16,6 +17,12 @@ namespace {
 constexpr const char* hint = "Copy the file again, or record the session again.";
 constexpr double longest_time = 1e9;                                          // s
 constexpr std::int64_t longest_ns = std::int64_t{1'000'000'000'000'000'000};  // ns
+
+hdf5::Contents open_master(const std::filesystem::path& path) {
+  FileDescriptor file = open_file(path, OpenMode::read);
+  check_superblock(file, {"a recording", "Give a recording that palpate-runtime has written.", hint});
+  return hdf5::Contents::read(std::move(file));
+}
 
 // ---- rows ----
 
@@ -162,7 +169,7 @@ RecordingFile::RecordingFile(const std::filesystem::path& path) {
   constexpr int attempts = 5;
   for (int attempt = 1;; ++attempt) {
     try {
-      files_ = std::make_shared<const RecordingFiles>(open_recording(hdf5::Contents::read(path)));
+      files_ = std::make_shared<const RecordingFiles>(open_recording(open_master(path)));
       recording_ = read_once(path, *files_);
       return;
     } catch (const Error&) {
@@ -199,7 +206,7 @@ bool finish_recording(const std::filesystem::path& recording) {
   if (!std::filesystem::exists(parts_folder(path))) return true;
   const std::optional<FileDescriptor> lock = lock_parts(path);
   if (!lock) return false;
-  const RecordingFiles files = open_recording(hdf5::Contents::read(path));
+  const RecordingFiles files = open_recording(open_master(path));
   const hdf5::Quiet quiet;
   merge_recording(path, parts_of(files), files.head);
   return true;

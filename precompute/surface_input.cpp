@@ -21,7 +21,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -29,8 +28,10 @@
 #include <sstream>
 
 #include "formats/child_process.h"
+#include "formats/output_paths.h"
 #include "meshes/error.h"
 #include "meshes/regular_file.h"
+#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {
@@ -253,28 +254,28 @@ std::vector<Corners> corners_of(const SurfaceMesh& mesh, const std::vector<FaceP
   return result;
 }
 
+/// Nothing where they may not or cannot be written: the mistake is told all the same.
 std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const std::string& stem) {
-  std::filesystem::path file = stem + ".bad-faces.off";
-  const std::filesystem::path partial = file.string() + ".partial";
-  {
-    std::ofstream out(partial);
-    out.imbue(std::locale::classic());
-    out.precision(17);
-    out << "OFF\n" << 3 * faces.size() << " " << faces.size() << " 0\n";
-    for (const Corners& corners : faces) {
-      for (const Vec3& p : corners) {
-        out << p.x() << " " << p.y() << " " << p.z() << "\n";
-      }
-    }
-    for (std::size_t i = 0; i < faces.size(); ++i) {
-      out << "3 " << 3 * i << " " << 3 * i + 1 << " " << 3 * i + 2 << "\n";
-    }
-    if (!out.flush()) {
-      return {};
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out.precision(17);
+  out << "OFF\n" << 3 * faces.size() << " " << faces.size() << " 0\n";
+  for (const Corners& corners : faces) {
+    for (const Vec3& p : corners) {
+      out << p.x() << " " << p.y() << " " << p.z() << "\n";
     }
   }
-  std::filesystem::rename(partial, file);
-  return file;
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    out << "3 " << 3 * i << " " << 3 * i + 1 << " " << 3 * i + 2 << "\n";
+  }
+  try {
+    const std::filesystem::path file =
+        OutputPaths(false).add(stem + ".bad-faces.off", OutputKind::faces, "self-intersections");
+    write_file(file, out.str());
+    return file;
+  } catch (const Error&) {
+    return {};
+  }
 }
 
 Point center(const SurfaceMesh& mesh, Face face) {

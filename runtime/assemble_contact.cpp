@@ -169,6 +169,18 @@ void assemble_body_compliance(State& state) noexcept {
   }
 }
 
+/// Which contacts press on what the body does not give way at, or hold it. Before the couplings are in W.
+void note_rigid_contacts(State& state) noexcept {
+  for (Index k = 0; k < state.contact_count; ++k) {
+    ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+    const Index first = state.problem.first_row(k);
+    const Index rows = contact.held ? state.problem.rows_of(k) : 1;
+    contact.rigid = false;
+    for (Index i = first; i < first + rows; ++i)
+      contact.rigid = contact.rigid || state.problem.w(i, i) < state.least_compliance;
+  }
+}
+
 /// What the couplings give way: W += J_tool C_tool J_tool^T.
 void add_coupling_compliance(State& state) noexcept {
   ContactProblem& problem = state.problem;
@@ -212,8 +224,9 @@ double exact_compliance(const Body& body, const State& state, const ContactRow& 
 constexpr double exact_rounding = std::numeric_limits<double>::epsilon();
 
 /// Contact points that nearly coincide make W nearly singular; the rounding of Xi must not make it
-/// indefinite. What that gives way along a tangent it gives from the force of the tick before: friction that
-/// sticks would creep by it in every tick.
+/// indefinite. Where next to nothing gives way a rigid tool would be given a force beyond all measure: there
+/// it presses on a wall that gives way a little. What all that gives way along a tangent it gives from the
+/// force of the tick before: friction that sticks would creep by it in every tick.
 void regularise(const Body& body, State& state, std::span<const double> spring) noexcept {
   const double rounding = body.greens().rounding();
   ContactProblem& problem = state.problem;
@@ -223,8 +236,9 @@ void regularise(const Body& body, State& state, std::span<const double> spring) 
       const auto row = static_cast<std::size_t>(i);
       double& w = problem.w(i, i);
       const double exact = exact_compliance(body, state, state.rows[row]);
-      const double give = 4.0 * (rounding * std::max(w - exact, 0.0) + exact_rounding * std::abs(exact)) +
-                          state.rigid_compliance;
+      double give = 4.0 * (rounding * std::max(w - exact, 0.0) + exact_rounding * std::abs(exact)) +
+                    state.rigid_compliance;
+      if (k < state.contact_count) give = std::max(give, state.least_compliance - w);
       w += give + spring[row];
       if (i > first && problem.held[static_cast<std::size_t>(k)] == 0)
         problem.b[row] -= give * problem.lambda[row];
@@ -251,6 +265,7 @@ void assemble_contact(const Body& body, State& state) noexcept {
   } else {
     assemble_body_compliance<2>(state);
   }
+  note_rigid_contacts(state);
   add_coupling_compliance(state);
   regularise(body, state, spring);
 }

@@ -39,7 +39,8 @@ static_assert(same(PALPATE_FORCE_LIMITED, StepStatus::force_limited));
 static_assert(same(PALPATE_HANDING_OVER, StepStatus::handing_over));
 static_assert(same(PALPATE_OLDER_PATCH, StepStatus::older_patch));
 static_assert(same(PALPATE_LATE_MOTION, StepStatus::late_motion));
-static_assert(status_names.size() == 11 + 2, "these and the two that only HeldNodes knows");
+static_assert(same(PALPATE_RIGID_CONTACT, StepStatus::rigid_contact));
+static_assert(status_names.size() == 12 + 2, "these and the two that only HeldNodes knows");
 
 constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
 

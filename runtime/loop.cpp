@@ -241,6 +241,7 @@ class Loop {
                              .shown = shown_.wrench.force.norm(),
                              .depth = parts_.feed != nullptr ? depth() : 0.0,
                              .contacts = tool().contacts,
+                             .rigid = has(parts_.state.status, StepStatus::rigid_contact),
                              .phase = phase(),
                              .fault = fault_,
                              .events = news_.events};

@@ -146,8 +146,8 @@ void Monitor::say(const std::string& text) {
 void Monitor::draw() {
   if (lateness_.total() == 0) return;
   const double time = static_cast<double>(last_.number) / static_cast<double>(options_.rate);
-  std::string line =
-      fmt::format("{:7.1f} s  {:6.3f} N  {:2d} contacts", time, last_.force.norm(), last_.contacts);
+  std::string line = fmt::format("{:7.1f} s  {:6.3f} N  {:2d} contacts{}", time, last_.force.norm(),
+                                 last_.contacts, last_.rigid ? " on what is held" : "");
   if (options_.shows_safety) {
     line += fmt::format("  shown {:5.2f} N {}", last_.shown,
                         safety_phase_names[static_cast<std::size_t>(last_.phase)].second);

@@ -24,6 +24,7 @@ struct TickNote {
   double shown = 0.0;         ///< that the device was told [N]
   double depth = 0.0;         ///< how far the contacts press the surface in, at most [m]
   std::int32_t contacts = 0;
+  bool rigid = false;  ///< the tool presses on what cannot move
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
   DeviceEvent events = DeviceEvent::none;

@@ -54,6 +54,19 @@ void print_loop(const LoopReport& report, bool fast) {
   }
 }
 
+/// A force that is not the body's.
+void warn_of_rigid_contact(const PlayedRun& run) {
+  const auto bit = std::find_if(status_names.begin(), status_names.end(),
+                                [](const auto& status) { return status.first == StepStatus::rigid_contact; });
+  const std::int64_t ticks = run.report.status_ticks[static_cast<std::size_t>(bit - status_names.begin())];
+  if (ticks == 0) return;
+  const bool has_coupling = std::isfinite(run.tool.coupling_stiffness);
+  print_warning(fmt::format("in {} ticks the tool pressed on what is held, or hardly moves: {}", ticks,
+                            has_coupling ? "what is felt there is its coupling alone"
+                                         : "the force there is that of a wall and not the body's; give the "
+                                           "tool a --coupling, and a --max-force"));
+}
+
 void print_device(const PlayedRun& run) {
   const LoopReport& report = run.report;
   if (run.settings.safety) {
@@ -194,6 +207,7 @@ std::string json_device(const PlayedRun& run) {
 
 void print_report(const PlayedRun& run) {
   print_loop(run.report, run.options.fast);
+  warn_of_rigid_contact(run);
   print_device(run);
   if (!run.options.record.empty())
     fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),

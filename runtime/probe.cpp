@@ -17,6 +17,9 @@
 namespace palpate {
 namespace {
 
+constexpr double small_strain =
+    0.1;  // of the body's size: the largest displacement that linear elasticity is for
+
 /// What is told of one node.
 struct Answer {
   Index node = -1;                   // of the mesh
@@ -106,6 +109,31 @@ std::vector<Answer> read_questions(const Body& body, const ProbeOptions& options
   return answers;
 }
 
+/// What was likely not meant, a sentence each.
+std::vector<std::string> warnings_of(const Body& body, const std::vector<Answer>& answers) {
+  const double edge = body.longest_surface_edge();
+  const double size = body.bounds().diagonal().norm();
+  std::vector<std::string> warnings;
+  for (const Answer& answer : answers) {
+    if (answer.distance && *answer.distance > edge) {
+      warnings.push_back(fmt::format(
+          "the place asked for is {:.3g} m from node {}, the nearest of the surface that is not held, and "
+          "the "
+          "surface's longest edge is {:.3g} m: check the place, which is in metres, on the body at rest",
+          *answer.distance, answer.node, edge));
+    }
+    const double moved = answer.displacement.norm();
+    if (moved > small_strain * size) {
+      warnings.push_back(fmt::format(
+          "a displacement of {:.3g} m of node {} is more than a tenth of the body's size, {:.3g} m: forces "
+          "and "
+          "displacements are those of small strain, and not the body's any more; check that it is in metres",
+          moved, answer.node, size));
+    }
+  }
+  return warnings;
+}
+
 /// A finer mesh over the elements round all nodes that are asked for.
 Overlay make_overlay(const Body& body, const std::vector<Answer>& answers, const OverlayOptions& options) {
   const Model& model = body.model();
@@ -155,7 +183,8 @@ void print_text(const std::vector<Answer>& answers) {
   fmt::print("total force on the body {} N\n", text_vector(total_force(answers)));
 }
 
-void print_json(const std::vector<Answer>& answers, const ProbeOptions& options) {
+void print_json(const std::vector<Answer>& answers, const std::vector<std::string>& warnings,
+                const ProbeOptions& options) {
   fmt::print("{{\n  \"file\": {},\n  \"nodes\": [", json_string(options.file.string()));
   for (std::size_t k = 0; k < answers.size(); ++k) {
     const Answer& answer = answers[k];
@@ -165,7 +194,10 @@ void print_json(const std::vector<Answer>& answers, const ProbeOptions& options)
     fmt::print("\"displacement\": {}, \"force\": {}}}", json_vector(answer.displacement),
                json_vector(answer.force));
   }
-  fmt::print("\n  ],\n  \"total_force\": {}\n}}\n", json_vector(total_force(answers)));
+  fmt::print("\n  ],\n  \"total_force\": {},\n  \"warnings\": [", json_vector(total_force(answers)));
+  for (std::size_t k = 0; k < warnings.size(); ++k)
+    fmt::print("{}{}", k == 0 ? "" : ", ", json_string(warnings[k]));
+  fmt::print("]\n}}\n");
 }
 
 }  // namespace
@@ -186,6 +218,8 @@ int probe(const ProbeOptions& options) {
   const Body body = load_body(options.file, options.model_toml);
   add_sources(paths, body.model(), options.file);
   std::vector<Answer> answers = read_questions(body, options);
+  const std::vector<std::string> warnings = warnings_of(body, answers);
+  for (const std::string& warning : warnings) print_warning(warning);
   std::optional<Overlay> overlay;
   if (options.overlay) overlay.emplace(make_overlay(body, answers, *options.overlay));
   HeldNodes contact(body, static_cast<Index>(options.places.size()), overlay ? &*overlay : nullptr);
@@ -197,7 +231,7 @@ int probe(const ProbeOptions& options) {
     write_field(field, body, overlay ? &*overlay : nullptr, u);
   }
   if (options.json) {
-    print_json(answers, options);
+    print_json(answers, warnings, options);
   } else {
     print_text(answers);
   }

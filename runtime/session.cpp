@@ -50,6 +50,16 @@ std::string faults_text(const SessionSummary& summary) {
   return text.empty() ? "none" : text;
 }
 
+std::string status_text(const SessionSummary& summary) {
+  std::string text;
+  for (std::size_t k = 0; k < status_names.size(); ++k) {
+    if (summary.status_ticks[k] > 0)
+      text += fmt::format("{}{} in {} ticks", text.empty() ? "" : ", ", status_names[k].second,
+                          summary.status_ticks[k]);
+  }
+  return text.empty() ? "none" : text;
+}
+
 /// How it ended.
 enum class Ending { finished, merged, going_on };
 
@@ -85,6 +95,7 @@ void print_text(const std::filesystem::path& path, const Recording& recording, c
   fmt::print("deadline misses  {}, at most {:.1f} us late\n", s.deadline_misses,
              microseconds(s.worst_lateness));
   fmt::print("faults           {}\n", faults_text(s));
+  fmt::print("status           {}\n", status_text(s));
   if (frames == 0) {
     fmt::print("frames           none\n");
   } else {
@@ -100,6 +111,9 @@ void print_json(const std::filesystem::path& path, const Recording& recording, c
   for (const SessionFault& fault : s.faults)
     faults += fmt::format("{}{{\"fault\": \"{}\", \"time_s\": {}}}", faults.empty() ? "" : ", ",
                           fault_name(fault.fault), fault.time);
+  std::string status;
+  for (std::size_t k = 0; k < status_names.size(); ++k)
+    status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, s.status_ticks[k]);
   const SessionInfo& info = recording.info;
   fmt::print("{{\n  \"recording\": {},\n  \"generator\": {},\n  \"was_killed\": {},\n  \"going_on\": {},\n",
              json_string(path.string()), json_string(recording.generator), ending == Ending::merged,
@@ -118,6 +132,7 @@ void print_json(const std::filesystem::path& path, const Recording& recording, c
              s.compute.percentile(0.5), s.compute.percentile(0.999), s.compute.worst());
   fmt::print("  \"deadline_misses\": {},\n  \"worst_lateness_ns\": {},\n  \"faults\": [{}],\n",
              s.deadline_misses, s.worst_lateness, faults);
+  fmt::print("  \"status_ticks\": {{{}}},\n", status);
   fmt::print("  \"frames\": {},\n  \"surface_nodes\": {}\n}}\n", recording.frames.time.size(),
              recording.frames.surface.nodes.size());
 }
@@ -137,6 +152,9 @@ SessionSummary summarise(const Recording& recording) {
   for (const TickRecord& tick : recording.ticks) {
     const std::int64_t k = number(tick);
     if (tick.contacts > 0) ++summary.in_contact;
+    for (std::size_t bit = 0; bit < status_names.size(); ++bit) {
+      if (has(static_cast<StepStatus>(tick.status), status_names[bit].first)) ++summary.status_ticks[bit];
+    }
     note_largest(length(tick.force), tick.time, summary.largest_force, summary.largest_force_time);
     note_largest(length(tick.shown_force), tick.time, summary.largest_shown, summary.largest_shown_time);
     summary.worst_lateness = std::max(summary.worst_lateness, tick.begun_ns - due(k));

@@ -1,6 +1,7 @@
 // palpate-runtime session: what is in a recording.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "formats/recording.h"
 #include "runtime/devices/fault.h"
 #include "runtime/histogram.h"
+#include "runtime/status.h"
 
 namespace palpate {
 
@@ -30,6 +32,8 @@ struct SessionSummary {
   std::int64_t deadline_misses = 0;  ///< ticks that had not ended when the next one was due
   std::int64_t worst_lateness = 0;   ///< from when a tick was due to when it began [ns]
   TimeHistogram compute;             ///< [ns]
+  std::array<std::int64_t, status_names.size()>
+      status_ticks{};  ///< ticks with each status bit, in the order of status_names
   std::vector<SessionFault> faults;
 };
 

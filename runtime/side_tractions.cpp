@@ -11,6 +11,8 @@ namespace {
 
 const double smooth = std::cos(M_PI / 6.0);  // of the angle between the normals of facets on one side
 constexpr double shear_cost = 100.0;         // times that of pressure, where a force is shared out
+constexpr int most_rounds = 5;               // on bodies all edges, that rows stay short
+constexpr std::size_t most_alone = 3;        // sides that are told apart of those without a node beside
 
 std::size_t index(Index number) {
   return static_cast<std::size_t>(number);
@@ -64,12 +66,12 @@ class EdgeRows {
     }
     find_beside();
     for (const auto& [node, places] : places_) edge_nodes.push_back(node);
-    while (!edge_nodes.empty()) {
+    for (int round = 1; !edge_nodes.empty(); ++round) {
       const auto alone = [&](Index node) { return places_without_neighbours(node); };
-      std::size_t least = 4;  // more than the rest: a corner of many sides
+      std::size_t least = most_alone;
       for (const Index node : edge_nodes) least = std::min(least, alone(node));
       const auto now = std::partition(edge_nodes.begin(), edge_nodes.end(),
-                                      [&](Index node) { return alone(node) > least; });
+                                      [&](Index node) { return round < most_rounds && alone(node) > least; });
       for (auto node = now; node != edge_nodes.end(); ++node) share_out(*node);
       for (auto node = now; node != edge_nodes.end(); ++node) {
         for (const Index place : places_.at(*node)) done_[index(place)] = 1;
@@ -101,9 +103,9 @@ class EdgeRows {
   }
   [[nodiscard]] std::size_t places_without_neighbours(Index node) const {
     const std::vector<Index>& places = places_.at(node);
-    return std::min<std::size_t>(
-        3, static_cast<std::size_t>(std::count_if(places.begin(), places.end(),
-                                                  [&](Index place) { return !has_neighbour(place); })));
+    const auto count =
+        std::count_if(places.begin(), places.end(), [&](Index place) { return !has_neighbour(place); });
+    return std::min(most_alone, static_cast<std::size_t>(count));
   }
 
   /// Mean of the nodes beside that are done.

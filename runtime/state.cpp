@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "meshes/error.h"
@@ -11,7 +12,8 @@ namespace palpate {
 namespace {
 
 constexpr double tree_margin = 0.1;   // of the mean edge: how much larger boxes are
-constexpr double rigid_share = 1e-9;  // compliance of the rigid, of the body's
+constexpr double rigid_share = 1e-9;  // of the body's compliance, added everywhere
+constexpr double wall_share = 0.01;   // compliance of what is held, of that of the stiffest node that moves
 
 void check(const Tool& tool, std::size_t number) {
   const auto check = [&](const char* what, double value, bool valid, const char* hint) {
@@ -67,6 +69,13 @@ double mean_compliance(const Body& body) {
   return sum / count;
 }
 
+double least_compliance_of_a_node(const Body& body) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Index node : body.free_surface_nodes())
+    least = std::min(least, body.greens().block(node, node).trace() / body.dimension());
+  return least;
+}
+
 Index near_room(const StateOptions& options) {
   return 3 * options.max_contacts + 32;
 }
@@ -97,6 +106,7 @@ State::State(const Body& body, const StateOptions& options)
       rows(static_cast<std::size_t>(most_rows(body, options))),
       row_response(static_cast<std::size_t>(body.dimension() * near_room(options))),
       rigid_compliance(rigid_share * mean_compliance(body)),
+      least_compliance(wall_share * least_compliance_of_a_node(body)),
       most_simplices(2 * static_cast<std::size_t>(options.max_contacts)),
       found(body.surface_friction().size()),
       found_distance(body.surface_friction().size()),

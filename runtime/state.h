@@ -92,7 +92,10 @@ struct State {
   ConeSolver cone_solver;
   std::vector<ContactRow> rows;      ///< [problem.rows]
   std::vector<double> row_response;  // [d near nodes] displacement by one row's force
-  double rigid_compliance;           ///< of what is rigid, so that rigid on rigid has an answer [m/N]
+  double rigid_compliance;  ///< added to what all contacts give way by: points that coincide share the force
+                            ///< [m/N]
+  double least_compliance;  ///< what body and coupling together give way by at least where a tool presses: a
+                            ///< hundredth of what the stiffest node of the surface does [m/N]
 
   // Scratch of a tick.
   std::size_t most_simplices;            // that a tool may look at

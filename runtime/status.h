@@ -21,8 +21,9 @@ enum class StepStatus : std::uint32_t {
   not_converged = 1U << 8,          ///< the contact forces did not reach their tolerance within the budget
   force_limited = 1U << 9,          ///< the force was cut to the tool's largest
   handing_over = 1U << 10,          ///< the force is on its way to the contact's, so as not to kick
-  older_patch = 1U << 11,  ///< the overlay for this place was not there yet: an older one was used, or none
-  late_motion = 1U << 12,  ///< the body's free motion was not there in time: the surface waits for it
+  older_patch = 1U << 11,    ///< the overlay for this place was not there yet: an older one was used, or none
+  late_motion = 1U << 12,    ///< the body's free motion was not there in time: the surface waits for it
+  rigid_contact = 1U << 13,  ///< the tool presses on what cannot move: only its coupling gives way
 };
 
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
@@ -36,7 +37,7 @@ constexpr bool has(StepStatus status, StepStatus bit) noexcept {
 }
 
 /// The bits and their names, for reports.
-inline constexpr std::array<std::pair<StepStatus, const char*>, 13> status_names = {{
+inline constexpr std::array<std::pair<StepStatus, const char*>, 14> status_names = {{
     {StepStatus::nothing_in_reach, "nothing_in_reach"},
     {StepStatus::capacity_full, "capacity_full"},
     {StepStatus::not_positive_definite, "not_positive_definite"},
@@ -50,6 +51,7 @@ inline constexpr std::array<std::pair<StepStatus, const char*>, 13> status_names
     {StepStatus::handing_over, "handing_over"},
     {StepStatus::older_patch, "older_patch"},
     {StepStatus::late_motion, "late_motion"},
+    {StepStatus::rigid_contact, "rigid_contact"},
 }};
 
 }  // namespace palpate

@@ -53,6 +53,7 @@ void apply_forces(State& state) noexcept {
     if (contact.force.squaredNorm() == 0.0) continue;
     ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
     ++tool.contacts;
+    if (contact.rigid) tool.status |= StepStatus::rigid_contact;
     tool.contact_wrench.force += contact.force;
     tool.contact_wrench.torque += contact.arm.cross(contact.force);
   }

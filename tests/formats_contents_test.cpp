@@ -15,6 +15,7 @@
 #include "formats/hdf5_contents.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
+#include "formats/shrunk_file.h"
 #include "meshes/error.h"
 #include "tests/formats_sample.h"
 #include "tests/formats_tamper.h"
@@ -168,6 +169,19 @@ TEST(LoadedModel, IsMappedWhereItDoesNotFitIntoMemory) {
         static_cast<std::size_t>(packed_size(read.greens.order()) * bytes_per_scalar(precision));
     EXPECT_EQ(std::memcmp(mapped.greens.data(), read.greens.data(), bytes), 0);
   }
+}
+
+TEST(LoadedModel, ThatIsMappedEndsAProgramPlainlyWhereItsFileIsCutOff) {
+  const Folder folder;
+  write_sample(folder / "a.palpate.hdf");
+  const int status = status_of_child([&] {
+    end_with_an_error_on_shrunk_files();
+    const Model model = load_model(folder / "a.palpate.hdf", {.most_in_memory = 0});
+    std::filesystem::resize_file(folder / "a.palpate.hdf", 0);
+    if (model.greens(0, 0) == sample_entry(0, 0)) _exit(77);
+  });
+  ASSERT_TRUE(WIFEXITED(status)) << "signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), exit_input_error);
 }
 
 TEST(Contents, OfWhatIsNoFileAreRefusedAtOnce) {

@@ -35,6 +35,7 @@ const std::vector<Example> examples = {
      "<?xml version=\"1.0\"?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [\n<!ENTITY t '<Topology TopologyType="},
     {OutputKind::page,
      "<!doctype html>\n<html>\n<head>\n<meta name=\"generator\" content=\"palpate-runtime 0.1.0\">"},
+    {OutputKind::faces, "OFF\n6 2 0\n0 0 0\n"},
     {OutputKind::page, "<!doctype html>\n<html lang=\"en\">\n<head>\n<title>Palpate</title>\n"}};
 
 constexpr OutputKind all_kinds[] = {OutputKind::model,  OutputKind::recording, OutputKind::frames,

@@ -176,7 +176,14 @@ TEST_F(SurfaceInput, SelfIntersection) {
   }
   const std::filesystem::path before = std::filesystem::current_path();
   std::filesystem::current_path(folder_.path());
-  const std::string text = error(surface);
+  std::ofstream("bad.bad-faces.off") << "mine\n";
+  EXPECT_EQ(error(surface).find("bad-faces"), std::string::npos) << "it is another's file";
+  std::string mine;
+  std::ifstream("bad.bad-faces.off") >> mine;
+  EXPECT_EQ(mine, "mine");
+  std::filesystem::remove("bad.bad-faces.off");
+  expect_mentions(error(surface), {"bad.bad-faces.off"});
+  const std::string text = error(surface);  // over its own
   std::filesystem::current_path(before);
   expect_mentions(text, {"intersects itself", "pair(s) of triangles", "near (", "bad.bad-faces.off"});
 

@@ -1,5 +1,6 @@
 """palpate-precompute as a person meets it: what it writes, what it refuses, what is left when it is stopped."""
 
+import json
 import os
 import re
 import resource
@@ -7,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import time
+import tomllib
 import unittest
 
 from programs import MODELS, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
@@ -417,6 +419,22 @@ class Models(ProgramTest):
         planned = run(PRECOMPUTE, MODELS / "nodule" / "model.toml", "--dry-run", cwd=self.folder)
         self.assertEqual(planned.returncode, 0, planned.stderr)
         self.assertIn("12288 elements (hex8)", planned.stderr)
+
+    def test_the_demo_s_liver_takes_overlays(self):
+        model = MODELS / "liver" / "model.toml"
+        storage = tomllib.loads(model.read_text())["storage"]
+        self.assertEqual((storage["scope"], storage["layers"]), ("layers", 2))  # as many as the overlay has rings
+        image = model.with_name("liver.inr.gz")
+        if not image.exists():
+            self.skipTest("scripts/demo fetches the liver's image")
+        shutil.copy(image, self.folder)
+        coarse = self.write("model.toml", re.sub("edge_length = [0-9.]+", "edge_length = 0.012", model.read_text()))
+        self.assertEqual(run(PRECOMPUTE, coarse, cwd=self.folder).returncode, 0)
+        touch = self.write("touch.csv", "t,x,y,z,grab\n0,0.155,0.0,0.117,0\n0.2,0.155,0.03,0.117,0\n")
+        played = run(RUNTIME, "play", self.folder / "liver.palpate.hdf", "--device", f"script:{touch}", "--fast", "--tool",
+                     "sphere:0.008", "--overlay", "r=3,rings=2", "--report", self.folder / "report.json")
+        self.assertEqual(played.returncode, 0, played.stderr)
+        self.assertGreater(json.loads((self.folder / "report.json").read_text())["largest_force_N"], 0.0)
 
     def test_the_liver_keeps_its_labels(self):
         image = MODELS / "liver" / "liver.inr.gz"

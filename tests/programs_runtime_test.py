@@ -98,6 +98,32 @@ class Probe(ProgramTest):
         for force in node["force"]:
             self.assertIn(f"{force:.10g}", text)
 
+    def test_warns_of_places_beside_the_body_and_of_displacements_beyond_small_strain(self):
+        file = self.bake(cube_toml(4))  # edges of 0.25 and, along diagonals, 0.354 m; 1.73 m across
+
+        def warnings(*question):
+            result = run(RUNTIME, "probe", file, *question, "--json")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            answer = json.loads(result.stdout)
+            told = [line.removeprefix("warning: ") for line in result.stderr.splitlines() if line.startswith("warning: ")]
+            self.assertEqual(answer["warnings"], told)
+            text = run(RUNTIME, "probe", file, *question)
+            self.assertEqual(text.stderr, result.stderr)
+            self.assertNotIn("warning", text.stdout)
+            return told
+
+        self.assertEqual(warnings("--at", "0.5,0.5,1.3", "--displace", "0,0,-0.1"), [])
+        self.assertEqual(warnings("--node", "112", "--displace", "0,0,-0.17"), [])
+        (far,) = warnings("--at", "0.5,0.5,1.4", "--displace", "0,0,-0.1")
+        self.assertIn("0.4 m from node 112", far)
+        self.assertIn("longest edge is 0.354 m", far)
+        (held,) = warnings("--at", "0.5,0.5,-0.2", "--displace", "0,0,0.1")  # what is nearest is held
+        self.assertIn("not held", held)
+        (large,) = warnings("--node", "112", "--displace", "0,0,5")
+        self.assertIn("5 m of node 112 is more than a tenth of the body's size, 1.73 m", large)
+        both = warnings("--at", "9,9,9", "--displace", "0,0,5", "--node", "112", "--displace", "0,0,0.1")
+        self.assertEqual(len(both), 2)
+
     def test_nodes_keep_the_order_in_which_they_were_given(self):
         file = self.bake(cube_toml(4))
         corner, middle = 124, 112
@@ -337,6 +363,33 @@ class Play(ProgramTest):
         for piece in ("301 ticks", "in contact", "deadline misses", "median", "99.9 %", "largest force", "largest jump",
                       "nothing_in_reach"):
             self.assertIn(piece, result.stderr)
+
+    def test_tells_of_a_tool_that_presses_on_what_is_held(self):
+        file = self.bake(cube_toml(4))
+        script = self.write("below.csv", "t,x,y,z\n0,0.5,0.5,-0.2\n0.1,0.5,0.5,-0.09\n0.2,0.5,0.5,-0.09\n0.3,0.5,0.5,-0.2\n")
+        play = ("--device", f"script:{script}", "--fast", "--tool", "sphere:0.1")
+        rigid = self.play(file, *play, "--record", "rigid.h5")
+        coupled = self.play(file, *play, "--coupling", "0.5")
+        limited = self.play(file, *play, "--max-force", "0.25")
+        above = self.write("above.csv", "t,x,y,z\n0,0.5,0.5,1.2\n0.1,0.5,0.5,1.09\n0.2,0.5,0.5,1.09\n")
+        free = self.play(file, "--device", f"script:{above}", "--fast", "--tool", "sphere:0.1")
+        for result, words in ((rigid, "wall and not the body's"), (coupled, "its coupling alone"), (limited, "wall and not the body's")):
+            self.assertEqual(result.returncode, 0, result.stderr)
+            report = json.loads(result.stdout)
+            ticks = report["status_ticks"]["rigid_contact"]
+            self.assertGreater(ticks, 100)
+            (warning,) = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
+            self.assertIn(f"in {ticks} ticks the tool pressed on what is held", warning)
+            self.assertIn(words, warning)
+        self.assertLess(json.loads(rigid.stdout)["largest_force_N"], 1000 * json.loads(free.stdout)["largest_force_N"])
+        self.assertAlmostEqual(json.loads(coupled.stdout)["largest_force_N"], 0.5 * 0.01, delta=1e-6)
+        self.assertEqual(json.loads(limited.stdout)["largest_force_N"], 0.25)
+        self.assertEqual(json.loads(free.stdout)["status_ticks"]["rigid_contact"], 0)
+        self.assertNotIn("warning", free.stderr)
+        session = run(RUNTIME, "session", self.folder / "rigid.h5")
+        self.assertIn(f"rigid_contact in {json.loads(rigid.stdout)['status_ticks']['rigid_contact']} ticks", session.stdout)
+        session = json.loads(run(RUNTIME, "session", self.folder / "rigid.h5", "--json").stdout)
+        self.assertEqual(session["status_ticks"], json.loads(rigid.stdout)["status_ticks"])
 
     def test_interrupt_finishes_the_recording(self):
         file = self.bake(cube_toml(4))
