@@ -372,7 +372,7 @@ test('a press begins no deeper than a quarter of the thickness, unless it was ty
 });
 
 test('overlays are offered as far as the file has layers', async (t) => {
-  const { page } = await open_cube(t, { toml: '[storage]\nscope = "layers"\nlayers = 1\n' });
+  const { page, served } = await open_cube(t, { toml: '[storage]\nscope = "layers"\nlayers = 1\n' });
   assert.equal((await told(page, 'state')).model.overlay_rings, 1);
   assert.equal(await part(page, 'overlay-rings').getAttribute('max'), '1');
   assert.equal(await part(page, 'overlay-rings').inputValue(), '1');
@@ -386,6 +386,8 @@ test('overlays are offered as far as the file has layers', async (t) => {
   });
   await page.getByText(/layers below the surface for at most 1 rings?, not 3/).first().waitFor();
   assert.ok(await part(page, 'refused').isVisible());
+  await page.context().close();
+  await served.stop();
   const none = await open_cube(t, { toml: '[storage]\nscope = "surface"\n' });
   assert.equal(await part(none.page, 'overlay').isDisabled(), true);
   assert.ok(await part(none.page, 'overlay-note').isVisible());
