@@ -85,6 +85,15 @@ class Hardening(unittest.TestCase):
                 self.assertRegex(header, r"GNU_STACK .* RW +0x")
                 self.assertRegex(dynamic(file), r"BIND_NOW|\(FLAGS_1\).*NOW")
 
+    def test_stacks_and_known_sizes_are_watched(self):
+        if re.search(r"^PALPATE_SANITIZE:\w+=.+$", (BINARY / "CMakeCache.txt").read_text(), re.MULTILINE):
+            self.skipTest("the sanitizers do that")
+        for file in (PRECOMPUTE, *LINKED):
+            with self.subTest(file=file.name):
+                symbols = subprocess.run(["nm", "-D", "--undefined-only", file], capture_output=True, text=True, check=True).stdout
+                self.assertIn("__stack_chk_fail", symbols)
+                self.assertRegex(symbols, r"__(mem\w+|str\w+|\w*printf|read|poll|fdelt|recv\w*)_chk")
+
 
 if __name__ == "__main__":
     unittest.main()
