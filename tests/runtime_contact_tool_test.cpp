@@ -275,10 +275,6 @@ TEST_P(Tools, PressedOnWhatIsHeldATellsThatItIsRigid) {
   }
 }
 
-    }
-  }
-}
-
 TEST_P(Tools, PressedOnWhatIsHeldGivesNoMoreThanItsLargestForce) {
   const double depth = 0.1 * radius_;
   const double most = 1e-3;
