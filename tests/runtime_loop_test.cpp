@@ -171,7 +171,8 @@ TEST_F(Loop, StandsStillWhilePausedAndGoesOnWithoutAGap) {
   Asking device(script, [&](std::int64_t k) {
     if (k == 50) control.paused = true;
   });
-  // Paused, it shows no force once per period: so many that there are 40 of the pause and some of single ticks.
+  // Paused, it shows no force once per period: so many that there are 40 of the pause and some of single
+  // ticks.
   const auto wait_for_shows = [&] {
     const std::size_t begin = device.shows;
     while (device.shows < begin + 44) std::this_thread::yield();
