@@ -53,7 +53,9 @@ TEST(OutputKind, IsKnownByItsContent) {
     for (const OutputKind other : all_kinds) {
       const bool both_xml = text.find("<!-- palpate") != std::string::npos &&
                             (other == OutputKind::grid || other == OutputKind::frames);
-      if (other != kind && !both_xml) EXPECT_FALSE(is_ours(folder / "out", other)) << text;
+      if (other != kind && !both_xml) {
+        EXPECT_FALSE(is_ours(folder / "out", other)) << text;
+      }
     }
   }
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "formats/hdf5.h"
+#include "formats/hdf5_contents.h"
 #include "formats/model_file.h"
 #include "tests/formats_sample.h"
 #include "tests/formats_tamper.h"
@@ -80,8 +80,7 @@ TEST(SplitFile, IsNotContinuedWithAnotherSmoothPart) {
 TEST(SplitFile, IsNothingThatOlderReadersKnow) {
   const Folder folder;
   write_split_sample(folder / "a.palpate.hdf");
-  EXPECT_EQ(hdf5::File::open_to_read(folder / "a.palpate.hdf").text_attribute("/", "scalar"),
-            "float32+smooth");
+  EXPECT_EQ(hdf5::Contents::read(folder / "a.palpate.hdf").text_attribute("/", "scalar"), "float32+smooth");
 }
 
 TEST(ForceErrors, AreNotInOlderFiles) {
