@@ -277,7 +277,7 @@ TEST_F(RecorderTest, WithoutFinishIsLeftAsIfItWereKilled) {
     recorder.push_frame(frame(0));
   }
   EXPECT_FALSE(read_recording(file_).finished);
-  EXPECT_EQ(session(file_, true), exit_ok);
+  EXPECT_EQ(session(file_, true, false), exit_ok);
   const Recording recording = read_recording(file_);
   EXPECT_TRUE(recording.finished);
   EXPECT_EQ(recording.ticks.size(), 100U);
