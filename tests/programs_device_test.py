@@ -298,7 +298,7 @@ class Choice(ProgramTest):
             self.assertEqual(result.returncode, 2, f"{arguments}: {result.stderr}")
             for piece in pieces:
                 self.assertIn(piece, result.stderr)
-        for device, pieces in (("replay:none.h5", ("none.h5",)), (f"replay:{file}", ("is not a recording",)),
+        for device, pieces in (("replay:none.h5", ("none.h5",)), (f"replay:{file}", ("is a model, not a recording",)),
                                ("bridge:70000", ("70000",)), ("bridge:1.2.3.4:4270", ("1.2.3.4",))):
             self.assert_refused(run(RUNTIME, "play", file, "--device", device, cwd=self.folder), *pieces)
         self.assert_refused(run(RUNTIME, "play", file, "--device", f"script:{script}", "--cpu", "4000", cwd=self.folder),

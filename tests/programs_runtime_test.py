@@ -367,12 +367,12 @@ class Play(ProgramTest):
     def test_tells_of_a_tool_that_presses_on_what_is_held(self):
         file = self.bake(cube_toml(4))
         script = self.write("below.csv", "t,x,y,z\n0,0.5,0.5,-0.2\n0.1,0.5,0.5,-0.09\n0.2,0.5,0.5,-0.09\n0.3,0.5,0.5,-0.2\n")
-        play = ("--device", f"script:{script}", "--fast", "--tool", "sphere:0.1")
+        play = ("--device", f"script:{script}", "--fast", "--tool", "sphere:0.1", "--report", "-")
         rigid = self.play(file, *play, "--record", "rigid.h5")
         coupled = self.play(file, *play, "--coupling", "0.5")
         limited = self.play(file, *play, "--max-force", "0.25")
         above = self.write("above.csv", "t,x,y,z\n0,0.5,0.5,1.2\n0.1,0.5,0.5,1.09\n0.2,0.5,0.5,1.09\n")
-        free = self.play(file, "--device", f"script:{above}", "--fast", "--tool", "sphere:0.1")
+        free = self.play(file, "--device", f"script:{above}", "--fast", "--tool", "sphere:0.1", "--report", "-")
         for result, words in ((rigid, "wall and not the body's"), (coupled, "its coupling alone"), (limited, "wall and not the body's")):
             self.assertEqual(result.returncode, 0, result.stderr)
             report = json.loads(result.stdout)
@@ -665,7 +665,7 @@ class Usage(ProgramTest):
 
     def test_wrong_arguments(self):
         place = ("--at", "0,0,1", "--displace", "0,0,1")
-        self.assert_usage("probe, play, view, export, session or devices")
+        self.assert_usage("play, view, probe, session, export or devices is required")
         self.assert_usage("bogus", "bogus")
         self.assert_usage("FILE", "probe", *place)
         self.assert_usage("--bogus", "probe", "x.palpate.hdf", *place, "--bogus")

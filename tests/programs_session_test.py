@@ -194,7 +194,7 @@ class Session(ProgramTest):
 
     def test_refuses_what_is_no_recording(self):
         file = self.bake(cube_toml(3))
-        self.assert_refused(run(RUNTIME, "session", file, cwd=self.folder), "is not a recording")
+        self.assert_refused(run(RUNTIME, "session", file, cwd=self.folder), "is a model, not a recording", "play")
         self.assert_refused(run(RUNTIME, "session", "none.h5", cwd=self.folder), "none.h5")
 
     def test_plots(self):

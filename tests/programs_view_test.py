@@ -163,7 +163,7 @@ class View(ViewTest):
         self.assert_wrong_addresses("view", "touch.h5")
 
     def test_refuses_what_it_cannot_show(self):
-        self.assert_refused(run(RUNTIME, "view", CUBE), "is not a recording")
+        self.assert_refused(run(RUNTIME, "view", CUBE), "is a model, not a recording", "play")
         self.assert_refused(run(RUNTIME, "view", "none.h5", cwd=self.folder), "none.h5")
         self.record("--record-frames", "0")
         self.assert_refused(run(RUNTIME, "view", "touch.h5", cwd=self.folder), "touch.h5", "--record-frames 0")

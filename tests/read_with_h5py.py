@@ -1,6 +1,7 @@
 """Opens what formats_sample_file wrote with h5py, as a user's notebook would: read_with_h5py.py FOLDER"""
 
 import pathlib
+import re
 import sys
 
 import h5py
@@ -37,7 +38,7 @@ def check_model(path, element, scalar):
     with h5py.File(path) as file:
         attributes = file.attrs
         expect(attributes["format"] == b"palpate", "format")
-        expect(list(attributes["version"]) == [3, 3], "version")
+        expect(list(attributes["version"]) == [3, 3], "version of a model")
         expect(attributes["units"] == b"m, N, Pa, kg, s", "units")
         expect(attributes["scalar"].decode() == scalar, "scalar")
         expect(attributes["element"].decode() == element and attributes["dimension"] == dimension, "element")
@@ -135,7 +136,7 @@ def enclosed(nodes, surface):
 def check_recording(path):
     with h5py.File(path) as file:
         expect(file.attrs["format"] == b"palpate-recording" and file.attrs["model"] == b"tet4.palpate.hdf", "recording")
-        expect(list(file.attrs["version"]) == [4, 1], "version")
+        expect(list(file.attrs["version"]) == [4, 2], "version of a recording")
         expect(file.attrs["rate"] == 1000 and file.attrs["device"] == b"none" and file.attrs["options"] == b"", "attributes")
         ticks = file["/ticks"]
         widths = {"time": 1, "device_position": 3, "device_orientation": 4, "tool_position": 3, "tool_orientation": 4, "force": 3,
@@ -158,6 +159,8 @@ def check_recording(path):
         expect(np.array_equal(file["/surface/held"], [7, 0, 0]) and file["/surface/held"].dtype == np.uint8, "held")
         expect(frames["von_mises"].dtype == np.float32 and np.array_equal(frames["von_mises"][9], [np.nan, 1, 4500], equal_nan=True), "stress")
         expect(frames["pressure"].dtype == np.float32 and np.array_equal(frames["pressure"][9], [0, -4500, 2]), "pressure")
+        datasets = [dataset for group in ("/ticks", "/frames", "/surface") for dataset in file[group].values()]
+        expect(all(re.fullmatch("[0-9a-f]{32}", dataset.attrs["xxh3"].decode()) for dataset in datasets), "checksums")
         print(f"{path.name}: 5000 ticks, 10 frames")
 
 
