@@ -408,7 +408,7 @@ TEST_F(Viewed, GoesOnWithTheLoadedBodyWhereItsFileIsGone) {
   std::filesystem::remove(folder_ / "gone.palpate.hdf");
   play_->change({{"stiffness-scale", "2"}});
   ASSERT_TRUE(wait_for([](const RunState& state) { return state.refused.has_value(); }));
-  EXPECT_NE(play_->state().refused->find("gone.palpate.hdf: cannot be read"), std::string::npos);
+  EXPECT_NE(play_->state().refused->find("gone.palpate.hdf: cannot open the file"), std::string::npos);
   ASSERT_TRUE(wait_for_ticks(50));
   play_->reset();
   ASSERT_TRUE(wait_for([](const RunState& state) { return !state.refused; }));
