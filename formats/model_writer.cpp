@@ -240,8 +240,8 @@ bool ModelWriter::Impl::resume() {
 /// Whether the HDF5 library can be given what a killed run left, and its packed matrices lie where the
 /// journal says.
 bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
-  const bool single = header.precision == Precision::single_precision;
-  const hdf5::ElementType scalar = single ? hdf5::element_type<float>() : hdf5::element_type<double>();
+  const hdf5::ElementType scalar =
+      has_float_entries(header.precision) ? hdf5::element_type<float>() : hdf5::element_type<double>();
   try {
     const hdf5::Contents contents = hdf5::Contents::read(partial);
     for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
