@@ -101,7 +101,8 @@ std::int64_t check_inr_header(const std::filesystem::path& file) {
     throw Error(fmt::format("PIXSIZE of the image's header is {} bits", bits), where, complete_file);
   }
   const std::int64_t needed = static_cast<std::int64_t>(voxels) * bits / 8;
-  const auto after_header = static_cast<std::int64_t>(text.size() - end);
+  const std::size_t data = std::min(text.find('\n', end), text.size() - 1) + 1;  // after the line "##}"
+  const auto after_header = static_cast<std::int64_t>(text.size() - data);
   const std::int64_t present = after_header + count_bytes(stream.get(), needed - after_header);
   if (present < needed) {
     throw Error(fmt::format("the image's header asks for {} voxels of {} bits, {} bytes, but only {} bytes "

@@ -605,7 +605,7 @@ TEST(Recording, BadPathsAndOtherFilesAreRefused) {
   EXPECT_NE(refusal([&] { RecordingWriter(folder / "none" / "a.h5", info); }).find("No such file"),
             std::string::npos);
   write_sample(folder / "a.palpate.hdf");
-  EXPECT_NE(refusal([&] { read_recording(folder / "a.palpate.hdf"); }).find("is not a recording"),
+  EXPECT_NE(refusal([&] { read_recording(folder / "a.palpate.hdf"); }).find("is a model, not a recording"),
             std::string::npos);
   write_bytes(folder / "text", "text");
   EXPECT_NE(refusal([&] { read_recording(folder / "text"); }), "");
