@@ -72,10 +72,6 @@ double median(const std::vector<double>& values) {
   return quantile(values, 0.5);
 }
 
-std::string name_of(Precision precision) {
-  return precision == Precision::single_precision ? "single" : "double";
-}
-
 template <class T>
 PackedGreens made_up_matrix(std::int64_t order, Precision precision, double size) {
   auto packed = std::make_shared<std::vector<T>>(static_cast<std::size_t>(packed_size(order)));
@@ -539,9 +535,9 @@ void register_boxes() {
   }
   for (const Precision precision : {Precision::single_precision, Precision::double_precision}) {
     for (const int hertz : {60, 1000}) {
-      add("largest/" + name_of(precision) + "/hertz:" + std::to_string(hertz), [=](benchmark::State& run) {
-        find_largest(run, precision, 1.0 / hertz);
-      })->Iterations(1);
+      add(std::string("largest/") + name_of(precision) + "/hertz:" + std::to_string(hertz),
+          [=](benchmark::State& run) { find_largest(run, precision, 1.0 / hertz); })
+          ->Iterations(1);
     }
   }
 }
