@@ -160,12 +160,14 @@ class Dynamics(ProgramTest):
 
 class Stopped(ProgramTest):
     def start_and_wait_for_columns(self, model, output, matrix=0):
-        """A running bake that has written some columns of the matrix but not all."""
-        process = subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.DEVNULL)
+        """A running bake that has written some columns of the matrix but not all, beyond those that an earlier run left."""
         journal = output.with_name(output.name + ".progress")
+        left = journal.read_text() if journal.exists() else ""
+        process = subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline and process.poll() is None:
-            if journal.exists() and f"\ncolumns {matrix} " in journal.read_text():
+            told = journal.read_text() if journal.exists() else ""
+            if told != left and f"\ncolumns {matrix} " in told:
                 return process
             time.sleep(0.002)
         self.fail("the run ended before it could be stopped")
@@ -253,7 +255,9 @@ class Stopped(ProgramTest):
     def test_interrupt_says_how_to_go_on_and_discard_begins_anew(self):
         model = self.write("model.toml", cube_toml(18))
         output = self.folder / "x.palpate.hdf"
-        self.start_and_wait_for_columns(model, output).kill()
+        killed = self.start_and_wait_for_columns(model, output)
+        killed.kill()
+        killed.wait()
         process = subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], stderr=subprocess.PIPE, text=True)
         for line in process.stderr:
             if "were kept" in line:
