@@ -225,8 +225,20 @@ struct Press {
   ToolPose pose;
 };
 
-/// All of the surface stays out of all of the tools: each end of a core from each simplex, and a core that is
-/// a segment from each corner and edge of it.
+/// Whether the edges between a simplex's corners are chords to a sphere, which touches the corners alone.
+bool is_chord(const Model& model, const std::vector<Index>& nodes, const Tool& tool) {
+  double edges = 0.0;
+  const std::size_t pairs = nodes.size() == 2 ? 1 : 3;
+  for (std::size_t n = 0; n < pairs; ++n) {
+    const auto from = static_cast<std::size_t>(nodes[n]);
+    const auto to = static_cast<std::size_t>(nodes[(n + 1) % nodes.size()]);
+    edges += (model.mesh.nodes[to] - model.mesh.nodes[from]).norm();
+  }
+  return tool.length == 0.0 && tool.radius > 6.0 * edges / static_cast<double>(pairs);
+}
+
+/// All of the surface stays out of all of the tools: each end of a core from each simplex (its corners where
+/// it is a chord), and a core that is a segment from each corner and edge of it.
 Constraints constraints_at(const Model& model, const std::vector<Press>& presses, const Eigen::VectorXd& u) {
   const int d = model.dimension();
   Constraints constraints;
@@ -263,6 +275,10 @@ Constraints constraints_at(const Model& model, const std::vector<Press>& presses
                                    model.surface.begin() + static_cast<std::ptrdiff_t>(simplex + corners));
     for (std::size_t k = 0; k < presses.size(); ++k) {
       const Core core = core_of(presses[k].tool, presses[k].pose, d);
+      if (is_chord(model, nodes, presses[k].tool)) {
+        for (const Index node : nodes) add(k, 0, {core.origin}, {node});
+        continue;
+      }
       add(k, 0, {core.origin}, nodes);
       if (presses[k].tool.length == 0.0) continue;
       add(k, 1, {core.end}, nodes);
@@ -480,6 +496,11 @@ std::vector<ContactCase> contact_cases() {
        {sphere(3, 0.5, 0.3, 0.37, 0.08), sphere(3, 0.35, 0.72, 0.61, 0.06)},
        8},
       {"two_circles",
+       ElementType::quad4,
+       24,
+       {sphere(2, 0.24, 0.31, 0.0, 0.06), sphere(2, 0.2, 0.77, 0.0, 0.05)},
+       6},
+      {"two_large_circles",  // against the edges
        ElementType::quad4,
        24,
        {sphere(2, 0.5, 0.31, 0.0, 0.06), sphere(2, 0.3, 0.77, 0.0, 0.05)},
