@@ -1,8 +1,12 @@
 #include "formats/hdf5.h"
 
+#include <unistd.h>
+
 #include <array>
+#include <cerrno>
 #include <limits>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "meshes/error.h"
@@ -140,7 +144,13 @@ File File::create(const std::filesystem::path& path, std::int64_t align_from) {
   const Id access = access_properties(align_from);
   const Id creation = timeless(H5P_FILE_CREATE);
   File file(Id(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose), path);
-  if (!file.file_.valid()) file.fail("make the file");
+  if (!file.file_.valid()) {
+    // Where the file vanishes while HDF5 makes it, HDF5 keeps the system's reason to itself.
+    if (::access(path.c_str(), F_OK) != 0)
+      throw Error("cannot make the file: " + std::system_category().message(errno), path.string(),
+                  "Something removed the file or its folder meanwhile.");
+    file.fail("make the file");
+  }
   return file;
 }
 

@@ -613,7 +613,7 @@ class FailedRecording(OutputTest):
         process = self.start()
         while not list(self.folder.glob("t.h5.parts/*.h5")):
             time.sleep(0.01)
-        shutil.rmtree(self.folder / "t.h5.parts")
+        (self.folder / "t.h5.parts").rename(self.folder / "gone")  # at once: what is removed file by file may be filled meanwhile
         self.wait_for_warning(process, "t.h5", "No such file")
         self.end(process, "No such file")
 
