@@ -120,7 +120,7 @@ export async function visit(t, url, options = {}, before = null) {
   const context = await (await open()).newContext({ viewport: { width: 1280, height: 800 }, ...options });
   t.after(() => context.close());
   const page = await context.newPage();
-  page.setDefaultTimeout(30_000);
+  page.setDefaultTimeout(120_000); // guards against what never comes, not against a busy machine
   page.complaints = [];
   page.on('pageerror', (error) => page.complaints.push(String(error)));
   page.on('request', (request) => {

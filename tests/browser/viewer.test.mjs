@@ -230,7 +230,7 @@ test('a recording that fails says so at once', async (t) => {
   const { recording } = await told(page, 'state');
   await rm(path.resolve(at, `${recording}.parts`), { recursive: true });
   await until(page, () => window.palpate.state.recording_failed);
-  await page.getByText('Recording failed').waitFor();
+  await page.getByText('Recording failed', { exact: true }).waitFor();
   await page.getByText(/The recording failed, and the run goes on without it: .*No such file/).first().waitFor();
   const before = await told(page, 'state');
   await page.waitForFunction((ticks) => window.palpate.state.ticks > ticks + 100, before.ticks);
