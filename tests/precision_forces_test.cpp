@@ -176,10 +176,12 @@ double worst_force_error(const Model& model) {
     for (const std::size_t count : {1U, 2U, 5U, 30U}) {
       const std::vector<Index> touched(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count));
       const auto size = 3 * static_cast<Eigen::Index>(count);
-      const auto dof = [&](Eigen::Index i) { return 3 * touched[static_cast<std::size_t>(i / 3)] + i % 3; };
+      const auto dof = [&](Eigen::Index i) {
+        return 3 * Eigen::Index{touched[static_cast<std::size_t>(i / 3)]} + i % 3;
+      };
       const auto xi = [&](Eigen::Index i, Eigen::Index j) { return model.greens(dof(i), dof(j)); };
       const Eigen::LLT<Eigen::MatrixXd> C(Eigen::MatrixXd::NullaryExpr(size, size, xi));
-      for (int kind = 0; kind < 3; ++kind) {
+      for (Eigen::Index kind = 0; kind < 3; ++kind) {
         Eigen::VectorXd u(size);
         for (Eigen::Index i = 0; i < size; ++i)
           u[i] = kind == 2 ? entry(random) : (i % 3 == 2 * kind ? 1.0 : 0.0);
