@@ -1,13 +1,16 @@
 #include "formats/file_io.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "meshes/error.h"
@@ -88,6 +91,16 @@ void FileDescriptor::close() noexcept {
 FileDescriptor open_file(const std::filesystem::path& path, OpenMode mode) {
   if (mode != OpenMode::read && std::filesystem::is_symlink(path)) refuse_stranger(path);
   return {open_regular_file(path, flags_of(mode)), path};
+}
+
+bool lock_file(const FileDescriptor& file) {
+  using namespace std::chrono_literals;
+  const auto deadline = std::chrono::steady_clock::now() + 2s;
+  while (::flock(file.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(10ms);
+  }
+  return true;
 }
 
 std::int64_t file_size(const FileDescriptor& file) {

@@ -37,6 +37,11 @@ enum class OpenMode : std::uint8_t {
 /// Opens a regular file and nothing else, without waiting. Throws Error with the reason.
 FileDescriptor open_file(const std::filesystem::path& path, OpenMode mode);
 
+/// Locks the file for this program (flock) until it is closed; false where another one has it, after two
+/// seconds: a program that was killed lets go only when the last process that it forked is gone. True where
+/// the file system knows no locks.
+bool lock_file(const FileDescriptor& file);
+
 /// [byte]
 std::int64_t file_size(const FileDescriptor& file);
 

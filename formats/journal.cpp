@@ -1,11 +1,9 @@
 #include "formats/journal.h"
 
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <string_view>
 
@@ -91,7 +89,7 @@ void expect_own_journal(const std::filesystem::path& model) {
 Journal::Journal(const std::filesystem::path& path) {
   do {
     file_ = open_file(path, OpenMode::read_append);
-    if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    if (!lock_file(file_))
       throw Error("another palpate-precompute is writing this file", path.string(),
                   "Wait for it, or choose another place with --output.");
   } while (!is_still_there(file_));

@@ -1,7 +1,5 @@
 #include "formats/recording_parts.h"
 
-#include <sys/file.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -334,7 +332,7 @@ std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording)
     throw Error("cannot make the folder: " + failed.message(), folder.string(),
                 "Check the path and the permissions of its folder.");
   FileDescriptor lock = open_file(folder / lock_name, OpenMode::read_append);
-  if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) return std::nullopt;
+  if (!lock_file(lock)) return std::nullopt;
   return lock;
 }
 

@@ -370,6 +370,19 @@ TEST(ModelFile, OneWriterAtATime) {
   EXPECT_TRUE(std::filesystem::exists(folder / "a.palpate.hdf.partial"));
 }
 
+TEST(ModelFile, WhatAKilledRunHasForkedMayEndAfterIt) {
+  const Folder folder;
+  const Model model = sample_model();
+  const pid_t killed = ::fork();
+  if (killed == 0) {
+    const ModelWriter writer(folder / "a.palpate.hdf", model, Precision::double_precision);
+    if (::fork() == 0) ::usleep(300'000);  // it has the lock too
+    ::_exit(0);
+  }
+  ::waitpid(killed, nullptr, 0);
+  EXPECT_NO_THROW(ModelWriter(folder / "a.palpate.hdf", model, Precision::double_precision));
+}
+
 TEST(ModelFile, WhatAReaderWouldRefuseIsNotWritten) {
   const Folder folder;
   Model model = sample_model();
