@@ -18,7 +18,7 @@ namespace {
 using Matrix = Eigen::MatrixXd;
 using Refined = RefinedSolution::Refined;
 
-constexpr std::size_t feared_places = 4, random_places = 4;
+constexpr std::size_t softest_places = 4, random_places = 4;
 constexpr std::array<std::size_t, 4> touched_nodes = {1, 2, 5, 30};
 constexpr Eigen::Index columns_at_once = 24;
 constexpr double fine_reference = 1e-8;  // error of forces that plain solves may have as the reference
@@ -65,8 +65,8 @@ std::vector<Index> nearest(const Model& model, const std::vector<Index>& nodes, 
 
 /// How much a unit displacement of one node could be lost in what many have in common: K's diagonal times the
 /// compliance of the smooth part.
-double fear(const Model& model, const SparseMatrix& K, std::span<const std::int64_t> stored_dofs,
-            const SmoothPart& smooth, Index node) {
+double amplification(const Model& model, const SparseMatrix& K, std::span<const std::int64_t> stored_dofs,
+                     const SmoothPart& smooth, Index node) {
   double most = 0.0;
   for (int axis = 0; axis < model.dimension(); ++axis) {
     const std::int64_t dof = std::int64_t{model.dimension()} * node + axis,
@@ -81,25 +81,26 @@ std::vector<std::vector<Index>> choose_places(const Model& model, const SparseMa
                                               std::span<const std::int64_t> stored_dofs,
                                               const SmoothPart& smooth) {
   const std::vector<Index> nodes = free_surface_nodes(model);
-  std::vector<std::pair<double, Index>> feared;
+  std::vector<std::pair<double, Index>> by_amplification;
   for (const Index node : nodes)
-    feared.emplace_back(-(smooth.terms == 0 ? 0.0 : fear(model, K, stored_dofs, smooth, node)), node);
-  std::sort(feared.begin(), feared.end());
+    by_amplification.emplace_back(
+        -(smooth.terms == 0 ? 0.0 : amplification(model, K, stored_dofs, smooth, node)), node);
+  std::sort(by_amplification.begin(), by_amplification.end());
   std::vector<std::vector<Index>> places;
   std::vector<bool> near(model.stored_nodes.size(), false);
   const auto add = [&](Index node) {
     places.push_back(nearest(model, nodes, node));
     for (const Index other : places.back()) near[static_cast<std::size_t>(other)] = true;
   };
-  for (const auto& [minus_fear, node] : feared)
-    if (places.size() < feared_places && !near[static_cast<std::size_t>(node)]) add(node);
+  for (const auto& [minus_amplification, node] : by_amplification)
+    if (places.size() < softest_places && !near[static_cast<std::size_t>(node)]) add(node);
   std::mt19937_64 random(23);
   for (std::size_t k = 0; k < std::min(random_places, nodes.size()); ++k) add(nodes[random() % nodes.size()]);
   return places;
 }
 
 /// What plain solves may make of a touch's forces: their error, of the columns of the place's first node,
-/// times what `fear` says that it grows by.
+/// times K's diagonal.
 double reference_error(const Model& model, const Factor& factor, const SparseMatrix& K,
                        std::span<const std::int64_t> stored_dofs, const TouchedPlace& place) {
   double worst = 0.0;

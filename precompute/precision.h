@@ -30,7 +30,7 @@ inline constexpr std::array<std::int64_t, 2> tried_terms = {16, 64};
 SmoothPart largest_smooth_part(const Factor& factor, const SparseMatrix& K,
                                std::span<const std::int64_t> stored_dofs);
 
-/// Up to eight places: the four where rounding is feared most (where K's diagonal times the compliance is
+/// Up to eight places: the four where rounding does most harm (where K's diagonal times the compliance is
 /// largest, no two side by side) and four at random. Model: mesh, surface, held and stored nodes. `factor`:
 /// of K, computed. The reference is refined where plain solves would be wrong by more than 1e-8 in the
 /// forces.

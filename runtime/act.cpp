@@ -55,7 +55,7 @@ Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActVie
   }
   const bool in_background = !options_.fast && !options_.session;
   if (settings.overlay) {
-    if (options_.session) check_overlays(*options_.session, body);
+    if (options_.session) check_overlays(*options_.session, body, options_.device.target);
     overlays_.emplace(body, state_,
                       PatchSourceOptions{.rings = settings.overlay->rings,
                                          .memory = settings.overlay_memory,

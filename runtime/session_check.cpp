@@ -56,7 +56,7 @@ Recording read_session(const std::filesystem::path& path) {
   return session;
 }
 
-void check_overlays(const Recording& session, const Body& body) {
+void check_overlays(const Recording& session, const Body& body, const std::filesystem::path& where) {
   const auto nodes = static_cast<std::int64_t>(body.model().mesh.nodes.size());
   for (std::size_t k = 0; k < session.ticks.size(); ++k) {
     const Index node = session.ticks[k].patch;
@@ -66,7 +66,7 @@ void check_overlays(const Recording& session, const Body& body) {
     throw Error(fmt::format("/ticks/patch, row {}, holds {}, which is no node that an overlay can lie round: "
                             "the body has {} nodes",
                             k, node, nodes),
-                "the session",
+                where.string(),
                 "replay it with the model that it was recorded with: " + session.info.model_path);
   }
 }

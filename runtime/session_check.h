@@ -16,6 +16,6 @@ void check_session(const Recording& session, const std::filesystem::path& where)
 Recording read_session(const std::filesystem::path& path);
 
 /// Proves that a replay on this body finds the nodes round which the session had its overlays. Throws Error.
-void check_overlays(const Recording& session, const Body& body);
+void check_overlays(const Recording& session, const Body& body, const std::filesystem::path& where);
 
 }  // namespace palpate
