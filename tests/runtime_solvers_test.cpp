@@ -122,6 +122,23 @@ TEST(ActiveSet, FindsTheOneSetThatEnumerationFinds) {
   }
 }
 
+/// b = (1 m, -1 nm): the second contact is pressed by what is small beside the first one's gap, and is no
+/// rounding.
+TEST(ActiveSet, ASmallOverlapBesideALargeGapIsClosed) {
+  ContactProblem problem(3, 2, 2);
+  problem.add(0.0, false);
+  problem.add(0.0, false);
+  problem.w(0, 0) = problem.w(1, 1) = 1e-3;
+  problem.w(0, 1) = problem.w(1, 0) = 0.0;
+  problem.b[0] = 1.0;
+  problem.b[1] = -1e-9;
+  problem.lambda[0] = problem.lambda[1] = 0.0;
+  ActiveSet solver(8);
+  ASSERT_TRUE(solver.solve(problem));
+  EXPECT_EQ(problem.lambda[0], 0.0);
+  EXPECT_DOUBLE_EQ(problem.lambda[1], 1e-6);
+}
+
 TEST(ActiveSet, AnyGuessLeadsToTheSameForces) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> guess(-2.0, 2.0);

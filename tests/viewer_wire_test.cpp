@@ -17,8 +17,8 @@ namespace {
 constexpr double half_unit = 0.502;  // to which values are rounded, and what float adds to that
 constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
 
-Body body_of(ElementType element, int refinement = 1) {
-  return Body(test::unit_model(element, 3, Scope::full, Precision::double_precision), {}, refinement);
+Body body_of(ElementType element, int refinement = 1, int cells = 3) {
+  return Body(test::unit_model(element, cells, Scope::full, Precision::double_precision), {}, refinement);
 }
 
 /// Displacement (0.1 x, -0.2 x, 0.05) of what is at x.
@@ -134,7 +134,7 @@ struct Patched {
   Scene scene = make_scene(body, 1);
   ScenePatch patch;
 
-  explicit Patched(ElementType element) : body(body_of(element, 2)) {
+  explicit Patched(ElementType element, int cells = 3) : body(body_of(element, 2, cells)) {
     const Index centre = body.nearest_surface_node(test::top_middle(body.dimension())).node;
     patch = make_scene_patch(body, scene, *PatchMaker(body, 1).make({&centre, 1}));
     patch.number = 5;
@@ -195,6 +195,20 @@ TEST(Wire, FrameOfAPlateHasAllItsNodes) {
   EXPECT_FLOAT_EQ(frame.stress.back(), 3.0F);
   EXPECT_EQ(frame.pressure_node,
             std::vector<std::uint32_t>{static_cast<std::uint32_t>(plate.surface_mesh_nodes().back())});
+}
+
+TEST(Wire, PatchOfAPlateOfAnOddNumberOfNodesComesBack) {
+  const Patched patched(ElementType::quad4, 2);
+  const std::size_t S = patched.scene.nodes.size();
+  ASSERT_EQ(S % 2, 1U);  // so that its stresses end amid four bytes
+  SurfacePicture picture = picture_of(patched.body);
+  picture.plane_displacement = sheared(patched.body.model().mesh.nodes);
+  const test::DecodedFrame frame =
+      test::decode_frame(encode_frame(picture, patched.scene, &patched.patch), S);
+  ASSERT_EQ(frame.patch_nodes, patched.patch.nodes.size());
+  const std::vector<float> expected = sheared(patched.patch.nodes);
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    EXPECT_NEAR(frame.u[3 * S + k], expected[k], half_unit * frame.unit_u);
 }
 
 TEST(Wire, TicksComeBack) {

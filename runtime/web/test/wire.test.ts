@@ -127,6 +127,7 @@ test('what is no message is refused', () => {
   const whole = frame_message();
   for (let bytes = 8; bytes < whole.byteLength - 3; bytes += 4) assert.throws(() => decode(whole.slice(0, bytes), scene), RangeError);
   assert.throws(() => decode(new Writer().u32(1, 7, 3, 1, 1, 0).f32(0, 0, 0).u32(0, 0, 1).u8(0).done(), null), /node 1 is not below 1/);
+  assert.throws(() => decode(new Writer().u32(1, 7, 3, 1, 0, 1).f32(0, 0, 0).u32(0, 1).u8(0).done(), null), /node 1 is not below 1/);
 });
 
 test('stored messages one after the other', () => {
