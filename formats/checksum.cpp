@@ -11,7 +11,7 @@
 #include <mutex>
 #include <thread>
 
-#include "formats/file_io.h"
+#include "base/file_io.h"
 
 namespace palpate {
 namespace {

@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "meshes/error.h"
+#include "base/error.h"
 
 namespace palpate::hdf5 {
 namespace {

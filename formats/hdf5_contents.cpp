@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
-#include "formats/child_process.h"
-#include "meshes/error.h"
+#include "base/child_process.h"
+#include "base/error.h"
 
 namespace palpate::hdf5 {
 namespace {

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "formats/file_io.h"
+#include "base/file_io.h"
 #include "formats/hdf5.h"
 
 namespace palpate::hdf5 {

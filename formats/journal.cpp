@@ -7,8 +7,8 @@
 #include <charconv>
 #include <string_view>
 
+#include "base/error.h"
 #include "formats/output_kind.h"
-#include "meshes/error.h"
 
 namespace palpate {
 namespace {

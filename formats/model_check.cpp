@@ -4,9 +4,9 @@
 #include <functional>
 #include <limits>
 
+#include "base/error.h"
 #include "formats/dynamics_fields.h"
 #include "meshes/element.h"
-#include "meshes/error.h"
 
 namespace palpate {
 namespace {

@@ -8,18 +8,18 @@
 #include <type_traits>
 #include <utility>
 
+#include "base/error.h"
+#include "base/file_io.h"
+#include "base/memory.h"
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
 #include "formats/dynamics_fields.h"
-#include "formats/file_io.h"
 #include "formats/hdf5_contents.h"
-#include "formats/memory.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
 #include "formats/precision_fields.h"
 #include "formats/superblock.h"
-#include "meshes/error.h"
 
 namespace palpate {
 namespace {

@@ -5,10 +5,11 @@
 #include <mutex>
 #include <optional>
 
+#include "base/error.h"
+#include "base/file_io.h"
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
 #include "formats/dynamics_fields.h"
-#include "formats/file_io.h"
 #include "formats/hdf5.h"
 #include "formats/hdf5_contents.h"
 #include "formats/journal.h"
@@ -16,7 +17,6 @@
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
 #include "formats/precision_fields.h"
-#include "meshes/error.h"
 
 namespace palpate {
 namespace {

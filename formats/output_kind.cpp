@@ -8,8 +8,8 @@
 #include <sstream>
 #include <string>
 
+#include "base/error.h"
 #include "formats/hdf5_contents.h"
-#include "meshes/error.h"
 
 namespace palpate {
 namespace {

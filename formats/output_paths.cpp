@@ -6,10 +6,10 @@
 #include <cerrno>
 #include <system_error>
 
+#include "base/error.h"
+#include "base/write_file.h"
 #include "formats/journal.h"
 #include "formats/recording_parts.h"
-#include "meshes/error.h"
-#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {

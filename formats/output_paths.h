@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/file_io.h"
+#include "base/file_io.h"
 #include "formats/output_kind.h"
 
 namespace palpate {

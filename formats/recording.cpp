@@ -6,10 +6,10 @@
 #include <cstring>
 #include <thread>
 
+#include "base/error.h"
+#include "base/write_file.h"
 #include "formats/recording_parts.h"
 #include "formats/superblock.h"
-#include "meshes/error.h"
-#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {

@@ -9,9 +9,9 @@
 #include <system_error>
 #include <utility>
 
+#include "base/error.h"
+#include "base/write_file.h"
 #include "formats/checksum.h"
-#include "meshes/error.h"
-#include "meshes/write_file.h"
 
 namespace palpate {
 namespace {

@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "formats/file_io.h"
+#include "base/file_io.h"
 #include "formats/hdf5_contents.h"
 #include "formats/recording.h"
 

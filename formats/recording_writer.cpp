@@ -1,8 +1,8 @@
 #include <iterator>
 #include <string>
 
+#include "base/error.h"
 #include "formats/recording_parts.h"
-#include "meshes/error.h"
 
 namespace palpate {
 namespace {

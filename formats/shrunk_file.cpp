@@ -5,7 +5,7 @@
 #include <csignal>
 #include <string_view>
 
-#include "meshes/error.h"
+#include "base/error.h"
 
 namespace palpate {
 namespace {

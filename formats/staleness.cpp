@@ -1,6 +1,6 @@
+#include "base/error.h"
 #include "formats/checksum.h"
 #include "formats/model_file.h"
-#include "meshes/error.h"
 
 namespace palpate {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <span>
 
-#include "meshes/error.h"
+#include "base/error.h"
 
 namespace palpate {
 namespace {

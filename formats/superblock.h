@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "formats/file_io.h"
+#include "base/file_io.h"
 
 namespace palpate {
 

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "base/error.h"
 #include "meshes/check.h"
-#include "meshes/error.h"
 #include "meshes/topology.h"
 
 namespace palpate {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "meshes/error.h"
+#include "base/error.h"
 #include "meshes/mesh.h"
 
 namespace palpate {

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <set>
 
+#include "base/error.h"
 #include "meshes/element.h"
-#include "meshes/error.h"
 
 namespace palpate {
 namespace {

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <string>
 
+#include "base/error.h"
 #include "meshes/element.h"
-#include "meshes/error.h"
 #include "meshes/topology.h"
 
 namespace palpate {

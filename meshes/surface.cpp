@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "meshes/error.h"
+#include "base/error.h"
 #include "meshes/topology.h"
 
 namespace palpate {

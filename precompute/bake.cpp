@@ -11,21 +11,21 @@
 #include <random>
 #include <thread>
 
+#include "base/error.h"
+#include "base/interrupt.h"
 #include "formats/model_file.h"
 #include "formats/output_paths.h"
-#include "meshes/error.h"
 #include "meshes/quality.h"
-#include "precompute/body.h"
-#include "precompute/dynamics.h"
-#include "precompute/factor.h"
-#include "precompute/greens.h"
-#include "precompute/interrupt.h"
-#include "precompute/loads.h"
-#include "precompute/overlay_regions.h"
+#include "precompute/numerics/body.h"
+#include "precompute/numerics/dynamics.h"
+#include "precompute/numerics/factor.h"
+#include "precompute/numerics/greens.h"
+#include "precompute/numerics/loads.h"
+#include "precompute/numerics/overlay_regions.h"
+#include "precompute/numerics/precision.h"
+#include "precompute/numerics/scope.h"
 #include "precompute/plan.h"
-#include "precompute/precision.h"
 #include "precompute/progress.h"
-#include "precompute/scope.h"
 
 namespace palpate {
 namespace {

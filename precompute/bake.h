@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "precompute/description.h"
+#include "precompute/description/description.h"
 
 namespace palpate {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "meshes/error.h"
-#include "precompute/touched_boundary.h"
+#include "base/error.h"
+#include "precompute/numerics/touched_boundary.h"
 
 namespace palpate {
 namespace {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <numbers>
 
-#include "meshes/printable.h"
-#include "precompute/precision.h"
+#include "base/printable.h"
+#include "precompute/numerics/precision.h"
 
 namespace palpate {
 namespace {

@@ -6,17 +6,17 @@
 #include <string>
 #include <thread>
 
+#include "base/command_line.h"
+#include "base/error.h"
+#include "base/printable.h"
+#include "base/spelling.h"
+#include "base/standard_output.h"
 #include "formats/model_file.h"
 #include "formats/shrunk_file.h"
-#include "meshes/command_line.h"
-#include "meshes/error.h"
-#include "meshes/printable.h"
-#include "meshes/spelling.h"
-#include "meshes/standard_output.h"
 #include "precompute/bake.h"
 #include "precompute/compare.h"
+#include "precompute/description/not_a_description.h"
 #include "precompute/inspect.h"
-#include "precompute/not_a_description.h"
 #include "precompute/verify.h"
 
 namespace {

@@ -8,8 +8,8 @@
 #include <thread>
 #include <vector>
 
-#include "formats/memory.h"
-#include "meshes/error.h"
+#include "base/error.h"
+#include "base/memory.h"
 
 namespace palpate {
 namespace {

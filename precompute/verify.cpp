@@ -7,11 +7,11 @@
 #include <limits>
 #include <random>
 
+#include "base/printable.h"
 #include "formats/model_file.h"
-#include "meshes/printable.h"
-#include "precompute/assembly.h"
-#include "precompute/dynamics.h"
-#include "precompute/factor.h"
+#include "precompute/numerics/assembly.h"
+#include "precompute/numerics/dynamics.h"
+#include "precompute/numerics/factor.h"
 #include "precompute/verify_description.h"
 #include "precompute/verify_dynamics.h"
 #include "precompute/verify_matrix.h"

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <array>
 
-#include "meshes/error.h"
-#include "precompute/description.h"
-#include "precompute/dynamics.h"
-#include "precompute/held_nodes.h"
-#include "precompute/loads.h"
-#include "precompute/material_parts.h"
-#include "precompute/overlay_regions.h"
+#include "base/error.h"
+#include "precompute/description/description.h"
+#include "precompute/geometry/material_parts.h"
+#include "precompute/numerics/dynamics.h"
+#include "precompute/numerics/held_nodes.h"
+#include "precompute/numerics/loads.h"
+#include "precompute/numerics/overlay_regions.h"
 
 namespace palpate {
 namespace {

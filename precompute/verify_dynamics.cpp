@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/dynamics.h"
-#include "precompute/factor.h"
-#include "precompute/modes.h"
+#include "precompute/numerics/dynamics.h"
+#include "precompute/numerics/factor.h"
+#include "precompute/numerics/modes.h"
 #include "precompute/verify_matrix.h"
 
 namespace palpate {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "precompute/assembly.h"
+#include "precompute/numerics/assembly.h"
 #include "precompute/verify.h"
 
 namespace palpate {

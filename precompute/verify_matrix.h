@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "precompute/precision.h"
+#include "precompute/numerics/precision.h"
 #include "precompute/verify.h"
 
 namespace palpate {

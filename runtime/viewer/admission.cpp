@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "runtime/random_bytes.h"
+#include "base/random_bytes.h"
 
 namespace palpate {
 namespace {

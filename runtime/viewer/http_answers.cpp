@@ -6,10 +6,10 @@
 #include <string_view>
 #include <utility>
 
-#include "meshes/error.h"
+#include "base/error.h"
 #include "runtime/viewer/admission.h"
-#include "runtime/viewer/page.h"
 #include "runtime/viewer/seen_surface.h"
+#include "runtime/web/page.h"
 
 namespace palpate {
 namespace {

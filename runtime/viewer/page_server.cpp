@@ -8,7 +8,7 @@
 #include <chrono>
 #include <variant>
 
-#include "meshes/error.h"
+#include "base/error.h"
 #include "runtime/viewer/page_connection.h"
 #include "runtime/viewer/run_words.h"
 

@@ -4,7 +4,7 @@
 
 #include "meshes/surface.h"
 #include "meshes/topology.h"
-#include "runtime/surface_numbering.h"
+#include "runtime/body/surface_numbering.h"
 
 namespace palpate {
 namespace {

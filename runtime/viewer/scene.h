@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "runtime/body.h"
-#include "runtime/patch.h"
-#include "runtime/surface_frames.h"
+#include "runtime/background/surface_frames.h"
+#include "runtime/body/body.h"
+#include "runtime/body/patch.h"
 
 namespace palpate {
 

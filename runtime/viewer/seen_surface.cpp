@@ -4,8 +4,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "meshes/error.h"
-#include "meshes/vtu_writer.h"
+#include "base/error.h"
+#include "meshes/readers/vtu_writer.h"
 #include "runtime/viewer/seen_values.h"
 
 namespace palpate {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/monitor.h"
+#include "runtime/loop/monitor.h"
 
 namespace palpate {
 

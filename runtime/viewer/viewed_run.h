@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "meshes/error.h"
-#include "runtime/pointer_pose.h"
+#include "base/error.h"
+#include "runtime/safety/pointer_pose.h"
 
 namespace palpate {
 

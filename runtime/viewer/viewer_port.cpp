@@ -7,7 +7,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <utility>
 
-#include "meshes/error.h"
+#include "base/error.h"
 #include "runtime/viewer/admission.h"
 
 namespace palpate {

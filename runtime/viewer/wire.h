@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
-#include "runtime/monitor.h"
-#include "runtime/surface_frames.h"
+#include "runtime/background/surface_frames.h"
+#include "runtime/loop/monitor.h"
 #include "runtime/viewer/scene.h"
 
 namespace palpate {

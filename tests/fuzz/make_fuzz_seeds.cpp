@@ -1,8 +1,8 @@
 // make_fuzz_seeds FOLDER: whole files, a cut one, and a few choices of edits.
 #include <random>
 
-#include "tests/formats_sample.h"
 #include "tests/fuzz/fuzz_input.h"
+#include "tests/support/formats_sample.h"
 
 int main(int count, char** arguments) {
   using namespace palpate;

@@ -7,12 +7,12 @@
 #include <cstdlib>
 #include <set>
 
+#include "base/error.h"
 #include "formats/hdf5.h"
 #include "formats/model_file.h"
-#include "meshes/error.h"
-#include "tests/formats_sample.h"
-#include "tests/formats_tamper.h"
 #include "tests/fuzz/fuzz_input.h"
+#include "tests/support/formats_sample.h"
+#include "tests/support/formats_tamper.h"
 
 namespace palpate::test {
 namespace {

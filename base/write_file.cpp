@@ -1,0 +1,177 @@
+#include "base/write_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "base/error.h"
+
+namespace palpate {
+namespace {
+
+std::string hint_for(int error) {
+  switch (error) {
+    case ENOENT:
+    case ENOTDIR:
+      return "make its folder first, or write elsewhere";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "check the rights of the file and of its folder, or write elsewhere";
+    case EPIPE:
+    case ENXIO:
+      return "start the program that reads from it first";
+    default:
+      return "check the folder, its rights and the free space";
+  }
+}
+
+[[noreturn]] void fail(const std::filesystem::path& file, int error) {
+  throw Error("cannot be written: " + std::generic_category().message(error), file.string(), hint_for(error));
+}
+
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
+  throw Error(what, file.string(), "give the name of a file");
+}
+
+/// While it lives, a pipe without a reader is an error of the write and not the end of the program.
+class IgnoredPipeSignal {
+ public:
+  IgnoredPipeSignal() {
+    struct sigaction ignore {};
+    ignore.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &ignore, &before_);
+  }
+  ~IgnoredPipeSignal() { sigaction(SIGPIPE, &before_, nullptr); }
+  IgnoredPipeSignal(const IgnoredPipeSignal&) = delete;
+  IgnoredPipeSignal& operator=(const IgnoredPipeSignal&) = delete;
+
+ private:
+  struct sigaction before_ {};
+};
+
+/// 0, or the system's reason.
+int write_all(int fd, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t put = ::write(fd, bytes.data(), bytes.size());
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) return errno;
+    bytes.remove_prefix(static_cast<std::size_t>(put));
+  }
+  return 0;
+}
+
+/// A new file that nothing else has opened, under the first free name beside `target`: what a killed run or a
+/// stranger left there is neither followed nor touched.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(std::filesystem::path target) : target_(std::move(target)) {
+    constexpr int most = 1000;
+    for (int k = 1; fd_ < 0; ++k) {
+      path_ = target_.string() + ".partial" + (k > 1 ? std::to_string(k) : "");
+      fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+      if (fd_ < 0 && (errno != EEXIST || k == most)) fail(target_, errno);
+    }
+  }
+  ~TemporaryFile() {
+    if (fd_ < 0) return;
+    ::close(fd_);
+    ::unlink(path_.c_str());
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  void write(std::string_view bytes) {
+    int error = write_all(fd_, bytes);
+    if (error == 0 && ::fsync(fd_) != 0 && errno != EINVAL) error = errno;
+    if (error != 0) fail(target_, error);
+  }
+
+  void take_its_place() {
+    if (std::rename(path_.c_str(), target_.c_str()) != 0) fail(target_, errno);
+    ::close(std::exchange(fd_, -1));
+  }
+
+ private:
+  std::filesystem::path target_, path_;
+  int fd_ = -1;
+};
+
+std::optional<struct stat> status_of(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) == 0) return status;
+  if (errno != ENOENT && errno != ENOTDIR) fail(file, errno);
+  return std::nullopt;
+}
+
+/// The descriptor of the standard stream that goes to the file with this status; -1 where none does.
+int standard_stream(const struct stat& status) {
+  for (const int fd : {STDOUT_FILENO, STDERR_FILENO}) {
+    struct stat open {};
+    if (::fstat(fd, &open) == 0 && open.st_dev == status.st_dev && open.st_ino == status.st_ino) return fd;
+  }
+  return -1;
+}
+
+}  // namespace
+
+std::filesystem::path link_target(const std::filesystem::path& file) {
+  std::error_code failed;
+  if (!std::filesystem::is_symlink(file, failed)) return file;
+  const std::filesystem::path target = std::filesystem::canonical(file, failed);
+  if (failed)
+    throw Error("is a symbolic link to nothing", file.string(), "remove the link, or write elsewhere");
+  return target;
+}
+
+WriteTarget write_target(const std::filesystem::path& file) {
+  const std::optional<struct stat> status = status_of(file);
+  if (!status) {
+    (void)link_target(file);
+    return WriteTarget::regular;
+  }
+  if (S_ISDIR(status->st_mode)) refuse(file, "is a folder");
+  if (S_ISSOCK(status->st_mode) && standard_stream(*status) < 0) refuse(file, "is a socket");
+  if (S_ISBLK(status->st_mode)) refuse(file, "is a block device");
+  if (standard_stream(*status) >= 0) return WriteTarget::standard_stream;
+  return S_ISREG(status->st_mode) ? WriteTarget::regular : WriteTarget::stream;
+}
+
+int open_stream(const std::filesystem::path& file) {
+  const int fd = ::open(file.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  if (fd < 0 && errno == ENXIO)
+    throw Error("is a pipe that no program reads", file.string(), hint_for(ENXIO));
+  if (fd < 0) fail(file, errno);
+  ::fcntl(fd, F_SETFL, ::fcntl(fd, F_GETFL) & ~O_NONBLOCK);
+  return fd;
+}
+
+void write_file(const std::filesystem::path& file, std::string_view bytes) {
+  const WriteTarget target = write_target(file);
+  if (target == WriteTarget::regular) {
+    TemporaryFile temporary(link_target(file));
+    temporary.write(bytes);
+    temporary.take_its_place();
+    return;
+  }
+  const IgnoredPipeSignal ignored;
+  std::fflush(stdout);  // what was printed before
+  const int fd = target == WriteTarget::stream ? open_stream(file) : ::dup(standard_stream(*status_of(file)));
+  const int error = write_all(fd, bytes);
+  ::close(fd);
+  if (error != 0) fail(file, error);
+}
+
+void expect_writable_folder(const std::filesystem::path& file) {
+  const TemporaryFile made_and_removed(link_target(file));
+}
+
+}  // namespace palpate

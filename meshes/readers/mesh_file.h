@@ -1,0 +1,46 @@
+// What a mesh file holds, and which of it is the body.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "meshes/mesh.h"
+#include "meshes/readers/text_reader.h"
+
+namespace palpate {
+
+/// An element as a file format writes it.
+struct FileElement {
+  ElementType type;
+  /// Place in the file's list of our node i; only where a format's order is not ours.
+  std::array<std::uint8_t, max_element_nodes> place = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
+};
+
+/// Elements of one kind.
+struct FileElements {
+  std::vector<Index> nodes;  ///< [elements * nodes an element]
+  std::vector<Index> tags;   ///< [elements] 0 where untagged
+};
+
+/// Nodes and elements of all kinds, the body's and others.
+struct MeshFile {
+  std::vector<Vec3> nodes;
+  std::array<FileElements, element_traits.size()> elements;  ///< by kind
+
+  /// `in_file`: the node numbers in the file's order.
+  void add(const FileElement& element, std::span<const Index> in_file, Index tag);
+};
+
+/// The body: the elements of the highest dimension, with the tagged elements of one dimension less as tagged
+/// facets (the middles of their edges are looked up where the file gives none). A plane mesh is moved to z
+/// = 0. Throws Error at the reader's place when there are no nodes or no elements, elements of several kinds,
+/// triangles or quadrilaterals that do not lie in a plane of equal z, or tagged facets that are not sides of
+/// the elements.
+Mesh to_body(MeshFile file, const TextReader& reader);
+
+/// Throws Error at the reader's place: an element of a kind that no body is made of.
+[[noreturn]] void fail_unknown_element(const TextReader& reader, const std::string& kind);
+
+}  // namespace palpate

@@ -1,0 +1,180 @@
+#include "meshes/readers/text_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <system_error>
+
+#include "base/error.h"
+#include "base/regular_file.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::string_view space = " \t\r\n\f\v";
+constexpr const char* remake = "The file may be damaged or cut short: write it again.";
+
+/// from_chars does not take the leading plus that some programs write.
+std::string_view without_plus(std::string_view word) {
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
+  return word;
+}
+
+template <class Number>
+bool parse(std::string_view word, Number& value) {
+  word = without_plus(word);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc() && end == word.data() + word.size();
+}
+
+/// At most what fits on a line of the terminal; bytes that are no text are shown as '?'.
+std::string shown(std::string_view word) {
+  std::string result(word.substr(0, 40));
+  std::replace_if(
+      result.begin(), result.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return word.size() > 40 ? result + "..." : result;
+}
+
+}  // namespace
+
+TextReader::TextReader(std::filesystem::path file, char comment)
+    : file_(std::move(file)), text_(read_all(file_)), comment_(comment) {
+  if (at_end()) fail("the file is empty");
+}
+
+void TextReader::skip_space() {
+  while (position_ < text_.size()) {
+    const char c = text_[position_];
+    if (comment_ != '\0' && c == comment_) {
+      position_ = std::min(text_.find('\n', position_), text_.size());
+    } else if (space.find(c) != std::string_view::npos) {
+      if (c == '\n') ++line_;
+      ++position_;
+    } else {
+      return;
+    }
+  }
+}
+
+bool TextReader::at_end() {
+  skip_space();
+  return position_ == text_.size();
+}
+
+std::string_view TextReader::peek() {
+  skip_space();
+  std::size_t end = position_;
+  while (end < text_.size() && space.find(text_[end]) == std::string_view::npos &&
+         (comment_ == '\0' || text_[end] != comment_)) {
+    ++end;
+  }
+  return std::string_view(text_).substr(position_, end - position_);
+}
+
+std::string_view TextReader::word(const char* what) {
+  const std::string_view next = peek();
+  word_line_ = line_;
+  if (next.empty()) fail(fmt::format("the file ends where {} should be", what));
+  position_ += next.size();
+  return next;
+}
+
+void TextReader::expect(std::string_view expected) {
+  const std::string_view found = word(std::string(expected).c_str());
+  if (found != expected) fail_on(found, std::string(expected).c_str());
+}
+
+std::int64_t TextReader::integer(const char* what) {
+  const std::string_view found = word(what);
+  std::int64_t value = 0;
+  if (!parse(found, value)) fail_on(found, what);
+  return value;
+}
+
+std::int64_t TextReader::integer(const char* what, std::int64_t low, std::int64_t high) {
+  const std::int64_t value = integer(what);
+  if (value < low || value > high) {
+    fail(high < low ? fmt::format("{} is {}, but there are none", what, value)
+                    : fmt::format("{} is {}, which is not in {} to {}", what, value, low, high));
+  }
+  return value;
+}
+
+std::int64_t TextReader::count(const char* what, std::int64_t words) {
+  const std::int64_t value = integer(what, 0, std::numeric_limits<Index>::max());
+  const auto left = static_cast<std::int64_t>(text_.size() - position_);
+  // A word takes at least two bytes with the space before it.
+  if (value * words > left / 2) {
+    fail(fmt::format("{} is {}, but only {} bytes are left of the file", what, value, left));
+  }
+  return value;
+}
+
+Index TextReader::tag() {
+  constexpr Index limit = std::numeric_limits<Index>::max();
+  return static_cast<Index>(integer("a tag", -limit, limit));
+}
+
+double TextReader::number(const char* what) {
+  const std::string_view found = word(what);
+  double value = 0.0;
+  if (!parse(found, value)) fail_on(found, what);
+  if (!std::isfinite(value)) fail(fmt::format("{} is not a finite number: '{}'", what, shown(found)));
+  return value;
+}
+
+Vec3 TextReader::point() {
+  const double x = number("a coordinate"), y = number("a coordinate"), z = number("a coordinate");
+  return {x, y, z};
+}
+
+Vec3 TextReader::plane_point() {
+  const double x = number("a coordinate"), y = number("a coordinate");
+  return {x, y, 0.0};
+}
+
+void TextReader::skip_words(std::int64_t count, const char* what) {
+  for (std::int64_t i = 0; i < count; ++i) word(what);
+}
+
+std::int64_t TextReader::words_on_line() const {
+  std::int64_t words = 0;
+  bool in_word = false;
+  for (std::size_t i = position_; i < text_.size() && text_[i] != '\n' && text_[i] != comment_; ++i) {
+    const bool is_space = space.find(text_[i]) != std::string_view::npos;
+    if (!is_space && !in_word) ++words;
+    in_word = !is_space;
+  }
+  return words;
+}
+
+std::string_view TextReader::rest_of_line() {
+  word_line_ = line_;
+  const std::size_t end = std::min(text_.find('\n', position_), text_.size());
+  std::string_view rest = std::string_view(text_).substr(position_, end - position_);
+  position_ = end;
+  if (position_ < text_.size()) {
+    ++position_;
+    ++line_;
+  }
+  if (comment_ != '\0') rest = rest.substr(0, rest.find(comment_));
+  while (!rest.empty() && space.find(rest.back()) != std::string_view::npos) rest.remove_suffix(1);
+  return rest;
+}
+
+void TextReader::fail(const std::string& what, const std::string& hint) const {
+  throw Error(what, fmt::format("{}:{}", file_.string(), word_line_), hint);
+}
+
+void TextReader::fail(const std::string& what) const {
+  fail(what, remake);
+}
+
+void TextReader::fail_on(std::string_view found, const char* what) const {
+  fail(fmt::format("'{}' stands where {} should be", shown(found), what));
+}
+
+}  // namespace palpate

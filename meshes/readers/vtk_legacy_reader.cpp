@@ -1,0 +1,174 @@
+// Legacy VTK unstructured grids (ASCII), both layouts of CELLS: counted lists (up to 4.x) and OFFSETS with
+// CONNECTIVITY (5.x). Format: VTK User's Guide, "VTK File Formats".
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include "meshes/readers/volume_mesh_readers.h"
+
+namespace palpate {
+namespace {
+
+enum SkippedType : std::int64_t { vertex = 1, poly_vertex = 2, poly_line = 4, quadratic_edge = 21 };
+
+/// Node lists of all cells, whatever their type.
+struct Cells {
+  std::vector<Index> nodes;
+  std::vector<std::size_t> offsets = {0};  // [cells + 1] into nodes
+};
+
+void read_header(TextReader& reader) {
+  if (!reader.rest_of_line().starts_with("# vtk DataFile Version")) {
+    reader.fail("the first line is not '# vtk DataFile Version ...'", "Give a legacy VTK file (.vtk).");
+  }
+  reader.rest_of_line();  // title
+  const std::string encoding(reader.word("ASCII"));
+  if (encoding == "BINARY") reader.fail("the file is binary; only text is read", "Save it as ASCII.");
+  if (encoding != "ASCII") reader.fail("the third line is neither ASCII nor BINARY");
+}
+
+std::vector<Vec3> read_points(TextReader& reader) {
+  std::vector<Vec3> points(static_cast<std::size_t>(reader.count("the number of points", 3)));
+  reader.word("the type of the coordinates");
+  for (Vec3& x : points) x = reader.point();
+  return points;
+}
+
+Index read_node(TextReader& reader, std::size_t points) {
+  return static_cast<Index>(reader.integer("a node number", 0, static_cast<std::int64_t>(points) - 1));
+}
+
+Cells read_counted_lists(TextReader& reader, std::int64_t cell_count, std::size_t points) {
+  Cells cells;
+  for (std::int64_t cell = 0; cell < cell_count; ++cell) {
+    const std::int64_t corners = reader.count("the number of nodes of a cell", 1);
+    for (std::int64_t i = 0; i < corners; ++i) cells.nodes.push_back(read_node(reader, points));
+    cells.offsets.push_back(cells.nodes.size());
+  }
+  return cells;
+}
+
+Cells read_offsets_and_connectivity(TextReader& reader, std::int64_t offset_count, std::int64_t size,
+                                    std::size_t points) {
+  Cells cells;
+  reader.expect("OFFSETS");
+  reader.word("the type of the offsets");
+  reader.integer("the first offset", 0, 0);
+  for (std::int64_t i = 1; i < offset_count; ++i) {
+    const auto before = static_cast<std::int64_t>(cells.offsets.back());
+    cells.offsets.push_back(static_cast<std::size_t>(reader.integer("an offset", before, size)));
+  }
+  reader.expect("CONNECTIVITY");
+  reader.word("the type of the connectivity");
+  for (std::int64_t i = 0; i < size; ++i) cells.nodes.push_back(read_node(reader, points));
+  return cells;
+}
+
+Cells read_cells(TextReader& reader, std::size_t points) {
+  const std::int64_t count = reader.count("the number of cells", 1),
+                     size = reader.count("the size of the cell list", 1);
+  if (reader.peek() == "OFFSETS") return read_offsets_and_connectivity(reader, count, size, points);
+  return read_counted_lists(reader, count, points);
+}
+
+/// The kind of element that a cell is, if any.
+const ElementTraits* find_element(std::int64_t type) {
+  const auto* const found = std::find_if(element_traits.begin(), element_traits.end(),
+                                         [&](const ElementTraits& t) { return t.vtk == type; });
+  return found == element_traits.end() ? nullptr : found;
+}
+
+/// How many nodes a cell of this type has; 0 where that differs. Throws for what is not read.
+std::size_t node_count(const TextReader& reader, std::int64_t type) {
+  if (const ElementTraits* element = find_element(type)) return static_cast<std::size_t>(element->nodes);
+  switch (type) {
+    case vertex:
+      return 1;
+    case quadratic_edge:
+      return 3;
+    case poly_vertex:
+    case poly_line:
+      return 0;
+    default:
+      fail_unknown_element(reader, fmt::format("cells of VTK type {}", type));
+  }
+}
+
+/// Takes the elements among the cells while reading their types. The sizes are compared for all of them, so
+/// that a type cut short (1 of 10) at the end of the file is noticed.
+void read_types(TextReader& reader, const Cells& cells, MeshFile& mesh) {
+  const std::int64_t count = reader.count("the number of cell types", 1);
+  if (count != static_cast<std::int64_t>(cells.offsets.size()) - 1) {
+    reader.fail(fmt::format("there are {} cell types for {} cells", count, cells.offsets.size() - 1));
+  }
+  for (std::size_t cell = 0; cell + 1 < cells.offsets.size(); ++cell) {
+    const std::int64_t type = reader.integer("a cell type");
+    const std::size_t first = cells.offsets[cell], nodes = cells.offsets[cell + 1] - first;
+    const std::size_t expected = node_count(reader, type);
+    if (expected != 0 && nodes != expected) {
+      reader.fail(
+          fmt::format("cell {} has {} nodes, but its type is {}, which has {}", cell, nodes, type, expected));
+    }
+    if (const ElementTraits* element = find_element(type)) {
+      mesh.add({element->type}, {cells.nodes.data() + first, nodes}, 0);
+    }
+  }
+}
+
+/// Arrays that belong to the whole file (time, cycle).
+void skip_field(TextReader& reader) {
+  reader.word("the field's name");
+  const std::int64_t arrays = reader.count("the number of arrays", 1);
+  for (std::int64_t i = 0; i < arrays; ++i) {
+    reader.word("an array's name");
+    const std::int64_t components = reader.count("the number of components", 1);
+    const std::int64_t tuples = reader.count("the number of tuples", components);
+    reader.word("an array's type");
+    reader.skip_words(components * tuples, "a field value");
+  }
+}
+
+/// METADATA ends with an empty line.
+void skip_metadata(TextReader& reader) {
+  reader.rest_of_line();
+  while (!reader.rest_of_line().empty()) {
+  }
+}
+
+}  // namespace
+
+Mesh read_vtk_legacy(const std::filesystem::path& file) {
+  TextReader reader(file);
+  read_header(reader);
+  reader.expect("DATASET");
+  if (const std::string kind(reader.word("UNSTRUCTURED_GRID")); kind != "UNSTRUCTURED_GRID") {
+    reader.fail(fmt::format("the file holds a {:.40}, not an UNSTRUCTURED_GRID", kind),
+                "Save the volume mesh as unstructured grid.");
+  }
+  MeshFile mesh;
+  std::optional<Cells> cells;
+  while (!reader.at_end() && reader.peek() != "POINT_DATA" && reader.peek() != "CELL_DATA") {
+    const std::string keyword(reader.word("a keyword"));
+    if (keyword == "POINTS") {
+      // The cells were checked against the first list.
+      if (!mesh.nodes.empty()) reader.fail("POINTS stands twice in the file");
+      mesh.nodes = read_points(reader);
+    } else if (keyword == "CELLS") {
+      cells = read_cells(reader, mesh.nodes.size());
+    } else if (keyword == "CELL_TYPES") {
+      if (!cells) reader.fail("CELL_TYPES stands before CELLS");
+      read_types(reader, *cells, mesh);
+    } else if (keyword == "FIELD") {
+      skip_field(reader);
+    } else if (keyword == "METADATA") {
+      skip_metadata(reader);
+    } else {
+      reader.fail_on(keyword, "POINTS, CELLS or CELL_TYPES");
+    }
+  }
+  return to_body(std::move(mesh), reader);
+}
+
+}  // namespace palpate

@@ -1,0 +1,69 @@
+// The fine mesh of an overlay: some elements of the body, each cut into smaller ones.
+#pragma once
+
+#include <Eigen/SparseCore>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "formats/model.h"
+#include "overlay/nested_nodes.h"
+
+namespace palpate {
+
+/// Elements at each node of a mesh.
+class ElementsAtNodes {
+ public:
+  explicit ElementsAtNodes(const Mesh& mesh);
+  [[nodiscard]] std::span<const Index> operator[](Index node) const noexcept {
+    const auto at = static_cast<std::size_t>(node);
+    return {elements_.data() + start_[at], static_cast<std::size_t>(start_[at + 1] - start_[at])};
+  }
+
+ private:
+  std::vector<Index> start_;     // [N + 1]
+  std::vector<Index> elements_;  // ascending at each node
+};
+
+/// The elements round some mesh nodes, ascending: those at the nodes, and in each further ring those at the
+/// nodes of the ring before.
+std::vector<Index> rings_round(const Mesh& mesh, const ElementsAtNodes& at, std::span<const Index> nodes,
+                               int rings);
+
+/// Nodes of some elements, each once, ascending.
+std::vector<Index> nodes_of(const Mesh& mesh, std::span<const Index> elements);
+
+/// A patch of elements and the mesh nested in it.
+struct PatchMesh {
+  std::vector<Index> elements;  ///< of the body, ascending
+  std::vector<Index>
+      nodes;   ///< [g] mesh nodes of those elements that are not held along every axis, ascending
+  Mesh local;  ///< the fine mesh
+  std::vector<Index> body_node;         ///< [local nodes] node of the body where each is, -1 where none is
+  std::vector<Vec3> rest_displacement;  ///< [local nodes] u0 there, by the body's shape functions [m]
+  std::vector<Index> parent;            ///< [local elements] element of the body that each is a part of
+  std::vector<Index> surface;  ///< [simplices * d] local nodes on the body's surface, as Model::surface
+  /// [local nodes x g] the body's shape functions of `nodes` at the local nodes: u_G there is `shape` u_G.
+  Eigen::SparseMatrix<double, Eigen::RowMajor> shape;
+  /// [d * local nodes] number of each local dof among the free ones, -1 where u_L = 0: on the border Γ^GL to
+  /// the rest of the body, where a node coincides with one of the body's, and where the body is held
+  /// (theory.md section 4).
+  std::vector<Index> free_dof;
+  Index free_dofs = 0;
+  std::map<NodeKey, Index> node_of_key;  ///< every local node
+};
+
+/// [m] local nodes on the body's surface, ascending.
+std::vector<Index> surface_nodes(const PatchMesh& patch);
+
+/// The body's shape functions by dofs, without those along which the body's nodes are held: u_G of all local
+/// dofs [d local nodes x d g] by u_G of the patch's nodes.
+Eigen::SparseMatrix<double, Eigen::RowMajor> shape_by_dofs(const Model& model, const PatchMesh& patch);
+
+/// Cuts each of the elements into r^d. Throws Error unless r >= 2, when an element is not one of the model's,
+/// or when there is none. Subdivisions that are kept from patch to patch need not be made again.
+PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts,
+                          std::vector<Index> elements);
+PatchMesh make_patch_mesh(const Model& model, const ElementsAtNodes& at, std::vector<Index> elements, int r);
+
+}  // namespace palpate

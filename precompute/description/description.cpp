@@ -1,0 +1,143 @@
+#include "precompute/description/description.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/regular_file.h"
+#include "base/toml_text.h"
+#include "precompute/description/description_parts.h"
+
+namespace palpate {
+namespace {
+
+const std::string add_plane =
+    R"(add plane = "stress" (a thin sheet) or plane = "strain" (a slice of a long body) at the top level)";
+
+Analysis read_analysis(const Section& root, std::string_view kind) {
+  if (!root.has("plane")) {
+    if (is_plane(kind)) {
+      root.fail("plane", "plane is missing: a " + std::string(kind) + " lies in the plane", add_plane);
+    }
+    return Analysis::solid;
+  }
+  if (!is_plane(kind) && kind != "volume") {
+    root.fail("plane", "plane is given, but geometry of kind " + std::string(kind) + " is in space",
+              "remove plane");
+  }
+  return root.choice("plane", {"stress", "strain"}) == "stress" ? Analysis::plane_stress
+                                                                : Analysis::plane_strain;
+}
+
+double read_thickness(const Section& root, Analysis analysis) {
+  if (analysis == Analysis::solid && root.has("thickness")) {
+    root.fail("thickness", "thickness is given, but the body is in space",
+              "remove it; a body in the plane also has plane = \"stress\" or \"strain\"");
+  }
+  return root.positive("thickness", 1.0);
+}
+
+/// In the plane the inside is cheap and is looked at: without scope and layers, all of it is kept.
+Scope read_scope(const Section& storage, int dimension) {
+  const std::string usual = dimension == 2 && !storage.has("layers") ? "full" : "layers";
+  const std::string scope =
+      storage.has("scope") ? storage.choice("scope", {"surface", "layers", "full"}) : usual;
+  if (scope == "surface") {
+    return Scope::surface;
+  }
+  return scope == "layers" ? Scope::layers : Scope::full;
+}
+
+Index read_layers(const Section& storage, Scope scope) {
+  if (scope == Scope::layers) {
+    return storage.has("layers") ? storage.count("layers") : 1;
+  }
+  if (storage.has("layers")) {
+    storage.fail("layers", "[storage] layers applies to scope \"layers\" only",
+                 "remove layers, or set scope = \"layers\"");
+  }
+  return 0;
+}
+
+/// Empty for "auto".
+std::optional<Precision> read_precision(const Section& storage) {
+  if (!storage.has("precision")) return std::nullopt;
+  const std::string name = storage.choice("precision", {"auto", "single", "split", "double"});
+  for (const Precision precision :
+       {Precision::single_precision, Precision::split_precision, Precision::double_precision})
+    if (name == name_of(precision)) return precision;
+  return std::nullopt;
+}
+
+/// The name becomes a file name.
+std::string read_name(const Section& root) {
+  std::string name = root.text("name");
+  const bool printable =
+      std::all_of(name.begin(), name.end(), [](unsigned char c) { return c > 31 && c != '/'; });
+  if (name.empty() || name[0] == '.' || !printable) {
+    root.fail("name", "name \"" + shortened(name) + "\" cannot be the name of a file",
+              "use letters, digits, - and _; the baked file is called NAME.palpate.hdf");
+  }
+  return name;
+}
+
+/// The image's labels stay apart in the mesh where materials need them.
+void keep_regions(Geometry& geometry, const std::vector<MaterialPart>& materials) {
+  if (auto* image = std::get_if<ImageGeometry>(&geometry)) {
+    image->regions = std::any_of(materials.begin(), materials.end(),
+                                 [](const MaterialPart& part) { return !part.regions.empty(); });
+  }
+}
+
+}  // namespace
+
+Description read_description(const std::filesystem::path& path) {
+  return parse_description(read_all(path, "Give the path of a model.toml."), path);
+}
+
+Description parse_description(const std::string& text, const std::filesystem::path& path) {
+  const std::string file = path.string();
+  Description result;
+  result.file = path;
+  result.text = text;
+  const toml::table table = parse_toml(result.text, file);
+  const toml::table empty;
+  const Section root(table, "", file,
+                     {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load",
+                      "storage", "overlay", "dynamics"});
+  const auto optional_section = [&](std::string_view key, const Keys& keys) {
+    return root.has(key) ? root.section(key, keys)
+                         : Section(empty, std::string("[").append(key).append("]"), file, keys);
+  };
+
+  Keys geometry_keys = geometry_kinds;
+  geometry_keys.insert(geometry_keys.end(), {"labels", "scale"});
+  const Section geometry = root.section("geometry", geometry_keys);
+  const Section mesh = optional_section("mesh", mesh_keys);
+  const Section storage = optional_section("storage", {"scope", "layers", "precision"});
+  const std::string_view kind = geometry.only_one_of(geometry_kinds);
+
+  result.name = read_name(root);
+  result.geometry = read_geometry(geometry, kind, path.parent_path());
+  result.scale = geometry.positive("scale", 1.0);
+  result.analysis = read_analysis(root, kind);
+  result.thickness = read_thickness(root, result.analysis);
+  result.mesh = read_mesh_options(mesh, kind);
+  const int dimension = result.analysis == Analysis::solid ? 3 : 2;
+  result.materials = read_materials(root, dimension);
+  keep_regions(result.geometry, result.materials);
+  result.fixed = read_fixed(root, dimension);
+  result.loads = read_loads(root, dimension);
+  result.scope = read_scope(storage, dimension);
+  result.layers = read_layers(storage, result.scope);
+  result.precision = read_precision(storage);
+  if (root.has("overlay")) {
+    result.overlay =
+        read_overlay(root.section("overlay", overlay_keys), dimension, result.scope, result.layers);
+  }
+  if (root.has("dynamics")) {
+    result.dynamics = read_dynamics(root.section("dynamics", dynamics_keys), result.scope);
+  }
+  return result;
+}
+
+}  // namespace palpate

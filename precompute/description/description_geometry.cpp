@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "precompute/description/description_parts.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t longest_path = 4095;  // Linux
+
+bool is_control(char c) {
+  return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+}
+
+/// Six elements a cell must stay within the 32-bit element numbers.
+void check_cells(const Section& shape, std::string_view key, double cells) {
+  if (6.0 * cells > std::numeric_limits<Index>::max()) {
+    shape.fail(key, shape.name_of(key) + " asks for too many cells: " + shown(cells),
+               "at most 357913941 cells can be numbered");
+  }
+}
+
+BoxShape read_box(const Section& box) {
+  const std::vector<int> cells = box.counts("cells", 3);
+  check_cells(box, "cells", double{1} * cells[0] * cells[1] * cells[2]);
+  return {
+      box.vector("origin", 3, Vec3::Zero()), box.positive_vector("size", 3), {cells[0], cells[1], cells[2]}};
+}
+
+RectangleShape read_rectangle(const Section& rectangle) {
+  const std::vector<int> cells = rectangle.counts("cells", 2);
+  check_cells(rectangle, "cells", double{1} * cells[0] * cells[1]);
+  return {rectangle.vector("origin", 2, Vec3::Zero()),
+          rectangle.positive_vector("size", 2),
+          {cells[0], cells[1]}};
+}
+
+PolygonGeometry read_polygon(const Section& polygon) {
+  PolygonGeometry result{polygon.points("points"), {}};
+  if (polygon.has("holes")) {
+    result.holes = polygon.point_lists("holes");
+  }
+  return result;
+}
+
+int read_cells_across(const Section& shape) {
+  const int cells = shape.count("cells_across");
+  if (cells % 2 != 0) {
+    shape.fail("cells_across", shape.name_of("cells_across") + " must be even, not " + std::to_string(cells),
+               "use " + std::to_string(cells + 1));
+  }
+  return cells;
+}
+
+CylinderShape read_cylinder(const Section& cylinder) {
+  const CylinderShape shape{cylinder.positive("radius"), cylinder.positive("height"),
+                            read_cells_across(cylinder), cylinder.count("cells_along")};
+  check_cells(cylinder, "cells_across",
+              double{1} * shape.cells_across * shape.cells_across * shape.cells_along);
+  return shape;
+}
+
+SphereShape read_sphere(const Section& sphere) {
+  const SphereShape shape{sphere.positive("radius"), read_cells_across(sphere)};
+  check_cells(sphere, "cells_across",
+              double{1} * shape.cells_across * shape.cells_across * shape.cells_across);
+  return shape;
+}
+
+}  // namespace
+
+const Keys geometry_kinds = {"surface", "image",     "volume",  "box",    "cylinder",
+                             "sphere",  "rectangle", "polygon", "picture"};
+
+bool is_plane(std::string_view geometry_kind) {
+  return geometry_kind == "rectangle" || geometry_kind == "polygon" || geometry_kind == "picture";
+}
+
+Geometry read_geometry(const Section& geometry, std::string_view kind, const std::filesystem::path& folder) {
+  const auto file = [&] {
+    const std::string name = geometry.text(kind);
+    if (name.size() > longest_path || std::any_of(name.begin(), name.end(), is_control)) {
+      geometry.fail(kind, geometry.name_of(kind) + " is no name of a file: \"" + shortened(name) + "\"",
+                    "give the path of a file, without control characters");
+    }
+    return (folder / name).lexically_normal();
+  };
+  if (kind != "image" && geometry.has("labels")) {
+    geometry.fail("labels", "[geometry] labels apply to images only, this geometry is a " + std::string(kind),
+                  "remove labels");
+  }
+  if (kind == "surface") {
+    return SurfaceGeometry{file()};
+  }
+  if (kind == "image") {
+    ImageGeometry image{file(), {}};
+    if (geometry.has("labels")) {
+      image.labels = geometry.integers("labels");
+    }
+    return image;
+  }
+  if (kind == "volume") {
+    return VolumeGeometry{file()};
+  }
+  if (kind == "picture") {
+    return PictureGeometry{file()};
+  }
+  if (kind == "polygon") {
+    return read_polygon(geometry.section(kind, {"points", "holes"}));
+  }
+  if (kind == "rectangle") {
+    return read_rectangle(geometry.section(kind, {"origin", "size", "cells"}));
+  }
+  if (kind == "box") {
+    return read_box(geometry.section(kind, {"origin", "size", "cells"}));
+  }
+  if (kind == "cylinder") {
+    return read_cylinder(geometry.section(kind, {"radius", "height", "cells_across", "cells_along"}));
+  }
+  return read_sphere(geometry.section(kind, {"radius", "cells_across"}));
+}
+
+}  // namespace palpate

@@ -1,0 +1,42 @@
+// The parts of model.toml, each read from its table. All throw Error with line and column.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "precompute/description/description.h"
+#include "precompute/description/toml_section.h"
+
+namespace palpate {
+
+/// The keys of [geometry] that say what it is: one of them is given.
+extern const Keys geometry_kinds;
+/// Those that lie in the plane. A volume file can be either.
+bool is_plane(std::string_view geometry_kind);
+
+/// [geometry]; `kind` is the one of geometry_kinds that it has.
+Geometry read_geometry(const Section& geometry, std::string_view kind, const std::filesystem::path& folder);
+
+extern const Keys mesh_keys;
+/// [mesh], for a kind of geometry.
+MeshOptions read_mesh_options(const Section& mesh, std::string_view geometry_kind);
+
+extern const Keys selection_kinds;
+/// The selection that an entry gives under `kind`.
+Selection read_selection(const Section& entry, std::string_view kind, int dimension);
+
+/// [material] or every [[material]].
+std::vector<MaterialPart> read_materials(const Section& root, int dimension);
+/// Every [[fixed]]: at least one.
+std::vector<Fixing> read_fixed(const Section& root, int dimension);
+extern const Keys overlay_keys;
+/// [overlay], for what [storage] keeps.
+OverlayRegions read_overlay(const Section& overlay, int dimension, Scope scope, Index layers);
+extern const Keys dynamics_keys;
+/// [dynamics], for what [storage] keeps.
+DynamicsOptions read_dynamics(const Section& dynamics, Scope scope);
+/// Every [[load]], possibly none.
+std::vector<Load> read_loads(const Section& root, int dimension);
+
+}  // namespace palpate

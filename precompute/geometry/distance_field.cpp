@@ -1,0 +1,172 @@
+#include "precompute/geometry/distance_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <set>
+
+namespace palpate {
+namespace {
+
+/// Replaces f by min_q f(q) + (spacing (p - q))^2 along one line: the lower envelope of parabolas.
+class LineTransform {
+ public:
+  LineTransform(Index length, double spacing)
+      : spacing2_(spacing * spacing),
+        f_(static_cast<std::size_t>(length)),
+        apex_(f_.size()),
+        from_(f_.size() + 1) {}
+
+  /// Line of the given length with `stride` between its entries.
+  void operator()(float* line, std::size_t stride) {
+    const std::size_t n = f_.size();
+    for (std::size_t p = 0; p < n; ++p) {
+      f_[p] = static_cast<double>(line[p * stride]);
+    }
+    std::size_t last = 0;
+    apex_[0] = 0;
+    from_[0] = -std::numeric_limits<double>::infinity();
+    for (std::size_t q = 1; q < n; ++q) {
+      double s = crossing(apex_[last], q);
+      while (s <= from_[last]) {
+        s = crossing(apex_[--last], q);
+      }
+      apex_[++last] = q;
+      from_[last] = s;
+    }
+    from_[last + 1] = std::numeric_limits<double>::infinity();
+    std::size_t active = 0;
+    for (std::size_t p = 0; p < n; ++p) {
+      while (from_[active + 1] < static_cast<double>(p)) {
+        ++active;
+      }
+      const double away = static_cast<double>(p) - static_cast<double>(apex_[active]);
+      line[p * stride] = static_cast<float>(f_[apex_[active]] + spacing2_ * away * away);
+    }
+  }
+
+ private:
+  /// Where the parabola with apex b takes over from that with apex a < b.
+  [[nodiscard]] double crossing(std::size_t a, std::size_t b) const {
+    const auto x = static_cast<double>(a), y = static_cast<double>(b);
+    return (f_[b] - f_[a] + spacing2_ * (y * y - x * x)) / (2.0 * spacing2_ * (y - x));
+  }
+
+  double spacing2_;
+  std::vector<double> f_;
+  std::vector<std::size_t> apex_;
+  std::vector<double> from_;
+};
+
+/// Distance of each voxel centre to the nearest one with inside == `to`. [voxels]
+std::vector<float> distance_to(const VoxelGrid& grid, const std::vector<std::uint8_t>& inside,
+                               std::uint8_t to) {
+  constexpr float far = 1e12F;  // finite: the parabolas of untouched lines must stay comparable
+  std::vector<float> d2(inside.size());
+  std::transform(inside.begin(), inside.end(), d2.begin(),
+                 [&](std::uint8_t v) { return v == to ? 0.0F : far; });
+  std::size_t stride = 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<std::size_t>(grid.size[axis]);
+    LineTransform transform(grid.size[axis], grid.spacing[static_cast<Eigen::Index>(axis)]);
+    for (std::size_t line = 0; line < d2.size() / n; ++line) {
+      transform(d2.data() + line / stride * stride * n + line % stride, stride);
+    }
+    stride *= n;
+  }
+  std::transform(d2.begin(), d2.end(), d2.begin(), [](float v) { return std::sqrt(v); });
+  return d2;
+}
+
+/// Binomial filter (1/4, 1/2, 1/4) along each axis; the rim stays.
+void smooth(const VoxelGrid& grid, std::vector<float>& values) {
+  std::size_t stride = 1;
+  for (const Index length : grid.size) {
+    const auto n = static_cast<std::size_t>(length);
+    for (std::size_t line = 0; line < values.size() / n; ++line) {
+      float* v = values.data() + line / stride * stride * n + line % stride;
+      float before = v[0];
+      for (std::size_t p = 1; p + 1 < n; ++p) {
+        const float here = v[p * stride];
+        v[p * stride] = 0.25F * (before + 2.0F * here + v[(p + 1) * stride]);
+        before = here;
+      }
+    }
+    stride *= n;
+  }
+}
+
+}  // namespace
+
+std::vector<float> signed_distances(const VoxelGrid& grid, const std::vector<std::uint8_t>& inside) {
+  std::vector<float> distance = distance_to(grid, inside, 0);
+  const std::vector<float> outside = distance_to(grid, inside, 1);
+  std::transform(distance.begin(), distance.end(), outside.begin(), distance.begin(), std::minus<>());
+  return distance;
+}
+
+DistanceField::DistanceField(const VoxelGrid& grid, const std::vector<std::uint8_t>& inside)
+    : grid_(grid), distance_(signed_distances(grid, inside)) {
+  smooth(grid_, distance_);  // the staircases of voxels are not the body's shape
+}
+
+double DistanceField::operator()(const Vec3& x) const noexcept {
+  std::array<Index, 3> cell{};
+  Vec3 t;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    const double last = static_cast<double>(grid_.size[axis] - 1);
+    const double position = std::clamp((x[a] - grid_.origin[a]) / grid_.spacing[a], 0.0, last);
+    cell[axis] = std::min(static_cast<Index>(position), grid_.size[axis] - 2);
+    t[a] = position - static_cast<double>(cell[axis]);
+  }
+  const auto row = [&](Index j, Index k) {
+    const std::size_t at = grid_.at(cell[0], cell[1] + j, cell[2] + k);
+    return (1.0 - t[0]) * static_cast<double>(distance_[at]) + t[0] * static_cast<double>(distance_[at + 1]);
+  };
+  const double front = (1.0 - t[1]) * row(0, 0) + t[1] * row(1, 0);
+  const double back = (1.0 - t[1]) * row(0, 1) + t[1] * row(1, 1);
+  return (1.0 - t[2]) * front + t[2] * back;
+}
+
+LabelField::LabelField(const VoxelBody& body) : body_(body, body.inside) {
+  std::set<Index> labels;
+  Index last = VoxelBody::no_label;
+  for (const Index label : body.labels) {
+    if (label != last) {
+      labels.insert(label);
+      last = label;
+    }
+  }
+  labels.erase(VoxelBody::no_label);
+  labels_ = labels.empty() ? std::vector<Index>{0} : std::vector<Index>(labels.begin(), labels.end());
+  if (labels_.size() == 1) {
+    return;
+  }
+  std::vector<std::uint8_t> carries(body.labels.size());
+  for (const Index label : labels_) {
+    std::transform(body.labels.begin(), body.labels.end(), carries.begin(),
+                   [&](Index l) { return l == label ? 1 : 0; });
+    parts_.emplace_back(body, carries);
+  }
+}
+
+LabelField::Place LabelField::operator()(const Vec3& x) const noexcept {
+  const double below = body_(x);
+  if (below <= 0.0) {
+    return {0, 0.0};
+  }
+  if (parts_.empty()) {
+    return {1, below};
+  }
+  Place place{1, parts_[0](x)};
+  for (std::size_t p = 1; p < parts_.size(); ++p) {
+    if (const double depth = parts_[p](x); depth > place.depth) {
+      place = {static_cast<int>(p) + 1, depth};
+    }
+  }
+  return {place.number, std::max(0.0, place.depth)};
+}
+
+}  // namespace palpate

@@ -1,0 +1,208 @@
+#include "precompute/geometry/image_mesh.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Labeled_mesh_domain_3.h>
+#include <CGAL/Mesh_complex_3_in_triangulation_3.h>
+#include <CGAL/Mesh_criteria_3.h>
+#include <CGAL/Mesh_triangulation_3.h>
+#include <CGAL/Random.h>
+#include <CGAL/make_mesh_3.h>
+#include <fmt/format.h>
+
+#include <array>
+#include <map>
+
+#include "base/child_process.h"
+#include "base/error.h"
+#include "meshes/element.h"
+#include "precompute/geometry/distance_field.h"
+#include "precompute/geometry/interface_crossings.h"
+#include "precompute/geometry/labelled_image.h"
+#include "precompute/geometry/mesh3.h"
+#include "precompute/geometry/mesh_bytes.h"
+#include "precompute/geometry/mesh_parts.h"
+#include "precompute/geometry/mesh_size.h"
+#include "precompute/geometry/tetgen_mesh.h"
+
+namespace palpate {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using Domain = CGAL::Labeled_mesh_domain_3<Kernel>;
+using Triangulation = CGAL::Mesh_triangulation_3<Domain>::type;
+using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
+using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
+namespace parameters = CGAL::parameters;
+
+constexpr double relative_error = 1e-4;  // of the body's size: where boundary and interfaces are found
+constexpr double seed_spacing = 1.5;     // [edge_length] largest between the first points on interfaces
+
+Vec3 as_vector(const Point& p) {
+  return {p.x(), p.y(), p.z()};
+}
+
+Point as_point(const Vec3& x) {
+  return {x[0], x[1], x[2]};
+}
+
+/// Bound on the circumradius of tetrahedra.
+struct CellSize {
+  using FT = Kernel::FT;
+  const LabelField* field;
+  double surface_edge;
+  double grading;
+
+  template <typename AnyIndex>
+  FT operator()(const Point& p, int /*dimension*/, const AnyIndex& /*index*/) const {
+    return mesh3::radius_per_edge * (surface_edge + grading * (*field)(as_vector(p)).depth);
+  }
+};
+
+CGAL::Bbox_3 bounding_box(const VoxelGrid& grid) {
+  const Vec3 low = grid.origin, high = grid.center(grid.voxels() - 1);
+  return {low[0], low[1], low[2], high[0], high[1], high[2]};
+}
+
+Domain make_domain(const VoxelGrid& grid, const LabelField& field) {
+  CGAL::get_default_random() = CGAL::Random(0);
+  return Domain(
+      parameters::function = [&field](const Point& p) { return field(as_vector(p)).number; },
+      parameters::bounding_object = bounding_box(grid), parameters::relative_error_bound = relative_error);
+}
+
+void insert(Complex& complex, const Point& point, const Domain::Index& index) {
+  const Complex::Vertex_handle vertex = complex.triangulation().insert(Triangulation::Point(point));
+  complex.set_dimension(vertex, 2);  // it is on a surface
+  complex.set_index(vertex, index);
+}
+
+/// Puts the first points on the boundary.
+void seed_boundary(Complex& complex, const Domain& domain) {
+  std::vector<std::pair<Point, Domain::Index>> seeds;
+  domain.construct_initial_points_object()(std::back_inserter(seeds));
+  for (const auto& [point, index] : seeds) {
+    insert(complex, point, index);
+  }
+}
+
+/// Puts points on the interfaces between labels: refinement by itself finds what is large compared with the
+/// elements, but not every vessel.
+void seed_interfaces(Complex& complex, const Domain& domain, const VoxelBody& body, const LabelField& field,
+                     double edge_length) {
+  for (const auto& [from, to] : interface_crossings(body, field, seed_spacing * edge_length)) {
+    const auto [point, index, dimension] =
+        domain.construct_intersection_object()(Kernel::Segment_3(as_point(from), as_point(to)));
+    insert(complex, point, index);
+  }
+}
+
+/// Delaunay refinement of the surfaces, and unless it is `hollow` of the inside.
+Complex refine(const Domain& domain, const VoxelBody& body, const LabelField& field,
+               const MeshOptions& options, bool hollow) {
+  const double facet_distance =
+      options.facet_distance > 0.0 ? options.facet_distance : body.spacing.maxCoeff();
+  const double size_per_edge = hollow ? mesh3::hollow_facet_size_per_edge : mesh3::facet_size_per_edge;
+  const Criteria::Facet_criteria facets(mesh3::facet_angle, size_per_edge * *options.edge_length,
+                                        facet_distance);
+  const CellSize cell_size{&field, *options.edge_length, options.grading};
+  const Criteria::Cell_criteria cells =
+      hollow ? Criteria::Cell_criteria(0.0, 0.0) : Criteria::Cell_criteria(options.radius_edge, cell_size);
+
+  Complex complex;
+  seed_boundary(complex, domain);
+  const bool one_label = field.labels().size() == 1;
+  if (!one_label) {
+    seed_interfaces(complex, domain, body, field, *options.edge_length);
+  }
+  // three labels may meet in an edge, so that only a single one has manifold surfaces
+  CGAL::refine_mesh_3(complex, domain, Criteria(facets, cells), parameters::no_reset_c3t3(),
+                      one_label ? parameters::manifold() : parameters::non_manifold(),
+                      parameters::no_perturb(), parameters::no_exude());
+  return complex;
+}
+
+/// Meshes with Mesh_3, `hollow` for the surfaces alone, in a child process.
+Mesh run_mesh3(const VoxelBody& body, const LabelField& field, const MeshOptions& options,
+               const std::string& where, bool hollow) {
+  const ChildTask task = {.name = "CGAL's mesher",
+                          .where = where,
+                          .limits = meshing_limits(expected_size(body, options), options, where),
+                          .hint = "use a larger edge_length or facet_distance in [mesh]"};
+  const ChildResult result = run_in_child(task, [&] {
+    try {
+      const Domain domain = make_domain(body, field);
+      Complex complex = refine(domain, body, field, options, hollow);
+      if (!hollow) {
+        mesh3::optimise(complex, domain, options);
+      }
+      return ChildResult{0, pack(mesh3::export_mesh(complex, [&](int number) {
+                           return field.labels()[static_cast<std::size_t>(number) - 1];
+                         }))};
+    } catch (const CGAL::Failure_exception&) {
+      return ChildResult{1, {}};
+    }
+  });
+  if (result.status != 0) {
+    throw Error("CGAL found no mesh of the image's body with this edge length", where,
+                "change edge_length in [mesh] a little, or smooth the segmentation");
+  }
+  Mesh mesh = unpack_mesh(result.bytes);
+  if (mesh.connectivity.empty()) {
+    throw Error("no tetrahedron fits into the image's body", where, "use a smaller edge_length in [mesh]");
+  }
+  return mesh;
+}
+
+Mesh fill_with_tetgen(const Mesh& hollow, const MeshOptions& options, const MeshSize& size,
+                      const std::string& where) {
+  TriangleSurface walls{hollow.nodes, {}};
+  for (Index t = 0; t < static_cast<Index>(hollow.facet_tags.size()); ++t) {
+    const auto corners = hollow.tagged_facet(t);
+    walls.triangles.push_back({corners[0], corners[1], corners[2]});
+  }
+  return mesh_regions(walls, region_points(hollow), options, size, where);
+}
+
+/// What became of each label.
+void report_volumes(const Mesh& mesh, const VoxelBody& body, std::vector<std::string>& notes) {
+  std::map<Index, std::array<double, 2>> volumes;
+  for (const Index label : body.labels) {
+    if (label != VoxelBody::no_label) {
+      volumes[label][0] += body.spacing.prod();
+    }
+  }
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    volumes[mesh.regions[static_cast<std::size_t>(e)]][1] +=
+        std::abs(element_volume(mesh.element, element_nodes(mesh, e)));
+  }
+  for (const auto& [label, volume] : volumes) {
+    notes.push_back(fmt::format("label {}: volume {:.4g} in the image, {:.4g} in the mesh ({:+.1f} %)", label,
+                                volume[0], volume[1], 100.0 * (volume[1] / volume[0] - 1.0)));
+  }
+}
+
+}  // namespace
+
+Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vector<std::string>& notes) {
+  const std::string where = image.file.string();
+  const VoxelBody body = read_labelled_image(image, *options.edge_length, notes);
+  const LabelField field(body);
+  const bool by_tetgen = options.mesher == Mesher::tetgen;
+  Mesh mesh = run_mesh3(body, field, options, where, by_tetgen);
+  if (by_tetgen) {
+    mesh = fill_with_tetgen(mesh, options, expected_size(body, options), where);
+  }
+  mesh.tagged_facets.clear();
+  mesh.facet_tags.clear();
+  if (const Index crumbs = remove_crumbs(mesh); crumbs != 0) {
+    notes.push_back(
+        fmt::format("removed {} element(s) that hung on the body by an edge or a corner", crumbs));
+  }
+  if (image.regions) {
+    report_volumes(mesh, body, notes);
+  }
+  return mesh;
+}
+
+}  // namespace palpate

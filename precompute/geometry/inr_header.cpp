@@ -1,0 +1,116 @@
+#include "precompute/geometry/inr_header.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "base/regular_file.h"
+#include "base/words.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::string_view magic = "#INRIMAGE-4#{";
+constexpr std::string_view header_end = "##}";
+constexpr std::size_t largest_header = 65'536;
+const char* const complete_file = "use a complete INR file (.inr, .inr.gz) with one label a voxel";
+
+using GzFile = std::unique_ptr<gzFile_s, int (*)(gzFile)>;
+
+/// Reads plain files as they are, gzipped ones unpacked.
+GzFile open_unpacked(const std::filesystem::path& file) {
+  const int fd = open_regular_file(file, O_RDONLY);
+  GzFile stream(gzdopen(fd, "rb"), gzclose);
+  if (!stream) {
+    throw Error("there is no memory to read the file", file.string(), "close other programs and try again");
+  }
+  return stream;
+}
+
+/// A field's value that is a whole number from 1; `fallback` where the header lacks the field.
+std::int64_t field(std::string_view header, std::string_view name, std::int64_t fallback,
+                   const std::string& where) {
+  std::int64_t value = fallback;
+  for (std::size_t at = header.find('\n'); at != std::string_view::npos; at = header.find('\n', at + 1)) {
+    std::string_view line = header.substr(at + 1, header.find('\n', at + 1) - at - 1);
+    if (!line.starts_with(name) || !line.substr(name.size()).starts_with("=")) {
+      continue;
+    }
+    line.remove_prefix(name.size() + 1);
+    const std::string_view given = line;
+    line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+    const auto [end, status] = std::from_chars(line.data(), line.data() + line.size(), value);
+    if (status != std::errc() || value < 1) {
+      throw Error(fmt::format("{} of the image's header is \"{}\", not a whole number from 1", name,
+                              shortened(given)),
+                  where, complete_file);
+    }
+  }
+  return value;
+}
+
+/// Bytes from here to the end, or `enough` where there are more.
+std::int64_t count_bytes(gzFile_s* stream, std::int64_t enough) {
+  std::vector<char> chunk(1 << 20);
+  std::int64_t count = 0;
+  while (count < enough) {
+    const int size = gzread(stream, chunk.data(), static_cast<unsigned>(chunk.size()));
+    if (size <= 0) break;
+    count += size;
+  }
+  return count;
+}
+
+}  // namespace
+
+std::int64_t check_inr_header(const std::filesystem::path& file) {
+  const std::string where = file.string();
+  const auto file_bytes = static_cast<std::int64_t>(std::filesystem::file_size(file));
+  const GzFile stream = open_unpacked(file);
+  std::string text(largest_header, '\0');
+  text.resize(static_cast<std::size_t>(
+      std::max(0, gzread(stream.get(), text.data(), static_cast<unsigned>(text.size())))));
+  const std::size_t end = text.find(header_end);
+  if (!text.starts_with(magic) || end == std::string::npos) {
+    return file_bytes;
+  }
+  const std::string_view header = std::string_view(text).substr(0, end);
+  double voxels = 1.0;
+  std::string product;
+  for (const char* name : {"XDIM", "YDIM", "ZDIM", "VDIM"}) {
+    const std::int64_t size = field(header, name, 1, where);
+    voxels *= static_cast<double>(size);
+    product += fmt::format("{}{} {}", product.empty() ? "" : " x ", name, size);
+  }
+  if (voxels > static_cast<double>(most_voxels)) {
+    throw Error(fmt::format("the image's header asks for {} = {:.3g} voxels; {:.1g} are read at most",
+                            product, voxels, static_cast<double>(most_voxels)),
+                where, "crop the image or scale it down, or correct the header");
+  }
+  const std::int64_t bits = field(header, "PIXSIZE", 8, where);
+  if (bits > 64) {
+    throw Error(fmt::format("PIXSIZE of the image's header is {} bits", bits), where, complete_file);
+  }
+  const std::int64_t needed = static_cast<std::int64_t>(voxels) * bits / 8;
+  const std::size_t data = std::min(text.find('\n', end), text.size() - 1) + 1;  // after the line "##}"
+  const auto after_header = static_cast<std::int64_t>(text.size() - data);
+  const std::int64_t present = after_header + count_bytes(stream.get(), needed - after_header);
+  if (present < needed) {
+    throw Error(fmt::format("the image's header asks for {} voxels of {} bits, {} bytes, but only {} bytes "
+                            "follow it",
+                            product, bits, needed, present),
+                where, "get the whole file, or correct the header");
+  }
+  return std::max(file_bytes, needed);
+}
+
+}  // namespace palpate

@@ -1,0 +1,175 @@
+#include "precompute/geometry/labelled_image.h"
+
+#define CGAL_USE_ZLIB 1  // .inr.gz
+#include <CGAL/Image_3.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <span>
+
+#include "base/child_process.h"
+#include "base/error.h"
+#include "base/regular_file.h"
+#include "base/words.h"
+#include "precompute/geometry/inr_header.h"
+
+namespace palpate {
+namespace {
+
+constexpr double largest_spacing_ratio = 100.0;  // slices of 5 mm with pixels of 0.1 mm have 50
+constexpr double voxels_per_edge = 20.0;
+const char* const complete_file =
+    "use a complete INR file (.inr, .inr.gz) with one label a voxel and positive VX, VY, VZ";
+constexpr std::size_t smallest_speck = 8;  // [voxels] less would be smoothed away
+
+enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
+
+struct ImageHeader {
+  std::array<Index, 3> size{};
+  std::array<double, 3> spacing{};
+  std::array<double, 3> origin{};
+};
+
+/// Reads the image and sends its header and its voxels as labels.
+ChildResult read_labels(const std::string& file) {
+  CGAL::Image_3 image;
+  if (!image.read(file) || image.size() == 0) {
+    return {not_an_image, {}};
+  }
+  if (image.image()->vdim != 1) {
+    return {not_scalar, {}};
+  }
+  ImageHeader header;
+  header.size = {static_cast<Index>(image.xdim()), static_cast<Index>(image.ydim()),
+                 static_cast<Index>(image.zdim())};
+  header.spacing = {image.vx(), image.vy(), image.vz()};
+  header.origin = {static_cast<double>(image.tx()), static_cast<double>(image.ty()),
+                   static_cast<double>(image.tz())};
+  std::vector<std::int32_t> labels;
+  labels.reserve(image.size());
+  for (std::size_t k = 0; k < image.zdim(); ++k) {
+    for (std::size_t j = 0; j < image.ydim(); ++j) {
+      for (std::size_t i = 0; i < image.xdim(); ++i) {
+        labels.push_back(static_cast<std::int32_t>(std::lround(image.value(i, j, k))));
+      }
+    }
+  }
+  ChildResult result;
+  append_array(result.bytes, std::span<const ImageHeader>(&header, 1));
+  append_array(result.bytes, std::span<const std::int32_t>(labels));
+  return result;
+}
+
+/// Refuses voxel sides and an origin that no image has.
+void check_geometry(const VoxelGrid& grid, const std::string& where) {
+  const double smallest = grid.spacing.minCoeff(), largest = grid.spacing.maxCoeff();
+  if (!(smallest > 1e-30 && largest < 1e30 && largest <= largest_spacing_ratio * smallest)) {
+    throw Error(fmt::format("the voxels' sides VX, VY, VZ are {}, {}, {}", shown(grid.spacing[0]),
+                            shown(grid.spacing[1]), shown(grid.spacing[2])),
+                where,
+                fmt::format("they must be positive, and none more than {} times another: correct the header",
+                            largest_spacing_ratio));
+  }
+  if (!(grid.origin.cwiseAbs().maxCoeff() < 1e12 * largest)) {
+    throw Error(fmt::format("the image's origin TX, TY, TZ is ({}, {}, {})", shown(grid.origin[0]),
+                            shown(grid.origin[1]), shown(grid.origin[2])),
+                where, "correct the header");
+  }
+}
+
+/// Marks the voxels that carry one of the labels (all but 0 where none are listed).
+VoxelBody select(const Bytes& bytes, const ImageGeometry& image) {
+  const std::string where = image.file.string();
+  const std::vector<int>& wanted = image.labels;
+  std::span<const std::byte> rest = bytes;
+  const std::vector<ImageHeader> headers = take_array<ImageHeader>(rest);
+  std::vector<std::int32_t> labels = take_array<std::int32_t>(rest);
+  if (headers.size() != 1) {
+    fail_on_answer();
+  }
+  const ImageHeader& header = headers[0];
+  VoxelBody body;
+  body.size = header.size;
+  body.spacing = Vec3(header.spacing[0], header.spacing[1], header.spacing[2]);
+  body.origin = Vec3(header.origin[0], header.origin[1], header.origin[2]);
+  if (labels.size() != body.voxels()) {
+    fail_on_answer();
+  }
+  check_geometry(body, where);
+
+  std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
+  body.inside.reserve(labels.size());
+  for (const std::int32_t label : labels) {
+    const auto [entry, is_new] = selected.try_emplace(label, 0);
+    if (is_new) {
+      entry->second =
+          wanted.empty() ? label != 0 : std::find(wanted.begin(), wanted.end(), label) != wanted.end();
+    }
+    body.inside.push_back(entry->second);
+  }
+  if (image.regions) {
+    body.labels = std::move(labels);
+    for (std::size_t v = 0; v < body.labels.size(); ++v) {
+      body.labels[v] = body.inside[v] != 0 ? body.labels[v] : VoxelBody::no_label;
+    }
+  }
+  std::string occurring;
+  for (const auto& [label, is_body] : selected) {
+    occurring += (occurring.empty() ? "" : ", ") + std::to_string(label);
+  }
+  for (const int label : wanted) {
+    if (!selected.contains(label)) {
+      throw Error("no voxel of the image has label " + std::to_string(label), where,
+                  "its labels are " + occurring);
+    }
+  }
+  if (wanted.empty() && selected.size() == 1 && selected.contains(0)) {
+    throw Error("the image is empty: all its voxels are 0", where, "give a segmented image");
+  }
+  return body;
+}
+
+}  // namespace
+
+VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
+                              std::vector<std::string>& notes) {
+  const std::string where = image.file.string();
+  check_regular_file(image.file, "Check image = \"...\" in [geometry].");
+  // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
+  const std::string path = std::filesystem::absolute(image.file).string();
+  const ChildTask task = {.name = "the image reader",
+                          .where = where,
+                          .limits = reading_limits(check_inr_header(image.file)),
+                          .hint = complete_file};
+  const ChildResult read = run_in_child(task, [&] { return read_labels(path); });
+  if (read.status != read_ok) {
+    throw Error(
+        read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
+        where, complete_file);
+  }
+  VoxelBody body = crop(select(read.bytes, image), 2);
+  if (edge_length * voxels_per_edge < body.spacing.minCoeff()) {
+    throw Error(
+        fmt::format("edge_length is {} of the image's units, its voxels are {} x {} x {}", shown(edge_length),
+                    shown(body.spacing[0]), shown(body.spacing[1]), shown(body.spacing[2])),
+        where,
+        "an image says nothing about lengths below its voxels: use a larger edge_length in [mesh], or "
+        "check scale in [geometry]");
+  }
+  keep_one_part(body, where, notes);
+  if (const std::size_t filled = join_across_edges(body); filled != 0) {
+    notes.push_back("filled " + std::to_string(filled) +
+                    " voxel(s) of the image where voxels touched along an edge only");
+  }
+  if (image.regions) {
+    const double element = std::pow(edge_length, 3) / (6.0 * std::sqrt(2.0));
+    complete_labels(body, std::max(static_cast<std::size_t>(element / body.spacing.prod()), smallest_speck),
+                    notes);
+  }
+  return body;
+}
+
+}  // namespace palpate

@@ -1,0 +1,81 @@
+#include "precompute/geometry/mesh_size.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "base/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr double most_elements = 5e7;  // against mistakes of scale
+
+// Estimates meant to be far above what a mesher takes, not measurements. What it makes beyond the expected is
+// at small details of the boundary, of which there are no more than facets.
+constexpr double elements_per_facet = 10.0;
+constexpr std::chrono::seconds least_time{5};
+constexpr double time_per_element = 2e-3;  // [s]
+constexpr double optimisation = 20.0;      // times as long with odt or lloyd
+constexpr std::int64_t least_memory = 512LL << 20;
+constexpr double memory_per_element = 4e3;  // [byte]
+
+/// Area of the faces between voxels that are not alike, and their number.
+template <typename Value>
+std::array<double, 2> walls(const VoxelBody& body, const std::vector<Value>& values) {
+  const std::array<double, 3> face = {body.spacing[1] * body.spacing[2], body.spacing[2] * body.spacing[0],
+                                      body.spacing[0] * body.spacing[1]};
+  const std::array<std::size_t, 3> step = {1, body.at(0, 1, 0), body.at(0, 0, 1)};
+  std::array<double, 2> result{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double faces = 0.0;
+    for (std::size_t v = step[axis]; v < values.size(); ++v) {
+      faces += values[v] != values[v - step[axis]] ? 1.0 : 0.0;
+    }
+    result[0] += faces * face[axis];
+    result[1] += faces;
+  }
+  return result;
+}
+
+}  // namespace
+
+double expected_elements(double volume, double area, double edge_length, double grading) {
+  const double per_volume = 6.0 * std::sqrt(2.0);                   // of regular tetrahedra of edge 1
+  const double inner_edge = edge_length + grading * volume / area;  // in the slab's middle
+  // the integral of (edge_length + grading d)^-3 over the depth d
+  return per_volume * volume * (edge_length + inner_edge) /
+         (2.0 * edge_length * edge_length * inner_edge * inner_edge);
+}
+
+MeshSize expected_size(const TriangleSurface& surface, const MeshOptions& options) {
+  const double edge_length = options.edge_length.value_or(mean_edge_length(surface));
+  return {expected_elements(std::abs(enclosed_volume(surface)), area(surface), edge_length, options.grading),
+          static_cast<double>(surface.triangles.size())};
+}
+
+MeshSize expected_size(const VoxelBody& body, const MeshOptions& options) {
+  double voxels = 0.0;
+  for (const std::uint8_t inside : body.inside) {
+    voxels += inside;
+  }
+  const auto [area, faces] = body.labels.empty() ? walls(body, body.inside) : walls(body, body.labels);
+  return {expected_elements(voxels * body.spacing.prod(), area, *options.edge_length, options.grading),
+          faces};
+}
+
+ChildLimits meshing_limits(const MeshSize& size, const MeshOptions& options, const std::string& where) {
+  if (!(size.elements <= most_elements)) {
+    throw Error(fmt::format("the mesh would have some {:.1g} elements; {:.1g} are too many", size.elements,
+                            most_elements),
+                where, "use a larger edge_length in [mesh], or check scale in [geometry]");
+  }
+  const double elements = size.elements + elements_per_facet * size.facets;
+  const double seconds = elements * time_per_element * (options.odt || options.lloyd ? optimisation : 1.0);
+  return child_limits(least_time + std::chrono::seconds(static_cast<std::int64_t>(seconds)),
+                      least_memory + static_cast<std::int64_t>(elements * memory_per_element));
+}
+
+}  // namespace palpate

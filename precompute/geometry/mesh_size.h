@@ -1,0 +1,31 @@
+// How large a mesh will be, and what its mesher may use.
+#pragma once
+
+#include <string>
+
+#include "base/child_process.h"
+#include "precompute/description/description.h"
+#include "precompute/geometry/surface_input.h"
+#include "precompute/geometry/voxel_body.h"
+
+namespace palpate {
+
+/// Tetrahedra that a mesher is expected to make, and facets that the boundary was given by. Both are rough.
+struct MeshSize {
+  double elements = 0.0;
+  double facets = 0.0;
+};
+
+/// Regular tetrahedra of edge length (edge_length + grading d) at depth d that fill a slab of this volume
+/// whose sides together have this area > 0.
+double expected_elements(double volume, double area, double edge_length, double grading);
+
+/// What a mesher will make of a surface or image. Lengths of `options` are in the unit of the body.
+MeshSize expected_size(const TriangleSurface& surface, const MeshOptions& options);
+MeshSize expected_size(const VoxelBody& body, const MeshOptions& options);
+
+/// Limits on a mesher, meant to be far above what a mesh of that size takes. Throws Error
+/// when the mesh would have more elements than can be computed with (where = `where`).
+ChildLimits meshing_limits(const MeshSize& size, const MeshOptions& options, const std::string& where);
+
+}  // namespace palpate

@@ -1,0 +1,511 @@
+#include "precompute/geometry/surface_input.h"
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/IO/polygon_soup_io.h>
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
+#include <CGAL/Polygon_mesh_processing/detect_features.h>
+#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/remesh.h>
+#include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/shape_predicates.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
+#include <CGAL/Surface_mesh.h>
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <numeric>
+#include <set>
+#include <sstream>
+
+#include "base/child_process.h"
+#include "base/error.h"
+#include "base/regular_file.h"
+#include "base/write_file.h"
+#include "formats/output_paths.h"
+
+namespace palpate {
+namespace {
+
+namespace PMP = CGAL::Polygon_mesh_processing;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using SurfaceMesh = CGAL::Surface_mesh<Point>;
+using Face = SurfaceMesh::Face_index;
+using Polygon = std::vector<std::size_t>;
+
+constexpr double sharp_edge_degrees = 60.0;
+constexpr int remesh_iterations = 5;
+constexpr double largest_coordinate = 1e30;
+constexpr double remesh_time = 1e-3;    // [s] for a triangle, meant to be far too much
+constexpr double remesh_memory = 4e3;   // [byte] for a triangle, likewise
+constexpr double most_triangles = 2e7;  // after remeshing; a body's boundary has some 1e5 at most
+
+/// Polygons that share points by number, as a file gives them.
+struct Soup {
+  std::vector<Point> points;
+  std::vector<Polygon> polygons;
+};
+
+std::string shown(const Point& p) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << "(" << p.x() << ", " << p.y() << ", " << p.z() << ")";
+  return text.str();
+}
+
+/// What CGAL's readers leave to others.
+void check_soup(const Soup& soup, const std::string& where) {
+  for (const Point& p : soup.points) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(std::abs(p[axis]) <= largest_coordinate)) {
+        throw Error("a coordinate is not a finite number or beyond all measure: " + shown(p), where,
+                    "export the surface again");
+      }
+    }
+  }
+  for (std::size_t i = 0; i < soup.polygons.size(); ++i) {
+    for (const std::size_t corner : soup.polygons[i]) {
+      if (corner >= soup.points.size()) {
+        throw Error("polygon " + std::to_string(i + 1) + " of " + std::to_string(soup.polygons.size()) +
+                        " has a corner that is none of the file's " + std::to_string(soup.points.size()) +
+                        " points",
+                    where, "the file is damaged: export the surface again");
+      }
+    }
+  }
+}
+
+Soup read_soup(const std::filesystem::path& file, const std::string& where) {
+  Soup soup;
+  bool read = false;
+  try {
+    read = CGAL::IO::read_polygon_soup(file.string(), soup.points, soup.polygons,
+                                       CGAL::parameters::verbose(false));
+  } catch (const std::exception&) {
+    read = false;
+  }
+  if (!read || soup.polygons.empty()) {
+    throw Error("cannot read a surface from this file", where,
+                "it must be a complete .off, .obj, .stl or .ply with triangles or polygons");
+  }
+  check_soup(soup, where);
+  return soup;
+}
+
+using Edge = std::pair<std::size_t, std::size_t>;
+
+/// How many polygons meet in each edge.
+std::map<Edge, int> count_edges(const Soup& soup) {
+  std::map<Edge, int> count;
+  for (const Polygon& polygon : soup.polygons) {
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      ++count[std::minmax(polygon[i], polygon[(i + 1) % polygon.size()])];
+    }
+  }
+  return count;
+}
+
+/// Number of connected groups of open edges.
+std::size_t count_holes(const std::vector<Edge>& open_edges, std::size_t points) {
+  std::vector<std::size_t> group(points);
+  std::iota(group.begin(), group.end(), std::size_t{0});
+  const auto root = [&](std::size_t i) {
+    while (group[i] != i) {
+      i = group[i] = group[group[i]];
+    }
+    return i;
+  };
+  for (const auto& [a, b] : open_edges) {
+    group[root(a)] = root(b);
+  }
+  std::set<std::size_t> holes;
+  for (const auto& edge : open_edges) {
+    holes.insert(root(edge.first));
+  }
+  return holes.size();
+}
+
+void check_edges(const Soup& soup, const std::string& where) {
+  std::vector<Edge> open_edges;
+  for (const auto& [edge, count] : count_edges(soup)) {
+    const std::string place =
+        "from " + shown(soup.points[edge.first]) + " to " + shown(soup.points[edge.second]) + " (file units)";
+    if (count > 2) {
+      throw Error(
+          "the surface is not manifold: " + std::to_string(count) + " triangles meet in the edge " + place,
+          where, "remove inner walls and doubled triangles in a mesh editor");
+    }
+    if (count == 1) {
+      open_edges.push_back(edge);
+    }
+  }
+  if (open_edges.empty()) {
+    return;
+  }
+  const auto& [a, b] = open_edges.front();
+  throw Error("the surface is open: " + std::to_string(count_holes(open_edges, soup.points.size())) +
+                  " hole(s), " + std::to_string(open_edges.size()) + " open edges, the first from " +
+                  shown(soup.points[a]) + " to " + shown(soup.points[b]) + " (file units)",
+              where, "close the holes in a mesh editor (\"fill holes\")");
+}
+
+/// Merges points at the same place and drops what collapses to less than a triangle.
+void weld(Soup& soup) {
+  PMP::merge_duplicate_points_in_polygon_soup(soup.points, soup.polygons);
+  for (Polygon& polygon : soup.polygons) {
+    polygon.erase(std::unique(polygon.begin(), polygon.end()), polygon.end());
+    while (polygon.size() > 1 && polygon.front() == polygon.back()) {
+      polygon.pop_back();
+    }
+  }
+  std::erase_if(soup.polygons, [](const Polygon& polygon) { return polygon.size() < 3; });
+  PMP::remove_isolated_points_in_polygon_soup(soup.points, soup.polygons);
+}
+
+/// Orients all polygons alike.
+SurfaceMesh connect(Soup& soup, const std::string& where, std::vector<std::string>& notes) {
+  const std::size_t points = soup.points.size();
+  const std::vector<Polygon> as_given = soup.polygons;
+  PMP::orient_polygon_soup(soup.points, soup.polygons);
+  if (soup.points.size() > points) {
+    throw Error("the surface is not manifold: parts of it touch in the point " + shown(soup.points[points]) +
+                    " (file units), or it is one-sided there",
+                where, "separate the parts in a mesh editor");
+  }
+  std::size_t turned = 0;
+  for (std::size_t i = 0; i < as_given.size(); ++i) {
+    turned += as_given[i] == soup.polygons[i] ? 0 : 1;
+  }
+  if (turned != 0 && turned != as_given.size()) {
+    notes.push_back(std::to_string(turned) + " of " + std::to_string(as_given.size()) +
+                    " polygons of the surface were turned to agree with their neighbours");
+  }
+  SurfaceMesh mesh;
+  PMP::polygon_soup_to_polygon_mesh(soup.points, soup.polygons, mesh);
+  PMP::triangulate_faces(mesh);
+  return mesh;
+}
+
+const Point& first_corner(const SurfaceMesh& mesh, Face face) {
+  return mesh.point(target(halfedge(face, mesh), mesh));
+}
+
+void check_triangles(const SurfaceMesh& mesh, const std::string& where) {
+  for (const Face face : mesh.faces()) {
+    if (PMP::is_degenerate_triangle_face(face, mesh)) {
+      throw Error("a triangle at " + shown(first_corner(mesh, face)) + " (file units) has no area", where,
+                  "remove degenerate triangles in a mesh editor");
+    }
+  }
+}
+
+void check_one_part(SurfaceMesh& mesh, const std::string& where) {
+  auto part = mesh.add_property_map<Face, std::size_t>("f:part").first;
+  const std::size_t parts = PMP::connected_components(mesh, part);
+  if (parts == 1) {
+    return;
+  }
+  std::string places;
+  for (std::size_t i = 0; i < std::min<std::size_t>(parts, 3); ++i) {
+    const auto face =
+        std::find_if(mesh.faces().begin(), mesh.faces().end(), [&](Face f) { return part[f] == i; });
+    places += (i == 0 ? " at " : ", ") + shown(first_corner(mesh, *face));
+  }
+  throw Error("the surface has " + std::to_string(parts) + " disconnected parts," + places + " (file units)",
+              where, "a body is one closed shell: keep one part, or join them");
+}
+
+void orient_outwards(SurfaceMesh& mesh, std::vector<std::string>& notes) {
+  if (!PMP::is_outward_oriented(mesh)) {
+    PMP::reverse_face_orientations(mesh);
+    notes.emplace_back("the surface was oriented inwards and has been turned");
+  }
+}
+
+using FacePair = std::pair<Face, Face>;
+using Corners = std::array<Vec3, 3>;
+
+std::vector<Corners> corners_of(const SurfaceMesh& mesh, const std::vector<FacePair>& pairs) {
+  std::vector<Face> faces;
+  for (const auto& [a, b] : pairs) {
+    faces.insert(faces.end(), {a, b});
+  }
+  std::sort(faces.begin(), faces.end());
+  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  std::vector<Corners> result;
+  for (const Face face : faces) {
+    Corners& corners = result.emplace_back();
+    std::size_t i = 0;
+    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
+      const Point& p = mesh.point(vertex);
+      corners.at(i++) = Vec3(p.x(), p.y(), p.z());
+    }
+  }
+  return result;
+}
+
+/// Nothing where they may not or cannot be written: the mistake is told all the same.
+std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const std::string& stem) {
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out.precision(17);
+  out << "OFF\n" << 3 * faces.size() << " " << faces.size() << " 0\n";
+  for (const Corners& corners : faces) {
+    for (const Vec3& p : corners) {
+      out << p.x() << " " << p.y() << " " << p.z() << "\n";
+    }
+  }
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    out << "3 " << 3 * i << " " << 3 * i + 1 << " " << 3 * i + 2 << "\n";
+  }
+  try {
+    const std::filesystem::path file =
+        OutputPaths(false).add(stem + ".bad-faces.off", OutputKind::faces, "self-intersections");
+    write_file(file, out.str());
+    return file;
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+Point center(const SurfaceMesh& mesh, Face face) {
+  const auto h = mesh.halfedge(face);
+  return CGAL::centroid(mesh.point(mesh.source(h)), mesh.point(mesh.target(h)),
+                        mesh.point(mesh.target(mesh.next(h))));
+}
+
+/// Where and how often a surface goes through itself.
+struct SelfIntersections {
+  std::string problem;  // empty: nowhere
+  std::vector<Corners> triangles;
+};
+
+SelfIntersections find_self_intersections(const SurfaceMesh& mesh) {
+  std::vector<FacePair> pairs;
+  PMP::self_intersections(mesh, std::back_inserter(pairs));
+  if (pairs.empty()) {
+    return {};
+  }
+  std::sort(pairs.begin(), pairs.end());
+  return {"intersects itself: " + std::to_string(pairs.size()) + " pair(s) of triangles, the first near " +
+              shown(center(mesh, pairs.front().first)) + " (file units)",
+          corners_of(mesh, pairs)};
+}
+
+void remesh(SurfaceMesh& mesh, double edge_length) {
+  auto sharp = mesh.add_property_map<SurfaceMesh::Edge_index, bool>("e:sharp", false).first;
+  PMP::detect_sharp_edges(mesh, sharp_edge_degrees, sharp);
+  PMP::isotropic_remeshing(
+      mesh.faces(), edge_length, mesh,
+      CGAL::parameters::number_of_iterations(remesh_iterations).edge_is_constrained_map(sharp));
+  mesh.collect_garbage();
+}
+
+TriangleSurface export_surface(const SurfaceMesh& mesh) {
+  TriangleSurface surface;
+  surface.nodes.reserve(mesh.number_of_vertices());
+  for (const auto vertex : mesh.vertices()) {
+    const Point& p = mesh.point(vertex);
+    surface.nodes.emplace_back(p.x(), p.y(), p.z());
+  }
+  surface.triangles.reserve(mesh.number_of_faces());
+  for (const Face face : mesh.faces()) {
+    Triangle triangle{};
+    std::size_t corner = 0;
+    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
+      triangle[corner++] = static_cast<Index>(static_cast<std::size_t>(vertex));
+    }
+    surface.triangles.push_back(triangle);
+  }
+  return surface;
+}
+
+/// What a child sends.
+struct Answer {
+  TriangleSurface surface;
+  std::vector<std::string> notes;
+  SelfIntersections crossings;
+};
+
+void append_text(Bytes& bytes, const std::string& text) {
+  append_array(bytes, std::span<const char>(text));
+}
+
+std::string take_text(std::span<const std::byte>& bytes) {
+  const std::vector<char> text = take_array<char>(bytes);
+  return {text.begin(), text.end()};
+}
+
+Bytes pack(const Answer& answer) {
+  Bytes bytes;
+  append_array(bytes, std::span(answer.surface.nodes));
+  append_array(bytes, std::span(answer.surface.triangles));
+  append_text(bytes, answer.crossings.problem);
+  append_array(bytes, std::span(answer.crossings.triangles));
+  for (const std::string& note : answer.notes) {
+    append_text(bytes, note);
+  }
+  return bytes;
+}
+
+Answer unpack(std::span<const std::byte> bytes) {
+  Answer answer;
+  answer.surface.nodes = take_array<Vec3>(bytes);
+  answer.surface.triangles = take_array<Triangle>(bytes);
+  answer.crossings.problem = take_text(bytes);
+  answer.crossings.triangles = take_array<Corners>(bytes);
+  while (!bytes.empty()) {
+    answer.notes.push_back(take_text(bytes));
+  }
+  return answer;
+}
+
+/// The surface of a file, whole and turned outwards; it may still intersect itself.
+SurfaceMesh read_mesh(const std::filesystem::path& file, const std::string& where,
+                      std::vector<std::string>& notes) {
+  Soup soup = read_soup(file, where);
+  weld(soup);
+  check_edges(soup, where);
+  SurfaceMesh mesh = connect(soup, where, notes);
+  check_triangles(mesh, where);
+  check_one_part(mesh, where);
+  orient_outwards(mesh, notes);
+  return mesh;
+}
+
+Answer read_in_child(const std::filesystem::path& file, const ChildLimits& limits, const char* hint,
+                     const std::function<void(SurfaceMesh&, Answer&)>& finish) {
+  const std::string where = file.string();
+  const std::filesystem::path path = std::filesystem::absolute(file);  // the child is elsewhere
+  const ChildResult result =
+      run_in_child({.name = "CGAL", .where = where, .limits = limits, .hint = hint}, [&] {
+        Answer answer;
+        try {
+          SurfaceMesh mesh = read_mesh(path, where, answer.notes);
+          finish(mesh, answer);
+        } catch (const CGAL::Failure_exception&) {
+          throw Error("CGAL cannot make a surface of what is in the file", where, hint);
+        }
+        return ChildResult{0, pack(answer)};
+      });
+  return unpack(result.bytes);
+}
+
+std::int64_t size_of(const std::filesystem::path& file) {
+  check_regular_file(file, "Check surface = \"...\" in [geometry].");
+  return static_cast<std::int64_t>(std::filesystem::file_size(file));
+}
+
+}  // namespace
+
+TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes) {
+  Answer answer = read_in_child(file, reading_limits(size_of(file)),
+                                "repair the surface in a mesh editor, or export it again",
+                                [](SurfaceMesh& mesh, Answer& into) {
+                                  into.crossings = find_self_intersections(mesh);
+                                  into.surface = export_surface(mesh);
+                                });
+  if (!answer.crossings.problem.empty()) {
+    const std::filesystem::path bad_faces = write_bad_faces(answer.crossings.triangles, file.stem().string());
+    throw Error("the surface " + answer.crossings.problem, file.string(),
+                bad_faces.empty()
+                    ? "repair it in a mesh editor"
+                    : "repair it in a mesh editor; the triangles were written to " + bad_faces.string());
+  }
+  notes.insert(notes.end(), answer.notes.begin(), answer.notes.end());
+  return std::move(answer.surface);
+}
+
+Remeshing remesh_surface(const std::filesystem::path& file, const TriangleSurface& surface,
+                         double edge_length) {
+  const double triangles = area(surface) / (std::sqrt(0.1875) * edge_length * edge_length);
+  if (!(triangles <= most_triangles)) {
+    throw Error(fmt::format("remeshed to this edge_length the surface has some {:.2g} triangles", triangles),
+                file.string(), "use a larger edge_length in [mesh], or check scale in [geometry]");
+  }
+  ChildLimits limits = reading_limits(size_of(file));
+  limits = child_limits(limits.processor + std::chrono::seconds(static_cast<int>(triangles * remesh_time)),
+                        limits.memory + static_cast<std::int64_t>(triangles * remesh_memory));
+  Answer answer =
+      read_in_child(file, limits, R"(use another edge_length, or mesher = "cgal" without remesh in [mesh])",
+                    [&](SurfaceMesh& mesh, Answer& into) {
+                      remesh(mesh, edge_length);
+                      try {
+                        check_triangles(mesh, file.string());
+                      } catch (const Error& error) {
+                        into.crossings.problem = std::string("is degenerate: ") + error.what();
+                        return;
+                      }
+                      into.crossings = find_self_intersections(mesh);
+                      into.surface = export_surface(mesh);
+                    });
+  return {std::move(answer.surface), std::move(answer.crossings.problem)};
+}
+
+double area(const TriangleSurface& surface) {
+  double sum = 0.0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vec3& x = surface.nodes[static_cast<std::size_t>(a)];
+    sum += (surface.nodes[static_cast<std::size_t>(b)] - x)
+               .cross(surface.nodes[static_cast<std::size_t>(c)] - x)
+               .norm() /
+           2.0;
+  }
+  return sum;
+}
+
+double enclosed_volume(const TriangleSurface& surface) {
+  const Vec3 origin = surface.nodes.empty() ? Vec3(Vec3::Zero()) : surface.nodes.front();
+  double sum = 0.0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const auto from_origin = [&](Index i) -> Vec3 {
+      return surface.nodes[static_cast<std::size_t>(i)] - origin;
+    };
+    sum += from_origin(a).cross(from_origin(b)).dot(from_origin(c)) / 6.0;
+  }
+  return sum;
+}
+
+double mean_edge_length(const TriangleSurface& surface) {
+  double sum = 0.0;
+  for (const Triangle& t : surface.triangles) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto from = static_cast<std::size_t>(t[i]), to = static_cast<std::size_t>(t[(i + 1) % 3]);
+      sum += (surface.nodes[from] - surface.nodes[to]).norm();
+    }
+  }
+  return sum / (3.0 * static_cast<double>(surface.triangles.size()));
+}
+
+std::function<double(const Vec3&)> distance_to(const TriangleSurface& surface) {
+  struct Triangles {
+    std::vector<Kernel::Triangle_3> list;
+    using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Kernel::Triangle_3>::const_iterator>;
+    CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree;
+  };
+  const auto triangles = std::make_shared<Triangles>();
+  const auto point = [&](Index node) {
+    const Vec3& x = surface.nodes[static_cast<std::size_t>(node)];
+    return Point(x[0], x[1], x[2]);
+  };
+  for (const Triangle& t : surface.triangles) {
+    triangles->list.emplace_back(point(t[0]), point(t[1]), point(t[2]));
+  }
+  triangles->tree.insert(triangles->list.begin(), triangles->list.end());
+  triangles->tree.accelerate_distance_queries();
+  return [triangles](const Vec3& x) {
+    return std::sqrt(CGAL::to_double(triangles->tree.squared_distance(Point(x[0], x[1], x[2]))));
+  };
+}
+
+}  // namespace palpate

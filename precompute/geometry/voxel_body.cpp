@@ -1,0 +1,254 @@
+#include "precompute/geometry/voxel_body.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <queue>
+
+#include "base/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr double small_part = 0.01;  // of the largest part
+
+/// A group of voxels that are connected through faces and have the same value.
+template <typename Value>
+struct Part {
+  Value value;
+  std::size_t voxels;
+  std::size_t first;  ///< one of them
+};
+
+/// Calls work(neighbour) for the voxels that share a face with `voxel`.
+template <typename Work>
+void for_neighbours(const VoxelGrid& grid, std::size_t voxel, const Work& work) {
+  std::size_t stride = 1;
+  for (const Index length : grid.size) {
+    const auto n = static_cast<std::size_t>(length);
+    const std::size_t position = voxel / stride % n;
+    if (position > 0) {
+      work(voxel - stride);
+    }
+    if (position + 1 < n) {
+      work(voxel + stride);
+    }
+    stride *= n;
+  }
+}
+
+/// Numbers the parts; `part_of` gets each voxel's.
+template <typename Value>
+std::vector<Part<Value>> find_parts(const VoxelGrid& grid, const std::vector<Value>& values,
+                                    std::vector<Index>& part_of) {
+  std::vector<Part<Value>> parts;
+  part_of.assign(values.size(), -1);
+  std::vector<std::size_t> front;
+  for (std::size_t v = 0; v < values.size(); ++v) {
+    if (part_of[v] >= 0) {
+      continue;
+    }
+    const auto number = static_cast<Index>(parts.size());
+    Part<Value> part{values[v], 0, v};
+    part_of[v] = number;
+    front.push_back(v);
+    while (!front.empty()) {
+      const std::size_t voxel = front.back();
+      front.pop_back();
+      ++part.voxels;
+      for_neighbours(grid, voxel, [&](std::size_t next) {
+        if (part_of[next] < 0 && values[next] == part.value) {
+          part_of[next] = number;
+          front.push_back(next);
+        }
+      });
+    }
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+std::string shown(const VoxelGrid& grid, std::size_t voxel) {
+  const Vec3 x = grid.center(voxel);
+  return fmt::format("({:f}, {:f}, {:f})", x[0], x[1], x[2]);
+}
+
+/// Takes the label from parts that are smaller than `smallest`, never from the largest; returns how many
+/// voxels of how many parts of each label.
+std::map<Index, std::array<std::size_t, 2>> unlabel_specks(VoxelBody& body, std::size_t smallest) {
+  std::vector<Index> part_of;
+  const auto parts = find_parts(body, body.labels, part_of);
+  std::size_t largest = 0;
+  for (const auto& part : parts) {
+    largest = part.value == VoxelBody::no_label ? largest : std::max(largest, part.voxels);
+  }
+  const std::size_t limit = std::min(smallest, largest);
+  std::map<Index, std::array<std::size_t, 2>> specks;
+  for (const auto& part : parts) {
+    if (part.value != VoxelBody::no_label && part.voxels < limit) {
+      specks[part.value][0] += part.voxels;
+      ++specks[part.value][1];
+    }
+  }
+  for (std::size_t v = 0; v < body.labels.size(); ++v) {
+    if (parts[static_cast<std::size_t>(part_of[v])].voxels < limit) {
+      body.labels[v] = VoxelBody::no_label;
+    }
+  }
+  return specks;
+}
+
+/// Spreads the labels, one layer of voxels after the other, over the body's voxels that have none.
+void spread_labels(VoxelBody& body) {
+  std::queue<std::size_t> front;
+  const auto lacks_label = [&](std::size_t v) {
+    return body.inside[v] != 0 && body.labels[v] == VoxelBody::no_label;
+  };
+  for (std::size_t v = 0; v < body.labels.size(); ++v) {
+    bool borders = false;
+    if (body.labels[v] != VoxelBody::no_label) {
+      for_neighbours(body, v, [&](std::size_t next) { borders = borders || lacks_label(next); });
+    }
+    if (borders) {
+      front.push(v);
+    }
+  }
+  while (!front.empty()) {
+    const std::size_t from = front.front();
+    front.pop();
+    for_neighbours(body, from, [&](std::size_t next) {
+      if (lacks_label(next)) {
+        body.labels[next] = body.labels[from];
+        front.push(next);
+      }
+    });
+  }
+}
+
+}  // namespace
+
+Vec3 VoxelGrid::center(std::size_t voxel) const noexcept {
+  Vec3 x = origin;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<std::size_t>(size[axis]);
+    const auto a = static_cast<Eigen::Index>(axis);
+    x[a] += static_cast<double>(voxel % n) * spacing[a];
+    voxel /= n;
+  }
+  return x;
+}
+
+VoxelBody crop(const VoxelBody& body, Index margin) {
+  std::array<Index, 3> low = body.size, high = {-1, -1, -1};
+  for (Index k = 0; k < body.size[2]; ++k) {
+    for (Index j = 0; j < body.size[1]; ++j) {
+      for (Index i = 0; i < body.size[0]; ++i) {
+        if (body.inside[body.at(i, j, k)] != 0) {
+          low = {std::min(low[0], i), std::min(low[1], j), std::min(low[2], k)};
+          high = {std::max(high[0], i), std::max(high[1], j), std::max(high[2], k)};
+        }
+      }
+    }
+  }
+  VoxelBody result;
+  result.spacing = body.spacing;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    result.size[axis] = high[axis] - low[axis] + 1 + 2 * margin;
+    result.origin[a] = body.origin[a] + body.spacing[a] * static_cast<double>(low[axis] - margin);
+  }
+  result.inside.assign(result.voxels(), 0);
+  result.labels.assign(body.labels.empty() ? 0 : result.voxels(), VoxelBody::no_label);
+  for (Index k = low[2]; k <= high[2]; ++k) {
+    for (Index j = low[1]; j <= high[1]; ++j) {
+      for (Index i = low[0]; i <= high[0]; ++i) {
+        const std::size_t from = body.at(i, j, k),
+                          to = result.at(i - low[0] + margin, j - low[1] + margin, k - low[2] + margin);
+        result.inside[to] = body.inside[from];
+        if (!body.labels.empty()) {
+          result.labels[to] = body.labels[from];
+        }
+      }
+    }
+  }
+  return result;
+}
+
+void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::string>& notes) {
+  std::vector<Index> part_of;
+  const auto parts = find_parts(body, body.inside, part_of);
+  const auto largest = std::max_element(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
+    return (a.value != 0 ? a.voxels : 0) < (b.value != 0 ? b.voxels : 0);
+  });
+  const double limit = small_part * static_cast<double>(largest->voxels);
+  const Index outside = part_of[0];
+
+  std::vector<std::uint8_t> turned(parts.size(), 0);
+  std::array<std::size_t, 2> turned_parts{}, turned_voxels{};
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const Part<std::uint8_t>& part = parts[p];
+    const bool is_small = static_cast<double>(part.voxels) < limit;
+    if (part.value != 0 && &part != &*largest && !is_small) {
+      throw Error("the image holds disconnected parts: one of " + std::to_string(largest->voxels) +
+                      " voxels at " + shown(body, largest->first) + " and one of " +
+                      std::to_string(part.voxels) + " at " + shown(body, part.first) + " (image units)",
+                  where, "choose the labels of one organ by labels = [...] in [geometry]");
+    }
+    if (is_small && static_cast<Index>(p) != outside) {
+      turned[p] = 1;
+      ++turned_parts[part.value];
+      turned_voxels[part.value] += part.voxels;
+    }
+  }
+  for (std::size_t v = 0; v < body.inside.size(); ++v) {
+    if (turned[static_cast<std::size_t>(part_of[v])] != 0) {
+      body.inside[v] ^= 1;
+    }
+  }
+  if (turned_parts[1] != 0) {
+    notes.push_back("dropped " + std::to_string(turned_parts[1]) + " stray part(s) of the image, together " +
+                    std::to_string(turned_voxels[1]) + " voxel(s)");
+  }
+  if (turned_parts[0] != 0) {
+    notes.push_back("filled " + std::to_string(turned_parts[0]) +
+                    " cavity(ies) inside the image's body, together " + std::to_string(turned_voxels[0]) +
+                    " voxel(s)");
+  }
+}
+
+std::size_t join_across_edges(VoxelBody& body) {
+  const std::array<std::size_t, 3> stride = {1, body.at(0, 1, 0), body.at(0, 0, 1)};
+  std::size_t filled = 0;
+  for (std::size_t before = filled + 1;
+       before != filled;) {  // a filled voxel may touch another one along an edge
+    before = filled;
+    for (std::size_t v = 0; v + stride[1] + stride[2] < body.inside.size(); ++v) {
+      for (const auto& [a, b] : {std::pair{0U, 1U}, {0U, 2U}, {1U, 2U}}) {
+        std::uint8_t &here = body.inside[v], &along_a = body.inside[v + stride[a]],
+                     &along_b = body.inside[v + stride[b]], &across = body.inside[v + stride[a] + stride[b]];
+        if (here == across && along_a == along_b && here != along_a) {
+          (here == 0 ? here : along_a) = 1;
+          ++filled;
+        }
+      }
+    }
+  }
+  return filled;
+}
+
+void complete_labels(VoxelBody& body, std::size_t smallest, std::vector<std::string>& notes) {
+  for (std::size_t v = 0; v < body.labels.size(); ++v) {
+    if (body.inside[v] == 0) {
+      body.labels[v] = VoxelBody::no_label;
+    }
+  }
+  for (const auto& [label, count] : unlabel_specks(body, smallest)) {
+    notes.push_back(fmt::format(
+        "{} voxel(s) of label {}, in {} part(s) too small for an element, went to the labels around them",
+        count[0], label, count[1]));
+  }
+  spread_labels(body);
+}
+
+}  // namespace palpate

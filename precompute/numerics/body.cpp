@@ -1,0 +1,202 @@
+#include "precompute/numerics/body.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "base/error.h"
+#include "meshes/check.h"
+#include "meshes/readers/volume_mesh.h"
+#include "precompute/geometry/cgal_surface_mesh.h"
+#include "precompute/geometry/image_mesh.h"
+#include "precompute/geometry/material_parts.h"
+#include "precompute/geometry/picture.h"
+#include "precompute/geometry/plane_mesh.h"
+#include "precompute/geometry/surface_input.h"
+#include "precompute/geometry/tetgen_mesh.h"
+#include "precompute/numerics/held_nodes.h"
+
+namespace palpate {
+namespace {
+
+constexpr double unnoticed_difference = 0.1;  // of edge lengths
+
+/// The options with lengths in the geometry's own unit.
+MeshOptions in_file_units(MeshOptions options, double scale) {
+  if (options.edge_length) {
+    *options.edge_length /= scale;
+  }
+  options.facet_distance /= scale;
+  return options;
+}
+
+/// Meshes each kind of geometry, in the geometry's own unit.
+struct MeshGeometry {
+  const MeshOptions& options;
+  double scale;  ///< [m] of the geometry's unit
+  const std::string& where;
+  const ProgressText& progress;
+  std::vector<std::string>& notes;
+
+  [[nodiscard]] const char* mesher() const { return options.mesher == Mesher::cgal ? "CGAL" : "TetGen"; }
+
+  Mesh operator()(const SurfaceGeometry& surface) const {
+    progress("reading the surface " + surface.file.filename().string());
+    TriangleSurface triangles = read_surface(surface.file, notes);
+    if (options.mesher == Mesher::cgal || (options.remesh && !remesh(surface.file, triangles))) {
+      progress("meshing with CGAL");
+      return mesh_surface_with_cgal(triangles, options, where);
+    }
+    note_kept_boundary(triangles);
+    progress("meshing with TetGen");
+    return mesh_surface(triangles, options, where);
+  }
+
+  /// False where CGAL's mesher is to make boundary and inside in one, as remeshing spoils the surface.
+  [[nodiscard]] bool remesh(const std::filesystem::path& file, TriangleSurface& triangles) const {
+    progress("remeshing the surface");
+    Remeshing remeshed = remesh_surface(file, triangles, *options.edge_length);
+    if (remeshed.problem.empty()) {
+      triangles = std::move(remeshed.surface);
+      return true;
+    }
+    const std::string what = "remeshed to edge_length, the surface " + remeshed.problem;
+    if (options.mesher_chosen) {
+      throw Error(
+          what, where,
+          "set mesher = \"cgal\" in [mesh] and remove remesh: CGAL's mesher makes a boundary of its own; "
+          "or use another edge_length");
+    }
+    notes.push_back(what + "; CGAL's mesher was used on the surface as it is (mesher = \"cgal\")");
+    return false;
+  }
+
+  /// Tells whom an edge_length does not do what it seems to.
+  void note_kept_boundary(const TriangleSurface& triangles) const {
+    if (!options.edge_length || options.remesh) {
+      return;
+    }
+    const double kept = mean_edge_length(triangles);
+    if (std::abs(kept / *options.edge_length - 1.0) > unnoticed_difference) {
+      notes.push_back(
+          fmt::format("the boundary keeps the file's triangles, of edge {:.3g} m in the mean; edge_length = "
+                      "{:.3g} m is for "
+                      "the inside alone: set remesh = true in [mesh] to have it on the boundary too",
+                      kept * scale, *options.edge_length * scale));
+    }
+  }
+
+  Mesh operator()(const ImageGeometry& image) const {
+    progress("meshing the image " + image.file.filename().string() + " with " + mesher());
+    return mesh_image(image, options, notes);
+  }
+
+  Mesh operator()(const VolumeGeometry& volume) const {
+    progress("reading the mesh " + volume.file.filename().string());
+    return read_volume_mesh(volume.file);
+  }
+
+  Mesh operator()(const PolygonGeometry& polygon) const {
+    progress("meshing the polygon with CGAL");
+    return mesh_polygon(polygon, options, where, notes);
+  }
+
+  Mesh operator()(const PictureGeometry& picture) const {
+    progress("meshing the picture " + picture.file.filename().string() + " with CGAL");
+    return mesh_picture(picture, options, notes);
+  }
+
+  Mesh operator()(const RectangleShape& rectangle) const {
+    progress("generating the mesh");
+    return generate(rectangle, options.element.value_or(ElementType::quad4));
+  }
+
+  Mesh operator()(const BoxShape& box) const {
+    progress("generating the mesh");
+    return generate(box, options.element == ElementType::hex8 ? ElementType::hex8 : ElementType::tet4);
+  }
+
+  template <typename Shape>
+  Mesh operator()(const Shape& shape) const {
+    progress("generating the mesh");
+    return generate(shape);
+  }
+};
+
+std::filesystem::path geometry_file(const Geometry& geometry) {
+  return std::visit(
+      [](const auto& source) -> std::filesystem::path {
+        if constexpr (requires { source.file; }) {
+          return source.file;
+        } else {
+          return {};
+        }
+      },
+      geometry);
+}
+
+/// Only a volume file can disagree: the dimension of the others is known from their kind.
+void check_dimension(const Mesh& mesh, const Description& description, const std::string& where) {
+  const std::string element = traits(mesh.element).name;
+  if (mesh.dimension() == 2 && description.analysis == Analysis::solid) {
+    throw Error("the mesh lies in the plane (" + element + "), but model.toml has no plane", where,
+                R"(add plane = "stress" (a thin sheet) or plane = "strain" (a slice of a long body) to )" +
+                    description.file.string());
+  }
+  if (mesh.dimension() == 3 && description.analysis != Analysis::solid) {
+    throw Error("the mesh is in space (" + element + "), but model.toml has plane", where,
+                "remove plane from " + description.file.string());
+  }
+}
+
+}  // namespace
+
+MeshedBody mesh_body(const Description& description, const ProgressText& progress) {
+  MeshedBody body;
+  const std::string toml = description.file.string();
+  const std::filesystem::path file = geometry_file(description.geometry);
+  const std::string where = file.empty() ? toml : file.string();
+  const MeshOptions options = in_file_units(description.mesh, description.scale);
+  body.mesh =
+      std::visit(MeshGeometry{options, description.scale, where, progress, body.notes}, description.geometry);
+  for (Vec3& x : body.mesh.nodes) {
+    x *= description.scale;
+  }
+
+  progress("checking the mesh");
+  check_dimension(body.mesh, description, where);
+  orient_elements(body.mesh, where);
+  if (options.element) {
+    body.mesh = with_elements(std::move(body.mesh), *options.element, where);
+  }
+  if (const std::size_t unused = remove_unused_nodes(body.mesh); unused != 0) {
+    body.notes.push_back("removed " + std::to_string(unused) +
+                         " nodes that no element uses; node numbers count the remaining ones");
+  }
+  check_connected(body.mesh, where);
+  body.surface = extract_surface(body.mesh);
+
+  body.material_of_element = materials_of_elements(body.mesh, description.materials, toml);
+  HeldNodes held = hold_nodes(body.mesh, description.fixed, toml);
+  body.fixed = std::move(held.axes);
+  body.prescribed = std::move(held.displacement);
+  check_held(body.mesh, body.fixed, toml);
+  body.warning = scale_warning(body.mesh, description.scale);
+  return body;
+}
+
+std::vector<std::filesystem::path> input_files(const Description& description) {
+  const std::filesystem::path file = geometry_file(description.geometry);
+  if (file.empty()) {
+    return {};
+  }
+  const std::string extension = file.extension().string();
+  const bool is_volume = std::holds_alternative<VolumeGeometry>(description.geometry);
+  if (is_volume && (extension.empty() || extension == ".node" || extension == ".ele")) {
+    std::filesystem::path node = file, ele = file;
+    return {node.replace_extension(".node"), ele.replace_extension(".ele")};
+  }
+  return {file};
+}
+
+}  // namespace palpate

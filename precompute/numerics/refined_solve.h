@@ -1,0 +1,25 @@
+// Solves that are right beyond what double precision gives: the reference that stored numbers are held
+// against.
+#pragma once
+
+#include <Eigen/Dense>
+
+#include "precompute/numerics/factor.h"
+
+namespace palpate {
+
+/// x = K^-1 b by the factor alone, and refined.
+struct RefinedSolution {
+  using Refined = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+  Eigen::MatrixXd plain;  ///< [n, columns] as Factor::solve gives it
+  Refined refined;        ///< [n, columns] with residuals in extended precision: its error does not depend on
+                          ///< the condition of K as long as that is below some 1e15
+};
+
+/// Solves for the columns of b [n, columns]. `factor`: of K, computed; K: the lower triangle.
+RefinedSolution solve_refined(const Factor& factor, const SparseMatrix& K, const Eigen::MatrixXd& b);
+
+/// Without refinement: both by the factor alone.
+RefinedSolution solve_plain(const Factor& factor, const Eigen::MatrixXd& b);
+
+}  // namespace palpate

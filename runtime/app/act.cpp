@@ -1,0 +1,189 @@
+#include "runtime/app/act.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "base/error.h"
+#include "base/write_file.h"
+#include "runtime/app/play_report.h"
+#include "runtime/app/session_check.h"
+#include "runtime/loop/last_tick.h"
+#include "runtime/loop/output.h"
+#include "runtime/loop/real_time.h"
+
+namespace palpate {
+namespace {
+
+constexpr double views_a_second = 60.0;
+
+std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) {
+  const double ticks = static_cast<double>(rate) / frames_a_second;
+  return std::max<std::int64_t>(std::llround(std::min(ticks, 1e15)), 1);
+}
+
+Tool tool_of(const Settings& settings, const Body& body) {
+  Tool tool = settings.tool;
+  tool.reach = settings.reach.value_or(body.longest_surface_edge());
+  return tool;
+}
+
+State state_of(const Settings& settings, const Body& body, const Tool& tool) {
+  return State(body, {.tools = {tool},
+                      .max_contacts = settings.max_contacts,
+                      .patch_nodes = settings.overlay ? patch_room(body, settings.overlay->rings, 1) : 0,
+                      .tick = 1.0 / static_cast<double>(settings.rate)});
+}
+
+}  // namespace
+
+Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActViewer& viewer)
+    : body_(body),
+      mover_(mover),
+      control_(viewer.control),
+      tool_(tool_of(options.settings, body)),
+      options_(std::move(options)),
+      state_(state_of(options_.settings, body, tool_)) {
+  Settings& settings = options_.settings;
+  if (settings.safety) {
+    settings.safety->period = 1.0 / static_cast<double>(settings.rate);
+    safety_.emplace(*settings.safety);
+  }
+  const bool in_background = !options_.fast && !options_.session;
+  if (settings.overlay) {
+    if (options_.session) check_overlays(*options_.session, body, options_.device.target);
+    overlays_.emplace(body, state_,
+                      PatchSourceOptions{.rings = settings.overlay->rings,
+                                         .memory = settings.overlay_memory,
+                                         .in_background = in_background});
+  }
+  if (body.model().dynamics.method == DynamicsMethod::packed)
+    motion_.emplace(body, state_, MotionSourceOptions{.in_background = in_background});
+  if (!options_.record.empty()) {
+    recorder_.emplace(options_.record,
+                      SessionInfo{.model_path = options_.file.string(),
+                                  .content_hash = body.model().content_hash,
+                                  .device = options_.device.text,
+                                  .rate = settings.rate,
+                                  .options = to_text(settings)},
+                      recorded_surface(body),
+                      [tell_viewer = viewer.recording_failed](const std::string& reason) {
+                        print_warning("the recording failed, and the run goes on without it: " + reason);
+                        if (tell_viewer) tell_viewer(reason);
+                      });
+  }
+  if (recorder_ && options_.record_frames > 0.0) {
+    frames_.emplace(
+        body, state_,
+        SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(settings.rate, options_.record_frames),
+                             .in_background = !options_.fast},
+        [this, fast = options_.fast](SurfacePicture picture) {
+          if (fast) {
+            recorder_->push_frame_waiting(std::move(picture.frame));
+          } else {
+            recorder_->push_frame(std::move(picture.frame));
+          }
+        });
+  }
+  if (viewer.pictures)
+    viewed_.emplace(body, state_, SurfaceFramesOptions{.ticks_per_frame = 1}, viewer.pictures);
+  if (viewer.ticks) feed_.emplace(viewer.ticks);
+  if (!options_.fast) {
+    monitor_.emplace(MonitorOptions{.rate = settings.rate,
+                                    .line = isatty(STDERR_FILENO) != 0,
+                                    .acknowledges = mover.link != nullptr,
+                                    .shows_safety = safety_.has_value()});
+  }
+}
+
+const LoopReport& Act::run(const std::atomic<bool>& stop) {
+  report_ = run_with_rights(stop);
+  monitor_.reset();
+  feed_.reset();
+  viewed_.reset();
+  frames_.reset();  // the last frame is in the recording
+  if (recorder_) finish_recording();
+  return report_;
+}
+
+void Act::finish_recording() {
+  try {
+    recorder_->finish();
+  } catch (const Error& error) {
+    recording_failure_ = in_one_line(error);
+  } catch (const std::exception& error) {
+    recording_failure_ = error.what();
+  }
+}
+
+/// The loop with the rights it needs, which the threads that were started before do not inherit.
+LoopReport Act::run_with_rights(const std::atomic<bool>& stop) {
+  const auto pointer = [](auto& part) { return part ? &*part : nullptr; };
+  const LoopParts parts = {.body = body_,
+                           .state = state_,
+                           .device = *mover_.device,
+                           .workspace = Workspace(options_.settings.workspace()),
+                           .safety = pointer(safety_),
+                           .overlays = pointer(overlays_),
+                           .motion = pointer(motion_),
+                           .recorder = pointer(recorder_),
+                           .monitor = pointer(monitor_),
+                           .frames = pointer(frames_),
+                           .control = control_,
+                           .feed = pointer(feed_),
+                           .viewed = pointer(viewed_),
+                           .replayed = options_.session.get()};
+  const LoopOptions loop = {.rate = options_.settings.rate,
+                            .ticks = mover_.ticks,
+                            .fast = options_.fast,
+                            .ticks_per_view = ticks_per_frame(options_.settings.rate, views_a_second)};
+  if (options_.fast) return run_loop(parts, loop, stop);
+  const RealTimeRights rights(options_.processor);
+  if (!rights.refused().empty()) print_warning(rights.refused());
+  return run_loop(parts, loop, stop);
+}
+
+void Act::tell() const {
+  const PlayedRun played{.options = options_,
+                         .settings = options_.settings,
+                         .body = body_,
+                         .tool = tool_,
+                         .tool_end = state_.tools.front().pose.position,
+                         .report = report_,
+                         .overlays = overlays_ ? &*overlays_ : nullptr,
+                         .motion = motion_ ? &*motion_ : nullptr,
+                         .link = mover_.link,
+                         .dropped = recorder_ ? recorder_->dropped() : 0,
+                         .dropped_frames = recorder_ ? recorder_->dropped_frames() : 0,
+                         .recording_failure = recording_failure_};
+  print_report(played);
+  std::optional<Error> first;
+  const auto attempt = [&first](const std::filesystem::path& file, auto&& write) {
+    if (file.empty()) return;
+    try {
+      write(file);
+    } catch (const Error& error) {
+      if (first) {
+        print_warning(in_one_line(error));
+      } else {
+        first = error;
+      }
+    }
+  };
+  attempt(options_.contacts, [&](const auto& file) { write_file(file, contact_table(body_, state_)); });
+  attempt(options_.surface, [&](const auto& file) { write_surface(file, body_, state_); });
+  attempt(options_.report, [&](const auto& file) {
+    if (file == standard_output) {
+      std::fputs(json_report(played).c_str(), stdout);  // main sees whether it arrived
+    } else {
+      write_file(file, json_report(played));
+    }
+  });
+  if (first) throw Error(*first);
+}
+
+}  // namespace palpate

@@ -1,0 +1,115 @@
+#include "runtime/app/devices_command.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/printable.h"
+#include "runtime/devices/hid/builtin_profiles.h"
+#include "runtime/devices/hid/hid_choice.h"
+#include "runtime/loop/output.h"
+
+namespace palpate {
+namespace {
+
+std::string indented(std::string text) {
+  for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) {
+    text.insert(at + 1, "  ");
+  }
+  return text;
+}
+
+void print_device(const AttachedDevice& device, const std::vector<NamedProfile>& profiles) {
+  fmt::print("{}\n", device.name());
+  if (!device.maker.empty()) fmt::print("  maker    {}\n", printable(device.maker));
+  if (!device.serial.empty()) fmt::print("  serial   {}\n", printable(device.serial));
+  const auto fitting = fitting_profiles(device, profiles);
+  if (fitting.empty()) {
+    fmt::print("  profile  none fits{}\n",
+               device.descriptor_problem.empty() ? "" : ": " + printable(device.descriptor_problem));
+  }
+  for (const NamedProfile* profile : fitting) {
+    fmt::print("  profile  {}: {}\n", printable(profile->key), printable(profile->profile.name));
+  }
+  // Nobody wants rules for the keyboard.
+  if (fitting.empty()) return;
+  if (device.access == 0) {
+    fmt::print("  access   yes\n");
+  } else {
+    const AccessProblem problem = access_problem(device);
+    fmt::print("  access   {}; {}\n", problem.what, indented(problem.hint));
+  }
+  if (fitting.size() > 1) fmt::print("  choose   with --profile NAME\n");
+}
+
+void print_text(const std::vector<AttachedDevice>& attached, const std::vector<NamedProfile>& profiles) {
+  if (attached.empty()) {
+    fmt::print(
+        "No HID device is attached (none in /sys/class/hidraw).\n"
+        "A container sees only the devices that it is given. Without a device a script moves the tool:\n"
+        "palpate-runtime play FILE --device script:TOUCH.csv\n");
+    return;
+  }
+  for (const AttachedDevice& device : attached) {
+    print_device(device, profiles);
+  }
+}
+
+std::string json_of(const AttachedDevice& device, const std::vector<NamedProfile>& profiles) {
+  std::string fitting;
+  for (const NamedProfile* profile : fitting_profiles(device, profiles)) {
+    fitting += (fitting.empty() ? "" : ", ") + json_string(profile->key);
+  }
+  std::string descriptor;
+  for (const std::uint8_t byte : device.descriptor) {
+    descriptor += fmt::format("{:02x}", byte);
+  }
+  const AccessProblem problem = device.access == 0 ? AccessProblem{} : access_problem(device);
+  return fmt::format(
+      "    {{\"path\": {}, \"vendor\": {}, \"product\": {}, \"serial\": {}, \"maker\": {}, \"name\": {},\n"
+      "     \"usage\": [{}, {}], \"profiles\": [{}], \"accessible\": {}, \"access_problem\": {}, \"hint\": "
+      "{},\n"
+      "     \"descriptor\": {}, \"descriptor_problem\": {}}}",
+      json_string(device.path), device.vendor, device.product, json_string(device.serial),
+      json_string(device.maker), json_string(device.product_name), device.reports.usage.page,
+      device.reports.usage.id, fitting, device.access == 0, json_string(problem.what),
+      json_string(problem.hint), json_string(descriptor), json_string(device.descriptor_problem));
+}
+
+void print_json(const std::vector<AttachedDevice>& attached, const std::vector<NamedProfile>& profiles) {
+  fmt::print("{{\n  \"devices\": [");
+  for (std::size_t k = 0; k < attached.size(); ++k) {
+    fmt::print("{}\n{}", k == 0 ? "" : ",", json_of(attached[k], profiles));
+  }
+  fmt::print("{}]\n}}\n", attached.empty() ? "" : "\n  ");
+}
+
+int print_profile(const std::string& name) {
+  std::string names;
+  for (const BuiltinProfile& profile : builtin_profiles()) {
+    if (profile.name == name) {
+      fmt::print("{}", profile.text);
+      return exit_ok;
+    }
+    names += (names.empty() ? "" : ", ") + std::string(profile.name);
+  }
+  throw Error("there is no built-in profile of this name", name, "the built-in ones are " + names);
+}
+
+}  // namespace
+
+int devices(const DevicesOptions& options) {
+  if (!options.print_profile.empty()) return print_profile(options.print_profile);
+  std::vector<NamedProfile> profiles = known_profiles();
+  if (!options.profile.empty()) profiles.push_back({options.profile, read_device_profile(options.profile)});
+  const std::vector<AttachedDevice> attached = attached_devices();
+  if (options.json) {
+    print_json(attached, profiles);
+  } else {
+    print_text(attached, profiles);
+  }
+  return exit_ok;
+}
+
+}  // namespace palpate

@@ -1,0 +1,46 @@
+#include "runtime/app/fitting_tool.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <string>
+
+#include "runtime/loop/output.h"
+
+namespace palpate {
+namespace {
+
+constexpr double least_share = 0.03;  // of the body's diagonal
+constexpr double most_share = 0.1;
+
+double diagonal(const Body& body) {
+  return body.bounds().diagonal().norm();
+}
+
+}  // namespace
+
+double fitting_radius(const Body& body) {
+  const double radius =
+      std::clamp(body.mean_surface_edge(), least_share * diagonal(body), most_share * diagonal(body));
+  return std::stod(fmt::format("{:.1e}", radius));
+}
+
+std::string too_large(const Tool& tool, double size) {
+  const double length = 2.0 * tool.radius + tool.length;
+  if (!(length > size)) return "";
+  return fmt::format("the tool is {:.4g} m long, and the whole body {:.4g} m", length, size);
+}
+
+void settle_tool(PlayOptions& options, const Body& body) {
+  if (options.device.is_live() && !options.settings_text.contains("tool")) {
+    const std::string tool = fmt::format("sphere:{}", fitting_radius(body));
+    options.settings_text["tool"] = tool;
+    options.settings.tool.radius = fitting_radius(body);
+    fmt::print(stderr, "tool: {}, which suits the body; --tool takes another one\n", tool);
+  }
+  const std::string problem = too_large(options.settings.tool, diagonal(body));
+  if (!problem.empty())
+    print_warning(problem + ": lengths are metres, a radius of 8 mm is --tool sphere:0.008");
+}
+
+}  // namespace palpate

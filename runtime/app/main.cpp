@@ -1,0 +1,296 @@
+// palpate-runtime: touches a precomputed body.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/command_line.h"
+#include "base/error.h"
+#include "base/printable.h"
+#include "base/spelling.h"
+#include "base/standard_output.h"
+#include "formats/shrunk_file.h"
+#include "runtime/app/devices_command.h"
+#include "runtime/app/play_command.h"
+#include "runtime/app/probe.h"
+#include "runtime/app/session.h"
+#include "runtime/app/view.h"
+#include "runtime/loop/numbers.h"
+
+namespace {
+
+using namespace palpate;
+
+/// The arguments as they were written.
+struct Arguments {
+  std::string file;
+  std::string model_toml;
+  std::vector<std::string> at;
+  std::vector<std::string> node;
+  std::vector<std::string> displace;
+  bool json = false;
+  bool force = false;
+  std::optional<std::string> overlay;
+  std::string field;
+  PlayArguments play;
+  DevicesOptions devices;
+  ExportOptions exported;
+  std::string view_address = "127.0.0.1:8017";
+  std::string about;
+};
+
+void add_file(CLI::App& command, Arguments& arguments) {
+  command.add_option("FILE", arguments.file, "baked model, NAME.palpate.hdf")->required()->type_name("");
+  command
+      .add_option("--model", arguments.model_toml, "fail unless FILE was made from exactly this model.toml")
+      ->type_name("FILE");
+}
+
+CLI::Option* add_repeatable(CLI::App& command, const std::string& name, std::vector<std::string>& values,
+                            const std::string& type, const std::string& help) {
+  return command.add_option(name, values, help)->type_name(type)->allow_extra_args(false);
+}
+
+CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
+  CLI::App* probe = app.add_subcommand("probe", "displace nodes and print the forces that this takes");
+  add_file(*probe, arguments);
+  add_repeatable(*probe, "--at", arguments.at, "X,Y,Z",
+                 "the free surface node that rests nearest to this place [m]; repeatable");
+  add_repeatable(*probe, "--node", arguments.node, "N", "the node with this number in the mesh; repeatable");
+  add_repeatable(*probe, "--displace", arguments.displace, "DX,DY,DZ",
+                 "its displacement [m]; one for each --at and --node, in the same order")
+      ->required();
+  probe
+      ->add_option(
+          "--overlay", arguments.overlay,
+          "a finer mesh over the elements in N rings round those nodes, each cut into R to the power "
+          "of the dimension (s-FEM)")
+      ->type_name("r=R,rings=N");
+  probe->add_flag("--json", arguments.json, "print JSON");
+  probe
+      ->add_option(
+          "--field", arguments.field,
+          "write the displacement at rest and by the probe: a table of the stored nodes, or a grid for "
+          "ParaView")
+      ->type_name("OUT.csv|OUT.vtu");
+  probe->add_flag("--force", arguments.force, force_help);
+  probe->footer(
+      "Forces are those on the body, in newtons; the hand feels the opposite. Displacements are relative to\n"
+      "the body as it rests under its loads. For a body in the plane give X,Y and DX,DY.\n"
+      "Example:\n  palpate-runtime probe liver.palpate.hdf --at 0.1,0.05,0.12 --displace 0,0,-0.005 --field "
+      "liver.vtu");
+  return probe;
+}
+
+CLI::App* add_devices(CLI::App& app, Arguments& arguments) {
+  CLI::App* devices = app.add_subcommand("devices", "list the HID devices and the profiles that fit them");
+  devices->add_flag("--json", arguments.devices.json, "print JSON");
+  devices
+      ->add_option("--profile", arguments.devices.profile, "a profile of your own beside the built-in ones")
+      ->type_name("FILE.toml");
+  devices
+      ->add_option("--print-profile", arguments.devices.print_profile,
+                   "print a built-in profile, to copy and edit")
+      ->type_name("NAME");
+  devices->footer(
+      "One that is listed with a profile is taken by palpate-runtime play FILE --device hid.\n"
+      "Examples:\n"
+      "  palpate-runtime devices\n"
+      "  palpate-runtime devices --print-profile spacemouse > mine.toml");
+  return devices;
+}
+
+CLI::App* add_session(CLI::App& app, Arguments& arguments) {
+  CLI::App* session = app.add_subcommand("session", "say what is in a recording of play");
+  session->add_option("SESSION.h5", arguments.file, "recording; one that was killed is made one file")
+      ->required()
+      ->type_name("");
+  session->add_flag("--json", arguments.json, "print JSON");
+  session->add_flag("--force", arguments.force, force_help);
+  session->footer(
+      "Example:\n"
+      "  palpate-runtime session touch.h5");
+  return session;
+}
+
+CLI::App* add_view(CLI::App& app, Arguments& arguments) {
+  CLI::App* view = app.add_subcommand("view", "show a recording of play in a browser");
+  view->add_option("SESSION.h5", arguments.file, "recording")->required()->type_name("");
+  view->add_option("--view-address", arguments.view_address, "where the page is served")
+      ->type_name("[ADDRESS:]PORT")
+      ->capture_default_str();
+  view->footer(
+      "To touch a model itself: palpate-runtime play FILE --view\n"
+      "Example:\n"
+      "  palpate-runtime view touch.h5");
+  return view;
+}
+
+/// CLI::PositiveNumber lets nan pass.
+std::string check_number(const std::string& text) {
+  return parse_number(text) ? "" : "'" + text + "' is not a finite number";
+}
+
+CLI::App* add_export(CLI::App& app, ExportOptions& options) {
+  CLI::App* exported = app.add_subcommand("export", "write a recording of play as one page for any browser");
+  exported->add_option("SESSION.h5", options.recording, "recording")->required()->type_name("");
+  exported->add_option("--html", options.html, "the page")->required()->type_name("OUT.html");
+  exported->add_flag("--force", options.force, force_help);
+  exported->add_option("--fps", options.fps, "pictures a second at most; else 30")
+      ->option_text("N")
+      ->check(CLI::PositiveNumber)
+      ->check(check_number);
+  exported->add_option("--from", options.from, "begin there")
+      ->option_text("S")
+      ->check(CLI::NonNegativeNumber)
+      ->check(check_number);
+  exported->add_option("--to", options.to, "end there")
+      ->option_text("S")
+      ->check(CLI::NonNegativeNumber)
+      ->check(check_number);
+  exported->footer(
+      "Example:\n"
+      "  palpate-runtime export touch.h5 --html touch.html");
+  return exported;
+}
+
+std::vector<double> vector_argument(const std::string& option, const std::string& text) {
+  const std::optional<std::vector<double>> vector = parse_vector(text);
+  if (!vector)
+    throw CLI::ValidationError(option, "'" + text + "' is not finite numbers X,Y,Z (in the plane X,Y)");
+  return *vector;
+}
+
+/// Pairs the places with the displacements in the order in which they were written.
+std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& arguments) {
+  std::vector<ProbePlace> places;
+  auto at = arguments.at.begin();
+  auto node = arguments.node.begin();
+  for (const CLI::Option* option : probe.parse_order()) {
+    if (option->get_name() == "--at") {
+      places.push_back({.at = vector_argument("--at", *at++), .node = {}, .displacement = {}});
+    } else if (option->get_name() == "--node") {
+      places.push_back({.at = {}, .node = parse_index(*node), .displacement = {}});
+      if (!places.back().node)
+        throw CLI::ValidationError("--node", "'" + *node + "' is not the number of a node");
+      ++node;
+    }
+  }
+  if (places.empty()) throw CLI::RequiredError("--at or --node");
+  if (places.size() != arguments.displace.size()) {
+    throw CLI::ValidationError("--displace", fmt::format("{} displacements are given for {} places",
+                                                         arguments.displace.size(), places.size()));
+  }
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    places[k].displacement = vector_argument("--displace", arguments.displace[k]);
+  }
+  return places;
+}
+
+constexpr std::string_view commands = "play, view, probe, session, export or devices";
+
+/// Where the first word is no command, what was meant by it; else nothing.
+std::string meant_by(const CLI::App& app, const std::string& word) {
+  if (word.empty() || word.starts_with('-') || find_command(app, word) != nullptr) return "";
+  if (word.ends_with(".h5")) return "palpate-runtime view " + word + " shows a recording.";
+  if (word.ends_with(".hdf"))
+    return "palpate-runtime play " + word + " --view shows it and lets you push it.";
+  if (word.ends_with(".toml")) return "palpate-precompute " + word + " makes the file that is played with.";
+  const auto command = meant(word, {"probe", "play", "view", "export", "session", "devices", "help"});
+  return command ? "Did you mean palpate-runtime " + *command + "?"
+                 : fmt::format("Commands are {}.", commands);
+}
+
+int play_and_name_next(const PlayOptions& options) {
+  const int status = play(options);
+  const bool has_pictures = options.record_frames > 0.0;
+  if (!options.record.empty())
+    fmt::print(stderr, "next: palpate-runtime {} {}\n", has_pictures ? "view" : "session",
+               options.record.string());
+  return status;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Touches a precomputed body and answers with finite-element forces.", "palpate-runtime");
+  app.formatter(std::make_shared<HelpFormatter>());
+  app.set_version_flag("--version", "palpate-runtime " PALPATE_VERSION);
+  app.require_subcommand(0, 1);
+  app.footer(
+      "Examples:\n"
+      "  palpate-runtime play cube.palpate.hdf --view    push it in a browser\n"
+      "  palpate-runtime help play                       more about a command\n"
+      "Exit status: 0 done, 1 bad input or file, 2 wrong arguments, 3 a replay differed, 130 interrupted.");
+  Arguments arguments;
+  const CLI::App* play_command = add_play(app, arguments.play);
+  const CLI::App* view_command = add_view(app, arguments);
+  const CLI::App* probe_command = add_probe(app, arguments);
+  const CLI::App* session_command = add_session(app, arguments);
+  const CLI::App* export_command = add_export(app, arguments.exported);
+  const CLI::App* devices_command = add_devices(app, arguments);
+  const CLI::App* help_command = add_help_command(app, arguments.about);
+  const std::string first_word = argc > 1 ? argv[1] : "";
+  if (const std::string hint = meant_by(app, first_word); !hint.empty()) {
+    fmt::print(stderr, "error: '{}' is no command\nhint: {} See palpate-runtime --help\n",
+               printable(first_word), printable(hint));
+    return exit_usage;
+  }
+  try {
+    app.parse(argc, argv);
+    if (app.get_subcommands().empty()) throw CLI::RequiredError(std::string(commands));
+    if (help_command->parsed()) {
+      std::fputs(help_page(app, arguments.about).c_str(), stdout);
+      return exit_ok;
+    }
+    if (devices_command->parsed()) return devices(arguments.devices);
+    if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.force);
+    if (view_command->parsed()) return view(arguments.file, read_view_address(arguments.view_address));
+    if (export_command->parsed()) return export_html(arguments.exported);
+    if (play_command->parsed()) return play_and_name_next(read_play(arguments.play));
+    return probe(
+        {.file = arguments.file,
+         .model_toml = arguments.model_toml,
+         .places = read_places(*probe_command, arguments),
+         .overlay = arguments.overlay ? std::optional(read_overlay(*arguments.overlay)) : std::nullopt,
+         .json = arguments.json,
+         .field = arguments.field,
+         .force = arguments.force});
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    const bool of_command = !app.get_subcommands().empty() && !help_command->parsed();
+    const std::string command = of_command ? app.get_subcommands().front()->get_name() + " " : "";
+    fmt::print(stderr, "error: {}\nhint: See palpate-runtime {}--help\n", printable_lines(error.what(), "  "),
+               command);
+    return exit_usage;
+  }
+}
+
+/// Errors in words.
+int run_and_tell(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const palpate::Error& error) {
+    std::fputs(palpate::to_text(error).c_str(), stderr);
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr,
+               "error: there is not enough memory\nhint: Close other programs, or precompute with fewer "
+               "surface nodes\n");
+  } catch (const std::exception& error) {
+    if (std::ferror(stdout) == 0)  // else finish_output says it
+      fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n",
+                 palpate::printable_lines(error.what(), "  "));
+  }
+  return palpate::exit_input_error;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  palpate::prepare_output();
+  palpate::end_with_an_error_on_shrunk_files();
+  return palpate::finish_output(run_and_tell(argc, argv));
+}

@@ -1,0 +1,101 @@
+#include "runtime/app/play.h"
+
+#include <atomic>
+#include <csignal>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "base/error.h"
+#include "formats/output_paths.h"
+#include "formats/recording_parts.h"
+#include "runtime/app/act.h"
+#include "runtime/app/fitting_tool.h"
+#include "runtime/app/mover.h"
+#include "runtime/app/viewed_play.h"
+#include "runtime/loop/loading.h"
+#include "runtime/loop/monitor.h"
+#include "runtime/loop/output.h"
+#include "runtime/loop/real_time.h"
+#include "runtime/loop/session_xdmf.h"
+
+namespace palpate {
+namespace {
+
+std::atomic<bool> stop_asked = false;
+static_assert(std::atomic<bool>::is_always_lock_free, "it is set by a signal handler");
+
+void stop_on_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_asked = true; };
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
+}
+
+void warn_of_other_model(const Recording& session, const Body& body) {
+  if (session.info.content_hash == body.model().content_hash) return;
+  print_warning("the session was recorded with another model or another precomputation of it (" +
+                session.info.model_path + "): forces will differ");
+}
+
+/// Where the run may write, and puts that into the options, before anything else.
+OutputPaths check_outputs(PlayOptions& options) {
+  using Kind = DeviceChoice::Kind;
+  OutputPaths paths(options.force);
+  paths.add_input(options.file, "the model");
+  if (!options.model_toml.empty()) paths.add_input(options.model_toml, "the model's description");
+  if (!options.device.profile.empty()) paths.add_input(options.device.profile, "the device's profile");
+  if (options.device.kind == Kind::script) paths.add_input(options.device.target, "the script");
+  if (options.device.kind == Kind::replay) {
+    paths.add_input(options.device.target, "the session that is replayed");
+    paths.add_input(parts_folder(options.device.target), "the replayed session's parts");
+  }
+  if (!options.record.empty()) options.record = add_recording(paths, options.record, "--record");
+  const auto add = [&paths](std::filesystem::path& file, OutputKind kind, const char* option) {
+    if (!file.empty()) file = paths.add(file, kind, option);
+  };
+  add(options.surface, OutputKind::grid, "--surface");
+  add(options.contacts, OutputKind::contacts, "--contacts");
+  if (options.report != standard_output) add(options.report, OutputKind::report, "--report");
+  return paths;
+}
+
+int exit_code(const LoopReport& report, bool recording_failed) {
+  if (recording_failed) return exit_input_error;
+  if (report.interrupted) return exit_interrupted;
+  return report.replay.different > 0 ? exit_differs : exit_ok;
+}
+
+}  // namespace
+
+int play(PlayOptions options) {
+  OutputPaths paths = check_outputs(options);
+  std::optional<Guardian> guardian;  // forks, so it comes before the first thread
+  if (options.device.kind == DeviceChoice::Kind::hid) guardian.emplace();
+  stop_on_signals();
+  block_acknowledging_signal();
+  if (options.processor) leave_to_the_loop(*options.processor);
+  std::optional<ViewerPort> port;
+  if (options.view) port.emplace(*options.view);
+  Mover mover = make_mover(options, guardian ? &*guardian : nullptr);
+  std::unique_ptr<const Body> body =
+      load_and_print(options.file, options.model_toml, options.settings.body());
+  add_sources(paths, body->model(), options.file);
+  if (options.session) warn_of_other_model(*options.session, *body);
+  if (mover.link != nullptr)
+    wait_for(*mover.link, options.device.kind == DeviceChoice::Kind::bridge, stop_asked);
+  if (port) {
+    ViewedPlay viewed(options, mover, std::move(body), std::move(*port));
+    const LoopReport report = viewed.run(stop_asked);
+    return exit_code(report, viewed.recording_failed());
+  }
+
+  settle_tool(options, *body);
+  options.settings = settle(options.settings, mover, *body);
+  print_device(mover, options.settings);
+  Act act(options, *body, mover);
+  const LoopReport& report = act.run(stop_asked);
+  act.tell();
+  return exit_code(report, act.recording_failure().has_value());
+}
+
+}  // namespace palpate

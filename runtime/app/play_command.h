@@ -1,0 +1,47 @@
+// The arguments of `palpate-runtime play`.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "runtime/app/play.h"
+
+namespace palpate {
+
+/// As they were written.
+struct PlayArguments {
+  std::string file;
+  std::string model_toml;
+  std::string device;
+  std::string profile;
+  SettingsText settings;
+  std::optional<std::string> duration;
+  std::optional<std::string> cpu;
+  bool fast = false;
+  bool view = false;
+  std::optional<std::string> view_address;
+  std::string record;
+  std::optional<std::string> record_frames;
+  std::string report;
+  std::string surface;
+  std::string contacts;
+  bool force = false;
+};
+
+constexpr const char* force_help = "let the files that are written take the place of any others";
+
+/// Adds the subcommand.
+CLI::App* add_play(CLI::App& app, PlayArguments& arguments);
+
+/// What they mean. For a replay, what is not given is as it was in the session. Throws CLI::ParseError for
+/// wrong arguments, Error for a session that cannot be read.
+PlayOptions read_play(PlayArguments arguments);
+
+/// Of `play` and `view`: "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
+ViewerOptions read_view_address(const std::string& text);
+
+/// Of `play` and `probe`: "r=3,rings=2". Throws CLI::ParseError.
+OverlayOptions read_overlay(const std::string& text);
+
+}  // namespace palpate

@@ -1,0 +1,266 @@
+#include "runtime/app/play_report.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+
+#include "runtime/loop/output.h"
+
+namespace palpate {
+namespace {
+
+double microseconds(std::int64_t nanoseconds) {
+  return static_cast<double>(nanoseconds) * 1e-3;
+}
+
+void print_overlays(const PatchSource& overlays) {
+  const PatchCounts& counts = overlays.counts();
+  const auto in_contact = static_cast<double>(std::max<std::int64_t>(counts.in_contact, 1));
+  fmt::print(
+      stderr,
+      "overlay: {} patches built (longest {:.1f} ms, {:.0f} MB kept), {} switches, {:.2f} % of the ticks in "
+      "contact on an older patch or none\n",
+      overlays.built(), 1e3 * overlays.longest_build(), 1e-6 * static_cast<double>(overlays.bytes()),
+      counts.switches, 100.0 * static_cast<double>(counts.older_in_contact) / in_contact);
+  if (overlays.failed() > 0)
+    print_warning(
+        fmt::format("{} overlays could not be made: the elements there are too flat, or those of the file do "
+                    "not belong to its mesh (precompute it again)",
+                    overlays.failed()));
+}
+
+void print_loop(const LoopReport& report, bool fast) {
+  fmt::print(stderr, "{} ticks{}, {} of them in contact, at most {} contact points\n", report.ticks,
+             report.interrupted ? " until interrupted" : "", report.ticks_in_contact, report.most_contacts);
+  const auto times = [](const char* what, const TimeHistogram& histogram) {
+    fmt::print(stderr, "{}: median {:.2f} us, 99.9 % {:.2f} us, 99.99 % {:.2f} us, worst {:.2f} us\n", what,
+               microseconds(histogram.percentile(0.5)), microseconds(histogram.percentile(0.999)),
+               microseconds(histogram.percentile(0.9999)), microseconds(histogram.worst()));
+  };
+  times("step", report.compute);
+  if (!fast) {
+    times("late", report.lateness);
+    fmt::print(stderr, "{} deadline misses at {} Hz\n", report.deadline_misses, report.rate);
+  }
+  fmt::print(stderr, "largest force {:.6g} N at {:.3f} s, largest jump between ticks {:.6g} N at {:.3f} s\n",
+             report.largest_force, report.largest_force_time, report.largest_jump, report.largest_jump_time);
+  for (std::size_t k = 0; k < status_names.size(); ++k) {
+    if (report.status_ticks[k] > 0)
+      fmt::print(stderr, "{}: {} ticks\n", status_names[k].second, report.status_ticks[k]);
+  }
+}
+
+/// A force that is not the body's.
+void warn_of_rigid_contact(const PlayedRun& run) {
+  const auto bit = std::find_if(status_names.begin(), status_names.end(),
+                                [](const auto& status) { return status.first == StepStatus::rigid_contact; });
+  const std::int64_t ticks = run.report.status_ticks[static_cast<std::size_t>(bit - status_names.begin())];
+  if (ticks == 0) return;
+  const bool has_coupling = std::isfinite(run.tool.coupling_stiffness);
+  print_warning(fmt::format("in {} ticks the tool pressed on what is held, or hardly moves: {}", ticks,
+                            has_coupling ? "what is felt there is its coupling alone"
+                                         : "the force there is that of a wall and not the body's; give the "
+                                           "tool a --coupling, and a --max-force"));
+}
+
+void print_device(const PlayedRun& run) {
+  const LoopReport& report = run.report;
+  if (run.settings.safety) {
+    fmt::print(stderr, "the hand was shown at most {:.6g} N", report.largest_shown);
+    for (std::size_t k = 1; k < fault_names.size(); ++k) {
+      if (report.faults[k] > 0)
+        fmt::print(stderr, "; {} faults: {}", report.faults[k], fault_names[k].second);
+    }
+    fmt::print(stderr, "\n");
+  }
+  if (run.link != nullptr) {
+    fmt::print(stderr,
+               "device: {} reports heard, {} commands written (longest {:.2f} ms, {} without the loop), "
+               "opened again {} times\n",
+               run.link->reports(), run.link->writes(), 1e-6 * static_cast<double>(run.link->worst_write()),
+               run.link->extrapolated(), report.opened_again);
+    const std::string refusals = run.link->refusals();
+    if (!refusals.empty()) print_warning("refused of the device: " + refusals);
+  }
+}
+
+void print_replay(const ReplayDifference& replay) {
+  if (replay.different == 0) {
+    fmt::print(stderr, "replay: all forces of {} ticks are those of the session, bit by bit\n", replay.ticks);
+  } else {
+    fmt::print(stderr, "replay: {} of {} ticks differ from the session, most by {:.6g} N at {:.3f} s\n",
+               replay.different, replay.ticks, replay.largest, replay.largest_time);
+  }
+}
+
+std::string box_text(const Body& body) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& position : body.surface_rest_positions()) box.extend(position);
+  const Vec3 low = box.min();
+  const Vec3 high = box.max();
+  return fmt::format("({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m", low.x(), low.y(), low.z(),
+                     high.x(), high.y(), high.z());
+}
+
+/// What is wrong with where the tool was, so that nothing is felt.
+void warn_of_places(const PlayedRun& run) {
+  const LoopReport& report = run.report;
+  const std::string place = "the body rests in " + box_text(run.body);
+  if (report.ticks_begun_inside > 0) {
+    const bool all = report.ticks_begun_inside == report.ticks;
+    const double seconds = static_cast<double>(report.ticks_begun_inside) / static_cast<double>(report.rate);
+    print_warning(fmt::format("the tool began inside the body and felt nothing {}: start outside ({})",
+                              all ? "at all" : fmt::format("until it was out at {} s", seconds), place));
+  } else if (report.ticks > 0 && report.ticks_in_contact == 0) {
+    const Vec3& end = run.tool_end;
+    const char* advice = run.link != nullptr
+                             ? "move the device on, or the body to it (--origin, --motion-scale)"
+                             : "check the script's positions, which are metres, and the tool's size";
+    print_warning(
+        fmt::format("the tool never touched the body: {} (the tool ended at ({:.4g}, {:.4g}, {:.4g}) m; {})",
+                    advice, end.x(), end.y(), end.z(), place));
+  }
+}
+
+/// JSON knows no infinity.
+std::string json_number(double value) {
+  return std::isfinite(value) ? fmt::format("{}", value) : "null";
+}
+
+std::string json_tool(const Tool& tool) {
+  return fmt::format(
+      "{{\"radius_m\": {}, \"length_m\": {}, \"reach_m\": {}, \"friction\": {}, \"coupling_N_per_m\": {}, "
+      "\"coupling_torsion_Nm_per_rad\": {}, \"max_force_N\": {}, \"hand_over\": {}}}",
+      tool.radius, tool.length, tool.reach, tool.friction ? json_number(*tool.friction) : "null",
+      json_number(tool.coupling_stiffness), json_number(tool.coupling_torsion), json_number(tool.max_force),
+      json_number(tool.hand_over));
+}
+
+std::string json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
+  const PatchCounts& counts = overlays.counts();
+  return fmt::format(
+      "{{\"refinement\": {}, \"rings\": {}, \"built\": {}, \"failed\": {}, \"longest_build_s\": {}, "
+      "\"bytes\": {}, "
+      "\"switches\": {}, \"ticks_near\": {}, \"older_ticks_near\": {}, \"ticks_in_contact\": {}, "
+      "\"older_ticks_in_contact\": {}}}",
+      options.refinement, options.rings, overlays.built(), overlays.failed(), overlays.longest_build(),
+      overlays.bytes(), counts.switches, counts.ticks, counts.older, counts.in_contact,
+      counts.older_in_contact);
+}
+
+std::string_view name_of(DynamicsMethod method) {
+  if (method == DynamicsMethod::none) return "none";
+  return method == DynamicsMethod::packed ? "packed" : "modal";
+}
+
+std::string json_dynamics(const Body& body, const MotionSource* motion) {
+  const StoredDynamics& dynamics = body.model().dynamics;
+  std::string json = fmt::format("{{\"method\": \"{}\", \"contact\": \"{}\"", name_of(dynamics.method),
+                                 body.contact_model() == ContactModel::dynamic ? "dynamic" : "quasi-static");
+  if (motion != nullptr)
+    json += fmt::format(", \"steps\": {}, \"longest_step_s\": {}", motion->steps(), motion->longest_step());
+  return json + "}";
+}
+
+/// How often each class of durations came: [upper end in ns, count], each twice as long as the one before.
+std::string json_histogram(const TimeHistogram& histogram) {
+  std::string json = "[";
+  std::int64_t from = 0;
+  for (std::int64_t to = 500; from <= histogram.worst(); to *= 2) {
+    json += fmt::format("{}[{}, {}]", from == 0 ? "" : ", ", to, histogram.total_between(from, to));
+    from = to;
+  }
+  return json + "]";
+}
+
+std::string json_times(const TimeHistogram& histogram) {
+  return fmt::format("{{\"median\": {}, \"p99_9\": {}, \"p99_99\": {}, \"worst\": {}, \"histogram\": {}}}",
+                     histogram.percentile(0.5), histogram.percentile(0.999), histogram.percentile(0.9999),
+                     histogram.worst(), json_histogram(histogram));
+}
+
+std::string json_safety(const LoopReport& report) {
+  std::string faults;
+  for (std::size_t k = 1; k < fault_names.size(); ++k)
+    faults += fmt::format("{}\"{}\": {}", k == 1 ? "" : ", ", fault_names[k].second, report.faults[k]);
+  return fmt::format("{{\"largest_shown_N\": {}, \"faults\": {{{}}}}}", report.largest_shown, faults);
+}
+
+std::string json_device(const PlayedRun& run) {
+  std::string json = fmt::format("{{\"name\": {}", json_string(run.options.device.text));
+  if (run.link != nullptr) {
+    json += fmt::format(
+        ", \"description\": {}, \"reports\": {}, \"writes\": {}, \"worst_write_ns\": {}, "
+        "\"writes_without_loop\": {}, \"opened_again\": {}",
+        json_string(run.link->name()), run.link->reports(), run.link->writes(), run.link->worst_write(),
+        run.link->extrapolated(), run.report.opened_again);
+    json += fmt::format(", \"refused\": {}", json_string(run.link->refusals()));
+  }
+  return json + "}";
+}
+
+}  // namespace
+
+void print_report(const PlayedRun& run) {
+  print_loop(run.report, run.options.fast);
+  warn_of_rigid_contact(run);
+  print_device(run);
+  if (!run.options.record.empty())
+    fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),
+               run.dropped, run.dropped_frames);
+  if (run.recording_failure) print_warning("the recording failed: " + *run.recording_failure);
+  if (run.overlays != nullptr) print_overlays(*run.overlays);
+  if (run.motion != nullptr) {
+    fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
+               1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
+  }
+  if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
+  if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
+}
+
+std::string json_report(const PlayedRun& run) {
+  const LoopReport& report = run.report;
+  std::string status;
+  for (std::size_t k = 0; k < status_names.size(); ++k) {
+    status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, report.status_ticks[k]);
+  }
+  std::string json = "{\n  \"generator\": \"palpate-runtime " PALPATE_VERSION "\",\n";
+  json += fmt::format("  \"file\": {},\n  \"model\": {},\n", json_string(run.options.file.string()),
+                      json_string(run.body.model().name));
+  json += fmt::format("  \"fast\": {},\n  \"interrupted\": {},\n  \"tool\": {},\n", run.options.fast,
+                      report.interrupted, json_tool(run.tool));
+  json += fmt::format("  \"ticks\": {},\n  \"ticks_in_contact\": {},\n  \"ticks_begun_inside\": {},\n",
+                      report.ticks, report.ticks_in_contact, report.ticks_begun_inside);
+  json += fmt::format("  \"most_contacts\": {},\n", report.most_contacts);
+  json +=
+      fmt::format("  \"rate_Hz\": {},\n  \"deadline_misses\": {},\n", report.rate, report.deadline_misses);
+  if (!run.options.fast) json += fmt::format("  \"lateness_ns\": {},\n", json_times(report.lateness));
+  json += fmt::format("  \"compute_ns\": {},\n", json_times(report.compute));
+  json += fmt::format("  \"largest_force_N\": {},\n  \"largest_force_time_s\": {},\n", report.largest_force,
+                      report.largest_force_time);
+  json += fmt::format("  \"largest_jump_N\": {},\n  \"largest_jump_time_s\": {},\n", report.largest_jump,
+                      report.largest_jump_time);
+  json += fmt::format("  \"status_ticks\": {{{}}},\n", status);
+  json += fmt::format("  \"device\": {},\n", json_device(run));
+  if (run.settings.safety) json += fmt::format("  \"safety\": {},\n", json_safety(report));
+  if (run.options.device.kind == DeviceChoice::Kind::replay) {
+    json += fmt::format(
+        "  \"replay\": {{\"ticks\": {}, \"different_ticks\": {}, \"largest_difference_N\": {}}},\n",
+        report.replay.ticks, report.replay.different, report.replay.largest);
+  }
+  if (run.overlays != nullptr)
+    json += fmt::format("  \"overlay\": {},\n", json_overlays(*run.overlays, run.settings.overlay.value()));
+  json += fmt::format("  \"dynamics\": {},\n", json_dynamics(run.body, run.motion));
+  if (!run.options.record.empty())
+    json += fmt::format("  \"recording\": {},\n  \"recording_failed\": {},\n",
+                        json_string(run.options.record.string()),
+                        run.recording_failure ? json_string(*run.recording_failure) : "null");
+  json += fmt::format("  \"dropped_ticks\": {}\n}}\n", run.dropped);
+  return json;
+}
+
+}  // namespace palpate

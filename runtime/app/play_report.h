@@ -1,0 +1,35 @@
+// What is told of a run when it is over.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "runtime/app/play.h"
+#include "runtime/loop/device_link.h"
+#include "runtime/loop/loop.h"
+
+namespace palpate {
+
+/// A run and its parts; the pointers may be null.
+struct PlayedRun {
+  const PlayOptions& options;
+  const Settings& settings;  ///< as they were in the end
+  const Body& body;
+  const Tool& tool;
+  const Vec3& tool_end;  ///< where the tool's origin was in the last tick [m]
+  const LoopReport& report;
+  const PatchSource* overlays = nullptr;
+  const MotionSource* motion = nullptr;
+  const DeviceLink* link = nullptr;
+  std::int64_t dropped = 0;                           ///< ticks that the recording lacks
+  std::int64_t dropped_frames = 0;                    ///< and frames
+  std::optional<std::string> recording_failure = {};  ///< why it is not whole
+};
+
+/// A few lines for a person, and warnings, on the error stream.
+void print_report(const PlayedRun& run);
+
+/// All of it for programs.
+std::string json_report(const PlayedRun& run);
+
+}  // namespace palpate

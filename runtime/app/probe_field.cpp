@@ -1,0 +1,168 @@
+#include "runtime/app/probe_field.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "base/write_file.h"
+#include "meshes/readers/vtu_writer.h"
+#include "runtime/body/surface_numbering.h"
+#include "runtime/solve/node_vectors.h"
+
+namespace palpate {
+namespace {
+
+/// A node of the body or of an overlay's fine mesh.
+struct FieldNode {
+  Index node;  // of the body, -1 where it has none
+  Vec3 x;      // in the mesh [m]
+  Vec3 u0;     // displacement at rest [m]
+  Vec3 u;      // by the probe, from rest [m]
+};
+
+FieldNode body_node(const Body& body, Index node, std::span<const double> u) {
+  const Model& model = body.model();
+  const auto at = static_cast<std::size_t>(node);
+  const Index stored = body.stored_node(node);
+  return {node, model.mesh.nodes[at], model.rest_displacement[at],
+          stored < 0 ? Vec3(Vec3::Zero()) : vector_at(u, body.dimension(), stored)};
+}
+
+/// The nodes of the fine mesh, those that the body has too among them: u = u_G + u_L.
+std::vector<FieldNode> fine_nodes(const Body& body, const Overlay& overlay, std::span<const double> u) {
+  const PatchMesh& patch = overlay.patch();
+  const auto d = static_cast<std::size_t>(body.dimension());
+  std::vector<double> at_nodes;
+  for (const Index stored : overlay.stored_nodes()) {
+    const auto node = u.subspan(d * static_cast<std::size_t>(stored), d);
+    at_nodes.insert(at_nodes.end(), node.begin(), node.end());
+  }
+  const Eigen::Map<const Eigen::VectorXd> u_Q(at_nodes.data(), std::ssize(at_nodes));
+  const auto by_axis = u_Q.reshaped(body.dimension(), patch.shape.cols());
+  Eigen::MatrixXd total = (patch.shape * by_axis.transpose()).transpose();
+  const Eigen::VectorXd u_L = overlay.local_displacement(u_Q);
+  for (std::size_t dof = 0; dof < patch.free_dof.size(); ++dof) {
+    if (patch.free_dof[dof] >= 0) total.data()[dof] += u_L[patch.free_dof[dof]];
+  }
+  const std::span<const double> values(total.data(), static_cast<std::size_t>(total.size()));
+  std::vector<FieldNode> nodes;
+  for (std::size_t k = 0; k < patch.local.nodes.size(); ++k) {
+    nodes.push_back({patch.body_node[k], patch.local.nodes[k], patch.rest_displacement[k],
+                     vector_at(values, body.dimension(), static_cast<Index>(k))});
+  }
+  return nodes;
+}
+
+/// A row a stored node, and then a row a node that only the fine mesh has.
+void write_csv(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
+               std::span<const double> u) {
+  std::string csv = "node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n";
+  const auto add = [&csv](const FieldNode& at) {
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", at.node, at.x.x(), at.x.y(), at.x.z(), at.u0.x(),
+                       at.u0.y(), at.u0.z(), at.u.x(), at.u.y(), at.u.z());
+  };
+  for (Index stored = 0; stored < body.greens().nodes(); ++stored)
+    add(body_node(body, body.mesh_node(stored), u));
+  if (overlay != nullptr) {
+    for (const FieldNode& node : fine_nodes(body, *overlay, u)) {
+      if (node.node < 0) add(node);
+    }
+  }
+  write_file(file, csv);
+}
+
+/// Elements of one kind.
+struct Cells {
+  ElementType element;
+  std::vector<Index> connectivity;
+};
+
+/// The fine mesh's cells in place of those that are of the patch's elements. Of its nodes those that the body
+/// has not are numbered after the body's.
+void lay_over(Cells& cells, const Body& body, const PatchMesh& patch) {
+  const Mesh& mesh = body.model().mesh;
+  const bool whole = cells.element == mesh.element;
+  std::vector<Index> element_of_cell(static_cast<std::size_t>(mesh.elements()));
+  std::iota(element_of_cell.begin(), element_of_cell.end(), 0);
+  if (!whole) element_of_cell = surface_elements(body.model());
+  const auto width = static_cast<std::size_t>(traits(cells.element).nodes);
+  std::vector<Index> result;
+  for (std::size_t cell = 0; cell < element_of_cell.size(); ++cell) {
+    if (std::binary_search(patch.elements.begin(), patch.elements.end(), element_of_cell[cell])) continue;
+    const auto nodes = std::span(cells.connectivity).subspan(width * cell, width);
+    result.insert(result.end(), nodes.begin(), nodes.end());
+  }
+  for (const Index node : whole ? patch.local.connectivity : patch.surface) {
+    const Index same = patch.body_node[static_cast<std::size_t>(node)];
+    result.push_back(same >= 0 ? same : static_cast<Index>(mesh.nodes.size()) + node);
+  }
+  cells.connectivity = std::move(result);
+}
+
+/// The whole mesh where every node of it is stored or held, else its surface.
+Cells shown_cells(const Body& body) {
+  const Model& model = body.model();
+  bool whole = true;
+  for (std::size_t node = 0; node < model.mesh.nodes.size(); ++node) {
+    whole = whole && (body.stored_node(static_cast<Index>(node)) >= 0 || model.fixed[node] != 0);
+  }
+  if (whole) return {model.mesh.element, model.mesh.connectivity};
+  return {body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, model.surface};
+}
+
+/// Drops the nodes that no cell has: returns which are left.
+std::vector<std::size_t> keep_used_nodes(Cells& cells, std::size_t nodes) {
+  std::vector<Index> number(nodes, -1);
+  for (const Index node : cells.connectivity) number[static_cast<std::size_t>(node)] = 0;
+  std::vector<std::size_t> kept;
+  for (std::size_t node = 0; node < nodes; ++node) {
+    if (number[node] < 0) continue;
+    number[node] = static_cast<Index>(kept.size());
+    kept.push_back(node);
+  }
+  for (Index& node : cells.connectivity) node = number[static_cast<std::size_t>(node)];
+  return kept;
+}
+
+/// A grid of the undeformed body with u0 and u0 + u, which is what is seen. Nodes that are not stored are
+/// held along every axis and shown at rest.
+void write_grid(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
+                std::span<const double> u) {
+  const auto body_nodes = static_cast<Index>(body.model().mesh.nodes.size());
+  std::vector<FieldNode> all;
+  all.reserve(body.model().mesh.nodes.size());
+  for (Index node = 0; node < body_nodes; ++node) all.push_back(body_node(body, node, u));
+  Cells cells = shown_cells(body);
+  if (overlay != nullptr) {
+    lay_over(cells, body, overlay->patch());
+    const std::vector<FieldNode> fine = fine_nodes(body, *overlay, u);
+    all.insert(all.end(), fine.begin(), fine.end());
+  }
+  std::vector<Vec3> nodes;
+  std::vector<double> rest, total;
+  for (const std::size_t k : keep_used_nodes(cells, all.size())) {
+    nodes.push_back(all[k].x);
+    const Vec3 seen = all[k].u0 + all[k].u;
+    rest.insert(rest.end(), all[k].u0.begin(), all[k].u0.end());
+    total.insert(total.end(), seen.begin(), seen.end());
+  }
+  const std::vector<NodalField> fields = {{"displacement", 3, total}, {"rest_displacement", 3, rest}};
+  write_vtu(file, nodes, cells.element, cells.connectivity, fields);
+}
+
+}  // namespace
+
+void write_field(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
+                 std::span<const double> u) {
+  if (file.extension() == ".csv") {
+    write_csv(file, body, overlay, u);
+  } else {
+    write_grid(file, body, overlay, u);
+  }
+}
+
+}  // namespace palpate

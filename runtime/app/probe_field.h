@@ -1,0 +1,18 @@
+// The displacement that a probe finds, as a file.
+#pragma once
+
+#include <filesystem>
+#include <span>
+
+#include "runtime/body/body.h"
+#include "runtime/body/overlay.h"
+
+namespace palpate {
+
+/// Writes u [n], the displacement of all stored nodes from rest [m], beside u0, that at rest: a table where
+/// `file` ends in .csv, else a grid for ParaView (.vtu). An overlay, which may be null, adds its fine mesh.
+/// Throws Error when the file cannot be written.
+void write_field(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
+                 std::span<const double> u);
+
+}  // namespace palpate

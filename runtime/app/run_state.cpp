@@ -1,0 +1,93 @@
+#include "runtime/app/run_state.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string_view>
+
+#include "meshes/element_type.h"
+#include "runtime/app/fitting_tool.h"
+#include "runtime/body/overlay_rings.h"
+#include "runtime/loop/monitor.h"
+
+namespace palpate {
+namespace {
+
+using Json = nlohmann::json;
+
+Json text_or_null(const std::optional<std::string>& text) {
+  return text ? Json(*text) : Json();
+}
+
+Json vector(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+/// The name of a numbered constant.
+template <class Names>
+std::string_view name_of(const Names& names, std::size_t number) {
+  return names[std::min(number, names.size() - 1)].second;
+}
+
+Json fault_or_null(Fault fault) {
+  if (fault == Fault::none) return {};
+  return {{"name", name_of(fault_names, static_cast<std::size_t>(fault))}, {"remedy", fault_remedy(fault)}};
+}
+
+bool has_loads(const Model& model) {
+  const auto is_there = [](const Vec3& vector) { return vector != Vec3::Zero(); };
+  return std::any_of(model.rest_displacement.begin(), model.rest_displacement.end(), is_there) ||
+         std::any_of(model.rest_force.begin(), model.rest_force.end(), is_there);
+}
+
+}  // namespace
+
+nlohmann::json to_json(const RunState& state) {
+  return {{"scene", state.scene},
+          {"model", state.model},
+          {"defaults", state.defaults},
+          {"settings", state.settings},
+          {"device", state.device},
+          {"pointer", state.pointer},
+          {"hand", state.hand},
+          {"rate", state.rate},
+          {"ticks", state.ticks},
+          {"misses", state.misses},
+          {"paused", state.paused},
+          {"recording", text_or_null(state.recording)},
+          {"recording_failed", text_or_null(state.recording_failed)},
+          {"busy", text_or_null(state.busy)},
+          {"refused", text_or_null(state.refused)},
+          {"locked", text_or_null(state.locked)},
+          {"fault", fault_or_null(state.fault)},
+          {"phase", name_of(safety_phase_names, static_cast<std::size_t>(state.phase))}};
+}
+
+nlohmann::json describe_model(const Body& body, const std::string& file) {
+  const Model& model = body.model();
+  return {{"name", model.name},
+          {"file", file},
+          {"dimension", model.dimension()},
+          {"nodes", model.mesh.nodes.size()},
+          {"surface_nodes", body.surface_mesh_nodes().size()},
+          {"elements", model.mesh.elements()},
+          {"dofs", body.greens().order()},
+          {"element", traits(model.mesh.element).name},
+          {"size", body.bounds().diagonal().norm()},
+          {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
+          {"moves", model.dynamics.method != DynamicsMethod::none},
+          {"loads", has_loads(model)},
+          {"overlay_rings", overlay_rings(body)}};
+}
+
+nlohmann::json describe_defaults(const Body& body) {
+  constexpr double share = 0.05;           // of the body's diagonal
+  constexpr double share_of_least = 0.25;  // of its least extent
+  const Vec3 extent = body.bounds().max() - body.bounds().min();
+  const double least = body.dimension() == 2 ? std::min(extent.x(), extent.y()) : extent.minCoeff();
+  return {{"radius", fitting_radius(body)},
+          {"reach", body.longest_surface_edge()},
+          {"friction", body.surface_friction().front()},
+          {"depth", std::min(share * extent.norm(), share_of_least * least)}};
+}
+
+}  // namespace palpate

@@ -1,0 +1,74 @@
+#include "runtime/app/session_check.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdint>
+
+#include "base/error.h"
+#include "runtime/safety/device.h"
+#include "runtime/safety/fault.h"
+#include "runtime/tick/status.h"
+
+namespace palpate {
+namespace {
+
+constexpr auto all_events =
+    static_cast<unsigned>(DeviceEvent::opened_again | DeviceEvent::lost | DeviceEvent::acknowledged |
+                          DeviceEvent::input_lost | DeviceEvent::lifted | DeviceEvent::resumed);
+
+std::uint32_t all_status_bits() {
+  std::uint32_t bits = 0;
+  for (const auto& [bit, name] : status_names) bits |= static_cast<std::uint32_t>(bit);
+  return bits;
+}
+
+/// Whether one of the names belongs to this number.
+template <class Names>
+bool is_named(const Names& names, std::uint8_t number) {
+  return std::any_of(names.begin(), names.end(), [number](const auto& named) {
+    return static_cast<std::uint8_t>(named.first) == number;
+  });
+}
+
+}  // namespace
+
+void check_session(const Recording& session, const std::filesystem::path& where) {
+  const std::uint32_t status_bits = all_status_bits();
+  for (std::size_t k = 0; k < session.ticks.size(); ++k) {
+    const TickRecord& tick = session.ticks[k];
+    const auto expect = [&](bool known, const char* name, std::uint32_t value, const char* kind) {
+      if (known) return;
+      throw Error(
+          fmt::format("{}, row {}, holds {}, which is no {}", name, k, value, kind), where.string(),
+          "copy the file again; if it is whole, read it with the version that made it: " + session.generator);
+    };
+    expect(is_named(safety_phase_names, tick.phase), "/ticks/phase", tick.phase, "phase of safety");
+    expect(is_named(fault_names, tick.fault), "/ticks/fault", tick.fault, "fault");
+    expect((tick.event & ~all_events) == 0, "/ticks/event", tick.event, "set of events");
+    expect((tick.status & ~status_bits) == 0, "/ticks/status", tick.status, "set of status bits");
+  }
+}
+
+Recording read_session(const std::filesystem::path& path) {
+  Recording session = read_recording(path);
+  check_session(session, path);
+  return session;
+}
+
+void check_overlays(const Recording& session, const Body& body, const std::filesystem::path& where) {
+  const auto nodes = static_cast<std::int64_t>(body.model().mesh.nodes.size());
+  for (std::size_t k = 0; k < session.ticks.size(); ++k) {
+    const Index node = session.ticks[k].patch;
+    if (node < 0) continue;
+    const Index stored = node < nodes ? body.stored_node(node) : -1;
+    if (stored >= 0 && body.surface_node_of_stored(stored) >= 0) continue;
+    throw Error(fmt::format("/ticks/patch, row {}, holds {}, which is no node that an overlay can lie round: "
+                            "the body has {} nodes",
+                            k, node, nodes),
+                where.string(),
+                "replay it with the model that it was recorded with: " + session.info.model_path);
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,21 @@
+// Recordings that a replay and a viewer can trust.
+#pragma once
+
+#include <filesystem>
+
+#include "formats/recording.h"
+#include "runtime/body/body.h"
+
+namespace palpate {
+
+/// Proves that the ticks of a recording hold only phases, faults, events and status bits that there are.
+/// Throws Error (where = `where`, the field is named).
+void check_session(const Recording& session, const std::filesystem::path& where);
+
+/// Reads a recording and checks it. Throws Error.
+Recording read_session(const std::filesystem::path& path);
+
+/// Proves that a replay on this body finds the nodes round which the session had its overlays. Throws Error.
+void check_overlays(const Recording& session, const Body& body, const std::filesystem::path& where);
+
+}  // namespace palpate

@@ -1,0 +1,126 @@
+#include "runtime/app/session_pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "runtime/app/run_state.h"
+#include "runtime/app/session_check.h"
+#include "runtime/loop/settings.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t most_samples = 100'000;
+
+Vec3 vector_of(const double (&v)[3]) {
+  return {v[0], v[1], v[2]};
+}
+
+Eigen::Quaterniond quaternion_of(const double (&wxyz)[4]) {
+  return {wxyz[0], wxyz[1], wxyz[2], wxyz[3]};
+}
+
+std::int64_t number_of(const TickRecord& tick, std::int64_t rate) {
+  return std::llround(tick.time * static_cast<double>(rate));
+}
+
+TickNote note_of(const TickRecord& tick, std::int64_t rate) {
+  const std::int64_t number = number_of(tick, rate);
+  const auto due = std::llround(static_cast<double>(number) * 1e9 / static_cast<double>(rate));
+  return {.number = number,
+          .lateness_ns = tick.begun_ns - due,
+          .compute_ns = tick.compute_ns,
+          .force = vector_of(tick.force),
+          .shown = vector_of(tick.shown_force).norm(),
+          .depth = std::numeric_limits<double>::quiet_NaN(),  // is not recorded
+          .contacts = tick.contacts,
+          .phase = static_cast<SafetyPhase>(tick.phase),
+          .fault = static_cast<Fault>(tick.fault)};
+}
+
+}  // namespace
+
+SessionPictures::SessionPictures(const std::filesystem::path& path) : file_(path) {
+  check_session(recording(), path);
+  if (frames() == 0 || recording().frames.surface.nodes.empty()) {
+    throw Error("has no pictures of the surface", path.string(),
+                "record it again without --record-frames 0; palpate-runtime session tells what is in it");
+  }
+}
+
+/// The tick with this number, or the last one before it; null where there is none.
+const TickRecord* SessionPictures::tick(std::int64_t number) const {
+  const std::int64_t rate = recording().info.rate;
+  const auto after =
+      std::upper_bound(recording().ticks.begin(), recording().ticks.end(), number,
+                       [&](std::int64_t wanted, const TickRecord& t) { return wanted < number_of(t, rate); });
+  return after == recording().ticks.begin() ? nullptr : &*std::prev(after);
+}
+
+SurfacePicture SessionPictures::picture(std::int64_t frame) const {
+  SurfacePicture picture;
+  picture.frame = file_.frame(frame);
+  if (const TickRecord* then = tick(picture.frame.tick)) {
+    picture.device = {.orientation = quaternion_of(then->device_orientation),
+                      .position = vector_of(then->device_position),
+                      .grab = then->grab != 0};
+    picture.tool = {.orientation = quaternion_of(then->tool_orientation),
+                    .position = vector_of(then->tool_position),
+                    .grab = then->grab != 0};
+    picture.on_body = {.force = vector_of(then->force), .torque = vector_of(then->torque)};
+    picture.status = static_cast<StepStatus>(then->status);
+  }
+  return picture;
+}
+
+nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
+  using nlohmann::json;
+  const RecordedSurface& surface = recording().frames.surface;
+  Eigen::AlignedBox3d bounds;
+  for (const Vec3& node : surface.nodes) bounds.extend(node);
+  const auto point = [](const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); };
+  std::string name = std::filesystem::path(recording().info.model_path).filename().string();
+  if (const std::size_t suffix = name.find(".palpate.hdf"); suffix != std::string::npos) name.resize(suffix);
+  RunState state;
+  state.model = {{"name", name},
+                 {"file", recording().info.model_path},
+                 {"dimension", surface.corners},
+                 {"nodes", nullptr},
+                 {"surface_nodes", surface.nodes.size()},
+                 {"elements", nullptr},
+                 {"dofs", nullptr},
+                 {"element", nullptr},
+                 {"size", bounds.diagonal().norm()},
+                 {"bounds", {point(bounds.min()), point(bounds.max())}},
+                 {"moves", false},
+                 {"loads", false}};
+  state.defaults = {{"radius", 0.0}, {"reach", 0.0}, {"friction", 0.0}, {"depth", 0.0}};
+  state.device = recording().info.device;
+  state.rate = recording().info.rate;
+  state.ticks = std::ssize(recording().ticks);
+  state.locked = "this is a recording";
+  state.settings = split_settings(recording().info.options);
+  json told = to_json(state);
+  told.update({{"frames", times.size()},
+               {"frame", 0},
+               {"duration", times.empty() ? 0.0 : times.back()},
+               {"times", times}});
+  return told;
+}
+
+std::vector<TickRun> SessionPictures::ticks() const {
+  const std::int64_t rate = recording().info.rate;
+  const std::int64_t stride = (std::ssize(recording().ticks) + most_samples - 1) / most_samples;
+  std::vector<TickRun> runs;
+  for (std::size_t k = 0; k < recording().ticks.size(); k += static_cast<std::size_t>(stride)) {
+    const TickNote note = note_of(recording().ticks[k], rate);
+    if (runs.empty() || note.number != runs.back().notes.back().number + stride)
+      runs.push_back({.notes = {}, .stride = stride});
+    runs.back().notes.push_back(note);
+  }
+  return runs;
+}
+
+}  // namespace palpate

@@ -1,0 +1,132 @@
+#include "runtime/app/view.h"
+
+#include <fmt/core.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/write_file.h"
+#include "formats/output_paths.h"
+#include "formats/recording_parts.h"
+#include "runtime/app/session_pictures.h"
+#include "runtime/viewer/page_archive.h"
+#include "runtime/viewer/run_words.h"
+#include "runtime/viewer/viewer_server.h"
+#include "runtime/viewer/wire.h"
+#include "runtime/web/page.h"
+
+namespace palpate {
+namespace {
+
+/// A recording that the viewer's page leafs through.
+class SessionView : public ViewedRun {
+ public:
+  SessionView(const SessionPictures& pictures, ViewerPort port)
+      : pictures_(pictures), state_(pictures.state(pictures.times())), server_(std::move(port), *this, true) {
+    const std::lock_guard lock(mutex_);  // a page may seek already
+    server_.show_scene(std::make_shared<const Scene>(pictures.scene()));
+    server_.show_state(json_text(state_));
+    state_.erase("times");  // which the server keeps
+    for (const TickRun& run : pictures.ticks()) server_.show_ticks(run.notes, run.stride);
+    server_.show_picture(pictures.picture(0));
+  }
+
+  [[nodiscard]] const std::string& url() const noexcept { return server_.url(); }
+
+  void seek(std::int64_t frame) override {
+    const std::lock_guard lock(mutex_);
+    const std::int64_t shown = std::clamp<std::int64_t>(frame, 0, pictures_.frames() - 1);
+    server_.show_picture(pictures_.picture(shown));
+    state_["frame"] = shown;
+    server_.show_state(json_text(state_));
+  }
+  void point(const PointerPose&) override {}
+  void lose_pointer() override {}
+  void pause(bool) override { refuse(); }
+  void step_once() override { refuse(); }
+  void reset() override { refuse(); }
+  void acknowledge() override { refuse(); }
+  void change(const SettingsChange&) override { refuse(); }
+  void record(bool) override { refuse(); }
+
+ private:
+  [[noreturn]] static void refuse() {
+    throw Error("cannot be done with a recording", "palpate-runtime view",
+                "touch the body itself: palpate-runtime play MODEL.palpate.hdf --view");
+  }
+
+  const SessionPictures& pictures_;
+  std::mutex mutex_;
+  nlohmann::json state_;
+  ViewerServer server_;
+};
+
+/// Numbers of the frames that go into the page.
+std::vector<std::int64_t> choose(const SessionPictures& pictures, const ExportOptions& options) {
+  std::vector<std::int64_t> chosen;
+  const double spacing = (1.0 - 1e-6) / options.fps;
+  for (std::int64_t k = 0; k < pictures.frames(); ++k) {
+    const double time = pictures.time(k);
+    if (time < options.from || (options.to && time > *options.to)) continue;
+    if (chosen.empty() || time - pictures.time(chosen.back()) >= spacing) chosen.push_back(k);
+  }
+  if (chosen.empty()) {
+    throw Error(
+        fmt::format("has no pictures from {:g} s on{}", options.from,
+                    options.to ? fmt::format(" to {:g} s", *options.to) : ""),
+        options.recording.string(),
+        fmt::format("it lasts from {:g} to {:g} s", pictures.time(0), pictures.time(pictures.frames() - 1)));
+  }
+  return chosen;
+}
+
+}  // namespace
+
+int view(const std::filesystem::path& recording, const ViewerOptions& options) {
+  sigset_t ends;  // blocked before the server's thread begins, which inherits that
+  sigemptyset(&ends);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
+  pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+  ViewerPort port(options);
+  const SessionPictures pictures(recording);
+  const SessionView session(pictures, std::move(port));
+  fmt::print(stderr, "{}: {} pictures, {:.3f} s\nopen {} in a browser; Ctrl-C ends\n", recording.string(),
+             pictures.frames(), pictures.time(pictures.frames() - 1), session.url());
+  int signal = 0;
+  sigwait(&ends, &signal);
+  return exit_ok;
+}
+
+int export_html(const ExportOptions& options) {
+  OutputPaths paths(options.force);
+  paths.add_input(options.recording, "the recording");
+  paths.add_input(parts_folder(options.recording), "the recording's parts");
+  const std::filesystem::path html = paths.add(options.html, OutputKind::page, "--html");
+  const SessionPictures pictures(options.recording);
+  const std::vector<std::int64_t> chosen = choose(pictures, options);
+  std::vector<double> times;
+  times.reserve(chosen.size());
+  for (const std::int64_t frame : chosen) times.push_back(pictures.time(frame));
+
+  PageArchive archive;
+  archive.add_text(hello_word("file", 0));
+  const Scene scene = pictures.scene();
+  const StateWord state(json_text(pictures.state(times)));
+  archive.add_text(state.for_page(scene.number, {}, state.times()));
+  archive.add_binary(encode_scene(scene));
+  for (const TickRun& run : pictures.ticks())
+    archive.add_binary(encode_ticks(scene.number, run.notes, run.stride));
+  for (const std::int64_t frame : chosen)
+    archive.add_binary(encode_frame(pictures.picture(frame), scene, nullptr));
+  const std::string page = archive.page(viewer_page());
+  write_file(html, page);
+  fmt::print(stderr, "{}: {} pictures, {:.1f} s, {:.1f} MB\n", options.html.string(), chosen.size(),
+             times.back() - times.front(), 1e-6 * static_cast<double>(page.size()));
+  return exit_ok;
+}
+
+}  // namespace palpate

@@ -1,0 +1,393 @@
+#include "runtime/app/viewed_play.h"
+
+#include <fmt/chrono.h>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <ctime>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include "base/error.h"
+#include "base/regular_file.h"
+#include "runtime/app/fitting_tool.h"
+#include "runtime/body/overlay_rings.h"
+#include "runtime/loop/loading.h"
+#include "runtime/loop/output.h"
+#include "runtime/loop/session_xdmf.h"
+#include "runtime/viewer/run_words.h"
+#include "runtime/viewer/scene.h"
+
+namespace palpate {
+namespace {
+
+constexpr auto state_period = std::chrono::milliseconds(500);
+/// Settings that decide how strong and how sudden the force on a hand may be.
+constexpr std::array<std::string_view, 5> settings_of_the_hand = {"safety", "coupling", "coupling-torsion",
+                                                                  "max-force", "hand-over"};
+
+constexpr auto pause_for_wishes = std::chrono::milliseconds(20);
+
+/// FILE-STEM-YYYYmmdd-HHMMSS.h5 in the working directory; with a number where that is there already.
+std::filesystem::path name_recording(const std::filesystem::path& model) {
+  std::filesystem::path stem = model.stem();  // without .hdf
+  if (stem.extension() == ".palpate") stem = stem.stem();
+  const std::string name =
+      fmt::format("{}-{:%Y%m%d-%H%M%S}", stem.string(), fmt::localtime(std::time(nullptr)));
+  std::filesystem::path path = name + ".h5";
+  for (int k = 2; std::filesystem::exists(path); ++k) path = fmt::format("{}-{}.h5", name, k);
+  return path;
+}
+
+/// What can be seen of a file that is gone before the body that came of it goes too.
+void expect_file(const std::filesystem::path& file) {
+  check_regular_file(file, "put it back, or start palpate-runtime play anew");
+}
+
+std::string sentence(const std::exception& error) {
+  const auto* known = dynamic_cast<const Error*>(&error);
+  if (known == nullptr) return error.what();
+  return in_one_line(*known);
+}
+
+}  // namespace
+
+ViewedPlay::ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body, ViewerPort port)
+    : options_(std::move(options)),
+      mover_(mover),
+      body_(std::move(body)),
+      body_options_(options_.settings.body()),
+      can_move_(body_->model().dynamics.method != DynamicsMethod::none),
+      most_rings_(overlay_rings(*body_)),
+      size_(body_->bounds().diagonal().norm()),
+      port_(std::move(port)),
+      wished_{.text = options_.settings_text, .settings = options_.settings, .record = options_.record} {
+  if (options_.device.kind == DeviceChoice::Kind::mouse) add_mouse(mover_, options_, *body_);
+  state_.device = options_.device.text;
+  state_.pointer = mover_.mouse != nullptr;
+  state_.hand = has_hand();
+  state_.rate = options_.settings.rate;
+  if (options_.session) state_.locked = "a replay is as its session was";
+}
+
+LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
+  ViewerServer server(std::move(port_), *this);
+  server_ = &server;
+  show_body();
+  const std::jthread teller([this](const std::stop_token& over) { tell_states(over); });
+
+  std::optional<Plan> good;  // that could be met
+  for (;;) {
+    const Plan plan = next_plan();
+    std::unique_ptr<Act> act;
+    LoopReport report;
+    try {
+      act = begin_act(plan);
+      if (!good) fmt::print(stderr, "open {} in a browser\n", server.url());
+      good = plan;
+      report = run_act(*act, stop);
+      if (has_hand()) latched_ = act->fault();
+    } catch (const std::exception& error) {
+      if (!good || !take_back(plan, *good, sentence(error))) throw;
+      continue;
+    }
+    const bool over = options_.duration && report.ticks >= mover_.ticks;
+    if (stop || over || !wait_for_wish(stop)) {
+      act->tell();
+      return report;
+    }
+  }
+}
+
+ViewedPlay::Plan ViewedPlay::next_plan() {
+  const std::lock_guard lock(mutex_);
+  control_.leave = false;
+  control_.single_ticks = control_.paused ? 1 : 0;  // it shows the body as it is then
+  return wished_;
+}
+
+/// The state that pages see is that of the new act from here on.
+std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
+  if (latched_ != Fault::none && !plan.record.empty()) {
+    throw Error("there is no force until the fault is acknowledged, and a recording begins without one",
+                "record", "acknowledge the fault first");
+  }
+  load(plan.settings);
+  PlayOptions options = options_;
+  options.settings_text = plan.text;
+  options.settings = plan.settings;
+  settle_tool(options, *body_);
+  options.settings = settle(options.settings, mover_, *body_);
+  options.record = plan.record;
+  if (!plan.record.empty() && plan.record != options_.record) {  // which was looked at before
+    OutputPaths paths(false);
+    add_recording(paths, plan.record, "record");
+  }
+  print_device(mover_, options.settings);
+  if (options.settings.overlay) begin_making("the overlay is being made");
+  const SettingsText settled = options.settings_text;
+  {
+    const std::lock_guard lock(mutex_);
+    state_.recording_failed.reset();
+  }
+  auto act = std::make_unique<Act>(
+      std::move(options), *body_, mover_,
+      ActViewer{
+          .control = &control_,
+          .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
+          .pictures =
+              [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); },
+          .recording_failed = [this](const std::string& reason) { take_recording_failure(reason); }});
+  act->latch(latched_);
+  const std::lock_guard lock(mutex_);
+  state_.settings = settled;
+  state_.busy.reset();
+  state_.ticks = 0;
+  state_.misses = 0;
+  state_.recording.reset();
+  if (!plan.record.empty()) state_.recording = plan.record.string();
+  if (!options_.session) {
+    state_.locked.reset();
+    if (state_.recording) state_.locked = "a recording is being made";
+  }
+  changed_ = true;
+  tell_.notify_all();
+  return act;
+}
+
+/// Another body where the settings need one; the old one goes first, as it is large.
+void ViewedPlay::load(const Settings& settings) {
+  if (body_ != nullptr && body_options_ == settings.body()) return;
+  expect_file(options_.file);
+  begin_making("the model is being loaded");
+  body_.reset();
+  body_ = load_and_print(options_.file, options_.model_toml, settings.body());
+  body_options_ = settings.body();
+  show_body();
+}
+
+/// Pages are told what they wait for.
+void ViewedPlay::begin_making(const char* what) {
+  const std::lock_guard lock(mutex_);
+  state_.busy = what;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+void ViewedPlay::show_body() {
+  std::uint32_t number = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    number = ++state_.scene;
+    state_.model = describe_model(*body_, options_.file.string());
+    state_.defaults = describe_defaults(*body_);
+    changed_ = true;
+  }
+  server_->show_scene(std::make_shared<const Scene>(make_scene(*body_, number)));
+  tell_.notify_all();
+}
+
+LoopReport ViewedPlay::run_act(Act& act, const std::atomic<bool>& stop) {
+  const LoopReport& report = act.run(stop);
+  if (!act.recording_failure()) return report;
+  recording_failed_ = true;
+  if (stop) return report;
+  const std::lock_guard lock(mutex_);  // the next one is without it
+  wished_.record.clear();
+  refuse("the recording failed: " + *act.recording_failure());
+  return report;
+}
+
+/// A script or a session is over: what it left is shown. False when it is to stop.
+bool ViewedPlay::wait_for_wish(const std::atomic<bool>& stop) const {
+  while (!control_.leave && !stop) std::this_thread::sleep_for(pause_for_wishes);
+  return !stop;
+}
+
+/// Back to what could be met, unless that is what failed.
+bool ViewedPlay::take_back(const Plan& failed, const Plan& good, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  if (failed.text == good.text && failed.record.empty()) return false;
+  wished_ = good;
+  wished_.record.clear();
+  refuse(why);
+  return true;
+}
+
+RunState ViewedPlay::state() const {
+  const std::lock_guard lock(mutex_);
+  RunState state = state_;
+  state.paused = control_.paused;
+  return state;
+}
+
+void ViewedPlay::point(const PointerPose& wanted) {
+  if (mover_.mouse != nullptr) mover_.mouse->point(wanted);
+}
+
+void ViewedPlay::lose_pointer() {
+  if (mover_.mouse != nullptr) mover_.mouse->lose();
+}
+
+void ViewedPlay::pause(bool paused) {
+  const std::lock_guard lock(mutex_);
+  control_.single_ticks = 0;
+  control_.paused = paused;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+void ViewedPlay::step_once() {
+  if (control_.paused) ++control_.single_ticks;
+}
+
+void ViewedPlay::acknowledge() {
+  if (has_hand()) {
+    throw PageError(PageRefusal::hand, "a hand is in the device, and no page may give it force again",
+                    "acknowledge",
+                    "who holds it presses Enter where palpate-runtime was started, or sends it SIGUSR1");
+  }
+  control_.acknowledged = true;
+}
+
+void ViewedPlay::reset() {
+  const std::lock_guard lock(mutex_);
+  if (wished_.record.empty()) return end_act();
+  throw PageError(PageRefusal::locked, "a recording is being made, which begins with the untouched body",
+                  "reset", "end the recording first");
+}
+
+void ViewedPlay::change(const SettingsChange& settings) {
+  const std::lock_guard lock(mutex_);
+  refuse_to_hand(settings);
+  refuse_while_locked();
+  Plan plan = wished_;
+  for (const auto& [name, value] : settings) {
+    for (const char* fixed : {"rate", "motion-scale", "force-scale", "origin", "axes"}) {
+      if (name == fixed)
+        throw Error("it stays as it is in a run", "--" + name,
+                    "start palpate-runtime play anew with another one");
+    }
+    if (value) {
+      plan.text[name] = *value;
+    } else {
+      plan.text.erase(name);
+    }
+  }
+  plan.settings = read_settings(plan.text);
+  check(plan.settings);
+  wished_ = std::move(plan);
+  end_act();
+}
+
+void ViewedPlay::record(bool on) {
+  const std::lock_guard lock(mutex_);
+  if (on == !wished_.record.empty()) return;
+  if (options_.session) {
+    throw PageError(PageRefusal::locked, "a replay is recorded already", "record", "copy the session's file");
+  }
+  wished_.record = on ? name_recording(options_.file) : std::filesystem::path();
+  end_act();
+}
+
+void ViewedPlay::seek(std::int64_t) {
+  throw Error("the loop goes through all ticks of the session, one after the other", "seek",
+              "reset it to see it from its beginning");
+}
+
+/// With the mutex held, as those below.
+void ViewedPlay::refuse_while_locked() const {
+  if (options_.session)
+    throw PageError(PageRefusal::locked, "a replay is as its session was", "change",
+                    "play without --device replay");
+  if (!wished_.record.empty()) {
+    throw PageError(PageRefusal::locked, "a recording is being made, of one group of settings", "change",
+                    "end the recording first");
+  }
+}
+
+/// What a page may change while a hand is in the device begins an act of its own: no force at once, then the
+/// same safety rules from their start, out of contact.
+void ViewedPlay::refuse_to_hand(const SettingsChange& settings) const {
+  if (!has_hand()) return;
+  for (const std::string_view name : settings_of_the_hand) {
+    if (!settings.contains(std::string(name))) continue;
+    throw PageError(PageRefusal::hand, "a hand is in the device, and no page may change what protects it",
+                    "--" + std::string(name), "start palpate-runtime play anew with another one");
+  }
+}
+
+/// What can be seen without loading.
+void ViewedPlay::check(const Settings& settings) const {
+  if (settings.contact == ContactModel::dynamic && !can_move_) {
+    throw Error("the file has no dynamics, which dynamic contact needs", "--contact",
+                "add [dynamics] to its model.toml and precompute it again");
+  }
+  if (settings.overlay && settings.overlay->rings > most_rings_) {
+    throw Error(most_rings_ == 0
+                    ? "the file keeps no layers below the surface, which overlays need"
+                    : fmt::format("the file keeps layers below the surface for at most {} rings, not {}",
+                                  most_rings_, settings.overlay->rings),
+                "--overlay",
+                fmt::format("{}precompute it with [storage] layers = {}",
+                            most_rings_ == 0 ? "" : "take fewer rings, or ", settings.overlay->rings));
+  }
+  const std::string problem = too_large(settings.tool, size_);
+  if (!problem.empty()) throw Error(problem, "--tool", "take a smaller one");
+}
+
+void ViewedPlay::end_act() {
+  state_.refused.reset();
+  control_.leave = true;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+/// The page is told until its next wish.
+void ViewedPlay::refuse(const std::string& why) {
+  print_warning(why);
+  state_.refused = why;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+/// By the recorder's thread.
+void ViewedPlay::take_recording_failure(const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  state_.recording_failed = reason;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+void ViewedPlay::take_ticks(std::span<const TickNote> notes) {
+  server_->show_ticks(notes);
+  const std::lock_guard lock(mutex_);
+  const std::int64_t period = 1'000'000'000 / state_.rate;
+  for (const TickNote& note : notes) state_.misses += note.lateness_ns + note.compute_ns > period ? 1 : 0;
+  const TickNote& last = notes.back();
+  state_.ticks = last.number + 1;
+  const bool other = state_.phase != last.phase || state_.fault != last.fault;
+  state_.phase = last.phase;
+  state_.fault = last.fault;
+  if (!other) return;
+  changed_ = true;
+  tell_.notify_all();
+}
+
+/// The thread that tells pages how it is, twice a second and when something changed.
+void ViewedPlay::tell_states(const std::stop_token& over) {
+  std::unique_lock lock(mutex_);
+  while (!over.stop_requested()) {
+    changed_ = false;
+    lock.unlock();
+    const std::string json = json_text(to_json(state()));
+    server_->show_state(json);
+    lock.lock();
+    tell_.wait_for(lock, over, state_period, [this] { return changed_; });
+  }
+}
+
+}  // namespace palpate

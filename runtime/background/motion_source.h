@@ -1,0 +1,60 @@
+// Steps the packed dynamics beside the tick.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+#include "base/latest.h"
+#include "runtime/body/packed_newmark.h"
+#include "runtime/tick/state.h"
+
+namespace palpate {
+
+struct MotionSourceOptions {
+  bool in_background = true;  ///< else `receive` does the step itself: equal runs stay equal
+  int jobs = 0;               ///< threads that multiply; 0: one for each processor but one
+};
+
+/// Does the jobs of a state's FreeMotion for a body of packed dynamics: after each tick `post`, before the
+/// next one `receive`. In the background neither waits: a step that is not there in time comes later, and the
+/// body's time stands still meanwhile.
+class MotionSource {
+ public:
+  /// `body` must live as long; `state` is one that the loop will use, or a copy. Throws Error unless the
+  /// body's dynamics are packed.
+  MotionSource(const Body& body, const State& state, const MotionSourceOptions& options);
+  ~MotionSource();
+  MotionSource(const MotionSource&) = delete;
+  MotionSource& operator=(const MotionSource&) = delete;
+
+  void receive(State& state) noexcept;
+  /// For a replay of a tick that had the samples up to `step`; not in the background.
+  void receive(State& state, std::int64_t step) noexcept;
+  void post(const State& state) noexcept;
+
+  [[nodiscard]] std::int64_t steps() const noexcept { return steps_; }     ///< done so far
+  [[nodiscard]] double longest_step() const noexcept { return longest_; }  ///< [s]
+
+ private:
+  void work() noexcept;
+  void do_job(const MotionJob& job) noexcept;
+  void let_go(const LetGo& release) noexcept;
+
+  const Body& body_;
+  PackedNewmark newmark_;
+  bool in_background_;
+  Latest<MotionJob> jobs_;
+  Latest<MotionSample> samples_;
+  std::int64_t done_ = 0;          // the last job
+  std::int64_t let_go_done_ = 0;   // of the body
+  std::vector<double> f_, u_, v_;  // [n] scratch
+  std::vector<std::int64_t> touched_;
+  std::atomic<std::int64_t> steps_ = 0;
+  std::atomic<double> longest_ = 0.0;
+  std::atomic<bool> stop_ = false;
+  std::thread worker_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,218 @@
+#include "runtime/background/patch_source.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t most_patches = 4096;
+constexpr auto pause = std::chrono::microseconds(500);
+
+}  // namespace
+
+PatchSource::PatchSource(const Body& body, const State& state, const PatchSourceOptions& options)
+    : body_(body),
+      options_(options),
+      maker_(body, options.rings),
+      choice_(body, state),
+      slots_(most_patches),
+      first_slot_(static_cast<std::size_t>(body.greens().nodes()), -1),
+      next_slot_(most_patches, -1),
+      wishes_(PatchWishes{}),
+      deliveries_(2 * most_patches) {
+  for (std::size_t slot = most_patches; slot-- > 0;) free_slots_.push_back(static_cast<Index>(slot));
+  if (options_.in_background) builder_ = std::thread([this] { build_wishes(); });
+}
+
+PatchSource::~PatchSource() {
+  stop_ = true;
+  if (builder_.joinable()) builder_.join();
+}
+
+void PatchSource::serve(State& state) noexcept {
+  choice_.follow(body_, state);
+  if (!options_.in_background && !choice_.now().empty()) {
+    ++round_;
+    build(choice_.now());
+  }
+  wishes_.next() = choice_.wishes();
+  wishes_.publish();
+  receive();
+  const PatchKey& wanted = choice_.now();
+  state.patch_is_older = false;
+  if (wanted.empty()) return;
+  if (!(wanted == used_ && state.patch != nullptr)) {
+    const std::shared_ptr<const Patch>* patch = find(wanted);
+    state.patch_is_older = patch == nullptr;
+    if (patch != nullptr) {
+      if (state.patch != nullptr) ++counts_.switches;
+      state.patch = *patch;
+      used_ = wanted;
+    }
+  }
+  count(state);
+}
+
+void PatchSource::serve(State& state, Index centre, bool older) noexcept {
+  state.patch_is_older = older;
+  if (centre < 0) return;
+  PatchKey key;
+  key.add(centre);
+  ++round_;
+  build(key);
+  receive();
+  const std::shared_ptr<const Patch>* patch = find(key);
+  if (patch != nullptr && !(key == used_ && state.patch != nullptr)) {
+    if (state.patch != nullptr) ++counts_.switches;
+    state.patch = *patch;
+    used_ = key;
+  }
+  count(state);
+}
+
+void PatchSource::count(const State& state) noexcept {
+  const bool touches = std::any_of(state.tools.begin(), state.tools.end(),
+                                   [](const ToolState& tool) { return tool.contacts > 0; });
+  ++counts_.ticks;
+  counts_.older += state.patch_is_older ? 1 : 0;
+  counts_.in_contact += touches ? 1 : 0;
+  counts_.older_in_contact += touches && state.patch_is_older ? 1 : 0;
+}
+
+void PatchSource::receive() noexcept {
+  Delivery delivery;
+  while (deliveries_.pop(delivery)) {
+    Delivery& slot = slots_[static_cast<std::size_t>(delivery.slot)];
+    if (slot.patch != nullptr) unlink(delivery.slot);
+    slot = std::move(delivery);
+    if (slot.patch == nullptr) continue;
+    Index& first = first_slot_[static_cast<std::size_t>(slot.key.centres[0])];
+    next_slot_[static_cast<std::size_t>(slot.slot)] = first;
+    first = slot.slot;
+  }
+}
+
+void PatchSource::unlink(Index slot) noexcept {
+  Index* link = &first_slot_[static_cast<std::size_t>(slots_[static_cast<std::size_t>(slot)].key.centres[0])];
+  while (*link != slot) link = &next_slot_[static_cast<std::size_t>(*link)];
+  *link = next_slot_[static_cast<std::size_t>(slot)];
+}
+
+const std::shared_ptr<const Patch>* PatchSource::find(const PatchKey& key) const noexcept {
+  for (Index slot = first_slot_[static_cast<std::size_t>(key.centres[0])]; slot >= 0;
+       slot = next_slot_[static_cast<std::size_t>(slot)]) {
+    const Delivery& at = slots_[static_cast<std::size_t>(slot)];
+    if (at.key == key) return &at.patch;
+  }
+  return nullptr;
+}
+
+void PatchSource::build_wishes() {
+  while (!stop_) {
+    ++round_;
+    if (!build_next(wishes_.read())) std::this_thread::sleep_for(pause);
+  }
+}
+
+/// What is wished for first, then what the file has, then, while there is memory, round the first centre,
+/// those first that the tool moves towards.
+bool PatchSource::build_next(const PatchWishes& wishes) {
+  const std::size_t usual = kept_.empty() ? 0 : bytes_ / kept_.size();
+  std::size_t wanted = 0;  // bytes of the wishes so far: later ones must not push them out
+  for (std::size_t k = 0; k < wishes.count && (k == 0 || wanted + usual <= options_.memory); ++k) {
+    if (build(wishes.keys[k])) return true;
+    const std::shared_ptr<const Patch>& patch = kept_.at(wishes.keys[k]).patch;
+    if (patch != nullptr) wanted += patch->bytes();
+  }
+  if (build_stored()) return true;
+  if (bytes_ + 2 * usual > options_.memory) return false;
+  if (wishes.count == 0 || wishes.keys[0].count() != 1) return false;
+  const Index centre = wishes.keys[0].centres[0];
+  std::vector<Index> neighbours = maker_.neighbours(centre);
+  const auto along = [&](Index node) {
+    return (body_.rest_position(node) - body_.rest_position(centre)).dot(wishes.direction);
+  };
+  std::sort(neighbours.begin(), neighbours.end(),
+            [&](Index a, Index b) { return along(a) != along(b) ? along(a) > along(b) : a < b; });
+  for (const Index neighbour : neighbours) {
+    PatchKey key;
+    key.add(neighbour);
+    if (build(key)) return true;
+  }
+  return false;
+}
+
+/// The next of the file's patches, in their order, as long as there is memory for them.
+bool PatchSource::build_stored() {
+  const StoredOverlay& overlay = body_.model().overlay;
+  while (next_stored_ < overlay.centres.size()) {
+    const Index centre = body_.stored_node(overlay.centres[next_stored_]);
+    const CondensedPatch* condensed = centre >= 0 ? maker_.stored(centre) : nullptr;
+    if (condensed == nullptr || free_slots_.empty() ||
+        bytes_ + Patch::bytes_of(*condensed) > options_.memory) {
+      next_stored_ = overlay.centres.size();
+      break;
+    }
+    ++next_stored_;
+    PatchKey key;
+    key.add(centre);
+    if (build(key)) return true;
+  }
+  return false;
+}
+
+bool PatchSource::build(const PatchKey& key) {
+  std::erase_if(retired_, [](const auto& patch) { return patch.use_count() == 1; });
+  const auto found = kept_.find(key);
+  if (found != kept_.end()) {
+    found->second.wanted = round_;
+    return false;
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  std::shared_ptr<const Patch> patch;
+  try {
+    patch = maker_.make({key.centres.data(), static_cast<std::size_t>(key.count())});
+  } catch (const std::exception&) {
+    ++failed_;  // it is not tried again, and the tick goes on without
+  }
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  longest_build_ = std::max<double>(longest_build_, took.count());
+  Kept& kept = kept_[key];
+  kept.wanted = round_;
+  if (patch == nullptr) return true;
+  ++built_;
+  bytes_ += patch->bytes();
+  make_room();
+  kept.slot = free_slots_.back();
+  free_slots_.pop_back();
+  kept.patch = patch;
+  deliver({kept.slot, key, std::move(patch)});
+  return true;
+}
+
+/// Lets go of those that were not wanted for longest until the rest is within the budget. They are freed by a
+/// later `build`, after the tick and whoever shows the surface have let go of them too.
+void PatchSource::make_room() {
+  while (bytes_ > options_.memory || free_slots_.empty()) {
+    auto oldest = kept_.end();
+    for (auto it = kept_.begin(); it != kept_.end(); ++it) {
+      if (it->second.slot < 0 || it->second.wanted == round_) continue;
+      if (oldest == kept_.end() || it->second.wanted < oldest->second.wanted) oldest = it;
+    }
+    if (oldest == kept_.end()) return;
+    bytes_ -= oldest->second.patch->bytes();
+    free_slots_.push_back(oldest->second.slot);
+    deliver({oldest->second.slot, oldest->first, nullptr});
+    retired_.push_back(std::move(oldest->second.patch));
+    kept_.erase(oldest);
+  }
+}
+
+void PatchSource::deliver(Delivery delivery) {
+  while (!deliveries_.push(delivery) && !stop_) std::this_thread::sleep_for(pause);
+}
+
+}  // namespace palpate

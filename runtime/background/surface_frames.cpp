@@ -1,0 +1,187 @@
+#include "runtime/background/surface_frames.h"
+
+#include <pthread.h>
+
+#include <chrono>
+
+#include "runtime/background/element_stress.h"
+#include "runtime/body/surface_load.h"
+#include "runtime/solve/node_vectors.h"
+
+namespace palpate {
+namespace {
+
+constexpr auto pause = std::chrono::milliseconds(1);
+
+/// A body in the plane, all of whose nodes that can move are stored.
+bool knows_interior(const Body& body) {
+  if (body.dimension() != 2) return false;
+  const std::vector<std::uint8_t>& fixed = body.model().fixed;
+  for (std::size_t node = 0; node < fixed.size(); ++node) {
+    if ((fixed[node] & 3U) != 3U && body.stored_node(static_cast<Index>(node)) < 0) return false;
+  }
+  return true;
+}
+
+void append(const Vec3& vector, std::vector<float>& numbers) {
+  for (const double x : vector) numbers.push_back(static_cast<float>(x));
+}
+
+/// Held where all nodes of the body are that it follows.
+std::uint8_t held_axes(const Body& body, std::size_t node) {
+  const FineSurface& fine = body.fine_surface();
+  unsigned held = (1U << body.dimension()) - 1U;
+  for (auto k = static_cast<std::size_t>(fine.first[node]);
+       k < static_cast<std::size_t>(fine.first[node + 1]); ++k)
+    held &= body.model().fixed[static_cast<std::size_t>(fine.parents[k])];
+  return static_cast<std::uint8_t>(held);
+}
+
+}  // namespace
+
+SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const SurfaceFramesOptions& options,
+                             Sink sink)
+    : body_(body),
+      options_(options),
+      sink_(std::move(sink)),
+      moments_(Moment{.load = state.near.load(),
+                      .motion = ShownMotion(body),
+                      .touches = std::vector<Touch>(state.contact_points.size()),
+                      .forces = std::vector<NodalForce>(static_cast<std::size_t>(state.near.capacity()))}),
+      rest_(body.surface_in_mesh()),
+      stored_(static_cast<std::size_t>(body.greens().order())),
+      u_(rest_.size()),
+      stress_(body),
+      force_(rest_.size(), Vec3::Zero()),
+      nodal_stress_(rest_.size()) {
+  for (std::size_t node = 0; node < rest_.size(); ++node)
+    rest_[node] = body.surface_rest_positions()[node] - rest_[node];
+  if (knows_interior(body)) {
+    const std::size_t nodes = body.model().mesh.nodes.size();
+    interior_ = {element_stress(body.model()), std::vector<Vec3>(nodes), std::vector<Stress>(nodes)};
+  }
+  if (options_.in_background) worker_ = std::thread([this] { work(); });
+}
+
+SurfaceFrames::~SurfaceFrames() {
+  stop_ = true;
+  if (worker_.joinable()) worker_.join();
+}
+
+void SurfaceFrames::post(const State& state, std::int64_t tick, double time) noexcept {
+  if (tick % options_.ticks_per_frame != 0) return;
+  Moment& next = moments_.next();
+  next.load = state.near.load();
+  state.motion.show(next.motion);
+  take_contacts(state, next);
+  const ToolState& tool = state.tools.front();
+  next.device = tool.device;
+  next.tool = tool.pose;
+  next.on_body = {Vec3::Zero() - tool.wrench.force, Vec3::Zero() - tool.wrench.torque};
+  next.status = state.status;
+  next.tick = tick;
+  next.time = time;
+  if (options_.in_background) {
+    moments_.publish();
+  } else {
+    compute(next);
+  }
+}
+
+void SurfaceFrames::take_contacts(const State& state, Moment& moment) const noexcept {
+  moment.touch_count = 0;
+  for (const ContactPoint& contact : state.contacts()) {
+    if (contact.force.isZero(0.0)) continue;
+    moment.touches[moment.touch_count++] = {seen_contact(body_, state, contact), contact.nodes,
+                                            contact.weights};
+  }
+  moment.force_count = 0;
+  for (Index place = 0; place < state.near.count(); ++place) {
+    const Vec3 force = state.near.force(place);
+    if (!force.isZero(0.0)) moment.forces[moment.force_count++] = {state.near.node(place), force};
+  }
+}
+
+void SurfaceFrames::work() {
+  pthread_setname_np(pthread_self(), "pictures");
+  for (;;) {
+    const bool last = stop_;  // read before the moment: nothing is posted after stopping
+    const Moment& moment = moments_.read();
+    if (moment.tick != computed_) {
+      compute(moment);
+    } else if (last) {
+      return;
+    } else {
+      std::this_thread::sleep_for(pause);
+    }
+  }
+}
+
+void SurfaceFrames::compute(const Moment& moment) {
+  computed_ = moment.tick;
+  surface_displacement(body_, moment.load, stored_, u_, &moment.motion);
+  SurfacePicture picture;
+  picture.device = moment.device;
+  picture.tool = moment.tool;
+  picture.on_body = moment.on_body;
+  picture.status = moment.status;
+  picture.patch = moment.load.patch;
+  SurfaceFrame& frame = picture.frame;
+  frame.tick = moment.tick;
+  frame.time = moment.time;
+  frame.displacement.reserve(3 * u_.size());
+  for (std::size_t node = 0; node < u_.size(); ++node) {
+    u_[node] += rest_[node];
+    append(u_[node], frame.displacement);
+  }
+  show_stress(moment, frame);
+  show_pressure(moment, frame);
+  for (std::size_t k = 0; k < moment.touch_count; ++k) picture.contacts.push_back(moment.touches[k].seen);
+  if (interior_) show_interior(picture);
+  sink_(std::move(picture));
+}
+
+void SurfaceFrames::show_stress(const Moment& moment, SurfaceFrame& frame) {
+  const std::span<const NodalForce> forces(moment.forces.data(), moment.force_count);
+  for (const NodalForce& loaded : forces) force_[static_cast<std::size_t>(loaded.node)] = loaded.force;
+  stress_.evaluate(u_, force_, moment.load.patch.get(), nodal_stress_);
+  for (const NodalForce& loaded : forces) force_[static_cast<std::size_t>(loaded.node)].setZero();
+  frame.von_mises.reserve(nodal_stress_.size());
+  for (const Stress& stress : nodal_stress_) frame.von_mises.push_back(static_cast<float>(von_mises(stress)));
+}
+
+void SurfaceFrames::show_pressure(const Moment& moment, SurfaceFrame& frame) const {
+  frame.pressure.resize(u_.size());
+  for (std::size_t k = 0; k < moment.touch_count; ++k) {
+    const Touch& touch = moment.touches[k];
+    const double normal = -touch.seen.force.dot(touch.seen.normal);
+    for (std::size_t n = 0; n < touch.nodes.size(); ++n) {
+      if (touch.nodes[n] < 0) continue;
+      const auto node = static_cast<std::size_t>(touch.nodes[n]);
+      frame.pressure[node] += static_cast<float>(touch.weights[n] * normal / stress_.areas()[node]);
+    }
+  }
+}
+
+void SurfaceFrames::show_interior(SurfacePicture& picture) {
+  Interior& interior = *interior_;
+  for (std::size_t node = 0; node < interior.u.size(); ++node) {
+    interior.u[node] = body_.model().rest_displacement[node];
+    const Index stored = body_.stored_node(static_cast<Index>(node));
+    if (stored >= 0) interior.u[node] += vector_at(stored_, body_.dimension(), stored);
+    append(interior.u[node], picture.plane_displacement);
+  }
+  interior.rows.apply(interior.u, interior.stress);
+  for (const Stress& stress : interior.stress)
+    picture.plane_von_mises.push_back(static_cast<float>(von_mises(stress)));
+}
+
+RecordedSurface recorded_surface(const Body& body) {
+  RecordedSurface surface{
+      body.surface_in_mesh(), body.dimension(), {body.simplices().begin(), body.simplices().end()}};
+  for (std::size_t node = 0; node < surface.nodes.size(); ++node)
+    surface.held.push_back(held_axes(body, node));
+  return surface;
+}
+
+}  // namespace palpate

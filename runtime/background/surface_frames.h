@@ -1,0 +1,116 @@
+// The displacement of the whole surface, at display rate, beside the tick.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "base/latest.h"
+#include "formats/recording.h"
+#include "runtime/background/seen_contact.h"
+#include "runtime/background/surface_stress.h"
+#include "runtime/body/free_motion.h"
+#include "runtime/tick/state.h"
+
+namespace palpate {
+
+struct SurfaceFramesOptions {
+  std::int64_t ticks_per_frame = 16;
+  bool in_background = true;  ///< else `post` computes the frame itself: equal runs stay equal
+};
+
+/// What is seen at one moment.
+struct SurfacePicture {
+  SurfaceFrame frame;
+  ToolPose device;  ///< where the hand wants the tool
+  ToolPose tool;    ///< where it is
+  Wrench on_body;   ///< the opposite of what the hand feels
+  StepStatus status = StepStatus::ok;
+  std::vector<SeenContact> contacts;   ///< those that are closed
+  std::shared_ptr<const Patch> patch;  ///< null: no overlay
+  /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
+  /// empty.
+  std::vector<float> plane_displacement;  ///< [N x 3] node + displacement is what is seen [m]
+  std::vector<float> plane_von_mises;     ///< [N] [Pa]
+};
+
+/// Takes a frame each `ticks_per_frame` ticks, from the first one on, and hands it to `sink`. In the
+/// background a thread of its own computes it; where that takes too long, frames are left out.
+class SurfaceFrames {
+ public:
+  using Sink = std::function<void(SurfacePicture)>;
+
+  /// `body` must live as long; `state` is one that the loop will use, or a copy. `sink` is called by one
+  /// thread and does not throw.
+  SurfaceFrames(const Body& body, const State& state, const SurfaceFramesOptions& options, Sink sink);
+  ~SurfaceFrames();  ///< after the last frame that was posted
+  SurfaceFrames(const SurfaceFrames&) = delete;
+  SurfaceFrames& operator=(const SurfaceFrames&) = delete;
+
+  /// After each tick, with its number and time [s]. In the background it is real-time safe.
+  void post(const State& state, std::int64_t tick, double time) noexcept;
+
+ private:
+  /// A closed contact point, and how its force is spread over surface nodes.
+  struct Touch {
+    SeenContact seen;
+    std::array<Index, 3> nodes{-1, -1, -1};
+    std::array<double, 3> weights{};
+  };
+  struct NodalForce {
+    Index node = -1;  // surface node
+    Vec3 force = Vec3::Zero();
+  };
+  struct Moment {
+    ToolPose device{};
+    ToolPose tool{};
+    SurfaceLoad load;
+    ShownMotion motion;
+    std::vector<Touch> touches;      // [most contacts] the first `touch_count`
+    std::vector<NodalForce> forces;  // [most nodes near the tools] the first `force_count`
+    std::size_t touch_count = 0;
+    std::size_t force_count = 0;
+    Wrench on_body{};
+    std::int64_t tick = -1;
+    double time = 0.0;
+    StepStatus status = StepStatus::ok;
+  };
+  /// The interior of a body in the plane.
+  struct Interior {
+    StressRows rows;
+    std::vector<Vec3> u;         // [N] u0 + u
+    std::vector<Stress> stress;  // [N]
+  };
+
+  void take_contacts(const State& state, Moment& moment) const noexcept;
+  void work();
+  void compute(const Moment& moment);
+  void show_stress(const Moment& moment, SurfaceFrame& frame);
+  void show_pressure(const Moment& moment, SurfaceFrame& frame) const;
+  void show_interior(SurfacePicture& picture);
+
+  const Body& body_;
+  SurfaceFramesOptions options_;
+  Sink sink_;
+  Latest<Moment> moments_;
+  std::vector<Vec3> rest_;      // [S] u0
+  std::vector<double> stored_;  // [n] scratch
+  std::vector<Vec3> u_;         // [S] u, then u0 + u
+  SurfaceStress stress_;
+  std::vector<Vec3> force_;           // [S] of the contacts
+  std::vector<Stress> nodal_stress_;  // [S]
+  std::optional<Interior> interior_;  // in the plane, where all of it is known
+  std::int64_t computed_ = -1;        // tick of the last frame
+  std::atomic<bool> stop_ = false;
+  std::thread worker_;
+};
+
+/// The surface of a body as a recording keeps it.
+RecordedSurface recorded_surface(const Body& body);
+
+}  // namespace palpate

@@ -1,0 +1,99 @@
+// Stress on the surface, where only the surface's displacement is known.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "meshes/element.h"
+#include "runtime/background/side_tractions.h"
+#include "runtime/background/stress_rows.h"
+#include "runtime/body/body.h"
+#include "runtime/body/patch.h"
+
+namespace palpate {
+
+/// The surface's displacement gives the strain within the surface as the elements have it, and the forces on
+/// it give the traction t = sigma n; with the material's D the other components follow: with e the strain
+/// within the surface, P = I - n n^T and sigma_0 = D eps_0
+///   sigma = lambda' (tr e) P + 2 mu e - P sigma_0 P + r (n . (t + sigma_0 n)) P + n t^T + t n^T - (n . t) n
+///   n^T, lambda' = 2 lambda mu / (lambda + 2 mu), r = lambda / (lambda + 2 mu).
+/// Evaluated at the nodes of each facet, and averaged there with the facets' areas as weights: what a facet
+/// says is known on it alone, whatever volume is behind it. At edges each facet has the traction of its own
+/// side (SideTractions), so that an even stress is found exactly there too. Small strain: normals and areas
+/// are those of the mesh. Facets whose nodes are all held along some axis have an unknown traction and do not
+/// count. The weight of the body is no traction: it is found as what interior nodes carry.
+class SurfaceStress {
+ public:
+  /// `body` must live as long.
+  explicit SurfaceStress(const Body& body);
+  SurfaceStress(const SurfaceStress&) = delete;
+  SurfaceStress& operator=(const SurfaceStress&) = delete;
+
+  /// [S] area over which the contact force of a surface node is spread [m^2].
+  [[nodiscard]] std::span<const double> areas() const noexcept { return area_; }
+
+  /// Stress [S] by u0 + u of all surface nodes [m] and the contact forces on them [N]; loads are in it
+  /// already. Not a number where a node has no facet that counts. With an overlay: on its fine surface by the
+  /// fine simplices, where it meets the rest by both; elsewhere between the body's nodes as their shape
+  /// functions say. Allocates nothing.
+  void evaluate(std::span<const Vec3> u, std::span<const Vec3> contact_force, const Patch* patch,
+                std::span<Stress> stress) noexcept;
+
+ private:
+  /// Facets of the elements, or simplices.
+  struct Facet {
+    ElementType type;
+    std::span<const Index> nodes;  // surface nodes
+    const HookesLaw* law;
+  };
+
+  [[nodiscard]] std::size_t facets() const noexcept { return element_.size(); }
+  [[nodiscard]] Facet facet(std::size_t number) const noexcept;
+  [[nodiscard]] Facet simplex(std::size_t number, std::size_t facet) const noexcept;
+  [[nodiscard]] ElementNodes positions_of(std::span<const Index> nodes) const noexcept;
+  [[nodiscard]] Vec3 normal_of(const Facet& facet) const noexcept;
+  [[nodiscard]] std::vector<double> simplex_areas(std::span<const Index> simplices) const;
+  [[nodiscard]] std::size_t place_on_patch(std::size_t facet, Index node) const noexcept;
+  void number_facets();
+  void measure();
+  [[nodiscard]] std::vector<Vec3> nodal_forces_of_loads() const;
+  void find_traction_of_loads();
+  void refine_sides();
+  void make_rows();
+  void evaluate_patch(std::span<const Vec3> u, std::span<const Vec3> contact_force, const Patch& patch,
+                      std::span<Stress> stress) noexcept;
+  template <class PlaceOf>
+  void add(const Facet& facet, const PlaceOf& place_of, std::span<const Vec3> u,
+           std::span<const Vec3> contact_force, std::span<Stress> sum) noexcept;
+  /// The body's nodes come first.
+  [[nodiscard]] std::size_t body_nodes() const noexcept { return body_.surface_mesh_nodes().size(); }
+
+  const Body& body_;
+  std::vector<HookesLaw> laws_;  // of the materials
+  std::vector<Vec3> position_;   // [S] in the mesh
+  ElementType facet_type_;
+  std::vector<Index> facet_nodes_;   // [facets x nodes of one] surface nodes, in the order of boundary_sides
+  std::vector<Index> element_;       // [facets]
+  std::vector<std::uint8_t> known_;  // [facets] whether the traction is
+  std::size_t simplices_of_facet_;   // of a refined surface
+  std::vector<Index> parents_;       // FineSurface::parents as surface nodes
+  std::vector<double> area_;         // [S]
+  std::optional<SurfaceSides> sides_;            // of the facets
+  std::vector<Vec3> load_traction_;              // [their places]
+  std::optional<SurfaceSides> fine_sides_;       // of the simplices, where they are refined
+  std::optional<SideTractions> fine_tractions_;  // by contact forces
+  std::vector<Vec3> fine_load_traction_;         // [their places]
+  StressRows rows_;                              // [body's] by displacement
+  std::vector<std::size_t> first_of_force_;      // [body's + 1] of each node's force in what follows
+  std::vector<Index> row_of_force_;              // node whose stress it changes
+  std::vector<StressBlock> by_force_;            // [1/m^2]
+  // Scratch.
+  std::vector<Vec3> body_force_;        // [body's]
+  std::vector<std::uint8_t> in_patch_;  // [elements]
+  std::vector<std::uint8_t> on_patch_;  // [S]
+  std::vector<double> weight_;          // [S]
+};
+
+}  // namespace palpate

@@ -1,0 +1,251 @@
+#include "runtime/body/body.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "runtime/body/modal_newmark.h"
+#include "runtime/body/surface_numbering.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t search_block = 64;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+void check_sizes(const Model& model) {
+  const std::size_t nodes = model.mesh.nodes.size();
+  const auto in_mesh = [nodes](Index node) { return node >= 0 && static_cast<std::size_t>(node) < nodes; };
+  if (model.greens.order() != model.stored_dofs() ||
+      !std::all_of(model.stored_nodes.begin(), model.stored_nodes.end(), in_mesh)) {
+    throw Error("the Green's functions of " + std::to_string(model.greens.order()) +
+                    " dofs do not belong to the " + std::to_string(model.stored_nodes.size()) +
+                    " stored nodes of a mesh of " + std::to_string(nodes),
+                model.name, "precompute the model again");
+  }
+  const auto check_nodal = [&](const char* what, std::size_t size) {
+    if (size == nodes) return;
+    throw Error(std::string(what) + " of " + std::to_string(size) + " nodes does not belong to a mesh of " +
+                    std::to_string(nodes),
+                model.name, "precompute the model again");
+  };
+  check_nodal("the rest displacement", model.rest_displacement.size());
+  check_nodal("the list of held axes", model.fixed.size());
+  const auto of_a_material = [&model](Index m) {
+    return m >= 0 && static_cast<std::size_t>(m) < model.materials.size();
+  };
+  if (std::ssize(model.material_of_element) != model.mesh.elements() ||
+      !std::all_of(model.material_of_element.begin(), model.material_of_element.end(), of_a_material)) {
+    throw Error("the materials of " + std::to_string(model.material_of_element.size()) +
+                    " elements do not belong to a mesh of " + std::to_string(model.mesh.elements()) +
+                    " elements and " + std::to_string(model.materials.size()) + " materials",
+                model.name, "precompute the model again");
+  }
+}
+
+/// The surface of the elements themselves.
+FineSurface surface_as_it_is(const Model& model) {
+  SurfaceNumbering numbering = number_surface(model.surface, model.mesh.nodes.size());
+  FineSurface surface;
+  surface.simplices = std::move(numbering.simplices);
+  surface.element = surface_elements(model);
+  surface.mesh_nodes = std::move(numbering.mesh_nodes);
+  surface.parents = surface.mesh_nodes;
+  surface.weights.assign(surface.parents.size(), 1.0);
+  surface.first.resize(surface.parents.size() + 1);
+  std::iota(surface.first.begin(), surface.first.end(), 0);
+  return surface;
+}
+
+/// Those that contact is to meet; of dynamic contact with modes still without them.
+Greens take_greens(Model& model, const GreensOptions& options, ContactModel contact) {
+  check_sizes(model);
+  PackedGreens greens = std::exchange(model.greens, {});
+  if (contact == ContactModel::dynamic) {
+    if (model.dynamics.method == DynamicsMethod::none) {
+      throw Error("the file has no dynamics, which dynamic contact needs", model.name,
+                  "add [dynamics] to its model.toml and precompute it again");
+    }
+    if (model.dynamics.method == DynamicsMethod::packed) greens = model.dynamics.inverse;
+  }
+  return Greens(std::move(greens), model.dimension(), options);
+}
+
+/// 1 / k_bar_i - 1 / omega_i^2
+std::vector<double> dynamic_weights(const Modes& modes, const StoredDynamics& dynamics) {
+  const ModalNewmark newmark(modes.omega(), dynamics.damping, dynamics.newmark);
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < modes.omega().size(); ++i) {
+    const double omega = modes.omega()[i];
+    weights.push_back(1.0 / newmark.effective_stiffness()[i] - 1.0 / (omega * omega));
+  }
+  return weights;
+}
+
+}  // namespace
+
+Body::Body(Model model, const GreensOptions& options, int refinement, ContactModel contact)
+    : model_(std::move(model)),
+      contact_model_(contact),
+      greens_(take_greens(model_, options, contact)),
+      refinement_(refinement) {
+  if (model_.dynamics.method == DynamicsMethod::modal) {
+    modes_ = std::make_shared<const Modes>(model_);
+    model_.dynamics.shapes = {};
+    if (contact == ContactModel::dynamic)
+      greens_.add_modes(*modes_, dynamic_weights(*modes_, model_.dynamics));
+  }
+  stored_of_mesh_.assign(model_.mesh.nodes.size(), -1);
+  for (std::size_t k = 0; k < model_.stored_nodes.size(); ++k) {
+    stored_of_mesh_[static_cast<std::size_t>(model_.stored_nodes[k])] = static_cast<Index>(k);
+  }
+  fine_ = refinement_ > 1 ? make_fine_surface(model_, refinement_) : surface_as_it_is(model_);
+  order_by_last_part();
+  find_free_nodes();
+  follow_body();
+  for (const Index element : fine_.element) {
+    const Index material = model_.material_of_element[static_cast<std::size_t>(element)];
+    surface_friction_.push_back(model_.materials[static_cast<std::size_t>(material)].friction);
+  }
+  measure_surface();
+}
+
+/// Surface nodes that follow the same node of the body lie together in memory: the tick moves them together.
+void Body::order_by_last_part() {
+  const auto of_body = static_cast<Index>(fine_.mesh_nodes.size());
+  std::vector<Index> last;
+  for (auto node = static_cast<std::size_t>(of_body); node < static_cast<std::size_t>(fine_.nodes());
+       ++node) {
+    Index& most = last.emplace_back(-1);
+    for (auto k = static_cast<std::size_t>(fine_.first[node]);
+         k < static_cast<std::size_t>(fine_.first[node + 1]); ++k)
+      most = std::max(most, stored_of_mesh_[static_cast<std::size_t>(fine_.parents[k])]);
+  }
+  std::vector<Index> order(last.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
+    return last[static_cast<std::size_t>(a)] < last[static_cast<std::size_t>(b)];
+  });
+  reorder(fine_, order);
+}
+
+void Body::find_free_nodes() {
+  surface_node_of_stored_.assign(model_.stored_nodes.size(), -1);
+  for (std::size_t k = 0; k < fine_.mesh_nodes.size(); ++k) {
+    const auto node = static_cast<std::size_t>(fine_.mesh_nodes[k]);
+    const Index stored = stored_of_mesh_[node];
+    surface_stored_nodes_.push_back(stored);
+    if (stored >= 0) surface_node_of_stored_[static_cast<std::size_t>(stored)] = static_cast<Index>(k);
+    if (stored < 0 || model_.fixed[node] != 0) continue;
+    const Vec3 rest = rest_position(stored);
+    surface_.push_back(stored);
+    x_.push_back(rest.x());
+    y_.push_back(rest.y());
+    z_.push_back(rest.z());
+  }
+  if (surface_.empty()) {
+    throw Error("no node of the surface is free to move, so nothing can be touched", model_.name,
+                "fix a smaller region of the body and precompute the model again");
+  }
+  const std::size_t padded = (surface_.size() + search_block - 1) / search_block * search_block;
+  for (std::vector<double>* coordinate : {&x_, &y_, &z_}) coordinate->resize(padded, infinity);
+}
+
+void Body::follow_body() {
+  first_part_.push_back(0);
+  std::vector<Index> last_part;  // of each surface node, -1 for none
+  for (Index node = 0; node < fine_.nodes(); ++node) {
+    const auto at = static_cast<std::size_t>(node);
+    Vec3 rest = Vec3::Zero();
+    std::vector<std::pair<Index, double>> parts;
+    for (Index k = fine_.first[at]; k < fine_.first[at + 1]; ++k) {
+      const auto parent = static_cast<std::size_t>(fine_.parents[static_cast<std::size_t>(k)]);
+      const double weight = fine_.weights[static_cast<std::size_t>(k)];
+      rest += weight * (model_.mesh.nodes[parent] + model_.rest_displacement[parent]);
+      if (stored_of_mesh_[parent] >= 0) parts.emplace_back(stored_of_mesh_[parent], weight);
+    }
+    std::sort(parts.begin(), parts.end());
+    for (const auto& [stored, weight] : parts) {
+      part_stored_.push_back(stored);
+      part_weight_.push_back(weight);
+    }
+    first_part_.push_back(static_cast<Index>(part_stored_.size()));
+    most_surface_parts_ = std::max(most_surface_parts_, static_cast<Index>(parts.size()));
+    last_part.push_back(parts.empty() ? -1 : parts.back().first);
+    surface_rest_.push_back(rest);
+  }
+  first_follower_.assign(model_.stored_nodes.size() + 1, 0);
+  for (const Index stored : last_part) {
+    if (stored >= 0) ++first_follower_[static_cast<std::size_t>(stored) + 1];
+  }
+  std::partial_sum(first_follower_.begin(), first_follower_.end(), first_follower_.begin());
+  followers_.resize(static_cast<std::size_t>(first_follower_.back()));
+  std::vector<Index> next(first_follower_.begin(), first_follower_.end() - 1);
+  for (std::size_t node = 0; node < last_part.size(); ++node) {
+    if (last_part[node] < 0) continue;
+    Index& place = next[static_cast<std::size_t>(last_part[node])];
+    followers_[static_cast<std::size_t>(place++)] = static_cast<Index>(node);
+  }
+}
+
+std::vector<Vec3> Body::surface_in_mesh() const {
+  std::vector<Vec3> positions(surface_rest_.size(), Vec3::Zero());
+  for (std::size_t node = 0; node < positions.size(); ++node) {
+    for (auto k = static_cast<std::size_t>(fine_.first[node]);
+         k < static_cast<std::size_t>(fine_.first[node + 1]); ++k) {
+      positions[node] += fine_.weights[k] * model_.mesh.nodes[static_cast<std::size_t>(fine_.parents[k])];
+    }
+  }
+  return positions;
+}
+
+void Body::measure_surface() {
+  for (const Vec3& position : surface_rest_) bounds_.extend(position);
+  const auto corners = static_cast<std::size_t>(dimension());
+  double sum = 0.0;
+  for (std::size_t simplex = 0; simplex < simplices().size(); simplex += corners) {
+    for (std::size_t k = 0; k < corners; ++k) {
+      const auto a = static_cast<std::size_t>(simplices()[simplex + k]);
+      const auto b = static_cast<std::size_t>(simplices()[simplex + (k + 1) % corners]);
+      const double length = (surface_rest_[a] - surface_rest_[b]).norm();
+      longest_surface_edge_ = std::max(longest_surface_edge_, length);
+      sum += length;  // a closed surface has each edge as often
+    }
+  }
+  mean_surface_edge_ = sum / static_cast<double>(simplices().size());
+}
+
+NearestNode Body::nearest_surface_node(const Vec3& point) const noexcept {
+  const double z = dimension() == 3 ? point.z() : 0.0;
+  const auto squared_distance = [&](std::size_t i) {
+    const double dx = x_[i] - point.x();
+    const double dy = y_[i] - point.y();
+    const double dz = z_[i] - z;
+    return dx * dx + dy * dy + dz * dz;
+  };
+
+  double nearest = infinity;
+  std::size_t nearest_block = 0;
+  for (std::size_t block = 0; block < x_.size(); block += search_block) {
+    double in_block = infinity;
+#pragma omp simd reduction(min : in_block)
+    for (std::size_t i = block; i < block + search_block; ++i)
+      in_block = std::min(in_block, squared_distance(i));
+    if (in_block < nearest) {
+      nearest = in_block;
+      nearest_block = block;
+    }
+  }
+
+  std::size_t best = nearest_block;
+  for (std::size_t i = best; i < std::min(nearest_block + search_block, surface_.size()); ++i) {
+    if (squared_distance(i) < squared_distance(best)) best = i;
+  }
+  return {surface_[best], std::sqrt(squared_distance(best))};
+}
+
+}  // namespace palpate

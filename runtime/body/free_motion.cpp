@@ -1,0 +1,280 @@
+#include "runtime/body/free_motion.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "runtime/solve/node_vectors.h"
+#include "runtime/solve/vector_loops.h"
+
+namespace palpate {
+namespace {
+
+constexpr double least_fade = 1e-6;
+constexpr double settling = 0.1;          // time in which quasi-static contact stills a body [s]
+constexpr std::size_t least_history = 4;  // ticks of contact that say how fast its forces change
+
+/// Ticks from one step of the file's dynamics to the next.
+std::int64_t count_ticks(const Body& body, double tick) {
+  const Model& model = body.model();
+  if (model.dynamics.method == DynamicsMethod::none) return 1;
+  const double step = model.dynamics.newmark.time_step;
+  const double ticks = std::round(step / tick);
+  const bool dynamic = body.contact_model() == ContactModel::dynamic;
+  if (ticks < 1.0 || std::abs(ticks * tick - step) > 1e-9 * step || (dynamic && ticks > 1.0)) {
+    throw Error(fmt::format("the file's time step of {} s is not {} of {} s", step,
+                            dynamic ? "that of dynamic contact, one tick" : "a whole number of ticks", tick),
+                model.name,
+                fmt::format("precompute with time_step = {} in [dynamics]",
+                            dynamic ? tick : std::max(1.0, ticks) * tick));
+  }
+  return static_cast<std::int64_t>(ticks);
+}
+
+std::size_t size_if(bool wanted, std::int64_t size) {
+  return wanted ? static_cast<std::size_t>(size) : 0;
+}
+
+/// Nodes to keep forces for: none of a body that does not swing.
+Index room(const Body& body, Index most_loads) {
+  return body.model().dynamics.method != DynamicsMethod::none ? most_loads : 0;
+}
+
+LetGo make_let_go(int dimension, Index most_loads) {
+  return {.force = NodalLoad(dimension, 4 * most_loads), .rate = NodalLoad(dimension, 4 * most_loads)};
+}
+
+void add(std::span<const double> x, double factor, std::span<double> y) noexcept {
+  palpate::add(x.data(), factor, y.data(), std::ssize(y));
+}
+
+void set_zero(std::span<double> x) noexcept {
+  std::fill(x.begin(), x.end(), 0.0);
+}
+
+}  // namespace
+
+ShownMotion::ShownMotion(const Body& body)
+    : q(body.modes() != nullptr ? static_cast<std::size_t>(body.modes()->count()) : 0),
+      u(size_if(body.model().dynamics.method != DynamicsMethod::none, body.greens().order())) {}
+
+Vec3 displacement(const Body& body, const ShownMotion& shown, Index stored) noexcept {
+  const Vec3 u = vector_at(shown.u, body.dimension(), stored);
+  return shown.q.empty() ? u : Vec3(u + body.modes()->displacement(stored, shown.q));
+}
+
+void add_motion(const Body& body, const ShownMotion& shown, std::span<double> u) noexcept {
+  const int d = body.dimension();
+  for (Index node = 0; node < body.greens().nodes(); ++node)
+    set_vector(u, d, node, vector_at(u, d, node) + displacement(body, shown, node));
+}
+
+FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
+    : dimension_(body.dimension()),
+      tick_(tick),
+      ticks_per_step_(count_ticks(body, tick)),
+      settled_(std::exp(-tick * static_cast<double>(ticks_per_step_) / settling)),
+      dynamic_contact_(body.contact_model() == ContactModel::dynamic),
+      phase_(ticks_per_step_),
+      pending_(make_let_go(dimension_, room(body, most_loads))),
+      job_{.release = make_let_go(dimension_, room(body, most_loads)),
+           .load = NodalLoad(dimension_, room(body, most_loads))} {
+  const StoredDynamics& dynamics = body.model().dynamics;
+  const bool swings = dynamics.method != DynamicsMethod::none;
+  const bool packed = dynamics.method == DynamicsMethod::packed;
+  const std::int64_t n = body.greens().order();
+  if (swings) loads_.assign(history, NodalLoad(dimension_, most_loads));
+  held_.resize(size_if(swings, n));
+  pending_held_.resize(held_.size());
+  u_before_.resize(size_if(packed, n));
+  u_.resize(u_before_.size());
+  if (const Modes* modes = body.modes()) {
+    modal_.emplace(modes->omega(), dynamics.damping, dynamics.newmark);
+    for (std::vector<double>* of_modes : {&q_before_, &q_held_, &shown_, &g_, &rate_})
+      of_modes->resize(static_cast<std::size_t>(modes->count()));
+  }
+  const std::size_t nodes = size_if(swings, std::ssize(body.surface_rest_positions()));
+  stamp_.assign(nodes, -2);
+  value_.assign(nodes, Vec3::Zero());
+  change_.assign(nodes, Vec3::Zero());
+}
+
+void FreeMotion::begin_tick(const Body& body) noexcept {
+  ++ticks_;
+  if (!active_) return;
+  const bool begins_step = ends_step();
+  phase_ = phase_ % ticks_per_step_ + 1;
+  if (modal_) {
+    if (begins_step) begin_modal_step(body);
+    fade_held(body.modes()->first_dropped_omega());  // from the step's beginning on, as the modes go on
+    const double share = static_cast<double>(phase_) / static_cast<double>(ticks_per_step_);
+    const std::span<const double> q = dynamic_contact_ ? modal_->predicted() : modal_->q();
+    for (std::size_t i = 0; i < shown_.size(); ++i)
+      shown_[i] = q_before_[i] + share * (q[i] - q_before_[i]) - fade_ * q_held_[i];
+  } else if (share_ < 1.0) {
+    share_ = std::min(1.0, static_cast<double>(phase_ - sample_phase_) /
+                               static_cast<double>(ticks_per_step_ - sample_phase_));
+  }
+}
+
+void FreeMotion::fade_held(double omega) noexcept {
+  if (fade_ == 0.0) return;
+  since_let_go_ += tick_;
+  const double angle = omega * since_let_go_;
+  fade_ = (1.0 + angle) * std::exp(-angle);
+  if (!(fade_ > least_fade)) fade_ = 0.0;
+}
+
+void FreeMotion::begin_modal_step(const Body& body) noexcept {
+  if (!pending_.force.empty()) {
+    set_zero(g_);
+    set_zero(rate_);
+    body.modes()->add_projection(pending_.force.nodes(), pending_.force.forces(), 1.0, g_);
+    body.modes()->add_projection(pending_.rate.nodes(), pending_.rate.forces(), 1.0, rate_);
+    modal_->let_go(g_, rate_);
+    const std::span<const double> omega = body.modes()->omega();
+    for (std::size_t i = 0; i < g_.size(); ++i)
+      q_held_[i] = fade_ * q_held_[i] + g_[i] / (omega[i] * omega[i]);
+    for (std::size_t i = 0; i < held_.size(); ++i) held_[i] = fade_ * held_[i] + pending_held_[i];
+    set_zero(pending_held_);
+    pending_.force.clear();
+    pending_.rate.clear();
+    fade_ = 1.0;
+    since_let_go_ = 0.0;
+  }
+  std::copy(modal_->q().begin(), modal_->q().end(), q_before_.begin());
+  modal_->predict();
+  if (!dynamic_contact_) modal_->advance();
+}
+
+Vec3 FreeMotion::displacement(const Body& body, Index stored) const noexcept {
+  Vec3 u = modal_ ? body.modes()->displacement(stored, shown_)
+                  : Vec3((1.0 - share_) * vector_at(u_before_, dimension_, stored) +
+                         share_ * vector_at(u_, dimension_, stored));
+  if (fade_ > 0.0) u += fade_ * vector_at(held_, dimension_, stored);
+  if (!pending_.force.empty()) u += vector_at(pending_held_, dimension_, stored);
+  return u;
+}
+
+Vec3 FreeMotion::at(const Body& body, Index surface_node) noexcept {
+  if (!active_) return Vec3::Zero();
+  const auto node = static_cast<std::size_t>(surface_node);
+  if (stamp_[node] == ticks_) return value_[node];
+  const SurfaceParts parts = body.surface_parts(surface_node);
+  Vec3 u = Vec3::Zero();
+  for (std::size_t k = 0; k < parts.stored.size(); ++k)
+    u += parts.weights[k] * displacement(body, parts.stored[k]);
+  change_[node] = stamp_[node] == ticks_ - 1 ? Vec3(u - value_[node]) : Vec3::Zero();
+  value_[node] = u;
+  stamp_[node] = ticks_;
+  return u;
+}
+
+void FreeMotion::show(ShownMotion& shown) const noexcept {
+  shown.moves = active_;
+  if (!active_) return;
+  std::copy(shown_.begin(), shown_.end(), shown.q.begin());
+  for (std::size_t i = 0; i < shown.u.size(); ++i) shown.u[i] = fade_ * held_[i] + pending_held_[i];
+  for (std::size_t i = 0; i < u_.size(); ++i) shown.u[i] += u_before_[i] + share_ * (u_[i] - u_before_[i]);
+}
+
+void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
+  if (loads_.empty()) return;
+  NodalLoad& now = loads_[static_cast<std::size_t>(ticks_) % history];
+  now.clear();
+  now.add(load.nodes(), load.forces(), 1.0);
+  active_ = active_ || (dynamic_contact_ && !now.empty());
+  if (!active_ || !ends_step()) return;
+  const bool stills = !dynamic_contact_ && !now.empty();
+  if (modal_) {
+    if (stills) modal_->settle(settled_);
+    if (!dynamic_contact_) return;
+    set_zero(g_);
+    body.modes()->add_projection(now.nodes(), now.forces(), 1.0, g_);
+    modal_->advance(g_);
+    return;
+  }
+  ++job_.step;
+  job_.left = stills ? settled_ : 1.0;
+  job_.load.clear();
+  if (dynamic_contact_) job_.load.add(now.nodes(), now.forces(), 1.0);
+  if (pending_.force.empty() || held_in_flight_) return;
+  std::swap(job_.release, pending_);
+  pending_.force.clear();
+  pending_.rate.clear();
+  ++job_.let_go;
+  std::swap(held_, pending_held_);
+  set_zero(pending_held_);
+  fade_ = 1.0;
+  held_in_flight_ = true;
+}
+
+/// How fast the forces of the last ticks changed while there was contact: not as it began, when they come
+/// from nothing at once.
+void FreeMotion::add_rate(const NodalLoad& last) noexcept {
+  const auto before = [&](std::size_t ticks) -> const NodalLoad& {
+    return loads_[(static_cast<std::size_t>(ticks_) + history - ticks) % history];
+  };
+  std::size_t count = 1;
+  while (count < history && !before(count + 1).empty()) ++count;
+  if (count < least_history) return;
+  const double per_second = 1.0 / (static_cast<double>(count - 1) * tick_);
+  if (pending_.rate.add(last.nodes(), last.forces(), per_second))
+    pending_.rate.add(before(count).nodes(), before(count).forces(), -per_second);
+}
+
+void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<double> displacement) noexcept {
+  if (loads_.empty() || (dynamic_contact_ && !modal_)) return;
+  const NodalLoad& last = loads_[static_cast<std::size_t>(ticks_ - 1) % history];
+  if (last.empty()) return;
+  if (dynamic_contact_) {
+    set_zero(g_);
+    body.modes()->add_projection(last.nodes(), last.forces(), 1.0, g_);
+    body.modes()->add_projection(load.nodes(), load.forces(), -1.0, g_);
+    const std::span<const double> k_bar = modal_->effective_stiffness();
+    for (std::size_t i = 0; i < g_.size(); ++i) q_held_[i] = fade_ * q_held_[i] + g_[i] / k_bar[i];
+    for (double& u : held_) u *= fade_;
+    add(displacement, 1.0, held_);
+    fade_ = 1.0;
+    since_let_go_ = 0.0;
+  } else {
+    // Without room for another: its energy is lost.
+    if (!pending_.force.add(last.nodes(), last.forces(), 1.0)) return;
+    pending_.force.add(load.nodes(), load.forces(), -1.0);
+    add_rate(last);
+    add(displacement, 1.0, pending_held_);
+  }
+  for (NodalLoad& before : loads_) {  // what is gone has no past for the next release
+    before.clear();
+    before.add(load.nodes(), load.forces(), 1.0);
+  }
+  active_ = true;
+  std::fill(stamp_.begin(), stamp_.end(), -2);  // what `at` gave holds no longer
+  if (load.count == 0) {
+    set_zero(displacement);
+    return;
+  }
+  body.greens().displacement(load.nodes(), load.forces(), displacement);
+  add(displacement, -1.0, dynamic_contact_ ? held_ : pending_held_);
+}
+
+void FreeMotion::receive(const MotionSample& sample) noexcept {
+  if (sample.step <= sample_step_ || sample.step > job_.step) return;
+  const bool has_held = held_in_flight_ && sample.let_go == job_.let_go;
+  for (std::size_t i = 0; i < u_.size(); ++i) {
+    u_before_[i] += share_ * (u_[i] - u_before_[i]);
+    if (has_held) u_before_[i] += held_[i];
+  }
+  std::copy(sample.u.begin(), sample.u.end(), u_.begin());
+  if (has_held) {
+    fade_ = 0.0;
+    held_in_flight_ = false;
+  }
+  sample_step_ = sample.step;
+  sample_phase_ = phase_ % ticks_per_step_;
+  share_ = 0.0;
+}
+
+}  // namespace palpate

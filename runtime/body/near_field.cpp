@@ -1,0 +1,353 @@
+#include "runtime/body/near_field.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "runtime/solve/node_vectors.h"
+#include "runtime/solve/vector_loops.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t patience = 200;  // ticks that an unwanted node stays: a tool often comes back
+
+std::size_t at(Index i) noexcept {
+  return static_cast<std::size_t>(i);
+}
+
+}  // namespace
+
+NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
+    : dimension_(body.dimension()),
+      capacity_(capacity),
+      parts_(body.most_surface_parts()),
+      stride_((static_cast<std::ptrdiff_t>(dimension_) * capacity + 7) / 8 * 8),
+      patch_stride_((static_cast<std::ptrdiff_t>(dimension_) * patch_nodes + 7) / 8 * 8),
+      patch_room_(patch_nodes),
+      place_(body.surface_rest_positions().size(), -1),
+      place_in_patch_(place_.size(), -1),
+      nodes_(at(capacity), -1),
+      wanted_(at(capacity), 0),
+      C_(static_cast<std::size_t>(stride_ * dimension_ * capacity)),
+      force_(static_cast<std::size_t>(dimension_ * capacity)),
+      last_force_(force_.size()),
+      displacement_(force_.size()),
+      blocks_(static_cast<std::size_t>(dimension_) * force_.size()),
+      base_(at(parts_ * capacity)),
+      base_uses_(base_.size()),
+      base_of_stored_(at(body.greens().nodes()), -1),
+      bases_of_(base_.size()),
+      part_weight_(base_.size()),
+      part_count_(at(capacity)),
+      by_base_(static_cast<std::size_t>(dimension_ * dimension_) * base_.size()),
+      gathered_(static_cast<std::size_t>(dimension_ * dimension_) * std::max(base_.size(), at(patch_nodes))),
+      base_force_(static_cast<std::size_t>(dimension_) * base_.size()),
+      X_(force_.size() * static_cast<std::size_t>(patch_stride_)),
+      Y_(X_.size()),
+      patch_force_(static_cast<std::size_t>(patch_stride_)),
+      load_(dimension_, capacity, static_cast<Index>(base_.size()), patch_nodes) {}
+
+bool NearField::is_loaded(Index place) const noexcept {
+  const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
+  return std::any_of(f, f + dimension_, [](double value) { return value != 0.0; });
+}
+
+Index NearField::longest_unwanted() const noexcept {
+  Index found = -1;
+  for (Index place = 0; place < count_; ++place) {
+    const std::int64_t wanted = wanted_[static_cast<std::size_t>(place)];
+    if (wanted == tick_ || is_loaded(place)) continue;
+    if (found < 0 || wanted < wanted_[static_cast<std::size_t>(found)]) found = place;
+  }
+  return found;
+}
+
+void NearField::begin_tick() noexcept {
+  ++tick_;
+  for (int k = 0; k < 2; ++k) {
+    const Index place = longest_unwanted();
+    if (place < 0 || wanted_[static_cast<std::size_t>(place)] + patience >= tick_) return;
+    forget(place);
+  }
+}
+
+bool NearField::want(const Body& body, Index surface_node) noexcept {
+  if (place_of(surface_node) < 0) {
+    if (count_ == capacity_) {
+      const Index place = longest_unwanted();
+      if (place < 0) return false;
+      forget(place);
+    }
+    add(body, surface_node);
+  }
+  wanted_[static_cast<std::size_t>(place_of(surface_node))] = tick_;
+  return true;
+}
+
+void NearField::add(const Body& body, Index surface_node) noexcept {
+  const Index place = count_++;
+  place_[at(surface_node)] = place;
+  nodes_[at(place)] = surface_node;
+  enter(body, place);
+  connect(body, place);
+  for (Index dof = dimension_ * place; dof < dimension_ * (place + 1); ++dof) {
+    force_[at(dof)] = 0.0;
+    displacement_[at(dof)] = dot(row(dof).data(), force_.data(), std::ptrdiff_t{dimension_} * place);
+  }
+}
+
+/// Of a node beside the patch: the stored nodes that it follows, and how the patch responds to it.
+void NearField::enter(const Body& body, Index place) noexcept {
+  part_count_[at(place)] = 0;
+  if (patch_place(place) >= 0) return;
+  const SurfaceParts parts = body.surface_parts(node(place));
+  part_count_[at(place)] = static_cast<Index>(parts.stored.size());
+  for (std::size_t k = 0; k < parts.stored.size(); ++k) {
+    Index& base = base_of_stored_[at(parts.stored[k])];
+    if (base < 0) {
+      base = base_count_++;
+      base_[at(base)] = parts.stored[k];
+      base_uses_[at(base)] = 0;
+    }
+    ++base_uses_[at(base)];
+    bases_of_[at(parts_ * place) + k] = base;
+    part_weight_[at(parts_ * place) + k] = parts.weights[k];
+  }
+  if (patch() != nullptr) respond(body, place);
+}
+
+/// Lets go of the stored nodes that nobody else follows; the last one takes the place of one that goes.
+void NearField::leave(Index place) noexcept {
+  for (Index k = 0; k < part_count_[at(place)]; ++k) {
+    const Index base = bases_of_[at(parts_ * place + k)];
+    if (--base_uses_[at(base)] > 0) continue;
+    base_of_stored_[at(base_[at(base)])] = -1;
+    const Index last = --base_count_;
+    if (base == last) continue;
+    base_[at(base)] = base_[at(last)];
+    base_uses_[at(base)] = base_uses_[at(last)];
+    base_of_stored_[at(base_[at(base)])] = base;
+    for (Index other = 0; other < count_; ++other) {
+      const auto first = bases_of_.begin() + std::ptrdiff_t{parts_} * other;
+      std::replace(first, first + part_count_[at(other)], last, base);
+    }
+  }
+  part_count_[at(place)] = 0;
+}
+
+/// X = Xi_Q of forces on the node, and Y = M X.
+void NearField::respond(const Body& body, Index place) noexcept {
+  const std::span<const Index> Q = patch()->stored_nodes();
+  const std::ptrdiff_t width = patch_dofs();
+  for (int axis = 0; axis < dimension_; ++axis) std::fill_n(X(dimension_ * place + axis), width, 0.0);
+  for (Index k = 0; k < part_count_[at(place)]; ++k) {
+    body.greens().gather(base_[at(bases_of_[at(parts_ * place + k)])], Q,
+                         {gathered_.data(), static_cast<std::size_t>(dimension_ * width)});
+    const double weight = part_weight_[at(parts_ * place + k)];
+    for (int axis = 0; axis < dimension_; ++axis)
+      palpate::add(gathered_.data() + axis * width, weight, X(dimension_ * place + axis), width);
+  }
+  for (int axis = 0; axis < dimension_; ++axis) {
+    const double* x = X(dimension_ * place + axis);
+    double* y = Y(dimension_ * place + axis);
+    for (std::ptrdiff_t dof = 0; dof < width; ++dof)
+      y[dof] = dot(patch()->correction(static_cast<Index>(dof)), x, width);
+  }
+}
+
+/// C between a node and those before it and itself.
+void NearField::connect(const Body& body, Index place) noexcept {
+  if (patch_place(place) >= 0) {
+    connect_within_patch(place);
+  } else {
+    connect_beside_patch(body, place);
+  }
+  const std::ptrdiff_t d = dimension_;
+  const std::ptrdiff_t width = d * (place + 1);
+  for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
+    const double* block = blocks_.data() + axis * width;
+    std::copy_n(block, width, C_.data() + (d * place + axis) * stride_);
+    double* column = C_.data() + d * place + axis;
+    for (std::ptrdiff_t dof = 0; dof < width; ++dof) column[dof * stride_] = block[dof];
+  }
+}
+
+void NearField::connect_within_patch(Index place) noexcept {
+  const Index d = dimension_;
+  double* block = blocks_.data();
+  for (Index i = 0; i < d; ++i) {
+    const double* C = patch()->compliance(d * patch_place(place) + i);
+    const double* H = patch()->response(d * patch_place(place) + i);
+    for (Index other = 0; other <= place; ++other) {
+      for (Index j = 0; j < d; ++j) {
+        *block++ =
+            patch_place(other) >= 0 ? C[d * patch_place(other) + j] : dot(H, X(d * other + j), patch_dofs());
+      }
+    }
+  }
+}
+
+void NearField::connect_beside_patch(const Body& body, Index place) noexcept {
+  const Index d = dimension_;
+  const std::ptrdiff_t width = std::ptrdiff_t{d} * base_count_;
+  std::fill_n(by_base_.data(), d * width, 0.0);
+  for (Index k = 0; k < part_count_[at(place)]; ++k) {
+    body.greens().gather(base_[at(bases_of_[at(parts_ * place + k)])], {base_.data(), at(base_count_)},
+                         {gathered_.data(), static_cast<std::size_t>(d * width)});
+    palpate::add(gathered_.data(), part_weight_[at(parts_ * place + k)], by_base_.data(), d * width);
+  }
+  double* block = blocks_.data();
+  for (Index i = 0; i < d; ++i) {
+    const double* by = by_base_.data() + i * width;
+    for (Index other = 0; other <= place; ++other) {
+      for (Index j = 0; j < d; ++j) {
+        double sum = 0.0;
+        if (patch_place(other) >= 0) {
+          sum = dot(patch()->response(d * patch_place(other) + j), X(d * place + i), patch_dofs());
+        } else {
+          for (Index k = 0; k < part_count_[at(other)]; ++k) {
+            const auto part = at(parts_ * other + k);
+            sum += part_weight_[part] * by[d * bases_of_[part] + j];
+          }
+          if (patch() != nullptr) sum += dot(X(d * other + j), Y(d * place + i), patch_dofs());
+        }
+        *block++ = sum;
+      }
+    }
+  }
+}
+
+/// The last node takes its place.
+void NearField::forget(Index place) noexcept {
+  leave(place);
+  const Index last = --count_;
+  place_[at(node(place))] = -1;
+  if (place == last) return;
+  const std::ptrdiff_t d = dimension_;
+  const std::ptrdiff_t width = d * (last + 1);
+  for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
+    std::copy_n(C_.data() + (d * last + axis) * stride_, width, C_.data() + (d * place + axis) * stride_);
+  }
+  for (std::ptrdiff_t dof = 0; dof < width; ++dof) {
+    double* row = C_.data() + dof * stride_;
+    std::copy_n(row + d * last, d, row + d * place);
+  }
+  move(last, place);
+  if (patch() == nullptr || patch_place(place) >= 0) return;
+  for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
+    std::copy_n(X(static_cast<Index>(d * last + axis)), patch_dofs(),
+                X(static_cast<Index>(d * place + axis)));
+    std::copy_n(Y(static_cast<Index>(d * last + axis)), patch_dofs(),
+                Y(static_cast<Index>(d * place + axis)));
+  }
+}
+
+/// All that is known of a node but C, X and Y.
+void NearField::move(Index from, Index to) noexcept {
+  nodes_[at(to)] = nodes_[at(from)];
+  wanted_[at(to)] = wanted_[at(from)];
+  part_count_[at(to)] = part_count_[at(from)];
+  std::copy_n(bases_of_.begin() + std::ptrdiff_t{parts_} * from, parts_,
+              bases_of_.begin() + std::ptrdiff_t{parts_} * to);
+  std::copy_n(part_weight_.begin() + std::ptrdiff_t{parts_} * from, parts_,
+              part_weight_.begin() + std::ptrdiff_t{parts_} * to);
+  for (std::vector<double>* of_dofs : {&force_, &last_force_, &displacement_}) {
+    std::copy_n(of_dofs->begin() + std::ptrdiff_t{dimension_} * from, dimension_,
+                of_dofs->begin() + std::ptrdiff_t{dimension_} * to);
+  }
+  place_[at(nodes_[at(to)])] = to;
+}
+
+bool NearField::change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept {
+  if (patch != nullptr && std::ssize(patch->stored_nodes()) > patch_room_) return false;
+  for (Index place = 0; place < count_; ++place) leave(place);
+  const Index before = count_;
+  count_ = 0;
+  for (Index place = 0; place < before; ++place) {
+    if (wanted_[at(place)] != tick_) {
+      place_[at(node(place))] = -1;
+    } else {
+      move(place, count_++);
+    }
+  }
+  if (load_.patch != nullptr) {
+    for (const Index surface_node : load_.patch->surface_nodes()) place_in_patch_[at(surface_node)] = -1;
+  }
+  load_.patch = std::move(patch);
+  if (load_.patch != nullptr) {
+    Index k = 0;
+    for (const Index surface_node : load_.patch->surface_nodes()) place_in_patch_[at(surface_node)] = k++;
+  }
+  for (Index place = 0; place < count_; ++place) {
+    enter(body, place);
+    connect(body, place);
+  }
+  return true;
+}
+
+void NearField::unload() noexcept {
+  std::copy_n(force_.begin(), dimension_ * count_, last_force_.begin());
+  std::fill_n(force_.begin(), dimension_ * count_, 0.0);
+}
+
+void NearField::retreat(double share) noexcept {
+  const Index dofs = dimension_ * count_;
+  for (std::size_t dof = 0; dof < static_cast<std::size_t>(dofs); ++dof)
+    force_[dof] = last_force_[dof] + share * (force_[dof] - last_force_[dof]);
+}
+
+void NearField::load(Index place, const Vec3& force) noexcept {
+  for (int axis = 0; axis < dimension_; ++axis) {
+    const Index dof = dimension_ * place + axis;
+    force_[static_cast<std::size_t>(dof)] += force[axis];
+  }
+}
+
+void NearField::displace() noexcept {
+  const std::ptrdiff_t width = std::ptrdiff_t{dimension_} * count_;
+  std::fill_n(displacement_.data(), width, 0.0);
+  std::fill_n(base_force_.data(), dimension_ * base_count_, 0.0);
+  std::fill(patch_force_.begin(), patch_force_.end(), 0.0);
+  load_.clear();
+  for (Index place = 0; place < count_; ++place) {
+    if (!is_loaded(place)) continue;
+    const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
+    for (int axis = 0; axis < dimension_; ++axis)
+      palpate::add(row(dimension_ * place + axis).data(), f[axis], displacement_.data(), width);
+    for (Index k = 0; k < part_count_[at(place)]; ++k) {
+      const auto part = at(parts_ * place + k);
+      double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
+      for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * f[axis];
+    }
+    if (patch() == nullptr) continue;
+    const Index in_patch = patch_place(place);
+    if (in_patch >= 0) load_.add_to_patch(in_patch, f);
+    for (int axis = 0; axis < dimension_; ++axis) {
+      const Index dof = dimension_ * place + axis;
+      const double* on_patch = in_patch >= 0 ? patch()->response(dimension_ * in_patch + axis) : Y(dof);
+      palpate::add(on_patch, f[axis], patch_force_.data(), patch_dofs());
+      if (in_patch < 0) palpate::add(X(dof), f[axis], load_.beside.data(), patch_dofs());
+    }
+  }
+  const auto add = [&](const Index* stored, const double* force, Index count) {
+    for (Index k = 0; k < count; ++k) {
+      const double* f = force + std::ptrdiff_t{dimension_} * k;
+      if (std::any_of(f, f + dimension_, [](double value) { return value != 0.0; })) load_.add(stored[k], f);
+    }
+  };
+  add(base_.data(), base_force_.data(), base_count_);
+  if (patch() != nullptr) {
+    const std::span<const Index> Q = patch()->stored_nodes();
+    add(Q.data(), patch_force_.data(), static_cast<Index>(Q.size()));
+  }
+}
+
+Vec3 NearField::force(Index place) const noexcept {
+  return vector_at(force_, dimension_, place);
+}
+
+Vec3 NearField::displacement(Index place) const noexcept {
+  return vector_at(displacement_, dimension_, place);
+}
+
+}  // namespace palpate

@@ -1,0 +1,87 @@
+#include "runtime/body/patch.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <numeric>
+
+#include "runtime/body/overlay.h"
+
+namespace palpate {
+namespace {
+
+using Eigen::MatrixXd;
+
+/// The surface node that each local node on the surface is.
+std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
+                                   const std::vector<Index>& local_nodes) {
+  std::vector<Index> number(mesh.local.nodes.size(), -1);
+  const std::map<NodeKey, Index>& surface = body.fine_surface().number;
+  const std::span<const Index> of_body = body.surface_mesh_nodes();
+  for (const auto& [key, local] : mesh.node_of_key) {
+    const auto found = surface.find(key);
+    if (found != surface.end()) number[static_cast<std::size_t>(local)] = found->second;
+  }
+  std::vector<Index> result;
+  for (const Index local : local_nodes) {
+    Index node = number[static_cast<std::size_t>(local)];
+    if (node < 0) {
+      // Mesh nodes are where the shape functions of one of them alone are not zero; held ones are not in Q.
+      node = static_cast<Index>(
+          std::lower_bound(of_body.begin(), of_body.end(), mesh.body_node[static_cast<std::size_t>(local)]) -
+          of_body.begin());
+    }
+    result.push_back(node);
+  }
+  return result;
+}
+
+}  // namespace
+
+MatrixXd overlay_correction(const MatrixXd& G, const MatrixXd& greens) {
+  const MatrixXd softened = MatrixXd::Identity(G.rows(), G.cols()) - G * greens;
+  const MatrixXd M = softened.partialPivLu().solve(G);
+  return 0.5 * (M + M.transpose());
+}
+
+Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed)
+    : elements_(mesh.elements), stored_nodes_(stored_nodes_of(body, mesh)) {
+  const auto d = static_cast<Eigen::Index>(body.dimension());
+  const std::vector<Index> numbers = surface_numbers(body, mesh, condensed.surface);
+  std::vector<std::size_t> order(numbers.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return numbers[a] < numbers[b]; });
+  std::vector<Eigen::Index> dofs;
+  for (const std::size_t k : order) {
+    surface_nodes_.push_back(numbers[k]);
+    for (Eigen::Index axis = 0; axis < d; ++axis) dofs.push_back(d * static_cast<Eigen::Index>(k) + axis);
+  }
+
+  const MatrixXd greens = greens_at(body, stored_nodes_);
+  const MatrixXd M = overlay_correction(condensed.G, greens);
+  const MatrixXd T = condensed.T(dofs, Eigen::all);
+  MatrixXd with_overlay = greens * M;
+  with_overlay.diagonal().array() += 1.0;
+  const MatrixXd H = T * with_overlay;
+  const MatrixXd by_body = H * greens;
+  MatrixXd compliance = condensed.compliance(dofs, dofs);
+  compliance.noalias() += by_body * T.transpose();
+  compliance_ = 0.5 * (compliance + compliance.transpose());
+  response_ = H;
+  correction_ = M;
+}
+
+std::size_t Patch::bytes() const noexcept {
+  return sizeof(double) *
+             static_cast<std::size_t>(compliance_.size() + response_.size() + correction_.size()) +
+         sizeof(Index) * (elements_.size() + surface_nodes_.size() + stored_nodes_.size());
+}
+
+std::size_t Patch::bytes_of(const CondensedPatch& condensed) noexcept {
+  const auto entries =
+      static_cast<std::size_t>(condensed.compliance.size() + condensed.T.size() + condensed.G.size());
+  const auto dofs = static_cast<std::size_t>(condensed.T.rows() + condensed.T.cols());
+  return sizeof(double) * entries + sizeof(Index) * dofs;  // the indices by dofs: an upper bound
+}
+
+}  // namespace palpate

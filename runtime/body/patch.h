@@ -1,0 +1,58 @@
+// An overlay as the tick uses it.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "overlay/condensation.h"
+#include "runtime/body/body.h"
+
+namespace palpate {
+
+/// A patch of the body's surface with a finer mesh under it, condensed (theory.md section 4): whatever the
+/// refinement, what a tick needs is here. d dofs a node; Q are the g nodes of the body in the patch. Const
+/// once made; any number of threads may use it.
+class Patch {
+ public:
+  /// Of a body whose surface is refined as the patch's mesh. Throws Error when a node of Q is not stored, as
+  /// the file keeps too few layers below the surface.
+  Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed);
+
+  /// [m] surface nodes of the body (Body::simplices), ascending.
+  [[nodiscard]] std::span<const Index> surface_nodes() const noexcept { return surface_nodes_; }
+  /// Elements of the body that it refines, ascending.
+  [[nodiscard]] std::span<const Index> elements() const noexcept { return elements_; }
+  /// [g] stored nodes Q.
+  [[nodiscard]] std::span<const Index> stored_nodes() const noexcept { return stored_nodes_; }
+
+  /// Row [d m] of the compliance between surface nodes, T Xi_G,QQ T^T + K_L^-1 [m/N]: of dof d k + axis for
+  /// the k-th of them.
+  [[nodiscard]] const double* compliance(Index dof) const noexcept { return compliance_.row(dof).data(); }
+  /// Row [d g] of H = T (I + Xi_QQ M): displacement of a surface dof by what forces beside the patch do to Q
+  /// without the overlay. Forces f on the surface nodes do to the rest of the body what H^T f on Q does
+  /// without the overlay.
+  [[nodiscard]] const double* response(Index dof) const noexcept { return response_.row(dof).data(); }
+  /// Row [d g] of M [N/m]: forces on Q that, beside forces elsewhere, stand for the overlay (Overlay).
+  [[nodiscard]] const double* correction(Index dof) const noexcept { return correction_.row(dof).data(); }
+
+  /// Memory that it takes.
+  [[nodiscard]] std::size_t bytes() const noexcept;
+  /// Memory that one of this takes.
+  [[nodiscard]] static std::size_t bytes_of(const CondensedPatch& condensed) noexcept;
+
+ private:
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  std::vector<Index> elements_;
+  std::vector<Index> surface_nodes_;
+  std::vector<Index> stored_nodes_;
+  Rows compliance_;
+  Rows response_;
+  Rows correction_;
+};
+
+/// M = (I - G Xi_QQ)^-1 G, symmetric (theory.md section 4).
+Eigen::MatrixXd overlay_correction(const Eigen::MatrixXd& G, const Eigen::MatrixXd& greens);
+
+}  // namespace palpate

@@ -1,0 +1,87 @@
+#include "runtime/body/patch_maker.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+
+namespace palpate {
+namespace {
+
+/// Whether the sizes are those of this mesh, and the surface's nodes.
+bool fits(const CondensedPatch& condensed, const PatchMesh& mesh, int dimension) {
+  const std::vector<Index> surface = surface_nodes(mesh);
+  const Eigen::Index g = dimension * std::ssize(mesh.nodes), m = dimension * std::ssize(surface);
+  return condensed.surface == surface && condensed.G.rows() == g && condensed.G.cols() == g &&
+         condensed.T.rows() == m && condensed.T.cols() == g && condensed.compliance.rows() == m &&
+         condensed.compliance.cols() == m;
+}
+
+}  // namespace
+
+Index patch_room(const Body& body, int rings, std::size_t tools) {
+  const Model& model = body.model();
+  const ElementsAtNodes at(model.mesh);
+  const unsigned all_axes = (1U << model.dimension()) - 1U;
+  Index most = 0;
+  for (const Index stored : body.surface_stored_nodes()) {
+    if (stored < 0) continue;
+    const Index centre = body.mesh_node(stored);
+    Index count = 0;
+    for (const Index node : nodes_of(model.mesh, rings_round(model.mesh, at, {&centre, 1}, rings))) {
+      if ((model.fixed[static_cast<std::size_t>(node)] & all_axes) == all_axes) continue;
+      ++count;
+      if (body.stored_node(node) >= 0) continue;
+      throw Error("an overlay of " + std::to_string(rings) + " rings reaches node " + std::to_string(node) +
+                      ", whose Green's functions are not stored",
+                  model.name,
+                  "precompute with [storage] scope = \"layers\" and layers = " + std::to_string(rings) +
+                      ", or take fewer rings");
+    }
+    most = std::max(most, count);
+  }
+  return most * static_cast<Index>(std::min(tools, most_overlay_tools));
+}
+
+PatchMaker::PatchMaker(const Body& body, int rings)
+    : body_(body),
+      at_(body.model().mesh),
+      cuts_(body.model().mesh.element, body.refinement()),
+      rings_(rings) {}
+
+std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
+  const Model& model = body_.model();
+  std::vector<Index> nodes;
+  for (const Index centre : centres) nodes.push_back(body_.mesh_node(centre));
+  const PatchMesh mesh = make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
+  const CondensedPatch* ready = centres.size() == 1 ? stored(centres[0]) : nullptr;
+  if (ready == nullptr) return std::make_shared<const Patch>(body_, mesh, condense(model, mesh));
+  if (!fits(*ready, mesh, body_.dimension()))
+    throw Error("the overlay that is stored for node " + std::to_string(nodes[0]) +
+                    " does not belong to the fine mesh there",
+                model.name, "precompute it again");
+  return std::make_shared<const Patch>(body_, mesh, *ready);
+}
+
+const CondensedPatch* PatchMaker::stored(Index centre) const noexcept {
+  const StoredOverlay& overlay = body_.model().overlay;
+  if (overlay.refinement != body_.refinement() || overlay.rings != rings_) return nullptr;
+  const Index node = body_.mesh_node(centre);
+  const auto found = std::lower_bound(overlay.centres.begin(), overlay.centres.end(), node);
+  if (found == overlay.centres.end() || *found != node) return nullptr;
+  return &overlay.patches[static_cast<std::size_t>(found - overlay.centres.begin())];
+}
+
+std::vector<Index> PatchMaker::neighbours(Index centre) const {
+  const Mesh& mesh = body_.model().mesh;
+  const auto around = at_[body_.mesh_node(centre)];
+  std::vector<Index> found;
+  for (const Index node : nodes_of(mesh, {around.begin(), around.end()})) {
+    const Index stored = body_.stored_node(node);
+    if (stored >= 0 && stored != centre && body_.surface_node_of_stored(stored) >= 0) found.push_back(stored);
+  }
+  return found;
+}
+
+}  // namespace palpate

@@ -1,0 +1,87 @@
+#include "runtime/body/surface_load.h"
+
+#include <algorithm>
+
+#include "runtime/body/free_motion.h"
+#include "runtime/solve/node_vectors.h"
+#include "runtime/solve/vector_loops.h"
+
+namespace palpate {
+namespace {
+
+std::size_t dofs(int dimension, Index nodes) noexcept {
+  return static_cast<std::size_t>(dimension) * static_cast<std::size_t>(nodes);
+}
+
+}  // namespace
+
+SurfaceLoad::SurfaceLoad(int d, Index near_nodes, Index stored_nodes, Index patch_nodes)
+    : dimension(d),
+      node(static_cast<std::size_t>(stored_nodes + patch_nodes)),
+      force(dofs(d, stored_nodes + patch_nodes)),
+      patch_place(static_cast<std::size_t>(patch_nodes > 0 ? near_nodes : 0)),
+      patch_force(dofs(d, static_cast<Index>(patch_place.size()))),
+      beside(dofs(d, patch_nodes)) {}
+
+void SurfaceLoad::clear() noexcept {
+  count = 0;
+  patch_count = 0;
+  std::fill(beside.begin(), beside.end(), 0.0);
+}
+
+void SurfaceLoad::add(Index stored, const double* f) noexcept {
+  node[static_cast<std::size_t>(count)] = stored;
+  std::copy_n(f, dimension, force.data() + dofs(dimension, count));
+  ++count;
+}
+
+void SurfaceLoad::add_to_patch(Index place, const double* f) noexcept {
+  patch_place[static_cast<std::size_t>(patch_count)] = place;
+  std::copy_n(f, dimension, patch_force.data() + dofs(dimension, patch_count));
+  ++patch_count;
+}
+
+void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> u) noexcept {
+  const int d = load.dimension;
+  const auto body_dofs = d * std::ssize(load.patch->stored_nodes());
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    const Index dof = d * first + static_cast<Index>(k);
+    const double* C = load.patch->compliance(dof);
+    double sum = dot(load.patch->response(dof), load.beside.data(), body_dofs);
+    for (Index i = 0; i < load.patch_count; ++i) {
+      const double* by = C + dofs(d, load.patch_place[static_cast<std::size_t>(i)]);
+      const double* f = load.patch_force.data() + dofs(d, i);
+      for (int axis = 0; axis < d; ++axis) sum += by[axis] * f[axis];
+    }
+    u[k] = sum;
+  }
+}
+
+void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<double> stored,
+                          std::span<Vec3> u, const ShownMotion* motion) noexcept {
+  const bool moves = motion != nullptr && motion->moves;
+  const auto follow_body = [&](Index node, const auto& of_stored) {
+    const SurfaceParts parts = body.surface_parts(node);
+    Vec3 sum = Vec3::Zero();
+    for (std::size_t k = 0; k < parts.stored.size(); ++k)
+      sum += parts.weights[k] * of_stored(parts.stored[k]);
+    return sum;
+  };
+  body.greens().displacement(load.nodes(), load.forces(), stored);
+  if (moves) add_motion(body, *motion, stored);
+  for (std::size_t node = 0; node < u.size(); ++node) {
+    u[node] =
+        follow_body(static_cast<Index>(node), [&](Index k) { return vector_at(stored, load.dimension, k); });
+  }
+  if (load.patch == nullptr) return;
+  const std::span<const Index> nodes = load.patch->surface_nodes();
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    double values[3] = {};
+    patch_displacement(load, static_cast<Index>(k), {values, static_cast<std::size_t>(load.dimension)});
+    Vec3& at = u[static_cast<std::size_t>(nodes[k])];
+    at = Vec3(values[0], values[1], values[2]);
+    if (moves) at += follow_body(nodes[k], [&](Index j) { return displacement(body, *motion, j); });
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,92 @@
+#include "runtime/devices/reports/woodenhaptics_arm.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace palpate {
+namespace {
+
+constexpr double turn = 2.0 * std::numbers::pi;
+
+/// Joint angle per motor angle, signed: a capstan with its motor along the joint's axis turns the other way.
+Vec3 transmission(const ArmConstants& arm) noexcept {
+  Vec3 ratio = arm.capstan_diameters.cwiseQuotient(arm.body_diameters);
+  for (int i = 0; i < 3; ++i) {
+    if (arm.motor_aligned[static_cast<std::size_t>(i)]) ratio[i] = -ratio[i];
+  }
+  return ratio;
+}
+
+}  // namespace
+
+Vec3 joint_angles(const ArmConstants& arm, const std::array<std::int16_t, 6>& counters) noexcept {
+  Vec3 motor;
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    motor[i] = turn * counters[k] / arm.counts_per_turn[k];
+  }
+  return motor.cwiseProduct(transmission(arm));
+}
+
+Vec3 wrist_angles(const ArmConstants& arm, const std::array<std::int16_t, 6>& counters) noexcept {
+  if (!arm.has_wrist()) return Vec3::Zero();
+  Vec3 angles;
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double angle = turn * counters[5 - k] / arm.counts_per_turn[3 + k];
+    angles[i] = arm.encoder_aligned[k] ? angle : -angle;
+  }
+  return angles;
+}
+
+Vec3 arm_position(const ArmConstants& arm, const Vec3& angles) noexcept {
+  const double reach = arm.lengths[1] * std::sin(angles[1]) + arm.lengths[2] * std::sin(angles[2]);
+  const double height =
+      arm.lengths[0] + arm.lengths[1] * std::cos(angles[1]) - arm.lengths[2] * std::cos(angles[2]);
+  return Vec3(std::cos(angles[0]) * reach, std::sin(angles[0]) * reach, height) - arm.workspace_origin;
+}
+
+Mat3 arm_jacobian(const ArmConstants& arm, const Vec3& angles) noexcept {
+  const double Lb = arm.lengths[1];
+  const double Lc = arm.lengths[2];
+  const double sinA = std::sin(angles[0]), cosA = std::cos(angles[0]);
+  const double sinB = std::sin(angles[1]), cosB = std::cos(angles[1]);
+  const double sinC = std::sin(angles[2]), cosC = std::cos(angles[2]);
+  const double reach = Lb * sinB + Lc * sinC;
+  Mat3 J;
+  J << -sinA * reach, cosA * Lb * cosB, cosA * Lc * cosC,  //
+      cosA * reach, sinA * Lb * cosB, sinA * Lc * cosC,    //
+      0.0, -Lb * sinB, Lc * sinC;
+  return J;
+}
+
+Eigen::Quaterniond arm_orientation(const ArmConstants& arm, const Vec3& angles, const Vec3& wrist) noexcept {
+  if (!arm.has_wrist()) return Eigen::Quaterniond::Identity();
+  using Turn = Eigen::AngleAxisd;
+  return Turn(angles[0], Vec3::UnitZ()) * Turn(std::numbers::pi / 2.0 - angles[2], Vec3::UnitY()) *
+         Turn(wrist[0], Vec3::UnitX()) * Turn(wrist[1], Vec3::UnitY()) * Turn(wrist[2], Vec3::UnitX());
+}
+
+std::optional<Vec3> inverse_arm(const ArmConstants& arm, const Vec3& position) noexcept {
+  const Vec3 p = position + arm.workspace_origin;
+  const double reach = std::hypot(p.x(), p.y());
+  const double height = p.z() - arm.lengths[0];
+  const double Lb = arm.lengths[1];
+  const double Lc = arm.lengths[2];
+  const double distance = std::hypot(reach, height);
+  if (!(reach > 0.0) || !(distance <= Lb + Lc) || distance < std::abs(Lb - Lc)) return std::nullopt;
+  // The triangle of b, c and the line from b's joint to the handle, by the law of cosines.
+  const double cosine = (Lb * Lb + distance * distance - Lc * Lc) / (2.0 * Lb * distance);
+  const double B = std::atan2(reach, height) - std::acos(std::clamp(cosine, -1.0, 1.0));
+  const double C = std::atan2(reach - Lb * std::sin(B), Lb * std::cos(B) - height);
+  return Vec3(std::atan2(p.y(), p.x()), B, C);
+}
+
+Saturated motor_currents(const ArmConstants& arm, const Vec3& angles, const Vec3& force) noexcept {
+  const Vec3 joint_torques = arm_jacobian(arm, angles).transpose() * force;
+  const Vec3 motor_torques = joint_torques.cwiseProduct(transmission(arm));
+  return saturate(motor_torques.cwiseQuotient(arm.torque_constants), arm.max_current);
+}
+
+}  // namespace palpate

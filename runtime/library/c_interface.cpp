@@ -1,0 +1,289 @@
+// The C functions of palpate.h over the C++ step.
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <new>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/latest.h"
+#include "formats/model_file.h"
+#include "runtime/background/motion_source.h"
+#include "runtime/background/patch_source.h"
+#include "runtime/body/body.h"
+#include "runtime/library/palpate.h"
+#include "runtime/solve/node_vectors.h"
+#include "runtime/tick/step.h"
+
+namespace palpate {
+namespace {
+
+constexpr bool same(int bit, StepStatus status) {
+  return static_cast<std::uint32_t>(bit) == static_cast<std::uint32_t>(status);
+}
+static_assert(same(PALPATE_NOTHING_IN_REACH, StepStatus::nothing_in_reach));
+static_assert(same(PALPATE_CAPACITY_FULL, StepStatus::capacity_full));
+static_assert(same(PALPATE_POSE_NOT_FINITE, StepStatus::pose_not_finite));
+static_assert(same(PALPATE_RESULT_NOT_FINITE, StepStatus::result_not_finite));
+static_assert(same(PALPATE_INSIDE_BODY, StepStatus::inside_body));
+static_assert(same(PALPATE_POSE_LIMITED, StepStatus::pose_limited));
+static_assert(same(PALPATE_NOT_CONVERGED, StepStatus::not_converged));
+static_assert(same(PALPATE_FORCE_LIMITED, StepStatus::force_limited));
+static_assert(same(PALPATE_HANDING_OVER, StepStatus::handing_over));
+static_assert(same(PALPATE_OLDER_PATCH, StepStatus::older_patch));
+static_assert(same(PALPATE_LATE_MOTION, StepStatus::late_motion));
+static_assert(same(PALPATE_RIGID_CONTACT, StepStatus::rigid_contact));
+static_assert(status_names.size() == 12 + 2, "these and the two that only HeldNodes knows");
+
+constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
+
+Tool to_tool(const palpate_tool& tool) {
+  Tool result{.radius = tool.radius,
+              .length = tool.length,
+              .coupling_stiffness = tool.coupling_stiffness,
+              .coupling_torsion = tool.coupling_torsion,
+              .max_force = tool.max_force,
+              .hand_over = tool.hand_over,
+              .reach = tool.reach,
+              .friction = {}};
+  if (!(tool.friction < 0.0)) result.friction = tool.friction;
+  return result;
+}
+
+ToolPose to_pose(const palpate_pose& pose) noexcept {
+  const double* q = pose.orientation;
+  return {.orientation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]),
+          .position = Eigen::Map<const Vec3>(pose.position),
+          .grab = pose.grab != 0};
+}
+
+void copy(const Vec3& vector, double* xyz) noexcept {
+  std::copy_n(vector.data(), 3, xyz);
+}
+
+void copy_text(std::string_view text, char* to, std::size_t size) noexcept {
+  if (to == nullptr || size == 0) return;
+  const std::size_t length = std::min(text.size(), size - 1);
+  std::copy_n(text.data(), length, to);
+  to[length] = '\0';
+}
+
+/// What a person is told about the exception that is being handled.
+std::string explanation() {
+  try {
+    throw;
+  } catch (const Error& error) {
+    return to_text(error);
+  } catch (const std::bad_alloc&) {
+    return "error: there is not enough memory\nhint: Close other programs, or precompute with fewer surface "
+           "nodes.\n";
+  } catch (const std::exception& error) {
+    return std::string("error: ") + error.what() + "\nhint: This should not happen; please report it.\n";
+  }
+}
+
+StateOptions read_options(const palpate_tool* tools, int tool_count, int max_contacts) {
+  if (tools == nullptr || tool_count < 1)
+    throw Error("there is no tool", "palpate_create", "give at least one");
+  if (max_contacts < 1 || max_contacts > most_contacts) {
+    throw Error("room for " + std::to_string(max_contacts) + " contacts was asked for", "palpate_create",
+                "ask for 1 to " + std::to_string(most_contacts));
+  }
+  StateOptions options{.tools = {}, .max_contacts = max_contacts};
+  for (int k = 0; k < tool_count; ++k) options.tools.push_back(to_tool(tools[k]));
+  return options;
+}
+
+/// None: refinement 1.
+OverlayOptions read_overlay(const palpate_overlay* overlay) {
+  if (overlay == nullptr) return {.refinement = 1, .rings = 0};
+  constexpr int most = 16;
+  if (overlay->refinement < 2 || overlay->refinement > most || overlay->rings < 1 || overlay->rings > most) {
+    throw Error("an overlay of " + std::to_string(overlay->rings) + " rings, refined " +
+                    std::to_string(overlay->refinement) + " times, was asked for",
+                "palpate_create_with_options", "ask for 1 to 16 rings, refined 2 to 16 times");
+  }
+  return {.refinement = overlay->refinement, .rings = overlay->rings};
+}
+
+StateOptions with_room(StateOptions options, const Body& body, const OverlayOptions& overlay) {
+  if (overlay.refinement > 1) options.patch_nodes = patch_room(body, overlay.rings, options.tools.size());
+  return options;
+}
+
+}  // namespace
+}  // namespace palpate
+
+using namespace palpate;
+
+/// What a tick left, for the eye.
+struct Shown {
+  SurfaceLoad load;
+  ShownMotion motion;
+};
+
+struct palpate_session {
+  palpate_session(Model model, const StateOptions& options, const OverlayOptions& overlay, std::size_t memory,
+                  ContactModel contact)
+      : body(std::move(model), {}, overlay.refinement, contact),
+        untouched(body, with_room(options, body, overlay)),
+        state(untouched),
+        poses(options.tools.size()),
+        shown(Shown{.load = state.near.load(), .motion = ShownMotion(body)}),
+        stored_displacement(static_cast<std::size_t>(body.greens().order())),
+        displacement(body.surface_rest_positions().size()) {
+    show();
+    if (overlay.refinement > 1)
+      overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = memory});
+    if (body.model().dynamics.method == DynamicsMethod::packed)
+      motion.emplace(body, state, MotionSourceOptions{});
+  }
+
+  /// Hands what the last tick did over to the thread that draws.
+  void show() noexcept {
+    Shown& next = shown.next();
+    next.load = state.near.load();
+    state.motion.show(next.motion);
+    shown.publish();
+  }
+
+  Body body;
+  State untouched;
+  State state;
+  std::vector<ToolPose> poses;
+  Latest<Shown> shown;
+  std::vector<double> stored_displacement;  // scratch of the thread that draws
+  std::vector<Vec3> displacement;
+  std::optional<PatchSource> overlays;
+  std::optional<MotionSource> motion;
+};
+
+extern "C" {
+
+palpate_tool palpate_default_tool() noexcept {
+  const Tool tool;
+  return {.radius = tool.radius,
+          .length = tool.length,
+          .coupling_stiffness = tool.coupling_stiffness,
+          .coupling_torsion = tool.coupling_torsion,
+          .max_force = tool.max_force,
+          .friction = -1.0,
+          .reach = tool.reach,
+          .hand_over = tool.hand_over};
+}
+
+const char* palpate_status_name(uint32_t bit) noexcept {
+  for (const auto& [status, name] : status_names) {
+    if (static_cast<std::uint32_t>(status) == bit) return name;
+  }
+  return nullptr;
+}
+
+palpate_options palpate_default_options(void) noexcept {
+  return {.overlay = nullptr, .dynamic_contact = 0, .tick = StateOptions{}.tick};
+}
+
+palpate_session* palpate_create(const char* file, const palpate_tool* tools, int tool_count, int max_contacts,
+                                char* error, size_t error_size) noexcept {
+  const palpate_options options = palpate_default_options();
+  return palpate_create_with_options(file, tools, tool_count, max_contacts, &options, error, error_size);
+}
+
+palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
+                                             int max_contacts, const palpate_options* options, char* error,
+                                             size_t error_size) noexcept {
+  copy_text("", error, error_size);
+  try {
+    if (file == nullptr) throw Error("there is no file name", "palpate_create", "name a .palpate.hdf file");
+    if (options == nullptr)
+      throw Error("there are no options", "palpate_create_with_options", "take palpate_default_options()");
+    StateOptions wanted = read_options(tools, tool_count, max_contacts);
+    wanted.tick = options->tick;
+    const OverlayOptions fine = read_overlay(options->overlay);
+    const std::size_t memory = options->overlay != nullptr ? options->overlay->memory : 0;
+    const ContactModel contact =
+        options->dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
+    return std::make_unique<palpate_session>(load_model(file), wanted, fine, memory, contact).release();
+  } catch (...) {
+    try {
+      copy_text(explanation(), error, error_size);
+    } catch (...) {  // no memory even for that
+    }
+    return nullptr;
+  }
+}
+
+void palpate_destroy(palpate_session* session) noexcept {
+  const std::unique_ptr<palpate_session> ended(session);
+}
+
+uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexcept {
+  if (poses == nullptr) return PALPATE_POSE_NOT_FINITE;
+  std::transform(poses, poses + session->poses.size(), session->poses.begin(), to_pose);
+  if (session->overlays) session->overlays->serve(session->state);
+  if (session->motion) session->motion->receive(session->state);
+  const StepStatus status = step(session->body, session->state, session->poses);
+  if (session->motion) session->motion->post(session->state);
+  session->show();
+  return static_cast<uint32_t>(status);
+}
+
+void palpate_get(const palpate_session* session, int tool, palpate_result* result) noexcept {
+  *result = {};
+  if (tool < 0 || static_cast<std::size_t>(tool) >= session->state.tools.size()) return;
+  const ToolState& state = session->state.tools[static_cast<std::size_t>(tool)];
+  copy(state.wrench.force, result->force);
+  copy(state.wrench.torque, result->torque);
+  copy(state.pose.position, result->tool_position);
+  const Eigen::Quaterniond& q = state.pose.orientation;
+  result->tool_orientation[0] = q.w();
+  result->tool_orientation[1] = q.x();
+  result->tool_orientation[2] = q.y();
+  result->tool_orientation[3] = q.z();
+  result->contacts = state.contacts;
+  for (Eigen::Index row = 0; row < 3; ++row)
+    copy(state.local.stiffness.row(row), result->local_stiffness + 3 * row);
+  copy(state.local.point, result->local_point);
+  result->local_radius = state.local.radius;
+}
+
+void palpate_reset(palpate_session* session) noexcept {
+  session->state = session->untouched;
+  session->show();
+}
+
+palpate_counts palpate_surface_counts(const palpate_session* session) noexcept {
+  return {.nodes = static_cast<int32_t>(session->body.surface_rest_positions().size()),
+          .simplices = static_cast<int32_t>(session->body.surface_friction().size()),
+          .corners = session->body.dimension()};
+}
+
+void palpate_surface_rest(const palpate_session* session, double* xyz) noexcept {
+  for (const Vec3& position : session->body.surface_rest_positions()) {
+    copy(position, xyz);
+    xyz += 3;
+  }
+}
+
+void palpate_surface_simplices(const palpate_session* session, int32_t* corners) noexcept {
+  std::copy(session->body.simplices().begin(), session->body.simplices().end(), corners);
+}
+
+void palpate_surface_displacement(palpate_session* session, double* xyz) noexcept {
+  const Shown& shown = session->shown.read();
+  surface_displacement(session->body, shown.load, session->stored_displacement, session->displacement,
+                       &shown.motion);
+  for (const Vec3& u : session->displacement) {
+    copy(u, xyz);
+    xyz += 3;
+  }
+}
+
+}  // extern "C"

@@ -1,0 +1,62 @@
+#include "runtime/loop/last_tick.h"
+
+#include <fmt/core.h>
+
+#include <span>
+#include <vector>
+
+#include "meshes/readers/vtu_writer.h"
+#include "runtime/background/surface_frames.h"
+
+namespace palpate {
+namespace {
+
+/// The gap that the tick left, to first order: the contact's normal row of r = b + W lambda.
+double gap_after(const ContactProblem& problem, Index contact) {
+  const Index normal = problem.first_row(contact);
+  double gap = problem.b[static_cast<std::size_t>(normal)];
+  for (Index j = 0; j < problem.rows; ++j)
+    gap += problem.w(normal, j) * problem.lambda[static_cast<std::size_t>(j)];
+  return gap;
+}
+
+}  // namespace
+
+std::string contact_table(const Body& body, const State& state) {
+  std::string table = "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held\n";
+  const std::span<const ContactPoint> contacts = state.contacts();
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const ContactPoint& contact = contacts[k];
+    const auto [x, n, f, held] = seen_contact(body, state, contact);
+    const double gap = held ? 0.0 : gap_after(state.problem, static_cast<Index>(k));
+    table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), n.x(), n.y(), n.z(),
+                         f.x(), f.y(), f.z(), gap, contact.simplex, held ? 1 : 0);
+  }
+  return table;
+}
+
+void write_surface(const std::filesystem::path& file, const Body& body, const State& state) {
+  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
+  std::vector<Vec3> u(body.surface_rest_positions().size());
+  ShownMotion motion(body);
+  state.motion.show(motion);
+  surface_displacement(body, state.near.load(), stored, u, &motion);
+  const std::vector<Vec3> nodes = body.surface_in_mesh();
+  std::vector<double> total;
+  for (std::size_t node = 0; node < u.size(); ++node) {
+    const Vec3 seen = body.surface_rest_positions()[node] + u[node] - nodes[node];
+    total.insert(total.end(), seen.begin(), seen.end());
+  }
+  SurfacePicture picture;
+  SurfaceFrames(body, state, {.ticks_per_frame = 1, .in_background = false}, [&](SurfacePicture shown) {
+    picture = std::move(shown);
+  }).post(state, 0, 0.0);
+  const std::vector<double> von_mises(picture.frame.von_mises.begin(), picture.frame.von_mises.end());
+  const std::vector<double> pressure(picture.frame.pressure.begin(), picture.frame.pressure.end());
+  const std::vector<NodalField> fields = {
+      {"displacement", 3, total}, {"von_mises", 1, von_mises}, {"pressure", 1, pressure}};
+  write_vtu(file, nodes, body.dimension() == 3 ? ElementType::tri3 : ElementType::line2, body.simplices(),
+            fields);
+}
+
+}  // namespace palpate

@@ -1,0 +1,65 @@
+#include "runtime/loop/loading.h"
+
+#include <fmt/core.h>
+
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+#include "base/printable.h"
+#include "base/regular_file.h"
+#include "formats/model_file.h"
+#include "runtime/body/scaled_model.h"
+#include "runtime/loop/output.h"
+
+namespace palpate {
+namespace {
+
+void print_loaded(const Body& body, double seconds) {
+  fmt::print(stderr, "{}: {} free surface nodes, {} dofs in {} precision, loaded in {:.2f} s\n",
+             printable(body.model().name), body.free_surface_nodes().size(), body.greens().order(),
+             name_of(body.greens().precision()), seconds);
+  if (!body.greens().unfolded()) {
+    print_warning(
+        "the Green's functions do not fit into half of the free memory as a full square; used packed, which "
+        "is slower");
+  }
+}
+
+}  // namespace
+
+Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
+               const BodyOptions& options) {
+  Model model = load_model(file);
+  const char* const if_missing = "give the model.toml that the file should have been made from";
+  if (!model_toml.empty() && read_all(model_toml, if_missing) != model.model_toml) {
+    throw Error("was not made from " + model_toml.string() + ": the description stored in it is another one",
+                file.string(), "precompute it again: palpate-precompute " + model_toml.string());
+  }
+  for (const std::string& stale : stale_sources(model, file)) {
+    print_warning(file.string() + ": " + stale + " (precompute it again)");
+  }
+  if (const std::string warning = precision_warning(model, model.greens.precision()); !warning.empty())
+    print_warning(file.string() + ": " + warning);
+  scale_loads(model, options.load_scale);
+  scale_stiffness(model, options.stiffness_scale);
+  return Body(std::move(model), {}, options.refinement, options.contact);
+}
+
+void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file) {
+  for (const SourceFile& source : model.sources)
+    paths.add_input(source_path(source, file), "what the model was made from (" + source.role + ")");
+}
+
+std::unique_ptr<const Body> load_and_print(const std::filesystem::path& file,
+                                           const std::filesystem::path& model_toml,
+                                           const BodyOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  std::unique_ptr<const Body> body(new Body(load_body(file, model_toml, options)));
+  print_loaded(*body, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  return body;
+}
+
+}  // namespace palpate

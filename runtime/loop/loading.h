@@ -1,0 +1,35 @@
+// From a file to a body that can be touched, with a word on models that are out of date.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "formats/output_paths.h"
+#include "runtime/body/body.h"
+
+namespace palpate {
+
+/// What of a file is made a body.
+struct BodyOptions {
+  int refinement = 1;  ///< of the surface, see Body
+  ContactModel contact = ContactModel::quasi_static;
+  double load_scale = 1.0;  ///< see scale_loads
+  double stiffness_scale = 1.0;
+
+  bool operator==(const BodyOptions&) const = default;
+};
+
+/// Loads `file` and prints a warning for each source that is no longer what it was. With `model_toml` (else
+/// empty) the file must have been made from exactly that description. Throws Error.
+Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
+               const BodyOptions& options = {});
+
+/// Likewise, with a line on the error stream about what was loaded and how long it took.
+std::unique_ptr<const Body> load_and_print(const std::filesystem::path& file,
+                                           const std::filesystem::path& model_toml,
+                                           const BodyOptions& options);
+
+/// What a model was made from, as inputs of a run: it must not be lost either. Throws Error.
+void add_sources(OutputPaths& paths, const Model& model, const std::filesystem::path& file);
+
+}  // namespace palpate

@@ -1,0 +1,73 @@
+// From the tick to the recording, without the tick ever touching a file.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "base/ring.h"
+#include "formats/recording.h"
+
+namespace palpate {
+
+/// A thread that writes a session to an HDF5 recording, fed through bounded lock-free rings: of ticks by one
+/// other thread, of frames by one too. Every half second all of it is put into the recording, so that no more
+/// is lost however the program ends. Where that fails (a full disk) nothing is kept any more, the reason is
+/// told at once, and the run goes on.
+class Recorder {
+ public:
+  /// Takes the reason why nothing is kept any more; called once at most, by the recorder's thread.
+  using OnFailure = std::function<void(const std::string& reason)>;
+
+  /// Starts writing to `path`, in the place of what was there. Throws Error when it cannot be made.
+  Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface = {},
+           OnFailure on_failure = {});
+  ~Recorder();  ///< without `finish`, the recording is left as if the program had been killed
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// Hands a tick over; never blocks. A full ring drops it and counts.
+  void push(const TickRecord& tick) noexcept;
+  /// Hands a frame over, likewise.
+  void push_frame(SurfaceFrame frame) noexcept;
+
+  /// Hands a tick over, waiting for room. Only for runs that nobody feels.
+  void push_waiting(const TickRecord& tick) noexcept;
+  /// Hands a frame over, likewise.
+  void push_frame_waiting(SurfaceFrame frame) noexcept;
+
+  /// Writes what is left and makes the recording one plain file, with a description of its frames for
+  /// ParaView beside it where there are any. Throws Error when any of it could not be written; what could is
+  /// in the recording.
+  void finish();
+
+  /// Ticks for which there was no room, or no disk any more.
+  [[nodiscard]] std::int64_t dropped() const noexcept { return dropped_; }
+  /// And frames.
+  [[nodiscard]] std::int64_t dropped_frames() const noexcept { return dropped_frames_; }
+
+ private:
+  bool try_push(const TickRecord& tick) noexcept;
+  bool try_push(SurfaceFrame& frame) noexcept;
+  void write() noexcept;
+  void fail(const std::string& reason) noexcept;
+  std::size_t take_all();
+
+  std::filesystem::path path_;
+  OnFailure on_failure_;
+  RecordingWriter writer_;
+  Ring<TickRecord> ticks_;
+  Ring<SurfaceFrame> frames_;
+  std::atomic<bool> closing_ = false;
+  std::atomic<bool> failed_ = false;
+  std::exception_ptr failure_;
+  std::atomic<std::int64_t> dropped_ = 0;
+  std::atomic<std::int64_t> dropped_frames_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,41 @@
+// A recorded session in place of a hand.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "formats/recording.h"
+#include "runtime/safety/device.h"
+
+namespace palpate {
+
+/// How a replay compares with its session.
+struct ReplayDifference {
+  std::int64_t ticks = 0;      ///< compared
+  std::int64_t different = 0;  ///< whose force, torque or shown force is not the same in every bit
+  double largest = 0.0;        ///< difference of a force [N]
+  double largest_time = 0.0;   ///< [s]
+};
+
+/// Says in each tick what the device said in the session, with its times, so that the loop does all of it
+/// again.
+class ReplayDevice : public Device {
+ public:
+  /// `session` must live as long.
+  explicit ReplayDevice(const Recording& session) noexcept : session_(session) {}
+
+  [[nodiscard]] std::int64_t ticks() const noexcept {
+    return static_cast<std::int64_t>(session_.ticks.size());
+  }
+
+  DeviceNews hear(const TickTime& tick) noexcept override;
+  void show(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
+
+ private:
+  const Recording& session_;
+};
+
+/// Takes note of how a tick of the replay differs from the same one then.
+void compare(const TickRecord& now, const TickRecord& then, ReplayDifference& difference) noexcept;
+
+}  // namespace palpate

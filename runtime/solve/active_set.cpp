@@ -1,0 +1,139 @@
+#include "runtime/solve/active_set.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/solve/vector_loops.h"
+
+namespace palpate {
+namespace {
+
+constexpr double gap_tolerance = 1e-11;  // of the largest entry of b: rounding
+
+}  // namespace
+
+ActiveSet::ActiveSet(Index max_rows)
+    : factor_(1, max_rows),
+      active_(static_cast<std::size_t>(max_rows)),
+      state_(static_cast<std::size_t>(max_rows)),
+      signed_(static_cast<std::size_t>(max_rows)),
+      z_(static_cast<std::size_t>(max_rows)),
+      entries_(static_cast<std::size_t>(max_rows) + 1) {}
+
+bool ActiveSet::activate(const ContactProblem& problem, Index row) noexcept {
+  const Index count = factor_.nodes();
+  for (Index k = 0; k < count; ++k)
+    entries_[static_cast<std::size_t>(k)] = problem.w(row, active_[static_cast<std::size_t>(k)]);
+  entries_[static_cast<std::size_t>(count)] = problem.w(row, row);
+  const bool added =
+      factor_.add({entries_.data(), static_cast<std::size_t>(count) + 1}) == CapacitanceStatus::ok;
+  if (added) active_[static_cast<std::size_t>(count)] = row;
+  state_[static_cast<std::size_t>(row)] = added ? Row::active : Row::dependent;
+  return added;
+}
+
+void ActiveSet::deactivate(Index position) noexcept {
+  const auto gap = active_.begin() + position;
+  state_[static_cast<std::size_t>(*gap)] = Row::inactive;
+  std::copy(gap + 1, active_.begin() + factor_.nodes(), gap);
+  factor_.remove(position);
+}
+
+/// z = -C^-1 b on the active rows.
+void ActiveSet::solve_active(std::span<const double> b) noexcept {
+  const auto count = static_cast<std::size_t>(factor_.nodes());
+  for (std::size_t k = 0; k < count; ++k) z_[k] = -b[static_cast<std::size_t>(active_[k])];
+  factor_.solve({z_.data(), count});
+}
+
+/// Goes from lambda towards z until the first normal force is zero, and takes that row out. True when z was
+/// reached.
+bool ActiveSet::step_towards_solution(ContactProblem& problem) noexcept {
+  double step = 1.0;
+  Index blocking = -1;
+  for (Index k = 0; k < factor_.nodes(); ++k) {
+    const auto row = static_cast<std::size_t>(active_[static_cast<std::size_t>(k)]);
+    const double z = z_[static_cast<std::size_t>(k)];
+    if (signed_[row] != 0 || z >= 0.0) continue;
+    const double to_zero = problem.lambda[row] / (problem.lambda[row] - z);
+    if (blocking >= 0 && to_zero >= step) continue;
+    step = to_zero;
+    blocking = k;
+  }
+  for (Index k = 0; k < factor_.nodes(); ++k) {
+    double& lambda = problem.lambda[static_cast<std::size_t>(active_[static_cast<std::size_t>(k)])];
+    lambda += step * (z_[static_cast<std::size_t>(k)] - lambda);
+    if (signed_[static_cast<std::size_t>(active_[static_cast<std::size_t>(k)])] == 0)
+      lambda = std::max(lambda, 0.0);
+  }
+  if (blocking < 0) return true;
+  problem.lambda[static_cast<std::size_t>(active_[static_cast<std::size_t>(blocking)])] = 0.0;
+  deactivate(blocking);
+  return false;
+}
+
+/// The inactive row with the most negative gap beyond rounding, -1 when there is none.
+Index ActiveSet::most_violated(const ContactProblem& problem) const noexcept {
+  double largest = 0.0;
+  for (Index i = 0; i < problem.rows; ++i)
+    largest = std::max(largest, std::abs(problem.b[static_cast<std::size_t>(i)]));
+  double worst = -gap_tolerance * largest;
+  Index found = -1;
+  for (Index i = 0; i < problem.rows; ++i) {
+    if (state_[static_cast<std::size_t>(i)] != Row::inactive) continue;
+    const double gap =
+        problem.b[static_cast<std::size_t>(i)] + dot(problem.row(i), problem.lambda.data(), problem.rows);
+    if (gap < worst) {
+      worst = gap;
+      found = i;
+    }
+  }
+  return found;
+}
+
+bool ActiveSet::solve(ContactProblem& problem) noexcept {
+  factor_.clear();
+  rounds_ = 0;
+  std::fill_n(state_.begin(), problem.rows, Row::inactive);
+  for (Index k = 0; k < problem.contacts; ++k) {
+    std::fill_n(signed_.begin() + problem.first_row(k), problem.rows_of(k),
+                problem.held[static_cast<std::size_t>(k)]);
+  }
+  for (Index i = 0; i < problem.rows; ++i) {
+    const auto row = static_cast<std::size_t>(i);
+    if (signed_[row] == 0) problem.lambda[row] = std::max(problem.lambda[row], 0.0);
+    const bool wanted = signed_[row] != 0 || problem.lambda[row] > 0.0;
+    if (!wanted || !activate(problem, i)) problem.lambda[row] = 0.0;
+  }
+
+  const int most_rounds = 3 * problem.rows + 10;
+  Index entered = -1;
+  while (rounds_ < most_rounds) {
+    ++rounds_;
+    solve_active(problem.b);
+    if (entered >= 0 &&
+        z_[static_cast<std::size_t>(factor_.nodes() - 1)] <= 0.0) {  // rounding alone let it in
+      deactivate(factor_.nodes() - 1);
+      state_[static_cast<std::size_t>(entered)] = Row::dependent;
+      entered = -1;
+      continue;
+    }
+    entered = -1;
+    if (!step_towards_solution(problem)) continue;
+    do {
+      entered = most_violated(problem);
+      if (entered < 0) return true;
+    } while (!activate(problem, entered));
+  }
+  return false;
+}
+
+void ActiveSet::derivative(const ContactProblem& problem, std::span<const double> db,
+                           std::span<double> dlambda) noexcept {
+  std::fill_n(dlambda.begin(), problem.rows, 0.0);
+  solve_active(db);
+  for (Index k = 0; k < factor_.nodes(); ++k)
+    dlambda[static_cast<std::size_t>(active_[static_cast<std::size_t>(k)])] = z_[static_cast<std::size_t>(k)];
+}
+
+}  // namespace palpate

@@ -1,0 +1,49 @@
+// Frictionless contact, exactly.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/solve/capacitance.h"
+#include "runtime/solve/contact_problem.h"
+
+namespace palpate {
+
+/// Solves a ContactProblem without friction, exactly: the active set method of Lawson & Hanson (1974, chapter
+/// 23) on the Cholesky factor of W, which grows and shrinks with the set. It starts from the rows that carry
+/// force in the guess. Each round lowers the energy lambda^T W lambda / 2 + b^T lambda, so it ends. All
+/// memory is taken at construction.
+class ActiveSet {
+ public:
+  explicit ActiveSet(Index max_rows);
+
+  /// Fills problem.lambda. False when the fixed number of rounds did not suffice: lambda is then feasible
+  /// (no negative normal force), but a gap may be negative.
+  bool solve(ContactProblem& problem) noexcept;
+
+  /// What lambda changes by when b changes by `db` [rows] and closed contacts stay closed: [rows].
+  void derivative(const ContactProblem& problem, std::span<const double> db,
+                  std::span<double> dlambda) noexcept;
+
+  [[nodiscard]] int rounds() const noexcept { return rounds_; }  ///< of the last `solve`
+
+ private:
+  enum class Row : std::uint8_t { inactive, active, dependent };
+
+  bool activate(const ContactProblem& problem, Index row) noexcept;
+  void deactivate(Index position) noexcept;
+  void solve_active(std::span<const double> b) noexcept;
+  bool step_towards_solution(ContactProblem& problem) noexcept;
+  [[nodiscard]] Index most_violated(const ContactProblem& problem) const noexcept;
+
+  CapacitanceMatrix factor_;
+  std::vector<Index> active_;         // [factor_.nodes()] rows, in the order of the factor
+  std::vector<Row> state_;            // [rows]
+  std::vector<std::uint8_t> signed_;  // [rows] of held contacts: their force may have any sign
+  std::vector<double> z_;             // [active] the solution with all gaps of the active rows closed
+  std::vector<double> entries_;       // [active + 1] a row of W there
+  int rounds_ = 0;
+};
+
+}  // namespace palpate

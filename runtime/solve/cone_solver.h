@@ -1,0 +1,94 @@
+// Contact with Coulomb friction.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/solve/active_set.h"
+#include "runtime/solve/contact_part.h"
+#include "runtime/solve/contact_problem.h"
+
+namespace palpate {
+
+/// Solves a ContactProblem with friction: a semismooth Newton method on Alart & Curnier's equations (1991)
+///   lambda_n = max(0, lambda_n - r_n / w_n),
+///   lambda_t = the point nearest to lambda_t - r_t / w_t within the disc of radius mu lambda_n,
+/// guarded by block Gauss-Seidel sweeps, and where that runs in circles by proximal steps: springs draw the
+/// forces to where they are, and are made weaker from step to step (Rockafellar 1976). Residual: the largest
+/// difference of the two sides. Solved are the contacts that the guess closes (without a guess: those that
+/// are closed without friction); those left out that are then penetrated are taken in. The budget is
+/// `most_rounds` rounds, and beyond the fourth `most_work`. All memory is taken at construction.
+class ConeSolver {
+ public:
+  static constexpr double tolerance = 1e-6;  ///< of the residual, relative to the largest force
+  static constexpr double accepted = 1e-4;   ///< where `tolerance` is not met
+  static constexpr int most_rounds = 60;
+  static constexpr double most_work = 6e5;  ///< multiplications, some 0.2 ms
+
+  ConeSolver(Index max_contacts, Index max_rows);
+
+  /// Fills problem.lambda from the guess in it, to `tolerance` where the budget suffices. False when the
+  /// residual is over `accepted`, or a contact left out is penetrated: lambda is then the best that was
+  /// found; forces are within the cones.
+  bool solve(ContactProblem& problem) noexcept;
+
+  /// What lambda changes by when b changes by `db` [rows], to first order: [rows]. Contacts stay open,
+  /// sticking or slipping as they are.
+  void derivative(const ContactProblem& problem, std::span<const double> db,
+                  std::span<double> dlambda) noexcept;
+
+  [[nodiscard]] int rounds() const noexcept { return rounds_; }  ///< of the last `solve`
+  [[nodiscard]] bool was_easy() const noexcept {
+    return work_ < 0.1 * most_work;
+  }  ///< `solve` left time for another
+
+ private:
+  enum class Mode : std::uint8_t { open, stick, slip };
+
+  void find_motion(const ContactProblem& problem) noexcept;
+  void change(ContactProblem& problem, Index row, double by) noexcept;
+  void scale_rows(const ContactProblem& problem) noexcept;
+  [[nodiscard]] double residual(const ContactProblem& problem) const noexcept;
+  void sweep(ContactProblem& problem) noexcept;
+  void choose_modes(const ContactProblem& problem) noexcept;
+  void linearise(const ContactProblem& problem) noexcept;
+  bool factor_jacobian() noexcept;
+  void solve_jacobian() noexcept;
+  bool newton_step(ContactProblem& problem) noexcept;
+  bool iterate(ContactProblem& problem, int rounds) noexcept;
+  void add_springs(ContactProblem& problem, double share) noexcept;
+  void remove_springs(ContactProblem& problem) noexcept;
+  [[nodiscard]] bool budget_spent() const noexcept;
+  [[nodiscard]] bool is_good_enough(const ContactProblem& problem, double share) const noexcept;
+  bool solve_part(ContactProblem& problem) noexcept;
+  void start_from(ContactProblem& problem, const std::vector<double>& lambda) noexcept;
+  bool search_along_step(ContactProblem& problem, double& now) noexcept;
+  [[nodiscard]] double* jacobian_row(Index i) noexcept {
+    return J_.data() + static_cast<std::ptrdiff_t>(i) * stride_;
+  }
+
+  ContactPart part_;  // that may be closed; all that follows is of it
+  ActiveSet without_friction_;
+  std::ptrdiff_t stride_;
+  std::vector<double> motion_;     // [rows] r
+  std::vector<double> weight_;     // [rows] 1 / w_n at normal rows, 1 / w_t at tangential ones [N/m]
+  std::vector<Mode> mode_;         // [contacts]
+  std::vector<double> direction_;  // [rows] of lambda_t where a contact slips
+  std::vector<double> share_;      // [contacts] mu lambda_n / |lambda_t - r_t / w_t| there
+  std::vector<Index> unknown_;     // [unknowns] rows of the contacts that are not open
+  Index unknowns_ = 0;
+  std::vector<double> J_;         // [unknowns x stride] Jacobian, then its LU factor
+  std::vector<Index> pivot_;      // [unknowns]
+  std::vector<double> x_;         // [unknowns]
+  std::vector<double> best_;      // [rows] of the smallest residual
+  std::vector<double> from_;      // [rows] where a step begins
+  std::vector<double> newton_;    // [rows] where it ends
+  std::vector<double> guess_;     // [rows]
+  std::vector<double> diagonal_;  // [rows] of W
+  std::vector<double> b_;         // [rows]
+  double work_ = 0.0;
+  int rounds_ = 0;
+};
+
+}  // namespace palpate

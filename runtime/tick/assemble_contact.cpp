@@ -1,0 +1,273 @@
+#include "runtime/tick/assemble_contact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "runtime/solve/vector_loops.h"
+#include "runtime/tick/state.h"
+
+namespace palpate {
+namespace {
+
+constexpr double closed_gap = 0.01;  // of the mean edge: a contact that may be closed
+constexpr double least_tilt_radius =
+    0.5;  // of the mean edge: a sharp tool's contact slides on its face as well
+
+/// Places of the contact's nodes in the near field.
+std::array<Index, 3> places_of(const NearField& near, const ContactPoint& contact) noexcept {
+  std::array<Index, 3> places{-1, -1, -1};
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (contact.nodes[n] >= 0) places[n] = near.place_of(contact.nodes[n]);
+  }
+  return places;
+}
+
+ContactRow contact_row(const NearField& near, const ContactPoint& contact, const Vec3& direction) noexcept {
+  ContactRow row{.places = places_of(near, contact),
+                 .body = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()},
+                 .tool = contact.tool,
+                 .force = direction,
+                 .moment = contact.arm.cross(direction)};
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] >= 0) row.body[n] = contact.weights[n] * direction;
+  }
+  return row;
+}
+
+/// Radius times the slope along a tangent, as a row.
+ContactRow tilt_row(const NearField& near, const ContactPoint& contact, double radius,
+                    const Vec3& tangent) noexcept {
+  ContactRow row;
+  row.places = places_of(near, contact);
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] < 0) continue;
+    row.body[n] = radius * contact.slope[n].dot(tangent) * contact.frame.col(0);
+  }
+  return row;
+}
+
+/// Motion along a row of the body's surface going back to rest.
+double unloading(const NearField& near, const ContactRow& row) noexcept {
+  double motion = 0.0;
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] >= 0) motion += row.body[n].dot(near.displacement(row.places[n]));
+  }
+  return motion;
+}
+
+/// Motion along a tangent of the surface itself since the tick before, which the places where the tick begins
+/// have in them already: what slides is the surface under the tool, by whatever it moves.
+double free_slip(const State& state, const ContactPoint& contact, const Vec3& tangent) noexcept {
+  if (!state.motion.active() || !state.is_first_pass) return 0.0;
+  double motion = 0.0;
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (contact.nodes[n] >= 0)
+      motion += contact.weights[n] * tangent.dot(state.motion.change(contact.nodes[n]));
+  }
+  return motion;
+}
+
+/// The contact of the tick before that is the same one, null when there is none.
+const ContactPoint* same_contact(const State& state, const ContactPoint& contact) noexcept {
+  const auto end = state.last_contacts.begin() + state.last_count;
+  const auto found = std::find_if(state.last_contacts.begin(), end, [&](const ContactPoint& last) {
+    return last.feature == contact.feature && last.tool == contact.tool;
+  });
+  return found == end ? nullptr : &*found;
+}
+
+void add_contact(State& state, const ContactPoint& contact, const ContactPoint* last) noexcept {
+  ContactProblem& problem = state.problem;
+  const Index first = problem.rows;
+  problem.add(contact.friction, contact.held);
+  const ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
+  Vec3 motion = device_motion(tool.pose, tool.device, contact.arm);
+  if (contact.held) motion += tool.pose.position + contact.arm - contact.position;
+  for (Index i = first; i < problem.rows; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const Vec3 direction = contact.frame.col(i - first);
+    state.rows[at] = contact_row(state.near, contact, direction);
+    problem.b[at] = direction.dot(motion) + unloading(state.near, state.rows[at]);
+    if (i == first && !contact.held) problem.b[at] += contact.gap;
+    if (i > first && !contact.held) problem.b[at] -= free_slip(state, contact, direction);
+    if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
+  }
+}
+
+/// The normal force by which a contact's tilt is judged: its own in the tick before, or, of one that has just
+/// become another vertex, edge or face, the mean of its tool's.
+double normal_force(const State& state, const ContactPoint& contact, const ContactPoint* last,
+                    double closed) noexcept {
+  if (last != nullptr) return last->force.dot(last->frame.col(0));
+  if (contact.gap > closed) return 0.0;
+  double sum = 0.0;
+  double count = 0.0;
+  for (Index k = 0; k < state.last_count; ++k) {
+    const ContactPoint& other = state.last_contacts[static_cast<std::size_t>(k)];
+    const double force = other.force.dot(other.frame.col(0));
+    if (other.tool != contact.tool || other.held || force <= 0.0) continue;
+    sum += force;
+    count += 1.0;
+  }
+  return count > 0.0 ? sum / count : 0.0;
+}
+
+void add_tilt(State& state, Index number, double force, double least_radius,
+              std::span<double> spring) noexcept {
+  const ContactPoint& contact = state.contact_points[static_cast<std::size_t>(number)];
+  const double radius =
+      std::max(least_radius, state.tools[static_cast<std::size_t>(contact.tool)].tool.radius);
+  const auto nodes =
+      std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
+  if (contact.held || nodes < 2 || !(force * radius > 0.0)) return;
+  const auto add = [&](const Vec3& tangent) {
+    const auto at = static_cast<std::size_t>(state.problem.rows);
+    state.problem.add_held_row(number);
+    state.rows[at] = tilt_row(state.near, contact, radius, tangent);
+    state.problem.b[at] = unloading(state.near, state.rows[at]);
+    spring[at] = radius / force;
+  };
+  if (nodes == 3) {
+    add(contact.frame.col(1));
+    add(contact.frame.col(2));
+  } else {
+    const auto end =
+        std::find_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
+    add(contact.slope[static_cast<std::size_t>(end - contact.nodes.begin())].normalized());
+  }
+}
+
+/// W = J Xi J^T, by y = Xi J^T row by row; D is the number of dofs a node.
+template <int D>
+void assemble_body_compliance(State& state) noexcept {
+  ContactProblem& problem = state.problem;
+  double* __restrict y = state.row_response.data();
+  const std::ptrdiff_t width = std::ptrdiff_t{D} * state.near.count();
+  for (Index j = 0; j < problem.rows; ++j) {
+    const ContactRow& by = state.rows[static_cast<std::size_t>(j)];
+    std::fill_n(y, width, 0.0);
+    for (std::size_t n = 0; n < 3; ++n) {
+      if (by.places[n] < 0) continue;
+      for (int axis = 0; axis < D; ++axis) {
+        const double factor = by.body[n][axis];
+        const double* __restrict c = state.near.row(D * by.places[n] + axis).data();
+#pragma omp simd
+        for (std::ptrdiff_t k = 0; k < width; ++k) y[k] += factor * c[k];
+      }
+    }
+    for (Index i = j; i < problem.rows; ++i) {
+      const ContactRow& at = state.rows[static_cast<std::size_t>(i)];
+      double w = 0.0;
+      for (std::size_t n = 0; n < 3; ++n) {
+        const double* u = y + D * std::ptrdiff_t{std::max<Index>(at.places[n], 0)};
+        for (int axis = 0; axis < D; ++axis) w += at.body[n][axis] * u[axis];
+      }
+      problem.w(i, j) = w;
+      problem.w(j, i) = w;
+    }
+  }
+}
+
+/// Which contacts press on what the body does not give way at, or hold it. Before the couplings are in W.
+void note_rigid_contacts(State& state) noexcept {
+  for (Index k = 0; k < state.contact_count; ++k) {
+    ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+    const Index first = state.problem.first_row(k);
+    const Index rows = contact.held ? state.problem.rows_of(k) : 1;
+    contact.rigid = false;
+    for (Index i = first; i < first + rows; ++i)
+      contact.rigid = contact.rigid || state.problem.w(i, i) < state.least_compliance;
+  }
+}
+
+/// What the couplings give way: W += J_tool C_tool J_tool^T.
+void add_coupling_compliance(State& state) noexcept {
+  ContactProblem& problem = state.problem;
+  for (Index j = 0; j < problem.rows; ++j) {
+    const ContactRow& by = state.rows[static_cast<std::size_t>(j)];
+    if (by.tool < 0) continue;
+    const Tool& tool = state.tools[static_cast<std::size_t>(by.tool)].tool;
+    if (std::isinf(tool.coupling_stiffness) && std::isinf(tool.coupling_torsion)) continue;
+    for (Index i = 0; i < problem.rows; ++i) {
+      const ContactRow& at = state.rows[static_cast<std::size_t>(i)];
+      if (at.tool != by.tool) continue;
+      problem.w(i, j) +=
+          at.force.dot(by.force) / tool.coupling_stiffness + at.moment.dot(by.moment) / tool.coupling_torsion;
+    }
+  }
+}
+
+/// The part of a row's own compliance that is in double where precision is split: e^T left right^T e.
+double exact_compliance(const Body& body, const State& state, const ContactRow& row) noexcept {
+  const Greens& greens = body.greens();
+  if (!greens.split()) return 0.0;
+  const auto terms = static_cast<std::ptrdiff_t>(greens.exact_terms());
+  std::array<double, most_exact_terms> left, right;
+  std::fill_n(left.begin(), terms, 0.0);
+  std::fill_n(right.begin(), terms, 0.0);
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] < 0) continue;
+    const SurfaceParts parts = body.surface_parts(state.near.node(row.places[n]));
+    for (std::size_t k = 0; k < parts.stored.size(); ++k) {
+      for (int axis = 0; axis < greens.dimension(); ++axis) {
+        const std::int64_t dof = std::int64_t{greens.dimension()} * parts.stored[k] + axis;
+        const double factor = parts.weights[k] * row.body[n][axis];
+        add(greens.exact_left(dof), factor, left.data(), terms);
+        add(greens.exact_right(dof), factor, right.data(), terms);
+      }
+    }
+  }
+  return dot(left.data(), right.data(), terms);
+}
+
+constexpr double exact_rounding = std::numeric_limits<double>::epsilon();
+
+/// Contact points that nearly coincide make W nearly singular; the rounding of Xi must not make it
+/// indefinite. Where next to nothing gives way a rigid tool would be given a force beyond all measure: there
+/// it presses on a wall that gives way a little. What all that gives way along a tangent it gives from the
+/// force of the tick before: friction that sticks would creep by it in every tick.
+void regularise(const Body& body, State& state, std::span<const double> spring) noexcept {
+  const double rounding = body.greens().rounding();
+  ContactProblem& problem = state.problem;
+  for (Index k = 0; k < problem.contacts; ++k) {
+    const Index first = problem.first_row(k);
+    for (Index i = first; i < first + problem.rows_of(k); ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      double& w = problem.w(i, i);
+      const double exact = exact_compliance(body, state, state.rows[row]);
+      double give = 4.0 * (rounding * std::max(w - exact, 0.0) + exact_rounding * std::abs(exact)) +
+                    state.rigid_compliance;
+      if (k < state.contact_count) give = std::max(give, state.least_compliance - w);
+      w += give + spring[row];
+      if (i > first && problem.held[static_cast<std::size_t>(k)] == 0)
+        problem.b[row] -= give * problem.lambda[row];
+    }
+  }
+}
+
+}  // namespace
+
+void assemble_contact(const Body& body, State& state) noexcept {
+  state.problem.clear();
+  std::fill(state.row_change.begin(), state.row_change.end(), 0.0);
+  const std::span<double> spring = state.row_change;
+  const std::span<const ContactPoint> contacts = state.contacts();
+  for (const ContactPoint& contact : contacts) add_contact(state, contact, same_contact(state, contact));
+  const double edge = body.mean_surface_edge();
+  for (Index k = 0; k < state.contact_count; ++k) {
+    const ContactPoint& contact = contacts[static_cast<std::size_t>(k)];
+    const double force = normal_force(state, contact, same_contact(state, contact), closed_gap * edge);
+    add_tilt(state, k, force, least_tilt_radius * edge, spring);
+  }
+  if (body.dimension() == 3) {
+    assemble_body_compliance<3>(state);
+  } else {
+    assemble_body_compliance<2>(state);
+  }
+  note_rigid_contacts(state);
+  add_coupling_compliance(state);
+  regularise(body, state, spring);
+}
+
+}  // namespace palpate

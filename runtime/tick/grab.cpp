@@ -1,0 +1,75 @@
+#include "runtime/tick/grab.h"
+
+#include <algorithm>
+
+#include "runtime/tick/state.h"
+
+namespace palpate {
+namespace {
+
+void hold_contact(State& state, const ContactPoint& contact) noexcept {
+  const ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
+  ContactPoint held = contact;
+  held.held = true;
+  held.feature = -1 - state.held_count;
+  held.frame.setIdentity();
+  held.tool_point = tool.pose.orientation.conjugate() * (contact.position - tool.pose.position);
+  state.contact_points[static_cast<std::size_t>(state.held_count++)] = held;
+}
+
+/// The nearest place of the surface within reach, as a contact.
+bool reach_out(const Body& body, State& state, Index number) noexcept {
+  ToolState& tool = state.tools[static_cast<std::size_t>(number)];
+  const NearestSimplex found = state.tree.nearest(tool.pose.position);
+  if (!(found.nearest.squared_distance <= tool.tool.reach * tool.tool.reach)) return false;
+  ContactPoint contact;
+  contact.tool = number;
+  contact.simplex = found.simplex;
+  contact.weights = found.nearest.weights;
+  contact.position = found.nearest.on_simplex;
+  const auto d = static_cast<std::size_t>(body.dimension());
+  bool free = false;
+  for (std::size_t k = 0; k < d; ++k) {
+    if (contact.weights[k] == 0.0) continue;
+    contact.nodes[k] = body.simplices()[d * static_cast<std::size_t>(found.simplex) + k];
+    free = free || body.surface_moves(contact.nodes[k]);
+  }
+  if (!free) return false;
+  hold_contact(state, contact);
+  return true;
+}
+
+/// Grab: what is closed is held; if nothing is, the surface within reach.
+void begin_hold(const Body& body, State& state, Index number) noexcept {
+  ToolState& tool = state.tools[static_cast<std::size_t>(number)];
+  const Index before = state.held_count;
+  for (Index k = 0; k < state.last_count && state.held_count < state.max_contacts; ++k) {
+    const ContactPoint& contact = state.last_contacts[static_cast<std::size_t>(k)];
+    if (contact.tool == number && !contact.held && contact.force.dot(contact.frame.col(0)) > 0.0)
+      hold_contact(state, contact);
+  }
+  tool.holding = state.held_count > before;
+  if (tool.holding || state.held_count == state.max_contacts) return;
+  tool.holding = reach_out(body, state, number);
+  if (!tool.holding) tool.status |= StepStatus::nothing_in_reach;
+}
+
+void end_hold(State& state, Index number) noexcept {
+  const auto begin = state.contact_points.begin();
+  const auto end = std::remove_if(begin, begin + state.held_count,
+                                  [&](const ContactPoint& contact) { return contact.tool == number; });
+  state.held_count = static_cast<Index>(end - begin);
+  state.tools[static_cast<std::size_t>(number)].holding = false;
+}
+
+}  // namespace
+
+void update_holds(const Body& body, State& state) noexcept {
+  for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
+    const ToolState& tool = state.tools[static_cast<std::size_t>(k)];
+    if (tool.device.grab && !tool.holding && tool.placed) begin_hold(body, state, k);
+    if (!tool.device.grab && tool.holding) end_hold(state, k);
+  }
+}
+
+}  // namespace palpate

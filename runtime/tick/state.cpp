@@ -1,0 +1,130 @@
+#include "runtime/tick/state.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "base/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr double tree_margin = 0.1;   // of the mean edge: how much larger boxes are
+constexpr double rigid_share = 1e-9;  // of the body's compliance, added everywhere
+constexpr double wall_share = 0.01;   // compliance of what is held, of that of the stiffest node that moves
+
+void check(const Tool& tool, std::size_t number) {
+  const auto check = [&](const char* what, double value, bool valid, const char* hint) {
+    if (valid) return;
+    throw Error(
+        "the " + std::string(what) + " of tool " + std::to_string(number) + " is " + std::to_string(value),
+        "State", hint);
+  };
+  const auto size = [&](const char* what, double value) {
+    check(what, value, std::isfinite(value) && value >= 0.0, "give a finite number that is not negative");
+  };
+  const auto bound = [&](const char* what, double value) {
+    check(what, value, value > 0.0, "give a positive number, infinite for none");
+  };
+  size("radius", tool.radius);
+  size("length", tool.length);
+  size("reach", tool.reach);
+  size("friction", tool.friction.value_or(0.0));
+  bound("coupling stiffness", tool.coupling_stiffness);
+  bound("coupling torsion", tool.coupling_torsion);
+  bound("largest force", tool.max_force);
+  bound("hand-over", tool.hand_over);
+}
+
+std::vector<ToolState> make_tools(const StateOptions& options) {
+  if (options.tools.empty()) throw Error("there is no tool", "State", "give at least one");
+  if (options.max_contacts < 1) {
+    throw Error("room for " + std::to_string(options.max_contacts) + " contacts was asked for", "State",
+                "ask for room for at least one");
+  }
+  if (!(options.tick > 0.0 && std::isfinite(options.tick))) {
+    throw Error("a tick of " + std::to_string(options.tick) + " s was asked for", "State",
+                "ask for one that is positive");
+  }
+  std::vector<ToolState> tools;
+  for (const Tool& tool : options.tools) {
+    check(tool, tools.size());
+    tools.emplace_back().tool = tool;
+  }
+  return tools;
+}
+
+/// Mean of the surface's own compliance over some nodes: the scale of what is soft.
+double mean_compliance(const Body& body) {
+  const std::vector<Index>& nodes = body.free_surface_nodes();
+  const std::size_t stride = std::max<std::size_t>(1, nodes.size() / 64);
+  double sum = 0.0;
+  double count = 0.0;
+  for (std::size_t k = 0; k < nodes.size(); k += stride) {
+    sum += body.greens().block(nodes[k], nodes[k]).trace() / body.dimension();
+    count += 1.0;
+  }
+  return sum / count;
+}
+
+double least_compliance_of_a_node(const Body& body) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Index node : body.free_surface_nodes())
+    least = std::min(least, body.greens().block(node, node).trace() / body.dimension());
+  return least;
+}
+
+Index near_room(const StateOptions& options) {
+  return 3 * options.max_contacts + 32;
+}
+
+/// A contact has up to d rows, and d - 1 for the tilt of its face.
+Index most_rows(const Body& body, const StateOptions& options) {
+  return (2 * body.dimension() - 1) * options.max_contacts;
+}
+
+Index entries(const Body& body, const StateOptions& options) {
+  return body.dimension() * options.max_contacts;
+}
+
+}  // namespace
+
+State::State(const Body& body, const StateOptions& options)
+    : tools(make_tools(options)),
+      contact_points(static_cast<std::size_t>(options.max_contacts)),
+      max_contacts(options.max_contacts),
+      tick(options.tick),
+      near(body, near_room(options), options.patch_nodes),
+      motion(body, options.tick, static_cast<Index>(near.load().node.size())),
+      tree(body.simplices(), body.dimension(), body.surface_rest_positions(),
+           tree_margin * body.mean_surface_edge()),
+      problem(body.dimension(), entries(body, options), most_rows(body, options)),
+      active_set(most_rows(body, options)),
+      cone_solver(entries(body, options), most_rows(body, options)),
+      rows(static_cast<std::size_t>(most_rows(body, options))),
+      row_response(static_cast<std::size_t>(body.dimension() * near_room(options))),
+      rigid_compliance(rigid_share * mean_compliance(body)),
+      least_compliance(wall_share * least_compliance_of_a_node(body)),
+      most_simplices(2 * static_cast<std::size_t>(options.max_contacts)),
+      found(body.surface_friction().size()),
+      found_distance(body.surface_friction().size()),
+      pairs(most_simplices),
+      candidates(3 * most_simplices * tools.size()),
+      last_contacts(static_cast<std::size_t>(options.max_contacts)),
+      row_change(rows.size()),
+      force_change(rows.size()),
+      far_displacement(static_cast<std::size_t>(body.dimension() * most_far_nodes)),
+      stored_displacement(static_cast<std::size_t>(body.greens().order())) {}
+
+Vec3 outward_normal(const Body& body, const State& state, Index simplex) noexcept {
+  const auto d = static_cast<std::size_t>(body.dimension());
+  const std::span<const Index> nodes = body.simplices().subspan(d * static_cast<std::size_t>(simplex), d);
+  const Vec3 a = state.tree.position(nodes[0]);
+  const Vec3 ab = state.tree.position(nodes[1]) - a;
+  if (d == 2) return Vec3(ab.y(), -ab.x(), 0.0).normalized();
+  return ab.cross(state.tree.position(nodes[2]) - a).normalized();
+}
+
+}  // namespace palpate

@@ -1,0 +1,110 @@
+#include "runtime/tick/tool_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/tick/state.h"
+
+namespace palpate {
+namespace {
+
+constexpr double base_margin = 0.03;  // of the mean edge: how far a surface is looked for at least
+constexpr double most_motion = 0.25;  // of the mean edge or the radius: what a tool may move in a tick
+constexpr double farthest = 1e100;    // that is a place [m]: squares of distances are numbers
+
+/// Not with Eigen's stableNorm, whose last bits depend on where in memory a vector lies.
+bool make_valid(ToolPose& pose, int dimension) noexcept {
+  if (!(pose.position.array().abs() < farthest).all() || !pose.orientation.coeffs().allFinite()) return false;
+  if (dimension == 2) {
+    pose.position.z() = 0.0;
+    pose.orientation.x() = 0.0;
+    pose.orientation.y() = 0.0;
+  }
+  const double largest = pose.orientation.coeffs().cwiseAbs().maxCoeff();
+  if (!(largest > 1e-6)) return false;
+  pose.orientation.coeffs() /= largest;
+  pose.orientation.normalize();
+  return true;
+}
+
+/// How far a tool's points move at most from one pose to another.
+double motion(const Tool& tool, const ToolPose& from, const ToolPose& to) noexcept {
+  const double turned =
+      tool.length > 0.0 || tool.radius > 0.0 ? from.orientation.angularDistance(to.orientation) : 0.0;
+  return (to.position - from.position).norm() + turned * (tool.length + tool.radius);
+}
+
+ToolPose between(const ToolPose& from, const ToolPose& to, double share) noexcept {
+  return {.orientation = from.orientation.slerp(share, to.orientation),
+          .position = from.position + share * (to.position - from.position),
+          .grab = to.grab};
+}
+
+/// Farther from the resting body than the body is large, whatever the tool is caught in: a fold of the
+/// surface, or behind the body on a soft spring.
+bool has_gone_away(const Body& body, const ToolState& tool) noexcept {
+  const double distance = body.bounds().exteriorDistance(tool.device.position);
+  return !tool.holding && distance > tool.tool.radius + tool.tool.length + body.bounds().diagonal().norm();
+}
+
+}  // namespace
+
+void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wanted) noexcept {
+  tool.last_device_position = tool.device.position;
+  if (!make_valid(wanted, body.dimension())) {
+    tool.status |= StepStatus::pose_not_finite;
+    wanted = tool.device;
+    if (!tool.placed) return;
+  }
+  const double size = std::max(body.mean_surface_edge(), tool.tool.radius);
+  const double least = base_margin * body.mean_surface_edge();
+  const auto place = [&] {
+    tool.last_device_position = wanted.position;  // nothing that is felt now comes from a motion
+    tool.pose = tool.device = wanted;
+    tool.margin = least;
+    tool.placed = true;
+  };
+  const bool caught = tool.contacts > 0 && has_gone_away(body, tool);
+  if (!tool.placed || (!tool.engaged && !tool.holding) || caught) {
+    place();
+    tool.engaged = tool.has_been_clear ? is_outside(body, state, tool.tool, wanted)
+                                       : is_clear(body, state, tool.tool, wanted);
+    tool.has_been_clear = tool.has_been_clear || tool.engaged;
+    if (!tool.engaged) tool.status |= StepStatus::inside_body;
+    return;
+  }
+
+  const double wish = motion(tool.tool, tool.device, wanted);
+  double most = most_motion * size;
+  if (wish > most && tool.contacts == 0 && !tool.holding) {
+    const double free = std::sqrt(state.tree.nearest(tool.device.position).nearest.squared_distance) -
+                        tool.tool.radius - tool.tool.length - least;
+    most = std::max(most, free);
+    if (wish <= free) return place();
+  }
+  if (wish > most) {
+    tool.status |= StepStatus::pose_limited;
+    wanted = between(tool.device, wanted, most / wish);
+  }
+  tool.device = wanted;
+  tool.margin = least + 2.0 * std::min(wish, most_motion * size);  // tool and surface may meet
+  if (tool.contacts == 0 && !tool.holding) {                       // free: it is where the device was
+    const double moved = motion(tool.tool, tool.pose, tool.device);
+    tool.margin = least + 2.0 * std::min(moved, most_motion * size);
+  }
+}
+
+void move_tools(const Body& body, State& state) noexcept {
+  for (ToolState& tool : state.tools) {
+    ToolPose pose = tool.device;
+    pose.position += tool.contact_wrench.force / tool.tool.coupling_stiffness;
+    const Vec3 turn = tool.contact_wrench.torque / tool.tool.coupling_torsion;
+    const double angle = turn.norm();
+    if (angle > 0.0) pose.orientation = Eigen::AngleAxisd(angle, turn / angle) * pose.orientation;
+    const double most = most_motion * std::max(body.mean_surface_edge(), tool.tool.radius) + tool.margin;
+    const double moved = motion(tool.tool, tool.pose, pose);
+    tool.pose = moved > most ? between(tool.pose, pose, most / moved) : pose;
+  }
+}
+
+}  // namespace palpate

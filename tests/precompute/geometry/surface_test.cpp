@@ -1,0 +1,227 @@
+// Surfaces in four formats, whole and broken.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "precompute/geometry/surface_input.h"
+#include "tests/support/geometry_shapes.h"
+
+namespace palpate {
+namespace {
+
+using testing::at;
+using testing::ball;
+using testing::cube;
+using testing::error_of;
+using testing::expect_mentions;
+using testing::joined;
+using testing::off;
+using testing::TempFolder;
+using testing::volume;
+
+std::string numbers(const Vec3& x) {
+  return std::to_string(x[0]) + " " + std::to_string(x[1]) + " " + std::to_string(x[2]);
+}
+
+std::string obj(const TriangleSurface& s) {
+  std::string text;
+  for (const Vec3& x : s.nodes) {
+    text += "v " + numbers(x) + "\n";
+  }
+  for (const auto& [a, b, c] : s.triangles) {
+    text += "f " + std::to_string(a + 1) + " " + std::to_string(b + 1) + " " + std::to_string(c + 1) + "\n";
+  }
+  return text;
+}
+
+std::string ply(const TriangleSurface& s) {
+  std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(s.nodes.size()) +
+                     "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+                     std::to_string(s.triangles.size()) +
+                     "\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const Vec3& x : s.nodes) {
+    text += numbers(x) + "\n";
+  }
+  for (const auto& [a, b, c] : s.triangles) {
+    text += "3 " + std::to_string(a) + " " + std::to_string(b) + " " + std::to_string(c) + "\n";
+  }
+  return text;
+}
+
+std::string ascii_stl(const TriangleSurface& s) {
+  std::string text = "solid s\n";
+  for (const Triangle& t : s.triangles) {
+    text += "facet normal 0 0 0\nouter loop\n";
+    for (const Index node : t) {
+      text += "vertex " + numbers(s.nodes[at(node)]) + "\n";
+    }
+    text += "endloop\nendfacet\n";
+  }
+  return text + "endsolid s\n";
+}
+
+std::string binary_stl(const TriangleSurface& s) {
+  std::string text(80, ' ');
+  const auto append = [&](const auto& value) {
+    text.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  append(static_cast<std::uint32_t>(s.triangles.size()));
+  for (const Triangle& t : s.triangles) {
+    for (int i = 0; i < 3; ++i) {
+      append(0.0F);
+    }
+    for (const Index node : t) {
+      for (const double x : s.nodes[at(node)]) {
+        append(static_cast<float>(x));
+      }
+    }
+    append(std::uint16_t{0});
+  }
+  return text;
+}
+
+class SurfaceInput : public ::testing::Test {
+ protected:
+  TriangleSurface read(const std::string& name, const std::string& text) {
+    return read_surface(folder_.write(name, text), notes_);
+  }
+
+  /// What a person is told about a bad surface.
+  std::string error(const TriangleSurface& surface) {
+    return error_of([&] { read("bad.off", off(surface)); });
+  }
+
+  TempFolder folder_;
+  std::vector<std::string> notes_;
+};
+
+TEST_F(SurfaceInput, ReadsAllFormatsAlike) {
+  const std::vector<std::pair<std::string, std::string (*)(const TriangleSurface&)>> formats = {
+      {"a.off", off}, {"a.obj", obj}, {"a.ply", ply}, {"a.stl", ascii_stl}, {"b.stl", binary_stl}};
+  for (const auto& [name, write] : formats) {
+    for (const TriangleSurface& surface : {cube(), testing::tetrahedron(), ball(2)}) {
+      const TriangleSurface result = read(name, write(surface));
+      EXPECT_EQ(result.nodes.size(), surface.nodes.size()) << name;
+      EXPECT_EQ(result.triangles.size(), surface.triangles.size()) << name;
+      EXPECT_NEAR(volume(result), volume(surface), 1e-5) << name;
+      EXPECT_NEAR(mean_edge_length(result), mean_edge_length(surface), 1e-5) << name;
+    }
+  }
+  EXPECT_TRUE(notes_.empty());
+}
+
+TEST_F(SurfaceInput, SplitsPolygons) {
+  const TriangleSurface result = read("quads.off",
+                                      "OFF\n8 6 0\n0 0 0\n2 0 0\n2 2 0\n0 2 0\n0 0 2\n2 0 2\n2 2 2\n0 2 2\n"
+                                      "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
+  EXPECT_EQ(result.triangles.size(), 12U);
+  EXPECT_NEAR(volume(result), 8.0, 1e-12);
+}
+
+TEST_F(SurfaceInput, TurnsAnInsideOutSurface) {
+  TriangleSurface surface = ball(1);
+  for (Triangle& t : surface.triangles) {
+    std::swap(t[0], t[1]);
+  }
+  ASSERT_LT(volume(surface), 0.0);
+  EXPECT_NEAR(volume(read("in.off", off(surface))), -volume(surface), 1e-5);
+  ASSERT_EQ(notes_.size(), 1U);
+  expect_mentions(notes_[0], {"inwards"});
+}
+
+TEST_F(SurfaceInput, TurnsSingleTriangles) {
+  TriangleSurface surface = cube();
+  std::swap(surface.triangles[3][0], surface.triangles[3][1]);
+  EXPECT_NEAR(volume(read("mixed.off", off(surface))), 1.0, 1e-12);
+  ASSERT_FALSE(notes_.empty());
+  expect_mentions(notes_[0], {"of 12 polygons", "turned"});
+}
+
+TEST_F(SurfaceInput, OpenSurface) {
+  TriangleSurface surface = cube();
+  surface.triangles.pop_back();                            // a corner at (1, 1, 1)
+  surface.triangles.erase(surface.triangles.begin() + 8);  // a corner at the origin
+  expect_mentions(error(surface), {"bad.off", "open", "2 hole(s)", "6 open edges", "(0, 0, 0)"});
+}
+
+TEST_F(SurfaceInput, NonManifoldEdge) {
+  TriangleSurface surface = cube();
+  surface.nodes.emplace_back(0.5, -1, -1);
+  surface.triangles.push_back({0, 1, 8});
+  expect_mentions(error(surface), {"not manifold", "3 triangles", "from (0, 0, 0) to (1, 0, 0)"});
+}
+
+TEST_F(SurfaceInput, NonManifoldPoint) {
+  expect_mentions(error(joined(cube(), cube(), {1, 1, 1})), {"not manifold", "touch in the point (1, 1, 1)"});
+}
+
+TEST_F(SurfaceInput, SeveralParts) {
+  expect_mentions(error(joined(cube(), cube(), {3, 0, 0})), {"2 disconnected parts"});
+}
+
+TEST_F(SurfaceInput, FlatTriangle) {
+  TriangleSurface surface = cube();
+  surface.nodes.emplace_back(0.5, 0, 0);  // on the edge 0-1, with a flat triangle between
+  surface.triangles[0] = {0, 2, 8};
+  surface.triangles.insert(surface.triangles.end(), {{8, 2, 1}, {8, 1, 0}});
+  expect_mentions(error(surface), {"no area", "0, 0)"});
+}
+
+TEST_F(SurfaceInput, SelfIntersection) {
+  TriangleSurface surface = testing::fine_cube(1);
+  for (Vec3& x : surface.nodes) {
+    if (x == Vec3(0.5, 0.5, 1.0)) {
+      x[2] = -1.0;  // the middle of the lid goes through the floor
+    }
+  }
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_.path());
+  std::ofstream("bad.bad-faces.off") << "mine\n";
+  EXPECT_EQ(error(surface).find("bad-faces"), std::string::npos) << "it is another's file";
+  std::string mine;
+  std::ifstream("bad.bad-faces.off") >> mine;
+  EXPECT_EQ(mine, "mine");
+  std::filesystem::remove("bad.bad-faces.off");
+  expect_mentions(error(surface), {"bad.bad-faces.off"});
+  const std::string text = error(surface);  // over its own
+  std::filesystem::current_path(before);
+  expect_mentions(text, {"intersects itself", "pair(s) of triangles", "near (", "bad.bad-faces.off"});
+
+  std::ifstream bad_faces(folder_.path() / "bad.bad-faces.off");
+  std::string head;
+  std::size_t points = 0, faces = 0;
+  bad_faces >> head >> points >> faces;
+  EXPECT_EQ(head, "OFF");
+  EXPECT_GE(faces, 2U);
+  EXPECT_LT(faces, surface.triangles.size());
+  EXPECT_EQ(points, 3 * faces);
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "bad.bad-faces.off.partial"));
+}
+
+TEST_F(SurfaceInput, UnreadableFiles) {
+  expect_mentions(error_of([&] { read_surface(folder_.path() / "none.off", notes_); }),
+                  {"none.off", "No such file", "surface ="});
+  for (const std::string name : {"a.off", "a.obj", "a.stl", "a.ply", "a.xyz"}) {
+    expect_mentions(error_of([&] { read(name, "this is no surface\n"); }), {name, "cannot read a surface"});
+    expect_mentions(error_of([&] { read(name, ""); }), {name, "cannot read a surface"});
+  }
+  expect_mentions(error_of([&] { read("cut.off", off(cube()).substr(0, 150)); }), {"cut.off"});
+}
+
+TEST_F(SurfaceInput, RemeshesAndKeepsSharpEdges) {
+  const TriangleSurface given = read("cube.off", off(cube()));
+  const Remeshing remeshing = remesh_surface(folder_.path() / "cube.off", given, 0.2);
+  ASSERT_EQ(remeshing.problem, "");
+  const TriangleSurface& result = remeshing.surface;
+  EXPECT_NEAR(mean_edge_length(result), 0.2, 0.04);
+  EXPECT_NEAR(volume(result), 1.0, 1e-9);  // no edge was rounded
+}
+
+TEST_F(SurfaceInput, MeasuresDistance) {
+  const auto distance = distance_to(cube());
+  EXPECT_NEAR(distance({0.5, 0.5, 0.4}), 0.4, 1e-12);
+  EXPECT_NEAR(distance({2.0, 2.0, 0.5}), std::sqrt(2.0), 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate

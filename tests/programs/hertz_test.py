@@ -1,0 +1,54 @@
+"""A rigid sphere on an elastic block, through both programs: the quick end of scripts/studies/hertz."""
+
+import importlib.machinery
+import importlib.util
+import unittest
+
+import numpy as np
+
+from programs import SOURCE, ProgramTest
+
+LOADER = importlib.machinery.SourceFileLoader("hertz", str(SOURCE / "scripts" / "hertz"))
+study = importlib.util.module_from_spec(importlib.util.spec_from_loader("hertz", LOADER))
+LOADER.exec_module(study)
+
+
+class References(unittest.TestCase):
+    """What the script compares with agrees where it must: all with Hertz as the depth goes to 0."""
+
+    def test_small_depths(self):
+        for poissons_ratio in (0.0, 0.3, 0.49):
+            hertz = study.hertz(1e-6, poissons_ratio)
+            self.assertAlmostEqual(study.sneddon(1e-6, poissons_ratio) / hertz, 1, delta=1e-6)
+            self.assertAlmostEqual(study.half_space(1e-6, poissons_ratio) / hertz, 1, delta=1e-3)  # points move sideways by sqrt(1e-6)
+
+    def test_sneddon_at_a_depth(self):
+        # a = R/2: delta = R/4 ln 3, F (1 - nu^2)/(E R^2) = 5/8 ln 3 - 1/2
+        self.assertAlmostEqual(study.sneddon(np.log(3) / 4, 0.0), 0.625 * np.log(3) - 0.5, delta=1e-12)
+
+
+class Hertz(ProgramTest):
+    """Cells of R/20, R/10 and R/5 under the sphere, block of 20 R."""
+
+    DEPTH, POISSON = 0.2, 0.3
+
+    def error(self, cells, depth=DEPTH):
+        file = study.bake(self.folder, cells, self.POISSON, size=20)
+        self.radius, self.force = study.press(file, cells, depth)
+        return study.more(self.force.sum(), study.half_space(depth, self.POISSON))
+
+    def test_force_and_pressure(self):
+        coarse, fine = self.error(5), self.error(10)
+        # Measured +10.0 and +2.7 %: 1.6 % by the block's end at 20 R, the rest discretisation where the contact has but 2.2 and 4.5 cells in its
+        # radius. With R/5 edges and faces are touched too, which hold the sphere out.
+        self.assertAlmostEqual(coarse, 10.0, delta=0.1)
+        self.assertAlmostEqual(fine, 2.7, delta=0.1)
+        # Hertz: 1 - (1 - 1/4)^1.5 = 35 % of the force is within half of the contact's radius, all within it but for a cell.
+        a = np.sqrt(self.DEPTH)
+        share = [self.force[self.radius < r].sum() / self.force.sum() for r in (0.5 * a, a + 0.1)]
+        self.assertAlmostEqual(share[0], 0.35, delta=0.1)
+        self.assertEqual(share[1], 1)
+
+    def test_a_shallow_press_is_not_held_out_by_edges(self):
+        # Edges of L are chords of the sphere: touched, they add 1.5 L^2 / (8 R depth), 4.7 % here with L the diagonal of a cell.
+        self.assertAlmostEqual(self.error(20, 0.02), -0.4, delta=0.3)

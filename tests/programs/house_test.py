@@ -1,0 +1,76 @@
+"""scripts/house: each of its rules, kept and broken."""
+
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from programs import SOURCE
+
+HOUSE = SOURCE / "scripts" / "house"
+PICTURE = "<svg><title>meshes&#45;&gt;base</title></svg>"
+
+
+class Rules(unittest.TestCase):
+    """A tree of two folders that keeps them all; each test breaks one."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        self.write("base/error.h", "#pragma once\n")
+        self.write("meshes/mesh.h", '#include "base/error.h"\n#include <vector>\n')
+        self.write("meshes/mesh.cpp", '#include "meshes/mesh.h"\n// theory.md section 1\n')
+        self.write("docs/theory.md", "# Theory\n\n## 1. Linear elastostatics\n")
+        self.write("docs/house.svg", PICTURE)
+
+    def write(self, name, text):
+        file = self.root / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+
+    def check(self):
+        done = subprocess.run([HOUSE, "--check", "--root", self.root], text=True, capture_output=True, check=False)
+        return done.returncode, done.stdout + done.stderr
+
+    def refused(self, *words):
+        status, said = self.check()
+        self.assertEqual(status, 1, said)
+        for word in words:
+            self.assertIn(word, said)
+
+    def test_a_house_in_order_passes(self):
+        status, said = self.check()
+        self.assertEqual(status, 0, said)
+        self.assertIn("3 files, 0 rules broken", said)
+
+    def test_an_include_upwards_is_refused(self):
+        self.write("base/words.cpp", '#include "meshes/mesh.h"\n')
+        self.refused("base/words.cpp:1: includes meshes/mesh.h, and base stands below meshes")
+
+    def test_folders_that_include_each_other_are_refused(self):
+        self.write("base/words.cpp", '\n#include "meshes/mesh.h"\n')
+        self.refused("base/words.cpp:2: base and meshes include each other (meshes/mesh.h:1)")
+
+    def test_a_folder_of_forty_files_is_the_largest(self):
+        for k in range(39):
+            self.write(f"base/part{k}.h", "")
+        self.assertEqual(self.check()[0], 0)
+        self.write("base/part39.cpp", "")
+        self.refused("base: 41 product files, of at most 40")
+
+    def test_a_folder_on_no_floor_is_refused(self):
+        self.write("runtime/attic/old.cpp", "")
+        self.refused("runtime/attic/old.cpp: its folder is on no floor")
+
+    def test_a_section_that_is_not_there_is_refused(self):
+        self.write("meshes/mesh.cpp", "// theory.md section 2\n")
+        self.refused("meshes/mesh.cpp:1: cites section 2 of docs/theory.md")
+
+    def test_a_picture_of_other_sources_is_refused(self):
+        self.write("docs/house.svg", PICTURE.replace("base", "formats"))
+        self.refused("docs/house.svg: is not of these sources")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,205 @@
+// The kept compliance against the Green's functions that it is gathered from, and the contact points that a
+// tick finds against what a naive search over the whole surface finds.
+#include "runtime/body/near_field.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "runtime/solve/nearest_point.h"
+#include "runtime/solve/node_vectors.h"
+#include "runtime/tick/step.h"
+#include "tests/support/runtime_model.h"
+
+namespace palpate {
+namespace {
+
+class Near : public testing::TestWithParam<int> {
+ protected:
+  Body body_{
+      test::unit_model(GetParam(), GetParam() == 3 ? 4 : 12, Scope::surface, Precision::double_precision)};
+
+  [[nodiscard]] Index stored(Index surface_node) const {
+    return body_.surface_stored_nodes()[static_cast<std::size_t>(surface_node)];
+  }
+
+  /// Surface nodes that are free to move, in a random order.
+  [[nodiscard]] std::vector<Index> free_nodes(unsigned seed) const {
+    std::vector<Index> nodes;
+    for (Index node = 0; node < static_cast<Index>(body_.surface_stored_nodes().size()); ++node) {
+      if (stored(node) >= 0) nodes.push_back(node);
+    }
+    std::shuffle(nodes.begin(), nodes.end(), std::mt19937(seed));
+    return nodes;
+  }
+
+  void expect_compliance(const NearField& near) const {
+    const int d = near.dimension();
+    for (Index i = 0; i < near.count(); ++i) {
+      ASSERT_EQ(near.place_of(near.node(i)), i);
+      for (Index j = 0; j < near.count(); ++j) {
+        const Eigen::MatrixXd xi = body_.greens().block(stored(near.node(i)), stored(near.node(j)));
+        for (int p = 0; p < d; ++p) {
+          for (int q = 0; q < d; ++q)
+            ASSERT_EQ(near.row(d * i + p)[static_cast<std::size_t>(d * j + q)], xi(p, q));
+        }
+      }
+    }
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Dimension, Near, testing::Values(2, 3));
+
+TEST_P(Near, KeepsTheComplianceOfWhatIsWantedWhileNodesComeAndGo) {
+  NearField near(body_, 10);
+  std::mt19937 random(2);
+  const std::vector<Index> nodes = free_nodes(1);
+  for (int tick = 0; tick < 300; ++tick) {
+    near.begin_tick();
+    std::set<Index> wanted;
+    for (int k = 0; k < 6; ++k) wanted.insert(nodes[random() % nodes.size()]);
+    for (const Index node : wanted) ASSERT_TRUE(near.want(body_, node));
+    for (const Index node : wanted) ASSERT_GE(near.place_of(node), 0);
+    ASSERT_LE(near.count(), 10);
+    if (tick % 30 == 0) expect_compliance(near);
+  }
+}
+
+TEST_P(Near, IsFullOnlyOfWhatIsWantedOrLoaded) {
+  NearField near(body_, 4);
+  const std::vector<Index> nodes = free_nodes(3);
+  near.begin_tick();
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_TRUE(near.want(body_, nodes[k]));
+  EXPECT_FALSE(near.want(body_, nodes[4]));
+  near.load(near.place_of(nodes[0]), Vec3(1.0, 0.0, 0.0));
+  near.begin_tick();
+  for (std::size_t k = 5; k < 8; ++k) EXPECT_TRUE(near.want(body_, nodes[k]));
+  EXPECT_GE(near.place_of(nodes[0]), 0) << "a loaded node stays";
+  EXPECT_FALSE(near.want(body_, nodes[9]));
+}
+
+TEST_P(Near, ForgetsWhatIsNotWantedForLong) {
+  NearField near(body_, 30);
+  const std::vector<Index> nodes = free_nodes(4);
+  near.begin_tick();
+  for (std::size_t k = 0; k < 20; ++k) near.want(body_, nodes[k]);
+  for (int tick = 0; tick < 300; ++tick) {
+    near.begin_tick();
+    near.want(body_, nodes[7]);
+  }
+  EXPECT_EQ(near.count(), 1);
+  EXPECT_EQ(near.node(0), nodes[7]);
+}
+
+TEST_P(Near, DisplacementIsThatOfTheGreensFunctions) {
+  NearField near(body_, 20);
+  const std::vector<Index> nodes = free_nodes(5);
+  near.begin_tick();
+  for (std::size_t k = 0; k < 6; ++k) near.want(body_, nodes[k]);
+  for (const std::size_t k : {0U, 3U, 4U}) {
+    near.load(near.place_of(nodes[k]), test::upright(GetParam(), 0.1, -0.2, 0.3 + static_cast<double>(k)));
+    near.load(near.place_of(nodes[k]), test::upright(GetParam(), 0.1, 0.0, 0.0));
+  }
+  near.displace();
+  EXPECT_EQ(near.load().nodes().size(), 3U);
+  for (std::size_t k = 6; k < 12; ++k) near.want(body_, nodes[k]);  // these come after the forces
+  std::vector<double> u(static_cast<std::size_t>(body_.greens().order()));
+  body_.greens().displacement(near.load().nodes(), near.load().forces(), u);
+  for (std::size_t k = 0; k < 12; ++k) {
+    const Vec3 expected = vector_at(u, GetParam(), stored(nodes[k]));
+    EXPECT_GT(expected.norm(), 1e-6);
+    EXPECT_LT((near.displacement(near.place_of(nodes[k])) - expected).norm(), 1e-13 * expected.norm());
+  }
+  near.unload();
+  near.displace();
+  EXPECT_EQ(near.load().nodes().size(), 0U);
+  EXPECT_EQ(near.displacement(0), Vec3::Zero());
+}
+
+TEST_P(Near, RetreatMakesAShareOfTheChange) {
+  NearField near(body_, 20);
+  const std::vector<Index> nodes = free_nodes(5);
+  near.begin_tick();
+  for (std::size_t k = 0; k < 6; ++k) near.want(body_, nodes[k]);
+  const auto displacements = [&] {
+    near.displace();
+    std::vector<Vec3> u;
+    u.reserve(static_cast<std::size_t>(near.count()));
+    for (Index place = 0; place < near.count(); ++place) u.push_back(near.displacement(place));
+    return u;
+  };
+  near.load(near.place_of(nodes[1]), test::upright(GetParam(), 0.4, 0.0, 1.0));
+  const std::vector<Vec3> before = displacements();
+  near.unload();
+  near.load(near.place_of(nodes[2]), test::upright(GetParam(), 0.0, 0.0, -3.0));
+  const std::vector<Vec3> after = displacements();
+  near.retreat(0.25);
+  const std::vector<Vec3> between = displacements();
+  EXPECT_EQ(near.load().nodes().size(), 2U);
+  for (std::size_t k = 0; k < between.size(); ++k)
+    EXPECT_LT((between[k] - (0.75 * before[k] + 0.25 * after[k])).norm(), 1e-14 * after[k].norm());
+}
+
+/// Contact points of a sphere that presses on the top: nearest points of all simplices of the surface that
+/// are as near, by a search without tree, near field or margins.
+TEST_P(Near, ContactPointsAreTheNearestPointsOfTheDeformedSurface) {
+  const double radius = 0.4;
+  State state(body_, {.tools = {Tool{.radius = radius}}, .max_contacts = 64});
+  ToolPose tool;
+  for (int k = 0; k <= 120; ++k) {
+    tool.position = test::upright(GetParam(), 0.47, 0.52, 1.45 - 0.001 * std::min(k, 100));
+    ASSERT_FALSE(has(step(body_, state, tool), StepStatus::capacity_full));
+  }
+  const auto d = static_cast<std::size_t>(GetParam());
+  std::vector<double> u(static_cast<std::size_t>(body_.greens().order()));
+  surface_displacement(body_, state, u);
+  const auto position = [&](Index node) -> Vec3 {
+    const Vec3 rest = body_.surface_rest_positions()[static_cast<std::size_t>(node)];
+    return stored(node) < 0 ? rest : Vec3(rest + vector_at(u, GetParam(), stored(node)));
+  };
+  std::size_t touching = 0;
+  for (std::size_t at = 0; at < body_.simplices().size(); at += d) {
+    const Vec3 a = position(body_.simplices()[at]);
+    const Vec3 b = position(body_.simplices()[at + 1]);
+    const NearestPoint nearest =
+        d == 2 ? nearest_on_line(tool.position, a, b)
+               : nearest_on_triangle(tool.position, a, b, position(body_.simplices()[at + 2]));
+    const double gap = std::sqrt(nearest.squared_distance) - radius;
+    EXPECT_GT(gap, -1e-9) << "simplex " << at / d << " is in the tool";
+    if (gap > 1e-9) continue;
+    ++touching;
+    const bool found =
+        std::any_of(state.contacts().begin(), state.contacts().end(),
+                    [&](const ContactPoint& c) { return (c.position - nearest.on_simplex).norm() < 1e-6; });
+    EXPECT_TRUE(found) << "simplex " << at / d << " touches and is no contact";
+  }
+  EXPECT_GE(touching, 2U);
+  for (const ContactPoint& c : state.contacts()) {
+    for (const ContactPoint& other : state.contacts())
+      EXPECT_TRUE(&c == &other || (c.position - other.position).norm() > 1e-6) << "twice the same";
+  }
+}
+
+// With room for two, the two that would be deepest without the body giving way are kept.
+TEST_P(Near, TheDeepestContactsAreKept) {
+  const auto contacts_with = [&](Index room) {
+    State state(body_, {.tools = {Tool{.radius = 0.4}}, .max_contacts = room});
+    ToolPose tool;
+    for (int k = 0; k <= 60; ++k) {
+      tool.position = test::upright(GetParam(), 0.47, 0.52, 1.42 - 0.001 * k);
+      step(body_, state, tool);
+    }
+    return state;
+  };
+  const State all = contacts_with(64);
+  const State few = contacts_with(2);
+  ASSERT_GT(all.contacts().size(), 2U);
+  EXPECT_EQ(few.contacts().size(), 2U);
+  EXPECT_TRUE(has(few.status, StepStatus::capacity_full));
+  EXPECT_GT(few.tools[0].wrench.force.norm(), 0.2 * all.tools[0].wrench.force.norm());
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,434 @@
+// palpate.h: the same as the C++ step, behind functions that never throw.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "formats/model_file.h"
+#include "runtime/background/patch_source.h"
+#include "runtime/library/palpate.h"
+#include "runtime/solve/node_vectors.h"
+#include "runtime/tick/status.h"
+#include "runtime/tick/step.h"
+
+namespace palpate {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+struct Ended {
+  void operator()(palpate_session* session) const { palpate_destroy(session); }
+};
+using Session = std::unique_ptr<palpate_session, Ended>;
+
+std::string golden(const std::string& name) {
+  return PALPATE_SOURCE_DIR "/tests/golden/" + name + "/" + name + ".palpate.hdf";
+}
+
+palpate_tool sphere(double radius) {
+  palpate_tool tool = palpate_default_tool();
+  tool.radius = radius;
+  return tool;
+}
+
+Session open(const std::string& name, const std::vector<palpate_tool>& tools) {
+  char error[300];
+  Session session(palpate_create(golden(name).c_str(), tools.data(), static_cast<int>(tools.size()), 24,
+                                 error, sizeof error));
+  EXPECT_NE(session, nullptr) << error;
+  EXPECT_STREQ(error, "");
+  return session;
+}
+
+/// The same as the step with the patch that it wants, once it is there.
+TEST(COverlay, FeelsAsTheStepWithItsPatch) {
+  const palpate_tool tool = sphere(0.2);
+  const palpate_overlay overlay{.refinement = 3, .rings = 1, .memory = std::size_t{1} << 28};
+  palpate_options options = palpate_default_options();
+  options.overlay = &overlay;
+  char error[300];
+  const Session session(
+      palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 64, &options, error, sizeof error));
+  ASSERT_NE(session, nullptr) << error;
+  const Body body(load_model(golden("cube2")), {}, 3);
+  EXPECT_EQ(palpate_surface_counts(session.get()).nodes, std::ssize(body.surface_rest_positions()));
+  EXPECT_GT(body.surface_rest_positions().size(), body.surface_mesh_nodes().size());
+
+  const auto pose = [](int tick) {
+    return palpate_pose{{0.45, 0.5, 1.25 - 0.001 * std::min(tick, 100)}, {1.0, 0.0, 0.0, 0.0}, 0};
+  };
+  for (int tick = 0; tick < 20000; ++tick) {  // hovers until the builder has made the patch
+    if (palpate_step(session.get(), std::array{pose(0)}.data()) == 0) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  State state(body,
+              {.tools = {Tool{.radius = 0.2}}, .max_contacts = 64, .patch_nodes = patch_room(body, 1, 1)});
+  PatchSource source(body, state, {.rings = 1, .in_background = false});
+  for (int tick = 0; tick < 1000; ++tick) {
+    palpate_step(session.get(), std::array{pose(tick)}.data());
+    source.serve(state);
+    const palpate_pose device = pose(tick);
+    step(body, state, ToolPose{.position = Eigen::Map<const Vec3>(device.position)});
+  }
+  palpate_result result;
+  palpate_get(session.get(), 0, &result);
+  const Vec3 force = state.tools.front().wrench.force;
+  EXPECT_GT(force.z(), 0.0);
+  EXPECT_LT((Eigen::Map<const Vec3>(result.force) - force).norm(), 1e-6 * force.norm());
+
+  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
+  std::vector<Vec3> u(body.surface_rest_positions().size());
+  surface_displacement(body, state.near.load(), stored, u);
+  std::vector<double> xyz(3 * u.size());
+  palpate_surface_displacement(session.get(), xyz.data());
+  double largest = 0.0;
+  for (const Vec3& displacement : u) largest = std::max(largest, displacement.norm());
+  for (std::size_t node = 0; node < u.size(); ++node)
+    EXPECT_LT((Eigen::Map<const Vec3>(&xyz[3 * node]) - u[node]).norm(), 1e-5 * largest);
+}
+
+TEST(COverlay, RefusesWhatCannotBe) {
+  const palpate_tool tool = sphere(0.2);
+  char error[300];
+  for (const palpate_overlay& overlay :
+       {palpate_overlay{1, 1, 1000}, palpate_overlay{3, 0, 1000}, palpate_overlay{99, 1, 1000}}) {
+    palpate_options options = palpate_default_options();
+    options.overlay = &overlay;
+    EXPECT_EQ(
+        palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 64, &options, error, sizeof error),
+        nullptr);
+    EXPECT_NE(std::string(error).find("overlay"), std::string::npos) << error;
+  }
+}
+
+/// What is said when a session cannot be made.
+std::string refusal(const char* file, const palpate_tool* tools, int count, int contacts) {
+  char error[300];
+  const Session session(palpate_create(file, tools, count, contacts, error, sizeof error));
+  EXPECT_EQ(session, nullptr);
+  return error;
+}
+
+palpate_result result_of(const palpate_session* session, int tool) {
+  palpate_result result;
+  palpate_get(session, tool, &result);
+  return result;
+}
+
+std::vector<double> displacement_of(palpate_session* session) {
+  std::vector<double> xyz(3 * static_cast<std::size_t>(palpate_surface_counts(session).nodes), nan);
+  palpate_surface_displacement(session, xyz.data());
+  return xyz;
+}
+
+/// The cube or, in the plane, the plate of the golden files and two tools: a sphere with friction, and a
+/// capsule that hangs on a spring.
+class CInterface : public testing::TestWithParam<const char*> {
+ protected:
+  CInterface() {
+    tools_[0].friction = 0.4;
+    tools_[0].reach = 0.2;
+    tools_[0].hand_over = 0.03;
+    tools_[1].length = 0.1;
+    tools_[1].coupling_stiffness = 0.5 * stiffness_;
+    tools_[1].coupling_torsion = 0.1 * stiffness_;
+    tools_[1].max_force = 0.002 * stiffness_;
+  }
+
+  [[nodiscard]] std::vector<Tool> cpp_tools() const {
+    std::vector<Tool> tools;
+    for (const palpate_tool& tool : tools_) {
+      tools.push_back({.radius = tool.radius,
+                       .length = tool.length,
+                       .coupling_stiffness = tool.coupling_stiffness,
+                       .coupling_torsion = tool.coupling_torsion,
+                       .max_force = tool.max_force,
+                       .hand_over = tool.hand_over,
+                       .reach = tool.reach,
+                       .friction = {}});
+    }
+    tools[0].friction = tools_[0].friction;
+    return tools;
+  }
+
+  /// A thousand ticks: down onto the body, along it, turning; a grab, nonsense, and up again.
+  [[nodiscard]] std::vector<palpate_pose> poses(int tick) const {
+    const double t = 0.001 * tick;
+    const double height = 1.0 + 0.15 + 0.05 - 0.12 * std::sin(3.0 * t);
+    palpate_pose first{{0.4 + 0.2 * t, 0.5, height}, {1.0, 0.0, 0.0, 0.0}, tick > 400 && tick < 600 ? 7 : 0};
+    palpate_pose second{{0.7, 0.4 + 0.1 * t, height - 0.04}, {2.0, 0.3 * t, 0.1, 0.2 * t}, 0};
+    if (!in_space_) {  // the plate hangs: from below, and the capsule points up
+      first.position[1] = 1.0 - height;
+      second.position[1] = 0.9 - height;
+    }
+    if (tick == 700) first.position[0] = nan;
+    if (tick == 701) std::fill_n(second.orientation, 4, 0.0);
+    return {first, second};
+  }
+
+  /// The results of a thousand ticks, byte for byte.
+  [[nodiscard]] std::vector<palpate_result> run(palpate_session* session) const {
+    std::vector<palpate_result> results;
+    for (int tick = 0; tick < 1000; ++tick) {
+      palpate_step(session, poses(tick).data());
+      results.push_back(result_of(session, 0));
+      results.push_back(result_of(session, 1));
+    }
+    return results;
+  }
+
+  bool in_space_ = std::string(GetParam()) == "cube2";
+  Body body_{load_model(golden(GetParam()))};
+  double stiffness_ = body_.model().materials[0].youngs_modulus;
+  std::vector<palpate_tool> tools_ = {sphere(0.15), sphere(0.15)};
+};
+
+INSTANTIATE_TEST_SUITE_P(Golden, CInterface, testing::Values("cube2", "plate2"),
+                         [](const auto& chosen) { return std::string(chosen.param); });
+
+ToolPose cpp_pose(const palpate_pose& pose) {
+  ToolPose result;
+  result.position = Vec3(pose.position[0], pose.position[1], pose.position[2]);
+  result.orientation = {pose.orientation[0], pose.orientation[1], pose.orientation[2], pose.orientation[3]};
+  result.grab = pose.grab != 0;
+  return result;
+}
+
+Vec3 vector(const double* xyz) {
+  return {xyz[0], xyz[1], xyz[2]};
+}
+
+TEST_P(CInterface, IsTheStepOfCppBitForBit) {
+  const Session session = open(GetParam(), tools_);
+  State state(body_, {.tools = cpp_tools(), .max_contacts = 24});
+  std::uint32_t seen = 0;
+  int touching[2] = {0, 0};
+  for (int tick = 0; tick < 1000; ++tick) {
+    const std::vector<palpate_pose> c = poses(tick);
+    const std::vector<ToolPose> cpp = {cpp_pose(c[0]), cpp_pose(c[1])};
+    const std::uint32_t status = palpate_step(session.get(), c.data());
+    ASSERT_EQ(status, static_cast<std::uint32_t>(step(body_, state, cpp))) << "tick " << tick;
+    seen |= status;
+    for (int k = 0; k < 2; ++k) {
+      const palpate_result result = result_of(session.get(), k);
+      const ToolState& tool = state.tools[static_cast<std::size_t>(k)];
+      ASSERT_EQ(vector(result.force), tool.wrench.force) << "tick " << tick;
+      ASSERT_EQ(vector(result.torque), tool.wrench.torque) << "tick " << tick;
+      ASSERT_EQ(vector(result.tool_position), tool.pose.position) << "tick " << tick;
+      ASSERT_EQ(Eigen::Quaterniond(result.tool_orientation[0], result.tool_orientation[1],
+                                   result.tool_orientation[2], result.tool_orientation[3])
+                    .coeffs(),
+                tool.pose.orientation.coeffs())
+          << "tick " << tick;
+      ASSERT_EQ(result.contacts, tool.contacts) << "tick " << tick;
+      for (int i = 0; i < 9; ++i) ASSERT_EQ(result.local_stiffness[i], tool.local.stiffness(i / 3, i % 3));
+      ASSERT_EQ(vector(result.local_point), tool.local.point) << "tick " << tick;
+      ASSERT_EQ(result.local_radius, tool.local.radius) << "tick " << tick;
+      if (result.contacts > 0) ++touching[k];
+    }
+  }
+  EXPECT_GT(touching[0], 300) << "the sphere hardly ever touched";
+  EXPECT_GT(touching[1], 300) << "the capsule hardly ever touched";
+  EXPECT_TRUE((seen & PALPATE_POSE_NOT_FINITE) != 0) << seen;
+  EXPECT_TRUE((seen & PALPATE_FORCE_LIMITED) != 0) << seen;
+}
+
+TEST_P(CInterface, SurfaceFollowsTheForces) {
+  const Session session = open(GetParam(), tools_);
+  State state(body_, {.tools = cpp_tools(), .max_contacts = 24});
+  std::vector<double> u(static_cast<std::size_t>(body_.greens().order()));
+  double largest = 0.0;
+  int held = 0;
+  for (int tick = 0; tick < 600; ++tick) {
+    palpate_step(session.get(), poses(tick).data());
+    step(body_, state, std::vector<ToolPose>{cpp_pose(poses(tick)[0]), cpp_pose(poses(tick)[1])});
+    if (tick % 50 != 49) continue;
+    const std::vector<double> seen = displacement_of(session.get());
+    surface_displacement(body_, state, u);
+    for (std::size_t node = 0; node < body_.surface_mesh_nodes().size(); ++node) {
+      const Index stored = body_.stored_node(body_.surface_mesh_nodes()[node]);
+      const Vec3 expected = stored < 0 ? Vec3::Zero() : vector_at(u, body_.dimension(), stored);
+      ASSERT_EQ(vector(&seen[3 * node]), expected) << "node " << node << ", tick " << tick;
+      largest = std::max(largest, expected.norm());
+      held += stored < 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(largest, 0.01);
+  EXPECT_GT(held, 0);
+}
+
+TEST_P(CInterface, ResetForgetsEverything) {
+  const Session session = open(GetParam(), tools_);
+  for (int tick = 0; tick < 500; ++tick) palpate_step(session.get(), poses(tick).data());
+  palpate_reset(session.get());
+  for (const double u : displacement_of(session.get())) ASSERT_EQ(u, 0.0);
+  EXPECT_EQ(vector(result_of(session.get(), 0).force), Vec3::Zero());
+
+  const std::vector<palpate_result> again = run(session.get());
+  const std::vector<palpate_result> fresh = run(open(GetParam(), tools_).get());
+  for (std::size_t k = 0; k < fresh.size(); ++k) {
+    ASSERT_EQ(vector(again[k].force), vector(fresh[k].force)) << k;
+    ASSERT_EQ(vector(again[k].tool_position), vector(fresh[k].tool_position)) << k;
+    ASSERT_EQ(again[k].local_radius, fresh[k].local_radius) << k;
+  }
+}
+
+/// Sum of the volumes, in the plane of the areas, of all elements at rest.
+double content_of_elements(const Body& body) {
+  const Model& model = body.model();
+  double sum = 0.0;
+  for (Index e = 0; e < model.mesh.elements(); ++e) {
+    const auto nodes = model.mesh.element_nodes(e);
+    const auto at = [&](std::size_t k) {
+      const auto node = static_cast<std::size_t>(nodes[k]);
+      return Vec3(model.mesh.nodes[node] + model.rest_displacement[node]);
+    };
+    if (model.dimension() == 3) {
+      sum += (at(1) - at(0)).cross(at(2) - at(0)).dot(at(3) - at(0)) / 6.0;
+    } else {
+      sum += (at(2) - at(0)).cross(at(3) - at(1)).z() / 2.0;
+    }
+  }
+  return sum;
+}
+
+TEST_P(CInterface, SurfaceAtRestIsClosedAndFacesOutwards) {
+  const Session session = open(GetParam(), tools_);
+  const palpate_counts counts = palpate_surface_counts(session.get());
+  EXPECT_EQ(counts.corners, in_space_ ? 3 : 2);
+  std::vector<double> xyz(3 * static_cast<std::size_t>(counts.nodes), nan);
+  std::vector<std::int32_t> nodes(static_cast<std::size_t>(counts.corners * counts.simplices), -1);
+  palpate_surface_rest(session.get(), xyz.data());
+  palpate_surface_simplices(session.get(), nodes.data());
+
+  const auto at = [&](std::size_t corner) {
+    return vector(&xyz[3 * static_cast<std::size_t>(nodes[corner])]);
+  };
+  double content = 0.0;  // by the divergence theorem
+  for (std::size_t k = 0; k < nodes.size(); k += static_cast<std::size_t>(counts.corners)) {
+    content += in_space_ ? at(k).dot(at(k + 1).cross(at(k + 2))) / 6.0 : at(k).cross(at(k + 1)).z() / 2.0;
+  }
+  EXPECT_NEAR(content, content_of_elements(body_), 1e-12);
+  EXPECT_GT(content, 0.5);
+}
+
+TEST(CInterfaceErrors, SayWhatIsWrongAndWhatToDo) {
+  const palpate_tool good = sphere(0.1);
+  const std::string file = golden("cube2");
+  EXPECT_NE(refusal("/no/such.palpate.hdf", &good, 1, 8).find("/no/such.palpate.hdf"), std::string::npos);
+  EXPECT_NE(refusal(nullptr, &good, 1, 8).find("file name"), std::string::npos);
+  EXPECT_NE(refusal(file.c_str(), nullptr, 1, 8).find("no tool"), std::string::npos);
+  EXPECT_NE(refusal(file.c_str(), &good, 0, 8).find("no tool"), std::string::npos);
+  EXPECT_NE(refusal(file.c_str(), &good, 1, 0).find("room for 0 contacts"), std::string::npos);
+  EXPECT_NE(refusal(file.c_str(), &good, 1, 257).find("1 to 256"), std::string::npos);
+  const palpate_tool bad[] = {good, sphere(-0.5)};
+  EXPECT_NE(refusal(file.c_str(), bad, 2, 8).find("radius of tool 1 is -0.5"), std::string::npos);
+  palpate_tool rough = good;
+  rough.friction = nan;
+  EXPECT_NE(refusal(file.c_str(), &rough, 1, 8).find("friction of tool 0"), std::string::npos);
+  for (const char* piece : {"error: ", "\nhint: "})
+    EXPECT_NE(refusal(file.c_str(), bad, 2, 8).find(piece), std::string::npos);
+}
+
+TEST(CInterfaceErrors, AFileThatIsNoModelIsNamed) {
+  const auto file = std::filesystem::temp_directory_path() / "palpate_c_interface_no_model.hdf";
+  std::ofstream(file) << "not a model";
+  const palpate_tool tool = sphere(0.1);
+  EXPECT_NE(refusal(file.c_str(), &tool, 1, 8).find("palpate_c_interface_no_model.hdf"), std::string::npos);
+  std::filesystem::remove(file);
+}
+
+TEST(CInterfaceErrors, TextIsCutToItsRoomAndMayBeMissing) {
+  const palpate_tool tool = sphere(0.1);
+  char error[12];
+  std::memset(error, 'x', sizeof error);
+  EXPECT_EQ(palpate_create("/no/such", &tool, 1, 8, error, 8), nullptr);
+  EXPECT_STREQ(error, "error: ");
+  EXPECT_EQ(std::string(error + 8, 4), "xxxx");
+  EXPECT_EQ(palpate_create("/no/such", &tool, 1, 8, nullptr, 0), nullptr);
+  EXPECT_EQ(palpate_create("/no/such", &tool, 1, 8, error, 0), nullptr);
+  EXPECT_STREQ(error, "error: ") << "no room is no room";
+}
+
+TEST(CInterfaceErrors, NothingHappensWithoutPosesOrATool) {
+  palpate_destroy(nullptr);
+  const Session session = open("cube2", {sphere(0.1)});
+  const palpate_pose touching{{0.5, 0.5, 1.08}, {1.0, 0.0, 0.0, 0.0}, 0};
+  const palpate_pose above{{0.5, 0.5, 1.2}, {1.0, 0.0, 0.0, 0.0}, 0};
+  palpate_step(session.get(), &above);
+  palpate_step(session.get(), &touching);
+  const palpate_result before = result_of(session.get(), 0);
+  EXPECT_GT(before.force[2], 0.0) << "it pushes the hand up";
+  EXPECT_EQ(palpate_step(session.get(), nullptr), static_cast<std::uint32_t>(PALPATE_POSE_NOT_FINITE));
+  EXPECT_EQ(vector(result_of(session.get(), 0).force), vector(before.force));
+  for (const int tool : {-1, 1, 1000}) {
+    const palpate_result none = result_of(session.get(), tool);
+    EXPECT_EQ(vector(none.force), Vec3::Zero());
+    EXPECT_EQ(none.tool_orientation[0], 0.0);
+    EXPECT_EQ(none.local_radius, 0.0);
+  }
+}
+
+TEST(CInterfaceStatus, HasANameForEachBitAndNoOther) {
+  EXPECT_STREQ(palpate_status_name(PALPATE_NOTHING_IN_REACH), "nothing_in_reach");
+  EXPECT_STREQ(palpate_status_name(PALPATE_FORCE_LIMITED), "force_limited");
+  EXPECT_EQ(palpate_status_name(0), nullptr);
+  EXPECT_EQ(palpate_status_name(PALPATE_FORCE_LIMITED | PALPATE_CAPACITY_FULL), nullptr);
+  EXPECT_EQ(palpate_status_name(1U << 31), nullptr);
+}
+
+TEST(CInterfaceThreads, AnotherThreadSeesWholeTicksOnly) {
+  palpate_tool point = palpate_default_tool();
+  point.reach = 0.05;
+  const Session session = open("cube2", {point});
+  const auto press = [&](double depth,
+                         int grab = 1) {  // the node in the middle of the top, held from 0.02 above
+    const palpate_pose pose{{0.5, 0.5, 1.02 - depth}, {1.0, 0.0, 0.0, 0.0}, grab};
+    palpate_step(session.get(), &pose);
+  };
+  press(0.0, 0);
+  press(0.0);
+  press(0.05);
+  const std::vector<double> shape = displacement_of(session.get());
+  const auto largest = static_cast<std::size_t>(
+      std::max_element(shape.begin(), shape.end(),
+                       [](double a, double b) { return std::abs(a) < std::abs(b); }) -
+      shape.begin());
+  ASSERT_NEAR(shape[largest], -0.05, 1e-8) << "the node that is held";
+
+  std::atomic<bool> done = false;
+  std::thread loop([&] {
+    for (int tick = 0; !done; ++tick) press(0.05 + 0.04 * std::sin(0.01 * tick));
+  });
+  std::set<double> depths;
+  double worst = 0.0;
+  for (int picture = 0; picture < 100'000'000 && depths.size() < 500; ++picture) {
+    const std::vector<double> seen = displacement_of(session.get());
+    const double share =
+        seen[largest] / shape[largest];  // one force: all ticks look alike but for their size
+    for (std::size_t k = 0; k < seen.size(); ++k)
+      worst = std::max(worst, std::abs(seen[k] - share * shape[k]));
+    depths.insert(seen[largest]);
+  }
+  done = true;
+  loop.join();
+  EXPECT_LT(worst, 1e-12);
+  EXPECT_EQ(depths.size(), 500U);
+  press(0.02);
+  EXPECT_NEAR(displacement_of(session.get())[largest], -0.02, 1e-8) << "not the latest tick";
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,608 @@
+// The viewer's server over real sockets.
+#include <gtest/gtest.h>
+
+#include <boost/asio/read.hpp>
+#include <boost/asio/write.hpp>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "base/error.h"
+#include "runtime/body/patch_maker.h"
+#include "runtime/viewer/page.h"
+#include "runtime/viewer/viewer_server.h"
+#include "tests/support/runtime_model.h"
+#include "tests/support/viewer_client.h"
+#include "tests/support/viewer_decoder.h"
+
+namespace palpate {
+namespace {
+
+using test::Asking;
+using test::Client;
+using test::Json;
+namespace http = test::http;
+namespace websocket = test::websocket;
+
+/// Writes down what it is asked.
+class Asked : public ViewedRun {
+ public:
+  void point(const PointerPose& wanted) override {
+    note("point " + std::to_string(wanted.pose.position.x()) + (wanted.lifted ? " lifted" : ""));
+  }
+  void lose_pointer() override { note("lose_pointer"); }
+  void pause(bool paused) override { note(paused ? "pause" : "go on"); }
+  void step_once() override { note("step"); }
+  void reset() override { note("reset"); }
+  void acknowledge() override { note("acknowledge"); }
+  void change(const SettingsChange& settings) override {
+    if (settings.contains("friction")) throw Error("friction is -1", "--friction", "give a positive one");
+    if (settings.contains("safety")) throw PageError(PageRefusal::hand, "a hand", "--safety", "no");
+    note("change " + std::to_string(settings.size()));
+  }
+  void record(bool on) override { note(on ? "record" : "record no more"); }
+  void seek(std::int64_t frame) override { note("seek " + std::to_string(frame)); }
+
+  /// Waits for it, which may be among what was asked already.
+  void wait_for(const std::string& word, std::ptrdiff_t times = 1) {
+    std::unique_lock lock(mutex_);
+    heard_.wait(lock, [&] { return std::count(words_.begin(), words_.end(), word) >= times; });
+  }
+  std::vector<std::string> words() {
+    const std::lock_guard lock(mutex_);
+    return words_;
+  }
+
+ private:
+  void note(const std::string& word) {
+    const std::lock_guard lock(mutex_);
+    words_.push_back(word);
+    heard_.notify_all();
+  }
+
+  std::mutex mutex_;
+  std::condition_variable heard_;
+  std::vector<std::string> words_;
+};
+
+constexpr const char* step = R"({"type":"step"})";
+constexpr const char* take_control = R"({"type":"control","take":true})";
+constexpr const char* give_control = R"({"type":"control","take":false})";
+
+class Viewer : public testing::Test {
+ protected:
+  Asked run_;
+  std::unique_ptr<ViewerServer> server_ = serve({.port = 0});
+  Body body_{test::unit_model(ElementType::tet4, 3, Scope::full, Precision::double_precision), {}, 2};
+  std::shared_ptr<const Scene> scene_ = std::make_shared<const Scene>(make_scene(body_, 1));
+
+  [[nodiscard]] std::unique_ptr<ViewerServer> serve(const ViewerOptions& options, bool is_replay = false) {
+    return std::make_unique<ViewerServer>(ViewerPort(options), run_, is_replay);
+  }
+  [[nodiscard]] test::Served served() const { return test::Served(server_->url()); }
+  [[nodiscard]] std::uint16_t port() const { return served().port; }
+  [[nodiscard]] Client client(const Asking& asking = {}) const { return Client(served(), asking); }
+
+  [[nodiscard]] SurfacePicture picture(std::int64_t tick) const {
+    SurfacePicture picture;
+    picture.frame.tick = tick;
+    picture.frame.displacement.assign(3 * body_.surface_rest_positions().size(), 0.0F);
+    return picture;
+  }
+  [[nodiscard]] double tick_of(const std::string& frame) const {
+    return test::decode_frame(frame, scene_->nodes.size()).tick;
+  }
+  /// Reads frames until that of a tick.
+  void hear_frame(Client& client, std::int64_t tick) const {
+    while (tick_of(client.hear(3)) != static_cast<double>(tick)) {
+    }
+  }
+};
+
+bool is_controller(const Json& state) {
+  return state.at("you") == "controller";
+}
+
+TEST_F(Viewer, ServesItsPageAndNothingElse) {
+  EXPECT_EQ(server_->url(), "http://127.0.0.1:" + std::to_string(port()) + "/" + served().query);
+  const test::Answer page = test::ask(served(), {.target = "/"});
+  EXPECT_EQ(page.result_int(), 200U);
+  EXPECT_EQ(page.body(), viewer_page());
+  EXPECT_EQ(page[http::field::content_type], "text/html; charset=utf-8");
+  EXPECT_EQ(page["X-Content-Type-Options"], "nosniff");
+  EXPECT_EQ(page["Referrer-Policy"], "no-referrer");
+  EXPECT_EQ(page["Cross-Origin-Resource-Policy"], "same-origin");
+  EXPECT_EQ(page.count("Access-Control-Allow-Origin"), 0U);
+  EXPECT_TRUE(page["Content-Security-Policy"].starts_with("default-src 'none';"));
+
+  const test::Answer header = test::ask(served(), {.target = "/"}, http::verb::head);
+  EXPECT_EQ(header.result_int(), 200U);
+  EXPECT_TRUE(header.body().empty());
+  EXPECT_EQ(header[http::field::content_length], std::to_string(viewer_page().size()));
+
+  for (const char* target : {"/index.html", "/../etc/passwd", "/surface.stl", "/surface.vtu", "//"})
+    EXPECT_EQ(test::ask(served(), {.target = target}).result_int(), 404U) << target;
+  EXPECT_EQ(test::ask(served(), {.target = "/socket"}).result_int(), 404U);  // without an upgrade
+  const test::Answer post = test::ask(served(), {.target = "/"}, http::verb::post);
+  EXPECT_EQ(post.result_int(), 405U);
+  EXPECT_EQ(post[http::field::allow], "GET, HEAD");
+}
+
+TEST_F(Viewer, RefusesForeignHostsAndPages) {
+  const std::string own = "127.0.0.1:" + std::to_string(port());
+  const std::string foreign = "evil.example:" + std::to_string(port());
+  EXPECT_EQ(test::ask(served(), {.target = "/", .host = foreign}).result_int(), 403U);
+  EXPECT_EQ(test::ask(served(), {.target = "/", .host = "127.0.0.1"}).result_int(), 403U);
+  EXPECT_EQ(test::ask(served(), {.target = "/", .origin = "http://evil.example"}).result_int(), 403U);
+  EXPECT_EQ(Client(served(), {.host = foreign, .origin = "http://" + foreign}).status, 403U);
+  EXPECT_EQ(Client(served(), {.origin = "http://evil.example"}).status, 403U);
+  EXPECT_EQ(Client(served(), {.origin = "null"}).status, 403U);
+  EXPECT_EQ(Client(served(), {.origin = "http://" + own}).status, 101U);
+  const std::string name = "localhost:" + std::to_string(port());
+  EXPECT_EQ(Client(served(), {.host = name, .origin = "http://" + name}).status, 101U);
+  EXPECT_EQ(Client(served(), {.target = "/other"}).status, 404U);
+  EXPECT_EQ(Client(served(), {.subprotocol = "palpate.2"}).status, 400U);
+  EXPECT_EQ(Client(served(), {.subprotocol = "palpate.2, palpate.1"}).subprotocol, "palpate.1");
+  EXPECT_EQ(Client(served(), {.subprotocol = ""}).status, 101U);
+}
+
+TEST_F(Viewer, AsksForATokenWhereverItIs) {
+  std::string before;
+  for (const char* address : {"127.0.0.1", "0.0.0.0"}) {
+    server_ = serve({.address = address, .port = 0});
+    const std::string& url = server_->url();
+    ASSERT_EQ(url.substr(0, 17), "http://127.0.0.1:");
+    const std::string token = served().query;
+    EXPECT_EQ(token.size(), 7U + 32U);
+    EXPECT_NE(token, before) << "it is another one each time";
+    before = token;
+    server_->show_scene(scene_);
+    server_->show_picture(picture(0));
+    Client page = client();
+    hear_frame(page, 0);
+    const std::string wrong = "?token=" + std::string(32, '0');
+    for (const char* path : {"/", "/surface.stl", "/surface.vtu", "/nothing", "/socket"}) {
+      for (const std::string& query : {std::string(), wrong, token + "0", token.substr(0, token.size() - 1)})
+        EXPECT_EQ(test::ask(served(), {.target = path, .query = query}).result_int(), 403U) << path << query;
+    }
+    for (const char* path : {"/", "/surface.stl", "/surface.vtu"})
+      EXPECT_EQ(test::ask(served(), {.target = path}).result_int(), 200U) << path;
+    for (const std::string& query : {std::string(), wrong}) EXPECT_EQ(client({.query = query}).status, 403U);
+    EXPECT_EQ(client().status, 101U);
+  }
+}
+
+TEST_F(Viewer, SaysHelloThenStateSceneAndPicture) {
+  server_->show_state(R"({"ticks":5})");
+  server_->show_scene(scene_);
+  server_->show_picture(picture(42));
+  hear_frame(*std::make_unique<Client>(served()), 42);  // all has arrived
+  Client page = client();
+  const Json hello = Json::parse(page.hear().bytes);
+  EXPECT_EQ(hello.at("type"), "hello");
+  EXPECT_EQ(hello.at("mode"), "live");
+  const Json state = Json::parse(page.hear().bytes);
+  EXPECT_EQ(state.at("type"), "state");
+  EXPECT_EQ(state.at("ticks"), 5);
+  EXPECT_EQ(state.at("scene"), 1);
+  const Client::Said scene = page.hear();
+  EXPECT_EQ(test::decode_scene(scene.bytes).position.size(), 3 * scene_->nodes.size());
+  EXPECT_EQ(tick_of(page.hear().bytes), 42.0);
+}
+
+TEST_F(Viewer, RepeatsTheStateTwiceASecond) {
+  server_->show_state(R"({"ticks":5})");
+  Client page = client();
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(page.hear("state").at("ticks"), 5);
+}
+
+TEST_F(Viewer, SendsAPatchBeforeTheFirstFrameOnIt) {
+  const Index centre = body_.nearest_surface_node(test::top_middle(3)).node;
+  PatchMaker maker(body_, 1);
+  const auto patch = maker.make({&centre, 1});
+  server_->show_scene(scene_);
+  Client page = client();
+  page.hear(1);
+  const auto shown = [&](std::int64_t tick, std::shared_ptr<const Patch> of) {
+    SurfacePicture next = picture(tick);
+    next.patch = std::move(of);
+    server_->show_picture(std::move(next), &body_);
+  };
+  shown(1, patch);
+  const test::DecodedPatch first = test::decode_patch(page.hear().bytes);
+  EXPECT_EQ(first.patch, 1U);
+  EXPECT_EQ(first.position.size(), 3 * patch->surface_nodes().size());
+  EXPECT_EQ(test::decode_frame(page.hear().bytes, scene_->nodes.size()).patch, 1U);
+  shown(2, patch);  // known
+  EXPECT_EQ(test::decode_frame(page.hear().bytes, scene_->nodes.size()).patch, 1U);
+  shown(3, nullptr);
+  EXPECT_EQ(test::decode_frame(page.hear().bytes, scene_->nodes.size()).patch, 0U);
+  shown(4, maker.make({&centre, 1}));
+  EXPECT_EQ(test::decode_patch(page.hear().bytes).patch, 2U);
+  EXPECT_EQ(test::decode_frame(page.hear().bytes, scene_->nodes.size()).patch, 2U);
+  Client late = client();
+  EXPECT_EQ(test::decode_patch(late.hear(2)).patch, 2U);
+}
+
+TEST_F(Viewer, ShowsNoPictureOfAnotherBody) {
+  server_->show_scene(scene_);
+  Client page = client();
+  server_->show_picture(picture(1));
+  hear_frame(page, 1);
+  const Body other(test::unit_model(ElementType::tet4, 4, Scope::full, Precision::double_precision));
+  server_->show_scene(std::make_shared<const Scene>(make_scene(other, 2)));
+  SurfacePicture small;
+  small.frame.tick = 2;
+  small.frame.displacement.assign(3 * scene_->nodes.size(), 0.0F);
+  server_->show_picture(std::move(small));  // of the body before
+  EXPECT_EQ(test::decode_scene(page.hear(1)).scene, 2U);
+  SurfacePicture fitting;
+  fitting.frame.tick = 3;
+  fitting.frame.displacement.assign(3 * other.surface_rest_positions().size(), 0.0F);
+  server_->show_picture(std::move(fitting));
+  const test::DecodedFrame frame = test::decode_frame(page.hear(3), other.surface_rest_positions().size());
+  EXPECT_EQ(frame.tick, 3.0);
+  EXPECT_EQ(frame.scene, 2U);
+}
+
+TEST_F(Viewer, OnlyTheControllerIsObeyed) {
+  server_->show_state(R"({"pointer":true})");
+  Client first = client();
+  EXPECT_EQ(first.hear("state", is_controller).at("pointer"), true);
+  Client second = client();
+  const Json state = second.hear("state");
+  EXPECT_EQ(state.at("you"), "watcher");
+  EXPECT_EQ(state.at("controlled"), true);
+  EXPECT_EQ(state.at("watchers"), 2);
+  EXPECT_EQ(state.at("pointer"), false);
+
+  second.say(step);
+  const Json refused = second.hear("error");
+  EXPECT_EQ(refused.at("about"), "step");
+  EXPECT_EQ(refused.at("reason"), "control");
+  second.say(take_control);
+  EXPECT_EQ(second.hear("error").at("about"), "control");
+  for (const char* word :
+       {R"({"type":"point","position":[2,0,0],"orientation":[0,0,0,1],"grab":false,"lifted":true})",
+        R"({"type":"pause","paused":true})", R"({"type":"pause","paused":false})", step,
+        R"({"type":"reset"})", R"({"type":"acknowledge"})", R"({"type":"change","settings":{"tool":null}})",
+        R"({"type":"record","on":true})", R"({"type":"record","on":false})", R"({"type":"seek","frame":9})"})
+    first.say(word);
+  run_.wait_for("seek 9");
+  EXPECT_EQ(run_.words(),
+            (std::vector<std::string>{"point 2.000000 lifted", "pause", "go on", "step", "reset",
+                                      "acknowledge", "change 1", "record", "record no more", "seek 9"}));
+}
+
+TEST_F(Viewer, ControlIsHandedOver) {
+  server_->show_state("{}");
+  Client first = client();
+  first.hear("state", is_controller);
+  Client second = client();
+  second.hear("state");
+  first.say(give_control);
+  run_.wait_for("lose_pointer");
+  second.hear("state", [](const Json& state) { return state.at("controlled") == false; });
+  second.say(take_control);
+  second.hear("state", is_controller);
+  first.hear("state",
+             [](const Json& state) { return !is_controller(state) && state.at("controlled") == true; });
+  second.say(step);
+  run_.wait_for("step");
+}
+
+TEST_F(Viewer, PointerIsLostWithItsPage) {
+  server_->show_state("{}");
+  Client first = client();
+  first.hear("state", is_controller);
+  Client second = client();
+  second.hear("state");
+  first.cut();
+  run_.wait_for("lose_pointer");
+  second.hear("state", [](const Json& state) { return state.at("controlled") == false; });
+  second.say(step);
+  EXPECT_EQ(second.hear("error").at("about"), "step");
+  second.say(take_control);
+  second.hear("state", is_controller);
+  second.cut();
+  run_.wait_for("lose_pointer", 2);
+  Client again = client();  // the only page: a reload
+  again.hear("state", is_controller);
+}
+
+TEST_F(Viewer, TellsThePageWhatCannotBe) {
+  Client page = client();
+  page.say(R"({"type":"change","settings":{"friction":"-1"}})");
+  EXPECT_EQ(page.hear("error"), (Json{{"type", "error"},
+                                      {"about", "change"},
+                                      {"reason", "value"},
+                                      {"message", "--friction: friction is -1"},
+                                      {"hint", "give a positive one"}}));
+  page.say(R"({"type":"change","settings":{"safety":"max_force=9"}})");
+  EXPECT_EQ(page.hear("error").at("reason"), "hand");
+  page.say(step);
+  run_.wait_for("step");
+}
+
+TEST_F(Viewer, ClosesOnlyThePageThatTalksNonsense) {
+  server_->show_scene(scene_);
+  Client good = client();
+  good.hear("hello");
+  const auto closed = [&](auto&& talk) {
+    Client bad = client();
+    talk(bad);
+    return bad.hear_end();
+  };
+  const websocket::close_reason text = closed([](Client& bad) { bad.say("{"); });
+  EXPECT_EQ(text.code, websocket::close_code::bad_payload);
+  EXPECT_EQ(text.reason, "the message is not JSON");
+  const websocket::close_reason unknown = closed([](Client& bad) { bad.say(R"({"type":"stop"})"); });
+  EXPECT_EQ(unknown.code, websocket::close_code::bad_payload);
+  EXPECT_FALSE(unknown.reason.empty());
+  EXPECT_EQ(closed([](Client& bad) { bad.say_binary(step); }).code, websocket::close_code::unknown_data);
+  EXPECT_EQ(closed([](Client& bad) { bad.say(std::string(16385, ' ')); }).code,
+            websocket::close_code::too_big);
+  EXPECT_EQ(closed([](Client& bad) { bad.say("\"\xff\""); }).code, websocket::close_code::bad_payload);
+  (void)closed([](Client& bad) {  // not a frame at all
+    test::asio::write(bad.connection(), test::asio::buffer(std::string(100, '\xff')));
+  });
+  good.say(step);
+  run_.wait_for("step");
+  server_->show_picture(picture(1));
+  hear_frame(good, 1);
+  EXPECT_EQ(run_.words(), std::vector<std::string>{"step"});
+}
+
+TEST_F(Viewer, RefusesWhatIsNoRequest) {
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(port()) + "\r\n";
+  for (const std::string& bytes :
+       {std::string("GARBAGE\r\n\r\n"), std::string(100, '\0'),
+        "GET / HTTP/1.1\r\n" + host + "X: " + std::string(20000, 'x') + "\r\n\r\n",
+        std::string("GET / HTTP/1.1\r\n\r\n"), "GET / HTTP/1.1\r\n" + host + "Host: evil.example\r\n\r\n"}) {
+    test::asio::io_context context;
+    test::tcp::socket socket(context);
+    socket.connect(test::local(port()));
+    boost::system::error_code problem;
+    test::asio::write(socket, test::asio::buffer(bytes), problem);
+    std::string answer;
+    test::asio::read(socket, test::asio::dynamic_buffer(answer), problem);
+    EXPECT_TRUE(answer.empty() || answer.starts_with("HTTP/1.1 403")) << answer;
+  }
+  EXPECT_EQ(client().status, 101U);
+}
+
+/// A scene whose pictures fill a slow page's buffers soon.
+class SlowPages : public Viewer {
+ protected:
+  static constexpr std::size_t nodes = 20'000;
+  static constexpr std::int64_t ticks_a_picture = 64;
+
+  SlowPages() {
+    Scene large;
+    large.number = 1;
+    large.nodes.assign(nodes, Vec3::Zero());
+    large.held.assign(nodes, 0);
+    scene_ = std::make_shared<const Scene>(large);
+    server_->show_scene(scene_);
+  }
+  void show(std::int64_t tick) {
+    SurfacePicture next;
+    next.frame.tick = tick;
+    next.frame.displacement.assign(3 * nodes, 0.001F);
+    server_->show_picture(std::move(next));
+    std::vector<TickNote> notes(ticks_a_picture);
+    for (std::size_t k = 0; k < notes.size(); ++k)
+      notes[k].number = ticks_a_picture * tick + static_cast<std::int64_t>(k);
+    server_->show_ticks(notes);
+  }
+};
+
+TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
+  constexpr std::int64_t pictures = 50;  // of 0.16 MB; a page that reads nothing for ten seconds is cut
+  Client slow = client();
+  slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
+  Client quick = client();
+  slow.hear(1);
+  quick.hear(1);
+  for (std::int64_t tick = 0; tick < pictures; ++tick) {
+    show(tick);
+    hear_frame(quick, tick);  // each of them
+  }
+  std::int64_t frames = 0;
+  std::int64_t most_ticks = 0;
+  std::int64_t last_tick = -1;
+  double last = -1.0;
+  while (last != pictures - 1 || last_tick != ticks_a_picture * pictures - 1) {
+    const Client::Said said = slow.hear();
+    if (said.kind() == 3) {
+      const double tick = tick_of(said.bytes);
+      EXPECT_GT(tick, last);
+      last = tick;
+      ++frames;
+    } else if (said.kind() == 4) {
+      const test::DecodedTicks ticks = test::decode_ticks(said.bytes);
+      EXPECT_GT(static_cast<std::int64_t>(ticks.first), last_tick);
+      most_ticks = std::max(most_ticks, std::ssize(ticks.shown));
+      last_tick = static_cast<std::int64_t>(ticks.first) + std::ssize(ticks.shown) - 1;
+    }
+  }
+  EXPECT_LT(frames, pictures / 2);
+  EXPECT_EQ(most_ticks, 2000);  // two seconds in one message
+}
+
+TEST_F(SlowPages, MissTheTicksOfTheBodyBefore) {
+  Client slow = client();
+  slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
+  slow.hear(1);
+  Client quick = client();
+  quick.hear(1);
+  for (std::int64_t tick = 0; tick < 30; ++tick) {  // until ticks wait
+    show(tick);
+    hear_frame(quick, tick);
+  }
+  Scene other = *scene_;
+  other.number = 2;
+  server_->show_scene(std::make_shared<const Scene>(other));
+  EXPECT_EQ(test::decode_scene(quick.hear(1)).scene, 2U);
+  while (test::decode_scene(slow.hear(1)).scene != 2) {
+  }
+  show(30);
+  hear_frame(slow, 30);
+}
+
+TEST_F(SlowPages, AreClosedWhenTheyDoNotReadForTenSeconds) {
+  server_->show_state("{}");
+  Client slow = client();
+  slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
+  slow.hear("state", is_controller);
+  test::asio::io_context context;
+  test::tcp::socket half_a_request(context);
+  half_a_request.connect(test::local(port()));
+  test::asio::write(half_a_request, test::asio::buffer(std::string("GET / HT")));
+  std::atomic<bool> done = false;
+  std::thread shows([&] {
+    for (std::int64_t tick = 0; !done; ++tick) {
+      show(tick);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  });
+  const auto begun = std::chrono::steady_clock::now();
+  run_.wait_for("lose_pointer");
+  // Else it is the pings that end it, after half a minute.
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(25));
+  done = true;
+  shows.join();
+  std::string answer;
+  boost::system::error_code end;
+  test::asio::read(half_a_request, test::asio::dynamic_buffer(answer), end);
+  EXPECT_TRUE(answer.empty());
+  EXPECT_TRUE(end);
+}
+
+TEST_F(Viewer, ReplayKeepsTicksAndTimesForLaterPages) {
+  server_ = serve({.port = 0}, true);
+  std::vector<TickNote> notes(5000);
+  for (std::size_t k = 0; k < notes.size(); ++k) notes[k].number = 4 * static_cast<std::int64_t>(k);
+  server_->show_state(R"({"frames":2,"times":[0,0.5]})");
+  server_->show_scene(scene_);
+  server_->show_ticks(notes, 4);
+  server_->show_state(R"({"frames":2})");
+  for (int k = 0; k < 2; ++k) {
+    Client page = client();
+    EXPECT_EQ(page.hear("hello").at("mode"), "replay");
+    const Json state = page.hear("state", [](const Json& s) { return s.contains("frames"); });
+    EXPECT_EQ(state.at("times"), Json({0, 0.5}));
+    const test::DecodedTicks ticks = test::decode_ticks(page.hear(4));
+    EXPECT_EQ(ticks.shown.size(), 5000U);
+    EXPECT_EQ(ticks.stride, 4U);
+    EXPECT_FALSE(page.hear("state").contains("times"));
+  }
+}
+
+/// Connections that say nothing, or nothing that is enough.
+class Held {
+ public:
+  Held(std::uint16_t port, int count, const std::string& said) {
+    for (int k = 0; k < count; ++k) {
+      sockets_.emplace_back(context_);
+      sockets_.back().connect(test::local(port));
+      test::asio::write(sockets_.back(), test::asio::buffer(said));
+    }
+  }
+
+ private:
+  test::asio::io_context context_;
+  std::vector<test::tcp::socket> sockets_;
+};
+
+TEST_F(Viewer, HeldConnectionsGiveWay) {
+  server_->show_state("{}");
+  Client before = client();
+  before.hear("state", is_controller);
+  const std::string request = "GET / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port()) + "\r\n";
+  for (const std::string& said : {std::string(), std::string("GET / HT"), request, request + "\r\n"}) {
+    const Held held(port(), 40, said);
+    EXPECT_EQ(test::ask(served(), {.target = "/"}).result_int(), 200U) << said;
+    Client page = client();
+    EXPECT_EQ(page.status, 101U) << said;
+    page.hear("state");
+  }
+  before.say(step);  // who is in stays in
+  run_.wait_for("step");
+}
+
+TEST_F(Viewer, PagesThatAreOpenAreNotCutForFurtherOnes) {
+  server_->show_state("{}");
+  std::vector<std::unique_ptr<Client>> pages;
+  for (int k = 0; k < 32; ++k) {
+    pages.push_back(std::make_unique<Client>(served()));
+    ASSERT_EQ(pages.back()->status, 101U) << k;
+  }
+  EXPECT_EQ(client().status, 503U);
+  EXPECT_EQ(test::ask(served(), {.target = "/"}).result_int(), 503U);
+  EXPECT_EQ(test::ask(served(), {.target = "/", .query = ""}).result_int(), 403U);
+  for (const auto& page : pages) EXPECT_EQ(page->hear("state").at("type"), "state");
+  pages.pop_back();
+  while (client().status != 101U)  // until it has noticed
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+}
+
+TEST_F(Viewer, SurfaceCanBeSaved) {
+  server_->show_scene(scene_);
+  SurfacePicture seen = picture(8);
+  for (std::size_t k = 0; k < body_.surface_rest_positions().size(); ++k)  // twice as high
+    seen.frame.displacement[3 * k + 2] = static_cast<float>(body_.surface_in_mesh()[k].z());
+  server_->show_picture(std::move(seen));
+  Client page = client();
+  hear_frame(page, 8);
+  const test::Answer stl = test::ask(served(), {.target = "/surface.stl"});
+  EXPECT_EQ(stl.result_int(), 200U);
+  EXPECT_EQ(stl[http::field::content_disposition], "attachment; filename=\"surface-tick-8.stl\"");
+  test::Bytes bytes(stl.body().substr(80));
+  double volume = 0.0;
+  for (std::uint32_t left = bytes.u32(); left > 0; --left) {
+    Mat3 corners;
+    for (int k = 0; k < 3; ++k) (void)bytes.take<float>();
+    for (Eigen::Index k = 0; k < 9; ++k) corners(k % 3, k / 3) = bytes.take<float>();
+    (void)bytes.take<std::uint16_t>();
+    volume += corners.determinant() / 6.0;
+  }
+  EXPECT_NEAR(volume, 2.0, 1e-6);
+  const test::Answer vtu = test::ask(served(), {.target = "/surface.vtu"});
+  EXPECT_EQ(vtu.result_int(), 200U);
+  EXPECT_TRUE(vtu.body().starts_with("<?xml"));
+}
+
+TEST_F(Viewer, PagesComeBackAfterARestartOnThePort) {
+  server_->show_state("{}");
+  Client page = client();
+  page.hear("hello");
+  const std::uint16_t taken = port();
+  server_.reset();
+  run_.wait_for("lose_pointer");
+  (void)page.hear_end();
+  server_ = serve({.port = taken});
+  EXPECT_EQ(port(), taken);
+  Client again = client();
+  EXPECT_EQ(again.hear("hello").at("id"), 1);
+}
+
+TEST_F(Viewer, SaysWhyItCannotListen) {
+  try {
+    const ViewerPort second({.port = port()});
+    FAIL() << "two have one port";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where(), "127.0.0.1:" + std::to_string(port()));
+    EXPECT_FALSE(error.hint().empty());
+  }
+  EXPECT_THROW(ViewerPort({.address = "elsewhere", .port = 0}), Error);
+  EXPECT_THROW(ViewerPort({.address = "192.0.2.1", .port = 0}), Error);
+}
+
+TEST_F(Viewer, RefusesAStateThatIsNone) {
+  EXPECT_THROW(server_->show_state("[1]"), Error);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,282 @@
+// Binary messages, decoded by the text of web/PROTOCOL.md, and files of what is seen.
+#include "runtime/viewer/wire.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "runtime/body/patch_maker.h"
+#include "runtime/viewer/seen_surface.h"
+#include "tests/support/runtime_model.h"
+#include "tests/support/viewer_decoder.h"
+
+namespace palpate {
+namespace {
+
+constexpr double half_unit = 0.502;  // to which values are rounded, and what float adds to that
+constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
+
+Body body_of(ElementType element, int refinement = 1, int cells = 3) {
+  return Body(test::unit_model(element, cells, Scope::full, Precision::double_precision), {}, refinement);
+}
+
+/// Displacement (0.1 x, -0.2 x, 0.05) of what is at x.
+std::vector<float> sheared(const std::vector<Vec3>& nodes) {
+  std::vector<float> u;
+  for (const Vec3& node : nodes) {
+    for (const double x : {0.1 * node.x(), -0.2 * node.x(), 0.05}) u.push_back(static_cast<float>(x));
+  }
+  return u;
+}
+
+SurfacePicture picture_of(const Body& body) {
+  SurfacePicture picture;
+  picture.frame.tick = 5'000'000'000;
+  picture.frame.time = 12.25;
+  picture.frame.displacement = sheared(body.surface_in_mesh());
+  picture.tool.position = Vec3(1, 2, 3);
+  picture.device.position = Vec3(4, 5, 6);
+  picture.device.orientation = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
+  picture.on_body = {Vec3(0.5, 1.5, -2.5), Vec3(7, 8, 9)};
+  picture.status = StepStatus::inside_body | StepStatus::pose_limited;
+  return picture;
+}
+
+TEST(Wire, SceneComesBack) {
+  const Scene scene = make_scene(body_of(ElementType::tet4), 9);
+  const test::DecodedScene decoded = test::decode_scene(encode_scene(scene));
+  EXPECT_EQ(decoded.scene, 9U);
+  EXPECT_EQ(decoded.dimension, 3U);
+  ASSERT_EQ(decoded.position.size(), 3 * scene.nodes.size());
+  for (std::size_t k = 0; k < decoded.position.size(); ++k)
+    EXPECT_EQ(decoded.position[k], static_cast<float>(scene.nodes[k / 3][static_cast<Eigen::Index>(k % 3)]));
+  ASSERT_EQ(decoded.triangle.size(), 3 * scene.triangles.size());
+  for (std::size_t k = 0; k < decoded.triangle.size(); ++k)
+    EXPECT_EQ(decoded.triangle[k], static_cast<std::uint32_t>(scene.triangles[k / 3][k % 3]));
+  ASSERT_EQ(decoded.edge.size(), 2 * scene.edges.size());
+  for (std::size_t k = 0; k < decoded.edge.size(); ++k)
+    EXPECT_EQ(decoded.edge[k], static_cast<std::uint32_t>(scene.edges[k / 2][k % 2]));
+  EXPECT_EQ(decoded.held, scene.held);
+}
+
+TEST(Wire, FrameComesBackToItsUnits) {
+  const Body body = body_of(ElementType::tet4);
+  const Scene scene = make_scene(body, 2);
+  SurfacePicture picture = picture_of(body);
+  const std::size_t nodes = scene.nodes.size();
+  picture.frame.von_mises.assign(nodes, 100.0F);
+  picture.frame.von_mises[1] = not_a_number;
+  picture.frame.von_mises[2] = 0.0F;
+  picture.frame.von_mises[3] = 65534.0F;
+  picture.frame.pressure.assign(nodes, 0.0F);
+  picture.frame.pressure[4] = 12.5F;
+  picture.contacts = {{Vec3(1, 2, 3), Vec3(0, 0, 1), Vec3(4, 5, 6), true}, {}};
+  ASSERT_TRUE(fits(picture, scene, nullptr));
+  const test::DecodedFrame frame = test::decode_frame(encode_frame(picture, scene, nullptr), nodes);
+  EXPECT_EQ(frame.scene, 2U);
+  EXPECT_EQ(frame.tick, 5e9);
+  EXPECT_EQ(frame.time, 12.25);
+  EXPECT_EQ(frame.tool, (std::vector<float>{1, 2, 3, 0, 0, 0, 1}));
+  EXPECT_EQ(frame.device, (std::vector<float>{4, 5, 6, -0.5, 0.5, 0.5, 0.5}));
+  EXPECT_EQ(frame.force, (std::vector<float>{0.5, 1.5, -2.5}));
+  EXPECT_EQ(frame.torque, (std::vector<float>{7, 8, 9}));
+  EXPECT_EQ(frame.status, (1U << 6) | (1U << 7));
+  EXPECT_EQ(frame.patch, 0U);
+  EXPECT_EQ(frame.patch_nodes, 0U);
+  ASSERT_EQ(frame.contact.size(), 20U);
+  EXPECT_EQ(std::vector<float>(frame.contact.begin(), frame.contact.begin() + 10),
+            (std::vector<float>{1, 2, 3, 0, 0, 1, 4, 5, 6, 1}));
+  EXPECT_EQ(frame.contact[19], 0.0F);
+  EXPECT_EQ(frame.pressure_node, std::vector<std::uint32_t>{4});
+  EXPECT_EQ(frame.pressure, std::vector<float>{12.5F});
+  EXPECT_FLOAT_EQ(frame.unit_u, 0.2F / 32767.0F);
+  for (std::size_t k = 0; k < 3 * nodes; ++k)
+    EXPECT_NEAR(frame.u[k], picture.frame.displacement[k], half_unit * frame.unit_u);
+  EXPECT_FLOAT_EQ(frame.unit_stress, 1.0F);
+  EXPECT_EQ(std::vector<float>(frame.stress.begin(), frame.stress.begin() + 5),
+            (std::vector<float>{100, -1, 0, 65534, 100}));
+}
+
+TEST(Wire, FrameOfUnknownStressOfRestAndOfWhatIsNotFinite) {
+  const Body body = body_of(ElementType::tet4);
+  const Scene scene = make_scene(body, 2);
+  SurfacePicture picture = picture_of(body);
+  picture.frame.displacement.assign(3 * scene.nodes.size(), 0.0F);
+  test::DecodedFrame frame = test::decode_frame(encode_frame(picture, scene, nullptr), scene.nodes.size());
+  EXPECT_EQ(frame.u, std::vector<float>(3 * scene.nodes.size(), 0.0F));
+  EXPECT_EQ(frame.stress, std::vector<float>(scene.nodes.size(), -1.0F));
+  picture.frame.displacement[0] = not_a_number;
+  picture.frame.displacement[1] = std::numeric_limits<float>::infinity();
+  picture.frame.displacement[2] = -2.0F;
+  frame = test::decode_frame(encode_frame(picture, scene, nullptr), scene.nodes.size());
+  EXPECT_EQ(frame.u[0], 0.0F);
+  EXPECT_EQ(frame.u[1], 0.0F);
+  EXPECT_FLOAT_EQ(frame.u[2], -2.0F);
+}
+
+TEST(Wire, PicturesOfOtherBodiesDoNotFit) {
+  const Body body = body_of(ElementType::tet4);
+  const Scene scene = make_scene(body, 1);
+  SurfacePicture picture = picture_of(body);
+  EXPECT_TRUE(fits(picture, scene, nullptr));
+  picture.frame.displacement.pop_back();
+  EXPECT_FALSE(fits(picture, scene, nullptr));
+  const Body plate = body_of(ElementType::quad4);
+  SurfacePicture of_plate = picture_of(plate);
+  EXPECT_FALSE(fits(of_plate, make_scene(plate, 1), nullptr));
+  of_plate.plane_displacement.assign(3 * plate.model().mesh.nodes.size(), 0.0F);
+  EXPECT_TRUE(fits(of_plate, make_scene(plate, 1), nullptr));
+}
+
+struct Patched {
+  Body body;
+  Scene scene = make_scene(body, 1);
+  ScenePatch patch;
+
+  explicit Patched(ElementType element, int cells = 3) : body(body_of(element, 2, cells)) {
+    const Index centre = body.nearest_surface_node(test::top_middle(body.dimension())).node;
+    patch = make_scene_patch(body, scene, *PatchMaker(body, 1).make({&centre, 1}));
+    patch.number = 5;
+  }
+};
+
+TEST(Wire, PatchAndItsFrameComeBack) {
+  const Patched patched(ElementType::tet4);
+  const ScenePatch& patch = patched.patch;
+  const test::DecodedPatch decoded = test::decode_patch(encode_patch(1, patch));
+  EXPECT_EQ(decoded.scene, 1U);
+  EXPECT_EQ(decoded.patch, 5U);
+  EXPECT_TRUE(std::equal(decoded.hidden.begin(), decoded.hidden.end(), patch.hidden.begin(),
+                         patch.hidden.end(),
+                         [](std::uint32_t a, Index b) { return static_cast<Index>(a) == b; }));
+  ASSERT_EQ(decoded.position.size(), 3 * patch.nodes.size());
+  EXPECT_EQ(decoded.position[5], static_cast<float>(patch.nodes[1].z()));
+  ASSERT_EQ(decoded.triangle.size(), 3 * patch.triangles.size());
+  EXPECT_EQ(decoded.triangle[4], static_cast<std::uint32_t>(patch.triangles[1][1]));
+  ASSERT_EQ(decoded.outline.size(), 2 * patch.outline.size());
+  EXPECT_EQ(decoded.outline[3], static_cast<std::uint32_t>(patch.outline[1][1]));
+
+  SurfacePicture picture = picture_of(patched.body);
+  // The pressure of a node of the body is that of the patch's node there too.
+  const std::size_t S = patched.scene.nodes.size();
+  picture.frame.pressure.assign(patched.body.surface_rest_positions().size(), 0.0F);
+  const auto of_body = static_cast<std::size_t>(patch.surface_nodes.front());
+  const auto fine = static_cast<std::size_t>(patch.surface_nodes.back());
+  ASSERT_LT(of_body, S);
+  ASSERT_GE(fine, S);
+  picture.frame.pressure[of_body] = 2.0F;
+  picture.frame.pressure[fine] = 3.0F;
+  ASSERT_TRUE(fits(picture, patched.scene, &patch));
+  const test::DecodedFrame frame = test::decode_frame(encode_frame(picture, patched.scene, &patch), S);
+  EXPECT_EQ(frame.patch, 5U);
+  ASSERT_EQ(frame.patch_nodes, patch.nodes.size());
+  const std::vector<float> expected = sheared(patch.nodes);
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    EXPECT_NEAR(frame.u[3 * S + k], expected[k], half_unit * frame.unit_u);
+  EXPECT_EQ(frame.pressure_node,
+            (std::vector<std::uint32_t>{static_cast<std::uint32_t>(of_body), static_cast<std::uint32_t>(S),
+                                        static_cast<std::uint32_t>(S + patch.nodes.size() - 1)}));
+  EXPECT_EQ(frame.pressure, (std::vector<float>{2, 2, 3}));
+}
+
+TEST(Wire, FrameOfAPlateHasAllItsNodes) {
+  const Body plate = body_of(ElementType::quad4);
+  const Scene scene = make_scene(plate, 1);
+  SurfacePicture picture = picture_of(plate);
+  picture.plane_displacement = sheared(plate.model().mesh.nodes);
+  picture.plane_von_mises.assign(scene.nodes.size(), 3.0F);
+  picture.frame.pressure.assign(plate.surface_mesh_nodes().size(), 0.0F);
+  picture.frame.pressure.back() = 4.0F;
+  const test::DecodedFrame frame =
+      test::decode_frame(encode_frame(picture, scene, nullptr), scene.nodes.size());
+  for (std::size_t k = 0; k < frame.u.size(); ++k)
+    EXPECT_NEAR(frame.u[k], picture.plane_displacement[k], half_unit * frame.unit_u);
+  EXPECT_FLOAT_EQ(frame.stress.back(), 3.0F);
+  EXPECT_EQ(frame.pressure_node,
+            std::vector<std::uint32_t>{static_cast<std::uint32_t>(plate.surface_mesh_nodes().back())});
+}
+
+TEST(Wire, PatchOfAPlateOfAnOddNumberOfNodesComesBack) {
+  const Patched patched(ElementType::quad4, 2);
+  const std::size_t S = patched.scene.nodes.size();
+  ASSERT_EQ(S % 2, 1U);  // so that its stresses end amid four bytes
+  SurfacePicture picture = picture_of(patched.body);
+  picture.plane_displacement = sheared(patched.body.model().mesh.nodes);
+  const test::DecodedFrame frame =
+      test::decode_frame(encode_frame(picture, patched.scene, &patched.patch), S);
+  ASSERT_EQ(frame.patch_nodes, patched.patch.nodes.size());
+  const std::vector<float> expected = sheared(patched.patch.nodes);
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    EXPECT_NEAR(frame.u[3 * S + k], expected[k], half_unit * frame.unit_u);
+}
+
+TEST(Wire, TicksComeBack) {
+  std::vector<TickNote> notes(3);
+  for (std::size_t k = 0; k < notes.size(); ++k) {
+    notes[k].number = 100 + 4 * static_cast<std::int64_t>(k);
+    notes[k].force = Vec3(1, 2, static_cast<double>(k));
+    notes[k].shown = 0.5;
+    notes[k].depth = 0.001;
+    notes[k].lateness_ns = 2500;
+    notes[k].compute_ns = 1500;
+    notes[k].contacts = k == 2 ? 1000 : static_cast<std::int32_t>(k);
+  }
+  const test::DecodedTicks ticks = test::decode_ticks(encode_ticks(8, notes, 4));
+  EXPECT_EQ(ticks.scene, 8U);
+  EXPECT_EQ(ticks.first, 100.0);
+  EXPECT_EQ(ticks.stride, 4U);
+  EXPECT_EQ(ticks.force, (std::vector<float>{1, 2, 0, 1, 2, 1, 1, 2, 2}));
+  EXPECT_EQ(ticks.shown, std::vector<float>(3, 0.5F));
+  EXPECT_EQ(ticks.depth, std::vector<float>(3, 0.001F));
+  EXPECT_EQ(ticks.late_us, std::vector<float>(3, 2.5F));
+  EXPECT_EQ(ticks.compute_us, std::vector<float>(3, 1.5F));
+  EXPECT_EQ(ticks.contacts, (std::vector<std::uint8_t>{0, 1, 255}));
+}
+
+/// Volume that an STL's triangles enclose.
+double stl_volume(const std::string& stl) {
+  test::Bytes bytes(stl.substr(80));
+  const std::uint32_t triangles = bytes.u32();
+  double volume = 0.0;
+  for (std::uint32_t t = 0; t < triangles; ++t) {
+    Mat3 corners;
+    Vec3 normal;
+    for (double& x : normal) x = bytes.take<float>();
+    for (Eigen::Index k = 0; k < 9; ++k) corners(k % 3, k / 3) = bytes.take<float>();
+    (void)bytes.take<std::uint16_t>();
+    EXPECT_GT(normal.dot((corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0))), 0.0);
+    volume += corners.determinant() / 6.0;
+  }
+  EXPECT_TRUE(bytes.at_end());
+  return volume;
+}
+
+TEST(SeenSurface, StlHoldsTheVolumeOfTheStretchedCube) {
+  for (const bool with_patch : {false, true}) {
+    const Patched patched(ElementType::tet4);
+    SurfacePicture picture = picture_of(patched.body);  // x by 1.1; the rest is shear and shift
+    const ScenePatch* patch = with_patch ? &patched.patch : nullptr;
+    const std::string stl = surface_stl(picture, patched.scene, patch);
+    EXPECT_NEAR(stl_volume(stl), 1.1, 1e-6);
+    const std::size_t triangles =
+        patched.scene.triangles.size() + (with_patch ? 3 * patched.patch.hidden.size() : 0);  // each is four
+    EXPECT_EQ(stl.size(), 84 + 50 * triangles);
+    const std::string vtu = surface_vtu(picture, patched.scene, patch);
+    EXPECT_NE(vtu.find("NumberOfCells=\"" + std::to_string(triangles) + "\""), std::string::npos);
+    for (const char* name : {"displacement", "von_mises", "contact_pressure"})
+      EXPECT_NE(vtu.find(std::string("Name=\"") + name + "\""), std::string::npos) << name;
+  }
+}
+
+TEST(SeenSurface, OfAPlatesBoundaryIsLines) {
+  const Body body(test::unit_model(ElementType::quad4, 4, Scope::surface, Precision::double_precision));
+  const Scene scene = make_scene(body, 1);
+  const SurfacePicture picture = picture_of(body);
+  EXPECT_THROW(surface_stl(picture, scene, nullptr), Error);
+  EXPECT_NE(surface_vtu(picture, scene, nullptr).find("NumberOfCells=\"16\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,329 @@
+// Random palpation of a baked body at 1 kHz, and what its slowest ticks are made of.
+//
+//   palpation_study MODEL.palpate.hdf [SECONDS [SEED [RADIUS [FRICTION]]]]
+//
+// A sphere (5 mm unless told otherwise) presses, slides, lifts and grabs all over the body in real time;
+// every tick is timed. Then the same motion is played twice more without waiting, the same ticks to the bit,
+// and the slowest ticks are repeated on copies of the state: one that stays slow is slow by its own work,
+// else it was held up by the machine (other programs, or the host of a virtual machine that had taken its
+// memory away). scripts/studies/palpation runs it beside cyclictest.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <ctime>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "formats/model_file.h"
+#include "runtime/loop/real_time.h"
+#include "runtime/tick/step.h"
+#include "tests/bench/palpation_paths.h"
+#include "tests/bench/tick_stages.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t second = 1'000'000'000;  // [ns]
+constexpr std::int64_t period = second / 1000;
+constexpr std::size_t shown = 20;  // ticks in each list of the slowest
+
+std::int64_t now() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return time.tv_sec * second + time.tv_nsec;
+}
+
+void sleep_until(std::int64_t due) {
+  const timespec time{.tv_sec = due / second, .tv_nsec = due % second};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) != 0) {
+  }
+}
+
+/// One playing of the whole motion.
+struct Run {
+  std::vector<std::int64_t> compute;   // [ns] of each tick
+  std::vector<std::int64_t> lateness;  // [ns] from when a tick was due to when it began
+  std::vector<Vec3> force;             // on the hand [N]
+
+  explicit Run(std::size_t ticks) : compute(ticks), lateness(ticks), force(ticks) {}
+};
+
+Run play(const Body& body, State state, const std::vector<ToolPose>& poses, bool real_time) {
+  Run run(poses.size());
+  const std::int64_t start = now() + period;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const std::int64_t due = start + static_cast<std::int64_t>(k) * period;
+    if (real_time) sleep_until(due);
+    const std::int64_t begin = now();
+    step(body, state, poses[k]);
+    run.compute[k] = now() - begin;
+    run.lateness[k] = real_time ? begin - due : 0;
+    run.force[k] = state.tools.front().wrench.force;
+  }
+  return run;
+}
+
+Run play_in_real_time(const Body& body, const State& state, const std::vector<ToolPose>& poses) {
+  const RealTimeRights rights;
+  if (!rights.refused().empty()) fmt::print("warning: {}\n", rights.refused());
+  return play(body, state, poses, true);
+}
+
+double us(std::int64_t ns) {
+  return 1e-3 * static_cast<double>(ns);
+}
+
+std::int64_t quantile(std::vector<std::int64_t> times, double fraction) {
+  const auto k = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(times.size() - 1));
+  std::nth_element(times.begin(), times.begin() + k, times.end());
+  return times[static_cast<std::size_t>(k)];
+}
+
+std::int64_t over(const std::vector<std::int64_t>& times, std::int64_t bound) {
+  return std::count_if(times.begin(), times.end(), [&](std::int64_t time) { return time > bound; });
+}
+
+void print_times(const char* what, const std::vector<std::int64_t>& times) {
+  fmt::print("| {} | {:.1f} | {:.1f} | {:.1f} | {:.0f} | {} |\n", what, us(quantile(times, 0.5)),
+             us(quantile(times, 0.999)), us(quantile(times, 0.99999)), us(quantile(times, 1.0)),
+             over(times, period));
+}
+
+/// The `count` ticks of the largest times, slowest first.
+std::vector<std::size_t> slowest(const std::vector<std::int64_t>& times, std::size_t count) {
+  std::vector<std::size_t> ticks(times.size());
+  std::iota(ticks.begin(), ticks.end(), std::size_t{0});
+  count = std::min(count, ticks.size());
+  std::partial_sort(ticks.begin(), ticks.begin() + static_cast<std::ptrdiff_t>(count), ticks.end(),
+                    [&](std::size_t a, std::size_t b) { return times[a] > times[b]; });
+  ticks.resize(count);
+  return ticks;
+}
+
+/// A tick taken apart.
+struct TickStudy {
+  std::int64_t alone =
+      0;  // [ns] the fastest of some repetitions at once: what it computes, without the machine
+  Index points = 0, closed = 0, held = 0, rows = 0, near = 0, new_nodes = 0;
+  int rounds = 0;  // of the solver in the last pass
+  bool more_passes = false;
+  test::TickStages stages;
+  StepStatus status = StepStatus::ok;
+};
+
+/// Nodes that the tick took into the near field.
+Index new_nodes(const State& before, const State& after) {
+  Index count = 0;
+  for (Index place = 0; place < after.near.count(); ++place) {
+    if (before.near.place_of(after.near.node(place)) < 0) ++count;
+  }
+  return count;
+}
+
+/// Whether more than one pass was made: then the contacts that the last pass began with are not those that
+/// the tick began with.
+bool more_passes(const State& before, const State& after) {
+  if (after.last_count != before.contact_count) return true;
+  for (Index k = 0; k < after.last_count; ++k) {
+    const ContactPoint& last = after.last_contacts[static_cast<std::size_t>(k)];
+    const ContactPoint& first = before.contact_points[static_cast<std::size_t>(k)];
+    if (last.feature != first.feature || last.position != first.position) return true;
+  }
+  return false;
+}
+
+TickStudy take_apart(const Body& body, const State& before, const ToolPose& pose) {
+  constexpr int repetitions = 7;
+  TickStudy study;
+  State state = before;
+  study.alone = std::numeric_limits<std::int64_t>::max();
+  for (int k = 0; k < repetitions; ++k) {
+    state = before;
+    const std::int64_t begin = now();
+    step(body, state, pose);
+    study.alone = std::min(study.alone, now() - begin);
+  }
+  study.points = state.contact_count;
+  study.closed = state.tools.front().contacts;
+  study.held = state.held_count;
+  study.rows = state.problem.rows;
+  study.near = state.near.count();
+  study.new_nodes = new_nodes(before, state);
+  study.rounds = state.problem.frictionless ? state.active_set.rounds() : state.cone_solver.rounds();
+  study.more_passes = more_passes(before, state);
+  study.status = state.status;
+  state = before;
+  study.stages = test::time_stages(body, state, pose);
+  return study;
+}
+
+std::map<std::size_t, TickStudy> take_apart(const Body& body, State state, const std::vector<ToolPose>& poses,
+                                            const std::vector<std::size_t>& ticks) {
+  const std::set<std::size_t> wanted(ticks.begin(), ticks.end());
+  std::map<std::size_t, TickStudy> studies;
+  for (std::size_t k = 0; k < poses.size() && studies.size() < wanted.size(); ++k) {
+    if (wanted.contains(k)) studies[k] = take_apart(body, state, poses[k]);
+    step(body, state, poses[k]);
+  }
+  return studies;
+}
+
+std::string names_of(StepStatus status) {
+  std::string names;
+  for (const auto& [bit, name] : status_names) {
+    if (has(status, bit)) names += fmt::format(" {}", name);
+  }
+  return names;
+}
+
+void print_studies(const std::vector<std::size_t>& ticks, const std::map<std::size_t, TickStudy>& studies,
+                   const Run& real) {
+  fmt::print(
+      "| tick | in real time | by itself | points looked at | closed | held | rows | near nodes | new | "
+      "rounds "
+      "| passes | find | assemble | solve | displace | linearise | status |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (const std::size_t k : ticks) {
+    const TickStudy& s = studies.at(k);
+    fmt::print(
+        "| {} | {:.1f} | {:.1f} | {} | {} | {} | {} | {} | {} | {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} "
+        "| "
+        "{:.1f} |{} |\n",
+        k, us(real.compute[k]), us(s.alone), s.points, s.closed, s.held, s.rows, s.near, s.new_nodes,
+        s.rounds, s.more_passes ? "2-3" : "1", 1e6 * s.stages.find, 1e6 * s.stages.assemble,
+        1e6 * s.stages.solve, 1e6 * s.stages.displace, 1e6 * s.stages.linearise, names_of(s.status));
+  }
+}
+
+/// Memory that is left alone, as large as the Green's functions: how long the machine takes to read a byte of
+/// it. Virtual machines whose host takes idle memory away show it here, and in ticks that meet nodes which
+/// were not met for long.
+class IdleMemory {
+ public:
+  explicit IdleMemory(std::size_t bytes) : bytes_(bytes, 1) {}
+
+  [[nodiscard]] std::vector<std::int64_t> read() const {
+    constexpr std::size_t page = 4096;
+    std::mt19937_64 random(1);
+    std::vector<std::int64_t> times(2000);
+    for (std::int64_t& time : times) {
+      const volatile std::uint8_t* byte = bytes_.data() + random() % (bytes_.size() / page) * page;
+      const std::int64_t begin = now();
+      [[maybe_unused]] const std::uint8_t value = *byte;
+      time = now() - begin;
+    }
+    return times;
+  }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
+/// Of the body's free surface nodes, those that were near the tool in some tick.
+double touched_share(const Body& body, const std::vector<ToolPose>& poses, double reach) {
+  std::vector<std::uint8_t> touched(static_cast<std::size_t>(body.greens().nodes()), 0);
+  for (std::size_t k = 0; k < poses.size(); k += 10) {
+    const NearestNode node = body.nearest_surface_node(poses[k].position);
+    if (node.distance < reach) touched[static_cast<std::size_t>(node.node)] = 1;
+  }
+  return static_cast<double>(std::count(touched.begin(), touched.end(), 1)) /
+         static_cast<double>(body.free_surface_nodes().size());
+}
+
+struct Arguments {
+  std::string model;
+  double seconds = 600.0;
+  test::Palpation palpation;
+  std::optional<double> friction;
+};
+
+void study(const Arguments& arguments) {
+  const Body body(load_model(arguments.model));
+  const double radius = arguments.palpation.radius;
+  const auto poses = test::palpation_poses(body, arguments.palpation,
+                                           static_cast<std::int64_t>(arguments.seconds / test::tick));
+  const State start(body, {.tools = {Tool{.radius = radius, .friction = arguments.friction}}});
+  double way = 0.0;
+  std::int64_t grabs = 0;
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    way += (poses[k].position - poses[k - 1].position).norm();
+    grabs += poses[k].grab && !poses[k - 1].grab ? 1 : 0;
+  }
+  fmt::print(
+      "{}: sphere of {:.1f} mm, {} ticks, seed {}, {:.1f} m of way, {} grabs, {:.0f} % of the free "
+      "surface\n\n",
+      body.model().name, 1e3 * radius, poses.size(), arguments.palpation.seed, way, grabs,
+      100.0 * touched_share(body, poses, 2.0 * radius));
+  std::fflush(stdout);
+
+  const IdleMemory idle(static_cast<std::size_t>(body.greens().order() * body.greens().order() *
+                                                 bytes_per_scalar(body.greens().precision())));
+  const Run real = play_in_real_time(body, start, poses);
+  const std::vector<std::int64_t> idle_memory = idle.read();
+  const Run first = play(body, start, poses, false);
+  const Run again = play(body, start, poses, false);
+  std::vector<std::int64_t> replayed(poses.size());
+  for (std::size_t k = 0; k < poses.size(); ++k) replayed[k] = std::min(first.compute[k], again.compute[k]);
+
+  const std::vector<std::size_t> slow = slowest(real.compute, shown);
+  std::vector<std::size_t> suspects = slowest(replayed, 10 * shown);
+  suspects.insert(suspects.end(), slow.begin(), slow.end());
+  const std::map<std::size_t, TickStudy> studies = take_apart(body, start, poses, suspects);
+  std::vector<std::int64_t> alone(poses.size(), 0);
+  for (const auto& [k, tick_study] : studies) alone[k] = tick_study.alone;
+
+  fmt::print("| µs | median | 99.9 % | 99.999 % | worst | over 1 ms |\n|---|---|---|---|---|---|\n");
+  print_times("tick, in real time", real.compute);
+  print_times("tick, replayed without waiting (the faster of two)", replayed);
+  fmt::print("| tick by itself (the fastest of 7 at once) | | | | {:.0f} | {} |\n", us(quantile(alone, 1.0)),
+             over(alone, period));
+  print_times("lateness of the loop's wake-up", real.lateness);
+  print_times("reading a byte that was left alone meanwhile", idle_memory);
+  fmt::print("\nreplay: {}\n", real.force == first.force && real.force == again.force
+                                   ? "the same forces to the last bit"
+                                   : "FORCES DIFFER");
+
+  const auto own =
+      std::count_if(slow.begin(), slow.end(), [&](std::size_t k) { return 2 * alone[k] > real.compute[k]; });
+  fmt::print("\nThe {} slowest ticks in real time; {} of them are slow by their own work [µs]:\n\n",
+             slow.size(), own);
+  print_studies(slow, studies, real);
+  const std::vector<std::size_t> heaviest = slowest(alone, shown);
+  fmt::print("\nThe {} ticks with most work [µs]:\n\n", heaviest.size());
+  print_studies(heaviest, studies, real);
+}
+
+Arguments read_arguments(int argc, char** argv) {
+  Arguments arguments;
+  arguments.model = argv[1];
+  if (argc > 2) arguments.seconds = std::strtod(argv[2], nullptr);
+  if (argc > 3) arguments.palpation.seed = std::strtoull(argv[3], nullptr, 10);
+  if (argc > 4) arguments.palpation.radius = std::strtod(argv[4], nullptr);
+  if (argc > 5) arguments.friction = std::strtod(argv[5], nullptr);
+  return arguments;
+}
+
+}  // namespace
+}  // namespace palpate
+
+int main(int argc, char** argv) {
+  if (argc < 2 || argc > 6) {
+    fmt::print(stderr, "usage: palpation_study MODEL.palpate.hdf [SECONDS [SEED [RADIUS [FRICTION]]]]\n");
+    return 2;
+  }
+  try {
+    palpate::study(palpate::read_arguments(argc, argv));
+  } catch (const palpate::Error& error) {
+    std::fputs(palpate::to_text(error).c_str(), stderr);
+    return 1;
+  }
+}
