@@ -8,11 +8,11 @@
 #include <string>
 
 #include "base/error.h"
-#include "runtime/app/held_nodes.h"
 #include "runtime/app/probe_field.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/output.h"
 #include "runtime/solve/node_vectors.h"
+#include "runtime/tick/held_nodes.h"
 
 namespace palpate {
 namespace {

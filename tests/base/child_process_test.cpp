@@ -150,12 +150,6 @@ TEST(ChildProcess, SignalsOfAHostProgramDoNotEndTheWait) {
   EXPECT_EQ(result.status, 5);
 }
 
-TEST(ChildProcess, AnAnswerCutShortIsAnError) {
-  Bytes bytes = pack(Mesh{});
-  bytes.resize(bytes.size() - 1);
-  expect_mentions(error_of([&] { unpack_mesh(bytes); }), {"damaged"});
-}
-
 TEST(ChildProcess, TerminatedChildIsAnInterruption) {
   expect_mentions(child_error([]() -> ChildResult {
                     raise(SIGINT);
@@ -188,18 +182,6 @@ TEST(ChildProcess, CannotLeaveFiles) {
     return ChildResult{dump ? 1 : 0, {}};
   });
   EXPECT_EQ(result.status, 0);
-}
-
-TEST(ChildProcess, MeshSurvivesPacking) {
-  const Mesh mesh{ElementType::tet4, {{1, 2, 3}, {4, 5, 6}},      {0, 1, 0, 1, 1, 0, 1, 0},
-                  {7, -2},           {0, 1, 1, 1, 0, 0, 0, 0, 1}, {3, 4, 5}};
-  const Mesh back = unpack_mesh(pack(mesh));
-  EXPECT_EQ(back.element, mesh.element);
-  EXPECT_EQ(back.nodes, mesh.nodes);
-  EXPECT_EQ(back.connectivity, mesh.connectivity);
-  EXPECT_EQ(back.regions, mesh.regions);
-  EXPECT_EQ(back.tagged_facets, mesh.tagged_facets);
-  EXPECT_EQ(back.facet_tags, mesh.facet_tags);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@
 #include "formats/model_file.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
-#include "runtime/app/held_nodes.h"
+#include "runtime/tick/held_nodes.h"
 
 namespace palpate {
 namespace {

@@ -15,11 +15,10 @@
 #include <random>
 #include <sstream>
 
-#include "formats/model_file.h"
-#include "precompute/bake.h"
 #include "precompute/inspect.h"
 #include "precompute/numerics/assembly.h"
 #include "precompute/verify.h"
+#include "tests/support/baked_body.h"
 
 namespace palpate {
 namespace {
@@ -66,28 +65,12 @@ std::string with_precision(const std::string& text, const std::string& precision
   return text + "[storage]\nprecision = \"" + precision + "\"\n";
 }
 
-class Baked : public testing::Test {
+class Baked : public testing::Test, public test::BakedBody {
  protected:
-  void SetUp() override { std::filesystem::create_directories(folder_); }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  Model bake_body(const std::string& text, int jobs = 1) {
-    std::ofstream(folder_ / "model.toml") << text;
-    testing::internal::CaptureStderr();
-    bake(read_description(folder_ / "model.toml"), {.output = file_, .jobs = jobs, .dry_run = false});
-    said_ = testing::internal::GetCapturedStderr();
-    return load_model(file_);
-  }
-
   [[nodiscard]] std::string bytes() const {
     std::ifstream in(file_, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
-
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() / ("palpate-precision-" + std::to_string(getpid()));
-  std::filesystem::path file_ = folder_ / "body.palpate.hdf";
-  std::string said_;
 };
 
 /// Reactions of K when some stored nodes are displaced by u: an own solve with those held.

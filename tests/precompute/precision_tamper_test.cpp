@@ -1,15 +1,11 @@
 // Files that were altered with all checksums and probes made right again: `verify` must find them.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <map>
 
-#include "formats/model_file.h"
-#include "precompute/bake.h"
 #include "precompute/verify.h"
+#include "tests/support/baked_body.h"
 #include "tests/support/formats_tamper.h"
 
 namespace palpate {
@@ -43,19 +39,8 @@ lowest = {axis = "x", percent = 0.1}
 precision = "double"
 )";
 
-class Tampered : public testing::TestWithParam<const char*> {
+class Tampered : public testing::TestWithParam<const char*>, public test::BakedBody {
  protected:
-  void SetUp() override { std::filesystem::create_directories(folder_); }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  Model bake_body(const std::string& text) {
-    std::ofstream(folder_ / "model.toml") << text;
-    testing::internal::CaptureStderr();
-    bake(read_description(folder_ / "model.toml"), {.output = file_, .jobs = 1, .dry_run = false});
-    testing::internal::GetCapturedStderr();
-    return load_model(file_);
-  }
-
   /// Doubles entry (i, j) of Xi and computes probes and checksums again.
   void double_entry(const Model& model, std::int64_t i, std::int64_t j) {
     const auto at = static_cast<std::uint64_t>(packed_index(i, j, model.stored_dofs()));
@@ -89,10 +74,6 @@ class Tampered : public testing::TestWithParam<const char*> {
       if (!check.passed()) names.push_back(check.name);
     return names;
   }
-
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() / ("palpate-tamper-" + std::to_string(getpid()));
-  std::filesystem::path file_ = folder_ / "body.palpate.hdf";
 };
 
 TEST_P(Tampered, AGreensEntryThatIsDoubledIsFound) {

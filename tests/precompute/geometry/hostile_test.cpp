@@ -5,6 +5,7 @@
 
 #include "precompute/geometry/image_mesh.h"
 #include "precompute/geometry/inr_header.h"
+#include "precompute/geometry/mesh_bytes.h"
 #include "precompute/geometry/mesh_size.h"
 #include "precompute/geometry/picture_reader.h"
 #include "tests/support/geometry_shapes.h"
@@ -17,6 +18,24 @@ using testing::error_of;
 using testing::expect_mentions;
 using testing::off;
 using testing::TempFolder;
+
+TEST(MeshBytes, CutShortAreAnError) {
+  Bytes bytes = pack(Mesh{});
+  bytes.resize(bytes.size() - 1);
+  expect_mentions(error_of([&] { unpack_mesh(bytes); }), {"damaged"});
+}
+
+TEST(MeshBytes, GiveTheMeshBack) {
+  const Mesh mesh{ElementType::tet4, {{1, 2, 3}, {4, 5, 6}},      {0, 1, 0, 1, 1, 0, 1, 0},
+                  {7, -2},           {0, 1, 1, 1, 0, 0, 0, 0, 1}, {3, 4, 5}};
+  const Mesh back = unpack_mesh(pack(mesh));
+  EXPECT_EQ(back.element, mesh.element);
+  EXPECT_EQ(back.nodes, mesh.nodes);
+  EXPECT_EQ(back.connectivity, mesh.connectivity);
+  EXPECT_EQ(back.regions, mesh.regions);
+  EXPECT_EQ(back.tagged_facets, mesh.tagged_facets);
+  EXPECT_EQ(back.facet_tags, mesh.facet_tags);
+}
 
 class HostileInput : public ::testing::Test {
  protected:

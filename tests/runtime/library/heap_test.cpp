@@ -18,12 +18,12 @@
 #include <tuple>
 #include <vector>
 
-#include "runtime/app/held_nodes.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/background/surface_stress.h"
 #include "runtime/library/palpate.h"
+#include "runtime/tick/held_nodes.h"
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 

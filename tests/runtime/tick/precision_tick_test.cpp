@@ -1,23 +1,16 @@
 // A tick on a slender body: contact with all that the tick does against rounding.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <filesystem>
-#include <fstream>
 #include <limits>
 
-#include "formats/model_file.h"
-#include "precompute/bake.h"
 #include "runtime/tick/step.h"
+#include "tests/support/baked_body.h"
 
 namespace palpate {
 namespace {
 
 Model bake_beam(const std::string& precision) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("palpate-tick-" + std::to_string(getpid()));
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "model.toml") << R"(name = "beam"
+  return test::BakedBody().bake_body(R"(name = "beam"
 [geometry]
 box = {size = [0.3, 0.01, 0.01], cells = [40, 1, 1]}
 [mesh]
@@ -28,13 +21,7 @@ poissons_ratio = 0.3
 [[fixed]]
 lowest = {axis = "x", percent = 1}
 [storage]
-precision = ")" << precision << "\"\n";
-  testing::internal::CaptureStderr();
-  bake(read_description(folder / "model.toml"), {.output = folder / "b.hdf", .jobs = 1, .dry_run = false});
-  testing::internal::GetCapturedStderr();
-  Model model = load_model(folder / "b.hdf");
-  std::filesystem::remove_all(folder);
-  return model;
+precision = ")" + precision + "\"\n");
 }
 
 /// A sphere pressed on the free end.

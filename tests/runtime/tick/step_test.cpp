@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "base/error.h"
-#include "runtime/app/held_nodes.h"
 #include "runtime/solve/node_vectors.h"
+#include "runtime/tick/held_nodes.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate {

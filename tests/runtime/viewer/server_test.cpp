@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "runtime/body/patch_maker.h"
-#include "runtime/viewer/page.h"
+#include "runtime/web/page.h"
 #include "runtime/viewer/viewer_server.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/viewer_client.h"

@@ -1,4 +1,6 @@
 // Held nodes against a direct solve, and what they refuse.
+#include "runtime/tick/held_nodes.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -10,7 +12,6 @@
 #include <vector>
 
 #include "base/error.h"
-#include "runtime/app/held_nodes.h"
 #include "runtime/solve/node_vectors.h"
 #include "tests/support/runtime_model.h"
 

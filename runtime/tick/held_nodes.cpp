@@ -1,4 +1,4 @@
-#include "runtime/app/held_nodes.h"
+#include "runtime/tick/held_nodes.h"
 
 #include <algorithm>
 #include <cmath>

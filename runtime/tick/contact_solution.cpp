@@ -1,0 +1,162 @@
+#include "runtime/tick/contact_solution.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/tick/assemble_contact.h"
+#include "runtime/tick/contact_detection.h"
+#include "runtime/tick/release.h"
+#include "runtime/tick/state.h"
+#include "runtime/tick/surface_motion.h"
+#include "runtime/tick/tool_motion.h"
+
+namespace palpate {
+namespace {
+
+constexpr double rough_penetration = 0.002;  // of the mean edge: more calls for another pass
+constexpr int most_passes = 3;
+constexpr double most_motion =
+    0.25;  // of the mean edge and what the tools may move: of the surface in a pass
+constexpr double max_plausible_force = 1e100;
+
+bool is_finite(const ContactProblem& problem) noexcept {
+  return std::all_of(problem.lambda.begin(), problem.lambda.begin() + problem.rows,
+                     [](double value) { return std::abs(value) < max_plausible_force; });
+}
+
+/// A point that slides over the edge of a fold throws the surface from one side of it to the other, and back
+/// in the next tick. Where forces would take the near surface farther than in a step of Newton's method that
+/// can be trusted, only a share of their change is made. A body that is let go does not leap: it stays where
+/// it is and swings from there.
+void retreat_from_leaps(const Body& body, State& state) noexcept {
+  if (state.near.load().count == 0 || is_released(body, state)) return;
+  double farthest = 0.0;
+  for (Index place = 0; place < state.near.count(); ++place) {
+    const Index node = state.near.node(place);
+    const Vec3 to = unloaded_position(body, state, node) + state.near.displacement(place);
+    farthest = std::max(farthest, (to - state.tree.position(node)).norm());
+  }
+  double most = most_motion * body.mean_surface_edge();
+  for (const ToolState& tool : state.tools) most += tool.margin;
+  if (!(farthest > most)) return;
+  const double share = most / farthest;
+  state.near.retreat(share);
+  state.near.displace();
+  for (ToolState& tool : state.tools) {
+    const Wrench& last = tool.last_contact_wrench;
+    tool.contact_wrench.force = last.force + share * (tool.contact_wrench.force - last.force);
+    tool.contact_wrench.torque = last.torque + share * (tool.contact_wrench.torque - last.torque);
+  }
+}
+
+/// Deepest penetration at the contact points, as the tick before or the pass before left it [m].
+double penetration(const State& state) noexcept {
+  double deepest = 0.0;
+  for (const ContactPoint& contact : state.contacts()) {
+    if (!contact.held) deepest = std::max(deepest, -contact.gap);
+  }
+  return deepest;
+}
+
+/// Whether the contact points have come to lie so deep that another pass is wanted.
+bool is_rough(const Body& body, const State& state) noexcept {
+  return penetration(state) > rough_penetration * body.mean_surface_edge();
+}
+
+/// Whether another pass would be quick, and is not past a release, from which the body swings.
+bool may_repeat(const Body& body, const State& state) noexcept {
+  return (state.problem.frictionless || state.cone_solver.was_easy()) && !is_released(body, state);
+}
+
+/// Takes up the patch that is wanted. Where there is no room for it the old one stays.
+void change_patch(const Body& body, State& state) noexcept {
+  if (state.patch == state.near.patch() || state.near.change_patch(body, state.patch)) return;
+  state.patch = state.near.patch();
+  state.status |= StepStatus::capacity_full;
+}
+
+/// One step of Newton's method about where everything is now. False when the forces are no numbers.
+bool solve_pass(const Body& body, State& state) noexcept {
+  assemble_contact(body, state);
+  if (!solve_problem(state)) state.status |= StepStatus::not_converged;
+  if (!is_finite(state.problem)) {
+    state.status |= StepStatus::result_not_finite;
+    return false;
+  }
+  apply_forces(state);
+  retreat_from_leaps(body, state);
+  move_tools(body, state);
+  move_near_surface(body, state);
+  return true;
+}
+
+/// Back to the contacts that were solved for.
+void recall_contacts(State& state) noexcept {
+  std::copy_n(state.last_contacts.begin(), state.last_count, state.contact_points.begin());
+  state.contact_count = state.last_count;
+}
+
+}  // namespace
+
+void remember_contacts(State& state) noexcept {
+  std::copy_n(state.contact_points.begin(), state.contact_count, state.last_contacts.begin());
+  state.last_count = state.contact_count;
+}
+
+bool solve_problem(State& state) noexcept {
+  return state.problem.frictionless ? state.active_set.solve(state.problem)
+                                    : state.cone_solver.solve(state.problem);
+}
+
+void apply_forces(State& state) noexcept {
+  state.near.unload();
+  for (ToolState& tool : state.tools) {
+    tool.last_contact_wrench = tool.contact_wrench;
+    tool.contact_wrench = {};
+    tool.contacts = 0;
+  }
+  for (Index i = 0; i < state.problem.rows; ++i) {
+    const ContactRow& row = state.rows[static_cast<std::size_t>(i)];
+    const double lambda = state.problem.lambda[static_cast<std::size_t>(i)];
+    if (lambda == 0.0) continue;
+    for (std::size_t n = 0; n < 3; ++n) {
+      if (row.places[n] >= 0) state.near.load(row.places[n], -lambda * row.body[n]);
+    }
+  }
+  state.near.displace();
+  for (Index k = 0; k < state.contact_count; ++k) {
+    ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+    const auto first = static_cast<std::size_t>(state.problem.first_row(k));
+    contact.force.setZero();
+    for (Index i = 0; i < state.problem.rows_of(k); ++i)
+      contact.force += state.problem.lambda[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
+    if (contact.force.squaredNorm() == 0.0) continue;
+    ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
+    ++tool.contacts;
+    if (contact.rigid) tool.status |= StepStatus::rigid_contact;
+    tool.contact_wrench.force += contact.force;
+    tool.contact_wrench.torque += contact.arm.cross(contact.force);
+  }
+}
+
+bool solve_contact(const Body& body, State& state) noexcept {
+  find_contacts(body, state);
+  change_patch(body, state);
+  bool rough = is_rough(body, state);
+  state.is_first_pass = true;
+  bool valid = solve_pass(body, state);
+  state.is_first_pass = false;
+  for (int pass = 1; rough && valid && pass < most_passes && may_repeat(body, state); ++pass) {
+    remember_contacts(state);
+    find_contacts(body, state);
+    rough = is_rough(body, state);
+    if (rough) {
+      valid = solve_pass(body, state);
+    } else {
+      recall_contacts(state);
+    }
+  }
+  return valid;
+}
+
+}  // namespace palpate
