@@ -8,7 +8,7 @@ import numpy as np
 from vtk.util.numpy_support import vtk_to_numpy
 
 from programs import RUNTIME, SOURCE, ProgramTest, cube_toml, run
-from programs_runtime_test import patch_u0, read_grid, rollers_toml
+from runtime_test import patch_u0, read_grid, rollers_toml
 
 sys.path.insert(0, str(SOURCE / "tests" / "golden"))
 from cube import kuhn_cube, stiffness  # noqa: E402

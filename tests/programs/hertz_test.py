@@ -8,7 +8,7 @@ import numpy as np
 
 from programs import SOURCE, ProgramTest
 
-LOADER = importlib.machinery.SourceFileLoader("hertz", str(SOURCE / "scripts" / "hertz"))
+LOADER = importlib.machinery.SourceFileLoader("hertz", str(SOURCE / "scripts" / "studies" / "hertz"))
 study = importlib.util.module_from_spec(importlib.util.spec_from_loader("hertz", LOADER))
 LOADER.exec_module(study)
 

@@ -12,7 +12,7 @@ import h5py
 
 from programs import BINARY, PRECOMPUTE, SOURCE, cube_toml, run
 
-HEADER_FUNCTIONS = set(re.findall(r"\b(palpate_\w+)\(", (SOURCE / "runtime" / "palpate.h").read_text()))
+HEADER_FUNCTIONS = set(re.findall(r"\b(palpate_\w+)\(", (SOURCE / "runtime" / "library" / "palpate.h").read_text()))
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 LINE = re.compile(r"\s*(\d+) ms  at (\S+) (\S+) (\S+) m  force +(\S+) +(\S+) +(\S+) N"
                   r"  stiffness along z +(\S+) N/m((?:  \w+)*)$")
@@ -49,7 +49,7 @@ class Library(unittest.TestCase):
         cls.folder = pathlib.Path(temporary.name)
         cls.prefix = cls.folder / "installed"
         done("cmake", "--install", BINARY, "--prefix", cls.prefix)
-        shutil.copy(SOURCE / "runtime" / "example" / "own_loop.c", cls.folder)
+        shutil.copy(SOURCE / "runtime" / "library" / "example" / "own_loop.c", cls.folder)
         model = cls.folder / "cube4.toml"
         model.write_text(cube_toml(4))
         cls.cube = cls.folder / "cube4.palpate.hdf"
