@@ -1,4 +1,5 @@
 // Files that others wrote: what reading them does to the program, and what they do to it.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/time.h>
@@ -88,7 +89,7 @@ TEST(Contents, OfAForeignFileHaveALimit) {
   const Folder folder;
   {
     hdf5::File file = hdf5::File::create(folder / "a.h5");
-    for (int k = 0; k < 10'001; ++k) file.make_group("/" + std::to_string(k));
+    for (int k = 0; k < 10'001; ++k) file.make_group(fmt::format("/{}", k));
     file.close();
   }
   const std::string text = refusal([&] { hdf5::Contents::read(folder / "a.h5"); });
