@@ -10,8 +10,8 @@
 
 #include "base/error.h"
 #include "runtime/body/patch_maker.h"
-#include "runtime/web/page.h"
 #include "runtime/viewer/viewer_server.h"
+#include "runtime/web/page.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/viewer_client.h"
 #include "tests/support/viewer_decoder.h"

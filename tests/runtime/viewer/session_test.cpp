@@ -16,8 +16,8 @@
 #include "base/error.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/app/view.h"
-#include "runtime/web/page.h"
 #include "runtime/viewer/page_archive.h"
+#include "runtime/web/page.h"
 #include "tests/support/viewer_decoder.h"
 
 namespace palpate {
