@@ -53,6 +53,7 @@ const Vec3& position(const Model& model, Index stored) {
 /// The nodes nearest to `node`, itself first.
 std::vector<Index> nearest(const Model& model, const std::vector<Index>& nodes, Index node) {
   std::vector<std::pair<double, Index>> by_distance;
+  by_distance.reserve(nodes.size());
   for (const Index other : nodes)
     by_distance.emplace_back((position(model, other) - position(model, node)).squaredNorm(), other);
   const auto count = std::min(nodes.size(), touched_nodes.back());
@@ -82,6 +83,7 @@ std::vector<std::vector<Index>> choose_places(const Model& model, const SparseMa
                                               const SmoothPart& smooth) {
   const std::vector<Index> nodes = free_surface_nodes(model);
   std::vector<std::pair<double, Index>> by_amplification;
+  by_amplification.reserve(nodes.size());
   for (const Index node : nodes)
     by_amplification.emplace_back(
         -(smooth.terms == 0 ? 0.0 : amplification(model, K, stored_dofs, smooth, node)), node);
