@@ -92,8 +92,11 @@ void print_replay(const ReplayDifference& replay) {
   if (replay.different == 0) {
     fmt::print(stderr, "replay: all forces of {} ticks are those of the session, bit by bit\n", replay.ticks);
   } else {
-    fmt::print(stderr, "replay: {} of {} ticks differ from the session, most by {:.6g} N at {:.3f} s\n",
-               replay.different, replay.ticks, replay.largest, replay.largest_time);
+    fmt::print(stderr,
+               "replay: {} of {} ticks differ from the session, most by {:.6g} N at {:.3f} s; the first is "
+               "tick {}, in its {}\n",
+               replay.different, replay.ticks, replay.largest, replay.largest_time, replay.first_tick,
+               replay.first_field);
   }
 }
 
@@ -249,8 +252,11 @@ std::string json_report(const PlayedRun& run) {
   if (run.settings.safety) json += fmt::format("  \"safety\": {},\n", json_safety(report));
   if (run.options.device.kind == DeviceChoice::Kind::replay) {
     json += fmt::format(
-        "  \"replay\": {{\"ticks\": {}, \"different_ticks\": {}, \"largest_difference_N\": {}}},\n",
-        report.replay.ticks, report.replay.different, report.replay.largest);
+        "  \"replay\": {{\"ticks\": {}, \"different_ticks\": {}, \"largest_difference_N\": {}, "
+        "\"first_different_tick\": {}, \"first_different_field\": {}}},\n",
+        report.replay.ticks, report.replay.different, report.replay.largest,
+        report.replay.first_tick < 0 ? "null" : std::to_string(report.replay.first_tick),
+        report.replay.first_tick < 0 ? "null" : fmt::format("\"{}\"", report.replay.first_field));
   }
   if (run.overlays != nullptr)
     json += fmt::format("  \"overlay\": {},\n", json_overlays(*run.overlays, run.settings.overlay.value()));

@@ -5,6 +5,35 @@
 #include <iterator>
 
 namespace palpate {
+namespace {
+
+bool same_bits(double a, double b) noexcept {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+template <std::size_t n>
+bool same(const double (&a)[n], const double (&b)[n]) noexcept {
+  return std::equal(std::begin(a), std::end(a), std::begin(b), same_bits);
+}
+
+/// The first that differs of what a tick computes, in that order; null where all is the same.
+const char* first_different_field(const TickRecord& now, const TickRecord& then) noexcept {
+  if (now.motion_step != then.motion_step) return "motion_step";
+  if (now.patch != then.patch) return "patch";
+  if (!same(now.tool_position, then.tool_position)) return "tool_position";
+  if (!same(now.tool_orientation, then.tool_orientation)) return "tool_orientation";
+  if (now.contacts != then.contacts) return "contacts";
+  if (!same(now.force, then.force)) return "force";
+  if (!same(now.torque, then.torque)) return "torque";
+  if (!same(now.stiffness, then.stiffness)) return "stiffness";
+  if (now.status != then.status) return "status";
+  if (now.phase != then.phase) return "phase";
+  if (!same(now.shown_force, then.shown_force)) return "shown_force";
+  if (!same(now.shown_torque, then.shown_torque)) return "shown_torque";
+  return nullptr;
+}
+
+}  // namespace
 
 DeviceNews ReplayDevice::hear(const TickTime& tick) noexcept {
   const TickRecord& then = session_.ticks[static_cast<std::size_t>(tick.number)];
@@ -24,12 +53,12 @@ DeviceNews ReplayDevice::hear(const TickTime& tick) noexcept {
 }
 
 void compare(const TickRecord& now, const TickRecord& then, ReplayDifference& difference) noexcept {
-  const auto same_bits = [](double a, double b) {
-    return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
-  };
-  const auto same = [&](const double(&a)[3], const double(&b)[3]) {
-    return std::equal(std::begin(a), std::end(a), std::begin(b), same_bits);
-  };
+  if (difference.first_tick < 0) {
+    if (const char* field = first_different_field(now, then)) {
+      difference.first_tick = difference.ticks;
+      difference.first_field = field;
+    }
+  }
   ++difference.ticks;
   if (same(now.force, then.force) && same(now.torque, then.torque) &&
       same(now.shown_force, then.shown_force) && same(now.shown_torque, then.shown_torque))

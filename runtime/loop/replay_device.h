@@ -11,10 +11,12 @@ namespace palpate {
 
 /// How a replay compares with its session.
 struct ReplayDifference {
-  std::int64_t ticks = 0;      ///< compared
-  std::int64_t different = 0;  ///< whose force, torque or shown force is not the same in every bit
-  double largest = 0.0;        ///< difference of a force [N]
-  double largest_time = 0.0;   ///< [s]
+  std::int64_t ticks = 0;        ///< compared
+  std::int64_t different = 0;    ///< whose force, torque or shown force is not the same in every bit
+  double largest = 0.0;          ///< difference of a force [N]
+  double largest_time = 0.0;     ///< [s]
+  std::int64_t first_tick = -1;  ///< in which anything that a tick computes is not the same; -1: none
+  const char* first_field = "";  ///< what it is, as a recording names it: of several what is computed first
 };
 
 /// Says in each tick what the device said in the session, with its times, so that the loop does all of it

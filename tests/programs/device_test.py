@@ -108,12 +108,15 @@ class Felt(ProgramTest):
         self.assertEqual(replay.returncode, 0, replay.stderr)
         report = json.loads(replay.stdout)
         self.assertEqual((report["replay"]["ticks"], report["replay"]["different_ticks"]), (len(force), 0), replay.stderr)
+        self.assertIsNone(report["replay"]["first_different_tick"])
         with h5py.File(self.folder / "again.h5") as again:
             numpy.testing.assert_array_equal(again["ticks/force"][:], force)
         # It is a comparison: with another tool it is another session.
         other = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--tool", "sphere:0.012", "--report", "-", cwd=self.folder)
         self.assertEqual(other.returncode, 3, other.stderr)
-        self.assertGreater(json.loads(other.stdout)["replay"]["different_ticks"], 100)
+        told = json.loads(other.stdout)["replay"]
+        self.assertGreater(told["different_ticks"], 100)
+        self.assertIn(f"the first is tick {told['first_different_tick']}, in its {told['first_different_field']}", other.stderr)
 
     def test_a_bridge_that_goes_is_a_fault_and_may_come_back(self):
         runtime = self.play()

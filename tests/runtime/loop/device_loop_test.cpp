@@ -222,13 +222,21 @@ TEST_F(Replay, IsTheSessionBitByBit) {
   EXPECT_EQ(same.ticks, 450);
   EXPECT_EQ(same.different, 0);
   EXPECT_EQ(same.largest, 0.0);
+  EXPECT_EQ(same.first_tick, -1);
 
   options.ramp = 0.1;
   const ReplayDifference other_ramp = replay(session, options);
   EXPECT_GT(other_ramp.different, 20);
   EXPECT_GT(other_ramp.largest, 0.0);
+  EXPECT_STREQ(other_ramp.first_field, "phase");  // where the session's ramp ended
+  ASSERT_GT(other_ramp.first_tick, 0);
+  const auto first = static_cast<std::size_t>(other_ramp.first_tick);
+  EXPECT_NE(session.ticks[first].phase, session.ticks[first - 1].phase);
   options.ramp = 0.05;
-  EXPECT_GT(replay(session, options, {.radius = 0.012}).different, 100);
+  const ReplayDifference other_tool = replay(session, options, {.radius = 0.012});
+  EXPECT_GT(other_tool.different, 100);
+  EXPECT_STREQ(other_tool.first_field, "contacts")
+      << "a larger tool touches earlier, and is where the device is";
 }
 
 TEST(Settings, ReadBackAsTheyWere) {
