@@ -15,8 +15,8 @@ inline constexpr std::size_t longest_printable = 1000;
 /// that are not UTF-8 as \xff. Of a text with more than `longest` characters the middle is left out (…).
 std::string printable(std::string_view text, std::size_t longest = longest_printable);
 
-/// The same for a text of several lines, which keeps them: each line is cut for itself, and those after the
-/// first begin with `indent`.
+/// A text of several lines, each cleaned and shortened as `printable` does it: each line is cut for itself,
+/// and those after the first begin with `indent`.
 std::string printable_lines(std::string_view text, std::string_view indent = "");
 
 }  // namespace palpate

@@ -19,7 +19,7 @@ class FileDescriptor;
 /// 32 hexadecimal digits.
 std::string checksum(std::span<const std::byte> bytes);
 
-/// The same of a text's bytes.
+/// XXH3-128 of a text's bytes, 32 hexadecimal digits.
 std::string checksum(std::string_view text);
 
 /// Checksum of a file's bytes (what `xxhsum -H2` prints); throws Error when it cannot be read.

@@ -28,10 +28,11 @@ struct Stored {
 /// file; fields are named).
 class Contents {
  public:
-  /// Of an open file; `file` stays open as long as this lives. Throws Error when it is no readable HDF5 file.
+  /// What an open file holds; `file` stays open as long as this lives. Throws Error when it is no readable
+  /// HDF5 file.
   static Contents read(FileDescriptor file);
   static Contents read(const std::filesystem::path& path) { return read(open_file(path, OpenMode::read)); }
-  /// Of several files, by one child.
+  /// What several files hold, looked at by one child.
   static std::vector<Contents> read(std::vector<FileDescriptor> files);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return file_.path(); }

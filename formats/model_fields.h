@@ -101,8 +101,8 @@ std::vector<std::int32_t> patch_surface_counts(const Model& model);
 void put_patch_surface_counts(Model& model, const std::vector<std::int32_t>& values);
 std::vector<std::int32_t> patch_surface_nodes(const Model& model);
 void put_patch_surface_nodes(Model& model, const std::vector<std::int32_t>& values);
-/// Of all patches, one after the other: symmetric matrices by their lower triangles, column by column, T by
-/// its rows.
+/// Matrices of all patches, one after the other: symmetric matrices by their lower triangles, column by
+/// column, T by its rows.
 std::vector<double> patch_softenings(const Model& model);
 void put_patch_softenings(Model& model, const std::vector<double>& values);
 std::vector<double> patch_transfers(const Model& model);

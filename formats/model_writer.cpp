@@ -98,7 +98,7 @@ void add_bytes(RunningChecksum& running, const FileDescriptor& file, std::int64_
   }
 }
 
-/// Of all bytes of the file but `gap_bytes` from each of the places.
+/// Checksum of all bytes of the file except `gap_bytes` from each of the places.
 std::string checksum_around(const FileDescriptor& file, std::vector<std::int64_t> gaps_at,
                             std::int64_t gap_bytes) {
   std::sort(gaps_at.begin(), gaps_at.end());

@@ -5,7 +5,7 @@
 namespace palpate {
 namespace {
 
-/// Of the file itself where `file` is a symbolic link.
+/// The folder of a file, of the file itself where `file` is a symbolic link.
 std::filesystem::path folder_of(const std::filesystem::path& file) {
   return std::filesystem::weakly_canonical(std::filesystem::absolute(file)).parent_path();
 }

@@ -42,9 +42,10 @@ Mesh generate(const RectangleShape& shape, ElementType element = ElementType::qu
 Mesh generate(const CylinderShape& shape);  ///< a square grid bent to the circle, Kuhn tetrahedra
 Mesh generate(const SphereShape& shape);    ///< a cubic grid bent to the sphere, Kuhn tetrahedra
 
-/// The same body with elements of another kind: tet4 to tet10 by a new node in the middle of each edge
-/// (numbered after the old ones; straight edges), tet10 to tet4 by dropping those; its own kind unchanged.
-/// The tagged facets follow. Throws Error (where = `where`) for any other pair: says which kind the mesh has.
+/// A mesh of the same body with elements of another kind: tet4 to tet10 by a new node in the middle of each
+/// edge (numbered after the old ones; straight edges), tet10 to tet4 by dropping those; its own kind
+/// unchanged. The tagged facets follow. Throws Error (where = `where`) for any other pair: says which kind
+/// the mesh has.
 Mesh with_elements(Mesh mesh, ElementType element, const std::string& where);
 
 }  // namespace palpate

@@ -25,7 +25,7 @@ class Subdivisions {
   [[nodiscard]] ElementType type() const noexcept { return type_; }
   [[nodiscard]] int refinement() const noexcept { return r_; }
 
-  /// That of the element with these corners; stays where it is.
+  /// The subdivision of the element with these corners; the reference stays valid.
   const Subdivision& of(std::span<const Index> corners);
 
  private:

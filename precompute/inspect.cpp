@@ -94,7 +94,7 @@ std::string overlay_text(const Model& model) {
                      8e-6 * static_cast<double>(entries));
 }
 
-/// Of damping a M + b K.
+/// Damping a M + b K in words.
 std::string damping_text(const Rayleigh& damping) {
   if (damping.mass == 0.0 && damping.stiffness == 0.0) return "no damping";
   return fmt::format("damping {:.4g}/s M + {:.4g} s K", damping.mass, damping.stiffness);

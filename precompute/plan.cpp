@@ -48,7 +48,7 @@ std::int64_t choose_block_columns(std::int64_t free_dofs) {
   return std::clamp<std::int64_t>(fits / 24 * 24, 24, max_block_columns);
 }
 
-/// Of so many threads, those that have a processor.
+/// How many of `jobs` threads have a processor.
 int working(int jobs) {
   return std::min(jobs, std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
 }

@@ -146,7 +146,7 @@ struct Description {
 /// column; an unknown key names the nearest known one.
 Description read_description(const std::filesystem::path& file);
 
-/// The same of a text in the place of the file's: of a description that is stored.
+/// Reads a description from its text, such as one stored in a baked file, in place of `file`.
 Description parse_description(const std::string& text, const std::filesystem::path& file);
 
 }  // namespace palpate

@@ -22,7 +22,7 @@ constexpr double wanted_dihedral = 12.0;
 constexpr double facet_size_per_edge = 1.2;
 constexpr double hollow_facet_size_per_edge = 0.77;
 constexpr double radius_per_edge = 0.73;
-/// Of a global optimisation; most converge earlier.
+/// Iterations of a global optimisation; most converge earlier.
 constexpr int most_iterations = 50;
 
 /// Moves the nodes of a refined complex for better elements, as far as the options ask for it. CGAL's own

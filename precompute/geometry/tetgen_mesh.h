@@ -18,7 +18,7 @@ namespace palpate {
 /// `where`) when TetGen refuses, crashes or does not end.
 Mesh mesh_surface(const TriangleSurface& surface, const MeshOptions& options, const std::string& where);
 
-/// The same for walls that enclose several parts, which may share walls: the elements of a part get the
+/// Meshes walls that enclose several parts, which may share walls: the elements of a part get the
 /// region of the point in it; a part without a point is left empty. `size` is what is expected of the mesh.
 Mesh mesh_regions(const TriangleSurface& walls, const std::vector<RegionPoint>& points,
                   const MeshOptions& options, const MeshSize& size, const std::string& where);

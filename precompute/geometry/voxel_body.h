@@ -35,7 +35,7 @@ struct VoxelBody : VoxelGrid {
   std::vector<Index> labels;  ///< [voxels] of the body, no_label elsewhere; empty: labels do not matter
 };
 
-/// The same voxels on the smallest grid that holds them and `margin` empty voxels on every side. Needs one
+/// The voxels copied to the smallest grid that holds them and `margin` empty voxels on every side. Needs one
 /// voxel of body.
 VoxelBody crop(const VoxelBody& body, Index margin);
 

@@ -67,7 +67,7 @@ class GreensSolver {
     [[nodiscard]] std::int64_t end() const noexcept { return first + columns; }
   };
 
-  /// Of the stored dofs [first, first + count), those that are free: a range of positions_.
+  /// Those of the stored dofs [first, first + count) that are free: a range of positions_.
   [[nodiscard]] std::span<const std::int64_t> free_positions(std::int64_t first, std::int64_t count) const;
   void mark_paths(std::span<const std::int64_t> block, std::vector<std::uint8_t>& on_path) const;
   [[nodiscard]] bool needed(const Supernode& s, std::int64_t first_position) const noexcept;

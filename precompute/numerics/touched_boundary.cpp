@@ -23,7 +23,7 @@ Vec3 nearest_on_line(const Vec3& a, const Vec3& b, const Vec3& p) {
   return {1.0 - t, t, 0.0};
 }
 
-/// Of a triangle: inside by projection, else on the nearest side.
+/// Nearest point of a triangle: inside by projection, else on the nearest side.
 Vec3 nearest_on_triangle(const std::array<Vec3, 3>& x, const Vec3& p) {
   const Vec3 normal = (x[1] - x[0]).cross(x[2] - x[0]);
   const double area = normal.squaredNorm();

@@ -22,8 +22,8 @@ struct Mover {
   std::int64_t ticks = std::numeric_limits<std::int32_t>::max();  ///< how long it goes on
 };
 
-/// Of all kinds but the mouse, which begins above the body: see add_mouse. `guardian` may be null. Throws
-/// Error.
+/// Movers of all kinds except the mouse, which begins above the body: see add_mouse. `guardian` may be null.
+/// Throws Error.
 [[nodiscard]] Mover make_mover(const PlayOptions& options, Guardian* guardian);
 
 /// The mouse, lifted above the body.

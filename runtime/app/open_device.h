@@ -9,8 +9,8 @@
 
 namespace palpate {
 
-/// Of `hid` or `bridge`; not open yet. `guardian` may be null. Throws Error that says what there is and how
-/// to choose, when it is not clear which device is meant or it cannot be had.
+/// The port of `hid` or `bridge`; not open yet. `guardian` may be null. Throws Error that says what there is
+/// and how to choose, when it is not clear which device is meant or it cannot be had.
 [[nodiscard]] std::unique_ptr<DevicePort> make_port(const DeviceChoice& choice, const SafetyOptions& safety,
                                                     Guardian* guardian);
 

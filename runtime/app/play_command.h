@@ -38,10 +38,10 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments);
 /// wrong arguments, Error for a session that cannot be read.
 PlayOptions read_play(PlayArguments arguments);
 
-/// Of `play` and `view`: "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
+/// The address of the viewer for `play` and `view`: "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
 ViewerOptions read_view_address(const std::string& text);
 
-/// Of `play` and `probe`: "r=3,rings=2". Throws CLI::ParseError.
+/// Overlay options of `play` and `probe`: "r=3,rings=2". Throws CLI::ParseError.
 OverlayOptions read_overlay(const std::string& text);
 
 }  // namespace palpate

@@ -27,12 +27,13 @@ class SessionPictures {
 
   [[nodiscard]] Scene scene() const { return make_scene(recording().frames.surface, 1); }
   [[nodiscard]] std::int64_t frames() const noexcept { return std::ssize(recording().frames.tick); }
-  /// Of all frames [s].
+  /// Times of all frames [s].
   [[nodiscard]] const std::vector<double>& times() const noexcept { return recording().frames.time; }
   [[nodiscard]] double time(std::int64_t frame) const {  ///< [s]
     return recording().frames.time[static_cast<std::size_t>(frame)];
   }
-  /// Of frame 0 .. frames() - 1, with the tool as it was in its tick. Throws Error when it cannot be read.
+  /// The picture of frame 0 .. frames() - 1, with the tool as it was in its tick. Throws Error when it cannot
+  /// be read.
   [[nodiscard]] SurfacePicture picture(std::int64_t frame) const;
   /// The members of the message `state` that are the run's, for frames at these times, the first of which is
   /// shown.

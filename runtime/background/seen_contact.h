@@ -12,7 +12,8 @@ struct SeenContact {
   bool held = false;
 };
 
-/// Of the last tick. The normal of one that a grab holds is that of its simplex as it is now.
+/// A contact point of the last tick as the viewer draws it. The normal of one that a grab holds is that of
+/// its simplex as it is now.
 SeenContact seen_contact(const Body& body, const State& state, const ContactPoint& contact) noexcept;
 
 }  // namespace palpate

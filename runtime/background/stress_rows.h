@@ -32,7 +32,7 @@ struct HookesLaw {
 
   /// In the plane: zz from xx and yy, of a stress that has a part by displacement or traction only.
   void complete(StressBlock& block) const noexcept;
-  /// Of the constant part.
+  /// Completes the constant part of the stress.
   void complete(Stress& stress) const noexcept;
 };
 

@@ -17,7 +17,7 @@ unsigned held_axes(const Model& model, Index mesh_node) {
   return model.fixed[static_cast<std::size_t>(mesh_node)] & ((1U << model.dimension()) - 1U);
 }
 
-/// Of a facet at a point.
+/// Normal and gradients of a facet at a point.
 struct Tangent {
   Vec3 normal;
   ShapeGradients gradients;  // [nodes, 3] along the facet [1/m]
@@ -380,7 +380,7 @@ void SurfaceStress::evaluate_patch(std::span<const Vec3> u, std::span<const Vec3
   for (const Index element : patch.elements()) in_patch_[static_cast<std::size_t>(element)] = 0;
 }
 
-/// Of a node of a facet on the refined surface.
+/// Place among the values of the patch of a node of a facet on the refined surface.
 std::size_t SurfaceStress::place_on_patch(std::size_t facet, Index node) const noexcept {
   if (!fine_sides_->is_creased(node)) return static_cast<std::size_t>(node);
   const std::size_t count = fine_sides_->width() * simplices_of_facet_;

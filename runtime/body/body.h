@@ -44,7 +44,7 @@ class Body {
 
   /// Everything baked, except `greens`, which greens() has taken over.
   [[nodiscard]] const Model& model() const noexcept { return model_; }
-  /// Of the static body; with dynamic contact K_bar^-1.
+  /// Green's functions of the static body; with dynamic contact K_bar^-1.
   [[nodiscard]] const Greens& greens() const noexcept { return greens_; }
   [[nodiscard]] ContactModel contact_model() const noexcept { return contact_model_; }
   /// Null unless the dynamics are modal.

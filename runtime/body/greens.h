@@ -72,7 +72,7 @@ class Greens {
   void displacement(std::span<const Index> nodes, std::span<const double> f,
                     std::span<double> u) const noexcept;
 
-  /// The same of a part of the nodes: `u` is the displacement of the u.size() / d stored nodes from
+  /// Displacement of a part of the nodes: `u` is the displacement of the u.size() / d stored nodes from
   /// `first_node` on.
   void displacement(std::span<const Index> nodes, std::span<const double> f, Index first_node,
                     std::span<double> u) const noexcept;

@@ -25,7 +25,7 @@ class ModalNewmark {
   void predict() noexcept;
   /// Ends the step under modal forces g [k]: q' = q_predicted + g / k_bar.
   void advance(std::span<const double> g) noexcept;
-  /// The same without forces.
+  /// Ends the step without forces: q' = q_predicted.
   void advance() noexcept;
 
   /// Leaves a share of the motion.

@@ -17,14 +17,15 @@ inline constexpr Index most_modes = 2048;
 /// tick needs of a dof is one row, contiguous in memory.
 class Modes {
  public:
-  /// Of a model with modal dynamics. Throws Error when there are none or too many, or their sizes do not fit.
+  /// The modes of a model with modal dynamics. Throws Error when there are none or too many, or their sizes
+  /// do not fit.
   explicit Modes(const Model& model);
 
   [[nodiscard]] Index count() const noexcept { return count_; }  ///< k
   [[nodiscard]] int dimension() const noexcept { return dimension_; }
   /// [k] angular frequencies [rad/s]
   [[nodiscard]] std::span<const double> omega() const noexcept { return omega_; }
-  /// That of the first mode that is not kept; infinity when all are [rad/s].
+  /// Angular frequency of the first mode that is not kept [rad/s]; infinity when all are.
   [[nodiscard]] double first_dropped_omega() const noexcept { return first_dropped_omega_; }
 
   /// [k] the modes at a stored dof [1/sqrt(kg)].

@@ -96,7 +96,7 @@ void NearField::add(const Body& body, Index surface_node) noexcept {
   }
 }
 
-/// Of a node beside the patch: the stored nodes that it follows, and how the patch responds to it.
+/// Enters a node beside the patch: the stored nodes that it follows, and how the patch responds to it.
 void NearField::enter(const Body& body, Index place) noexcept {
   part_count_[at(place)] = 0;
   if (patch_place(place) >= 0) return;

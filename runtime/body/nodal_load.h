@@ -22,7 +22,7 @@ class NodalLoad {
   NodalLoad(NodalLoad&&) = default;
   NodalLoad& operator=(NodalLoad&&) = default;
   ~NodalLoad() = default;
-  /// Of one with as much room: copies what is in it, and allocates nothing.
+  /// Assigns from a load with as much room: copies what is in it, and allocates nothing.
   NodalLoad& operator=(const NodalLoad& other) {
     if (node_.size() != other.node_.size() || dimension_ != other.dimension_) return *this = NodalLoad(other);
     clear();

@@ -15,8 +15,8 @@ namespace palpate {
 /// once made; any number of threads may use it.
 class Patch {
  public:
-  /// Of a body whose surface is refined as the patch's mesh. Throws Error when a node of Q is not stored, as
-  /// the file keeps too few layers below the surface.
+  /// A patch of a body whose surface is refined as the patch's mesh. Throws Error when a node of Q is not
+  /// stored, as the file keeps too few layers below the surface.
   Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed);
 
   /// [m] surface nodes of the body (Body::simplices), ascending.

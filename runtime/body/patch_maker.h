@@ -17,7 +17,7 @@ struct OverlayOptions {
 /// Patches round nodes of a body's surface. For one thread at a time.
 class PatchMaker {
  public:
-  /// Of a body whose surface is refined as the overlays will be; it must live as long.
+  /// For a body whose surface is refined as the overlays will be; it must live as long.
   PatchMaker(const Body& body, int rings);
 
   /// One patch over the elements within the rings round all centres (stored nodes): where those of several

@@ -24,7 +24,7 @@ struct BodyOptions {
 Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
                const BodyOptions& options = {});
 
-/// Likewise, with a line on the error stream about what was loaded and how long it took.
+/// Loads a body, with a line on the error stream about what was loaded and how long it took.
 std::unique_ptr<const Body> load_and_print(const std::filesystem::path& file,
                                            const std::filesystem::path& model_toml,
                                            const BodyOptions& options);

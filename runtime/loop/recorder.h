@@ -47,7 +47,7 @@ class Recorder {
 
   /// Ticks for which there was no room, or no disk any more.
   [[nodiscard]] std::int64_t dropped() const noexcept { return dropped_; }
-  /// And frames.
+  /// Frames for which there was no room, or no disk any more.
   [[nodiscard]] std::int64_t dropped_frames() const noexcept { return dropped_frames_; }
 
  private:

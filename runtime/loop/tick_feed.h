@@ -14,7 +14,7 @@ namespace palpate {
 /// up, notes are lost, as their numbers tell.
 class TickFeed {
  public:
-  /// Of ticks whose numbers follow one another.
+  /// Takes ticks whose numbers follow one another.
   using Sink = std::function<void(std::span<const TickNote>)>;
 
   /// `sink` is called by one thread and does not throw.

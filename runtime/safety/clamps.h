@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// The same direction, no longer than `most`; zero where the length is no number.
+/// The vector shortened to at most `most`; zero where the length is no number.
 inline Vec3 clamped(const Vec3& vector, double most) noexcept {
   const double length = vector.norm();
   if (!std::isfinite(length)) return Vec3::Zero();

@@ -42,7 +42,7 @@ enum class SafetyPhase : std::uint8_t {
   shut_down = 4,  ///< no force any more
 };
 
-/// And theirs.
+/// Phases of safety and their names.
 inline constexpr std::array<std::pair<SafetyPhase, const char*>, 5> safety_phase_names = {{
     {SafetyPhase::waiting, "waiting"},
     {SafetyPhase::ramping, "ramping"},

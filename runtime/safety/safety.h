@@ -40,7 +40,7 @@ struct SafetyOptions {
 /// With what the device bears where that is lower.
 [[nodiscard]] SafetyOptions limited(SafetyOptions options, const DeviceLimits& limits) noexcept;
 
-/// Of one tick, by the monotonic clock.
+/// Times of one tick, by the monotonic clock.
 struct TickTiming {
   std::int64_t now = 0;      ///< when the tick is [ns]
   std::int64_t due = 0;      ///< when it should have begun [ns]

@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// Of a contact problem those contacts that may be closed, without its held rows: these are equations, and
+/// The contacts of a contact problem that may be closed, without its held rows: these are equations, and
 /// eliminated,
 ///   W' = W_cc - W_ch W_hh^-1 W_hc,  b' = b_c - W_ch W_hh^-1 b_h  (Schur complement).
 /// A held row that has an owner is there when that is. All memory is taken at construction.

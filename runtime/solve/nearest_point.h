@@ -16,19 +16,19 @@ struct NearestPoint {
   double squared_distance = 0.0;  ///< [m^2]
 };
 
-/// Of point p and triangle a b c (Ericson, Real-Time Collision Detection, section 5.1.5). A triangle without
-/// area counts as its longest edge. Never a result that is not finite for finite input.
+/// Nearest point of p on triangle a b c (Ericson, Real-Time Collision Detection, section 5.1.5). A triangle
+/// without area counts as its longest edge. Never a result that is not finite for finite input.
 NearestPoint nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
 
-/// Of point p and line a b.
+/// Nearest point of p on line a b.
 NearestPoint nearest_on_line(const Vec3& p, const Vec3& a, const Vec3& b) noexcept;
 
-/// Of segment p q and triangle a b c. Where the segment cuts the triangle the distance is 0. Where it is
-/// parallel, one of the nearest pairs.
+/// Nearest points of segment p q and triangle a b c. Where the segment cuts the triangle the distance is 0.
+/// Where it is parallel, one of the nearest pairs.
 NearestPoint nearest_of_segment_and_triangle(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b,
                                              const Vec3& c) noexcept;
 
-/// Of segment p q and line a b.
+/// Nearest points of segment p q and line a b.
 NearestPoint nearest_of_segments(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b) noexcept;
 
 }  // namespace palpate

@@ -62,7 +62,7 @@ NearestPoint nearest_to_core(const SurfaceTree& tree, const std::array<Index, 3>
                       : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
 }
 
-/// Of a tool's core and a corner of a simplex.
+/// Nearest points of a tool's core and a corner of a simplex.
 NearestPoint nearest_to_corner(const SurfaceTree& tree, const std::array<Index, 3>& nodes, std::size_t corner,
                                const Core& core) noexcept {
   NearestPoint result;
@@ -73,7 +73,7 @@ NearestPoint nearest_to_corner(const SurfaceTree& tree, const std::array<Index, 
   return result;
 }
 
-/// Of a tool's core and the edge of a triangle between two of its corners.
+/// Nearest points of a tool's core and the edge of a triangle between two of its corners.
 NearestPoint nearest_to_edge(const SurfaceTree& tree, const std::array<Index, 3>& nodes, std::size_t from,
                              std::size_t to, const Core& core) noexcept {
   NearestPoint result =

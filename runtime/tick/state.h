@@ -61,8 +61,8 @@ struct State {
   static constexpr Index most_far_nodes = 64;       ///< of the body, whose far displacement a tick renews
   static constexpr Index most_far_patch_nodes = 8;  ///< and of the patch's surface
 
-  /// Of a body at rest that no tool touches. Throws Error for tools without sense (a size or stiffness that
-  /// is negative or not a number), none, or no room for contacts.
+  /// The state of a body at rest that no tool touches. Throws Error for tools without sense (a size or
+  /// stiffness that is negative or not a number), none, or no room for contacts.
   explicit State(const Body& body, const StateOptions& options = {});
 
   /// Contact points of the last tick, closed ones with their force.
@@ -122,7 +122,7 @@ inline Vec3 unloaded_position(const Body& body, State& state, Index surface_node
          state.motion.at(body, surface_node);
 }
 
-/// Of a simplex of the surface as it is now.
+/// Outward unit normal of a simplex of the surface as it is now.
 Vec3 outward_normal(const Body& body, const State& state, Index simplex) noexcept;
 
 }  // namespace palpate

@@ -16,7 +16,7 @@ namespace palpate {
 /// exception; never a force that is not finite.
 StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses) noexcept;
 
-/// That of a state with one tool.
+/// One tick of a state with one tool.
 StepStatus step(const Body& body, State& state, const ToolPose& pose) noexcept;
 
 /// u = Xi E f: displacement u [n] of all stored nodes [m] by the present contact forces, relative to rest

@@ -13,7 +13,7 @@ namespace palpate {
 using Request = boost::beast::http::request<boost::beast::http::empty_body>;
 using Response = boost::beast::http::response<boost::beast::http::string_body>;
 
-/// Of the WebSocket.
+/// Subprotocol of the WebSocket.
 inline constexpr const char* subprotocol = "palpate.1";
 
 /// Why a request is not answered at all: its host, page, method, token or subprotocol.

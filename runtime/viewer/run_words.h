@@ -25,7 +25,7 @@ std::string hello_word(const char* mode, std::uint64_t page);
 /// `about`: the word of the page that could not be.
 std::string error_word(const std::string& about, PageRefusal reason, const std::string& message,
                        const std::string& hint);
-/// The same of an Error, with its kind where it is a PageError.
+/// The message of an Error, with its kind where it is a PageError.
 std::string error_word(const std::string& about, const Error& error);
 
 /// Ticks a second where a run does not say.

@@ -36,13 +36,13 @@ struct ScenePatch {
   std::vector<std::array<Index, 2>> outline;    ///< in the plane: the boundary
 };
 
-/// Of a body. Throws Error when the model's surface is not that of its mesh.
+/// The scene of a body. Throws Error when the model's surface is not that of its mesh.
 Scene make_scene(const Body& body, std::uint32_t number);
 
-/// Of an overlay of the body that the scene is of. Its number is left 0.
+/// The scene of an overlay on the body of `scene`. Its number is left 0.
 ScenePatch make_scene_patch(const Body& body, const Scene& scene, const Patch& patch);
 
-/// Of a recording: all of its surface with the edges of its triangles.
+/// The scene of a recording: all of its surface with the edges of its triangles.
 Scene make_scene(const RecordedSurface& surface, std::uint32_t number);
 
 }  // namespace palpate

@@ -27,7 +27,8 @@ class SeenValues {
     const bool of_plane = scene_.is_plane && k < scene_nodes();
     return at(of_plane ? picture_.plane_von_mises : picture_.frame.von_mises, value(k));
   }
-  /// Of the contact, at node k of the scene's on the body's surface or, from there on, of the patch [Pa].
+  /// Pressure of the contact, at node k of the scene's on the body's surface or, from there on, of the patch
+  /// [Pa].
   struct Pressure {
     Index node;  ///< of the scene, from S on of the patch
     float value;

@@ -37,13 +37,13 @@ class Show {
   void set_scene(std::shared_ptr<const Scene> scene);
   /// Nothing, where it is of another scene.
   void set_picture(ShownPicture picture);
-  /// Of a `replay` all are kept, else the last two seconds.
+  /// Adds ticks to those shown: of a `replay` all are kept, otherwise the last two seconds.
   void add_ticks(const std::vector<TickNote>& ticks, std::int64_t stride, bool replay);
   void set_state(StateWord state);
   void set_times(nlohmann::json times) { times_ = std::move(times); }
   /// Pages are to be sent the state again.
   void touch_state();
-  /// Likewise, where that was half a second ago.
+  /// Has the state sent to pages again where that was last half a second ago.
   void repeat_state();
 
   [[nodiscard]] std::int64_t scenes() const noexcept { return scenes_; }
@@ -56,7 +56,7 @@ class Show {
   [[nodiscard]] const Message& scene_message() const noexcept { return scene_message_; }
   [[nodiscard]] const Message& patch_message();
   [[nodiscard]] const Message& frame_message();
-  /// Of the ticks from a place on, which it moves on.
+  /// The message of the ticks from `place` on, which it moves on.
   [[nodiscard]] Message ticks_message(std::int64_t& place);
   [[nodiscard]] Message state_message(const PageRole& role, bool is_first) const;
 

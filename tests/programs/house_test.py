@@ -67,6 +67,12 @@ class Rules(unittest.TestCase):
         self.write("meshes/mesh.cpp", "// theory.md section 2\n")
         self.refused("meshes/mesh.cpp:1: cites section 2 of docs/theory.md")
 
+    def test_a_doc_comment_that_leans_on_another_is_refused(self):
+        self.write("base/error.h", "/// An error.\nint a();\n/// Made up\n/// Of two lines.\nint b();\n")
+        self.assertEqual(self.check()[0], 0)
+        self.write("base/error.h", "/// An error.\nint a();\n/// The same with a hint.\nint b();\n")
+        self.refused("base/error.h:3: a doc comment that begins with 'The same'")
+
     def test_a_picture_of_other_sources_is_refused(self):
         self.write("docs/house.svg", PICTURE.replace("base", "formats"))
         self.refused("docs/house.svg: is not of these sources")

@@ -22,7 +22,7 @@ struct BridgeAddress {
   std::uint16_t port = 4270;          ///< 0: any that is free
 };
 
-/// Of "bridge", "bridge:PORT" or "bridge:ADDRESS:PORT". Throws Error for anything else.
+/// The address in "bridge", "bridge:PORT" or "bridge:ADDRESS:PORT". Throws Error for anything else.
 [[nodiscard]] BridgeAddress parse_bridge_address(std::string_view text);
 
 struct BridgeOptions {

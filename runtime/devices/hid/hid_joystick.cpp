@@ -14,7 +14,7 @@ constexpr std::int64_t repeat_after = 100'000'000;  // ns
 constexpr std::int64_t still_after = 20'000'000;    // ns; no stick that moves is slower
 constexpr std::int64_t millisecond = 1'000'000;     // ns
 
-/// Of one count of each axis [m].
+/// Travel of one count of each axis [m].
 Vec3 resolution(const PidLayout& layout, const PidConstants& constants) {
   Vec3 result = Vec3::Zero();
   for (std::size_t k = 0; k < pid_axes; ++k) {

@@ -59,7 +59,7 @@ struct DeviceProfile {
 /// Reads a profile (TOML). Throws Error that names file, line and key, and says what to do.
 [[nodiscard]] DeviceProfile read_device_profile(const std::filesystem::path& file);
 
-/// The same of `text`; `name` stands for the file in messages.
+/// Reads a profile from `text`; `name` stands for the file in messages.
 [[nodiscard]] DeviceProfile parse_device_profile(std::string_view text, const std::string& name);
 
 }  // namespace palpate

@@ -56,7 +56,7 @@ struct HidReportDescriptor {
   std::vector<HidField> fields;
   std::vector<HidUsage> collections;  ///< usages of all of them, as they begin
 
-  /// Of a report behind its id; 0 where there is none such.
+  /// Length of a report behind its id [byte]; 0 where there is none such.
   [[nodiscard]] std::uint16_t report_bytes(HidReportType type, std::uint8_t report_id) const noexcept;
 
   /// The first number of the usage that lies in all of the collections, and has 1 to 32 bits.

@@ -26,8 +26,8 @@ struct PidReport {
 struct PidConstants {
   std::array<double, pid_axes> half_travel{};  ///< of the handle from the middle to the stop, x and y [m]
   std::array<double, pid_axes> full_force{};   ///< of the handle at the largest magnitude [N]
-  /// Of the effect whose positive magnitude is a force along +x (right) and +y (from the user) [degrees]: by
-  /// Linux, which follows PID, 0 pulls to the user, 90 to the left.
+  /// Direction of the effect whose positive magnitude is a force along +x (right) and +y (from the user)
+  /// [degrees]: by Linux, which follows PID, 0 pulls to the user, 90 to the left.
   std::array<double, pid_axes> directions{270.0, 180.0};
 };
 
@@ -37,7 +37,7 @@ struct PidInput {
   std::uint32_t buttons = 0;            ///< bit k: button k is down
 };
 
-/// Of what hidapi reads. Empty for another report, another length and an axis outside its logical range.
+/// Decodes what hidapi reads. Empty for another report, another length and an axis outside its logical range.
 [[nodiscard]] std::optional<PidInput> decode_pid_input(const PidLayout& layout,
                                                        std::span<const std::uint8_t> report) noexcept;
 
@@ -52,7 +52,8 @@ struct PidBlockLoad {
   std::uint32_t block = 0;  ///< its number, from 1
 };
 
-/// Of what hid_get_feature_report gives: the report id, then the report. Empty for another report or length.
+/// Decodes what hid_get_feature_report gives: the report id, then the report. Empty for another report or
+/// length.
 [[nodiscard]] std::optional<PidBlockLoad> decode_block_load(const PidLayout& layout,
                                                             std::span<const std::uint8_t> report) noexcept;
 
