@@ -11,7 +11,7 @@ struct State;
 void remember_contacts(State& state) noexcept;
 
 /// Fills state.problem.lambda for the rows of state.problem: the active set where nothing rubs, otherwise the
-/// cone solver. False, with StepStatus::not_converged, where it did not reach its tolerance.
+/// cone solver. False where it did not reach its tolerance.
 bool solve_problem(State& state) noexcept;
 
 /// Gives state.problem.lambda to the contact points, the near field and the tools' contact wrenches.
