@@ -9,10 +9,10 @@
 
 #include "base/error.h"
 #include "runtime/app/probe_field.h"
+#include "runtime/body/prescribed_nodes.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/output.h"
 #include "runtime/solve/node_vectors.h"
-#include "runtime/tick/held_nodes.h"
 
 namespace palpate {
 namespace {
@@ -145,17 +145,18 @@ Overlay make_overlay(const Body& body, const std::vector<Answer>& answers, const
           make_patch_mesh(model, at, rings_round(model.mesh, at, nodes, options.rings), options.refinement)};
 }
 
-void solve(const Body& body, HeldNodes& contact, std::vector<Answer>& answers, const std::string& where) {
+void solve(const Body& body, PrescribedNodes& contact, std::vector<Answer>& answers,
+           const std::string& where) {
   for (const Answer& answer : answers) {
-    if (contact.hold(body, answer.stored) != StepStatus::ok ||
-        contact.prescribe(answer.stored, answer.displacement) != StepStatus::ok) {
+    if (contact.hold(body, answer.stored) != PrescribedStatus::ok ||
+        contact.prescribe(answer.stored, answer.displacement) != PrescribedStatus::ok) {
       throw Error(
           fmt::format("node {} does not move independently of the others in the stored Green's functions",
                       answer.node),
           where, "check the file with palpate-precompute verify");
     }
   }
-  if (contact.solve() != StepStatus::ok) {
+  if (contact.solve() != PrescribedStatus::ok) {
     throw Error("the forces are too large for a number", where, "give displacements in metres");
   }
   for (std::size_t k = 0; k < answers.size(); ++k)
@@ -222,7 +223,7 @@ int probe(const ProbeOptions& options) {
   for (const std::string& warning : warnings) print_warning(warning);
   std::optional<Overlay> overlay;
   if (options.overlay) overlay.emplace(make_overlay(body, answers, *options.overlay));
-  HeldNodes contact(body, static_cast<Index>(options.places.size()), overlay ? &*overlay : nullptr);
+  PrescribedNodes contact(body, static_cast<Index>(options.places.size()), overlay ? &*overlay : nullptr);
   solve(body, contact, answers, options.file.string());
 
   if (!options.field.empty()) {

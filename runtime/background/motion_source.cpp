@@ -20,7 +20,7 @@ MotionSource::MotionSource(const Body& body, const State& state, const MotionSou
     : body_(body),
       newmark_(body.model().dynamics, options.jobs > 0 ? options.jobs : processors_beside_the_tick()),
       in_background_(options.in_background),
-      jobs_(state.motion.job()),
+      jobs_(state.surface.motion.job()),
       samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.greens().order()))}),
       f_(static_cast<std::size_t>(body.greens().order())),
       u_(f_.size()),
@@ -35,18 +35,18 @@ MotionSource::~MotionSource() {
 }
 
 void MotionSource::receive(State& state, std::int64_t step) noexcept {
-  if (state.motion.sample_step() < step) receive(state);
+  if (state.surface.motion.sample_step() < step) receive(state);
 }
 
 void MotionSource::receive(State& state) noexcept {
-  if (!state.motion.active()) return;
-  if (!in_background_ && state.motion.job().step != done_) do_job(state.motion.job());
-  state.motion.receive(samples_.read());
+  if (!state.surface.motion.active()) return;
+  if (!in_background_ && state.surface.motion.job().step != done_) do_job(state.surface.motion.job());
+  state.surface.motion.receive(samples_.read());
 }
 
 void MotionSource::post(const State& state) noexcept {
-  if (!in_background_ || !state.motion.active()) return;
-  jobs_.next() = state.motion.job();
+  if (!in_background_ || !state.surface.motion.active()) return;
+  jobs_.next() = state.surface.motion.job();
   jobs_.publish();
 }
 

@@ -2,13 +2,10 @@
 
 #include <algorithm>
 
+#include "runtime/solve/tick_tuning.h"
+
 namespace palpate {
 namespace {
-
-constexpr double clearly_more = 0.1;     // of all, that another node must have to become the centre
-constexpr double near_edges = 3.0;       // mean edges of the body's mesh: nearer, a free tool has an overlay
-constexpr double smoothing = 0.05;       // of the velocity, a tick
-constexpr std::int64_t look_stride = 8;  // ticks, of a free tool
 
 /// How much a contact point tells where a tool touches: by how deep the device is in the body at rest there,
 /// squared.
@@ -38,9 +35,9 @@ void PatchWishes::add(const PatchKey& key) noexcept {
 }
 
 PatchChoice::PatchChoice(const Body& body, const State& state)
-    : reach_(near_edges * body.mean_surface_edge() * body.refinement()),
+    : reach_(tuning.patches.near_edges * body.mean_surface_edge() * body.refinement()),
       tools_(state.tools.size()),
-      touched_(static_cast<std::size_t>(3 * body.most_surface_parts() * state.max_contacts)),
+      touched_(static_cast<std::size_t>(3 * body.most_surface_parts() * state.max_contacts())),
       share_(touched_.size()) {}
 
 /// Gives the nodes of the body that a surface node follows their parts of a share.
@@ -69,7 +66,7 @@ Index PatchChoice::chosen(Index present) const noexcept {
     of_best = share_[k];
     best = touched_[k];
   }
-  return present >= 0 && of_best <= of_present + clearly_more * sum ? present : best;
+  return present >= 0 && of_best <= of_present + tuning.patches.clearly_more * sum ? present : best;
 }
 
 Index PatchChoice::touched_centre(const Body& body, const State& state, std::size_t number) noexcept {
@@ -97,13 +94,13 @@ void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t 
   Followed& followed = tools_[number];
   if (!tool.placed) return;
   const Vec3 moved = tool.device.position - tool.last_device_position;
-  followed.velocity += smoothing * (moved - followed.velocity);
+  followed.velocity += tuning.patches.smoothing * (moved - followed.velocity);
   if (tool.contacts > 0) {
     followed.centre = touched_centre(body, state, number);
     return;
   }
-  if (ticks_ % look_stride != 0) return;
-  const NearestSimplex found = state.tree.nearest(tool.pose.position);
+  if (ticks_ % tuning.patches.look_stride != 0) return;
+  const NearestSimplex found = state.surface.tree.nearest(tool.pose.position);
   const double most = reach_ + tool.tool.radius + tool.tool.length;
   followed.centre = tool.engaged && found.nearest.squared_distance < most * most
                         ? nearest_centre(body, found, followed.centre)
@@ -116,7 +113,7 @@ PatchKey PatchChoice::key_at(const Body& body, const State& state, double ticks)
   for (std::size_t k = 0; k < tools_.size(); ++k) {
     if (tools_[k].centre < 0) continue;
     const Vec3 place = state.tools[k].pose.position + ticks * tools_[k].velocity;
-    if (place.allFinite()) key.add(nearest_centre(body, state.tree.nearest(place), -1));
+    if (place.allFinite()) key.add(nearest_centre(body, state.surface.tree.nearest(place), -1));
   }
   return key;
 }
@@ -129,7 +126,7 @@ void PatchChoice::follow(const Body& body, const State& state) noexcept {
     if (tools_[k].centre >= 0) now_.add(tools_[k].centre);
   }
   const auto turn = static_cast<std::size_t>(ticks_) % ahead_.size();
-  ahead_[turn] = now_.empty() ? PatchKey{} : key_at(body, state, times_ahead[turn]);
+  ahead_[turn] = now_.empty() ? PatchKey{} : key_at(body, state, tuning.patches.times_ahead[turn]);
   wishes_.count = 0;
   wishes_.add(now_);
   for (const PatchKey& key : ahead_) wishes_.add(key);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/body/patch_maker.h"
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/state.h"
 
 namespace palpate {
@@ -46,8 +47,6 @@ class PatchChoice {
   [[nodiscard]] const PatchWishes& wishes() const noexcept { return wishes_; }
 
  private:
-  static constexpr std::array<double, 4> times_ahead = {15.0, 40.0, 80.0, 150.0};  // ticks
-
   struct Followed {
     Index centre = -1;
     Vec3 velocity = Vec3::Zero();  // of the device, smoothed [m a tick]
@@ -68,7 +67,7 @@ class PatchChoice {
   std::vector<Index> touched_;  // stored nodes that have a part in the places that count
   std::vector<double> share_;   // and how much
   PatchKey now_;
-  std::array<PatchKey, times_ahead.size()> ahead_;  // where the tools will be
+  std::array<PatchKey, tuning.patches.times_ahead.size()> ahead_;  // where the tools will be
   PatchWishes wishes_;
 };
 

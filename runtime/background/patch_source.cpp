@@ -42,14 +42,14 @@ void PatchSource::serve(State& state) noexcept {
   wishes_.publish();
   receive();
   const PatchKey& wanted = choice_.now();
-  state.patch_is_older = false;
+  state.surface.patch_is_older = false;
   if (wanted.empty()) return;
-  if (!(wanted == used_ && state.patch != nullptr)) {
+  if (!(wanted == used_ && state.surface.patch != nullptr)) {
     const std::shared_ptr<const Patch>* patch = find(wanted);
-    state.patch_is_older = patch == nullptr;
+    state.surface.patch_is_older = patch == nullptr;
     if (patch != nullptr) {
-      if (state.patch != nullptr) ++counts_.switches;
-      state.patch = *patch;
+      if (state.surface.patch != nullptr) ++counts_.switches;
+      state.surface.patch = *patch;
       used_ = wanted;
     }
   }
@@ -57,7 +57,7 @@ void PatchSource::serve(State& state) noexcept {
 }
 
 void PatchSource::serve(State& state, Index centre, bool older) noexcept {
-  state.patch_is_older = older;
+  state.surface.patch_is_older = older;
   if (centre < 0) return;
   PatchKey key;
   key.add(centre);
@@ -65,9 +65,9 @@ void PatchSource::serve(State& state, Index centre, bool older) noexcept {
   build(key);
   receive();
   const std::shared_ptr<const Patch>* patch = find(key);
-  if (patch != nullptr && !(key == used_ && state.patch != nullptr)) {
-    if (state.patch != nullptr) ++counts_.switches;
-    state.patch = *patch;
+  if (patch != nullptr && !(key == used_ && state.surface.patch != nullptr)) {
+    if (state.surface.patch != nullptr) ++counts_.switches;
+    state.surface.patch = *patch;
     used_ = key;
   }
   count(state);
@@ -77,9 +77,9 @@ void PatchSource::count(const State& state) noexcept {
   const bool touches = std::any_of(state.tools.begin(), state.tools.end(),
                                    [](const ToolState& tool) { return tool.contacts > 0; });
   ++counts_.ticks;
-  counts_.older += state.patch_is_older ? 1 : 0;
+  counts_.older += state.surface.patch_is_older ? 1 : 0;
   counts_.in_contact += touches ? 1 : 0;
-  counts_.older_in_contact += touches && state.patch_is_older ? 1 : 0;
+  counts_.older_in_contact += touches && state.surface.patch_is_older ? 1 : 0;
 }
 
 void PatchSource::receive() noexcept {

@@ -90,7 +90,7 @@ class PatchSource {
   PatchMaker maker_;
   PatchChoice choice_;
   PatchCounts counts_;
-  PatchKey used_;  // of state.patch
+  PatchKey used_;  // of state.surface.patch
 
   // The tick's side.
   std::vector<Delivery> slots_;

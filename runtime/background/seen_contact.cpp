@@ -7,7 +7,7 @@ namespace {
 Vec3 surface_position(const State& state, const ContactPoint& contact) noexcept {
   Vec3 position = Vec3::Zero();
   for (std::size_t k = 0; k < contact.nodes.size(); ++k) {
-    if (contact.nodes[k] >= 0) position += contact.weights[k] * state.tree.position(contact.nodes[k]);
+    if (contact.nodes[k] >= 0) position += contact.weights[k] * state.surface.tree.position(contact.nodes[k]);
   }
   return position;
 }

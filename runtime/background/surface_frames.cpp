@@ -44,10 +44,11 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
     : body_(body),
       options_(options),
       sink_(std::move(sink)),
-      moments_(Moment{.load = state.near.load(),
-                      .motion = ShownMotion(body),
-                      .touches = std::vector<Touch>(state.contact_points.size()),
-                      .forces = std::vector<NodalForce>(static_cast<std::size_t>(state.near.capacity()))}),
+      moments_(
+          Moment{.load = state.surface.near.load(),
+                 .motion = ShownMotion(body),
+                 .touches = std::vector<Touch>(state.contact_points.size()),
+                 .forces = std::vector<NodalForce>(static_cast<std::size_t>(state.surface.near.capacity()))}),
       rest_(body.surface_in_mesh()),
       stored_(static_cast<std::size_t>(body.greens().order())),
       u_(rest_.size()),
@@ -71,8 +72,8 @@ SurfaceFrames::~SurfaceFrames() {
 void SurfaceFrames::post(const State& state, std::int64_t tick, double time) noexcept {
   if (tick % options_.ticks_per_frame != 0) return;
   Moment& next = moments_.next();
-  next.load = state.near.load();
-  state.motion.show(next.motion);
+  next.load = state.surface.near.load();
+  state.surface.motion.show(next.motion);
   take_contacts(state, next);
   const ToolState& tool = state.tools.front();
   next.device = tool.device;
@@ -96,9 +97,9 @@ void SurfaceFrames::take_contacts(const State& state, Moment& moment) const noex
                                             contact.weights};
   }
   moment.force_count = 0;
-  for (Index place = 0; place < state.near.count(); ++place) {
-    const Vec3 force = state.near.force(place);
-    if (!force.isZero(0.0)) moment.forces[moment.force_count++] = {state.near.node(place), force};
+  for (Index place = 0; place < state.surface.near.count(); ++place) {
+    const Vec3 force = state.surface.near.force(place);
+    if (!force.isZero(0.0)) moment.forces[moment.force_count++] = {state.surface.near.node(place), force};
   }
 }
 

@@ -7,14 +7,11 @@
 
 #include "base/error.h"
 #include "runtime/solve/node_vectors.h"
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
 namespace {
-
-constexpr double least_fade = 1e-6;
-constexpr double settling = 0.1;          // time in which quasi-static contact stills a body [s]
-constexpr std::size_t least_history = 4;  // ticks of contact that say how fast its forces change
 
 /// Ticks from one step of the file's dynamics to the next.
 std::int64_t count_ticks(const Body& body, double tick) {
@@ -75,7 +72,7 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
     : dimension_(body.dimension()),
       tick_(tick),
       ticks_per_step_(count_ticks(body, tick)),
-      settled_(std::exp(-tick * static_cast<double>(ticks_per_step_) / settling)),
+      settled_(std::exp(-tick * static_cast<double>(ticks_per_step_) / tuning.body.settling)),
       dynamic_contact_(body.contact_model() == ContactModel::dynamic),
       phase_(ticks_per_step_),
       pending_(make_let_go(dimension_, room(body, most_loads))),
@@ -85,7 +82,7 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
   const bool swings = dynamics.method != DynamicsMethod::none;
   const bool packed = dynamics.method == DynamicsMethod::packed;
   const std::int64_t n = body.greens().order();
-  if (swings) loads_.assign(history, NodalLoad(dimension_, most_loads));
+  if (swings) loads_.assign(tuning.body.history, NodalLoad(dimension_, most_loads));
   held_.resize(size_if(swings, n));
   pending_held_.resize(held_.size());
   u_before_.resize(size_if(packed, n));
@@ -124,7 +121,7 @@ void FreeMotion::fade_held(double omega) noexcept {
   since_let_go_ += tick_;
   const double angle = omega * since_let_go_;
   fade_ = (1.0 + angle) * std::exp(-angle);
-  if (!(fade_ > least_fade)) fade_ = 0.0;
+  if (!(fade_ > tuning.body.least_fade)) fade_ = 0.0;
 }
 
 void FreeMotion::begin_modal_step(const Body& body) noexcept {
@@ -182,7 +179,7 @@ void FreeMotion::show(ShownMotion& shown) const noexcept {
 
 void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
   if (loads_.empty()) return;
-  NodalLoad& now = loads_[static_cast<std::size_t>(ticks_) % history];
+  NodalLoad& now = loads_[static_cast<std::size_t>(ticks_) % tuning.body.history];
   now.clear();
   now.add(load.nodes(), load.forces(), 1.0);
   active_ = active_ || (dynamic_contact_ && !now.empty());
@@ -215,11 +212,11 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
 /// from nothing at once.
 void FreeMotion::add_rate(const NodalLoad& last) noexcept {
   const auto before = [&](std::size_t ticks) -> const NodalLoad& {
-    return loads_[(static_cast<std::size_t>(ticks_) + history - ticks) % history];
+    return loads_[(static_cast<std::size_t>(ticks_) + tuning.body.history - ticks) % tuning.body.history];
   };
   std::size_t count = 1;
-  while (count < history && !before(count + 1).empty()) ++count;
-  if (count < least_history) return;
+  while (count < tuning.body.history && !before(count + 1).empty()) ++count;
+  if (count < tuning.body.least_history) return;
   const double per_second = 1.0 / (static_cast<double>(count - 1) * tick_);
   if (pending_.rate.add(last.nodes(), last.forces(), per_second))
     pending_.rate.add(before(count).nodes(), before(count).forces(), -per_second);
@@ -227,7 +224,7 @@ void FreeMotion::add_rate(const NodalLoad& last) noexcept {
 
 void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<double> displacement) noexcept {
   if (loads_.empty() || (dynamic_contact_ && !modal_)) return;
-  const NodalLoad& last = loads_[static_cast<std::size_t>(ticks_ - 1) % history];
+  const NodalLoad& last = loads_[static_cast<std::size_t>(ticks_ - 1) % tuning.body.history];
   if (last.empty()) return;
   if (dynamic_contact_) {
     set_zero(g_);

@@ -94,8 +94,6 @@ class FreeMotion {
   [[nodiscard]] bool is_late() const noexcept { return ends_step() && job_.step > sample_step_; }
 
  private:
-  static constexpr std::size_t history = 8;  // ticks that a velocity is taken over
-
   void begin_modal_step(const Body& body) noexcept;
   void fade_held(double omega) noexcept;
   void add_rate(const NodalLoad& last) noexcept;

@@ -4,12 +4,11 @@
 #include <utility>
 
 #include "runtime/solve/node_vectors.h"
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
 namespace {
-
-constexpr std::int64_t patience = 200;  // ticks that an unwanted node stays: a tool often comes back
 
 std::size_t at(Index i) noexcept {
   return static_cast<std::size_t>(i);
@@ -66,7 +65,7 @@ void NearField::begin_tick() noexcept {
   ++tick_;
   for (int k = 0; k < 2; ++k) {
     const Index place = longest_unwanted();
-    if (place < 0 || wanted_[static_cast<std::size_t>(place)] + patience >= tick_) return;
+    if (place < 0 || wanted_[static_cast<std::size_t>(place)] + tuning.body.patience >= tick_) return;
     forget(place);
   }
 }

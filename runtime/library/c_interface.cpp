@@ -40,7 +40,7 @@ static_assert(same(PALPATE_HANDING_OVER, StepStatus::handing_over));
 static_assert(same(PALPATE_OLDER_PATCH, StepStatus::older_patch));
 static_assert(same(PALPATE_LATE_MOTION, StepStatus::late_motion));
 static_assert(same(PALPATE_RIGID_CONTACT, StepStatus::rigid_contact));
-static_assert(status_names.size() == 12 + 2, "these and the two that only HeldNodes knows");
+static_assert(status_names.size() == 12, "these");
 
 constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
 
@@ -136,7 +136,7 @@ struct palpate_session {
         untouched(body, with_room(options, body, overlay)),
         state(untouched),
         poses(options.tools.size()),
-        shown(Shown{.load = state.near.load(), .motion = ShownMotion(body)}),
+        shown(Shown{.load = state.surface.near.load(), .motion = ShownMotion(body)}),
         stored_displacement(static_cast<std::size_t>(body.greens().order())),
         displacement(body.surface_rest_positions().size()) {
     show();
@@ -149,8 +149,8 @@ struct palpate_session {
   /// Hands what the last tick did over to the thread that draws.
   void show() noexcept {
     Shown& next = shown.next();
-    next.load = state.near.load();
-    state.motion.show(next.motion);
+    next.load = state.surface.near.load();
+    state.surface.motion.show(next.motion);
     shown.publish();
   }
 

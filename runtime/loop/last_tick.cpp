@@ -28,7 +28,7 @@ std::string contact_table(const Body& body, const State& state) {
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const ContactPoint& contact = contacts[k];
     const auto [x, n, f, held] = seen_contact(body, state, contact);
-    const double gap = held ? 0.0 : gap_after(state.problem, static_cast<Index>(k));
+    const double gap = held ? 0.0 : gap_after(state.scratch.problem, static_cast<Index>(k));
     table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), n.x(), n.y(), n.z(),
                          f.x(), f.y(), f.z(), gap, contact.simplex, held ? 1 : 0);
   }
@@ -39,8 +39,8 @@ void write_surface(const std::filesystem::path& file, const Body& body, const St
   std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
   std::vector<Vec3> u(body.surface_rest_positions().size());
   ShownMotion motion(body);
-  state.motion.show(motion);
-  surface_displacement(body, state.near.load(), stored, u, &motion);
+  state.surface.motion.show(motion);
+  surface_displacement(body, state.surface.near.load(), stored, u, &motion);
   const std::vector<Vec3> nodes = body.surface_in_mesh();
   std::vector<double> total;
   for (std::size_t node = 0; node < u.size(); ++node) {

@@ -270,7 +270,7 @@ class Loop {
         const Index node = contact.nodes[k];
         if (node < 0) continue;
         const Vec3& rest = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)];
-        moved += contact.weights[k] * (rest - parts_.state.tree.position(node));
+        moved += contact.weights[k] * (rest - parts_.state.surface.tree.position(node));
       }
       deepest = std::max(deepest,
                          moved.dot(contact.held ? outward_normal(parts_.body, parts_.state, contact.simplex)
@@ -296,7 +296,7 @@ class Loop {
     record.grab = in_body_.pose.grab ? 1 : 0;
     if (parts_.overlays != nullptr && parts_.overlays->centre() >= 0)
       record.patch = parts_.body.mesh_node(parts_.overlays->centre());
-    record.motion_step = parts_.state.motion.sample_step();
+    record.motion_step = parts_.state.surface.motion.sample_step();
 
     set(record.handle_position, news_.state.pose.position);
     set(record.handle_orientation, news_.state.pose.orientation);

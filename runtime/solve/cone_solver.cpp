@@ -5,21 +5,11 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
 namespace {
-
-constexpr int fewest_rounds = 4;
-constexpr int sweeps = 3;
-constexpr int local_rounds = 3;  // of a sweep at a contact
-constexpr int plain_rounds = 5;
-constexpr int spring_rounds = 12;
-// Springs of the proximal steps, of w_ii, and how much weaker the next ones are: of 250 problems of a sphere
-// and a point sliding over the liver that plain rounds had not solved, these solve 220, the rest to 2e-4 of
-// the force.
-constexpr double first_share = 0.01;
-constexpr double next_share = 0.5;
 
 double largest_force(const ContactProblem& problem) noexcept {
   double largest = 0.0;
@@ -121,7 +111,7 @@ void ConeSolver::sweep(ContactProblem& problem) noexcept {
     const Index first = problem.first_row(k);
     const Index count = problem.rows_of(k);
     const auto at = static_cast<std::size_t>(first);
-    for (int round = 0; round < local_rounds; ++round) {
+    for (int round = 0; round < tuning.cone.local_rounds; ++round) {
       const double normal = std::max(0.0, problem.lambda[at] - weight_[at] * motion_[at]);
       change(problem, first, normal - problem.lambda[at]);
       if (count == 1) break;
@@ -312,13 +302,13 @@ bool ConeSolver::iterate(ContactProblem& problem, int rounds) noexcept {
     const bool stepped = newton_step(problem);
     ++rounds_;
     work_ += std::pow(unknowns_, 3) / 3.0 + 2.0 * std::pow(problem.rows, 2);
-    if (stepped && is_good_enough(problem, tolerance)) return true;
+    if (stepped && is_good_enough(problem, tuning.cone.tolerance)) return true;
     if (stepped && search_along_step(problem, now)) continue;
-    // Newton may run in circles between sets of closed contacts: sweeps from where it would go, at times from
-    // here.
+    // Newton may run in circles between sets of closed contacts: tuning.cone.sweeps from where it would go,
+    // at times from here.
     start_from(problem, stepped && round % 5 != 4 ? newton_ : from_);
-    for (int k = 0; k < sweeps; ++k) sweep(problem);
-    work_ += (3.0 * sweeps + 4.0) * std::pow(problem.rows, 2) * local_rounds;
+    for (int k = 0; k < tuning.cone.sweeps; ++k) sweep(problem);
+    work_ += (3.0 * tuning.cone.sweeps + 4.0) * std::pow(problem.rows, 2) * tuning.cone.local_rounds;
     now = residual(problem);
   }
   if (best < now) start_from(problem, best_);
@@ -350,18 +340,18 @@ bool ConeSolver::is_good_enough(const ContactProblem& problem, double share) con
 /// From lambda.
 bool ConeSolver::solve_part(ContactProblem& problem) noexcept {
   std::copy_n(problem.lambda.begin(), problem.rows, guess_.begin());
-  if (iterate(problem, plain_rounds)) return true;
+  if (iterate(problem, tuning.cone.plain_rounds)) return true;
 
   start_from(problem, guess_);
-  for (double share = first_share; !budget_spent(); share *= next_share) {
+  for (double share = tuning.cone.first_share; !budget_spent(); share *= tuning.cone.next_share) {
     add_springs(problem, share);
-    iterate(problem, spring_rounds);
+    iterate(problem, tuning.cone.spring_rounds);
     remove_springs(problem);
     scale_rows(problem);
     find_motion(problem);
-    if (is_good_enough(problem, tolerance)) return true;
+    if (is_good_enough(problem, tuning.cone.tolerance)) return true;
   }
-  return is_good_enough(problem, accepted);
+  return is_good_enough(problem, tuning.cone.accepted);
 }
 
 bool ConeSolver::solve(ContactProblem& problem) noexcept {
@@ -378,13 +368,15 @@ bool ConeSolver::solve(ContactProblem& problem) noexcept {
     part_.gather(problem, true);
     const bool solved = solve_part(part_.problem);
     part_.spread(problem);
-    if (!part_.take_in_penetrated(problem, accepted * largest_force(part_.problem))) return solved;
+    if (!part_.take_in_penetrated(problem, tuning.cone.accepted * largest_force(part_.problem)))
+      return solved;
     if (budget_spent()) return false;
   }
 }
 
 bool ConeSolver::budget_spent() const noexcept {
-  return rounds_ >= most_rounds || (rounds_ >= fewest_rounds && work_ >= most_work);
+  return rounds_ >= tuning.cone.most_rounds ||
+         (rounds_ >= tuning.cone.fewest_rounds && work_ >= tuning.cone.most_work);
 }
 
 void ConeSolver::derivative(const ContactProblem& problem, std::span<const double> db,

@@ -8,6 +8,7 @@
 #include "runtime/solve/active_set.h"
 #include "runtime/solve/contact_part.h"
 #include "runtime/solve/contact_problem.h"
+#include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
 
@@ -18,14 +19,9 @@ namespace palpate {
 /// forces to where they are, and are made weaker from step to step (Rockafellar 1976). Residual: the largest
 /// difference of the two sides. Solved are the contacts that the guess closes (without a guess: those that
 /// are closed without friction); those left out that are then penetrated are taken in. The budget is
-/// `most_rounds` rounds, and beyond the fourth `most_work`. All memory is taken at construction.
+/// ConeTuning's `most_rounds` rounds, and beyond the fourth `most_work`. All memory is taken at construction.
 class ConeSolver {
  public:
-  static constexpr double tolerance = 1e-6;  ///< of the residual, relative to the largest force
-  static constexpr double accepted = 1e-4;   ///< where `tolerance` is not met
-  static constexpr int most_rounds = 60;
-  static constexpr double most_work = 6e5;  ///< multiplications, some 0.2 ms
-
   ConeSolver(Index max_contacts, Index max_rows);
 
   /// Fills problem.lambda from the guess in it, to `tolerance` where the budget suffices. False when the
@@ -40,7 +36,7 @@ class ConeSolver {
 
   [[nodiscard]] int rounds() const noexcept { return rounds_; }  ///< of the last `solve`
   [[nodiscard]] bool was_easy() const noexcept {
-    return work_ < 0.1 * most_work;
+    return work_ < tuning.cone.easy_share * tuning.cone.most_work;
   }  ///< `solve` left time for another
 
  private:

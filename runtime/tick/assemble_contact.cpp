@@ -4,15 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
-#include "runtime/tick/state.h"
+#include "runtime/tick/tool_geometry.h"
 
 namespace palpate {
 namespace {
-
-constexpr double closed_gap = 0.01;  // of the mean edge: a contact that may be closed
-constexpr double least_tilt_radius =
-    0.5;  // of the mean edge: a sharp tool's contact slides on its face as well
 
 /// Places of the contact's nodes in the near field.
 std::array<Index, 3> places_of(const NearField& near, const ContactPoint& contact) noexcept {
@@ -58,27 +55,28 @@ double unloading(const NearField& near, const ContactRow& row) noexcept {
 
 /// Motion along a tangent of the surface itself since the tick before, which the places where the tick begins
 /// have in them already: what slides is the surface under the tool, by whatever it moves.
-double free_slip(const State& state, const ContactPoint& contact, const Vec3& tangent) noexcept {
-  if (!state.motion.active() || !state.is_first_pass) return 0.0;
+double free_slip(const SurfaceState& surface, const ContactPoint& contact, const Vec3& tangent) noexcept {
+  if (!surface.motion.active()) return 0.0;
   double motion = 0.0;
   for (std::size_t n = 0; n < 3; ++n) {
     if (contact.nodes[n] >= 0)
-      motion += contact.weights[n] * tangent.dot(state.motion.change(contact.nodes[n]));
+      motion += contact.weights[n] * tangent.dot(surface.motion.change(contact.nodes[n]));
   }
   return motion;
 }
 
 /// The contact of the tick before that is the same one, null when there is none.
-const ContactPoint* same_contact(const State& state, const ContactPoint& contact) noexcept {
-  const auto end = state.last_contacts.begin() + state.last_count;
-  const auto found = std::find_if(state.last_contacts.begin(), end, [&](const ContactPoint& last) {
+const ContactPoint* same_contact(const Scratch& scratch, const ContactPoint& contact) noexcept {
+  const auto end = scratch.last_contacts.begin() + scratch.last_count;
+  const auto found = std::find_if(scratch.last_contacts.begin(), end, [&](const ContactPoint& last) {
     return last.feature == contact.feature && last.tool == contact.tool;
   });
   return found == end ? nullptr : &*found;
 }
 
-void add_contact(State& state, const ContactPoint& contact, const ContactPoint* last) noexcept {
-  ContactProblem& problem = state.problem;
+void add_contact(const State& state, Scratch& scratch, const ContactPoint& contact,
+                 const ContactPoint* last) noexcept {
+  ContactProblem& problem = scratch.problem;
   const Index first = problem.rows;
   problem.add(contact.friction, contact.held);
   const ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
@@ -87,24 +85,25 @@ void add_contact(State& state, const ContactPoint& contact, const ContactPoint* 
   for (Index i = first; i < problem.rows; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const Vec3 direction = contact.frame.col(i - first);
-    state.rows[at] = contact_row(state.near, contact, direction);
-    problem.b[at] = direction.dot(motion) + unloading(state.near, state.rows[at]);
+    scratch.rows[at] = contact_row(state.surface.near, contact, direction);
+    problem.b[at] = direction.dot(motion) + unloading(state.surface.near, scratch.rows[at]);
     if (i == first && !contact.held) problem.b[at] += contact.gap;
-    if (i > first && !contact.held) problem.b[at] -= free_slip(state, contact, direction);
+    if (i > first && !contact.held && scratch.is_first_pass)
+      problem.b[at] -= free_slip(state.surface, contact, direction);
     if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
   }
 }
 
 /// The normal force by which a contact's tilt is judged: its own in the tick before, or, of one that has just
 /// become another vertex, edge or face, the mean of its tool's.
-double normal_force(const State& state, const ContactPoint& contact, const ContactPoint* last,
+double normal_force(const Scratch& scratch, const ContactPoint& contact, const ContactPoint* last,
                     double closed) noexcept {
   if (last != nullptr) return last->force.dot(last->frame.col(0));
   if (contact.gap > closed) return 0.0;
   double sum = 0.0;
   double count = 0.0;
-  for (Index k = 0; k < state.last_count; ++k) {
-    const ContactPoint& other = state.last_contacts[static_cast<std::size_t>(k)];
+  for (Index k = 0; k < scratch.last_count; ++k) {
+    const ContactPoint& other = scratch.last_contacts[static_cast<std::size_t>(k)];
     const double force = other.force.dot(other.frame.col(0));
     if (other.tool != contact.tool || other.held || force <= 0.0) continue;
     sum += force;
@@ -113,8 +112,8 @@ double normal_force(const State& state, const ContactPoint& contact, const Conta
   return count > 0.0 ? sum / count : 0.0;
 }
 
-void add_tilt(State& state, Index number, double force, double least_radius,
-              std::span<double> spring) noexcept {
+void add_tilt(const State& state, Scratch& scratch, Index number, double force,
+              double least_radius) noexcept {
   const ContactPoint& contact = state.contact_points[static_cast<std::size_t>(number)];
   const double radius =
       std::max(least_radius, state.tools[static_cast<std::size_t>(contact.tool)].tool.radius);
@@ -122,11 +121,11 @@ void add_tilt(State& state, Index number, double force, double least_radius,
       std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
   if (contact.held || nodes < 2 || !(force * radius > 0.0)) return;
   const auto add = [&](const Vec3& tangent) {
-    const auto at = static_cast<std::size_t>(state.problem.rows);
-    state.problem.add_held_row(number);
-    state.rows[at] = tilt_row(state.near, contact, radius, tangent);
-    state.problem.b[at] = unloading(state.near, state.rows[at]);
-    spring[at] = radius / force;
+    const auto at = static_cast<std::size_t>(scratch.problem.rows);
+    scratch.problem.add_held_row(number);
+    scratch.rows[at] = tilt_row(state.surface.near, contact, radius, tangent);
+    scratch.problem.b[at] = unloading(state.surface.near, scratch.rows[at]);
+    scratch.tilt_spring[at] = radius / force;
   };
   if (nodes == 3) {
     add(contact.frame.col(1));
@@ -140,24 +139,24 @@ void add_tilt(State& state, Index number, double force, double least_radius,
 
 /// W = J Xi J^T, by y = Xi J^T row by row; D is the number of dofs a node.
 template <int D>
-void assemble_body_compliance(State& state) noexcept {
-  ContactProblem& problem = state.problem;
-  double* __restrict y = state.row_response.data();
-  const std::ptrdiff_t width = std::ptrdiff_t{D} * state.near.count();
+void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept {
+  ContactProblem& problem = scratch.problem;
+  double* __restrict y = scratch.row_response.data();
+  const std::ptrdiff_t width = std::ptrdiff_t{D} * near.count();
   for (Index j = 0; j < problem.rows; ++j) {
-    const ContactRow& by = state.rows[static_cast<std::size_t>(j)];
+    const ContactRow& by = scratch.rows[static_cast<std::size_t>(j)];
     std::fill_n(y, width, 0.0);
     for (std::size_t n = 0; n < 3; ++n) {
       if (by.places[n] < 0) continue;
       for (int axis = 0; axis < D; ++axis) {
         const double factor = by.body[n][axis];
-        const double* __restrict c = state.near.row(D * by.places[n] + axis).data();
+        const double* __restrict c = near.row(D * by.places[n] + axis).data();
 #pragma omp simd
         for (std::ptrdiff_t k = 0; k < width; ++k) y[k] += factor * c[k];
       }
     }
     for (Index i = j; i < problem.rows; ++i) {
-      const ContactRow& at = state.rows[static_cast<std::size_t>(i)];
+      const ContactRow& at = scratch.rows[static_cast<std::size_t>(i)];
       double w = 0.0;
       for (std::size_t n = 0; n < 3; ++n) {
         const double* u = y + D * std::ptrdiff_t{std::max<Index>(at.places[n], 0)};
@@ -170,27 +169,27 @@ void assemble_body_compliance(State& state) noexcept {
 }
 
 /// Which contacts press on what the body does not give way at, or hold it. Before the couplings are in W.
-void note_rigid_contacts(State& state) noexcept {
+void note_rigid_contacts(State& state, const ContactProblem& problem) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
     ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
-    const Index first = state.problem.first_row(k);
-    const Index rows = contact.held ? state.problem.rows_of(k) : 1;
+    const Index first = problem.first_row(k);
+    const Index rows = contact.held ? problem.rows_of(k) : 1;
     contact.rigid = false;
     for (Index i = first; i < first + rows; ++i)
-      contact.rigid = contact.rigid || state.problem.w(i, i) < state.least_compliance;
+      contact.rigid = contact.rigid || problem.w(i, i) < state.surface.least_compliance;
   }
 }
 
 /// What the couplings give way: W += J_tool C_tool J_tool^T.
-void add_coupling_compliance(State& state) noexcept {
-  ContactProblem& problem = state.problem;
+void add_coupling_compliance(const State& state, Scratch& scratch) noexcept {
+  ContactProblem& problem = scratch.problem;
   for (Index j = 0; j < problem.rows; ++j) {
-    const ContactRow& by = state.rows[static_cast<std::size_t>(j)];
+    const ContactRow& by = scratch.rows[static_cast<std::size_t>(j)];
     if (by.tool < 0) continue;
     const Tool& tool = state.tools[static_cast<std::size_t>(by.tool)].tool;
     if (std::isinf(tool.coupling_stiffness) && std::isinf(tool.coupling_torsion)) continue;
     for (Index i = 0; i < problem.rows; ++i) {
-      const ContactRow& at = state.rows[static_cast<std::size_t>(i)];
+      const ContactRow& at = scratch.rows[static_cast<std::size_t>(i)];
       if (at.tool != by.tool) continue;
       problem.w(i, j) +=
           at.force.dot(by.force) / tool.coupling_stiffness + at.moment.dot(by.moment) / tool.coupling_torsion;
@@ -199,7 +198,7 @@ void add_coupling_compliance(State& state) noexcept {
 }
 
 /// The part of a row's own compliance that is in double where precision is split: e^T left right^T e.
-double exact_compliance(const Body& body, const State& state, const ContactRow& row) noexcept {
+double exact_compliance(const Body& body, const NearField& near, const ContactRow& row) noexcept {
   const Greens& greens = body.greens();
   if (!greens.split()) return 0.0;
   const auto terms = static_cast<std::ptrdiff_t>(greens.exact_terms());
@@ -208,7 +207,7 @@ double exact_compliance(const Body& body, const State& state, const ContactRow& 
   std::fill_n(right.begin(), terms, 0.0);
   for (std::size_t n = 0; n < 3; ++n) {
     if (row.places[n] < 0) continue;
-    const SurfaceParts parts = body.surface_parts(state.near.node(row.places[n]));
+    const SurfaceParts parts = body.surface_parts(near.node(row.places[n]));
     for (std::size_t k = 0; k < parts.stored.size(); ++k) {
       for (int axis = 0; axis < greens.dimension(); ++axis) {
         const std::int64_t dof = std::int64_t{greens.dimension()} * parts.stored[k] + axis;
@@ -227,19 +226,19 @@ constexpr double exact_rounding = std::numeric_limits<double>::epsilon();
 /// indefinite. Where next to nothing gives way a rigid tool would be given a force beyond all measure: there
 /// it presses on a wall that gives way a little. What all that gives way along a tangent it gives from the
 /// force of the tick before: friction that sticks would creep by it in every tick.
-void regularise(const Body& body, State& state, std::span<const double> spring) noexcept {
+void regularise(const Body& body, const State& state, Scratch& scratch) noexcept {
   const double rounding = body.greens().rounding();
-  ContactProblem& problem = state.problem;
+  ContactProblem& problem = scratch.problem;
   for (Index k = 0; k < problem.contacts; ++k) {
     const Index first = problem.first_row(k);
     for (Index i = first; i < first + problem.rows_of(k); ++i) {
       const auto row = static_cast<std::size_t>(i);
       double& w = problem.w(i, i);
-      const double exact = exact_compliance(body, state, state.rows[row]);
+      const double exact = exact_compliance(body, state.surface.near, scratch.rows[row]);
       double give = 4.0 * (rounding * std::max(w - exact, 0.0) + exact_rounding * std::abs(exact)) +
-                    state.rigid_compliance;
-      if (k < state.contact_count) give = std::max(give, state.least_compliance - w);
-      w += give + spring[row];
+                    state.surface.rigid_compliance;
+      if (k < state.contact_count) give = std::max(give, state.surface.least_compliance - w);
+      w += give + scratch.tilt_spring[row];
       if (i > first && problem.held[static_cast<std::size_t>(k)] == 0)
         problem.b[row] -= give * problem.lambda[row];
     }
@@ -248,26 +247,31 @@ void regularise(const Body& body, State& state, std::span<const double> spring) 
 
 }  // namespace
 
-void assemble_contact(const Body& body, State& state) noexcept {
-  state.problem.clear();
-  std::fill(state.row_change.begin(), state.row_change.end(), 0.0);
-  const std::span<double> spring = state.row_change;
+void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept {
+  scratch.problem.clear();
+  std::fill(scratch.tilt_spring.begin(), scratch.tilt_spring.end(), 0.0);
   const std::span<const ContactPoint> contacts = state.contacts();
-  for (const ContactPoint& contact : contacts) add_contact(state, contact, same_contact(state, contact));
+  for (const ContactPoint& contact : contacts)
+    add_contact(state, scratch, contact, same_contact(scratch, contact));
   const double edge = body.mean_surface_edge();
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = contacts[static_cast<std::size_t>(k)];
-    const double force = normal_force(state, contact, same_contact(state, contact), closed_gap * edge);
-    add_tilt(state, k, force, least_tilt_radius * edge, spring);
+    const double force =
+        normal_force(scratch, contact, same_contact(scratch, contact), tuning.assembly.closed_gap * edge);
+    add_tilt(state, scratch, k, force, tuning.assembly.least_tilt_radius * edge);
   }
+  HighWater& most = scratch.high_water;
+  most.contact_points = std::max(most.contact_points, state.contact_count);
+  most.unknowns = std::max(most.unknowns, scratch.problem.rows);
+  most.near_nodes = std::max(most.near_nodes, state.surface.near.count());
   if (body.dimension() == 3) {
-    assemble_body_compliance<3>(state);
+    assemble_body_compliance<3>(state.surface.near, scratch);
   } else {
-    assemble_body_compliance<2>(state);
+    assemble_body_compliance<2>(state.surface.near, scratch);
   }
-  note_rigid_contacts(state);
-  add_coupling_compliance(state);
-  regularise(body, state, spring);
+  note_rigid_contacts(state, scratch.problem);
+  add_coupling_compliance(state, scratch);
+  regularise(body, state, scratch);
 }
 
 }  // namespace palpate

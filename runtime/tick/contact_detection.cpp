@@ -4,41 +4,13 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/tick/state.h"
+#include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
 namespace {
 
-constexpr double same_place = 1e-4;       // of the mean edge: nearer contact points are one
-constexpr double same_held_place = 0.05;  // of the mean edge: nearer to a held place nothing else is touched
-constexpr double same_direction = 1e-6;   // 1 - cos of their normals
-constexpr double deepest_inside = 0.25;   // of the mean edge: deeper, the tool is lost in the body
-constexpr double smooth_radius = 6.0;  // of a simplex's mean edge: a larger sphere touches its corners alone
-constexpr double on_surface =
-    1e-6;  // of the mean edge: nearer, the face tells the normal and not the distance
-
-std::array<Index, 3> nodes_of(const Body& body, Index simplex) noexcept {
-  const auto d = static_cast<std::size_t>(body.dimension());
-  const std::size_t at = d * static_cast<std::size_t>(simplex);
-  const std::span<const Index> simplices = body.simplices();
-  return {simplices[at], simplices[at + 1], d == 3 ? simplices[at + 2] : -1};
-}
-
-Vec3 outward_normal(const SurfaceTree& tree, const std::array<Index, 3>& nodes) noexcept {
-  const Vec3& a = tree.position(nodes[0]);
-  const Vec3& b = tree.position(nodes[1]);
-  Vec3 normal;
-  if (nodes[2] < 0) {
-    normal = Vec3(b.y() - a.y(), a.x() - b.x(), 0.0);
-  } else {
-    normal = (b - a).cross(tree.position(nodes[2]) - a);
-  }
-  const double length = normal.norm();
-  return length > 0.0 ? Vec3(normal / length) : Vec3::Zero();
-}
-
 /// Mean length of a simplex's edges at rest [m].
-double mean_edge(const Body& body, const std::array<Index, 3>& nodes) noexcept {
+double mean_edge(const Body& body, const SimplexNodes& nodes) noexcept {
   const auto at = [&](std::size_t k) {
     return body.surface_rest_positions()[static_cast<std::size_t>(nodes[k])];
   };
@@ -46,54 +18,10 @@ double mean_edge(const Body& body, const std::array<Index, 3>& nodes) noexcept {
   return nodes[2] < 0 ? first : (first + (at(2) - at(1)).norm() + (at(0) - at(2)).norm()) / 3.0;
 }
 
-NearestPoint nearest_on_simplex(const SurfaceTree& tree, const std::array<Index, 3>& nodes,
-                                const Vec3& point) noexcept {
-  const Vec3& a = tree.position(nodes[0]);
-  const Vec3& b = tree.position(nodes[1]);
-  return nodes[2] < 0 ? nearest_on_line(point, a, b)
-                      : nearest_on_triangle(point, a, b, tree.position(nodes[2]));
-}
-
-NearestPoint nearest_to_core(const SurfaceTree& tree, const std::array<Index, 3>& nodes,
-                             const Core& core) noexcept {
-  const Vec3& a = tree.position(nodes[0]);
-  const Vec3& b = tree.position(nodes[1]);
-  return nodes[2] < 0 ? nearest_of_segments(core.origin, core.end, a, b)
-                      : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
-}
-
-/// Nearest points of a tool's core and a corner of a simplex.
-NearestPoint nearest_to_corner(const SurfaceTree& tree, const std::array<Index, 3>& nodes, std::size_t corner,
-                               const Core& core) noexcept {
-  NearestPoint result;
-  result.weights[corner] = 1.0;
-  result.on_simplex = tree.position(nodes[corner]);
-  result.on_core = nearest_on_line(result.on_simplex, core.origin, core.end).on_simplex;
-  result.squared_distance = (result.on_core - result.on_simplex).squaredNorm();
-  return result;
-}
-
-/// Nearest points of a tool's core and the edge of a triangle between two of its corners.
-NearestPoint nearest_to_edge(const SurfaceTree& tree, const std::array<Index, 3>& nodes, std::size_t from,
-                             std::size_t to, const Core& core) noexcept {
-  NearestPoint result =
-      nearest_of_segments(core.origin, core.end, tree.position(nodes[from]), tree.position(nodes[to]));
-  const std::array<double, 3> weights = result.weights;
-  result.weights = {};
-  result.weights[from] = weights[0];
-  result.weights[to] = weights[1];
-  return result;
-}
-
-NearestPoint nearest(const SurfaceTree& tree, const std::array<Index, 3>& nodes, const Core& core,
-                     bool is_point) noexcept {
-  return is_point ? nearest_on_simplex(tree, nodes, core.origin) : nearest_to_core(tree, nodes, core);
-}
-
 /// Same vertex, edge or face, same place on the same tool: the same number. Faces have the simplex's number;
 /// edges and vertices those of their nodes.
-std::int64_t feature_of(Index tool, int place, Index simplex, bool face_tells,
-                        const std::array<Index, 3>& nodes, const std::array<double, 3>& weights) noexcept {
+std::int64_t feature_of(Index tool, int place, Index simplex, bool face_tells, const SimplexNodes& nodes,
+                        const std::array<double, 3>& weights) noexcept {
   std::array<Index, 3> used{};
   int count = 0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -106,11 +34,11 @@ std::int64_t feature_of(Index tool, int place, Index simplex, bool face_tells,
   return (head + 2) * room * room + std::min(used[0], used[1]) * room + std::max(used[0], used[1]);
 }
 
-Vec3 displacement_of(const Body& body, const State& state, const ContactPoint& contact) noexcept {
+Vec3 displacement_of(const Body& body, const NearField& near, const ContactPoint& contact) noexcept {
   Vec3 u = Vec3::Zero();
   for (std::size_t k = 0; k < 3; ++k) {
     if (contact.nodes[k] < 0 || !body.surface_moves(contact.nodes[k])) continue;
-    u += contact.weights[k] * state.near.displacement(state.near.place_of(contact.nodes[k]));
+    u += contact.weights[k] * near.displacement(near.place_of(contact.nodes[k]));
   }
   return u;
 }
@@ -129,7 +57,7 @@ Eigen::Matrix3d frame_of(const Vec3& normal, int dimension) noexcept {
 }
 
 /// Gradients of the barycentric weights that are not zero, along the edge or face that they span.
-std::array<Vec3, 3> slopes(const SurfaceTree& tree, const std::array<Index, 3>& nodes) noexcept {
+std::array<Vec3, 3> slopes(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept {
   std::array<Vec3, 3> slope{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
   std::array<std::size_t, 3> used{};
   std::size_t count = 0;
@@ -156,59 +84,60 @@ std::array<Vec3, 3> slopes(const SurfaceTree& tree, const std::array<Index, 3>& 
 }
 
 /// Puts the nodes of a simplex into the near field, at their present places in the tree.
-bool want_nodes(const Body& body, State& state, const std::array<Index, 3>& nodes) noexcept {
+bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nodes) noexcept {
   bool room = true;
   for (const Index node : nodes) {
     if (node < 0 || !body.surface_moves(node)) continue;
-    room = state.near.want(body, node) && room;
+    room = surface.near.want(body, node) && room;
   }
   if (!room) return false;
   for (const Index node : nodes) {
     if (node < 0 || !body.surface_moves(node)) continue;
-    state.tree.move(
-        node, unloaded_position(body, state, node) + state.near.displacement(state.near.place_of(node)));
+    surface.tree.move(node, unloaded_position(body, surface, node) +
+                                surface.near.displacement(surface.near.place_of(node)));
   }
   return true;
 }
 
 /// The simplices nearest to the tool by what the tree knows, at most as many as may be looked at: fills
-/// state.found and returns how many.
-std::size_t nearest_simplices(const Body& body, State& state, ToolState& tool, const Core& core,
-                              double reach) noexcept {
-  const std::size_t all = state.tree.near_segment(core.origin, core.end, reach, state.found);
+/// scratch.found and returns how many.
+std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
+                              const Core& core, double reach) noexcept {
+  const std::size_t all = tree.near_segment(core.origin, core.end, reach, scratch.found);
   const bool is_point = tool.tool.length == 0.0;
   std::size_t count = 0;
-  for (std::size_t k = 0; k < std::min(all, state.found.size()); ++k) {
-    const Index simplex = state.found[k];
-    const double distance = nearest(state.tree, nodes_of(body, simplex), core, is_point).squared_distance;
+  for (std::size_t k = 0; k < std::min(all, scratch.found.size()); ++k) {
+    const Index simplex = scratch.found[k];
+    const double distance = nearest_points(tree, nodes_of(body, simplex), core, is_point).squared_distance;
     if (distance > reach * reach) continue;
-    state.found[count] = simplex;
-    state.found_distance[static_cast<std::size_t>(simplex)] = distance;
+    scratch.found[count] = simplex;
+    scratch.found_distance[static_cast<std::size_t>(simplex)] = distance;
     ++count;
   }
-  if (all > state.found.size()) tool.status |= StepStatus::capacity_full;
-  if (count > state.most_simplices) {
+  scratch.high_water.simplices = std::max(scratch.high_water.simplices, static_cast<Index>(count));
+  if (all > scratch.found.size()) tool.status |= StepStatus::capacity_full;
+  if (count > scratch.pairs.size()) {
     tool.status |= StepStatus::capacity_full;
     const auto nearer = [&](Index a, Index b) {
-      const double da = state.found_distance[static_cast<std::size_t>(a)];
-      const double db = state.found_distance[static_cast<std::size_t>(b)];
+      const double da = scratch.found_distance[static_cast<std::size_t>(a)];
+      const double db = scratch.found_distance[static_cast<std::size_t>(b)];
       return da < db || (da == db && a < b);
     };
-    std::nth_element(state.found.begin(),
-                     state.found.begin() + static_cast<std::ptrdiff_t>(state.most_simplices),
-                     state.found.begin() + static_cast<std::ptrdiff_t>(count), nearer);
-    count = state.most_simplices;
+    std::nth_element(scratch.found.begin(),
+                     scratch.found.begin() + static_cast<std::ptrdiff_t>(scratch.pairs.size()),
+                     scratch.found.begin() + static_cast<std::ptrdiff_t>(count), nearer);
+    count = scratch.pairs.size();
   }
   return count;
 }
 
-bool is_duplicate(const Body& body, const State& state, Index begin, const Vec3& position,
+bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const Vec3& position,
                   const Vec3& normal) noexcept {
-  const double near = same_place * body.mean_surface_edge();
-  for (Index k = begin; k < state.candidate_count; ++k) {
-    const ContactPoint& other = state.candidates[static_cast<std::size_t>(k)];
+  const double near = tuning.detection.same_place * body.mean_surface_edge();
+  for (Index k = begin; k < scratch.candidate_count; ++k) {
+    const ContactPoint& other = scratch.candidates[static_cast<std::size_t>(k)];
     if ((other.position - position).squaredNorm() < near * near &&
-        other.frame.col(0).dot(normal) > 1.0 - same_direction) {
+        other.frame.col(0).dot(normal) > 1.0 - tuning.detection.same_direction) {
       return true;
     }
   }
@@ -217,7 +146,7 @@ bool is_duplicate(const Body& body, const State& state, Index begin, const Vec3&
 
 /// Whether a held contact of the same tool is at the same place, or holds all that this one touches.
 bool is_held_already(const Body& body, const State& state, const ContactPoint& contact) noexcept {
-  const double near = same_held_place * body.mean_surface_edge();
+  const double near = tuning.detection.same_held_place * body.mean_surface_edge();
   const auto holds = [](const ContactPoint& held, Index node) {
     return node < 0 || std::find(held.nodes.begin(), held.nodes.end(), node) != held.nodes.end();
   };
@@ -230,16 +159,16 @@ bool is_held_already(const Body& body, const State& state, const ContactPoint& c
                      });
 }
 
-void add_candidate(const Body& body, State& state, Index tool_number, Index begin, const TouchingPair& pair,
-                   bool face_tells) noexcept {
+void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_number, Index begin,
+                   const TouchingPair& pair, bool face_tells) noexcept {
   ToolState& tool = state.tools[static_cast<std::size_t>(tool_number)];
-  if (static_cast<std::size_t>(state.candidate_count) == state.candidates.size()) {
+  if (static_cast<std::size_t>(scratch.candidate_count) == scratch.candidates.size()) {
     tool.status |= StepStatus::capacity_full;
     return;
   }
   const Vec3 normal =
       face_tells ? pair.normal : Vec3((pair.nearest.on_core - pair.nearest.on_simplex) / pair.distance);
-  if (is_duplicate(body, state, begin, pair.nearest.on_simplex, normal)) return;
+  if (is_duplicate(body, scratch, begin, pair.nearest.on_simplex, normal)) return;
   const std::array<Index, 3> nodes = nodes_of(body, pair.simplex);
   ContactPoint contact;
   contact.feature =
@@ -251,119 +180,134 @@ void add_candidate(const Body& body, State& state, Index tool_number, Index begi
   contact.position = pair.nearest.on_simplex;
   if (is_held_already(body, state, contact)) return;
   contact.arm = contact.position - tool.pose.position;
-  contact.slope = slopes(state.tree, contact.nodes);
+  contact.slope = slopes(state.surface.tree, contact.nodes);
   contact.frame = frame_of(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction =
       tool.tool.friction.value_or(body.surface_friction()[static_cast<std::size_t>(pair.simplex)]);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
-                                              displacement_of(body, state, contact));
-  state.candidates[static_cast<std::size_t>(state.candidate_count++)] = contact;
+                                              displacement_of(body, state.surface.near, contact));
+  scratch.candidates[static_cast<std::size_t>(scratch.candidate_count++)] = contact;
 }
 
 /// Whether the simplex carried force at the same tool in the tick or pass before.
-bool carried(const State& state, Index tool, const TouchingPair& pair) noexcept {
-  const auto begin = state.last_contacts.begin();
-  return std::any_of(begin, begin + state.last_count, [&](const ContactPoint& last) {
+bool carried(const Scratch& scratch, Index tool, const TouchingPair& pair) noexcept {
+  const auto begin = scratch.last_contacts.begin();
+  return std::any_of(begin, begin + scratch.last_count, [&](const ContactPoint& last) {
     return last.tool == tool && last.simplex == pair.simplex && !last.held && last.force.squaredNorm() > 0.0;
   });
 }
 
-/// Contact points of one tool. From outside, a simplex is touched from its outer side: those that turn their
-/// back are behind others. From a little inside (rounding, or a fast tick), the nearest ones and those that
-/// carried force push out along their normals.
-void find_candidates(const Body& body, State& state, Index tool_number, double margin) noexcept {
-  ToolState& tool = state.tools[static_cast<std::size_t>(tool_number)];
-  const double edge = body.mean_surface_edge();
-  const Core core = core_of(tool.tool, tool.pose, body.dimension());
-  const double lost = deepest_inside * edge;
-  const std::size_t count =
-      nearest_simplices(body, state, tool, core, std::max(tool.tool.radius + margin, lost));
+/// How one tool meets the surface in this tick.
+struct ToolContact {
+  Index number;  // of the tool
+  Core core;
+  double margin;          // [m]
+  double lost;            // [m] a core that is deeper than this is lost in the body
+  Index usable = 0;       // simplices of scratch.found whose nodes are in the near field
+  Index first_candidate;  // of this tool
+  double nearest_distance = std::numeric_limits<double>::infinity();  // [m] of the core's origin
+  bool inside = false;  // the core's origin is behind the surface
+};
 
-  Index usable = 0;
+/// Keeps those of `count` simplices whose nodes find room in the near field.
+void keep_usable(const Body& body, State& state, Scratch& scratch, ToolContact& touch,
+                 std::size_t count) noexcept {
   for (std::size_t k = 0; k < count; ++k) {
-    const Index simplex = state.found[k];
-    if (!want_nodes(body, state, nodes_of(body, simplex))) {
-      tool.status |= StepStatus::capacity_full;
+    const Index simplex = scratch.found[k];
+    if (!want_nodes(body, state.surface, nodes_of(body, simplex))) {
+      state.tools[static_cast<std::size_t>(touch.number)].status |= StepStatus::capacity_full;
       continue;
     }
-    state.found[static_cast<std::size_t>(usable++)] = simplex;
+    scratch.found[static_cast<std::size_t>(touch.usable++)] = simplex;
   }
+}
 
-  const auto make_pair = [&](Index simplex, int place, const NearestPoint& nearest) {
-    TouchingPair pair{.simplex = simplex, .place = place, .nearest = nearest};
-    pair.normal = outward_normal(state.tree, nodes_of(body, simplex));
-    const Vec3 across = nearest.on_core - nearest.on_simplex;
-    pair.height = across.dot(pair.normal);
-    pair.distance = across.norm();
-    return pair;
-  };
-  const auto pair_of_end = [&](Index simplex, int place) {
-    const Vec3& end = place == 0 ? core.origin : core.end;
-    NearestPoint nearest = nearest_on_simplex(state.tree, nodes_of(body, simplex), end);
-    nearest.on_core = end;
-    return make_pair(simplex, place, nearest);
-  };
-
-  double nearest_distance = std::numeric_limits<double>::infinity();
-  for (Index k = 0; k < usable; ++k) {
-    TouchingPair& pair = state.pairs[static_cast<std::size_t>(k)];
-    pair = pair_of_end(state.found[static_cast<std::size_t>(k)], 0);
-    nearest_distance = std::min(nearest_distance, pair.distance);
+/// Fills the pairs of the core's origin, and tells on which side of the nearest simplices it is.
+void look_from_origin(const Body& body, const SurfaceTree& tree, Scratch& scratch,
+                      ToolContact& touch) noexcept {
+  for (Index k = 0; k < touch.usable; ++k) {
+    TouchingPair& pair = scratch.pairs[static_cast<std::size_t>(k)];
+    pair = pair_of_end(body, tree, scratch.found[static_cast<std::size_t>(k)], touch.core, 0);
+    touch.nearest_distance = std::min(touch.nearest_distance, pair.distance);
   }
-  const auto is_nearest = [&](const TouchingPair& pair) {
-    return pair.place == 0 && pair.distance <= nearest_distance + on_surface * edge;
-  };
+  const double as_near = touch.nearest_distance + tuning.detection.on_surface * body.mean_surface_edge();
   double side = 0.0;
-  for (Index k = 0; k < usable; ++k) {
-    const TouchingPair& pair = state.pairs[static_cast<std::size_t>(k)];
-    if (is_nearest(pair)) side += pair.height;
+  for (Index k = 0; k < touch.usable; ++k) {
+    const TouchingPair& pair = scratch.pairs[static_cast<std::size_t>(k)];
+    if (pair.distance <= as_near) side += pair.height;
   }
-  const bool inside = side < 0.0;
-  if (inside && nearest_distance > lost) {
+  touch.inside = side < 0.0;
+}
+
+/// Makes a candidate of a pair that touches or may touch in this tick. From outside, a simplex is touched
+/// from its outer side: those that turn their back are behind others. From a little inside (rounding, or a
+/// fast tick), the nearest ones and those that carried force push out along their normals.
+void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+                const TouchingPair& pair) noexcept {
+  const double radius = state.tools[static_cast<std::size_t>(touch.number)].tool.radius;
+  const bool pushes_out =
+      pair.height < 0.0 && ((touch.inside && pair.distance <= 2.0 * touch.nearest_distance) ||
+                            (carried(scratch, touch.number, pair) && pair.distance < touch.lost));
+  const bool face_tells =
+      pushes_out || pair.distance < tuning.detection.on_surface * body.mean_surface_edge();
+  if (!face_tells && (pair.height < 0.0 || pair.distance - radius > touch.margin)) return;
+  add_candidate(body, state, scratch, touch.number, touch.first_candidate, pair, face_tells);
+}
+
+/// On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
+/// now at the other: all corners under it are contact points, and under a segment the edges.
+void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolContact& touch, Index simplex,
+                   bool is_segment) noexcept {
+  const SurfaceTree& tree = state.surface.tree;
+  const std::size_t corners = body.dimension() == 2 ? 2 : 3;
+  for (std::size_t n = 0; n < corners; ++n) {
+    const int place = is_segment ? 2 : 0;
+    touch_pair(body, state, scratch, touch, pair_of_corner(body, tree, simplex, n, touch.core, place));
+    if (is_segment && corners == 3)
+      touch_pair(body, state, scratch, touch, pair_of_edge(body, tree, simplex, n, touch.core));
+  }
+}
+
+/// Contact points of one tool with one simplex. Between its nodes the surface is smooth: its triangles are
+/// chords of a sphere that is large against them, and would hold it out by edge^2 / 6 R.
+void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+                   TouchingPair pair) noexcept {
+  const Tool& tool = state.tools[static_cast<std::size_t>(touch.number)].tool;
+  const SurfaceTree& tree = state.surface.tree;
+  const Index simplex = pair.simplex;
+  const bool is_segment = tool.length > 0.0;
+  const bool is_chord =
+      !is_segment && tool.radius > tuning.detection.smooth_radius * mean_edge(body, nodes_of(body, simplex));
+  if (!is_chord) touch_pair(body, state, scratch, touch, pair);
+  if (is_segment) {
+    touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
+    pair = pair_of_core(body, tree, simplex, touch.core);
+    touch_pair(body, state, scratch, touch, pair);
+  }
+  const bool is_flat = is_segment || is_chord || tool.radius > body.mean_surface_edge();
+  if (is_flat && pair.distance - tool.radius <= touch.margin)
+    touch_corners(body, state, scratch, touch, simplex, is_segment);
+}
+
+/// Contact points of one tool.
+void find_candidates(const Body& body, State& state, Scratch& scratch, Index number) noexcept {
+  ToolState& tool = state.tools[static_cast<std::size_t>(number)];
+  ToolContact touch{.number = number,
+                    .core = core_of(tool.tool, tool.pose, body.dimension()),
+                    .margin = tool.margin,
+                    .lost = tuning.detection.deepest_inside * body.mean_surface_edge(),
+                    .first_candidate = scratch.candidate_count};
+  const double reach = std::max(tool.tool.radius + touch.margin, touch.lost);
+  const std::size_t count = nearest_simplices(body, state.surface.tree, scratch, tool, touch.core, reach);
+  keep_usable(body, state, scratch, touch, count);
+  look_from_origin(body, state.surface.tree, scratch, touch);
+  if (touch.inside && touch.nearest_distance > touch.lost) {
     tool.engaged = false;
     return;
   }
-
-  const Index begin = state.candidate_count;
-  const auto touch = [&](const TouchingPair& pair) {
-    const bool pushes_out =
-        pair.height < 0.0 && ((inside && pair.distance <= 2.0 * nearest_distance) ||
-                              (carried(state, tool_number, pair) && pair.distance < lost));
-    const bool face_tells = pushes_out || pair.distance < on_surface * edge;
-    if (!face_tells && (pair.height < 0.0 || pair.distance - tool.tool.radius > margin)) return;
-    add_candidate(body, state, tool_number, begin, pair, face_tells);
-  };
-  // On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
-  // now at the other: all corners under it are contact points, and under a segment the edges.
-  const bool is_segment = tool.tool.length > 0.0;
-  // Between its nodes the surface is smooth: its triangles are chords of a sphere that is large against them,
-  // and would hold it out by edge^2 / 6 R.
-  const auto is_chord = [&](Index simplex) {
-    return !is_segment && tool.tool.radius > smooth_radius * mean_edge(body, nodes_of(body, simplex));
-  };
-  const auto touch_corners = [&](Index simplex) {
-    const std::array<Index, 3> nodes = nodes_of(body, simplex);
-    const std::size_t corners = nodes[2] < 0 ? 2 : 3;
-    for (std::size_t n = 0; n < corners; ++n) {
-      touch(make_pair(simplex, is_segment ? 2 : 0, nearest_to_corner(state.tree, nodes, n, core)));
-      if (is_segment && corners == 3)
-        touch(make_pair(simplex, 2, nearest_to_edge(state.tree, nodes, n, (n + 1) % 3, core)));
-    }
-  };
-  for (Index k = 0; k < usable; ++k) {
-    const Index simplex = state.found[static_cast<std::size_t>(k)];
-    TouchingPair pair = state.pairs[static_cast<std::size_t>(k)];
-    const bool chord = is_chord(simplex);
-    if (!chord) touch(pair);
-    if (is_segment) {
-      touch(pair_of_end(simplex, 1));
-      pair = make_pair(simplex, 2, nearest_to_core(state.tree, nodes_of(body, simplex), core));
-      touch(pair);
-    }
-    if ((is_segment || chord || tool.tool.radius > edge) && pair.distance - tool.tool.radius <= margin)
-      touch_corners(simplex);
-  }
+  for (Index k = 0; k < touch.usable; ++k)
+    touch_simplex(body, state, scratch, touch, scratch.pairs[static_cast<std::size_t>(k)]);
 }
 
 /// Where held contacts are now. Those whose nodes find no room are let go.
@@ -372,14 +316,14 @@ void update_held(const Body& body, State& state) noexcept {
   for (Index k = 0; k < state.held_count; ++k) {
     ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
     ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
-    if (!want_nodes(body, state, contact.nodes)) {
+    if (!want_nodes(body, state.surface, contact.nodes)) {
       tool.status |= StepStatus::capacity_full;
       continue;
     }
     contact.position.setZero();
     for (std::size_t n = 0; n < 3; ++n) {
       if (contact.nodes[n] >= 0)
-        contact.position += contact.weights[n] * state.tree.position(contact.nodes[n]);
+        contact.position += contact.weights[n] * state.surface.tree.position(contact.nodes[n]);
     }
     contact.arm = tool.pose.orientation * contact.tool_point;
     state.contact_points[static_cast<std::size_t>(kept++)] = contact;
@@ -387,63 +331,27 @@ void update_held(const Body& body, State& state) noexcept {
   state.held_count = kept;
 }
 
-/// Whether no simplex is within a distance of a tool's core, nor cut by it.
-bool keeps_distance(const Body& body, State& state, const Tool& tool, const Core& core,
-                    double distance) noexcept {
-  const std::size_t count = state.tree.near_segment(core.origin, core.end, distance, state.found);
-  return std::all_of(
-      state.found.begin(), state.found.begin() + static_cast<std::ptrdiff_t>(count), [&](Index simplex) {
-        const NearestPoint pair = nearest(state.tree, nodes_of(body, simplex), core, tool.length == 0.0);
-        return pair.squared_distance > 0.0 && pair.squared_distance >= distance * distance;
-      });
-}
-
 }  // namespace
 
-Core core_of(const Tool& tool, const ToolPose& pose, int dimension) noexcept {
-  if (tool.length == 0.0) return {pose.position, pose.position};
-  const Vec3 axis = pose.orientation * (dimension == 3 ? Vec3::UnitZ() : Vec3::UnitY());
-  return {pose.position, pose.position + tool.length * axis};
-}
-
-Vec3 device_motion(const ToolPose& from, const ToolPose& to, const Vec3& arm) noexcept {
-  return to.position - from.position + to.orientation * (from.orientation.conjugate() * arm) - arm;
-}
-
-void find_contacts(const Body& body, State& state) noexcept {
+void find_contacts(const Body& body, State& state, Scratch& scratch) noexcept {
   update_held(body, state);
-  state.candidate_count = 0;
+  scratch.candidate_count = 0;
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
-    ToolState& tool = state.tools[static_cast<std::size_t>(k)];
-    if (tool.engaged) find_candidates(body, state, k, tool.margin);
+    if (state.tools[static_cast<std::size_t>(k)].engaged) find_candidates(body, state, scratch, k);
   }
 
-  Index room = state.max_contacts - state.held_count;
-  const auto begin = state.candidates.begin();
-  if (state.candidate_count > room) {
-    std::nth_element(begin, begin + room, begin + state.candidate_count,
+  const Index room = state.max_contacts() - state.held_count;
+  const auto begin = scratch.candidates.begin();
+  if (scratch.candidate_count > room) {
+    std::nth_element(begin, begin + room, begin + scratch.candidate_count,
                      [](const ContactPoint& a, const ContactPoint& b) {
                        return a.free_gap < b.free_gap || (a.free_gap == b.free_gap && a.feature < b.feature);
                      });
     state.status |= StepStatus::capacity_full;
-    state.candidate_count = room;
+    scratch.candidate_count = room;
   }
-  std::copy_n(begin, state.candidate_count, state.contact_points.begin() + state.held_count);
-  state.contact_count = state.held_count + state.candidate_count;
-}
-
-bool is_outside(const Body& body, State& state, const Tool& tool, const ToolPose& pose) noexcept {
-  const Core core = core_of(tool, pose, body.dimension());
-  return !state.tree.inside(core.origin) &&
-         (tool.length == 0.0 ||
-          (!state.tree.inside(core.end) && keeps_distance(body, state, tool, core, 0.0)));
-}
-
-bool is_clear(const Body& body, State& state, const Tool& tool, const ToolPose& pose) noexcept {
-  const Core core = core_of(tool, pose, body.dimension());
-  const double radius = tool.radius - on_surface * body.mean_surface_edge();
-  return is_outside(body, state, tool, pose) &&
-         (radius <= 0.0 || keeps_distance(body, state, tool, core, radius));
+  std::copy_n(begin, scratch.candidate_count, state.contact_points.begin() + state.held_count);
+  state.contact_count = state.held_count + scratch.candidate_count;
 }
 
 }  // namespace palpate

@@ -29,7 +29,7 @@ struct ContactPoint {
                             Vec3::Zero()};  ///< gradient of each weight along the edge or
                                             ///< face; zero for a vertex [1/m]
   bool held = false;                        ///< by a grab: bilateral, and it does not slide
-  bool rigid = false;                       ///< the body gives way there by less than State::least_compliance
+  bool rigid = false;  ///< the body gives way there by less than SurfaceState::least_compliance
   Vec3 tool_point =
       Vec3::Zero();           ///< held: the place in the tool's own frame that stays with the surface [m]
   Vec3 force = Vec3::Zero();  ///< on the tool, after the tick [N]

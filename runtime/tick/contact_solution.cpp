@@ -3,20 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/assemble_contact.h"
 #include "runtime/tick/contact_detection.h"
 #include "runtime/tick/release.h"
-#include "runtime/tick/state.h"
 #include "runtime/tick/surface_motion.h"
 #include "runtime/tick/tool_motion.h"
 
 namespace palpate {
 namespace {
 
-constexpr double rough_penetration = 0.002;  // of the mean edge: more calls for another pass
-constexpr int most_passes = 3;
-constexpr double most_motion =
-    0.25;  // of the mean edge and what the tools may move: of the surface in a pass
 constexpr double max_plausible_force = 1e100;
 
 bool is_finite(const ContactProblem& problem) noexcept {
@@ -29,19 +25,19 @@ bool is_finite(const ContactProblem& problem) noexcept {
 /// can be trusted, only a share of their change is made. A body that is let go does not leap: it stays where
 /// it is and swings from there.
 void retreat_from_leaps(const Body& body, State& state) noexcept {
-  if (state.near.load().count == 0 || is_released(body, state)) return;
+  if (state.surface.near.load().count == 0 || is_released(body, state)) return;
   double farthest = 0.0;
-  for (Index place = 0; place < state.near.count(); ++place) {
-    const Index node = state.near.node(place);
-    const Vec3 to = unloaded_position(body, state, node) + state.near.displacement(place);
-    farthest = std::max(farthest, (to - state.tree.position(node)).norm());
+  for (Index place = 0; place < state.surface.near.count(); ++place) {
+    const Index node = state.surface.near.node(place);
+    const Vec3 to = unloaded_position(body, state.surface, node) + state.surface.near.displacement(place);
+    farthest = std::max(farthest, (to - state.surface.tree.position(node)).norm());
   }
-  double most = most_motion * body.mean_surface_edge();
+  double most = tuning.passes.most_motion * body.mean_surface_edge();
   for (const ToolState& tool : state.tools) most += tool.margin;
   if (!(farthest > most)) return;
   const double share = most / farthest;
-  state.near.retreat(share);
-  state.near.displace();
+  state.surface.near.retreat(share);
+  state.surface.near.displace();
   for (ToolState& tool : state.tools) {
     const Wrench& last = tool.last_contact_wrench;
     tool.contact_wrench.force = last.force + share * (tool.contact_wrench.force - last.force);
@@ -60,76 +56,78 @@ double penetration(const State& state) noexcept {
 
 /// Whether the contact points have come to lie so deep that another pass is wanted.
 bool is_rough(const Body& body, const State& state) noexcept {
-  return penetration(state) > rough_penetration * body.mean_surface_edge();
+  return penetration(state) > tuning.passes.penetration * body.mean_surface_edge();
 }
 
 /// Whether another pass would be quick, and is not past a release, from which the body swings.
-bool may_repeat(const Body& body, const State& state) noexcept {
-  return (state.problem.frictionless || state.cone_solver.was_easy()) && !is_released(body, state);
+bool may_repeat(const Body& body, const State& state, const Scratch& scratch) noexcept {
+  return (scratch.problem.frictionless || scratch.cone_solver.was_easy()) && !is_released(body, state);
 }
 
 /// Takes up the patch that is wanted. Where there is no room for it the old one stays.
 void change_patch(const Body& body, State& state) noexcept {
-  if (state.patch == state.near.patch() || state.near.change_patch(body, state.patch)) return;
-  state.patch = state.near.patch();
+  if (state.surface.patch == state.surface.near.patch() ||
+      state.surface.near.change_patch(body, state.surface.patch))
+    return;
+  state.surface.patch = state.surface.near.patch();
   state.status |= StepStatus::capacity_full;
 }
 
 /// One step of Newton's method about where everything is now. False when the forces are no numbers.
-bool solve_pass(const Body& body, State& state) noexcept {
-  assemble_contact(body, state);
-  if (!solve_problem(state)) state.status |= StepStatus::not_converged;
-  if (!is_finite(state.problem)) {
+bool solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
+  assemble_contact(body, state, scratch);
+  if (!solve_problem(scratch)) state.status |= StepStatus::not_converged;
+  if (!is_finite(scratch.problem)) {
     state.status |= StepStatus::result_not_finite;
     return false;
   }
-  apply_forces(state);
+  apply_forces(state, scratch);
   retreat_from_leaps(body, state);
   move_tools(body, state);
-  move_near_surface(body, state);
+  move_near_surface(body, state.surface);
   return true;
 }
 
 /// Back to the contacts that were solved for.
-void recall_contacts(State& state) noexcept {
-  std::copy_n(state.last_contacts.begin(), state.last_count, state.contact_points.begin());
-  state.contact_count = state.last_count;
+void recall_contacts(State& state, const Scratch& scratch) noexcept {
+  std::copy_n(scratch.last_contacts.begin(), scratch.last_count, state.contact_points.begin());
+  state.contact_count = scratch.last_count;
 }
 
 }  // namespace
 
-void remember_contacts(State& state) noexcept {
-  std::copy_n(state.contact_points.begin(), state.contact_count, state.last_contacts.begin());
-  state.last_count = state.contact_count;
+void remember_contacts(const State& state, Scratch& scratch) noexcept {
+  std::copy_n(state.contact_points.begin(), state.contact_count, scratch.last_contacts.begin());
+  scratch.last_count = state.contact_count;
 }
 
-bool solve_problem(State& state) noexcept {
-  return state.problem.frictionless ? state.active_set.solve(state.problem)
-                                    : state.cone_solver.solve(state.problem);
+bool solve_problem(Scratch& scratch) noexcept {
+  return scratch.problem.frictionless ? scratch.active_set.solve(scratch.problem)
+                                      : scratch.cone_solver.solve(scratch.problem);
 }
 
-void apply_forces(State& state) noexcept {
-  state.near.unload();
+void apply_forces(State& state, const Scratch& scratch) noexcept {
+  state.surface.near.unload();
   for (ToolState& tool : state.tools) {
     tool.last_contact_wrench = tool.contact_wrench;
     tool.contact_wrench = {};
     tool.contacts = 0;
   }
-  for (Index i = 0; i < state.problem.rows; ++i) {
-    const ContactRow& row = state.rows[static_cast<std::size_t>(i)];
-    const double lambda = state.problem.lambda[static_cast<std::size_t>(i)];
+  for (Index i = 0; i < scratch.problem.rows; ++i) {
+    const ContactRow& row = scratch.rows[static_cast<std::size_t>(i)];
+    const double lambda = scratch.problem.lambda[static_cast<std::size_t>(i)];
     if (lambda == 0.0) continue;
     for (std::size_t n = 0; n < 3; ++n) {
-      if (row.places[n] >= 0) state.near.load(row.places[n], -lambda * row.body[n]);
+      if (row.places[n] >= 0) state.surface.near.load(row.places[n], -lambda * row.body[n]);
     }
   }
-  state.near.displace();
+  state.surface.near.displace();
   for (Index k = 0; k < state.contact_count; ++k) {
     ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
-    const auto first = static_cast<std::size_t>(state.problem.first_row(k));
+    const auto first = static_cast<std::size_t>(scratch.problem.first_row(k));
     contact.force.setZero();
-    for (Index i = 0; i < state.problem.rows_of(k); ++i)
-      contact.force += state.problem.lambda[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
+    for (Index i = 0; i < scratch.problem.rows_of(k); ++i)
+      contact.force += scratch.problem.lambda[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
     if (contact.force.squaredNorm() == 0.0) continue;
     ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
     ++tool.contacts;
@@ -139,21 +137,24 @@ void apply_forces(State& state) noexcept {
   }
 }
 
-bool solve_contact(const Body& body, State& state) noexcept {
-  find_contacts(body, state);
+bool solve_contact(const Body& body, State& state, Scratch& scratch) noexcept {
+  find_contacts(body, state, scratch);
   change_patch(body, state);
   bool rough = is_rough(body, state);
-  state.is_first_pass = true;
-  bool valid = solve_pass(body, state);
-  state.is_first_pass = false;
-  for (int pass = 1; rough && valid && pass < most_passes && may_repeat(body, state); ++pass) {
-    remember_contacts(state);
-    find_contacts(body, state);
+  scratch.is_first_pass = true;
+  bool valid = solve_pass(body, state, scratch);
+  scratch.is_first_pass = false;
+  const auto wants_pass = [&](int pass) {
+    return rough && valid && pass < tuning.passes.most && may_repeat(body, state, scratch);
+  };
+  for (int pass = 1; wants_pass(pass); ++pass) {
+    remember_contacts(state, scratch);
+    find_contacts(body, state, scratch);
     rough = is_rough(body, state);
     if (rough) {
-      valid = solve_pass(body, state);
+      valid = solve_pass(body, state, scratch);
     } else {
-      recall_contacts(state);
+      recall_contacts(state, scratch);
     }
   }
   return valid;

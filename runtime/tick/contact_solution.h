@@ -1,26 +1,24 @@
 // Contact in one tick: the contact problem about where everything is, solved by Newton passes.
 #pragma once
 
-#include "runtime/body/body.h"
+#include "runtime/tick/state.h"
 
 namespace palpate {
 
-struct State;
-
 /// Keeps the contact points as those of the tick (or pass) before.
-void remember_contacts(State& state) noexcept;
+void remember_contacts(const State& state, Scratch& scratch) noexcept;
 
-/// Fills state.problem.lambda for the rows of state.problem: the active set where nothing rubs, otherwise the
-/// cone solver. False where it did not reach its tolerance.
-bool solve_problem(State& state) noexcept;
+/// Fills scratch.problem.lambda for the rows of scratch.problem: the active set where nothing rubs, otherwise
+/// the cone solver. False where it did not reach its tolerance.
+bool solve_problem(Scratch& scratch) noexcept;
 
-/// Gives state.problem.lambda to the contact points, the near field and the tools' contact wrenches.
-void apply_forces(State& state) noexcept;
+/// Gives scratch.problem.lambda to the contact points, the near field and the tools' contact wrenches.
+void apply_forces(State& state, const Scratch& scratch) noexcept;
 
 /// Finds the contact points and their forces, and moves tools and near surface to where these take them. A
 /// pass is a step of Newton's method: one is enough except for contact that slips far in a tick. Takes up the
 /// patch that is wanted. False, with StepStatus::result_not_finite, when the forces are no numbers:
 /// everything but the contact points stays as it was.
-bool solve_contact(const Body& body, State& state) noexcept;
+bool solve_contact(const Body& body, State& state, Scratch& scratch) noexcept;
 
 }  // namespace palpate

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "runtime/tick/state.h"
-
 namespace palpate {
 namespace {
 
@@ -20,7 +18,7 @@ void hold_contact(State& state, const ContactPoint& contact) noexcept {
 /// The nearest place of the surface within reach, as a contact.
 bool reach_out(const Body& body, State& state, Index number) noexcept {
   ToolState& tool = state.tools[static_cast<std::size_t>(number)];
-  const NearestSimplex found = state.tree.nearest(tool.pose.position);
+  const NearestSimplex found = state.surface.tree.nearest(tool.pose.position);
   if (!(found.nearest.squared_distance <= tool.tool.reach * tool.tool.reach)) return false;
   ContactPoint contact;
   contact.tool = number;
@@ -40,16 +38,16 @@ bool reach_out(const Body& body, State& state, Index number) noexcept {
 }
 
 /// Grab: what is closed is held; if nothing is, the surface within reach.
-void begin_hold(const Body& body, State& state, Index number) noexcept {
+void begin_hold(const Body& body, State& state, const Scratch& scratch, Index number) noexcept {
   ToolState& tool = state.tools[static_cast<std::size_t>(number)];
   const Index before = state.held_count;
-  for (Index k = 0; k < state.last_count && state.held_count < state.max_contacts; ++k) {
-    const ContactPoint& contact = state.last_contacts[static_cast<std::size_t>(k)];
+  for (Index k = 0; k < scratch.last_count && state.held_count < state.max_contacts(); ++k) {
+    const ContactPoint& contact = scratch.last_contacts[static_cast<std::size_t>(k)];
     if (contact.tool == number && !contact.held && contact.force.dot(contact.frame.col(0)) > 0.0)
       hold_contact(state, contact);
   }
   tool.holding = state.held_count > before;
-  if (tool.holding || state.held_count == state.max_contacts) return;
+  if (tool.holding || state.held_count == state.max_contacts()) return;
   tool.holding = reach_out(body, state, number);
   if (!tool.holding) tool.status |= StepStatus::nothing_in_reach;
 }
@@ -64,10 +62,10 @@ void end_hold(State& state, Index number) noexcept {
 
 }  // namespace
 
-void update_holds(const Body& body, State& state) noexcept {
+void update_holds(const Body& body, State& state, const Scratch& scratch) noexcept {
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
     const ToolState& tool = state.tools[static_cast<std::size_t>(k)];
-    if (tool.device.grab && !tool.holding && tool.placed) begin_hold(body, state, k);
+    if (tool.device.grab && !tool.holding && tool.placed) begin_hold(body, state, scratch, k);
     if (!tool.device.grab && tool.holding) end_hold(state, k);
   }
 }

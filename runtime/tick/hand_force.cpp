@@ -3,26 +3,23 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/tick/state.h"
-
+#include "runtime/solve/tick_tuning.h"
 namespace palpate {
 namespace {
 
-constexpr double usual_tick = 0.001;  // s
-constexpr double fade_time = 20.0;    // ms
-constexpr double memory = 0.98;       // of the force that was felt, a millisecond: the measure of a fade
-
 void hand_over(ToolState& tool, double tick) noexcept {
-  const double milliseconds = tick / usual_tick;
+  const double milliseconds = tick / tuning.hand.usual_tick;
   const Wrench last = tool.wrench;
   const Wrench& contact = tool.contact_wrench;
   const double size = contact.force.norm();
-  tool.felt = std::max({size, last.force.norm(), std::pow(memory, milliseconds) * tool.felt});
+  tool.recent_force =
+      std::max({size, last.force.norm(), std::pow(tuning.hand.memory, milliseconds) * tool.recent_force});
   const Vec3 moved = tool.device.position - tool.last_device_position - tool.surface_change;
   const double explained = (tool.local.stiffness * moved).norm();
   const double handed_over =
-      milliseconds * (tool.contacts > 0 ? tool.tool.hand_over * std::max(size, last.force.norm())
-                                        : std::max(tool.tool.hand_over, 1.0 / fade_time) * tool.felt);
+      milliseconds * (tool.contacts > 0
+                          ? tool.tool.hand_over * std::max(size, last.force.norm())
+                          : std::max(tool.tool.hand_over, 1.0 / tuning.hand.fade_time) * tool.recent_force);
   const double change = (contact.force - last.force).norm();
   if (!(change > explained + handed_over)) {
     tool.wrench = contact;

@@ -1,9 +1,9 @@
 // From the contact's force to what the hand is given.
 #pragma once
 
-namespace palpate {
+#include "runtime/tick/state.h"
 
-struct ToolState;
+namespace palpate {
 
 /// Sets tool.wrench from tool.contact_wrench and the local model of it: straight towards the contact's
 /// wrench, by no more a tick than the device's own motion explains (the local stiffness times how far it

@@ -7,8 +7,6 @@
 
 namespace palpate {
 
-struct State;
-
 /// What the hand feels near a place of the device: force(x) = force - stiffness (x - point) for |x - point|
 /// up to `radius`. For devices that run faster than the tick, and for ticks that come late.
 struct LocalModel {
@@ -17,8 +15,5 @@ struct LocalModel {
   Vec3 point = Vec3::Zero();                            ///< of the device [m]
   double radius = 0.0;  ///< how far it may move before a contact is made or broken, or curvature counts [m]
 };
-
-/// Fills the local model of each tool after the contact problem was solved and the forces were applied.
-void linearise(State& state) noexcept;
 
 }  // namespace palpate

@@ -1,11 +1,9 @@
 // A body that is let go begins to move freely.
 #pragma once
 
-#include "runtime/body/body.h"
+#include "runtime/tick/state.h"
 
 namespace palpate {
-
-struct State;
 
 /// Whether a body with dynamics is let go in this tick: some tool has lost what it touched in the tick
 /// before, or ended its hold.

@@ -5,15 +5,13 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "base/error.h"
+#include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
 namespace {
-
-constexpr double tree_margin = 0.1;   // of the mean edge: how much larger boxes are
-constexpr double rigid_share = 1e-9;  // of the body's compliance, added everywhere
-constexpr double wall_share = 0.01;   // compliance of what is held, of that of the stiffest node that moves
 
 void check(const Tool& tool, std::size_t number) {
   const auto check = [&](const char* what, double value, bool valid, const char* hint) {
@@ -80,51 +78,36 @@ Index near_room(const StateOptions& options) {
   return 3 * options.max_contacts + 32;
 }
 
-/// A contact has up to d rows, and d - 1 for the tilt of its face.
-Index most_rows(const Body& body, const StateOptions& options) {
-  return (2 * body.dimension() - 1) * options.max_contacts;
-}
-
-Index entries(const Body& body, const StateOptions& options) {
-  return body.dimension() * options.max_contacts;
+SurfaceState make_surface(const Body& body, const StateOptions& options) {
+  NearField near(body, near_room(options), options.patch_nodes);
+  FreeMotion motion(body, options.tick, static_cast<Index>(near.load().node.size()));
+  return {.tree = SurfaceTree(body.simplices(), body.dimension(), body.surface_rest_positions(),
+                              tuning.far.tree_margin * body.mean_surface_edge()),
+          .near = std::move(near),
+          .motion = std::move(motion),
+          .stored_displacement = std::vector<double>(static_cast<std::size_t>(body.greens().order())),
+          .sweep = {},
+          .patch = nullptr,
+          .rigid_compliance = tuning.assembly.coincident_share * mean_compliance(body),
+          .least_compliance = tuning.assembly.wall_share * least_compliance_of_a_node(body)};
 }
 
 }  // namespace
 
 State::State(const Body& body, const StateOptions& options)
-    : tools(make_tools(options)),
+    : tick(options.tick),
+      tools(make_tools(options)),
       contact_points(static_cast<std::size_t>(options.max_contacts)),
-      max_contacts(options.max_contacts),
-      tick(options.tick),
-      near(body, near_room(options), options.patch_nodes),
-      motion(body, options.tick, static_cast<Index>(near.load().node.size())),
-      tree(body.simplices(), body.dimension(), body.surface_rest_positions(),
-           tree_margin * body.mean_surface_edge()),
-      problem(body.dimension(), entries(body, options), most_rows(body, options)),
-      active_set(most_rows(body, options)),
-      cone_solver(entries(body, options), most_rows(body, options)),
-      rows(static_cast<std::size_t>(most_rows(body, options))),
-      row_response(static_cast<std::size_t>(body.dimension() * near_room(options))),
-      rigid_compliance(rigid_share * mean_compliance(body)),
-      least_compliance(wall_share * least_compliance_of_a_node(body)),
-      most_simplices(2 * static_cast<std::size_t>(options.max_contacts)),
-      found(body.surface_friction().size()),
-      found_distance(body.surface_friction().size()),
-      pairs(most_simplices),
-      candidates(3 * most_simplices * tools.size()),
-      last_contacts(static_cast<std::size_t>(options.max_contacts)),
-      row_change(rows.size()),
-      force_change(rows.size()),
-      far_displacement(static_cast<std::size_t>(body.dimension() * most_far_nodes)),
-      stored_displacement(static_cast<std::size_t>(body.greens().order())) {}
+      surface(make_surface(body, options)),
+      scratch(body, static_cast<Index>(tools.size()), options.max_contacts, near_room(options)) {}
 
 Vec3 outward_normal(const Body& body, const State& state, Index simplex) noexcept {
   const auto d = static_cast<std::size_t>(body.dimension());
   const std::span<const Index> nodes = body.simplices().subspan(d * static_cast<std::size_t>(simplex), d);
-  const Vec3 a = state.tree.position(nodes[0]);
-  const Vec3 ab = state.tree.position(nodes[1]) - a;
+  const Vec3 a = state.surface.tree.position(nodes[0]);
+  const Vec3 ab = state.surface.tree.position(nodes[1]) - a;
   if (d == 2) return Vec3(ab.y(), -ab.x(), 0.0).normalized();
-  return ab.cross(state.tree.position(nodes[2]) - a).normalized();
+  return ab.cross(state.surface.tree.position(nodes[2]) - a).normalized();
 }
 
 }  // namespace palpate

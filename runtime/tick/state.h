@@ -1,7 +1,6 @@
 // Everything that a tick changes.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,14 +9,10 @@
 #include "runtime/body/body.h"
 #include "runtime/body/free_motion.h"
 #include "runtime/body/near_field.h"
-#include "runtime/solve/active_set.h"
-#include "runtime/solve/cone_solver.h"
-#include "runtime/solve/contact_problem.h"
 #include "runtime/solve/surface_tree.h"
-#include "runtime/tick/assemble_contact.h"
-#include "runtime/tick/contact_detection.h"
 #include "runtime/tick/contact_point.h"
 #include "runtime/tick/local_model.h"
+#include "runtime/tick/scratch.h"
 #include "runtime/tick/status.h"
 #include "runtime/tick/tool.h"
 
@@ -25,27 +20,50 @@ namespace palpate {
 
 /// One tool.
 struct ToolState {
-  ToolPose
-      pose;  ///< of the tool itself, which the body keeps outside; of the device: with the coupling's stretch
-  ToolPose device;  ///< the device pose that the tick used: the last finite one, approached at bounded speed
   Tool tool;
+  ToolPose device;  ///< the device pose that the tick used: the last finite one, approached at bounded speed
+  ToolPose pose;    ///< of the tool itself, outside of the body: away from `device` by the coupling's stretch
   Wrench contact_wrench;       ///< of the contacts on the tool, about its origin
   Wrench wrench;               ///< on the hand, about the tool's origin: what the device is to display
   LocalModel local;            ///< of wrench.force
   Wrench last_contact_wrench;  ///< of the tick or pass before
   Vec3 last_device_position = Vec3::Zero();  ///< of the tick before [m]
-  Vec3 surface_change = Vec3::Zero();        ///< free motion of what it touches, since the tick before [m]
-  double felt = 0.0;                         ///< the force of late [N]
+  Vec3 surface_change = Vec3::Zero();        ///< free motion of the touched surface since the tick before [m]
+  double recent_force = 0.0;                 ///< running maximum of the contact force, which fades [N]
   double margin = 0.0;   ///< how far the surface may be from the tool and still be met in this tick [m]
   Index contacts = 0;    ///< closed contact points
   bool placed = false;   ///< has had a pose
   bool engaged = false;  ///< can touch
-  bool has_been_clear = false;  ///< of the body once: nothing is felt before; one that is lost in the body
+  bool has_been_clear = false;  ///< of the body once: nothing is felt before; a tool that is lost in the body
                                 ///< after that is felt again as soon as its core is outside
   bool holding = false;         ///< a grab holds the surface
-  bool touched = false;         ///< in the tick before
-  bool held = false;            ///< a grab, in the tick before
+  bool touched_last_tick = false;      ///< had closed contact points
+  bool held_last_tick = false;         ///< a grab held the surface
   StepStatus status = StepStatus::ok;  ///< of the last tick
+};
+
+/// The slices in which ticks renew the surface far from the tools.
+struct FarSweep {
+  Index next_node = 0;        ///< stored node from which the next tick goes on
+  Index next_patch_node = 0;  ///< place in the patch from which it goes on there
+  double change = 0.0;        ///< how far a node was moved at most in this sweep [m]
+  double last_change = 0.0;   ///< and in the one before: how wrong a far node can be [m]
+};
+
+/// The deformed surface, as it goes from tick to tick.
+struct SurfaceState {
+  //                                        shape               changed by
+  SurfaceTree tree;                         // [S] nodes           every stage that moves the surface
+  NearField near;                           // [near nodes]        detection (nodes), solution (forces)
+  FreeMotion motion;                        // [n]                 follow_free_motion, release
+  std::vector<double> stored_displacement;  // [n] [m]          renew_*: by contact forces, as renewed last
+  FarSweep sweep;                           //                     renew_far_surface, renew_patch_surface
+  std::shared_ptr<const Patch>
+      patch;  //                     the overlay wanted; null: none. Taken up by the next tick
+  bool patch_is_older = false;  //                     whoever sets `patch`: it is not the one wanted
+  double rigid_compliance;      // [m/N]               fixed: added to every contact, so that points that
+                                //                     coincide share the force
+  double least_compliance;      // [m/N]               fixed: what body and coupling give way by at least
 };
 
 struct StateOptions {
@@ -55,12 +73,10 @@ struct StateOptions {
   double tick = 0.001;      ///< time from one tick to the next [s]
 };
 
-/// Everything that a tick changes on one body. Copies are complete and independent, so that reset, record and
-/// replay are copies. All memory is taken here: copying allocates, a tick does not.
+/// Everything that a tick changes on one body: the tools, the surface with its contacts, and the tick's
+/// workspace. Copies are complete and independent, so that reset, record and replay are copies. All memory is
+/// taken here: copying allocates, a tick does not.
 struct State {
-  static constexpr Index most_far_nodes = 64;       ///< of the body, whose far displacement a tick renews
-  static constexpr Index most_far_patch_nodes = 8;  ///< and of the patch's surface
-
   /// The state of a body at rest that no tool touches. Throws Error for tools without sense (a size or
   /// stiffness that is negative or not a number), none, or no room for contacts.
   explicit State(const Body& body, const StateOptions& options = {});
@@ -69,57 +85,23 @@ struct State {
   [[nodiscard]] std::span<const ContactPoint> contacts() const noexcept {
     return {contact_points.data(), static_cast<std::size_t>(contact_count)};
   }
+  [[nodiscard]] Index max_contacts() const noexcept { return static_cast<Index>(contact_points.size()); }
 
+  double tick;                         ///< time from one tick to the next [s]
+  std::int64_t ticks = 0;              ///< taken so far
+  StepStatus status = StepStatus::ok;  ///< of the last tick, all tools
   std::vector<ToolState> tools;
   std::vector<ContactPoint> contact_points;  ///< [max_contacts] held ones first
   Index contact_count = 0;
   Index held_count = 0;  ///< of contact_points, by grabs
-  Index max_contacts;
-  double tick;                         ///< time from one tick to the next [s]
-  bool is_first_pass = true;           ///< of the tick's Newton steps
-  StepStatus status = StepStatus::ok;  ///< of the last tick, all tools
-  std::int64_t ticks = 0;              ///< taken so far
-
-  /// The overlay that ticks are to use; null: none. A change comes with the next tick.
-  std::shared_ptr<const Patch> patch;
-  bool patch_is_older = false;  ///< than what is wanted: to be told in the status
-
-  NearField near;
-  FreeMotion motion;
-  SurfaceTree tree;
-  ContactProblem problem;
-  ActiveSet active_set;
-  ConeSolver cone_solver;
-  std::vector<ContactRow> rows;      ///< [problem.rows]
-  std::vector<double> row_response;  // [d near nodes] displacement by one row's force
-  double rigid_compliance;  ///< added to what all contacts give way by: points that coincide share the force
-                            ///< [m/N]
-  double least_compliance;  ///< what body and coupling together give way by at least where a tool presses: a
-                            ///< hundredth of what the stiffest node of the surface does [m/N]
-
-  // Scratch of a tick.
-  std::size_t most_simplices;            // that a tool may look at
-  std::vector<Index> found;              // [F] simplices near a tool
-  std::vector<double> found_distance;    // [F]
-  std::vector<TouchingPair> pairs;       // [most_simplices]
-  std::vector<ContactPoint> candidates;  // before the deepest are chosen
-  Index candidate_count = 0;
-  std::vector<ContactPoint> last_contacts;  // [max_contacts] of the tick before
-  Index last_count = 0;
-  std::vector<double> row_change;           // [rows] for the local model
-  std::vector<double> force_change;         // [rows]
-  std::vector<double> far_displacement;     // [d * slice]
-  Index next_far_node = 0;                  // stored node from which the far field is renewed next
-  std::vector<double> stored_displacement;  // [n] as it was renewed last
-  double sweep_change = 0.0;                // how far a far node was moved at most in this sweep [m]
-  double far_change = 0.0;                  // and in the one before: how wrong a far node can be [m]
-  Index next_patch_node = 0;                // place in the patch from which its surface is renewed next
+  SurfaceState surface;
+  Scratch scratch;  ///< handed to the stages that use it
 };
 
 /// Where a surface node is in this tick without the forces of its contacts [m].
-inline Vec3 unloaded_position(const Body& body, State& state, Index surface_node) noexcept {
+inline Vec3 unloaded_position(const Body& body, SurfaceState& surface, Index surface_node) noexcept {
   return body.surface_rest_positions()[static_cast<std::size_t>(surface_node)] +
-         state.motion.at(body, surface_node);
+         surface.motion.at(body, surface_node);
 }
 
 /// Outward unit normal of a simplex of the surface as it is now.

@@ -7,20 +7,18 @@
 
 namespace palpate {
 
-/// What a tick or a call could not do; bits, none set when all is well.
+/// What a tick could not do; bits, none set when all is well. Bits 2 and 5 are free.
 enum class StepStatus : std::uint32_t {
   ok = 0,
-  nothing_in_reach = 1U << 0,       ///< grab is set, the tool touches nothing and no surface is within reach
-  capacity_full = 1U << 1,          ///< there is no room for another node or contact: the deepest are kept
-  not_positive_definite = 1U << 2,  ///< the node cannot be held beside those that are
-  pose_not_finite = 1U << 3,        ///< the pose was ignored: the last valid one stands
-  result_not_finite = 1U << 4,      ///< the force overflowed: the last valid result stands
-  no_such_node = 1U << 5,           ///< not a stored node, or not a held one
-  inside_body = 1U << 6,            ///< the tool is inside the body and touches nothing until it is out
-  pose_limited = 1U << 7,           ///< the pose jumped: the tool follows at a bounded speed
-  not_converged = 1U << 8,          ///< the contact forces did not reach their tolerance within the budget
-  force_limited = 1U << 9,          ///< the force was cut to the tool's largest
-  handing_over = 1U << 10,          ///< the force is on its way to the contact's, so as not to kick
+  nothing_in_reach = 1U << 0,   ///< grab is set, the tool touches nothing and no surface is within reach
+  capacity_full = 1U << 1,      ///< there is no room for another node or contact: the deepest are kept
+  pose_not_finite = 1U << 3,    ///< the pose was ignored: the last valid one stands
+  result_not_finite = 1U << 4,  ///< the force overflowed: the last valid result stands
+  inside_body = 1U << 6,        ///< the tool is inside the body and touches nothing until it is out
+  pose_limited = 1U << 7,       ///< the pose jumped: the tool follows at a bounded speed
+  not_converged = 1U << 8,      ///< the contact forces did not reach their tolerance within the budget
+  force_limited = 1U << 9,      ///< the force was cut to the tool's largest
+  handing_over = 1U << 10,      ///< the force is on its way to the contact's, so as not to kick
   older_patch = 1U << 11,    ///< the overlay for this place was not there yet: an older one was used, or none
   late_motion = 1U << 12,    ///< the body's free motion was not there in time: the surface waits for it
   rigid_contact = 1U << 13,  ///< the tool presses on what cannot move: only its coupling gives way
@@ -37,13 +35,11 @@ constexpr bool has(StepStatus status, StepStatus bit) noexcept {
 }
 
 /// The bits and their names, for reports.
-inline constexpr std::array<std::pair<StepStatus, const char*>, 14> status_names = {{
+inline constexpr std::array<std::pair<StepStatus, const char*>, 12> status_names = {{
     {StepStatus::nothing_in_reach, "nothing_in_reach"},
     {StepStatus::capacity_full, "capacity_full"},
-    {StepStatus::not_positive_definite, "not_positive_definite"},
     {StepStatus::pose_not_finite, "pose_not_finite"},
     {StepStatus::result_not_finite, "result_not_finite"},
-    {StepStatus::no_such_node, "no_such_node"},
     {StepStatus::inside_body, "inside_body"},
     {StepStatus::pose_limited, "pose_limited"},
     {StepStatus::not_converged, "not_converged"},

@@ -4,7 +4,7 @@
 #include "runtime/tick/contact_solution.h"
 #include "runtime/tick/grab.h"
 #include "runtime/tick/hand_force.h"
-#include "runtime/tick/local_model.h"
+#include "runtime/tick/linearise.h"
 #include "runtime/tick/release.h"
 #include "runtime/tick/surface_motion.h"
 #include "runtime/tick/tool_motion.h"
@@ -14,29 +14,31 @@ namespace {
 
 void begin_tick(State& state) noexcept {
   ++state.ticks;
-  state.status = state.patch_is_older ? StepStatus::older_patch : StepStatus::ok;
+  state.status = state.surface.patch_is_older ? StepStatus::older_patch : StepStatus::ok;
   for (ToolState& tool : state.tools) {
     tool.status = StepStatus::ok;
-    tool.touched = tool.contacts > 0;
-    tool.held = tool.holding;
+    tool.touched_last_tick = tool.contacts > 0;
+    tool.held_last_tick = tool.holding;
   }
 }
 
-void follow_devices(const Body& body, State& state, std::span<const ToolPose> poses) noexcept {
-  for (std::size_t k = 0; k < state.tools.size(); ++k) follow_device(body, state, state.tools[k], poses[k]);
-  state.near.begin_tick();
+void follow_devices(const Body& body, State& state, Scratch& scratch,
+                    std::span<const ToolPose> poses) noexcept {
+  for (std::size_t k = 0; k < state.tools.size(); ++k)
+    follow_device(body, state.surface.tree, scratch, state.tools[k], poses[k]);
+  state.surface.near.begin_tick();
 }
 
 /// How what a tool touches moves on its own.
 void note_surface_change(const State& state, ToolState& tool, Index number) noexcept {
   tool.surface_change.setZero();
-  if (!state.motion.active()) return;
+  if (!state.surface.motion.active()) return;
   double sum = 0.0;
   for (const ContactPoint& contact : state.contacts()) {
     const double force = contact.tool == number ? contact.force.norm() : 0.0;
     for (std::size_t n = 0; n < 3; ++n) {
       if (contact.nodes[n] >= 0)
-        tool.surface_change += force * contact.weights[n] * state.motion.change(contact.nodes[n]);
+        tool.surface_change += force * contact.weights[n] * state.surface.motion.change(contact.nodes[n]);
     }
     sum += force;
   }
@@ -58,19 +60,20 @@ StepStatus end_tick(State& state) noexcept {
 }  // namespace
 
 StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses) noexcept {
+  Scratch& scratch = state.scratch;
   begin_tick(state);
-  follow_free_motion(body, state);
-  follow_devices(body, state, poses);
-  remember_contacts(state);
-  update_holds(body, state);
-  if (solve_contact(body, state)) {
-    linearise(state);
+  follow_free_motion(body, state, scratch);
+  follow_devices(body, state, scratch, poses);
+  remember_contacts(state, scratch);
+  update_holds(body, state, scratch);
+  if (solve_contact(body, state, scratch)) {
+    linearise(state, scratch);
     give_forces(state);
   }
   release(body, state);
-  renew_stored_displacement(body, state);
-  renew_far_surface(body, state);
-  renew_patch_surface(body, state);
+  renew_stored_displacement(body, state.surface);
+  renew_far_surface(body, state.surface, scratch);
+  renew_patch_surface(body, state.surface, scratch);
   return end_tick(state);
 }
 
@@ -79,11 +82,11 @@ StepStatus step(const Body& body, State& state, const ToolPose& pose) noexcept {
 }
 
 void surface_displacement(const Body& body, const State& state, std::span<double> u) noexcept {
-  body.greens().displacement(state.near.load().nodes(), state.near.load().forces(), u);
-  if (!state.motion.active()) return;
+  body.greens().displacement(state.surface.near.load().nodes(), state.surface.near.load().forces(), u);
+  if (!state.surface.motion.active()) return;
   const int d = body.dimension();
   for (Index node = 0; node < body.greens().nodes(); ++node)
-    set_vector(u, d, node, vector_at(u, d, node) + state.motion.displacement(body, node));
+    set_vector(u, d, node, vector_at(u, d, node) + state.surface.motion.displacement(body, node));
 }
 
 }  // namespace palpate

@@ -1,27 +1,25 @@
 // The surface that the tools meet: where the body's free motion and the contact forces take it.
 #pragma once
 
-#include "runtime/body/body.h"
+#include "runtime/tick/state.h"
 
 namespace palpate {
 
-struct State;
-
 /// Moves the surface to where the body's free motion has it in this tick: all near nodes, and as many around
 /// the tools as may have come near since they were looked at. Sets StepStatus::late_motion.
-void follow_free_motion(const Body& body, State& state) noexcept;
+void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexcept;
 
 /// Moves the near surface nodes to where free motion and contact forces have them.
-void move_near_surface(const Body& body, State& state) noexcept;
+void move_near_surface(const Body& body, SurfaceState& surface) noexcept;
 
-/// Writes what the near field knows of the body's nodes into state.stored_displacement.
-void renew_stored_displacement(const Body& body, State& state) noexcept;
+/// Writes what the near field knows of the body's nodes into surface.stored_displacement.
+void renew_stored_displacement(const Body& body, SurfaceState& surface) noexcept;
 
 /// Moves the next slice of the far surface, by u = Xi E f of as many stored nodes as the tick has time for
 /// (theory.md section 3): so the whole surface follows within tens of ticks.
-void renew_far_surface(const Body& body, State& state) noexcept;
+void renew_far_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept;
 
 /// Moves the next slice of the overlay patch's surface; nothing where there is none.
-void renew_patch_surface(const Body& body, State& state) noexcept;
+void renew_patch_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept;
 
 }  // namespace palpate

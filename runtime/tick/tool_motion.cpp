@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/tick/state.h"
+#include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/clearance.h"
 
 namespace palpate {
 namespace {
 
-constexpr double base_margin = 0.03;  // of the mean edge: how far a surface is looked for at least
-constexpr double most_motion = 0.25;  // of the mean edge or the radius: what a tool may move in a tick
-constexpr double farthest = 1e100;    // that is a place [m]: squares of distances are numbers
+constexpr double farthest = 1e100;  // that is a place [m]: squares of distances are numbers
 
 /// Not with Eigen's stableNorm, whose last bits depend on where in memory a vector lies.
 bool make_valid(ToolPose& pose, int dimension) noexcept {
@@ -49,7 +48,8 @@ bool has_gone_away(const Body& body, const ToolState& tool) noexcept {
 
 }  // namespace
 
-void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wanted) noexcept {
+void follow_device(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
+                   ToolPose wanted) noexcept {
   tool.last_device_position = tool.device.position;
   if (!make_valid(wanted, body.dimension())) {
     tool.status |= StepStatus::pose_not_finite;
@@ -57,7 +57,7 @@ void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wan
     if (!tool.placed) return;
   }
   const double size = std::max(body.mean_surface_edge(), tool.tool.radius);
-  const double least = base_margin * body.mean_surface_edge();
+  const double least = tuning.following.margin * body.mean_surface_edge();
   const auto place = [&] {
     tool.last_device_position = wanted.position;  // nothing that is felt now comes from a motion
     tool.pose = tool.device = wanted;
@@ -67,30 +67,31 @@ void follow_device(const Body& body, State& state, ToolState& tool, ToolPose wan
   const bool caught = tool.contacts > 0 && has_gone_away(body, tool);
   if (!tool.placed || (!tool.engaged && !tool.holding) || caught) {
     place();
-    tool.engaged = tool.has_been_clear ? is_outside(body, state, tool.tool, wanted)
-                                       : is_clear(body, state, tool.tool, wanted);
+    tool.engaged = tool.has_been_clear ? is_outside(body, tree, scratch, tool.tool, wanted)
+                                       : is_clear(body, tree, scratch, tool.tool, wanted);
     tool.has_been_clear = tool.has_been_clear || tool.engaged;
     if (!tool.engaged) tool.status |= StepStatus::inside_body;
     return;
   }
 
-  const double wish = motion(tool.tool, tool.device, wanted);
-  double most = most_motion * size;
-  if (wish > most && tool.contacts == 0 && !tool.holding) {
-    const double free = std::sqrt(state.tree.nearest(tool.device.position).nearest.squared_distance) -
+  const double wanted_motion = motion(tool.tool, tool.device, wanted);
+  double most = tuning.following.most_motion * size;
+  if (wanted_motion > most && tool.contacts == 0 && !tool.holding) {
+    const double free = std::sqrt(tree.nearest(tool.device.position).nearest.squared_distance) -
                         tool.tool.radius - tool.tool.length - least;
     most = std::max(most, free);
-    if (wish <= free) return place();
+    if (wanted_motion <= free) return place();
   }
-  if (wish > most) {
+  if (wanted_motion > most) {
     tool.status |= StepStatus::pose_limited;
-    wanted = between(tool.device, wanted, most / wish);
+    wanted = between(tool.device, wanted, most / wanted_motion);
   }
   tool.device = wanted;
-  tool.margin = least + 2.0 * std::min(wish, most_motion * size);  // tool and surface may meet
-  if (tool.contacts == 0 && !tool.holding) {                       // free: it is where the device was
+  tool.margin = least + 2.0 * std::min(wanted_motion,
+                                       tuning.following.most_motion * size);  // tool and surface may meet
+  if (tool.contacts == 0 && !tool.holding) {  // free: it is where the device was
     const double moved = motion(tool.tool, tool.pose, tool.device);
-    tool.margin = least + 2.0 * std::min(moved, most_motion * size);
+    tool.margin = least + 2.0 * std::min(moved, tuning.following.most_motion * size);
   }
 }
 
@@ -101,7 +102,8 @@ void move_tools(const Body& body, State& state) noexcept {
     const Vec3 turn = tool.contact_wrench.torque / tool.tool.coupling_torsion;
     const double angle = turn.norm();
     if (angle > 0.0) pose.orientation = Eigen::AngleAxisd(angle, turn / angle) * pose.orientation;
-    const double most = most_motion * std::max(body.mean_surface_edge(), tool.tool.radius) + tool.margin;
+    const double most =
+        tuning.following.most_motion * std::max(body.mean_surface_edge(), tool.tool.radius) + tool.margin;
     const double moved = motion(tool.tool, tool.pose, pose);
     tool.pose = moved > most ? between(tool.pose, pose, most / moved) : pose;
   }

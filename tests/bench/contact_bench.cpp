@@ -109,8 +109,8 @@ struct Counts {
   void add(const State& state) {
     looked_at += state.contact_count;
     closed += state.tools.front().contacts;
-    rows += state.problem.rows;
-    near += state.near.count();
+    rows += state.scratch.problem.rows;
+    near += state.surface.near.count();
     const bool handing = state.status == StepStatus::handing_over;
     not_ok += state.status == StepStatus::ok || handing ? 0.0 : 1.0;
     ticks += 1.0;
@@ -185,8 +185,8 @@ class SparseCompliance {
   SparseCompliance(const SparseCompliance&) = delete;
   SparseCompliance& operator=(const SparseCompliance&) = delete;
 
-  /// Solves K X = J^T for the contact points' rows of state.problem and sets W = J X in `problem`, which has
-  /// them.
+  /// Solves K X = J^T for the contact points' rows of state.scratch.problem and sets W = J X in `problem`,
+  /// which has them.
   void assemble(const Body& body, const State& state, ContactProblem& problem) {
     const auto n = static_cast<std::size_t>(factor_.order());
     const auto rows = static_cast<std::size_t>(problem.rows);
@@ -217,10 +217,10 @@ class SparseCompliance {
   /// Entries of row i of J in the free dofs.
   template <class F>
   void for_each_entry(const Body& body, const State& state, std::size_t i, F&& f) const {
-    const ContactRow& row = state.rows[i];
+    const ContactRow& row = state.scratch.rows[i];
     for (std::size_t k = 0; k < 3; ++k) {
       if (row.places[k] < 0) continue;
-      const auto node = static_cast<std::size_t>(state.near.node(row.places[k]));
+      const auto node = static_cast<std::size_t>(state.surface.near.node(row.places[k]));
       const std::int64_t first = std::int64_t{3} * body.surface_mesh_nodes()[node];
       for (int axis = 0; axis < 3; ++axis) {
         const std::int64_t dof = stiffness_.free_of_dof[static_cast<std::size_t>(first + axis)];
@@ -240,14 +240,14 @@ class SparseCompliance {
 /// The contact points of a tick as a problem without W and without the springs against tilting.
 void copy_contacts(const State& state, ContactProblem& problem) {
   problem.clear();
-  for (Index k = 0; k < state.problem.contacts; ++k) {
+  for (Index k = 0; k < state.scratch.problem.contacts; ++k) {
     const auto at = static_cast<std::size_t>(k);
-    const bool held = state.problem.held[at] != 0;
-    if (held && state.problem.rows_of(k) == 1) break;  // a spring, and all that follow
-    problem.add(state.problem.friction[at], held);
+    const bool held = state.scratch.problem.held[at] != 0;
+    if (held && state.scratch.problem.rows_of(k) == 1) break;  // a spring, and all that follow
+    problem.add(state.scratch.problem.friction[at], held);
   }
-  std::copy_n(state.problem.b.begin(), problem.rows, problem.b.begin());
-  std::copy_n(state.problem.lambda.begin(), problem.rows, problem.lambda.begin());
+  std::copy_n(state.scratch.problem.b.begin(), problem.rows, problem.b.begin());
+  std::copy_n(state.scratch.problem.lambda.begin(), problem.rows, problem.lambda.begin());
 }
 
 /// The largest difference of W off its diagonal, where springs are added, over its largest entry.
@@ -267,9 +267,9 @@ double difference(const ContactProblem& a, const ContactProblem& b) {
 /// thread.
 void time_sparse(benchmark::State& run, const Body& body, SparseCompliance& sparse, const Motion& motion) {
   State state = motion.start;
-  ContactProblem problem(3, 3 * max_contacts, static_cast<Index>(state.rows.size()));
-  ActiveSet active_set(static_cast<Index>(state.rows.size()));
-  ConeSolver cone_solver(3 * max_contacts, static_cast<Index>(state.rows.size()));
+  ContactProblem problem(3, 3 * max_contacts, static_cast<Index>(state.scratch.rows.size()));
+  ActiveSet active_set(static_cast<Index>(state.scratch.rows.size()));
+  ConeSolver cone_solver(3 * max_contacts, static_cast<Index>(state.scratch.rows.size()));
   Counts counts;
   std::vector<double> ours, theirs;
   double worst = 0.0;
@@ -287,7 +287,7 @@ void time_sparse(benchmark::State& run, const Body& body, SparseCompliance& spar
       benchmark::DoNotOptimize(problem.frictionless ? active_set.solve(problem) : cone_solver.solve(problem));
     }));
     run.SetIterationTime(theirs.back());
-    worst = std::max(worst, difference(problem, state.problem));
+    worst = std::max(worst, difference(problem, state.scratch.problem));
   }
   run.counters["median_us"] = 1e6 * quantile(theirs, 0.5);
   run.counters["ours_median_us"] = 1e6 * quantile(ours, 0.5);

@@ -442,7 +442,8 @@ struct Touched {
     if (!timed) return;
     times.push_back(taken);
     contacts += state.tools.front().contacts;
-    if (state.motion.active()) swing = std::max(swing, state.motion.displacement(body, watched).norm());
+    if (state.surface.motion.active())
+      swing = std::max(swing, state.surface.motion.displacement(body, watched).norm());
   }
   void report(benchmark::State& run, const std::string& name) const {
     run.counters[name + "_median_us"] = 1e6 * median(times);

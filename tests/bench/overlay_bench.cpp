@@ -192,9 +192,9 @@ void time_switch(benchmark::State& run, const Touched& touched, int refinement, 
   std::size_t turn = 0;
   double near = 0.0;
   while (run.KeepRunning()) {
-    state.patch = patches[turn++ % 2];
+    state.surface.patch = patches[turn++ % 2];
     changes.push_back(seconds([&] { step(overlaid.body, state, overlaid.pose); }));
-    near += state.near.count();
+    near += state.surface.near.count();
     for (int k = 0; k < 20; ++k)
       between.push_back(seconds([&] { step(overlaid.body, state, overlaid.pose); }));
     run.SetIterationTime(changes.back());
@@ -208,14 +208,14 @@ void time_switch(benchmark::State& run, const Touched& touched, int refinement, 
 
 void time_held(benchmark::State& run, const Touched& touched, int refinement, int rings) {
   Overlaid overlaid(touched, refinement, rings);
-  overlaid.state.patch = overlaid.patch(overlaid.centre);
+  overlaid.state.surface.patch = overlaid.patch(overlaid.centre);
   ToolPose pose = overlaid.pose;
   step(overlaid.body, overlaid.state, pose);
   pose.grab = true;
   State with = overlaid.state;
   for (int k = 0; k < 100; ++k) step(overlaid.body, with, pose);
   State without = with;
-  without.patch = nullptr;
+  without.surface.patch = nullptr;
   for (int k = 0; k < 100; ++k) step(overlaid.body, without, pose);
   std::vector<double> times_with, times_without;
   int turn = 0;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "runtime/tick/clearance.h"
 #include "runtime/tick/step.h"
 
 namespace palpate::test {
@@ -105,7 +106,8 @@ Wish next_wish(const Palpation& palpation, Random& random, std::int64_t now, dou
 std::optional<double> touch(const Body& body, State& rest, const Vec3& from, const Vec3& inward,
                             double most) {
   const auto clear = [&](double way) {
-    return is_clear(body, rest, rest.tools.front().tool, {.position = from + way * inward});
+    return is_clear(body, rest.surface.tree, rest.scratch, rest.tools.front().tool,
+                    {.position = from + way * inward});
   };
   if (!clear(0.0)) return std::nullopt;
   const double stride = 0.5 * rest.tools.front().tool.radius;

@@ -20,7 +20,7 @@
 #include "formats/model_file.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
-#include "runtime/tick/held_nodes.h"
+#include "runtime/body/prescribed_nodes.h"
 
 namespace palpate {
 namespace {
@@ -100,7 +100,7 @@ class NodeSource {
   std::size_t next_ = 0;
 };
 
-void move_contacts(const Body& body, HeldNodes& held, NodeSource& nodes, std::int64_t contacts) {
+void move_contacts(const Body& body, PrescribedNodes& held, NodeSource& nodes, std::int64_t contacts) {
   held.release_all();
   for (std::int64_t k = 0; k < contacts; ++k) {
     const Index node = nodes.next();
@@ -111,7 +111,7 @@ void move_contacts(const Body& body, HeldNodes& held, NodeSource& nodes, std::in
 
 /// One node taken anew: gather, factor and solve.
 void new_contact(benchmark::State& run, const Body& body) {
-  HeldNodes held(body);
+  PrescribedNodes held(body);
   NodeSource nodes(body);
   Samples samples;
   while (run.KeepRunning()) {
@@ -125,7 +125,7 @@ void new_contact(benchmark::State& run, const Body& body) {
 
 /// A held node that moves.
 void held_tick(benchmark::State& run, const Body& body) {
-  HeldNodes held(body);
+  PrescribedNodes held(body);
   const Index node = body.free_surface_nodes().front();
   held.hold(body, node);
   Vec3 displacement = Vec3::Zero();
@@ -142,7 +142,7 @@ void held_tick(benchmark::State& run, const Body& body) {
 
 /// C of 30 nodes and its factor, from nothing.
 void capacitance_30(benchmark::State& run, const Body& body) {
-  HeldNodes held(body);
+  PrescribedNodes held(body);
   NodeSource nodes(body);
   Samples samples;
   while (run.KeepRunning()) {
@@ -153,7 +153,7 @@ void capacitance_30(benchmark::State& run, const Body& body) {
 
 /// Contacts moved to new nodes: gather, factor, forces and the displacement of all stored nodes.
 void moved_contacts(benchmark::State& run, const Body& body, std::int64_t contacts) {
-  HeldNodes held(body);
+  PrescribedNodes held(body);
   NodeSource nodes(body);
   std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
   Samples samples;

@@ -5,7 +5,7 @@
 #include "runtime/tick/assemble_contact.h"
 #include "runtime/tick/contact_detection.h"
 #include "runtime/tick/contact_solution.h"
-#include "runtime/tick/local_model.h"
+#include "runtime/tick/linearise.h"
 
 namespace palpate::test {
 namespace {
@@ -20,18 +20,19 @@ double seconds(F&& f) {
 }  // namespace
 
 TickStages time_stages(const Body& body, State& state, const ToolPose& pose) {
+  Scratch& scratch = state.scratch;
   ToolState& tool = state.tools.front();
   tool.margin = 0.1 * body.mean_surface_edge() + (pose.position - tool.device.position).norm();
   tool.device = pose;
-  state.near.begin_tick();
-  remember_contacts(state);
+  state.surface.near.begin_tick();
+  remember_contacts(state, scratch);
 
   TickStages stages;
-  stages.find = seconds([&] { find_contacts(body, state); });
-  stages.assemble = seconds([&] { assemble_contact(body, state); });
-  stages.solve = seconds([&] { solve_problem(state); });
-  stages.displace = seconds([&] { apply_forces(state); });
-  stages.linearise = seconds([&] { linearise(state); });
+  stages.find = seconds([&] { find_contacts(body, state, scratch); });
+  stages.assemble = seconds([&] { assemble_contact(body, state, scratch); });
+  stages.solve = seconds([&] { solve_problem(scratch); });
+  stages.displace = seconds([&] { apply_forces(state, scratch); });
+  stages.linearise = seconds([&] { linearise(state, scratch); });
   return stages;
 }
 

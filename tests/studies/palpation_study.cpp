@@ -123,8 +123,8 @@ struct TickStudy {
 /// Nodes that the tick took into the near field.
 Index new_nodes(const State& before, const State& after) {
   Index count = 0;
-  for (Index place = 0; place < after.near.count(); ++place) {
-    if (before.near.place_of(after.near.node(place)) < 0) ++count;
+  for (Index place = 0; place < after.surface.near.count(); ++place) {
+    if (before.surface.near.place_of(after.surface.near.node(place)) < 0) ++count;
   }
   return count;
 }
@@ -132,9 +132,9 @@ Index new_nodes(const State& before, const State& after) {
 /// Whether more than one pass was made: then the contacts that the last pass began with are not those that
 /// the tick began with.
 bool more_passes(const State& before, const State& after) {
-  if (after.last_count != before.contact_count) return true;
-  for (Index k = 0; k < after.last_count; ++k) {
-    const ContactPoint& last = after.last_contacts[static_cast<std::size_t>(k)];
+  if (after.scratch.last_count != before.contact_count) return true;
+  for (Index k = 0; k < after.scratch.last_count; ++k) {
+    const ContactPoint& last = after.scratch.last_contacts[static_cast<std::size_t>(k)];
     const ContactPoint& first = before.contact_points[static_cast<std::size_t>(k)];
     if (last.feature != first.feature || last.position != first.position) return true;
   }
@@ -155,10 +155,11 @@ TickStudy take_apart(const Body& body, const State& before, const ToolPose& pose
   study.points = state.contact_count;
   study.closed = state.tools.front().contacts;
   study.held = state.held_count;
-  study.rows = state.problem.rows;
-  study.near = state.near.count();
+  study.rows = state.scratch.problem.rows;
+  study.near = state.surface.near.count();
   study.new_nodes = new_nodes(before, state);
-  study.rounds = state.problem.frictionless ? state.active_set.rounds() : state.cone_solver.rounds();
+  study.rounds = state.scratch.problem.frictionless ? state.scratch.active_set.rounds()
+                                                    : state.scratch.cone_solver.rounds();
   study.more_passes = more_passes(before, state);
   study.status = state.status;
   state = before;

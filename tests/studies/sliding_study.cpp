@@ -121,9 +121,9 @@ struct FrozenContact {
   Vec3 device;
 
   explicit FrozenContact(const State& state)
-      : problem(state.problem), device(state.tools.front().device.position) {
+      : problem(state.scratch.problem), device(state.tools.front().device.position) {
     for (Index i = 0; i < problem.rows; ++i)
-      directions.push_back(state.rows[static_cast<std::size_t>(i)].force);
+      directions.push_back(state.scratch.rows[static_cast<std::size_t>(i)].force);
   }
 };
 
@@ -131,9 +131,9 @@ struct FrozenContact {
 class StaleSolver {
  public:
   explicit StaleSolver(const State& state)
-      : problem_(state.problem),
-        active_set_(state.problem.stride),
-        cone_solver_(state.max_contacts, state.problem.stride) {}
+      : problem_(state.scratch.problem),
+        active_set_(state.scratch.problem.stride),
+        cone_solver_(state.max_contacts(), state.scratch.problem.stride) {}
 
   /// Force on the tool with the device where it is now.
   Vec3 force(const FrozenContact& frozen, const Vec3& device) {

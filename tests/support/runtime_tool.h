@@ -47,7 +47,7 @@ inline Vec3 friction_force(const ContactPoint& contact) {
 inline Vec3 place_now(const State& state, const ContactPoint& contact) {
   Vec3 place = Vec3::Zero();
   for (std::size_t n = 0; n < 3; ++n) {
-    if (contact.nodes[n] >= 0) place += contact.weights[n] * state.tree.position(contact.nodes[n]);
+    if (contact.nodes[n] >= 0) place += contact.weights[n] * state.surface.tree.position(contact.nodes[n]);
   }
   return place;
 }

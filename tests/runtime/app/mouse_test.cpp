@@ -176,7 +176,7 @@ TEST_F(PointedCube, FeelsNothingOnceItIsLiftedAfterAPress) {
   EXPECT_EQ(report.ticks, 450);
   EXPECT_EQ(state_.tools.front().contacts, 0);
   EXPECT_EQ(state_.tools.front().wrench.force, Vec3(Vec3::Zero()));
-  EXPECT_EQ(state_.near.load().count, 0) << "the body is loaded by nothing";
+  EXPECT_EQ(state_.surface.near.load().count, 0) << "the body is loaded by nothing";
 }
 
 TEST_F(PointedCube, IsReplayedToTheSameBits) {

@@ -31,7 +31,7 @@ class Loop {
     palpate::step(body, state, at);
     if (source) source->post(state);
   }
-  Vec3 surface(Index node) const { return state.tree.position(node); }
+  Vec3 surface(Index node) const { return state.surface.tree.position(node); }
 
   Body body;
   State state;
@@ -77,13 +77,13 @@ TEST_P(Release, GoesOnAsTheSparseRouteDoes) {
   pull(loop, test::upright(d_, 0.05, 0.02, 0.04), 20);
   const VectorXd held = test::displacement(loop.body, loop.state);
   ASSERT_GT(held.norm(), 0.03);
-  ASSERT_FALSE(loop.state.motion.active());
+  ASSERT_FALSE(loop.state.surface.motion.active());
   const test::SparseRoute sparse(model());
   test::NewmarkIntegrator reference = sparse.start(held, VectorXd::Zero(held.size()));
 
   const Vec3 far = last_ + test::upright(d_, 0.0, 0.0, 1.0);
   loop.step(pose(far));
-  EXPECT_EQ(loop.state.near.load().count, 0);
+  EXPECT_EQ(loop.state.surface.near.load().count, 0);
   EXPECT_LT((test::displacement(loop.body, loop.state) - held).norm(), 1e-12 * held.norm())
       << "it stays in the tick";
   const int m = GetParam().ticks_per_step;
@@ -131,7 +131,7 @@ TEST_P(Release, TakesTheVelocityFromTheContact) {
 TEST_P(ReleaseInEachTick, ForgetsTheTouchBefore) {
   const auto press = [&](bool before) {
     Loop loop(model(), tool_);
-    FreeMotion& motion = loop.state.motion;
+    FreeMotion& motion = loop.state.surface.motion;
     const Greens& greens = loop.body.greens();
     std::vector<double> u(static_cast<std::size_t>(greens.order()));
     SurfaceLoad none(d_, 0, 8, 0), load(d_, 0, 8, 0), far(d_, 0, 8, 0);
@@ -159,7 +159,7 @@ TEST_P(ReleaseInEachTick, ForgetsTheTouchBefore) {
   };
   const auto alone_before = [&] {  // the first touch without the second
     Loop loop(model(), tool_);
-    FreeMotion& motion = loop.state.motion;
+    FreeMotion& motion = loop.state.surface.motion;
     std::vector<double> u(static_cast<std::size_t>(loop.body.greens().order()));
     SurfaceLoad none(d_, 0, 8, 0), far(d_, 0, 8, 0);
     const std::vector<double> large = {1.0, 1.0, 1.0};
@@ -186,7 +186,7 @@ TEST_P(Release, AddsToWhatMoves) {
   const Greens& greens = loop.body.greens();
   const auto n = static_cast<std::size_t>(greens.order());
   const test::SparseRoute sparse(model());
-  FreeMotion& motion = loop.state.motion;
+  FreeMotion& motion = loop.state.surface.motion;
   SurfaceLoad none(d_, 0, 8, 0), first(d_, 0, 8, 0), second(d_, 0, 8, 0);
   const std::vector<double> f = {1e-3, -2e-3, 0.5e-3};
   first.add(3, f.data());
@@ -247,7 +247,7 @@ TEST_P(Release, AddsToWhatMoves) {
 TEST_P(Release, MovesTheSurfaceThatTheTickHasAskedFor) {
   Loop loop(model(), tool_);
   const Body& body = loop.body;
-  FreeMotion& motion = loop.state.motion;
+  FreeMotion& motion = loop.state.surface.motion;
   SurfaceLoad none(d_, 0, 8, 0), load(d_, 0, 8, 0);
   const std::vector<double> f = {1e-3, -2e-3, 0.5e-3};
   load.add(3, f.data());
@@ -306,7 +306,7 @@ TEST_P(ReleaseInEachTick, GoesOnFromFarAwayBesideAnotherTool) {
   for (int k = 0; k <= 400; ++k) before = tick(above + by * (std::min(k, 380) / 380.0), true, pressed);
   ASSERT_GT(before.lpNorm<Eigen::Infinity>(), 0.4);
   const VectorXd now = tick(above + by, false, pressed);
-  ASSERT_TRUE(d_ == 2 || state.near.load().count > 0);
+  ASSERT_TRUE(d_ == 2 || state.surface.near.load().count > 0);
   EXPECT_EQ(state.tools[0].contact_wrench.force.norm(), 0.0) << "all of it is let go";
   EXPECT_LT((now - before).norm(), 1e-3 * before.norm());  // the other tool's contact still settles
 }
@@ -354,7 +354,7 @@ TEST(OverlayRelease, IsFoldedBackIntoTheBody) {
     const Vec3 top = test::top_middle(3), above = top + Vec3(0.0, 0.0, 0.01), far(0.5, 0.5, 3.0);
     PatchMaker maker(body, 1);
     const Index centre = body.nearest_surface_node(top).node;
-    state.patch = maker.make({&centre, 1});
+    state.surface.patch = maker.make({&centre, 1});
     const auto tick = [&](const ToolPose& at) {
       if (source) source->receive(state);
       step(body, state, at);
@@ -363,7 +363,7 @@ TEST(OverlayRelease, IsFoldedBackIntoTheBody) {
     tick(pose(above));
     for (int k = 0; k <= 200; ++k) tick(pose(above + Vec3(0.02, 0.0, 0.04) * (k / 200.0), true));
     for (int k = 0; k < 50; ++k) tick(pose(above + Vec3(0.02, 0.0, 0.04), true));
-    ASSERT_GT(state.near.load().patch_count, 0);
+    ASSERT_GT(state.surface.near.load().patch_count, 0);
     const VectorXd held = test::displacement(body, state);
     const test::SparseRoute sparse(model);
     test::NewmarkIntegrator reference = sparse.start(held, VectorXd::Zero(held.size()));
@@ -380,13 +380,13 @@ TEST(OverlayRelease, IsFoldedBackIntoTheBody) {
     std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
     std::vector<Vec3> u(body.surface_rest_positions().size());
     ShownMotion shown(body);
-    state.motion.show(shown);
-    surface_displacement(body, state.near.load(), stored, u, &shown);
+    state.surface.motion.show(shown);
+    surface_displacement(body, state.surface.near.load(), stored, u, &shown);
     for (std::size_t node = 0; node < u.size(); ++node) {
       const SurfaceParts parts = body.surface_parts(static_cast<Index>(node));
       Vec3 expected = Vec3::Zero();
       for (std::size_t k = 0; k < parts.stored.size(); ++k)
-        expected += parts.weights[k] * state.motion.displacement(body, parts.stored[k]);
+        expected += parts.weights[k] * state.surface.motion.displacement(body, parts.stored[k]);
       ASSERT_LT((u[node] - expected).norm(), 1e-12);
     }
   }
@@ -441,7 +441,7 @@ TEST(FewModes, FadeTheRestInStepWithTheModes) {
     const Modes& modes = *loop.body.modes();
     const std::span<const double> omega = modes.omega();
     std::vector<double> g(omega.size()), rate(omega.size());
-    const SurfaceLoad& load = loop.state.near.load();
+    const SurfaceLoad& load = loop.state.surface.near.load();
     modes.add_projection(load.nodes(), load.forces(), 1.0, g);
     ModalNewmark reference(omega, options.damping, options.newmark);
     reference.let_go(g, rate);
@@ -493,7 +493,7 @@ TEST_P(TouchAgain, IsContactWithAMovingSurface) {
   double largest = 0.0, last = 0.0;
   int touched = 0, free = 0;
   for (int k = 0; k < 1500; ++k) {
-    const double surface = loop.state.tree.nearest(Vec3(0.5, 0.5, 1.1)).nearest.on_simplex.z();
+    const double surface = loop.state.surface.tree.nearest(Vec3(0.5, 0.5, 1.1)).nearest.on_simplex.z();
     loop.step(pose(wait));
     const ToolState& tool = loop.state.tools.front();
     ASSERT_FALSE(has(loop.state.status, StepStatus::inside_body)) << k;
@@ -503,7 +503,7 @@ TEST_P(TouchAgain, IsContactWithAMovingSurface) {
     touched += tool.contacts > 0 ? 1 : 0;
     free += tool.contacts == 0 ? 1 : 0;
     const double moved =
-        std::abs(loop.state.tree.nearest(Vec3(0.5, 0.5, 1.1)).nearest.on_simplex.z() - surface) +
+        std::abs(loop.state.surface.tree.nearest(Vec3(0.5, 0.5, 1.1)).nearest.on_simplex.z() - surface) +
         std::abs(tool.surface_change.z());
     ASSERT_LE(std::abs(force - last), 5.0 * moved + 1e-9) << k;
     last = force;
@@ -548,7 +548,8 @@ TEST_P(TouchAgain, SticksToWhatMoves) {
     ASSERT_GT(state.tools[0].contacts, 0) << k;
     swung = std::max(
         swung,
-        std::abs(state.motion.at(body, std::max({stuck.nodes[0], stuck.nodes[1], stuck.nodes[2]})).y()));
+        std::abs(
+            state.surface.motion.at(body, std::max({stuck.nodes[0], stuck.nodes[1], stuck.nodes[2]})).y()));
     farthest = std::max(farthest, std::abs(test::place_now(state, stuck).y() - place.y()));
   }
   EXPECT_GT(swung, 0.01);
@@ -572,8 +573,8 @@ TEST(Background, SwingsTheSameBody) {
       step(body, state, k < 201 ? pose(above + Vec3(0.0, 0.0, 0.05 * k / 200.0), k > 0) : pose(far));
       source.post(state);
       motion.push_back(test::displacement(body, state));
-      if (!in_background || !state.motion.active()) continue;
-      const std::int64_t posted = state.motion.job().step;  // wait as a loop in real time would
+      if (!in_background || !state.surface.motion.active()) continue;
+      const std::int64_t posted = state.surface.motion.job().step;  // wait as a loop in real time would
       while (source.steps() < posted) std::this_thread::yield();
     }
     return motion;
@@ -614,7 +615,7 @@ TEST(WithoutDynamics, NothingSwings) {
   const Vec3 above(0.5, 0.5, 1.01);
   for (int k = 0; k < 100; ++k) step(body, state, pose(above + Vec3(0.0, 0.0, 0.05 * k / 100.0), k > 0));
   step(body, state, pose(Vec3(0.5, 0.5, 3.0)));
-  EXPECT_FALSE(state.motion.active());
+  EXPECT_FALSE(state.surface.motion.active());
   EXPECT_EQ(test::displacement(body, state).norm(), 0.0);
 }
 

@@ -90,7 +90,7 @@ TEST(COverlay, FeelsAsTheStepWithItsPatch) {
 
   std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
   std::vector<Vec3> u(body.surface_rest_positions().size());
-  surface_displacement(body, state.near.load(), stored, u);
+  surface_displacement(body, state.surface.near.load(), stored, u);
   std::vector<double> xyz(3 * u.size());
   palpate_surface_displacement(session.get(), xyz.data());
   double largest = 0.0;

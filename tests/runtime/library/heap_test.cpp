@@ -22,8 +22,8 @@
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/background/surface_stress.h"
+#include "runtime/body/prescribed_nodes.h"
 #include "runtime/library/palpate.h"
-#include "runtime/tick/held_nodes.h"
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 
@@ -78,7 +78,7 @@ namespace palpate {
 namespace {
 
 /// Ticks that touch, grab, move, miss, let go and send nonsense; beside them nodes that are held and dropped.
-void exercise(const Body& body, State& state, HeldNodes& held, std::span<double> u,
+void exercise(const Body& body, State& state, PrescribedNodes& held, std::span<double> u,
               const std::vector<ToolPose>& poses) {
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const auto node = static_cast<Index>(k % 30);
@@ -108,7 +108,7 @@ class Tick : public testing::TestWithParam<int> {
   Body body_{
       test::unit_model(GetParam(), GetParam() == 3 ? 4 : 20, Scope::surface, Precision::single_precision)};
   State state_{body_, {.tools = {Tool{.reach = 0.3}}}};
-  HeldNodes held_{body_, 24};
+  PrescribedNodes held_{body_, 24};
   std::vector<double> u_ = std::vector<double>(static_cast<std::size_t>(body_.greens().order()));
   std::vector<ToolPose> poses_;
 };
@@ -166,10 +166,10 @@ class OverlayTick : public Tick {
   }
   void exercise_patches() {
     for (std::size_t k = 0; k < poses_.size(); ++k) {
-      if (k % 13 == 0) with_.patch = patches_[k / 13 % patches_.size()];
+      if (k % 13 == 0) with_.surface.patch = patches_[k / 13 % patches_.size()];
       step(overlaid_, with_, poses_[k]);
       touching_ += with_.tools.front().contacts > 0 ? 1 : 0;
-      load_ = with_.near.load();
+      load_ = with_.surface.near.load();
       if (k % 10 == 5) {
         surface_displacement(overlaid_, load_, stored_, surface_);
         surface_stress_.evaluate(surface_, force_, load_.patch.get(), stress_);
@@ -185,7 +185,7 @@ class OverlayTick : public Tick {
   Index room_ = patch_room(overlaid_, 1, 1);
   State with_{overlaid_, {.tools = {Tool{.radius = 0.05, .reach = 0.3}}, .patch_nodes = room_}};
   int touching_ = 0;
-  SurfaceLoad load_ = with_.near.load();
+  SurfaceLoad load_ = with_.surface.near.load();
   std::vector<std::shared_ptr<const Patch>> patches_;
   std::vector<double> stored_ = std::vector<double>(static_cast<std::size_t>(overlaid_.greens().order()));
   std::vector<Vec3> surface_ = std::vector<Vec3>(overlaid_.surface_rest_positions().size());
@@ -297,7 +297,7 @@ class MovingTick : public testing::TestWithParam<std::tuple<DynamicsMethod, Cont
       step(body_, state_, tool);
       if (source_) source_->post(state_);
       if (frames_) frames_->post(state_, k, 0.001 * k);
-      if (k % 10 == 0) state_.motion.show(shown_);
+      if (k % 10 == 0) state_.surface.motion.show(shown_);
     }
   }
 
@@ -329,7 +329,7 @@ TEST_P(MovingTick, MakesNoHeapCall) {
 #else
   exercise_motion();
 #endif
-  EXPECT_TRUE(state_.motion.active());
+  EXPECT_TRUE(state_.surface.motion.active());
   frames_.reset();
   EXPECT_GT(shown_frames_, 0);
 }
@@ -340,7 +340,7 @@ TEST_P(MovingTick, MakesNoSystemCall) {
 #else
   expect_no_system_call([&] {
     exercise_motion();
-    return state_.motion.active();
+    return state_.surface.motion.active();
   });
 #endif
 }

@@ -48,7 +48,7 @@ Vec3 seen_displacement(const Body& body, const State& state, std::size_t node) {
   Vec3 u = body.model().rest_displacement[static_cast<std::size_t>(body.surface_mesh_nodes()[node])];
   const Index stored = body.surface_stored_nodes()[node];
   if (stored < 0) return u;
-  const SurfaceLoad& load = state.near.load();
+  const SurfaceLoad& load = state.surface.near.load();
   for (std::size_t k = 0; k < load.nodes().size(); ++k)
     u += body.greens().block(stored, load.nodes()[k]) * Vec3(load.forces().data() + 3 * k);
   return u;
@@ -139,7 +139,7 @@ TEST_F(Frames, ShowWhatTouchesAndWhatThatDoes) {
         pressure[node] += contact.weights[k] * contact.force.dot(contact.frame.col(0)) / stress.areas()[node];
       }
     }
-    const SurfaceLoad& load = state_.near.load();
+    const SurfaceLoad& load = state_.surface.near.load();
     for (std::size_t k = 0; k < load.nodes().size(); ++k)
       nodal[static_cast<std::size_t>(body_.surface_node_of_stored(load.nodes()[k]))] +=
           Vec3(load.forces().data() + 3 * k);
@@ -196,7 +196,7 @@ TEST(FramesInThePlane, ShowTheInterior) {
     }
     for (std::size_t node = 0; node < N; ++node) {
       Vec3 u = model.rest_displacement[node];
-      const SurfaceLoad& load = state.near.load();
+      const SurfaceLoad& load = state.surface.near.load();
       const Index stored = body.stored_node(static_cast<Index>(node));
       for (std::size_t k = 0; stored >= 0 && k < load.nodes().size(); ++k)
         u += body.greens().block(stored, load.nodes()[k]) *

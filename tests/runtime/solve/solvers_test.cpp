@@ -204,7 +204,7 @@ TEST_P(Cones, MeetsSignoriniAndCoulomb) {
       largest_force = std::max(largest_force, std::abs(problem.lambda[static_cast<std::size_t>(i)]));
       largest_compliance = std::max(largest_compliance, problem.w(i, i));
     }
-    const double force = 1e-15 + 3.0 * ConeSolver::tolerance * largest_force;
+    const double force = 1e-15 + 3.0 * tuning.cone.tolerance * largest_force;
     expect_contact(problem, force * largest_compliance, force);
   }
   EXPECT_LE(unsolved, GetParam().friction < 1.0 ? 0 : 2)
@@ -259,7 +259,7 @@ TEST(ConeSolver, HeldRowsAreMetOrLeftOutWithTheirOwners) {
     ASSERT_TRUE(solver.solve(problem));
     double force = 0.0;
     for (const double lambda : problem.lambda) force = std::max(force, std::abs(lambda));
-    expect_contact(problem, 3e-5 * 1e-3 * force, 3.0 * ConeSolver::tolerance * force);
+    expect_contact(problem, 3e-5 * 1e-3 * force, 3.0 * tuning.cone.tolerance * force);
     for (Index k = 8; k < problem.contacts; ++k)
       ++(problem.lambda[at_contact(problem.first_row(k))] == 0.0 ? left_out : met);
   }

@@ -122,7 +122,7 @@ TEST_P(Friction, SlipsAtMuTimesTheNormalForceAgainstTheSlip) {
     ASSERT_FALSE(has(status, StepStatus::not_converged));
     double largest = 0.0;
     for (const ContactPoint& contact : state.contacts()) largest = std::max(largest, contact.force.norm());
-    const double tolerance = 3.0 * ConeSolver::tolerance * largest;
+    const double tolerance = 3.0 * tuning.cone.tolerance * largest;
     for (const ContactPoint& contact : state.contacts()) {
       const double bound = mu * normal_force(contact);
       const Vec3 friction = friction_force(contact);

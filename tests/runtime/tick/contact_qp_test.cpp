@@ -461,11 +461,12 @@ TEST_P(WholeMeshContact, GivesTheSameForcesAndDisplacements) {
   Eigen::VectorXd u(body.greens().order());
   surface_displacement(body, state, {u.data(), static_cast<std::size_t>(u.size())});
   Eigen::VectorXd f = Eigen::VectorXd::Zero(mesh.dofs());
-  for (std::size_t k = 0; k < state.near.load().nodes().size(); ++k) {
-    const Index node = body.mesh_node(state.near.load().nodes()[k]);
+  for (std::size_t k = 0; k < state.surface.near.load().nodes().size(); ++k) {
+    const Index node = body.mesh_node(state.surface.near.load().nodes()[k]);
     for (int axis = 0; axis < d; ++axis)
       f[Eigen::Index{d} * node + axis] =
-          state.near.load().forces()[static_cast<std::size_t>(d) * k + static_cast<std::size_t>(axis)];
+          state.surface.near.load()
+              .forces()[static_cast<std::size_t>(d) * k + static_cast<std::size_t>(axis)];
   }
   const Eigen::VectorXd f_direct = mesh.force(direct.u);
   EXPECT_LE((f - f_direct).lpNorm<Eigen::Infinity>(), 1e-6 * f_direct.lpNorm<Eigen::Infinity>());

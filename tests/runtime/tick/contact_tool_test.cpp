@@ -242,7 +242,7 @@ TEST_P(Tools, ASphereThatIsLargeAgainstTheEdgesTouchesNodesAlone) {
     }
     EXPECT_GE(closed, GetParam());
     for (Index node = 0; node < std::ssize(body_.surface_rest_positions()); ++node)
-      EXPECT_GT((state.tree.position(node) - place).norm(), radius - 1e-6 * edge_);
+      EXPECT_GT((state.surface.tree.position(node) - place).norm(), radius - 1e-6 * edge_);
   }
 }
 
@@ -476,12 +476,12 @@ TEST_P(Tools, TheWrenchIsThatOfTheForcesOnTheBody) {
     ASSERT_GT(tool.wrench.torque.norm(), 0.1 * edge_ * tool.wrench.force.norm());
     Vec3 force = Vec3::Zero();
     Vec3 torque = Vec3::Zero();
-    const std::span<const Index> nodes = state.near.load().nodes();
+    const std::span<const Index> nodes = state.surface.near.load().nodes();
     for (Index k = 0; k < static_cast<Index>(nodes.size()); ++k) {
-      const Vec3 f = vector_at(state.near.load().forces(), GetParam(), k);
+      const Vec3 f = vector_at(state.surface.near.load().forces(), GetParam(), k);
       const Index node = body_.surface_node_of_stored(nodes[static_cast<std::size_t>(k)]);
       force += f;
-      torque += (state.tree.position(node) - tool.pose.position).cross(f);
+      torque += (state.surface.tree.position(node) - tool.pose.position).cross(f);
     }
     EXPECT_LT((tool.wrench.force + force).norm(), 1e-12 * force.norm());
     EXPECT_LT((tool.wrench.torque + torque).norm(), 1e-6 * torque.norm());
@@ -507,14 +507,14 @@ TEST_P(Tools, ASecondToolFindsTheSurfaceWhereTheFirstHasPutIt) {
     const Index stored = body_.surface_stored_nodes()[static_cast<std::size_t>(node)];
     const Vec3 displacement = stored < 0 ? Vec3::Zero() : vector_at(u, GetParam(), stored);
     const Vec3 now = body_.surface_rest_positions()[static_cast<std::size_t>(node)] + displacement;
-    furthest = std::max(furthest, (state.tree.position(node) - now).norm());
+    furthest = std::max(furthest, (state.surface.tree.position(node) - now).norm());
     largest = std::max(largest, displacement.norm());
   }
   EXPECT_GT(largest, 0.3 * edge_);
   EXPECT_LT(furthest, 1e-9 * edge_);
 
   // It comes down on where the top has gone.
-  const NearestSimplex under = state.tree.nearest(at(0.8, 0.7, 1.0));
+  const NearestSimplex under = state.surface.tree.nearest(at(0.8, 0.7, 1.0));
   const Vec3 top = under.nearest.on_simplex;
   const double moved = std::abs(top[GetParam() - 1] - 1.0);
   EXPECT_GT(moved, 1e-3 * edge_);

@@ -185,7 +185,7 @@ class Walk : public testing::TestWithParam<WalkCase> {
     surface_displacement(body_, state_, u_);
     for (const double u : u_) ASSERT_TRUE(std::isfinite(u)) << "tick " << state_.ticks;
     for (Index node = 0; node < static_cast<Index>(body_.surface_rest_positions().size()); ++node)
-      ASSERT_TRUE(state_.tree.position(node).allFinite()) << "tick " << state_.ticks;
+      ASSERT_TRUE(state_.surface.tree.position(node).allFinite()) << "tick " << state_.ticks;
   }
 
   /// All tools go away and nothing is left of what they did.
@@ -197,7 +197,7 @@ class Walk : public testing::TestWithParam<WalkCase> {
       ASSERT_EQ(tool.wrench.torque, Vec3::Zero());
       ASSERT_EQ(tool.contacts, 0);
     }
-    ASSERT_TRUE(state_.near.load().nodes().empty());
+    ASSERT_TRUE(state_.surface.near.load().nodes().empty());
   }
 
   /// Presses the first tool in and comes back: the force there.

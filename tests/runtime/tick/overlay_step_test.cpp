@@ -81,7 +81,7 @@ INSTANTIATE_TEST_SUITE_P(Elements, WholeOverlay,
 TEST_P(WholeOverlay, FeelsAsTheFinerBodyDoes) {
   const std::shared_ptr<const Patch> patch = this->patch();
   State with = state(coarse_, static_cast<Index>(patch->stored_nodes().size()));
-  with.patch = patch;
+  with.surface.patch = patch;
   State finer = state(fine_, 0);
   double largest = 0.0;
   int touching = 0;
@@ -94,7 +94,7 @@ TEST_P(WholeOverlay, FeelsAsTheFinerBodyDoes) {
     touching += with.tools.front().contacts > 0 ? 1 : 0;
   }
   EXPECT_GT(touching, 200);
-  EXPECT_EQ(with.near.patch(), patch);
+  EXPECT_EQ(with.surface.near.patch(), patch);
 
   // And the coarse mesh alone is another body.
   State without = state(coarse_, 0);
@@ -107,10 +107,10 @@ TEST_P(WholeOverlay, FeelsAsTheFinerBodyDoes) {
   // All surfaces agree, node by node.
   std::vector<double> stored(static_cast<std::size_t>(coarse_.greens().order()));
   std::vector<Vec3> u(coarse_.surface_rest_positions().size());
-  surface_displacement(coarse_, with.near.load(), stored, u);
+  surface_displacement(coarse_, with.surface.near.load(), stored, u);
   std::vector<double> fine_stored(static_cast<std::size_t>(fine_.greens().order()));
   std::vector<Vec3> fine_u(fine_.surface_rest_positions().size());
-  surface_displacement(fine_, finer.near.load(), fine_stored, fine_u);
+  surface_displacement(fine_, finer.surface.near.load(), fine_stored, fine_u);
   ASSERT_EQ(u.size(), fine_u.size());
   double most = 0.0;
   for (const Vec3& displacement : fine_u) most = std::max(most, displacement.norm());
@@ -153,7 +153,7 @@ TEST_P(Sliding, ChangesThePatchWithoutAKick) {
   PatchSource source(body_, state, {.in_background = false});
   press(state, 0.05, nullptr);
   const Vec3 before = state.tools.front().wrench.force;
-  const Vec3 at = state.near.displacement(state.near.place_of(
+  const Vec3 at = state.surface.near.displacement(state.surface.near.place_of(
       state.contacts()[0].nodes[0] >= 0 ? state.contacts()[0].nodes[0] : state.contacts()[0].nodes[1]));
   // From none to one, under a tool that rests: the force falls to what the finer body has, a little a tick.
   Vec3 last = before;
@@ -165,7 +165,7 @@ TEST_P(Sliding, ChangesThePatchWithoutAKick) {
     largest = std::max(largest, (force - last).norm() / last.norm());
     last = force;
   }
-  ASSERT_NE(state.near.patch(), nullptr);
+  ASSERT_NE(state.surface.near.patch(), nullptr);
   EXPECT_LT(last.norm(), 0.95 * before.norm());
   EXPECT_LT(largest, 1.01 * Tool{}.hand_over);
   EXPECT_GT(at.norm(), 0.0);
@@ -223,12 +223,12 @@ TEST_P(Sliding, BuildsAheadInTheBackground) {
   PatchSource source(body_, state, {});
   const int all = GetParam() == 2 ? 3 : 7;  // its own, and those of the neighbours
   // A tool that waits over the body has its patch, and those round it, before it touches.
-  for (int tick = 0; tick < 600'000 && (state.patch == nullptr || source.built() < all); ++tick) {
+  for (int tick = 0; tick < 600'000 && (state.surface.patch == nullptr || source.built() < all); ++tick) {
     source.serve(state);
     step(body_, state, pose(0.3, -0.1));
     std::this_thread::sleep_for(std::chrono::microseconds(100));
   }
-  ASSERT_NE(state.patch, nullptr);
+  ASSERT_NE(state.surface.patch, nullptr);
   EXPECT_GE(source.built(), all);
   EXPECT_EQ(source.counts().in_contact, 0);
   State same = this->state();
@@ -237,8 +237,9 @@ TEST_P(Sliding, BuildsAheadInTheBackground) {
     waiting.serve(same);
     step(body_, same, pose(0.3, -0.1));
   }
-  EXPECT_TRUE(std::equal(state.patch->surface_nodes().begin(), state.patch->surface_nodes().end(),
-                         same.patch->surface_nodes().begin(), same.patch->surface_nodes().end()));
+  EXPECT_TRUE(
+      std::equal(state.surface.patch->surface_nodes().begin(), state.surface.patch->surface_nodes().end(),
+                 same.surface.patch->surface_nodes().begin(), same.surface.patch->surface_nodes().end()));
 }
 
 TEST_P(Sliding, KeepsToItsMemory) {
@@ -251,7 +252,7 @@ TEST_P(Sliding, KeepsToItsMemory) {
       source.serve(state);
       step(body_, state, pose(0.5 - 0.3 * std::cos(2.0 * M_PI * tick / 800.0), 0.05));
       EXPECT_LE(source.bytes(), memory);
-      EXPECT_NE(state.patch, nullptr);
+      EXPECT_NE(state.surface.patch, nullptr);
     }
     EXPECT_GE(source.counts().switches, 4);
     EXPECT_EQ(source.counts().older_in_contact, 0);
@@ -274,12 +275,12 @@ TEST_P(Sliding, RestsWhenItsMemoryIsFull) {
   }
   State again = this->state();
   PatchSource source(body_, again, {.memory = one + one / 2});
-  for (int tick = 0; tick < 600'000 && again.patch == nullptr; ++tick) {
+  for (int tick = 0; tick < 600'000 && again.surface.patch == nullptr; ++tick) {
     source.serve(again);
     step(body_, again, pose(0.3, -0.1));
     std::this_thread::sleep_for(std::chrono::microseconds(100));
   }
-  ASSERT_NE(again.patch, nullptr);
+  ASSERT_NE(again.surface.patch, nullptr);
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   EXPECT_LE(source.built(), 2);
 }
@@ -304,7 +305,7 @@ TEST_P(Sliding, MergesThePatchesOfTwoTools) {
     centres.push_back(body_.nearest_surface_node(test::upright(GetParam(), x, 0.5, 1.0)).node);
   const std::shared_ptr<const Patch> both = maker.make(centres);
   const std::shared_ptr<const Patch> one = maker.make({centres.data(), 1});
-  EXPECT_EQ(two.patch->surface_nodes().size(), both->surface_nodes().size());
+  EXPECT_EQ(two.surface.patch->surface_nodes().size(), both->surface_nodes().size());
   EXPECT_GT(both->surface_nodes().size(), one->surface_nodes().size());
   EXPECT_LT(both->surface_nodes().size(), 2 * one->surface_nodes().size());
   EXPECT_GT(two.tools[0].contacts, 0);
@@ -326,9 +327,9 @@ TEST(PatchRoom, RefusesAFileThatKeepsTooLittle) {
 TEST_P(Sliding, GoesOnWithoutAPatchThatIsTooLarge) {
   State state(body_, {.tools = {Tool{.radius = radius_}}, .patch_nodes = 3});
   const Index centre = body_.nearest_surface_node(test::top_middle(GetParam())).node;
-  state.patch = PatchMaker(body_, 1).make({&centre, 1});
+  state.surface.patch = PatchMaker(body_, 1).make({&centre, 1});
   EXPECT_TRUE(has(step(body_, state, pose(0.3, -0.1)), StepStatus::capacity_full));
-  EXPECT_EQ(state.near.patch(), nullptr);
+  EXPECT_EQ(state.surface.near.patch(), nullptr);
   press(state, 0.05, nullptr);
   EXPECT_GT(state.tools.front().contacts, 0);
 }

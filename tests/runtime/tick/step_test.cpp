@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "runtime/body/prescribed_nodes.h"
 #include "runtime/solve/node_vectors.h"
-#include "runtime/tick/held_nodes.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate {
@@ -78,7 +78,7 @@ TEST_P(Touch, GrabDoesNotKickAndThePlaceFollowsTheTool) {
 }
 
 TEST_P(Touch, GrabbedNodeGivesTheForceOfTheCapacitanceMatrixAlgorithm) {
-  HeldNodes held(body_);
+  PrescribedNodes held(body_);
   held.hold(body_, top_);
   go(start_, true);
   for (int k = 1; k <= 20; ++k) {

@@ -1,25 +1,34 @@
 // Nodes whose displacement is prescribed: the papers' contact.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "runtime/body/body.h"
 #include "runtime/body/overlay.h"
 #include "runtime/solve/capacitance.h"
-#include "runtime/tick/status.h"
 
 namespace palpate {
+
+/// What a call could not do.
+enum class PrescribedStatus : std::uint8_t {
+  ok,
+  no_such_node,           ///< not a stored node, or not a held one
+  full,                   ///< `max_nodes` are held already
+  not_positive_definite,  ///< the node cannot be held beside those that are
+  result_not_finite,      ///< the forces overflowed: those before stand
+};
 
 /// Stored nodes that are held at a prescribed displacement, and the forces that this takes (theory.md section
 /// 3). Copies are complete and independent. All memory is taken at construction. Vectors are those by
 /// contact, relative to rest; d numbers a node, d = dimension(), where they are not vectors in space (z = 0
 /// in the plane).
-class HeldNodes {
+class PrescribedNodes {
  public:
   /// Holds nothing; room for `max_nodes`. Throws Error unless that is at least one. With an overlay, which
   /// must live as long, the body is the finer one: then `hold` and `displace` take memory.
-  explicit HeldNodes(const Body& body, Index max_nodes = 256, const Overlay* overlay = nullptr);
+  explicit PrescribedNodes(const Body& body, Index max_nodes = 256, const Overlay* overlay = nullptr);
 
   [[nodiscard]] int dimension() const noexcept { return capacitance_.dimension(); }  ///< d, dofs a node
   [[nodiscard]] Index count() const noexcept { return capacitance_.nodes(); }  ///< m, number of held nodes
@@ -29,21 +38,21 @@ class HeldNodes {
 
   /// Takes hold of a stored node where it is now, so that no force changes. A node that is held stays so
   /// (ok).
-  StepStatus hold(const Body& body, Index node) noexcept;
+  PrescribedStatus hold(const Body& body, Index node) noexcept;
 
   /// Lets go of a stored node. The other forces are out of date until `solve`.
-  StepStatus release(Index node) noexcept;
+  PrescribedStatus release(Index node) noexcept;
 
   /// Lets go of all nodes.
   void release_all() noexcept { capacitance_.clear(); }
 
   /// Prescribes the displacement [m] of a held node, relative to rest; z is ignored in the plane. Forces are
   /// out of date until `solve`.
-  StepStatus prescribe(Index node, const Vec3& displacement) noexcept;
+  PrescribedStatus prescribe(Index node, const Vec3& displacement) noexcept;
 
   /// f = C^-1 u: the forces on the body that give the held nodes their prescribed displacement (theory.md
   /// section 3).
-  StepStatus solve() noexcept;
+  PrescribedStatus solve() noexcept;
 
   /// Position of a stored node among the held ones, -1 when it is not held.
   [[nodiscard]] Index position_of(Index node) const noexcept;

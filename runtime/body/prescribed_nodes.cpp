@@ -1,4 +1,4 @@
-#include "runtime/tick/held_nodes.h"
+#include "runtime/body/prescribed_nodes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -25,7 +25,7 @@ void erase_entries(std::vector<T>& values, Index k, Index nodes, std::ptrdiff_t 
 
 }  // namespace
 
-HeldNodes::HeldNodes(const Body& body, Index max_nodes, const Overlay* overlay)
+PrescribedNodes::PrescribedNodes(const Body& body, Index max_nodes, const Overlay* overlay)
     : capacitance_(body.dimension(), max_nodes),
       overlay_(overlay),
       nodes_(static_cast<std::size_t>(max_nodes), -1),
@@ -33,21 +33,21 @@ HeldNodes::HeldNodes(const Body& body, Index max_nodes, const Overlay* overlay)
       force_(dofs(body.dimension(), max_nodes)),
       work_(static_cast<std::size_t>(body.dimension()) * dofs(body.dimension(), max_nodes)) {}
 
-std::span<const Index> HeldNodes::nodes() const noexcept {
+std::span<const Index> PrescribedNodes::nodes() const noexcept {
   return {nodes_.data(), static_cast<std::size_t>(count())};
 }
-std::span<const double> HeldNodes::displacement() const noexcept {
+std::span<const double> PrescribedNodes::displacement() const noexcept {
   return {displacement_.data(), dofs(dimension(), count())};
 }
-std::span<const double> HeldNodes::forces() const noexcept {
+std::span<const double> PrescribedNodes::forces() const noexcept {
   return {force_.data(), dofs(dimension(), count())};
 }
 
-StepStatus HeldNodes::hold(const Body& body, Index node) noexcept {
-  if (node < 0 || node >= body.greens().nodes()) return StepStatus::no_such_node;
-  if (position_of(node) >= 0) return StepStatus::ok;
+PrescribedStatus PrescribedNodes::hold(const Body& body, Index node) noexcept {
+  if (node < 0 || node >= body.greens().nodes()) return PrescribedStatus::no_such_node;
+  if (position_of(node) >= 0) return PrescribedStatus::ok;
   const Index k = count();
-  if (k == capacitance_.max_nodes()) return StepStatus::capacity_full;
+  if (k == capacitance_.max_nodes()) return PrescribedStatus::full;
 
   nodes_[static_cast<std::size_t>(k)] = node;
   const auto d = static_cast<std::size_t>(dimension());
@@ -62,45 +62,45 @@ StepStatus HeldNodes::hold(const Body& body, Index node) noexcept {
     const auto row = static_cast<Eigen::Index>(axis);
     for (std::size_t j = 0; j < width - d; ++j) where_it_is[row] += blocks[axis * width + j] * force_[j];
   }
-  if (capacitance_.add(blocks) != CapacitanceStatus::ok) return StepStatus::not_positive_definite;
+  if (capacitance_.add(blocks) != CapacitanceStatus::ok) return PrescribedStatus::not_positive_definite;
   set_vector(displacement_, dimension(), k, where_it_is);
   set_vector(force_, dimension(), k, Vec3::Zero());
-  return StepStatus::ok;
+  return PrescribedStatus::ok;
 }
 
-StepStatus HeldNodes::release(Index node) noexcept {
+PrescribedStatus PrescribedNodes::release(Index node) noexcept {
   const Index k = position_of(node);
-  if (k < 0) return StepStatus::no_such_node;
+  if (k < 0) return PrescribedStatus::no_such_node;
   erase_entries(nodes_, k, count(), 1);
   erase_entries(displacement_, k, count(), dimension());
   erase_entries(force_, k, count(), dimension());
   capacitance_.remove(k);
-  return StepStatus::ok;
+  return PrescribedStatus::ok;
 }
 
-StepStatus HeldNodes::prescribe(Index node, const Vec3& displacement) noexcept {
+PrescribedStatus PrescribedNodes::prescribe(Index node, const Vec3& displacement) noexcept {
   const Index k = position_of(node);
-  if (k < 0) return StepStatus::no_such_node;
+  if (k < 0) return PrescribedStatus::no_such_node;
   set_vector(displacement_, dimension(), k, displacement);
-  return StepStatus::ok;
+  return PrescribedStatus::ok;
 }
 
-StepStatus HeldNodes::solve() noexcept {
+PrescribedStatus PrescribedNodes::solve() noexcept {
   const std::span<double> f(work_.data(), dofs(dimension(), count()));
   std::copy_n(displacement_.begin(), f.size(), f.begin());
   capacitance_.solve(f);
-  if (!all_finite(f)) return StepStatus::result_not_finite;
+  if (!all_finite(f)) return PrescribedStatus::result_not_finite;
   std::copy(f.begin(), f.end(), force_.begin());
-  return StepStatus::ok;
+  return PrescribedStatus::ok;
 }
 
-Index HeldNodes::position_of(Index node) const noexcept {
+Index PrescribedNodes::position_of(Index node) const noexcept {
   const std::span<const Index> held = nodes();
   const auto found = std::find(held.begin(), held.end(), node);
   return found == held.end() ? -1 : static_cast<Index>(found - held.begin());
 }
 
-void HeldNodes::displace(const Body& body, std::span<double> u) const noexcept {
+void PrescribedNodes::displace(const Body& body, std::span<double> u) const noexcept {
   if (overlay_ == nullptr) return body.greens().displacement(nodes(), forces(), u);
   const Eigen::VectorXd beside = overlay_->forces_beside(body, nodes(), forces());
   std::vector<Index> all(nodes().begin(), nodes().end());

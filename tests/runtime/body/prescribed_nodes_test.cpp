@@ -1,5 +1,5 @@
 // Held nodes against a direct solve, and what they refuse.
-#include "runtime/tick/held_nodes.h"
+#include "runtime/body/prescribed_nodes.h"
 
 #include <gtest/gtest.h>
 
@@ -67,7 +67,7 @@ TEST_P(DirectSolve, GivesTheForcesAndDisplacementsOfTheCapacitanceMatrixAlgorith
       test::unit_model(GetParam().element, GetParam().cells, Scope::full, Precision::double_precision);
   const Body body{Model(model)};
   const Eigen::Index d = body.dimension();
-  HeldNodes held(body, 40);
+  PrescribedNodes held(body, 40);
   std::mt19937 random(9);
   std::vector<Index> candidates = body.free_surface_nodes();
   std::shuffle(candidates.begin(), candidates.end(), random);
@@ -80,10 +80,10 @@ TEST_P(DirectSolve, GivesTheForcesAndDisplacementsOfTheCapacitanceMatrixAlgorith
     const Eigen::VectorXd own = displacement.segment(d * k, d);
     const Vec3 prescribed(own[0], own[1], d == 3 ? own[2] : 0.3);  // z does not count in the plane
     mesh_nodes.push_back(body.mesh_node(node));
-    ASSERT_EQ(held.hold(body, node), StepStatus::ok);
-    ASSERT_EQ(held.prescribe(node, prescribed), StepStatus::ok);
+    ASSERT_EQ(held.hold(body, node), PrescribedStatus::ok);
+    ASSERT_EQ(held.prescribe(node, prescribed), PrescribedStatus::ok);
   }
-  ASSERT_EQ(held.solve(), StepStatus::ok);
+  ASSERT_EQ(held.solve(), PrescribedStatus::ok);
   Eigen::VectorXd u(body.greens().order());
   held.displace(body, {u.data(), static_cast<std::size_t>(u.size())});
 
@@ -121,20 +121,20 @@ INSTANTIATE_TEST_SUITE_P(Elements, DirectSolve, testing::ValuesIn(direct_cases()
 class Held : public testing::TestWithParam<int> {
  protected:
   const Body body_{test::unit_model(GetParam(), 4, Scope::surface, Precision::double_precision)};
-  HeldNodes held_{body_, 4};
+  PrescribedNodes held_{body_, 4};
   Index top_ = body_.nearest_surface_node(test::top_middle(GetParam())).node;
   Index corner_ = body_.nearest_surface_node(at(1.0, 1.0, 1.0)).node;
 
   /// The place or motion (x, y, z) with z up, in the plane (x, z).
   static Vec3 at(double x, double y, double z) { return test::upright(GetParam(), x, y, z); }
 
-  [[nodiscard]] Vec3 force(const HeldNodes& held, Index node) const {
+  [[nodiscard]] Vec3 force(const PrescribedNodes& held, Index node) const {
     return vector_at(held.forces(), GetParam(), held.position_of(node));
   }
-  [[nodiscard]] Vec3 displacement(const HeldNodes& held, Index node) const {
+  [[nodiscard]] Vec3 displacement(const PrescribedNodes& held, Index node) const {
     return vector_at(held.displacement(), GetParam(), held.position_of(node));
   }
-  static std::vector<double> displace(const Body& body, const HeldNodes& held) {
+  static std::vector<double> displace(const Body& body, const PrescribedNodes& held) {
     std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
     held.displace(body, u);
     return u;
@@ -148,18 +148,18 @@ TEST_P(Held, StartsWithNothing) {
   EXPECT_EQ(held_.count(), 0);
   EXPECT_TRUE(held_.nodes().empty() && held_.displacement().empty() && held_.forces().empty());
   EXPECT_EQ(held_.position_of(top_), -1);
-  EXPECT_EQ(held_.solve(), StepStatus::ok);
+  EXPECT_EQ(held_.solve(), PrescribedStatus::ok);
   EXPECT_EQ(displace(body_, held_), std::vector<double>(static_cast<std::size_t>(body_.greens().order())));
 }
 
 // One node: f is the inverse of its block of the Green's functions times u.
 TEST_P(Held, OneNodeTakesTheForceOfItsBlock) {
   const Vec3 motion = at(0.001, -0.002, -0.01);
-  ASSERT_EQ(held_.hold(body_, top_), StepStatus::ok);
+  ASSERT_EQ(held_.hold(body_, top_), PrescribedStatus::ok);
   EXPECT_EQ(force(held_, top_), Vec3::Zero()) << "taken where it is";
-  ASSERT_EQ(held_.prescribe(top_, motion), StepStatus::ok);
+  ASSERT_EQ(held_.prescribe(top_, motion), PrescribedStatus::ok);
   EXPECT_EQ(force(held_, top_), Vec3::Zero()) << "not solved yet";
-  ASSERT_EQ(held_.solve(), StepStatus::ok);
+  ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
   const Eigen::Map<const Eigen::VectorXd> u(motion.data(), GetParam());
   const Eigen::VectorXd f = body_.greens().block(top_, top_).inverse() * u;
   const Vec3 expected = vector_at({f.data(), static_cast<std::size_t>(f.size())}, GetParam(), 0);
@@ -169,26 +169,26 @@ TEST_P(Held, OneNodeTakesTheForceOfItsBlock) {
 
 // A node is taken where the others have pulled it to: no force, and theirs stay. Let go, it leaves no trace.
 TEST_P(Held, AnotherNodeComesAndGoesWithoutTrace) {
-  ASSERT_EQ(held_.hold(body_, corner_), StepStatus::ok);
-  ASSERT_EQ(held_.prescribe(corner_, at(0.0, 0.0, -0.02)), StepStatus::ok);
-  ASSERT_EQ(held_.solve(), StepStatus::ok);
+  ASSERT_EQ(held_.hold(body_, corner_), PrescribedStatus::ok);
+  ASSERT_EQ(held_.prescribe(corner_, at(0.0, 0.0, -0.02)), PrescribedStatus::ok);
+  ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
   const Vec3 alone = force(held_, corner_);
   const std::vector<double> u = displace(body_, held_);
 
-  ASSERT_EQ(held_.hold(body_, top_), StepStatus::ok);
+  ASSERT_EQ(held_.hold(body_, top_), PrescribedStatus::ok);
   const Vec3 taken = displacement(held_, top_);
   EXPECT_GT(taken.norm(), 1e-5);
   EXPECT_LT((taken - vector_at(u, GetParam(), top_)).norm(), 1e-13 * taken.norm());
-  ASSERT_EQ(held_.solve(), StepStatus::ok);
+  ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
   EXPECT_LT(force(held_, top_).norm(), 1e-13 * alone.norm());
   EXPECT_LT((force(held_, corner_) - alone).norm(), 1e-13 * alone.norm());
 
-  ASSERT_EQ(held_.prescribe(top_, taken + at(0.01, 0.0, 0.0)), StepStatus::ok);
-  ASSERT_EQ(held_.solve(), StepStatus::ok);
+  ASSERT_EQ(held_.prescribe(top_, taken + at(0.01, 0.0, 0.0)), PrescribedStatus::ok);
+  ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
   EXPECT_GT(force(held_, top_).norm(), 1e-5);
   EXPECT_GT((force(held_, corner_) - alone).norm(), 1e-5);
-  ASSERT_EQ(held_.release(top_), StepStatus::ok);
-  ASSERT_EQ(held_.solve(), StepStatus::ok);
+  ASSERT_EQ(held_.release(top_), PrescribedStatus::ok);
+  ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
   ASSERT_EQ(held_.count(), 1);
   EXPECT_LT((force(held_, corner_) - alone).norm(), 1e-12 * alone.norm());
 }
@@ -196,24 +196,24 @@ TEST_P(Held, AnotherNodeComesAndGoesWithoutTrace) {
 // Prescribed in another order than taken, and one of the middle let go: each node keeps its own numbers.
 TEST_P(Held, NodesKeepTheirOwnNumbers) {
   const auto motion = [](Index node) { return at(0.001 * (node + 1), 0.002, -0.003 * (node + 1)); };
-  for (const Index node : {0, 1, 2, 3}) ASSERT_EQ(held_.hold(body_, node), StepStatus::ok);
-  for (const Index node : {2, 0, 3, 1}) ASSERT_EQ(held_.prescribe(node, motion(node)), StepStatus::ok);
-  ASSERT_EQ(held_.solve(), StepStatus::ok);
+  for (const Index node : {0, 1, 2, 3}) ASSERT_EQ(held_.hold(body_, node), PrescribedStatus::ok);
+  for (const Index node : {2, 0, 3, 1}) ASSERT_EQ(held_.prescribe(node, motion(node)), PrescribedStatus::ok);
+  ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
   for (const Index k : {0, 1, 2, 3}) EXPECT_EQ(vector_at(held_.displacement(), GetParam(), k), motion(k));
   std::vector<double> forces(held_.forces().begin(), held_.forces().end());
 
-  ASSERT_EQ(held_.release(1), StepStatus::ok);
+  ASSERT_EQ(held_.release(1), PrescribedStatus::ok);
   const auto second = forces.begin() + GetParam();
   forces.erase(second, second + GetParam());
   EXPECT_EQ(std::vector<double>(held_.forces().begin(), held_.forces().end()), forces);
   EXPECT_EQ(std::vector<Index>(held_.nodes().begin(), held_.nodes().end()), (std::vector<Index>{0, 2, 3}));
-  ASSERT_EQ(held_.solve(), StepStatus::ok);
-  HeldNodes fresh(body_, 3);
+  ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
+  PrescribedNodes fresh(body_, 3);
   for (const Index node : {0, 2, 3}) {
-    ASSERT_EQ(fresh.hold(body_, node), StepStatus::ok);
-    ASSERT_EQ(fresh.prescribe(node, motion(node)), StepStatus::ok);
+    ASSERT_EQ(fresh.hold(body_, node), PrescribedStatus::ok);
+    ASSERT_EQ(fresh.prescribe(node, motion(node)), PrescribedStatus::ok);
   }
-  ASSERT_EQ(fresh.solve(), StepStatus::ok);
+  ASSERT_EQ(fresh.solve(), PrescribedStatus::ok);
   for (const Index node : {0, 2, 3}) {
     EXPECT_EQ(displacement(held_, node), displacement(fresh, node));
     const Vec3 expected = force(fresh, node);
@@ -222,25 +222,25 @@ TEST_P(Held, NodesKeepTheirOwnNumbers) {
 }
 
 TEST_P(Held, LetsGoOfAll) {
-  for (const Index node : {top_, corner_}) ASSERT_EQ(held_.hold(body_, node), StepStatus::ok);
-  ASSERT_EQ(held_.prescribe(top_, at(0.0, 0.0, -0.01)), StepStatus::ok);
-  ASSERT_EQ(held_.solve(), StepStatus::ok);
+  for (const Index node : {top_, corner_}) ASSERT_EQ(held_.hold(body_, node), PrescribedStatus::ok);
+  ASSERT_EQ(held_.prescribe(top_, at(0.0, 0.0, -0.01)), PrescribedStatus::ok);
+  ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
   held_.release_all();
   EXPECT_EQ(held_.count(), 0);
   EXPECT_EQ(displace(body_, held_), std::vector<double>(static_cast<std::size_t>(body_.greens().order())));
-  ASSERT_EQ(held_.hold(body_, corner_), StepStatus::ok);
+  ASSERT_EQ(held_.hold(body_, corner_), PrescribedStatus::ok);
   EXPECT_EQ(displacement(held_, corner_), Vec3::Zero());
   EXPECT_EQ(force(held_, corner_), Vec3::Zero());
 }
 
 TEST_P(Held, SaysWhatCannotBeHeld) {
-  EXPECT_EQ(held_.hold(body_, -1), StepStatus::no_such_node);
-  EXPECT_EQ(held_.hold(body_, body_.greens().nodes()), StepStatus::no_such_node);
-  EXPECT_EQ(held_.release(3), StepStatus::no_such_node);
-  EXPECT_EQ(held_.prescribe(3, Vec3::Zero()), StepStatus::no_such_node);
-  for (Index node = 0; node < 4; ++node) ASSERT_EQ(held_.hold(body_, node), StepStatus::ok);
-  EXPECT_EQ(held_.hold(body_, 5), StepStatus::capacity_full);
-  EXPECT_EQ(held_.hold(body_, 0), StepStatus::ok) << "held already";
+  EXPECT_EQ(held_.hold(body_, -1), PrescribedStatus::no_such_node);
+  EXPECT_EQ(held_.hold(body_, body_.greens().nodes()), PrescribedStatus::no_such_node);
+  EXPECT_EQ(held_.release(3), PrescribedStatus::no_such_node);
+  EXPECT_EQ(held_.prescribe(3, Vec3::Zero()), PrescribedStatus::no_such_node);
+  for (Index node = 0; node < 4; ++node) ASSERT_EQ(held_.hold(body_, node), PrescribedStatus::ok);
+  EXPECT_EQ(held_.hold(body_, 5), PrescribedStatus::full);
+  EXPECT_EQ(held_.hold(body_, 0), PrescribedStatus::ok) << "held already";
   EXPECT_EQ(held_.count(), 4);
 }
 
@@ -260,17 +260,17 @@ Model glued_model(int dimension) {
 
 TEST_P(Held, RefusesANodeThatDoesNotMoveOnItsOwn) {
   const Body body(glued_model(GetParam()));
-  HeldNodes held(body, 4);
-  ASSERT_EQ(held.hold(body, 0), StepStatus::ok);
-  ASSERT_EQ(held.prescribe(0, at(0.0, 0.0, -0.01)), StepStatus::ok);
-  ASSERT_EQ(held.solve(), StepStatus::ok);
+  PrescribedNodes held(body, 4);
+  ASSERT_EQ(held.hold(body, 0), PrescribedStatus::ok);
+  ASSERT_EQ(held.prescribe(0, at(0.0, 0.0, -0.01)), PrescribedStatus::ok);
+  ASSERT_EQ(held.solve(), PrescribedStatus::ok);
   const Vec3 alone = force(held, 0);
-  EXPECT_EQ(held.hold(body, 1), StepStatus::not_positive_definite);
+  EXPECT_EQ(held.hold(body, 1), PrescribedStatus::not_positive_definite);
   EXPECT_EQ(held.count(), 1);
   EXPECT_EQ(held.position_of(1), -1);
-  ASSERT_EQ(held.solve(), StepStatus::ok);
+  ASSERT_EQ(held.solve(), PrescribedStatus::ok);
   EXPECT_EQ(force(held, 0), alone);
-  EXPECT_EQ(held.hold(body, 2), StepStatus::ok);
+  EXPECT_EQ(held.hold(body, 2), PrescribedStatus::ok);
 }
 
 TEST_P(Held, KeepsTheLastForcesWhenTheNewOnesOverflow) {
@@ -278,28 +278,29 @@ TEST_P(Held, KeepsTheLastForcesWhenTheNewOnesOverflow) {
   stiff.greens =
       test::pack(1e-9 * test::random_definite(stiff.stored_dofs(), 1), Precision::double_precision);
   const Body body(std::move(stiff));
-  HeldNodes held(body, 4);
-  ASSERT_EQ(held.hold(body, top_), StepStatus::ok);
-  ASSERT_EQ(held.prescribe(top_, at(0.0, 0.0, -0.01)), StepStatus::ok);
-  ASSERT_EQ(held.solve(), StepStatus::ok);
+  PrescribedNodes held(body, 4);
+  ASSERT_EQ(held.hold(body, top_), PrescribedStatus::ok);
+  ASSERT_EQ(held.prescribe(top_, at(0.0, 0.0, -0.01)), PrescribedStatus::ok);
+  ASSERT_EQ(held.solve(), PrescribedStatus::ok);
   const Vec3 before = force(held, top_);
-  ASSERT_EQ(held.prescribe(top_, Vec3::Constant(-1.7e308)), StepStatus::ok);
-  EXPECT_EQ(held.solve(), StepStatus::result_not_finite);
+  ASSERT_EQ(held.prescribe(top_, Vec3::Constant(-1.7e308)), PrescribedStatus::ok);
+  EXPECT_EQ(held.solve(), PrescribedStatus::result_not_finite);
   EXPECT_EQ(force(held, top_), before);
 }
 
 TEST_P(Held, CopiesGoTheirOwnWay) {
-  ASSERT_EQ(held_.hold(body_, top_), StepStatus::ok);
-  ASSERT_EQ(held_.prescribe(top_, at(0.01, 0.0, -0.01)), StepStatus::ok);
-  HeldNodes copy = held_;
-  for (HeldNodes* held : {&held_, &copy}) {
-    ASSERT_EQ(held->hold(body_, corner_), StepStatus::ok);
-    ASSERT_EQ(held->solve(), StepStatus::ok);
+  ASSERT_EQ(held_.hold(body_, top_), PrescribedStatus::ok);
+  ASSERT_EQ(held_.prescribe(top_, at(0.01, 0.0, -0.01)), PrescribedStatus::ok);
+  PrescribedNodes copy = held_;
+  for (PrescribedNodes* held : {&held_, &copy}) {
+    ASSERT_EQ(held->hold(body_, corner_), PrescribedStatus::ok);
+    ASSERT_EQ(held->solve(), PrescribedStatus::ok);
   }
   const std::vector<double> forces(held_.forces().begin(), held_.forces().end());
   EXPECT_EQ(std::vector<double>(copy.forces().begin(), copy.forces().end()), forces);
   copy.release_all();
-  for (Index node = 0; node < 4; ++node) ASSERT_EQ(copy.hold(body_, node), StepStatus::ok) << "room for four";
+  for (Index node = 0; node < 4; ++node)
+    ASSERT_EQ(copy.hold(body_, node), PrescribedStatus::ok) << "room for four";
   EXPECT_EQ(std::vector<double>(held_.forces().begin(), held_.forces().end()), forces);
 }
 
@@ -309,12 +310,12 @@ TEST_P(Held, RestMovesTheBodyAndChangesNoForce) {
   test::set_rest(model, 0.5);
   const Body loaded(std::move(model));
   ASSERT_GT((loaded.rest_position(top_) - body_.rest_position(top_)).norm(), 0.5);
-  HeldNodes held(loaded, 4);
+  PrescribedNodes held(loaded, 4);
   for (const auto& [body, contact] : {std::pair(&body_, &held_), std::pair(&loaded, &held)}) {
-    ASSERT_EQ(contact->hold(*body, top_), StepStatus::ok);
+    ASSERT_EQ(contact->hold(*body, top_), PrescribedStatus::ok);
     EXPECT_EQ(displacement(*contact, top_), Vec3::Zero()) << "relative to rest";
-    ASSERT_EQ(contact->prescribe(top_, at(0.0, 0.0, -0.02)), StepStatus::ok);
-    ASSERT_EQ(contact->solve(), StepStatus::ok);
+    ASSERT_EQ(contact->prescribe(top_, at(0.0, 0.0, -0.02)), PrescribedStatus::ok);
+    ASSERT_EQ(contact->solve(), PrescribedStatus::ok);
   }
   EXPECT_GT(force(held, top_).norm(), 1e-3);
   EXPECT_EQ(force(held, top_), force(held_, top_));
@@ -326,12 +327,12 @@ TEST(HeldPrecision, SingleDiffersFromDoubleByItsRounding) {
   for (const bool single : {false, true}) {
     const Body body(test::unit_model(3, 4, Scope::surface,
                                      single ? Precision::single_precision : Precision::double_precision));
-    HeldNodes held(body, 8);
+    PrescribedNodes held(body, 8);
     for (Index node = 0; node < 8; ++node) {
-      ASSERT_EQ(held.hold(body, 5 * node), StepStatus::ok);
-      ASSERT_EQ(held.prescribe(5 * node, Vec3(0.0, 0.0, 0.001 * node)), StepStatus::ok);
+      ASSERT_EQ(held.hold(body, 5 * node), PrescribedStatus::ok);
+      ASSERT_EQ(held.prescribe(5 * node, Vec3(0.0, 0.0, 0.001 * node)), PrescribedStatus::ok);
     }
-    ASSERT_EQ(held.solve(), StepStatus::ok);
+    ASSERT_EQ(held.solve(), PrescribedStatus::ok);
     forces[single ? 1 : 0] = Eigen::Map<const Eigen::VectorXd>(held.forces().data(), 24);
   }
   const double difference = (forces[0] - forces[1]).norm() / forces[0].norm();
@@ -339,11 +340,11 @@ TEST(HeldPrecision, SingleDiffersFromDoubleByItsRounding) {
   EXPECT_GT(difference, 1e-12) << "both were stored in the same precision";
 }
 
-TEST(HeldNodes, RefusesToBeBuiltWithoutRoom) {
+TEST(PrescribedNodes, RefusesToBeBuiltWithoutRoom) {
   const Body body(test::unit_model(2, 2, Scope::surface, Precision::single_precision));
   for (const Index room : {0, -3}) {
     try {
-      const HeldNodes held(body, room);
+      const PrescribedNodes held(body, room);
       FAIL() << "no room was taken";
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find("room for " + std::to_string(room) + " "), std::string::npos)

@@ -1,0 +1,119 @@
+// Every tuned number of the tick in one place.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "meshes/mesh.h"
+
+namespace palpate {
+
+// Units stand in brackets; [edge] is the mean edge of the body's surface at rest, [1] a pure number. Where a
+// value was chosen by a measurement, the measurement is named; all others are not measured: they were chosen
+// by their order of magnitude, and the tests pass with them. Limits of arithmetic (rounding, denormal
+// numbers) stay beside the formulas that they belong to.
+
+/// How tools follow their devices.
+struct FollowingTuning {
+  double margin = 0.03;       ///< [edge] the surface is looked for at least this far from a tool
+  double most_motion = 0.25;  ///< [edge or radius, the larger] a tool moves in a tick
+};
+
+/// Where tools and surface touch.
+struct DetectionTuning {
+  double same_place = 1e-4;       ///< [edge] contact points nearer than this are one
+  double same_direction = 1e-6;   ///< [1] if 1 - cos of their normals is smaller as well
+  double same_held_place = 0.05;  ///< [edge] nothing else is touched nearer to a held place
+  double deepest_inside = 0.25;   ///< [edge] a tool whose core is deeper is lost in the body
+  double smooth_radius = 6.0;     ///< [edge of the simplex] a larger sphere touches corners alone: from there
+                                  ///< on the sagitta edge^2 / 6 R of its chords would be felt (CHANGELOG,
+                                  ///< "Large spheres")
+  double on_surface = 1e-6;       ///< [edge] nearer, the normal is the face's and not the distance's
+};
+
+/// The contact problem about where everything is.
+struct AssemblyTuning {
+  double closed_gap = 0.01;        ///< [edge] a contact with a smaller gap may be closed
+  double least_tilt_radius = 0.5;  ///< [edge] a sharper tool's contact slides on its face as if it were this
+  double coincident_share = 1e-9;  ///< [mean compliance] added to every contact, so that points that coincide
+                                   ///< share the force
+  double wall_share = 0.01;        ///< [compliance of the stiffest node] what a fixed boundary gives way by
+};
+
+/// Newton's passes within a tick.
+struct PassTuning {
+  int most = 3;                ///< passes in a tick
+  double penetration = 0.002;  ///< [edge] a deeper one calls for another pass
+  double most_motion = 0.25;   ///< [edge] and what the tools may move: farther, the surface retreats
+};
+
+/// The solver for contact with friction.
+struct ConeTuning {
+  double tolerance = 1e-6;  ///< [largest force] of the residual
+  double accepted = 1e-4;   ///< [largest force] where `tolerance` is not met
+  int fewest_rounds = 4;    ///< whatever they cost
+  int most_rounds = 60;
+  double most_work = 6e5;     ///< multiplications; measured: some 0.2 ms
+  double easy_share = 0.1;    ///< [most_work] less leaves time for another pass
+  int sweeps = 3;             ///< block Gauss-Seidel sweeps where Newton's step is not taken
+  int local_rounds = 3;       ///< of a sweep at a contact
+  int plain_rounds = 5;       ///< before the proximal steps
+  int spring_rounds = 12;     ///< of each proximal step
+  double first_share = 0.01;  ///< [w_ii] springs of the first proximal step
+  double next_share = 0.5;  ///< [spring before] measured with first_share: of 250 problems of a sphere and a
+                            ///< point sliding over the liver that plain rounds had not solved, these solve
+                            ///< 220, the rest to 2e-4 of the force
+};
+
+/// What the hand is given.
+struct HandTuning {
+  double usual_tick = 0.001;     ///< [s] the unit of the shares a millisecond
+  double fade_time = 20.0;       ///< [ms] in which the force of a lost contact fades
+  double memory = 0.98;          ///< [1/ms] of the recent force, the measure of a fade
+  double curvature_share = 0.1;  ///< [radius] farther, the normals turn too much for the local model
+};
+
+/// How much of the far surface a tick renews.
+struct FarTuning {
+  Index nodes = 64;          ///< of the body, whose displacement a tick renews
+  Index patch_nodes = 8;     ///< of the patch's surface
+  Index blocks = 512;        ///< pairs of loaded and renewed nodes
+  Index moves = 64;          ///< surface nodes that are moved with them
+  double tree_margin = 0.1;  ///< [edge] how much larger the tree's boxes are
+};
+
+/// The near field and the free motion.
+struct BodyTuning {
+  std::int64_t patience = 200;    ///< ticks that an unwanted node stays near: a tool often comes back
+  double settling = 0.1;          ///< [s] in which quasi-static contact stills a body
+  double least_fade = 1e-6;       ///< [1] what is held of a released body below this is forgotten
+  std::size_t least_history = 4;  ///< ticks of contact that say how fast its forces change
+  std::size_t history = 8;        ///< ticks that this velocity is taken over
+};
+
+/// Where overlays belong.
+struct PatchTuning {
+  double clearly_more = 0.1;     ///< [1] of all shares, that another node must have to become the centre
+  double near_edges = 3.0;       ///< [edge of the body's mesh] nearer, a free tool has an overlay
+  double smoothing = 0.05;       ///< [1/tick] of the tool's velocity
+  std::int64_t look_stride = 8;  ///< ticks from one look at a free tool's surroundings to the next
+  std::array<double, 4> times_ahead = {15.0, 40.0, 80.0, 150.0};  ///< [ticks] that patches are asked for
+};
+
+/// The tuned numbers of a tick.
+struct TickTuning {
+  FollowingTuning following;
+  DetectionTuning detection;
+  AssemblyTuning assembly;
+  PassTuning passes;
+  ConeTuning cone;
+  HandTuning hand;
+  FarTuning far;
+  BodyTuning body;
+  PatchTuning patches;
+};
+
+inline constexpr TickTuning tuning{};
+
+}  // namespace palpate

@@ -1,0 +1,39 @@
+#include "runtime/tick/clearance.h"
+
+#include <algorithm>
+
+#include "runtime/solve/tick_tuning.h"
+
+namespace palpate {
+namespace {
+
+/// Whether no simplex is within a distance of a tool's core, nor cut by it.
+bool keeps_distance(const Body& body, const SurfaceTree& tree, Scratch& scratch, const Tool& tool,
+                    const Core& core, double distance) noexcept {
+  const std::size_t count = tree.near_segment(core.origin, core.end, distance, scratch.found);
+  return std::all_of(
+      scratch.found.begin(), scratch.found.begin() + static_cast<std::ptrdiff_t>(count), [&](Index simplex) {
+        const NearestPoint pair = nearest_points(tree, nodes_of(body, simplex), core, tool.length == 0.0);
+        return pair.squared_distance > 0.0 && pair.squared_distance >= distance * distance;
+      });
+}
+
+}  // namespace
+
+bool is_outside(const Body& body, const SurfaceTree& tree, Scratch& scratch, const Tool& tool,
+                const ToolPose& pose) noexcept {
+  const Core core = core_of(tool, pose, body.dimension());
+  return !tree.inside(core.origin) &&
+         (tool.length == 0.0 ||
+          (!tree.inside(core.end) && keeps_distance(body, tree, scratch, tool, core, 0.0)));
+}
+
+bool is_clear(const Body& body, const SurfaceTree& tree, Scratch& scratch, const Tool& tool,
+              const ToolPose& pose) noexcept {
+  const Core core = core_of(tool, pose, body.dimension());
+  const double radius = tool.radius - tuning.detection.on_surface * body.mean_surface_edge();
+  return is_outside(body, tree, scratch, tool, pose) &&
+         (radius <= 0.0 || keeps_distance(body, tree, scratch, tool, core, radius));
+}
+
+}  // namespace palpate

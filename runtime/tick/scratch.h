@@ -1,0 +1,53 @@
+// The workspace of a tick.
+#pragma once
+
+#include <vector>
+
+#include "runtime/body/body.h"
+#include "runtime/solve/active_set.h"
+#include "runtime/solve/cone_solver.h"
+#include "runtime/solve/contact_problem.h"
+#include "runtime/tick/contact_point.h"
+#include "runtime/tick/contact_row.h"
+#include "runtime/tick/touching_pair.h"
+
+namespace palpate {
+
+/// The most that a tick has used of what has fixed room.
+struct HighWater {
+  Index near_nodes = 0;      ///< of NearField::capacity
+  Index contact_points = 0;  ///< of State::max_contacts
+  Index unknowns = 0;        ///< rows of the contact problem, of Scratch::rows
+  Index simplices = 0;       ///< near a tool, of Scratch::pairs; more were there where it is larger
+};
+
+/// What stages of a tick hand to each other and no tick needs from the one before, except that the forces of
+/// `problem` may be read until the next tick. Sized at start; nothing here is a part of the body's state.
+struct Scratch {
+  /// Room for the tools' contacts: `max_contacts` of all tools together, `near_nodes` nodes near them.
+  Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes);
+
+  //                                            shape                 filled by
+  std::vector<ContactPoint>
+      last_contacts;                   // [max_contacts]        remember_contacts: of the tick or pass before
+  Index last_count = 0;                //
+  std::vector<Index> found;            // [simplices]           detection, free motion: those near a tool
+  std::vector<double> found_distance;  // [simplices] [m^2]     detection
+  std::vector<TouchingPair> pairs;     // [2 max_contacts]      detection
+  std::vector<ContactPoint> candidates;  // [6 max_contacts tools] detection: before the deepest are chosen
+  Index candidate_count = 0;             //
+  bool is_first_pass = true;             //                       solve_contact: of the tick's Newton passes
+  ContactProblem problem;                // [rows]                assembly: W, b; solution: lambda
+  std::vector<ContactRow> rows;          // [rows]                assembly: J
+  std::vector<double> row_response;      // [d near_nodes] [m/N]  assembly: a column of Xi J^T
+  std::vector<double> tilt_spring;       // [rows] [m/N]          assembly: of edges and faces
+  ActiveSet active_set;                  //                       solution, without friction
+  ConeSolver cone_solver;                //                       solution, with friction
+  std::vector<double> row_change;        // [rows] [m]            linearise: db
+  std::vector<double> force_change;      // [rows] [N]            linearise: dlambda
+  std::vector<double>
+      far_displacement;  // [d tuning.far.nodes]  far surface: of the slice that is renewed [m]
+  HighWater high_water;  //                       detection and assembly
+};
+
+}  // namespace palpate

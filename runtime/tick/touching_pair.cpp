@@ -1,0 +1,97 @@
+#include "runtime/tick/touching_pair.h"
+
+namespace palpate {
+namespace {
+
+Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept {
+  const Vec3& a = tree.position(nodes[0]);
+  const Vec3& b = tree.position(nodes[1]);
+  Vec3 normal;
+  if (nodes[2] < 0) {
+    normal = Vec3(b.y() - a.y(), a.x() - b.x(), 0.0);
+  } else {
+    normal = (b - a).cross(tree.position(nodes[2]) - a);
+  }
+  const double length = normal.norm();
+  return length > 0.0 ? Vec3(normal / length) : Vec3::Zero();
+}
+
+NearestPoint nearest_on_simplex(const SurfaceTree& tree, const SimplexNodes& nodes,
+                                const Vec3& point) noexcept {
+  const Vec3& a = tree.position(nodes[0]);
+  const Vec3& b = tree.position(nodes[1]);
+  return nodes[2] < 0 ? nearest_on_line(point, a, b)
+                      : nearest_on_triangle(point, a, b, tree.position(nodes[2]));
+}
+
+NearestPoint nearest_to_core(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core) noexcept {
+  const Vec3& a = tree.position(nodes[0]);
+  const Vec3& b = tree.position(nodes[1]);
+  return nodes[2] < 0 ? nearest_of_segments(core.origin, core.end, a, b)
+                      : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
+}
+
+TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
+                       const NearestPoint& nearest) noexcept {
+  TouchingPair pair{.simplex = simplex, .place = place, .nearest = nearest};
+  pair.normal = outward_normal(tree, nodes);
+  const Vec3 across = nearest.on_core - nearest.on_simplex;
+  pair.height = across.dot(pair.normal);
+  pair.distance = across.norm();
+  return pair;
+}
+
+}  // namespace
+
+SimplexNodes nodes_of(const Body& body, Index simplex) noexcept {
+  const auto d = static_cast<std::size_t>(body.dimension());
+  const std::size_t at = d * static_cast<std::size_t>(simplex);
+  const std::span<const Index> simplices = body.simplices();
+  return {simplices[at], simplices[at + 1], d == 3 ? simplices[at + 2] : -1};
+}
+
+NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
+                            bool is_point) noexcept {
+  return is_point ? nearest_on_simplex(tree, nodes, core.origin) : nearest_to_core(tree, nodes, core);
+}
+
+TouchingPair pair_of_end(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
+                         int place) noexcept {
+  const SimplexNodes nodes = nodes_of(body, simplex);
+  const Vec3& end = place == 0 ? core.origin : core.end;
+  NearestPoint nearest = nearest_on_simplex(tree, nodes, end);
+  nearest.on_core = end;
+  return make_pair(tree, nodes, simplex, place, nearest);
+}
+
+TouchingPair pair_of_core(const Body& body, const SurfaceTree& tree, Index simplex,
+                          const Core& core) noexcept {
+  const SimplexNodes nodes = nodes_of(body, simplex);
+  return make_pair(tree, nodes, simplex, 2, nearest_to_core(tree, nodes, core));
+}
+
+TouchingPair pair_of_corner(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
+                            const Core& core, int place) noexcept {
+  const SimplexNodes nodes = nodes_of(body, simplex);
+  NearestPoint nearest;
+  nearest.weights[corner] = 1.0;
+  nearest.on_simplex = tree.position(nodes[corner]);
+  nearest.on_core = nearest_on_line(nearest.on_simplex, core.origin, core.end).on_simplex;
+  nearest.squared_distance = (nearest.on_core - nearest.on_simplex).squaredNorm();
+  return make_pair(tree, nodes, simplex, place, nearest);
+}
+
+TouchingPair pair_of_edge(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
+                          const Core& core) noexcept {
+  const SimplexNodes nodes = nodes_of(body, simplex);
+  const std::size_t next = (corner + 1) % 3;
+  NearestPoint nearest =
+      nearest_of_segments(core.origin, core.end, tree.position(nodes[corner]), tree.position(nodes[next]));
+  const std::array<double, 3> weights = nearest.weights;
+  nearest.weights = {};
+  nearest.weights[corner] = weights[0];
+  nearest.weights[next] = weights[1];
+  return make_pair(tree, nodes, simplex, 2, nearest);
+}
+
+}  // namespace palpate

@@ -1,0 +1,45 @@
+// A simplex of the surface and the place of a tool that is nearest to it.
+#pragma once
+
+#include "runtime/body/body.h"
+#include "runtime/solve/nearest_point.h"
+#include "runtime/solve/surface_tree.h"
+#include "runtime/tick/tool_geometry.h"
+
+namespace palpate {
+
+/// Nearest points of a tool's core and a simplex.
+struct TouchingPair {
+  Index simplex = -1;
+  int place = 0;  ///< on the core: 0 its origin, 1 its end, 2 between
+  NearestPoint nearest;
+  Vec3 normal = Vec3::Zero();  ///< of the simplex, outward, unit
+  double height = 0.0;         ///< of the core's point over the simplex's plane [m]
+  double distance = 0.0;       ///< [m]
+};
+
+/// Nodes of a simplex, the third -1 in the plane.
+using SimplexNodes = std::array<Index, 3>;
+SimplexNodes nodes_of(const Body& body, Index simplex) noexcept;
+
+/// Nearest points of a tool's core and a simplex where the tree has it; of a core that is a point, by that.
+NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
+                            bool is_point) noexcept;
+
+/// The pair of a simplex and an end of the core: 0 its origin, 1 its end.
+TouchingPair pair_of_end(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
+                         int place) noexcept;
+
+/// The pair of a simplex and the whole core.
+TouchingPair pair_of_core(const Body& body, const SurfaceTree& tree, Index simplex,
+                          const Core& core) noexcept;
+
+/// The pair of a corner of a simplex and the core.
+TouchingPair pair_of_corner(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
+                            const Core& core, int place) noexcept;
+
+/// The pair of a triangle's edge, from a corner to the next one, and the core.
+TouchingPair pair_of_edge(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
+                          const Core& core) noexcept;
+
+}  // namespace palpate
