@@ -45,7 +45,7 @@ class Layers {
   }
 
   [[nodiscard]] int count() const { return static_cast<int>(sizes_.size()); }
-  [[nodiscard]] Eigen::Index size(int layer) const { return sizes_[static_cast<std::size_t>(layer)]; }
+  [[nodiscard]] Eigen::Index size(int layer) const { return sizes_[layer]; }
   [[nodiscard]] int layer_of(Index node) const { return layer_of_[at(node)]; }  ///< < 0: none
   /// Place of a local dof in its layer, -1 when it is not free.
   [[nodiscard]] Index place_of(std::size_t dof) const { return first_dof_[dof]; }

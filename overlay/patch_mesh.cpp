@@ -35,8 +35,8 @@ std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at,
     std::vector<Index> corners;
     unsigned bits = 0;
     for (int k = 0; k < traits(kind.facet).corners; ++k) {
-      corners.push_back(nodes[side[static_cast<std::size_t>(k)]]);
-      bits |= 1U << side[static_cast<std::size_t>(k)];
+      corners.push_back(nodes[side[k]]);
+      bits |= 1U << side[k];
     }
     const auto neighbour = std::find_if(at[corners[0]].begin(), at[corners[0]].end(), [&](Index e) {
       const auto others = mesh.element_nodes(e);
@@ -56,7 +56,7 @@ std::vector<OuterSide> outer_sides(const Mesh& mesh, const ElementsAtNodes& at,
 class Builder {
  public:
   Builder(const Model& model, const ElementsAtNodes& at, Subdivisions& cuts, std::vector<Index> elements)
-      : model_(model), at_(at), cuts_(cuts), d_(static_cast<std::size_t>(model.dimension())) {
+      : model_(model), at_(at), cuts_(cuts), d_(model.dimension()) {
     patch_.elements = std::move(elements);
     patch_.local.element = model.mesh.element;
     surface_.facet = traits(model.mesh.element).facet;
@@ -79,9 +79,7 @@ class Builder {
 
  private:
   [[nodiscard]] unsigned all_axes() const { return (1U << d_) - 1; }
-  [[nodiscard]] unsigned held_axes(Index node) const {
-    return model_.fixed[static_cast<std::size_t>(node)] & all_axes();
-  }
+  [[nodiscard]] unsigned held_axes(Index node) const { return model_.fixed[node] & all_axes(); }
 
   void choose_nodes() {
     for (const Index e : patch_.elements) {
@@ -97,7 +95,7 @@ class Builder {
 
   void cut(Index e) {
     const auto nodes = model_.mesh.element_nodes(e);
-    const auto corners = nodes.first(static_cast<std::size_t>(traits(model_.mesh.element).corners));
+    const auto corners = nodes.first(traits(model_.mesh.element).corners);
     const Subdivision& parts = cuts_.of(corners);
     const std::vector<OuterSide> sides = outer_sides(model_.mesh, at_, patch_.elements, e);
     std::vector<Index> local;  // numbers of the subdivision's nodes in the local mesh
@@ -107,12 +105,11 @@ class Builder {
       for (std::size_t k = 0; k < corners.size(); ++k) bits |= node.weights[k] > 0 ? 1U << k : 0U;
       local.push_back(number);
       for (const OuterSide& side : sides) {
-        if (side.is_border && (bits & ~side.corners) == 0)
-          zero_axes_[static_cast<std::size_t>(number)] = all_axes();
+        if (side.is_border && (bits & ~side.corners) == 0) zero_axes_[number] = all_axes();
       }
     }
     const auto add = [&local](const std::vector<Index>& from, std::vector<Index>& to) {
-      for (const Index node : from) to.push_back(local[static_cast<std::size_t>(node)]);
+      for (const Index node : from) to.push_back(local[node]);
     };
     add(parts.connectivity, patch_.local.connectivity);
     const auto width = static_cast<std::size_t>(traits(model_.mesh.element).nodes);
@@ -137,8 +134,8 @@ class Builder {
       const double part = N[static_cast<Eigen::Index>(k)];
       if (std::abs(part) < no_part) continue;
       if (std::abs(part - 1.0) < no_part) coincident = nodes[k];
-      position += part * model_.mesh.nodes[static_cast<std::size_t>(nodes[k])];
-      rest += part * model_.rest_displacement[static_cast<std::size_t>(nodes[k])];
+      position += part * model_.mesh.nodes[nodes[k]];
+      rest += part * model_.rest_displacement[nodes[k]];
       zero &= held_axes(nodes[k]);
       const auto place = place_.find(nodes[k]);
       if (place != place_.end()) shape_.emplace_back(number, place->second, part);
@@ -174,8 +171,7 @@ ElementsAtNodes::ElementsAtNodes(const Mesh& mesh) : start_(mesh.nodes.size() + 
   elements_.resize(mesh.connectivity.size());
   std::vector<Index> next(start_.begin(), start_.end() - 1);
   for (Index e = 0; e < mesh.elements(); ++e) {
-    for (const Index node : mesh.element_nodes(e))
-      elements_[static_cast<std::size_t>(next[static_cast<std::size_t>(node)]++)] = e;
+    for (const Index node : mesh.element_nodes(e)) elements_[next[node]++] = e;
   }
 }
 
@@ -211,7 +207,7 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> shape_by_dofs(const Model& model, c
   std::vector<Eigen::Triplet<double>> entries;
   for (Eigen::Index node = 0; node < patch.shape.outerSize(); ++node) {
     for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(patch.shape, node); it; ++it) {
-      const auto body_node = static_cast<std::size_t>(patch.nodes[static_cast<std::size_t>(it.col())]);
+      const auto body_node = static_cast<std::size_t>(patch.nodes[it.col()]);
       for (Eigen::Index axis = 0; axis < d; ++axis) {
         if ((model.fixed[body_node] >> axis & 1) == 0)
           entries.emplace_back(d * node + axis, d * it.col() + axis, it.value());

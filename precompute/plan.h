@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "formats/packed.h"
-#include "precompute/numerics/greens.h"
+#include "precompute/numerics/greens_solver.h"
 
 namespace palpate {
 

@@ -10,7 +10,7 @@
 #include "precompute/description/description.h"
 #include "precompute/geometry/material_parts.h"
 #include "precompute/numerics/dynamics.h"
-#include "precompute/numerics/held_nodes.h"
+#include "precompute/numerics/fixed_nodes.h"
 #include "precompute/numerics/loads.h"
 #include "precompute/numerics/overlay_regions.h"
 
@@ -97,7 +97,7 @@ class Comparison {
     if (std::any_of(asked_.fixed.begin(), asked_.fixed.end(),
                     [](const Fixing& f) { return by_tag(f.where); }))
       return;
-    const HeldNodes held = hold_nodes(model_.mesh, asked_.fixed, "/model_toml");
+    const FixedNodes held = hold_nodes(model_.mesh, asked_.fixed, "/model_toml");
     same_rows("/dofs/fixed", model_.fixed, held.axes);
     std::vector<Vec3> stored = model_.rest_displacement;
     for (std::size_t node = 0; node < stored.size(); ++node)

@@ -6,7 +6,7 @@
 
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/factor.h"
-#include "precompute/numerics/modes.h"
+#include "precompute/numerics/lowest_modes.h"
 #include "precompute/verify_matrix.h"
 
 namespace palpate {

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "base/error.h"
-#include "precompute/numerics/modes.h"
+#include "precompute/numerics/lowest_modes.h"
 
 namespace palpate {
 namespace {

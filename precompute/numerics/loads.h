@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "precompute/numerics/assembly.h"
-#include "precompute/numerics/body.h"
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/meshed_body.h"
 
 namespace palpate {
 

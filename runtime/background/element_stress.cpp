@@ -11,7 +11,7 @@ StressRows element_stress(const Model& model) {
   StressMean mean(model.mesh.nodes.size());
   std::vector<StressBlock> blocks;
   for (Index e = 0; e < model.mesh.elements(); ++e) {
-    const auto material = static_cast<std::size_t>(model.material_of_element[static_cast<std::size_t>(e)]);
+    const auto material = static_cast<std::size_t>(model.material_of_element[e]);
     const HookesLaw& law = laws[material];
     const ElementNodes x = element_nodes(model.mesh, e);
     const std::span<const Index> nodes = model.mesh.element_nodes(e);

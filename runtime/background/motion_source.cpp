@@ -22,7 +22,7 @@ MotionSource::MotionSource(const Body& body, const State& state, const MotionSou
       in_background_(options.in_background),
       jobs_(state.surface.motion.job()),
       samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.greens().order()))}),
-      f_(static_cast<std::size_t>(body.greens().order())),
+      f_(body.greens().order()),
       u_(f_.size()),
       v_(f_.size()) {
   newmark_.predict();  // reads the matrix once

@@ -37,7 +37,7 @@ void PatchWishes::add(const PatchKey& key) noexcept {
 PatchChoice::PatchChoice(const Body& body, const State& state)
     : reach_(tuning.patches.near_edges * body.mean_surface_edge() * body.refinement()),
       tools_(state.tools.size()),
-      touched_(static_cast<std::size_t>(3 * body.most_surface_parts() * state.max_contacts())),
+      touched_(3 * body.most_surface_parts() * state.max_contacts()),
       share_(touched_.size()) {}
 
 /// Gives the nodes of the body that a surface node follows their parts of a share.

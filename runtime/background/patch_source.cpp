@@ -85,26 +85,25 @@ void PatchSource::count(const State& state) noexcept {
 void PatchSource::receive() noexcept {
   Delivery delivery;
   while (deliveries_.pop(delivery)) {
-    Delivery& slot = slots_[static_cast<std::size_t>(delivery.slot)];
+    Delivery& slot = slots_[delivery.slot];
     if (slot.patch != nullptr) unlink(delivery.slot);
     slot = std::move(delivery);
     if (slot.patch == nullptr) continue;
-    Index& first = first_slot_[static_cast<std::size_t>(slot.key.centres[0])];
-    next_slot_[static_cast<std::size_t>(slot.slot)] = first;
+    Index& first = first_slot_[slot.key.centres[0]];
+    next_slot_[slot.slot] = first;
     first = slot.slot;
   }
 }
 
 void PatchSource::unlink(Index slot) noexcept {
-  Index* link = &first_slot_[static_cast<std::size_t>(slots_[static_cast<std::size_t>(slot)].key.centres[0])];
-  while (*link != slot) link = &next_slot_[static_cast<std::size_t>(*link)];
-  *link = next_slot_[static_cast<std::size_t>(slot)];
+  Index* link = &first_slot_[slots_[slot].key.centres[0]];
+  while (*link != slot) link = &next_slot_[*link];
+  *link = next_slot_[slot];
 }
 
 const std::shared_ptr<const Patch>* PatchSource::find(const PatchKey& key) const noexcept {
-  for (Index slot = first_slot_[static_cast<std::size_t>(key.centres[0])]; slot >= 0;
-       slot = next_slot_[static_cast<std::size_t>(slot)]) {
-    const Delivery& at = slots_[static_cast<std::size_t>(slot)];
+  for (Index slot = first_slot_[key.centres[0]]; slot >= 0; slot = next_slot_[slot]) {
+    const Delivery& at = slots_[slot];
     if (at.key == key) return &at.patch;
   }
   return nullptr;

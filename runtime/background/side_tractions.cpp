@@ -215,9 +215,7 @@ SideTractions::SideTractions(const SurfaceSides& sides, std::span<const double> 
 
 Vec3 SideTractions::at(Index place, std::span<const Vec3> force) const noexcept {
   Vec3 traction = Vec3::Zero();
-  for_each(place, [&](Index node, const Mat3& by_force) {
-    traction.noalias() += by_force * force[static_cast<std::size_t>(node)];
-  });
+  for_each(place, [&](Index node, const Mat3& by_force) { traction.noalias() += by_force * force[node]; });
   return traction;
 }
 

@@ -25,15 +25,11 @@ class SurfaceSides {
   [[nodiscard]] std::span<const Index> facet_nodes() const noexcept { return facet_nodes_; }
   /// [F x width] place of each node of each facet.
   [[nodiscard]] std::span<const Index> places_of_facets() const noexcept { return place_; }
-  [[nodiscard]] Index node(Index place) const noexcept { return node_[static_cast<std::size_t>(place)]; }
+  [[nodiscard]] Index node(Index place) const noexcept { return node_[place]; }
   /// Whether several sides meet at a node.
-  [[nodiscard]] bool is_creased(Index node) const noexcept {
-    return is_creased_[static_cast<std::size_t>(node)] != 0;
-  }
+  [[nodiscard]] bool is_creased(Index node) const noexcept { return is_creased_[node] != 0; }
   /// Mean of the facets' normals at a place, unit.
-  [[nodiscard]] const Vec3& normal(Index place) const noexcept {
-    return normal_[static_cast<std::size_t>(place)];
-  }
+  [[nodiscard]] const Vec3& normal(Index place) const noexcept { return normal_[place]; }
 
  private:
   std::size_t width_;
@@ -72,7 +68,7 @@ class SideTractions {
 
  private:
   [[nodiscard]] double inverse_area(Index place) const noexcept {
-    const double area = area_[static_cast<std::size_t>(place)];
+    const double area = area_[place];
     return area > 0.0 ? 1.0 / area : 0.0;
   }
 

@@ -62,7 +62,7 @@ void StressRows::apply(std::span<const Vec3> u, std::span<Stress> stress) const 
     for (int i = 0; i < 6; ++i) sum[i] = constant[row][i];
     for (auto k = static_cast<std::size_t>(first[row]); k < static_cast<std::size_t>(first[row + 1]); ++k) {
       const double* b = block.data() + 18 * k;
-      const double* v = u[static_cast<std::size_t>(node[k])].data();
+      const double* v = u[node[k]].data();
 #pragma omp simd
       for (int i = 0; i < 6; ++i) sum[i] += b[i] * v[0] + b[6 + i] * v[1] + b[12 + i] * v[2];
     }
@@ -72,7 +72,7 @@ void StressRows::apply(std::span<const Vec3> u, std::span<Stress> stress) const 
 
 void StressMean::add(Index row, double weight, std::span<const Index> nodes,
                      std::span<const StressBlock> by_nodes, const Stress& constant) {
-  Row& to = rows_[static_cast<std::size_t>(row)];
+  Row& to = rows_[row];
   to.weight += weight;
   to.constant += weight * constant;
   for (std::size_t j = 0; j < nodes.size(); ++j) {

@@ -33,7 +33,7 @@ std::uint8_t held_axes(const Body& body, std::size_t node) {
   unsigned held = (1U << body.dimension()) - 1U;
   for (auto k = static_cast<std::size_t>(fine.first[node]);
        k < static_cast<std::size_t>(fine.first[node + 1]); ++k)
-    held &= body.model().fixed[static_cast<std::size_t>(fine.parents[k])];
+    held &= body.model().fixed[fine.parents[k]];
   return static_cast<std::uint8_t>(held);
 }
 
@@ -50,7 +50,7 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
                  .touches = std::vector<Touch>(state.contact_points.size()),
                  .forces = std::vector<NodalForce>(static_cast<std::size_t>(state.surface.near.capacity()))}),
       rest_(body.surface_in_mesh()),
-      stored_(static_cast<std::size_t>(body.greens().order())),
+      stored_(body.greens().order()),
       u_(rest_.size()),
       stress_(body),
       force_(rest_.size(), Vec3::Zero()),
@@ -144,9 +144,9 @@ void SurfaceFrames::compute(const Moment& moment) {
 
 void SurfaceFrames::show_stress(const Moment& moment, SurfaceFrame& frame) {
   const std::span<const NodalForce> forces(moment.forces.data(), moment.force_count);
-  for (const NodalForce& loaded : forces) force_[static_cast<std::size_t>(loaded.node)] = loaded.force;
+  for (const NodalForce& loaded : forces) force_[loaded.node] = loaded.force;
   stress_.evaluate(u_, force_, moment.load.patch.get(), nodal_stress_);
-  for (const NodalForce& loaded : forces) force_[static_cast<std::size_t>(loaded.node)].setZero();
+  for (const NodalForce& loaded : forces) force_[loaded.node].setZero();
   frame.von_mises.reserve(nodal_stress_.size());
   for (const Stress& stress : nodal_stress_) frame.von_mises.push_back(static_cast<float>(von_mises(stress)));
 }

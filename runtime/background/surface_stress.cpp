@@ -14,7 +14,7 @@ namespace palpate {
 namespace {
 
 unsigned held_axes(const Model& model, Index mesh_node) {
-  return model.fixed[static_cast<std::size_t>(mesh_node)] & ((1U << model.dimension()) - 1U);
+  return model.fixed[mesh_node] & ((1U << model.dimension()) - 1U);
 }
 
 /// Normal and gradients of a facet at a point.
@@ -76,8 +76,7 @@ struct FacetLaw {
 template <class T, class At>
 void spread_middles(std::span<const Index> nodes, std::vector<std::uint8_t>& done, const At& at) {
   for (std::size_t k = 3; k < nodes.size(); ++k) {
-    if (!done.empty() && std::exchange(done[static_cast<std::size_t>(nodes[k])], std::uint8_t{1}) != 0)
-      continue;
+    if (!done.empty() && std::exchange(done[nodes[k]], std::uint8_t{1}) != 0) continue;
     T& middle = at(k);
     const T part = 0.125 * middle;
     middle -= 2.0 * part;
@@ -93,7 +92,7 @@ SurfaceStress::SurfaceStress(const Body& body)
       position_(body.surface_in_mesh()),
       facet_type_(traits(body.model().mesh.element).facet),
       body_force_(body.surface_mesh_nodes().size()),
-      in_patch_(static_cast<std::size_t>(body.model().mesh.elements())),
+      in_patch_(body.model().mesh.elements()),
       on_patch_(position_.size()),
       weight_(position_.size()) {
   for (const Material& material : body.model().materials) laws_.emplace_back(material, body.model().analysis);
@@ -106,9 +105,8 @@ SurfaceStress::SurfaceStress(const Body& body)
 
 SurfaceStress::Facet SurfaceStress::facet(std::size_t number) const noexcept {
   const auto width = static_cast<std::size_t>(traits(facet_type_).nodes);
-  const Index material = body_.model().material_of_element[static_cast<std::size_t>(element_[number])];
-  return {facet_type_, std::span(facet_nodes_).subspan(width * number, width),
-          &laws_[static_cast<std::size_t>(material)]};
+  const Index material = body_.model().material_of_element[element_[number]];
+  return {facet_type_, std::span(facet_nodes_).subspan(width * number, width), &laws_[material]};
 }
 
 SurfaceStress::Facet SurfaceStress::simplex(std::size_t number, std::size_t of) const noexcept {
@@ -120,7 +118,7 @@ SurfaceStress::Facet SurfaceStress::simplex(std::size_t number, std::size_t of) 
 ElementNodes SurfaceStress::positions_of(std::span<const Index> nodes) const noexcept {
   ElementNodes x(static_cast<Eigen::Index>(nodes.size()), 3);
   for (std::size_t k = 0; k < nodes.size(); ++k)
-    x.row(static_cast<Eigen::Index>(k)) = position_[static_cast<std::size_t>(nodes[k])].transpose();
+    x.row(static_cast<Eigen::Index>(k)) = position_[nodes[k]].transpose();
   return x;
 }
 
@@ -128,18 +126,17 @@ void SurfaceStress::number_facets() {
   const Model& model = body_.model();
   std::vector<Index> number(model.mesh.nodes.size(), -1);
   for (std::size_t k = 0; k < body_nodes(); ++k)
-    number[static_cast<std::size_t>(body_.surface_mesh_nodes()[k])] = static_cast<Index>(k);
+    number[body_.surface_mesh_nodes()[k]] = static_cast<Index>(k);
   for (const ElementSide& side : boundary_sides(model.mesh)) {
     unsigned held = ~0U;
     for (const Index node : side_nodes(model.mesh, side)) {
-      facet_nodes_.push_back(number[static_cast<std::size_t>(node)]);
+      facet_nodes_.push_back(number[node]);
       held &= held_axes(model, node);
     }
     element_.push_back(side.element);
     known_.push_back(held == 0 ? 1 : 0);
   }
-  for (const Index parent : body_.fine_surface().parents)
-    parents_.push_back(number[static_cast<std::size_t>(parent)]);
+  for (const Index parent : body_.fine_surface().parents) parents_.push_back(number[parent]);
   simplices_of_facet_ = body_.surface_friction().size() / facets();
 }
 
@@ -167,8 +164,7 @@ std::vector<double> SurfaceStress::simplex_areas(std::span<const Index> simplice
 void SurfaceStress::measure() {
   const std::vector<double> areas = simplex_areas(body_.simplices());
   area_.assign(position_.size(), 0.0);
-  for (std::size_t k = 0; k < areas.size(); ++k)
-    area_[static_cast<std::size_t>(body_.simplices()[k])] += areas[k];
+  for (std::size_t k = 0; k < areas.size(); ++k) area_[body_.simplices()[k]] += areas[k];
   std::vector<Vec3> normals;
   for (std::size_t f = 0; f < facets(); ++f) normals.push_back(normal_of(facet(f)));
   sides_.emplace(body_nodes(), facet_nodes_, normals);
@@ -183,7 +179,7 @@ std::vector<Vec3> SurfaceStress::nodal_forces_of_loads() const {
   std::vector<Vec3> force = model.rest_force;
   std::vector<double> mass(force.size());
   for (Index e = 0; e < model.mesh.elements(); ++e) {
-    const auto number = static_cast<std::size_t>(model.material_of_element[static_cast<std::size_t>(e)]);
+    const auto number = static_cast<std::size_t>(model.material_of_element[e]);
     const Material& material = model.materials[number];
     const ElementNodes x = element_nodes(model.mesh, e);
     const ElementVector f =
@@ -191,12 +187,12 @@ std::vector<Vec3> SurfaceStress::nodal_forces_of_loads() const {
     const ShapeValues shares = element_shape_integrals(type, x, model.thickness);
     Eigen::Index k = 0;
     for (const Index node : model.mesh.element_nodes(e)) {
-      force[static_cast<std::size_t>(node)].head(d) -= f.segment(d * k, d);
-      mass[static_cast<std::size_t>(node)] += material.density * shares[k++];
+      force[node].head(d) -= f.segment(d * k, d);
+      mass[node] += material.density * shares[k++];
     }
   }
   std::vector<std::uint8_t> is_inside(force.size(), 1);
-  for (const Index node : body_.surface_mesh_nodes()) is_inside[static_cast<std::size_t>(node)] = 0;
+  for (const Index node : body_.surface_mesh_nodes()) is_inside[node] = 0;
   Vec3 weight = Vec3::Zero();
   double inside = 0.0;
   for (std::size_t node = 0; node < force.size(); ++node) {
@@ -207,8 +203,7 @@ std::vector<Vec3> SurfaceStress::nodal_forces_of_loads() const {
   const Vec3 acceleration = inside > 0.0 ? Vec3(weight / inside) : Vec3(Vec3::Zero());
   std::vector<Vec3> of_surface;
   for (const Index node : body_.surface_mesh_nodes())
-    of_surface.push_back(force[static_cast<std::size_t>(node)] -
-                         mass[static_cast<std::size_t>(node)] * acceleration);
+    of_surface.push_back(force[node] - mass[node] * acceleration);
   return of_surface;
 }
 
@@ -224,9 +219,7 @@ void SurfaceStress::find_traction_of_loads() {
     if (facet.type == ElementType::tri6 && known_[f] != 0) {
       spread_middles<double>(facet.nodes, none,
                              [&](std::size_t k) -> double& { return shares[static_cast<Eigen::Index>(k)]; });
-      spread_middles<Vec3>(facet.nodes, done, [&](std::size_t k) -> Vec3& {
-        return force[static_cast<std::size_t>(facet.nodes[k])];
-      });
+      spread_middles<Vec3>(facet.nodes, done, [&](std::size_t k) -> Vec3& { return force[facet.nodes[k]]; });
     }
     areas.insert(areas.end(), shares.begin(), shares.end());
   }
@@ -250,7 +243,7 @@ void SurfaceStress::refine_sides() {
   const std::size_t width = sides_->width();
   for (std::size_t k = 0; k < simplices.size(); ++k) {
     const auto node = static_cast<std::size_t>(simplices[k]);
-    Vec3& traction = fine_load_traction_[static_cast<std::size_t>(fine_sides_->places_of_facets()[k])];
+    Vec3& traction = fine_load_traction_[fine_sides_->places_of_facets()[k]];
     traction.setZero();  // each simplex of a side says the same
     const std::size_t of_facet = width * (k / (d * simplices_of_facet_));
     const auto nodes = std::span(facet_nodes_).subspan(of_facet, width);
@@ -260,7 +253,7 @@ void SurfaceStress::refine_sides() {
       if (found == nodes.end()) continue;
       const Index place =
           sides_->places_of_facets()[of_facet + static_cast<std::size_t>(found - nodes.begin())];
-      traction += fine.weights[j] * load_traction_[static_cast<std::size_t>(place)];
+      traction += fine.weights[j] * load_traction_[place];
     }
   }
 }
@@ -301,14 +294,12 @@ void SurfaceStress::make_rows() {
             law.by_displacement(tangent.gradients.row(static_cast<Eigen::Index>(j)).transpose()));
       const Index node = facet.nodes[p];
       const Index place = sides_->places_of_facets()[width * f + p];
-      mean.add(node, area, facet.nodes, blocks,
-               law.constant() + law.by_traction() * load_traction_[static_cast<std::size_t>(place)]);
+      mean.add(node, area, facet.nodes, blocks, law.constant() + law.by_traction() * load_traction_[place]);
       tractions.for_each(place, [&](Index of, const Mat3& matrix) {
-        const auto [found, is_new] =
-            by_force[static_cast<std::size_t>(of)].emplace(node, StressBlock::Zero());
+        const auto [found, is_new] = by_force[of].emplace(node, StressBlock::Zero());
         found->second += area * law.by_traction() * matrix;
       });
-      weight[static_cast<std::size_t>(node)] += area;
+      weight[node] += area;
     }
   }
   rows_ = mean.rows();
@@ -316,7 +307,7 @@ void SurfaceStress::make_rows() {
   for (const std::map<Index, StressBlock>& of_node : by_force) {
     for (const auto& [row, block] : of_node) {
       row_of_force_.push_back(row);
-      by_force_.emplace_back(block / weight[static_cast<std::size_t>(row)]);
+      by_force_.emplace_back(block / weight[row]);
     }
     first_of_force_.push_back(row_of_force_.size());
   }
@@ -331,26 +322,26 @@ void SurfaceStress::evaluate(std::span<const Vec3> u, std::span<const Vec3> cont
     if (contact_force[node].isZero(0.0)) continue;
     for (auto k = static_cast<std::size_t>(fine.first[node]);
          k < static_cast<std::size_t>(fine.first[node + 1]); ++k)
-      body_force_[static_cast<std::size_t>(parents_[k])] += fine.weights[k] * contact_force[node];
+      body_force_[parents_[k]] += fine.weights[k] * contact_force[node];
   }
   rows_.apply(u, stress);
   for (std::size_t node = 0; node < nodes; ++node) {
     if (body_force_[node].isZero(0.0)) continue;
     for (std::size_t k = first_of_force_[node]; k < first_of_force_[node + 1]; ++k)
-      stress[static_cast<std::size_t>(row_of_force_[k])].noalias() += by_force_[k] * body_force_[node];
+      stress[row_of_force_[k]].noalias() += by_force_[k] * body_force_[node];
   }
   for (std::size_t node = nodes; node < position_.size(); ++node) {
     stress[node].setZero();
     for (auto k = static_cast<std::size_t>(fine.first[node]);
          k < static_cast<std::size_t>(fine.first[node + 1]); ++k)
-      stress[node] += fine.weights[k] * stress[static_cast<std::size_t>(parents_[k])];
+      stress[node] += fine.weights[k] * stress[parents_[k]];
   }
   if (patch != nullptr) evaluate_patch(u, contact_force, *patch, stress);
 }
 
 void SurfaceStress::evaluate_patch(std::span<const Vec3> u, std::span<const Vec3> contact_force,
                                    const Patch& patch, std::span<Stress> stress) noexcept {
-  for (const Index element : patch.elements()) in_patch_[static_cast<std::size_t>(element)] = 1;
+  for (const Index element : patch.elements()) in_patch_[element] = 1;
   for (const Index node : patch.surface_nodes()) {
     const auto at = static_cast<std::size_t>(node);
     on_patch_[at] = 1;
@@ -359,7 +350,7 @@ void SurfaceStress::evaluate_patch(std::span<const Vec3> u, std::span<const Vec3
   }
   for (std::size_t f = 0; f < facets(); ++f) {
     if (known_[f] == 0) continue;
-    if (in_patch_[static_cast<std::size_t>(element_[f])] == 0) {
+    if (in_patch_[element_[f]] == 0) {
       const Facet facet = this->facet(f);
       add(
           facet, [&](std::size_t p) { return place_on_patch(f, facet.nodes[p]); }, u, contact_force, stress);
@@ -377,7 +368,7 @@ void SurfaceStress::evaluate_patch(std::span<const Vec3> u, std::span<const Vec3
     on_patch_[at] = 0;
     stress[at] /= weight_[at];  // 0 / 0 where no facet counts
   }
-  for (const Index element : patch.elements()) in_patch_[static_cast<std::size_t>(element)] = 0;
+  for (const Index element : patch.elements()) in_patch_[element] = 0;
 }
 
 /// Place among the values of the patch of a node of a facet on the refined surface.
@@ -394,7 +385,7 @@ std::size_t SurfaceStress::place_on_patch(std::size_t facet, Index node) const n
 template <class PlaceOf>
 void SurfaceStress::add(const Facet& facet, const PlaceOf& place_of, std::span<const Vec3> u,
                         std::span<const Vec3> contact_force, std::span<Stress> sum) noexcept {
-  const auto on_patch = [&](Index node) { return on_patch_[static_cast<std::size_t>(node)] != 0; };
+  const auto on_patch = [&](Index node) { return on_patch_[node] != 0; };
   if (std::none_of(facet.nodes.begin(), facet.nodes.end(), on_patch)) return;
   const ElementNodes x = positions_of(facet.nodes);
   double area = 0.0;
@@ -408,7 +399,7 @@ void SurfaceStress::add(const Facet& facet, const PlaceOf& place_of, std::span<c
     Stress here = law.constant();
     for (std::size_t j = 0; j < facet.nodes.size(); ++j)
       here.noalias() += law.by_displacement(tangent.gradients.row(static_cast<Eigen::Index>(j)).transpose()) *
-                        u[static_cast<std::size_t>(facet.nodes[j])];
+                        u[facet.nodes[j]];
     const std::size_t place = place_of(p);
     here.noalias() += law.by_traction() * (fine_load_traction_[place] +
                                            fine_tractions_->at(static_cast<Index>(place), contact_force));

@@ -101,15 +101,15 @@ Body::Body(Model model, const GreensOptions& options, int refinement, ContactMod
   }
   stored_of_mesh_.assign(model_.mesh.nodes.size(), -1);
   for (std::size_t k = 0; k < model_.stored_nodes.size(); ++k) {
-    stored_of_mesh_[static_cast<std::size_t>(model_.stored_nodes[k])] = static_cast<Index>(k);
+    stored_of_mesh_[model_.stored_nodes[k]] = static_cast<Index>(k);
   }
   fine_ = refinement_ > 1 ? make_fine_surface(model_, refinement_) : surface_as_it_is(model_);
   order_by_last_part();
   find_free_nodes();
   follow_body();
   for (const Index element : fine_.element) {
-    const Index material = model_.material_of_element[static_cast<std::size_t>(element)];
-    surface_friction_.push_back(model_.materials[static_cast<std::size_t>(material)].friction);
+    const Index material = model_.material_of_element[element];
+    surface_friction_.push_back(model_.materials[material].friction);
   }
   measure_surface();
 }
@@ -123,13 +123,11 @@ void Body::order_by_last_part() {
     Index& most = last.emplace_back(-1);
     for (auto k = static_cast<std::size_t>(fine_.first[node]);
          k < static_cast<std::size_t>(fine_.first[node + 1]); ++k)
-      most = std::max(most, stored_of_mesh_[static_cast<std::size_t>(fine_.parents[k])]);
+      most = std::max(most, stored_of_mesh_[fine_.parents[k]]);
   }
   std::vector<Index> order(last.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
-    return last[static_cast<std::size_t>(a)] < last[static_cast<std::size_t>(b)];
-  });
+  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return last[a] < last[b]; });
   reorder(fine_, order);
 }
 
@@ -139,7 +137,7 @@ void Body::find_free_nodes() {
     const auto node = static_cast<std::size_t>(fine_.mesh_nodes[k]);
     const Index stored = stored_of_mesh_[node];
     surface_stored_nodes_.push_back(stored);
-    if (stored >= 0) surface_node_of_stored_[static_cast<std::size_t>(stored)] = static_cast<Index>(k);
+    if (stored >= 0) surface_node_of_stored_[stored] = static_cast<Index>(k);
     if (stored < 0 || model_.fixed[node] != 0) continue;
     const Vec3 rest = rest_position(stored);
     surface_.push_back(stored);
@@ -163,8 +161,8 @@ void Body::follow_body() {
     Vec3 rest = Vec3::Zero();
     std::vector<std::pair<Index, double>> parts;
     for (Index k = fine_.first[at]; k < fine_.first[at + 1]; ++k) {
-      const auto parent = static_cast<std::size_t>(fine_.parents[static_cast<std::size_t>(k)]);
-      const double weight = fine_.weights[static_cast<std::size_t>(k)];
+      const auto parent = static_cast<std::size_t>(fine_.parents[k]);
+      const double weight = fine_.weights[k];
       rest += weight * (model_.mesh.nodes[parent] + model_.rest_displacement[parent]);
       if (stored_of_mesh_[parent] >= 0) parts.emplace_back(stored_of_mesh_[parent], weight);
     }
@@ -183,12 +181,12 @@ void Body::follow_body() {
     if (stored >= 0) ++first_follower_[static_cast<std::size_t>(stored) + 1];
   }
   std::partial_sum(first_follower_.begin(), first_follower_.end(), first_follower_.begin());
-  followers_.resize(static_cast<std::size_t>(first_follower_.back()));
+  followers_.resize(first_follower_.back());
   std::vector<Index> next(first_follower_.begin(), first_follower_.end() - 1);
   for (std::size_t node = 0; node < last_part.size(); ++node) {
     if (last_part[node] < 0) continue;
-    Index& place = next[static_cast<std::size_t>(last_part[node])];
-    followers_[static_cast<std::size_t>(place++)] = static_cast<Index>(node);
+    Index& place = next[last_part[node]];
+    followers_[place++] = static_cast<Index>(node);
   }
 }
 
@@ -197,7 +195,7 @@ std::vector<Vec3> Body::surface_in_mesh() const {
   for (std::size_t node = 0; node < positions.size(); ++node) {
     for (auto k = static_cast<std::size_t>(fine_.first[node]);
          k < static_cast<std::size_t>(fine_.first[node + 1]); ++k) {
-      positions[node] += fine_.weights[k] * model_.mesh.nodes[static_cast<std::size_t>(fine_.parents[k])];
+      positions[node] += fine_.weights[k] * model_.mesh.nodes[fine_.parents[k]];
     }
   }
   return positions;

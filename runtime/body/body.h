@@ -54,13 +54,9 @@ class Body {
   [[nodiscard]] int dimension() const noexcept { return greens_.dimension(); }
 
   /// Stored node of a mesh node, -1 when it is held along every axis or not kept.
-  [[nodiscard]] Index stored_node(Index mesh_node) const noexcept {
-    return stored_of_mesh_[static_cast<std::size_t>(mesh_node)];
-  }
+  [[nodiscard]] Index stored_node(Index mesh_node) const noexcept { return stored_of_mesh_[mesh_node]; }
   /// Mesh node of a stored node.
-  [[nodiscard]] Index mesh_node(Index stored) const noexcept {
-    return model_.stored_nodes[static_cast<std::size_t>(stored)];
-  }
+  [[nodiscard]] Index mesh_node(Index stored) const noexcept { return model_.stored_nodes[stored]; }
   /// Position of a stored node as the body rests under its loads, without a tool: node + u0 [m].
   [[nodiscard]] Vec3 rest_position(Index stored) const noexcept {
     const auto node = static_cast<std::size_t>(mesh_node(stored));
@@ -94,7 +90,7 @@ class Body {
   [[nodiscard]] std::span<const Index> surface_stored_nodes() const noexcept { return surface_stored_nodes_; }
   /// How a surface node moves with the body's.
   [[nodiscard]] SurfaceParts surface_parts(Index node) const noexcept {
-    const auto first = static_cast<std::size_t>(first_part_[static_cast<std::size_t>(node)]);
+    const auto first = static_cast<std::size_t>(first_part_[node]);
     const auto count = static_cast<std::size_t>(first_part_[static_cast<std::size_t>(node) + 1]) - first;
     return {{part_stored_.data() + first, count}, {part_weight_.data() + first, count}};
   }
@@ -104,7 +100,7 @@ class Body {
   [[nodiscard]] Index most_surface_parts() const noexcept { return most_surface_parts_; }
   /// Surface nodes whose last part is a stored node: with it, all that they follow are known.
   [[nodiscard]] std::span<const Index> followers(Index stored) const noexcept {
-    const auto first = static_cast<std::size_t>(first_follower_[static_cast<std::size_t>(stored)]);
+    const auto first = static_cast<std::size_t>(first_follower_[stored]);
     const auto end = static_cast<std::size_t>(first_follower_[static_cast<std::size_t>(stored) + 1]);
     return {followers_.data() + first, end - first};
   }
@@ -112,7 +108,7 @@ class Body {
   [[nodiscard]] const FineSurface& fine_surface() const noexcept { return fine_; }
   /// Surface node of a stored node, -1 when it is inside the body.
   [[nodiscard]] Index surface_node_of_stored(Index stored) const noexcept {
-    return surface_node_of_stored_[static_cast<std::size_t>(stored)];
+    return surface_node_of_stored_[stored];
   }
   /// [S] where each rests [m].
   [[nodiscard]] std::span<const Vec3> surface_rest_positions() const noexcept { return surface_rest_; }

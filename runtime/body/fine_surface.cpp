@@ -30,10 +30,10 @@ class Builder {
     std::vector<Index> elements;  // of each facet
     for (const ElementSide& side : boundary_sides(mesh_)) {
       const auto nodes = mesh_.element_nodes(side.element);
-      const auto corners = nodes.first(static_cast<std::size_t>(traits(mesh_.element).corners));
+      const auto corners = nodes.first(traits(mesh_.element).corners);
       const Subdivision& parts = cuts_.of(corners);
       for (const Index node : parts.sides[side.side])
-        surface.facets.push_back(number_of(parts.nodes[static_cast<std::size_t>(node)], corners, nodes));
+        surface.facets.push_back(number_of(parts.nodes[node], corners, nodes));
       elements.resize(static_cast<std::size_t>(surface.count()), side.element);
     }
     result_.simplices = surface_simplices(surface);
@@ -103,8 +103,8 @@ void reorder(FineSurface& surface, std::span<const Index> order) {
     }
     surface.first.push_back(static_cast<Index>(surface.parents.size()));
   }
-  for (Index& node : surface.simplices) node = number[static_cast<std::size_t>(node)];
-  for (auto& [key, node] : surface.number) node = number[static_cast<std::size_t>(node)];
+  for (Index& node : surface.simplices) node = number[node];
+  for (auto& [key, node] : surface.number) node = number[node];
 }
 
 FineSurface make_fine_surface(const Model& model, int r) {

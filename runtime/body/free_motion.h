@@ -70,9 +70,7 @@ class FreeMotion {
   /// Displacement of a surface node in this tick [m].
   [[nodiscard]] Vec3 at(const Body& body, Index surface_node) noexcept;
   /// By how much more it is than in the tick before, as far as that is known [m]; after `at`.
-  [[nodiscard]] const Vec3& change(Index surface_node) const noexcept {
-    return change_[static_cast<std::size_t>(surface_node)];
-  }
+  [[nodiscard]] const Vec3& change(Index surface_node) const noexcept { return change_[surface_node]; }
   /// Displacement of a stored node in this tick [m].
   [[nodiscard]] Vec3 displacement(const Body& body, Index stored) const noexcept;
   /// All of it in this tick.

@@ -262,7 +262,7 @@ void Greens::add_modes(const Modes& modes, std::span<const double> weights) {
     std::copy_n(right_.get() + dof * terms_, terms_, to_right);
     const double* row = modes.row(dof);
     std::copy_n(row, k, to_right + terms_);
-    for (std::int64_t i = 0; i < k; ++i) to_left[terms_ + i] = weights[static_cast<std::size_t>(i)] * row[i];
+    for (std::int64_t i = 0; i < k; ++i) to_left[terms_ + i] = weights[i] * row[i];
   }
   terms_ = terms;
   left_ = left;

@@ -27,8 +27,8 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       place_in_patch_(place_.size(), -1),
       nodes_(at(capacity), -1),
       wanted_(at(capacity), 0),
-      C_(static_cast<std::size_t>(stride_ * dimension_ * capacity)),
-      force_(static_cast<std::size_t>(dimension_ * capacity)),
+      C_(stride_ * dimension_ * capacity),
+      force_(dimension_ * capacity),
       last_force_(force_.size()),
       displacement_(force_.size()),
       blocks_(static_cast<std::size_t>(dimension_) * force_.size()),
@@ -43,7 +43,7 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       base_force_(static_cast<std::size_t>(dimension_) * base_.size()),
       X_(force_.size() * static_cast<std::size_t>(patch_stride_)),
       Y_(X_.size()),
-      patch_force_(static_cast<std::size_t>(patch_stride_)),
+      patch_force_(patch_stride_),
       load_(dimension_, capacity, static_cast<Index>(base_.size()), patch_nodes) {}
 
 bool NearField::is_loaded(Index place) const noexcept {
@@ -54,9 +54,9 @@ bool NearField::is_loaded(Index place) const noexcept {
 Index NearField::longest_unwanted() const noexcept {
   Index found = -1;
   for (Index place = 0; place < count_; ++place) {
-    const std::int64_t wanted = wanted_[static_cast<std::size_t>(place)];
+    const std::int64_t wanted = wanted_[place];
     if (wanted == tick_ || is_loaded(place)) continue;
-    if (found < 0 || wanted < wanted_[static_cast<std::size_t>(found)]) found = place;
+    if (found < 0 || wanted < wanted_[found]) found = place;
   }
   return found;
 }
@@ -65,7 +65,7 @@ void NearField::begin_tick() noexcept {
   ++tick_;
   for (int k = 0; k < 2; ++k) {
     const Index place = longest_unwanted();
-    if (place < 0 || wanted_[static_cast<std::size_t>(place)] + tuning.body.patience >= tick_) return;
+    if (place < 0 || wanted_[place] + tuning.body.patience >= tick_) return;
     forget(place);
   }
 }
@@ -79,7 +79,7 @@ bool NearField::want(const Body& body, Index surface_node) noexcept {
     }
     add(body, surface_node);
   }
-  wanted_[static_cast<std::size_t>(place_of(surface_node))] = tick_;
+  wanted_[place_of(surface_node)] = tick_;
   return true;
 }
 
@@ -298,7 +298,7 @@ void NearField::retreat(double share) noexcept {
 void NearField::load(Index place, const Vec3& force) noexcept {
   for (int axis = 0; axis < dimension_; ++axis) {
     const Index dof = dimension_ * place + axis;
-    force_[static_cast<std::size_t>(dof)] += force[axis];
+    force_[dof] += force[axis];
   }
 }
 

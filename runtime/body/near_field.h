@@ -28,11 +28,9 @@ class NearField {
   [[nodiscard]] Index count() const noexcept { return count_; }        ///< m, nodes that are here
   [[nodiscard]] Index capacity() const noexcept { return capacity_; }  ///< most of them
   /// Place of a surface node, -1 when it is not here. Places change with `add` and `forget`.
-  [[nodiscard]] Index place_of(Index surface_node) const noexcept {
-    return place_[static_cast<std::size_t>(surface_node)];
-  }
+  [[nodiscard]] Index place_of(Index surface_node) const noexcept { return place_[surface_node]; }
   /// Surface node at a place.
-  [[nodiscard]] Index node(Index place) const noexcept { return nodes_[static_cast<std::size_t>(place)]; }
+  [[nodiscard]] Index node(Index place) const noexcept { return nodes_[place]; }
   /// Row of C [d m] of one dof, d place + axis.
   [[nodiscard]] std::span<const double> row(Index dof) const noexcept {
     return {C_.data() + static_cast<std::ptrdiff_t>(dof) * stride_,
@@ -54,7 +52,7 @@ class NearField {
   bool change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept;
   /// Place of a surface node in the patch, -1 when it is beside it.
   [[nodiscard]] Index place_in_patch(Index surface_node) const noexcept {
-    return place_in_patch_[static_cast<std::size_t>(surface_node)];
+    return place_in_patch_[surface_node];
   }
 
   /// Takes all forces off.

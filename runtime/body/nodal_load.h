@@ -15,7 +15,7 @@ class NodalLoad {
  public:
   NodalLoad(int dimension, Index most_nodes)
       : dimension_(dimension),
-        node_(static_cast<std::size_t>(most_nodes)),
+        node_(most_nodes),
         force_(static_cast<std::size_t>(dimension) * node_.size()) {}
 
   NodalLoad(const NodalLoad&) = default;

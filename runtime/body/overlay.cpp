@@ -19,15 +19,13 @@ Eigen::SparseMatrix<double> assemble_local(const Model& model, const PatchMesh& 
   for (const Material& material : model.materials) D.push_back(elasticity_matrix(material, model.analysis));
   std::vector<Eigen::Triplet<double>> entries;
   for (Index e = 0; e < patch.local.elements(); ++e) {
-    const auto parent = static_cast<std::size_t>(patch.parent[static_cast<std::size_t>(e)]);
+    const auto parent = static_cast<std::size_t>(patch.parent[e]);
     const auto nodes = patch.local.element_nodes(e);
-    const ElementMatrix K =
-        element_stiffness(patch.local.element, element_nodes(patch.local, e),
-                          D[static_cast<std::size_t>(model.material_of_element[parent])], model.thickness);
+    const ElementMatrix K = element_stiffness(patch.local.element, element_nodes(patch.local, e),
+                                              D[model.material_of_element[parent]], model.thickness);
     for (Eigen::Index i = 0; i < K.rows(); ++i) {
       for (Eigen::Index j = 0; j < K.cols(); ++j) {
-        entries.emplace_back(d * nodes[static_cast<std::size_t>(i / d)] + i % d,
-                             d * nodes[static_cast<std::size_t>(j / d)] + j % d, K(i, j));
+        entries.emplace_back(d * nodes[i / d] + i % d, d * nodes[j / d] + j % d, K(i, j));
       }
     }
   }

@@ -16,8 +16,7 @@ int overlay_rings(const Body& body) {
     if (stored >= 0) centres.push_back(body.mesh_node(stored));
   }
   const auto is_known = [&](Index node) {
-    return body.stored_node(node) >= 0 ||
-           (model.fixed[static_cast<std::size_t>(node)] & all_axes) == all_axes;
+    return body.stored_node(node) >= 0 || (model.fixed[node] & all_axes) == all_axes;
   };
   int rings = 0;
   for (; rings < most_rings; ++rings) {

@@ -99,9 +99,9 @@ void multiply_columns(std::span<const T> packed, std::int64_t order, const doubl
       for (std::int64_t i = j + c + 1; i < end; ++i) {
         const auto e = static_cast<double>(a[i - j - c]);
         sum += e * x[i];
-        y[static_cast<std::size_t>(i - first)] += e * x[j + c];
+        y[i - first] += e * x[j + c];
       }
-      y[static_cast<std::size_t>(j + c - first)] += sum;
+      y[j + c - first] += sum;
     }
     if (group < columns) return;
     std::array<double, columns> by;
@@ -109,10 +109,9 @@ void multiply_columns(std::span<const T> packed, std::int64_t order, const doubl
     std::copy_n(x + j, columns, by.begin());
     const std::int64_t below = j + columns;
     std::array<const T*, columns> a;
-    for (std::int64_t c = 0; c < columns; ++c) a[static_cast<std::size_t>(c)] = entry(below, j + c);
+    for (std::int64_t c = 0; c < columns; ++c) a[c] = entry(below, j + c);
     multiply_rows<T>(a, by, x + below, y.data() + (below - first), sums, order - below);
-    for (std::int64_t c = 0; c < columns; ++c)
-      y[static_cast<std::size_t>(j + c - first)] += sums[static_cast<std::size_t>(c)];
+    for (std::int64_t c = 0; c < columns; ++c) y[j + c - first] += sums[c];
   }
 }
 

@@ -19,16 +19,15 @@ std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
   const std::span<const Index> of_body = body.surface_mesh_nodes();
   for (const auto& [key, local] : mesh.node_of_key) {
     const auto found = surface.find(key);
-    if (found != surface.end()) number[static_cast<std::size_t>(local)] = found->second;
+    if (found != surface.end()) number[local] = found->second;
   }
   std::vector<Index> result;
   for (const Index local : local_nodes) {
-    Index node = number[static_cast<std::size_t>(local)];
+    Index node = number[local];
     if (node < 0) {
       // Mesh nodes are where the shape functions of one of them alone are not zero; held ones are not in Q.
-      node = static_cast<Index>(
-          std::lower_bound(of_body.begin(), of_body.end(), mesh.body_node[static_cast<std::size_t>(local)]) -
-          of_body.begin());
+      node = static_cast<Index>(std::lower_bound(of_body.begin(), of_body.end(), mesh.body_node[local]) -
+                                of_body.begin());
     }
     result.push_back(node);
   }

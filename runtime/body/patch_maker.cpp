@@ -30,7 +30,7 @@ Index patch_room(const Body& body, int rings, std::size_t tools) {
     const Index centre = body.mesh_node(stored);
     Index count = 0;
     for (const Index node : nodes_of(model.mesh, rings_round(model.mesh, at, {&centre, 1}, rings))) {
-      if ((model.fixed[static_cast<std::size_t>(node)] & all_axes) == all_axes) continue;
+      if ((model.fixed[node] & all_axes) == all_axes) continue;
       ++count;
       if (body.stored_node(node) >= 0) continue;
       throw Error("an overlay of " + std::to_string(rings) + " rings reaches node " + std::to_string(node) +
@@ -70,7 +70,7 @@ const CondensedPatch* PatchMaker::stored(Index centre) const noexcept {
   const Index node = body_.mesh_node(centre);
   const auto found = std::lower_bound(overlay.centres.begin(), overlay.centres.end(), node);
   if (found == overlay.centres.end() || *found != node) return nullptr;
-  return &overlay.patches[static_cast<std::size_t>(found - overlay.centres.begin())];
+  return &overlay.patches[found - overlay.centres.begin()];
 }
 
 std::vector<Index> PatchMaker::neighbours(Index centre) const {

@@ -49,7 +49,7 @@ PrescribedStatus PrescribedNodes::hold(const Body& body, Index node) noexcept {
   const Index k = count();
   if (k == capacitance_.max_nodes()) return PrescribedStatus::full;
 
-  nodes_[static_cast<std::size_t>(k)] = node;
+  nodes_[k] = node;
   const auto d = static_cast<std::size_t>(dimension());
   const std::size_t width = d * static_cast<std::size_t>(k + 1);
   const std::span<double> blocks(work_.data(), d * width);

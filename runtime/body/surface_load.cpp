@@ -30,13 +30,13 @@ void SurfaceLoad::clear() noexcept {
 }
 
 void SurfaceLoad::add(Index stored, const double* f) noexcept {
-  node[static_cast<std::size_t>(count)] = stored;
+  node[count] = stored;
   std::copy_n(f, dimension, force.data() + dofs(dimension, count));
   ++count;
 }
 
 void SurfaceLoad::add_to_patch(Index place, const double* f) noexcept {
-  patch_place[static_cast<std::size_t>(patch_count)] = place;
+  patch_place[patch_count] = place;
   std::copy_n(f, dimension, patch_force.data() + dofs(dimension, patch_count));
   ++patch_count;
 }
@@ -49,7 +49,7 @@ void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> 
     const double* C = load.patch->compliance(dof);
     double sum = dot(load.patch->response(dof), load.beside.data(), body_dofs);
     for (Index i = 0; i < load.patch_count; ++i) {
-      const double* by = C + dofs(d, load.patch_place[static_cast<std::size_t>(i)]);
+      const double* by = C + dofs(d, load.patch_place[i]);
       const double* f = load.patch_force.data() + dofs(d, i);
       for (int axis = 0; axis < d; ++axis) sum += by[axis] * f[axis];
     }
@@ -78,7 +78,7 @@ void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<d
   for (std::size_t k = 0; k < nodes.size(); ++k) {
     double values[3] = {};
     patch_displacement(load, static_cast<Index>(k), {values, static_cast<std::size_t>(load.dimension)});
-    Vec3& at = u[static_cast<std::size_t>(nodes[k])];
+    Vec3& at = u[nodes[k]];
     at = Vec3(values[0], values[1], values[2]);
     if (moves) at += follow_body(nodes[k], [&](Index j) { return displacement(body, *motion, j); });
   }

@@ -14,27 +14,26 @@ constexpr double gap_tolerance = 1e-11;  // of the largest entry of b: rounding
 
 ActiveSet::ActiveSet(Index max_rows)
     : factor_(1, max_rows),
-      active_(static_cast<std::size_t>(max_rows)),
-      state_(static_cast<std::size_t>(max_rows)),
-      signed_(static_cast<std::size_t>(max_rows)),
-      z_(static_cast<std::size_t>(max_rows)),
+      active_(max_rows),
+      state_(max_rows),
+      signed_(max_rows),
+      z_(max_rows),
       entries_(static_cast<std::size_t>(max_rows) + 1) {}
 
 bool ActiveSet::activate(const ContactProblem& problem, Index row) noexcept {
   const Index count = factor_.nodes();
-  for (Index k = 0; k < count; ++k)
-    entries_[static_cast<std::size_t>(k)] = problem.w(row, active_[static_cast<std::size_t>(k)]);
-  entries_[static_cast<std::size_t>(count)] = problem.w(row, row);
+  for (Index k = 0; k < count; ++k) entries_[k] = problem.w(row, active_[k]);
+  entries_[count] = problem.w(row, row);
   const bool added =
       factor_.add({entries_.data(), static_cast<std::size_t>(count) + 1}) == CapacitanceStatus::ok;
-  if (added) active_[static_cast<std::size_t>(count)] = row;
-  state_[static_cast<std::size_t>(row)] = added ? Row::active : Row::dependent;
+  if (added) active_[count] = row;
+  state_[row] = added ? Row::active : Row::dependent;
   return added;
 }
 
 void ActiveSet::deactivate(Index position) noexcept {
   const auto gap = active_.begin() + position;
-  state_[static_cast<std::size_t>(*gap)] = Row::inactive;
+  state_[*gap] = Row::inactive;
   std::copy(gap + 1, active_.begin() + factor_.nodes(), gap);
   factor_.remove(position);
 }
@@ -42,7 +41,7 @@ void ActiveSet::deactivate(Index position) noexcept {
 /// z = -C^-1 b on the active rows.
 void ActiveSet::solve_active(std::span<const double> b) noexcept {
   const auto count = static_cast<std::size_t>(factor_.nodes());
-  for (std::size_t k = 0; k < count; ++k) z_[k] = -b[static_cast<std::size_t>(active_[k])];
+  for (std::size_t k = 0; k < count; ++k) z_[k] = -b[active_[k]];
   factor_.solve({z_.data(), count});
 }
 
@@ -52,8 +51,8 @@ bool ActiveSet::step_towards_solution(ContactProblem& problem) noexcept {
   double step = 1.0;
   Index blocking = -1;
   for (Index k = 0; k < factor_.nodes(); ++k) {
-    const auto row = static_cast<std::size_t>(active_[static_cast<std::size_t>(k)]);
-    const double z = z_[static_cast<std::size_t>(k)];
+    const auto row = static_cast<std::size_t>(active_[k]);
+    const double z = z_[k];
     if (signed_[row] != 0 || z >= 0.0) continue;
     const double to_zero = problem.lambda[row] / (problem.lambda[row] - z);
     if (blocking >= 0 && to_zero >= step) continue;
@@ -61,13 +60,12 @@ bool ActiveSet::step_towards_solution(ContactProblem& problem) noexcept {
     blocking = k;
   }
   for (Index k = 0; k < factor_.nodes(); ++k) {
-    double& lambda = problem.lambda[static_cast<std::size_t>(active_[static_cast<std::size_t>(k)])];
-    lambda += step * (z_[static_cast<std::size_t>(k)] - lambda);
-    if (signed_[static_cast<std::size_t>(active_[static_cast<std::size_t>(k)])] == 0)
-      lambda = std::max(lambda, 0.0);
+    double& lambda = problem.lambda[active_[k]];
+    lambda += step * (z_[k] - lambda);
+    if (signed_[active_[k]] == 0) lambda = std::max(lambda, 0.0);
   }
   if (blocking < 0) return true;
-  problem.lambda[static_cast<std::size_t>(active_[static_cast<std::size_t>(blocking)])] = 0.0;
+  problem.lambda[active_[blocking]] = 0.0;
   deactivate(blocking);
   return false;
 }
@@ -75,14 +73,12 @@ bool ActiveSet::step_towards_solution(ContactProblem& problem) noexcept {
 /// The inactive row with the most negative gap beyond rounding, -1 when there is none.
 Index ActiveSet::most_violated(const ContactProblem& problem) const noexcept {
   double largest = 0.0;
-  for (Index i = 0; i < problem.rows; ++i)
-    largest = std::max(largest, std::abs(problem.b[static_cast<std::size_t>(i)]));
+  for (Index i = 0; i < problem.rows; ++i) largest = std::max(largest, std::abs(problem.b[i]));
   double worst = -gap_tolerance * largest;
   Index found = -1;
   for (Index i = 0; i < problem.rows; ++i) {
-    if (state_[static_cast<std::size_t>(i)] != Row::inactive) continue;
-    const double gap =
-        problem.b[static_cast<std::size_t>(i)] + dot(problem.row(i), problem.lambda.data(), problem.rows);
+    if (state_[i] != Row::inactive) continue;
+    const double gap = problem.b[i] + dot(problem.row(i), problem.lambda.data(), problem.rows);
     if (gap < worst) {
       worst = gap;
       found = i;
@@ -96,8 +92,7 @@ bool ActiveSet::solve(ContactProblem& problem) noexcept {
   rounds_ = 0;
   std::fill_n(state_.begin(), problem.rows, Row::inactive);
   for (Index k = 0; k < problem.contacts; ++k) {
-    std::fill_n(signed_.begin() + problem.first_row(k), problem.rows_of(k),
-                problem.held[static_cast<std::size_t>(k)]);
+    std::fill_n(signed_.begin() + problem.first_row(k), problem.rows_of(k), problem.held[k]);
   }
   for (Index i = 0; i < problem.rows; ++i) {
     const auto row = static_cast<std::size_t>(i);
@@ -111,10 +106,9 @@ bool ActiveSet::solve(ContactProblem& problem) noexcept {
   while (rounds_ < most_rounds) {
     ++rounds_;
     solve_active(problem.b);
-    if (entered >= 0 &&
-        z_[static_cast<std::size_t>(factor_.nodes() - 1)] <= 0.0) {  // rounding alone let it in
+    if (entered >= 0 && z_[factor_.nodes() - 1] <= 0.0) {  // rounding alone let it in
       deactivate(factor_.nodes() - 1);
-      state_[static_cast<std::size_t>(entered)] = Row::dependent;
+      state_[entered] = Row::dependent;
       entered = -1;
       continue;
     }
@@ -132,8 +126,7 @@ void ActiveSet::derivative(const ContactProblem& problem, std::span<const double
                            std::span<double> dlambda) noexcept {
   std::fill_n(dlambda.begin(), problem.rows, 0.0);
   solve_active(db);
-  for (Index k = 0; k < factor_.nodes(); ++k)
-    dlambda[static_cast<std::size_t>(active_[static_cast<std::size_t>(k)])] = z_[static_cast<std::size_t>(k)];
+  for (Index k = 0; k < factor_.nodes(); ++k) dlambda[active_[k]] = z_[k];
 }
 
 }  // namespace palpate

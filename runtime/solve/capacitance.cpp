@@ -63,8 +63,8 @@ CapacitanceMatrix::CapacitanceMatrix(int dimension, Index max_nodes)
     throw Error("room for " + std::to_string(max_nodes) + " held nodes was asked for", "CapacitanceMatrix",
                 "ask for room for at least one");
   }
-  L_.resize(static_cast<std::size_t>(packed_size(capacity_)));
-  rows_.resize(static_cast<std::size_t>(dimension_ * capacity_));
+  L_.resize(packed_size(capacity_));
+  rows_.resize(dimension_ * capacity_);
 }
 
 double* CapacitanceMatrix::column(std::int64_t j) noexcept {

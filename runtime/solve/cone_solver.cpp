@@ -13,8 +13,7 @@ namespace {
 
 double largest_force(const ContactProblem& problem) noexcept {
   double largest = 0.0;
-  for (Index i = 0; i < problem.rows; ++i)
-    largest = std::max(largest, std::abs(problem.lambda[static_cast<std::size_t>(i)]));
+  for (Index i = 0; i < problem.rows; ++i) largest = std::max(largest, std::abs(problem.lambda[i]));
   return largest;
 }
 
@@ -44,9 +43,9 @@ ConeSolver::ConeSolver(Index max_contacts, Index max_rows)
   const auto rows = static_cast<std::size_t>(max_rows);
   motion_.resize(rows);
   weight_.resize(rows);
-  mode_.resize(static_cast<std::size_t>(max_contacts));
+  mode_.resize(max_contacts);
   direction_.resize(rows);
-  share_.resize(static_cast<std::size_t>(max_contacts));
+  share_.resize(max_contacts);
   unknown_.resize(rows);
   J_.resize(rows * static_cast<std::size_t>(stride_));
   pivot_.resize(rows);
@@ -62,15 +61,14 @@ ConeSolver::ConeSolver(Index max_contacts, Index max_rows)
 /// r = b + W lambda.
 void ConeSolver::find_motion(const ContactProblem& problem) noexcept {
   for (Index i = 0; i < problem.rows; ++i) {
-    motion_[static_cast<std::size_t>(i)] =
-        problem.b[static_cast<std::size_t>(i)] + dot(problem.row(i), problem.lambda.data(), problem.rows);
+    motion_[i] = problem.b[i] + dot(problem.row(i), problem.lambda.data(), problem.rows);
   }
 }
 
 /// One force changes, and the motion with it.
 void ConeSolver::change(ContactProblem& problem, Index row, double by) noexcept {
   if (by == 0.0) return;
-  problem.lambda[static_cast<std::size_t>(row)] += by;
+  problem.lambda[row] += by;
   subtract(problem.row(row), -by, motion_.data(), problem.rows);
 }
 
@@ -80,8 +78,8 @@ void ConeSolver::scale_rows(const ContactProblem& problem) noexcept {
     const Index count = problem.rows_of(k);
     double tangent = 0.0;
     for (Index j = i + 1; j < i + count; ++j) tangent = std::max(tangent, problem.w(j, j));
-    weight_[static_cast<std::size_t>(i)] = 1.0 / problem.w(i, i);
-    for (Index j = i + 1; j < i + count; ++j) weight_[static_cast<std::size_t>(j)] = 1.0 / tangent;
+    weight_[i] = 1.0 / problem.w(i, i);
+    for (Index j = i + 1; j < i + count; ++j) weight_[j] = 1.0 / tangent;
   }
 }
 
@@ -99,7 +97,7 @@ double ConeSolver::residual(const ContactProblem& problem) const noexcept {
     const Tangential now = tangential(lambda, count);
     const Tangential moved = tangential(r, count);
     const Tangential to = Tangential{now.x - weight[1] * moved.x, now.y - weight[1] * moved.y}.within(
-        problem.friction[static_cast<std::size_t>(k)] * normal);
+        problem.friction[k] * normal);
     worst = std::max(worst, Tangential{now.x - to.x, now.y - to.y}.norm());
   }
   return worst;
@@ -119,7 +117,7 @@ void ConeSolver::sweep(ContactProblem& problem) noexcept {
       const Tangential moved = tangential(motion_.data() + first, count);
       const Tangential to =
           Tangential{now.x - weight_[at + 1] * moved.x, now.y - weight_[at + 1] * moved.y}.within(
-              problem.friction[static_cast<std::size_t>(k)] * normal);
+              problem.friction[k] * normal);
       change(problem, first + 1, to.x - now.x);
       if (count == 3) change(problem, first + 2, to.y - now.y);
     }
@@ -151,7 +149,7 @@ void ConeSolver::choose_modes(const ContactProblem& problem) noexcept {
     }
     mode_[contact] = mode;
     if (mode == Mode::open) continue;
-    for (Index i = first; i < first + count; ++i) unknown_[static_cast<std::size_t>(unknowns_++)] = i;
+    for (Index i = first; i < first + count; ++i) unknown_[unknowns_++] = i;
   }
 }
 
@@ -161,7 +159,7 @@ void ConeSolver::choose_modes(const ContactProblem& problem) noexcept {
 void ConeSolver::linearise(const ContactProblem& problem) noexcept {
   const auto gather_row = [&](Index row, double factor, double* out) {
     const double* w = problem.row(row);
-    for (Index j = 0; j < unknowns_; ++j) out[j] += factor * w[unknown_[static_cast<std::size_t>(j)]];
+    for (Index j = 0; j < unknowns_; ++j) out[j] += factor * w[unknown_[j]];
   };
   Index next = 0;
   for (Index k = 0; k < problem.contacts; ++k) {
@@ -180,13 +178,13 @@ void ConeSolver::linearise(const ContactProblem& problem) noexcept {
         continue;
       }
       // In metres like the other rows: the equation of forces over the weight.
-      const double compliance = 1.0 / weight_[static_cast<std::size_t>(row)];
-      const double e = direction_[static_cast<std::size_t>(row)];
+      const double compliance = 1.0 / weight_[row];
+      const double e = direction_[row];
       out[base] -= compliance * problem.friction[contact] * e;
       out[base + i] += compliance;
       for (Index j = 1; j < count; ++j) {
         const Index tangent = first + j;
-        const double across = (i == j ? 1.0 : 0.0) - e * direction_[static_cast<std::size_t>(tangent)];
+        const double across = (i == j ? 1.0 : 0.0) - e * direction_[tangent];
         out[base + j] -= compliance * share_[contact] * across;
         gather_row(tangent, share_[contact] * across, out);
       }
@@ -201,7 +199,7 @@ bool ConeSolver::factor_jacobian() noexcept {
     for (Index i = k + 1; i < unknowns_; ++i) {
       if (std::abs(jacobian_row(i)[k]) > std::abs(jacobian_row(best)[k])) best = i;
     }
-    pivot_[static_cast<std::size_t>(k)] = best;
+    pivot_[k] = best;
     double* top = jacobian_row(k);
     if (best != k) std::swap_ranges(top, top + unknowns_, jacobian_row(best));
     if (!(std::abs(top[k]) > std::numeric_limits<double>::min())) return false;
@@ -218,13 +216,11 @@ bool ConeSolver::factor_jacobian() noexcept {
 
 /// x = J^-1 x.
 void ConeSolver::solve_jacobian() noexcept {
-  for (Index k = 0; k < unknowns_; ++k)
-    std::swap(x_[static_cast<std::size_t>(k)],
-              x_[static_cast<std::size_t>(pivot_[static_cast<std::size_t>(k)])]);
-  for (Index i = 0; i < unknowns_; ++i) x_[static_cast<std::size_t>(i)] -= dot(jacobian_row(i), x_.data(), i);
+  for (Index k = 0; k < unknowns_; ++k) std::swap(x_[k], x_[pivot_[k]]);
+  for (Index i = 0; i < unknowns_; ++i) x_[i] -= dot(jacobian_row(i), x_.data(), i);
   for (Index i = unknowns_; i-- > 0;) {
     const double* row = jacobian_row(i);
-    double& x = x_[static_cast<std::size_t>(i)];
+    double& x = x_[i];
     x = (x - dot(row + i + 1, x_.data() + i + 1, unknowns_ - i - 1)) / row[i];
   }
 }
@@ -233,9 +229,9 @@ void ConeSolver::solve_jacobian() noexcept {
 bool ConeSolver::newton_step(ContactProblem& problem) noexcept {
   choose_modes(problem);
   for (Index k = 0; k < problem.contacts; ++k) {
-    if (mode_[static_cast<std::size_t>(k)] != Mode::open) continue;
+    if (mode_[k] != Mode::open) continue;
     for (Index i = problem.first_row(k); i < problem.first_row(k + 1); ++i)
-      change(problem, i, -problem.lambda[static_cast<std::size_t>(i)]);
+      change(problem, i, -problem.lambda[i]);
   }
   linearise(problem);
   if (!factor_jacobian()) return false;
@@ -252,13 +248,11 @@ bool ConeSolver::newton_step(ContactProblem& problem) noexcept {
         const double bound = problem.friction[contact] * std::max(0.0, problem.lambda[first]);
         value = (problem.lambda[row] - bound * direction_[row]) / weight_[row];
       }
-      x_[static_cast<std::size_t>(next++)] = -value;
+      x_[next++] = -value;
     }
   }
   solve_jacobian();
-  for (Index j = 0; j < unknowns_; ++j)
-    problem.lambda[static_cast<std::size_t>(unknown_[static_cast<std::size_t>(j)])] +=
-        x_[static_cast<std::size_t>(j)];
+  for (Index j = 0; j < unknowns_; ++j) problem.lambda[unknown_[j]] += x_[j];
   find_motion(problem);
   return true;
 }
@@ -328,8 +322,8 @@ void ConeSolver::add_springs(ContactProblem& problem, double share) noexcept {
 
 void ConeSolver::remove_springs(ContactProblem& problem) noexcept {
   for (Index i = 0; i < problem.rows; ++i) {
-    problem.w(i, i) = diagonal_[static_cast<std::size_t>(i)];
-    problem.b[static_cast<std::size_t>(i)] = b_[static_cast<std::size_t>(i)];
+    problem.w(i, i) = diagonal_[i];
+    problem.b[i] = b_[i];
   }
 }
 
@@ -400,13 +394,12 @@ void ConeSolver::derivative(const ContactProblem& problem, std::span<const doubl
           value += share_[contact] * across * b_[tangent];
         }
       }
-      x_[static_cast<std::size_t>(next++)] = -value;
+      x_[next++] = -value;
     }
   }
   solve_jacobian();
   std::fill_n(guess_.begin(), part_.problem.rows, 0.0);
-  for (Index j = 0; j < unknowns_; ++j)
-    guess_[static_cast<std::size_t>(unknown_[static_cast<std::size_t>(j)])] = x_[static_cast<std::size_t>(j)];
+  for (Index j = 0; j < unknowns_; ++j) guess_[unknown_[j]] = x_[j];
   part_.spread_change(guess_, dlambda);
 }
 

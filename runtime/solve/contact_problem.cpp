@@ -8,12 +8,12 @@ ContactProblem::ContactProblem(int d, Index max_contacts, Index max_rows)
     : dimension(d),
       stride((max_rows + 7) / 8 * 8),
       first(static_cast<std::size_t>(max_contacts) + 1),
-      friction(static_cast<std::size_t>(max_contacts)),
-      held(static_cast<std::size_t>(max_contacts)),
-      owner(static_cast<std::size_t>(max_contacts)),
+      friction(max_contacts),
+      held(max_contacts),
+      owner(max_contacts),
       W(static_cast<std::size_t>(stride) * static_cast<std::size_t>(stride)),
-      b(static_cast<std::size_t>(stride)),
-      lambda(static_cast<std::size_t>(stride)) {}
+      b(stride),
+      lambda(stride) {}
 
 void ContactProblem::clear() noexcept {
   contacts = 0;
@@ -38,8 +38,8 @@ void ContactProblem::append(double mu, bool is_held, Index owner_of, Index count
   first[k] = rows;
   first[k + 1] = rows + count;
   for (Index i = rows; i < rows + count; ++i) {
-    b[static_cast<std::size_t>(i)] = 0.0;
-    lambda[static_cast<std::size_t>(i)] = 0.0;
+    b[i] = 0.0;
+    lambda[i] = 0.0;
   }
   rows += count;
 }

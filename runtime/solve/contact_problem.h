@@ -28,9 +28,7 @@ struct ContactProblem {
   /// Appends one held row that is there for a contact: where that is left out as open, so is the row.
   void add_held_row(Index owner) noexcept;
 
-  [[nodiscard]] Index first_row(Index contact) const noexcept {
-    return first[static_cast<std::size_t>(contact)];
-  }
+  [[nodiscard]] Index first_row(Index contact) const noexcept { return first[contact]; }
   [[nodiscard]] Index rows_of(Index contact) const noexcept {
     return first_row(contact + 1) - first_row(contact);
   }

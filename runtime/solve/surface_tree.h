@@ -28,9 +28,7 @@ class SurfaceTree {
   SurfaceTree(std::span<const Index> simplices, int corners, std::span<const Vec3> positions, double margin);
 
   /// Where the node was last moved to [m].
-  [[nodiscard]] const Vec3& position(Index node) const noexcept {
-    return positions_[static_cast<std::size_t>(node)];
-  }
+  [[nodiscard]] const Vec3& position(Index node) const noexcept { return positions_[node]; }
 
   /// Moves a node; `position` must be finite.
   void move(Index node, const Vec3& position) noexcept;

@@ -79,7 +79,7 @@ void add_contact(const State& state, Scratch& scratch, const ContactPoint& conta
   ContactProblem& problem = scratch.problem;
   const Index first = problem.rows;
   problem.add(contact.friction, contact.held);
-  const ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
+  const ToolState& tool = state.tools[contact.tool];
   Vec3 motion = device_motion(tool.pose, tool.device, contact.arm);
   if (contact.held) motion += tool.pose.position + contact.arm - contact.position;
   for (Index i = first; i < problem.rows; ++i) {
@@ -103,7 +103,7 @@ double normal_force(const Scratch& scratch, const ContactPoint& contact, const C
   double sum = 0.0;
   double count = 0.0;
   for (Index k = 0; k < scratch.last_count; ++k) {
-    const ContactPoint& other = scratch.last_contacts[static_cast<std::size_t>(k)];
+    const ContactPoint& other = scratch.last_contacts[k];
     const double force = other.force.dot(other.frame.col(0));
     if (other.tool != contact.tool || other.held || force <= 0.0) continue;
     sum += force;
@@ -114,9 +114,8 @@ double normal_force(const Scratch& scratch, const ContactPoint& contact, const C
 
 void add_tilt(const State& state, Scratch& scratch, Index number, double force,
               double least_radius) noexcept {
-  const ContactPoint& contact = state.contact_points[static_cast<std::size_t>(number)];
-  const double radius =
-      std::max(least_radius, state.tools[static_cast<std::size_t>(contact.tool)].tool.radius);
+  const ContactPoint& contact = state.contact_points[number];
+  const double radius = std::max(least_radius, state.tools[contact.tool].tool.radius);
   const auto nodes =
       std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
   if (contact.held || nodes < 2 || !(force * radius > 0.0)) return;
@@ -133,7 +132,7 @@ void add_tilt(const State& state, Scratch& scratch, Index number, double force,
   } else {
     const auto end =
         std::find_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
-    add(contact.slope[static_cast<std::size_t>(end - contact.nodes.begin())].normalized());
+    add(contact.slope[end - contact.nodes.begin()].normalized());
   }
 }
 
@@ -144,7 +143,7 @@ void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept 
   double* __restrict y = scratch.row_response.data();
   const std::ptrdiff_t width = std::ptrdiff_t{D} * near.count();
   for (Index j = 0; j < problem.rows; ++j) {
-    const ContactRow& by = scratch.rows[static_cast<std::size_t>(j)];
+    const ContactRow& by = scratch.rows[j];
     std::fill_n(y, width, 0.0);
     for (std::size_t n = 0; n < 3; ++n) {
       if (by.places[n] < 0) continue;
@@ -156,7 +155,7 @@ void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept 
       }
     }
     for (Index i = j; i < problem.rows; ++i) {
-      const ContactRow& at = scratch.rows[static_cast<std::size_t>(i)];
+      const ContactRow& at = scratch.rows[i];
       double w = 0.0;
       for (std::size_t n = 0; n < 3; ++n) {
         const double* u = y + D * std::ptrdiff_t{std::max<Index>(at.places[n], 0)};
@@ -171,7 +170,7 @@ void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept 
 /// Which contacts press on what the body does not give way at, or hold it. Before the couplings are in W.
 void note_rigid_contacts(State& state, const ContactProblem& problem) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
-    ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+    ContactPoint& contact = state.contact_points[k];
     const Index first = problem.first_row(k);
     const Index rows = contact.held ? problem.rows_of(k) : 1;
     contact.rigid = false;
@@ -184,12 +183,12 @@ void note_rigid_contacts(State& state, const ContactProblem& problem) noexcept {
 void add_coupling_compliance(const State& state, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
   for (Index j = 0; j < problem.rows; ++j) {
-    const ContactRow& by = scratch.rows[static_cast<std::size_t>(j)];
+    const ContactRow& by = scratch.rows[j];
     if (by.tool < 0) continue;
-    const Tool& tool = state.tools[static_cast<std::size_t>(by.tool)].tool;
+    const Tool& tool = state.tools[by.tool].tool;
     if (std::isinf(tool.coupling_stiffness) && std::isinf(tool.coupling_torsion)) continue;
     for (Index i = 0; i < problem.rows; ++i) {
-      const ContactRow& at = scratch.rows[static_cast<std::size_t>(i)];
+      const ContactRow& at = scratch.rows[i];
       if (at.tool != by.tool) continue;
       problem.w(i, j) +=
           at.force.dot(by.force) / tool.coupling_stiffness + at.moment.dot(by.moment) / tool.coupling_torsion;
@@ -239,8 +238,7 @@ void regularise(const Body& body, const State& state, Scratch& scratch) noexcept
                     state.surface.rigid_compliance;
       if (k < state.contact_count) give = std::max(give, state.surface.least_compliance - w);
       w += give + scratch.tilt_spring[row];
-      if (i > first && problem.held[static_cast<std::size_t>(k)] == 0)
-        problem.b[row] -= give * problem.lambda[row];
+      if (i > first && problem.held[k] == 0) problem.b[row] -= give * problem.lambda[row];
     }
   }
 }
@@ -255,7 +253,7 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
     add_contact(state, scratch, contact, same_contact(scratch, contact));
   const double edge = body.mean_surface_edge();
   for (Index k = 0; k < state.contact_count; ++k) {
-    const ContactPoint& contact = contacts[static_cast<std::size_t>(k)];
+    const ContactPoint& contact = contacts[k];
     const double force =
         normal_force(scratch, contact, same_contact(scratch, contact), tuning.assembly.closed_gap * edge);
     add_tilt(state, scratch, k, force, tuning.assembly.least_tilt_radius * edge);

@@ -11,9 +11,7 @@ namespace {
 
 /// Mean length of a simplex's edges at rest [m].
 double mean_edge(const Body& body, const SimplexNodes& nodes) noexcept {
-  const auto at = [&](std::size_t k) {
-    return body.surface_rest_positions()[static_cast<std::size_t>(nodes[k])];
-  };
+  const auto at = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
   const double first = (at(1) - at(0)).norm();
   return nodes[2] < 0 ? first : (first + (at(2) - at(1)).norm() + (at(0) - at(2)).norm()) / 3.0;
 }
@@ -25,7 +23,7 @@ std::int64_t feature_of(Index tool, int place, Index simplex, bool face_tells, c
   std::array<Index, 3> used{};
   int count = 0;
   for (std::size_t k = 0; k < 3; ++k) {
-    if (weights[k] > 0.0) used[static_cast<std::size_t>(count++)] = nodes[k];
+    if (weights[k] > 0.0) used[count++] = nodes[k];
   }
   const std::int64_t head = (std::int64_t{tool} * 4 + place) * 4;
   constexpr std::int64_t room = std::int64_t{1} << 26;
@@ -111,7 +109,7 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
     const double distance = nearest_points(tree, nodes_of(body, simplex), core, is_point).squared_distance;
     if (distance > reach * reach) continue;
     scratch.found[count] = simplex;
-    scratch.found_distance[static_cast<std::size_t>(simplex)] = distance;
+    scratch.found_distance[simplex] = distance;
     ++count;
   }
   scratch.high_water.simplices = std::max(scratch.high_water.simplices, static_cast<Index>(count));
@@ -119,8 +117,8 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
   if (count > scratch.pairs.size()) {
     tool.status |= StepStatus::capacity_full;
     const auto nearer = [&](Index a, Index b) {
-      const double da = scratch.found_distance[static_cast<std::size_t>(a)];
-      const double db = scratch.found_distance[static_cast<std::size_t>(b)];
+      const double da = scratch.found_distance[a];
+      const double db = scratch.found_distance[b];
       return da < db || (da == db && a < b);
     };
     std::nth_element(scratch.found.begin(),
@@ -135,7 +133,7 @@ bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const V
                   const Vec3& normal) noexcept {
   const double near = tuning.detection.same_place * body.mean_surface_edge();
   for (Index k = begin; k < scratch.candidate_count; ++k) {
-    const ContactPoint& other = scratch.candidates[static_cast<std::size_t>(k)];
+    const ContactPoint& other = scratch.candidates[k];
     if ((other.position - position).squaredNorm() < near * near &&
         other.frame.col(0).dot(normal) > 1.0 - tuning.detection.same_direction) {
       return true;
@@ -161,7 +159,7 @@ bool is_held_already(const Body& body, const State& state, const ContactPoint& c
 
 void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_number, Index begin,
                    const TouchingPair& pair, bool face_tells) noexcept {
-  ToolState& tool = state.tools[static_cast<std::size_t>(tool_number)];
+  ToolState& tool = state.tools[tool_number];
   if (static_cast<std::size_t>(scratch.candidate_count) == scratch.candidates.size()) {
     tool.status |= StepStatus::capacity_full;
     return;
@@ -183,11 +181,10 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.slope = slopes(state.surface.tree, contact.nodes);
   contact.frame = frame_of(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
-  contact.friction =
-      tool.tool.friction.value_or(body.surface_friction()[static_cast<std::size_t>(pair.simplex)]);
+  contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
-  scratch.candidates[static_cast<std::size_t>(scratch.candidate_count++)] = contact;
+  scratch.candidates[scratch.candidate_count++] = contact;
 }
 
 /// Whether the simplex carried force at the same tool in the tick or pass before.
@@ -216,10 +213,10 @@ void keep_usable(const Body& body, State& state, Scratch& scratch, ToolContact& 
   for (std::size_t k = 0; k < count; ++k) {
     const Index simplex = scratch.found[k];
     if (!want_nodes(body, state.surface, nodes_of(body, simplex))) {
-      state.tools[static_cast<std::size_t>(touch.number)].status |= StepStatus::capacity_full;
+      state.tools[touch.number].status |= StepStatus::capacity_full;
       continue;
     }
-    scratch.found[static_cast<std::size_t>(touch.usable++)] = simplex;
+    scratch.found[touch.usable++] = simplex;
   }
 }
 
@@ -227,14 +224,14 @@ void keep_usable(const Body& body, State& state, Scratch& scratch, ToolContact& 
 void look_from_origin(const Body& body, const SurfaceTree& tree, Scratch& scratch,
                       ToolContact& touch) noexcept {
   for (Index k = 0; k < touch.usable; ++k) {
-    TouchingPair& pair = scratch.pairs[static_cast<std::size_t>(k)];
-    pair = pair_of_end(body, tree, scratch.found[static_cast<std::size_t>(k)], touch.core, 0);
+    TouchingPair& pair = scratch.pairs[k];
+    pair = pair_of_end(body, tree, scratch.found[k], touch.core, 0);
     touch.nearest_distance = std::min(touch.nearest_distance, pair.distance);
   }
   const double as_near = touch.nearest_distance + tuning.detection.on_surface * body.mean_surface_edge();
   double side = 0.0;
   for (Index k = 0; k < touch.usable; ++k) {
-    const TouchingPair& pair = scratch.pairs[static_cast<std::size_t>(k)];
+    const TouchingPair& pair = scratch.pairs[k];
     if (pair.distance <= as_near) side += pair.height;
   }
   touch.inside = side < 0.0;
@@ -245,7 +242,7 @@ void look_from_origin(const Body& body, const SurfaceTree& tree, Scratch& scratc
 /// fast tick), the nearest ones and those that carried force push out along their normals.
 void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                 const TouchingPair& pair) noexcept {
-  const double radius = state.tools[static_cast<std::size_t>(touch.number)].tool.radius;
+  const double radius = state.tools[touch.number].tool.radius;
   const bool pushes_out =
       pair.height < 0.0 && ((touch.inside && pair.distance <= 2.0 * touch.nearest_distance) ||
                             (carried(scratch, touch.number, pair) && pair.distance < touch.lost));
@@ -273,7 +270,7 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
 /// chords of a sphere that is large against them, and would hold it out by edge^2 / 6 R.
 void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                    TouchingPair pair) noexcept {
-  const Tool& tool = state.tools[static_cast<std::size_t>(touch.number)].tool;
+  const Tool& tool = state.tools[touch.number].tool;
   const SurfaceTree& tree = state.surface.tree;
   const Index simplex = pair.simplex;
   const bool is_segment = tool.length > 0.0;
@@ -292,7 +289,7 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
 
 /// Contact points of one tool.
 void find_candidates(const Body& body, State& state, Scratch& scratch, Index number) noexcept {
-  ToolState& tool = state.tools[static_cast<std::size_t>(number)];
+  ToolState& tool = state.tools[number];
   ToolContact touch{.number = number,
                     .core = core_of(tool.tool, tool.pose, body.dimension()),
                     .margin = tool.margin,
@@ -306,16 +303,15 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
     tool.engaged = false;
     return;
   }
-  for (Index k = 0; k < touch.usable; ++k)
-    touch_simplex(body, state, scratch, touch, scratch.pairs[static_cast<std::size_t>(k)]);
+  for (Index k = 0; k < touch.usable; ++k) touch_simplex(body, state, scratch, touch, scratch.pairs[k]);
 }
 
 /// Where held contacts are now. Those whose nodes find no room are let go.
 void update_held(const Body& body, State& state) noexcept {
   Index kept = 0;
   for (Index k = 0; k < state.held_count; ++k) {
-    ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
-    ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
+    ContactPoint& contact = state.contact_points[k];
+    ToolState& tool = state.tools[contact.tool];
     if (!want_nodes(body, state.surface, contact.nodes)) {
       tool.status |= StepStatus::capacity_full;
       continue;
@@ -326,7 +322,7 @@ void update_held(const Body& body, State& state) noexcept {
         contact.position += contact.weights[n] * state.surface.tree.position(contact.nodes[n]);
     }
     contact.arm = tool.pose.orientation * contact.tool_point;
-    state.contact_points[static_cast<std::size_t>(kept++)] = contact;
+    state.contact_points[kept++] = contact;
   }
   state.held_count = kept;
 }
@@ -337,7 +333,7 @@ void find_contacts(const Body& body, State& state, Scratch& scratch) noexcept {
   update_held(body, state);
   scratch.candidate_count = 0;
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
-    if (state.tools[static_cast<std::size_t>(k)].engaged) find_candidates(body, state, scratch, k);
+    if (state.tools[k].engaged) find_candidates(body, state, scratch, k);
   }
 
   const Index room = state.max_contacts() - state.held_count;

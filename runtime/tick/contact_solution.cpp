@@ -114,8 +114,8 @@ void apply_forces(State& state, const Scratch& scratch) noexcept {
     tool.contacts = 0;
   }
   for (Index i = 0; i < scratch.problem.rows; ++i) {
-    const ContactRow& row = scratch.rows[static_cast<std::size_t>(i)];
-    const double lambda = scratch.problem.lambda[static_cast<std::size_t>(i)];
+    const ContactRow& row = scratch.rows[i];
+    const double lambda = scratch.problem.lambda[i];
     if (lambda == 0.0) continue;
     for (std::size_t n = 0; n < 3; ++n) {
       if (row.places[n] >= 0) state.surface.near.load(row.places[n], -lambda * row.body[n]);
@@ -123,13 +123,13 @@ void apply_forces(State& state, const Scratch& scratch) noexcept {
   }
   state.surface.near.displace();
   for (Index k = 0; k < state.contact_count; ++k) {
-    ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+    ContactPoint& contact = state.contact_points[k];
     const auto first = static_cast<std::size_t>(scratch.problem.first_row(k));
     contact.force.setZero();
     for (Index i = 0; i < scratch.problem.rows_of(k); ++i)
       contact.force += scratch.problem.lambda[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
     if (contact.force.squaredNorm() == 0.0) continue;
-    ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
+    ToolState& tool = state.tools[contact.tool];
     ++tool.contacts;
     if (contact.rigid) tool.status |= StepStatus::rigid_contact;
     tool.contact_wrench.force += contact.force;

@@ -6,18 +6,18 @@ namespace palpate {
 namespace {
 
 void hold_contact(State& state, const ContactPoint& contact) noexcept {
-  const ToolState& tool = state.tools[static_cast<std::size_t>(contact.tool)];
+  const ToolState& tool = state.tools[contact.tool];
   ContactPoint held = contact;
   held.held = true;
   held.feature = -1 - state.held_count;
   held.frame.setIdentity();
   held.tool_point = tool.pose.orientation.conjugate() * (contact.position - tool.pose.position);
-  state.contact_points[static_cast<std::size_t>(state.held_count++)] = held;
+  state.contact_points[state.held_count++] = held;
 }
 
 /// The nearest place of the surface within reach, as a contact.
 bool reach_out(const Body& body, State& state, Index number) noexcept {
-  ToolState& tool = state.tools[static_cast<std::size_t>(number)];
+  ToolState& tool = state.tools[number];
   const NearestSimplex found = state.surface.tree.nearest(tool.pose.position);
   if (!(found.nearest.squared_distance <= tool.tool.reach * tool.tool.reach)) return false;
   ContactPoint contact;
@@ -39,10 +39,10 @@ bool reach_out(const Body& body, State& state, Index number) noexcept {
 
 /// Grab: what is closed is held; if nothing is, the surface within reach.
 void begin_hold(const Body& body, State& state, const Scratch& scratch, Index number) noexcept {
-  ToolState& tool = state.tools[static_cast<std::size_t>(number)];
+  ToolState& tool = state.tools[number];
   const Index before = state.held_count;
   for (Index k = 0; k < scratch.last_count && state.held_count < state.max_contacts(); ++k) {
-    const ContactPoint& contact = scratch.last_contacts[static_cast<std::size_t>(k)];
+    const ContactPoint& contact = scratch.last_contacts[k];
     if (contact.tool == number && !contact.held && contact.force.dot(contact.frame.col(0)) > 0.0)
       hold_contact(state, contact);
   }
@@ -57,14 +57,14 @@ void end_hold(State& state, Index number) noexcept {
   const auto end = std::remove_if(begin, begin + state.held_count,
                                   [&](const ContactPoint& contact) { return contact.tool == number; });
   state.held_count = static_cast<Index>(end - begin);
-  state.tools[static_cast<std::size_t>(number)].holding = false;
+  state.tools[number].holding = false;
 }
 
 }  // namespace
 
 void update_holds(const Body& body, State& state, const Scratch& scratch) noexcept {
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
-    const ToolState& tool = state.tools[static_cast<std::size_t>(k)];
+    const ToolState& tool = state.tools[k];
     if (tool.device.grab && !tool.holding && tool.placed) begin_hold(body, state, scratch, k);
     if (!tool.device.grab && tool.holding) end_hold(state, k);
   }

@@ -24,7 +24,7 @@ Eigen::Matrix3d passive(const Eigen::Matrix3d& stiffness) noexcept {
 void fill_row_change(const State& state, Scratch& scratch, Index number, int axis) noexcept {
   const ContactProblem& problem = scratch.problem;
   for (Index k = 0; k < state.contact_count; ++k) {
-    const ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+    const ContactPoint& contact = state.contact_points[k];
     const auto first = static_cast<std::size_t>(problem.first_row(k));
     for (Index i = 0; i < problem.rows_of(k); ++i) {
       scratch.row_change[first + static_cast<std::size_t>(i)] =
@@ -52,7 +52,7 @@ Vec3 force_change(const State& state, Scratch& scratch, ToolState& tool, Index n
   }
   Vec3 change = Vec3::Zero();
   for (Index k = 0; k < state.contact_count; ++k) {
-    const ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
+    const ContactPoint& contact = state.contact_points[k];
     const auto first = static_cast<std::size_t>(problem.first_row(k));
     if (contact.tool == number) {
       for (Index i = 0; i < problem.rows_of(k); ++i)
@@ -70,16 +70,14 @@ Vec3 force_change(const State& state, Scratch& scratch, ToolState& tool, Index n
 void keep_open_contacts(const State& state, const ContactProblem& problem, ToolState& tool,
                         Index number) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
-    const ContactPoint& contact = state.contact_points[static_cast<std::size_t>(k)];
-    if (contact.held || contact.tool != number ||
-        problem.lambda[static_cast<std::size_t>(problem.first_row(k))] > 0.0)
-      continue;
+    const ContactPoint& contact = state.contact_points[k];
+    if (contact.held || contact.tool != number || problem.lambda[problem.first_row(k)] > 0.0) continue;
     tool.local.radius = std::min(tool.local.radius, std::max(0.0, contact.gap));
   }
 }
 
 void linearise_tool(State& state, Scratch& scratch, Index number) noexcept {
-  ToolState& tool = state.tools[static_cast<std::size_t>(number)];
+  ToolState& tool = state.tools[number];
   tool.local = {.force = tool.contact_wrench.force,
                 .stiffness = Eigen::Matrix3d::Zero(),
                 .point = tool.device.position,

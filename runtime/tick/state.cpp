@@ -97,7 +97,7 @@ SurfaceState make_surface(const Body& body, const StateOptions& options) {
 State::State(const Body& body, const StateOptions& options)
     : tick(options.tick),
       tools(make_tools(options)),
-      contact_points(static_cast<std::size_t>(options.max_contacts)),
+      contact_points(options.max_contacts),
       surface(make_surface(body, options)),
       scratch(body, static_cast<Index>(tools.size()), options.max_contacts, near_room(options)) {}
 

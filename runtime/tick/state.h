@@ -100,8 +100,7 @@ struct State {
 
 /// Where a surface node is in this tick without the forces of its contacts [m].
 inline Vec3 unloaded_position(const Body& body, SurfaceState& surface, Index surface_node) noexcept {
-  return body.surface_rest_positions()[static_cast<std::size_t>(surface_node)] +
-         surface.motion.at(body, surface_node);
+  return body.surface_rest_positions()[surface_node] + surface.motion.at(body, surface_node);
 }
 
 /// Outward unit normal of a simplex of the surface as it is now.

@@ -105,8 +105,7 @@ void renew_patch_surface(const Body& body, SurfaceState& surface, Scratch& scrat
       static_cast<std::size_t>(body.dimension() * (end - surface.sweep.next_patch_node)));
   patch_displacement(surface.near.load(), surface.sweep.next_patch_node, u);
   for (Index k = surface.sweep.next_patch_node; k < end; ++k)
-    move_far(body, surface, nodes[static_cast<std::size_t>(k)],
-             vector_at(u, body.dimension(), k - surface.sweep.next_patch_node));
+    move_far(body, surface, nodes[k], vector_at(u, body.dimension(), k - surface.sweep.next_patch_node));
   surface.sweep.next_patch_node = end;
 }
 

@@ -17,8 +17,8 @@
 
 #include "meshes/surface.h"
 #include "precompute/bake.h"
-#include "precompute/numerics/body.h"
-#include "precompute/numerics/greens.h"
+#include "precompute/numerics/greens_solver.h"
+#include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
 
 namespace palpate {

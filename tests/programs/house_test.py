@@ -59,6 +59,10 @@ class Rules(unittest.TestCase):
         self.write("base/part39.cpp", "")
         self.refused("base: 41 product files, of at most 40")
 
+    def test_two_headers_of_one_name_are_refused(self):
+        self.write("base/mesh.h", "")
+        self.refused("base/mesh.h and meshes/mesh.h: two headers of one name")
+
     def test_a_folder_on_no_floor_is_refused(self):
         self.write("runtime/attic/old.cpp", "")
         self.refused("runtime/attic/old.cpp: its folder is on no floor")

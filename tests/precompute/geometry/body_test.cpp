@@ -1,9 +1,8 @@
 // From model.toml to a checked body; the sample models.
-#include "precompute/numerics/body.h"
-
 #include <gtest/gtest.h>
 
 #include "meshes/element.h"
+#include "precompute/numerics/meshed_body.h"
 #include "tests/support/geometry_shapes.h"
 
 namespace palpate {

@@ -12,7 +12,7 @@
 
 #include "base/error.h"
 #include "meshes/surface.h"
-#include "precompute/numerics/modes.h"
+#include "precompute/numerics/lowest_modes.h"
 #include "tests/support/precompute_case.h"
 #include "tests/support/precompute_kinds.h"
 

@@ -1,6 +1,4 @@
 // Green's functions against the dense inverse.
-#include "precompute/numerics/greens.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -10,6 +8,7 @@
 #include "formats/packed.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
+#include "precompute/numerics/greens_solver.h"
 #include "precompute/numerics/scope.h"
 #include "tests/support/precompute_case.h"
 

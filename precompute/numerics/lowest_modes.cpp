@@ -1,4 +1,4 @@
-#include "precompute/numerics/modes.h"
+#include "precompute/numerics/lowest_modes.h"
 
 #include <Spectra/SymGEigsShiftSolver.h>
 #include <fmt/format.h>

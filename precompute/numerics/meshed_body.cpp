@@ -1,4 +1,4 @@
-#include "precompute/numerics/body.h"
+#include "precompute/numerics/meshed_body.h"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "precompute/geometry/plane_mesh.h"
 #include "precompute/geometry/surface_input.h"
 #include "precompute/geometry/tetgen_mesh.h"
-#include "precompute/numerics/held_nodes.h"
+#include "precompute/numerics/fixed_nodes.h"
 
 namespace palpate {
 namespace {
@@ -177,7 +177,7 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   body.surface = extract_surface(body.mesh);
 
   body.material_of_element = materials_of_elements(body.mesh, description.materials, toml);
-  HeldNodes held = hold_nodes(body.mesh, description.fixed, toml);
+  FixedNodes held = hold_nodes(body.mesh, description.fixed, toml);
   body.fixed = std::move(held.axes);
   body.prescribed = std::move(held.displacement);
   check_held(body.mesh, body.fixed, toml);

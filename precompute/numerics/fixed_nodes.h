@@ -10,13 +10,13 @@
 
 namespace palpate {
 
-struct HeldNodes {
+struct FixedNodes {
   std::vector<std::uint8_t> axes;  ///< [N] bit `axis` is set where held along it
   std::vector<Vec3> displacement;  ///< [N] along the held axes [m]; zero along others
 };
 
 /// All entries together. Throws Error (where = `file` and the entry) for a selection without nodes, and where
 /// two entries hold a node along the same axis at different displacements.
-HeldNodes hold_nodes(const Mesh& mesh, const std::vector<Fixing>& fixed, const std::string& file);
+FixedNodes hold_nodes(const Mesh& mesh, const std::vector<Fixing>& fixed, const std::string& file);
 
 }  // namespace palpate

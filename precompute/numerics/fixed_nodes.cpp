@@ -1,4 +1,4 @@
-#include "precompute/numerics/held_nodes.h"
+#include "precompute/numerics/fixed_nodes.h"
 
 #include <fmt/format.h>
 
@@ -15,9 +15,9 @@ bool holds(std::uint8_t axes, std::size_t axis) {
 
 }  // namespace
 
-HeldNodes hold_nodes(const Mesh& mesh, const std::vector<Fixing>& fixed, const std::string& file) {
+FixedNodes hold_nodes(const Mesh& mesh, const std::vector<Fixing>& fixed, const std::string& file) {
   const std::size_t count = mesh.nodes.size();
-  HeldNodes held{std::vector<std::uint8_t>(count, 0), std::vector<Vec3>(count, Vec3::Zero())};
+  FixedNodes held{std::vector<std::uint8_t>(count, 0), std::vector<Vec3>(count, Vec3::Zero())};
   std::vector<std::array<std::size_t, 3>> holder(count);  // entry that holds each dof first
 
   for (std::size_t entry = 0; entry < fixed.size(); ++entry) {

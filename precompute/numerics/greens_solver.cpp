@@ -1,4 +1,4 @@
-#include "precompute/numerics/greens.h"
+#include "precompute/numerics/greens_solver.h"
 
 #include <cblas.h>
 
