@@ -14,7 +14,6 @@ std::string to_text(const Error& error) {
   if (first_word.find_first_of("_./-=") == std::string::npos && !hint.empty()) {
     hint[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(hint[0])));
   }
-  if (!hint.empty() && std::isalnum(static_cast<unsigned char>(hint.back())) != 0) hint += '.';
   const std::string where = error.where().empty() ? "" : printable(error.where()) + ": ";
   return "error: " + where + printable_lines(error.what(), "  ") + "\nhint: " + printable_lines(hint) + "\n";
 }

@@ -12,7 +12,7 @@ namespace palpate {
 class Error : public std::runtime_error {
  public:
   /// `what` says what is wrong (with the numbers), `where` names the file, field or line, `hint` says what to
-  /// do.
+  /// do, without a full stop at its end.
   Error(const std::string& what, std::string where, std::string hint)
       : std::runtime_error(what), where_(std::move(where)), hint_(std::move(hint)) {}
 

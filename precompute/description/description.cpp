@@ -91,7 +91,7 @@ void keep_regions(Geometry& geometry, const std::vector<MaterialPart>& materials
 }  // namespace
 
 Description read_description(const std::filesystem::path& path) {
-  return parse_description(read_all(path, "Give the path of a model.toml."), path);
+  return parse_description(read_all(path, "Give the path of a model.toml"), path);
 }
 
 Description parse_description(const std::string& text, const std::filesystem::path& path) {

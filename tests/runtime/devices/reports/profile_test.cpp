@@ -116,15 +116,15 @@ TEST(DeviceProfile, SaysFileLineKeyAndWhatToDo) {
   EXPECT_EQ(told("dead_zone = 15", "deadzone = 15"),
             "error: my.toml:9:1: unknown key \"deadzone\" in [spacemouse]\n"
             "hint: The nearest known key is \"dead_zone\" of full_scale, dead_zone, speed, turning_speed, "
-            "translation_signs, rotation_signs, silence.\n");
+            "translation_signs, rotation_signs, silence\n");
   EXPECT_EQ(told("speed = 0.1\n", ""),
             "error: my.toml:7:1: [spacemouse] speed is missing\nhint: Add it to [spacemouse]\n");
   EXPECT_EQ(told("speed = 0.1", "speed = -0.1"),
             "error: my.toml:10:9: [spacemouse] speed must be greater than 0, not -0.1\nhint: Give a positive "
-            "number.\n");
+            "number\n");
   EXPECT_EQ(told("dead_zone = 15", "dead_zone = 200"),
             "error: my.toml:9:13: [spacemouse] dead_zone must be from 0 to 175, not 200\n"
-            "hint: Choose a value in that range.\n");
+            "hint: Choose a value in that range\n");
   EXPECT_EQ(told("= [1, -1, -1]", "= [1, -1]"),
             "error: my.toml:12:21: [spacemouse] translation_signs must be [three whole numbers]\n"
             "hint: Write translation_signs = [three whole numbers]\n");
