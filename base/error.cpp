@@ -1,6 +1,7 @@
 #include "base/error.h"
 
 #include <cctype>
+#include <new>
 
 #include "base/printable.h"
 
@@ -13,9 +14,20 @@ std::string to_text(const Error& error) {
   if (first_word.find_first_of("_./-=") == std::string::npos && !hint.empty()) {
     hint[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(hint[0])));
   }
-  if (!hint.empty() && std::isalnum(static_cast<unsigned char>(hint.back())) != 0) hint += '.';
-  return "error: " + printable(error.where()) + ": " + printable_lines(error.what(), "  ") +
-         "\nhint: " + printable_lines(hint) + "\n";
+  const std::string where = error.where().empty() ? "" : printable(error.where()) + ": ";
+  return "error: " + where + printable_lines(error.what(), "  ") + "\nhint: " + printable_lines(hint) + "\n";
+}
+
+Error handled_error(const std::string& where, const std::string& if_no_memory) {
+  try {
+    throw;
+  } catch (const Error& error) {
+    return error;
+  } catch (const std::bad_alloc&) {
+    return {"no more memory could be had", where, if_no_memory};
+  } catch (const std::exception& error) {
+    return {error.what(), where, "this is a defect of Palpate; please report it"};
+  }
 }
 
 }  // namespace palpate

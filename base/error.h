@@ -7,12 +7,12 @@
 namespace palpate {
 
 /// What a person is told when something cannot be done: one sentence, its place, and a way out.
-/// Thrown offline and at load, never in the tick; caught once in each `main`, which prints `to_text` and
-/// exits with `exit_input_error`.
+/// Thrown offline and at load, never in the tick; run_program catches it, prints `to_text` and exits with
+/// `exit_input_error`.
 class Error : public std::runtime_error {
  public:
   /// `what` says what is wrong (with the numbers), `where` names the file, field or line, `hint` says what to
-  /// do.
+  /// do, without a full stop at its end.
   Error(const std::string& what, std::string where, std::string hint)
       : std::runtime_error(what), where_(std::move(where)), hint_(std::move(hint)) {}
 
@@ -24,8 +24,13 @@ class Error : public std::runtime_error {
   std::string hint_;
 };
 
-/// The two lines that a person sees: `error: WHERE: WHAT` and `hint: HINT`, the hint as a sentence.
+/// The two lines that a person sees: `error: WHERE: WHAT`, without WHERE where it is empty, and `hint: HINT`,
+/// which begins with a capital letter.
 std::string to_text(const Error& error);
+
+/// The exception that is being handled as an Error, which it may be: the lack of memory has `if_no_memory`
+/// for a hint, everything else is a mistake in the program. `where` is the place of these two.
+[[nodiscard]] Error handled_error(const std::string& where, const std::string& if_no_memory);
 
 /// Exit statuses of both programs (documented in the README).
 enum ExitCode : int {

@@ -26,17 +26,17 @@ std::string reason(int error) {
 const char* hint_for(int error) {
   switch (error) {
     case ENOENT:
-      return "Check the path.";
+      return "Check the path";
     case EACCES:
     case EPERM:
     case EROFS:
-      return "Check the permissions of the file and its folder.";
+      return "Check the permissions of the file and its folder";
     case ENOSPC:
     case EDQUOT:
     case EFBIG:
-      return "Free some disk space or choose another place with --output.";
+      return "Free some disk space or choose another place with --output";
     default:
-      return "Check the disk and the folder.";
+      return "Check the disk and the folder";
   }
 }
 
@@ -49,7 +49,7 @@ const char* hint_for(int error) {
   throw Error(
       std::string("is in the way: it is ") +
           (std::filesystem::is_symlink(path) ? "a symbolic link, which is not followed" : "not a file"),
-      path.string(), "Remove it, or write elsewhere.");
+      path.string(), "Remove it, or write elsewhere");
 }
 
 std::filesystem::path folder_of(const std::filesystem::path& path) {
@@ -120,10 +120,20 @@ std::size_t read_some(const FileDescriptor& file, std::span<std::byte> into, std
 void read_exactly(const FileDescriptor& file, std::span<std::byte> into, std::int64_t offset) {
   while (!into.empty()) {
     const std::size_t got = read_some(file, into, offset);
-    if (got == 0) throw Error("ends too early", file.path().string(), "Copy or make the file again.");
+    if (got == 0) throw Error("ends too early", file.path().string(), "Copy or make the file again");
     into = into.subspan(got);
     offset += static_cast<std::int64_t>(got);
   }
+}
+
+int write_all(int fd, std::string_view bytes) noexcept {
+  while (!bytes.empty()) {
+    const ssize_t put = ::write(fd, bytes.data(), bytes.size());
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) return errno;
+    bytes.remove_prefix(static_cast<std::size_t>(put));
+  }
+  return 0;
 }
 
 void write_exactly(const FileDescriptor& file, std::span<const std::byte> bytes, std::int64_t offset) {
@@ -136,14 +146,8 @@ void write_exactly(const FileDescriptor& file, std::span<const std::byte> bytes,
   }
 }
 
-void append_text(const FileDescriptor& file, const std::string& text) {
-  std::string_view rest = text;
-  while (!rest.empty()) {
-    const ssize_t put = ::write(file.get(), rest.data(), rest.size());
-    if (put < 0 && errno == EINTR) continue;
-    if (put < 0) fail("write to the file", file.path(), errno);
-    rest.remove_prefix(static_cast<std::size_t>(put));
-  }
+void append_text(const FileDescriptor& file, std::string_view text) {
+  if (const int error = write_all(file.get(), text)) fail("write to the file", file.path(), error);
 }
 
 std::shared_ptr<const void> map_file(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes) {
@@ -174,15 +178,18 @@ void reserve_space(const FileDescriptor& file, std::int64_t offset, std::int64_t
   fail("reserve " + std::to_string(megabytes(bytes)) + " MB", file.path(), errno);
 }
 
+int make_new_file(const std::filesystem::path& path, mode_t mode) noexcept {
+  return ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode);
+}
+
 void make_anew(const std::filesystem::path& temporary) {
   struct stat status = {};
   if (::lstat(temporary.c_str(), &status) == 0) {
     if (!S_ISREG(status.st_mode)) refuse_stranger(temporary);
     if (::unlink(temporary.c_str()) != 0) fail("remove what an earlier run left", temporary, errno);
   }
-  const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-  if (fd < 0) fail("make the file", temporary, errno);
-  ::close(fd);
+  const FileDescriptor made(make_new_file(temporary), temporary);
+  if (made.get() < 0) fail("make the file", temporary, errno);
 }
 
 void rename_file(const std::filesystem::path& from, const std::filesystem::path& to) {

@@ -1,12 +1,15 @@
 // Files below HDF5: positioned reads and writes, mappings, free space, durable renames (POSIX).
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace palpate {
 
@@ -51,11 +54,14 @@ std::size_t read_some(const FileDescriptor& file, std::span<std::byte> into, std
 /// Reads exactly `into.size()` bytes at `offset`. Throws Error when the file ends before.
 void read_exactly(const FileDescriptor& file, std::span<std::byte> into, std::int64_t offset);
 
+/// Writes all of `bytes` where the descriptor is. Returns 0, or the system's reason (errno).
+int write_all(int fd, std::string_view bytes) noexcept;
+
 /// Throws Error with the system's reason (full disk, ...).
 void write_exactly(const FileDescriptor& file, std::span<const std::byte> bytes, std::int64_t offset);
 
 /// Adds a line to a file opened with read_append. Throws Error.
-void append_text(const FileDescriptor& file, const std::string& text);
+void append_text(const FileDescriptor& file, std::string_view text);
 
 /// Maps bytes [offset, offset + bytes) read-only; the mapping lives as long as the pointer. `bytes` > 0 and
 /// inside the file.
@@ -68,6 +74,11 @@ void check_free_space(const std::filesystem::path& path, std::int64_t needed);
 /// Takes the disk space of [offset, offset + bytes) now, where the file system can. Throws Error when it is
 /// full.
 void reserve_space(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
+
+/// Makes an empty file with the rights `mode` (less the umask) and opens it for writing; what already has the
+/// name is neither opened, followed nor replaced. Returns the descriptor, which the caller closes; -1 with
+/// errno where that cannot be.
+[[nodiscard]] int make_new_file(const std::filesystem::path& path, mode_t mode = 0666) noexcept;
 
 /// Makes an empty file, in the place of what a killed run may have left under the same temporary name. Throws
 /// Error where something that is not a regular file has that name, which is neither followed nor removed.

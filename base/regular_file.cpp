@@ -18,12 +18,12 @@ const char* hint_for(int error) {
     case EACCES:
     case EPERM:
     case EROFS:
-      return "Check the permissions of the file and its folder.";
+      return "Check the permissions of the file and its folder";
     case ENOSPC:
     case EDQUOT:
-      return "Free some disk space or choose another place with --output.";
+      return "Free some disk space or choose another place with --output";
     default:
-      return "Check the name, and that it is a file that you may read.";
+      return "Check the name, and that it is a file that you may read";
   }
 }
 
@@ -52,7 +52,7 @@ const char* kind_of(mode_t mode) {
 void check_kind(mode_t mode, const std::filesystem::path& file) {
   if (S_ISREG(mode)) return;
   throw Error(std::string("is ") + kind_of(mode) + ", not a file", file.string(),
-              S_ISDIR(mode) ? "Give the path of a file in it." : "Save what it gives as a file first.");
+              S_ISDIR(mode) ? "Give the path of a file in it" : "Save what it gives as a file first");
 }
 
 /// Closes a descriptor when it goes.

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/file_io.h"
 
 namespace palpate {
 namespace {
@@ -58,26 +59,15 @@ class IgnoredPipeSignal {
   struct sigaction before_ {};
 };
 
-/// 0, or the system's reason.
-int write_all(int fd, std::string_view bytes) {
-  while (!bytes.empty()) {
-    const ssize_t put = ::write(fd, bytes.data(), bytes.size());
-    if (put < 0 && errno == EINTR) continue;
-    if (put < 0) return errno;
-    bytes.remove_prefix(static_cast<std::size_t>(put));
-  }
-  return 0;
-}
-
 /// A new file that nothing else has opened, under the first free name beside `target`: what a killed run or a
 /// stranger left there is neither followed nor touched.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(std::filesystem::path target) : target_(std::move(target)) {
+  explicit TemporaryFile(std::filesystem::path target, mode_t mode = 0666) : target_(std::move(target)) {
     constexpr int most = 1000;
     for (int k = 1; fd_ < 0; ++k) {
       path_ = target_.string() + ".partial" + (k > 1 ? std::to_string(k) : "");
-      fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+      fd_ = make_new_file(path_, mode);
       if (fd_ < 0 && (errno != EEXIST || k == most)) fail(target_, errno);
     }
   }
@@ -90,13 +80,11 @@ class TemporaryFile {
   TemporaryFile& operator=(const TemporaryFile&) = delete;
 
   void write(std::string_view bytes) {
-    int error = write_all(fd_, bytes);
-    if (error == 0 && ::fsync(fd_) != 0 && errno != EINVAL) error = errno;
-    if (error != 0) fail(target_, error);
+    if (const int error = write_all(fd_, bytes)) fail(target_, error);
   }
 
   void take_its_place() {
-    if (std::rename(path_.c_str(), target_.c_str()) != 0) fail(target_, errno);
+    rename_durably(path_, target_);
     ::close(std::exchange(fd_, -1));
   }
 
@@ -157,9 +145,7 @@ int open_stream(const std::filesystem::path& file) {
 void write_file(const std::filesystem::path& file, std::string_view bytes) {
   const WriteTarget target = write_target(file);
   if (target == WriteTarget::regular) {
-    TemporaryFile temporary(link_target(file));
-    temporary.write(bytes);
-    temporary.take_its_place();
+    replace_file(link_target(file), bytes);
     return;
   }
   const IgnoredPipeSignal ignored;
@@ -168,6 +154,12 @@ void write_file(const std::filesystem::path& file, std::string_view bytes) {
   const int error = write_all(fd, bytes);
   ::close(fd);
   if (error != 0) fail(file, error);
+}
+
+void replace_file(const std::filesystem::path& file, std::string_view bytes, mode_t mode) {
+  TemporaryFile temporary(file, mode);
+  temporary.write(bytes);
+  temporary.take_its_place();
 }
 
 void expect_writable_folder(const std::filesystem::path& file) {

@@ -1,6 +1,8 @@
 // Files that appear whole or not at all.
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
 #include <string_view>
 
@@ -11,6 +13,11 @@ namespace palpate {
 /// other character devices are written to directly, also `/dev/stdout` when it is redirected to a file.
 /// Throws Error with the system's reason; then a regular file is as it was.
 void write_file(const std::filesystem::path& file, std::string_view bytes);
+
+/// Writes a regular file under a fresh temporary name beside it, with the rights `mode` (less the umask), and
+/// renames it, in the place of what was there, a symbolic link too. Throws Error with the system's reason;
+/// then what was there is as it was.
+void replace_file(const std::filesystem::path& file, std::string_view bytes, mode_t mode = 0666);
 
 /// What becomes of the bytes that are written to a path.
 enum class WriteTarget {

@@ -137,7 +137,7 @@ Id timeless(hid_t kind) {
 
 void File::fail(const std::string& doing) const {
   throw Error("cannot " + doing + ": " + reason(), path_.string(),
-              "Check the disk and the folder's permissions.");
+              "Check the disk and the folder's permissions");
 }
 
 File File::create(const std::filesystem::path& path, std::int64_t align_from) {
@@ -148,7 +148,7 @@ File File::create(const std::filesystem::path& path, std::int64_t align_from) {
     // Where the file vanishes while HDF5 makes it, HDF5 keeps the system's reason to itself.
     if (::access(path.c_str(), F_OK) != 0)
       throw Error("cannot make the file: " + std::system_category().message(errno), path.string(),
-                  "Something removed the file or its folder meanwhile.");
+                  "Something removed the file or its folder meanwhile");
     file.fail("make the file");
   }
   return file;
@@ -206,7 +206,7 @@ void File::write_attribute(const std::string& object, const std::string& name, c
   if (text.size() > longest_text)
     throw Error(name + " is " + std::to_string(text.size()) + " bytes long, at most " +
                     std::to_string(longest_text) + " fit",
-                path_.string(), "Use a shorter text.");
+                path_.string(), "Use a shorter text");
   const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);
   const Id type = text_type(text.size(), is_ascii(text) ? H5T_CSET_ASCII : H5T_CSET_UTF8);
   const Id space(H5Screate(H5S_SCALAR), H5Sclose);

@@ -17,7 +17,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "bytes are taken from the file as they are");
 
-constexpr const char* altered_hint = "Copy the file again, or precompute it again.";
+constexpr const char* altered_hint = "Copy the file again, or precompute it again";
 constexpr std::size_t longest_text = 4096;
 constexpr hssize_t most_integers = 16;       // of an attribute
 constexpr std::size_t most_dims = 4;         // that are reported

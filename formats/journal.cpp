@@ -61,7 +61,7 @@ bool is_there(const std::filesystem::path& file) {
   if (::lstat(file.c_str(), &status) != 0) return false;
   if (!S_ISREG(status.st_mode))
     throw Error("is in the way: it is no file of palpate-precompute's", file.string(),
-                "Remove it, or choose another place with --output.");
+                "Remove it, or choose another place with --output");
   return true;
 }
 
@@ -71,7 +71,7 @@ void expect_journal(const FileDescriptor& file) {
   start.resize(read_some(file, std::as_writable_bytes(std::span(start)), 0));
   if (!first_word.starts_with(start))  // which a kill may have cut off
     throw Error("is in the way: it is not what palpate-precompute writes there", file.path().string(),
-                "Remove it, or choose another place with --output.");
+                "Remove it, or choose another place with --output");
 }
 
 }  // namespace
@@ -83,7 +83,7 @@ void expect_own_journal(const std::filesystem::path& model) {
   if (has_journal) expect_journal(open_file(progress, OpenMode::read));
   if (is_there(partial) && !has_journal && !is_ours(partial, OutputKind::model))
     throw Error("is in the way: it is not what palpate-precompute writes there", partial.string(),
-                "Remove it, or choose another place with --output.");
+                "Remove it, or choose another place with --output");
 }
 
 Journal::Journal(const std::filesystem::path& path) {
@@ -91,7 +91,7 @@ Journal::Journal(const std::filesystem::path& path) {
     file_ = open_file(path, OpenMode::read_append);
     if (!lock_file(file_))
       throw Error("another palpate-precompute is writing this file", path.string(),
-                  "Wait for it, or choose another place with --output.");
+                  "Wait for it, or choose another place with --output");
   } while (!is_still_there(file_));
   expect_journal(file_);
 }
@@ -137,7 +137,7 @@ void Journal::write(const JournalContents& contents) {
 
 void Journal::empty() {
   if (::ftruncate(file_.get(), 0) != 0)
-    throw Error("cannot be emptied", file_.path().string(), "Delete this file.");
+    throw Error("cannot be emptied", file_.path().string(), "Delete this file");
 }
 
 void Journal::add(const JournalRange& range) {

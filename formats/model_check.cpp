@@ -127,7 +127,7 @@ void check_overlay(const Model& model, const std::string& where) {
 }  // namespace
 
 void refuse(const std::string& where, const std::string& what) {
-  throw Error(what, where, "Copy the file again, or precompute it again.");
+  throw Error(what, where, "Copy the file again, or precompute it again");
 }
 
 Counts::Counts(std::string where) : where_(std::move(where)) {

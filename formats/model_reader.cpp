@@ -25,9 +25,9 @@ namespace palpate {
 namespace {
 
 constexpr const char* precompute_again =
-    "Copy the file again, or precompute it again: palpate-precompute model.toml.";
+    "Copy the file again, or precompute it again: palpate-precompute model.toml";
 
-constexpr const char* give_a_model = "Give a NAME.palpate.hdf that palpate-precompute has written.";
+constexpr const char* give_a_model = "Give a NAME.palpate.hdf that palpate-precompute has written";
 
 /// Proves that this is our format in a version that we read.
 std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
@@ -35,7 +35,7 @@ std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
   const auto format = file.text_attribute("/", "format");
   if (format == "palpate-recording")
     throw Error("is a recording, not a model", where,
-                "palpate-runtime view " + where + " shows it; a model is a NAME.palpate.hdf.");
+                "palpate-runtime view " + where + " shows it; a model is a NAME.palpate.hdf");
   if (format != "palpate") throw Error("is an HDF5 file, but not a Palpate file", where, give_a_model);
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version) refuse(where, "the attribute version is missing");
@@ -43,7 +43,7 @@ std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
     throw Error("the file has format version " + std::to_string((*version)[0]) + "." +
                     std::to_string((*version)[1]) + ", this program reads version " +
                     std::to_string(format_major) + ".x",
-                where, "Precompute it again with this program's palpate-precompute.");
+                where, "Precompute it again with this program's palpate-precompute");
   if ((*version)[1] < 0) refuse(where, "the attribute version is negative");
   return *version;
 }

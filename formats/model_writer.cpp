@@ -312,7 +312,7 @@ void ModelWriter::Impl::store(std::size_t matrix, std::int64_t first, std::int64
       throw Error(std::string("columns ") + std::to_string(first) + " to " +
                       std::to_string(first + count - 1) + " of " + matrices[matrix].name +
                       " hold a value that is not finite in the stored precision",
-                  path.string(), "Check the material and the mesh's quality, or store in double precision.");
+                  path.string(), "Check the material and the mesh's quality, or store in double precision");
     stored.update(bytes_of(converted));
     write_exactly(data, bytes_of(converted), at);
     at += static_cast<std::int64_t>(bytes_of(converted).size());
@@ -397,7 +397,7 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
     throw Error("columns " + std::to_string(first) + " to " + std::to_string(first + count - 1) + " with " +
                     std::to_string(packed.size()) + " entries do not fit a matrix of order " +
                     std::to_string(n),
-                impl_->path.string(), "This is a mistake in the program; please report it.");
+                impl_->path.string(), "This is a mistake in the program; please report it");
   try {
     if (const SmoothPart* smooth = impl_->matrices[which].smooth.get(); smooth != nullptr)
       impl_->store<float>(which, first, count, without(*smooth, first, n, packed));
@@ -417,7 +417,7 @@ void ModelWriter::finish(const std::vector<Probe>& probes) {
     if (missing != matrix.done.end())
       throw Error("column " + std::to_string(missing - matrix.done.begin()) + " of " + matrix.name +
                       " was not written",
-                  impl_->path.string(), "This is a mistake in the program; please report it.");
+                  impl_->path.string(), "This is a mistake in the program; please report it");
   }
   try {
     impl_->seal(probes);

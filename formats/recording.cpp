@@ -14,13 +14,13 @@
 namespace palpate {
 namespace {
 
-constexpr const char* hint = "Copy the file again, or record the session again.";
+constexpr const char* hint = "Copy the file again, or record the session again";
 constexpr double longest_time = 1e9;                                          // s
 constexpr std::int64_t longest_ns = std::int64_t{1'000'000'000'000'000'000};  // ns
 
 hdf5::Contents open_master(const std::filesystem::path& path) {
   FileDescriptor file = open_file(path, OpenMode::read);
-  check_superblock(file, {"a recording", "Give a recording that palpate-runtime has written.", hint});
+  check_superblock(file, {"a recording", "Give a recording that palpate-runtime has written", hint});
   return hdf5::Contents::read(std::move(file));
 }
 
@@ -73,7 +73,7 @@ std::vector<T> read_some(const RecordingFiles& recording, const char* name, std:
   if (first < 0 || found != frames)
     throw Error("has " + std::to_string(before) + " frames, not " + std::to_string(frames) + " from number " +
                     std::to_string(first) + " on",
-                recording.files.front().path().string(), "Ask for frames that are there.");
+                recording.files.front().path().string(), "Ask for frames that are there");
   return values;
 }
 

@@ -22,7 +22,7 @@ constexpr const char* format_name = "palpate-recording";
 constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
 constexpr const char* lock_name = "lock";
 constexpr const char* master_name = "master.partial";
-constexpr const char* altered_hint = "Copy the file again, or record the session again.";
+constexpr const char* altered_hint = "Copy the file again, or record the session again";
 constexpr std::int64_t block = std::int64_t{4} << 20;  // bytes that are copied at once
 
 /// A dataset with a row for each tick or frame.
@@ -264,12 +264,12 @@ RecordingHead read_head(const hdf5::Contents& file) {
   const auto format = file.text_attribute("/", "format");
   if (format == "palpate")
     throw Error("is a model, not a recording", path,
-                "palpate-runtime play " + path + " --view shows it and lets you push it.");
+                "palpate-runtime play " + path + " --view shows it and lets you push it");
   if (format != format_name)
-    throw Error("is not a recording", path, "Give a recording that palpate-runtime has written.");
+    throw Error("is not a recording", path, "Give a recording that palpate-runtime has written");
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version || (*version)[0] != major_version)
-    throw Error("is a recording of another version", path, "Record the session again.");
+    throw Error("is a recording of another version", path, "Record the session again");
   RecordingHead head;
   head.has_stress = (*version)[1] >= 1;
   head.has_checksums = (*version)[1] >= 2;
@@ -278,7 +278,7 @@ RecordingHead read_head(const hdf5::Contents& file) {
   head.info.device = file.text_attribute("/", "device").value_or("");
   const auto rate = file.integer_attribute("/", "rate", 1);
   if (!rate || (*rate)[0] < 1 || (*rate)[0] > highest_rate)
-    throw Error("does not say how many ticks a second has", path, "Record the session again.");
+    throw Error("does not say how many ticks a second has", path, "Record the session again");
   head.info.rate = (*rate)[0];
   head.info.options = file.text_attribute("/", "options").value_or("");
   head.generator = file.text_attribute("/", "generator").value_or("");
@@ -286,7 +286,7 @@ RecordingHead read_head(const hdf5::Contents& file) {
   const auto nodes = file.locate("/surface/nodes", hdf5::element_type<double>(), 2);
   const auto simplices = file.locate("/surface/simplices", hdf5::element_type<Index>(), 2);
   if (nodes.dims[1] != 3 || simplices.dims[1] < 2 || simplices.dims[1] > 3)
-    throw Error("/surface is neither of triangles nor of lines", path, "Record the session again.");
+    throw Error("/surface is neither of triangles nor of lines", path, "Record the session again");
   RecordedSurface& surface = head.surface;
   surface.corners = static_cast<int>(simplices.dims[1]);
   const auto numbers = read_surface<double>(file, "/surface/nodes", nodes, head.has_checksums);
@@ -296,7 +296,7 @@ RecordingHead read_head(const hdf5::Contents& file) {
   if (!head.has_stress) return head;
   const auto held = file.locate("/surface/held", hdf5::element_type<std::uint8_t>(), 1);
   if (held.dims[0] != nodes.dims[0])
-    throw Error("/surface/held has another number of nodes", path, "Record the session again.");
+    throw Error("/surface/held has another number of nodes", path, "Record the session again");
   surface.held = read_surface<std::uint8_t>(file, "/surface/held", held, head.has_checksums);
   return head;
 }
@@ -310,7 +310,7 @@ std::filesystem::path parts_folder(const std::filesystem::path& recording) {
 void expect_own_parts(const std::filesystem::path& recording) {
   const std::filesystem::path folder = parts_folder(recording);
   const auto refuse = [&](const std::string& what) {
-    throw Error("is in the way: " + what, folder.string(), "Remove it, or record elsewhere.");
+    throw Error("is in the way: " + what, folder.string(), "Remove it, or record elsewhere");
   };
   std::error_code failed;
   const std::filesystem::file_type type = std::filesystem::symlink_status(folder, failed).type();
@@ -330,7 +330,7 @@ std::optional<FileDescriptor> lock_parts(const std::filesystem::path& recording)
   std::filesystem::create_directory(folder, failed);
   if (failed)
     throw Error("cannot make the folder: " + failed.message(), folder.string(),
-                "Check the path and the permissions of its folder.");
+                "Check the path and the permissions of its folder");
   FileDescriptor lock = open_file(folder / lock_name, OpenMode::read_append);
   if (!lock_file(lock)) return std::nullopt;
   return lock;
@@ -365,7 +365,7 @@ RecordingFiles open_recording(hdf5::Contents master) {
   for (std::size_t k = 1; k < names.size(); ++k) {
     if (!std::filesystem::exists(names[k]))
       throw Error("its part " + names[k].string() + " is missing", path.string(),
-                  "Keep the folder of a recording that is not finished beside it, under its own name.");
+                  "Keep the folder of a recording that is not finished beside it, under its own name");
     parts.push_back(open_file(names[k], OpenMode::read));
   }
   recording.files.push_back(std::move(master));

@@ -24,7 +24,7 @@ struct RecordingWriter::Impl {
     shown.surface = surface;
     std::optional<FileDescriptor> locked = lock_parts(path);
     if (!locked)
-      throw Error("is being recorded by another program", path.string(), "Wait for it, or record elsewhere.");
+      throw Error("is being recorded by another program", path.string(), "Wait for it, or record elsewhere");
     lock = std::move(*locked);
     try {
       write_master(path, head, {});

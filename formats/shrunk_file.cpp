@@ -14,7 +14,7 @@ void end(int) {
   constexpr std::string_view text =
       "error: a file was cut off while it was in use\nhint: Leave files alone while a program reads them, "
       "and "
-      "start it again.\n";
+      "start it again\n";
   [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
   ::_exit(exit_input_error);
 }

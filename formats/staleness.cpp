@@ -52,7 +52,7 @@ SourceFile describe_source(const std::string& role, const std::filesystem::path&
   source.bytes = static_cast<std::int64_t>(std::filesystem::file_size(file));
   source.path = std::filesystem::proximate(file, folder_of(model_path)).generic_string();
   if (source.path.find('\n') != std::string::npos)
-    throw Error("has a line end in its name", file.string(), "Rename the file.");
+    throw Error("has a line end in its name", file.string(), "Rename the file");
   return source;
 }
 

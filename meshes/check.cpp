@@ -26,27 +26,27 @@ Vec3 centre_of(const Mesh& mesh, Index e) {
 
 void check_numbers(const Mesh& mesh, const std::string& where) {
   if (mesh.connectivity.empty()) {
-    throw Error("the mesh has no elements", where, "Save the elements of the body, not only its boundary.");
+    throw Error("the mesh has no elements", where, "Save the elements of the body, not only its boundary");
   }
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
     if (mesh.nodes[node].allFinite()) continue;
     throw Error(fmt::format("node {} has a coordinate that is not a finite number", node), where,
-                "Repair or remake the mesh.");
+                "Repair or remake the mesh");
   }
   for (Index e = 0; e < mesh.elements(); ++e) {
     for (const Index node : mesh.element_nodes(e)) {
       if (node >= 0 && static_cast<std::size_t>(node) < mesh.nodes.size()) continue;
       throw Error(fmt::format("element {} uses node {}, but there are only nodes 0 to {}", e, node,
                               static_cast<std::int64_t>(mesh.nodes.size()) - 1),
-                  where, "Repair or remake the mesh.");
+                  where, "Repair or remake the mesh");
     }
   }
 }
 
 std::string remake_hint(const Mesh& mesh) {
   return traits(mesh.element).nodes > traits(mesh.element).corners
-             ? "The middles of its edges are too far out or in the wrong order; remake the mesh."
-             : "Remake the mesh with a bound on the quality of its elements.";
+             ? "The middles of its edges are too far out or in the wrong order; remake the mesh"
+             : "Remake the mesh with a bound on the quality of its elements";
 }
 
 /// Volumes that are smaller count as zero.
@@ -74,7 +74,7 @@ std::size_t count_inverted(const Mesh& mesh, const std::string& where) {
   if (inverted != 0 && inverted != mesh.elements()) {
     throw Error(fmt::format("{} of {} elements are inverted, e.g. element {} near {}", inverted,
                             mesh.elements(), an_inverted_one, text(centre_of(mesh, an_inverted_one), d)),
-                where, "The mesh is folded there; remake it.");
+                where, "The mesh is folded there; remake it");
   }
   return static_cast<std::size_t>(inverted);
 }
@@ -263,10 +263,10 @@ void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const 
   }
   if (any == 0) {
     throw Error("nothing is fixed: the body can move freely", where,
-                "Add a [[fixed]] region that holds a part of the body.");
+                "Add a [[fixed]] region that holds a part of the body");
   }
   if (all == every_axis) {
-    throw Error("every node is fixed: nothing is left to move", where, "Make the [[fixed]] regions smaller.");
+    throw Error("every node is fixed: nothing is left to move", where, "Make the [[fixed]] regions smaller");
   }
   const RigidMotions motions(mesh, fixed);
   const Eigen::MatrixXd left = motions.left_over();
@@ -280,10 +280,10 @@ void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const 
       if ((any >> axis & 1) == 0) axes += fmt::format("{}{}", axes.empty() ? "" : " and ", "xyz"[axis]);
     }
     throw Error(fmt::format("{}slide along {}", begin, axes), where,
-                fmt::format("Hold some nodes along {} too, in this [[fixed]] region or another.", axes));
+                fmt::format("Hold some nodes along {} too, in this [[fixed]] region or another", axes));
   }
   throw Error(begin + turning_text(motions, left), where,
-              "Add a [[fixed]] region, or an axis to one, that holds nodes elsewhere against it.");
+              "Add a [[fixed]] region, or an axis to one, that holds nodes elsewhere against it");
 }
 
 std::string scale_warning(const Mesh& mesh, double scale) {

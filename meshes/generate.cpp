@@ -105,7 +105,7 @@ Vec3 to_ball(const Vec3& x) {
 Error wrong_kind(ElementType has, ElementType wanted, const std::string& where) {
   return {
       fmt::format("the mesh has {} elements, which cannot be made {}", traits(has).name, traits(wanted).name),
-      where, fmt::format("Ask for {} elements, or give another mesh.", traits(has).name)};
+      where, fmt::format("Ask for {} elements, or give another mesh", traits(has).name)};
 }
 
 /// The node in the middle of each edge of a mesh.

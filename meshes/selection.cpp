@@ -64,7 +64,7 @@ struct SelectMeshNodes : SelectPoints {
       if (node < 0 || static_cast<std::size_t>(node) >= mesh.nodes.size()) {
         throw Error(
             fmt::format("node {} does not exist: the mesh has nodes 0 to {}", node, mesh.nodes.size() - 1),
-            where, "Node numbers count from 0 in the order of the mesh.");
+            where, "Node numbers count from 0 in the order of the mesh");
       }
       marks[static_cast<std::size_t>(node)] = 1;
     }
@@ -82,7 +82,7 @@ struct SelectMeshNodes : SelectPoints {
     if (!tags.contains(s.tag)) {
       throw Error(fmt::format("no boundary facet has the tag {}", s.tag), where,
                   tags.empty()
-                      ? "The mesh file has no tagged boundary facets; select by box, half_space or sphere."
+                      ? "The mesh file has no tagged boundary facets; select by box, half_space or sphere"
                       : fmt::format("The mesh has the tags {}.", fmt::join(tags, ", ")));
     }
     return marks;
@@ -99,7 +99,7 @@ struct SelectMeshElements : SelectPoints {
  private:
   [[noreturn]] void refuse(const char* selection) const {
     throw Error(fmt::format("{} cannot select elements", selection), where,
-                "Select by box, half_space, sphere or lowest, or by the mesh's regions.");
+                "Select by box, half_space, sphere or lowest, or by the mesh's regions");
   }
 };
 
@@ -117,7 +117,7 @@ void check_not_empty(const Marks& marks, const char* kind, const Eigen::AlignedB
   if (std::find(marks.begin(), marks.end(), 1) != marks.end()) return;
   const Vec3 &low = box.min(), &high = box.max();
   throw Error(fmt::format("the selection holds no {}", kind), where,
-              fmt::format("The body reaches from ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m.",
+              fmt::format("The body reaches from ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m",
                           low.x(), low.y(), low.z(), high.x(), high.y(), high.z()));
 }
 

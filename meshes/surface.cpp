@@ -12,7 +12,7 @@
 namespace palpate {
 namespace {
 
-constexpr const char* remove_overlap = "Remove the elements that overlap or stand twice in the mesh.";
+constexpr const char* remove_overlap = "Remove the elements that overlap or stand twice in the mesh";
 
 /// "face of nodes 3, 7, 9"
 std::string text(const Mesh& mesh, const ElementSide& side) {
@@ -36,7 +36,7 @@ void check_pair(const Mesh& mesh, const ElementSide& one, const ElementSide& oth
   std::sort(b_middles, b.end());
   if (a != b) {
     throw Error(fmt::format("two elements share the {} but not the middles of its edges", text(mesh, one)),
-                "mesh", "Join the nodes that are at the same place.");
+                "mesh", "Join the nodes that are at the same place");
   }
 }
 

@@ -320,7 +320,7 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
   if (std::none_of(surface.nodes.begin(), surface.nodes.end(),
                    [&](Index node) { return model.fixed[static_cast<std::size_t>(node)] == 0; })) {
     throw Error("no node of the boundary is free along every axis, so nothing can be touched",
-                description.file.string(), "Hold a smaller part of the body in [[fixed]].");
+                description.file.string(), "Hold a smaller part of the body in [[fixed]]");
   }
   Plan plan = make_plan(model.mesh, *factor, solver, description.precision, options.jobs);
   print_plan(plan, model, description, options, progress);

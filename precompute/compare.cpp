@@ -28,7 +28,7 @@ Extent3 extent_of(const Model& model) {
 
 void check_same_body(const Model& a, const Model& b) {
   const std::string where = a.name + " and " + b.name,
-                    hint = "Compare two files that were made from the same body.";
+                    hint = "Compare two files that were made from the same body";
   if (a.dimension() != b.dimension()) {
     throw Error(fmt::format("one is a body in {} dimensions, the other in {}", a.dimension(), b.dimension()),
                 where, hint);
@@ -81,7 +81,7 @@ Comparison compare(const Model& a, const Model& b, const CompareOptions& options
   Comparison result{options.radius.value_or(3.0 * std::max(on_a.mean_edge(), on_b.mean_edge())), {}};
   if (on_a.free_nodes().empty() || on_b.free_nodes().empty()) {
     throw Error("no node of the boundary is free to be touched", a.name + " and " + b.name,
-                "Hold a smaller part of the body in [[fixed]].");
+                "Hold a smaller part of the body in [[fixed]]");
   }
 
   struct Observed {
@@ -111,7 +111,7 @@ Comparison compare(const Model& a, const Model& b, const CompareOptions& options
   }
   if (result.touches.empty()) {
     throw Error("their free boundaries have no place in common", a.name + " and " + b.name,
-                "Compare two files that were made from the same body.");
+                "Compare two files that were made from the same body");
   }
   return result;
 }

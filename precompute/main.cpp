@@ -1,16 +1,14 @@
 // palpate-precompute: from model.toml to NAME.palpate.hdf, once a model.
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <string>
 #include <thread>
 
 #include "base/command_line.h"
 #include "base/error.h"
-#include "base/printable.h"
+#include "base/program.h"
 #include "base/spelling.h"
-#include "base/standard_output.h"
 #include "formats/model_file.h"
 #include "formats/shrunk_file.h"
 #include "precompute/bake.h"
@@ -169,9 +167,7 @@ int run(int argc, char** argv) {
                             CLI::ExitCodes::ExtrasError);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    std::fprintf(stderr, "error: %s\nhint: %s\n", palpate::printable_lines(error.what(), "  ").c_str(),
-                 usage_hint(app, argc > 1 ? argv[1] : "").c_str());
-    return palpate::exit_usage;
+    return palpate::tell_usage(error.what(), usage_hint(app, argc > 1 ? argv[1] : ""));
   }
   if (inspect_command->parsed()) {
     std::fputs(palpate::inspect(palpate::load_model(arguments.file)).c_str(), stdout);
@@ -182,29 +178,10 @@ int run(int argc, char** argv) {
   return run_bake(arguments.model, arguments.bake);
 }
 
-/// Errors in words.
-int run_and_tell(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (const palpate::Error& error) {
-    std::fputs(palpate::to_text(error).c_str(), stderr);
-  } catch (const std::bad_alloc&) {
-    std::fputs(
-        "error: memory: no more memory could be had\nhint: Try --dry-run, and fewer --jobs or a coarser "
-        "mesh.\n",
-        stderr);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr,
-                 "error: palpate-precompute: %s\nhint: This is a defect of Palpate; please report it.\n",
-                 palpate::printable_lines(error.what(), "  ").c_str());
-  }
-  return palpate::exit_input_error;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-  palpate::prepare_output();
   palpate::end_with_an_error_on_shrunk_files();
-  return palpate::finish_output(run_and_tell(argc, argv));
+  return palpate::run_program("palpate-precompute", "try --dry-run, and fewer --jobs or a coarser mesh",
+                              [&] { return run(argc, argv); });
 }

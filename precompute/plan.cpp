@@ -110,7 +110,7 @@ void check_memory(const Plan& plan) {
       "memory",
       std::string("Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading") +
           (overlays.empty() ? "" : ", or smaller regions in [overlay]") +
-          (dynamics.empty() ? "." : ", or fewer modes in [dynamics]."));
+          (dynamics.empty() ? "" : ", or fewer modes in [dynamics]"));
 }
 
 }  // namespace palpate

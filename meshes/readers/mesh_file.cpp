@@ -13,7 +13,7 @@ namespace palpate {
 namespace {
 
 constexpr const char* kinds_read =
-    "Bodies are of tet4, tet10 or hex8, in the plane of tri3 or quad4: mesh with one of these kinds alone.";
+    "Bodies are of tet4, tet10 or hex8, in the plane of tri3 or quad4: mesh with one of these kinds alone";
 
 FileElements& of_kind(MeshFile& file, ElementType type) {
   return file.elements[static_cast<std::size_t>(type)];
@@ -56,7 +56,7 @@ ElementType body_kind(const MeshFile& file, const TextReader& reader) {
     return kinds.front();
   }
   reader.fail("the file has no elements that a body could be of",
-              "Save the elements of the body, not only its boundary.");
+              "Save the elements of the body, not only its boundary");
 }
 
 /// Moves a plane mesh to z = 0.
@@ -68,7 +68,7 @@ void flatten(Mesh& mesh, const TextReader& reader) {
         fmt::format("the file holds a surface of {} {} (z from {:.4g} to {:.4g}), not a body",
                     mesh.elements(), traits(mesh.element).name, box.min().z(), box.max().z()),
         "Save its solid elements too; to have a closed surface meshed, give it as OFF, OBJ, STL or PLY under "
-        "'surface ='. A body in the plane has the same z everywhere.");
+        "'surface ='. A body in the plane has the same z everywhere");
   }
   for (Vec3& x : mesh.nodes) x.z() = 0.0;
 }
@@ -89,7 +89,7 @@ std::vector<Index> find_middles(const Mesh& mesh, const std::vector<Index>& corn
       reader.fail(fmt::format("the tagged triangle of the nodes {}, {}, {} (counted from 0) is not a side of "
                               "an element",
                               corners[first], corners[first + 1], corners[first + 2]),
-                  "Save boundary and body from the same mesh.");
+                  "Save boundary and body from the same mesh");
     }
     const std::vector<Index> nodes = side_nodes(mesh, *side);
     facets.insert(facets.end(), nodes.begin(), nodes.end());
@@ -121,7 +121,7 @@ void take_facets(MeshFile& file, Mesh& mesh, const TextReader& reader) {
     } else if (kind != wanted) {
       reader.fail(fmt::format("the file tags {} facets, but the sides of its {} elements are {}",
                               counts(file, {kind}), traits(mesh.element).name, traits(wanted).name),
-                  "Save boundary and body from the same mesh.");
+                  "Save boundary and body from the same mesh");
     }
     mesh.tagged_facets.insert(mesh.tagged_facets.end(), facets.nodes.begin(), facets.nodes.end());
     mesh.facet_tags.insert(mesh.facet_tags.end(), facets.tags.begin(), facets.tags.end());

@@ -17,8 +17,7 @@ std::filesystem::path with_ending(std::filesystem::path stem, const char* ending
 Index read_region(TextReader& reader) {
   const double value = reader.number("a region attribute");
   if (value != std::round(value) || std::abs(value) > std::numeric_limits<Index>::max()) {
-    reader.fail("the region attribute is not a whole number",
-                "Give regions whole numbers in the .poly file.");
+    reader.fail("the region attribute is not a whole number", "Give regions whole numbers in the .poly file");
   }
   return static_cast<Index>(value);
 }
@@ -28,7 +27,7 @@ std::int64_t read_nodes(const std::filesystem::path& file, MeshFile& mesh) {
   TextReader reader(file, '#');
   const std::int64_t count = reader.count("the number of nodes", 4);
   if (reader.integer("the dimension") != 3)
-    reader.fail("the mesh is not three-dimensional", "Give a TetGen .node file.");
+    reader.fail("the mesh is not three-dimensional", "Give a TetGen .node file");
   reader.rest_of_line();
   std::int64_t first = 0;
   mesh.nodes.reserve(static_cast<std::size_t>(count));

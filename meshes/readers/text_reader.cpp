@@ -15,7 +15,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view space = " \t\r\n\f\v";
-constexpr const char* remake = "The file may be damaged or cut short: write it again.";
+constexpr const char* remake = "The file may be damaged or cut short: write it again";
 
 /// from_chars does not take the leading plus that some programs write.
 std::string_view without_plus(std::string_view word) {

@@ -30,7 +30,7 @@ Mesh read_volume_mesh(const std::filesystem::path& file) {
       fmt::format("the extension '{}' is not one of a volume mesh that can be read", shortened(extension)),
       file.string(),
       "Known are .msh (Gmsh 2.2 or 4.1), .mesh (Medit), .node and .ele (TetGen), .vtk (legacy), all "
-      "as text.");
+      "as text");
 }
 
 }  // namespace palpate

@@ -21,11 +21,11 @@ struct Cells {
 
 void read_header(TextReader& reader) {
   if (!reader.rest_of_line().starts_with("# vtk DataFile Version")) {
-    reader.fail("the first line is not '# vtk DataFile Version ...'", "Give a legacy VTK file (.vtk).");
+    reader.fail("the first line is not '# vtk DataFile Version ...'", "Give a legacy VTK file (.vtk)");
   }
   reader.rest_of_line();  // title
   const std::string encoding(reader.word("ASCII"));
-  if (encoding == "BINARY") reader.fail("the file is binary; only text is read", "Save it as ASCII.");
+  if (encoding == "BINARY") reader.fail("the file is binary; only text is read", "Save it as ASCII");
   if (encoding != "ASCII") reader.fail("the third line is neither ASCII nor BINARY");
 }
 
@@ -145,7 +145,7 @@ Mesh read_vtk_legacy(const std::filesystem::path& file) {
   reader.expect("DATASET");
   if (const std::string kind(reader.word("UNSTRUCTURED_GRID")); kind != "UNSTRUCTURED_GRID") {
     reader.fail(fmt::format("the file holds a {:.40}, not an UNSTRUCTURED_GRID", kind),
-                "Save the volume mesh as unstructured grid.");
+                "Save the volume mesh as unstructured grid");
   }
   MeshFile mesh;
   std::optional<Cells> cells;

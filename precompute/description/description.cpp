@@ -13,7 +13,7 @@ namespace {
 const std::string add_plane =
     R"(add plane = "stress" (a thin sheet) or plane = "strain" (a slice of a long body) at the top level)";
 
-Analysis read_analysis(const Section& root, std::string_view kind) {
+Analysis read_analysis(const TomlTable& root, std::string_view kind) {
   if (!root.has("plane")) {
     if (is_plane(kind)) {
       root.fail("plane", "plane is missing: a " + std::string(kind) + " lies in the plane", add_plane);
@@ -28,7 +28,7 @@ Analysis read_analysis(const Section& root, std::string_view kind) {
                                                                 : Analysis::plane_strain;
 }
 
-double read_thickness(const Section& root, Analysis analysis) {
+double read_thickness(const TomlTable& root, Analysis analysis) {
   if (analysis == Analysis::solid && root.has("thickness")) {
     root.fail("thickness", "thickness is given, but the body is in space",
               "remove it; a body in the plane also has plane = \"stress\" or \"strain\"");
@@ -37,7 +37,7 @@ double read_thickness(const Section& root, Analysis analysis) {
 }
 
 /// In the plane the inside is cheap and is looked at: without scope and layers, all of it is kept.
-Scope read_scope(const Section& storage, int dimension) {
+Scope read_scope(const TomlTable& storage, int dimension) {
   const std::string usual = dimension == 2 && !storage.has("layers") ? "full" : "layers";
   const std::string scope =
       storage.has("scope") ? storage.choice("scope", {"surface", "layers", "full"}) : usual;
@@ -47,7 +47,7 @@ Scope read_scope(const Section& storage, int dimension) {
   return scope == "layers" ? Scope::layers : Scope::full;
 }
 
-Index read_layers(const Section& storage, Scope scope) {
+Index read_layers(const TomlTable& storage, Scope scope) {
   if (scope == Scope::layers) {
     return storage.has("layers") ? storage.count("layers") : 1;
   }
@@ -59,7 +59,7 @@ Index read_layers(const Section& storage, Scope scope) {
 }
 
 /// Empty for "auto".
-std::optional<Precision> read_precision(const Section& storage) {
+std::optional<Precision> read_precision(const TomlTable& storage) {
   if (!storage.has("precision")) return std::nullopt;
   const std::string name = storage.choice("precision", {"auto", "single", "split", "double"});
   for (const Precision precision :
@@ -69,7 +69,7 @@ std::optional<Precision> read_precision(const Section& storage) {
 }
 
 /// The name becomes a file name.
-std::string read_name(const Section& root) {
+std::string read_name(const TomlTable& root) {
   std::string name = root.text("name");
   const bool printable =
       std::all_of(name.begin(), name.end(), [](unsigned char c) { return c > 31 && c != '/'; });
@@ -91,7 +91,7 @@ void keep_regions(Geometry& geometry, const std::vector<MaterialPart>& materials
 }  // namespace
 
 Description read_description(const std::filesystem::path& path) {
-  return parse_description(read_all(path, "Give the path of a model.toml."), path);
+  return parse_description(read_all(path, "Give the path of a model.toml"), path);
 }
 
 Description parse_description(const std::string& text, const std::filesystem::path& path) {
@@ -101,19 +101,19 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   result.text = text;
   const toml::table table = parse_toml(result.text, file);
   const toml::table empty;
-  const Section root(table, "", file,
-                     {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load",
-                      "storage", "overlay", "dynamics"});
-  const auto optional_section = [&](std::string_view key, const Keys& keys) {
-    return root.has(key) ? root.section(key, keys)
-                         : Section(empty, std::string("[").append(key).append("]"), file, keys);
+  const TomlTable root(table, "", file,
+                       {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load",
+                        "storage", "overlay", "dynamics"});
+  const auto optional_table = [&](std::string_view key, const Keys& keys) {
+    return root.has(key) ? root.table(key, keys)
+                         : TomlTable(empty, std::string("[").append(key).append("]"), file, keys);
   };
 
   Keys geometry_keys = geometry_kinds;
   geometry_keys.insert(geometry_keys.end(), {"labels", "scale"});
-  const Section geometry = root.section("geometry", geometry_keys);
-  const Section mesh = optional_section("mesh", mesh_keys);
-  const Section storage = optional_section("storage", {"scope", "layers", "precision"});
+  const TomlTable geometry = root.table("geometry", geometry_keys);
+  const TomlTable mesh = optional_table("mesh", mesh_keys);
+  const TomlTable storage = optional_table("storage", {"scope", "layers", "precision"});
   const std::string_view kind = geometry.only_one_of(geometry_kinds);
 
   result.name = read_name(root);
@@ -132,10 +132,10 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   result.precision = read_precision(storage);
   if (root.has("overlay")) {
     result.overlay =
-        read_overlay(root.section("overlay", overlay_keys), dimension, result.scope, result.layers);
+        read_overlay(root.table("overlay", overlay_keys), dimension, result.scope, result.layers);
   }
   if (root.has("dynamics")) {
-    result.dynamics = read_dynamics(root.section("dynamics", dynamics_keys), result.scope);
+    result.dynamics = read_dynamics(root.table("dynamics", dynamics_keys), result.scope);
   }
   return result;
 }

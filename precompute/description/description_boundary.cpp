@@ -6,7 +6,7 @@ namespace palpate {
 namespace {
 
 /// Bit `axis` is set for each letter.
-std::uint8_t read_axes(const Section& entry, int dimension) {
+std::uint8_t read_axes(const TomlTable& entry, int dimension) {
   const std::string letters = dimension == 3 ? "xyz" : "xy";
   if (!entry.has("axes")) {
     return dimension == 3 ? 7 : 3;
@@ -28,9 +28,10 @@ std::uint8_t read_axes(const Section& entry, int dimension) {
   return bits;
 }
 
-Fixing read_fixing(const Section& entry, int dimension) {
+Fixing read_fixing(const TomlTable& entry, int dimension) {
   Fixing fixing{read_selection(entry, entry.only_one_of(selection_kinds), dimension),
-                read_axes(entry, dimension), entry.vector("displacement", dimension, Vec3::Zero())};
+                read_axes(entry, dimension),
+                entry.has("displacement") ? read_vector(entry, "displacement", dimension) : Vec3::Zero()};
   for (int axis = 0; axis < 3; ++axis) {
     const double u = fixing.displacement[axis];
     if (u != 0.0 && (fixing.axes >> axis & 1) == 0) {
@@ -44,9 +45,9 @@ Fixing read_fixing(const Section& entry, int dimension) {
   return fixing;
 }
 
-Load read_load(const Section& entry, int dimension) {
+Load read_load(const TomlTable& entry, int dimension) {
   const std::string_view kind = entry.only_one_of({"nodal_force", "traction", "gravity"});
-  const Vec3 value = entry.vector(kind, dimension);
+  const Vec3 value = read_vector(entry, kind, dimension);
   if (kind == "gravity") {
     if (const std::string_view where = entry.at_most_one_of(selection_kinds); !where.empty()) {
       entry.fail(where, "[[load]] gravity acts on the whole body and takes no " + std::string(where),
@@ -61,18 +62,6 @@ Load read_load(const Section& entry, int dimension) {
   return NodalForce{value, where};
 }
 
-int count_within(const Section& section, std::string_view key, int low, int high, int fallback) {
-  if (!section.has(key)) {
-    return fallback;
-  }
-  const Index value = section.integer(key);
-  if (value < low || value > high) {
-    section.fail(key, fmt::format("{} must be from {} to {}, not {}", section.name_of(key), low, high, value),
-                 fmt::format("use {} unless you know better", fallback));
-  }
-  return value;
-}
-
 Keys with_selections(Keys keys) {
   keys.insert(keys.end(), selection_kinds.begin(), selection_kinds.end());
   return keys;
@@ -80,7 +69,7 @@ Keys with_selections(Keys keys) {
 
 }  // namespace
 
-std::vector<Fixing> read_fixed(const Section& root, int dimension) {
+std::vector<Fixing> read_fixed(const TomlTable& root, int dimension) {
   const std::string hint = dimension == 3
                                ? "add for example\n[[fixed]]\nlowest = {axis = \"z\", percent = 5}"
                                : "add for example\n[[fixed]]\nlowest = {axis = \"y\", percent = 5}";
@@ -88,7 +77,7 @@ std::vector<Fixing> read_fixed(const Section& root, int dimension) {
     root.fail("fixed", "no region is fixed: the body would fly away at the first touch", hint);
   }
   std::vector<Fixing> result;
-  for (const Section& entry : root.sections("fixed", with_selections({"axes", "displacement"}), hint)) {
+  for (const TomlTable& entry : root.tables("fixed", with_selections({"axes", "displacement"}), hint)) {
     result.push_back(read_fixing(entry, dimension));
   }
   return result;
@@ -96,11 +85,10 @@ std::vector<Fixing> read_fixed(const Section& root, int dimension) {
 
 const Keys overlay_keys = {"refinement", "rings", "region"};
 
-OverlayRegions read_overlay(const Section& overlay, int dimension, Scope scope, Index layers) {
+OverlayRegions read_overlay(const TomlTable& overlay, int dimension, Scope scope, Index layers) {
   OverlayRegions result;
-  result.refinement =
-      count_within(overlay, "refinement", least_refinement, most_refinement, result.refinement);
-  result.rings = count_within(overlay, "rings", 1, most_rings, result.rings);
+  result.refinement = overlay.integer("refinement", least_refinement, most_refinement, result.refinement);
+  result.rings = overlay.integer("rings", 1, most_rings, result.rings);
   if (scope != Scope::full && result.rings > layers) {
     const std::string kept = scope == Scope::surface ? "none" : std::to_string(layers);
     overlay.fail(
@@ -116,13 +104,13 @@ OverlayRegions read_overlay(const Section& overlay, int dimension, Scope scope, 
   if (!overlay.has("region")) {
     overlay.fail("region", "[overlay] has no region", hint);
   }
-  for (const Section& entry : overlay.sections("region", selection_kinds, hint)) {
+  for (const TomlTable& entry : overlay.tables("region", selection_kinds, hint)) {
     result.regions.push_back(read_selection(entry, entry.only_one_of(selection_kinds), dimension));
   }
   return result;
 }
 
-std::vector<Load> read_loads(const Section& root, int dimension) {
+std::vector<Load> read_loads(const TomlTable& root, int dimension) {
   std::vector<Load> result;
   if (!root.has("load")) {
     return result;
@@ -130,7 +118,7 @@ std::vector<Load> read_loads(const Section& root, int dimension) {
   const Keys keys = with_selections({"nodal_force", "traction", "gravity"});
   const std::string hint = "write for example\n[[load]]\ngravity = " +
                            std::string(dimension == 3 ? "[0, 0, -9.81]" : "[0, -9.81]");
-  for (const Section& entry : root.sections("load", keys, hint)) {
+  for (const TomlTable& entry : root.tables("load", keys, hint)) {
     result.push_back(read_load(entry, dimension));
   }
   return result;

@@ -7,7 +7,7 @@
 namespace palpate {
 namespace {
 
-std::optional<DynamicsMethod> read_method(const Section& dynamics, Scope scope) {
+std::optional<DynamicsMethod> read_method(const TomlTable& dynamics, Scope scope) {
   const std::string method =
       dynamics.has("method") ? dynamics.choice("method", {"auto", "packed", "modal"}) : "auto";
   if (method == "auto") {
@@ -24,7 +24,7 @@ std::optional<DynamicsMethod> read_method(const Section& dynamics, Scope scope) 
   return DynamicsMethod::packed;
 }
 
-Newmark read_newmark(const Section& dynamics) {
+Newmark read_newmark(const TomlTable& dynamics) {
   Newmark newmark;
   newmark.time_step = dynamics.positive("time_step", newmark.time_step);
   newmark.alpha = dynamics.number("alpha", newmark.alpha);
@@ -46,7 +46,7 @@ Newmark read_newmark(const Section& dynamics) {
   return newmark;
 }
 
-double not_negative(const Section& damping, std::string_view key) {
+double not_negative(const TomlTable& damping, std::string_view key) {
   const double value = damping.number(key, 0.0);
   if (value < 0.0) {
     damping.fail(key, damping.name_of(key) + " must be 0 or more, not " + shown(value),
@@ -55,7 +55,7 @@ double not_negative(const Section& damping, std::string_view key) {
   return value;
 }
 
-Rayleigh read_ratios(const Section& damping) {
+Rayleigh read_ratios(const TomlTable& damping) {
   const std::vector<double> ratios = damping.numbers("ratios", 2), f = damping.numbers("frequencies", 2);
   if (ratios[0] < 0.0 || ratios[1] < 0.0) {
     damping.fail(
@@ -88,9 +88,9 @@ Rayleigh read_ratios(const Section& damping) {
   return result;
 }
 
-Rayleigh read_damping(const Section& dynamics) {
+Rayleigh read_damping(const TomlTable& dynamics) {
   const Keys keys = {"mass", "stiffness", "ratios", "frequencies"};
-  const Section damping = dynamics.section("damping", keys);
+  const TomlTable damping = dynamics.table("damping", keys);
   const bool by_ratios = damping.has("ratios") || damping.has("frequencies");
   if (!by_ratios) {
     return {.mass = not_negative(damping, "mass"), .stiffness = not_negative(damping, "stiffness")};
@@ -108,7 +108,7 @@ Rayleigh read_damping(const Section& dynamics) {
 
 const Keys dynamics_keys = {"method", "time_step", "alpha", "delta", "mass", "damping", "modes"};
 
-DynamicsOptions read_dynamics(const Section& dynamics, Scope scope) {
+DynamicsOptions read_dynamics(const TomlTable& dynamics, Scope scope) {
   DynamicsOptions result;
   result.method = read_method(dynamics, scope);
   result.newmark = read_newmark(dynamics);

@@ -14,29 +14,30 @@ bool is_control(char c) {
 }
 
 /// Six elements a cell must stay within the 32-bit element numbers.
-void check_cells(const Section& shape, std::string_view key, double cells) {
+void check_cells(const TomlTable& shape, std::string_view key, double cells) {
   if (6.0 * cells > std::numeric_limits<Index>::max()) {
     shape.fail(key, shape.name_of(key) + " asks for too many cells: " + shown(cells),
                "at most 357913941 cells can be numbered");
   }
 }
 
-BoxShape read_box(const Section& box) {
-  const std::vector<int> cells = box.counts("cells", 3);
+Vec3 read_origin(const TomlTable& shape, int dimension) {
+  return shape.has("origin") ? read_vector(shape, "origin", dimension) : Vec3::Zero();
+}
+
+BoxShape read_box(const TomlTable& box) {
+  const std::vector<Index> cells = box.integers("cells", 3, 1);
   check_cells(box, "cells", double{1} * cells[0] * cells[1] * cells[2]);
-  return {
-      box.vector("origin", 3, Vec3::Zero()), box.positive_vector("size", 3), {cells[0], cells[1], cells[2]}};
+  return {read_origin(box, 3), box.positive_vector("size", 3), {cells[0], cells[1], cells[2]}};
 }
 
-RectangleShape read_rectangle(const Section& rectangle) {
-  const std::vector<int> cells = rectangle.counts("cells", 2);
+RectangleShape read_rectangle(const TomlTable& rectangle) {
+  const std::vector<Index> cells = rectangle.integers("cells", 2, 1);
   check_cells(rectangle, "cells", double{1} * cells[0] * cells[1]);
-  return {rectangle.vector("origin", 2, Vec3::Zero()),
-          rectangle.positive_vector("size", 2),
-          {cells[0], cells[1]}};
+  return {read_origin(rectangle, 2), rectangle.positive_vector("size", 2), {cells[0], cells[1]}};
 }
 
-PolygonGeometry read_polygon(const Section& polygon) {
+PolygonGeometry read_polygon(const TomlTable& polygon) {
   PolygonGeometry result{polygon.points("points"), {}};
   if (polygon.has("holes")) {
     result.holes = polygon.point_lists("holes");
@@ -44,7 +45,7 @@ PolygonGeometry read_polygon(const Section& polygon) {
   return result;
 }
 
-int read_cells_across(const Section& shape) {
+int read_cells_across(const TomlTable& shape) {
   const int cells = shape.count("cells_across");
   if (cells % 2 != 0) {
     shape.fail("cells_across", shape.name_of("cells_across") + " must be even, not " + std::to_string(cells),
@@ -53,7 +54,7 @@ int read_cells_across(const Section& shape) {
   return cells;
 }
 
-CylinderShape read_cylinder(const Section& cylinder) {
+CylinderShape read_cylinder(const TomlTable& cylinder) {
   const CylinderShape shape{cylinder.positive("radius"), cylinder.positive("height"),
                             read_cells_across(cylinder), cylinder.count("cells_along")};
   check_cells(cylinder, "cells_across",
@@ -61,7 +62,7 @@ CylinderShape read_cylinder(const Section& cylinder) {
   return shape;
 }
 
-SphereShape read_sphere(const Section& sphere) {
+SphereShape read_sphere(const TomlTable& sphere) {
   const SphereShape shape{sphere.positive("radius"), read_cells_across(sphere)};
   check_cells(sphere, "cells_across",
               double{1} * shape.cells_across * shape.cells_across * shape.cells_across);
@@ -77,7 +78,8 @@ bool is_plane(std::string_view geometry_kind) {
   return geometry_kind == "rectangle" || geometry_kind == "polygon" || geometry_kind == "picture";
 }
 
-Geometry read_geometry(const Section& geometry, std::string_view kind, const std::filesystem::path& folder) {
+Geometry read_geometry(const TomlTable& geometry, std::string_view kind,
+                       const std::filesystem::path& folder) {
   const auto file = [&] {
     const std::string name = geometry.text(kind);
     if (name.size() > longest_path || std::any_of(name.begin(), name.end(), is_control)) {
@@ -107,18 +109,18 @@ Geometry read_geometry(const Section& geometry, std::string_view kind, const std
     return PictureGeometry{file()};
   }
   if (kind == "polygon") {
-    return read_polygon(geometry.section(kind, {"points", "holes"}));
+    return read_polygon(geometry.table(kind, {"points", "holes"}));
   }
   if (kind == "rectangle") {
-    return read_rectangle(geometry.section(kind, {"origin", "size", "cells"}));
+    return read_rectangle(geometry.table(kind, {"origin", "size", "cells"}));
   }
   if (kind == "box") {
-    return read_box(geometry.section(kind, {"origin", "size", "cells"}));
+    return read_box(geometry.table(kind, {"origin", "size", "cells"}));
   }
   if (kind == "cylinder") {
-    return read_cylinder(geometry.section(kind, {"radius", "height", "cells_across", "cells_along"}));
+    return read_cylinder(geometry.table(kind, {"radius", "height", "cells_across", "cells_along"}));
   }
-  return read_sphere(geometry.section(kind, {"radius", "cells_across"}));
+  return read_sphere(geometry.table(kind, {"radius", "cells_across"}));
 }
 
 }  // namespace palpate

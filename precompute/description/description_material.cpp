@@ -6,14 +6,14 @@ namespace {
 const Keys claim_kinds = {"regions", "box", "half_space", "sphere", "lowest"};
 
 /// In space [xx yy zz xy yz zx], in the plane [xx yy zz xy].
-std::array<double, 6> read_initial_strain(const Section& material, int dimension) {
+std::array<double, 6> read_initial_strain(const TomlTable& material, int dimension) {
   const std::vector<double> values = material.numbers("initial_strain", dimension == 3 ? 6 : 4);
   std::array<double, 6> strain{};
   std::copy(values.begin(), values.end(), strain.begin());
   return strain;
 }
 
-MaterialPart read_material(const Section& material, int dimension) {
+MaterialPart read_material(const TomlTable& material, int dimension) {
   MaterialPart part;
   part.material.youngs_modulus = material.positive("youngs_modulus");
   part.material.poissons_ratio = material.number("poissons_ratio");
@@ -48,16 +48,16 @@ bool is_rest(const MaterialPart& part) {
 
 }  // namespace
 
-std::vector<MaterialPart> read_materials(const Section& root, int dimension) {
+std::vector<MaterialPart> read_materials(const TomlTable& root, int dimension) {
   Keys keys = {"youngs_modulus", "poissons_ratio", "density", "friction", "initial_strain"};
   keys.insert(keys.end(), claim_kinds.begin(), claim_kinds.end());
   if (root.is_table("material") || !root.has("material")) {
-    return {read_material(root.section("material", keys), dimension)};
+    return {read_material(root.table("material", keys), dimension)};
   }
   std::vector<MaterialPart> parts;
   std::size_t rest = 0;  // number of the entry that takes the rest
-  for (const Section& entry :
-       root.sections("material", keys, "write one [material], or several [[material]]")) {
+  for (const TomlTable& entry :
+       root.tables("material", keys, "write one [material], or several [[material]]")) {
     parts.push_back(read_material(entry, dimension));
     if (!is_rest(parts.back())) {
       continue;

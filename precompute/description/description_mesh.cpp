@@ -50,7 +50,7 @@ Keys keys_of(std::string_view kind, std::string_view mesher) {
   return keys;
 }
 
-void check_keys(const Section& mesh, std::string_view kind, std::string_view mesher) {
+void check_keys(const TomlTable& mesh, std::string_view kind, std::string_view mesher) {
   const Keys keys = keys_of(kind, mesher);
   for (const std::string_view key : mesh_keys) {
     if (!mesh.has(key) || holds(keys, key)) {
@@ -74,7 +74,7 @@ ElementType element_named(std::string_view name) {
       ->type;
 }
 
-void read_optimize(const Section& mesh, std::string_view kind, MeshOptions& options) {
+void read_optimize(const TomlTable& mesh, std::string_view kind, MeshOptions& options) {
   const bool plane = is_plane(kind);
   options.perturb = options.exude = !plane;
   if (!mesh.has("optimize")) {
@@ -99,7 +99,7 @@ void read_optimize(const Section& mesh, std::string_view kind, MeshOptions& opti
 const Keys mesh_keys = {"element",     "mesher",       "edge_length",    "remesh",        "grading",
                         "radius_edge", "min_dihedral", "facet_distance", "feature_angle", "optimize"};
 
-MeshOptions read_mesh_options(const Section& mesh, std::string_view kind) {
+MeshOptions read_mesh_options(const TomlTable& mesh, std::string_view kind) {
   const Keys meshers = meshers_of(kind);
   std::string mesher = meshers.empty() ? "" : std::string(meshers[0]);
   if (!meshers.empty() && mesh.has("mesher")) {

@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/toml_table.h"
 #include "precompute/description/description.h"
-#include "precompute/description/toml_section.h"
 
 namespace palpate {
 
@@ -16,27 +16,30 @@ extern const Keys geometry_kinds;
 bool is_plane(std::string_view geometry_kind);
 
 /// [geometry]; `kind` is the one of geometry_kinds that it has.
-Geometry read_geometry(const Section& geometry, std::string_view kind, const std::filesystem::path& folder);
+Geometry read_geometry(const TomlTable& geometry, std::string_view kind, const std::filesystem::path& folder);
 
 extern const Keys mesh_keys;
 /// [mesh], for a kind of geometry.
-MeshOptions read_mesh_options(const Section& mesh, std::string_view geometry_kind);
+MeshOptions read_mesh_options(const TomlTable& mesh, std::string_view geometry_kind);
+
+/// `dimension` numbers, the others 0.
+Vec3 read_vector(const TomlTable& table, std::string_view key, int dimension);
 
 extern const Keys selection_kinds;
 /// The selection that an entry gives under `kind`.
-Selection read_selection(const Section& entry, std::string_view kind, int dimension);
+Selection read_selection(const TomlTable& entry, std::string_view kind, int dimension);
 
 /// [material] or every [[material]].
-std::vector<MaterialPart> read_materials(const Section& root, int dimension);
+std::vector<MaterialPart> read_materials(const TomlTable& root, int dimension);
 /// Every [[fixed]]: at least one.
-std::vector<Fixing> read_fixed(const Section& root, int dimension);
+std::vector<Fixing> read_fixed(const TomlTable& root, int dimension);
 extern const Keys overlay_keys;
 /// [overlay], for what [storage] keeps.
-OverlayRegions read_overlay(const Section& overlay, int dimension, Scope scope, Index layers);
+OverlayRegions read_overlay(const TomlTable& overlay, int dimension, Scope scope, Index layers);
 extern const Keys dynamics_keys;
 /// [dynamics], for what [storage] keeps.
-DynamicsOptions read_dynamics(const Section& dynamics, Scope scope);
+DynamicsOptions read_dynamics(const TomlTable& dynamics, Scope scope);
 /// Every [[load]], possibly none.
-std::vector<Load> read_loads(const Section& root, int dimension);
+std::vector<Load> read_loads(const TomlTable& root, int dimension);
 
 }  // namespace palpate

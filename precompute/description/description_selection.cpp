@@ -3,16 +3,17 @@
 namespace palpate {
 namespace {
 
-SelectBox read_box(const Section& box, int dimension) {
-  SelectBox result{box.vector("min", dimension), box.vector("max", dimension)};
+SelectBox read_box(const TomlTable& box, int dimension) {
+  SelectBox result{read_vector(box, "min", dimension), read_vector(box, "max", dimension)};
   if ((result.min.array() > result.max.array()).any()) {
     box.fail("min", box.name_of("min") + " is greater than max", "exchange them where min > max");
   }
   return result;
 }
 
-SelectHalfSpace read_half_space(const Section& half_space, int dimension) {
-  SelectHalfSpace result{half_space.vector("point", dimension), half_space.vector("normal", dimension)};
+SelectHalfSpace read_half_space(const TomlTable& half_space, int dimension) {
+  SelectHalfSpace result{read_vector(half_space, "point", dimension),
+                         read_vector(half_space, "normal", dimension)};
   if (result.normal.isZero(0.0)) {
     half_space.fail("normal", half_space.name_of("normal") + " is the zero vector",
                     "the half space is where (x - point) . normal >= 0");
@@ -20,7 +21,7 @@ SelectHalfSpace read_half_space(const Section& half_space, int dimension) {
   return result;
 }
 
-SelectLowest read_lowest(const Section& lowest, int dimension) {
+SelectLowest read_lowest(const TomlTable& lowest, int dimension) {
   const std::string axis = lowest.choice("axis", dimension == 3 ? Keys{"x", "y", "z"} : Keys{"x", "y"});
   const double percent = lowest.positive("percent");
   if (percent > 100.0) {
@@ -31,18 +32,26 @@ SelectLowest read_lowest(const Section& lowest, int dimension) {
 
 }  // namespace
 
+Vec3 read_vector(const TomlTable& table, std::string_view key, int dimension) {
+  const std::string name(key);
+  return table.vector(key, dimension,
+                      dimension == 3 ? "in space write " + name + " = [x, y, z]; a body in the plane has " +
+                                           R"(plane = "stress" or "strain" at the top level)"
+                                     : "in the plane write " + name + " = [x, y]");
+}
+
 const Keys selection_kinds = {"box", "half_space", "sphere", "nodes", "tag", "lowest"};
 
-Selection read_selection(const Section& entry, std::string_view kind, int dimension) {
+Selection read_selection(const TomlTable& entry, std::string_view kind, int dimension) {
   if (kind == "box") {
-    return read_box(entry.section(kind, {"min", "max"}), dimension);
+    return read_box(entry.table(kind, {"min", "max"}), dimension);
   }
   if (kind == "half_space") {
-    return read_half_space(entry.section(kind, {"point", "normal"}), dimension);
+    return read_half_space(entry.table(kind, {"point", "normal"}), dimension);
   }
   if (kind == "sphere") {
-    const Section sphere = entry.section(kind, {"center", "radius"});
-    return SelectSphere{sphere.vector("center", dimension), sphere.positive("radius")};
+    const TomlTable sphere = entry.table(kind, {"center", "radius"});
+    return SelectSphere{read_vector(sphere, "center", dimension), sphere.positive("radius")};
   }
   if (kind == "nodes") {
     return SelectNodes{entry.integers(kind)};
@@ -50,7 +59,7 @@ Selection read_selection(const Section& entry, std::string_view kind, int dimens
   if (kind == "tag") {
     return SelectTag{entry.integer(kind)};
   }
-  return read_lowest(entry.section(kind, {"axis", "percent"}), dimension);
+  return read_lowest(entry.table(kind, {"axis", "percent"}), dimension);
 }
 
 }  // namespace palpate

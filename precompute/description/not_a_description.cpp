@@ -66,7 +66,7 @@ void check_is_description(const std::filesystem::path& path) {
     const bool has_one = std::filesystem::exists(path / "model.toml");
     throw Error(
         "is a folder", file,
-        has_one ? "palpate-precompute " + (path / "model.toml").string() : "Give the path of a model.toml.");
+        has_one ? "palpate-precompute " + (path / "model.toml").string() : "Give the path of a model.toml");
   }
   std::string name = path.filename().string();
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -81,9 +81,9 @@ void check_is_description(const std::filesystem::path& path) {
   if (name.ends_with(".hdf"))
     throw Error("is a baked model already", file,
                 "palpate-runtime play " + file + " --view shows it, palpate-precompute inspect " + file +
-                    " says what is in it.");
+                    " says what is in it");
   if (name.ends_with(".h5"))
-    throw Error("is a recording", file, "palpate-runtime view " + file + " shows it.");
+    throw Error("is a recording", file, "palpate-runtime view " + file + " shows it");
 }
 
 }  // namespace palpate

@@ -137,7 +137,7 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image) {
 VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                               std::vector<std::string>& notes) {
   const std::string where = image.file.string();
-  check_regular_file(image.file, "Check image = \"...\" in [geometry].");
+  check_regular_file(image.file, "Check image = \"...\" in [geometry]");
   // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
   const std::string path = std::filesystem::absolute(image.file).string();
   const ChildTask task = {.name = "the image reader",

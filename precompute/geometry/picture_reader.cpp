@@ -181,7 +181,7 @@ class PbmReader {
 
 PixelBody read_picture(const std::filesystem::path& file) {
   const std::string where = file.string();
-  const std::string bytes = read_all(file, "Check picture = \"...\" in [geometry].");
+  const std::string bytes = read_all(file, "Check picture = \"...\" in [geometry]");
   if (bytes.starts_with(png_signature)) {
     return read_png_in_child(bytes, where);
   }

@@ -402,7 +402,7 @@ Answer read_in_child(const std::filesystem::path& file, const ChildLimits& limit
 }
 
 std::int64_t size_of(const std::filesystem::path& file) {
-  check_regular_file(file, "Check surface = \"...\" in [geometry].");
+  check_regular_file(file, "Check surface = \"...\" in [geometry]");
   return static_cast<std::int64_t>(std::filesystem::file_size(file));
 }
 

@@ -47,7 +47,7 @@ Error out_of_memory(const cholmod_common& common) {
   return {fmt::format("CHOLMOD ran out of memory (status {}, {:.2f} GB in use)", common.status,
                       static_cast<double>(common.memory_inuse) / 1e9),
           "factorisation of K",
-          "Use a coarser mesh (mesh.edge_length) or a stronger grading, or a machine with more memory."};
+          "Use a coarser mesh (mesh.edge_length) or a stronger grading, or a machine with more memory"};
 }
 
 }  // namespace
@@ -93,7 +93,7 @@ void Factor::factorize() {
   if (common_.status == CHOLMOD_NOT_POSDEF) {
     throw Error(fmt::format("K is not positive definite (column {} of {})", factor_->minor, factor_->n),
                 "factorisation of K",
-                "Hold the body against every rigid motion, and look at the worst element of the mesh.");
+                "Hold the body against every rigid motion, and look at the worst element of the mesh");
   }
   if (common_.status < CHOLMOD_OK) throw out_of_memory(common_);
 }

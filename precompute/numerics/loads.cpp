@@ -57,7 +57,7 @@ class Loader {
     }
     if (!found) {
       throw Error("the traction's selection holds nodes but no whole facet of the boundary", where,
-                  "Select a part of the boundary that is larger than one element.");
+                  "Select a part of the boundary that is larger than one element");
     }
   }
 

@@ -75,7 +75,7 @@ Modes all_modes(const SparseMatrix& K, const SparseMatrix& M, std::int64_t count
                                                                          Eigen::MatrixXd(M)};
   if (solver.info() != Eigen::Success)
     throw Error("the dense eigenvalue problem has no solution", "[dynamics] modes",
-                "Look at the worst element of the mesh and at the densities.");
+                "Look at the worst element of the mesh and at the densities");
   Modes modes;
   for (std::int64_t i = 0; i <= count; ++i)
     modes.omega.push_back(i < K.rows() ? std::sqrt(solver.eigenvalues()[i])
@@ -105,7 +105,7 @@ Modes lanczos(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M
     }
     if (basis == K.rows())
       throw Error(fmt::format("Lanczos' method has not found the {} lowest modes", wanted),
-                  "[dynamics] modes", "Ask for some modes more or fewer.");
+                  "[dynamics] modes", "Ask for some modes more or fewer");
   }
 }
 
@@ -133,7 +133,7 @@ std::int64_t modes_below(const SparseMatrix& K, const SparseMatrix& M, double sq
   const Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower> factor(shifted);
   if (factor.info() != Eigen::Success)
     throw Error(fmt::format("K - {:g} M has a pivot of zero", square), "count of modes",
-                "This is a mistake in the program; please report it.");
+                "This is a mistake in the program; please report it");
   const Vector pivots = factor.vectorD();
   return (pivots.array() < 0.0).count();
 }

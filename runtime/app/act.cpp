@@ -113,10 +113,8 @@ const LoopReport& Act::run(const std::atomic<bool>& stop) {
 void Act::finish_recording() {
   try {
     recorder_->finish();
-  } catch (const Error& error) {
-    recording_failure_ = in_one_line(error);
   } catch (const std::exception& error) {
-    recording_failure_ = error.what();
+    recording_failure_ = in_one_line(error);
   }
 }
 

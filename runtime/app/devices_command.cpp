@@ -5,10 +5,10 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "runtime/devices/hid/builtin_profiles.h"
 #include "runtime/devices/hid/hid_choice.h"
-#include "runtime/loop/output.h"
 
 namespace palpate {
 namespace {
@@ -56,33 +56,33 @@ void print_text(const std::vector<AttachedDevice>& attached, const std::vector<N
   }
 }
 
-std::string json_of(const AttachedDevice& device, const std::vector<NamedProfile>& profiles) {
-  std::string fitting;
-  for (const NamedProfile* profile : fitting_profiles(device, profiles)) {
-    fitting += (fitting.empty() ? "" : ", ") + json_string(profile->key);
-  }
+nlohmann::ordered_json json_of(const AttachedDevice& device, const std::vector<NamedProfile>& profiles) {
+  auto fitting = nlohmann::ordered_json::array();
+  for (const NamedProfile* profile : fitting_profiles(device, profiles)) fitting.push_back(profile->key);
   std::string descriptor;
   for (const std::uint8_t byte : device.descriptor) {
     descriptor += fmt::format("{:02x}", byte);
   }
   const AccessProblem problem = device.access == 0 ? AccessProblem{} : access_problem(device);
-  return fmt::format(
-      "    {{\"path\": {}, \"vendor\": {}, \"product\": {}, \"serial\": {}, \"maker\": {}, \"name\": {},\n"
-      "     \"usage\": [{}, {}], \"profiles\": [{}], \"accessible\": {}, \"access_problem\": {}, \"hint\": "
-      "{},\n"
-      "     \"descriptor\": {}, \"descriptor_problem\": {}}}",
-      json_string(device.path), device.vendor, device.product, json_string(device.serial),
-      json_string(device.maker), json_string(device.product_name), device.reports.usage.page,
-      device.reports.usage.id, fitting, device.access == 0, json_string(problem.what),
-      json_string(problem.hint), json_string(descriptor), json_string(device.descriptor_problem));
+  return {{"path", device.path},
+          {"vendor", device.vendor},
+          {"product", device.product},
+          {"serial", device.serial},
+          {"maker", device.maker},
+          {"name", device.product_name},
+          {"usage", {device.reports.usage.page, device.reports.usage.id}},
+          {"profiles", fitting},
+          {"accessible", device.access == 0},
+          {"access_problem", problem.what},
+          {"hint", problem.hint},
+          {"descriptor", descriptor},
+          {"descriptor_problem", device.descriptor_problem}};
 }
 
 void print_json(const std::vector<AttachedDevice>& attached, const std::vector<NamedProfile>& profiles) {
-  fmt::print("{{\n  \"devices\": [");
-  for (std::size_t k = 0; k < attached.size(); ++k) {
-    fmt::print("{}\n{}", k == 0 ? "" : ",", json_of(attached[k], profiles));
-  }
-  fmt::print("{}]\n}}\n", attached.empty() ? "" : "\n  ");
+  nlohmann::ordered_json json = {{"devices", nlohmann::ordered_json::array()}};
+  for (const AttachedDevice& device : attached) json["devices"].push_back(json_of(device, profiles));
+  fmt::print("{}", json_text(json, 2));
 }
 
 int print_profile(const std::string& name) {

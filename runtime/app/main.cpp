@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,9 +10,8 @@
 
 #include "base/command_line.h"
 #include "base/error.h"
-#include "base/printable.h"
+#include "base/program.h"
 #include "base/spelling.h"
-#include "base/standard_output.h"
 #include "formats/shrunk_file.h"
 #include "runtime/app/devices_command.h"
 #include "runtime/app/play_command.h"
@@ -194,16 +192,18 @@ std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& argu
 
 constexpr std::string_view commands = "play, view, probe, session, export or devices";
 
-/// Where the first word is no command, what was meant by it; else nothing.
+/// Where the first word is no command, a hint of what was meant by it; else nothing.
 std::string meant_by(const CLI::App& app, const std::string& word) {
   if (word.empty() || word.starts_with('-') || find_command(app, word) != nullptr) return "";
-  if (word.ends_with(".h5")) return "palpate-runtime view " + word + " shows a recording.";
+  const std::string see = "See palpate-runtime --help";
+  if (word.ends_with(".h5")) return "palpate-runtime view " + word + " shows a recording. " + see;
   if (word.ends_with(".hdf"))
-    return "palpate-runtime play " + word + " --view shows it and lets you push it.";
-  if (word.ends_with(".toml")) return "palpate-precompute " + word + " makes the file that is played with.";
+    return "palpate-runtime play " + word + " --view shows it and lets you push it. " + see;
+  if (word.ends_with(".toml"))
+    return "palpate-precompute " + word + " makes the file that is played with. " + see;
   const auto command = meant(word, {"probe", "play", "view", "export", "session", "devices", "help"});
-  return command ? "Did you mean palpate-runtime " + *command + "?"
-                 : fmt::format("Commands are {}.", commands);
+  return command ? "Did you mean palpate-runtime " + *command + "? " + see
+                 : fmt::format("Commands are {}. {}", commands, see);
 }
 
 int play_and_name_next(const PlayOptions& options) {
@@ -235,9 +235,7 @@ int run(int argc, char** argv) {
   const CLI::App* help_command = add_help_command(app, arguments.about);
   const std::string first_word = argc > 1 ? argv[1] : "";
   if (const std::string hint = meant_by(app, first_word); !hint.empty()) {
-    fmt::print(stderr, "error: '{}' is no command\nhint: {} See palpate-runtime --help\n",
-               printable(first_word), printable(hint));
-    return exit_usage;
+    return tell_usage("'" + first_word + "' is no command", hint);
   }
   try {
     app.parse(argc, argv);
@@ -263,34 +261,15 @@ int run(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const bool of_command = !app.get_subcommands().empty() && !help_command->parsed();
     const std::string command = of_command ? app.get_subcommands().front()->get_name() + " " : "";
-    fmt::print(stderr, "error: {}\nhint: See palpate-runtime {}--help\n", printable_lines(error.what(), "  "),
-               command);
-    return exit_usage;
+    return tell_usage(error.what(), "See palpate-runtime " + command + "--help");
   }
-}
-
-/// Errors in words.
-int run_and_tell(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (const palpate::Error& error) {
-    std::fputs(palpate::to_text(error).c_str(), stderr);
-  } catch (const std::bad_alloc&) {
-    fmt::print(stderr,
-               "error: there is not enough memory\nhint: Close other programs, or precompute with fewer "
-               "surface nodes\n");
-  } catch (const std::exception& error) {
-    if (std::ferror(stdout) == 0)  // else finish_output says it
-      fmt::print(stderr, "error: {}\nhint: This should not happen; please report it\n",
-                 palpate::printable_lines(error.what(), "  "));
-  }
-  return palpate::exit_input_error;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  palpate::prepare_output();
   palpate::end_with_an_error_on_shrunk_files();
-  return palpate::finish_output(run_and_tell(argc, argv));
+  return palpate::run_program("palpate-runtime",
+                              "close other programs, or precompute with fewer surface nodes",
+                              [&] { return run(argc, argv); });
 }

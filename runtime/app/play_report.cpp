@@ -8,10 +8,13 @@
 #include <cstdio>
 #include <string_view>
 
+#include "base/json_text.h"
 #include "runtime/loop/output.h"
 
 namespace palpate {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 double microseconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) * 1e-3;
@@ -129,30 +132,30 @@ void warn_of_places(const PlayedRun& run) {
   }
 }
 
-/// JSON knows no infinity.
-std::string json_number(double value) {
-  return std::isfinite(value) ? fmt::format("{}", value) : "null";
+Json json_tool(const Tool& tool) {
+  return {{"radius_m", tool.radius},
+          {"length_m", tool.length},
+          {"reach_m", tool.reach},
+          {"friction", tool.friction ? Json(*tool.friction) : Json()},
+          {"coupling_N_per_m", tool.coupling_stiffness},
+          {"coupling_torsion_Nm_per_rad", tool.coupling_torsion},
+          {"max_force_N", tool.max_force},
+          {"hand_over", tool.hand_over}};
 }
 
-std::string json_tool(const Tool& tool) {
-  return fmt::format(
-      "{{\"radius_m\": {}, \"length_m\": {}, \"reach_m\": {}, \"friction\": {}, \"coupling_N_per_m\": {}, "
-      "\"coupling_torsion_Nm_per_rad\": {}, \"max_force_N\": {}, \"hand_over\": {}}}",
-      tool.radius, tool.length, tool.reach, tool.friction ? json_number(*tool.friction) : "null",
-      json_number(tool.coupling_stiffness), json_number(tool.coupling_torsion), json_number(tool.max_force),
-      json_number(tool.hand_over));
-}
-
-std::string json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
+Json json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
   const PatchCounts& counts = overlays.counts();
-  return fmt::format(
-      "{{\"refinement\": {}, \"rings\": {}, \"built\": {}, \"failed\": {}, \"longest_build_s\": {}, "
-      "\"bytes\": {}, "
-      "\"switches\": {}, \"ticks_near\": {}, \"older_ticks_near\": {}, \"ticks_in_contact\": {}, "
-      "\"older_ticks_in_contact\": {}}}",
-      options.refinement, options.rings, overlays.built(), overlays.failed(), overlays.longest_build(),
-      overlays.bytes(), counts.switches, counts.ticks, counts.older, counts.in_contact,
-      counts.older_in_contact);
+  return {{"refinement", options.refinement},
+          {"rings", options.rings},
+          {"built", overlays.built()},
+          {"failed", overlays.failed()},
+          {"longest_build_s", overlays.longest_build()},
+          {"bytes", overlays.bytes()},
+          {"switches", counts.switches},
+          {"ticks_near", counts.ticks},
+          {"older_ticks_near", counts.older},
+          {"ticks_in_contact", counts.in_contact},
+          {"older_ticks_in_contact", counts.older_in_contact}};
 }
 
 std::string_view name_of(DynamicsMethod method) {
@@ -160,50 +163,62 @@ std::string_view name_of(DynamicsMethod method) {
   return method == DynamicsMethod::packed ? "packed" : "modal";
 }
 
-std::string json_dynamics(const Body& body, const MotionSource* motion) {
-  const StoredDynamics& dynamics = body.model().dynamics;
-  std::string json = fmt::format("{{\"method\": \"{}\", \"contact\": \"{}\"", name_of(dynamics.method),
-                                 body.contact_model() == ContactModel::dynamic ? "dynamic" : "quasi-static");
-  if (motion != nullptr)
-    json += fmt::format(", \"steps\": {}, \"longest_step_s\": {}", motion->steps(), motion->longest_step());
-  return json + "}";
+Json json_dynamics(const Body& body, const MotionSource* motion) {
+  Json json = {{"method", name_of(body.model().dynamics.method)},
+               {"contact", body.contact_model() == ContactModel::dynamic ? "dynamic" : "quasi-static"}};
+  if (motion != nullptr) {
+    json["steps"] = motion->steps();
+    json["longest_step_s"] = motion->longest_step();
+  }
+  return json;
 }
 
 /// How often each class of durations came: [upper end in ns, count], each twice as long as the one before.
-std::string json_histogram(const TimeHistogram& histogram) {
-  std::string json = "[";
+Json json_histogram(const TimeHistogram& histogram) {
+  Json json = Json::array();
   std::int64_t from = 0;
   for (std::int64_t to = 500; from <= histogram.worst(); to *= 2) {
-    json += fmt::format("{}[{}, {}]", from == 0 ? "" : ", ", to, histogram.total_between(from, to));
+    json.push_back({to, histogram.total_between(from, to)});
     from = to;
   }
-  return json + "]";
+  return json;
 }
 
-std::string json_times(const TimeHistogram& histogram) {
-  return fmt::format("{{\"median\": {}, \"p99_9\": {}, \"p99_99\": {}, \"worst\": {}, \"histogram\": {}}}",
-                     histogram.percentile(0.5), histogram.percentile(0.999), histogram.percentile(0.9999),
-                     histogram.worst(), json_histogram(histogram));
+Json json_times(const TimeHistogram& histogram) {
+  return {{"median", histogram.percentile(0.5)},
+          {"p99_9", histogram.percentile(0.999)},
+          {"p99_99", histogram.percentile(0.9999)},
+          {"worst", histogram.worst()},
+          {"histogram", json_histogram(histogram)}};
 }
 
-std::string json_safety(const LoopReport& report) {
-  std::string faults;
-  for (std::size_t k = 1; k < fault_names.size(); ++k)
-    faults += fmt::format("{}\"{}\": {}", k == 1 ? "" : ", ", fault_names[k].second, report.faults[k]);
-  return fmt::format("{{\"largest_shown_N\": {}, \"faults\": {{{}}}}}", report.largest_shown, faults);
+Json json_safety(const LoopReport& report) {
+  Json faults;
+  for (std::size_t k = 1; k < fault_names.size(); ++k) faults[fault_names[k].second] = report.faults[k];
+  return {{"largest_shown_N", report.largest_shown}, {"faults", faults}};
 }
 
-std::string json_device(const PlayedRun& run) {
-  std::string json = fmt::format("{{\"name\": {}", json_string(run.options.device.text));
+Json json_device(const PlayedRun& run) {
+  Json json = {{"name", run.options.device.text}};
   if (run.link != nullptr) {
-    json += fmt::format(
-        ", \"description\": {}, \"reports\": {}, \"writes\": {}, \"worst_write_ns\": {}, "
-        "\"writes_without_loop\": {}, \"opened_again\": {}",
-        json_string(run.link->name()), run.link->reports(), run.link->writes(), run.link->worst_write(),
-        run.link->extrapolated(), run.report.opened_again);
-    json += fmt::format(", \"refused\": {}", json_string(run.link->refusals()));
+    json["description"] = run.link->name();
+    json["reports"] = run.link->reports();
+    json["writes"] = run.link->writes();
+    json["worst_write_ns"] = run.link->worst_write();
+    json["writes_without_loop"] = run.link->extrapolated();
+    json["opened_again"] = run.report.opened_again;
+    json["refused"] = run.link->refusals();
   }
-  return json + "}";
+  return json;
+}
+
+Json json_replay(const ReplayDifference& replay) {
+  const bool differs = replay.first_tick >= 0;
+  return {{"ticks", replay.ticks},
+          {"different_ticks", replay.different},
+          {"largest_difference_N", replay.largest},
+          {"first_different_tick", differs ? Json(replay.first_tick) : Json()},
+          {"first_different_field", differs ? Json(replay.first_field) : Json()}};
 }
 
 }  // namespace
@@ -227,46 +242,39 @@ void print_report(const PlayedRun& run) {
 
 std::string json_report(const PlayedRun& run) {
   const LoopReport& report = run.report;
-  std::string status;
-  for (std::size_t k = 0; k < status_names.size(); ++k) {
-    status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, report.status_ticks[k]);
+  Json status;
+  for (std::size_t k = 0; k < status_names.size(); ++k)
+    status[status_names[k].second] = report.status_ticks[k];
+  Json json = {{"generator", "palpate-runtime " PALPATE_VERSION},
+               {"file", run.options.file.string()},
+               {"model", run.body.model().name},
+               {"fast", run.options.fast},
+               {"interrupted", report.interrupted},
+               {"tool", json_tool(run.tool)},
+               {"ticks", report.ticks},
+               {"ticks_in_contact", report.ticks_in_contact},
+               {"ticks_begun_inside", report.ticks_begun_inside},
+               {"most_contacts", report.most_contacts},
+               {"rate_Hz", report.rate},
+               {"deadline_misses", report.deadline_misses}};
+  if (!run.options.fast) json["lateness_ns"] = json_times(report.lateness);
+  json["compute_ns"] = json_times(report.compute);
+  json["largest_force_N"] = report.largest_force;
+  json["largest_force_time_s"] = report.largest_force_time;
+  json["largest_jump_N"] = report.largest_jump;
+  json["largest_jump_time_s"] = report.largest_jump_time;
+  json["status_ticks"] = status;
+  json["device"] = json_device(run);
+  if (run.settings.safety) json["safety"] = json_safety(report);
+  if (run.options.device.kind == DeviceChoice::Kind::replay) json["replay"] = json_replay(report.replay);
+  if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay.value());
+  json["dynamics"] = json_dynamics(run.body, run.motion);
+  if (!run.options.record.empty()) {
+    json["recording"] = run.options.record.string();
+    json["recording_failed"] = run.recording_failure ? Json(*run.recording_failure) : Json();
   }
-  std::string json = "{\n  \"generator\": \"palpate-runtime " PALPATE_VERSION "\",\n";
-  json += fmt::format("  \"file\": {},\n  \"model\": {},\n", json_string(run.options.file.string()),
-                      json_string(run.body.model().name));
-  json += fmt::format("  \"fast\": {},\n  \"interrupted\": {},\n  \"tool\": {},\n", run.options.fast,
-                      report.interrupted, json_tool(run.tool));
-  json += fmt::format("  \"ticks\": {},\n  \"ticks_in_contact\": {},\n  \"ticks_begun_inside\": {},\n",
-                      report.ticks, report.ticks_in_contact, report.ticks_begun_inside);
-  json += fmt::format("  \"most_contacts\": {},\n", report.most_contacts);
-  json +=
-      fmt::format("  \"rate_Hz\": {},\n  \"deadline_misses\": {},\n", report.rate, report.deadline_misses);
-  if (!run.options.fast) json += fmt::format("  \"lateness_ns\": {},\n", json_times(report.lateness));
-  json += fmt::format("  \"compute_ns\": {},\n", json_times(report.compute));
-  json += fmt::format("  \"largest_force_N\": {},\n  \"largest_force_time_s\": {},\n", report.largest_force,
-                      report.largest_force_time);
-  json += fmt::format("  \"largest_jump_N\": {},\n  \"largest_jump_time_s\": {},\n", report.largest_jump,
-                      report.largest_jump_time);
-  json += fmt::format("  \"status_ticks\": {{{}}},\n", status);
-  json += fmt::format("  \"device\": {},\n", json_device(run));
-  if (run.settings.safety) json += fmt::format("  \"safety\": {},\n", json_safety(report));
-  if (run.options.device.kind == DeviceChoice::Kind::replay) {
-    json += fmt::format(
-        "  \"replay\": {{\"ticks\": {}, \"different_ticks\": {}, \"largest_difference_N\": {}, "
-        "\"first_different_tick\": {}, \"first_different_field\": {}}},\n",
-        report.replay.ticks, report.replay.different, report.replay.largest,
-        report.replay.first_tick < 0 ? "null" : std::to_string(report.replay.first_tick),
-        report.replay.first_tick < 0 ? "null" : fmt::format("\"{}\"", report.replay.first_field));
-  }
-  if (run.overlays != nullptr)
-    json += fmt::format("  \"overlay\": {},\n", json_overlays(*run.overlays, run.settings.overlay.value()));
-  json += fmt::format("  \"dynamics\": {},\n", json_dynamics(run.body, run.motion));
-  if (!run.options.record.empty())
-    json += fmt::format("  \"recording\": {},\n  \"recording_failed\": {},\n",
-                        json_string(run.options.record.string()),
-                        run.recording_failure ? json_string(*run.recording_failure) : "null");
-  json += fmt::format("  \"dropped_ticks\": {}\n}}\n", run.dropped);
-  return json;
+  json["dropped_ticks"] = run.dropped;
+  return json_text(json, 2);
 }
 
 }  // namespace palpate

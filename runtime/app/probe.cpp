@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "runtime/app/probe_field.h"
 #include "runtime/body/prescribed_nodes.h"
 #include "runtime/loop/loading.h"
@@ -184,21 +185,25 @@ void print_text(const std::vector<Answer>& answers) {
   fmt::print("total force on the body {} N\n", text_vector(total_force(answers)));
 }
 
+nlohmann::ordered_json json_vector(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
 void print_json(const std::vector<Answer>& answers, const std::vector<std::string>& warnings,
                 const ProbeOptions& options) {
-  fmt::print("{{\n  \"file\": {},\n  \"nodes\": [", json_string(options.file.string()));
-  for (std::size_t k = 0; k < answers.size(); ++k) {
-    const Answer& answer = answers[k];
-    fmt::print("{}\n    {{\"node\": {}, \"position\": {}, ", k == 0 ? "" : ",", answer.node,
-               json_vector(answer.position));
-    if (answer.distance) fmt::print("\"distance\": {}, ", *answer.distance);
-    fmt::print("\"displacement\": {}, \"force\": {}}}", json_vector(answer.displacement),
-               json_vector(answer.force));
+  auto nodes = nlohmann::ordered_json::array();
+  for (const Answer& answer : answers) {
+    nlohmann::ordered_json node = {{"node", answer.node}, {"position", json_vector(answer.position)}};
+    if (answer.distance) node["distance"] = *answer.distance;
+    node["displacement"] = json_vector(answer.displacement);
+    node["force"] = json_vector(answer.force);
+    nodes.push_back(std::move(node));
   }
-  fmt::print("\n  ],\n  \"total_force\": {},\n  \"warnings\": [", json_vector(total_force(answers)));
-  for (std::size_t k = 0; k < warnings.size(); ++k)
-    fmt::print("{}{}", k == 0 ? "" : ", ", json_string(warnings[k]));
-  fmt::print("]\n}}\n");
+  const nlohmann::ordered_json json = {{"file", options.file.string()},
+                                       {"nodes", nodes},
+                                       {"total_force", json_vector(total_force(answers))},
+                                       {"warnings", warnings}};
+  fmt::print("{}", json_text(json, 2));
 }
 
 }  // namespace

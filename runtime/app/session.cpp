@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "base/write_file.h"
 #include "runtime/app/session_check.h"
@@ -107,34 +108,40 @@ void print_text(const std::filesystem::path& path, const Recording& recording, c
 
 void print_json(const std::filesystem::path& path, const Recording& recording, const SessionSummary& s,
                 Ending ending) {
-  std::string faults;
+  auto faults = nlohmann::ordered_json::array();
   for (const SessionFault& fault : s.faults)
-    faults += fmt::format("{}{{\"fault\": \"{}\", \"time_s\": {}}}", faults.empty() ? "" : ", ",
-                          fault_name(fault.fault), fault.time);
-  std::string status;
-  for (std::size_t k = 0; k < status_names.size(); ++k)
-    status += fmt::format("{}\"{}\": {}", k == 0 ? "" : ", ", status_names[k].second, s.status_ticks[k]);
+    faults.push_back({{"fault", fault_name(fault.fault)}, {"time_s", fault.time}});
+  nlohmann::ordered_json status;
+  for (std::size_t k = 0; k < status_names.size(); ++k) status[status_names[k].second] = s.status_ticks[k];
   const SessionInfo& info = recording.info;
-  fmt::print("{{\n  \"recording\": {},\n  \"generator\": {},\n  \"was_killed\": {},\n  \"going_on\": {},\n",
-             json_string(path.string()), json_string(recording.generator), ending == Ending::merged,
-             ending == Ending::going_on);
-  fmt::print("  \"model\": {},\n  \"content_hash\": {},\n  \"device\": {},\n  \"options\": {},\n",
-             json_string(info.model_path), json_string(info.content_hash), json_string(info.device),
-             json_string(info.options));
-  fmt::print("  \"rate\": {},\n  \"ticks\": {},\n  \"missing_ticks\": {},\n  \"seconds\": {},\n", info.rate,
-             s.ticks, s.missing, s.seconds);
-  fmt::print("  \"ticks_in_contact\": {},\n", s.in_contact);
-  fmt::print("  \"largest_force_N\": {},\n  \"largest_force_time_s\": {},\n", s.largest_force,
-             s.largest_force_time);
-  fmt::print("  \"largest_shown_force_N\": {},\n  \"largest_shown_force_time_s\": {},\n", s.largest_shown,
-             s.largest_shown_time);
-  fmt::print("  \"compute_ns\": {{\"median\": {}, \"p99_9\": {}, \"worst\": {}}},\n",
-             s.compute.percentile(0.5), s.compute.percentile(0.999), s.compute.worst());
-  fmt::print("  \"deadline_misses\": {},\n  \"worst_lateness_ns\": {},\n  \"faults\": [{}],\n",
-             s.deadline_misses, s.worst_lateness, faults);
-  fmt::print("  \"status_ticks\": {{{}}},\n", status);
-  fmt::print("  \"frames\": {},\n  \"surface_nodes\": {}\n}}\n", recording.frames.time.size(),
-             recording.frames.surface.nodes.size());
+  const nlohmann::ordered_json json = {{"recording", path.string()},
+                                       {"generator", recording.generator},
+                                       {"was_killed", ending == Ending::merged},
+                                       {"going_on", ending == Ending::going_on},
+                                       {"model", info.model_path},
+                                       {"content_hash", info.content_hash},
+                                       {"device", info.device},
+                                       {"options", info.options},
+                                       {"rate", info.rate},
+                                       {"ticks", s.ticks},
+                                       {"missing_ticks", s.missing},
+                                       {"seconds", s.seconds},
+                                       {"ticks_in_contact", s.in_contact},
+                                       {"largest_force_N", s.largest_force},
+                                       {"largest_force_time_s", s.largest_force_time},
+                                       {"largest_shown_force_N", s.largest_shown},
+                                       {"largest_shown_force_time_s", s.largest_shown_time},
+                                       {"compute_ns",
+                                        {{"median", s.compute.percentile(0.5)},
+                                         {"p99_9", s.compute.percentile(0.999)},
+                                         {"worst", s.compute.worst()}}},
+                                       {"deadline_misses", s.deadline_misses},
+                                       {"worst_lateness_ns", s.worst_lateness},
+                                       {"faults", faults},
+                                       {"status_ticks", status},
+                                       {"frames", recording.frames.time.size()},
+                                       {"surface_nodes", recording.frames.surface.nodes.size()}};
+  fmt::print("{}", json_text(json, 2));
 }
 
 }  // namespace

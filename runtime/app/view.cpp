@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "base/write_file.h"
 #include "formats/output_paths.h"
 #include "formats/recording_parts.h"

@@ -12,13 +12,13 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "base/regular_file.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/body/overlay_rings.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/session_xdmf.h"
-#include "runtime/viewer/run_words.h"
 #include "runtime/viewer/scene.h"
 
 namespace palpate {
@@ -45,12 +45,6 @@ std::filesystem::path name_recording(const std::filesystem::path& model) {
 /// What can be seen of a file that is gone before the body that came of it goes too.
 void expect_file(const std::filesystem::path& file) {
   check_regular_file(file, "put it back, or start palpate-runtime play anew");
-}
-
-std::string sentence(const std::exception& error) {
-  const auto* known = dynamic_cast<const Error*>(&error);
-  if (known == nullptr) return error.what();
-  return in_one_line(*known);
 }
 
 }  // namespace
@@ -91,7 +85,7 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
       report = run_act(*act, stop);
       if (has_hand()) latched_ = act->fault();
     } catch (const std::exception& error) {
-      if (!good || !take_back(plan, *good, sentence(error))) throw;
+      if (!good || !take_back(plan, *good, in_one_line(error))) throw;
       continue;
     }
     const bool over = options_.duration && report.ticks >= mover_.ticks;

@@ -2,9 +2,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cstdint>
-#include <exception>
 #include <memory>
-#include <new>
 #include <optional>
 #include <span>
 #include <string>
@@ -73,20 +71,6 @@ void copy_text(std::string_view text, char* to, std::size_t size) noexcept {
   const std::size_t length = std::min(text.size(), size - 1);
   std::copy_n(text.data(), length, to);
   to[length] = '\0';
-}
-
-/// What a person is told about the exception that is being handled.
-std::string explanation() {
-  try {
-    throw;
-  } catch (const Error& error) {
-    return to_text(error);
-  } catch (const std::bad_alloc&) {
-    return "error: there is not enough memory\nhint: Close other programs, or precompute with fewer surface "
-           "nodes.\n";
-  } catch (const std::exception& error) {
-    return std::string("error: ") + error.what() + "\nhint: This should not happen; please report it.\n";
-  }
 }
 
 StateOptions read_options(const palpate_tool* tools, int tool_count, int max_contacts) {
@@ -213,7 +197,9 @@ palpate_session* palpate_create_with_options(const char* file, const palpate_too
     return std::make_unique<palpate_session>(load_model(file), wanted, fine, memory, contact).release();
   } catch (...) {
     try {
-      copy_text(explanation(), error, error_size);
+      const Error told =
+          handled_error("palpate_create", "close other programs, or precompute with fewer surface nodes");
+      copy_text(to_text(told), error, error_size);
     } catch (...) {  // no memory even for that
     }
     return nullptr;

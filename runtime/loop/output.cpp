@@ -5,31 +5,15 @@
 
 #include <cstdio>
 
+#include "base/error.h"
 #include "base/printable.h"
 
 namespace palpate {
 
-std::string json_string(std::string_view text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      quoted += '\\';
-      quoted += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      quoted += fmt::format("\\u{:04x}", static_cast<int>(c));
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + '"';
-}
-
-std::string json_vector(const Vec3& v) {
-  return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z());
-}
-
-std::string in_one_line(const Error& error) {
-  return error.where() + ": " + error.what() + " (" + error.hint() + ")";
+std::string in_one_line(const std::exception& error) {
+  const auto* known = dynamic_cast<const Error*>(&error);
+  if (known == nullptr) return error.what();
+  return known->where() + ": " + known->what() + " (" + known->hint() + ")";
 }
 
 void print_warning(std::string_view text) {

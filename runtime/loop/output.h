@@ -1,22 +1,14 @@
 // What the program prints and writes.
 #pragma once
 
+#include <exception>
 #include <string>
 #include <string_view>
 
-#include "base/error.h"
-#include "meshes/mesh.h"
-
 namespace palpate {
 
-/// `text` as a JSON string, with its quotes.
-std::string json_string(std::string_view text);
-
-/// `v` as a JSON array; numbers read back to the same bits.
-std::string json_vector(const Vec3& v);
-
-/// `WHERE: WHAT (HINT)`
-std::string in_one_line(const Error& error);
+/// `WHERE: WHAT (HINT)` of an Error; of another exception what it says.
+std::string in_one_line(const std::exception& error);
 
 /// `warning: TEXT` on the error stream, in one piece and over a line that is being renewed there.
 void print_warning(std::string_view text);

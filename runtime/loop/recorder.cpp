@@ -103,12 +103,9 @@ void Recorder::write() noexcept {
       if (taken == 0) std::this_thread::sleep_for(pause);
     }
     writer_.checkpoint();
-  } catch (const Error& error) {
-    failure_ = std::current_exception();
-    fail(in_one_line(error));
   } catch (const std::exception& error) {
     failure_ = std::current_exception();
-    fail(error.what());
+    fail(in_one_line(error));
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "base/json_text.h"
+
 namespace palpate {
 namespace {
 
@@ -11,22 +13,18 @@ constexpr double highest_rate = 1e5;
 
 }  // namespace
 
-std::string json_text(const Json& value) {
-  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 std::string hello_word(const char* mode, std::uint64_t page) {
   return json_text(
-      {{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", mode}, {"id", page}});
+      Json{{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", mode}, {"id", page}});
 }
 
 std::string error_word(const std::string& about, PageRefusal reason, const std::string& message,
                        const std::string& hint) {
-  return json_text({{"type", "error"},
-                    {"about", about},
-                    {"reason", page_refusal_names[static_cast<std::size_t>(reason)].second},
-                    {"message", message},
-                    {"hint", hint}});
+  return json_text(Json{{"type", "error"},
+                        {"about", about},
+                        {"reason", page_refusal_names[static_cast<std::size_t>(reason)].second},
+                        {"message", message},
+                        {"hint", hint}});
 }
 
 std::string error_word(const std::string& about, const Error& error) {

@@ -16,9 +16,6 @@ struct PageRole {
   std::size_t pages = 0;    ///< all that watch
 };
 
-/// As text. File names may be any bytes: what is not UTF-8 is shown as such.
-std::string json_text(const nlohmann::json& value);
-
 /// The first message of all. `mode`: live, replay or file.
 std::string hello_word(const char* mode, std::uint64_t page);
 

@@ -59,7 +59,7 @@ TEST(Printable, ErrorsAreClean) {
   EXPECT_LT(text.size(), 2000U);
   EXPECT_EQ(text.find("error: f\\x1b[0mile: '\\x1b[31m"), 0U) << text;
   EXPECT_EQ(text.find("\nhint: none"), std::string::npos) << text;
-  EXPECT_TRUE(text.ends_with("\nhint: Look.\n")) << text;
+  EXPECT_TRUE(text.ends_with("\nhint: Look\n")) << text;
 }
 
 }  // namespace

@@ -77,6 +77,13 @@ class Rules(unittest.TestCase):
         self.write("base/error.h", "/// An error.\nint a();\n/// The same with a hint.\nint b();\n")
         self.refused("base/error.h:3: a doc comment that begins with 'The same'")
 
+    def test_a_hint_that_ends_in_a_full_stop_is_refused(self):
+        self.write("base/error.h", 'f("a. b", "look at " + x);  // "a stop."\ng("one. "\n  "two", \'"\', path("."));\napp.footer("A page.");\nh("... and so on", "It" + (a ? "."\n + b : "c"));\n')
+        self.assertEqual(self.check()[0], 0, self.check()[1])
+        for text in ('"what", "Look."', '"what", a ? "Look." : b', '"Look "\n  "there."', '"The \\"x\\"."', '"hint: Look.\\n"', 'R"(Look.)"'):
+            self.write("base/error.h", f"void f();\nfail({text});\n")
+            self.refused("base/error.h:", ": a hint that ends in a full stop")
+
     def test_a_picture_of_other_sources_is_refused(self):
         self.write("docs/house.svg", PICTURE.replace("base", "formats"))
         self.refused("docs/house.svg: is not of these sources")

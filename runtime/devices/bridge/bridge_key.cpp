@@ -1,17 +1,16 @@
 #include "runtime/devices/bridge/bridge_key.h"
 
-#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <system_error>
 
 #include "base/error.h"
+#include "base/write_file.h"
 #include "runtime/devices/bridge/bridge_seal.h"
 
 namespace palpate {
@@ -66,18 +65,7 @@ void write_bridge_key(const std::filesystem::path& file, const BridgeKey& key) {
     text += digits[byte & 15U];
   }
   text += '\n';
-  const std::string partial = file.string() + ".partial";
-  unlink(partial.c_str());
-  const int made =
-      open(partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
-  if (made < 0) fail(file, errno);
-  const bool is_written = write(made, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  const int error = errno;
-  close(made);
-  if (is_written && std::rename(partial.c_str(), file.c_str()) == 0) return;
-  const int why = is_written ? errno : error;
-  unlink(partial.c_str());
-  fail(file, why);
+  replace_file(file, text, S_IRUSR | S_IWUSR);
 }
 
 void seal(const BridgeKey& key, std::span<std::uint8_t> datagram) noexcept {

@@ -6,32 +6,29 @@
 
 #include "base/error.h"
 #include "base/regular_file.h"
+#include "base/toml_table.h"
 #include "base/toml_text.h"
-#include "base/words.h"
 #include "runtime/devices/reports/palpate_board.h"
-#include "runtime/devices/reports/profile_table.h"
 #include "runtime/devices/reports/woodenhaptics_report.h"
 
 namespace palpate {
 namespace {
 
-using Keys = std::vector<std::string_view>;
-
 constexpr int longest_report = 4096;  // bytes; of Linux's hidraw
 
 /// A usage as [page, number].
-std::optional<HidUsage> read_usage(const ProfileTable& table, std::string_view key) {
+std::optional<HidUsage> read_usage(const TomlTable& table, std::string_view key) {
   if (!table.has(key)) return std::nullopt;
   const auto pair = table.integers(key, 2, 0, 0xFFFF);
   return HidUsage{static_cast<std::uint16_t>(pair[0]), static_cast<std::uint16_t>(pair[1])};
 }
 
-std::optional<std::uint16_t> read_id(const ProfileTable& table, std::string_view key) {
+std::optional<std::uint16_t> read_id(const TomlTable& table, std::string_view key) {
   if (!table.has(key)) return std::nullopt;
   return static_cast<std::uint16_t>(table.integer(key, 0, 0xFFFF));
 }
 
-DeviceMatch read_match(const ProfileTable& table) {
+DeviceMatch read_match(const TomlTable& table) {
   DeviceMatch match{read_id(table, "vendor"), read_id(table, "product"), read_usage(table, "usage"),
                     read_usage(table, "collection")};
   if (match.product && !match.vendor) {
@@ -44,18 +41,14 @@ DeviceMatch read_match(const ProfileTable& table) {
   return match;
 }
 
-ReportLengths read_reports(const ProfileTable& table) {
-  const auto length = [&](std::string_view key) {
-    return table.has(key) ? static_cast<int>(table.integer(key, 1, longest_report)) : 0;
-  };
+ReportLengths read_reports(const TomlTable& table) {
+  const auto length = [&](std::string_view key) { return table.integer(key, 1, longest_report, 0); };
   return {length("input"), length("output"), length("feature")};
 }
 
-DeviceLimits read_limits(const ProfileTable& table) {
+DeviceLimits read_limits(const TomlTable& table) {
   DeviceLimits limits;
-  const auto read = [&](std::string_view key, double& limit) {
-    if (table.has(key)) limit = table.positive(key);
-  };
+  const auto read = [&](std::string_view key, double& limit) { limit = table.positive(key, limit); };
   read("max_force", limits.max_force);
   read("max_torque", limits.max_torque);
   read("max_stiffness", limits.max_stiffness);
@@ -68,12 +61,12 @@ const Keys arm_keys = {"lengths",     "capstan_diameters", "body_diameters", "to
                        "max_current", "counts_per_turn",   "motor_aligned",  "encoder_aligned",
                        "calibration", "workspace_origin"};
 
-ArmConstants read_arm(const ProfileTable& table) {
+ArmConstants read_arm(const TomlTable& table) {
   ArmConstants arm;
-  arm.lengths = table.positive_vector("lengths");
-  arm.capstan_diameters = table.positive_vector("capstan_diameters");
-  arm.body_diameters = table.positive_vector("body_diameters");
-  arm.torque_constants = table.positive_vector("torque_constants");
+  arm.lengths = table.positive_vector("lengths", 3);
+  arm.capstan_diameters = table.positive_vector("capstan_diameters", 3);
+  arm.body_diameters = table.positive_vector("body_diameters", 3);
+  arm.torque_constants = table.positive_vector("torque_constants", 3);
   arm.max_current = table.positive("max_current");
   const auto counts = table.numbers("counts_per_turn", 6);
   std::copy(counts.begin(), counts.end(), arm.counts_per_turn.begin());
@@ -89,25 +82,25 @@ ArmConstants read_arm(const ProfileTable& table) {
   std::copy(encoders.begin(), encoders.end(), arm.encoder_aligned.begin());
   const auto calibration = table.integers("calibration", 6, -32768, 32767);
   std::transform(calibration.begin(), calibration.end(), arm.calibration.begin(),
-                 [](std::int64_t counter) { return static_cast<std::int16_t>(counter); });
-  arm.workspace_origin = table.vector("workspace_origin");
+                 [](std::int32_t counter) { return static_cast<std::int16_t>(counter); });
+  arm.workspace_origin = table.vector("workspace_origin", 3);
   return arm;
 }
 
 const Keys space_mouse_keys = {"full_scale",        "dead_zone",      "speed",  "turning_speed",
                                "translation_signs", "rotation_signs", "silence"};
 
-Vec3 read_signs(const ProfileTable& table, std::string_view key) {
+Vec3 read_signs(const TomlTable& table, std::string_view key) {
   const auto signs = table.integers(key, 3, -1, 1);
   return {static_cast<double>(signs[0]), static_cast<double>(signs[1]), static_cast<double>(signs[2])};
 }
 
-SpaceMouseConstants read_space_mouse(const ProfileTable& table) {
+SpaceMouseConstants read_space_mouse(const TomlTable& table) {
   SpaceMouseConstants constants;
   constants.full_scale = table.positive("full_scale");
-  constants.dead_zone = table.number("dead_zone", 0.0, 0.5 * constants.full_scale);
+  constants.dead_zone = table.within("dead_zone", 0.0, 0.5 * constants.full_scale);
   constants.speed = table.positive("speed");
-  constants.turning_speed = table.number("turning_speed", 0.0, 100.0);
+  constants.turning_speed = table.within("turning_speed", 0.0, 100.0);
   constants.translation_signs = read_signs(table, "translation_signs");
   constants.rotation_signs = read_signs(table, "rotation_signs");
   constants.silence = table.positive("silence");
@@ -116,7 +109,7 @@ SpaceMouseConstants read_space_mouse(const ProfileTable& table) {
 
 const Keys pid_keys = {"half_travel", "full_force", "directions"};
 
-PidConstants read_pid(const ProfileTable& table) {
+PidConstants read_pid(const TomlTable& table) {
   PidConstants constants;
   const auto read = [](const std::vector<double>& values, std::array<double, pid_axes>& pair) {
     std::copy(values.begin(), values.end(), pair.begin());
@@ -140,15 +133,11 @@ const Kind& read_kind(const toml::table& root, const std::string& name) {
   for (const Kind& kind : kinds) {
     if (!kind.table.empty()) known.push_back(kind.table);
   }
-  const ProfileTable table(root, "", name, known);
-  const std::string text = table.text("kind");
-  const auto found =
-      std::find_if(kinds.begin(), kinds.end(), [&](const Kind& kind) { return kind.name == text; });
-  if (found == kinds.end()) {
-    table.fail("kind", "kind is \"" + shortened(text) + "\"",
-               R"(use "woodenhaptics", "spacemouse", "pid" or "palpate_board")");
-  }
-  return *found;
+  const TomlTable table(root, "", name, known);
+  Keys names;
+  for (const Kind& kind : kinds) names.push_back(kind.name);
+  const std::string text = table.choice("kind", names);
+  return *std::find_if(kinds.begin(), kinds.end(), [&](const Kind& kind) { return kind.name == text; });
 }
 
 }  // namespace
@@ -174,11 +163,13 @@ DeviceProfile parse_device_profile(std::string_view text, const std::string& nam
   const Kind& kind = read_kind(root, name);
   Keys known = {"name", "kind", "match", "reports", "limits"};
   if (!kind.table.empty()) known.push_back(kind.table);
-  const ProfileTable table(root, "", name, known);
+  const TomlTable table(root, "", name, known);
 
   DeviceProfile profile;
   profile.name = table.text("name");
-  for (const ProfileTable& match : table.tables("match", {"vendor", "product", "usage", "collection"})) {
+  if (profile.name.empty()) table.fail("name", "name is empty", "give the name that is shown");
+  for (const TomlTable& match : table.tables("match", {"vendor", "product", "usage", "collection"},
+                                             "write for example\n[[match]]\nvendor = 0x256f")) {
     profile.matches.push_back(read_match(match));
   }
   if (table.has("reports")) {

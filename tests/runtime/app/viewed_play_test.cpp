@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
 #include "runtime/app/act.h"
@@ -26,7 +27,6 @@
 #include "runtime/body/patch_maker.h"
 #include "runtime/loop/device_link.h"
 #include "runtime/loop/loading.h"
-#include "runtime/viewer/run_words.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate {

@@ -1,0 +1,73 @@
+#include "base/program.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <system_error>
+
+#include "base/error.h"
+#include "base/file_io.h"
+
+namespace palpate {
+namespace {
+
+void prepare_output() {
+  std::signal(SIGXFSZ, SIG_IGN);
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) < 0) (void)::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+  const auto write_or_lose = [](void*, const char* bytes, std::size_t size) -> ssize_t {
+    (void)write_all(STDERR_FILENO, {bytes, size});
+    return static_cast<ssize_t>(size);
+  };
+  std::FILE* stream = ::fopencookie(
+      nullptr, "w", {.read = nullptr, .write = write_or_lose, .seek = nullptr, .close = nullptr});
+  if (stream == nullptr) return;
+  std::setvbuf(stream, nullptr, _IONBF, 0);
+  stderr = stream;  // which the GNU C library lets a program do
+}
+
+void tell(const Error& error) {
+  std::fputs(to_text(error).c_str(), stderr);
+}
+
+/// What is printed arrives, or it is told that it has not.
+int finish_output(int status) {
+  const bool failed_before = std::ferror(stdout) != 0;
+  errno = 0;
+  const bool flushed = std::fflush(stdout) == 0;
+  if (flushed && !failed_before) return status;
+  tell({"cannot be written" + (flushed ? "" : ": " + std::generic_category().message(errno)) +
+            ": some of what was printed is lost",
+        "standard output", "free some disk space, or send it elsewhere"});
+  return status == exit_ok ? exit_input_error : status;
+}
+
+int run_and_tell(const std::string& name, const std::string& if_no_memory, const std::function<int()>& body) {
+  try {
+    return body();
+  } catch (const Error& error) {
+    tell(error);
+  } catch (...) {
+    // finish_output tells what fmt throws where the standard output is full.
+    if (std::ferror(stdout) == 0) tell(handled_error(name, if_no_memory));
+  }
+  return exit_input_error;
+}
+
+}  // namespace
+
+int run_program(const std::string& name, const std::string& if_no_memory, const std::function<int()>& body) {
+  prepare_output();
+  return finish_output(run_and_tell(name, if_no_memory, body));
+}
+
+int tell_usage(const std::string& what, const std::string& hint) {
+  tell({what, "", hint});
+  return exit_usage;
+}
+
+}  // namespace palpate
