@@ -31,77 +31,103 @@ class NodeList {
   std::map<std::array<int, 8>, Index> place_;
 };
 
-/// The node of a simplex with whole-number barycentric weights.
-Index simplex_node(NodeList& nodes, ElementType type, const std::array<int, 8>& weights, int denominator) {
-  Vec3 xi = Vec3::Zero();
-  for (int axis = 0; axis < traits(type).dimension; ++axis)
-    xi[axis] = static_cast<double>(weights[static_cast<std::size_t>(axis) + 1]) / denominator;
-  return nodes.find(weights, xi);
+/// Calls `visit` for the lowest corner of each cell of a lattice of r^d cells, x fastest.
+template <typename Visit>
+void for_each_cell(int d, int r, Visit&& visit) {
+  Lattice cell{};
+  const int last = d == 3 ? r : 1;
+  for (cell[2] = 0; cell[2] < last; ++cell[2]) {
+    for (cell[1] = 0; cell[1] < r; ++cell[1]) {
+      for (cell[0] = 0; cell[0] < r; ++cell[0]) visit(cell);
+    }
+  }
 }
 
-/// With ranked corners v_0 v_1 .. the point (x) of the lattice r >= x_1 >= x_2 >= .. >= 0 is
+/// Cuts a simplex. With ranked corners v_0 v_1 .. the point (x) of the lattice r >= x_1 >= x_2 >= .. >= 0 is
 /// v_0 + x_1/r (v_1 - v_0) + x_2/r (v_2 - v_1) + ..; Kuhn's simplices of the lattice's cells that are within
 /// are the children.
-void cut_simplex(ElementType type, int r, const std::array<int, 4>& order, Subdivision& result) {
-  const int d = traits(type).dimension;
-  const bool has_middles = traits(type).nodes > traits(type).corners;
-  const int scale = has_middles ? 2 : 1;
-  result.denominator = scale * r;
-  NodeList nodes(result);
-  const auto is_within = [&](const Lattice& x) {
-    for (int axis = 0; axis < d; ++axis) {
+class SimplexCut {
+ public:
+  SimplexCut(ElementType type, int r, const std::array<int, 4>& order, Subdivision& result)
+      : type_(type),
+        d_(traits(type).dimension),
+        r_(r),
+        scale_(traits(type).nodes > traits(type).corners ? 2 : 1),  // middles of edges are nodes too
+        order_(order),
+        result_(result),
+        nodes_(result) {
+    result_.denominator = scale_ * r;
+  }
+
+  void cut() {
+    std::array<int, 3> axes{0, 1, 2};
+    do {
+      for_each_cell(d_, r_, [&](const Lattice& cell) { add_child(cell, axes); });
+    } while (std::next_permutation(axes.begin(), axes.begin() + d_));
+  }
+
+ private:
+  using Weights = std::array<int, 8>;
+
+  [[nodiscard]] bool is_within(const Lattice& x) const {
+    for (int axis = 0; axis < d_; ++axis) {
       const auto at = static_cast<std::size_t>(axis);
-      if (x[at] > (axis == 0 ? r : x[at - 1]) || x[at] < 0) return false;
+      if (x[at] > (axis == 0 ? r_ : x[at - 1]) || x[at] < 0) return false;
     }
     return true;
-  };
-  const auto weights_at = [&](const Lattice& x) {
-    std::array<int, 8> weights{};
-    int before = r;
-    for (int rank = 0; rank <= d; ++rank) {
-      const int here = rank < d ? x[static_cast<std::size_t>(rank)] : 0;
+  }
+
+  [[nodiscard]] Weights weights_at(const Lattice& x) const {
+    Weights weights{};
+    int before = r_;
+    for (int rank = 0; rank <= d_; ++rank) {
+      const int here = rank < d_ ? x[static_cast<std::size_t>(rank)] : 0;
       const auto corner =
-          static_cast<std::size_t>(std::find(order.begin(), order.begin() + d + 1, rank) - order.begin());
-      weights[corner] = scale * (before - here);
+          static_cast<std::size_t>(std::find(order_.begin(), order_.begin() + d_ + 1, rank) - order_.begin());
+      weights[corner] = scale_ * (before - here);
       before = here;
     }
     return weights;
-  };
-  const auto add_child = [&](const std::array<Lattice, 4>& path) {
-    std::array<std::array<int, 8>, 4> corner;
-    for (std::size_t k = 0; k <= static_cast<std::size_t>(d); ++k) {
-      corner[k] = weights_at(path[k]);
-      result.connectivity.push_back(simplex_node(nodes, type, corner[k], result.denominator));
+  }
+
+  /// The node with whole-number barycentric weights.
+  void add_node(const Weights& weights) {
+    Vec3 xi = Vec3::Zero();
+    for (int axis = 0; axis < d_; ++axis)
+      xi[axis] = static_cast<double>(weights[static_cast<std::size_t>(axis) + 1]) / result_.denominator;
+    result_.connectivity.push_back(nodes_.find(weights, xi));
+  }
+
+  /// Kuhn's simplex of the cell that goes along `axes` one after the other, where it is within.
+  void add_child(const Lattice& cell, const std::array<int, 3>& axes) {
+    std::array<Lattice, 4> path{cell};
+    for (std::size_t k = 0; k < static_cast<std::size_t>(d_); ++k) {
+      path[k + 1] = path[k];
+      ++path[k + 1][static_cast<std::size_t>(axes[k])];
     }
-    if (!has_middles) return;
-    for (const EdgeNodes& edge : element_edges(type)) {
-      std::array<int, 8> middle{};
+    const auto end = path.begin() + d_ + 1;
+    if (!std::all_of(path.begin(), end, [&](const Lattice& x) { return is_within(x); })) return;
+    std::array<Weights, 4> corner;
+    std::transform(path.begin(), end, corner.begin(), [&](const Lattice& x) { return weights_at(x); });
+    std::for_each(corner.begin(), corner.begin() + d_ + 1,
+                  [&](const Weights& weights) { add_node(weights); });
+    if (scale_ == 1) return;
+    for (const EdgeNodes& edge : element_edges(type_)) {
+      Weights middle{};
       for (std::size_t k = 0; k < middle.size(); ++k)
         middle[k] = (corner[edge[0]][k] + corner[edge[1]][k]) / 2;
-      result.connectivity.push_back(simplex_node(nodes, type, middle, result.denominator));
+      add_node(middle);
     }
-  };
+  }
 
-  std::array<int, 3> axes{0, 1, 2};
-  do {
-    Lattice cell{};
-    const int last = d == 3 ? r : 1;
-    for (cell[2] = 0; cell[2] < last; ++cell[2]) {
-      for (cell[1] = 0; cell[1] < r; ++cell[1]) {
-        for (cell[0] = 0; cell[0] < r; ++cell[0]) {
-          std::array<Lattice, 4> path{cell};
-          bool within = is_within(cell);
-          for (std::size_t k = 0; k < static_cast<std::size_t>(d); ++k) {
-            path[k + 1] = path[k];
-            ++path[k + 1][static_cast<std::size_t>(axes[k])];
-            within = within && is_within(path[k + 1]);
-          }
-          if (within) add_child(path);
-        }
-      }
-    }
-  } while (std::next_permutation(axes.begin(), axes.begin() + d));
-}
+  ElementType type_;
+  int d_;
+  int r_;
+  int scale_;
+  const std::array<int, 4>& order_;
+  Subdivision& result_;
+  NodeList nodes_;
+};
 
 void cut_cell(ElementType type, int r, Subdivision& result) {
   const int d = traits(type).dimension;
@@ -121,20 +147,13 @@ void cut_cell(ElementType type, int r, Subdivision& result) {
     }
     return nodes.find(weights, xi);
   };
-  Lattice cell{};
-  const int last = d == 3 ? r : 1;
-  for (cell[2] = 0; cell[2] < last; ++cell[2]) {
-    for (cell[1] = 0; cell[1] < r; ++cell[1]) {
-      for (cell[0] = 0; cell[0] < r; ++cell[0]) {
-        for (const Vec3& corner : corners) {
-          Lattice x = cell;
-          for (int axis = 0; axis < d; ++axis)
-            x[static_cast<std::size_t>(axis)] += corner[axis] > 0.0 ? 1 : 0;
-          result.connectivity.push_back(node_at(x));
-        }
-      }
+  for_each_cell(d, r, [&](const Lattice& cell) {
+    for (const Vec3& corner : corners) {
+      Lattice x = cell;
+      for (int axis = 0; axis < d; ++axis) x[static_cast<std::size_t>(axis)] += corner[axis] > 0.0 ? 1 : 0;
+      result.connectivity.push_back(node_at(x));
     }
-  }
+  });
 }
 
 std::span<const Index> part_nodes(const Subdivision& parts, ElementType type, std::size_t part) {
@@ -195,7 +214,7 @@ Subdivision subdivide(ElementType type, int r, const std::array<int, 4>& order) 
   if (type == ElementType::quad4 || type == ElementType::hex8) {
     cut_cell(type, r, result);
   } else {
-    cut_simplex(type, r, order, result);
+    SimplexCut(type, r, order, result).cut();
     orient(type, result);
   }
   find_sides(type, result);

@@ -125,6 +125,32 @@ struct LayeredStiffness {
   std::vector<MatrixXd> to_body;   // [n_k x d g]
 };
 
+/// Adds to a block of K_L what an element couples two local nodes by.
+void add_local(const Layers& layers, Index row_node, Index column_node, const auto& part, MatrixXd& block) {
+  const Eigen::Index d = part.rows();
+  for (Eigen::Index j = 0; j < d; ++j) {
+    const Index column = layers.place_of(static_cast<std::size_t>(d * column_node + j));
+    for (Eigen::Index i = 0; column >= 0 && i < d; ++i) {
+      const Index row = layers.place_of(static_cast<std::size_t>(d * row_node + i));
+      if (row >= 0) block(row, column) += part(i, j);
+    }
+  }
+}
+
+/// Adds the same to a block of K_LG, through the body's shape functions at the second node.
+void add_to_body(const Layers& layers, const Rows& shape, Index row_node, Index column_node, const auto& part,
+                 MatrixXd& block) {
+  const Eigen::Index d = part.rows();
+  for (Eigen::Index j = 0; j < d; ++j) {
+    for (Rows::InnerIterator it(shape, d * column_node + j); it; ++it) {
+      for (Eigen::Index i = 0; i < d; ++i) {
+        const Index row = layers.place_of(static_cast<std::size_t>(d * row_node + i));
+        if (row >= 0) block(row, it.col()) += it.value() * part(i, j);
+      }
+    }
+  }
+}
+
 LayeredStiffness assemble(const Model& model, const PatchMesh& patch, const Rows& shape,
                           const Layers& layers) {
   const auto d = static_cast<Eigen::Index>(model.dimension());
@@ -135,15 +161,6 @@ LayeredStiffness assemble(const Model& model, const PatchMesh& patch, const Rows
     K.above.push_back(MatrixXd::Zero(layers.size(k), k > 0 ? layers.size(k - 1) : 0));
     K.to_body.push_back(MatrixXd::Zero(layers.size(k), body_dofs));
   }
-  const auto add = [&](MatrixXd& block, Index row_node, Index column_node, const auto& part) {
-    for (Eigen::Index j = 0; j < d; ++j) {
-      const Index column = layers.place_of(static_cast<std::size_t>(d * column_node + j));
-      for (Eigen::Index i = 0; column >= 0 && i < d; ++i) {
-        const Index row = layers.place_of(static_cast<std::size_t>(d * row_node + i));
-        if (row >= 0) block(row, column) += part(i, j);
-      }
-    }
-  };
   ElementStiffness stiffness(model, patch);
   for (Index e = 0; e < patch.local.elements(); ++e) {
     const auto nodes = patch.local.element_nodes(e);
@@ -155,16 +172,9 @@ LayeredStiffness assemble(const Model& model, const PatchMesh& patch, const Rows
       for (std::size_t b = 0; b < nodes.size(); ++b) {
         const auto part = K_e.block(d * static_cast<Eigen::Index>(a), d * static_cast<Eigen::Index>(b), d, d);
         const int other = layers.layer_of(nodes[b]);
-        if (other == layer) add(K.diagonal[l], nodes[a], nodes[b], part);
-        if (other >= 0 && other == layer - 1) add(K.above[l], nodes[a], nodes[b], part);
-        for (Eigen::Index j = 0; j < d; ++j) {
-          for (Rows::InnerIterator it(shape, d * nodes[b] + j); it; ++it) {
-            for (Eigen::Index i = 0; i < d; ++i) {
-              const Index row = layers.place_of(static_cast<std::size_t>(d * nodes[a] + i));
-              if (row >= 0) K.to_body[l](row, it.col()) += it.value() * part(i, j);
-            }
-          }
-        }
+        if (other == layer) add_local(layers, nodes[a], nodes[b], part, K.diagonal[l]);
+        if (other >= 0 && other == layer - 1) add_local(layers, nodes[a], nodes[b], part, K.above[l]);
+        add_to_body(layers, shape, nodes[a], nodes[b], part, K.to_body[l]);
       }
     }
   }

@@ -8,6 +8,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <random>
 #include <thread>
 
@@ -68,9 +69,15 @@ constexpr const char* column_stage(PackedMatrix matrix) {
   return matrix == PackedMatrix::greens ? "Green's functions" : "inverse of K_bar";
 }
 
+struct Plans {
+  Plan plan;
+  OverlayPlan overlays;
+  DynamicsPlan dynamics;
+};
+
 /// What follows the plan.
-std::vector<Stage> stages_of(const Plan& plan, const OverlayPlan& overlays, const DynamicsPlan& dynamics,
-                             int jobs) {
+std::vector<Stage> stages_of(const Plans& plans, int jobs) {
+  const auto& [plan, overlays, dynamics] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
     stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs)});
@@ -284,6 +291,110 @@ bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const Dy
   return solve_columns(solver, plan, jobs, writer, PackedMatrix::inverse, progress, interrupt);
 }
 
+OverlayPlan announce_overlays(const Description& description, const Model& model, Progress& progress) {
+  OverlayPlan overlays = plan_overlays(model, *description.overlay, description.file.string());
+  progress.line(fmt::format("overlays: {} patches, {} ring{} of elements each, cut into {}^{}: {:.1f} MB",
+                            overlays.centres.size(), description.overlay->rings,
+                            description.overlay->rings == 1 ? "" : "s", description.overlay->refinement,
+                            model.dimension(), static_cast<double>(overlays.file_bytes) * 1e-6));
+  return overlays;
+}
+
+DynamicsPlan announce_dynamics(const Description& description, const Plan& plan, const Stiffness& stiffness,
+                               Progress& progress) {
+  const DynamicsPlan dynamics =
+      plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
+                    description.precision.value_or(Precision::single_precision));
+  const std::string method =
+      dynamics.method == DynamicsMethod::packed ? "packed" : fmt::format("modal, {} modes", dynamics.modes);
+  progress.line(fmt::format("dynamics: {}, {:.1f} MB, {:.2f} GB of memory ({})", method,
+                            static_cast<double>(dynamics.file_bytes) * 1e-6,
+                            static_cast<double>(dynamics.memory_bytes) * 1e-9, dynamics.reason));
+  return dynamics;
+}
+
+/// Plans all stages and says what they will take.
+Plans announce_plans(const Description& description, const BakeOptions& options, const Model& model,
+                     const Stiffness& stiffness, const Factor& factor, const GreensSolver& solver,
+                     Progress& progress) {
+  Plans plans{make_plan(model.mesh, factor, solver, description.precision, options.jobs), {}, {}};
+  Plan& plan = plans.plan;
+  print_plan(plan, model, description, options, progress);
+  if (plan.file_bytes > large_file) {
+    progress.line(
+        fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with, and grow with "
+                    "the square of the "
+                    "stored dofs: {}",
+                    static_cast<double>(plan.file_bytes) * 1e-9, size_advice(description)));
+  }
+  if (description.overlay) {
+    plans.overlays = announce_overlays(description, model, progress);
+    plan.overlay_bytes = plans.overlays.memory_bytes;
+  }
+  if (description.dynamics) {
+    plans.dynamics = announce_dynamics(description, plan, stiffness, progress);
+    plan.dynamics_bytes = plans.dynamics.memory_bytes;
+    if (plans.dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
+      plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
+  }
+  return plans;
+}
+
+void add_dynamics(const Description& description, const DynamicsPlan& plan, const ElasticBody& body,
+                  const Stiffness& stiffness, const Factor& factor,
+                  const std::vector<std::int64_t>& stored_dofs, Model& model, Progress& progress) {
+  if (!description.dynamics) return;
+  if (plan.method == DynamicsMethod::modal) progress.begin(modes_stage);
+  model.dynamics =
+      describe_dynamics(*description.dynamics, plan, stiffness.K,
+                        assemble_mass(body, stiffness, description.dynamics->lumped), factor, stored_dofs);
+}
+
+/// Computes the columns of the packed matrices and the probes of the first one. Nothing when interrupted.
+std::optional<std::vector<Probe>> solve_matrices(const Description& description, const ElasticBody& body,
+                                                 const Stiffness& stiffness, std::unique_ptr<Factor> factor,
+                                                 const GreensSolver& solver,
+                                                 const std::vector<std::uint8_t>& stored, const Plans& plans,
+                                                 int jobs, ModelWriter& writer, Progress& progress,
+                                                 const InterruptGuard& interrupt) {
+  const std::vector<std::int64_t> stored_dofs = solver.stored_dofs();
+  if (!solve_columns(solver, plans.plan, jobs, writer, PackedMatrix::greens, progress, interrupt)) return {};
+  std::vector<Probe> probes = make_probes(*factor, stored_dofs);
+  if (plans.dynamics.method == DynamicsMethod::packed) {
+    factor.reset();  // its memory is for that of K_bar
+    if (!solve_inverse(body, stiffness, *description.dynamics, stored, stored_dofs, plans.plan, jobs, writer,
+                       progress, interrupt))
+      return {};
+  }
+  return probes;
+}
+
+/// Condenses the overlays that the file is to keep. False when interrupted.
+bool add_overlays(const Description& description, const OverlayPlan& overlays, int jobs, Model& model,
+                  Progress& progress, const InterruptGuard& interrupt) {
+  progress.begin(overlay_stage);
+  model.overlay = condense_overlays(model, *description.overlay, overlays.centres, jobs, [&](double share) {
+    progress.reach(share);
+    return !interrupt.requested();
+  });
+  return !interrupt.requested();
+}
+
+std::string interruption_text(const std::filesystem::path& output) {
+  return fmt::format(
+      "interrupted: the columns that are done are kept in {}.partial; the same command goes on from there, "
+      "with --discard it begins anew",
+      output.string());
+}
+
+void check_touchable(const Surface& surface, const Model& model, const Description& description) {
+  if (std::none_of(surface.nodes.begin(), surface.nodes.end(),
+                   [&](Index node) { return model.fixed[static_cast<std::size_t>(node)] == 0; })) {
+    throw Error("no node of the boundary is free along every axis, so nothing can be touched",
+                description.file.string(), "Hold a smaller part of the body in [[fixed]]");
+  }
+}
+
 /// Where the model may be written; before any work.
 std::filesystem::path check_output(const Description& description, const BakeOptions& options) {
   OutputPaths paths(options.force);
@@ -310,79 +421,32 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
   ElasticBody elastic = elastic_body(model);
   elastic.prescribed = prescribed;
   const Stiffness stiffness = assemble_stiffness(elastic);
-  openblas_set_num_threads(
-      1);  // the blocks of columns are the parallel work, and the bytes do not depend on the jobs
+  openblas_set_num_threads(1);  // blocks of columns are the parallel work: the bytes depend on no `jobs`
   progress.begin("ordering K");
   auto factor = std::make_unique<Factor>(stiffness.K, stiffness.node_start);
   const std::vector<std::uint8_t> stored =
       stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers);
   const GreensSolver solver(*factor, stored, stiffness.free_dofs, model.dimension());
-  if (std::none_of(surface.nodes.begin(), surface.nodes.end(),
-                   [&](Index node) { return model.fixed[static_cast<std::size_t>(node)] == 0; })) {
-    throw Error("no node of the boundary is free along every axis, so nothing can be touched",
-                description.file.string(), "Hold a smaller part of the body in [[fixed]]");
-  }
-  Plan plan = make_plan(model.mesh, *factor, solver, description.precision, options.jobs);
-  print_plan(plan, model, description, options, progress);
-  if (plan.file_bytes > large_file) {
-    progress.line(
-        fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with, and grow with "
-                    "the square of the "
-                    "stored dofs: {}",
-                    static_cast<double>(plan.file_bytes) * 1e-9, size_advice(description)));
-  }
-  OverlayPlan overlays;
-  if (description.overlay) {
-    overlays = plan_overlays(model, *description.overlay, description.file.string());
-    progress.line(fmt::format("overlays: {} patches, {} ring{} of elements each, cut into {}^{}: {:.1f} MB",
-                              overlays.centres.size(), description.overlay->rings,
-                              description.overlay->rings == 1 ? "" : "s", description.overlay->refinement,
-                              model.dimension(), static_cast<double>(overlays.file_bytes) * 1e-6));
-    plan.overlay_bytes = overlays.memory_bytes;
-  }
-  DynamicsPlan dynamics;
-  if (description.dynamics) {
-    dynamics = plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
-                             description.precision.value_or(Precision::single_precision));
-    const std::string method =
-        dynamics.method == DynamicsMethod::packed ? "packed" : fmt::format("modal, {} modes", dynamics.modes);
-    progress.line(fmt::format("dynamics: {}, {:.1f} MB, {:.2f} GB of memory ({})", method,
-                              static_cast<double>(dynamics.file_bytes) * 1e-6,
-                              static_cast<double>(dynamics.memory_bytes) * 1e-9, dynamics.reason));
-    plan.dynamics_bytes = dynamics.memory_bytes;
-    if (dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
-      plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
-  }
+  check_touchable(surface, model, description);
+  const Plans plans = announce_plans(description, options, model, stiffness, *factor, solver, progress);
   if (!warning.empty()) progress.warn(warning);
-  check_memory(plan);
+  check_memory(plans.plan);
   if (options.dry_run) return BakeResult::planned;
 
-  progress.plan(stages_of(plan, overlays, dynamics, options.jobs));
+  progress.plan(stages_of(plans, options.jobs));
   progress.begin(factor_stage);
   factor->factorize();
   model.stored_nodes = stored_nodes(solver, stiffness, model.dimension());
   model.rest_force = loads;
   model.rest_displacement = rest_displacement(*factor, stiffness, loads, prescribed, model.dimension());
   const InterruptGuard interrupt;
-  if (description.overlay) {
-    progress.begin(overlay_stage);
-    model.overlay =
-        condense_overlays(model, *description.overlay, overlays.centres, options.jobs, [&](double share) {
-          progress.reach(share);
-          return !interrupt.requested();
-        });
-    if (interrupt.requested()) {
-      progress.line("interrupted: nothing was written");
-      return BakeResult::interrupted;
-    }
+  if (description.overlay &&
+      !add_overlays(description, plans.overlays, options.jobs, model, progress, interrupt)) {
+    progress.line("interrupted: nothing was written");
+    return BakeResult::interrupted;
   }
   const std::vector<std::int64_t> stored_dofs = solver.stored_dofs();
-  if (description.dynamics) {
-    if (dynamics.method == DynamicsMethod::modal) progress.begin(modes_stage);
-    model.dynamics = describe_dynamics(*description.dynamics, dynamics, stiffness.K,
-                                       assemble_mass(elastic, stiffness, description.dynamics->lumped),
-                                       *factor, stored_dofs);
-  }
+  add_dynamics(description, plans.dynamics, elastic, stiffness, *factor, stored_dofs, model, progress);
   progress.begin(precision_stage);
   const Precision precision =
       decide_precision(description, elastic, stiffness, *factor, stored_dofs, model, progress);
@@ -390,23 +454,14 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
                      options.discard ? Leftovers::discard : Leftovers::resume);
   model.overlay = {};  // written by now
   model.dynamics = {};
-  bool whole = solve_columns(solver, plan, options.jobs, writer, PackedMatrix::greens, progress, interrupt);
-  std::vector<Probe> probes;
-  if (whole) probes = make_probes(*factor, stored_dofs);
-  if (whole && dynamics.method == DynamicsMethod::packed) {
-    factor.reset();  // its memory is for that of K_bar
-    whole = solve_inverse(elastic, stiffness, *description.dynamics, stored, stored_dofs, plan, options.jobs,
-                          writer, progress, interrupt);
-  }
-  if (!whole) {
-    progress.line(fmt::format(
-        "interrupted: the columns that are done are kept in {}.partial; the same command goes on from there, "
-        "with --discard it begins anew",
-        options.output.string()));
+  const auto probes = solve_matrices(description, elastic, stiffness, std::move(factor), solver, stored,
+                                     plans, options.jobs, writer, progress, interrupt);
+  if (!probes) {
+    progress.line(interruption_text(options.output));
     return BakeResult::interrupted;
   }
   progress.begin(write_stage);
-  writer.finish(probes);
+  writer.finish(*probes);
   progress.line(fmt::format("{} written", options.output.string()));
   if (!warning.empty()) progress.warn(warning);
   return BakeResult::done;

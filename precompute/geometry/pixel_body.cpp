@@ -24,37 +24,38 @@ struct Part {
   Pixel first{};  ///< one of them
 };
 
+/// Numbers the pixels that are connected with `first`.
+Part fill_part(const PixelBody& body, const Pixel& first, Index number, std::vector<Index>& part_of) {
+  Part part{body.is_body(first[0], first[1]), false, 0, first};
+  part_of[body.at(first[0], first[1])] = number;
+  std::vector<Pixel> front{first};
+  while (!front.empty()) {
+    const auto [x, y] = front.back();
+    front.pop_back();
+    ++part.pixels;
+    for (const Pixel next : {Pixel{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}}) {
+      if (next[0] < 0 || next[1] < 0 || next[0] >= body.width || next[1] >= body.height) {
+        part.is_at_rim = true;
+        continue;
+      }
+      Index& next_part = part_of[body.at(next[0], next[1])];
+      if (next_part < 0 && body.is_body(next[0], next[1]) == part.is_body) {
+        next_part = number;
+        front.push_back(next);
+      }
+    }
+  }
+  return part;
+}
+
 /// Numbers the parts; `part_of` gets each pixel's.
 std::vector<Part> find_parts(const PixelBody& body, std::vector<Index>& part_of) {
   std::vector<Part> parts;
   part_of.assign(body.inside.size(), -1);
-  std::vector<Pixel> front;
   for (Index j = 0; j < body.height; ++j) {
     for (Index i = 0; i < body.width; ++i) {
-      if (part_of[body.at(i, j)] >= 0) {
-        continue;
-      }
-      const auto number = static_cast<Index>(parts.size());
-      Part part{body.is_body(i, j), false, 0, {i, j}};
-      part_of[body.at(i, j)] = number;
-      front.push_back({i, j});
-      while (!front.empty()) {
-        const auto [x, y] = front.back();
-        front.pop_back();
-        ++part.pixels;
-        for (const Pixel next : {Pixel{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}}) {
-          if (next[0] < 0 || next[1] < 0 || next[0] >= body.width || next[1] >= body.height) {
-            part.is_at_rim = true;
-            continue;
-          }
-          Index& next_part = part_of[body.at(next[0], next[1])];
-          if (next_part < 0 && body.is_body(next[0], next[1]) == part.is_body) {
-            next_part = number;
-            front.push_back(next);
-          }
-        }
-      }
-      parts.push_back(part);
+      if (part_of[body.at(i, j)] < 0)
+        parts.push_back(fill_part(body, {i, j}, static_cast<Index>(parts.size()), part_of));
     }
   }
   return parts;
@@ -179,6 +180,31 @@ void fill_small_holes(PixelBody& body, std::vector<std::string>& notes) {
   }
 }
 
+constexpr std::uint8_t no_step = 4;
+
+std::size_t corner_at(const PixelBody& body, const LatticePoint& p) {
+  return static_cast<std::size_t>(p[0]) +
+         static_cast<std::size_t>(body.width + 1) * static_cast<std::size_t>(p[1]);
+}
+
+/// The step (0 to 3: right, up, left, down) that leaves each corner of pixels with the body on its left: one
+/// at most, as no corner touches another.
+std::vector<std::uint8_t> steps_along_outlines(const PixelBody& body) {
+  std::vector<std::uint8_t> onward(corner_at(body, {0, body.height + 1}), no_step);
+  for (Index j = 0; j < body.height; ++j) {
+    for (Index i = 0; i < body.width; ++i) {
+      if (!body.is_body(i, j)) {
+        continue;
+      }
+      if (!body.is_body(i, j - 1)) onward[corner_at(body, {i, j})] = 0;
+      if (!body.is_body(i + 1, j)) onward[corner_at(body, {i + 1, j})] = 1;
+      if (!body.is_body(i, j + 1)) onward[corner_at(body, {i + 1, j + 1})] = 2;
+      if (!body.is_body(i - 1, j)) onward[corner_at(body, {i, j + 1})] = 3;
+    }
+  }
+  return onward;
+}
+
 }  // namespace
 
 void keep_one_body(PixelBody& body, const std::string& where, std::vector<std::string>& notes) {
@@ -189,34 +215,18 @@ void keep_one_body(PixelBody& body, const std::string& where, std::vector<std::s
 
 std::vector<std::vector<LatticePoint>> trace_outlines(const PixelBody& body) {
   constexpr std::array<LatticePoint, 4> step = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
-  constexpr std::uint8_t none = 4;
-  const auto at = [&](const LatticePoint& p) {
-    return static_cast<std::size_t>(p[0]) +
-           static_cast<std::size_t>(body.width + 1) * static_cast<std::size_t>(p[1]);
-  };
-  // the step that leaves each corner of pixels with the body on its left: one at most, as no corner touches
-  std::vector<std::uint8_t> onward(at({0, body.height + 1}), none);
-  for (Index j = 0; j < body.height; ++j) {
-    for (Index i = 0; i < body.width; ++i) {
-      if (!body.is_body(i, j)) {
-        continue;
-      }
-      if (!body.is_body(i, j - 1)) onward[at({i, j})] = 0;
-      if (!body.is_body(i + 1, j)) onward[at({i + 1, j})] = 1;
-      if (!body.is_body(i, j + 1)) onward[at({i + 1, j + 1})] = 2;
-      if (!body.is_body(i - 1, j)) onward[at({i, j + 1})] = 3;
-    }
-  }
+  std::vector<std::uint8_t> onward = steps_along_outlines(body);
+  const auto next = [&](const LatticePoint& p) -> std::uint8_t& { return onward[corner_at(body, p)]; };
   std::vector<std::vector<LatticePoint>> lines;  // the outer one holds the lowest point, so it comes first
   for (Index y = 0; y <= body.height; ++y) {
     for (Index x = 0; x <= body.width; ++x) {
-      if (onward[at({x, y})] == none) {
+      if (next({x, y}) == no_step) {
         continue;
       }
       lines.emplace_back();
-      for (LatticePoint p = {x, y}; onward[at(p)] != none;) {
+      for (LatticePoint p = {x, y}; next(p) != no_step;) {
         lines.back().push_back(p);
-        const LatticePoint& d = step[std::exchange(onward[at(p)], none)];
+        const LatticePoint& d = step[std::exchange(next(p), no_step)];
         p = {p[0] + d[0], p[1] + d[1]};
       }
     }

@@ -17,6 +17,7 @@
 #include "runtime/background/patch_source.h"
 #include "runtime/body/body.h"
 #include "runtime/library/palpate.h"
+#include "runtime/library/sized_struct.h"
 #include "runtime/solve/node_vectors.h"
 #include "runtime/tick/step.h"
 
@@ -42,6 +43,11 @@ static_assert(status_names.size() == 12, "these");
 
 constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
 
+constexpr palpate_tool default_tool = PALPATE_TOOL_INIT;
+constexpr palpate_pose default_pose = PALPATE_POSE_INIT;
+constexpr palpate_overlay default_overlay = PALPATE_OVERLAY_INIT;
+constexpr palpate_options default_options = PALPATE_OPTIONS_INIT;
+
 Tool to_tool(const palpate_tool& tool) {
   Tool result{.radius = tool.radius,
               .length = tool.length,
@@ -66,6 +72,24 @@ void copy(const Vec3& vector, double* xyz) noexcept {
   std::copy_n(vector.data(), 3, xyz);
 }
 
+palpate_result to_result(const ToolState& state) noexcept {
+  palpate_result result{};
+  copy(state.wrench.force, result.force);
+  copy(state.wrench.torque, result.torque);
+  copy(state.pose.position, result.tool_position);
+  const Eigen::Quaterniond& q = state.pose.orientation;
+  result.tool_orientation[0] = q.w();
+  result.tool_orientation[1] = q.x();
+  result.tool_orientation[2] = q.y();
+  result.tool_orientation[3] = q.z();
+  result.contacts = state.contacts;
+  for (Eigen::Index row = 0; row < 3; ++row)
+    copy(state.local.stiffness.row(row), result.local_stiffness + 3 * row);
+  copy(state.local.point, result.local_point);
+  result.local_radius = state.local.radius;
+  return result;
+}
+
 void copy_text(std::string_view text, char* to, std::size_t size) noexcept {
   if (to == nullptr || size == 0) return;
   const std::size_t length = std::min(text.size(), size - 1);
@@ -73,7 +97,22 @@ void copy_text(std::string_view text, char* to, std::size_t size) noexcept {
   to[length] = '\0';
 }
 
-StateOptions read_options(const palpate_tool* tools, int tool_count, int max_contacts) {
+/// Element `k`, called `name`, of an array of structs that the macro `init` initializes.
+template <typename Struct>
+Struct read_or_throw(const Struct* first, std::size_t k, const Struct& defaults, const std::string& name,
+                     const std::string& init) {
+  if (const auto read = read_struct(first, k, defaults)) return *read;
+  if (!is_size_of<Struct>(first->size)) {
+    throw Error("the size of " + name + " is " + std::to_string(first->size) + " bytes", "palpate_create",
+                "begin with " + init + ", which sets it");
+  }
+  throw Error("libpalpate " PALPATE_VERSION " cannot read " + name +
+                  ": a member that it does not know is set, or its size is not that of the first",
+              "palpate_create",
+              "begin with " + init + ", and use a libpalpate as new as the palpate.h that you compile with");
+}
+
+StateOptions read_tools(const palpate_tool* tools, int tool_count, int max_contacts) {
   if (tools == nullptr || tool_count < 1)
     throw Error("there is no tool", "palpate_create", "give at least one");
   if (max_contacts < 1 || max_contacts > most_contacts) {
@@ -81,23 +120,28 @@ StateOptions read_options(const palpate_tool* tools, int tool_count, int max_con
                 "ask for 1 to " + std::to_string(most_contacts));
   }
   StateOptions options{.tools = {}, .max_contacts = max_contacts};
-  for (int k = 0; k < tool_count; ++k) options.tools.push_back(to_tool(tools[k]));
+  for (int k = 0; k < tool_count; ++k) {
+    options.tools.push_back(to_tool(read_or_throw(tools, static_cast<std::size_t>(k), default_tool,
+                                                  "tool " + std::to_string(k), "PALPATE_TOOL_INIT")));
+  }
   return options;
 }
 
-/// None: refinement 1.
-OverlayOptions read_overlay(const palpate_overlay* overlay) {
-  if (overlay == nullptr) return {.refinement = 1, .rings = 0};
+/// An overlay that is not asked for has refinement 1.
+palpate_overlay read_overlay(const palpate_overlay* given) {
+  if (given == nullptr) return {.size = sizeof(palpate_overlay), .refinement = 1, .rings = 0, .memory = 0};
+  const palpate_overlay overlay =
+      read_or_throw(given, 0, default_overlay, "the overlay", "PALPATE_OVERLAY_INIT");
   constexpr int most = 16;
-  if (overlay->refinement < 2 || overlay->refinement > most || overlay->rings < 1 || overlay->rings > most) {
-    throw Error("an overlay of " + std::to_string(overlay->rings) + " rings, refined " +
-                    std::to_string(overlay->refinement) + " times, was asked for",
+  if (overlay.refinement < 2 || overlay.refinement > most || overlay.rings < 1 || overlay.rings > most) {
+    throw Error("an overlay of " + std::to_string(overlay.rings) + " rings, refined " +
+                    std::to_string(overlay.refinement) + " times, was asked for",
                 "palpate_create_with_options", "ask for 1 to 16 rings, refined 2 to 16 times");
   }
-  return {.refinement = overlay->refinement, .rings = overlay->rings};
+  return overlay;
 }
 
-StateOptions with_room(StateOptions options, const Body& body, const OverlayOptions& overlay) {
+StateOptions with_room(StateOptions options, const Body& body, const palpate_overlay& overlay) {
   if (overlay.refinement > 1) options.patch_nodes = patch_room(body, overlay.rings, options.tools.size());
   return options;
 }
@@ -114,7 +158,7 @@ struct Shown {
 };
 
 struct palpate_session {
-  palpate_session(Model model, const StateOptions& options, const OverlayOptions& overlay, std::size_t memory,
+  palpate_session(Model model, const StateOptions& options, const palpate_overlay& overlay,
                   ContactModel contact)
       : body(std::move(model), {}, overlay.refinement, contact),
         untouched(body, with_room(options, body, overlay)),
@@ -125,7 +169,7 @@ struct palpate_session {
         displacement(body.surface_rest_positions().size()) {
     show();
     if (overlay.refinement > 1)
-      overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = memory});
+      overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = overlay.memory});
     if (body.model().dynamics.method == DynamicsMethod::packed)
       motion.emplace(body, state, MotionSourceOptions{});
   }
@@ -151,18 +195,6 @@ struct palpate_session {
 
 extern "C" {
 
-palpate_tool palpate_default_tool() noexcept {
-  const Tool tool;
-  return {.radius = tool.radius,
-          .length = tool.length,
-          .coupling_stiffness = tool.coupling_stiffness,
-          .coupling_torsion = tool.coupling_torsion,
-          .max_force = tool.max_force,
-          .friction = -1.0,
-          .reach = tool.reach,
-          .hand_over = tool.hand_over};
-}
-
 const char* palpate_status_name(uint32_t bit) noexcept {
   for (const auto& [status, name] : status_names) {
     if (static_cast<std::uint32_t>(status) == bit) return name;
@@ -170,14 +202,10 @@ const char* palpate_status_name(uint32_t bit) noexcept {
   return nullptr;
 }
 
-palpate_options palpate_default_options(void) noexcept {
-  return {.overlay = nullptr, .dynamic_contact = 0, .tick = StateOptions{}.tick};
-}
-
 palpate_session* palpate_create(const char* file, const palpate_tool* tools, int tool_count, int max_contacts,
                                 char* error, size_t error_size) noexcept {
-  const palpate_options options = palpate_default_options();
-  return palpate_create_with_options(file, tools, tool_count, max_contacts, &options, error, error_size);
+  return palpate_create_with_options(file, tools, tool_count, max_contacts, &default_options, error,
+                                     error_size);
 }
 
 palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
@@ -187,14 +215,15 @@ palpate_session* palpate_create_with_options(const char* file, const palpate_too
   try {
     if (file == nullptr) throw Error("there is no file name", "palpate_create", "name a .palpate.hdf file");
     if (options == nullptr)
-      throw Error("there are no options", "palpate_create_with_options", "take palpate_default_options()");
-    StateOptions wanted = read_options(tools, tool_count, max_contacts);
-    wanted.tick = options->tick;
-    const OverlayOptions fine = read_overlay(options->overlay);
-    const std::size_t memory = options->overlay != nullptr ? options->overlay->memory : 0;
+      throw Error("there are no options", "palpate_create_with_options", "begin with PALPATE_OPTIONS_INIT");
+    const palpate_options wanted =
+        read_or_throw(options, 0, default_options, "the options", "PALPATE_OPTIONS_INIT");
+    const palpate_overlay overlay = read_overlay(wanted.overlay);
+    StateOptions state = read_tools(tools, tool_count, max_contacts);
+    state.tick = wanted.tick;
     const ContactModel contact =
-        options->dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
-    return std::make_unique<palpate_session>(load_model(file), wanted, fine, memory, contact).release();
+        wanted.dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
+    return std::make_unique<palpate_session>(load_model(file), state, overlay, contact).release();
   } catch (...) {
     try {
       const Error told =
@@ -212,7 +241,11 @@ void palpate_destroy(palpate_session* session) noexcept {
 
 uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexcept {
   if (poses == nullptr) return PALPATE_POSE_NOT_FINITE;
-  std::transform(poses, poses + session->poses.size(), session->poses.begin(), to_pose);
+  for (std::size_t k = 0; k < session->poses.size(); ++k) {
+    const auto pose = read_struct(poses, k, default_pose);
+    if (!pose) return PALPATE_POSE_NOT_FINITE;
+    session->poses[k] = to_pose(*pose);
+  }
   if (session->overlays) session->overlays->serve(session->state);
   if (session->motion) session->motion->receive(session->state);
   const StepStatus status = step(session->body, session->state, session->poses);
@@ -221,23 +254,11 @@ uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexc
   return static_cast<uint32_t>(status);
 }
 
-void palpate_get(const palpate_session* session, int tool, palpate_result* result) noexcept {
-  *result = {};
-  if (tool < 0 || static_cast<std::size_t>(tool) >= session->state.tools.size()) return;
-  const ToolState& state = session->state.tools[static_cast<std::size_t>(tool)];
-  copy(state.wrench.force, result->force);
-  copy(state.wrench.torque, result->torque);
-  copy(state.pose.position, result->tool_position);
-  const Eigen::Quaterniond& q = state.pose.orientation;
-  result->tool_orientation[0] = q.w();
-  result->tool_orientation[1] = q.x();
-  result->tool_orientation[2] = q.y();
-  result->tool_orientation[3] = q.z();
-  result->contacts = state.contacts;
-  for (Eigen::Index row = 0; row < 3; ++row)
-    copy(state.local.stiffness.row(row), result->local_stiffness + 3 * row);
-  copy(state.local.point, result->local_point);
-  result->local_radius = state.local.radius;
+int palpate_get(const palpate_session* session, int tool, palpate_result* result) noexcept {
+  palpate_result felt{};
+  const bool exists = tool >= 0 && static_cast<std::size_t>(tool) < session->state.tools.size();
+  if (exists) felt = to_result(session->state.tools[static_cast<std::size_t>(tool)]);
+  return write_struct(felt, result) && exists ? 0 : -1;
 }
 
 void palpate_reset(palpate_session* session) noexcept {
@@ -245,10 +266,12 @@ void palpate_reset(palpate_session* session) noexcept {
   session->show();
 }
 
-palpate_counts palpate_surface_counts(const palpate_session* session) noexcept {
-  return {.nodes = static_cast<int32_t>(session->body.surface_rest_positions().size()),
-          .simplices = static_cast<int32_t>(session->body.surface_friction().size()),
-          .corners = session->body.dimension()};
+int palpate_surface_counts(const palpate_session* session, palpate_counts* counts) noexcept {
+  const palpate_counts all{.size = sizeof(palpate_counts),
+                           .nodes = static_cast<int32_t>(session->body.surface_rest_positions().size()),
+                           .simplices = static_cast<int32_t>(session->body.surface_friction().size()),
+                           .corners = session->body.dimension()};
+  return write_struct(all, counts) ? 0 : -1;
 }
 
 void palpate_surface_rest(const palpate_session* session, double* xyz) noexcept {

@@ -7,10 +7,17 @@
  * at a time may use the functions of the loop, palpate_step, palpate_get and palpate_reset; while it does,
  * one other thread at a time may use those of the surface. "Real-time safe" below means: no memory is taken,
  * no lock, no system call, and the time is bounded. A session must not be NULL but where that is said.
+ *
+ * Each struct begins with its size, so that later versions can add members at its end: begin yours with its
+ * PALPATE_..._INIT, which sets the size and the defaults, then change what is to differ. A program that was
+ * compiled with an older palpate.h has smaller structs: what they lack takes its default. One compiled with a
+ * newer palpate.h may leave members that this library does not know 0; set, or with a size of 0, a struct is
+ * refused. All elements of an array have one size.
  */
 #ifndef PALPATE_H
 #define PALPATE_H
 
+#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -28,6 +35,7 @@ typedef struct palpate_session palpate_session;
  * hangs on the device by a spring, the virtual coupling, in series with the body: what the hand feels is
  * never stiffer than that. */
 typedef struct palpate_tool {
+  size_t size;               /* sizeof(palpate_tool) */
   double radius;             /* [m] */
   double length;             /* [m] */
   double coupling_stiffness; /* [N/m] the stiffest that the device can show; HUGE_VAL: no spring */
@@ -41,14 +49,20 @@ typedef struct palpate_tool {
 
 /* A point without a coupling or limit, with the material's friction, no reach and a hand-over of
  * 0.005. */
-palpate_tool palpate_default_tool(void) PALPATE_NOEXCEPT;
+#define PALPATE_TOOL_INIT \
+  { sizeof(palpate_tool), 0.0, 0.0, HUGE_VAL, HUGE_VAL, HUGE_VAL, -1.0, 0.0, 0.005 }
 
 /* Where the device wants a tool. */
 typedef struct palpate_pose {
+  size_t size;           /* sizeof(palpate_pose) */
   double position[3];    /* of the tool's origin [m] */
   double orientation[4]; /* quaternion w, x, y, z of any length but 0; 1, 0, 0, 0 is not turned */
   int grab;              /* not 0: hold what the tool touches until it is 0 again */
 } palpate_pose;
+
+/* At the origin, not turned, no grab. */
+#define PALPATE_POSE_INIT \
+  { sizeof(palpate_pose), {0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}, 0 }
 
 /* What palpate_step could not do; bits, 0 when all is well. Whatever they say, the forces are finite. */
 enum {
@@ -85,15 +99,19 @@ palpate_session* palpate_create(const char* file, const palpate_tool* tools, int
  * tools are felt; the file must keep as many layers below the surface as there are rings. Four tools at most
  * have overlays. */
 typedef struct palpate_overlay {
+  size_t size;    /* sizeof(palpate_overlay) */
   int refinement; /* 2 to 16; 3 is a good beginning */
   int rings;      /* 1 to 16; 2 is markedly better than 1 */
   size_t memory;  /* [bytes] that overlays may take; 512 MB is much */
 } palpate_overlay;
 
-/* How a session is to be, beyond its tools. Take it from palpate_default_options and change what is to
- * differ.
- */
+/* Refined 3 times, 2 rings, 512 MB. */
+#define PALPATE_OVERLAY_INIT \
+  { sizeof(palpate_overlay), 3, 2, (size_t)512 << 20 }
+
+/* How a session is to be, beyond its tools. */
 typedef struct palpate_options {
+  size_t size; /* sizeof(palpate_options) */
   const palpate_overlay*
       overlay;         /* NULL: none. A thread of the session builds overlays ahead of the tools, at
                         * the priority of the thread that calls this; palpate_step never waits */
@@ -103,7 +121,8 @@ typedef struct palpate_options {
 } palpate_options;
 
 /* No overlay, quasi-static contact, 0.001 s. */
-palpate_options palpate_default_options(void) PALPATE_NOEXCEPT;
+#define PALPATE_OPTIONS_INIT \
+  { sizeof(palpate_options), NULL, 0, 0.001 }
 
 /* palpate_create with options. A body whose file has packed dynamics is swung by threads of the session. */
 palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
@@ -116,13 +135,15 @@ void palpate_destroy(palpate_session* session) PALPATE_NOEXCEPT;
 /* --- The loop --- */
 
 /* One tick: one pose for each tool, in the order of palpate_create.
- * Returns status bits. Real-time safe. With `poses` NULL nothing happens: PALPATE_POSE_NOT_FINITE. */
+ * Returns status bits. Real-time safe. With `poses` NULL or refused nothing happens: PALPATE_POSE_NOT_FINITE.
+ */
 uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) PALPATE_NOEXCEPT;
 
 /* What a tool feels since the last tick. For devices that run faster, and for ticks that come late: while the
  * device is at x, within local_radius of local_point, the force is
  *   force - local_stiffness (x - local_point). */
 typedef struct palpate_result {
+  size_t size;                /* sizeof(palpate_result) */
   double force[3];            /* on the hand: what the device is to display [N] */
   double torque[3];           /* on the hand, about the tool's origin [N m] */
   double tool_position[3];    /* of the tool itself, which the surface keeps outside [m] */
@@ -133,8 +154,16 @@ typedef struct palpate_result {
   double local_radius;        /* [m] */
 } palpate_result;
 
-/* Of tool 0, 1, ...; all zero for a number that is none. Real-time safe. */
-void palpate_get(const palpate_session* session, int tool, palpate_result* result) PALPATE_NOEXCEPT;
+/* All zero. */
+#define PALPATE_RESULT_INIT                                                                             \
+  {                                                                                                     \
+    sizeof(palpate_result), {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, 0, \
+        {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0                             \
+  }
+
+/* Fills the members that `result` has for tool 0, 1, ... Returns 0; -1 where the number is none, and all is
+ * zero, or the size is refused, and nothing is written. Real-time safe. */
+int palpate_get(const palpate_session* session, int tool, palpate_result* result) PALPATE_NOEXCEPT;
 
 /* To the state after palpate_create: a body that nobody has touched. Takes no memory, but too long for a
  * tick. */
@@ -143,12 +172,17 @@ void palpate_reset(palpate_session* session) PALPATE_NOEXCEPT;
 /* --- The surface, for the eye --- */
 
 typedef struct palpate_counts {
+  size_t size; /* sizeof(palpate_counts) */
   int32_t nodes;
   int32_t simplices;
   int32_t corners; /* of a simplex: 3, triangles; in the plane 2, lines */
 } palpate_counts;
 
-palpate_counts palpate_surface_counts(const palpate_session* session) PALPATE_NOEXCEPT;
+#define PALPATE_COUNTS_INIT \
+  { sizeof(palpate_counts), 0, 0, 0 }
+
+/* Fills the members that `counts` has. Returns 0; -1 where the size is refused. */
+int palpate_surface_counts(const palpate_session* session, palpate_counts* counts) PALPATE_NOEXCEPT;
 
 /* Positions of the surface nodes on the body at rest, 3 `nodes` numbers x, y, z [m]. Never changes. */
 void palpate_surface_rest(const palpate_session* session, double* xyz) PALPATE_NOEXCEPT;

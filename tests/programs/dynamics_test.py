@@ -139,20 +139,20 @@ class Swing(ProgramTest):
 
 
 class Tool(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_double) for name in
-                ("radius", "length", "coupling_stiffness", "coupling_torsion", "max_force", "friction", "reach", "hand_over")]
+    _fields_ = [("size", ctypes.c_size_t)] + [(name, ctypes.c_double) for name in ("radius", "length", "coupling_stiffness",
+                "coupling_torsion", "max_force", "friction", "reach", "hand_over")]
 
 
 class Options(ctypes.Structure):
-    _fields_ = [("overlay", ctypes.c_void_p), ("dynamic_contact", ctypes.c_int), ("tick", ctypes.c_double)]
+    _fields_ = [("size", ctypes.c_size_t), ("overlay", ctypes.c_void_p), ("dynamic_contact", ctypes.c_int), ("tick", ctypes.c_double)]
 
 
 class Pose(ctypes.Structure):
-    _fields_ = [("position", ctypes.c_double * 3), ("orientation", ctypes.c_double * 4), ("grab", ctypes.c_int)]
+    _fields_ = [("size", ctypes.c_size_t), ("position", ctypes.c_double * 3), ("orientation", ctypes.c_double * 4), ("grab", ctypes.c_int)]
 
 
 class Counts(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_int32) for name in ("nodes", "simplices", "corners")]
+    _fields_ = [("size", ctypes.c_size_t)] + [(name, ctypes.c_int32) for name in ("nodes", "simplices", "corners")]
 
 
 class OwnLoop(ProgramTest):
@@ -164,15 +164,12 @@ class OwnLoop(ProgramTest):
         if re.search(r"^PALPATE_SANITIZE:\w+=(.+)$", cache, re.MULTILINE):
             self.skipTest("Python has no sanitizer")
         self.library = ctypes.CDLL(str(BINARY / "runtime" / "libpalpate.so"))
-        self.library.palpate_default_tool.restype = Tool
-        self.library.palpate_default_options.restype = Options
         self.library.palpate_create_with_options.restype = ctypes.c_void_p
-        self.library.palpate_surface_counts.restype = Counts
 
     def create(self, file, **changed):
-        tool = self.library.palpate_default_tool()
-        tool.reach = 0.02
-        options = self.library.palpate_default_options()
+        unbounded = float("inf")
+        tool = Tool(ctypes.sizeof(Tool), 0.0, 0.0, unbounded, unbounded, unbounded, -1.0, 0.02, 0.005)
+        options = Options(ctypes.sizeof(Options), None, 0, 0.001)
         for name, value in changed.items():
             setattr(options, name, value)
         error = ctypes.create_string_buffer(400)
@@ -185,15 +182,16 @@ class OwnLoop(ProgramTest):
             session, error = self.create(self.bake(text))
             self.assertEqual(error, "")
             session = ctypes.c_void_p(session)
-            nodes = self.library.palpate_surface_counts(session).nodes
-            u = numpy.zeros((nodes, 3))
+            counts = Counts(ctypes.sizeof(Counts))
+            self.assertEqual(self.library.palpate_surface_counts(session, ctypes.byref(counts)), 0)
+            u = numpy.zeros((counts.nodes, 3))
 
             def displacement():
                 self.library.palpate_surface_displacement(session, u.ctypes.data_as(ctypes.c_void_p))
                 return numpy.abs(u).max()
 
             def step(y, grab):
-                pose = Pose((TIP[0] + 0.001, y, TIP[2]), (1.0, 0.0, 0.0, 0.0), grab)
+                pose = Pose(ctypes.sizeof(Pose), (TIP[0] + 0.001, y, TIP[2]), (1.0, 0.0, 0.0, 0.0), grab)
                 self.library.palpate_step(session, ctypes.byref(pose))
 
             step(TIP[1], 0)

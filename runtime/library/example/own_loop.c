@@ -8,7 +8,9 @@
 
 /* Half a millimetre above the surface's highest node, over the middle of its nodes. */
 static void place_above(const palpate_session* session, double radius, double position[3]) {
-  const int nodes = palpate_surface_counts(session).nodes;
+  palpate_counts counts = PALPATE_COUNTS_INIT;
+  palpate_surface_counts(session, &counts);
+  const int nodes = counts.nodes;
   double* xyz = malloc(3 * sizeof(double) * (size_t)nodes);
   if (xyz == NULL) abort();
   palpate_surface_rest(session, xyz);
@@ -34,14 +36,14 @@ static void print(int tick, const palpate_pose* pose, const palpate_result* felt
 
 int main(int argc, char** argv) {
   char error[512] = "usage: own_loop NAME.palpate.hdf\n";
-  palpate_tool tool = palpate_default_tool();
+  palpate_tool tool = PALPATE_TOOL_INIT;
   tool.radius = 0.005;
   tool.coupling_stiffness = 2000.0; /* what the device can show */
   tool.max_force = 5.0;
   palpate_session* session = argc == 2 ? palpate_create(argv[1], &tool, 1, 32, error, sizeof error) : NULL;
   if (session == NULL) return fputs(error, stderr), 1;
 
-  palpate_pose pose = {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}, 0}; /* yours comes from the device */
+  palpate_pose pose = PALPATE_POSE_INIT; /* yours comes from the device */
   place_above(session, tool.radius, pose.position);
   double pressed = 0.0, rubbed = 0.0, stride = 0.00002; /* 20 mm/s */
   struct timespec due;
@@ -52,7 +54,7 @@ int main(int argc, char** argv) {
     due.tv_nsec %= 1000000000;
     clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL);
 
-    palpate_result felt;
+    palpate_result felt = PALPATE_RESULT_INIT;
     const uint32_t status = palpate_step(session, &pose);
     palpate_get(session, 0, &felt); /* yours sends felt.force to the device */
     if (tick % 200 == 0) print(tick, &pose, &felt, status);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -38,7 +39,7 @@ std::string golden(const std::string& name) {
 }
 
 palpate_tool sphere(double radius) {
-  palpate_tool tool = palpate_default_tool();
+  palpate_tool tool = PALPATE_TOOL_INIT;
   tool.radius = radius;
   return tool;
 }
@@ -52,22 +53,36 @@ Session open(const std::string& name, const std::vector<palpate_tool>& tools) {
   return session;
 }
 
+palpate_result result_of(const palpate_session* session, int tool) {
+  palpate_result result = PALPATE_RESULT_INIT;
+  palpate_get(session, tool, &result);
+  return result;
+}
+
+palpate_counts counts_of(const palpate_session* session) {
+  palpate_counts counts = PALPATE_COUNTS_INIT;
+  EXPECT_EQ(palpate_surface_counts(session, &counts), 0);
+  return counts;
+}
+
 /// The same as the step with the patch that it wants, once it is there.
 TEST(COverlay, FeelsAsTheStepWithItsPatch) {
   const palpate_tool tool = sphere(0.2);
-  const palpate_overlay overlay{.refinement = 3, .rings = 1, .memory = std::size_t{1} << 28};
-  palpate_options options = palpate_default_options();
+  palpate_overlay overlay = PALPATE_OVERLAY_INIT;
+  overlay.rings = 1;
+  palpate_options options = PALPATE_OPTIONS_INIT;
   options.overlay = &overlay;
   char error[300];
   const Session session(
       palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 64, &options, error, sizeof error));
   ASSERT_NE(session, nullptr) << error;
   const Body body(load_model(golden("cube2")), {}, 3);
-  EXPECT_EQ(palpate_surface_counts(session.get()).nodes, std::ssize(body.surface_rest_positions()));
+  EXPECT_EQ(counts_of(session.get()).nodes, std::ssize(body.surface_rest_positions()));
   EXPECT_GT(body.surface_rest_positions().size(), body.surface_mesh_nodes().size());
 
   const auto pose = [](int tick) {
-    return palpate_pose{{0.45, 0.5, 1.25 - 0.001 * std::min(tick, 100)}, {1.0, 0.0, 0.0, 0.0}, 0};
+    return palpate_pose{
+        sizeof(palpate_pose), {0.45, 0.5, 1.25 - 0.001 * std::min(tick, 100)}, {1.0, 0.0, 0.0, 0.0}, 0};
   };
   for (int tick = 0; tick < 20000; ++tick) {  // hovers until the builder has made the patch
     if (palpate_step(session.get(), std::array{pose(0)}.data()) == 0) break;
@@ -82,8 +97,7 @@ TEST(COverlay, FeelsAsTheStepWithItsPatch) {
     const palpate_pose device = pose(tick);
     step(body, state, ToolPose{.position = Eigen::Map<const Vec3>(device.position)});
   }
-  palpate_result result;
-  palpate_get(session.get(), 0, &result);
+  const palpate_result result = result_of(session.get(), 0);
   const Vec3 force = state.tools.front().wrench.force;
   EXPECT_GT(force.z(), 0.0);
   EXPECT_LT((Eigen::Map<const Vec3>(result.force) - force).norm(), 1e-6 * force.norm());
@@ -102,9 +116,10 @@ TEST(COverlay, FeelsAsTheStepWithItsPatch) {
 TEST(COverlay, RefusesWhatCannotBe) {
   const palpate_tool tool = sphere(0.2);
   char error[300];
-  for (const palpate_overlay& overlay :
-       {palpate_overlay{1, 1, 1000}, palpate_overlay{3, 0, 1000}, palpate_overlay{99, 1, 1000}}) {
-    palpate_options options = palpate_default_options();
+  for (const palpate_overlay& overlay : {palpate_overlay{sizeof(palpate_overlay), 1, 1, 1000},
+                                         palpate_overlay{sizeof(palpate_overlay), 3, 0, 1000},
+                                         palpate_overlay{sizeof(palpate_overlay), 99, 1, 1000}}) {
+    palpate_options options = PALPATE_OPTIONS_INIT;
     options.overlay = &overlay;
     EXPECT_EQ(
         palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 64, &options, error, sizeof error),
@@ -121,14 +136,8 @@ std::string refusal(const char* file, const palpate_tool* tools, int count, int 
   return error;
 }
 
-palpate_result result_of(const palpate_session* session, int tool) {
-  palpate_result result;
-  palpate_get(session, tool, &result);
-  return result;
-}
-
 std::vector<double> displacement_of(palpate_session* session) {
-  std::vector<double> xyz(3 * static_cast<std::size_t>(palpate_surface_counts(session).nodes), nan);
+  std::vector<double> xyz(3 * static_cast<std::size_t>(counts_of(session).nodes), nan);
   palpate_surface_displacement(session, xyz.data());
   return xyz;
 }
@@ -167,8 +176,12 @@ class CInterface : public testing::TestWithParam<const char*> {
   [[nodiscard]] std::vector<palpate_pose> poses(int tick) const {
     const double t = 0.001 * tick;
     const double height = 1.0 + 0.15 + 0.05 - 0.12 * std::sin(3.0 * t);
-    palpate_pose first{{0.4 + 0.2 * t, 0.5, height}, {1.0, 0.0, 0.0, 0.0}, tick > 400 && tick < 600 ? 7 : 0};
-    palpate_pose second{{0.7, 0.4 + 0.1 * t, height - 0.04}, {2.0, 0.3 * t, 0.1, 0.2 * t}, 0};
+    palpate_pose first{sizeof(palpate_pose),
+                       {0.4 + 0.2 * t, 0.5, height},
+                       {1.0, 0.0, 0.0, 0.0},
+                       tick > 400 && tick < 600 ? 7 : 0};
+    palpate_pose second{
+        sizeof(palpate_pose), {0.7, 0.4 + 0.1 * t, height - 0.04}, {2.0, 0.3 * t, 0.1, 0.2 * t}, 0};
     if (!in_space_) {  // the plate hangs: from below, and the capsule points up
       first.position[1] = 1.0 - height;
       second.position[1] = 0.9 - height;
@@ -306,7 +319,7 @@ double content_of_elements(const Body& body) {
 
 TEST_P(CInterface, SurfaceAtRestIsClosedAndFacesOutwards) {
   const Session session = open(GetParam(), tools_);
-  const palpate_counts counts = palpate_surface_counts(session.get());
+  const palpate_counts counts = counts_of(session.get());
   EXPECT_EQ(counts.corners, in_space_ ? 3 : 2);
   std::vector<double> xyz(3 * static_cast<std::size_t>(counts.nodes), nan);
   std::vector<std::int32_t> nodes(static_cast<std::size_t>(counts.corners * counts.simplices), -1);
@@ -365,8 +378,8 @@ TEST(CInterfaceErrors, TextIsCutToItsRoomAndMayBeMissing) {
 TEST(CInterfaceErrors, NothingHappensWithoutPosesOrATool) {
   palpate_destroy(nullptr);
   const Session session = open("cube2", {sphere(0.1)});
-  const palpate_pose touching{{0.5, 0.5, 1.08}, {1.0, 0.0, 0.0, 0.0}, 0};
-  const palpate_pose above{{0.5, 0.5, 1.2}, {1.0, 0.0, 0.0, 0.0}, 0};
+  const palpate_pose touching{sizeof(palpate_pose), {0.5, 0.5, 1.08}, {1.0, 0.0, 0.0, 0.0}, 0};
+  const palpate_pose above{sizeof(palpate_pose), {0.5, 0.5, 1.2}, {1.0, 0.0, 0.0, 0.0}, 0};
   palpate_step(session.get(), &above);
   palpate_step(session.get(), &touching);
   const palpate_result before = result_of(session.get(), 0);
@@ -374,11 +387,163 @@ TEST(CInterfaceErrors, NothingHappensWithoutPosesOrATool) {
   EXPECT_EQ(palpate_step(session.get(), nullptr), static_cast<std::uint32_t>(PALPATE_POSE_NOT_FINITE));
   EXPECT_EQ(vector(result_of(session.get(), 0).force), vector(before.force));
   for (const int tool : {-1, 1, 1000}) {
-    const palpate_result none = result_of(session.get(), tool);
+    palpate_result none = PALPATE_RESULT_INIT;
+    none.local_radius = 1.0;
+    EXPECT_EQ(palpate_get(session.get(), tool, &none), -1);
     EXPECT_EQ(vector(none.force), Vec3::Zero());
     EXPECT_EQ(none.tool_orientation[0], 0.0);
     EXPECT_EQ(none.local_radius, 0.0);
   }
+}
+
+// What a program compiled with an older palpate.h has: the first members only.
+struct OldTool {
+  std::size_t size;
+  double radius;
+  double length;
+};
+struct OldPose {
+  std::size_t size;
+  double position[3];
+};
+struct OldOptions {
+  std::size_t size;
+  const palpate_overlay* overlay;
+};
+struct OldResult {
+  std::size_t size;
+  double force[3];
+  double behind;  // not its own
+};
+
+// What a program compiled with a newer palpate.h has: a member at the end.
+template <typename Struct>
+struct Newer {
+  Struct known;
+  double unknown;
+};
+
+palpate_session* create(const void* tools, int count, const void* options, std::string& why) {
+  char error[400];
+  palpate_session* session =
+      palpate_create_with_options(golden("cube2").c_str(), static_cast<const palpate_tool*>(tools), count, 24,
+                                  static_cast<const palpate_options*>(options), error, sizeof error);
+  why = error;
+  return session;
+}
+
+TEST(CInterfaceSizes, InitsAreTheDefaultsOfCpp) {
+  const palpate_tool tool = PALPATE_TOOL_INIT;
+  const Tool cpp;
+  EXPECT_EQ(tool.size, sizeof tool);
+  EXPECT_EQ(tool.radius, cpp.radius);
+  EXPECT_EQ(tool.length, cpp.length);
+  EXPECT_EQ(tool.coupling_stiffness, cpp.coupling_stiffness);
+  EXPECT_EQ(tool.coupling_torsion, cpp.coupling_torsion);
+  EXPECT_EQ(tool.max_force, cpp.max_force);
+  EXPECT_LT(tool.friction, 0.0);
+  EXPECT_EQ(tool.reach, cpp.reach);
+  EXPECT_EQ(tool.hand_over, cpp.hand_over);
+  const palpate_options options = PALPATE_OPTIONS_INIT;
+  EXPECT_EQ(options.tick, StateOptions{}.tick);
+  const palpate_overlay overlay = PALPATE_OVERLAY_INIT;
+  EXPECT_EQ(overlay.memory, PatchSourceOptions{}.memory);
+}
+
+TEST(CInterfaceSizes, SmallerStructsOfAnOlderProgramTakeDefaults) {
+  std::string why;
+  const OldTool old_tools[] = {{sizeof(OldTool), 0.1, 0.0}, {sizeof(OldTool), 0.15, 0.1}};
+  const OldOptions old_options{sizeof(OldOptions), nullptr};
+  const Session session(create(old_tools, 2, &old_options, why));
+  ASSERT_NE(session, nullptr) << why;
+  palpate_tool second = sphere(0.15);
+  second.length = 0.1;
+  const Session today = open("cube2", {sphere(0.1), second});
+  for (const double z : {1.2, 1.08}) {
+    const OldPose old_poses[] = {{sizeof(OldPose), {0.3, 0.5, z}}, {sizeof(OldPose), {0.7, 0.5, z + 0.05}}};
+    const palpate_pose poses[] = {{sizeof(palpate_pose), {0.3, 0.5, z}, {1.0, 0.0, 0.0, 0.0}, 0},
+                                  {sizeof(palpate_pose), {0.7, 0.5, z + 0.05}, {1.0, 0.0, 0.0, 0.0}, 0}};
+    EXPECT_EQ(palpate_step(session.get(), reinterpret_cast<const palpate_pose*>(old_poses)), 0U);
+    EXPECT_EQ(palpate_step(today.get(), poses), 0U);
+  }
+  for (const int tool : {0, 1}) {
+    const palpate_result expected = result_of(today.get(), tool);
+    EXPECT_GT(expected.force[2], 0.0);
+    OldResult result{offsetof(OldResult, behind), {}, -7.0};
+    EXPECT_EQ(palpate_get(session.get(), tool, reinterpret_cast<palpate_result*>(&result)), 0);
+    EXPECT_EQ(vector(result.force), vector(expected.force));
+    EXPECT_EQ(result.size, offsetof(OldResult, behind));
+    EXPECT_EQ(result.behind, -7.0);
+  }
+}
+
+TEST(CInterfaceSizes, LargerStructsOfANewerProgramMustLeaveWhatIsUnknownZero) {
+  std::string why;
+  Newer<palpate_tool> tools[] = {{sphere(0.1), 0.0}, {sphere(0.1), 0.0}};
+  for (auto& tool : tools) tool.known.size = sizeof tool;
+  const palpate_options options = PALPATE_OPTIONS_INIT;
+  const Session session(create(tools, 2, &options, why));
+  ASSERT_NE(session, nullptr) << why;
+  tools[1].unknown = 1.0;
+  EXPECT_EQ(create(tools, 2, &options, why), nullptr);
+  EXPECT_NE(why.find("tool 1"), std::string::npos) << why;
+  EXPECT_NE(why.find("as new as the palpate.h"), std::string::npos) << why;
+
+  Newer<palpate_pose> poses[] = {{PALPATE_POSE_INIT, 0.0}, {PALPATE_POSE_INIT, 0.0}};
+  for (auto& pose : poses) pose.known.size = sizeof pose;
+  for (auto& pose : poses) pose.known.position[2] = 1.5;
+  EXPECT_EQ(palpate_step(session.get(), &poses[0].known), 0U);
+  poses[1].unknown = 1.0;
+  EXPECT_EQ(palpate_step(session.get(), &poses[0].known),
+            static_cast<std::uint32_t>(PALPATE_POSE_NOT_FINITE));
+
+  Newer<palpate_result> result{PALPATE_RESULT_INIT, 5.0};
+  result.known.size = sizeof result;
+  EXPECT_EQ(palpate_get(session.get(), 0, &result.known), 0);
+  EXPECT_EQ(result.known.tool_position[2], 1.5);
+  EXPECT_EQ(result.unknown, 0.0);
+}
+
+TEST(CInterfaceSizes, SizesThatCannotBeAreRefused) {
+  std::string why;
+  const palpate_tool good = sphere(0.1);
+  const palpate_options options = PALPATE_OPTIONS_INIT;
+  for (const std::size_t size :
+       {std::size_t{0}, sizeof(std::size_t), sizeof(palpate_tool) - 1, std::size_t{1} << 40}) {
+    palpate_tool tool = good;
+    tool.size = size;
+    EXPECT_EQ(create(&tool, 1, &options, why), nullptr) << size;
+    EXPECT_NE(why.find("size of tool 0 is " + std::to_string(size)), std::string::npos) << why;
+    EXPECT_NE(why.find("PALPATE_TOOL_INIT"), std::string::npos) << why;
+  }
+  palpate_options unsized = options;
+  unsized.size = 0;
+  EXPECT_EQ(create(&good, 1, &unsized, why), nullptr);
+  EXPECT_NE(why.find("PALPATE_OPTIONS_INIT"), std::string::npos) << why;
+  palpate_overlay overlay = PALPATE_OVERLAY_INIT;
+  overlay.size = 0;
+  unsized = options;
+  unsized.overlay = &overlay;
+  EXPECT_EQ(create(&good, 1, &unsized, why), nullptr);
+  EXPECT_NE(why.find("PALPATE_OVERLAY_INIT"), std::string::npos) << why;
+  palpate_tool mixed[] = {good, good};
+  mixed[1].size = 16;
+  EXPECT_EQ(create(mixed, 2, &options, why), nullptr);
+  EXPECT_NE(why.find("cannot read tool 1"), std::string::npos) << why;
+
+  const Session session = open("cube2", {good});
+  palpate_pose pose = PALPATE_POSE_INIT;
+  pose.size = 0;
+  EXPECT_EQ(palpate_step(session.get(), &pose), static_cast<std::uint32_t>(PALPATE_POSE_NOT_FINITE));
+  palpate_result result = PALPATE_RESULT_INIT;
+  result.size = 0;
+  result.local_radius = 3.0;
+  EXPECT_EQ(palpate_get(session.get(), 0, &result), -1);
+  EXPECT_EQ(result.local_radius, 3.0);
+  palpate_counts counts = PALPATE_COUNTS_INIT;
+  counts.size = 0;
+  EXPECT_EQ(palpate_surface_counts(session.get(), &counts), -1);
+  EXPECT_EQ(counts.nodes, 0);
 }
 
 TEST(CInterfaceStatus, HasANameForEachBitAndNoOther) {
@@ -390,12 +555,12 @@ TEST(CInterfaceStatus, HasANameForEachBitAndNoOther) {
 }
 
 TEST(CInterfaceThreads, AnotherThreadSeesWholeTicksOnly) {
-  palpate_tool point = palpate_default_tool();
+  palpate_tool point = PALPATE_TOOL_INIT;
   point.reach = 0.05;
   const Session session = open("cube2", {point});
   const auto press = [&](double depth,
                          int grab = 1) {  // the node in the middle of the top, held from 0.02 above
-    const palpate_pose pose{{0.5, 0.5, 1.02 - depth}, {1.0, 0.0, 0.0, 0.0}, grab};
+    const palpate_pose pose{sizeof(palpate_pose), {0.5, 0.5, 1.02 - depth}, {1.0, 0.0, 0.0, 0.0}, grab};
     palpate_step(session.get(), &pose);
   };
   press(0.0, 0);

@@ -347,20 +347,24 @@ TEST_P(MovingTick, MakesNoSystemCall) {
 
 // libpalpate.so calls this program's malloc too.
 TEST(OwnLoop, MakesNoHeapCall) {
-  palpate_tool tool = palpate_default_tool();
+  palpate_tool tool = PALPATE_TOOL_INIT;
   tool.radius = 0.2;
   tool.friction = 0.3;
   const char* file = PALPATE_SOURCE_DIR "/tests/golden/cube2/cube2.palpate.hdf";
   palpate_session* session = palpate_create(file, &tool, 1, 8, nullptr, 0);
   ASSERT_NE(session, nullptr);
-  std::vector<double> xyz(3 * static_cast<std::size_t>(palpate_surface_counts(session).nodes));
-  palpate_result result{};
+  palpate_counts counts = PALPATE_COUNTS_INIT;
+  palpate_surface_counts(session, &counts);
+  std::vector<double> xyz(3 * static_cast<std::size_t>(counts.nodes));
+  palpate_result result = PALPATE_RESULT_INIT;
   int touching = 0;
   const auto loop = [&] {
     for (int tick = 0; tick < 1000; ++tick) {
       const double depth = 0.1 * (tick % 200) / 200.0 - 0.02;
-      const palpate_pose pose{
-          {0.3 + 0.0004 * tick, 0.5, 1.2 - depth}, {1.0, 0.1, 0.0, 0.0}, tick % 300 > 250 ? 1 : 0};
+      const palpate_pose pose{sizeof pose,
+                              {0.3 + 0.0004 * tick, 0.5, 1.2 - depth},
+                              {1.0, 0.1, 0.0, 0.0},
+                              tick % 300 > 250 ? 1 : 0};
       palpate_step(session, &pose);
       palpate_get(session, 0, &result);
       palpate_surface_displacement(session, xyz.data());
