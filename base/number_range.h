@@ -6,15 +6,15 @@
 
 namespace palpate {
 
-/// An interval of finite numbers.
+/// An interval of numbers.
 struct NumberRange {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  bool has_low = false;               ///< `low` itself is in it; `high` never is
-  std::string_view words = "finite";  ///< what a number must be to be in it
+  bool has_low = false, has_high = false;  ///< the end itself is in it
+  std::string_view words = "finite";       ///< what a number must be to be in it
 
   [[nodiscard]] constexpr bool contains(double x) const noexcept {
-    return (x > low || (has_low && x == low)) && x < high;
+    return (x > low || (has_low && x == low)) && (x < high || (has_high && x == high));
   }
 };
 

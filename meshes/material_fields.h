@@ -27,7 +27,7 @@ struct MaterialField {
 template <class SomeMaterial, class Visitor>
 void for_each_material_field(SomeMaterial&& material, Visitor&& visit) {
   auto& [youngs_modulus, poissons_ratio, density, friction, initial_strain] = material;
-  constexpr NumberRange compressible{-1.0, 0.5, false, "between -1 and 1/2, both excluded"};
+  constexpr NumberRange compressible{-1.0, 0.5, false, false, "between -1 and 1/2, both excluded"};
   visit(MaterialField{"youngs_modulus", "/material/isotropic", "E", "Pa", true, positive_number, "E > 0",
                       "give Young's modulus in pascals, e.g. 5e3 for soft tissue"},
         std::span(&youngs_modulus, 1));

@@ -104,11 +104,13 @@ StateOptions read_options(const palpate_tool* tools, int tool_count, int max_con
 /// None: refinement 1.
 OverlayOptions read_overlay(const palpate_overlay* overlay) {
   if (overlay == nullptr) return {.refinement = 1, .rings = 0};
-  constexpr int most = 16;
-  if (overlay->refinement < 2 || overlay->refinement > most || overlay->rings < 1 || overlay->rings > most) {
+  if (overlay->refinement < least_refinement || overlay->refinement > most_refinement || overlay->rings < 1 ||
+      overlay->rings > most_rings) {
     throw Error("an overlay of " + std::to_string(overlay->rings) + " rings, refined " +
                     std::to_string(overlay->refinement) + " times, was asked for",
-                "palpate_create_with_options", "ask for 1 to 16 rings, refined 2 to 16 times");
+                "palpate_create_with_options",
+                "ask for 1 to " + std::to_string(most_rings) + " rings, refined " +
+                    std::to_string(least_refinement) + " to " + std::to_string(most_refinement) + " times");
   }
   return {.refinement = overlay->refinement, .rings = overlay->rings};
 }
