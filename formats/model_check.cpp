@@ -1,5 +1,7 @@
 #include "formats/model_check.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <functional>
 #include <limits>
@@ -7,6 +9,7 @@
 #include "base/error.h"
 #include "formats/dynamics_fields.h"
 #include "meshes/element.h"
+#include "meshes/material_fields.h"
 
 namespace palpate {
 namespace {
@@ -59,13 +62,14 @@ void check_plane(const std::vector<Vec3>& rows, const std::string& path, const s
 }
 
 void check_materials(const Model& model, const std::string& where) {
-  for (std::size_t m = 0; m < model.materials.size(); ++m) {
-    const std::string row = ", row " + std::to_string(m);
-    if (model.materials[m].friction < 0.0)
-      refuse(where, "/material/friction" + row + " is " + std::to_string(model.materials[m].friction) +
-                        ", negative");
-    check_material(model.materials[m], where + ": /material/isotropic" + row);
-  }
+  for (std::size_t m = 0; m < model.materials.size(); ++m)
+    for_each_material_field(model.materials[m],
+                            [&](const MaterialField& field, std::span<const double> numbers) {
+                              for (const double number : numbers)
+                                if (!field.range.contains(number))
+                                  refuse(where, fmt::format("{}, row {} is {}: {} must be {}", field.dataset,
+                                                            m, number, field.key, field.range.words));
+                            });
 }
 
 void check_elements(const Mesh& mesh, const std::string& where) {

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <span>
 #include <string_view>
+#include <utility>
+
+#include "meshes/material_fields.h"
 
 namespace palpate {
 namespace {
@@ -138,45 +141,47 @@ std::vector<std::int64_t> offsets_of(const Model& model) {
   return offsets;
 }
 
-std::vector<double> constants_of(const Model& model) {
+namespace {
+
+std::vector<double> material_values(const Model& model, std::string_view dataset) {
   std::vector<double> values;
-  for (const Material& m : model.materials)
-    values.insert(values.end(), {m.youngs_modulus, m.poissons_ratio, m.density});
+  for (const Material& material : model.materials)
+    for_each_material_field(material, [&](const MaterialField& field, std::span<const double> numbers) {
+      if (field.dataset == dataset) values.insert(values.end(), numbers.begin(), numbers.end());
+    });
   return values;
 }
 
-void put_constants(Model& model, const std::vector<double>& values) {
-  model.materials.resize(values.size() / 3);
+void put_material_values(Model& model, std::string_view dataset, std::size_t width,
+                         const std::vector<double>& values) {
+  model.materials.resize(values.size() / width);
   auto value = values.begin();
-  for (Material& m : model.materials) {
-    m.youngs_modulus = *value++;
-    m.poissons_ratio = *value++;
-    m.density = *value++;
+  for (Material& material : model.materials)
+    for_each_material_field(material, [&](const MaterialField& field, std::span<double> numbers) {
+      if (field.dataset == dataset)
+        for (double& number : numbers) number = *value++;
+    });
+}
+
+}  // namespace
+
+std::vector<Field<double>> material_datasets() {
+  std::vector<std::pair<std::string_view, std::size_t>> widths;
+  for_each_material_field(Material{}, [&](const MaterialField& field, std::span<const double> numbers) {
+    if (widths.empty() || widths.back().first != field.dataset) widths.emplace_back(field.dataset, 0);
+    widths.back().second += numbers.size();
+  });
+  std::vector<Field<double>> datasets;
+  for (const auto& [path, width] : widths) {
+    std::vector<Extent> shape = {{Count::materials}};
+    if (width > 1) shape.push_back({Count::one, static_cast<std::int64_t>(width), 0});
+    datasets.push_back({path.data(), shape,
+                        [path = path](const Model& model) { return material_values(model, path); },
+                        [path = path, width = width](Model& model, const std::vector<double>& values) {
+                          put_material_values(model, path, width, values);
+                        }});
   }
-}
-
-std::vector<double> frictions_of(const Model& model) {
-  std::vector<double> values;
-  for (const Material& m : model.materials) values.push_back(m.friction);
-  return values;
-}
-
-void put_frictions(Model& model, const std::vector<double>& values) {
-  auto value = values.begin();
-  for (Material& m : model.materials) m.friction = *value++;
-}
-
-std::vector<double> initial_strains_of(const Model& model) {
-  std::vector<double> values;
-  for (const Material& m : model.materials)
-    values.insert(values.end(), m.initial_strain.begin(), m.initial_strain.end());
-  return values;
-}
-
-void put_initial_strains(Model& model, const std::vector<double>& values) {
-  auto value = values.begin();
-  for (Material& m : model.materials)
-    for (double& strain : m.initial_strain) strain = *value++;
+  return datasets;
 }
 
 std::vector<double> quality_summary(const Model& model) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -60,11 +61,11 @@ template <class T>
 struct Field {
   const char* path;
   std::vector<Extent> shape;
-  std::vector<T> (*take)(const Model&);  ///< its values for a model
-  void (*put)(Model&,
-              const std::vector<T>&);  ///< null: it must have the values that `take` gives; throws Unreadable
-  Extent below = {Count::one, 0, 0};   ///< integers: every value must be in [0, below); no limit when 0
-  bool infinite = false;               ///< numbers: infinity is a value too
+  std::function<std::vector<T>(const Model&)> take;  ///< its values for a model
+  /// Null: it must have the values that `take` gives; throws Unreadable.
+  std::function<void(Model&, const std::vector<T>&)> put;
+  Extent below = {Count::one, 0, 0};  ///< integers: every value must be in [0, below); no limit when 0
+  bool infinite = false;              ///< numbers: infinity is a value too
 };
 
 /// More nodes on the surface of one patch are refused: its matrices' sizes would not be numbers.
@@ -84,12 +85,8 @@ std::string text_of(Precision precision);
 std::vector<double> flat(const std::vector<Vec3>& rows);
 std::vector<Vec3> rows(const std::vector<double>& values);
 std::vector<std::int64_t> offsets_of(const Model& model);
-std::vector<double> constants_of(const Model& model);
-void put_constants(Model& model, const std::vector<double>& values);
-std::vector<double> frictions_of(const Model& model);
-void put_frictions(Model& model, const std::vector<double>& values);
-std::vector<double> initial_strains_of(const Model& model);
-void put_initial_strains(Model& model, const std::vector<double>& values);
+/// The datasets of the materials' constants.
+std::vector<Field<double>> material_datasets();
 std::vector<double> quality_summary(const Model& model);
 void put_quality_summary(Model& model, const std::vector<double>& values);
 std::vector<std::uint8_t> sources_text(const Model& model);
@@ -194,10 +191,7 @@ void for_each_body_field(ElementType element, Visitor&& visit) {
                             [](const Model& m) { return m.stored_nodes; },
                             [](Model& m, const Int32s& v) { m.stored_nodes = v; },
                             nodes});
-  visit(Field<double>{"/material/isotropic", {materials, three}, constants_of, put_constants});
-  visit(Field<double>{"/material/friction", {materials}, frictions_of, put_frictions});
-  visit(Field<double>{
-      "/material/initial_strain", {materials, {Count::one, 6, 0}}, initial_strains_of, put_initial_strains});
+  for (const Field<double>& dataset : material_datasets()) visit(dataset);
   visit(Field<std::int32_t>{"/material/of_element",
                             {elements},
                             [](const Model& m) { return m.material_of_element; },

@@ -1,10 +1,5 @@
 #include "meshes/material.h"
 
-#include <fmt/format.h>
-
-#include <cmath>
-
-#include "base/error.h"
 #include "meshes/mesh.h"
 
 namespace palpate {
@@ -40,28 +35,6 @@ StressVector initial_stress(const Material& material, Analysis analysis) {
   StressVector stress = elasticity_matrix(material, analysis) * in_plane;
   if (analysis == Analysis::plane_strain) stress.head(2).array() += lame_lambda(material) * strain[2];
   return stress;
-}
-
-void check_material(const Material& material, const std::string& where) {
-  const double E = material.youngs_modulus, nu = material.poissons_ratio, rho = material.density;
-  if (!(std::isfinite(E) && E > 0.0)) {
-    throw Error(fmt::format("youngs_modulus must be positive, not {}", E), where,
-                "Give Young's modulus in pascal, e.g. 5000");
-  }
-  if (!(nu > -1.0 && nu < 0.5)) {
-    throw Error(fmt::format("poissons_ratio must be between -1 and 0.5 (both excluded), not {}", nu), where,
-                "Soft tissue is 0.45 to 0.499");
-  }
-  if (!(std::isfinite(rho) && rho > 0.0)) {
-    throw Error(fmt::format("density must be positive, not {}", rho), where, "Give it in kg/m^3, e.g. 1060");
-  }
-  if (!(std::isfinite(material.friction) && material.friction >= 0.0)) {
-    throw Error(fmt::format("friction must be 0 or more, not {}", material.friction), where,
-                "Give Coulomb's coefficient, e.g. 0.2 for wet tissue");
-  }
-  for (const double strain : material.initial_strain) {
-    if (!std::isfinite(strain)) throw Error("initial_strain is not finite", where, "Give six numbers");
-  }
 }
 
 }  // namespace palpate

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <string>
 
 namespace palpate {
 
@@ -20,7 +19,7 @@ using ElasticityMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0
 /// Stress [xx yy zz xy yz zx], in the plane [xx yy xy] [Pa].
 using StressVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
-/// Isotropic material. Valid for E > 0, -1 < nu < 1/2, density > 0, friction >= 0.
+/// Isotropic material; material_fields.h names each member and its range.
 struct Material {
   double youngs_modulus = 0.0;  ///< E [Pa]
   double poissons_ratio = 0.0;  ///< nu [-]
@@ -37,8 +36,5 @@ ElasticityMatrix elasticity_matrix(const Material& material, Analysis analysis =
 /// D eps_0: the stress that would be needed to keep the initial strain away. In plane strain eps_0,zz counts
 /// through Poisson's ratio; in plane stress it is free.
 StressVector initial_stress(const Material& material, Analysis analysis = Analysis::solid);
-
-/// Throws Error (where = `where`) unless the constants are finite and in the valid ranges.
-void check_material(const Material& material, const std::string& where);
 
 }  // namespace palpate

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/printable.h"
+#include "meshes/material_fields.h"
 #include "precompute/numerics/precision.h"
 
 namespace palpate {
@@ -54,15 +55,18 @@ std::string materials_text(const Model& model) {
   for (const Index material : model.material_of_element) ++elements[static_cast<std::size_t>(material)];
   std::string text;
   for (std::size_t m = 0; m < model.materials.size(); ++m) {
-    const Material& material = model.materials[m];
-    text += fmt::format(
-        "  material {:<8} E = {:g} Pa, nu = {:g}, density = {:g} kg/m^3, friction = {:g}, {} elements\n",
-        m + 1, material.youngs_modulus, material.poissons_ratio, material.density, material.friction,
-        elements[m]);
-    const auto& strain = material.initial_strain;
-    if (std::any_of(strain.begin(), strain.end(), [](double e) { return e != 0.0; })) {
-      text += fmt::format("    initial strain  {:g}\n", fmt::join(strain, ", "));
-    }
+    std::string lists;
+    text += fmt::format("  material {:<8} ", m + 1);
+    for_each_material_field(
+        model.materials[m], [&](const MaterialField& field, std::span<const double> values) {
+          const std::string unit = field.unit.empty() ? "" : " " + std::string(field.unit);
+          if (values.size() == 1) {
+            text += fmt::format("{} = {:g}{}, ", field.symbol, values[0], unit);
+          } else if (std::ranges::any_of(values, [](double value) { return value != 0.0; })) {
+            lists += fmt::format("    {:<15} {:g}{}\n", field.symbol, fmt::join(values, ", "), unit);
+          }
+        });
+    text += fmt::format("{} elements\n", elements[m]) + lists;
   }
   return text;
 }

@@ -4,9 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 
 #include "base/error.h"
+#include "meshes/material_fields.h"
 #include "precompute/description/description.h"
 #include "precompute/geometry/material_parts.h"
 #include "precompute/numerics/dynamics.h"
@@ -76,16 +76,15 @@ class Comparison {
     for (std::size_t m = 0; m < model_.materials.size(); ++m) {
       const Material& stored = model_.materials[m];
       const MaterialPart& part = asked_.materials[m];
-      const std::string row = fmt::format(", row {},", m);
-      const auto constants = [](const Material& a) {
-        return fmt::format("{}", fmt::join(std::array{a.youngs_modulus, a.poissons_ratio, a.density}, " "));
-      };
-      compare("/material/isotropic" + row, constants(stored), constants(part.material));
-      compare("/material/friction" + row, stored.friction, part.material.friction);
-      const auto strain = [](const Material& a) {
-        return fmt::format("{}", fmt::join(a.initial_strain, " "));
-      };
-      compare("/material/initial_strain" + row, strain(stored), strain(part.material));
+      std::vector<std::string> asked;
+      for_each_material_field(part.material, [&](const MaterialField&, std::span<const double> values) {
+        asked.push_back(fmt::format("{}", fmt::join(values, " ")));
+      });
+      for_each_material_field(stored,
+                              [&, k = std::size_t{0}](const MaterialField& field, auto values) mutable {
+                                compare(fmt::format("{}, row {}, {}", field.dataset, m, field.key),
+                                        fmt::format("{}", fmt::join(values, " ")), asked[k++]);
+                              });
       tags = tags || (part.where && by_tag(*part.where));
     }
     if (!tags)

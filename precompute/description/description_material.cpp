@@ -1,3 +1,8 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "meshes/material_fields.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
@@ -5,34 +10,29 @@ namespace {
 
 const Keys claim_kinds = {"regions", "box", "half_space", "sphere", "lowest"};
 
-/// In space [xx yy zz xy yz zx], in the plane [xx yy zz xy].
-std::array<double, 6> read_initial_strain(const TomlTable& material, int dimension) {
-  const std::vector<double> values = material.numbers("initial_strain", dimension == 3 ? 6 : 4);
-  std::array<double, 6> strain{};
-  std::copy(values.begin(), values.end(), strain.begin());
-  return strain;
+/// One constant, where it is given; in the plane a list has no strains across it.
+void read_field(const TomlTable& material, const MaterialField& field, std::span<double> values,
+                int dimension) {
+  if (!field.required && !material.has(field.key)) return;
+  if (values.size() == 1) {
+    values[0] = material.number(field.key);
+  } else {
+    std::ranges::copy(material.numbers(field.key, dimension == 3 ? values.size() : 4), values.begin());
+  }
+  for (const double value : values) {
+    if (field.range.contains(value)) continue;
+    material.fail(
+        field.key,
+        fmt::format("{} must be {}, not {}", material.name_of(field.key), field.range.words, shown(value)),
+        std::string(field.hint));
+  }
 }
 
 MaterialPart read_material(const TomlTable& material, int dimension) {
   MaterialPart part;
-  part.material.youngs_modulus = material.positive("youngs_modulus");
-  part.material.poissons_ratio = material.number("poissons_ratio");
-  part.material.density = material.positive("density", part.material.density);
-  if (!(part.material.poissons_ratio > -1.0 && part.material.poissons_ratio < 0.5)) {
-    material.fail("poissons_ratio",
-                  material.name_of("poissons_ratio") + " must lie between -1 and 1/2, both excluded, not " +
-                      shown(part.material.poissons_ratio),
-                  "nearly incompressible tissue is 0.45 to 0.49");
-  }
-  part.material.friction = material.number("friction", part.material.friction);
-  if (part.material.friction < 0.0) {
-    material.fail("friction",
-                  material.name_of("friction") + " must be 0 or more, not " + shown(part.material.friction),
-                  "give Coulomb's coefficient, e.g. 0.2 for wet tissue");
-  }
-  if (material.has("initial_strain")) {
-    part.material.initial_strain = read_initial_strain(material, dimension);
-  }
+  for_each_material_field(part.material, [&](const MaterialField& field, std::span<double> values) {
+    read_field(material, field, values, dimension);
+  });
   const std::string_view claim = material.at_most_one_of(claim_kinds);
   if (claim == "regions") {
     part.regions = material.integers(claim);
@@ -49,8 +49,8 @@ bool is_rest(const MaterialPart& part) {
 }  // namespace
 
 std::vector<MaterialPart> read_materials(const TomlTable& root, int dimension) {
-  Keys keys = {"youngs_modulus", "poissons_ratio", "density", "friction", "initial_strain"};
-  keys.insert(keys.end(), claim_kinds.begin(), claim_kinds.end());
+  Keys keys = claim_kinds;
+  for_each_material_field(Material{}, [&](const MaterialField& field, auto) { keys.push_back(field.key); });
   if (root.is_table("material") || !root.has("material")) {
     return {read_material(root.table("material", keys), dimension)};
   }

@@ -14,6 +14,7 @@
 #include "runtime/app/script_device.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/replay_device.h"
+#include "runtime/safety/safety.h"
 
 namespace palpate {
 namespace {

@@ -16,21 +16,24 @@
 namespace palpate {
 namespace {
 
-/// An option that is one of the settings.
-CLI::Option* add_setting(CLI::App& play, PlayArguments& arguments, const std::string& name,
-                         const std::string& help) {
-  return play.add_option_function<std::string>(
-      "--" + name, [&arguments, name](const std::string& text) { arguments.settings[name] = text; }, help);
+/// Adds the settings of a group as options below a heading.
+void add_settings(CLI::App& play, PlayArguments& arguments, SettingGroup group, const char* heading) {
+  for (const Setting& setting : settings_table()) {
+    if (setting.group != group) continue;
+    play.add_option_function<std::string>(
+            std::string("--") + setting.name,
+            [&arguments, name = setting.name](const std::string& text) { arguments.settings[name] = text; },
+            fmt::format("{}; default: {}", setting.meaning, setting.otherwise))
+        ->type_name(setting.value)
+        ->group(heading);
+  }
 }
 
 constexpr const char* input_group = "What moves the tool";
-constexpr const char* tool_group = "The tool";
 constexpr const char* viewer_group = "In a browser";
 constexpr const char* body_group = "The body";
 constexpr const char* loop_group = "The loop";
 constexpr const char* output_group = "What is written";
-constexpr const char* workspace_group = "Where the device is in the body's frame";
-constexpr const char* safety_group = "Safety of the hand";
 
 void add_input(CLI::App& play, PlayArguments& arguments) {
   play.add_option(
@@ -56,46 +59,8 @@ void add_viewer(CLI::App& play, PlayArguments& arguments) {
       ->group(viewer_group);
 }
 
-void add_tool(CLI::App& play, PlayArguments& arguments) {
-  const auto add = [&](const char* name, const char* help, const char* type) {
-    add_setting(play, arguments, name, help)->type_name(type)->group(tool_group);
-  };
-  add("tool", "its shape [m]; else a ball that suits the body, in scripts a point",
-      "point|sphere:RADIUS|capsule:RADIUS,LENGTH");
-  add("friction", "Coulomb's coefficient, in place of the materials'", "MU");
-  add("coupling",
-      "stiffness of the spring between the device and the tool; else the tool is where the device is",
-      "N_PER_M");
-  add("coupling-torsion",
-      "stiffness of that spring against turning; else the tool is turned as the device is", "NM_PER_RAD");
-  add("max-force", "the largest force that the hand is given", "N");
-  add("hand-over",
-      "share of the force that may change in a millisecond without the tool's motion explaining it: less is "
-      "smoother where contact slips; else 0.005; inf for the contact's own force",
-      "SHARE");
-  add("reach",
-      "how far from its origin a grab that touches nothing takes hold of the surface; else the longest edge "
-      "of the surface",
-      "METRES");
-  add("max-contacts", "most contact points; where there are more, the deepest are kept; else 32", "N");
-}
-
 void add_body(CLI::App& play, PlayArguments& arguments) {
-  const auto add = [&](const char* name, const char* help, const char* type) {
-    add_setting(play, arguments, name, help)->type_name(type)->group(body_group);
-  };
-  add("overlay",
-      "a finer mesh under the tool: each element within N rings round it is cut into R to the power of the "
-      "dimension (s-FEM)",
-      "r=R,rings=N");
-  add("overlay-memory", "most that overlays may take; else 512", "MB");
-  add("contact",
-      "quasi-static: the tool meets the body's stiffness; dynamic: its inertia and viscosity too, for files "
-      "with [dynamics] and a time step of one tick",
-      "quasi-static|dynamic");
-  add("load-scale", "share of the file's loads that the body rests under: 0 is without them; else 1", "S");
-  add("stiffness-scale", "what all Young's moduli are multiplied by, without precomputing again; else 1",
-      "S");
+  add_settings(play, arguments, SettingGroup::body, body_group);
   play.add_option("--model", arguments.model_toml, "fail unless FILE was made from exactly this model.toml")
       ->type_name("FILE")
       ->group(body_group);
@@ -105,9 +70,7 @@ void add_loop(CLI::App& play, PlayArguments& arguments) {
   play.add_option("--duration", arguments.duration, "stop after so many seconds")
       ->type_name("S")
       ->group(loop_group);
-  add_setting(play, arguments, "rate", "ticks a second, 1000 to 5000; else 1000")
-      ->type_name("HZ")
-      ->group(loop_group);
+  add_settings(play, arguments, SettingGroup::loop, loop_group);
   play.add_option("--cpu", arguments.cpu, "a processor that the loop has for itself within this program")
       ->type_name("N")
       ->group(loop_group);
@@ -138,29 +101,6 @@ void add_outputs(CLI::App& play, PlayArguments& arguments) {
       ->type_name("OUT.csv")
       ->group(output_group);
   play.add_flag("--force", arguments.force, force_help)->group(output_group);
-}
-
-void add_workspace(CLI::App& play, PlayArguments& arguments) {
-  const auto add = [&](const char* name, const char* help, const char* type) {
-    add_setting(play, arguments, name, help)->type_name(type)->group(workspace_group);
-  };
-  add("motion-scale", "metres in the body's frame for one of the device; else 1", "S");
-  add("force-scale",
-      "newtons on the hand for one on the tool; else 1. Limits of the device are scaled with both", "C");
-  add("origin",
-      "where the device's origin lies in the body's frame [m]; else, for devices, above the body, half the "
-      "workspace's radius from touch",
-      "X,Y,Z");
-  add("axes", "the body's axes along which the device's right, away-from-you and up point; else x,y,z",
-      "AXES");
-}
-
-void add_safety(CLI::App& play, PlayArguments& arguments) {
-  add_setting(play, arguments, "safety",
-              "on by default for devices with a hand in them, with these bounds changed; for scripts only "
-              "where it is given: default, or NAME=VALUE of the names below")
-      ->type_name("NAME=VALUE,...")
-      ->group(safety_group);
 }
 
 /// What `read` gives; its Error is one of the arguments.
@@ -229,9 +169,9 @@ void read_view(PlayArguments& arguments, PlayOptions& options) {
   const bool is_mouse = options.device.kind == DeviceChoice::Kind::mouse;
   if (is_mouse && !arguments.view)
     throw CLI::ValidationError("--device", "'mouse' is the pointer in a browser: give --view too");
-  for (const char* name : {"motion-scale", "force-scale", "origin", "axes"}) {
-    if (is_mouse && arguments.settings.contains(name))
-      throw CLI::ValidationError(std::string("--") + name, "the pointer is in the body's frame already");
+  for (const auto& [name, value] : arguments.settings) {
+    if (is_mouse && find_setting(name)->group == SettingGroup::workspace)
+      throw CLI::ValidationError("--" + name, "the pointer is in the body's frame already");
   }
 }
 
@@ -261,13 +201,13 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
   play->add_option("FILE", arguments.file, "baked model, NAME.palpate.hdf")->required()->type_name("");
   add_input(*play, arguments);
   add_viewer(*play, arguments);
-  add_tool(*play, arguments);
+  add_settings(*play, arguments, SettingGroup::tool, "The tool");
   add_body(*play, arguments);
   add_loop(*play, arguments);
   add_outputs(*play, arguments);
-  add_workspace(*play, arguments);
+  add_settings(*play, arguments, SettingGroup::workspace, "Where the device is in the body's frame");
   play->get_help_ptr()->group("");
-  add_safety(*play, arguments);
+  add_settings(*play, arguments, SettingGroup::safety, "Safety of the hand");
   play->footer(
       safety_help() +
       "\nThe tool pushes what it touches and slides along it; while grab is set it holds what it "

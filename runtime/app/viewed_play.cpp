@@ -4,7 +4,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <ctime>
 #include <string_view>
@@ -25,10 +24,6 @@ namespace palpate {
 namespace {
 
 constexpr auto state_period = std::chrono::milliseconds(500);
-/// Settings that decide how strong and how sudden the force on a hand may be.
-constexpr std::array<std::string_view, 5> settings_of_the_hand = {"safety", "coupling", "coupling-torsion",
-                                                                  "max-force", "hand-over"};
-
 constexpr auto pause_for_wishes = std::chrono::milliseconds(20);
 
 /// FILE-STEM-YYYYmmdd-HHMMSS.h5 in the working directory; with a number where that is there already.
@@ -45,6 +40,10 @@ std::filesystem::path name_recording(const std::filesystem::path& model) {
 /// What can be seen of a file that is gone before the body that came of it goes too.
 void expect_file(const std::filesystem::path& file) {
   check_regular_file(file, "put it back, or start palpate-runtime play anew");
+}
+
+bool is_of_the_run(const Setting& setting) {
+  return setting.group == SettingGroup::loop || setting.group == SettingGroup::workspace;
 }
 
 }  // namespace
@@ -260,11 +259,10 @@ void ViewedPlay::change(const SettingsChange& settings) {
   refuse_while_locked();
   Plan plan = wished_;
   for (const auto& [name, value] : settings) {
-    for (const char* fixed : {"rate", "motion-scale", "force-scale", "origin", "axes"}) {
-      if (name == fixed)
-        throw Error("it stays as it is in a run", "--" + name,
-                    "start palpate-runtime play anew with another one");
-    }
+    const Setting* setting = find_setting(name);
+    if (setting != nullptr && is_of_the_run(*setting))
+      throw Error("it stays as it is in a run", "--" + name,
+                  "start palpate-runtime play anew with another one");
     if (value) {
       plan.text[name] = *value;
     } else {
@@ -307,10 +305,10 @@ void ViewedPlay::refuse_while_locked() const {
 /// same safety rules from their start, out of contact.
 void ViewedPlay::refuse_to_hand(const SettingsChange& settings) const {
   if (!has_hand()) return;
-  for (const std::string_view name : settings_of_the_hand) {
-    if (!settings.contains(std::string(name))) continue;
+  for (const Setting& setting : settings_table()) {
+    if (!setting.protects_hand || !settings.contains(setting.name)) continue;
     throw PageError(PageRefusal::hand, "a hand is in the device, and no page may change what protects it",
-                    "--" + std::string(name), "start palpate-runtime play anew with another one");
+                    std::string("--") + setting.name, "start palpate-runtime play anew with another one");
   }
 }
 

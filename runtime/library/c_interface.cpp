@@ -132,11 +132,12 @@ palpate_overlay read_overlay(const palpate_overlay* given) {
   if (given == nullptr) return {.size = sizeof(palpate_overlay), .refinement = 1, .rings = 0, .memory = 0};
   const palpate_overlay overlay =
       read_or_throw(given, 0, default_overlay, "the overlay", "PALPATE_OVERLAY_INIT");
-  constexpr int most = 16;
-  if (overlay.refinement < 2 || overlay.refinement > most || overlay.rings < 1 || overlay.rings > most) {
+  if (overlay.refinement < least_refinement || overlay.refinement > most_refinement || overlay.rings < 1 ||
+      overlay.rings > most_rings) {
     throw Error("an overlay of " + std::to_string(overlay.rings) + " rings, refined " +
                     std::to_string(overlay.refinement) + " times, was asked for",
-                "palpate_create_with_options", "ask for 1 to 16 rings, refined 2 to 16 times");
+                "palpate_create_with_options", "ask for 1 to " + std::to_string(most_rings) + " rings, refined " +
+                    std::to_string(least_refinement) + " to " + std::to_string(most_refinement) + " times");
   }
   return overlay;
 }

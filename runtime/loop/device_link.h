@@ -13,15 +13,15 @@
 #include "base/latest.h"
 #include "runtime/safety/clamps.h"
 #include "runtime/safety/device_port.h"
-#include "runtime/safety/safety.h"
-#include "runtime/safety/stale_solution.h"
+#include "runtime/safety/safety_options.h"
 
 namespace palpate {
 
 struct DeviceLinkOptions {
-  double max_force = 3.0;         ///< of what the writer works out itself, where the device bears it [N]
-  double max_force_rate = 500.0;  ///< [N/s]
-  StaleOptions stale{};           ///< of the loop's solutions, when it gives no new ones
+  /// Of what the writer works out itself, where the device bears it [N].
+  double max_force = SafetyOptions{}.max_force;
+  double max_force_rate = SafetyOptions{}.max_force_rate;  ///< [N/s]
+  StaleOptions stale{};  ///< of the loop's solutions, when it gives no new ones
 };
 
 /// A device with a reader and a writer thread. The reader hands over the latest report, and opens the device

@@ -1,11 +1,11 @@
 #include "runtime/loop/settings.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <concepts>
 #include <limits>
 #include <vector>
 
@@ -14,6 +14,14 @@
 
 namespace palpate {
 namespace {
+
+/// The compliance between the nodes of so many contacts fits into a gigabyte.
+constexpr NumberRange contact_counts{1.0, 1000.0, true, true, "from 1 to 1000"};
+
+constexpr NumberRange megabytes{1.0, 1e9, true, true, "of megabytes, from 1 on"};
+constexpr NumberRange positive_or_infinite{0.0, std::numeric_limits<double>::infinity(), false, true,
+                                           "greater than 0, or inf"};
+constexpr bool protects_hand = true;
 
 /// A part NAME=VALUE.
 struct Part {
@@ -26,183 +34,248 @@ Part split_part(std::string_view part) {
   return {part.substr(0, equals), part.substr(std::min(equals + 1, part.size()))};
 }
 
-/// Visits each safety option: name, unit, meaning, reference to the number.
-template <class Options, class Visitor>
-void for_each_safety_option(Options& o, Visitor&& visit) {
-  visit("max_force", "N", "largest force on the hand", o.max_force);
-  visit("max_torque", "N m", "largest torque on the hand", o.max_torque);
-  visit("max_force_rate", "N/s", "how fast the force may change", o.max_force_rate);
-  visit("max_torque_rate", "N m/s", "how fast the torque may change", o.max_torque_rate);
-  visit("max_stiffness", "N/m", "largest stiffness of the local model", o.max_stiffness);
-  visit("max_damping", "N s/m", "most that the passivity controller adds; 0: it only observes",
-        o.max_damping);
-  visit("max_speed", "m/s", "of the device; faster is a fault", o.max_speed);
-  visit("ramp", "s", "from no to whole force, at the start and after a fault", o.ramp);
-  visit("small_force", "N", "force begins only where it was below this", o.small_force);
-  visit("calm_time", "s", "for so long", o.calm_time);
-  visit("late", "s", "a tick that begins so much late is a miss", o.deadline.tolerance);
-  visit("late_fade", "s", "from whole to no force while ticks are late", o.deadline.fade);
-  visit("late_recovery", "s", "and back, while they are in time", o.deadline.recovery);
-  visit("most_late", "ticks", "misses that are a fault", o.deadline.most);
-  visit("forgiveness", "ticks", "misses that a tick in time makes good", o.deadline.forgiveness);
-  visit("silence", "s", "without a report of the device: a fault", o.silence.most);
-  visit("silence_fade", "s", "the force fades from here on, to nothing at silence", o.silence.fade_from);
-  visit("frozen", "s", "with the same numbers in every report: a fault", o.silence.frozen);
-  visit("frozen_force", "N", "but only while the force is above this", o.silence.frozen_force);
-  visit("stale", "s", "up to this age a solution is of this tick", o.stale.fresh);
-  visit("stale_life", "s", "up to this age an older one is extrapolated", o.stale.time_to_live);
-  visit("stale_fade", "s", "then from whole to no force", o.stale.fade);
-  visit("stale_damping", "N s/m", "damping of a solution that is not fresh", o.stale.damping);
-  visit("buzz_speed", "m/s", "amplitude of the device's speed that counts as buzzing", o.buzz.speed);
-  visit("buzz_force", "N", "amplitude of the force about its mean that counts", o.buzz.force);
-  visit("buzz_mean", "s", "of that mean", o.buzz.mean_time);
-  visit("buzz_window", "s", "in which changes of sign are counted", o.buzz.window);
-  visit("buzz_flips", "", "so many in the window are buzzing", o.buzz.flips);
-  visit("buzz_fade", "s", "from whole to no force while it buzzes; then a fault", o.buzz.fade);
-  visit("buzz_recovery", "s", "and back, while it does not", o.buzz.recovery);
+[[noreturn]] void refuse(std::string_view name, const std::string& what, const std::string& hint) {
+  throw Error(what, "--" + std::string(name), hint);
 }
 
-std::string shape_text(const Tool& tool) {
+// What each kind of setting is written as, and read from.
+
+std::string text_of(double value) {
+  return fmt::format("{}", value);
+}
+std::string text_of(std::signed_integral auto value) {
+  return std::to_string(value);
+}
+std::string text_of(std::size_t bytes) {
+  return std::to_string(bytes >> 20);
+}
+std::string text_of(const std::string& value) {
+  return value;
+}
+std::string text_of(const Tool& tool) {
   if (tool.length > 0.0) return fmt::format("capsule:{},{}", tool.radius, tool.length);
   return tool.radius > 0.0 ? fmt::format("sphere:{}", tool.radius) : "point";
 }
-
-std::string safety_text(const SafetyOptions& options) {
+std::string text_of(ContactModel contact) {
+  return contact == ContactModel::dynamic ? "dynamic" : "quasi-static";
+}
+std::string text_of(const OverlayOptions& overlay) {
+  return fmt::format("r={},rings={}", overlay.refinement, overlay.rings);
+}
+std::string text_of(const Vec3& place) {
+  return fmt::format("{},{},{}", place.x(), place.y(), place.z());
+}
+std::string text_of(const SafetyOptions& options) {
   std::string text;
-  for_each_safety_option(options, [&](const char* name, const char*, const char*, const auto& value) {
-    text += fmt::format("{}{}={}", text.empty() ? "" : ",", name, value);
+  for_each_safety_field(options, [&](const SafetyField& field, const auto& value) {
+    text += fmt::format("{}{}={}", text.empty() ? "" : ",", field.name, value);
   });
   return text;
 }
-
-[[noreturn]] void refuse(const std::string& name, const std::string& what, const std::string& hint) {
-  throw Error(what, "--" + name, hint);
+template <class Value>
+std::string text_of(const std::optional<Value>& value) {
+  return value ? text_of(*value) : "";
 }
 
-double read_positive(const std::string& name, const std::string& text, const std::string& unit) {
-  const std::optional<double> number = parse_number(text);
-  if (!number || *number <= 0.0)
-    refuse(name, "'" + text + "' is not a positive number of " + unit, "write for instance 2.5");
-  return *number;
-}
-
-double read_from_zero(const std::string& name, const std::string& text) {
-  const std::optional<double> number = parse_number(text);
-  if (!number || *number < 0.0)
-    refuse(name, "'" + text + "' is not a number from 0 on", "write for instance 0.3");
-  return *number;
-}
-
-double read_hand_over(const std::string& text) {
-  if (text == "inf") return std::numeric_limits<double>::infinity();
-  return read_positive("hand-over", text, "the force, or inf");
-}
-
-std::int64_t read_whole(const std::string& name, const std::string& text, Index least, Index most) {
-  const std::optional<Index> number = parse_index(text);
-  if (!number || *number < least || *number > most) {
-    refuse(name, fmt::format("'{}' is not a whole number from {} to {}", text, least, most),
-           fmt::format("write for instance {}", least));
+void read_value(const Setting& setting, const std::string& text, double& value) {
+  const std::optional<double> number =
+      text == "inf" ? std::numeric_limits<double>::infinity() : parse_number(text);
+  if (!number || !setting.range.contains(*number)) {
+    const std::string unit = setting.unit[0] == '\0' ? "" : fmt::format(" [{}]", setting.unit);
+    refuse(setting.name, fmt::format("'{}' is not a number that is {}{}", text, setting.range.words, unit),
+           "write for instance 2.5");
   }
-  return *number;
+  value = *number;
 }
 
-std::size_t read_megabytes(const std::string& text) {
-  const std::optional<Index> megabytes = parse_index(text);
-  if (!megabytes || *megabytes < 1)
-    refuse("overlay-memory", "'" + text + "' is not a whole number of megabytes", "write for instance 512");
-  return static_cast<std::size_t>(*megabytes) << 20;
+template <std::integral Whole>
+void read_value(const Setting& setting, const std::string& text, Whole& value) {
+  const std::optional<Index> number = parse_index(text);
+  if (!number || !setting.range.contains(*number)) {
+    refuse(setting.name, fmt::format("'{}' is not a whole number {}", text, setting.range.words),
+           fmt::format("write for instance {}", setting.otherwise));
+  }
+  value = static_cast<Whole>(*number);
 }
 
-ContactModel read_contact(const std::string& text) {
-  if (text == "dynamic") return ContactModel::dynamic;
-  if (text != "quasi-static")
-    refuse("contact", "'" + text + "' is neither quasi-static nor dynamic", "write one of them");
-  return ContactModel::quasi_static;
+void read_value(const Setting& setting, const std::string& text, std::size_t& bytes) {
+  Index count = 0;
+  read_value(setting, text, count);
+  bytes = static_cast<std::size_t>(count) << 20;
 }
 
-Vec3 read_place(const std::string& text) {
-  const std::optional<std::vector<double>> place = parse_vector(text);
-  if (!place) refuse("origin", "'" + text + "' is not finite numbers X,Y,Z", "write for instance 0,0,0.1");
-  return {(*place)[0], (*place)[1], place->size() == 3 ? (*place)[2] : 0.0};
-}
-
-void read_shape(Settings& settings, const std::string& text) {
+void read_value(const Setting&, const std::string& text, Tool& tool) {
   const Tool shape = parse_shape(text);
-  settings.tool.radius = shape.radius;
-  settings.tool.length = shape.length;
+  tool.radius = shape.radius;
+  tool.length = shape.length;
 }
 
-void read_axes(Settings& settings, const std::string& text) {
+void read_value(const Setting& setting, const std::string& text, ContactModel& contact) {
+  contact = text == "dynamic" ? ContactModel::dynamic : ContactModel::quasi_static;
+  if (text != text_of(contact))
+    refuse(setting.name, "'" + text + "' is neither quasi-static nor dynamic", "write one of them");
+}
+
+void read_value(const Setting&, const std::string& text, OverlayOptions& overlay) {
+  overlay = parse_overlay(text, "--overlay");
+}
+
+void read_value(const Setting& setting, const std::string& text, Vec3& place) {
+  const std::optional<std::vector<double>> numbers = parse_vector(text);
+  if (!numbers)
+    refuse(setting.name, "'" + text + "' is not finite numbers X,Y,Z", "write for instance 0,0,0.1");
+  place = {(*numbers)[0], (*numbers)[1], numbers->size() == 3 ? (*numbers)[2] : 0.0};
+}
+
+void read_value(const Setting&, const std::string& text, std::string& axes) {
   static_cast<void>(parse_axes(text));
-  settings.axes = text;
+  axes = text;
 }
 
-/// How each option is read.
-struct SettingReader {
-  std::string_view name;
-  void (*read)(Settings& settings, const std::string& text);
-};
+void read_value(const Setting&, const std::string& text, SafetyOptions& options) {
+  options = parse_safety(text);
+}
 
-constexpr Index most_contacts = 1000;  // a factor of so many fits into a gigabyte
+template <class Value>
+void read_value(const Setting& setting, const std::string& text, std::optional<Value>& value) {
+  read_value(setting, text, value.emplace());
+}
 
-constexpr std::array<SettingReader, 19> setting_readers = {{
-    {"tool", read_shape},
-    {"friction", [](Settings& s, const std::string& t) { s.tool.friction = read_from_zero("friction", t); }},
-    {"coupling",
-     [](Settings& s, const std::string& t) {
-       s.tool.coupling_stiffness = read_positive("coupling", t, "N/m");
-     }},
-    {"coupling-torsion",
-     [](Settings& s, const std::string& t) {
-       s.tool.coupling_torsion = read_positive("coupling-torsion", t, "N m/rad");
-     }},
-    {"max-force",
-     [](Settings& s, const std::string& t) { s.tool.max_force = read_positive("max-force", t, "newtons"); }},
-    {"hand-over", [](Settings& s, const std::string& t) { s.tool.hand_over = read_hand_over(t); }},
-    {"reach", [](Settings& s, const std::string& t) { s.reach = read_positive("reach", t, "metres"); }},
-    {"max-contacts",
-     [](Settings& s, const std::string& t) {
-       s.max_contacts = static_cast<Index>(read_whole("max-contacts", t, 1, most_contacts));
-     }},
-    {"contact", [](Settings& s, const std::string& t) { s.contact = read_contact(t); }},
-    {"load-scale", [](Settings& s, const std::string& t) { s.load_scale = read_from_zero("load-scale", t); }},
-    {"stiffness-scale",
-     [](Settings& s, const std::string& t) {
-       s.stiffness_scale = read_positive("stiffness-scale", t, "Young's moduli for one");
-     }},
-    {"overlay", [](Settings& s, const std::string& t) { s.overlay = parse_overlay(t, "--overlay"); }},
-    {"overlay-memory", [](Settings& s, const std::string& t) { s.overlay_memory = read_megabytes(t); }},
-    {"rate",
-     [](Settings& s, const std::string& t) { s.rate = read_whole("rate", t, least_rate, most_rate); }},
-    {"motion-scale",
-     [](Settings& s, const std::string& t) {
-       s.motion_scale = read_positive("motion-scale", t, "metres for one");
-     }},
-    {"force-scale",
-     [](Settings& s,
-        const std::string& t) { s.force_scale = read_positive("force-scale", t, "newtons for one"); }},
-    {"origin", [](Settings& s, const std::string& t) { s.origin = read_place(t); }},
-    {"axes", read_axes},
-    {"safety", [](Settings& s, const std::string& t) { s.safety = parse_safety(t); }},
-}};
+/// Visits the settings that are members of the tool; its reach is that of the settings.
+template <class SomeTool, class Visitor>
+void for_each_tool_setting(SomeTool& tool, Visitor&& visit) {
+  auto& [radius, length, coupling, torsion, max_force, hand_over, reach, friction] = tool;
+  constexpr SettingGroup group = SettingGroup::tool;
+  visit(Setting{"tool", group, "point|sphere:RADIUS|capsule:RADIUS,LENGTH", "m",
+                "a ball that suits the body, in scripts a point",
+                "its shape: a point, a ball about the tool's origin, or all within the radius of a segment "
+                "that begins there and goes along the tool's z axis (in the plane y)"},
+        tool);
+  visit(Setting{"friction", group, "MU", "", "the materials'", "Coulomb's coefficient", number_from_zero,
+                friction.has_value()},
+        friction);
+  visit(Setting{"coupling", group, "N_PER_M", "N/m", "none, with a device what it can show",
+                "stiffness of the spring between device and tool, in series with the body: what the hand "
+                "feels is never stiffer",
+                positive_number, std::isfinite(coupling), protects_hand},
+        coupling);
+  visit(Setting{"coupling-torsion", group, "NM_PER_RAD", "N m/rad", "none",
+                "stiffness of that spring against turning", positive_number, std::isfinite(torsion),
+                protects_hand},
+        torsion);
+  visit(Setting{"max-force", group, "N", "N", "any", "the largest force that the hand is given",
+                positive_number, std::isfinite(max_force), protects_hand},
+        max_force);
+  visit(Setting{"hand-over", group, "SHARE", "", "0.005",
+                "share of the force that may change in a millisecond without the tool's motion explaining "
+                "it: less is smoother where contact slips; inf for the contact's own force, with its kicks",
+                positive_or_infinite, true, protects_hand},
+        hand_over);
+}
 
-bool is_setting(std::string_view name) {
-  return std::any_of(setting_readers.begin(), setting_readers.end(),
-                     [name](const SettingReader& reader) { return reader.name == name; });
+/// Visits the settings of the body.
+template <class SomeSettings, class Visitor>
+void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
+  constexpr SettingGroup group = SettingGroup::body;
+  visit(Setting{"contact", group, "quasi-static|dynamic", "", "quasi-static",
+                "quasi-static: the tool meets the body's stiffness; dynamic: its inertia and viscosity too, "
+                "for files with [dynamics] and a time step of one tick"},
+        s.contact);
+  visit(Setting{"load-scale", group, "S", "", "1",
+                "share of the file's loads (forces, prescribed displacements, initial strains) that the body "
+                "rests under; 0 is without them",
+                number_from_zero, s.load_scale != 1.0},
+        s.load_scale);
+  visit(Setting{"stiffness-scale", group, "S", "", "1",
+                "what all Young's moduli are multiplied by, exactly, without precomputing again",
+                positive_number, s.stiffness_scale != 1.0},
+        s.stiffness_scale);
+  visit(
+      Setting{"overlay", group, "r=R,rings=N", "", "none",
+              fmt::format("a finer mesh under the tool: each element within N rings round it, from 1 to {}, "
+                          "is cut into R to the power of the dimension (s-FEM), R from {} to {}",
+                          most_rings, least_refinement, most_refinement),
+              any_number, s.overlay.has_value()},
+      s.overlay);
+  visit(Setting{"overlay-memory", group, "MB", "MB", "512", "most that overlays may take", megabytes,
+                s.overlay.has_value()},
+        s.overlay_memory);
+}
+
+/// Visits the settings of the loop, and of where the device is in the body's frame.
+template <class SomeSettings, class Visitor>
+void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
+  constexpr SettingGroup group = SettingGroup::workspace;
+  visit(Setting{"rate", SettingGroup::loop, "HZ", "1/s", "1000", "ticks a second, 1000 to 5000", tick_rates},
+        s.rate);
+  visit(Setting{"motion-scale", group, "S", "", "1", "metres in the body's frame for one of the device",
+                positive_number},
+        s.motion_scale);
+  visit(Setting{"force-scale", group, "C", "", "1",
+                "newtons on the hand for one on the tool; limits of the device are scaled with both",
+                positive_number},
+        s.force_scale);
+  visit(Setting{"origin", group, "X,Y,Z", "m",
+                "0,0,0; for devices above the body, half the workspace's radius from touch",
+                "where the device's origin lies in the body's frame", any_number, s.origin.has_value()},
+        s.origin);
+  visit(Setting{"axes", group, "AXES", "", "x,y,z",
+                "the body's axes along which the device's right, away-from-you and up point"},
+        s.axes);
+}
+
+/// Calls visit(setting, value) for each setting. A member that is added to Settings must be named here, or
+/// nothing compiles.
+template <class SomeSettings, class Visitor>
+void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
+  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_memory, rate,
+         motion_scale, force_scale, origin, axes, safety] = settings;
+  for_each_tool_setting(tool, visit);
+  visit(Setting{"reach", SettingGroup::tool, "METRES", "m", "the longest edge of the surface",
+                "a grab that touches nothing takes hold of the nearest surface within this distance of the "
+                "tool's origin",
+                positive_number, reach.has_value()},
+        reach);
+  visit(Setting{"max-contacts", SettingGroup::tool, "N", "", "32",
+                "most contact points; where there are more, the deepest are kept", contact_counts},
+        max_contacts);
+  for_each_body_setting(settings, visit);
+  for_each_frame_setting(settings, visit);
+  visit(
+      Setting{
+          "safety", SettingGroup::safety, "NAME=VALUE,...", "",
+          "on for devices with a hand in them, off for scripts",
+          "other values of the bounds that protect the hand, each by its name; the word default keeps all",
+          any_number, safety.has_value(), protects_hand},
+      safety);
 }
 
 }  // namespace
 
+const std::vector<Setting>& settings_table() {
+  static const std::vector<Setting> table = [] {
+    std::vector<Setting> settings;
+    for_each_setting(Settings{}, [&](const Setting& setting, const auto&) { settings.push_back(setting); });
+    return settings;
+  }();
+  return table;
+}
+
+const Setting* find_setting(std::string_view name) {
+  const auto found = std::ranges::find(settings_table(), name, &Setting::name);
+  return found == settings_table().end() ? nullptr : &*found;
+}
+
 Settings read_settings(const SettingsText& text) {
   for (const auto& [name, value] : text) {
-    if (!is_setting(name)) refuse(name, "there is no such option", "palpate-runtime play --help lists them");
+    if (find_setting(name) == nullptr)
+      refuse(name, "there is no such option", "palpate-runtime play --help lists them");
   }
   Settings settings;
-  for (const SettingReader& reader : setting_readers) {
-    const auto found = text.find(std::string(reader.name));
-    if (found != text.end()) reader.read(settings, found->second);
-  }
+  for_each_setting(settings, [&](const Setting& setting, auto& value) {
+    if (const auto found = text.find(setting.name); found != text.end())
+      read_value(setting, found->second, value);
+  });
   return settings;
 }
 
@@ -212,9 +285,17 @@ SettingsText split_settings(std::string_view lines) {
     const std::size_t end = std::min(lines.find('\n'), lines.size());
     const Part line = split_part(lines.substr(0, end));
     lines.remove_prefix(std::min(end + 1, lines.size()));
-    if (is_setting(line.name)) settings.emplace(line.name, line.value);
+    if (find_setting(line.name) != nullptr) settings.emplace(line.name, line.value);
   }
   return settings;
+}
+
+std::string to_text(const Settings& settings) {
+  std::string text;
+  for_each_setting(settings, [&](const Setting& setting, const auto& value) {
+    if (setting.is_told) text += fmt::format("{}={}\n", setting.name, text_of(value));
+  });
+  return text;
 }
 
 WorkspaceOptions Settings::workspace() const {
@@ -230,38 +311,6 @@ BodyOptions Settings::body() const {
           .contact = contact,
           .load_scale = load_scale,
           .stiffness_scale = stiffness_scale};
-}
-
-std::string to_text(const Settings& settings) {
-  std::string text;
-  const auto add = [&](const char* name, const auto& value) { text += fmt::format("{}={}\n", name, value); };
-  const auto add_finite = [&](const char* name, double value) {
-    if (std::isfinite(value)) add(name, value);
-  };
-  const Tool& tool = settings.tool;
-  add("tool", shape_text(tool));
-  if (tool.friction) add("friction", *tool.friction);
-  add_finite("coupling", tool.coupling_stiffness);
-  add_finite("coupling-torsion", tool.coupling_torsion);
-  add_finite("max-force", tool.max_force);
-  add("hand-over", tool.hand_over);
-  if (settings.reach) add("reach", *settings.reach);
-  add("max-contacts", settings.max_contacts);
-  add("contact", settings.contact == ContactModel::dynamic ? "dynamic" : "quasi-static");
-  if (settings.load_scale != 1.0) add("load-scale", settings.load_scale);
-  if (settings.stiffness_scale != 1.0) add("stiffness-scale", settings.stiffness_scale);
-  if (settings.overlay) {
-    add("overlay", fmt::format("r={},rings={}", settings.overlay->refinement, settings.overlay->rings));
-    add("overlay-memory", settings.overlay_memory >> 20);
-  }
-  add("rate", settings.rate);
-  add("motion-scale", settings.motion_scale);
-  add("force-scale", settings.force_scale);
-  if (settings.origin)
-    add("origin", fmt::format("{},{},{}", settings.origin->x(), settings.origin->y(), settings.origin->z()));
-  add("axes", settings.axes);
-  if (settings.safety) add("safety", safety_text(*settings.safety));
-  return text;
 }
 
 Tool parse_shape(const std::string& text) {
@@ -291,13 +340,14 @@ OverlayOptions parse_overlay(const std::string& text, const std::string& where) 
   for (const std::string_view part : split_commas(text)) {
     const auto [name, number] = split_part(part);
     const std::optional<Index> value = parse_index(std::string(number));
-    if (name == "r" && value && *value >= 2 && *value <= 16) {
+    if (name == "r" && value && *value >= least_refinement && *value <= most_refinement) {
       overlay.refinement = *value;
-    } else if (name == "rings" && value && *value >= 1 && *value <= 16) {
+    } else if (name == "rings" && value && *value >= 1 && *value <= most_rings) {
       overlay.rings = *value;
     } else {
-      throw Error(fmt::format("'{}' is neither r=2 to r=16 nor rings=1 to rings=16", part), where,
-                  "write for instance r=3,rings=2");
+      throw Error(fmt::format("'{}' is neither r={} to r={} nor rings=1 to rings={}", part, least_refinement,
+                              most_refinement, most_rings),
+                  where, "write for instance r=3,rings=2");
     }
   }
   return overlay;
@@ -327,20 +377,22 @@ SafetyOptions parse_safety(const std::string& text) {
   SafetyOptions options;
   if (text == "default") return options;
   for (const std::string_view part : split_commas(text)) {
-    const auto [wanted, number] = split_part(part);
+    const auto [name, number] = split_part(part);
     const std::optional<double> parsed = parse_number(number);
     if (!parsed || *parsed < 0.0)
       throw Error(fmt::format("'{}' is not NAME=NUMBER, from 0 on", part), "--safety",
                   "write max_force=2,ramp=3");
     bool known = false;
-    for_each_safety_option(options, [&, name_wanted = wanted, value_wanted = *parsed](
-                                        const char* name, const char*, const char*, auto& value) {
-      if (name_wanted != name) return;
-      value = static_cast<std::remove_reference_t<decltype(value)>>(value_wanted);
+    for_each_safety_field(options, [&, name = name, bound = *parsed](const SafetyField& field, auto& value) {
+      if (name != field.name) return;
       known = true;
+      value = static_cast<std::remove_reference_t<decltype(value)>>(std::min(bound, field.range.high));
+      if (!field.range.contains(bound) || value != bound)
+        throw Error(fmt::format("{} must be {}, not {}", name, field.range.words, bound), "--safety",
+                    "palpate-runtime play --help lists the bounds");
     });
     if (!known)
-      throw Error(fmt::format("there is no safety option '{}'", wanted), "--safety",
+      throw Error(fmt::format("there is no safety option '{}'", name), "--safety",
                   "palpate-runtime play --help lists them");
   }
   return options;
@@ -349,10 +401,9 @@ SafetyOptions parse_safety(const std::string& text) {
 std::string safety_help() {
   std::string text;
   const SafetyOptions defaults;
-  for_each_safety_option(defaults,
-                         [&](const char* name, const char* unit, const char* meaning, const auto& value) {
-                           text += fmt::format("    {:<16} {:>7} {:<6} {}\n", name, value, unit, meaning);
-                         });
+  for_each_safety_field(defaults, [&](const SafetyField& field, const auto& value) {
+    text += fmt::format("    {:<16} {:>7} {:<6} {}\n", field.name, value, field.unit, field.meaning);
+  });
   return text;
 }
 

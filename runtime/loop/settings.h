@@ -1,24 +1,27 @@
 // What the outcome of a session follows from, beside the model and the hand; as text too.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "base/number_range.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/body/body.h"
 #include "runtime/loop/loading.h"
-#include "runtime/safety/safety.h"
+#include "runtime/safety/safety_options.h"
 #include "runtime/safety/workspace.h"
 #include "runtime/tick/tool.h"
 
 namespace palpate {
 
-inline constexpr Index least_rate = 1000;  ///< ticks a second
-inline constexpr Index most_rate = 5000;
+inline constexpr NumberRange tick_rates{1000.0, 5000.0, true, true, "from 1000 to 5000"};  ///< ticks a second
 
-/// Each is an option of `palpate-runtime play`, by whose name it stands in a recording.
+/// Each is an option of `palpate-runtime play`, by whose name it stands in a recording; settings_table has
+/// them.
 struct Settings {
   Tool tool;                    ///< but for its reach
   std::optional<double> reach;  ///< [m]; else the longest edge of the surface
@@ -39,7 +42,29 @@ struct Settings {
   [[nodiscard]] BodyOptions body() const;
 };
 
-/// A line NAME=VALUE for each that is not left to its default; numbers read back to the same bits.
+/// What a setting is of: its place in the help. The loop's and the workspace's stay as they are in a run.
+enum class SettingGroup : std::uint8_t { tool, body, loop, workspace, safety };
+
+/// A setting as options, recordings, pages and the documentation have it.
+struct Setting {
+  const char* name;  ///< of the option, without dashes
+  SettingGroup group;
+  const char* value;      ///< what is written for it
+  const char* unit;       ///< of a number, "" where it has none
+  std::string otherwise;  ///< what holds where it is left out
+  std::string meaning;
+  NumberRange range{};         ///< of a number
+  bool is_told = true;         ///< in recordings of the settings that it was made for
+  bool protects_hand = false;  ///< it decides how strong and how sudden the force on a hand may be
+};
+
+/// All settings, in the order of recordings.
+[[nodiscard]] const std::vector<Setting>& settings_table();
+
+/// The setting of a name, null for none.
+[[nodiscard]] const Setting* find_setting(std::string_view name);
+
+/// A line NAME=VALUE for each that is told; numbers read back to the same bits.
 [[nodiscard]] std::string to_text(const Settings& settings);
 
 /// Options by name, as they are written.

@@ -1,8 +1,9 @@
 #include "runtime/safety/safety.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cmath>
-#include <string>
+#include <string_view>
 
 #include "base/error.h"
 #include "runtime/safety/plausible.h"
@@ -11,44 +12,16 @@
 namespace palpate {
 namespace {
 
-void check(double value, const char* name, bool may_be_zero = true) {
-  if (std::isfinite(value) && (value > 0.0 || (may_be_zero && value == 0.0))) return;
-  throw Error(std::string(name) + " is " + std::to_string(value), "SafetyOptions",
-              may_be_zero ? "give a finite number, 0 or more" : "give a finite number above 0");
-}
-
 SafetyOptions checked(const SafetyOptions& options) {
-  check(options.period, "period", false);
-  check(options.max_force, "max_force");
-  check(options.max_torque, "max_torque");
-  check(options.max_force_rate, "max_force_rate");
-  check(options.max_torque_rate, "max_torque_rate");
-  check(options.max_stiffness, "max_stiffness");
-  check(options.max_damping, "max_damping");
-  check(options.max_speed, "max_speed");
-  check(options.ramp, "ramp");
-  check(options.small_force, "small_force");
-  check(options.calm_time, "calm_time");
-  check(options.deadline.tolerance, "deadline.tolerance");
-  check(options.deadline.fade, "deadline.fade", false);
-  check(options.deadline.recovery, "deadline.recovery", false);
-  check(options.deadline.most, "deadline.most", false);
-  check(options.deadline.forgiveness, "deadline.forgiveness");
-  check(options.silence.fade_from, "silence.fade_from");
-  check(options.silence.most - options.silence.fade_from, "silence.most - silence.fade_from", false);
-  check(options.silence.frozen, "silence.frozen", false);
-  check(options.silence.frozen_force, "silence.frozen_force");
-  check(options.stale.fresh, "stale.fresh");
-  check(options.stale.time_to_live, "stale.time_to_live");
-  check(options.stale.fade, "stale.fade", false);
-  check(options.stale.damping, "stale.damping");
-  check(options.buzz.speed, "buzz.speed");
-  check(options.buzz.force, "buzz.force");
-  check(options.buzz.mean_time, "buzz.mean_time", false);
-  check(options.buzz.window, "buzz.window", false);
-  check(options.buzz.flips, "buzz.flips", false);
-  check(options.buzz.fade, "buzz.fade", false);
-  check(options.buzz.recovery, "buzz.recovery", false);
+  const auto check = [](std::string_view name, const NumberRange& range, double value) {
+    if (!range.contains(value))
+      throw Error(fmt::format("{} must be {}, not {}", name, range.words, value), "SafetyOptions",
+                  "give a number in that range");
+  };
+  check("period", positive_number, options.period);
+  for_each_safety_field(
+      options, [&](const SafetyField& field, double value) { check(field.name, field.range, value); });
+  check("silence - silence_fade", positive_number, options.silence.most - options.silence.fade_from);
   return options;
 }
 

@@ -10,32 +10,12 @@
 #include "runtime/safety/engagement.h"
 #include "runtime/safety/fault.h"
 #include "runtime/safety/passivity.h"
+#include "runtime/safety/safety_options.h"
 #include "runtime/safety/silence_watch.h"
 #include "runtime/safety/speed_limit.h"
 #include "runtime/safety/stale_solution.h"
 
 namespace palpate {
-
-/// SI units. Where the device's limits are lower, they hold. Bounds that are not wanted are made large.
-struct SafetyOptions {
-  double period = 0.001;          ///< of the loop [s]
-  double max_force = 3.0;         ///< [N]; of hand-held devices the weakest shows 3.3 (Touch)
-  double max_torque = 0.1;        ///< [N m]; half of what a sigma.7 shows
-  double max_force_rate = 500.0;  ///< [N/s]; a wall of 1000 N/m that is met at 0.5 m/s
-  double max_torque_rate = 10.0;  ///< [N m/s]; a lever of 2 cm at that
-  double max_stiffness =
-      2000.0;                ///< of the local model [N/m]; Polhem v3's, between Touch's 400 and omega's 5000
-  double max_damping = 5.0;  ///< that the passivity controller adds [N s/m]: K T / 2 of 10 kN/m (Colgate
-                             ///< and Brown); 0: it only observes
-  double max_speed = 1.0;    ///< of the device [m/s]; palpation stays below 0.3
-  double ramp = 1.0;         ///< from no to whole force [s]; CHAI3D takes 2
-  double small_force = 0.1;  ///< below which force may begin [N] ...
-  double calm_time = 0.01;   ///< ... when it was so for this long [s]
-  DeadlineOptions deadline{};
-  SilenceOptions silence{};
-  StaleOptions stale{};
-  BuzzOptions buzz{};
-};
 
 /// With what the device bears where that is lower.
 [[nodiscard]] SafetyOptions limited(SafetyOptions options, const DeviceLimits& limits) noexcept;

@@ -244,7 +244,7 @@ const Edit edits[] = {
      {"/material/isotropic, row 1", "poissons_ratio"}},
     {"NegativeFriction",
      [](const Path& p) { set_entry(p, "/material/friction", 1, -0.5); },
-     {"/material/friction, row 1 is -0.5", "negative"}},
+     {"/material/friction, row 1 is -0.5", "0 or more"}},
     {"NanFriction",
      [](const Path& p) { set_entry(p, "/material/friction", 0, nan); },
      {"/material/friction holds a value that is not finite (entry 0)"}},

@@ -4,15 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cstddef>
 #include <limits>
+#include <regex>
 
-#include "tests/support/meshes_files.h"
+#include "base/words.h"
+#include "meshes/material_fields.h"
+#include "tests/support/documentation.h"
 
 namespace palpate {
 namespace {
-
-using test::contains;
-using test::error_of;
 
 const Material rubber{2.0e5, 0.42, 1100.0};
 const double E = rubber.youngs_modulus, nu = rubber.poissons_ratio, G = E / (2.0 * (1.0 + nu));
@@ -77,34 +78,55 @@ TEST(Material, InitialStressOfAnyInitialStrain) {
   EXPECT_LT((sheet - Eigen::Vector3d(relaxed(0, 0), relaxed(1, 1), relaxed(0, 1))).norm(), 1e-13 * E);
 }
 
-TEST(Material, ConstantsOutsideTheirRangesAreRefused) {
+TEST(Material, OneConstantIsOutOfItsRange) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   const struct {
     Material material;
     const char* names;
-  } cases[] = {{{0.0, 0.3, 1e3}, "youngs_modulus"},
-               {{-5.0, 0.3, 1e3}, "-5"},
-               {{nan, 0.3, 1e3}, "youngs_modulus"},
-               {{inf, 0.3, 1e3}, "youngs_modulus"},
-               {{1e3, 0.5, 1e3}, "0.5"},
-               {{1e3, -1.0, 1e3}, "poissons_ratio"},
-               {{1e3, nan, 1e3}, "poissons_ratio"},
-               {{1e3, 0.3, 0.0}, "density"},
-               {{1e3, 0.3, nan}, "density"},
-               {{1e3, 0.3, inf}, "density"},
-               {{1e3, 0.3, 1e3, -0.25}, "friction must be 0 or more, not -0.25"},
-               {{1e3, 0.3, 1e3, nan}, "friction"},
-               {{1e3, 0.3, 1e3, inf}, "friction"},
-               {{1e3, 0.3, 1e3, 0.0, {0, 0, 0, nan, 0, 0}}, "initial_strain"}};
-  for (const auto& bad : cases) {
-    const Error error = error_of([&] { check_material(bad.material, "model.toml:7"); });
-    EXPECT_TRUE(contains(error.what(), bad.names)) << error.what();
-    EXPECT_EQ(error.where(), "model.toml:7");
-    EXPECT_FALSE(error.hint().empty());
-  }
-  EXPECT_NO_THROW(check_material({1e3, 0.4999, 1e3}, ""));
-  EXPECT_NO_THROW(check_material({1e3, -0.9, 1e3}, ""));
-  EXPECT_NO_THROW(check_material({1e3, 0.3, 1e3, 1.5}, ""));
+  } cases[] = {
+      {{0.0, 0.3, 1e3}, "youngs_modulus"},  {{-5.0, 0.3, 1e3}, "youngs_modulus"},
+      {{nan, 0.3, 1e3}, "youngs_modulus"},  {{inf, 0.3, 1e3}, "youngs_modulus"},
+      {{1e3, 0.5, 1e3}, "poissons_ratio"},  {{1e3, -1.0, 1e3}, "poissons_ratio"},
+      {{1e3, nan, 1e3}, "poissons_ratio"},  {{1e3, 0.3, 0.0}, "density"},
+      {{1e3, 0.3, nan}, "density"},         {{1e3, 0.3, inf}, "density"},
+      {{1e3, 0.3, 1e3, -0.25}, "friction"}, {{1e3, 0.3, 1e3, nan}, "friction"},
+      {{1e3, 0.3, 1e3, inf}, "friction"},   {{1e3, 0.3, 1e3, 0.0, {0, 0, 0, nan, 0, 0}}, "initial_strain"}};
+  const auto out_of_range = [](const Material& material) {
+    std::string keys;
+    for_each_material_field(material, [&](const MaterialField& field, std::span<const double> values) {
+      if (!std::ranges::all_of(values, [&](double value) { return field.range.contains(value); }))
+        keys += field.key;
+    });
+    return keys;
+  };
+  for (const auto& bad : cases) EXPECT_EQ(out_of_range(bad.material), bad.names);
+  EXPECT_EQ(out_of_range({1e3, 0.4999, 1e3}), "");
+  EXPECT_EQ(out_of_range({1e3, -0.9, 1e3}), "");
+  EXPECT_EQ(out_of_range({1e3, 0.3, 1e3, 1.5}), "");
+}
+
+// Members are numbers only, so what is visited must fill the struct.
+TEST(MaterialFields, AreAllMembersInTheirPlaces) {
+  const Material material;
+  const auto* next = reinterpret_cast<const std::byte*>(&material);
+  for_each_material_field(material, [&](const MaterialField& field, std::span<const double> values) {
+    const auto bytes = std::as_bytes(values);
+    EXPECT_EQ(bytes.data(), next) << field.key;
+    next = bytes.data() + bytes.size();
+  });
+  EXPECT_EQ(next, reinterpret_cast<const std::byte*>(&material + 1)) << "a member is not in the table";
+}
+
+TEST(MaterialFields, AreRowsOfTheDocumentation) {
+  const std::string pages = test::documentation();
+  for_each_material_field(Material{}, [&](const MaterialField& field, std::span<const double> values) {
+    const std::string unit = field.unit == "kg/m^3" ? "kg/m³" : std::string(field.unit);
+    const std::string fallback = field.required ? "required" : values.size() > 1 ? "none" : shown(values[0]);
+    const std::string row = fmt::format("| `{}` | {} | {} | {} |", field.key, unit, fallback, field.meaning);
+    EXPECT_TRUE(test::has_row(pages, std::regex_replace(row, std::regex("  +"), " "))) << row;
+    EXPECT_NE(pages.find(fmt::format("| `{}` |", field.dataset)), std::string::npos) << field.dataset;
+    EXPECT_FALSE(field.hint.empty());
+  });
 }
 
 }  // namespace

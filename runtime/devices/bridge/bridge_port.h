@@ -12,7 +12,7 @@
 #include "runtime/devices/bridge/bridge_key.h"
 #include "runtime/devices/bridge/bridge_order.h"
 #include "runtime/safety/device_port.h"
-#include "runtime/safety/stale_solution.h"
+#include "runtime/safety/safety_options.h"
 
 namespace palpate {
 
@@ -27,8 +27,8 @@ struct BridgeAddress {
 
 struct BridgeOptions {
   BridgeAddress listen{};
-  double max_force = 3.0;  ///< that a bridge may show, local model included; as SafetyOptions's [N]
-  StaleOptions stale{};    ///< how long a bridge shows a command, and with what damping
+  double max_force = SafetyOptions{}.max_force;  ///< that a bridge may show, local model included [N]
+  StaleOptions stale{};                          ///< how long a bridge shows a command, and with what damping
 };
 
 /// What came and went since the port was made.

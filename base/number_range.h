@@ -1,0 +1,25 @@
+// Numbers that a quantity may have, and the words for them.
+#pragma once
+
+#include <limits>
+#include <string_view>
+
+namespace palpate {
+
+/// An interval of numbers.
+struct NumberRange {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool has_low = false, has_high = false;  ///< the end itself is in it
+  std::string_view words = "finite";       ///< what a number must be to be in it
+
+  [[nodiscard]] constexpr bool contains(double x) const noexcept {
+    return (x > low || (has_low && x == low)) && (x < high || (has_high && x == high));
+  }
+};
+
+inline constexpr NumberRange any_number{};
+inline constexpr NumberRange positive_number{.low = 0.0, .words = "greater than 0"};
+inline constexpr NumberRange number_from_zero{.low = 0.0, .has_low = true, .words = "0 or more"};
+
+}  // namespace palpate

@@ -1,0 +1,52 @@
+// The table of a material's constants. Description, baked file, checks, inspection and documentation walk it,
+// so a constant that is added here is read, stored, loaded, checked and shown.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include "base/number_range.h"
+#include "meshes/material.h"
+
+namespace palpate {
+
+/// A constant of a material, or several under one name.
+struct MaterialField {
+  std::string_view key;      ///< in model.toml
+  std::string_view dataset;  ///< in the baked file, a row a material; neighbours in the table may share one
+  std::string_view symbol;   ///< for people
+  std::string_view unit;     ///< SI, empty for a pure number
+  bool required = false;     ///< else the default of `Material` holds where it is left out
+  NumberRange range{};
+  std::string_view meaning;  ///< as the documentation tells it
+  std::string_view hint;     ///< what to give
+};
+
+/// Calls visit(field, numbers) for each constant, in the order of the baked file; `numbers` is a span of the
+/// material's own. A member that is added to Material must be named here, or nothing compiles.
+template <class SomeMaterial, class Visitor>
+void for_each_material_field(SomeMaterial&& material, Visitor&& visit) {
+  auto& [youngs_modulus, poissons_ratio, density, friction, initial_strain] = material;
+  constexpr NumberRange compressible{-1.0, 0.5, false, false, "between -1 and 1/2, both excluded"};
+  visit(MaterialField{"youngs_modulus", "/material/isotropic", "E", "Pa", true, positive_number, "E > 0",
+                      "give Young's modulus in pascals, e.g. 5e3 for soft tissue"},
+        std::span(&youngs_modulus, 1));
+  visit(MaterialField{"poissons_ratio", "/material/isotropic", "nu", "", true, compressible, "−1 < ν < 1/2",
+                      "nearly incompressible tissue is 0.45 to 0.49"},
+        std::span(&poissons_ratio, 1));
+  visit(MaterialField{"density", "/material/isotropic", "density", "kg/m^3", false, positive_number, "> 0",
+                      "give it in kg/m^3, e.g. 1060 for tissue"},
+        std::span(&density, 1));
+  visit(
+      MaterialField{"friction", "/material/friction", "friction", "", false, number_from_zero,
+                    "Coulomb's coefficient between the material's surface and a tool, ≥ 0; 0 is frictionless",
+                    "give Coulomb's coefficient, e.g. 0.2 for wet tissue"},
+      std::span(&friction, 1));
+  visit(MaterialField{"initial_strain", "/material/initial_strain", "initial strain", "", false, any_number,
+                      "strain at which the material is free of stress: `[xx, yy, zz, xy, yz, zx]`, in the "
+                      "plane `[xx, yy, zz, xy]`; shear is γ = 2ε",
+                      "give six numbers, in the plane four"},
+        std::span(initial_strain));
+}
+
+}  // namespace palpate

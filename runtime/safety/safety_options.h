@@ -1,0 +1,92 @@
+// The bounds between the solver and a hand, each with its name, unit, range and meaning.
+#pragma once
+
+#include <string_view>
+
+#include "base/number_range.h"
+#include "runtime/safety/buzz_detector.h"
+#include "runtime/safety/deadline_watch.h"
+#include "runtime/safety/silence_watch.h"
+#include "runtime/safety/stale_solution.h"
+
+namespace palpate {
+
+/// SI units. Where the device's limits are lower, they hold. Bounds that are not wanted are made large.
+struct SafetyOptions {
+  double period = 0.001;          ///< of the loop [s]
+  double max_force = 3.0;         ///< [N]; of hand-held devices the weakest shows 3.3 (Touch)
+  double max_torque = 0.1;        ///< [N m]; half of what a sigma.7 shows
+  double max_force_rate = 500.0;  ///< [N/s]; a wall of 1000 N/m that is met at 0.5 m/s
+  double max_torque_rate = 10.0;  ///< [N m/s]; a lever of 2 cm at that
+  double max_stiffness =
+      2000.0;                ///< of the local model [N/m]; Polhem v3's, between Touch's 400 and omega's 5000
+  double max_damping = 5.0;  ///< that the passivity controller adds [N s/m]: K T / 2 of 10 kN/m (Colgate
+                             ///< and Brown); 0: it only observes
+  double max_speed = 1.0;    ///< of the device [m/s]; palpation stays below 0.3
+  double ramp = 1.0;         ///< from no to whole force [s]; CHAI3D takes 2
+  double small_force = 0.1;  ///< below which force may begin [N] ...
+  double calm_time = 0.01;   ///< ... when it was so for this long [s]
+  DeadlineOptions deadline{};
+  SilenceOptions silence{};
+  StaleOptions stale{};
+  BuzzOptions buzz{};
+};
+
+/// A bound as `--safety`, its help and the documentation have it.
+struct SafetyField {
+  std::string_view name;
+  std::string_view unit;
+  NumberRange range;
+  std::string_view meaning;
+};
+
+/// Calls visit(field, number) for each bound; the number is a double or an int. The period is none: it
+/// follows from the loop's rate. A member that is added to the options must be named here, or nothing
+/// compiles.
+template <class SomeOptions, class Visitor>
+void for_each_safety_field(SomeOptions&& options, Visitor&& visit) {
+  auto& [period, max_force, max_torque, max_force_rate, max_torque_rate, max_stiffness, max_damping,
+         max_speed, ramp, small_force, calm_time, deadline, silence, stale, buzz] = options;
+  auto& [late, late_fade, late_recovery, most_late, forgiveness] = deadline;
+  auto& [silent, silence_fade, frozen, frozen_force] = silence;
+  auto& [fresh, stale_life, stale_fade, stale_damping] = stale;
+  auto& [buzz_speed, buzz_force, buzz_mean, buzz_window, buzz_flips, buzz_fade, buzz_recovery] = buzz;
+  constexpr NumberRange positive = positive_number, from_zero = number_from_zero;
+  constexpr NumberRange count{1.0, 1e9, true, true, "a whole number from 1 on"};
+  using F = SafetyField;
+  visit(F{"max_force", "N", from_zero, "largest force on the hand"}, max_force);
+  visit(F{"max_torque", "N m", from_zero, "largest torque on the hand"}, max_torque);
+  visit(F{"max_force_rate", "N/s", from_zero, "how fast the force may change"}, max_force_rate);
+  visit(F{"max_torque_rate", "N m/s", from_zero, "how fast the torque may change"}, max_torque_rate);
+  visit(F{"max_stiffness", "N/m", from_zero, "largest stiffness of the local model"}, max_stiffness);
+  visit(F{"max_damping", "N s/m", from_zero, "most that the passivity controller adds; 0: it only observes"},
+        max_damping);
+  visit(F{"max_speed", "m/s", from_zero, "of the device; faster is a fault"}, max_speed);
+  visit(F{"ramp", "s", from_zero, "from no to whole force, at the start and after a fault"}, ramp);
+  visit(F{"small_force", "N", from_zero, "force begins only where it was below this"}, small_force);
+  visit(F{"calm_time", "s", from_zero, "for so long"}, calm_time);
+  visit(F{"late", "s", from_zero, "a tick that begins so much late is a miss"}, late);
+  visit(F{"late_fade", "s", positive, "from whole to no force while ticks are late"}, late_fade);
+  visit(F{"late_recovery", "s", positive, "and back, while they are in time"}, late_recovery);
+  visit(F{"most_late", "ticks", positive, "misses that are a fault"}, most_late);
+  visit(F{"forgiveness", "ticks", from_zero, "misses that a tick in time makes good"}, forgiveness);
+  visit(F{"silence", "s", positive, "without a report of the device: a fault"}, silent);
+  visit(F{"silence_fade", "s", from_zero, "the force fades from here on, to nothing at silence"},
+        silence_fade);
+  visit(F{"frozen", "s", positive, "with the same numbers in every report: a fault"}, frozen);
+  visit(F{"frozen_force", "N", from_zero, "but only while the force is above this"}, frozen_force);
+  visit(F{"stale", "s", from_zero, "up to this age a solution is of this tick"}, fresh);
+  visit(F{"stale_life", "s", from_zero, "up to this age an older one is extrapolated"}, stale_life);
+  visit(F{"stale_fade", "s", positive, "then from whole to no force"}, stale_fade);
+  visit(F{"stale_damping", "N s/m", from_zero, "damping of a solution that is not fresh"}, stale_damping);
+  visit(F{"buzz_speed", "m/s", from_zero, "amplitude of the device's speed that counts as buzzing"},
+        buzz_speed);
+  visit(F{"buzz_force", "N", from_zero, "amplitude of the force about its mean that counts"}, buzz_force);
+  visit(F{"buzz_mean", "s", positive, "of that mean"}, buzz_mean);
+  visit(F{"buzz_window", "s", positive, "in which changes of sign are counted"}, buzz_window);
+  visit(F{"buzz_flips", "", count, "so many in the window are buzzing"}, buzz_flips);
+  visit(F{"buzz_fade", "s", positive, "from whole to no force while it buzzes; then a fault"}, buzz_fade);
+  visit(F{"buzz_recovery", "s", positive, "and back, while it does not"}, buzz_recovery);
+}
+
+}  // namespace palpate

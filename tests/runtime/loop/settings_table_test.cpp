@@ -1,0 +1,134 @@
+// The tables of settings and of safety bounds: each member stands in them, and the documentation has their
+// rows.
+#include <gtest/gtest.h>
+
+#include <regex>
+#include <set>
+
+#include "base/error.h"
+#include "runtime/loop/settings.h"
+#include "runtime/safety/safety.h"
+#include "tests/support/documentation.h"
+
+namespace palpate {
+namespace {
+
+/// A value for each setting that is not its default, as it is written.
+const SettingsText others = {
+    {"tool", "capsule:0.25,0.5"}, {"friction", "0.3"},      {"coupling", "250"},
+    {"coupling-torsion", "0.75"}, {"max-force", "7.5"},     {"hand-over", "inf"},
+    {"reach", "0.125"},           {"max-contacts", "7"},    {"contact", "dynamic"},
+    {"load-scale", "0"},          {"stiffness-scale", "2"}, {"overlay", "r=16,rings=16"},
+    {"overlay-memory", "64"},     {"rate", "5000"},         {"motion-scale", "0.5"},
+    {"force-scale", "4"},         {"origin", "1,2,3"},      {"axes", "x,-z,y"},
+    {"safety", "max_force=2"}};
+
+/// In a table of the documentation.
+std::string escaped(const std::string& text) {
+  return std::regex_replace(text, std::regex("\\|"), "\\|");
+}
+
+TEST(SettingsTable, HasEachMember) {
+  const auto& [tool, reach, contacts, contact, load, stiffness, overlay, memory, rate, motion, force, origin,
+               axes, safety] = Settings{};
+  const Settings all = read_settings(others);
+  const auto& [tool2, reach2, contacts2, contact2, load2, stiffness2, overlay2, memory2, rate2, motion2,
+               force2, origin2, axes2, safety2] = all;
+  EXPECT_NE(reach, reach2);
+  EXPECT_NE(contacts, contacts2);
+  EXPECT_NE(contact, contact2);
+  EXPECT_NE(load, load2);
+  EXPECT_NE(stiffness, stiffness2);
+  EXPECT_NE(overlay.has_value(), overlay2.has_value());
+  EXPECT_NE(memory, memory2);
+  EXPECT_NE(rate, rate2);
+  EXPECT_NE(motion, motion2);
+  EXPECT_NE(force, force2);
+  EXPECT_NE(origin, origin2);
+  EXPECT_NE(axes, axes2);
+  EXPECT_NE(safety.has_value(), safety2.has_value());
+  const auto& [radius, length, coupling, torsion, most, hand_over, unset, friction] = tool;
+  const auto& [radius2, length2, coupling2, torsion2, most2, hand_over2, unset2, friction2] = tool2;
+  EXPECT_NE(radius, radius2);
+  EXPECT_NE(length, length2);
+  EXPECT_NE(coupling, coupling2);
+  EXPECT_NE(torsion, torsion2);
+  EXPECT_NE(most, most2);
+  EXPECT_NE(hand_over, hand_over2);
+  EXPECT_EQ(unset, unset2) << "the reach is that of the settings";
+  EXPECT_NE(friction, friction2);
+}
+
+TEST(SettingsTable, TellsEachAsItIsWritten) {
+  SettingsText told = split_settings(to_text(read_settings(others)));
+  EXPECT_EQ(told.size(), settings_table().size());
+  EXPECT_EQ(std::exchange(told["safety"], "max_force=2").substr(0, 12), "max_force=2,");
+  EXPECT_EQ(told, others);
+  for (const Setting& setting : settings_table()) EXPECT_TRUE(others.contains(setting.name)) << setting.name;
+}
+
+TEST(SettingsTable, HasTheDefaults) {
+  std::set<std::string> in_words;
+  SettingsText defaults;
+  for (const Setting& setting : settings_table()) {
+    try {
+      static_cast<void>(read_settings({{setting.name, setting.otherwise}}));
+      defaults[setting.name] = setting.otherwise;
+    } catch (const Error&) {
+      in_words.insert(setting.name);
+    }
+  }
+  EXPECT_EQ(in_words, (std::set<std::string>{"tool", "friction", "coupling", "coupling-torsion", "max-force",
+                                             "reach", "overlay", "origin", "safety"}));
+  Settings read = read_settings(defaults), made;
+  read.overlay = made.overlay = OverlayOptions{};  // else its memory is not told
+  EXPECT_EQ(to_text(read), to_text(made));
+}
+
+TEST(SettingsTable, IsTheDocumentations) {
+  const std::string pages = test::documentation();
+  for (const Setting& setting : settings_table()) {
+    const std::string row = fmt::format("| `--{} {}` | {} | {} | {} |", setting.name, escaped(setting.value),
+                                        setting.unit, setting.otherwise, escaped(setting.meaning));
+    EXPECT_TRUE(test::has_row(pages, std::regex_replace(row, std::regex("  +"), " "))) << row;
+  }
+}
+
+TEST(SafetyFields, AreAllMembers) {
+  const SafetyOptions options;
+  std::set<const void*> members = {&options.period};
+  for_each_safety_field(options, [&](const SafetyField&, const auto& number) { members.insert(&number); });
+  static_assert(alignof(SafetyOptions) == sizeof(double), "each number takes as much room as a double");
+  EXPECT_EQ(members.size() * sizeof(double), sizeof(SafetyOptions)) << "a member is not in the table";
+}
+
+TEST(SafetyFields, AreReadInTheirRanges) {
+  const auto where = [](const std::string& text) -> std::string {
+    try {
+      static_cast<void>(parse_safety(text));
+    } catch (const Error& error) {
+      return error.where();
+    }
+    return "";
+  };
+  for_each_safety_field(SafetyOptions{}, [&](const SafetyField& field, const auto& number) {
+    const std::string name(field.name);
+    EXPECT_EQ(where(name + "=0"), field.range.contains(0.0) ? "" : "--safety") << name;
+    EXPECT_EQ(where(name + "=-1"), "--safety") << name;
+    EXPECT_EQ(where(name + "=" + fmt::format("{}", number)), "") << name;
+  });
+  EXPECT_EQ(where("buzz_flips=7.5"), "--safety");
+  EXPECT_EQ(where("buzz_flips=1e10"), "--safety");
+}
+
+TEST(SafetyFields, AreRowsOfTheDocumentation) {
+  const std::string pages = test::documentation();
+  for_each_safety_field(SafetyOptions{}, [&](const SafetyField& field, const auto& number) {
+    const std::string row =
+        fmt::format("| `{}` | {} | {} | {} |", field.name, number, field.unit, field.meaning);
+    EXPECT_TRUE(test::has_row(pages, std::regex_replace(row, std::regex("  +"), " "))) << row;
+  });
+}
+
+}  // namespace
+}  // namespace palpate
