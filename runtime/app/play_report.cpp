@@ -215,7 +215,7 @@ void print_report(const PlayedRun& run) {
   if (!run.options.record.empty())
     fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),
                run.dropped, run.dropped_frames);
-  if (run.recording_failure) print_warning("the recording failed: " + *run.recording_failure);
+  if (run.recording_failure) print_warning("the recording failed: " + in_one_line(*run.recording_failure));
   if (run.overlays != nullptr) print_overlays(*run.overlays);
   if (run.motion != nullptr) {
     fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
@@ -264,7 +264,7 @@ std::string json_report(const PlayedRun& run) {
   if (!run.options.record.empty())
     json += fmt::format("  \"recording\": {},\n  \"recording_failed\": {},\n",
                         json_string(run.options.record.string()),
-                        run.recording_failure ? json_string(*run.recording_failure) : "null");
+                        run.recording_failure ? json_string(in_one_line(*run.recording_failure)) : "null");
   json += fmt::format("  \"dropped_ticks\": {}\n}}\n", run.dropped);
   return json;
 }

@@ -18,7 +18,7 @@
 namespace palpate {
 
 struct DeviceLinkOptions {
-  /// Of what the writer works out itself, where the device bears it [N].
+  /// Bounds what the writer works out itself, where the device bears it [N].
   double max_force = SafetyOptions{}.max_force;
   double max_force_rate = SafetyOptions{}.max_force_rate;  ///< [N/s]
   StaleOptions stale{};  ///< of the loop's solutions, when it gives no new ones

@@ -28,8 +28,14 @@ std::string json_vector(const Vec3& v) {
   return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z());
 }
 
+Error as_error(const std::exception& error) {
+  const auto* known = dynamic_cast<const Error*>(&error);
+  return known != nullptr ? *known : Error(error.what(), "", "");
+}
+
 std::string in_one_line(const Error& error) {
-  return error.where() + ": " + error.what() + " (" + error.hint() + ")";
+  const std::string where = error.where().empty() ? "" : error.where() + ": ";
+  return where + error.what() + (error.hint().empty() ? "" : " (" + error.hint() + ")");
 }
 
 void print_warning(std::string_view text) {

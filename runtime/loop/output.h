@@ -1,6 +1,7 @@
 // What the program prints and writes.
 #pragma once
 
+#include <exception>
 #include <string>
 #include <string_view>
 
@@ -15,7 +16,10 @@ std::string json_string(std::string_view text);
 /// `v` as a JSON array; numbers read back to the same bits.
 std::string json_vector(const Vec3& v);
 
-/// `WHERE: WHAT (HINT)`
+/// `error` itself where it is an Error, else what it says without a place and a hint.
+Error as_error(const std::exception& error);
+
+/// `WHERE: WHAT (HINT)`, without the parts that are empty.
 std::string in_one_line(const Error& error);
 
 /// `warning: TEXT` on the error stream, in one piece and over a line that is being renewed there.

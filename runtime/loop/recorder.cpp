@@ -103,18 +103,15 @@ void Recorder::write() noexcept {
       if (taken == 0) std::this_thread::sleep_for(pause);
     }
     writer_.checkpoint();
-  } catch (const Error& error) {
-    failure_ = std::current_exception();
-    fail(in_one_line(error));
   } catch (const std::exception& error) {
     failure_ = std::current_exception();
-    fail(error.what());
+    fail(error);
   }
 }
 
-void Recorder::fail(const std::string& reason) noexcept {
+void Recorder::fail(const std::exception& reason) noexcept {
   failed_ = true;
-  if (on_failure_) on_failure_(reason);
+  if (on_failure_) on_failure_(as_error(reason));
 }
 
 }  // namespace palpate
