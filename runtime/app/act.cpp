@@ -64,17 +64,17 @@ Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActVie
   if (body.model().dynamics.method == DynamicsMethod::packed)
     motion_.emplace(body, state_, MotionSourceOptions{.in_background = in_background});
   if (!options_.record.empty()) {
-    recorder_.emplace(options_.record,
-                      SessionInfo{.model_path = options_.file.string(),
-                                  .content_hash = body.model().content_hash,
-                                  .device = options_.device.text,
-                                  .rate = settings.rate,
-                                  .options = to_text(settings)},
-                      recorded_surface(body),
-                      [tell_viewer = viewer.recording_failed](const std::string& reason) {
-                        print_warning("the recording failed, and the run goes on without it: " + reason);
-                        if (tell_viewer) tell_viewer(reason);
-                      });
+    recorder_.emplace(
+        options_.record,
+        SessionInfo{.model_path = options_.file.string(),
+                    .content_hash = body.model().content_hash,
+                    .device = options_.device.text,
+                    .rate = settings.rate,
+                    .options = to_text(settings)},
+        recorded_surface(body), [tell_viewer = viewer.recording_failed](const Error& reason) {
+          print_warning("the recording failed, and the run goes on without it: " + in_one_line(reason));
+          if (tell_viewer) tell_viewer(reason);
+        });
   }
   if (recorder_ && options_.record_frames > 0.0) {
     frames_.emplace(
@@ -114,7 +114,7 @@ void Act::finish_recording() {
   try {
     recorder_->finish();
   } catch (const std::exception& error) {
-    recording_failure_ = in_one_line(error);
+    recording_failure_ = as_error(error);
   }
 }
 

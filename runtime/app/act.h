@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "base/error.h"
 #include "runtime/app/mover.h"
 #include "runtime/app/play.h"
 #include "runtime/body/body.h"
@@ -46,9 +47,7 @@ class Act {
   const LoopReport& run(const std::atomic<bool>& stop);
 
   /// Why the recording of the run that is over is not whole; nothing where it is, or there is none.
-  [[nodiscard]] const std::optional<std::string>& recording_failure() const noexcept {
-    return recording_failure_;
-  }
+  [[nodiscard]] const std::optional<Error>& recording_failure() const noexcept { return recording_failure_; }
 
   /// The report, and the files that the options ask for. Throws Error for the first that cannot be written,
   /// after all others are.
@@ -67,7 +66,7 @@ class Act {
   std::optional<Recorder> recorder_;
   std::optional<Monitor> monitor_;
   LoopReport report_;
-  std::optional<std::string> recording_failure_;
+  std::optional<Error> recording_failure_;
   std::optional<SurfaceFrames> frames_;  // after the recorder, which it feeds to its end
   std::optional<SurfaceFrames> viewed_;
   PlayOptions options_;

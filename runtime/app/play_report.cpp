@@ -230,7 +230,7 @@ void print_report(const PlayedRun& run) {
   if (!run.options.record.empty())
     fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),
                run.dropped, run.dropped_frames);
-  if (run.recording_failure) print_warning("the recording failed: " + *run.recording_failure);
+  if (run.recording_failure) print_warning("the recording failed: " + in_one_line(*run.recording_failure));
   if (run.overlays != nullptr) print_overlays(*run.overlays);
   if (run.motion != nullptr) {
     fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
@@ -271,7 +271,7 @@ std::string json_report(const PlayedRun& run) {
   json["dynamics"] = json_dynamics(run.body, run.motion);
   if (!run.options.record.empty()) {
     json["recording"] = run.options.record.string();
-    json["recording_failed"] = run.recording_failure ? Json(*run.recording_failure) : Json();
+    json["recording_failed"] = run.recording_failure ? Json(in_one_line(*run.recording_failure)) : Json();
   }
   json["dropped_ticks"] = run.dropped;
   return json_text(json, 2);

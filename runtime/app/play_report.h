@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "base/error.h"
 #include "runtime/app/play.h"
 #include "runtime/loop/device_link.h"
 #include "runtime/loop/loop.h"
@@ -21,9 +22,9 @@ struct PlayedRun {
   const PatchSource* overlays = nullptr;
   const MotionSource* motion = nullptr;
   const DeviceLink* link = nullptr;
-  std::int64_t dropped = 0;                           ///< ticks that the recording lacks
-  std::int64_t dropped_frames = 0;                    ///< and frames
-  std::optional<std::string> recording_failure = {};  ///< why it is not whole
+  std::int64_t dropped = 0;                     ///< ticks that the recording lacks
+  std::int64_t dropped_frames = 0;              ///< and frames
+  std::optional<Error> recording_failure = {};  ///< why it is not whole
 };
 
 /// A few lines for a person, and warnings, on the error stream.

@@ -8,6 +8,7 @@
 #include "runtime/app/fitting_tool.h"
 #include "runtime/body/overlay_rings.h"
 #include "runtime/loop/monitor.h"
+#include "runtime/viewer/run_words.h"
 
 namespace palpate {
 namespace {
@@ -16,6 +17,10 @@ using Json = nlohmann::json;
 
 Json text_or_null(const std::optional<std::string>& text) {
   return text ? Json(*text) : Json();
+}
+
+Json error_or_null(const std::optional<Error>& error) {
+  return error ? error_members(*error) : Json();
 }
 
 Json vector(const Vec3& v) {
@@ -54,9 +59,9 @@ nlohmann::json to_json(const RunState& state) {
           {"misses", state.misses},
           {"paused", state.paused},
           {"recording", text_or_null(state.recording)},
-          {"recording_failed", text_or_null(state.recording_failed)},
+          {"recording_failed", error_or_null(state.recording_failed)},
           {"busy", text_or_null(state.busy)},
-          {"refused", text_or_null(state.refused)},
+          {"refused", error_or_null(state.refused)},
           {"locked", text_or_null(state.locked)},
           {"fault", fault_or_null(state.fault)},
           {"phase", name_of(safety_phase_names, static_cast<std::size_t>(state.phase))}};
@@ -76,7 +81,8 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
           {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
           {"moves", model.dynamics.method != DynamicsMethod::none},
           {"loads", has_loads(model)},
-          {"overlay_rings", overlay_rings(body)}};
+          {"overlay_rings", overlay_rings(body)},
+          {"overlay_refinement", {least_refinement, most_refinement}}};
 }
 
 nlohmann::json describe_defaults(const Body& body) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "base/error.h"
 #include "runtime/body/body.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/fault.h"
@@ -24,11 +25,11 @@ struct RunState {
   std::int64_t ticks = 0;   ///< since the act began
   std::int64_t misses = 0;  ///< of deadlines
   bool paused = false;
-  std::optional<std::string> recording;         ///< file
-  std::optional<std::string> recording_failed;  ///< why nothing is kept in it any more
-  std::optional<std::string> busy;              ///< what is being made
-  std::optional<std::string> refused;           ///< why the last wish could not be met
-  std::optional<std::string> locked;            ///< why settings cannot be changed
+  std::optional<std::string> recording;   ///< file
+  std::optional<Error> recording_failed;  ///< why nothing is kept in it any more
+  std::optional<std::string> busy;        ///< what is being made
+  std::optional<Error> refused;           ///< why the last wish could not be met
+  std::optional<std::string> locked;      ///< why settings cannot be changed
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
   SettingsText settings;

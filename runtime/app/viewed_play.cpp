@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
-#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -84,7 +83,7 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
       report = run_act(*act, stop);
       if (has_hand()) latched_ = act->fault();
     } catch (const std::exception& error) {
-      if (!good || !take_back(plan, *good, in_one_line(error))) throw;
+      if (!good || !take_back(plan, *good, as_error(error))) throw;
       continue;
     }
     const bool over = options_.duration && report.ticks >= mover_.ticks;
@@ -133,7 +132,7 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
           .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
           .pictures =
               [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); },
-          .recording_failed = [this](const std::string& reason) { take_recording_failure(reason); }});
+          .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
   act->latch(latched_);
   const std::lock_guard lock(mutex_);
   state_.settings = settled;
@@ -190,7 +189,8 @@ LoopReport ViewedPlay::run_act(Act& act, const std::atomic<bool>& stop) {
   if (stop) return report;
   const std::lock_guard lock(mutex_);  // the next one is without it
   wished_.record.clear();
-  refuse("the recording failed: " + *act.recording_failure());
+  const Error& reason = *act.recording_failure();
+  refuse(Error(std::string("the recording failed: ") + reason.what(), reason.where(), reason.hint()));
   return report;
 }
 
@@ -201,7 +201,7 @@ bool ViewedPlay::wait_for_wish(const std::atomic<bool>& stop) const {
 }
 
 /// Back to what could be met, unless that is what failed.
-bool ViewedPlay::take_back(const Plan& failed, const Plan& good, const std::string& why) {
+bool ViewedPlay::take_back(const Plan& failed, const Plan& good, const Error& why) {
   const std::lock_guard lock(mutex_);
   if (failed.text == good.text && failed.record.empty()) return false;
   wished_ = good;
@@ -339,15 +339,15 @@ void ViewedPlay::end_act() {
 }
 
 /// The page is told until its next wish.
-void ViewedPlay::refuse(const std::string& why) {
-  print_warning(why);
+void ViewedPlay::refuse(const Error& why) {
+  print_warning(in_one_line(why));
   state_.refused = why;
   changed_ = true;
   tell_.notify_all();
 }
 
 /// By the recorder's thread.
-void ViewedPlay::take_recording_failure(const std::string& reason) {
+void ViewedPlay::take_recording_failure(const Error& reason) {
   const std::lock_guard lock(mutex_);
   state_.recording_failed = reason;
   changed_ = true;

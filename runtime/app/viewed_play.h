@@ -11,6 +11,7 @@
 #include <stop_token>
 #include <string>
 
+#include "base/error.h"
 #include "runtime/app/act.h"
 #include "runtime/app/run_state.h"
 #include "runtime/viewer/viewed_run.h"
@@ -61,7 +62,7 @@ class ViewedPlay : public ViewedRun {
   LoopReport run_act(Act& act, const std::atomic<bool>& stop);
   bool wait_for_wish(const std::atomic<bool>& stop) const;
   Plan next_plan();
-  bool take_back(const Plan& failed, const Plan& good, const std::string& why);
+  bool take_back(const Plan& failed, const Plan& good, const Error& why);
 
   [[nodiscard]] bool has_hand() const noexcept { return mover_.link != nullptr; }
   void refuse_to_hand(const SettingsChange& settings) const;
@@ -69,8 +70,8 @@ class ViewedPlay : public ViewedRun {
   void check(const Settings& settings) const;
   void end_act();
   void begin_making(const char* what);
-  void refuse(const std::string& why);
-  void take_recording_failure(const std::string& reason);
+  void refuse(const Error& why);
+  void take_recording_failure(const Error& reason);
   void take_ticks(std::span<const TickNote> notes);
   void tell_states(const std::stop_token& over);
 

@@ -10,10 +10,14 @@
 
 namespace palpate {
 
-std::string in_one_line(const std::exception& error) {
+Error as_error(const std::exception& error) {
   const auto* known = dynamic_cast<const Error*>(&error);
-  if (known == nullptr) return error.what();
-  return known->where() + ": " + known->what() + " (" + known->hint() + ")";
+  return known != nullptr ? *known : Error(error.what(), "", "");
+}
+
+std::string in_one_line(const Error& error) {
+  const std::string where = error.where().empty() ? "" : error.where() + ": ";
+  return where + error.what() + (error.hint().empty() ? "" : " (" + error.hint() + ")");
 }
 
 void print_warning(std::string_view text) {

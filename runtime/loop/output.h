@@ -5,10 +5,15 @@
 #include <string>
 #include <string_view>
 
+#include "base/error.h"
+
 namespace palpate {
 
-/// `WHERE: WHAT (HINT)` of an Error; of another exception what it says.
-std::string in_one_line(const std::exception& error);
+/// `error` itself where it is an Error, else what it says without a place and a hint.
+Error as_error(const std::exception& error);
+
+/// `WHERE: WHAT (HINT)`, without the parts that are empty.
+std::string in_one_line(const Error& error);
 
 /// `warning: TEXT` on the error stream, in one piece and over a line that is being renewed there.
 void print_warning(std::string_view text);

@@ -105,13 +105,13 @@ void Recorder::write() noexcept {
     writer_.checkpoint();
   } catch (const std::exception& error) {
     failure_ = std::current_exception();
-    fail(in_one_line(error));
+    fail(error);
   }
 }
 
-void Recorder::fail(const std::string& reason) noexcept {
+void Recorder::fail(const std::exception& reason) noexcept {
   failed_ = true;
-  if (on_failure_) on_failure_(reason);
+  if (on_failure_) on_failure_(as_error(reason));
 }
 
 }  // namespace palpate

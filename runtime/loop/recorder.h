@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "base/error.h"
 #include "base/ring.h"
 #include "formats/recording.h"
 
@@ -21,7 +22,7 @@ namespace palpate {
 class Recorder {
  public:
   /// Takes the reason why nothing is kept any more; called once at most, by the recorder's thread.
-  using OnFailure = std::function<void(const std::string& reason)>;
+  using OnFailure = std::function<void(const Error& reason)>;
 
   /// Starts writing to `path`, in the place of what was there. Throws Error when it cannot be made.
   Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface = {},
@@ -54,7 +55,7 @@ class Recorder {
   bool try_push(const TickRecord& tick) noexcept;
   bool try_push(SurfaceFrame& frame) noexcept;
   void write() noexcept;
-  void fail(const std::string& reason) noexcept;
+  void fail(const std::exception& reason) noexcept;
   std::size_t take_all();
 
   std::filesystem::path path_;

@@ -40,17 +40,11 @@ Part split_part(std::string_view part) {
 
 // What each kind of setting is written as, and read from.
 
-std::string text_of(double value) {
+std::string text_of(const auto& value) {
   return fmt::format("{}", value);
-}
-std::string text_of(std::signed_integral auto value) {
-  return std::to_string(value);
 }
 std::string text_of(std::size_t bytes) {
   return std::to_string(bytes >> 20);
-}
-std::string text_of(const std::string& value) {
-  return value;
 }
 std::string text_of(const Tool& tool) {
   if (tool.length > 0.0) return fmt::format("capsule:{},{}", tool.radius, tool.length);

@@ -177,8 +177,8 @@ void PageServer::hand_over(PageConnection& page, bool take) {
     controller_ = &page;
     show_state_anew();
   } else if (controller_ != &page) {
-    page.say(error_word("control", PageRefusal::control, "another page has control",
-                        "ask for it when that page has given it up"));
+    page.say(error_word("control", PageError(PageRefusal::control, "another page has control", "",
+                                             "ask for it when that page has given it up")));
   }
 }
 
@@ -186,8 +186,9 @@ void PageServer::obey(PageConnection& page, const PageWord& word) {
   if (const auto* control = std::get_if<ControlWord>(&word)) return hand_over(page, control->take);
   const char* name = name_of(word);
   if (controller_ != &page) {
-    page.say(error_word(name, PageRefusal::control, "this page only watches",
-                        controller_ == nullptr ? "take control first" : "another page has control"));
+    page.say(error_word(
+        name, PageError(PageRefusal::control, "this page only watches", "",
+                        controller_ == nullptr ? "take control first" : "another page has control")));
     return;
   }
   try {
@@ -195,7 +196,7 @@ void PageServer::obey(PageConnection& page, const PageWord& word) {
   } catch (const Error& error) {
     page.say(error_word(name, error));
   } catch (const std::exception& error) {  // no memory, say: the run goes on
-    page.say(error_word(name, PageRefusal::value, error.what(), ""));
+    page.say(error_word(name, Error(error.what(), "", "")));
   }
 }
 

@@ -18,20 +18,18 @@ std::string hello_word(const char* mode, std::uint64_t page) {
       Json{{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", mode}, {"id", page}});
 }
 
-std::string error_word(const std::string& about, PageRefusal reason, const std::string& message,
-                       const std::string& hint) {
-  return json_text(Json{{"type", "error"},
-                        {"about", about},
-                        {"reason", page_refusal_names[static_cast<std::size_t>(reason)].second},
-                        {"message", message},
-                        {"hint", hint}});
+Json error_members(const Error& error) {
+  return {{"what", error.what()}, {"where", error.where()}, {"hint", error.hint()}};
 }
 
 std::string error_word(const std::string& about, const Error& error) {
-  const std::string where = error.where().empty() ? "" : error.where() + ": ";
   const auto* typed = dynamic_cast<const PageError*>(&error);
-  return error_word(about, typed != nullptr ? typed->reason() : PageRefusal::value, where + error.what(),
-                    error.hint());
+  const PageRefusal reason = typed != nullptr ? typed->reason() : PageRefusal::value;
+  Json word = error_members(error);
+  word["type"] = "error";
+  word["about"] = about;
+  word["reason"] = page_refusal_names[static_cast<std::size_t>(reason)].second;
+  return json_text(word);
 }
 
 StateWord::StateWord(const std::string& json) : members_(Json::parse(json, nullptr, false)) {

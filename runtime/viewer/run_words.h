@@ -19,10 +19,11 @@ struct PageRole {
 /// The first message of all. `mode`: live, replay or file.
 std::string hello_word(const char* mode, std::uint64_t page);
 
-/// `about`: the word of the page that could not be.
-std::string error_word(const std::string& about, PageRefusal reason, const std::string& message,
-                       const std::string& hint);
-/// The message of an Error, with its kind where it is a PageError.
+/// What is wrong, where, and what to do about it: the members `what`, `where` and `hint`.
+nlohmann::json error_members(const Error& error);
+
+/// The message of an Error, with its kind where it is a PageError. `about`: the word of the page that could
+/// not be.
 std::string error_word(const std::string& about, const Error& error);
 
 /// Ticks a second where a run does not say.

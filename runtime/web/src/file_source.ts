@@ -31,7 +31,8 @@ export class FileSource implements Source {
   ) {
     this.load(base64).catch((error: unknown) => {
       listener_.connected(false, 'the session in this page cannot be read');
-      listener_.said({ type: 'error', message: `The session in this page cannot be read: ${String(error)}`, hint: 'Export it again' });
+      const what = `The session in this page cannot be read: ${String(error)}`;
+      listener_.said({ type: 'error', about: 'session', what, where: '', hint: 'Export it again' });
     });
   }
 

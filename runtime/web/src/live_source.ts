@@ -67,7 +67,7 @@ export class LiveSource implements Source {
       if (picture?.kind === 'scene') this.scene_ = picture;
       if (picture) this.listener_.pictured(picture);
     } catch (error) {
-      this.listener_.said({ type: 'error', about: 'message', message: String(error) });
+      this.listener_.said({ type: 'error', about: 'message', what: String(error), where: '', hint: '' });
     }
   }
 }

@@ -14,6 +14,7 @@ import { show_felt, show_timing, type Felt } from './numbers';
 import { Plots } from './plots';
 import { Hand, pointer_modes, type HandSettings, type PointerMode } from './pointer';
 import { parse_tool } from './pose';
+import { headline, is_news, sentences } from './problem';
 import { ReplayBar } from './replay_bar';
 import { metres, RunControls, typed_number } from './run_controls';
 import { compose } from './screenshot';
@@ -29,8 +30,6 @@ const plot_wait = 50; // [ms] between drawings of the plots
 const numbers_wait = 100;
 const timing_wait = 500;
 const kept_patches = 4;
-
-const sentence = (hint: string): string => `${hint.charAt(0).toUpperCase()}${hint.slice(1)}.`;
 
 class Page implements Listener {
   private mode_: Mode = 'live';
@@ -112,10 +111,10 @@ class Page implements Listener {
       write(part('version'), message.version);
     } else if (message.type === 'error') {
       if (message.about === 'change') {
-        this.run_.show_refused(message.hint ? `${message.message}. ${sentence(message.hint)}` : message.message);
+        this.run_.show_refused(sentences(message));
         if (this.state_?.model) this.run_.show(this.state_, this.mode_); // what was typed is not what is
       } else {
-        toast(message.message, message.hint);
+        toast(headline(message), message.hint);
       }
     } else {
       this.take_state({ ...this.state_, ...message } as State);
@@ -153,14 +152,13 @@ class Page implements Listener {
   }
 
   private take_state(state: State): void {
-    if (state.refused && state.refused !== this.state_?.refused) {
-      const [, what = state.refused, hint = ''] = /^(.*) \((.*)\)$/.exec(state.refused) ?? [];
-      toast(what, hint);
-      this.run_.show_refused(hint ? `${what}. ${sentence(hint)}` : what);
+    if (is_news(state.refused, this.state_?.refused)) {
+      toast(headline(state.refused), state.refused.hint);
+      this.run_.show_refused(sentences(state.refused));
     }
-    if (state.recording_failed && state.recording_failed !== this.state_?.recording_failed) {
-      const [, what = state.recording_failed, hint = ''] = /^(.*) \((.*)\)$/.exec(state.recording_failed) ?? [];
-      toast(`The recording failed, and the run goes on without it: ${what}`, hint);
+    if (is_news(state.recording_failed, this.state_?.recording_failed)) {
+      const { hint } = state.recording_failed;
+      toast(`The recording failed, and the run goes on without it: ${headline(state.recording_failed)}`, hint);
     }
     const recorded = this.state_?.recording;
     if (recorded && !state.recording && state.model && !state.refused) toast(`Recorded ${recorded}`, `palpate-runtime view ${recorded}`, 'note');

@@ -2,6 +2,7 @@
 import { button, input, part, select, show_value, write } from './dom';
 import { format_number } from './format';
 import { parse_tool, tool_text } from './pose';
+import { sentences } from './problem';
 import type { Mode, State, Word } from './words';
 
 /** A number as typed, with a point or a comma; null where it is none or below `least`. */
@@ -14,7 +15,9 @@ export function typed_number(text: string, least: number): number | null {
 export const metres = (millimetres: number): number => Number((millimetres / 1000).toPrecision(9));
 const millimetres = (value: number): string => String(Number((value * 1000).toPrecision(6)));
 
-const most_rings = 4; // that the page offers: with more it would wait for minutes
+// The most that the page offers: with more it would wait for minutes.
+const most_rings = 4;
+const most_refinement = 6;
 
 export class RunControls {
   private state_: State | null = null;
@@ -91,7 +94,7 @@ export class RunControls {
     button('record').classList.toggle('failed', Boolean(failed));
     write(part('record-label'), failed ? 'Recording failed' : state.recording ? state.recording.split('/').at(-1)! : 'Record');
     button('record').title = failed
-      ? `${failed}\nWhat was kept is in ${state.recording}. Press to go on without.`
+      ? `${sentences(failed)}\nWhat was kept is in ${state.recording}. Press to go on without.`
       : state.recording
       ? `Finish ${state.recording}`
       : 'Begin anew from the untouched body, and write every tick to a file';
@@ -115,6 +118,11 @@ export class RunControls {
     select('contact').disabled = !model.moves;
     select('contact').title = model.moves ? 'Dynamic: the body swings' : 'This model has no dynamics: the body cannot swing';
     this.show_overlay_limits(model.overlay_rings ?? most_rings);
+    if (model.overlay_refinement) {
+      const [least, most] = model.overlay_refinement;
+      input('overlay-r').min = String(least);
+      input('overlay-r').max = String(Math.min(most, most_refinement));
+    }
     input('overlay').checked = settings.overlay !== undefined;
     const overlay = /^(?:r=(\d+))?,?(?:rings=(\d+))?/.exec(settings.overlay ?? '');
     if (overlay?.[1]) show_value(input('overlay-r'), overlay[1]);

@@ -26,6 +26,7 @@ export interface Model {
   moves: boolean;
   loads: boolean;
   overlay_rings?: number; // the most that an overlay may have; 0: none may be
+  overlay_refinement?: [number, number]; // least and most
 }
 
 /** How the run is. What a message leaves out is as it was. */
@@ -42,9 +43,9 @@ export interface State {
   ticks: number;
   paused: boolean;
   recording: string | null;
-  recording_failed: string | null;
+  recording_failed: Problem | null;
   busy: string | null;
-  refused: string | null;
+  refused: Problem | null;
   locked: string | null;
   fault: { name: string; remedy: string } | null;
   phase: string;
@@ -57,15 +58,17 @@ export interface State {
   times?: number[];
 }
 
+/** What cannot be done, its place (an option, a file), and a way out; the last two may be empty. */
 export interface Problem {
-  type: 'error';
-  about?: string;
-  reason?: 'value' | 'control' | 'hand' | 'locked';
-  message: string;
-  hint?: string;
+  what: string;
+  where: string;
+  hint: string;
 }
 
-export type Said = Hello | (Partial<State> & { type: 'state' }) | Problem;
+/** The problem of a message that this page sent, or cannot read; the runtime gives the reason. */
+export type Refusal = Problem & { type: 'error'; about: string; reason?: 'value' | 'control' | 'hand' | 'locked' };
+
+export type Said = Hello | (Partial<State> & { type: 'state' }) | Refusal;
 
 /** Where the tool is wanted. */
 export interface Point {

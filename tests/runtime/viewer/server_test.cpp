@@ -317,7 +317,8 @@ TEST_F(Viewer, TellsThePageWhatCannotBe) {
   EXPECT_EQ(page.hear("error"), (Json{{"type", "error"},
                                       {"about", "change"},
                                       {"reason", "value"},
-                                      {"message", "--friction: friction is -1"},
+                                      {"what", "friction is -1"},
+                                      {"where", "--friction"},
                                       {"hint", "give a positive one"}}));
   page.say(R"({"type":"change","settings":{"safety":"max_force=9"}})");
   EXPECT_EQ(page.hear("error").at("reason"), "hand");

@@ -127,16 +127,16 @@ TEST(RunWords, HelloAndErrors) {
       hello,
       (Json{{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", "live"}, {"id", 7}}));
   EXPECT_EQ(Json::parse(hello_word("replay", 1)).at("mode"), "replay");
-  EXPECT_EQ(Json::parse(error_word("change", Error("what", "where", "hint"))),
-            (Json{{"type", "error"},
-                  {"about", "change"},
-                  {"reason", "value"},
-                  {"message", "where: what"},
-                  {"hint", "hint"}}));
+  EXPECT_EQ(Json::parse(error_word("change", Error("what", "where", "hint"))), (Json{{"type", "error"},
+                                                                                     {"about", "change"},
+                                                                                     {"reason", "value"},
+                                                                                     {"what", "what"},
+                                                                                     {"where", "where"},
+                                                                                     {"hint", "hint"}}));
   EXPECT_EQ(
       Json::parse(error_word("change", PageError(PageRefusal::hand, "what", "where", "hint"))).at("reason"),
       "hand");
-  EXPECT_EQ(Json::parse(error_word("change", PageRefusal::value, "a file \xff", "")).at("message"),
+  EXPECT_EQ(Json::parse(error_word("change", Error("a file \xff", "", ""))).at("what"),
             "a file \xef\xbf\xbd");
 }
 
