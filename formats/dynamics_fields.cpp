@@ -92,10 +92,11 @@ void check_modes(const Model& model, const std::string& where) {
   }
   for (std::int64_t dof = 0; dof < n; ++dof) {
     if (!is_held(model, dof)) continue;
-    for (std::int64_t i = 0; i < modes; ++i)
+    for (std::int64_t i = 0; i < modes; ++i) {
       if (dynamics.shapes[static_cast<std::size_t>(i * n + dof)] != 0.0)
         refuse(where, "/dynamics/modes/shapes: mode " + std::to_string(i) + " moves dof " +
                           std::to_string(dof) + ", which is held");
+    }
   }
 }
 

@@ -203,10 +203,11 @@ std::int64_t File::write(const std::string& dataset, const ElementType& type,
 }
 
 void File::write_attribute(const std::string& object, const std::string& name, const std::string& text) {
-  if (text.size() > longest_text)
+  if (text.size() > longest_text) {
     throw Error(name + " is " + std::to_string(text.size()) + " bytes long, at most " +
                     std::to_string(longest_text) + " fit",
                 path_.string(), "Use a shorter text");
+  }
   const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);
   const Id type = text_type(text.size(), is_ascii(text) ? H5T_CSET_ASCII : H5T_CSET_UTF8);
   const Id space(H5Screate(H5S_SCALAR), H5Sclose);

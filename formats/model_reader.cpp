@@ -39,11 +39,12 @@ std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
   if (format != "palpate") throw Error("is an HDF5 file, but not a Palpate file", where, give_a_model);
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version) refuse(where, "the attribute version is missing");
-  if ((*version)[0] != format_major)
+  if ((*version)[0] != format_major) {
     throw Error("the file has format version " + std::to_string((*version)[0]) + "." +
                     std::to_string((*version)[1]) + ", this program reads version " +
                     std::to_string(format_major) + ".x",
                 where, "Precompute it again with this program's palpate-precompute");
+  }
   if ((*version)[1] < 0) refuse(where, "the attribute version is negative");
   return *version;
 }
@@ -135,11 +136,12 @@ void Reader::read_field(const Field<T>& field) {
   if (field.put == nullptr) {
     const std::vector<T> expected = field.take(model_);
     const auto differs = std::mismatch(values.begin(), values.end(), expected.begin()).first - values.begin();
-    if (static_cast<std::size_t>(differs) < values.size())
+    if (static_cast<std::size_t>(differs) < values.size()) {
       refuse(where_, std::string(field.path) + " holds " +
                          std::to_string(values[static_cast<std::size_t>(differs)]) + " (entry " +
                          std::to_string(differs) + "), " +
                          std::to_string(expected[static_cast<std::size_t>(differs)]) + " is expected");
+    }
     return;
   }
   try {

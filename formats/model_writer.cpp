@@ -308,11 +308,12 @@ void ModelWriter::Impl::store(std::size_t matrix, std::int64_t first, std::int64
     converted.assign(part.begin(), part.end());
     for (T& value : converted)
       if (std::abs(value) < std::numeric_limits<T>::min()) value = T{0};
-    if (!std::all_of(converted.begin(), converted.end(), [](T value) { return std::isfinite(value); }))
+    if (!std::all_of(converted.begin(), converted.end(), [](T value) { return std::isfinite(value); })) {
       throw Error(std::string("columns ") + std::to_string(first) + " to " +
                       std::to_string(first + count - 1) + " of " + matrices[matrix].name +
                       " hold a value that is not finite in the stored precision",
                   path.string(), "Check the material and the mesh's quality, or store in double precision");
+    }
     stored.update(bytes_of(converted));
     write_exactly(data, bytes_of(converted), at);
     at += static_cast<std::int64_t>(bytes_of(converted).size());
@@ -340,10 +341,11 @@ void ModelWriter::Impl::seal(const std::vector<Probe>& probes) {
   extra.mesh.element = element;
   extra.probes = probes;
   counts.set(Count::probes, static_cast<std::int64_t>(probes.size()), "/probes/forces");
-  for (const Probe& probe : probes)
+  for (const Probe& probe : probes) {
     if (static_cast<std::int64_t>(probe.force.size()) != order ||
         probe.displacement.size() != probe.force.size())
       refuse(path.string(), "/probes/forces: a probe does not have " + std::to_string(order) + " values");
+  }
 
   std::vector<std::string> checksums;
   for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
@@ -393,11 +395,12 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
   const std::int64_t n = impl_->order;
   const auto which = static_cast<std::size_t>(matrix);
   if (which >= impl_->matrices.size() || first < 0 || count < 0 || first > n || count > n - first ||
-      static_cast<std::int64_t>(packed.size()) != packed_column(first + count, n) - packed_column(first, n))
+      static_cast<std::int64_t>(packed.size()) != packed_column(first + count, n) - packed_column(first, n)) {
     throw Error("columns " + std::to_string(first) + " to " + std::to_string(first + count - 1) + " with " +
                     std::to_string(packed.size()) + " entries do not fit a matrix of order " +
                     std::to_string(n),
                 impl_->path.string(), "This is a mistake in the program; please report it");
+  }
   try {
     if (const SmoothPart* smooth = impl_->matrices[which].smooth.get(); smooth != nullptr)
       impl_->store<float>(which, first, count, without(*smooth, first, n, packed));
@@ -414,10 +417,11 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
 void ModelWriter::finish(const std::vector<Probe>& probes) {
   for (const Streamed& matrix : impl_->matrices) {
     const auto missing = std::find(matrix.done.begin(), matrix.done.end(), false);
-    if (missing != matrix.done.end())
+    if (missing != matrix.done.end()) {
       throw Error("column " + std::to_string(missing - matrix.done.begin()) + " of " + matrix.name +
                       " was not written",
                   impl_->path.string(), "This is a mistake in the program; please report it");
+    }
   }
   try {
     impl_->seal(probes);

@@ -20,11 +20,12 @@ void for_each_smooth_field(const Model& model, Visitor&& visit) {
                       {stored_dofs, terms},
                       [](const Model& m) { return m.greens.smooth()->rows; },
                       put_greens_smooth});
-  if (model.dynamics.method == DynamicsMethod::packed)
+  if (model.dynamics.method == DynamicsMethod::packed) {
     visit(Field<double>{"/dynamics/smooth",
                         {stored_dofs, terms},
                         [](const Model& m) { return m.dynamics.inverse.smooth()->rows; },
                         put_inverse_smooth});
+  }
 }
 
 /// What was measured of Xi; not in files before format 3.3.

@@ -70,10 +70,11 @@ std::vector<T> read_some(const RecordingFiles& recording, const char* name, std:
     found += std::max(end - begin, std::int64_t{0});
     before += here;
   }
-  if (first < 0 || found != frames)
+  if (first < 0 || found != frames) {
     throw Error("has " + std::to_string(before) + " frames, not " + std::to_string(frames) + " from number " +
                     std::to_string(first) + " on",
                 recording.files.front().path().string(), "Ask for frames that are there");
+  }
   return values;
 }
 
@@ -101,10 +102,11 @@ void check_surface(const RecordedSurface& surface, const Checker& check) {
     for (const double x : surface.nodes[i])
       check.expect(std::isfinite(x), "/surface/nodes", i, x, "a finite number");
   const auto nodes = std::ssize(surface.nodes);
-  for (std::size_t i = 0; i < surface.simplices.size(); ++i)
+  for (std::size_t i = 0; i < surface.simplices.size(); ++i) {
     check.expect(surface.simplices[i] >= 0 && surface.simplices[i] < nodes, "/surface/simplices",
                  i / static_cast<std::size_t>(surface.corners), surface.simplices[i],
                  "a node of the surface");
+  }
   for (std::size_t i = 0; i < surface.held.size(); ++i)
     check.expect(surface.held[i] < 8, "/surface/held", i, int{surface.held[i]}, "a set of axes");
 }

@@ -219,10 +219,11 @@ std::vector<StoredRows> locate_fields(const hdf5::Contents& file, std::span<cons
     if (field.of_frame != of_frame) continue;
     auto [stored, here] = locate_rows(file, field, has_checksums);
     if (first == nullptr) rows = here;
-    if (here != rows)
+    if (here != rows) {
       throw Error(std::string(field.name) + " has " + std::to_string(here) + " rows, " + first->name +
                       " has " + std::to_string(rows),
                   file.path().string(), altered_hint);
+    }
     if (first == nullptr) first = &field;
     located.push_back(std::move(stored));
   }

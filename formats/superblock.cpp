@@ -36,10 +36,11 @@ void check_superblock(const FileDescriptor& file, const ExpectedFile& expected) 
   if (std::memcmp(superblock.data(), start.data(), start.size()) != 0)
     throw Error("is an HDF5 file, but not " + expected.what, where, expected.give);
   const std::uint64_t end = little_endian(std::span(superblock).subspan(end_at, 8));
-  if (end > static_cast<std::uint64_t>(size))
+  if (end > static_cast<std::uint64_t>(size)) {
     throw Error(
         "the file is truncated: it has " + std::to_string(size) + " of " + std::to_string(end) + " bytes",
         where, expected.again);
+  }
 }
 
 }  // namespace palpate

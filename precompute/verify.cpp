@@ -212,11 +212,13 @@ VerifyReport verify(const Model& model, const std::filesystem::path& file, int s
   add({check_residual(model, stiffness, stored_dofs, bounds.residual, samples),
        check_rest_state(model, stiffness)});
   if (model.dynamics.method != DynamicsMethod::none) add(verify_dynamics(model, stiffness, samples));
-  for (const Check& check : report.checks)
-    if (check.name.ends_with("touches") && check.error > good_force_error)
+  for (const Check& check : report.checks) {
+    if (check.name.ends_with("touches") && check.error > good_force_error) {
       report.warnings.push_back(
           fmt::format("{}: contact forces of neighbouring nodes are wrong by up to {:.1e} of the largest",
                       check.name, check.error));
+    }
+  }
   report.differences = description_differences(model, file);
   report.stale = stale_sources(model, file);
   return report;

@@ -36,11 +36,13 @@ using Point = Kernel::Point_2;
 template <typename Base = CGAL::Delaunay_mesh_vertex_base_2<Kernel>>
 class NumberedVertex : public Base {
  public:
+  // NOLINTBEGIN(readability-identifier-naming): CGAL's names
   using Has_timestamp = CGAL::Tag_true;
   template <typename DataStructure>
   struct Rebind_TDS {
     using Other = NumberedVertex<typename Base::template Rebind_TDS<DataStructure>::Other>;
   };
+  // NOLINTEND(readability-identifier-naming)
   using Base::Base;
 
   [[nodiscard]] std::size_t time_stamp() const { return number_; }
@@ -117,7 +119,7 @@ class Criteria {
     }
   };
 
-  class Is_bad {
+  class Is_bad {  // NOLINT(readability-identifier-naming): CGAL's name
    public:
     explicit Is_bad(const EdgeTarget& target) : target_(target) {}
 

@@ -69,13 +69,14 @@ DynamicsPlan plan_dynamics(const DynamicsOptions& options, Scope scope, std::int
   if (plan.modes > free)
     throw Error(fmt::format("[dynamics] modes is {}, but the body has only {} free dofs", plan.modes, free),
                 options.place, fmt::format("use at most {}", free));
-  if (dense_modes(plan.modes, free) && free > most_dense_dofs)
+  if (dense_modes(plan.modes, free) && free > most_dense_dofs) {
     throw Error(fmt::format("[dynamics] modes is {}, more than a third of {} free dofs: that takes a dense "
                             "matrix of all of them",
                             plan.modes, free),
                 options.place,
                 fmt::format("use at most {}, or mesh the body with at most {} free dofs", free / 3 - 1,
                             most_dense_dofs));
+  }
   plan.reason = options.method ? "as told" : full ? numbers : "the scope is not full";
   plan.file_bytes = plan.modes * stored_dofs * scalar;
   plan.memory_bytes = matrices + modes_bytes(plan.modes, free) + 2 * plan.file_bytes;

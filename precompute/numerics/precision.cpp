@@ -138,10 +138,11 @@ void solve_place(const Factor& factor, const SparseMatrix& K, std::span<const st
     }
   }
   // As a packed matrix: an entry and its mirror image are one number, from the column that comes first.
-  for (Eigen::Index i = 0; i < size; ++i)
+  for (Eigen::Index i = 0; i < size; ++i) {
     for (Eigen::Index j = 0; j < size; ++j)
       if (place.dofs[static_cast<std::size_t>(j)] < place.dofs[static_cast<std::size_t>(i)])
         place.plain(j, i) = place.plain(i, j);
+  }
   place.reference = ((place.reference + place.reference.transpose()) / 2.0L).eval();
 }
 

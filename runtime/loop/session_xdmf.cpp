@@ -76,11 +76,12 @@ void write_xdmf(const std::filesystem::path& recording, const RecordedFrames& fr
   const std::string kind =
       d == 3 ? R"(TopologyType="Triangle")" : R"(TopologyType="Polyline" NodesPerElement="2")";
   std::string scalars;
-  for (const Scalar& scalar : scalars_of(frames))
+  for (const Scalar& scalar : scalars_of(frames)) {
     scalars += fmt::format(
         "<!ENTITY {} '<DataItem Dimensions=\"{} {}\" NumberType=\"Float\" Precision=\"4\" "
         "Format=\"HDF\">{}:/frames/{}</DataItem>'>\n",
         scalar.entity, F, S, file, scalar.dataset);
+  }
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n<!-- palpate " PALPATE_VERSION
       " -->\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [\n"

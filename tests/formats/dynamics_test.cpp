@@ -45,10 +45,11 @@ TEST(DynamicsFile, WhatIsWrittenIsRead) {
         ASSERT_EQ(inverse.order(), n);
         ASSERT_EQ(inverse.precision(), precision);
         const std::vector<double> expected = sample_inverse_columns(0, n, n);
-        for (std::int64_t j = 0; j < n; ++j)
+        for (std::int64_t j = 0; j < n; ++j) {
           for (std::int64_t i = j; i < n; ++i)
             EXPECT_NEAR(inverse(i, j), expected[static_cast<std::size_t>(packed_index(i, j, n))],
                         precision == Precision::single_precision ? 1e-10 : 0.0);
+        }
       }
     }
   }

@@ -62,13 +62,14 @@ TEST_P(BothPrecisions, WhatIsWrittenIsRead) {
   EXPECT_EQ(read.content_hash.size(), 32U);
   ASSERT_EQ(read.greens.order(), written.stored_dofs());
   ASSERT_EQ(read.greens.precision(), GetParam());
-  for (std::int64_t i = 0; i < read.greens.order(); ++i)
+  for (std::int64_t i = 0; i < read.greens.order(); ++i) {
     for (std::int64_t j = 0; j < read.greens.order(); ++j) {
       const double exact = i >= j ? sample_entry(i, j) : sample_entry(j, i);
       const double stored =
           GetParam() == Precision::single_precision ? static_cast<double>(static_cast<float>(exact)) : exact;
       ASSERT_EQ(read.greens(i, j), stored) << i << ", " << j;
     }
+  }
   EXPECT_EQ(files_in(folder), Names{"a.palpate.hdf"});
 }
 

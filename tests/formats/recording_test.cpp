@@ -577,10 +577,11 @@ TEST(Recording, OfVersion41IsReadWithoutChecksumsAndFinishedWithThem) {
     append(killed, some_ticks(30), 10);
   }
   set_integers(folder / "a.h5", "version", {4, 1});
-  for (const auto& part : std::filesystem::directory_iterator(folder / "a.h5.parts"))
+  for (const auto& part : std::filesystem::directory_iterator(folder / "a.h5.parts")) {
     if (part.path().extension() == ".h5")
       for (const std::string& dataset : checked_datasets(part.path()))
         remove_attribute(part.path(), dataset, "xxh3");
+  }
   expect_ticks(read_recording(folder / "a.h5"), 30);
   EXPECT_TRUE(finish_recording(folder / "a.h5"));
   expect_ticks(read_recording(folder / "a.h5"), 30);
@@ -616,11 +617,12 @@ TEST(Recording, BadPathsAndOtherFilesAreRefused) {
             }).find("has 3 frames"),
             std::string::npos);
   EXPECT_EQ(RecordingFile(folder / "a.h5").displacement(1, 2)[0], 100.0F);
-  for (const std::int64_t number : {-1, 3})
+  for (const std::int64_t number : {-1, 3}) {
     EXPECT_NE(refusal([&] {
                 static_cast<void>(RecordingFile(folder / "a.h5").frame(number));
               }).find("has 3 frames"),
               std::string::npos);
+  }
 }
 
 /// Records as fast as it goes, and says after each checkpoint how many ticks there are.

@@ -84,10 +84,11 @@ class Reactions {
   [[nodiscard]] Eigen::VectorXd operator()(const std::vector<Index>& stored, const Eigen::VectorXd& u) const {
     std::vector<std::int64_t> number(static_cast<std::size_t>(K_.rows()), 0);
     std::vector<std::int64_t> held;
-    for (const Index k : stored)
+    for (const Index k : stored) {
       for (int axis = 0; axis < 3; ++axis)
         held.push_back(stiffness_.free_of_dof[static_cast<std::size_t>(
             3 * std::int64_t{model_.stored_nodes[static_cast<std::size_t>(k)]} + axis)]);
+    }
     for (const std::int64_t dof : held) number[static_cast<std::size_t>(dof)] = -1;
     std::int64_t rest = 0;
     for (std::int64_t& i : number) i = i < 0 ? -1 : rest++;

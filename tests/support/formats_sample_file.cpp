@@ -36,13 +36,14 @@ int main(int count, char** arguments) {
                                                       .contacts = i % 5,
                                                       .stiffness = {1, 2, 3, 4, 5, x},
                                                       .grab = 1}});
-      if (i % 500 == 0)
+      if (i % 500 == 0) {
         recording.append(
             palpate::SurfaceFrame{.tick = i,
                                   .time = 1e-3 * x,
                                   .displacement = {0, 0, static_cast<float>(i), 1, 2, 3, 4, 5, 6},
                                   .von_mises = {NAN, 1, static_cast<float>(i)},
                                   .pressure = {0, static_cast<float>(-i), 2}});
+      }
     }
     recording.finish();
   } catch (const palpate::Error& error) {

@@ -185,12 +185,13 @@ void reseal(const std::filesystem::path& path) {
         H5Aopen_by_idx(root.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     std::string name(200, '\0');
     name.resize(static_cast<std::size_t>(H5Aget_name(attribute.get(), name.size(), name.data())));
-    if (name != "content_hash")
+    if (name != "content_hash") {
       lines.push_back(std::string("attribute ")
                           .append(name)
                           .append(" ")
                           .append(attribute_text(attribute.get()))
                           .append("\n"));
+    }
   }
   std::sort(lines.begin(), lines.end());
   std::string text;

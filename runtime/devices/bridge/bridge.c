@@ -137,16 +137,20 @@ static void stop(int number) {
   stopped = 1;
 }
 
-int main(int argc, char** argv) {
-  struct sockaddr_in runtime = {.sin_family = AF_INET, .sin_port = htons(4270)};
-  double rate = 1000.0, seconds = 10.0;
-  const char* key_file = NULL;
-  int bad = argc % 2 == 0 || inet_pton(AF_INET, "127.0.0.1", &runtime.sin_addr) != 1;
+struct options {
+  struct sockaddr_in runtime;
+  double rate, seconds;
+  const char* key_file;
+};
+
+/* 0 where they cannot be understood. */
+static int read_options(int argc, char** argv, struct options* options) {
+  int bad = argc % 2 == 0 || inet_pton(AF_INET, "127.0.0.1", &options->runtime.sin_addr) != 1;
   for (int k = 1; k + 1 < argc; k += 2) {
     const char *option = argv[k], *value = argv[k + 1];
     double* place = strcmp(option, "--from") == 0 ? from : strcmp(option, "--to") == 0 ? to : NULL;
-    double* number = strcmp(option, "--rate") == 0      ? &rate
-                     : strcmp(option, "--seconds") == 0 ? &seconds
+    double* number = strcmp(option, "--rate") == 0      ? &options->rate
+                     : strcmp(option, "--seconds") == 0 ? &options->seconds
                      : strcmp(option, "--period") == 0  ? &period
                                                         : NULL;
     has_to |= place == to;
@@ -155,17 +159,23 @@ int main(int argc, char** argv) {
     else if (number != NULL)
       *number = atof(value);
     else if (strcmp(option, "--key") == 0)
-      key_file = value;
+      options->key_file = value;
     else if (strcmp(option, "--address") == 0)
-      bad |= inet_pton(AF_INET, value, &runtime.sin_addr) != 1;
+      bad |= inet_pton(AF_INET, value, &options->runtime.sin_addr) != 1;
     else if (strcmp(option, "--port") == 0)
-      runtime.sin_port = htons((uint16_t)atoi(value));
+      options->runtime.sin_port = htons((uint16_t)atoi(value));
     else
       bad = 1;
   }
-  if (bad || !(rate > 0.0)) return fputs("usage: see the top of bridge.c\n", stderr), 2;
+  return !bad && options->rate > 0.0;
+}
+
+int main(int argc, char** argv) {
+  struct options options = {
+      .runtime = {.sin_family = AF_INET, .sin_port = htons(4270)}, .rate = 1000.0, .seconds = 10.0};
+  if (!read_options(argc, argv, &options)) return fputs("usage: see the top of bridge.c\n", stderr), 2;
   wire = socket(AF_INET, SOCK_DGRAM, 0);
-  if (wire < 0 || connect(wire, (const struct sockaddr*)&runtime, sizeof runtime) != 0)
+  if (wire < 0 || connect(wire, (const struct sockaddr*)&options.runtime, sizeof options.runtime) != 0)
     return perror("bridge"), 1;
   if (device_open() != 0) return fputs("bridge: there is no device\n", stderr), 1;
   signal(SIGINT, stop);
@@ -174,18 +184,18 @@ int main(int argc, char** argv) {
   const double start = seconds_now();
   double now = start, due = start, said = start, asked = 0.0, largest = 0.0, late = 0.0, latest = 0.0;
   unsigned long cycles = 0;
-  while (!stopped && now - start < seconds) {
+  while (!stopped && now - start < options.seconds) {
     struct bridge_reading reading;
     double force[3];
     if (now - fmax(arrived, asked) >
         0.2) { /* nobody speaks to us: perhaps a runtime with another key has begun */
-      read_key(key_file, ntohs(runtime.sin_port), session.key);
+      read_key(options.key_file, ntohs(options.runtime.sin_port), session.key);
       asked = now;
     }
     bridge_cycle(&reading, force);
     largest = fmax(largest, sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]));
     ++cycles;
-    due = fmax(due + 1.0 / rate, seconds_now()); /* what is missed is not made good in a burst */
+    due = fmax(due + 1.0 / options.rate, seconds_now()); /* what is missed is not made good in a burst */
     const struct timespec wake = {(time_t)due, (long)(1e9 * (due - floor(due)))};
     clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, NULL);
     now = seconds_now();
@@ -203,7 +213,7 @@ int main(int argc, char** argv) {
     printf(
         "no runtime answered: is one there (palpate-runtime play MODEL --device bridge), of the same user, "
         "on port %u?\n",
-        (unsigned)ntohs(runtime.sin_port));
+        (unsigned)ntohs(options.runtime.sin_port));
   else if (!(largest > 0.0))
     printf("no force was ever felt: the tool did not touch the body, or the runtime holds a fault\n");
   printf("rate %.1f Hz, largest force %.3f N, late by %.1f us (mean), %.1f us (most), %lu commands\n",

@@ -25,10 +25,9 @@
 namespace palpate {
 namespace {
 
-constexpr int patience = 10;                    // ms that a read waits
-constexpr int most_at_once = 1024;              // datagrams that a read takes: it ends, whoever floods us
-constexpr int farewells = 3;                    // a datagram may be lost
-constexpr std::int64_t second = 1'000'000'000;  // ns
+constexpr int patience = 10;        // ms that a read waits
+constexpr int most_at_once = 1024;  // datagrams that a read takes: it ends, whoever floods us
+constexpr int farewells = 3;        // a datagram may be lost
 
 /// Not 0, and no later one is.
 std::uint64_t draw_nonce() {

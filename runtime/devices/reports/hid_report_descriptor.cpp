@@ -26,10 +26,6 @@ enum Item : std::uint8_t {
   usage_page_item = 0x04,
   logical_minimum_item = 0x14,
   logical_maximum_item = 0x24,
-  physical_minimum_item = 0x34,
-  physical_maximum_item = 0x44,
-  unit_exponent_item = 0x54,
-  unit_item = 0x64,
   report_size_item = 0x74,
   report_id_item = 0x84,
   report_count_item = 0x94,
@@ -117,6 +113,26 @@ class Parser {
         collections_.pop_back();
         locals_ = {};
         return;
+      case usage_item:
+        return add_usage({data, data});
+      case usage_minimum_item:
+        locals_.minimum = data;
+        return add_range();
+      case usage_maximum_item:
+        locals_.maximum = data;
+        return add_range();
+      case delimiter_item:
+        locals_.delimited = data.bits == 1;
+        locals_.taken = false;
+        return;
+      default:
+        return global_item(tag, data);
+    }
+  }
+
+  /// An item that holds until the next of its kind.
+  void global_item(std::uint8_t tag, Data data) {
+    switch (tag) {
       case usage_page_item:
         globals_.page = static_cast<std::uint16_t>(data.bits);
         return;
@@ -125,11 +141,6 @@ class Parser {
         return;
       case logical_maximum_item:
         globals_.maximum = data;
-        return;
-      case physical_minimum_item:
-      case physical_maximum_item:
-      case unit_exponent_item:
-      case unit_item:
         return;
       case report_size_item:
         if (data.bits > largest_element) fail("numbers of " + std::to_string(data.bits) + " bits");
@@ -153,20 +164,8 @@ class Parser {
         globals_ = pushed_.back();
         pushed_.pop_back();
         return;
-      case usage_item:
-        return add_usage({data, data});
-      case usage_minimum_item:
-        locals_.minimum = data;
-        return add_range();
-      case usage_maximum_item:
-        locals_.maximum = data;
-        return add_range();
-      case delimiter_item:
-        locals_.delimited = data.bits == 1;
-        locals_.taken = false;
-        return;
       default:
-        return;  // designators, strings, and what later versions may add
+        return;  // physical range, unit, designators, strings, and what later versions may add
     }
   }
 

@@ -26,17 +26,13 @@ double or_infinite(std::uint32_t value, double unit) noexcept {
 std::vector<std::uint8_t> board_report_descriptor(int axes) {
   const auto count = static_cast<std::uint8_t>(axes);
   return {
-      0x06, 0x48,
-      0xFF,        // usage page: vendor 0xFF48
-      0x09, 0x01,  // usage: haptic device
-      0xA1, 0x01,  // collection: application
-      0x85, 0x01,  //   report id 1
-      0x17, 0x00,
-      0x00, 0x00,
-      0x80,  //   logical minimum -2^31
-      0x27, 0xFF,
-      0xFF, 0xFF,
-      0x7F,                                          //   logical maximum 2^31 - 1
+      // clang-format off
+      0x06, 0x48, 0xFF,                              // usage page: vendor 0xFF48
+      0x09, 0x01,                                    // usage: haptic device
+      0xA1, 0x01,                                    // collection: application
+      0x85, 0x01,                                    //   report id 1
+      0x17, 0x00, 0x00, 0x00, 0x80,                  //   logical minimum -2^31
+      0x27, 0xFF, 0xFF, 0xFF, 0x7F,                  //   logical maximum 2^31 - 1
       0x75, 0x20,                                    //   report size 32
       0x95, 0x01,                                    //   report count 1
       0x09, 0x02,                                    //   usage: sequence
@@ -53,50 +49,40 @@ std::vector<std::uint8_t> board_report_descriptor(int axes) {
       0x29, 0x2F,                                    //   usage maximum: button 15
       0x81, 0x02,                                    //   input
       0x85, 0x02,                                    //   report id 2
-      0x17, 0x00,
-      0x00, 0x00,
-      0x80,  //   logical minimum -2^31
-      0x27, 0xFF,
-      0xFF, 0xFF,
-      0x7F,        //   logical maximum 2^31 - 1
-      0x75, 0x20,  //   report size 32
-      0x95, 0x01,  //   report count 1
-      0x09, 0x03,  //   usage: sequence answered
-      0x91, 0x02,  //   output
-      0x16, 0x01,
-      0x80,  //   logical minimum -32767
-      0x26, 0xFF,
-      0x7F,        //   logical maximum 32767
-      0x75, 0x10,  //   report size 16
-      0x95, 0x03,  //   report count 3
-      0x19, 0x30,  //   usage minimum: force x
-      0x29, 0x32,  //   usage maximum: force z
-      0x91, 0x02,  //   output
-      0x85, 0x03,  //   report id 3
-      0x15, 0x00,  //   logical minimum 0
-      0x26, 0xFF,
-      0x00,        //   logical maximum 255
-      0x75, 0x08,  //   report size 8
-      0x95, 0x02,  //   report count 2
-      0x19, 0x40,  //   usage minimum: version
-      0x29, 0x41,  //   usage maximum: axes
-      0xB1, 0x02,  //   feature
-      0x27, 0xFF,
-      0xFF, 0x00,
-      0x00,        //   logical maximum 65535
-      0x75, 0x10,  //   report size 16
-      0x95, 0x01,  //   report count 1
-      0x09, 0x42,  //   usage: watchdog
-      0xB1, 0x02,  //   feature
-      0x27, 0xFF,
-      0xFF, 0xFF,
-      0x7F,        //   logical maximum 2^31 - 1
-      0x75, 0x20,  //   report size 32
-      0x95, 0x05,  //   report count 5
-      0x19, 0x43,  //   usage minimum: force unit
-      0x29, 0x47,  //   usage maximum: workspace radius
-      0xB1, 0x02,  //   feature
-      0xC0,        // end of the collection
+      0x17, 0x00, 0x00, 0x00, 0x80,                  //   logical minimum -2^31
+      0x27, 0xFF, 0xFF, 0xFF, 0x7F,                  //   logical maximum 2^31 - 1
+      0x75, 0x20,                                    //   report size 32
+      0x95, 0x01,                                    //   report count 1
+      0x09, 0x03,                                    //   usage: sequence answered
+      0x91, 0x02,                                    //   output
+      0x16, 0x01, 0x80,                              //   logical minimum -32767
+      0x26, 0xFF, 0x7F,                              //   logical maximum 32767
+      0x75, 0x10,                                    //   report size 16
+      0x95, 0x03,                                    //   report count 3
+      0x19, 0x30,                                    //   usage minimum: force x
+      0x29, 0x32,                                    //   usage maximum: force z
+      0x91, 0x02,                                    //   output
+      0x85, 0x03,                                    //   report id 3
+      0x15, 0x00,                                    //   logical minimum 0
+      0x26, 0xFF, 0x00,                              //   logical maximum 255
+      0x75, 0x08,                                    //   report size 8
+      0x95, 0x02,                                    //   report count 2
+      0x19, 0x40,                                    //   usage minimum: version
+      0x29, 0x41,                                    //   usage maximum: axes
+      0xB1, 0x02,                                    //   feature
+      0x27, 0xFF, 0xFF, 0x00, 0x00,                  //   logical maximum 65535
+      0x75, 0x10,                                    //   report size 16
+      0x95, 0x01,                                    //   report count 1
+      0x09, 0x42,                                    //   usage: watchdog
+      0xB1, 0x02,                                    //   feature
+      0x27, 0xFF, 0xFF, 0xFF, 0x7F,                  //   logical maximum 2^31 - 1
+      0x75, 0x20,                                    //   report size 32
+      0x95, 0x05,                                    //   report count 5
+      0x19, 0x43,                                    //   usage minimum: force unit
+      0x29, 0x47,                                    //   usage maximum: workspace radius
+      0xB1, 0x02,                                    //   feature
+      0xC0,                                          // end of the collection
+      // clang-format on
   };
 }
 

@@ -336,11 +336,12 @@ TEST(SurfaceStress, OfAnEvenStressIsExactAtEdgesAndCorners) {
     for (const Acts acts : {Acts::by_facets, Acts::by_simplices}) {
       for (const int cells : {2, 3, 5}) {
         const Model of = without_greens(turned_box(element, cells));
-        for (const Mat3& strain : even_strains(of.dimension()))
+        for (const Mat3& strain : even_strains(of.dimension())) {
           EXPECT_LT(error_of_even_stress(of, strain, acts), 1e-11)
               << traits(element).name << ", " << cells << " cells, "
               << (acts == Acts::by_facets ? "load" : "contact") << '\n'
               << strain;
+        }
       }
     }
   }
@@ -463,12 +464,13 @@ Solved solve(const Model& model, const std::function<Vec3(const Vec3&)>& pressur
     std::vector<Eigen::Index> dofs;
     for (const Index node : model.mesh.element_nodes(e))
       for (int axis = 0; axis < d; ++axis) dofs.push_back(number[static_cast<std::size_t>(d * node + axis)]);
-    for (Eigen::Index i = 0; i < K.rows(); ++i)
+    for (Eigen::Index i = 0; i < K.rows(); ++i) {
       for (Eigen::Index j = 0; j < K.cols(); ++j) {
         const Eigen::Index row = dofs[static_cast<std::size_t>(i)],
                            column = dofs[static_cast<std::size_t>(j)];
         if (row >= 0 && column >= 0) entries.emplace_back(row, column, K(i, j));
       }
+    }
   }
   Eigen::SparseMatrix<double> K(free, free);
   K.setFromTriplets(entries.begin(), entries.end());

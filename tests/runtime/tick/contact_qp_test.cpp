@@ -197,10 +197,11 @@ Pair nearest(const std::vector<Vec3>& core, const std::vector<Vec3>& piece) {
       for (std::size_t k = 1; k < c.size(); ++k) along.col(column++) = at(core, c[k]) - at(core, c[0]);
       for (std::size_t k = 1; k < p.size(); ++k) along.col(column++) = at(piece, p[0]) - at(piece, p[k]);
       Eigen::VectorXd x;
-      if (column > 0)
+      if (column > 0) {
         x = Eigen::MatrixXd(along.transpose() * along)
                 .ldlt()
                 .solve(Eigen::VectorXd(along.transpose() * across));
+      }
 
       Eigen::VectorXd of_corner = Eigen::VectorXd::Zero(std::ssize(core));
       Pair pair;
