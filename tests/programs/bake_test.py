@@ -173,7 +173,7 @@ class Stopped(ProgramTest):
         self.fail("the run ended before it could be stopped")
 
     def test_killed_run_is_resumed_and_gives_the_same_file(self):
-        model = self.write("model.toml", cube_toml(18))
+        model = self.write("model.toml", cube_toml(14))
         output = self.folder / "killed.palpate.hdf"
         process = self.start_and_wait_for_columns(model, output)
         process.kill()
@@ -237,7 +237,7 @@ class Stopped(ProgramTest):
     def test_interrupt_keeps_what_is_done_and_the_old_file_whole(self):
         old = self.bake(cube_toml(3))
         before = old.read_bytes()
-        model = self.write("model.toml", cube_toml(18))
+        model = self.write("model.toml", cube_toml(14))
         for stop in (signal.SIGINT, signal.SIGTERM):
             process = self.start_and_wait_for_columns(model, old)
             process.send_signal(stop)
@@ -253,7 +253,7 @@ class Stopped(ProgramTest):
         self.assertEqual(old.read_bytes(), straight.read_bytes())
 
     def test_interrupt_says_how_to_go_on_and_discard_begins_anew(self):
-        model = self.write("model.toml", cube_toml(18))
+        model = self.write("model.toml", cube_toml(14))
         output = self.folder / "x.palpate.hdf"
         killed = self.start_and_wait_for_columns(model, output)
         killed.kill()
