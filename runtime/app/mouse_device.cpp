@@ -29,7 +29,7 @@ void MouseDevice::point(const PointerPose& target) noexcept {
   is_gone_ = false;
 }
 
-DeviceNews MouseDevice::hear(const TickTime& tick) noexcept {
+DeviceNews MouseDevice::poll(const TickTime& tick) noexcept {
   const Word& word = said_.read();
   if (word.number != heard_) {
     heard_ = word.number;

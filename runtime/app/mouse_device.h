@@ -26,8 +26,8 @@ class MouseDevice : public Device {
   /// From the viewer's thread: it is gone.
   void lose() noexcept { is_gone_ = true; }
 
-  DeviceNews hear(const TickTime& tick) noexcept override;
-  void show(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
+  DeviceNews poll(const TickTime& tick) noexcept override;
+  void display(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
 
  private:
   struct Word {

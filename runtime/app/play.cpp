@@ -9,9 +9,9 @@
 #include "base/error.h"
 #include "formats/output_paths.h"
 #include "formats/recording_parts.h"
-#include "runtime/app/act.h"
 #include "runtime/app/fitting_tool.h"
-#include "runtime/app/mover.h"
+#include "runtime/app/input_source.h"
+#include "runtime/app/play_session.h"
 #include "runtime/app/viewed_play.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/monitor.h"
@@ -76,26 +76,26 @@ int play(PlayOptions options) {
   if (options.processor) leave_to_the_loop(*options.processor);
   std::optional<ViewerPort> port;
   if (options.view) port.emplace(*options.view);
-  Mover mover = make_mover(options, guardian ? &*guardian : nullptr);
+  InputSource input = make_input_source(options, guardian ? &*guardian : nullptr);
   std::unique_ptr<const Body> body =
       load_and_print(options.file, options.model_toml, options.settings.body());
   add_sources(paths, body->model(), options.file);
   if (options.session) warn_of_other_model(*options.session, *body);
-  if (mover.link != nullptr)
-    wait_for(*mover.link, options.device.kind == DeviceChoice::Kind::bridge, stop_asked);
+  if (input.link != nullptr)
+    wait_for(*input.link, options.device.kind == DeviceChoice::Kind::bridge, stop_asked);
   if (port) {
-    ViewedPlay viewed(options, mover, std::move(body), std::move(*port));
+    ViewedPlay viewed(options, input, std::move(body), std::move(*port));
     const LoopReport report = viewed.run(stop_asked);
     return exit_code(report, viewed.recording_failed());
   }
 
   settle_tool(options, *body);
-  options.settings = settle(options.settings, mover, *body);
-  print_device(mover, options.settings);
-  Act act(options, *body, mover);
-  const LoopReport& report = act.run(stop_asked);
-  act.tell();
-  return exit_code(report, act.recording_failure().has_value());
+  options.settings = apply_defaults(options.settings, input, *body);
+  print_device(input, options.settings);
+  PlaySession session(options, *body, input);
+  const LoopReport& report = session.run(stop_asked);
+  session.tell();
+  return exit_code(report, session.recording_failure().has_value());
 }
 
 }  // namespace palpate

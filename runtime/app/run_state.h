@@ -22,13 +22,13 @@ struct RunState {
   bool pointer = false;     ///< it is a page's pointer
   bool hand = false;        ///< a hand is in it, whose safety is not a page's to change
   std::int64_t rate = 1000;
-  std::int64_t ticks = 0;   ///< since the act began
+  std::int64_t ticks = 0;   ///< since the session began
   std::int64_t misses = 0;  ///< of deadlines
   bool paused = false;
   std::optional<std::string> recording;   ///< file
   std::optional<Error> recording_failed;  ///< why nothing is kept in it any more
   std::optional<std::string> busy;        ///< what is being made
-  std::optional<Error> refused;           ///< why the last wish could not be met
+  std::optional<Error> refused;           ///< why the last request could not be met
   std::optional<std::string> locked;      ///< why settings cannot be changed
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;

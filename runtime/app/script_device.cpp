@@ -153,7 +153,7 @@ std::int64_t ScriptDevice::ticks() const noexcept {
   return static_cast<std::int64_t>(std::floor(end_time() * static_cast<double>(rate_) + rounding)) + 1;
 }
 
-DeviceNews ScriptDevice::hear(const TickTime& tick) noexcept {
+DeviceNews ScriptDevice::poll(const TickTime& tick) noexcept {
   const auto rate = static_cast<double>(rate_);
   DeviceNews news;
   news.state.pose = pose(static_cast<double>(tick.number) / rate);

@@ -35,8 +35,8 @@ class ScriptDevice : public Device {
   [[nodiscard]] std::int64_t ticks() const noexcept;
 
   /// The pose at the tick's time, and the velocity from the tick before.
-  DeviceNews hear(const TickTime& tick) noexcept override;
-  void show(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
+  DeviceNews poll(const TickTime& tick) noexcept override;
+  void display(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
 
  private:
   struct Row {

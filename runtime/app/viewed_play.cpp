@@ -47,19 +47,20 @@ bool is_of_the_run(const Setting& setting) {
 
 }  // namespace
 
-ViewedPlay::ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body, ViewerPort port)
+ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body,
+                       ViewerPort port)
     : options_(std::move(options)),
-      mover_(mover),
+      input_(input),
       body_(std::move(body)),
       body_options_(options_.settings.body()),
       can_move_(body_->model().dynamics.method != DynamicsMethod::none),
       most_rings_(overlay_rings(*body_)),
       size_(body_->bounds().diagonal().norm()),
       port_(std::move(port)),
-      wished_{.text = options_.settings_text, .settings = options_.settings, .record = options_.record} {
-  if (options_.device.kind == DeviceChoice::Kind::mouse) add_mouse(mover_, options_, *body_);
+      requested_{.text = options_.settings_text, .settings = options_.settings, .record = options_.record} {
+  if (options_.device.kind == DeviceChoice::Kind::mouse) add_mouse(input_, options_, *body_);
   state_.device = options_.device.text;
-  state_.pointer = mover_.mouse != nullptr;
+  state_.pointer = input_.mouse != nullptr;
   state_.hand = has_hand();
   state_.rate = options_.settings.rate;
   if (options_.session) state_.locked = "a replay is as its session was";
@@ -74,21 +75,21 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
   std::optional<Plan> good;  // that could be met
   for (;;) {
     const Plan plan = next_plan();
-    std::unique_ptr<Act> act;
+    std::unique_ptr<PlaySession> session;
     LoopReport report;
     try {
-      act = begin_act(plan);
+      session = begin_act(plan);
       if (!good) fmt::print(stderr, "open {} in a browser\n", server.url());
       good = plan;
-      report = run_act(*act, stop);
-      if (has_hand()) latched_ = act->fault();
+      report = run_act(*session, stop);
+      if (has_hand()) latched_ = session->fault();
     } catch (const std::exception& error) {
       if (!good || !take_back(plan, *good, as_error(error))) throw;
       continue;
     }
-    const bool over = options_.duration && report.ticks >= mover_.ticks;
+    const bool over = options_.duration && report.ticks >= input_.ticks;
     if (stop || over || !wait_for_wish(stop)) {
-      act->tell();
+      session->tell();
       return report;
     }
   }
@@ -98,11 +99,11 @@ ViewedPlay::Plan ViewedPlay::next_plan() {
   const std::lock_guard lock(mutex_);
   control_.leave = false;
   control_.single_ticks = control_.paused ? 1 : 0;  // it shows the body as it is then
-  return wished_;
+  return requested_;
 }
 
-/// The state that pages see is that of the new act from here on.
-std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
+/// The state that pages see is that of the new session from here on.
+std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   if (latched_ != Fault::none && !plan.record.empty()) {
     throw Error("there is no force until the fault is acknowledged, and a recording begins without one",
                 "record", "acknowledge the fault first");
@@ -112,28 +113,28 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
   options.settings_text = plan.text;
   options.settings = plan.settings;
   settle_tool(options, *body_);
-  options.settings = settle(options.settings, mover_, *body_);
+  options.settings = apply_defaults(options.settings, input_, *body_);
   options.record = plan.record;
   if (!plan.record.empty() && plan.record != options_.record) {  // which was looked at before
     OutputPaths paths(false);
     add_recording(paths, plan.record, "record");
   }
-  print_device(mover_, options.settings);
+  print_device(input_, options.settings);
   if (options.settings.overlay) begin_making("the overlay is being made");
   const SettingsText settled = options.settings_text;
   {
     const std::lock_guard lock(mutex_);
     state_.recording_failed.reset();
   }
-  auto act = std::make_unique<Act>(
-      std::move(options), *body_, mover_,
-      ActViewer{
+  auto session = std::make_unique<PlaySession>(
+      std::move(options), *body_, input_,
+      SessionViewer{
           .control = &control_,
           .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
           .pictures =
               [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); },
           .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
-  act->latch(latched_);
+  session->latch(latched_);
   const std::lock_guard lock(mutex_);
   state_.settings = settled;
   state_.busy.reset();
@@ -147,7 +148,7 @@ std::unique_ptr<Act> ViewedPlay::begin_act(const Plan& plan) {
   }
   changed_ = true;
   tell_.notify_all();
-  return act;
+  return session;
 }
 
 /// Another body where the settings need one; the old one goes first, as it is large.
@@ -182,14 +183,14 @@ void ViewedPlay::show_body() {
   tell_.notify_all();
 }
 
-LoopReport ViewedPlay::run_act(Act& act, const std::atomic<bool>& stop) {
-  const LoopReport& report = act.run(stop);
-  if (!act.recording_failure()) return report;
+LoopReport ViewedPlay::run_act(PlaySession& session, const std::atomic<bool>& stop) {
+  const LoopReport& report = session.run(stop);
+  if (!session.recording_failure()) return report;
   recording_failed_ = true;
   if (stop) return report;
   const std::lock_guard lock(mutex_);  // the next one is without it
-  wished_.record.clear();
-  const Error& reason = *act.recording_failure();
+  requested_.record.clear();
+  const Error& reason = *session.recording_failure();
   refuse(Error(std::string("the recording failed: ") + reason.what(), reason.where(), reason.hint()));
   return report;
 }
@@ -204,8 +205,8 @@ bool ViewedPlay::wait_for_wish(const std::atomic<bool>& stop) const {
 bool ViewedPlay::take_back(const Plan& failed, const Plan& good, const Error& why) {
   const std::lock_guard lock(mutex_);
   if (failed.text == good.text && failed.record.empty()) return false;
-  wished_ = good;
-  wished_.record.clear();
+  requested_ = good;
+  requested_.record.clear();
   refuse(why);
   return true;
 }
@@ -218,11 +219,11 @@ RunState ViewedPlay::state() const {
 }
 
 void ViewedPlay::point(const PointerPose& wanted) {
-  if (mover_.mouse != nullptr) mover_.mouse->point(wanted);
+  if (input_.mouse != nullptr) input_.mouse->point(wanted);
 }
 
 void ViewedPlay::lose_pointer() {
-  if (mover_.mouse != nullptr) mover_.mouse->lose();
+  if (input_.mouse != nullptr) input_.mouse->lose();
 }
 
 void ViewedPlay::pause(bool paused) {
@@ -248,7 +249,7 @@ void ViewedPlay::acknowledge() {
 
 void ViewedPlay::reset() {
   const std::lock_guard lock(mutex_);
-  if (wished_.record.empty()) return end_act();
+  if (requested_.record.empty()) return end_act();
   throw PageError(PageRefusal::locked, "a recording is being made, which begins with the untouched body",
                   "reset", "end the recording first");
 }
@@ -257,7 +258,7 @@ void ViewedPlay::change(const SettingsChange& settings) {
   const std::lock_guard lock(mutex_);
   refuse_to_hand(settings);
   refuse_while_locked();
-  Plan plan = wished_;
+  Plan plan = requested_;
   for (const auto& [name, value] : settings) {
     const Setting* setting = find_setting(name);
     if (setting != nullptr && is_of_the_run(*setting))
@@ -271,17 +272,17 @@ void ViewedPlay::change(const SettingsChange& settings) {
   }
   plan.settings = read_settings(plan.text);
   check(plan.settings);
-  wished_ = std::move(plan);
+  requested_ = std::move(plan);
   end_act();
 }
 
 void ViewedPlay::record(bool on) {
   const std::lock_guard lock(mutex_);
-  if (on == !wished_.record.empty()) return;
+  if (on == !requested_.record.empty()) return;
   if (options_.session) {
     throw PageError(PageRefusal::locked, "a replay is recorded already", "record", "copy the session's file");
   }
-  wished_.record = on ? name_recording(options_.file) : std::filesystem::path();
+  requested_.record = on ? name_recording(options_.file) : std::filesystem::path();
   end_act();
 }
 
@@ -295,14 +296,14 @@ void ViewedPlay::refuse_while_locked() const {
   if (options_.session)
     throw PageError(PageRefusal::locked, "a replay is as its session was", "change",
                     "play without --device replay");
-  if (!wished_.record.empty()) {
+  if (!requested_.record.empty()) {
     throw PageError(PageRefusal::locked, "a recording is being made, of one group of settings", "change",
                     "end the recording first");
   }
 }
 
-/// What a page may change while a hand is in the device begins an act of its own: no force at once, then the
-/// same safety rules from their start, out of contact.
+/// What a page may change while a hand is in the device begins a session of its own: no force at once, then
+/// the same safety rules from their start, out of contact.
 void ViewedPlay::refuse_to_hand(const SettingsChange& settings) const {
   if (!has_hand()) return;
   for (const Setting& setting : settings_table()) {
@@ -338,7 +339,7 @@ void ViewedPlay::end_act() {
   tell_.notify_all();
 }
 
-/// The page is told until its next wish.
+/// The page is told until its next request.
 void ViewedPlay::refuse(const Error& why) {
   print_warning(in_one_line(why));
   state_.refused = why;

@@ -12,24 +12,24 @@
 #include <string>
 
 #include "base/error.h"
-#include "runtime/app/act.h"
+#include "runtime/app/play_session.h"
 #include "runtime/app/run_state.h"
 #include "runtime/viewer/viewed_run.h"
 #include "runtime/viewer/viewer_server.h"
 
 namespace palpate {
 
-/// Runs one act after the other: what a page asks for that cannot be had within an act - the untouched body,
-/// other settings, a recording - ends it and begins the next one, on the same loaded body where that will do.
-/// A wish that cannot be met is told to the page, and the act before begins again.
+/// Runs one session after the other: what a page asks for that cannot be had within a session - the untouched
+/// body, other settings, a recording - ends it and begins the next one, on the same loaded body where that
+/// will do. A request that cannot be met is told to the page, and the session before begins again.
 class ViewedPlay : public ViewedRun {
  public:
-  /// `mover` as make_mover left it, `body` as the options ask for it; `port`: where it is shown.
-  ViewedPlay(PlayOptions options, Mover& mover, std::unique_ptr<const Body> body, ViewerPort port);
+  /// `input` as make_input_source left it, `body` as the options ask for it; `port`: where it is shown.
+  ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body, ViewerPort port);
 
-  /// Serves the pages, says where once the first act could begin, and goes on until `stop` or the end of a
-  /// duration that the options give. Tells of the last act, whose report it returns. Throws Error. To be
-  /// called once.
+  /// Serves the pages, says where once the first session could begin, and goes on until `stop` or the end of
+  /// a duration that the options give. Tells of the last session, whose report it returns. Throws Error. To
+  /// be called once.
   LoopReport run(const std::atomic<bool>& stop);
 
   /// Whether a recording of the run is not whole.
@@ -49,22 +49,22 @@ class ViewedPlay : public ViewedRun {
   void seek(std::int64_t frame) override;
 
  private:
-  /// What an act is to be.
+  /// What a session is to be.
   struct Plan {
     SettingsText text;
     Settings settings;
     std::filesystem::path record;  ///< empty: nothing
   };
 
-  std::unique_ptr<Act> begin_act(const Plan& plan);
+  std::unique_ptr<PlaySession> begin_act(const Plan& plan);
   void load(const Settings& settings);
   void show_body();
-  LoopReport run_act(Act& act, const std::atomic<bool>& stop);
+  LoopReport run_act(PlaySession& session, const std::atomic<bool>& stop);
   bool wait_for_wish(const std::atomic<bool>& stop) const;
   Plan next_plan();
   bool take_back(const Plan& failed, const Plan& good, const Error& why);
 
-  [[nodiscard]] bool has_hand() const noexcept { return mover_.link != nullptr; }
+  [[nodiscard]] bool has_hand() const noexcept { return input_.link != nullptr; }
   void refuse_to_hand(const SettingsChange& settings) const;
   void refuse_while_locked() const;
   void check(const Settings& settings) const;
@@ -76,7 +76,7 @@ class ViewedPlay : public ViewedRun {
   void tell_states(const std::stop_token& over);
 
   PlayOptions options_;
-  Mover& mover_;
+  InputSource& input_;
   std::unique_ptr<const Body> body_;
   BodyOptions body_options_;
   bool can_move_;   // the file has dynamics
@@ -87,10 +87,10 @@ class ViewedPlay : public ViewedRun {
   LoopControl control_;
   bool recording_failed_ = false;
 
-  Fault latched_ = Fault::none;  // of the act before, where a hand is in the device
+  Fault latched_ = Fault::none;  // of the session before, where a hand is in the device
 
   mutable std::mutex mutex_;  // of what follows; the loop takes it never
-  Plan wished_;               // of the next act
+  Plan requested_;            // of the next session
   RunState state_;
   bool changed_ = true;  // since pages were told
   std::condition_variable_any tell_;

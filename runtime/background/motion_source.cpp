@@ -85,7 +85,7 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
     }
     newmark_.advance(u_, touched_);
   }
-  if (job.left < 1.0) newmark_.settle(job.left);
+  if (job.left < 1.0) newmark_.damp(job.left);
   if (job.let_go != let_go_done_) let_go(job.release);
   let_go_done_ = job.let_go;
   newmark_.predict();

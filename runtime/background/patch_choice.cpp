@@ -28,7 +28,7 @@ void PatchKey::add(Index centre) noexcept {
   std::sort(centres.begin(), end + 1);
 }
 
-void PatchWishes::add(const PatchKey& key) noexcept {
+void PatchRequests::add(const PatchKey& key) noexcept {
   const auto end = keys.begin() + static_cast<std::ptrdiff_t>(count);
   if (key.empty() || count == most || std::find(keys.begin(), end, key) != end) return;
   keys[count++] = key;
@@ -127,11 +127,11 @@ void PatchChoice::follow(const Body& body, const State& state) noexcept {
   }
   const auto turn = static_cast<std::size_t>(ticks_) % ahead_.size();
   ahead_[turn] = now_.empty() ? PatchKey{} : key_at(body, state, tuning.patches.times_ahead[turn]);
-  wishes_.count = 0;
-  wishes_.add(now_);
-  for (const PatchKey& key : ahead_) wishes_.add(key);
+  requests_.count = 0;
+  requests_.add(now_);
+  for (const PatchKey& key : ahead_) requests_.add(key);
   const double speed = tools_.front().velocity.norm();
-  wishes_.direction = speed > 0.0 ? Vec3(tools_.front().velocity / speed) : Vec3::Zero();
+  requests_.direction = speed > 0.0 ? Vec3(tools_.front().velocity / speed) : Vec3::Zero();
 }
 
 }  // namespace palpate

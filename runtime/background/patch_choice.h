@@ -22,7 +22,7 @@ struct PatchKey {
 };
 
 /// What is wanted of overlays, the most urgent first, each once.
-struct PatchWishes {
+struct PatchRequests {
   static constexpr std::size_t most = 8;
   std::array<PatchKey, most> keys{};
   std::size_t count = 0;
@@ -44,7 +44,7 @@ class PatchChoice {
   void follow(const Body& body, const State& state) noexcept;
 
   [[nodiscard]] const PatchKey& now() const noexcept { return now_; }  ///< empty while no tool is near
-  [[nodiscard]] const PatchWishes& wishes() const noexcept { return wishes_; }
+  [[nodiscard]] const PatchRequests& requests() const noexcept { return requests_; }
 
  private:
   struct Followed {
@@ -68,7 +68,7 @@ class PatchChoice {
   std::vector<double> share_;   // and how much
   PatchKey now_;
   std::array<PatchKey, tuning.patches.times_ahead.size()> ahead_;  // where the tools will be
-  PatchWishes wishes_;
+  PatchRequests requests_;
 };
 
 }  // namespace palpate

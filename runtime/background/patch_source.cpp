@@ -21,7 +21,7 @@ PatchSource::PatchSource(const Body& body, const State& state, const PatchSource
       slots_(most_patches),
       first_slot_(static_cast<std::size_t>(body.greens().nodes()), -1),
       next_slot_(most_patches, -1),
-      wishes_(PatchWishes{}),
+      requests_(PatchRequests{}),
       deliveries_(2 * most_patches) {
   for (std::size_t slot = most_patches; slot-- > 0;) free_slots_.push_back(static_cast<Index>(slot));
   if (options_.in_background) builder_ = std::thread([this] { build_wishes(); });
@@ -38,8 +38,8 @@ void PatchSource::serve(State& state) noexcept {
     ++round_;
     build(choice_.now());
   }
-  wishes_.next() = choice_.wishes();
-  wishes_.publish();
+  requests_.next() = choice_.requests();
+  requests_.publish();
   receive();
   const PatchKey& wanted = choice_.now();
   state.surface.patch_is_older = false;
@@ -112,27 +112,27 @@ const std::shared_ptr<const Patch>* PatchSource::find(const PatchKey& key) const
 void PatchSource::build_wishes() {
   while (!stop_) {
     ++round_;
-    if (!build_next(wishes_.read())) std::this_thread::sleep_for(pause);
+    if (!build_next(requests_.read())) std::this_thread::sleep_for(pause);
   }
 }
 
 /// What is wished for first, then what the file has, then, while there is memory, round the first centre,
 /// those first that the tool moves towards.
-bool PatchSource::build_next(const PatchWishes& wishes) {
+bool PatchSource::build_next(const PatchRequests& requests) {
   const std::size_t usual = kept_.empty() ? 0 : bytes_ / kept_.size();
-  std::size_t wanted = 0;  // bytes of the wishes so far: later ones must not push them out
-  for (std::size_t k = 0; k < wishes.count && (k == 0 || wanted + usual <= options_.memory); ++k) {
-    if (build(wishes.keys[k])) return true;
-    const std::shared_ptr<const Patch>& patch = kept_.at(wishes.keys[k]).patch;
+  std::size_t wanted = 0;  // bytes of the requests so far: later ones must not push them out
+  for (std::size_t k = 0; k < requests.count && (k == 0 || wanted + usual <= options_.memory); ++k) {
+    if (build(requests.keys[k])) return true;
+    const std::shared_ptr<const Patch>& patch = kept_.at(requests.keys[k]).patch;
     if (patch != nullptr) wanted += patch->bytes();
   }
   if (build_stored()) return true;
   if (bytes_ + 2 * usual > options_.memory) return false;
-  if (wishes.count == 0 || wishes.keys[0].count() != 1) return false;
-  const Index centre = wishes.keys[0].centres[0];
+  if (requests.count == 0 || requests.keys[0].count() != 1) return false;
+  const Index centre = requests.keys[0].centres[0];
   std::vector<Index> neighbours = maker_.neighbours(centre);
   const auto along = [&](Index node) {
-    return (body_.rest_position(node) - body_.rest_position(centre)).dot(wishes.direction);
+    return (body_.rest_position(node) - body_.rest_position(centre)).dot(requests.direction);
   };
   std::sort(neighbours.begin(), neighbours.end(),
             [&](Index a, Index b) { return along(a) != along(b) ? along(a) > along(b) : a < b; });

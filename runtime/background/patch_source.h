@@ -35,7 +35,7 @@ struct PatchCounts {
 /// locks or allocates. Patches are freed by the builder, after nobody uses them any more.
 class PatchSource {
  public:
-  /// Starts the builder, which makes what the file has of patches first of all but the wishes. `body` must
+  /// Starts the builder, which makes the patches that the file has, after those requested. `body` must
   /// live as long; `state` is one that the loop will use, or a copy, with room as patch_room says.
   PatchSource(const Body& body, const State& state, const PatchSourceOptions& options);
   ~PatchSource();
@@ -79,7 +79,7 @@ class PatchSource {
   void count(const State& state) noexcept;
 
   void build_wishes();
-  bool build_next(const PatchWishes& wishes);
+  bool build_next(const PatchRequests& requests);
   bool build_stored();
   bool build(const PatchKey& key);
   void make_room();
@@ -96,7 +96,7 @@ class PatchSource {
   std::vector<Delivery> slots_;
   std::vector<Index> first_slot_;  // [stored nodes] of the patches whose first centre each is, -1 for none
   std::vector<Index> next_slot_;   // [slots] of the same first centre
-  Latest<PatchWishes> wishes_;
+  Latest<PatchRequests> requests_;
   Ring<Delivery> deliveries_;
 
   // The builder's side.

@@ -46,7 +46,7 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
       sink_(std::move(sink)),
       moments_(
           Moment{.load = state.surface.near.load(),
-                 .motion = ShownMotion(body),
+                 .motion = MotionSnapshot(body),
                  .touches = std::vector<Touch>(state.contact_points.size()),
                  .forces = std::vector<NodalForce>(static_cast<std::size_t>(state.surface.near.capacity()))}),
       rest_(body.surface_in_mesh()),
@@ -73,7 +73,7 @@ void SurfaceFrames::post(const State& state, std::int64_t tick, double time) noe
   if (tick % options_.ticks_per_frame != 0) return;
   Moment& next = moments_.next();
   next.load = state.surface.near.load();
-  state.surface.motion.show(next.motion);
+  state.surface.motion.snapshot(next.motion);
   take_contacts(state, next);
   const ToolState& tool = state.tools.front();
   next.device = tool.device;

@@ -70,7 +70,7 @@ class SurfaceFrames {
     ToolPose device{};
     ToolPose tool{};
     SurfaceLoad load;
-    ShownMotion motion;
+    MotionSnapshot motion;
     std::vector<Touch> touches;      // [most contacts] the first `touch_count`
     std::vector<NodalForce> forces;  // [most nodes near the tools] the first `force_count`
     std::size_t touch_count = 0;

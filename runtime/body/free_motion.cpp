@@ -53,16 +53,16 @@ void set_zero(std::span<double> x) noexcept {
 
 }  // namespace
 
-ShownMotion::ShownMotion(const Body& body)
+MotionSnapshot::MotionSnapshot(const Body& body)
     : q(body.modes() != nullptr ? static_cast<std::size_t>(body.modes()->count()) : 0),
       u(size_if(body.model().dynamics.method != DynamicsMethod::none, body.greens().order())) {}
 
-Vec3 displacement(const Body& body, const ShownMotion& shown, Index stored) noexcept {
+Vec3 displacement(const Body& body, const MotionSnapshot& shown, Index stored) noexcept {
   const Vec3 u = vector_at(shown.u, body.dimension(), stored);
   return shown.q.empty() ? u : Vec3(u + body.modes()->displacement(stored, shown.q));
 }
 
-void add_motion(const Body& body, const ShownMotion& shown, std::span<double> u) noexcept {
+void add_motion(const Body& body, const MotionSnapshot& shown, std::span<double> u) noexcept {
   const int d = body.dimension();
   for (Index node = 0; node < body.greens().nodes(); ++node)
     set_vector(u, d, node, vector_at(u, d, node) + displacement(body, shown, node));
@@ -72,7 +72,7 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
     : dimension_(body.dimension()),
       tick_(tick),
       ticks_per_step_(count_ticks(body, tick)),
-      settled_(std::exp(-tick * static_cast<double>(ticks_per_step_) / tuning.body.settling)),
+      decay_(std::exp(-tick * static_cast<double>(ticks_per_step_) / tuning.body.settling)),
       dynamic_contact_(body.contact_model() == ContactModel::dynamic),
       phase_(ticks_per_step_),
       pending_(make_let_go(dimension_, room(body, most_loads))),
@@ -169,7 +169,7 @@ Vec3 FreeMotion::at(const Body& body, Index surface_node) noexcept {
   return u;
 }
 
-void FreeMotion::show(ShownMotion& shown) const noexcept {
+void FreeMotion::snapshot(MotionSnapshot& shown) const noexcept {
   shown.moves = active_;
   if (!active_) return;
   std::copy(shown_.begin(), shown_.end(), shown.q.begin());
@@ -186,7 +186,7 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
   if (!active_ || !ends_step()) return;
   const bool stills = !dynamic_contact_ && !now.empty();
   if (modal_) {
-    if (stills) modal_->settle(settled_);
+    if (stills) modal_->damp(decay_);
     if (!dynamic_contact_) return;
     set_zero(g_);
     body.modes()->add_projection(now.nodes(), now.forces(), 1.0, g_);
@@ -194,7 +194,7 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
     return;
   }
   ++job_.step;
-  job_.left = stills ? settled_ : 1.0;
+  job_.left = stills ? decay_ : 1.0;
   job_.load.clear();
   if (dynamic_contact_) job_.load.add(now.nodes(), now.forces(), 1.0);
   if (pending_.force.empty() || held_in_flight_) return;

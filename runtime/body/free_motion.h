@@ -37,18 +37,18 @@ struct MotionSample {
 };
 
 /// A moment of free motion, for the eye: the modes times q plus u.
-struct ShownMotion {
-  explicit ShownMotion(const Body& body);
+struct MotionSnapshot {
+  explicit MotionSnapshot(const Body& body);
   bool moves = false;     ///< else what follows is old
   std::vector<double> q;  ///< [k]
   std::vector<double> u;  ///< [n] of the stored dofs [m]
 };
 
 /// Displacement of a stored node [m].
-Vec3 displacement(const Body& body, const ShownMotion& shown, Index stored) noexcept;
+Vec3 displacement(const Body& body, const MotionSnapshot& shown, Index stored) noexcept;
 
 /// Adds it to the displacement of the stored nodes [n].
-void add_motion(const Body& body, const ShownMotion& shown, std::span<double> u) noexcept;
+void add_motion(const Body& body, const MotionSnapshot& shown, std::span<double> u) noexcept;
 
 /// The body's motion on its own: free vibration once it was let go and, with dynamic contact, what inertia
 /// and viscosity make of the forces so far (theory.md section 5). Contact forces of the tick displace the
@@ -74,7 +74,7 @@ class FreeMotion {
   /// Displacement of a stored node in this tick [m].
   [[nodiscard]] Vec3 displacement(const Body& body, Index stored) const noexcept;
   /// All of it in this tick.
-  void show(ShownMotion& shown) const noexcept;
+  void snapshot(MotionSnapshot& shown) const noexcept;
 
   /// Ends a tick with its forces.
   void end_tick(const Body& body, const SurfaceLoad& load) noexcept;
@@ -100,7 +100,7 @@ class FreeMotion {
   int dimension_;
   double tick_;
   std::int64_t ticks_per_step_ = 1;
-  double settled_;  // what quasi-static contact leaves of the motion in a step
+  double decay_;  // what quasi-static contact leaves of the motion in a step
   bool dynamic_contact_;
   bool active_ = false;
   std::int64_t ticks_ = 0;

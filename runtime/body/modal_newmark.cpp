@@ -54,7 +54,7 @@ void ModalNewmark::advance() noexcept {
   }
 }
 
-void ModalNewmark::settle(double share) noexcept {
+void ModalNewmark::damp(double share) noexcept {
   for (std::vector<double>* motion : {&q_, &v_, &a_}) {
     for (double& value : *motion) value *= share;
   }

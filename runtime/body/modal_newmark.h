@@ -29,7 +29,7 @@ class ModalNewmark {
   void advance() noexcept;
 
   /// Leaves a share of the motion.
-  void settle(double share) noexcept;
+  void damp(double share) noexcept;
 
   [[nodiscard]] std::span<const double> q() const noexcept { return q_; }                  ///< now
   [[nodiscard]] std::span<const double> velocity() const noexcept { return v_; }           ///< now

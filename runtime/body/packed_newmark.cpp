@@ -61,7 +61,7 @@ void PackedNewmark::rest() noexcept {
     std::fill(motion->begin(), motion->end(), 0.0);
 }
 
-void PackedNewmark::settle(double share) noexcept {
+void PackedNewmark::damp(double share) noexcept {
   for (std::vector<double>* motion : {&u_, &v_, &a_}) {
     for (double& value : *motion) value *= share;
   }

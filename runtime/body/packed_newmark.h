@@ -21,7 +21,7 @@ class PackedNewmark {
   void rest() noexcept;
 
   /// Leaves a share of the motion.
-  void settle(double share) noexcept;
+  void damp(double share) noexcept;
 
   /// By superposition, from now on: the body let go in its static displacement u [n] by forces f [n], at
   /// velocity v [n]; with the consistent acceleration M a = -f - C_d v.

@@ -58,7 +58,7 @@ void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> 
 }
 
 void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<double> stored,
-                          std::span<Vec3> u, const ShownMotion* motion) noexcept {
+                          std::span<Vec3> u, const MotionSnapshot* motion) noexcept {
   const bool moves = motion != nullptr && motion->moves;
   const auto follow_body = [&](Index node, const auto& of_stored) {
     const SurfaceParts parts = body.surface_parts(node);

@@ -136,7 +136,8 @@ palpate_overlay read_overlay(const palpate_overlay* given) {
       overlay.rings > most_rings) {
     throw Error("an overlay of " + std::to_string(overlay.rings) + " rings, refined " +
                     std::to_string(overlay.refinement) + " times, was asked for",
-                "palpate_create_with_options", "ask for 1 to " + std::to_string(most_rings) + " rings, refined " +
+                "palpate_create_with_options",
+                "ask for 1 to " + std::to_string(most_rings) + " rings, refined " +
                     std::to_string(least_refinement) + " to " + std::to_string(most_refinement) + " times");
   }
   return overlay;
@@ -155,7 +156,7 @@ using namespace palpate;
 /// What a tick left, for the eye.
 struct Shown {
   SurfaceLoad load;
-  ShownMotion motion;
+  MotionSnapshot motion;
 };
 
 struct palpate_session {
@@ -165,7 +166,7 @@ struct palpate_session {
         untouched(body, with_room(options, body, overlay)),
         state(untouched),
         poses(options.tools.size()),
-        shown(Shown{.load = state.surface.near.load(), .motion = ShownMotion(body)}),
+        shown(Shown{.load = state.surface.near.load(), .motion = MotionSnapshot(body)}),
         stored_displacement(static_cast<std::size_t>(body.greens().order())),
         displacement(body.surface_rest_positions().size()) {
     show();
@@ -179,7 +180,7 @@ struct palpate_session {
   void show() noexcept {
     Shown& next = shown.next();
     next.load = state.surface.near.load();
-    state.surface.motion.show(next.motion);
+    state.surface.motion.snapshot(next.motion);
     shown.publish();
   }
 

@@ -49,7 +49,7 @@ DeviceLink::~DeviceLink() {
   sem_destroy(&is_shown_);
 }
 
-DeviceNews DeviceLink::hear(const TickTime&) noexcept {
+DeviceNews DeviceLink::poll(const TickTime&) noexcept {
   DeviceNews news;
   const std::int64_t losses = losses_;
   const std::int64_t openings = openings_;
@@ -61,7 +61,8 @@ DeviceNews DeviceLink::hear(const TickTime&) noexcept {
   return news;
 }
 
-void DeviceLink::show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept {
+void DeviceLink::display(const DeviceCommand& command, const DeviceState& state,
+                         std::int64_t begun) noexcept {
   shown_.next() = {.command = command, .state = state, .begun = begun};
   shown_.publish();
   sem_post(&is_shown_);
@@ -80,11 +81,11 @@ void DeviceLink::read_reports() noexcept {
       continue;
     }
     DeviceState state;
-    const DevicePort::Heard heard = port_->read(state);
-    if (heard == DevicePort::Heard::lost || broken_) {
+    const DevicePort::ReadResult heard = port_->read(state);
+    if (heard == DevicePort::ReadResult::lost || broken_) {
       lose();
       is_open = false;
-    } else if (heard == DevicePort::Heard::report) {
+    } else if (heard == DevicePort::ReadResult::report) {
       if (reports_ == 0) first_ = state;
       heard_.next() = state;
       heard_.publish();

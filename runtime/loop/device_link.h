@@ -45,8 +45,8 @@ class DeviceLink : public Device {
   [[nodiscard]] DeviceLimits limits() const { return port_->limits(); }
   [[nodiscard]] std::string refusals() const { return port_->refusals(); }
 
-  DeviceNews hear(const TickTime& tick) noexcept override;
-  void show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override;
+  DeviceNews poll(const TickTime& tick) noexcept override;
+  void display(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override;
 
   [[nodiscard]] std::int64_t reports() const noexcept { return reports_; }            ///< heard so far
   [[nodiscard]] std::int64_t writes() const noexcept { return writes_; }              ///< done so far

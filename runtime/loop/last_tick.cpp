@@ -38,8 +38,8 @@ std::string contact_table(const Body& body, const State& state) {
 void write_surface(const std::filesystem::path& file, const Body& body, const State& state) {
   std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
   std::vector<Vec3> u(body.surface_rest_positions().size());
-  ShownMotion motion(body);
-  state.surface.motion.show(motion);
+  MotionSnapshot motion(body);
+  state.surface.motion.snapshot(motion);
   surface_displacement(body, state.surface.near.load(), stored, u, &motion);
   const std::vector<Vec3> nodes = body.surface_in_mesh();
   std::vector<double> total;

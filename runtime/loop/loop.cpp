@@ -59,7 +59,7 @@ class Loop {
       tick();
     }
     if (parts_.safety != nullptr) parts_.safety->shut_down();
-    parts_.device.show(DeviceCommand{}, news_.state, monotonic_now());
+    parts_.device.display(DeviceCommand{}, news_.state, monotonic_now());
     report_.interrupted = stop;
     return report_;
   }
@@ -87,7 +87,7 @@ class Loop {
         --control.single_ticks;
         return;
       }
-      parts_.device.show(nothing, news_.state, monotonic_now());
+      parts_.device.display(nothing, news_.state, monotonic_now());
       start_ += second / options_.rate;
       set_due();
       sleep_until(tick_.due);
@@ -105,7 +105,7 @@ class Loop {
 
   void tick() noexcept {
     const std::int64_t next_due = start_ + (tick_.number + 1) * second / options_.rate;
-    news_ = parts_.device.hear(tick_);
+    news_ = parts_.device.poll(tick_);
     if (news_.begun) tick_.begun = *news_.begun;
     hear_person();
     lift();
@@ -118,7 +118,7 @@ class Loop {
     step(parts_.body, parts_.state, in_body_.pose);
     if (parts_.motion != nullptr) parts_.motion->post(parts_.state);
     guard();
-    parts_.device.show(shown_, news_.state, tick_.begun);
+    parts_.device.display(shown_, news_.state, tick_.begun);
     const std::int64_t end = monotonic_now();
 
     compute_ns_ = end - begin;

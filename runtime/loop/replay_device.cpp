@@ -35,7 +35,7 @@ const char* first_different_field(const TickRecord& now, const TickRecord& then)
 
 }  // namespace
 
-DeviceNews ReplayDevice::hear(const TickTime& tick) noexcept {
+DeviceNews ReplayDevice::poll(const TickTime& tick) noexcept {
   const TickRecord& then = session_.ticks[static_cast<std::size_t>(tick.number)];
   const double* q = then.handle_orientation;
   DeviceNews news;

@@ -30,8 +30,8 @@ class ReplayDevice : public Device {
     return static_cast<std::int64_t>(session_.ticks.size());
   }
 
-  DeviceNews hear(const TickTime& tick) noexcept override;
-  void show(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
+  DeviceNews poll(const TickTime& tick) noexcept override;
+  void display(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
 
  private:
   const Recording& session_;

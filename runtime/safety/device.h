@@ -78,10 +78,11 @@ class Device {
   virtual ~Device() = default;
 
   /// What is known of the device now; the same state as before when nothing new was heard.
-  virtual DeviceNews hear(const TickTime& tick) noexcept = 0;
+  virtual DeviceNews poll(const TickTime& tick) noexcept = 0;
 
   /// What it is to show, which follows from `state` in a tick that began at `begun`.
-  virtual void show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept = 0;
+  virtual void display(const DeviceCommand& command, const DeviceState& state,
+                       std::int64_t begun) noexcept = 0;
 };
 
 }  // namespace palpate

@@ -11,7 +11,7 @@ namespace palpate {
 /// writes in between; the tick never comes here. After a device was lost it may be closed and opened again.
 class DevicePort {
  public:
-  enum class Heard {
+  enum class ReadResult {
     report,   ///< a new one
     nothing,  ///< in the time that a read waits, or nothing that makes sense
     lost,     ///< unplugged or broken: close, and open again when it is back
@@ -25,7 +25,7 @@ class DevicePort {
 
   /// Waits for a report for at most 10 ms and takes the newest. Fills `state`: in the device's frame, with
   /// velocity, time of arrival (CLOCK_MONOTONIC) and number. Otherwise leaves it as it is.
-  virtual Heard read(DeviceState& state) noexcept = 0;
+  virtual ReadResult read(DeviceState& state) noexcept = 0;
 
   /// Shows a command that follows from `state`; false when the device is lost. May block for milliseconds.
   virtual bool write(const DeviceCommand& command, const DeviceState& state) noexcept = 0;

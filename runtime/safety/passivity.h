@@ -26,7 +26,7 @@ class Passivity {
   Vec3 control(const Vec3& force, const Vec3& velocity) noexcept;
 
   /// What the hand gets in the end [N], until the next one.
-  void show(const Vec3& force) noexcept { shown_ = force; }
+  void set_displayed(const Vec3& force) noexcept { shown_ = force; }
 
   [[nodiscard]] double energy() const noexcept { return energy_; }    ///< absorbed from the hand [J]
   [[nodiscard]] double damping() const noexcept { return damping_; }  ///< alpha of the last tick [N s/m]

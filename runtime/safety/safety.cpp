@@ -63,7 +63,7 @@ DeviceCommand Safety::filter(const DeviceState& device, const DeviceCommand& wan
 }
 
 void Safety::take(const DeviceState& device, const DeviceCommand& wanted, const TickTiming& timing) noexcept {
-  if (silence_.hear(device, timing.now, shown_.norm())) {
+  if (silence_.observe(device, timing.now, shown_.norm())) {
     device_ = device;
     speed_limit_.see(device);
     passivity_.observe(device.pose.position);
@@ -109,7 +109,7 @@ DeviceCommand Safety::pass(const TickTiming& timing, double elapsed) noexcept {
   Vec3 scaled = Vec3::Zero();
   if (gate_.open()) scaled = passivity_.control(share_ * field, silence_.share() * device_.velocity);
   shown_ = force_rate_.follow(clamped(scaled, options_.max_force), time);
-  passivity_.show(shown_);
+  passivity_.display(shown_);
   felt_ = felt_ || !shown_.isZero(0.0);
 
   DeviceCommand command;

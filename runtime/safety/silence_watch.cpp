@@ -19,7 +19,7 @@ bool same_numbers(const DeviceState& a, const DeviceState& b) noexcept {
 
 }  // namespace
 
-bool SilenceWatch::hear(const DeviceState& device, std::int64_t now, double shown) noexcept {
+bool SilenceWatch::observe(const DeviceState& device, std::int64_t now, double shown) noexcept {
   if (!started_) {
     started_ = true;
     heard_ = now;

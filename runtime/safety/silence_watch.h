@@ -20,7 +20,7 @@ class SilenceWatch {
   explicit SilenceWatch(const SilenceOptions& options) noexcept : options_(options) {}
 
   /// Each tick: true when `device` is a new report. `shown`: the size of the force that the hand has [N].
-  bool hear(const DeviceState& device, std::int64_t now, double shown) noexcept;
+  bool observe(const DeviceState& device, std::int64_t now, double shown) noexcept;
 
   /// The share of the force [0, 1].
   [[nodiscard]] double share() const noexcept;

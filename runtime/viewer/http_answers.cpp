@@ -57,7 +57,7 @@ Response page(std::string_view host) {
   return response;
 }
 
-Response surface_file(bool is_stl, const ShownPicture& shown) {
+Response surface_file(bool is_stl, const DrawnPicture& shown) {
   try {
     Response response(http::status::ok, http_version);
     response.set(http::field::content_type, is_stl ? "model/stl" : "application/octet-stream");
@@ -106,7 +106,7 @@ Response full_house() {
                        "Too many pages are open: close one, then load this one anew."));
 }
 
-Response answer(const Request& request, const std::optional<ShownPicture>& shown) {
+Response answer(const Request& request, const std::optional<DrawnPicture>& shown) {
   const std::string_view path = target_of(request).path;
   if (path == "/") return guarded(page(view(request[http::field::host])));
   const bool is_stl = path == "/surface.stl";

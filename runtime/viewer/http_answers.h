@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "runtime/viewer/show.h"
+#include "runtime/viewer/broadcast.h"
 #include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
@@ -26,6 +26,6 @@ Response full_house();
 bool wants_socket(const Request& request);
 
 /// To all other requests that are not refused: the page, the surface as it is seen, or that it is not there.
-Response answer(const Request& request, const std::optional<ShownPicture>& shown);
+Response answer(const Request& request, const std::optional<DrawnPicture>& shown);
 
 }  // namespace palpate

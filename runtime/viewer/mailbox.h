@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "runtime/viewer/show.h"
+#include "runtime/viewer/broadcast.h"
 
 namespace palpate {
 
@@ -21,7 +21,7 @@ struct Mail {
   };
 
   std::shared_ptr<const Scene> scene;
-  std::optional<ShownPicture> picture;
+  std::optional<DrawnPicture> picture;
   std::deque<Ticks> ticks;
   std::optional<StateWord> state;
   nlohmann::json times;  ///< of the last state that had them

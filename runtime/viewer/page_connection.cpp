@@ -53,7 +53,7 @@ void PageConnection::answer_request() {
   if (wants_socket(request)) {
     open_socket();
   } else {
-    respond(answer(request, server_.show().picture()));
+    respond(answer(request, server_.broadcast().picture()));
   }
 }
 
@@ -94,18 +94,19 @@ void PageConnection::open_socket() {
   socket_->async_accept(request, [self = shared_from_this()](const ErrorCode& problem) {
     if (problem) return self->server_.leave(*self);
     self->is_open_ = true;
-    self->ticks_ = self->server_.is_replay() ? 0 : self->server_.show().ticks().end();
+    self->ticks_ = self->server_.is_replay() ? 0 : self->server_.broadcast().ticks().end();
     self->server_.join(*self);
     self->read();
   });
 }
 
 void PageConnection::read() {
-  socket_->async_read(
-      buffer_, [self = shared_from_this()](const ErrorCode& problem, std::size_t) { self->hear(problem); });
+  socket_->async_read(buffer_, [self = shared_from_this()](const ErrorCode& problem, std::size_t) {
+    self->receive(problem);
+  });
 }
 
-void PageConnection::hear(const ErrorCode& problem) {
+void PageConnection::receive(const ErrorCode& problem) {
   if (problem) return server_.leave(*this);
   if (!is_open_) return;
   if (!socket_->got_text()) return close(websocket::close_code::unknown_data, "only text is read");
@@ -145,10 +146,10 @@ void PageConnection::say(std::string text) {
   said_bytes_ += text.size();
   said_.push_back(std::move(text));
   if (said_bytes_ > most_unread) return close(websocket::close_code::policy_error, "too much is unread");
-  show();
+  send_news();
 }
 
-void PageConnection::show() {
+void PageConnection::send_news() {
   if (!is_open_ || writing_) return;
   writing_ = next_message();
   if (!writing_) return;
@@ -158,12 +159,12 @@ void PageConnection::show() {
                        [self = shared_from_this()](const ErrorCode& problem, std::size_t) {
                          self->writing_ = {};
                          if (problem) return self->server_.leave(*self);
-                         self->show();
+                         self->send_news();
                        });
 }
 
 Message PageConnection::next_message() {
-  Show& shown = server_.show();
+  Broadcast& shown = server_.broadcast();
   if (!said_.empty()) {
     Message message = text_message(std::move(said_.front()));
     said_bytes_ -= message.bytes->size();

@@ -12,8 +12,8 @@
 #include <optional>
 #include <string>
 
+#include "runtime/viewer/broadcast.h"
 #include "runtime/viewer/http_answers.h"
-#include "runtime/viewer/show.h"
 
 namespace palpate {
 
@@ -30,7 +30,7 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   /// Without a word.
   void cut() noexcept;
   /// Sends what there is that the page has not been sent, one message after the other.
-  void show();
+  void send_news();
   /// A text that it must not miss.
   void say(std::string text);
   /// It has shown the token, and there is room for it.
@@ -45,7 +45,7 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   void respond(Response response);
   void open_socket();
   void read();
-  void hear(const ErrorCode& problem);
+  void receive(const ErrorCode& problem);
   void close(boost::beast::websocket::close_code code, std::string reason);
   Message next_message();
 

@@ -99,7 +99,7 @@ void PageServer::tick() {
     for (const auto& page : connections) {
       if (page->is_stalled()) cut(*page);
     }
-    show_.repeat_state();
+    broadcast_.repeat_state();
     show_all();
     tick();
   });
@@ -127,28 +127,28 @@ void PageServer::cut(PageConnection& page) {
 
 void PageServer::take_mail() {
   Mail mail = mailbox_.take();
-  if (mail.scene) show_.set_scene(std::move(mail.scene));
-  if (!mail.times.is_null()) show_.set_times(std::move(mail.times));
-  if (mail.state) show_.set_state(std::move(*mail.state));
-  if (mail.picture) show_.set_picture(std::move(*mail.picture));
-  for (const Mail::Ticks& ticks : mail.ticks) show_.add_ticks(ticks.notes, ticks.stride, is_replay_);
+  if (mail.scene) broadcast_.set_scene(std::move(mail.scene));
+  if (!mail.times.is_null()) broadcast_.set_times(std::move(mail.times));
+  if (mail.state) broadcast_.set_state(std::move(*mail.state));
+  if (mail.picture) broadcast_.set_picture(std::move(*mail.picture));
+  for (const Mail::Ticks& ticks : mail.ticks) broadcast_.add_ticks(ticks.notes, ticks.stride, is_replay_);
   show_all();
 }
 
 void PageServer::show_state_anew() {
-  show_.touch_state();
+  broadcast_.touch_state();
   show_all();
 }
 
 void PageServer::show_all() {
   const std::set<PageConnection*> pages = open_;
-  for (PageConnection* page : pages) page->show();
+  for (PageConnection* page : pages) page->send_news();
 }
 
 void PageServer::join(PageConnection& page) {
   open_.insert(&page);
   if (open_.size() == 1) controller_ = &page;
-  show_.touch_state();
+  broadcast_.touch_state();
   page.say(hello_word(is_replay_ ? "replay" : "live", ++joined_));
   show_all();
 }

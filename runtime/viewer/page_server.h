@@ -13,10 +13,10 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/viewer/broadcast.h"
 #include "runtime/viewer/http_answers.h"
 #include "runtime/viewer/mailbox.h"
 #include "runtime/viewer/page_word.h"
-#include "runtime/viewer/show.h"
 #include "runtime/viewer/viewer_server.h"
 
 namespace palpate {
@@ -47,7 +47,7 @@ class PageServer {
   // What follows is for connections, on the thread.
   [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
   [[nodiscard]] bool is_replay() const noexcept { return is_replay_; }
-  [[nodiscard]] Show& show() noexcept { return show_; }
+  [[nodiscard]] Broadcast& broadcast() noexcept { return broadcast_; }
   [[nodiscard]] PageRole role(const PageConnection& page) const {
     return {controller_ == &page, controller_ != nullptr, open_.size()};
   }
@@ -81,7 +81,7 @@ class PageServer {
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer timer_;
   boost::asio::steady_timer retry_;
-  Show show_;
+  Broadcast broadcast_;
   std::vector<std::shared_ptr<PageConnection>> connections_;  // as they came
   std::set<PageConnection*> open_;                            // those that are sockets
   PageConnection* controller_ = nullptr;

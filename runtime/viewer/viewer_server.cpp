@@ -48,7 +48,7 @@ void ViewerServer::show_scene(std::shared_ptr<const Scene> scene) {
 
 void ViewerServer::show_picture(SurfacePicture picture, const Body* body) {
   const std::lock_guard lock(impl_->mutex);
-  ShownPicture shown{.scene = impl_->scene, .patch = nullptr, .picture = {}};
+  DrawnPicture shown{.scene = impl_->scene, .patch = nullptr, .picture = {}};
   if (shown.scene == nullptr) return;
   if (picture.patch != impl_->patch || shown.scene != impl_->patch_scene) {
     impl_->patch = picture.patch;

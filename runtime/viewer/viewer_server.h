@@ -1,4 +1,4 @@
-// Serves the viewer's page, its pictures and its wishes.
+// Serves the viewer's page, its pictures and its requests.
 #pragma once
 
 #include <cstdint>

@@ -33,7 +33,7 @@ double imbalance(const Integrator& at, const Equation& equation) {
   return (inertia - equation.force_left(at.time(), at.u(), at.v())).norm() / inertia.norm();
 }
 
-TEST(Swing, EveryStepEndsInBalance) {
+TEST(SwingingBody, EveryStepEndsInBalance) {
   for (const bool lumped : {false, true}) {
     const Equation equation = pushed_block(lumped);
     const Eigen::Index n = equation.M.rows();
@@ -50,7 +50,7 @@ TEST(Swing, EveryStepEndsInBalance) {
 }
 
 // What the implicit ones solve for, besides the balance: u' and v' as each of them defines these.
-TEST(Swing, ImplicitStepsAreWhatDefinesThem) {
+TEST(SwingingBody, ImplicitStepsAreWhatDefinesThem) {
   const Equation equation = pushed_block(false);
   const Eigen::Index n = equation.M.rows();
   const VectorXd u0 = VectorXd::LinSpaced(n, 1e-3, 0.0), v0 = VectorXd::LinSpaced(n, 0.0, 0.01);
@@ -80,7 +80,7 @@ TEST(Swing, ImplicitStepsAreWhatDefinesThem) {
 }
 
 // C = 0, f = 0: Newmark's with alpha = 1/4, delta = 1/2 is the trapezoidal rule, which keeps the energy.
-TEST(Swing, NewmarkKeepsTheEnergy) {
+TEST(SwingingBody, NewmarkKeepsTheEnergy) {
   for (const bool lumped : {false, true}) {
     const Equation equation = equation_of(clamped_block({4, 3, 2}), lumped);
     const Eigen::Index n = equation.M.rows();
@@ -112,7 +112,7 @@ double measured_decay(const std::vector<double>& q, double Dt) {
 }
 
 // Newmark's steps change the rate by about (omega Dt)^2 / 4 of it.
-TEST(Swing, RayleighDampingDecaysAsPredicted) {
+TEST(SwingingBody, RayleighDampingDecaysAsPredicted) {
   const Equation free = equation_of(clamped_block({4, 2, 2}));
   const Modes modes = all_modes(free);
   const Eigen::Index low = 0, high = 7, between = 3;
@@ -156,7 +156,7 @@ double error_at_end(Method method, const Equation& equation, const Rayleigh& dam
   return (integrator->u() - exact).norm() / exact.norm();
 }
 
-TEST(Swing, EveryIntegratorConvergesToTheSumOfModes) {
+TEST(SwingingBody, EveryIntegratorConvergesToTheSumOfModes) {
   const std::map<Method, double> orders = {
       {Method::explicit_euler, 1}, {Method::semi_implicit_euler, 1}, {Method::rk2, 2},    {Method::rk4, 4},
       {Method::verlet, 2},         {Method::implicit_euler, 1},      {Method::newmark, 2}};

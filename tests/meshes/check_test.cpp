@@ -23,7 +23,7 @@ using test::error_of;
 constexpr std::uint8_t x_axis = 1, y_axis = 2, z_axis = 4, every_axis = 7;
 
 /// (node, axes) of some nodes.
-using Held = std::vector<std::pair<std::size_t, std::uint8_t>>;
+using HeldMesh = std::vector<std::pair<std::size_t, std::uint8_t>>;
 
 std::vector<std::uint8_t> masks(const Mesh& mesh, const Held& held) {
   std::vector<std::uint8_t> result(mesh.nodes.size(), 0);
@@ -37,7 +37,7 @@ Held held_everywhere(const Mesh& mesh, std::uint8_t axes) {
   return held;
 }
 
-TEST(Check, AGoodMeshIsLeftAsItIs) {
+TEST(MeshCheck, AGoodMeshIsLeftAsItIs) {
   for (const ElementType type : body_elements) {
     Mesh mesh = block(type);
     const Mesh before = mesh;
@@ -50,7 +50,7 @@ TEST(Check, AGoodMeshIsLeftAsItIs) {
 }
 
 /// A mirror image has every element inside out.
-TEST(Check, AMeshOfTheOtherSignIsTurnedRound) {
+TEST(MeshCheck, AMeshOfTheOtherSignIsTurnedRound) {
   for (const ElementType type : body_elements) {
     SCOPED_TRACE(traits(type).name);
     Mesh mesh = block(type);
@@ -78,7 +78,7 @@ TEST(Check, AMeshOfTheOtherSignIsTurnedRound) {
   }
 }
 
-TEST(Check, BadElementsAreNamedWithTheirPlace) {
+TEST(MeshCheck, BadElementsAreNamedWithTheirPlace) {
   const struct {
     void (*spoil)(Mesh&);
     std::vector<const char*> says;
@@ -102,7 +102,7 @@ TEST(Check, BadElementsAreNamedWithTheirPlace) {
   }
 }
 
-TEST(Check, FlatElementIsFoundAtAnySize) {
+TEST(MeshCheck, FlatElementIsFoundAtAnySize) {
   for (const double size : {1e-6, 1.0, 1e6}) {
     Mesh mesh;
     mesh.nodes = {{0, 0, 0}, {size, 0, 0}, {0, size, 0}, {0.3 * size, 0.3 * size, 0}};
@@ -121,7 +121,7 @@ TEST(Check, FlatElementIsFoundAtAnySize) {
 }
 
 /// Their volume is positive, but the map is not one to one.
-TEST(Check, FoldedElementsAreRefused) {
+TEST(MeshCheck, FoldedElementsAreRefused) {
   Mesh quad = generate(RectangleShape{});
   quad.nodes[3] = Vec3(0.4, 0.4, 0);  // a dart: its corner turns inwards
   EXPECT_TRUE(
@@ -149,7 +149,7 @@ TEST(Check, FoldedElementsAreRefused) {
   EXPECT_EQ(orient_elements(tet, ""), 0u);
 }
 
-TEST(Check, UnusedNodesGoAndTheRestKeepsItsOrder) {
+TEST(MeshCheck, UnusedNodesGoAndTheRestKeepsItsOrder) {
   for (const ElementType type : body_elements) {
     SCOPED_TRACE(traits(type).name);
     Mesh mesh = block(type);
@@ -172,7 +172,7 @@ TEST(Check, UnusedNodesGoAndTheRestKeepsItsOrder) {
   }
 }
 
-TEST(Check, DisconnectedPartsAreCounted) {
+TEST(MeshCheck, DisconnectedPartsAreCounted) {
   for (const ElementType type : body_elements) {
     SCOPED_TRACE(traits(type).name);
     Mesh mesh = block(type);
@@ -190,7 +190,7 @@ TEST(Check, DisconnectedPartsAreCounted) {
   }
 }
 
-TEST(Check, PartsThatTouchOnlyInANodeAreNotConnected) {
+TEST(MeshCheck, PartsThatTouchOnlyInANodeAreNotConnected) {
   Mesh mesh;
   mesh.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
   mesh.connectivity = {0, 1, 2, 3, 0, 4, 5, 6};
@@ -200,7 +200,7 @@ TEST(Check, PartsThatTouchOnlyInANodeAreNotConnected) {
   EXPECT_TRUE(contains(error_of([&] { check_connected(mesh, ""); }).what(), "2 disconnected parts"));
 }
 
-TEST(Held, AMotionThatIsLeftIsNamed) {
+TEST(HeldMesh, AMotionThatIsLeftIsNamed) {
   const Mesh solid = block(ElementType::tet4);  // 5 x 3 x 3 nodes, 0.1 m apart, x fastest
   const Mesh plane = block(ElementType::quad4);
   const struct {
@@ -245,7 +245,7 @@ TEST(Held, AMotionThatIsLeftIsNamed) {
   }
 }
 
-TEST(Held, EnoughIsEnough) {
+TEST(HeldMesh, EnoughIsEnough) {
   const Mesh solid = block(ElementType::tet4), plane = block(ElementType::tri3);
   for (const Held& held : std::vector<Held>{{{0, every_axis}, {4, every_axis}, {5, every_axis}},
                                             {{0, every_axis}, {4, y_axis | z_axis}, {10, z_axis}},  // 3-2-1
@@ -258,7 +258,7 @@ TEST(Held, EnoughIsEnough) {
   EXPECT_NO_THROW(check_held(plane, masks(plane, {{0, x_axis}, {5, x_axis}, {4, y_axis}}), ""));
 }
 
-TEST(Held, DoesNotDependOnSizeOrPlace) {
+TEST(HeldMesh, DoesNotDependOnSizeOrPlace) {
   for (const double size : {1e-4, 1.0, 1e4}) {
     Mesh mesh = block(ElementType::tet4);
     for (Vec3& x : mesh.nodes) x = size * (x + Vec3(30, -20, 10));
@@ -336,13 +336,13 @@ void compare_with_stiffness(const Mesh& mesh, Analysis analysis) {
   EXPECT_TRUE(d == 2 || axes > 20) << axes;
 }
 
-TEST(Held, AgreesWithTheStiffness) {
+TEST(HeldMesh, AgreesWithTheStiffness) {
   compare_with_stiffness(generate(BoxShape{Vec3(1, 2, 3), Vec3(1, 0.7, 0.5), {2, 1, 1}}), Analysis::solid);
   compare_with_stiffness(generate(RectangleShape{Vec3(1, 2, 0), Vec3(1, 0.7, 0), {2, 2}}),
                          Analysis::plane_stress);
 }
 
-TEST(Check, ScaleWarning) {
+TEST(MeshCheck, ScaleWarning) {
   const auto warning = [](double size, double scale = 1.0) {
     return scale_warning(generate(BoxShape{Vec3::Zero(), Vec3::Constant(size), {1, 1, 1}}), scale);
   };

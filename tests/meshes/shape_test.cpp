@@ -42,7 +42,7 @@ TEST(Shapes, EveryKindFillsTheBlockWithPositiveElements) {
   }
 }
 
-TEST(Box, OneCellIsSixTetrahedraAlongTheDiagonal) {
+TEST(BoxMesh, OneCellIsSixTetrahedraAlongTheDiagonal) {
   const Mesh mesh = generate(BoxShape{});
   ASSERT_EQ(mesh.nodes.size(), 8u);
   for (int node = 0; node < 8; ++node) {  // x fastest, then y, then z
@@ -57,12 +57,12 @@ TEST(Box, OneCellIsSixTetrahedraAlongTheDiagonal) {
   }
 }
 
-TEST(Box, OneHexahedronHasItsCornersInVtksOrder) {
+TEST(BoxMesh, OneHexahedronHasItsCornersInVtksOrder) {
   const Mesh mesh = generate(BoxShape{}, ElementType::hex8);
   EXPECT_EQ(mesh.connectivity, (std::vector<Index>{0, 1, 3, 2, 4, 5, 7, 6}));
 }
 
-TEST(Box, PlaceSizeAndNumbers) {
+TEST(BoxMesh, PlaceSizeAndNumbers) {
   for (const ElementType type : {ElementType::tet4, ElementType::hex8}) {
     const Mesh mesh = generate(BoxShape{Vec3(-1, 2, 0.5), Vec3(0.3, 0.2, 0.7), {3, 2, 5}}, type);
     EXPECT_EQ(mesh.nodes.size(), 4u * 3u * 6u);

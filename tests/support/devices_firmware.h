@@ -61,7 +61,7 @@ class Firmware {
   [[nodiscard]] double time() const;  ///< [s]
 
  protected:
-  void show(const Vec3& force);  ///< for `do_...`
+  void set_displayed(const Vec3& force);  ///< for `do_...`
   void show(const Vec3& force, double time);
   [[nodiscard]] double now() const;
 

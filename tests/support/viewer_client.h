@@ -126,22 +126,22 @@ class Client {
   }
 
   /// The next message; throws boost::system::system_error when the connection is closed.
-  Said hear() {
+  Said receive() {
     beast::flat_buffer buffer;
     socket_.read(buffer);
     return {socket_.got_text(), beast::buffers_to_string(buffer.data())};
   }
   /// The next one of a binary kind, others are let pass.
-  std::string hear(std::uint32_t kind) {
+  std::string receive(std::uint32_t kind) {
     for (;;) {
-      Said said = hear();
+      Said said = receive();
       if (said.kind() == kind) return std::move(said.bytes);
     }
   }
   /// The next text of a type that is as it should be.
-  Json hear(const std::string& type, const std::function<bool(const Json&)>& wanted = {}) {
+  Json receive(const std::string& type, const std::function<bool(const Json&)>& wanted = {}) {
     for (;;) {
-      const Said said = hear();
+      const Said said = receive();
       if (said.type() != type) continue;
       Json word = Json::parse(said.bytes);
       if (!wanted || wanted(word)) return word;
@@ -150,7 +150,7 @@ class Client {
   /// Reads until the server closes; how it did.
   websocket::close_reason hear_end() {
     try {
-      for (;;) (void)hear();
+      for (;;) (void)receive();
     } catch (const boost::system::system_error&) {
       return socket_.reason();
     }

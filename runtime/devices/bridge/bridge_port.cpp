@@ -147,8 +147,8 @@ void BridgePort::open() {
   }
 }
 
-DevicePort::Heard BridgePort::read(DeviceState& state) noexcept {
-  if (socket_ < 0) return Heard::lost;
+DevicePort::ReadResult BridgePort::read(DeviceState& state) noexcept {
+  if (socket_ < 0) return ReadResult::lost;
   pollfd waiting{socket_, POLLIN, 0};
   poll(&waiting, 1, patience);
   BridgeState newest;
@@ -166,15 +166,15 @@ DevicePort::Heard BridgePort::read(DeviceState& state) noexcept {
     heard = heard || refusal == Refusal::none;
   }
   if (!heard) {
-    if (partner_ == 0 || seconds_between(heard_, monotonic_now()) <= most_silence) return Heard::nothing;
+    if (partner_ == 0 || seconds_between(heard_, monotonic_now()) <= most_silence) return ReadResult::nothing;
     forget_partner();
-    return Heard::lost;
+    return ReadResult::lost;
   }
   skipped_.store(order_.skipped(), std::memory_order_relaxed);
   set_limits(newest.limits);
-  if (newest.fault) return Heard::lost;
+  if (newest.fault) return ReadResult::lost;
   state = newest.device;
-  return Heard::report;
+  return ReadResult::report;
 }
 
 Refusal BridgePort::take(std::span<const std::uint8_t> datagram, Peer from, std::int64_t now,

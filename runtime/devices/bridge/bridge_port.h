@@ -62,7 +62,7 @@ class BridgePort final : public DevicePort {
 
   /// Lost: the partner was silent for too long, or it says that its device has a fault. Nothing, and not
   /// lost, while there was no partner yet.
-  Heard read(DeviceState& state) noexcept override;
+  ReadResult read(DeviceState& state) noexcept override;
 
   /// Numbers that are not finite are sent as no force. True while there is nobody to tell: it is read that
   /// says lost.

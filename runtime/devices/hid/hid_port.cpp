@@ -81,8 +81,8 @@ void HidPort::open() {
   write_failed_ = false;
 }
 
-DevicePort::Heard HidPort::read(DeviceState& state) noexcept {
-  if (!device_ || read_failed_) return Heard::lost;
+DevicePort::ReadResult HidPort::read(DeviceState& state) noexcept {
+  if (!device_ || read_failed_) return ReadResult::lost;
   // Exactly the longest report of interest is asked for. A hidraw device gives one report a read, whatever is
   // asked for, and a shorter or cut-off one does not decode. The pseudo-terminals by which tests emulate a
   // device give all that waits, one report behind the other: asked for one, they give one.
@@ -94,7 +94,7 @@ DevicePort::Heard HidPort::read(DeviceState& state) noexcept {
     const int size = device_->read(buffer, wait);
     if (size < 0) {
       read_failed_ = true;
-      return Heard::lost;
+      return ReadResult::lost;
     }
     if (size == 0) break;
     if (protocol_->take(buffer.first(static_cast<std::size_t>(size)))) {
@@ -107,11 +107,11 @@ DevicePort::Heard HidPort::read(DeviceState& state) noexcept {
   const std::int64_t now = monotonic_now();
   const std::int64_t writing_since = writing_since_;
   const bool hangs = writing_since != 0 && now - writing_since > longest_write;
-  if (!heard && hangs) return Heard::nothing;
-  if (!protocol_->tell(heard, now, state)) return Heard::nothing;
+  if (!heard && hangs) return ReadResult::nothing;
+  if (!protocol_->tell(heard, now, state)) return ReadResult::nothing;
   state.arrived = now;
   sequence_ = state.sequence;
-  return Heard::report;
+  return ReadResult::report;
 }
 
 bool HidPort::write(const DeviceCommand& command, const DeviceState& state) noexcept {

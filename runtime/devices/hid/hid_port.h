@@ -33,7 +33,7 @@ class HidPort : public DevicePort {
   void open() override;
   /// Drains what has come to the newest. Reports that make no sense are dropped and counted. While the
   /// device does not take a write for 20 ms, only what it really says is told.
-  Heard read(DeviceState& state) noexcept override;
+  ReadResult read(DeviceState& state) noexcept override;
   bool write(const DeviceCommand& command, const DeviceState& state) noexcept override;
   /// Sends each report of no force twice.
   void close() noexcept override;

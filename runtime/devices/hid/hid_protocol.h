@@ -1,4 +1,4 @@
-// What a kind of HID device says and wants to hear; HidPort has the wire.
+// What a kind of HID device says and expects; HidPort has the wire.
 #pragma once
 
 #include <algorithm>

@@ -19,7 +19,7 @@ constexpr std::int64_t ms_ns = 1'000'000;
 
 DeviceNews tick(MouseDevice& mouse, std::int64_t number, std::int64_t rate = 1000) {
   const std::int64_t time = number * 1'000'000'000 / rate;
-  return mouse.hear({.number = number, .due = time, .begun = time});
+  return mouse.poll({.number = number, .due = time, .begun = time});
 }
 
 // x = d (1 - (1 + t / T) exp(-t / T)) after a step of d, whatever the rate.
@@ -114,11 +114,11 @@ class Pointed : public Device {
  public:
   using Hand = std::function<PointerPose(std::int64_t)>;
   explicit Pointed(Hand hand) : hand_(std::move(hand)), mouse_(hand_(0), 1000) {}
-  DeviceNews hear(const TickTime& tick) noexcept override {
+  DeviceNews poll(const TickTime& tick) noexcept override {
     mouse_.point(hand_(tick.number));
-    return mouse_.hear(tick);
+    return mouse_.poll(tick);
   }
-  void show(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
+  void display(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
 
  private:
   Hand hand_;

@@ -20,9 +20,9 @@
 #include "base/json_text.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
-#include "runtime/app/act.h"
 #include "runtime/app/fitting_tool.h"
-#include "runtime/app/mover.h"
+#include "runtime/app/input_source.h"
+#include "runtime/app/play_session.h"
 #include "runtime/body/overlay_rings.h"
 #include "runtime/body/patch_maker.h"
 #include "runtime/loop/device_link.h"
@@ -48,7 +48,7 @@ PlayOptions options_of(const std::filesystem::path& file) {
 }
 
 /// A run in a folder of its own, as that is where recordings go.
-class Viewed : public testing::Test {
+class ViewedPlay : public testing::Test {
  protected:
   void SetUp() override {
     std::filesystem::create_directory(folder_);
@@ -61,7 +61,7 @@ class Viewed : public testing::Test {
   }
 
   void start(const PlayOptions& options) {
-    play_ = std::make_unique<ViewedPlay>(options, mover_,
+    play_ = std::make_unique<ViewedPlay>(options, input_,
                                          load_and_print(options.file, "", options.settings.body()),
                                          ViewerPort(*options.view));
     thread_ = std::thread([this] { report_ = play_->run(stop_); });
@@ -92,7 +92,7 @@ class Viewed : public testing::Test {
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) / ("palpate_viewed." + std::to_string(getpid()));
   std::atomic<bool> stop_ = false;
-  Mover mover_;
+  InputSource input_;
   std::unique_ptr<ViewedPlay> play_;
   LoopReport report_;
   std::thread thread_;
@@ -107,7 +107,7 @@ std::string where_it_is_refused(const std::function<void()>& wish) {
   return "";
 }
 
-TEST_F(Viewed, RecordsAnActThatIsReplayedToTheSameBits) {
+TEST_F(ViewedPlay, RecordsAnActThatIsReplayedToTheSameBits) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   play_->record(true);
@@ -137,15 +137,15 @@ TEST_F(Viewed, RecordsAnActThatIsReplayedToTheSameBits) {
   options.settings = read_settings(split_settings(options.session->info.options));
   options.fast = true;
   const Body body = load_body(cube, "", options.settings.body());
-  const Mover mover = make_mover(options, nullptr);
-  const LoopReport replay = Act(options, body, mover).run(std::atomic<bool>(false));
+  const InputSource input = make_input_source(options, nullptr);
+  const LoopReport replay = PlaySession(options, body, input).run(std::atomic<bool>(false));
   EXPECT_GT(replay.ticks, 450);
   EXPECT_GT(replay.ticks_in_contact, 200);
   EXPECT_GT(replay.largest_shown, 0.0);
   EXPECT_EQ(replay.replay.different, 0);
 }
 
-TEST_F(Viewed, StandsStillAndTakesSingleTicks) {
+TEST_F(ViewedPlay, StandsStillAndTakesSingleTicks) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   play_->pause(true);
@@ -165,7 +165,7 @@ TEST_F(Viewed, StandsStillAndTakesSingleTicks) {
       << "a paused run shows the untouched body";
 }
 
-TEST_F(Viewed, BeginsAnewWithOtherSettings) {
+TEST_F(ViewedPlay, BeginsAnewWithOtherSettings) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   const std::uint32_t scene = play_->state().scene;
@@ -187,13 +187,13 @@ class HeldPort : public DevicePort {
   explicit HeldPort(const std::atomic<double>& height) : height_(height) {}
 
   void open() override {}
-  Heard read(DeviceState& state) noexcept override {
+  ReadResult read(DeviceState& state) noexcept override {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
     state.pose.position = Vec3(0.0, 0.0, height_);
     state.arrived = std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
     ++sequence_;
     state.sequence = sequence_;
-    return Heard::report;
+    return ReadResult::report;
   }
   bool write(const DeviceCommand&, const DeviceState&) noexcept override { return true; }
   void close() noexcept override {}
@@ -207,13 +207,13 @@ class HeldPort : public DevicePort {
 };
 
 /// A run whose device has a hand in it. This machine may be busy: late ticks and reports are no faults here.
-class Held : public Viewed {
+class HeldDevice : public Viewed {
  protected:
   void start_held() {
     auto link = std::make_unique<DeviceLink>(std::make_unique<HeldPort>(height_), DeviceLinkOptions{});
-    mover_.link = link.get();
-    mover_.device = std::move(link);
-    while (!mover_.link->has_reported()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    input_.link = link.get();
+    input_.device = std::move(link);
+    while (!input_.link->has_reported()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     PlayOptions options = options_of(cube);
     options.device.kind = DeviceChoice::Kind::bridge;
     options.device.text = "bridge";
@@ -224,13 +224,13 @@ class Held : public Viewed {
   }
   void TearDown() override {
     Viewed::TearDown();
-    mover_.device.reset();  // before the height
+    input_.device.reset();  // before the height
   }
 
   std::atomic<double> height_ = 0.1;  // [m]
 };
 
-TEST_F(Held, NoPageChangesWhatProtectsAHand) {
+TEST_F(HeldDevice, NoPageChangesWhatProtectsAHand) {
   start_held();
   EXPECT_TRUE(play_->state().hand);
   const auto refused = [](const std::function<void()>& wish) {
@@ -261,7 +261,7 @@ TEST_F(Held, NoPageChangesWhatProtectsAHand) {
   EXPECT_TRUE(wait_for([](const RunState& state) { return state.settings.contains("friction"); }));
 }
 
-TEST_F(Held, AFaultOutlivesWhatAPageBegins) {
+TEST_F(HeldDevice, AFaultOutlivesWhatAPageBegins) {
   start_held();
   height_ = 0.5;  // nobody moves so fast
   const auto is_latched = [](const RunState& state) {
@@ -289,7 +289,7 @@ TEST_F(Held, AFaultOutlivesWhatAPageBegins) {
   EXPECT_FALSE(play_->state().recording);
 }
 
-TEST_F(Viewed, NobodyIsInAPointer) {
+TEST_F(ViewedPlay, NobodyIsInAPointer) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   EXPECT_FALSE(play_->state().hand);
@@ -298,7 +298,7 @@ TEST_F(Viewed, NobodyIsInAPointer) {
   EXPECT_TRUE(wait_for([](const RunState& state) { return state.settings.contains("safety"); }));
 }
 
-TEST_F(Viewed, ABallSuitsTheBodyWhereNoToolIsGiven) {
+TEST_F(ViewedPlay, ABallSuitsTheBodyWhereNoToolIsGiven) {
   PlayOptions options = options_of(cube);
   options.settings_text.clear();
   options.settings = read_settings({});
@@ -313,7 +313,7 @@ TEST_F(Viewed, ABallSuitsTheBodyWhereNoToolIsGiven) {
   EXPECT_TRUE(wait_for([](const RunState& state) { return state.settings.at("tool") == "sphere:0.17"; }));
 }
 
-TEST_F(Viewed, RefusesAToolThatIsLargerThanTheBody) {
+TEST_F(ViewedPlay, RefusesAToolThatIsLargerThanTheBody) {
   start(options_of(cube));
   const auto refused = [&](const char* tool) {
     return where_it_is_refused([&] { play_->change({{"tool", tool}}); });
@@ -357,7 +357,7 @@ TEST_P(OverlayRings, AreAsManyAsTheFileKeepsLayersFor) {
   EXPECT_THROW(static_cast<void>(patch_room(body, rings + 1, 1)), Error);
 }
 
-TEST_F(Viewed, RefusesAtOnceWhatCannotBe) {
+TEST_F(ViewedPlay, RefusesAtOnceWhatCannotBe) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   const auto refused = [&](const char* name, const char* value) {
@@ -386,7 +386,7 @@ void write_mixed_cube(const std::filesystem::path& file) {
   writer.finish(model.probes);
 }
 
-TEST_F(Viewed, GoesOnAsBeforeWhereLoadingShowsThatItCannotBe) {
+TEST_F(ViewedPlay, GoesOnAsBeforeWhereLoadingShowsThatItCannotBe) {
   write_mixed_cube(folder_ / "mixed.palpate.hdf");
   start(options_of(folder_ / "mixed.palpate.hdf"));
   ASSERT_TRUE(wait_for_ticks(50));
@@ -403,7 +403,7 @@ TEST_F(Viewed, GoesOnAsBeforeWhereLoadingShowsThatItCannotBe) {
   EXPECT_TRUE(wait_for_ticks(50));
 }
 
-TEST_F(Viewed, GoesOnWithTheLoadedBodyWhereItsFileIsGone) {
+TEST_F(ViewedPlay, GoesOnWithTheLoadedBodyWhereItsFileIsGone) {
   std::filesystem::copy_file(cube, folder_ / "gone.palpate.hdf");
   start(options_of(folder_ / "gone.palpate.hdf"));
   ASSERT_TRUE(wait_for_ticks(50));
@@ -420,7 +420,7 @@ TEST_F(Viewed, GoesOnWithTheLoadedBodyWhereItsFileIsGone) {
   EXPECT_TRUE(wait_for_ticks(50));
 }
 
-TEST_F(Viewed, GoesOnWhereARecordingCannotBeMade) {
+TEST_F(ViewedPlay, GoesOnWhereARecordingCannotBeMade) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   std::filesystem::remove_all(folder_);  // the working directory is gone
@@ -433,7 +433,7 @@ TEST_F(Viewed, GoesOnWhereARecordingCannotBeMade) {
   std::filesystem::current_path(folder_);
 }
 
-TEST_F(Viewed, TellsAtOnceOfARecordingThatFailsAndGoesOn) {
+TEST_F(ViewedPlay, TellsAtOnceOfARecordingThatFailsAndGoesOn) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   play_->record(true);
@@ -470,10 +470,10 @@ TEST(RunState, IsJsonWhateverAFileIsCalled) {
             fault_remedy(Fault::too_fast));
 }
 
-class Settled : public testing::TestWithParam<double> {};
+class SettledSession : public testing::TestWithParam<double> {};
 
 /// As soft as jelly, and steel.
-INSTANTIATE_TEST_SUITE_P(Bodies, Settled, testing::Values(1.0, 2e11));
+INSTANTIATE_TEST_SUITE_P(Bodies, SettledSession, testing::Values(1.0, 2e11));
 
 Body body_of(double youngs_modulus) {
   Model model = test::unit_model(3, 4, Scope::surface, Precision::double_precision);
@@ -481,47 +481,47 @@ Body body_of(double youngs_modulus) {
   return Body(std::move(model));
 }
 
-TEST_P(Settled, AMouseHangsOnAStiffCoupling) {
+TEST_P(SettledSession, AMouseHangsOnAStiffCoupling) {
   const Body body = body_of(GetParam());
-  Mover mover;
-  add_mouse(mover, options_of(cube), body);
+  InputSource input;
+  add_mouse(input, options_of(cube), body);
   std::vector<double> stiffness;
   for (const Index node : body.free_surface_nodes())
     stiffness.push_back(3.0 / body.greens().block(node, node).trace());
   std::sort(stiffness.begin(), stiffness.end());
-  const double k = settle({}, mover, body).tool.coupling_stiffness;
+  const double k = apply_defaults({}, input, body).tool.coupling_stiffness;
   EXPECT_GE(k, 50.0 * stiffness[stiffness.size() / 2 - 1] * (1.0 - 1e-12));
   EXPECT_LE(k, 50.0 * stiffness[stiffness.size() / 2 + 1] * (1.0 + 1e-12));
   Settings asked;
   asked.tool.coupling_stiffness = 7.0;
-  EXPECT_EQ(settle(asked, mover, body).tool.coupling_stiffness, 7.0);
+  EXPECT_EQ(apply_defaults(asked, input, body).tool.coupling_stiffness, 7.0);
 }
 
 /// A pointer that presses, rests there, and hears its clock stand still for a while.
 class Pressing : public Device {
  public:
   Pressing() : mouse_({.pose = {.position = {0.5, 0.5, 1.2}}}, 1000) {}
-  DeviceNews hear(const TickTime& tick) noexcept override {
+  DeviceNews poll(const TickTime& tick) noexcept override {
     if (tick.number == 20) mouse_.point({.pose = {.position = {0.5, 0.5, 1.05}}});
-    DeviceNews news = mouse_.hear(tick);
+    DeviceNews news = mouse_.poll(tick);
     const std::int64_t stop = tick.number < 400 ? 0 : 300'000'000;  // ns
     news.begun = tick.begun + stop;
     news.state.arrived = *news.begun;
     return news;
   }
-  void show(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
+  void display(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
 
  private:
   MouseDevice mouse_;
 };
 
-TEST_P(Settled, AMouseIsShownAllForceAndNoFault) {
+TEST_P(SettledSession, AMouseIsShownAllForceAndNoFault) {
   const Body body = body_of(GetParam());
-  Mover mover;
-  add_mouse(mover, options_of(cube), body);
+  InputSource input;
+  add_mouse(input, options_of(cube), body);
   Settings settings;
   settings.tool = {.radius = 0.1};
-  settings = settle(settings, mover, body);
+  settings = apply_defaults(settings, input, body);
   State state(body, {.tools = {settings.tool}});
   Safety safety(*settings.safety);
   Pressing device;

@@ -379,8 +379,8 @@ TEST(OverlayRelease, IsFoldedBackIntoTheBody) {
     // Fine nodes follow the body's.
     std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
     std::vector<Vec3> u(body.surface_rest_positions().size());
-    ShownMotion shown(body);
-    state.surface.motion.show(shown);
+    MotionSnapshot shown(body);
+    state.surface.motion.snapshot(shown);
     surface_displacement(body, state.surface.near.load(), stored, u, &shown);
     for (std::size_t node = 0; node < u.size(); ++node) {
       const SurfaceParts parts = body.surface_parts(static_cast<Index>(node));

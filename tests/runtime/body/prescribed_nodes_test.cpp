@@ -118,7 +118,7 @@ std::string direct_name(const testing::TestParamInfo<DirectCase>& info) {
 INSTANTIATE_TEST_SUITE_P(Elements, DirectSolve, testing::ValuesIn(direct_cases()), direct_name);
 
 /// A cube or, in the plane, a square, and its top's middle and corner.
-class Held : public testing::TestWithParam<int> {
+class PrescribedNodesOnBody : public testing::TestWithParam<int> {
  protected:
   const Body body_{test::unit_model(GetParam(), 4, Scope::surface, Precision::double_precision)};
   PrescribedNodes held_{body_, 4};
@@ -141,9 +141,9 @@ class Held : public testing::TestWithParam<int> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Dimension, Held, testing::Values(2, 3));
+INSTANTIATE_TEST_SUITE_P(Dimension, PrescribedNodesOnBody, testing::Values(2, 3));
 
-TEST_P(Held, StartsWithNothing) {
+TEST_P(PrescribedNodesOnBody, StartsWithNothing) {
   EXPECT_EQ(held_.dimension(), GetParam());
   EXPECT_EQ(held_.count(), 0);
   EXPECT_TRUE(held_.nodes().empty() && held_.displacement().empty() && held_.forces().empty());
@@ -153,7 +153,7 @@ TEST_P(Held, StartsWithNothing) {
 }
 
 // One node: f is the inverse of its block of the Green's functions times u.
-TEST_P(Held, OneNodeTakesTheForceOfItsBlock) {
+TEST_P(PrescribedNodesOnBody, OneNodeTakesTheForceOfItsBlock) {
   const Vec3 motion = at(0.001, -0.002, -0.01);
   ASSERT_EQ(held_.hold(body_, top_), PrescribedStatus::ok);
   EXPECT_EQ(force(held_, top_), Vec3::Zero()) << "taken where it is";
@@ -168,7 +168,7 @@ TEST_P(Held, OneNodeTakesTheForceOfItsBlock) {
 }
 
 // A node is taken where the others have pulled it to: no force, and theirs stay. Let go, it leaves no trace.
-TEST_P(Held, AnotherNodeComesAndGoesWithoutTrace) {
+TEST_P(PrescribedNodesOnBody, AnotherNodeComesAndGoesWithoutTrace) {
   ASSERT_EQ(held_.hold(body_, corner_), PrescribedStatus::ok);
   ASSERT_EQ(held_.prescribe(corner_, at(0.0, 0.0, -0.02)), PrescribedStatus::ok);
   ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
@@ -194,7 +194,7 @@ TEST_P(Held, AnotherNodeComesAndGoesWithoutTrace) {
 }
 
 // Prescribed in another order than taken, and one of the middle let go: each node keeps its own numbers.
-TEST_P(Held, NodesKeepTheirOwnNumbers) {
+TEST_P(PrescribedNodesOnBody, NodesKeepTheirOwnNumbers) {
   const auto motion = [](Index node) { return at(0.001 * (node + 1), 0.002, -0.003 * (node + 1)); };
   for (const Index node : {0, 1, 2, 3}) ASSERT_EQ(held_.hold(body_, node), PrescribedStatus::ok);
   for (const Index node : {2, 0, 3, 1}) ASSERT_EQ(held_.prescribe(node, motion(node)), PrescribedStatus::ok);
@@ -221,7 +221,7 @@ TEST_P(Held, NodesKeepTheirOwnNumbers) {
   }
 }
 
-TEST_P(Held, LetsGoOfAll) {
+TEST_P(PrescribedNodesOnBody, LetsGoOfAll) {
   for (const Index node : {top_, corner_}) ASSERT_EQ(held_.hold(body_, node), PrescribedStatus::ok);
   ASSERT_EQ(held_.prescribe(top_, at(0.0, 0.0, -0.01)), PrescribedStatus::ok);
   ASSERT_EQ(held_.solve(), PrescribedStatus::ok);
@@ -233,7 +233,7 @@ TEST_P(Held, LetsGoOfAll) {
   EXPECT_EQ(force(held_, corner_), Vec3::Zero());
 }
 
-TEST_P(Held, SaysWhatCannotBeHeld) {
+TEST_P(PrescribedNodesOnBody, SaysWhatCannotBeHeld) {
   EXPECT_EQ(held_.hold(body_, -1), PrescribedStatus::no_such_node);
   EXPECT_EQ(held_.hold(body_, body_.greens().nodes()), PrescribedStatus::no_such_node);
   EXPECT_EQ(held_.release(3), PrescribedStatus::no_such_node);
@@ -258,7 +258,7 @@ Model glued_model(int dimension) {
   return model;
 }
 
-TEST_P(Held, RefusesANodeThatDoesNotMoveOnItsOwn) {
+TEST_P(PrescribedNodesOnBody, RefusesANodeThatDoesNotMoveOnItsOwn) {
   const Body body(glued_model(GetParam()));
   PrescribedNodes held(body, 4);
   ASSERT_EQ(held.hold(body, 0), PrescribedStatus::ok);
@@ -273,7 +273,7 @@ TEST_P(Held, RefusesANodeThatDoesNotMoveOnItsOwn) {
   EXPECT_EQ(held.hold(body, 2), PrescribedStatus::ok);
 }
 
-TEST_P(Held, KeepsTheLastForcesWhenTheNewOnesOverflow) {
+TEST_P(PrescribedNodesOnBody, KeepsTheLastForcesWhenTheNewOnesOverflow) {
   Model stiff = test::unit_model(GetParam(), 4, Scope::surface, Precision::double_precision);
   stiff.greens =
       test::pack(1e-9 * test::random_definite(stiff.stored_dofs(), 1), Precision::double_precision);
@@ -288,7 +288,7 @@ TEST_P(Held, KeepsTheLastForcesWhenTheNewOnesOverflow) {
   EXPECT_EQ(force(held, top_), before);
 }
 
-TEST_P(Held, CopiesGoTheirOwnWay) {
+TEST_P(PrescribedNodesOnBody, CopiesGoTheirOwnWay) {
   ASSERT_EQ(held_.hold(body_, top_), PrescribedStatus::ok);
   ASSERT_EQ(held_.prescribe(top_, at(0.01, 0.0, -0.01)), PrescribedStatus::ok);
   PrescribedNodes copy = held_;
@@ -305,7 +305,7 @@ TEST_P(Held, CopiesGoTheirOwnWay) {
 }
 
 /// A body under loads rests elsewhere and feels the same.
-TEST_P(Held, RestMovesTheBodyAndChangesNoForce) {
+TEST_P(PrescribedNodesOnBody, RestMovesTheBodyAndChangesNoForce) {
   Model model = test::unit_model(GetParam(), 4, Scope::surface, Precision::double_precision);
   test::set_rest(model, 0.5);
   const Body loaded(std::move(model));

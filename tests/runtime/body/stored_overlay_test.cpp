@@ -50,7 +50,7 @@ std::vector<double> numbers(const Patch& patch, int dimension) {
   return all;
 }
 
-class FromTheFile : public testing::TestWithParam<int> {
+class OverlayFromFile : public testing::TestWithParam<int> {
  protected:
   int d_ = GetParam();
   Body plain_{test::unit_model(d_, 4, Scope::full, Precision::double_precision), {}, refinement};
@@ -68,13 +68,13 @@ class FromTheFile : public testing::TestWithParam<int> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Dimensions, FromTheFile, testing::Values(2, 3));
+INSTANTIATE_TEST_SUITE_P(Dimensions, OverlayFromFile, testing::Values(2, 3));
 
-TEST_P(FromTheFile, PatchesAreTheSame) {
+TEST_P(OverlayFromFile, PatchesAreTheSame) {
   EXPECT_EQ(made(stored_, {middle(stored_)}), made(plain_, {middle(plain_)}));
 }
 
-TEST_P(FromTheFile, PatchesAreReallyUsed) {
+TEST_P(OverlayFromFile, PatchesAreReallyUsed) {
   const std::vector<double> exact = made(plain_, {middle(plain_)});
   const std::vector<double> softer = made(softer_, {middle(softer_)});
   ASSERT_EQ(softer.size(), exact.size());
@@ -83,7 +83,7 @@ TEST_P(FromTheFile, PatchesAreReallyUsed) {
   EXPECT_GT(change, 0.1 * *std::max_element(exact.begin(), exact.end()));
 }
 
-TEST_P(FromTheFile, PatchesAreOfOneCentreOneDepthAndOneRefinement) {
+TEST_P(OverlayFromFile, PatchesAreOfOneCentreOneDepthAndOneRefinement) {
   const Index middle = this->middle(softer_);
   const Index other = PatchMaker(softer_, rings).neighbours(middle).front();
   EXPECT_EQ(made(softer_, {middle, other}), made(plain_, {middle, other}));
@@ -98,7 +98,7 @@ TEST_P(FromTheFile, PatchesAreOfOneCentreOneDepthAndOneRefinement) {
             finer(test::unit_model(d_, 4, Scope::full, Precision::double_precision)));
 }
 
-TEST_P(FromTheFile, PatchesOfAnotherMeshAreRefused) {
+TEST_P(OverlayFromFile, PatchesOfAnotherMeshAreRefused) {
   const auto expect_refused = [&](auto&& spoil) {
     const Body body(model_with_overlay(d_, spoil), {}, refinement);
     PatchMaker maker(body, rings);
@@ -131,7 +131,7 @@ std::pair<std::int64_t, std::size_t> built_ahead(const Body& body, std::size_t m
   return {source.built(), source.bytes()};
 }
 
-TEST_P(FromTheFile, PatchesAreMadeAheadOfTheTools) {
+TEST_P(OverlayFromFile, PatchesAreMadeAheadOfTheTools) {
   EXPECT_EQ(built_ahead(plain_, std::size_t{512} << 20, 0).first, 0);
   const std::int64_t centres = std::ssize(stored_.model().overlay.centres);
   const auto [all, bytes] = built_ahead(stored_, std::size_t{512} << 20, centres);

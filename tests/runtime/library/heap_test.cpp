@@ -297,13 +297,13 @@ class MovingTick : public testing::TestWithParam<std::tuple<DynamicsMethod, Cont
       step(body_, state_, tool);
       if (source_) source_->post(state_);
       if (frames_) frames_->post(state_, k, 0.001 * k);
-      if (k % 10 == 0) state_.surface.motion.show(shown_);
+      if (k % 10 == 0) state_.surface.motion.display(shown_);
     }
   }
 
   Body body_{swinging_model(std::get<0>(GetParam())), {}, 1, std::get<1>(GetParam())};
   State state_{body_, {.tools = {Tool{.radius = 0.04, .coupling_stiffness = 2.0, .reach = 0.3}}}};
-  ShownMotion shown_{body_};
+  MotionSnapshot shown_{body_};
   std::optional<MotionSource> source_;
   std::atomic<int> shown_frames_ = 0;
   std::optional<SurfaceFrames> frames_;

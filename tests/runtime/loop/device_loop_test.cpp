@@ -25,8 +25,8 @@ constexpr std::int64_t millisecond = 1'000'000;
 class MadeUpDevice : public Device {
  public:
   explicit MadeUpDevice(std::function<DeviceNews(const TickTime&)> says) : says_(std::move(says)) {}
-  DeviceNews hear(const TickTime& tick) noexcept override { return says_(tick); }
-  void show(const DeviceCommand& command, const DeviceState& state, std::int64_t) noexcept override {
+  DeviceNews poll(const TickTime& tick) noexcept override { return says_(tick); }
+  void display(const DeviceCommand& command, const DeviceState& state, std::int64_t) noexcept override {
     shown.push_back(command);
     answered.push_back(state.sequence);
   }

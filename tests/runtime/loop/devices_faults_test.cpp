@@ -88,14 +88,14 @@ class Hanging : public Device {
   }
   std::vector<ComputedForce> computed;
 
-  DeviceNews hear(const TickTime& tick) noexcept override {
+  DeviceNews poll(const TickTime& tick) noexcept override {
     if (tick.number == tick_ && seconds_ > 0.0)
       std::this_thread::sleep_for(std::chrono::duration<double>(seconds_));
-    return device_.hear(tick);
+    return device_.poll(tick);
   }
-  void show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override {
+  void display(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override {
     computed.push_back({begun, command.wrench.force});
-    device_.show(command, state, begun);
+    device_.display(command, state, begun);
   }
 
  private:

@@ -109,7 +109,7 @@ TEST(SafetyTick, MakesNoHeapCall) {
 class QuietPort : public DevicePort {
  public:
   void open() override {}
-  Heard read(DeviceState& state) noexcept override {
+  ReadResult read(DeviceState& state) noexcept override {
     timespec time{.tv_sec = 0, .tv_nsec = ms_ns};
     nanosleep(&time, nullptr);
     clock_gettime(CLOCK_MONOTONIC, &time);
@@ -117,7 +117,7 @@ class QuietPort : public DevicePort {
     state.pose.position = Vec3(0.52, 0.5, 1.15 - 0.17 * std::min(1.0, 0.002 * said_) + 1e-6 * (said_ % 7));
     state.arrived = time.tv_sec * 1'000'000'000 + time.tv_nsec;
     state.sequence = static_cast<std::uint32_t>(said_);
-    return Heard::report;
+    return ReadResult::report;
   }
   bool write(const DeviceCommand& /*command*/, const DeviceState& /*state*/) noexcept override {
     return true;
@@ -135,13 +135,13 @@ class QuietPort : public DevicePort {
 class CountingDevice : public Device {
  public:
   explicit CountingDevice(Device& device) : device_(device) {}
-  DeviceNews hear(const TickTime& tick) noexcept override {
+  DeviceNews poll(const TickTime& tick) noexcept override {
     if (tick.number == 20) heap_calls = 0;
     if (tick.number == 980) counted = heap_calls;
-    return device_.hear(tick);
+    return device_.poll(tick);
   }
-  void show(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override {
-    device_.show(command, state, begun);
+  void display(const DeviceCommand& command, const DeviceState& state, std::int64_t begun) noexcept override {
+    device_.display(command, state, begun);
   }
 
   long counted = -1;

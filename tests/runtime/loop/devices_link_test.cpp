@@ -68,17 +68,17 @@ class MadeUpPort : public DevicePort {
     is_open_ = true;
   }
 
-  Heard read(DeviceState& state) noexcept override {
+  ReadResult read(DeviceState& state) noexcept override {
     ++wire_->users;
     if (!is_open_) wire_->misused = true;
     std::this_thread::sleep_for(std::chrono::microseconds(200));
-    Heard heard = Heard::nothing;
+    ReadResult heard = ReadResult::nothing;
     if (wire_->is_lost) {
-      heard = Heard::lost;
+      heard = ReadResult::lost;
     } else if (const std::lock_guard lock(wire_->mutex); !wire_->reports.empty()) {
       state = wire_->reports.front();
       wire_->reports.pop_front();
-      heard = Heard::report;
+      heard = ReadResult::report;
     }
     --wire_->users;
     return heard;
@@ -110,7 +110,7 @@ class MadeUpPort : public DevicePort {
   std::atomic<bool> is_open_ = false;
 };
 
-class Link : public testing::Test {
+class DeviceLink : public testing::Test {
  protected:
   ~Link() override {
     EXPECT_FALSE(wire_->misused) << "read or written while it was closed, or closed while it was used";
@@ -136,7 +136,7 @@ DeviceState at(const Vec3& position, std::uint32_t sequence, const Vec3& velocit
   return {.pose = {.position = position}, .velocity = velocity, .arrived = now(), .sequence = sequence};
 }
 
-TEST_F(Link, HandsReportsToTheLoopAndCommandsToTheDevice) {
+TEST_F(DeviceLink, HandsReportsToTheLoopAndCommandsToTheDevice) {
   const auto link = make();
   EXPECT_FALSE(link->has_reported());
   wire_->say(at({0.1, 0.2, 0.3}, 7));
@@ -144,14 +144,14 @@ TEST_F(Link, HandsReportsToTheLoopAndCommandsToTheDevice) {
   EXPECT_EQ(link->first_report().sequence, 7U);
   wire_->say(at({0.4, 0.5, 0.6}, 8));
   wait_for([&] { return link->reports() == 2; });
-  const DeviceNews news = link->hear({});
+  const DeviceNews news = link->poll({});
   EXPECT_EQ(news.events, DeviceEvent::none);
   EXPECT_EQ(news.state.pose.position, Vec3(0.4, 0.5, 0.6));
   EXPECT_EQ(link->first_report().sequence, 7U);
 
   DeviceCommand command;
   command.wrench = {.force = {1, 2, 3}, .torque = {4, 5, 6}};
-  link->show(command, news.state, now());
+  link->display(command, news.state, now());
   wait_for([&] { return !wire_->trace().empty(); });
   const Written first = wire_->trace().front();
   EXPECT_EQ(first.command.wrench.force, Vec3(1, 2, 3));
@@ -159,14 +159,14 @@ TEST_F(Link, HandsReportsToTheLoopAndCommandsToTheDevice) {
   EXPECT_EQ(first.state.sequence, 8U);
 }
 
-TEST_F(Link, RefusesADeviceThatCannotBeOpened) {
+TEST_F(DeviceLink, RefusesADeviceThatCannotBeOpened) {
   wire_->refusals = 1;
   EXPECT_THROW(make(), Error);
   EXPECT_EQ(wire_->opened, 0);
 }
 
 // The loop hangs: the hand moves on in the field of the last solution, which fades.
-TEST_F(Link, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
+TEST_F(DeviceLink, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
   const DeviceLinkOptions options;
   const double stiffness = 100.0;
   const Vec3 moved(0.002, 0.0, 0.0);
@@ -182,7 +182,7 @@ TEST_F(Link, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
   wire_->say(at(moved, 1, velocity));
   wait_for([&] { return link->has_reported(); });
   const std::int64_t shown = now();
-  link->show(command, link->hear({}).state, shown);
+  link->display(command, link->poll({}).state, shown);
   wait_for([&] {
     const auto trace = wire_->trace();
     return trace.size() > 20 && trace.back().command.wrench.force.isZero(0.0);
@@ -212,21 +212,21 @@ TEST_F(Link, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
 
 // What the loop worked out before it hung comes too late: it is the field of then, as far as that still
 // holds.
-TEST_F(Link, ShowsNoOldCommandAsIfItWereNew) {
+TEST_F(DeviceLink, ShowsNoOldCommandAsIfItWereNew) {
   const auto link = make();
   wire_->say(at({0.0, 0.0, 0.0}, 1));
   wait_for([&] { return link->has_reported(); });
   const DeviceCommand command{.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}};
-  link->show(command, link->hear({}).state, now());
+  link->display(command, link->poll({}).state, now());
   wait_for([&] { return !wire_->trace().empty() && wire_->trace().back().command.wrench.force.isZero(0.0); });
   const std::size_t before = wire_->trace().size();
-  link->show(command, link->hear({}).state, now() - 60'000'000);
+  link->display(command, link->poll({}).state, now() - 60'000'000);
   wait_for([&] { return wire_->trace().size() > before + 5; });
   for (std::size_t k = before; k < wire_->trace().size(); ++k)
     ASSERT_TRUE(wire_->trace()[k].command.wrench.force.isZero(0.0)) << "a kick";
 }
 
-TEST_F(Link, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
+TEST_F(DeviceLink, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
   const DeviceLinkOptions options{.max_force = 2.0, .max_force_rate = 100.0};
   const auto link = make(options);
   DeviceCommand command;
@@ -238,7 +238,7 @@ TEST_F(Link, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
   wire_->say(at({-0.009, 0.0, 0.0}, 1));  // where the field has 46 N
   wait_for([&] { return link->has_reported(); });
   const std::int64_t shown = now();
-  link->show(command, link->hear({}).state, shown);
+  link->display(command, link->poll({}).state, shown);
   wait_for([&] { return link->extrapolated() > 25; });
   const std::vector<Written> trace = wire_->trace();
   for (std::size_t k = 1; k < trace.size(); ++k) {
@@ -250,7 +250,7 @@ TEST_F(Link, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
   }
 }
 
-TEST_F(Link, NeverShowsMoreThanTheDeviceBearsWhenItGoesOnByItself) {
+TEST_F(DeviceLink, NeverShowsMoreThanTheDeviceBearsWhenItGoesOnByItself) {
   wire_->limits.max_force = 0.5;
   const auto link = make({.max_force = 2.0, .max_force_rate = 1e6});
   DeviceCommand command;
@@ -261,7 +261,7 @@ TEST_F(Link, NeverShowsMoreThanTheDeviceBearsWhenItGoesOnByItself) {
                    .radius = 0.01};
   wire_->say(at({-0.005, 0.0, 0.0}, 1));  // where the field is 0.9 N
   wait_for([&] { return link->has_reported(); });
-  link->show(command, link->hear({}).state, now());
+  link->display(command, link->poll({}).state, now());
   wait_for([&] { return link->extrapolated() > 20; });
   double largest = 0.0;
   for (const Written& written : wire_->trace())
@@ -269,7 +269,7 @@ TEST_F(Link, NeverShowsMoreThanTheDeviceBearsWhenItGoesOnByItself) {
   EXPECT_LE(largest, 0.5 * (1.0 + 1e-12));
 }
 
-TEST_F(Link, TellsOfALostDeviceAndOfItsReturn) {
+TEST_F(DeviceLink, TellsOfALostDeviceAndOfItsReturn) {
   const auto link = make();
   wire_->say(at({0.1, 0.0, 0.0}, 1));
   wait_for([&] { return link->has_reported(); });
@@ -277,20 +277,20 @@ TEST_F(Link, TellsOfALostDeviceAndOfItsReturn) {
   wire_->is_lost = true;
   wait_for([&] { return wire_->closed == 1; });
   DeviceEvent events = DeviceEvent::none;
-  wait_for([&] { return (events = link->hear({}).events) != DeviceEvent::none; });
+  wait_for([&] { return (events = link->poll({}).events) != DeviceEvent::none; });
   EXPECT_EQ(events, DeviceEvent::lost);
-  EXPECT_EQ(link->hear({}).events, DeviceEvent::none) << "told once";
-  EXPECT_EQ(link->hear({}).state.pose.position.x(), 0.1) << "the last state stands";
+  EXPECT_EQ(link->poll({}).events, DeviceEvent::none) << "told once";
+  EXPECT_EQ(link->poll({}).state.pose.position.x(), 0.1) << "the last state stands";
   const std::size_t before = wire_->trace().size();
   link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());
   wire_->is_lost = false;
   wait_for([&] { return wire_->opened == 2; });
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  EXPECT_EQ(link->hear({}).events, DeviceEvent::none) << "it has not said anything yet";
+  EXPECT_EQ(link->poll({}).events, DeviceEvent::none) << "it has not said anything yet";
   wire_->say(at({0.2, 0.0, 0.0}, 1));
-  wait_for([&] { return (events = link->hear({}).events) != DeviceEvent::none; });
+  wait_for([&] { return (events = link->poll({}).events) != DeviceEvent::none; });
   EXPECT_EQ(events, DeviceEvent::opened_again);
-  EXPECT_EQ(link->hear({}).state.pose.position.x(), 0.2);
+  EXPECT_EQ(link->poll({}).state.pose.position.x(), 0.2);
   EXPECT_EQ(wire_->opened, 2);
   for (std::size_t k = before; k < wire_->trace().size(); ++k) {
     EXPECT_GT(wire_->trace()[k].at, 0);
@@ -299,7 +299,7 @@ TEST_F(Link, TellsOfALostDeviceAndOfItsReturn) {
   }
 }
 
-TEST_F(Link, ADeviceThatTakesNothingIsLost) {
+TEST_F(DeviceLink, ADeviceThatTakesNothingIsLost) {
   const auto link = make();
   wire_->say(at({0.1, 0.0, 0.0}, 1));
   wait_for([&] { return link->has_reported(); });
@@ -307,12 +307,12 @@ TEST_F(Link, ADeviceThatTakesNothingIsLost) {
   wire_->refusals = 1000;
   link->show({}, {}, now());
   DeviceEvent events = DeviceEvent::none;
-  wait_for([&] { return (events = link->hear({}).events) != DeviceEvent::none; });
+  wait_for([&] { return (events = link->poll({}).events) != DeviceEvent::none; });
   EXPECT_EQ(events, DeviceEvent::lost);
   EXPECT_EQ(wire_->closed, 1);
 }
 
-TEST_F(Link, ClosesTheDeviceAtItsEnd) {
+TEST_F(DeviceLink, ClosesTheDeviceAtItsEnd) {
   {
     const auto link = make();
     link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());

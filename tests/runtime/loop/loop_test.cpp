@@ -148,12 +148,12 @@ class Asking : public ScriptDevice {
  public:
   Asking(const ScriptDevice& script, std::function<void(std::int64_t)> ask)
       : ScriptDevice(script), ask_(std::move(ask)) {}
-  DeviceNews hear(const TickTime& tick) noexcept override {
+  DeviceNews poll(const TickTime& tick) noexcept override {
     heard.push_back(tick);
     ask_(tick.number);
-    return ScriptDevice::hear(tick);
+    return ScriptDevice::poll(tick);
   }
-  void show(const DeviceCommand& command, const DeviceState&, std::int64_t) noexcept override {
+  void display(const DeviceCommand& command, const DeviceState&, std::int64_t) noexcept override {
     shown.push_back(command.wrench.force.norm());
     ++shows;
   }

@@ -30,7 +30,7 @@ Model loaded_model() {
   return model;
 }
 
-class Frames : public testing::Test {
+class RecordedFrames : public testing::Test {
  protected:
   /// A ball that presses and slides.
   [[nodiscard]] static ToolPose pose(int tick) {
@@ -54,7 +54,7 @@ Vec3 seen_displacement(const Body& body, const State& state, std::size_t node) {
   return u;
 }
 
-TEST_F(Frames, AreTheDisplacementFromTheMesh) {
+TEST_F(RecordedFrames, AreTheDisplacementFromTheMesh) {
   std::vector<SurfaceFrame> frames;
   SurfaceFrames source(body_, state_, {.ticks_per_frame = 10, .in_background = false},
                        [&](SurfacePicture picture) { frames.push_back(std::move(picture.frame)); });
@@ -82,7 +82,7 @@ TEST_F(Frames, AreTheDisplacementFromTheMesh) {
   EXPECT_GT(largest, 0.02) << "nothing was pressed";
 }
 
-TEST_F(Frames, OfTheThreadAreTheSame) {
+TEST_F(RecordedFrames, OfTheThreadAreTheSame) {
   std::vector<SurfaceFrame> expected, frames;
   {
     State again = state_;
@@ -110,7 +110,7 @@ TEST_F(Frames, OfTheThreadAreTheSame) {
 }
 
 // Contacts, wrench and pressure say the same, and stress is that of the surface as it is seen.
-TEST_F(Frames, ShowWhatTouchesAndWhatThatDoes) {
+TEST_F(RecordedFrames, ShowWhatTouchesAndWhatThatDoes) {
   std::vector<SurfacePicture> pictures;
   SurfaceFrames source(body_, state_, {.ticks_per_frame = 1, .in_background = false},
                        [&](SurfacePicture picture) { pictures.push_back(std::move(picture)); });

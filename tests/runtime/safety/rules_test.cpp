@@ -172,41 +172,41 @@ DeviceState report(std::uint32_t sequence, const Vec3& position = Vec3::Zero()) 
 
 TEST(SilenceWatch, FadesThenIsSilent) {
   SilenceWatch watch({.most = 20 * ms, .fade_from = 5 * ms});
-  EXPECT_TRUE(watch.hear(report(7), 7 * ms_ns, 0.0));  // came at 7 ms
+  EXPECT_TRUE(watch.observe(report(7), 7 * ms_ns, 0.0));  // came at 7 ms
   for (int k = 7; k <= 27; ++k) {
-    EXPECT_EQ(watch.hear(report(7), k * ms_ns, 0.0), false);
+    EXPECT_EQ(watch.observe(report(7), k * ms_ns, 0.0), false);
     EXPECT_NEAR(watch.share(), std::min(1.0, (27.0 - k) / 15.0), 1e-12);
     EXPECT_FALSE(watch.silent());
   }
-  watch.hear(report(7), 27 * ms_ns + 1, 0.0);
+  watch.observe(report(7), 27 * ms_ns + 1, 0.0);
   EXPECT_TRUE(watch.silent());
-  EXPECT_TRUE(watch.hear(report(22), 28 * ms_ns, 0.0));
+  EXPECT_TRUE(watch.observe(report(22), 28 * ms_ns, 0.0));
   EXPECT_FALSE(watch.silent());
   EXPECT_NEAR(watch.share(), 14.0 / 15.0, 1e-12) << "the loop was late: it came 6 ms ago";
-  EXPECT_TRUE(watch.hear(report(30), 29 * ms_ns, 0.0));
+  EXPECT_TRUE(watch.observe(report(30), 29 * ms_ns, 0.0));
   EXPECT_EQ(watch.share(), 1.0) << "it came after the tick had begun";
 }
 
 TEST(SilenceWatch, OldNumbersAndNoNumbersAreNoReports) {
   SilenceWatch watch({});
   EXPECT_EQ(watch.share(), 0.0);
-  EXPECT_FALSE(watch.hear(report(7, Vec3(nan, 0, 0)), 0, 0.0));
+  EXPECT_FALSE(watch.observe(report(7, Vec3(nan, 0, 0)), 0, 0.0));
   EXPECT_EQ(watch.share(), 0.0);
-  EXPECT_TRUE(watch.hear(report(7), 0, 0.0));
-  EXPECT_FALSE(watch.hear(report(6), 0, 0.0));
-  EXPECT_FALSE(watch.hear(report(8, Vec3(0, inf, 0)), 0, 0.0));
-  EXPECT_TRUE(watch.hear(report(8), 0, 0.0));
+  EXPECT_TRUE(watch.observe(report(7), 0, 0.0));
+  EXPECT_FALSE(watch.observe(report(6), 0, 0.0));
+  EXPECT_FALSE(watch.observe(report(8, Vec3(0, inf, 0)), 0, 0.0));
+  EXPECT_TRUE(watch.observe(report(8), 0, 0.0));
   watch.reset();
-  EXPECT_TRUE(watch.hear(report(0xFFFFFFFF), 0, 0.0));
-  EXPECT_TRUE(watch.hear(report(0), 0, 0.0));  // it wraps around
-  EXPECT_FALSE(watch.hear(report(0xFFFFFFFF), 0, 0.0));
+  EXPECT_TRUE(watch.observe(report(0xFFFFFFFF), 0, 0.0));
+  EXPECT_TRUE(watch.observe(report(0), 0, 0.0));  // it wraps around
+  EXPECT_FALSE(watch.observe(report(0xFFFFFFFF), 0, 0.0));
 }
 
 TEST(SilenceWatch, FrozenNumbersAreSeenWhileForceIsShown) {
   const auto frozen = [](double force, double motion) {
     SilenceWatch watch({.frozen = 0.25, .frozen_force = 0.1});
     for (int k = 0; k <= 300; ++k)
-      watch.hear(report(static_cast<std::uint32_t>(k), Vec3(motion * k, 0, 0)), k * ms_ns, force);
+      watch.observe(report(static_cast<std::uint32_t>(k), Vec3(motion * k, 0, 0)), k * ms_ns, force);
     EXPECT_FALSE(watch.silent());
     return watch.frozen();
   };

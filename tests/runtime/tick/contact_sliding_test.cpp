@@ -72,7 +72,7 @@ std::string name_of(const testing::TestParamInfo<SlideCase>& info) {
          std::to_string(static_cast<int>(100 * c.depth));
 }
 
-class Slide : public testing::TestWithParam<SlideCase> {
+class SlidingTool : public testing::TestWithParam<SlideCase> {
  protected:
   Body body_{GetParam().round
                  ? test::round_model(GetParam().dimension)
@@ -102,7 +102,7 @@ class Slide : public testing::TestWithParam<SlideCase> {
         body_, state, [&](double share) { return place(share, height); }, ticks);
   }
 };
-INSTANTIATE_TEST_SUITE_P(Bodies, Slide,
+INSTANTIATE_TEST_SUITE_P(Bodies, SlidingTool,
                          testing::Values(SlideCase{3, false, 0.0, 0.2}, SlideCase{3, false, 0.2, 0.2},
                                          SlideCase{3, false, 0.0, 0.6}, SlideCase{3, false, 0.2, 0.6},
                                          SlideCase{3, true, 0.0, 0.2}, SlideCase{3, true, 0.2, 0.2},
@@ -113,7 +113,7 @@ INSTANTIATE_TEST_SUITE_P(Bodies, Slide,
                                          SlideCase{2, true, 0.0, 0.6}, SlideCase{2, true, 0.2, 0.6}),
                          name_of);
 
-TEST_P(Slide, TheHandFeelsNoKick) {
+TEST_P(SlidingTool, TheHandFeelsNoKick) {
   const Jumps at_50 = slide_at(slow, Tool{}.hand_over);
   const Jumps at_200 = slide_at(fast, Tool{}.hand_over);
   const Jumps raw_at_50 = slide_at(slow, infinity);

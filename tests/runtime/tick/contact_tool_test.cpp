@@ -378,7 +378,7 @@ struct LocalCase {
   double friction;
   bool grab;
 };
-class Local : public testing::TestWithParam<LocalCase> {};
+class LocalModelOfTool : public testing::TestWithParam<LocalCase> {};
 INSTANTIATE_TEST_SUITE_P(
     Contacts, Local,
     testing::Values(LocalCase{"Frictionless", 3, 0.0, false}, LocalCase{"Sticking", 3, 5.0, false},
@@ -389,7 +389,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 // The model leaves out that normals turn as the tool moves: without friction to hold it, a share of depth /
 // radius of the stiffness is the sideways one of the pressed surface.
-TEST_P(Local, ModelIsTheDerivativeOfTheForce) {
+TEST_P(LocalModelOfTool, ModelIsTheDerivativeOfTheForce) {
   const int d = GetParam().dimension;
   const bool grab = GetParam().grab;
   const Body body(test::unit_model(d, 6, Scope::surface, Precision::double_precision));

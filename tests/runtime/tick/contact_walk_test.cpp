@@ -146,7 +146,7 @@ bool all_finite(const ContactPoint& contact) {
          contact.force.allFinite() && std::isfinite(contact.gap) && std::isfinite(contact.free_gap);
 }
 
-class Walk : public testing::TestWithParam<WalkCase> {
+class RandomWalk : public testing::TestWithParam<WalkCase> {
  protected:
   Walk() {
     poses_.resize(GetParam().tools.size());
@@ -221,10 +221,10 @@ class Walk : public testing::TestWithParam<WalkCase> {
   std::vector<ToolPose> poses_;
   std::vector<double> u_ = std::vector<double>(static_cast<std::size_t>(body_.greens().order()));
 };
-INSTANTIATE_TEST_SUITE_P(Tools, Walk, testing::ValuesIn(walk_cases()),
+INSTANTIATE_TEST_SUITE_P(Tools, RandomWalk, testing::ValuesIn(walk_cases()),
                          [](const testing::TestParamInfo<WalkCase>& tested) { return tested.param.name; });
 
-TEST_P(Walk, NothingBreaksAndTheStateRecovers) {
+TEST_P(RandomWalk, NothingBreaksAndTheStateRecovers) {
   const int rounds = 10;
   const int ticks = all_ticks / rounds / static_cast<int>(walk_cases().size());
   for (int round = 0; round < rounds; ++round) {

@@ -36,7 +36,7 @@ Tool plain(Tool tool) {
 }
 
 /// A cube or, in the plane, a square and a tool above the middle of its top.
-class Touch : public testing::TestWithParam<int> {
+class ToolTouch : public testing::TestWithParam<int> {
  protected:
   Body body_{test::unit_model(GetParam(), 4, Scope::surface, Precision::double_precision)};
   State state_{body_, {.tools = {plain({.reach = 0.1})}}};
@@ -56,9 +56,9 @@ class Touch : public testing::TestWithParam<int> {
   const ToolState& tool() { return state_.tools[0]; }
   StepStatus go(const Vec3& position, bool grab = false) { return step(body_, state_, pose(position, grab)); }
 };
-INSTANTIATE_TEST_SUITE_P(Dimension, Touch, testing::Values(2, 3));
+INSTANTIATE_TEST_SUITE_P(Dimension, ToolTouch, testing::Values(2, 3));
 
-TEST_P(Touch, GrabDoesNotKickAndThePlaceFollowsTheTool) {
+TEST_P(ToolTouch, GrabDoesNotKickAndThePlaceFollowsTheTool) {
   EXPECT_EQ(go(start_), StepStatus::ok);
   EXPECT_FALSE(tool().holding);
   EXPECT_EQ(go(start_, true), StepStatus::ok);
@@ -77,7 +77,7 @@ TEST_P(Touch, GrabDoesNotKickAndThePlaceFollowsTheTool) {
             1e-10);
 }
 
-TEST_P(Touch, GrabbedNodeGivesTheForceOfTheCapacitanceMatrixAlgorithm) {
+TEST_P(ToolTouch, GrabbedNodeGivesTheForceOfTheCapacitanceMatrixAlgorithm) {
   PrescribedNodes held(body_);
   held.hold(body_, top_);
   go(start_, true);
@@ -91,7 +91,7 @@ TEST_P(Touch, GrabbedNodeGivesTheForceOfTheCapacitanceMatrixAlgorithm) {
   }
 }
 
-TEST_P(Touch, KeepsTheSurfaceWhereverItPullsUntilReleased) {
+TEST_P(ToolTouch, KeepsTheSurfaceWhereverItPullsUntilReleased) {
   go(start_, true);
   for (int k = 1; k < 200; ++k) {
     go(start_ + at(0.0, 0.0, 0.025 * k), true);
@@ -105,7 +105,7 @@ TEST_P(Touch, KeepsTheSurfaceWhereverItPullsUntilReleased) {
   EXPECT_EQ(tool().contacts, 0);
 }
 
-TEST_P(Touch, TakesHoldOnceItComesWithinReach) {
+TEST_P(ToolTouch, TakesHoldOnceItComesWithinReach) {
   const Vec3 far = at(0.5, 0.5, 1.2);
   EXPECT_EQ(go(far, true), StepStatus::nothing_in_reach);
   EXPECT_FALSE(tool().holding);
@@ -115,7 +115,7 @@ TEST_P(Touch, TakesHoldOnceItComesWithinReach) {
   EXPECT_TRUE(tool().holding);
 }
 
-TEST_P(Touch, HoldsTheLastValidPoseWhenThePoseIsNotFinite) {
+TEST_P(ToolTouch, HoldsTheLastValidPoseWhenThePoseIsNotFinite) {
   go(start_, true);
   go(start_ - at(0.0, 0.0, 0.01), true);
   const Vec3 force = tool().wrench.force;
@@ -134,7 +134,7 @@ TEST_P(Touch, HoldsTheLastValidPoseWhenThePoseIsNotFinite) {
 }
 
 // So stiff a body that its force passes the largest number.
-TEST_P(Touch, NeverGivesAForceThatIsNotFinite) {
+TEST_P(ToolTouch, NeverGivesAForceThatIsNotFinite) {
   Model stiff = test::unit_model(GetParam(), 4, Scope::surface, Precision::double_precision);
   stiff.greens =
       test::pack(1e-200 * test::random_definite(stiff.stored_dofs(), 1), Precision::double_precision);
@@ -145,7 +145,7 @@ TEST_P(Touch, NeverGivesAForceThatIsNotFinite) {
   EXPECT_EQ(state.tools[0].wrench.force, Vec3::Zero()) << "the last valid force stands";
 }
 
-TEST_P(Touch, APushOpensAndClosesWithoutForceInBetween) {
+TEST_P(ToolTouch, APushOpensAndClosesWithoutForceInBetween) {
   for (const double height : {1.1, 1.05, 1.01, 1.001}) {
     go(at(0.5, 0.5, height));
     EXPECT_EQ(tool().wrench.force, Vec3::Zero());
@@ -160,7 +160,7 @@ TEST_P(Touch, APushOpensAndClosesWithoutForceInBetween) {
   EXPECT_EQ(tool().wrench.force, Vec3::Zero()) << "nothing sticks to the tool";
 }
 
-TEST_P(Touch, BeginsToFeelOnlyOnceItHasBeenOutside) {
+TEST_P(ToolTouch, BeginsToFeelOnlyOnceItHasBeenOutside) {
   EXPECT_EQ(go(at(0.5, 0.5, 0.95)), StepStatus::inside_body);
   EXPECT_EQ(go(at(0.5, 0.5, 0.97)), StepStatus::inside_body);
   EXPECT_EQ(tool().wrench.force, Vec3::Zero());
@@ -170,7 +170,7 @@ TEST_P(Touch, BeginsToFeelOnlyOnceItHasBeenOutside) {
 }
 
 // One that has been lost (here by hand) need not be taken away first, only out.
-TEST_P(Touch, OneLostInTheBodyIsFeltAgainWithoutAKick) {
+TEST_P(ToolTouch, OneLostInTheBodyIsFeltAgainWithoutAKick) {
   State state(body_, {.tools = {{.radius = 0.1}}});
   const ToolPose pressed = pose(at(0.5, 0.5, 1.07));
   step(body_, state, pose(at(0.5, 0.5, 1.2)));
@@ -195,7 +195,7 @@ TEST_P(Touch, OneLostInTheBodyIsFeltAgainWithoutAKick) {
 }
 
 // Free space is crossed at once; a body in the way is met however far the device jumps.
-TEST_P(Touch, ATeleportDoesNotPassThroughTheBody) {
+TEST_P(ToolTouch, ATeleportDoesNotPassThroughTheBody) {
   go(at(0.5, 0.5, 3.0));
   EXPECT_EQ(go(at(0.5, 0.5, 1.3)), StepStatus::ok) << "nothing in between";
   StepStatus status = StepStatus::ok;
@@ -208,7 +208,7 @@ TEST_P(Touch, ATeleportDoesNotPassThroughTheBody) {
 }
 
 // Spheres: the gap is the radius sooner.
-TEST_P(Touch, ASphereTouchesByItsRadiusAndPushesAlongTheNormal) {
+TEST_P(ToolTouch, ASphereTouchesByItsRadiusAndPushesAlongTheNormal) {
   State state(body_, {.tools = {plain({.radius = 0.1})}});
   step(body_, state, pose(at(0.37, 0.41, 1.11)));
   step(body_, state, pose(at(0.37, 0.41, 1.1001)));
@@ -229,7 +229,7 @@ bool same_bits(const Vec3& a, const Vec3& b) {
 }
 
 // Copies are whole: a copy taken in the middle goes the same way to the last bit.
-TEST_P(Touch, CopiesReplayBitwise) {
+TEST_P(ToolTouch, CopiesReplayBitwise) {
   State state(body_, {.tools = {Tool{.radius = 0.1, .length = 0.2, .friction = 0.3}, Tool{.reach = 0.2}}});
   std::mt19937 random(1);
   std::uniform_real_distribution<double> move(-0.05, 0.05);
@@ -271,10 +271,10 @@ TEST(Plane, TheToolsHeightOverThePlaneDoesNotCount) {
 }
 
 /// A body under loads rests elsewhere and feels the same.
-class Rest : public testing::TestWithParam<int> {};
-INSTANTIATE_TEST_SUITE_P(Dimension, Rest, testing::Values(2, 3));
+class RestState : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Dimension, RestState, testing::Values(2, 3));
 
-TEST_P(Rest, MovesTheBodyAndChangesNoForceOfAGrab) {
+TEST_P(RestState, MovesTheBodyAndChangesNoForceOfAGrab) {
   Model model = test::unit_model(GetParam(), 4, Scope::surface, Precision::double_precision);
   const Body unloaded{Model(model)};
   test::set_rest(model, 0.1);

@@ -95,7 +95,7 @@ class Viewer : public testing::Test {
   }
   /// Reads frames until that of a tick.
   void hear_frame(Client& client, std::int64_t tick) const {
-    while (tick_of(client.hear(3)) != static_cast<double>(tick)) {
+    while (tick_of(client.receive(3)) != static_cast<double>(tick)) {
     }
   }
 };
@@ -179,22 +179,22 @@ TEST_F(Viewer, SaysHelloThenStateSceneAndPicture) {
   server_->show_picture(picture(42));
   hear_frame(*std::make_unique<Client>(served()), 42);  // all has arrived
   Client page = client();
-  const Json hello = Json::parse(page.hear().bytes);
+  const Json hello = Json::parse(page.receive().bytes);
   EXPECT_EQ(hello.at("type"), "hello");
   EXPECT_EQ(hello.at("mode"), "live");
-  const Json state = Json::parse(page.hear().bytes);
+  const Json state = Json::parse(page.receive().bytes);
   EXPECT_EQ(state.at("type"), "state");
   EXPECT_EQ(state.at("ticks"), 5);
   EXPECT_EQ(state.at("scene"), 1);
-  const Client::Said scene = page.hear();
+  const Client::Said scene = page.receive();
   EXPECT_EQ(test::decode_scene(scene.bytes).position.size(), 3 * scene_->nodes.size());
-  EXPECT_EQ(tick_of(page.hear().bytes), 42.0);
+  EXPECT_EQ(tick_of(page.receive().bytes), 42.0);
 }
 
 TEST_F(Viewer, RepeatsTheStateTwiceASecond) {
   server_->show_state(R"({"ticks":5})");
   Client page = client();
-  for (int k = 0; k < 3; ++k) EXPECT_EQ(page.hear("state").at("ticks"), 5);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(page.receive("state").at("ticks"), 5);
 }
 
 TEST_F(Viewer, SendsAPatchBeforeTheFirstFrameOnIt) {
@@ -203,26 +203,26 @@ TEST_F(Viewer, SendsAPatchBeforeTheFirstFrameOnIt) {
   const auto patch = maker.make({&centre, 1});
   server_->show_scene(scene_);
   Client page = client();
-  page.hear(1);
+  page.receive(1);
   const auto shown = [&](std::int64_t tick, std::shared_ptr<const Patch> of) {
     SurfacePicture next = picture(tick);
     next.patch = std::move(of);
     server_->show_picture(std::move(next), &body_);
   };
   shown(1, patch);
-  const test::DecodedPatch first = test::decode_patch(page.hear().bytes);
+  const test::DecodedPatch first = test::decode_patch(page.receive().bytes);
   EXPECT_EQ(first.patch, 1U);
   EXPECT_EQ(first.position.size(), 3 * patch->surface_nodes().size());
-  EXPECT_EQ(test::decode_frame(page.hear().bytes, scene_->nodes.size()).patch, 1U);
+  EXPECT_EQ(test::decode_frame(page.receive().bytes, scene_->nodes.size()).patch, 1U);
   shown(2, patch);  // known
-  EXPECT_EQ(test::decode_frame(page.hear().bytes, scene_->nodes.size()).patch, 1U);
+  EXPECT_EQ(test::decode_frame(page.receive().bytes, scene_->nodes.size()).patch, 1U);
   shown(3, nullptr);
-  EXPECT_EQ(test::decode_frame(page.hear().bytes, scene_->nodes.size()).patch, 0U);
+  EXPECT_EQ(test::decode_frame(page.receive().bytes, scene_->nodes.size()).patch, 0U);
   shown(4, maker.make({&centre, 1}));
-  EXPECT_EQ(test::decode_patch(page.hear().bytes).patch, 2U);
-  EXPECT_EQ(test::decode_frame(page.hear().bytes, scene_->nodes.size()).patch, 2U);
+  EXPECT_EQ(test::decode_patch(page.receive().bytes).patch, 2U);
+  EXPECT_EQ(test::decode_frame(page.receive().bytes, scene_->nodes.size()).patch, 2U);
   Client late = client();
-  EXPECT_EQ(test::decode_patch(late.hear(2)).patch, 2U);
+  EXPECT_EQ(test::decode_patch(late.receive(2)).patch, 2U);
 }
 
 TEST_F(Viewer, ShowsNoPictureOfAnotherBody) {
@@ -236,12 +236,12 @@ TEST_F(Viewer, ShowsNoPictureOfAnotherBody) {
   small.frame.tick = 2;
   small.frame.displacement.assign(3 * scene_->nodes.size(), 0.0F);
   server_->show_picture(std::move(small));  // of the body before
-  EXPECT_EQ(test::decode_scene(page.hear(1)).scene, 2U);
+  EXPECT_EQ(test::decode_scene(page.receive(1)).scene, 2U);
   SurfacePicture fitting;
   fitting.frame.tick = 3;
   fitting.frame.displacement.assign(3 * other.surface_rest_positions().size(), 0.0F);
   server_->show_picture(std::move(fitting));
-  const test::DecodedFrame frame = test::decode_frame(page.hear(3), other.surface_rest_positions().size());
+  const test::DecodedFrame frame = test::decode_frame(page.receive(3), other.surface_rest_positions().size());
   EXPECT_EQ(frame.tick, 3.0);
   EXPECT_EQ(frame.scene, 2U);
 }
@@ -249,20 +249,20 @@ TEST_F(Viewer, ShowsNoPictureOfAnotherBody) {
 TEST_F(Viewer, OnlyTheControllerIsObeyed) {
   server_->show_state(R"({"pointer":true})");
   Client first = client();
-  EXPECT_EQ(first.hear("state", is_controller).at("pointer"), true);
+  EXPECT_EQ(first.receive("state", is_controller).at("pointer"), true);
   Client second = client();
-  const Json state = second.hear("state");
+  const Json state = second.receive("state");
   EXPECT_EQ(state.at("you"), "watcher");
   EXPECT_EQ(state.at("controlled"), true);
   EXPECT_EQ(state.at("watchers"), 2);
   EXPECT_EQ(state.at("pointer"), false);
 
   second.say(step);
-  const Json refused = second.hear("error");
+  const Json refused = second.receive("error");
   EXPECT_EQ(refused.at("about"), "step");
   EXPECT_EQ(refused.at("reason"), "control");
   second.say(take_control);
-  EXPECT_EQ(second.hear("error").at("about"), "control");
+  EXPECT_EQ(second.receive("error").at("about"), "control");
   for (const char* word :
        {R"({"type":"point","position":[2,0,0],"orientation":[0,0,0,1],"grab":false,"lifted":true})",
         R"({"type":"pause","paused":true})", R"({"type":"pause","paused":false})", step,
@@ -278,16 +278,16 @@ TEST_F(Viewer, OnlyTheControllerIsObeyed) {
 TEST_F(Viewer, ControlIsHandedOver) {
   server_->show_state("{}");
   Client first = client();
-  first.hear("state", is_controller);
+  first.receive("state", is_controller);
   Client second = client();
-  second.hear("state");
+  second.receive("state");
   first.say(give_control);
   run_.wait_for("lose_pointer");
-  second.hear("state", [](const Json& state) { return state.at("controlled") == false; });
+  second.receive("state", [](const Json& state) { return state.at("controlled") == false; });
   second.say(take_control);
-  second.hear("state", is_controller);
-  first.hear("state",
-             [](const Json& state) { return !is_controller(state) && state.at("controlled") == true; });
+  second.receive("state", is_controller);
+  first.receive("state",
+                [](const Json& state) { return !is_controller(state) && state.at("controlled") == true; });
   second.say(step);
   run_.wait_for("step");
 }
@@ -295,33 +295,33 @@ TEST_F(Viewer, ControlIsHandedOver) {
 TEST_F(Viewer, PointerIsLostWithItsPage) {
   server_->show_state("{}");
   Client first = client();
-  first.hear("state", is_controller);
+  first.receive("state", is_controller);
   Client second = client();
-  second.hear("state");
+  second.receive("state");
   first.cut();
   run_.wait_for("lose_pointer");
-  second.hear("state", [](const Json& state) { return state.at("controlled") == false; });
+  second.receive("state", [](const Json& state) { return state.at("controlled") == false; });
   second.say(step);
-  EXPECT_EQ(second.hear("error").at("about"), "step");
+  EXPECT_EQ(second.receive("error").at("about"), "step");
   second.say(take_control);
-  second.hear("state", is_controller);
+  second.receive("state", is_controller);
   second.cut();
   run_.wait_for("lose_pointer", 2);
   Client again = client();  // the only page: a reload
-  again.hear("state", is_controller);
+  again.receive("state", is_controller);
 }
 
 TEST_F(Viewer, TellsThePageWhatCannotBe) {
   Client page = client();
   page.say(R"({"type":"change","settings":{"friction":"-1"}})");
-  EXPECT_EQ(page.hear("error"), (Json{{"type", "error"},
-                                      {"about", "change"},
-                                      {"reason", "value"},
-                                      {"what", "friction is -1"},
-                                      {"where", "--friction"},
-                                      {"hint", "give a positive one"}}));
+  EXPECT_EQ(page.receive("error"), (Json{{"type", "error"},
+                                         {"about", "change"},
+                                         {"reason", "value"},
+                                         {"what", "friction is -1"},
+                                         {"where", "--friction"},
+                                         {"hint", "give a positive one"}}));
   page.say(R"({"type":"change","settings":{"safety":"max_force=9"}})");
-  EXPECT_EQ(page.hear("error").at("reason"), "hand");
+  EXPECT_EQ(page.receive("error").at("reason"), "hand");
   page.say(step);
   run_.wait_for("step");
 }
@@ -329,7 +329,7 @@ TEST_F(Viewer, TellsThePageWhatCannotBe) {
 TEST_F(Viewer, ClosesOnlyThePageThatTalksNonsense) {
   server_->show_scene(scene_);
   Client good = client();
-  good.hear("hello");
+  good.receive("hello");
   const auto closed = [&](auto&& talk) {
     Client bad = client();
     talk(bad);
@@ -404,8 +404,8 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
   Client slow = client();
   slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
   Client quick = client();
-  slow.hear(1);
-  quick.hear(1);
+  slow.receive(1);
+  quick.receive(1);
   for (std::int64_t tick = 0; tick < pictures; ++tick) {
     show(tick);
     hear_frame(quick, tick);  // each of them
@@ -415,7 +415,7 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
   std::int64_t last_tick = -1;
   double last = -1.0;
   while (last != pictures - 1 || last_tick != ticks_a_picture * pictures - 1) {
-    const Client::Said said = slow.hear();
+    const Client::Said said = slow.receive();
     if (said.kind() == 3) {
       const double tick = tick_of(said.bytes);
       EXPECT_GT(tick, last);
@@ -435,9 +435,9 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
 TEST_F(SlowPages, MissTheTicksOfTheBodyBefore) {
   Client slow = client();
   slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
-  slow.hear(1);
+  slow.receive(1);
   Client quick = client();
-  quick.hear(1);
+  quick.receive(1);
   for (std::int64_t tick = 0; tick < 30; ++tick) {  // until ticks wait
     show(tick);
     hear_frame(quick, tick);
@@ -445,8 +445,8 @@ TEST_F(SlowPages, MissTheTicksOfTheBodyBefore) {
   Scene other = *scene_;
   other.number = 2;
   server_->show_scene(std::make_shared<const Scene>(other));
-  EXPECT_EQ(test::decode_scene(quick.hear(1)).scene, 2U);
-  while (test::decode_scene(slow.hear(1)).scene != 2) {
+  EXPECT_EQ(test::decode_scene(quick.receive(1)).scene, 2U);
+  while (test::decode_scene(slow.receive(1)).scene != 2) {
   }
   show(30);
   hear_frame(slow, 30);
@@ -456,7 +456,7 @@ TEST_F(SlowPages, AreClosedWhenTheyDoNotReadForTenSeconds) {
   server_->show_state("{}");
   Client slow = client();
   slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
-  slow.hear("state", is_controller);
+  slow.receive("state", is_controller);
   test::asio::io_context context;
   test::tcp::socket half_a_request(context);
   half_a_request.connect(test::local(port()));
@@ -491,13 +491,13 @@ TEST_F(Viewer, ReplayKeepsTicksAndTimesForLaterPages) {
   server_->show_state(R"({"frames":2})");
   for (int k = 0; k < 2; ++k) {
     Client page = client();
-    EXPECT_EQ(page.hear("hello").at("mode"), "replay");
-    const Json state = page.hear("state", [](const Json& s) { return s.contains("frames"); });
+    EXPECT_EQ(page.receive("hello").at("mode"), "replay");
+    const Json state = page.receive("state", [](const Json& s) { return s.contains("frames"); });
     EXPECT_EQ(state.at("times"), Json({0, 0.5}));
-    const test::DecodedTicks ticks = test::decode_ticks(page.hear(4));
+    const test::DecodedTicks ticks = test::decode_ticks(page.receive(4));
     EXPECT_EQ(ticks.shown.size(), 5000U);
     EXPECT_EQ(ticks.stride, 4U);
-    EXPECT_FALSE(page.hear("state").contains("times"));
+    EXPECT_FALSE(page.receive("state").contains("times"));
   }
 }
 
@@ -520,14 +520,14 @@ class Held {
 TEST_F(Viewer, HeldConnectionsGiveWay) {
   server_->show_state("{}");
   Client before = client();
-  before.hear("state", is_controller);
+  before.receive("state", is_controller);
   const std::string request = "GET / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port()) + "\r\n";
   for (const std::string& said : {std::string(), std::string("GET / HT"), request, request + "\r\n"}) {
     const Held held(port(), 40, said);
     EXPECT_EQ(test::ask(served(), {.target = "/"}).result_int(), 200U) << said;
     Client page = client();
     EXPECT_EQ(page.status, 101U) << said;
-    page.hear("state");
+    page.receive("state");
   }
   before.say(step);  // who is in stays in
   run_.wait_for("step");
@@ -543,7 +543,7 @@ TEST_F(Viewer, PagesThatAreOpenAreNotCutForFurtherOnes) {
   EXPECT_EQ(client().status, 503U);
   EXPECT_EQ(test::ask(served(), {.target = "/"}).result_int(), 503U);
   EXPECT_EQ(test::ask(served(), {.target = "/", .query = ""}).result_int(), 403U);
-  for (const auto& page : pages) EXPECT_EQ(page->hear("state").at("type"), "state");
+  for (const auto& page : pages) EXPECT_EQ(page->poll("state").at("type"), "state");
   pages.pop_back();
   while (client().status != 101U)  // until it has noticed
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -578,7 +578,7 @@ TEST_F(Viewer, SurfaceCanBeSaved) {
 TEST_F(Viewer, PagesComeBackAfterARestartOnThePort) {
   server_->show_state("{}");
   Client page = client();
-  page.hear("hello");
+  page.receive("hello");
   const std::uint16_t taken = port();
   server_.reset();
   run_.wait_for("lose_pointer");
@@ -586,7 +586,7 @@ TEST_F(Viewer, PagesComeBackAfterARestartOnThePort) {
   server_ = serve({.port = taken});
   EXPECT_EQ(port(), taken);
   Client again = client();
-  EXPECT_EQ(again.hear("hello").at("id"), 1);
+  EXPECT_EQ(again.receive("hello").at("id"), 1);
 }
 
 TEST_F(Viewer, SaysWhyItCannotListen) {

@@ -44,7 +44,7 @@ SurfacePicture picture_of(const Body& body) {
   return picture;
 }
 
-TEST(Wire, SceneComesBack) {
+TEST(ViewerWire, SceneComesBack) {
   const Scene scene = make_scene(body_of(ElementType::tet4), 9);
   const test::DecodedScene decoded = test::decode_scene(encode_scene(scene));
   EXPECT_EQ(decoded.scene, 9U);
@@ -61,7 +61,7 @@ TEST(Wire, SceneComesBack) {
   EXPECT_EQ(decoded.held, scene.held);
 }
 
-TEST(Wire, FrameComesBackToItsUnits) {
+TEST(ViewerWire, FrameComesBackToItsUnits) {
   const Body body = body_of(ElementType::tet4);
   const Scene scene = make_scene(body, 2);
   SurfacePicture picture = picture_of(body);
@@ -99,7 +99,7 @@ TEST(Wire, FrameComesBackToItsUnits) {
             (std::vector<float>{100, -1, 0, 65534, 100}));
 }
 
-TEST(Wire, FrameOfUnknownStressOfRestAndOfWhatIsNotFinite) {
+TEST(ViewerWire, FrameOfUnknownStressOfRestAndOfWhatIsNotFinite) {
   const Body body = body_of(ElementType::tet4);
   const Scene scene = make_scene(body, 2);
   SurfacePicture picture = picture_of(body);
@@ -116,7 +116,7 @@ TEST(Wire, FrameOfUnknownStressOfRestAndOfWhatIsNotFinite) {
   EXPECT_FLOAT_EQ(frame.u[2], -2.0F);
 }
 
-TEST(Wire, PicturesOfOtherBodiesDoNotFit) {
+TEST(ViewerWire, PicturesOfOtherBodiesDoNotFit) {
   const Body body = body_of(ElementType::tet4);
   const Scene scene = make_scene(body, 1);
   SurfacePicture picture = picture_of(body);
@@ -142,7 +142,7 @@ struct Patched {
   }
 };
 
-TEST(Wire, PatchAndItsFrameComeBack) {
+TEST(ViewerWire, PatchAndItsFrameComeBack) {
   const Patched patched(ElementType::tet4);
   const ScenePatch& patch = patched.patch;
   const test::DecodedPatch decoded = test::decode_patch(encode_patch(1, patch));
@@ -181,7 +181,7 @@ TEST(Wire, PatchAndItsFrameComeBack) {
   EXPECT_EQ(frame.pressure, (std::vector<float>{2, 2, 3}));
 }
 
-TEST(Wire, FrameOfAPlateHasAllItsNodes) {
+TEST(ViewerWire, FrameOfAPlateHasAllItsNodes) {
   const Body plate = body_of(ElementType::quad4);
   const Scene scene = make_scene(plate, 1);
   SurfacePicture picture = picture_of(plate);
@@ -198,7 +198,7 @@ TEST(Wire, FrameOfAPlateHasAllItsNodes) {
             std::vector<std::uint32_t>{static_cast<std::uint32_t>(plate.surface_mesh_nodes().back())});
 }
 
-TEST(Wire, PatchOfAPlateOfAnOddNumberOfNodesComesBack) {
+TEST(ViewerWire, PatchOfAPlateOfAnOddNumberOfNodesComesBack) {
   const Patched patched(ElementType::quad4, 2);
   const std::size_t S = patched.scene.nodes.size();
   ASSERT_EQ(S % 2, 1U);  // so that its stresses end amid four bytes
@@ -212,7 +212,7 @@ TEST(Wire, PatchOfAPlateOfAnOddNumberOfNodesComesBack) {
     EXPECT_NEAR(frame.u[3 * S + k], expected[k], half_unit * frame.unit_u);
 }
 
-TEST(Wire, TicksComeBack) {
+TEST(ViewerWire, TicksComeBack) {
   std::vector<TickNote> notes(3);
   for (std::size_t k = 0; k < notes.size(); ++k) {
     notes[k].number = 100 + 4 * static_cast<std::int64_t>(k);

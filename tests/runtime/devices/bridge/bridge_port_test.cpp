@@ -34,7 +34,7 @@ namespace palpate {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Heard = DevicePort::Heard;
+using ReadResult = DevicePort::ReadResult;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 BridgeOptions any_port() {
@@ -126,10 +126,10 @@ class Partner {
 };
 
 /// Reads until something comes of it, or not for `seconds`.
-Heard hear(BridgePort& port, DeviceState& state, double seconds = 10.0) {
+ReadResult hear(BridgePort& port, DeviceState& state, double seconds = 10.0) {
   const auto end = Clock::now() + std::chrono::duration<double>(seconds);
-  Heard heard = Heard::nothing;
-  while (heard == Heard::nothing && Clock::now() < end) heard = port.read(state);
+  ReadResult heard = ReadResult::nothing;
+  while (heard == ReadResult::nothing && Clock::now() < end) heard = port.read(state);
   return heard;
 }
 
@@ -140,7 +140,7 @@ class BridgePortTest : public testing::Test {
   /// Says hello, is told the nonce.
   void shake_hands(Partner& partner) {
     partner.say({});
-    EXPECT_EQ(port.read(state), Heard::nothing);
+    EXPECT_EQ(port.read(state), ReadResult::nothing);
     const auto answer = partner.told();
     ASSERT_TRUE(answer);
     EXPECT_EQ(answer->mode, BridgeMode::zero);
@@ -150,13 +150,13 @@ class BridgePortTest : public testing::Test {
   void join(Partner& partner) {
     shake_hands(partner);
     partner.say({});
-    ASSERT_EQ(port.read(state), Heard::report);
+    ASSERT_EQ(port.read(state), ReadResult::report);
   }
   /// What is said is refused, once and for that reason.
   void expect_refused(Refusal refusal) {
     const std::uint64_t before = port.counts()[refusal];
     const std::uint64_t taken = port.counts()[Refusal::none];
-    EXPECT_EQ(port.read(state), Heard::nothing);
+    EXPECT_EQ(port.read(state), ReadResult::nothing);
     EXPECT_EQ(port.counts()[refusal], before + 1);
     EXPECT_EQ(port.counts()[Refusal::none], taken);
   }
@@ -217,7 +217,7 @@ TEST_F(BridgePortTest, HandshakeThenReports) {
   said.device.buttons = 0x8001;
   const auto before = Clock::now().time_since_epoch();
   partner.say(said);
-  ASSERT_EQ(port.read(state), Heard::report);
+  ASSERT_EQ(port.read(state), ReadResult::report);
   EXPECT_EQ(state.pose.position, said.device.pose.position);
   EXPECT_EQ(state.pose.orientation.coeffs(), said.device.pose.orientation.coeffs());
   EXPECT_EQ(state.velocity, said.device.velocity);
@@ -226,7 +226,7 @@ TEST_F(BridgePortTest, HandshakeThenReports) {
   EXPECT_EQ(state.sequence, 2U);
   EXPECT_GE(state.arrived, std::chrono::nanoseconds(before).count());
   EXPECT_LE(state.arrived, std::chrono::nanoseconds(Clock::now().time_since_epoch()).count());
-  EXPECT_EQ(port.read(state), Heard::nothing);
+  EXPECT_EQ(port.read(state), ReadResult::nothing);
 }
 
 TEST_F(BridgePortTest, EachPortHasItsOwnSession) {
@@ -237,7 +237,7 @@ TEST_F(BridgePortTest, EachPortHasItsOwnSession) {
   Partner stale(other);
   stale.nonce = partner.nonce;
   stale.say({});
-  EXPECT_EQ(other.read(state), Heard::nothing);
+  EXPECT_EQ(other.read(state), ReadResult::nothing);
   EXPECT_EQ(other.counts()[Refusal::wrong_nonce], 1U);
   const auto answer = stale.told();
   ASSERT_TRUE(answer);
@@ -245,7 +245,7 @@ TEST_F(BridgePortTest, EachPortHasItsOwnSession) {
   EXPECT_NE(answer->nonce, partner.nonce);
   stale.nonce = answer->nonce;
   stale.say({});
-  EXPECT_EQ(other.read(state), Heard::report);
+  EXPECT_EQ(other.read(state), ReadResult::report);
 }
 
 TEST_F(BridgePortTest, TakesTheNewestOfWhatWaits) {
@@ -257,7 +257,7 @@ TEST_F(BridgePortTest, TakesTheNewestOfWhatWaits) {
     partner.say(said);
   }
   partner.say_bytes({1, 2, 3});
-  ASSERT_EQ(port.read(state), Heard::report);
+  ASSERT_EQ(port.read(state), ReadResult::report);
   EXPECT_EQ(state.pose.position.x(), 0.001 * 20);
   EXPECT_EQ(port.counts()[Refusal::none], 21U);
   EXPECT_EQ(port.counts()[Refusal::size], 1U);
@@ -317,7 +317,7 @@ TEST_F(BridgePortTest, RefusesByReason) {
   EXPECT_EQ(state.arrived, before.arrived);
 
   partner.say_sealed(good);
-  EXPECT_EQ(port.read(state), Heard::report);
+  EXPECT_EQ(port.read(state), ReadResult::report);
   EXPECT_EQ(state.sequence, 10U);
   EXPECT_EQ(port.counts().skipped, 7U);  // 3 to 9
 }
@@ -330,7 +330,7 @@ TEST_F(BridgePortTest, TooLongOnItsWay) {
   said.device.sequence = 3;
   said.time = 3'000'000'000;
   partner.say_sealed(as_bytes(encode_bridge_state(said)));
-  ASSERT_EQ(port.read(state), Heard::report);
+  ASSERT_EQ(port.read(state), ReadResult::report);
   std::this_thread::sleep_for(std::chrono::milliseconds(40));
   said.device.sequence = 4;
   said.time += 1'000'000;  // by its clock it was said 1 ms later
@@ -353,17 +353,17 @@ TEST_F(BridgePortTest, RandomDatagramsDoNotGetThrough) {
     }
     partner.say_bytes(any);
     if (i % 50 == 0) {
-      EXPECT_NE(port.read(state), Heard::report);  // after a second the partner is lost
+      EXPECT_NE(port.read(state), ReadResult::report);  // after a second the partner is lost
     }
   }
-  EXPECT_NE(port.read(state), Heard::report);
+  EXPECT_NE(port.read(state), ReadResult::report);
   EXPECT_EQ(port.counts()[Refusal::none], 1U);
   EXPECT_GT(port.counts()[Refusal::wrong_nonce], 5'000U);
   EXPECT_GT(port.counts()[Refusal::seal], 5'000U);
 }
 
 TEST_F(BridgePortTest, NobodyIsNotLost) {
-  EXPECT_EQ(hear(port, state, 1.2), Heard::nothing);
+  EXPECT_EQ(hear(port, state, 1.2), ReadResult::nothing);
   EXPECT_TRUE(port.write({}, state));
   EXPECT_EQ(port.counts().commands, 0U);
 }
@@ -373,12 +373,12 @@ TEST_F(BridgePortTest, TheNextOneTakesOverAfterSilence) {
   join(first);
   Partner second(port);
   const auto silent_since = Clock::now();
-  Heard heard = Heard::nothing;
-  while (heard == Heard::nothing && Clock::now() - silent_since < std::chrono::seconds(20)) {
+  ReadResult heard = ReadResult::nothing;
+  while (heard == ReadResult::nothing && Clock::now() - silent_since < std::chrono::seconds(20)) {
     second.say({});  // hello
     heard = port.read(state);
   }
-  EXPECT_EQ(heard, Heard::lost);
+  EXPECT_EQ(heard, ReadResult::lost);
   EXPECT_GE(Clock::now() - silent_since, std::chrono::milliseconds(900));
   EXPECT_LE(Clock::now() - silent_since, std::chrono::seconds(6));
   EXPECT_GE(port.counts()[Refusal::address], 1U);
@@ -391,34 +391,34 @@ TEST_F(BridgePortTest, TheNextOneTakesOverAfterSilence) {
 TEST_F(BridgePortTest, LostAndOpenedAgainItWaits) {
   Partner partner(port);
   join(partner);
-  EXPECT_EQ(hear(port, state), Heard::lost);
+  EXPECT_EQ(hear(port, state), ReadResult::lost);
   port.close();
-  EXPECT_EQ(port.read(state), Heard::lost);
+  EXPECT_EQ(port.read(state), ReadResult::lost);
   EXPECT_FALSE(port.write({}, state));
   port.open();
-  EXPECT_EQ(port.read(state), Heard::nothing);
+  EXPECT_EQ(port.read(state), ReadResult::nothing);
   Partner again(port);
   EXPECT_EQ(again.key, partner.key) << "it is the port's";
   again.nonce = partner.nonce;
   again.say({});
-  EXPECT_EQ(port.read(state), Heard::nothing) << "what was said before does not count any more";
+  EXPECT_EQ(port.read(state), ReadResult::nothing) << "what was said before does not count any more";
   const auto answer = again.told();
   ASSERT_TRUE(answer);
   again.nonce = answer->nonce;
   again.say({});
-  EXPECT_EQ(port.read(state), Heard::report);
+  EXPECT_EQ(port.read(state), ReadResult::report);
 }
 
 /// Until the port has given its partner up; `meanwhile` is called all the time.
 void lose(BridgePort& port, const std::function<void()>& meanwhile) {
   DeviceState state;
   const auto end = Clock::now() + std::chrono::seconds(20);
-  Heard heard = Heard::nothing;
-  while (heard == Heard::nothing && Clock::now() < end) {
+  ReadResult heard = ReadResult::nothing;
+  while (heard == ReadResult::nothing && Clock::now() < end) {
     meanwhile();
     heard = port.read(state);
   }
-  EXPECT_EQ(heard, Heard::lost);
+  EXPECT_EQ(heard, ReadResult::lost);
 }
 
 TEST_F(BridgePortTest, AStrangerNeverBecomesThePartner) {
@@ -429,7 +429,7 @@ TEST_F(BridgePortTest, AStrangerNeverBecomesThePartner) {
     const std::uint64_t before = port.counts()[Refusal::seal];
     stranger.say({});
     stranger.say_bytes(as_bytes(encode_bridge_state({})));  // not even sealed
-    EXPECT_EQ(port.read(state), Heard::nothing);
+    EXPECT_EQ(port.read(state), ReadResult::nothing);
     EXPECT_EQ(port.counts()[Refusal::seal], before + 2);
     EXPECT_FALSE(stranger.told()) << "it was answered";
   };
@@ -452,13 +452,13 @@ TEST_F(BridgePortTest, WhatWasSaidOnceDoesNotCountAgain) {
   join(honest);
   for (int k = 0; k < 3; ++k) {
     honest.say({});
-    EXPECT_EQ(port.read(state), Heard::report);
+    EXPECT_EQ(port.read(state), ReadResult::report);
   }
   Partner thief(port);  // it has heard all, and has no key
   const auto replay = [&] {
     for (const Bytes& bytes : honest.said) {
       thief.say_bytes(bytes);
-      EXPECT_NE(port.read(state), Heard::report);
+      EXPECT_NE(port.read(state), ReadResult::report);
     }
   };
   replay();
@@ -470,7 +470,7 @@ TEST_F(BridgePortTest, WhatWasSaidOnceDoesNotCountAgain) {
   Partner later(port);
   for (const Bytes& bytes : honest.said) {
     later.say_bytes(bytes);
-    EXPECT_EQ(port.read(state), Heard::nothing);
+    EXPECT_EQ(port.read(state), ReadResult::nothing);
   }
   EXPECT_EQ(port.counts()[Refusal::none], taken);
   Partner back(port);
@@ -485,7 +485,7 @@ TEST_F(BridgePortTest, FaultOfTheDeviceIsLost) {
   said.fault = true;
   said.device.pose.position.x() = 0.5;
   partner.say(said);
-  EXPECT_EQ(port.read(state), Heard::lost);
+  EXPECT_EQ(port.read(state), ReadResult::lost);
   EXPECT_EQ(state.pose.position, before.pose.position);
 }
 
@@ -499,7 +499,7 @@ TEST_F(BridgePortTest, LimitsAreWhatWasSaidLast) {
   said.limits = {8.0, infinity, 2000.0, 20.0, 0.125};
   for (int k = 0; k < 3; ++k) {
     partner.say(said);
-    ASSERT_EQ(port.read(state), Heard::report);
+    ASSERT_EQ(port.read(state), ReadResult::report);
     EXPECT_EQ(port.limit_changes(), 1U);
   }
   const DeviceLimits limits = port.limits();
@@ -510,7 +510,7 @@ TEST_F(BridgePortTest, LimitsAreWhatWasSaidLast) {
   EXPECT_EQ(limits.workspace_radius, 0.125);
   said.limits.max_force = 3.0;
   partner.say(said);
-  ASSERT_EQ(port.read(state), Heard::report);
+  ASSERT_EQ(port.read(state), ReadResult::report);
   EXPECT_EQ(port.limit_changes(), 2U);
   EXPECT_EQ(port.limits().max_force, 3.0);
 }
@@ -658,11 +658,11 @@ TEST(BridgeExample, TheHandIsPushedToWhereForcesBalance) {
 
   DeviceState state;
   const auto end = Clock::now() + std::chrono::seconds(40);
-  ASSERT_EQ(hear(port, state, 20.0), Heard::report);
+  ASSERT_EQ(hear(port, state, 20.0), ReadResult::report);
   EXPECT_LT((state.pose.position - start).norm(), 1e-9);  // it was not pushed yet
   double distance = 1.0;
   while (distance > 1e-6 && Clock::now() < end) {
-    if (port.read(state) == Heard::report) {
+    if (port.read(state) == ReadResult::report) {
       distance = (state.pose.position - expected).norm() + 0.01 * state.velocity.norm();
     }
     ASSERT_TRUE(port.write(command, state));
@@ -683,7 +683,7 @@ TEST(BridgeExample, TheHandIsPushedToWhereForcesBalance) {
   port.close();
   BridgePort second(options);
   second.open();
-  EXPECT_EQ(hear(second, state, 20.0), Heard::report);
+  EXPECT_EQ(hear(second, state, 20.0), ReadResult::report);
   EXPECT_GE(second.counts()[Refusal::seal], 1U) << "it had the first one's key";
   EXPECT_GE(second.counts()[Refusal::wrong_nonce], 1U);
 }

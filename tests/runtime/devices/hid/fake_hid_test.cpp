@@ -19,7 +19,7 @@
 namespace palpate {
 namespace {
 
-using Heard = DevicePort::Heard;
+using ReadResult = DevicePort::ReadResult;
 
 const BoardFeature board_feature{.axes = 3,
                                  .watchdog = 100,
@@ -59,12 +59,12 @@ struct Bench {
   DeviceState state;
 
   /// Reads until something comes that is not nothing.
-  Heard next() {
+  ReadResult next() {
     for (int k = 0; k < 1000; ++k) {
-      const Heard heard = port.read(state);
-      if (heard != Heard::nothing) return heard;
+      const ReadResult heard = port.read(state);
+      if (heard != ReadResult::nothing) return heard;
     }
-    return Heard::nothing;
+    return ReadResult::nothing;
   }
 };
 
@@ -102,7 +102,7 @@ TEST(HidArm, RequestsAreAnsweredAndForcesAreFelt) {
   std::vector<double> speeds;
   for (int tick = 0; tick < 300; ++tick) {
     const std::int64_t asked = monotonic_now();
-    ASSERT_EQ(bench.next(), Heard::report);
+    ASSERT_EQ(bench.next(), ReadResult::report);
     EXPECT_EQ(bench.state.sequence, before + 1);
     before = bench.state.sequence;
     EXPECT_GE(bench.state.arrived, asked);
@@ -133,7 +133,7 @@ TEST(HidArm, OutOfReachThereIsNoForce) {
   auto firmware = std::make_shared<WoodenHapticsFirmware>(arm(), resting);
   Bench bench(firmware, "woodenhaptics");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   bench.state.pose.position = Vec3(2, 0, 0);
   ASSERT_TRUE(bench.port.write(command(Vec3(1, 1, 1)), bench.state));
   EXPECT_EQ(firmware->outputs().back(), Bytes(15, 0));
@@ -145,16 +145,16 @@ TEST(HidArm, CalibrateButtonSetsTheCountersOnce) {
   firmware->misplace({200, -300, 150, 0, 0, 0});
   Bench bench(firmware, "woodenhaptics");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   EXPECT_GT((bench.state.pose.position - pose).norm(), 0.01);
   firmware->press_calibrate();
   ASSERT_TRUE(bench.port.write(command(Vec3(0, 0, 1)), bench.state));
-  ASSERT_EQ(bench.next(), Heard::report);  // says that the button was pressed
+  ASSERT_EQ(bench.next(), ReadResult::report);  // says that the button was pressed
   ASSERT_TRUE(bench.port.write(command(Vec3(0, 0, 1)), bench.state));
   const auto set = encode_counters(arm().calibration);
   EXPECT_EQ(firmware->outputs().back(), Bytes(set.begin(), set.end()));
   EXPECT_EQ(firmware->forces().back().force, Vec3::Zero());
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   EXPECT_LT((bench.state.pose.position - pose).norm(), 1e-12);
   ASSERT_TRUE(bench.port.write(command(Vec3(0, 0, 1)), bench.state));
   EXPECT_NEAR(firmware->forces().back().force.z(), 1.0, 0.01);
@@ -165,7 +165,7 @@ TEST(HidArm, ButtonGrabs) {
   Bench bench(firmware, "woodenhaptics");
   firmware->press_button(true);
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   EXPECT_TRUE(bench.state.pose.grab);
 }
 
@@ -181,7 +181,7 @@ TEST(HidArm, AnotherReportLengthIsAnotherProtocol) {
   Bench bench(std::make_shared<Later>(), "woodenhaptics");
   const std::string text = message([&] { bench.port.open(); });
   EXPECT_TRUE(says(text, "its longest input report has 64 bytes, the profile says 14"));
-  EXPECT_EQ(bench.port.read(bench.state), Heard::lost);
+  EXPECT_EQ(bench.port.read(bench.state), ReadResult::lost);
 }
 
 // --- board ---
@@ -197,7 +197,7 @@ TEST(HidBoard, LimitsNumbersAndForces) {
   EXPECT_EQ(bench.port.limits().workspace_radius, 0.08);
   std::vector<std::uint32_t> sequences;
   while (bench.state.sequence < 200) {
-    ASSERT_EQ(bench.next(), Heard::report);
+    ASSERT_EQ(bench.next(), ReadResult::report);
     sequences.push_back(bench.state.sequence);
     const Vec3 force(0.001 * bench.state.sequence, -1.0, 0.5);
     ASSERT_TRUE(bench.port.write(command(force), bench.state));
@@ -233,19 +233,19 @@ TEST(HidBoard, NumbersGrowOnWhenItIsPluggedInAgain) {
   Bench bench(std::make_shared<BoardFirmware>(board_feature, circle, 5000), "palpate_board");
   bench.port.open();
   for (int k = 0; k < 20; ++k) {
-    ASSERT_EQ(bench.next(), Heard::report);
+    ASSERT_EQ(bench.next(), ReadResult::report);
   }
   const std::uint32_t last = bench.state.sequence;
   bench.hid.detach(bench.path);
-  EXPECT_EQ(bench.next(), Heard::lost);
-  EXPECT_EQ(bench.next(), Heard::lost);
+  EXPECT_EQ(bench.next(), ReadResult::lost);
+  EXPECT_EQ(bench.next(), ReadResult::lost);
   EXPECT_FALSE(bench.port.write({}, bench.state));
   EXPECT_FALSE(bench.port.write({}, bench.state));
   EXPECT_EQ(bench.hid.calls_after_error(), 0);
   bench.port.close();
   EXPECT_EQ(bench.hid.open_devices(), 0);
   EXPECT_TRUE(says(message([&] { bench.port.open(); }), "the device is not attached"));
-  EXPECT_EQ(bench.port.read(bench.state), Heard::lost);
+  EXPECT_EQ(bench.port.read(bench.state), ReadResult::lost);
   EXPECT_FALSE(bench.port.write({}, bench.state));
 
   auto again = std::make_shared<BoardFirmware>(board_feature, circle, 7);
@@ -253,7 +253,7 @@ TEST(HidBoard, NumbersGrowOnWhenItIsPluggedInAgain) {
   EXPECT_NE(path, bench.path);
   bench.port.open();
   EXPECT_TRUE(says(bench.port.name(), path));
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   EXPECT_GT(bench.state.sequence, last);
   EXPECT_LT(bench.state.sequence, last + 100);
   ASSERT_TRUE(bench.port.write(command(Vec3(1, 0, 0)), bench.state));
@@ -285,19 +285,19 @@ TEST(HidBoard, RefusesAxesThatDiffer) {
 TEST(HidBoard, FrozenNumbersAreNoNews) {
   Bench bench(std::make_shared<BoardFirmware>(board_feature, circle), "palpate_board");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   const DeviceState last = bench.state;
   bench.hid.freeze(true);
   // What was read ahead of the freeze may still come.
   int news = 0;
   for (int k = 0; k < 50; ++k) {
-    news += bench.port.read(bench.state) == Heard::report ? 1 : 0;
+    news += bench.port.read(bench.state) == ReadResult::report ? 1 : 0;
   }
   EXPECT_LE(news, 1);
   EXPECT_LE(bench.state.sequence - last.sequence, 2U);
   EXPECT_GT(bench.port.dropped(), 20);
   bench.hid.freeze(false);
-  EXPECT_EQ(bench.next(), Heard::report);
+  EXPECT_EQ(bench.next(), ReadResult::report);
 }
 
 TEST(HidBoard, DamagedReportsAreDroppedAndCounted) {
@@ -311,7 +311,7 @@ TEST(HidBoard, DamagedReportsAreDroppedAndCounted) {
   });
   std::uint32_t before = 0;
   while (before < 100) {
-    ASSERT_NE(bench.port.read(bench.state), Heard::lost);
+    ASSERT_NE(bench.port.read(bench.state), ReadResult::lost);
     if (bench.state.sequence == 0) continue;
     EXPECT_GE(bench.state.sequence, before);
     EXPECT_LT((bench.state.pose.position - circle(1e-3 * (bench.state.sequence - 1))).norm(), 1e-6);
@@ -327,7 +327,7 @@ TEST(HidBoard, GarbageAloneIsNothing) {
   bench.hid.on_read([](std::int64_t) { return FakeFault::short_report; });
   const DeviceState untouched = bench.state;
   for (int k = 0; k < 10; ++k) {
-    EXPECT_EQ(bench.port.read(bench.state), Heard::nothing);
+    EXPECT_EQ(bench.port.read(bench.state), ReadResult::nothing);
   }
   EXPECT_EQ(bench.state.arrived, untouched.arrived);
   EXPECT_EQ(bench.state.sequence, untouched.sequence);
@@ -337,9 +337,9 @@ TEST(HidBoard, StallsAreDrainedToTheNewest) {
   auto firmware = std::make_shared<BoardFirmware>(board_feature, circle);
   Bench bench(firmware, "palpate_board");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   bench.hid.on_read([](std::int64_t k) { return k == 0 ? FakeFault::stall_50ms : FakeFault::none; });
-  ASSERT_EQ(bench.next(), Heard::report);  // the one that was held up, and all that came meanwhile
+  ASSERT_EQ(bench.next(), ReadResult::report);  // the one that was held up, and all that came meanwhile
   EXPECT_GE(bench.state.sequence, 50U);
   EXPECT_GE(bench.state.sequence + 2, firmware->sequence());
   bench.hid.on_write([](std::int64_t) { return FakeFault::stall_5ms; });
@@ -349,14 +349,14 @@ TEST(HidBoard, StallsAreDrainedToTheNewest) {
 TEST(HidBoard, AReadErrorIsALoss) {
   Bench bench(std::make_shared<BoardFirmware>(board_feature, circle), "palpate_board");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   bench.hid.on_read([](std::int64_t) { return FakeFault::error; });
-  EXPECT_EQ(bench.next(), Heard::lost);
+  EXPECT_EQ(bench.next(), ReadResult::lost);
   bench.hid.on_read({});
-  EXPECT_EQ(bench.next(), Heard::lost);
+  EXPECT_EQ(bench.next(), ReadResult::lost);
   EXPECT_EQ(bench.hid.calls_after_error(), 0);
   bench.port.open();  // closes what is left
-  EXPECT_EQ(bench.next(), Heard::report);
+  EXPECT_EQ(bench.next(), ReadResult::report);
   EXPECT_EQ(bench.hid.open_devices(), 1);
 }
 
@@ -364,7 +364,7 @@ TEST(HidBoard, AfterAFailingWriteTheWriterKeepsAwayAndTheWayOutStillTakesTheForc
   auto firmware = std::make_shared<BoardFirmware>(board_feature, circle);
   Bench bench(firmware, "palpate_board");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   ASSERT_TRUE(bench.port.write(command(Vec3(1, 0, 0)), bench.state));
   bench.hid.on_write([](std::int64_t k) { return k == 0 ? FakeFault::error : FakeFault::none; });
   EXPECT_FALSE(bench.port.write(command(Vec3(2, 0, 0)), bench.state));
@@ -380,7 +380,7 @@ TEST(HidBoard, ReadsWhileItWrites) {
   auto firmware = std::make_shared<BoardFirmware>(board_feature, circle);
   Bench bench(firmware, "palpate_board");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   const DeviceState first = bench.state;
   std::thread writer([&] {
     for (int k = 0; k < 200; ++k) {
@@ -388,7 +388,7 @@ TEST(HidBoard, ReadsWhileItWrites) {
     }
   });
   for (int k = 0; k < 100; ++k) {
-    EXPECT_EQ(bench.next(), Heard::report);
+    EXPECT_EQ(bench.next(), ReadResult::report);
   }
   writer.join();
   EXPECT_EQ(firmware->forces().size(), 200U);
@@ -409,7 +409,7 @@ TEST(HidJoystick, ConversationForcesAndWayOut) {
   EXPECT_EQ(firmware->playing(), 2U);
   EXPECT_EQ(firmware->forces().back().force, Vec3::Zero());
   for (int tick = 0; tick < 100; ++tick) {
-    ASSERT_EQ(bench.next(), Heard::report);
+    ASSERT_EQ(bench.next(), ReadResult::report);
     const Vec3& place = bench.state.pose.position;
     EXPECT_NEAR(std::hypot(place.x() / 0.03, place.y() / 0.02), 1.0, 0.02);
     const Vec3 force(3.0 * place.x() / 0.03, -2.0, 5.0);
@@ -428,7 +428,7 @@ TEST(HidJoystick, EqualForcesAreNotRepeatedTooOften) {
   auto firmware = std::make_shared<JoystickFirmware>(joystick(), resting);
   Bench bench(firmware, "pid_joystick");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   const std::size_t before = firmware->outputs().size();
   const auto write = [&](const Vec3& force) {
     EXPECT_TRUE(bench.port.write(command(force), bench.state));
@@ -459,17 +459,17 @@ TEST(HidJoystick, OneThatReportsChangesAndRestsIsToldOn) {
   firmware->on_change = true;
   Bench bench(firmware, "pid_joystick");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   SilenceWatch silence({.most = 1e3, .fade_from = 0.1, .frozen = 0.2});
   SpeedLimit speed(0.6, 1e-3);
   double frozen_at = 0.0;
   DeviceState last = bench.state;
   while (firmware->time() < 0.15 || (frozen_at == 0.0 && firmware->time() < 5.0)) {
-    ASSERT_EQ(bench.port.read(bench.state), Heard::report);
+    ASSERT_EQ(bench.port.read(bench.state), ReadResult::report);
     ASSERT_GT(static_cast<std::int32_t>(bench.state.sequence - last.sequence), 0);
     last = bench.state;
     speed.see(bench.state);
-    EXPECT_TRUE(silence.hear(bench.state, bench.state.arrived, 1.0));
+    EXPECT_TRUE(silence.poll(bench.state, bench.state.arrived, 1.0));
     if (frozen_at == 0.0 && silence.frozen()) frozen_at = firmware->time();
   }
   EXPECT_GT(frozen_at, 0.35) << "it rests, and while a force is shown that must not last";
@@ -477,7 +477,7 @@ TEST(HidJoystick, OneThatReportsChangesAndRestsIsToldOn) {
   EXPECT_EQ(bench.state.velocity, Vec3::Zero());
   EXPECT_NEAR(bench.state.pose.position.x(), 0.03, 5e-4);
   bench.hid.detach(bench.path);
-  EXPECT_EQ(bench.port.read(bench.state), Heard::lost);
+  EXPECT_EQ(bench.port.read(bench.state), ReadResult::lost);
 }
 
 /// A stick that reports each 10 ms: between, its place is told again; its speed is from report to report.
@@ -510,7 +510,7 @@ TEST(HidJoystick, NothingIsMadeUpForOneThatTakesNoWrites) {
   firmware->on_change = true;
   Bench bench(firmware, "pid_joystick");
   bench.port.open();
-  ASSERT_EQ(bench.next(), Heard::report);
+  ASSERT_EQ(bench.next(), ReadResult::report);
   bench.hid.on_write([](std::int64_t) { return FakeFault::stall_50ms; });
   std::atomic<bool> stop = false;
   std::thread writer([&] {
@@ -520,7 +520,7 @@ TEST(HidJoystick, NothingIsMadeUpForOneThatTakesNoWrites) {
   int told = 0;
   int kept = 0;
   for (int k = 0; k < 200; ++k) {
-    ++(bench.port.read(bench.state) == Heard::report ? told : kept);
+    ++(bench.port.read(bench.state) == ReadResult::report ? told : kept);
   }
   stop = true;
   writer.join();
@@ -557,12 +557,12 @@ TEST(HidSpaceMouse, IntegratesAndGoesOnTellingWhileItIsStill) {
   EXPECT_EQ(bench.port.limits().max_force, 0.0);
   EXPECT_EQ(bench.port.limits().max_torque, 0.0);
   EXPECT_EQ(bench.port.limits().workspace_radius, 0.1);
-  ASSERT_EQ(bench.port.read(bench.state), Heard::report);
+  ASSERT_EQ(bench.port.read(bench.state), ReadResult::report);
   double fastest = 0.0;
   const auto go_on = [&](double until) {
     while (firmware->time() < until) {
       const DeviceState last = bench.state;
-      ASSERT_EQ(bench.port.read(bench.state), Heard::report);
+      ASSERT_EQ(bench.port.read(bench.state), ReadResult::report);
       EXPECT_EQ(bench.state.sequence, last.sequence + 1);
       // Places are the integral of speeds, over 20 ms at most where the reader was held up.
       const double passed = std::min(0.02, 1e-9 * static_cast<double>(bench.state.arrived - last.arrived));
@@ -583,7 +583,7 @@ TEST(HidSpaceMouse, IntegratesAndGoesOnTellingWhileItIsStill) {
   EXPECT_TRUE(bench.port.write(command(Vec3(1, 1, 1)), bench.state));
   EXPECT_TRUE(firmware->outputs().empty());
   bench.hid.detach(bench.path);
-  EXPECT_EQ(bench.port.read(bench.state), Heard::lost);
+  EXPECT_EQ(bench.port.read(bench.state), ReadResult::lost);
 }
 
 // --- choosing ---

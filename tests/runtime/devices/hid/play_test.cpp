@@ -173,7 +173,7 @@ class Program {
   pid_t child_ = -1;
 };
 
-class Played : public ::testing::Test {
+class PlayedDevice : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     std::string name = (fs::temp_directory_path() / "palpate-play-XXXXXX").string();
@@ -243,7 +243,7 @@ class Played : public ::testing::Test {
 
 fs::path Played::folder;
 
-TEST_F(Played, ABoardIsFeltAsTheSessionSays) {
+TEST_F(PlayedDevice, ABoardIsFeltAsTheSessionSays) {
   EmulatedBus bus;
   auto board = std::make_shared<BoardFirmware>(board_feature, pressing);
   const std::string path = bus.plug_in(board);
@@ -303,7 +303,7 @@ TEST_F(Played, ABoardIsFeltAsTheSessionSays) {
   RecordProperty("reports", std::to_string(reported("reports")));
 }
 
-TEST_F(Played, WoodenHapticsIsFeltAsTheSessionSays) {
+TEST_F(PlayedDevice, WoodenHapticsIsFeltAsTheSessionSays) {
   EmulatedBus bus;
   const auto arm = constants_of<ArmConstants>("woodenhaptics");
   auto firmware = std::make_shared<WoodenHapticsFirmware>(arm, pressing);
@@ -337,7 +337,7 @@ TEST_F(Played, WoodenHapticsIsFeltAsTheSessionSays) {
   EXPECT_EQ(last_force(*firmware), 0.0);
 }
 
-TEST_F(Played, UnpluggedInContactAndPluggedInAgain) {
+TEST_F(PlayedDevice, UnpluggedInContactAndPluggedInAgain) {
   constexpr double rate = 20.0;  // N/s
   constexpr double lifts = 2.0;  // the second hand, from its beginning [s]
   WaitingHand hand;
@@ -404,7 +404,7 @@ TEST_F(Played, UnpluggedInContactAndPluggedInAgain) {
   EXPECT_NE(faulted, recording.ticks.end());
 }
 
-TEST_F(Played, KilledInContactItLeavesNoForce) {
+TEST_F(PlayedDevice, KilledInContactItLeavesNoForce) {
   WaitingHand hand;
   EmulatedBus bus;
   auto board = std::make_shared<BoardFirmware>(board_feature, hand.hand());
@@ -419,7 +419,7 @@ TEST_F(Played, KilledInContactItLeavesNoForce) {
   EXPECT_TRUE(comes_true([&] { return last_force(*board) == 0.0; })) << "the guardian's";
 }
 
-TEST_F(Played, ASpaceMouseMovesTheToolAndShowsNothing) {
+TEST_F(PlayedDevice, ASpaceMouseMovesTheToolAndShowsNothing) {
   EmulatedBus bus;
   std::atomic<bool> down = false;
   auto firmware = std::make_shared<SpaceMouseFirmware>([&](double) {
@@ -461,7 +461,7 @@ TEST_F(Played, ASpaceMouseMovesTheToolAndShowsNothing) {
   EXPECT_TRUE(firmware->outputs().empty());
 }
 
-TEST_F(Played, AJoystickIsFeltAlsoWhileItRests) {
+TEST_F(PlayedDevice, AJoystickIsFeltAlsoWhileItRests) {
   WaitingHand hand;  // along y, and it rests there without a tremor
   EmulatedBus bus;
   auto firmware = std::make_shared<JoystickFirmware>(

@@ -20,7 +20,7 @@
 namespace palpate {
 namespace {
 
-using Heard = DevicePort::Heard;
+using ReadResult = DevicePort::ReadResult;
 
 const BoardFeature board_feature{.axes = 3,
                                  .watchdog = 100,
@@ -79,12 +79,12 @@ bool comes_true(const Condition& condition) {
   return condition();
 }
 
-Heard next(HidPort& port, DeviceState& state) {
+ReadResult next(HidPort& port, DeviceState& state) {
   for (int k = 0; k < 500; ++k) {
-    const Heard heard = port.read(state);
-    if (heard != Heard::nothing) return heard;
+    const ReadResult heard = port.read(state);
+    if (heard != ReadResult::nothing) return heard;
   }
-  return Heard::nothing;
+  return ReadResult::nothing;
 }
 
 /// What a program prints.
@@ -190,7 +190,7 @@ TEST_F(EmulatedHid, BoardAtAThousandReportsASecond) {
   std::vector<std::uint32_t> sequences;
   std::vector<Vec3> wanted;
   while (state.sequence < 2000) {
-    ASSERT_EQ(next(port, state), Heard::report);
+    ASSERT_EQ(next(port, state), ReadResult::report);
     // In order; each is the place that belongs to its number: none is torn.
     if (!sequences.empty()) {
       ASSERT_GT(state.sequence, sequences.back());
@@ -227,13 +227,13 @@ TEST_F(EmulatedHid, ReportsThatWaitAreDrained) {
   port.open();
   bus.talk(path);
   DeviceState state;
-  ASSERT_EQ(next(port, state), Heard::report);
+  ASSERT_EQ(next(port, state), ReadResult::report);
   // Some thirty, one behind the other, once the device has not been held up as well; else they come one by
   // one.
   EXPECT_TRUE(comes_true([&] {
     const std::uint32_t before = state.sequence;
     std::this_thread::sleep_for(std::chrono::milliseconds(30));
-    return next(port, state) == Heard::report && state.sequence >= before + 20;
+    return next(port, state) == ReadResult::report && state.sequence >= before + 20;
   }));
   EXPECT_EQ(port.dropped(), 0);
 }
@@ -250,7 +250,7 @@ TEST_F(EmulatedHid, WoodenHapticsByRequestAndResponse) {
   DeviceState state;
   const Vec3 force(0.5, -0.3, 0.8);
   for (std::uint32_t tick = 1; tick <= 500; ++tick) {
-    ASSERT_EQ(next(port, state), Heard::report);
+    ASSERT_EQ(next(port, state), ReadResult::report);
     ASSERT_EQ(state.sequence, tick);
     ASSERT_NEAR(state.pose.position.head<2>().norm(), 0.02, 3e-4);
     ASSERT_TRUE(port.write(command(force), state));
@@ -279,7 +279,7 @@ TEST_F(EmulatedHid, JoystickConversation) {
   bus.talk(path);
   DeviceState state;
   for (int tick = 0; tick < 200; ++tick) {
-    ASSERT_EQ(next(port, state), Heard::report);
+    ASSERT_EQ(next(port, state), ReadResult::report);
     EXPECT_NEAR(state.pose.position.norm(), 0.03, 5e-4);
     ASSERT_TRUE(port.write(command(Vec3(0.04 * tick, -2.0, 0.0)), state));
   }
@@ -304,7 +304,7 @@ TEST_F(EmulatedHid, SpaceMouseStream) {
   std::uint32_t before = 0;
   const auto read_until = [&](const std::function<bool()>& is_so) {
     return comes_true([&] {
-      EXPECT_EQ(port.read(state), Heard::report);
+      EXPECT_EQ(port.read(state), ReadResult::report);
       EXPECT_EQ(state.sequence, ++before);
       return is_so();
     });
@@ -319,7 +319,7 @@ TEST_F(EmulatedHid, SpaceMouseStream) {
   EXPECT_EQ(port.dropped(), 0);
   EXPECT_LE(state.pose.position.z(), 0.1 * (end - begin)) << "up, with 0.1 m/s while it was pressed";
   const Vec3 rest = state.pose.position;
-  for (int k = 0; k < 50; ++k) ASSERT_EQ(port.read(state), Heard::report);
+  for (int k = 0; k < 50; ++k) ASSERT_EQ(port.read(state), ReadResult::report);
   EXPECT_EQ(state.pose.position, rest);
 }
 
@@ -331,10 +331,10 @@ TEST_F(EmulatedHid, UnpluggedAndPluggedInAgain) {
   bus.talk(path);
   DeviceState state;
   for (int k = 0; k < 50; ++k) {
-    ASSERT_EQ(next(port, state), Heard::report);
+    ASSERT_EQ(next(port, state), ReadResult::report);
   }
   bus.unplug(path);
-  EXPECT_TRUE(comes_true([&] { return port.read(state) == Heard::lost; }));
+  EXPECT_TRUE(comes_true([&] { return port.read(state) == ReadResult::lost; }));
   EXPECT_FALSE(port.write(command(Vec3(1, 0, 0)), state));
   port.close();
   EXPECT_TRUE(says(message([&] { port.open(); }), "the device is not attached"));
@@ -344,7 +344,7 @@ TEST_F(EmulatedHid, UnpluggedAndPluggedInAgain) {
   const std::string new_path = bus.plug_in(again, "B1");
   port.open();
   bus.talk(new_path);
-  ASSERT_EQ(next(port, state), Heard::report);
+  ASSERT_EQ(next(port, state), ReadResult::report);
   EXPECT_GT(state.sequence, last);
   ASSERT_TRUE(port.write(command(Vec3(1, 0, 0)), state));
   EXPECT_TRUE(comes_true([&] { return !again->forces().empty(); }));

@@ -1,4 +1,4 @@
-#include "runtime/app/act.h"
+#include "runtime/app/play_session.h"
 
 #include <fmt/core.h>
 #include <unistd.h>
@@ -41,9 +41,10 @@ State state_of(const Settings& settings, const Body& body, const Tool& tool) {
 
 }  // namespace
 
-Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActViewer& viewer)
+PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSource& input,
+                         const SessionViewer& viewer)
     : body_(body),
-      mover_(mover),
+      input_(input),
       control_(viewer.control),
       tool_(tool_of(options.settings, body)),
       options_(std::move(options)),
@@ -95,12 +96,12 @@ Act::Act(PlayOptions options, const Body& body, const Mover& mover, const ActVie
   if (!options_.fast) {
     monitor_.emplace(MonitorOptions{.rate = settings.rate,
                                     .line = isatty(STDERR_FILENO) != 0,
-                                    .acknowledges = mover.link != nullptr,
+                                    .acknowledges = input.link != nullptr,
                                     .shows_safety = safety_.has_value()});
   }
 }
 
-const LoopReport& Act::run(const std::atomic<bool>& stop) {
+const LoopReport& PlaySession::run(const std::atomic<bool>& stop) {
   report_ = run_with_rights(stop);
   monitor_.reset();
   feed_.reset();
@@ -110,7 +111,7 @@ const LoopReport& Act::run(const std::atomic<bool>& stop) {
   return report_;
 }
 
-void Act::finish_recording() {
+void PlaySession::finish_recording() {
   try {
     recorder_->finish();
   } catch (const std::exception& error) {
@@ -119,11 +120,11 @@ void Act::finish_recording() {
 }
 
 /// The loop with the rights it needs, which the threads that were started before do not inherit.
-LoopReport Act::run_with_rights(const std::atomic<bool>& stop) {
+LoopReport PlaySession::run_with_rights(const std::atomic<bool>& stop) {
   const auto pointer = [](auto& part) { return part ? &*part : nullptr; };
   const LoopParts parts = {.body = body_,
                            .state = state_,
-                           .device = *mover_.device,
+                           .device = *input_.device,
                            .workspace = Workspace(options_.settings.workspace()),
                            .safety = pointer(safety_),
                            .overlays = pointer(overlays_),
@@ -136,7 +137,7 @@ LoopReport Act::run_with_rights(const std::atomic<bool>& stop) {
                            .viewed = pointer(viewed_),
                            .replayed = options_.session.get()};
   const LoopOptions loop = {.rate = options_.settings.rate,
-                            .ticks = mover_.ticks,
+                            .ticks = input_.ticks,
                             .fast = options_.fast,
                             .ticks_per_view = ticks_per_frame(options_.settings.rate, views_a_second)};
   if (options_.fast) return run_loop(parts, loop, stop);
@@ -145,7 +146,7 @@ LoopReport Act::run_with_rights(const std::atomic<bool>& stop) {
   return run_loop(parts, loop, stop);
 }
 
-void Act::tell() const {
+void PlaySession::tell() const {
   const PlayedRun played{.options = options_,
                          .settings = options_.settings,
                          .body = body_,
@@ -154,7 +155,7 @@ void Act::tell() const {
                          .report = report_,
                          .overlays = overlays_ ? &*overlays_ : nullptr,
                          .motion = motion_ ? &*motion_ : nullptr,
-                         .link = mover_.link,
+                         .link = input_.link,
                          .dropped = recorder_ ? recorder_->dropped() : 0,
                          .dropped_frames = recorder_ ? recorder_->dropped_frames() : 0,
                          .recording_failure = recording_failure_};

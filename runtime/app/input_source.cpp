@@ -1,4 +1,4 @@
-#include "runtime/app/mover.h"
+#include "runtime/app/input_source.h"
 
 #include <fmt/core.h>
 
@@ -78,35 +78,35 @@ Settings settle_mouse(Settings settings, const Body& body) {
 
 }  // namespace
 
-Mover make_mover(const PlayOptions& options, Guardian* guardian) {
+InputSource make_input_source(const PlayOptions& options, Guardian* guardian) {
   using Kind = DeviceChoice::Kind;
-  Mover mover;
+  InputSource input;
   if (options.device.kind == Kind::script) {
     auto script = std::make_unique<ScriptDevice>(ScriptDevice::read(options.device.target));
     script->set_rate(options.settings.rate);
-    mover.ticks = script->ticks();
-    mover.device = std::move(script);
+    input.ticks = script->ticks();
+    input.device = std::move(script);
   } else if (options.device.kind == Kind::replay) {
     auto replay = std::make_unique<ReplayDevice>(*options.session);
-    mover.ticks = replay->ticks();
-    mover.device = std::move(replay);
+    input.ticks = replay->ticks();
+    input.device = std::move(replay);
   } else if (options.device.kind != Kind::mouse) {
     const SafetyOptions safety = options.settings.safety.value_or(SafetyOptions{});
     auto link = std::make_unique<DeviceLink>(
         make_port(options.device, safety, guardian),
         DeviceLinkOptions{
             .max_force = safety.max_force, .max_force_rate = safety.max_force_rate, .stale = safety.stale});
-    mover.link = link.get();
-    mover.device = std::move(link);
+    input.link = link.get();
+    input.device = std::move(link);
   }
   if (options.duration) {
     const double ticks = std::ceil(*options.duration * static_cast<double>(options.settings.rate));
-    mover.ticks = std::min(mover.ticks, static_cast<std::int64_t>(std::min(ticks, 1e15)));
+    input.ticks = std::min(input.ticks, static_cast<std::int64_t>(std::min(ticks, 1e15)));
   }
-  return mover;
+  return input;
 }
 
-void add_mouse(Mover& mover, const PlayOptions& options, const Body& body) {
+void add_mouse(InputSource& input, const PlayOptions& options, const Body& body) {
   const int up = body.dimension() - 1;
   PointerPose above;
   above.lifted = true;
@@ -114,8 +114,8 @@ void add_mouse(Mover& mover, const PlayOptions& options, const Body& body) {
   above.pose.position[up] =
       body.bounds().max()[up] + options.settings.tool.radius + 0.25 * body.bounds().diagonal().norm();
   auto mouse = std::make_unique<MouseDevice>(above, options.settings.rate);
-  mover.mouse = mouse.get();
-  mover.device = std::move(mouse);
+  input.mouse = mouse.get();
+  input.device = std::move(mouse);
 }
 
 void wait_for(const DeviceLink& link, bool is_bridge, const std::atomic<bool>& stop) {
@@ -139,23 +139,23 @@ void wait_for(const DeviceLink& link, bool is_bridge, const std::atomic<bool>& s
   }
 }
 
-Settings settle(Settings settings, const Mover& mover, const Body& body) {
-  if (mover.link != nullptr) return settle_hand(std::move(settings), mover.link->limits(), body);
-  if (mover.mouse != nullptr) return settle_mouse(std::move(settings), body);
+Settings apply_defaults(Settings settings, const InputSource& input, const Body& body) {
+  if (input.link != nullptr) return settle_hand(std::move(settings), input.link->limits(), body);
+  if (input.mouse != nullptr) return settle_mouse(std::move(settings), body);
   return settings;
 }
 
-void print_device(const Mover& mover, const Settings& settings) {
-  if (mover.mouse != nullptr)
+void print_device(const InputSource& input, const Settings& settings) {
+  if (input.mouse != nullptr)
     fmt::print(stderr, "device: the viewer's pointer; the coupling is {:.4g} N/m\n",
                settings.tool.coupling_stiffness);
-  if (mover.link == nullptr) return;
+  if (input.link == nullptr) return;
   const Vec3& at = *settings.origin;
   fmt::print(
       stderr,
       "device: {}; its origin lies at ({:.4g}, {:.4g}, {:.4g}) m, axes along {}; motion x {:g}, force x "
       "{:g}; at most {:g} N and, by the coupling, {:g} N/m on the body's side\n",
-      mover.link->name(), at.x(), at.y(), at.z(), settings.axes, settings.motion_scale, settings.force_scale,
+      input.link->name(), at.x(), at.y(), at.z(), settings.axes, settings.motion_scale, settings.force_scale,
       settings.safety->max_force, settings.tool.coupling_stiffness);
 }
 

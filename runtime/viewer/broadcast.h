@@ -24,7 +24,7 @@ struct Message {
 Message text_message(std::string text);
 
 /// A picture and what it is drawn on.
-struct ShownPicture {
+struct DrawnPicture {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const ScenePatch> patch;  ///< null: none
   SurfacePicture picture;
@@ -32,11 +32,11 @@ struct ShownPicture {
 
 /// Encoded when the first page wants it. Counts tell a page whether it has been sent what there is. For the
 /// server's thread.
-class Show {
+class Broadcast {
  public:
   void set_scene(std::shared_ptr<const Scene> scene);
   /// Nothing, where it is of another scene.
-  void set_picture(ShownPicture picture);
+  void set_picture(DrawnPicture picture);
   /// Adds ticks to those shown: of a `replay` all are kept, otherwise the last two seconds.
   void add_ticks(const std::vector<TickNote>& ticks, std::int64_t stride, bool replay);
   void set_state(StateWord state);
@@ -50,7 +50,7 @@ class Show {
   [[nodiscard]] std::int64_t pictures() const noexcept { return pictures_; }
   [[nodiscard]] std::int64_t states() const noexcept { return state_ ? states_ : 0; }
   [[nodiscard]] const TickHistory& ticks() const noexcept { return ticks_; }
-  [[nodiscard]] const std::optional<ShownPicture>& picture() const noexcept { return picture_; }
+  [[nodiscard]] const std::optional<DrawnPicture>& picture() const noexcept { return picture_; }
 
   // Of what there is, see above.
   [[nodiscard]] const Message& scene_message() const noexcept { return scene_message_; }
@@ -62,7 +62,7 @@ class Show {
 
  private:
   std::shared_ptr<const Scene> scene_;
-  std::optional<ShownPicture> picture_;
+  std::optional<DrawnPicture> picture_;
   TickHistory ticks_;
   std::optional<StateWord> state_;
   nlohmann::json times_;

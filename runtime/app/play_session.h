@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "runtime/app/mover.h"
+#include "runtime/app/input_source.h"
 #include "runtime/app/play.h"
 #include "runtime/body/body.h"
 #include "runtime/loop/loop.h"
@@ -19,7 +19,7 @@ namespace palpate {
 constexpr const char* standard_output = "-";
 
 /// Who looks on, and may steer it. Without a viewer nothing is set.
-struct ActViewer {
+struct SessionViewer {
   LoopControl* control = nullptr;
   TickFeed::Sink ticks;
   SurfaceFrames::Sink pictures;
@@ -27,13 +27,14 @@ struct ActViewer {
 };
 
 /// Everything that works beside the loop in one run: overlays, motion, recording, frames, monitor.
-class Act {
+class PlaySession {
  public:
-  /// `options` with the settings and the recording of this act, settled for the mover; `body` and `mover`
+  /// `options` of this session, with defaults applied for `input`; `body` and `input`
   /// must live as long. Throws Error.
-  Act(PlayOptions options, const Body& body, const Mover& mover, const ActViewer& viewer = {});
-  Act(const Act&) = delete;
-  Act& operator=(const Act&) = delete;
+  PlaySession(PlayOptions options, const Body& body, const InputSource& input,
+              const SessionViewer& viewer = {});
+  PlaySession(const PlaySession&) = delete;
+  PlaySession& operator=(const PlaySession&) = delete;
 
   /// Begins with a fault that was latched before and that nobody has acknowledged yet. Before `run`.
   void latch(Fault fault) noexcept {
@@ -59,7 +60,7 @@ class Act {
 
   std::optional<Safety> safety_;
   const Body& body_;
-  const Mover& mover_;
+  const InputSource& input_;
   LoopControl* control_;
   Tool tool_;
   std::optional<TickFeed> feed_;

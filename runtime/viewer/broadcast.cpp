@@ -1,4 +1,4 @@
-#include "runtime/viewer/show.h"
+#include "runtime/viewer/broadcast.h"
 
 #include <utility>
 
@@ -23,7 +23,7 @@ Message text_message(std::string text) {
   return {std::make_shared<const std::string>(std::move(text)), true};
 }
 
-void Show::set_scene(std::shared_ptr<const Scene> scene) {
+void Broadcast::set_scene(std::shared_ptr<const Scene> scene) {
   scene_ = std::move(scene);
   scene_message_ = binary_message(encode_scene(*scene_));
   picture_.reset();
@@ -33,7 +33,7 @@ void Show::set_scene(std::shared_ptr<const Scene> scene) {
   touch_state();  // which has the scene's number
 }
 
-void Show::set_picture(ShownPicture picture) {
+void Broadcast::set_picture(DrawnPicture picture) {
   if (picture.scene != scene_) return;  // of the body before
   if (!picture_ || picture_->patch != picture.patch) patch_message_ = {};
   picture_ = std::move(picture);
@@ -41,37 +41,37 @@ void Show::set_picture(ShownPicture picture) {
   ++pictures_;
 }
 
-void Show::add_ticks(const std::vector<TickNote>& ticks, std::int64_t stride, bool replay) {
+void Broadcast::add_ticks(const std::vector<TickNote>& ticks, std::int64_t stride, bool replay) {
   const double rate = state_ ? state_->rate() : usual_rate;
   ticks_.append(ticks, stride,
                 replay ? most_recorded_ticks : static_cast<std::size_t>(seconds_of_ticks * rate));
 }
 
-void Show::set_state(StateWord state) {
+void Broadcast::set_state(StateWord state) {
   state_ = std::move(state);
   touch_state();
 }
 
-void Show::touch_state() {
+void Broadcast::touch_state() {
   ++states_;
   state_touched_ = Clock::now();
 }
 
-void Show::repeat_state() {
+void Broadcast::repeat_state() {
   if (state_ && Clock::now() - state_touched_ >= state_period) touch_state();
 }
 
-const Message& Show::patch_message() {
+const Message& Broadcast::patch_message() {
   if (!patch_message_) patch_message_ = binary_message(encode_patch(scene_->number, *picture_->patch));
   return patch_message_;
 }
 
-const Message& Show::frame_message() {
+const Message& Broadcast::frame_message() {
   if (!frame_) frame_ = binary_message(encode_frame(picture_->picture, *scene_, picture_->patch.get()));
   return frame_;
 }
 
-Message Show::ticks_message(std::int64_t& place) {
+Message Broadcast::ticks_message(std::int64_t& place) {
   if (!run_message_ || run_begin_ != place || run_last_ != ticks_.end()) {
     const TickHistory::Run run = ticks_.run_from(place);
     run_begin_ = place;
@@ -83,7 +83,7 @@ Message Show::ticks_message(std::int64_t& place) {
   return run_message_;
 }
 
-Message Show::state_message(const PageRole& role, bool is_first) const {
+Message Broadcast::state_message(const PageRole& role, bool is_first) const {
   return text_message(
       state_->for_page(scene_ ? scene_->number : 0, role, is_first ? times_ : nlohmann::json()));
 }
