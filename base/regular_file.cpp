@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-const char* hint_for(int error) {
+const char* hint_to_read(int error) {
   switch (error) {
     case EACCES:
     case EPERM:
@@ -30,7 +30,7 @@ const char* hint_for(int error) {
 [[noreturn]] void fail(const char* doing, const std::filesystem::path& file, int error,
                        const char* if_missing) {
   throw Error(std::string("cannot ") + doing + " the file: " + std::generic_category().message(error),
-              file.string(), error == ENOENT || error == ENOTDIR ? if_missing : hint_for(error));
+              file.string(), error == ENOENT || error == ENOTDIR ? if_missing : hint_to_read(error));
 }
 
 const char* kind_of(mode_t mode) {

@@ -18,7 +18,7 @@
 namespace palpate {
 namespace {
 
-std::string hint_for(int error) {
+std::string hint_to_write(int error) {
   switch (error) {
     case ENOENT:
     case ENOTDIR:
@@ -36,7 +36,8 @@ std::string hint_for(int error) {
 }
 
 [[noreturn]] void fail(const std::filesystem::path& file, int error) {
-  throw Error("cannot be written: " + std::generic_category().message(error), file.string(), hint_for(error));
+  throw Error("cannot be written: " + std::generic_category().message(error), file.string(),
+              hint_to_write(error));
 }
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
@@ -136,7 +137,7 @@ WriteTarget write_target(const std::filesystem::path& file) {
 int open_stream(const std::filesystem::path& file) {
   const int fd = ::open(file.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
   if (fd < 0 && errno == ENXIO)
-    throw Error("is a pipe that no program reads", file.string(), hint_for(ENXIO));
+    throw Error("is a pipe that no program reads", file.string(), hint_to_write(ENXIO));
   if (fd < 0) fail(file, errno);
   ::fcntl(fd, F_SETFL, ::fcntl(fd, F_GETFL) & ~O_NONBLOCK);
   return fd;

@@ -15,7 +15,7 @@ namespace palpate::hdf5 {
 namespace {
 
 constexpr hsize_t alignment = 4096;  // a page
-constexpr std::size_t longest_text = 4096;
+constexpr std::size_t longest_written_text = 4096;
 constexpr std::size_t highest_rank = 4;
 
 /// We close every file ourselves; the library's own exit handler crashes after a close that failed (full
@@ -203,9 +203,9 @@ std::int64_t File::write(const std::string& dataset, const ElementType& type,
 }
 
 void File::write_attribute(const std::string& object, const std::string& name, const std::string& text) {
-  if (text.size() > longest_text) {
+  if (text.size() > longest_written_text) {
     throw Error(name + " is " + std::to_string(text.size()) + " bytes long, at most " +
-                    std::to_string(longest_text) + " fit",
+                    std::to_string(longest_written_text) + " fit",
                 path_.string(), "Use a shorter text");
   }
   const Id holder(H5Oopen(id(), object.c_str(), H5P_DEFAULT), H5Oclose);

@@ -21,7 +21,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::array<std::int64_t, 2> version = {format_major, format_minor};
+constexpr std::array<std::int64_t, 2> written_version = {format_major, format_minor};
 constexpr std::int64_t metadata_allowance = 1 << 20;  // more than HDF5 needs around our datasets [byte]
 constexpr std::size_t values_at_once = 1 << 15;       // converted and written together
 constexpr std::int64_t window =
@@ -60,7 +60,7 @@ void for_each_known_field(const Model& model, Visitor&& visit) {
 
 void write_attributes(hdf5::File& file, const Model& model, const FileHeader& header) {
   file.write_attribute("/", "format", std::string("palpate"));
-  file.write_attribute("/", "version", version);
+  file.write_attribute("/", "version", written_version);
   for_each_attribute([&](const auto& attribute) {
     const auto value = attribute.take(model, header);
     if constexpr (std::is_same_v<decltype(value), const std::string>)
@@ -122,17 +122,17 @@ std::vector<double> without(const SmoothPart& smooth, std::int64_t first, std::i
   return remainder;
 }
 
-/// A packed matrix that arrives by columns.
-struct Streamed {
-  const char* path;
-  const char* name;
-  std::vector<bool> done;  ///< [n] columns
-  std::shared_ptr<const SmoothPart> smooth;
-};
-
 }  // namespace
 
 struct ModelWriter::Impl {
+  /// A packed matrix that arrives by columns.
+  struct Streamed {
+    const char* path;
+    const char* name;
+    std::vector<bool> done;  ///< [n] columns
+    std::shared_ptr<const SmoothPart> smooth;
+  };
+
   Impl(std::filesystem::path to, const Model& model, Precision precision, Leftovers leftovers);
 
   [[nodiscard]] JournalFrame examine(const Model& model);
@@ -188,7 +188,7 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
 /// Proves that a reader will take the model; gives the key and an upper bound of the file's size. Before
 /// anything on the disk is touched, so that a mistake does not cost an earlier run's columns.
 JournalFrame ModelWriter::Impl::examine(const Model& model) {
-  add_attributes(content, model, header, version);
+  add_attributes(content, model, header, written_version);
   check_precision(model, header.precision, path.string());
   std::int64_t bytes = 0;
   for_each_known_field(model, [&](const auto& field) {
@@ -415,7 +415,7 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
 }
 
 void ModelWriter::finish(const std::vector<Probe>& probes) {
-  for (const Streamed& matrix : impl_->matrices) {
+  for (const Impl::Streamed& matrix : impl_->matrices) {
     const auto missing = std::find(matrix.done.begin(), matrix.done.end(), false);
     if (missing != matrix.done.end()) {
       throw Error("column " + std::to_string(missing - matrix.done.begin()) + " of " + matrix.name +

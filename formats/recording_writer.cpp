@@ -11,14 +11,14 @@ namespace {
 /// system lets it open a thousand files: of a part each half second that is enough for years.
 constexpr std::size_t fan = 16;
 
-struct Level {
-  RecordingPart part;
-  int level = 0;
-};
-
 }  // namespace
 
 struct RecordingWriter::Impl {
+  struct Level {
+    RecordingPart part;
+    int level = 0;
+  };
+
   Impl(std::filesystem::path to, const SessionInfo& info, const RecordedSurface& surface)
       : path(std::move(to)), head{.info = info, .generator = "palpate " PALPATE_VERSION, .surface = surface} {
     shown.surface = surface;

@@ -25,7 +25,7 @@ const FileElement* find_element(std::int64_t type) {
   return found == elements.end() ? nullptr : &found->second;
 }
 
-enum SkippedType : std::int64_t { quadratic_line = 8, point = 15 };
+enum SkippedElement : std::int64_t { quadratic_line = 8, point = 15 };
 
 /// What is gathered while the sections go by.
 struct GmshMesh {

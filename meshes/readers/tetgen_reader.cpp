@@ -7,11 +7,12 @@
 #include "meshes/readers/volume_mesh_readers.h"
 
 namespace palpate {
-namespace {
 
 std::filesystem::path with_ending(std::filesystem::path stem, const char* ending) {
   return stem += ending;
 }
+
+namespace {
 
 /// TetGen writes the attribute of a region as a real number.
 Index read_region(TextReader& reader) {

@@ -9,14 +9,6 @@
 #include "meshes/readers/volume_mesh_readers.h"
 
 namespace palpate {
-namespace {
-
-std::filesystem::path with_ending(std::filesystem::path stem, const char* ending) {
-  return stem += ending;
-}
-
-}  // namespace
-
 Mesh read_volume_mesh(const std::filesystem::path& file) {
   const std::string extension = file.extension().string();
   if (extension == ".msh") return read_gmsh(file);

@@ -13,6 +13,9 @@ Mesh read_medit(const std::filesystem::path& file);       ///< .mesh, ASCII
 Mesh read_tetgen(const std::filesystem::path& stem);      ///< stem.node, stem.ele and, if there, stem.face
 Mesh read_vtk_legacy(const std::filesystem::path& file);  ///< .vtk, ASCII unstructured grid
 
+/// A set of files is named by what their names have in common: "liver" for liver.node and liver.ele.
+std::filesystem::path with_ending(std::filesystem::path stem, const char* ending);
+
 /// Adds an element whose node numbers, counted from `first`, come next in the file; `read_tag` reads its tag.
 template <class ReadTag>
 void read_element(TextReader& reader, MeshFile& file, const FileElement& element, std::int64_t first,

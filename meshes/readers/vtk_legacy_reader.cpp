@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-enum SkippedType : std::int64_t { vertex = 1, poly_vertex = 2, poly_line = 4, quadratic_edge = 21 };
+enum SkippedCell : std::int64_t { vertex = 1, poly_vertex = 2, poly_line = 4, quadratic_edge = 21 };
 
 /// Node lists of all cells, whatever their type.
 struct Cells {
@@ -74,7 +74,7 @@ Cells read_cells(TextReader& reader, std::size_t points) {
 }
 
 /// The kind of element that a cell is, if any.
-const ElementTraits* find_element(std::int64_t type) {
+const ElementTraits* find_cell_type(std::int64_t type) {
   const auto* const found = std::find_if(element_traits.begin(), element_traits.end(),
                                          [&](const ElementTraits& t) { return t.vtk == type; });
   return found == element_traits.end() ? nullptr : found;
@@ -82,7 +82,7 @@ const ElementTraits* find_element(std::int64_t type) {
 
 /// How many nodes a cell of this type has; 0 where that differs. Throws for what is not read.
 std::size_t node_count(const TextReader& reader, std::int64_t type) {
-  if (const ElementTraits* element = find_element(type)) return static_cast<std::size_t>(element->nodes);
+  if (const ElementTraits* element = find_cell_type(type)) return static_cast<std::size_t>(element->nodes);
   switch (type) {
     case vertex:
       return 1;
@@ -111,7 +111,7 @@ void read_types(TextReader& reader, const Cells& cells, MeshFile& mesh) {
       reader.fail(
           fmt::format("cell {} has {} nodes, but its type is {}, which has {}", cell, nodes, type, expected));
     }
-    if (const ElementTraits* element = find_element(type)) {
+    if (const ElementTraits* element = find_cell_type(type)) {
       mesh.add({element->type}, {cells.nodes.data() + first, nodes}, 0);
     }
   }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t ring_seconds = 16;  // ticks for which there is room
 constexpr std::size_t frame_ring = 256;   // four seconds at 60 Hz
-constexpr auto pause = std::chrono::milliseconds(1);
+constexpr auto recorder_pause = std::chrono::milliseconds(1);
 constexpr auto interval = std::chrono::milliseconds(500);    // between checkpoints
 constexpr std::size_t most_waiting = std::size_t{32} << 20;  // bytes, for a checkpoint that is not due yet
 
@@ -52,14 +52,14 @@ void Recorder::push_frame(SurfaceFrame frame) noexcept {
 void Recorder::push_waiting(const TickRecord& tick) noexcept {
   while (!try_push(tick)) {
     if (failed_) return push(tick);
-    std::this_thread::sleep_for(pause);
+    std::this_thread::sleep_for(recorder_pause);
   }
 }
 
 void Recorder::push_frame_waiting(SurfaceFrame frame) noexcept {
   while (!try_push(frame)) {
     if (failed_) return push_frame(std::move(frame));
-    std::this_thread::sleep_for(pause);
+    std::this_thread::sleep_for(recorder_pause);
   }
 }
 
@@ -100,7 +100,7 @@ void Recorder::write() noexcept {
         last = now;
         waiting = 0;
       }
-      if (taken == 0) std::this_thread::sleep_for(pause);
+      if (taken == 0) std::this_thread::sleep_for(recorder_pause);
     }
     writer_.checkpoint();
   } catch (const std::exception& error) {

@@ -7,12 +7,12 @@
 namespace palpate {
 namespace {
 
-constexpr auto pause = std::chrono::milliseconds(33);
-constexpr std::size_t room = 8192;  // ticks that may wait: more than a second of the fastest loop
+constexpr auto feed_pause = std::chrono::milliseconds(33);
+constexpr std::size_t feed_room = 8192;  // ticks that may wait: more than a second of the fastest loop
 
 }  // namespace
 
-TickFeed::TickFeed(Sink sink) : sink_(std::move(sink)), notes_(room), thread_([this] { run(); }) {}
+TickFeed::TickFeed(Sink sink) : sink_(std::move(sink)), notes_(feed_room), thread_([this] { run(); }) {}
 
 TickFeed::~TickFeed() {
   stop_ = true;
@@ -34,7 +34,7 @@ void TickFeed::run() {
     }
     hand_on();
     if (last) return;
-    std::this_thread::sleep_for(pause);
+    std::this_thread::sleep_for(feed_pause);
   }
 }
 

@@ -17,9 +17,9 @@ constexpr std::size_t alignment = 4;
 constexpr float largest_displacement = 32767.0F;
 constexpr float largest_stress = 65534.0F;
 
-class Message {
+class WireMessage {
  public:
-  Message(Kind kind, std::uint32_t scene) {
+  WireMessage(Kind kind, std::uint32_t scene) {
     add(static_cast<std::uint32_t>(kind));
     add(scene);
   }
@@ -47,7 +47,7 @@ class Message {
 };
 
 template <std::size_t corners>
-void add_nodes(Message& message, const std::vector<std::array<Index, corners>>& simplices) {
+void add_nodes(WireMessage& message, const std::vector<std::array<Index, corners>>& simplices) {
   for (const std::array<Index, corners>& nodes : simplices) {
     for (const Index node : nodes) message.add(static_cast<std::uint32_t>(node));
   }
@@ -66,7 +66,7 @@ float in_unit(float value, float unit, float largest_number) {
 }  // namespace
 
 std::string encode_scene(const Scene& scene) {
-  Message message(Kind::scene, scene.number);
+  WireMessage message(Kind::scene, scene.number);
   message.add_count(static_cast<std::size_t>(scene.dimension));
   message.add_count(scene.nodes.size());
   message.add_count(scene.triangles.size());
@@ -79,7 +79,7 @@ std::string encode_scene(const Scene& scene) {
 }
 
 std::string encode_patch(std::uint32_t scene, const ScenePatch& patch) {
-  Message message(Kind::patch, scene);
+  WireMessage message(Kind::patch, scene);
   message.add(patch.number);
   message.add_count(patch.hidden.size());
   message.add_count(patch.nodes.size());
@@ -117,7 +117,7 @@ std::string encode_frame(const SurfacePicture& picture, const Scene& scene, cons
   const float unit_stress = unit_of(largest_von_mises, largest_stress);
   const std::vector<SeenValues::Pressure> pressures = values.pressures();
 
-  Message message(Kind::frame, scene.number);
+  WireMessage message(Kind::frame, scene.number);
   message.reserve(256 + 40 * picture.contacts.size() + 8 * pressures.size() + 8 * all_nodes);
   message.add(static_cast<double>(picture.frame.tick));
   message.add(picture.frame.time);
@@ -162,7 +162,7 @@ std::string encode_frame(const SurfacePicture& picture, const Scene& scene, cons
 }
 
 std::string encode_ticks(std::uint32_t scene, std::span<const TickNote> ticks, std::int64_t stride) {
-  Message message(Kind::ticks, scene);
+  WireMessage message(Kind::ticks, scene);
   message.add(static_cast<double>(ticks.front().number));
   message.add_count(ticks.size());
   message.add(static_cast<std::uint32_t>(stride));

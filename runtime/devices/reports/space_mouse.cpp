@@ -8,14 +8,14 @@
 namespace palpate {
 namespace {
 
-constexpr int largest_count = 500;  // logical range of the first SpaceNavigators; 350 since
+constexpr int largest_logical_count = 500;  // logical range of the first SpaceNavigators; 350 since
 
 std::optional<std::array<std::int16_t, 3>> triple(std::span<const std::uint8_t> report,
                                                   std::size_t at) noexcept {
   std::array<std::int16_t, 3> counts{};
   for (std::size_t i = 0; i < 3; ++i) {
     counts[i] = read_number<std::int16_t>(report, at + 2 * i);
-    if (counts[i] < -largest_count || counts[i] > largest_count) return std::nullopt;
+    if (counts[i] < -largest_logical_count || counts[i] > largest_count) return std::nullopt;
   }
   return counts;
 }

@@ -223,7 +223,7 @@ class HeldDevice : public Viewed {
     ASSERT_TRUE(wait_for_ticks(50));
   }
   void TearDown() override {
-    Viewed::TearDown();
+    ViewedPlay::TearDown();
     input_.device.reset();  // before the height
   }
 
