@@ -8,7 +8,7 @@
 
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::material_test {
 namespace {
 
 using test::contains;
@@ -108,4 +108,4 @@ TEST(Material, ConstantsOutsideTheirRangesAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::material_test

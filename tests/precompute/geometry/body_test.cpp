@@ -6,7 +6,7 @@
 #include "meshes/element.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::body_test {
 namespace {
 
 using testing::error_of;
@@ -454,4 +454,4 @@ TEST(Body, ReportsProgress) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::body_test

@@ -29,7 +29,7 @@
 #include "runtime/viewer/run_words.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::viewed_play_test {
 namespace {
 
 const std::filesystem::path cube = PALPATE_SOURCE_DIR "/tests/golden/cube2/cube2.palpate.hdf";
@@ -532,4 +532,4 @@ TEST_P(Settled, AMouseIsShownAllForceAndNoFault) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::viewed_play_test
