@@ -12,7 +12,7 @@
 
 #include "base/error.h"
 
-namespace palpate {
+namespace palpate::child_process_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -185,4 +185,4 @@ TEST(ChildProcess, CannotLeaveFiles) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::child_process_test

@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 
-namespace palpate::test {
+namespace palpate::test::printable_test {
 namespace {
 
 TEST(Printable, LeavesOrdinaryTextAsItIs) {
@@ -63,4 +63,4 @@ TEST(Printable, ErrorsAreClean) {
 }
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::printable_test

@@ -12,7 +12,7 @@
 
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::regular_file_test {
 namespace {
 
 using test::contains;
@@ -77,4 +77,4 @@ TEST(RegularFile, MissingFileHasTheCallersHint) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::regular_file_test

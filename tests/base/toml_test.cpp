@@ -5,7 +5,7 @@
 #include "base/words.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::toml_test {
 namespace {
 
 using test::contains;
@@ -89,4 +89,4 @@ TEST(Words, LongTokensAreShortened) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::toml_test

@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "tests/support/formats_sample.h"
 
-namespace palpate::test {
+namespace palpate::test::checksum_test {
 namespace {
 
 std::vector<std::byte> pattern(std::size_t count) {
@@ -98,4 +98,4 @@ TEST(ChunkedChecksum, ShowsEveryByteOnce) {
 }
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::checksum_test

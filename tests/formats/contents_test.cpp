@@ -21,7 +21,7 @@
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
-namespace palpate::test {
+namespace palpate::test::contents_test {
 namespace {
 
 /// Wait status of a child that runs `work`.
@@ -196,4 +196,4 @@ TEST(Contents, OfWhatIsNoFileAreRefusedAtOnce) {
 }
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::contents_test

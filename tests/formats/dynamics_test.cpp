@@ -8,7 +8,7 @@
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
-namespace palpate::test {
+namespace palpate::test::dynamics_test {
 namespace {
 
 using Path = std::filesystem::path;
@@ -336,4 +336,4 @@ INSTANTIATE_TEST_SUITE_P(Files, HostileDynamics, testing::ValuesIn(edits),
                          [](const auto& edit) { return std::string(edit.param.name); });
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::dynamics_test

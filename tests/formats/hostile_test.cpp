@@ -9,7 +9,7 @@
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
-namespace palpate::test {
+namespace palpate::test::hostile_test {
 namespace {
 
 using Path = std::filesystem::path;
@@ -635,4 +635,4 @@ TEST(FlippedBits, AreRefusedOrInSlackSpace) {
 }
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::hostile_test

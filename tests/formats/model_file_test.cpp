@@ -15,7 +15,7 @@
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
-namespace palpate::test {
+namespace palpate::test::model_file_test {
 namespace {
 
 using testing::Values;
@@ -552,4 +552,4 @@ TEST(Staleness, TheTwoFilesMayMoveTogether) {
 }
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::model_file_test

@@ -14,7 +14,7 @@
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
-namespace palpate::test {
+namespace palpate::test::output_paths_test {
 namespace {
 
 using Example = std::pair<OutputKind, std::string>;
@@ -120,4 +120,4 @@ TEST(OutputPaths, LeaveNothingBehind) {
 }
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::output_paths_test

@@ -9,7 +9,7 @@
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
-namespace palpate::test {
+namespace palpate::test::precision_test {
 namespace {
 
 using Path = std::filesystem::path;
@@ -189,4 +189,4 @@ TEST(HostileSplit, RowsOfHeldDofsAreZero) {
 }
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::precision_test

@@ -20,7 +20,7 @@
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
-namespace palpate::test {
+namespace palpate::test::recording_test {
 namespace {
 
 constexpr std::size_t surface_nodes = 4;
@@ -688,4 +688,4 @@ TEST(Recording, SurvivesBeingKilledAtAnyMoment) {
 }
 
 }  // namespace
-}  // namespace palpate::test
+}  // namespace palpate::test::recording_test

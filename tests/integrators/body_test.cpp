@@ -7,7 +7,7 @@
 
 #include "tests/support/dynamics_bodies.h"
 
-namespace palpate {
+namespace palpate::body_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -176,4 +176,4 @@ TEST(SwingingBody, EveryIntegratorConvergesToTheSumOfModes) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::body_test

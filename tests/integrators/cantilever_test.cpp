@@ -12,7 +12,7 @@
 #include "tests/integrators/timoshenko_beam.h"
 #include "tests/support/dynamics_bodies.h"
 
-namespace palpate {
+namespace palpate::cantilever_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -171,4 +171,4 @@ TEST(Cantilever, TheModesOfFineMeshesAreTimoshenkos) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::cantilever_test

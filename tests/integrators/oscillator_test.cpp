@@ -9,7 +9,7 @@
 #include "tests/integrators/stability_limit.h"
 #include "tests/support/dynamics_bodies.h"
 
-namespace palpate {
+namespace palpate::oscillator_test {
 namespace {
 
 using test::Integrator;
@@ -135,4 +135,4 @@ TEST(Oscillator, DeltaOverOneHalfDissipatesAndUnderItGrows) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::oscillator_test

@@ -9,7 +9,7 @@
 #include "tests/integrators/stability_limit.h"
 #include "tests/support/dynamics_bodies.h"
 
-namespace palpate {
+namespace palpate::stability_test {
 namespace {
 
 using test::Integrator;
@@ -122,4 +122,4 @@ TEST(Stability, TheHighestModeOfABodySetsItsLimit) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stability_test

@@ -13,7 +13,7 @@
 #include "tests/support/meshes_bodies.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::check_test {
 namespace {
 
 using test::block;
@@ -357,4 +357,4 @@ TEST(MeshCheck, ScaleWarning) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::check_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/meshes_elements.h"
 
-namespace palpate {
+namespace palpate::element_test {
 namespace {
 
 using namespace test;
@@ -206,4 +206,4 @@ TEST(Quad4, AReentrantCornerIsSeenThoughTheAreaIsPositive) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::element_test

@@ -3,7 +3,7 @@
 
 #include "tests/support/meshes_elements.h"
 
-namespace palpate {
+namespace palpate::mass_test {
 namespace {
 
 using namespace test;
@@ -95,4 +95,4 @@ TEST_P(ElementMasses, GiveARigidMotionItsKineticEnergy) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::mass_test

@@ -12,7 +12,7 @@
 #include "meshes/material_fields.h"
 #include "tests/support/documentation.h"
 
-namespace palpate {
+namespace palpate::material_test {
 namespace {
 
 const Material rubber{2.0e5, 0.42, 1100.0};
@@ -130,4 +130,4 @@ TEST(MaterialFields, AreRowsOfTheDocumentation) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::material_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/meshes_elements.h"
 
-namespace palpate {
+namespace palpate::quadrature_test {
 namespace {
 
 using namespace test;
@@ -101,4 +101,4 @@ TEST_P(Quadrature, OfTheTestsThemselvesIsExactToItsDegreeToo) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::quadrature_test

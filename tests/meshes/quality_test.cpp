@@ -12,7 +12,7 @@
 #include "meshes/element.h"
 #include "tests/support/meshes_bodies.h"
 
-namespace palpate {
+namespace palpate::quality_test {
 namespace {
 
 using std::numbers::pi;
@@ -169,4 +169,4 @@ TEST(Quality, FrustumAndWorstHexahedron) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::quality_test

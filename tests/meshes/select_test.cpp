@@ -6,7 +6,7 @@
 #include "tests/support/meshes_bodies.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::select_test {
 namespace {
 
 using test::block;
@@ -117,4 +117,4 @@ TEST(Select, EmptySelectionsAndUnknownNodesAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::select_test

@@ -15,7 +15,7 @@
 #include "tests/support/meshes_bodies.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::shape_test {
 namespace {
 
 using std::numbers::pi;
@@ -225,4 +225,4 @@ TEST(WithElements, ItsOwnKindIsLeftAsItIsAndOtherPairsAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::shape_test

@@ -3,7 +3,7 @@
 
 #include "tests/support/meshes_elements.h"
 
-namespace palpate {
+namespace palpate::stiffness_test {
 namespace {
 
 using namespace test;
@@ -152,4 +152,4 @@ TEST_P(ElementStiffness, StrainEnergyAndForcesOfALinearField) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stiffness_test

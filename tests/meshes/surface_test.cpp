@@ -11,7 +11,7 @@
 #include "tests/support/meshes_bodies.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::surface_test {
 namespace {
 
 using test::contains;
@@ -180,4 +180,4 @@ TEST(Surface, ElementsThatDoNotShareTheirMiddlesAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::surface_test

@@ -7,7 +7,7 @@
 #include "meshes/surface.h"
 #include "precompute/numerics/touched_boundary.h"
 
-namespace palpate {
+namespace palpate::compare_test {
 namespace {
 
 /// A unit cube, or in the plane a square, of 4 cells per edge: held where its last coordinate is 0, with the
@@ -78,4 +78,4 @@ TEST_P(FingerTip, SharesAllOfItsForceElsewhere) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::compare_test

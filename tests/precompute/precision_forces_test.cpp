@@ -20,7 +20,7 @@
 #include "precompute/verify.h"
 #include "tests/support/baked_body.h"
 
-namespace palpate {
+namespace palpate::precision_forces_test {
 namespace {
 
 /// 30 times as long as high: bending along the whole length is 6e4 times softer than one node alone.
@@ -290,4 +290,4 @@ TEST_F(PrecisionForces, AKilledRunIsContinuedInSplitPrecision) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::precision_forces_test

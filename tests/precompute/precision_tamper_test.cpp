@@ -8,7 +8,7 @@
 #include "tests/support/baked_body.h"
 #include "tests/support/formats_tamper.h"
 
-namespace palpate {
+namespace palpate::precision_tamper_test {
 namespace {
 
 constexpr const char* block = R"(name = "block"
@@ -155,4 +155,4 @@ TEST_P(IllConditioned, AnAlteredEntryIsFoundAllTheSame) {
 INSTANTIATE_TEST_SUITE_P(Precisions, IllConditioned, testing::Values("double"));
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::precision_tamper_test

@@ -8,7 +8,7 @@
 
 #include "precompute/progress.h"
 
-namespace palpate {
+namespace palpate::time_left_test {
 namespace {
 
 /// A stage as it really is: seconds, and whether it says how far it is.
@@ -127,4 +127,4 @@ TEST(TimeLeft, IsWrittenInNoMoreDigitsThanAnEstimateHas) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::time_left_test

@@ -12,7 +12,7 @@
 #include "formats/model_file.h"
 #include "precompute/bake.h"
 
-namespace palpate {
+namespace palpate::verify_test {
 namespace {
 
 constexpr const char* loaded_block = R"(name = "block"
@@ -190,4 +190,4 @@ TEST_F(Verify, FindsAnotherMaterial) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::verify_test

@@ -8,7 +8,7 @@
 #include "tests/support/meshes_bodies.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::reader_kinds_test {
 namespace {
 
 using test::contains;
@@ -275,4 +275,4 @@ TEST(VolumeMesh, NamesThatNoFileCanHaveAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::reader_kinds_test

@@ -9,7 +9,7 @@
 #include "meshes/readers/vtu_writer.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::reader_test {
 namespace {
 
 using test::contains;
@@ -407,4 +407,4 @@ TEST(VolumeMesh, MissingEmptyAndUnknownFiles) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::reader_test

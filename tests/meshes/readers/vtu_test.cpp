@@ -15,7 +15,7 @@
 #include "tests/support/meshes_bodies.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::vtu_test {
 namespace {
 
 using test::contains;
@@ -235,4 +235,4 @@ for name in "tri3", "quad4", "tet4", "tet10", "hex8":
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::vtu_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::description_test {
 namespace {
 
 using testing::error_of;
@@ -808,4 +808,4 @@ TEST(Description, LongTextsAreQuotedInShort) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::description_test

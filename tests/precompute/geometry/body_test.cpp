@@ -5,7 +5,7 @@
 #include "precompute/numerics/meshed_body.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::body_test {
 namespace {
 
 using testing::error_of;
@@ -453,4 +453,4 @@ TEST(Body, ReportsProgress) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::body_test

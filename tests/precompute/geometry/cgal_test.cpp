@@ -10,7 +10,7 @@
 #include "precompute/geometry/mesh_parts.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::cgal_test {
 namespace {
 
 using testing::at;
@@ -164,4 +164,4 @@ TEST(MeshParts, OnePointInEachPartOfARegion) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::cgal_test

@@ -10,7 +10,7 @@
 #include "precompute/geometry/picture_reader.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::hostile_test {
 namespace {
 
 using testing::cube;
@@ -215,4 +215,4 @@ TEST_F(HostileInput, RemeshingToNothingIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::hostile_test

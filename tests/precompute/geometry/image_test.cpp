@@ -12,7 +12,7 @@
 #include "precompute/geometry/interface_crossings.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::image_test {
 namespace {
 
 using testing::error_of;
@@ -505,4 +505,4 @@ TEST(LabelField, CrossingsAreDenseWhereALabelIsThin) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::image_test

@@ -12,7 +12,7 @@
 #include "tests/support/geometry_plane.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::picture_test {
 namespace {
 
 using testing::area;
@@ -335,4 +335,4 @@ TEST(PixelBody, OutlinesEncloseThePixels) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::picture_test

@@ -9,7 +9,7 @@
 #include "tests/support/geometry_plane.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::plane_test {
 namespace {
 
 using testing::area;
@@ -268,4 +268,4 @@ TEST(PolygonCheckGood, ManyPointsAndNeighbours) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::plane_test

@@ -6,7 +6,7 @@
 #include "precompute/geometry/surface_input.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::surface_test {
 namespace {
 
 using testing::at;
@@ -224,4 +224,4 @@ TEST_F(SurfaceInput, MeasuresDistance) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::surface_test

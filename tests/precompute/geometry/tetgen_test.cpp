@@ -6,7 +6,7 @@
 #include "precompute/geometry/tetgen_mesh.h"
 #include "tests/support/geometry_shapes.h"
 
-namespace palpate {
+namespace palpate::tetgen_test {
 namespace {
 
 using testing::at;
@@ -102,4 +102,4 @@ TEST(TetGen, OpenSurfaceIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::tetgen_test

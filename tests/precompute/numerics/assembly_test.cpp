@@ -13,7 +13,7 @@
 #include "precompute/numerics/factor.h"
 #include "tests/support/precompute_case.h"
 
-namespace palpate {
+namespace palpate::assembly_test {
 namespace {
 
 using test::ElasticCase;
@@ -153,4 +153,4 @@ TEST(Assembly, CantileverConvergesToTimoshenko) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::assembly_test

@@ -16,7 +16,7 @@
 #include "tests/support/precompute_case.h"
 #include "tests/support/precompute_kinds.h"
 
-namespace palpate {
+namespace palpate::dynamics_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -264,4 +264,4 @@ TEST(Dynamics, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::dynamics_test

@@ -10,7 +10,7 @@
 #include "tests/support/precompute_case.h"
 #include "tests/support/precompute_kinds.h"
 
-namespace palpate {
+namespace palpate::elements_test {
 namespace {
 
 using test::ElasticCase;
@@ -219,4 +219,4 @@ TEST_P(AssembledKind, ConvergesWithTheOrderOfItsShapeFunctions) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::elements_test

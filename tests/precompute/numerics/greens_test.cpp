@@ -12,7 +12,7 @@
 #include "precompute/numerics/scope.h"
 #include "tests/support/precompute_case.h"
 
-namespace palpate {
+namespace palpate::greens_test {
 namespace {
 
 const Material soft{1.0e4, 0.45, 1000.0};
@@ -194,4 +194,4 @@ TEST(Greens, DofsOfANodeStayTogether) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::greens_test

@@ -9,7 +9,7 @@
 #include "tests/support/meshes_files.h"
 #include "tests/support/precompute_kinds.h"
 
-namespace palpate {
+namespace palpate::loads_test {
 namespace {
 
 using test::Kind;
@@ -439,4 +439,4 @@ TEST_P(LoadedKind, StretchedBarOfTwoMaterialsAsDescribed) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::loads_test

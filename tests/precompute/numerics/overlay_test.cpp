@@ -15,7 +15,7 @@
 #include "precompute/bake.h"
 #include "precompute/numerics/overlay_regions.h"
 
-namespace palpate {
+namespace palpate::overlay_test {
 namespace {
 
 const std::string block = R"(name = "block"
@@ -158,4 +158,4 @@ TEST_F(StoredOverlays, NeedNodesThatCanBeTouched) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::overlay_test

@@ -12,7 +12,7 @@
 #include "runtime/loop/loop.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::mouse_test {
 namespace {
 
 constexpr std::int64_t ms_ns = 1'000'000;
@@ -203,4 +203,4 @@ TEST_F(PointedCube, IsReplayedToTheSameBits) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::mouse_test

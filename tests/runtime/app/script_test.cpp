@@ -10,7 +10,7 @@
 #include "runtime/app/script_device.h"
 #include "runtime/loop/numbers.h"
 
-namespace palpate {
+namespace palpate::script_test {
 namespace {
 
 TEST(Numbers, AreReadWholeAndFinite) {
@@ -126,4 +126,4 @@ TEST(Script, AMissingFileIsNamed) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::script_test

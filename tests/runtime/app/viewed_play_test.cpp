@@ -29,7 +29,7 @@
 #include "runtime/loop/loading.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::viewed_play_test {
 namespace {
 
 const std::filesystem::path cube = PALPATE_SOURCE_DIR "/tests/golden/cube2/cube2.palpate.hdf";
@@ -537,4 +537,4 @@ TEST_P(SettledSession, AMouseIsShownAllForceAndNoFault) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::viewed_play_test

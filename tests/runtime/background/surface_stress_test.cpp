@@ -18,7 +18,7 @@
 #include "runtime/body/patch_maker.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::surface_stress_test {
 namespace {
 
 using Field = std::function<Vec3(const Vec3&)>;
@@ -750,4 +750,4 @@ TEST(SurfaceStress, OfALinearDisplacementIsExactOnARefinedSurface) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::surface_stress_test

@@ -14,7 +14,7 @@
 #include "meshes/topology.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::body_test {
 namespace {
 
 TEST(Body, FindsStoredNodesBothWays) {
@@ -297,4 +297,4 @@ TEST_P(Bodies, RefuseThePartsOfAnotherBody) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::body_test

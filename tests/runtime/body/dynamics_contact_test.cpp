@@ -11,7 +11,7 @@
 #include "tests/support/dynamics_sample.h"
 #include "tests/support/runtime_tool.h"
 
-namespace palpate {
+namespace palpate::dynamics_contact_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -262,4 +262,4 @@ TEST(DynamicContact, NeedsDynamics) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::dynamics_contact_test

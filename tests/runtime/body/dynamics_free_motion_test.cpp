@@ -12,7 +12,7 @@
 #include "tests/support/dynamics_sample.h"
 #include "tests/support/runtime_tool.h"
 
-namespace palpate {
+namespace palpate::dynamics_free_motion_test {
 namespace {
 
 using Eigen::VectorXd;
@@ -620,4 +620,4 @@ TEST(WithoutDynamics, NothingSwings) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::dynamics_free_motion_test

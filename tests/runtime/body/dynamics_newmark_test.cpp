@@ -10,7 +10,7 @@
 #include "runtime/body/packed_newmark.h"
 #include "tests/support/dynamics_sample.h"
 
-namespace palpate {
+namespace palpate::dynamics_newmark_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -285,4 +285,4 @@ TEST(Greens, WithAllModesIsTheDynamicInverse) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::dynamics_newmark_test

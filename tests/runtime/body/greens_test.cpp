@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::greens_test {
 namespace {
 
 struct Case {
@@ -143,4 +143,4 @@ TEST(Greens, IsUnfoldedByDefaultWhenItIsSmall) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::greens_test

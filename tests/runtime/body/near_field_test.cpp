@@ -14,7 +14,7 @@
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::near_field_test {
 namespace {
 
 class NearField : public testing::TestWithParam<int> {
@@ -202,4 +202,4 @@ TEST_P(NearField, TheDeepestContactsAreKept) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::near_field_test

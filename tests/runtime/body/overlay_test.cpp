@@ -19,7 +19,7 @@
 #include "tests/support/partitioned_inverse.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::overlay_test {
 namespace {
 
 Index node_at(const Mesh& mesh, const Vec3& place) {
@@ -315,4 +315,4 @@ TEST(Overlay, SaysWhenTheFileDoesNotReachDeepEnough) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::overlay_test

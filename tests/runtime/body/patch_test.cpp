@@ -16,7 +16,7 @@
 #include "runtime/body/overlay.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::patch_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -239,4 +239,4 @@ TEST_P(Patches, CondenseAsTheOverlayDoes) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::patch_test

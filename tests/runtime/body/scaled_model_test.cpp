@@ -14,7 +14,7 @@
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::scaled_model_test {
 namespace {
 
 constexpr double scale = 2.5;
@@ -205,4 +205,4 @@ TEST(ScaledModel, RefusesWhereItCannotTellForcesFromDisplacements) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::scaled_model_test

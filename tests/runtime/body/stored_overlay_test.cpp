@@ -14,7 +14,7 @@
 #include "runtime/background/patch_source.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::stored_overlay_test {
 namespace {
 
 constexpr int refinement = 2, rings = 1;
@@ -143,4 +143,4 @@ TEST_P(OverlayFromFile, PatchesAreMadeAheadOfTheTools) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stored_overlay_test

@@ -24,7 +24,7 @@
 #include "runtime/tick/status.h"
 #include "runtime/tick/step.h"
 
-namespace palpate {
+namespace palpate::c_interface_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -596,4 +596,4 @@ TEST(CInterfaceThreads, AnotherThreadSeesWholeTicksOnly) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::c_interface_test

@@ -74,7 +74,7 @@ void free(void* p) {
 }
 #endif
 
-namespace palpate {
+namespace palpate::heap_test {
 namespace {
 
 /// Ticks that touch, grab, move, miss, let go and send nonsense; beside them nodes that are held and dropped.
@@ -389,4 +389,4 @@ static_assert(noexcept(step(std::declval<const Body&>(), std::declval<State&>(),
                             std::declval<const ToolPose&>())));
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::heap_test

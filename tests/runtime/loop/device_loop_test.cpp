@@ -16,7 +16,7 @@
 #include "runtime/loop/settings.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::device_loop_test {
 namespace {
 
 constexpr std::int64_t millisecond = 1'000'000;
@@ -379,4 +379,4 @@ TEST(Monitor, DrawsHowDurationsAreSpread) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::device_loop_test

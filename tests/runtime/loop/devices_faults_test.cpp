@@ -20,7 +20,7 @@
 #include "tests/support/fake_hidapi.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::devices_faults_test {
 namespace {
 
 constexpr double fault_time = 1.0;  // when the fault begins, while the hand presses [s]
@@ -299,4 +299,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::devices_faults_test

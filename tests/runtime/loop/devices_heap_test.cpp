@@ -48,7 +48,7 @@ void free(void* p) {
 }
 }
 
-namespace palpate {
+namespace palpate::devices_heap_test {
 namespace {
 
 constexpr std::int64_t ms_ns = 1'000'000;  // ns
@@ -216,6 +216,6 @@ TEST(SafetyTick, MakesNoSystemCall) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::devices_heap_test
 
 #endif

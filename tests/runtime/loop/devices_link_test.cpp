@@ -14,7 +14,7 @@
 #include "base/error.h"
 #include "runtime/loop/device_link.h"
 
-namespace palpate {
+namespace palpate::devices_link_test {
 namespace {
 
 std::int64_t now() {
@@ -324,4 +324,4 @@ TEST_F(DeviceLink, ClosesTheDeviceAtItsEnd) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::devices_link_test

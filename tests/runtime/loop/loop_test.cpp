@@ -22,7 +22,7 @@
 #include "runtime/app/script_device.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::loop_test {
 namespace {
 
 const char* const pull =
@@ -399,4 +399,4 @@ TEST(TimeHistogram, GivesPercentilesOfWhatItCounted) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::loop_test

@@ -21,7 +21,7 @@
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::session_test {
 namespace {
 
 Model loaded_model() {
@@ -358,4 +358,4 @@ TEST(SessionSummary, CountsWhatTheTicksSay) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::session_test

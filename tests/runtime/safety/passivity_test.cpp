@@ -8,7 +8,7 @@
 
 #include "runtime/safety/safety.h"
 
-namespace palpate {
+namespace palpate::passivity_test {
 namespace {
 
 constexpr double T = 0.001;  // s
@@ -169,4 +169,4 @@ TEST(Passivity, LeaningOnTheWallGainsEnergyWithoutItAndNoneWithIt) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::passivity_test

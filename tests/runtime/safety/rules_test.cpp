@@ -17,7 +17,7 @@
 #include "runtime/safety/stale_solution.h"
 #include "runtime/safety/stiffness_limit.h"
 
-namespace palpate {
+namespace palpate::rules_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -347,4 +347,4 @@ TEST(BuzzDetector, AHandThatShakesInTheAirIsItsOwnAffair) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rules_test

@@ -17,7 +17,7 @@
 
 #include "base/error.h"
 
-namespace palpate {
+namespace palpate::safety_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -678,4 +678,4 @@ TEST(Safety, ChaosIsOfForces) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::safety_test

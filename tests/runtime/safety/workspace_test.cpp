@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 
-namespace palpate {
+namespace palpate::workspace_test {
 namespace {
 
 class Random {
@@ -223,4 +223,4 @@ TEST(Workspace, RefusesWhatIsNoMap) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::workspace_test

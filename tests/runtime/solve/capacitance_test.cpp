@@ -17,7 +17,7 @@
 #include "base/error.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::capacitance_test {
 namespace {
 
 /// C and its nodes, grown and shrunk together.
@@ -221,4 +221,4 @@ TEST(CapacitanceMatrix, RefusesAnotherDimension) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::capacitance_test

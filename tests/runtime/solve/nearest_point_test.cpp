@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace palpate {
+namespace palpate::nearest_point_test {
 namespace {
 
 using Weights = std::array<double, 3>;
@@ -361,4 +361,4 @@ TEST(NearestPoint, IsFiniteAtAnySize) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::nearest_point_test

@@ -9,7 +9,7 @@
 #include "runtime/solve/active_set.h"
 #include "runtime/solve/cone_solver.h"
 
-namespace palpate {
+namespace palpate::solvers_test {
 namespace {
 
 struct Contact {
@@ -280,4 +280,4 @@ TEST(ConeSolver, WithoutFrictionItIsTheActiveSet) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::solvers_test

@@ -18,7 +18,7 @@
 #include "meshes/generate.h"
 #include "meshes/surface.h"
 
-namespace palpate {
+namespace palpate::surface_tree_test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -409,4 +409,4 @@ TEST(SurfaceTree, ThePointsOfTheSurfaceAreNotInside) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::surface_tree_test

@@ -14,7 +14,7 @@
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
-namespace palpate {
+namespace palpate::contact_friction_test {
 namespace {
 
 using test::friction_force;
@@ -219,4 +219,4 @@ TEST_P(Friction, TorqueAboutASpheresCentreIsThatOfFriction) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_friction_test

@@ -20,7 +20,7 @@
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::contact_qp_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -519,4 +519,4 @@ INSTANTIATE_TEST_SUITE_P(Cases, WholeMeshContact, testing::ValuesIn(contact_case
                          });
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_qp_test

@@ -11,7 +11,7 @@
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
-namespace palpate {
+namespace palpate::contact_sliding_test {
 namespace {
 
 using test::go;
@@ -204,4 +204,4 @@ TEST_P(ComesToRest, WhereverItIsHeld) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_sliding_test

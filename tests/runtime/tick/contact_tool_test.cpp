@@ -15,7 +15,7 @@
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
-namespace palpate {
+namespace palpate::contact_tool_test {
 namespace {
 
 using test::go;
@@ -530,4 +530,4 @@ TEST_P(Tools, ASecondToolFindsTheSurfaceWhereTheFirstHasPutIt) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_tool_test

@@ -13,7 +13,7 @@
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
-namespace palpate {
+namespace palpate::contact_walk_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -243,4 +243,4 @@ TEST_P(RandomWalk, NothingBreaksAndTheStateRecovers) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::contact_walk_test

@@ -14,7 +14,7 @@
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::overlay_step_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -335,4 +335,4 @@ TEST_P(Sliding, GoesOnWithoutAPatchThatIsTooLarge) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::overlay_step_test

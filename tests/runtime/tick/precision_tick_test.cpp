@@ -6,7 +6,7 @@
 #include "runtime/tick/step.h"
 #include "tests/support/baked_body.h"
 
-namespace palpate {
+namespace palpate::precision_tick_test {
 namespace {
 
 Model bake_beam(const std::string& precision) {
@@ -49,4 +49,4 @@ TEST(PrecisionTick, ForcesOnASlenderBodyAreThoseOfDoubleByDefault) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::precision_tick_test

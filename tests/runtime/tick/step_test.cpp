@@ -16,7 +16,7 @@
 #include "runtime/solve/node_vectors.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::step_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -327,4 +327,4 @@ TEST(State, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::step_test

@@ -10,7 +10,7 @@
 #include "runtime/body/patch_maker.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate {
+namespace palpate::scene_test {
 namespace {
 
 using Triangles = std::vector<std::array<Index, 3>>;
@@ -196,4 +196,4 @@ TEST(Scene, OfARecordingHasAllItsSurface) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::scene_test

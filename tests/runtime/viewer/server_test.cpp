@@ -16,7 +16,7 @@
 #include "tests/support/viewer_client.h"
 #include "tests/support/viewer_decoder.h"
 
-namespace palpate {
+namespace palpate::server_test {
 namespace {
 
 using test::Asking;
@@ -606,4 +606,4 @@ TEST_F(Viewer, RefusesAStateThatIsNone) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::server_test

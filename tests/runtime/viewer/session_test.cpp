@@ -20,7 +20,7 @@
 #include "runtime/web/page.h"
 #include "tests/support/viewer_decoder.h"
 
-namespace palpate {
+namespace palpate::session_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -363,4 +363,4 @@ TEST_F(Export, SaysWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::session_test

@@ -12,7 +12,7 @@
 #include "tests/support/runtime_model.h"
 #include "tests/support/viewer_decoder.h"
 
-namespace palpate {
+namespace palpate::wire_test {
 namespace {
 
 constexpr double half_unit = 0.502;  // to which values are rounded, and what float adds to that
@@ -279,4 +279,4 @@ TEST(SeenSurface, OfAPlatesBoundaryIsLines) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::wire_test

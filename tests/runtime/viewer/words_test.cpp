@@ -10,7 +10,7 @@
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/tick_history.h"
 
-namespace palpate {
+namespace palpate::words_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -242,4 +242,4 @@ TEST(TickHistory, ForgetsTheOldest) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::words_test

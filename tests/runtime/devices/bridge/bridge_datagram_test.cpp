@@ -13,7 +13,7 @@
 #include "runtime/devices/bridge/bridge_wire.h"
 #include "tests/support/devices_bytes.h"
 
-namespace palpate {
+namespace palpate::bridge_datagram_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -380,4 +380,4 @@ TEST(BridgeOrder, ClocksMayDriftByAThousandth) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::bridge_datagram_test

@@ -7,7 +7,7 @@
 
 #include "meshes/mesh.h"
 
-namespace palpate {
+namespace palpate::bridge_force_test {
 namespace {
 
 const Vec3 force_at_point(1.0, -2.0, 0.5);
@@ -128,4 +128,4 @@ TEST(BridgeForce, NoNumbersNoForce) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::bridge_force_test

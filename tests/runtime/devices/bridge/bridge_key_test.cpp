@@ -20,7 +20,7 @@
 #include "base/error.h"
 #include "runtime/devices/bridge/bridge_seal.h"
 
-namespace palpate {
+namespace palpate::bridge_key_test {
 namespace {
 
 std::string hex(std::span<const std::uint8_t> bytes) {
@@ -163,4 +163,4 @@ TEST_F(BridgeKeyFile, TakesThePlaceOfALinkAndLeavesWhatItLedTo) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::bridge_key_test

@@ -30,7 +30,7 @@
 #include "base/error.h"
 #include "tests/support/devices_bytes.h"
 
-namespace palpate {
+namespace palpate::bridge_port_test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -689,4 +689,4 @@ TEST(BridgeExample, TheHandIsPushedToWhereForcesBalance) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::bridge_port_test

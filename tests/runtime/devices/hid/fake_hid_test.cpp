@@ -16,7 +16,7 @@
 #include "runtime/safety/speed_limit.h"
 #include "tests/support/fake_hidapi.h"
 
-namespace palpate {
+namespace palpate::fake_hid_test {
 namespace {
 
 using ReadResult = DevicePort::ReadResult;
@@ -715,4 +715,4 @@ TEST(HidChoice, OtherReasonsThanRights) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::fake_hid_test

@@ -16,7 +16,7 @@
 
 #include "tests/support/devices_bytes.h"
 
-namespace palpate {
+namespace palpate::guardian_test {
 namespace {
 
 const std::vector<Bytes> reports = {{0, 1, 2}, {5, 0}};
@@ -148,4 +148,4 @@ TEST_F(GuardianTest, DoesNothingForADeviceThatWasClosed) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::guardian_test

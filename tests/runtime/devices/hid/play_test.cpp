@@ -26,7 +26,7 @@
 #include "runtime/safety/safety.h"
 #include "tests/support/devices_emulated_bus.h"
 
-namespace palpate {
+namespace palpate::play_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -497,4 +497,4 @@ TEST_F(PlayedDevice, AJoystickIsFeltAlsoWhileItRests) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::play_test

@@ -17,7 +17,7 @@
 #include "runtime/devices/hid/hid_port.h"
 #include "tests/support/devices_emulated_bus.h"
 
-namespace palpate {
+namespace palpate::umockdev_test {
 namespace {
 
 using ReadResult = DevicePort::ReadResult;
@@ -384,4 +384,4 @@ TEST_F(EmulatedHid, AKilledProcessLeavesNoForce) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::umockdev_test

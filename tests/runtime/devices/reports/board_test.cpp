@@ -9,7 +9,7 @@
 #include "runtime/devices/reports/palpate_board.h"
 #include "tests/support/devices_bytes.h"
 
-namespace palpate {
+namespace palpate::board_test {
 namespace {
 
 TEST(Board, DescriptorSaysTheReports) {
@@ -147,4 +147,4 @@ TEST(Board, WhatIsEncodedIsDecoded) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::board_test

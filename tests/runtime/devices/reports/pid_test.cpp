@@ -13,7 +13,7 @@
 #include "runtime/devices/reports/pid_sequence.h"
 #include "tests/support/devices_bytes.h"
 
-namespace palpate {
+namespace palpate::pid_test {
 namespace {
 
 using enum HidReportType;
@@ -443,4 +443,4 @@ TEST(PidSequence, GarbageForAnAnswerIsNoAnswer) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::pid_test

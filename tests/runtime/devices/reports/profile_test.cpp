@@ -11,7 +11,7 @@
 #include "runtime/devices/reports/palpate_board.h"
 #include "tests/support/devices_bytes.h"
 
-namespace palpate {
+namespace palpate::profile_test {
 namespace {
 
 const std::string folder = PALPATE_SOURCE_DIR "/runtime/devices/hid/profiles/";
@@ -185,4 +185,4 @@ TEST(DeviceProfile, RefusesArmsThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::profile_test

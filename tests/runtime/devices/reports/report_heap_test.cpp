@@ -32,7 +32,7 @@ void* malloc(std::size_t size) {
 }
 #endif
 
-namespace palpate {
+namespace palpate::report_heap_test {
 namespace {
 
 TEST(DeviceHeap, TicksTakeNothing) {
@@ -77,4 +77,4 @@ TEST(DeviceHeap, TicksTakeNothing) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::report_heap_test

@@ -8,7 +8,7 @@
 #include "runtime/devices/reports/space_mouse.h"
 #include "tests/support/devices_bytes.h"
 
-namespace palpate {
+namespace palpate::spacemouse_test {
 namespace {
 
 using Triple = std::array<std::int16_t, 3>;
@@ -126,4 +126,4 @@ TEST(SpaceMouse, SilenceStopsIt) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::spacemouse_test

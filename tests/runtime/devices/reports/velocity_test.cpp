@@ -7,7 +7,7 @@
 
 #include "runtime/safety/velocity_estimator.h"
 
-namespace palpate {
+namespace palpate::velocity_test {
 namespace {
 
 constexpr std::int64_t millisecond = 1'000'000;
@@ -127,4 +127,4 @@ TEST(Velocity, NoTimeNoChange) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::velocity_test

@@ -11,7 +11,7 @@
 #include "runtime/devices/reports/woodenhaptics_report.h"
 #include "tests/support/devices_bytes.h"
 
-namespace palpate {
+namespace palpate::woodenhaptics_test {
 namespace {
 
 constexpr double quarter = std::numbers::pi / 2.0;
@@ -221,4 +221,4 @@ TEST(WoodenHaptics, MotorsDoTheWorkOfTheForce) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::woodenhaptics_test
