@@ -20,6 +20,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/file_io.h"
 
 namespace palpate {
 namespace {
@@ -62,24 +63,12 @@ struct Pipe {
   }
 };
 
-bool write_all(int file, const void* data, std::size_t size) {
-  const char* at = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t written = write(file, at, size);
-    if (written < 0 && errno != EINTR) {
-      return false;
-    }
-    if (written > 0) {
-      at += written;
-      size -= static_cast<std::size_t>(written);
-    }
-  }
-  return true;
-}
-
 bool send(int pipe, AnswerHeader header, const Bytes& bytes) {
   header.size = bytes.size();
-  return write_all(pipe, &header, sizeof(header)) && write_all(pipe, bytes.data(), bytes.size());
+  const auto sent = [pipe](const void* data, std::size_t size) {
+    return write_all(pipe, {static_cast<const char*>(data), size}) == 0;
+  };
+  return sent(&header, sizeof(header)) && sent(bytes.data(), bytes.size());
 }
 
 void append_text(Bytes& bytes, const std::string& text) {

@@ -169,7 +169,7 @@ struct palpate_session {
         shown(Shown{.load = state.surface.near.load(), .motion = MotionSnapshot(body)}),
         stored_displacement(static_cast<std::size_t>(body.greens().order())),
         displacement(body.surface_rest_positions().size()) {
-    show();
+    publish();
     if (overlay.refinement > 1)
       overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = overlay.memory});
     if (body.model().dynamics.method == DynamicsMethod::packed)
@@ -177,7 +177,7 @@ struct palpate_session {
   }
 
   /// Hands what the last tick did over to the thread that draws.
-  void show() noexcept {
+  void publish() noexcept {
     Shown& next = shown.next();
     next.load = state.surface.near.load();
     state.surface.motion.snapshot(next.motion);
@@ -252,7 +252,7 @@ uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexc
   if (session->motion) session->motion->receive(session->state);
   const StepStatus status = step(session->body, session->state, session->poses);
   if (session->motion) session->motion->post(session->state);
-  session->show();
+  session->publish();
   return static_cast<uint32_t>(status);
 }
 
@@ -265,7 +265,7 @@ int palpate_get(const palpate_session* session, int tool, palpate_result* result
 
 void palpate_reset(palpate_session* session) noexcept {
   session->state = session->untouched;
-  session->show();
+  session->publish();
 }
 
 int palpate_surface_counts(const palpate_session* session, palpate_counts* counts) noexcept {

@@ -109,7 +109,7 @@ DeviceCommand Safety::pass(const TickTiming& timing, double elapsed) noexcept {
   Vec3 scaled = Vec3::Zero();
   if (gate_.open()) scaled = passivity_.control(share_ * field, silence_.share() * device_.velocity);
   shown_ = force_rate_.follow(clamped(scaled, options_.max_force), time);
-  passivity_.display(shown_);
+  passivity_.set_displayed(shown_);
   felt_ = felt_ || !shown_.isZero(0.0);
 
   DeviceCommand command;

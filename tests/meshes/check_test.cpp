@@ -23,7 +23,7 @@ using test::error_of;
 constexpr std::uint8_t x_axis = 1, y_axis = 2, z_axis = 4, every_axis = 7;
 
 /// (node, axes) of some nodes.
-using HeldMesh = std::vector<std::pair<std::size_t, std::uint8_t>>;
+using Held = std::vector<std::pair<std::size_t, std::uint8_t>>;
 
 std::vector<std::uint8_t> masks(const Mesh& mesh, const Held& held) {
   std::vector<std::uint8_t> result(mesh.nodes.size(), 0);

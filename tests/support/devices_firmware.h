@@ -61,7 +61,7 @@ class Firmware {
   [[nodiscard]] double time() const;  ///< [s]
 
  protected:
-  void set_displayed(const Vec3& force);  ///< for `do_...`
+  void show(const Vec3& force);  ///< for `do_...`
   void show(const Vec3& force, double time);
   [[nodiscard]] double now() const;
 

@@ -48,7 +48,7 @@ PlayOptions options_of(const std::filesystem::path& file) {
 }
 
 /// A run in a folder of its own, as that is where recordings go.
-class ViewedPlay : public testing::Test {
+class ViewedPlayTest : public testing::Test {
  protected:
   void SetUp() override {
     std::filesystem::create_directory(folder_);
@@ -107,7 +107,7 @@ std::string where_it_is_refused(const std::function<void()>& wish) {
   return "";
 }
 
-TEST_F(ViewedPlay, RecordsAnActThatIsReplayedToTheSameBits) {
+TEST_F(ViewedPlayTest, RecordsAnActThatIsReplayedToTheSameBits) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   play_->record(true);
@@ -145,7 +145,7 @@ TEST_F(ViewedPlay, RecordsAnActThatIsReplayedToTheSameBits) {
   EXPECT_EQ(replay.replay.different, 0);
 }
 
-TEST_F(ViewedPlay, StandsStillAndTakesSingleTicks) {
+TEST_F(ViewedPlayTest, StandsStillAndTakesSingleTicks) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   play_->pause(true);
@@ -165,7 +165,7 @@ TEST_F(ViewedPlay, StandsStillAndTakesSingleTicks) {
       << "a paused run shows the untouched body";
 }
 
-TEST_F(ViewedPlay, BeginsAnewWithOtherSettings) {
+TEST_F(ViewedPlayTest, BeginsAnewWithOtherSettings) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   const std::uint32_t scene = play_->state().scene;
@@ -207,7 +207,7 @@ class HeldPort : public DevicePort {
 };
 
 /// A run whose device has a hand in it. This machine may be busy: late ticks and reports are no faults here.
-class HeldDevice : public Viewed {
+class HeldDevice : public ViewedPlayTest {
  protected:
   void start_held() {
     auto link = std::make_unique<DeviceLink>(std::make_unique<HeldPort>(height_), DeviceLinkOptions{});
@@ -223,7 +223,7 @@ class HeldDevice : public Viewed {
     ASSERT_TRUE(wait_for_ticks(50));
   }
   void TearDown() override {
-    ViewedPlay::TearDown();
+    ViewedPlayTest::TearDown();
     input_.device.reset();  // before the height
   }
 
@@ -289,7 +289,7 @@ TEST_F(HeldDevice, AFaultOutlivesWhatAPageBegins) {
   EXPECT_FALSE(play_->state().recording);
 }
 
-TEST_F(ViewedPlay, NobodyIsInAPointer) {
+TEST_F(ViewedPlayTest, NobodyIsInAPointer) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   EXPECT_FALSE(play_->state().hand);
@@ -298,7 +298,7 @@ TEST_F(ViewedPlay, NobodyIsInAPointer) {
   EXPECT_TRUE(wait_for([](const RunState& state) { return state.settings.contains("safety"); }));
 }
 
-TEST_F(ViewedPlay, ABallSuitsTheBodyWhereNoToolIsGiven) {
+TEST_F(ViewedPlayTest, ABallSuitsTheBodyWhereNoToolIsGiven) {
   PlayOptions options = options_of(cube);
   options.settings_text.clear();
   options.settings = read_settings({});
@@ -313,7 +313,7 @@ TEST_F(ViewedPlay, ABallSuitsTheBodyWhereNoToolIsGiven) {
   EXPECT_TRUE(wait_for([](const RunState& state) { return state.settings.at("tool") == "sphere:0.17"; }));
 }
 
-TEST_F(ViewedPlay, RefusesAToolThatIsLargerThanTheBody) {
+TEST_F(ViewedPlayTest, RefusesAToolThatIsLargerThanTheBody) {
   start(options_of(cube));
   const auto refused = [&](const char* tool) {
     return where_it_is_refused([&] { play_->change({{"tool", tool}}); });
@@ -357,7 +357,7 @@ TEST_P(OverlayRings, AreAsManyAsTheFileKeepsLayersFor) {
   EXPECT_THROW(static_cast<void>(patch_room(body, rings + 1, 1)), Error);
 }
 
-TEST_F(ViewedPlay, RefusesAtOnceWhatCannotBe) {
+TEST_F(ViewedPlayTest, RefusesAtOnceWhatCannotBe) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   const auto refused = [&](const char* name, const char* value) {
@@ -386,7 +386,7 @@ void write_mixed_cube(const std::filesystem::path& file) {
   writer.finish(model.probes);
 }
 
-TEST_F(ViewedPlay, GoesOnAsBeforeWhereLoadingShowsThatItCannotBe) {
+TEST_F(ViewedPlayTest, GoesOnAsBeforeWhereLoadingShowsThatItCannotBe) {
   write_mixed_cube(folder_ / "mixed.palpate.hdf");
   start(options_of(folder_ / "mixed.palpate.hdf"));
   ASSERT_TRUE(wait_for_ticks(50));
@@ -403,7 +403,7 @@ TEST_F(ViewedPlay, GoesOnAsBeforeWhereLoadingShowsThatItCannotBe) {
   EXPECT_TRUE(wait_for_ticks(50));
 }
 
-TEST_F(ViewedPlay, GoesOnWithTheLoadedBodyWhereItsFileIsGone) {
+TEST_F(ViewedPlayTest, GoesOnWithTheLoadedBodyWhereItsFileIsGone) {
   std::filesystem::copy_file(cube, folder_ / "gone.palpate.hdf");
   start(options_of(folder_ / "gone.palpate.hdf"));
   ASSERT_TRUE(wait_for_ticks(50));
@@ -420,7 +420,7 @@ TEST_F(ViewedPlay, GoesOnWithTheLoadedBodyWhereItsFileIsGone) {
   EXPECT_TRUE(wait_for_ticks(50));
 }
 
-TEST_F(ViewedPlay, GoesOnWhereARecordingCannotBeMade) {
+TEST_F(ViewedPlayTest, GoesOnWhereARecordingCannotBeMade) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   std::filesystem::remove_all(folder_);  // the working directory is gone
@@ -433,7 +433,7 @@ TEST_F(ViewedPlay, GoesOnWhereARecordingCannotBeMade) {
   std::filesystem::current_path(folder_);
 }
 
-TEST_F(ViewedPlay, TellsAtOnceOfARecordingThatFailsAndGoesOn) {
+TEST_F(ViewedPlayTest, TellsAtOnceOfARecordingThatFailsAndGoesOn) {
   start(options_of(cube));
   ASSERT_TRUE(wait_for_ticks(50));
   play_->record(true);

@@ -17,7 +17,7 @@
 namespace palpate::near_field_test {
 namespace {
 
-class NearField : public testing::TestWithParam<int> {
+class NearFieldTest : public testing::TestWithParam<int> {
  protected:
   Body body_{
       test::unit_model(GetParam(), GetParam() == 3 ? 4 : 12, Scope::surface, Precision::double_precision)};
@@ -50,9 +50,9 @@ class NearField : public testing::TestWithParam<int> {
     }
   }
 };
-INSTANTIATE_TEST_SUITE_P(Dimension, NearField, testing::Values(2, 3));
+INSTANTIATE_TEST_SUITE_P(Dimension, NearFieldTest, testing::Values(2, 3));
 
-TEST_P(NearField, KeepsTheComplianceOfWhatIsWantedWhileNodesComeAndGo) {
+TEST_P(NearFieldTest, KeepsTheComplianceOfWhatIsWantedWhileNodesComeAndGo) {
   NearField near(body_, 10);
   std::mt19937 random(2);
   const std::vector<Index> nodes = free_nodes(1);
@@ -67,7 +67,7 @@ TEST_P(NearField, KeepsTheComplianceOfWhatIsWantedWhileNodesComeAndGo) {
   }
 }
 
-TEST_P(NearField, IsFullOnlyOfWhatIsWantedOrLoaded) {
+TEST_P(NearFieldTest, IsFullOnlyOfWhatIsWantedOrLoaded) {
   NearField near(body_, 4);
   const std::vector<Index> nodes = free_nodes(3);
   near.begin_tick();
@@ -80,7 +80,7 @@ TEST_P(NearField, IsFullOnlyOfWhatIsWantedOrLoaded) {
   EXPECT_FALSE(near.want(body_, nodes[9]));
 }
 
-TEST_P(NearField, ForgetsWhatIsNotWantedForLong) {
+TEST_P(NearFieldTest, ForgetsWhatIsNotWantedForLong) {
   NearField near(body_, 30);
   const std::vector<Index> nodes = free_nodes(4);
   near.begin_tick();
@@ -93,7 +93,7 @@ TEST_P(NearField, ForgetsWhatIsNotWantedForLong) {
   EXPECT_EQ(near.node(0), nodes[7]);
 }
 
-TEST_P(NearField, DisplacementIsThatOfTheGreensFunctions) {
+TEST_P(NearFieldTest, DisplacementIsThatOfTheGreensFunctions) {
   NearField near(body_, 20);
   const std::vector<Index> nodes = free_nodes(5);
   near.begin_tick();
@@ -118,7 +118,7 @@ TEST_P(NearField, DisplacementIsThatOfTheGreensFunctions) {
   EXPECT_EQ(near.displacement(0), Vec3::Zero());
 }
 
-TEST_P(NearField, RetreatMakesAShareOfTheChange) {
+TEST_P(NearFieldTest, RetreatMakesAShareOfTheChange) {
   NearField near(body_, 20);
   const std::vector<Index> nodes = free_nodes(5);
   near.begin_tick();
@@ -144,7 +144,7 @@ TEST_P(NearField, RetreatMakesAShareOfTheChange) {
 
 /// Contact points of a sphere that presses on the top: nearest points of all simplices of the surface that
 /// are as near, by a search without tree, near field or margins.
-TEST_P(NearField, ContactPointsAreTheNearestPointsOfTheDeformedSurface) {
+TEST_P(NearFieldTest, ContactPointsAreTheNearestPointsOfTheDeformedSurface) {
   const double radius = 0.4;
   State state(body_, {.tools = {Tool{.radius = radius}}, .max_contacts = 64});
   ToolPose tool;
@@ -183,7 +183,7 @@ TEST_P(NearField, ContactPointsAreTheNearestPointsOfTheDeformedSurface) {
 }
 
 // With room for two, the two that would be deepest without the body giving way are kept.
-TEST_P(NearField, TheDeepestContactsAreKept) {
+TEST_P(NearFieldTest, TheDeepestContactsAreKept) {
   const auto contacts_with = [&](Index room) {
     State state(body_, {.tools = {Tool{.radius = 0.4}}, .max_contacts = room});
     ToolPose tool;

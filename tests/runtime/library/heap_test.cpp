@@ -297,7 +297,7 @@ class MovingTick : public testing::TestWithParam<std::tuple<DynamicsMethod, Cont
       step(body_, state_, tool);
       if (source_) source_->post(state_);
       if (frames_) frames_->post(state_, k, 0.001 * k);
-      if (k % 10 == 0) state_.surface.motion.display(shown_);
+      if (k % 10 == 0) state_.surface.motion.snapshot(shown_);
     }
   }
 

@@ -110,9 +110,9 @@ class MadeUpPort : public DevicePort {
   std::atomic<bool> is_open_ = false;
 };
 
-class DeviceLink : public testing::Test {
+class DeviceLinkTest : public testing::Test {
  protected:
-  ~Link() override {
+  ~DeviceLinkTest() override {
     EXPECT_FALSE(wire_->misused) << "read or written while it was closed, or closed while it was used";
   }
 
@@ -136,7 +136,7 @@ DeviceState at(const Vec3& position, std::uint32_t sequence, const Vec3& velocit
   return {.pose = {.position = position}, .velocity = velocity, .arrived = now(), .sequence = sequence};
 }
 
-TEST_F(DeviceLink, HandsReportsToTheLoopAndCommandsToTheDevice) {
+TEST_F(DeviceLinkTest, HandsReportsToTheLoopAndCommandsToTheDevice) {
   const auto link = make();
   EXPECT_FALSE(link->has_reported());
   wire_->say(at({0.1, 0.2, 0.3}, 7));
@@ -159,14 +159,14 @@ TEST_F(DeviceLink, HandsReportsToTheLoopAndCommandsToTheDevice) {
   EXPECT_EQ(first.state.sequence, 8U);
 }
 
-TEST_F(DeviceLink, RefusesADeviceThatCannotBeOpened) {
+TEST_F(DeviceLinkTest, RefusesADeviceThatCannotBeOpened) {
   wire_->refusals = 1;
   EXPECT_THROW(make(), Error);
   EXPECT_EQ(wire_->opened, 0);
 }
 
 // The loop hangs: the hand moves on in the field of the last solution, which fades.
-TEST_F(DeviceLink, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
+TEST_F(DeviceLinkTest, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
   const DeviceLinkOptions options;
   const double stiffness = 100.0;
   const Vec3 moved(0.002, 0.0, 0.0);
@@ -212,7 +212,7 @@ TEST_F(DeviceLink, GoesOnByItselfWhenTheLoopHangsAndLetsGo) {
 
 // What the loop worked out before it hung comes too late: it is the field of then, as far as that still
 // holds.
-TEST_F(DeviceLink, ShowsNoOldCommandAsIfItWereNew) {
+TEST_F(DeviceLinkTest, ShowsNoOldCommandAsIfItWereNew) {
   const auto link = make();
   wire_->say(at({0.0, 0.0, 0.0}, 1));
   wait_for([&] { return link->has_reported(); });
@@ -226,7 +226,7 @@ TEST_F(DeviceLink, ShowsNoOldCommandAsIfItWereNew) {
     ASSERT_TRUE(wire_->trace()[k].command.wrench.force.isZero(0.0)) << "a kick";
 }
 
-TEST_F(DeviceLink, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
+TEST_F(DeviceLinkTest, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
   const DeviceLinkOptions options{.max_force = 2.0, .max_force_rate = 100.0};
   const auto link = make(options);
   DeviceCommand command;
@@ -250,7 +250,7 @@ TEST_F(DeviceLink, NeverShowsMoreThanTheClampsWhenItGoesOnByItself) {
   }
 }
 
-TEST_F(DeviceLink, NeverShowsMoreThanTheDeviceBearsWhenItGoesOnByItself) {
+TEST_F(DeviceLinkTest, NeverShowsMoreThanTheDeviceBearsWhenItGoesOnByItself) {
   wire_->limits.max_force = 0.5;
   const auto link = make({.max_force = 2.0, .max_force_rate = 1e6});
   DeviceCommand command;
@@ -269,7 +269,7 @@ TEST_F(DeviceLink, NeverShowsMoreThanTheDeviceBearsWhenItGoesOnByItself) {
   EXPECT_LE(largest, 0.5 * (1.0 + 1e-12));
 }
 
-TEST_F(DeviceLink, TellsOfALostDeviceAndOfItsReturn) {
+TEST_F(DeviceLinkTest, TellsOfALostDeviceAndOfItsReturn) {
   const auto link = make();
   wire_->say(at({0.1, 0.0, 0.0}, 1));
   wait_for([&] { return link->has_reported(); });
@@ -282,7 +282,7 @@ TEST_F(DeviceLink, TellsOfALostDeviceAndOfItsReturn) {
   EXPECT_EQ(link->poll({}).events, DeviceEvent::none) << "told once";
   EXPECT_EQ(link->poll({}).state.pose.position.x(), 0.1) << "the last state stands";
   const std::size_t before = wire_->trace().size();
-  link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());
+  link->display({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());
   wire_->is_lost = false;
   wait_for([&] { return wire_->opened == 2; });
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -299,23 +299,23 @@ TEST_F(DeviceLink, TellsOfALostDeviceAndOfItsReturn) {
   }
 }
 
-TEST_F(DeviceLink, ADeviceThatTakesNothingIsLost) {
+TEST_F(DeviceLinkTest, ADeviceThatTakesNothingIsLost) {
   const auto link = make();
   wire_->say(at({0.1, 0.0, 0.0}, 1));
   wait_for([&] { return link->has_reported(); });
   wire_->takes_nothing = true;
   wire_->refusals = 1000;
-  link->show({}, {}, now());
+  link->display({}, {}, now());
   DeviceEvent events = DeviceEvent::none;
   wait_for([&] { return (events = link->poll({}).events) != DeviceEvent::none; });
   EXPECT_EQ(events, DeviceEvent::lost);
   EXPECT_EQ(wire_->closed, 1);
 }
 
-TEST_F(DeviceLink, ClosesTheDeviceAtItsEnd) {
+TEST_F(DeviceLinkTest, ClosesTheDeviceAtItsEnd) {
   {
     const auto link = make();
-    link->show({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());
+    link->display({.wrench = {.force = {1, 0, 0}, .torque = Vec3::Zero()}, .local = {}}, {}, now());
   }
   EXPECT_EQ(wire_->closed, 1);
   const std::size_t written = wire_->trace().size();

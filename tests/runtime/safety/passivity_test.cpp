@@ -27,7 +27,7 @@ TEST(Passivity, ObserverSeesTheEnergyOfTheHold) {
     const double velocity = k < n ? v : -v;
     const Vec3 force(-K * x, 0, 0);
     EXPECT_EQ(observer.control(force, Vec3(velocity, 0, 0)), force);  // it only observes
-    observer.show(force);
+    observer.set_displayed(force);
     x += velocity * T;
   }
   observer.observe(Vec3(x, 0, 0));
@@ -39,7 +39,7 @@ TEST(Passivity, ObserverTakesADamperAsDissipation) {
   Passivity observer(0.0, T);
   for (int k = 0; k <= 100; ++k) {
     observer.observe(k * T * velocity);
-    observer.show(-3.0 * velocity);
+    observer.set_displayed(-3.0 * velocity);
   }
   EXPECT_NEAR(observer.energy(), 3.0 * velocity.squaredNorm() * 100 * T, 1e-12);
 }
@@ -60,7 +60,7 @@ TEST(Passivity, ControllerAddsTheDampingOfTheFormula) {
 TEST(Passivity, ControllerLetsASpringGiveBackWhatItTook) {
   Passivity controller(10.0, T);
   controller.observe(Vec3::Zero());
-  controller.show(Vec3(-1, 0, 0));
+  controller.set_displayed(Vec3(-1, 0, 0));
   controller.observe(Vec3(0.01, 0, 0));  // 0.01 J went in
   EXPECT_NEAR(controller.energy(), 0.01, 1e-15);
   const Vec3 back(-1, 0, 0);
@@ -71,11 +71,11 @@ TEST(Passivity, ControllerLetsASpringGiveBackWhatItTook) {
 TEST(Passivity, OutOfContactNothingIsStored) {
   Passivity controller(10.0, T);
   controller.observe(Vec3::Zero());
-  controller.show(Vec3(-1, 0, 0));
+  controller.set_displayed(Vec3(-1, 0, 0));
   controller.observe(Vec3(0.01, 0, 0));
   controller.control(Vec3::Zero(), Vec3::Zero());
   EXPECT_EQ(controller.energy(), 0.0);
-  controller.show(Vec3(1, 0, 0));
+  controller.set_displayed(Vec3(1, 0, 0));
   controller.observe(Vec3(0.02, 0, 0));  // but a debt stays
   controller.control(Vec3::Zero(), Vec3::Zero());
   EXPECT_NEAR(controller.energy(), -0.01, 1e-15);
@@ -110,7 +110,7 @@ double rebound(double max_damping) {
     passivity.observe(Vec3(device.x, 0, 0));
     EXPECT_NEAR(passivity.energy(), before - device.energy(), 1e-12);
     const Vec3 force = passivity.control(wall_force(device), Vec3(device.v, 0, 0));
-    passivity.show(force);
+    passivity.set_displayed(force);
     device.move(force.x());
   }
   EXPECT_GT(device.x, 0.0);

@@ -380,7 +380,7 @@ struct LocalCase {
 };
 class LocalModelOfTool : public testing::TestWithParam<LocalCase> {};
 INSTANTIATE_TEST_SUITE_P(
-    Contacts, Local,
+    Contacts, LocalModelOfTool,
     testing::Values(LocalCase{"Frictionless", 3, 0.0, false}, LocalCase{"Sticking", 3, 5.0, false},
                     LocalCase{"Held", 3, 0.0, true}, LocalCase{"FrictionlessInThePlane", 2, 0.0, false},
                     LocalCase{"StickingInThePlane", 2, 5.0, false},

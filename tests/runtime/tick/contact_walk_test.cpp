@@ -148,7 +148,7 @@ bool all_finite(const ContactPoint& contact) {
 
 class RandomWalk : public testing::TestWithParam<WalkCase> {
  protected:
-  Walk() {
+  RandomWalk() {
     poses_.resize(GetParam().tools.size());
     for (std::size_t k = 0; k < poses_.size(); ++k) poses_[k].position = above(k, 0.5);
   }

@@ -543,7 +543,7 @@ TEST_F(Viewer, PagesThatAreOpenAreNotCutForFurtherOnes) {
   EXPECT_EQ(client().status, 503U);
   EXPECT_EQ(test::ask(served(), {.target = "/"}).result_int(), 503U);
   EXPECT_EQ(test::ask(served(), {.target = "/", .query = ""}).result_int(), 403U);
-  for (const auto& page : pages) EXPECT_EQ(page->poll("state").at("type"), "state");
+  for (const auto& page : pages) EXPECT_EQ(page->receive("state").at("type"), "state");
   pages.pop_back();
   while (client().status != 101U)  // until it has noticed
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -469,7 +469,7 @@ TEST(HidJoystick, OneThatReportsChangesAndRestsIsToldOn) {
     ASSERT_GT(static_cast<std::int32_t>(bench.state.sequence - last.sequence), 0);
     last = bench.state;
     speed.see(bench.state);
-    EXPECT_TRUE(silence.poll(bench.state, bench.state.arrived, 1.0));
+    EXPECT_TRUE(silence.observe(bench.state, bench.state.arrived, 1.0));
     if (frozen_at == 0.0 && silence.frozen()) frozen_at = firmware->time();
   }
   EXPECT_GT(frozen_at, 0.35) << "it rests, and while a force is shown that must not last";

@@ -241,7 +241,7 @@ class PlayedDevice : public ::testing::Test {
   static fs::path folder;
 };
 
-fs::path Played::folder;
+fs::path PlayedDevice::folder;
 
 TEST_F(PlayedDevice, ABoardIsFeltAsTheSessionSays) {
   EmulatedBus bus;
