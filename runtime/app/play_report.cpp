@@ -122,7 +122,7 @@ void warn_of_places(const PlayedRun& run) {
     print_warning(fmt::format("the tool began inside the body and felt nothing {}: start outside ({})",
                               all ? "at all" : fmt::format("until it was out at {} s", seconds), place));
   } else if (report.ticks > 0 && report.ticks_in_contact == 0) {
-    const Vec3& end = run.tool_end;
+    const Vec3& end = run.state.tools.front().pose.position;
     const char* advice = run.link != nullptr
                              ? "move the device on, or the body to it (--origin, --motion-scale)"
                              : "check the script's positions, which are metres, and the tool's size";
@@ -130,6 +130,16 @@ void warn_of_places(const PlayedRun& run) {
         fmt::format("the tool never touched the body: {} (the tool ended at ({:.4g}, {:.4g}, {:.4g}) m; {})",
                     advice, end.x(), end.y(), end.z(), place));
   }
+}
+
+/// How much of what has fixed room the tick has used at most.
+Json json_room(const State& state) {
+  const HighWater& most = state.scratch.high_water;
+  const auto entry = [](Index used, auto room) { return Json{{"most", used}, {"room", room}}; };
+  return {{"near_nodes", entry(most.near_nodes, state.surface.near.capacity())},
+          {"contact_points", entry(most.contact_points, state.max_contacts())},
+          {"unknowns", entry(most.unknowns, state.scratch.rows.size())},
+          {"simplices", entry(most.simplices, state.scratch.pairs.size())}};
 }
 
 Json json_tool(const Tool& tool) {
@@ -264,6 +274,7 @@ std::string json_report(const PlayedRun& run) {
   json["largest_jump_N"] = report.largest_jump;
   json["largest_jump_time_s"] = report.largest_jump_time;
   json["status_ticks"] = status;
+  json["room"] = json_room(run.state);
   json["device"] = json_device(run);
   if (run.settings.safety) json["safety"] = json_safety(report);
   if (run.options.device.kind == DeviceChoice::Kind::replay) json["replay"] = json_replay(report.replay);

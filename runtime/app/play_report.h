@@ -17,7 +17,7 @@ struct PlayedRun {
   const Settings& settings;  ///< as they were in the end
   const Body& body;
   const Tool& tool;
-  const Vec3& tool_end;  ///< where the tool's origin was in the last tick [m]
+  const State& state;  ///< after the last tick
   const LoopReport& report;
   const PatchSource* overlays = nullptr;
   const MotionSource* motion = nullptr;

@@ -151,7 +151,7 @@ void PlaySession::tell() const {
                          .settings = options_.settings,
                          .body = body_,
                          .tool = tool_,
-                         .tool_end = state_.tools.front().pose.position,
+                         .state = state_,
                          .report = report_,
                          .overlays = overlays_ ? &*overlays_ : nullptr,
                          .motion = motion_ ? &*motion_ : nullptr,

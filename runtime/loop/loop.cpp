@@ -107,7 +107,7 @@ class Loop {
     const std::int64_t next_due = start_ + (tick_.number + 1) * second / options_.rate;
     news_ = parts_.device.poll(tick_);
     if (news_.begun) tick_.begun = *news_.begun;
-    hear_person();
+    poll_person();
     lift();
     in_body_ = parts_.workspace.in_body(news_.state);
     const Vec3 force_before = tool().wrench.force;
@@ -131,7 +131,7 @@ class Loop {
   }
 
   /// What was said beside the device. A replay has it from its session.
-  void hear_person() noexcept {
+  void poll_person() noexcept {
     const bool resumes = std::exchange(was_paused_, is_paused());
     if (parts_.replayed != nullptr) return;
     const bool seen = parts_.monitor != nullptr && parts_.monitor->acknowledged();

@@ -41,7 +41,7 @@ class BuildFlags(unittest.TestCase):
     def test_our_presets_have_both(self):
         for preset in ("release", "asan"):
             with self.subTest(preset):
-                self.assertEqual(self.flags_of_c_interface("--preset", preset, "-DPALPATE_TESTS=OFF", "-DPALPATE_WEB=OFF"), FLAGS)
+                self.assertEqual(self.flags_of_c_interface("--preset", preset, "-DPALPATE_TESTS=OFF", "-DPALPATE_WEB=OFF", "-DCMAKE_UNITY_BUILD=OFF"), FLAGS)
 
 
 if __name__ == "__main__":

@@ -537,6 +537,12 @@ class Tools(ProgramTest):
         report, ticks, contacts = self.play(file, self.PRESS, "--tool", "sphere:0.2")
         self.assertEqual((report["tool"]["radius_m"], report["tool"]["length_m"]), (0.2, 0))
         self.assertGreater(report["most_contacts"], 1)
+        room = report["room"]
+        self.assertEqual(set(room), {"near_nodes", "contact_points", "unknowns", "simplices"})
+        self.assertGreaterEqual(room["contact_points"]["most"], report["most_contacts"])
+        for used in room.values():
+            self.assertLess(0, used["most"])
+            self.assertLessEqual(used["most"], used["room"])
         x, n, f = (self.vectors(contacts, prefix) for prefix in ("", "n", "f"))
         numpy.testing.assert_allclose(f.sum(axis=0), ticks["force"][-1], rtol=1e-12)
         closed = numpy.linalg.norm(f, axis=1) > 0
@@ -686,7 +692,7 @@ class Usage(ProgramTest):
                                     ("--tool", "capsule:0.1", "is none of"), ("--tool", "capsule:0.1,nan", "'nan'"),
                                     ("--tool", "point:1", "is none of"), ("--friction", "-0.1", "'-0.1'"),
                                     ("--friction", "inf", "'inf'"), ("--friction", "", "''"), ("--coupling", "0", "N/m"), ("--coupling-torsion", "x", "N m/rad"),
-                                    ("--max-force", "-3", "newtons"), ("--max-contacts", "0", "from 1 to"),
+                                    ("--max-force", "-3", "greater than 0 [N]"), ("--max-contacts", "0", "from 1 to"),
                                     ("--max-contacts", "1.5", "'1.5'"), ("--max-contacts", "100000", "from 1 to 1000")):
             with self.subTest(option=option, text=text):
                 self.assert_usage(piece, "play", "x.palpate.hdf", "--device", "script:a.csv", option, text)

@@ -15,7 +15,7 @@ std::optional<std::array<std::int16_t, 3>> triple(std::span<const std::uint8_t> 
   std::array<std::int16_t, 3> counts{};
   for (std::size_t i = 0; i < 3; ++i) {
     counts[i] = read_number<std::int16_t>(report, at + 2 * i);
-    if (counts[i] < -largest_logical_count || counts[i] > largest_count) return std::nullopt;
+    if (counts[i] < -largest_logical_count || counts[i] > largest_logical_count) return std::nullopt;
   }
   return counts;
 }

@@ -253,6 +253,30 @@ TEST_P(ToolTouch, CopiesReplayBitwise) {
   EXPECT_GT(largest, 1e-3);
 }
 
+// No tick needs the workspace of the one before: with that of another state it goes the same way.
+TEST_P(ToolTouch, ScratchIsOfOneTick) {
+  const StateOptions options{.tools = {Tool{.radius = 0.3, .friction = 0.3}}};
+  State state(body_, options);
+  State other(body_, options);
+  HighWater most;
+  for (int k = 0; k < 60; ++k) {
+    const ToolPose at_tick = pose(at(0.5 + 0.002 * k, 0.5, 1.35 - 0.002 * k), k > 45);
+    State copy = state;
+    copy.scratch = other.scratch;
+    step(body_, other, pose(at(0.4, 0.6, k % 2 == 0 ? 1.25 : 1.4)));
+    ASSERT_EQ(step(body_, state, at_tick), step(body_, copy, at_tick)) << k;
+    ASSERT_TRUE(same_bits(state.tools[0].wrench.force, copy.tools[0].wrench.force)) << k;
+    most.contact_points = std::max(most.contact_points, state.contact_count);
+    most.unknowns = std::max(most.unknowns, state.scratch.problem.rows);
+  }
+  EXPECT_GT(state.tools[0].wrench.force.norm(), 1e-3);
+  EXPECT_GT(most.contact_points, 1);
+  EXPECT_EQ(state.scratch.high_water.contact_points, most.contact_points);
+  EXPECT_GE(state.scratch.high_water.unknowns, most.unknowns);
+  EXPECT_GE(state.scratch.high_water.simplices, most.contact_points / GetParam());
+  EXPECT_GE(state.scratch.high_water.near_nodes, most.contact_points);
+}
+
 TEST(Plane, TheToolsHeightOverThePlaneDoesNotCount) {
   const Body body(test::unit_model(2, 4, Scope::surface, Precision::double_precision));
   const StateOptions options{.tools = {Tool{.radius = 0.05, .length = 0.1, .friction = 0.2}}};

@@ -127,7 +127,7 @@ TickRecord tick_record(std::int64_t number) {
   tick.contacts = 2;
   tick.compute_ns = 70'000;
   tick.begun_ns = 1'000'000 * number + 5000;
-  tick.status = 4;
+  tick.status = 8;
   return tick;
 }
 
@@ -194,7 +194,7 @@ TEST_F(Recorded, APictureShowsItsTick) {
   EXPECT_EQ(seen.device.position, Vec3(4.25, 0, 0));
   EXPECT_EQ(seen.on_body.force, Vec3(0, 0, -4));
   EXPECT_EQ(seen.on_body.torque, Vec3(0, 8, 0));
-  EXPECT_EQ(static_cast<int>(seen.status), 4);
+  EXPECT_EQ(static_cast<int>(seen.status), 8);
   EXPECT_EQ(pictures.picture(2).tool.position.x(), 9.0) << "tick 12 was lost: that before it";
   EXPECT_EQ(pictures.picture(3).tool.position.x(), 16.0);
   EXPECT_THROW((void)pictures.picture(4), Error);
