@@ -63,6 +63,13 @@ class Rules(unittest.TestCase):
         self.write("base/mesh.h", "")
         self.refused("base/mesh.h and meshes/mesh.h: two headers of one name")
 
+    def test_a_private_name_of_another_source_is_refused(self):
+        self.write("base/ranges.cpp", "namespace palpate {\nnamespace {\nconstexpr int widest = 3;\n}  // namespace\n}\n")
+        self.write("base/narrow.cpp", "bool narrow(int x) {\n  const int widest = 2;\n  return x > widest;\n}\n")
+        self.assertEqual(self.check()[0], 0)
+        self.write("base/words.cpp", "bool wide(int x) {\n  return x > widest;\n}\n")
+        self.refused("base/words.cpp: uses widest, which base/ranges.cpp keeps to itself")
+
     def test_a_folder_on_no_floor_is_refused(self):
         self.write("runtime/attic/old.cpp", "")
         self.refused("runtime/attic/old.cpp: its folder is on no floor")
