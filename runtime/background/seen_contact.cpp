@@ -16,7 +16,8 @@ Vec3 surface_position(const State& state, const ContactPoint& contact) noexcept 
 
 SeenContact seen_contact(const Body& body, const State& state, const ContactPoint& contact) noexcept {
   return {surface_position(state, contact),
-          contact.held ? outward_normal(body, state, contact.simplex) : Vec3(contact.frame.col(0)),
+          contact.held ? outward_normal(state.surface.tree, nodes_of(body, contact.simplex))
+                       : Vec3(contact.frame.col(0)),
           Vec3::Zero() - contact.force, contact.held};
 }
 

@@ -272,9 +272,10 @@ class Loop {
         const Vec3& rest = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)];
         moved += contact.weights[k] * (rest - parts_.state.surface.tree.position(node));
       }
-      deepest = std::max(deepest,
-                         moved.dot(contact.held ? outward_normal(parts_.body, parts_.state, contact.simplex)
-                                                : Vec3(contact.frame.col(0))));
+      deepest =
+          std::max(deepest, moved.dot(contact.held ? outward_normal(parts_.state.surface.tree,
+                                                                    nodes_of(parts_.body, contact.simplex))
+                                                   : Vec3(contact.frame.col(0))));
     }
     return deepest;
   }

@@ -21,33 +21,31 @@ struct HighWater {
   Index simplices = 0;       ///< near a tool, of Scratch::pairs; more were there where it is larger
 };
 
-/// What stages of a tick hand to each other and no tick needs from the one before, except that the forces of
-/// `problem` may be read until the next tick. Sized at start; nothing here is a part of the body's state.
+/// What stages of a tick hand to each other. No tick needs it from the one before: only `high_water` goes on,
+/// and the problem's forces may be read until the next tick. Sized at start. Each member: shape, who fills
+/// it.
 struct Scratch {
   /// Room for the tools' contacts: `max_contacts` of all tools together, `near_nodes` nodes near them.
   Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes);
 
-  //                                            shape                 filled by
-  std::vector<ContactPoint>
-      last_contacts;                   // [max_contacts]        remember_contacts: of the tick or pass before
-  Index last_count = 0;                //
-  std::vector<Index> found;            // [simplices]           detection, free motion: those near a tool
-  std::vector<double> found_distance;  // [simplices] [m^2]     detection
-  std::vector<TouchingPair> pairs;     // [2 max_contacts]      detection
-  std::vector<ContactPoint> candidates;  // [6 max_contacts tools] detection: before the deepest are chosen
-  Index candidate_count = 0;             //
-  bool is_first_pass = true;             //                       solve_contact: of the tick's Newton passes
-  ContactProblem problem;                // [rows]                assembly: W, b; solution: lambda
-  std::vector<ContactRow> rows;          // [rows]                assembly: J
-  std::vector<double> row_response;      // [d near_nodes] [m/N]  assembly: a column of Xi J^T
-  std::vector<double> tilt_spring;       // [rows] [m/N]          assembly: of edges and faces
-  ActiveSet active_set;                  //                       solution, without friction
-  ConeSolver cone_solver;                //                       solution, with friction
-  std::vector<double> row_change;        // [rows] [m]            linearise: db
-  std::vector<double> force_change;      // [rows] [N]            linearise: dlambda
-  std::vector<double>
-      far_displacement;  // [d tuning.far.nodes]  far surface: of the slice that is renewed [m]
-  HighWater high_water;  //                       detection and assembly
+  std::vector<ContactPoint> last_contacts;  ///< [max_contacts] remember_contacts: of the tick or pass before
+  Index last_count = 0;
+  std::vector<Index> found;              ///< [F] detection, free motion: simplices near a tool
+  std::vector<double> found_distance;    ///< [F] detection: squared [m^2]
+  std::vector<TouchingPair> pairs;       ///< [2 max_contacts] detection
+  std::vector<ContactPoint> candidates;  ///< [6 max_contacts tools] detection: before the deepest are chosen
+  Index candidate_count = 0;
+  bool is_first_pass = true;             ///< solve_contact: of the tick's Newton passes
+  ContactProblem problem;                ///< [rows] assembly: W and b; solution: lambda
+  std::vector<ContactRow> rows;          ///< [rows] assembly: J
+  std::vector<double> row_response;      ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
+  std::vector<double> tilt_spring;       ///< [rows] assembly: of edges and faces [m/N]
+  ActiveSet active_set;                  ///< solution without friction
+  ConeSolver cone_solver;                ///< solution with friction
+  std::vector<double> row_change;        ///< [rows] linearise: db [m]
+  std::vector<double> force_change;      ///< [rows] linearise: dlambda [N]
+  std::vector<double> far_displacement;  ///< [d tuning.far.nodes] far surface: the slice that is renewed [m]
+  HighWater high_water;                  ///< detection and assembly: since the start
 };
 
 }  // namespace palpate

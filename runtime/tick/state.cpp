@@ -1,6 +1,5 @@
 #include "runtime/tick/state.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -100,14 +99,5 @@ State::State(const Body& body, const StateOptions& options)
       contact_points(options.max_contacts),
       surface(make_surface(body, options)),
       scratch(body, static_cast<Index>(tools.size()), options.max_contacts, near_room(options)) {}
-
-Vec3 outward_normal(const Body& body, const State& state, Index simplex) noexcept {
-  const auto d = static_cast<std::size_t>(body.dimension());
-  const std::span<const Index> nodes = body.simplices().subspan(d * static_cast<std::size_t>(simplex), d);
-  const Vec3 a = state.surface.tree.position(nodes[0]);
-  const Vec3 ab = state.surface.tree.position(nodes[1]) - a;
-  if (d == 2) return Vec3(ab.y(), -ab.x(), 0.0).normalized();
-  return ab.cross(state.surface.tree.position(nodes[2]) - a).normalized();
-}
 
 }  // namespace palpate

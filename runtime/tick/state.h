@@ -50,20 +50,19 @@ struct FarSweep {
   double last_change = 0.0;   ///< and in the one before: how wrong a far node can be [m]
 };
 
-/// The deformed surface, as it goes from tick to tick.
+/// The deformed surface, as it goes from tick to tick. Each member: shape, who changes it.
 struct SurfaceState {
-  //                                        shape               changed by
-  SurfaceTree tree;                         // [S] nodes           every stage that moves the surface
-  NearField near;                           // [near nodes]        detection (nodes), solution (forces)
-  FreeMotion motion;                        // [n]                 follow_free_motion, release
-  std::vector<double> stored_displacement;  // [n] [m]          renew_*: by contact forces, as renewed last
-  FarSweep sweep;                           //                     renew_far_surface, renew_patch_surface
-  std::shared_ptr<const Patch>
-      patch;  //                     the overlay wanted; null: none. Taken up by the next tick
-  bool patch_is_older = false;  //                     whoever sets `patch`: it is not the one wanted
-  double rigid_compliance;      // [m/N]               fixed: added to every contact, so that points that
-                                //                     coincide share the force
-  double least_compliance;      // [m/N]               fixed: what body and coupling give way by at least
+  SurfaceTree tree;                         ///< [S] every stage that moves the surface
+  NearField near;                           ///< [near nodes] detection: its nodes; solution: its forces
+  FreeMotion motion;                        ///< [n] follow_free_motion and release
+  std::vector<double> stored_displacement;  ///< [n] by contact forces, as renewed last [m]
+  FarSweep sweep;                           ///< renew_far_surface and renew_patch_surface
+  std::shared_ptr<const Patch> patch;       ///< the overlay wanted, null for none; the next tick takes it up
+  bool patch_is_older = false;  ///< whoever sets `patch`: it is not the one wanted, as the status then tells
+  double rigid_compliance;      ///< fixed: added to every contact, so that points that coincide share the
+                                ///< force [m/N]
+  double least_compliance;      ///< fixed: what body and coupling together give way by at least where a tool
+                                ///< presses [m/N]
 };
 
 struct StateOptions {
@@ -102,8 +101,5 @@ struct State {
 inline Vec3 unloaded_position(const Body& body, SurfaceState& surface, Index surface_node) noexcept {
   return body.surface_rest_positions()[surface_node] + surface.motion.at(body, surface_node);
 }
-
-/// Outward unit normal of a simplex of the surface as it is now.
-Vec3 outward_normal(const Body& body, const State& state, Index simplex) noexcept;
 
 }  // namespace palpate

@@ -3,19 +3,6 @@
 namespace palpate {
 namespace {
 
-Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept {
-  const Vec3& a = tree.position(nodes[0]);
-  const Vec3& b = tree.position(nodes[1]);
-  Vec3 normal;
-  if (nodes[2] < 0) {
-    normal = Vec3(b.y() - a.y(), a.x() - b.x(), 0.0);
-  } else {
-    normal = (b - a).cross(tree.position(nodes[2]) - a);
-  }
-  const double length = normal.norm();
-  return length > 0.0 ? Vec3(normal / length) : Vec3::Zero();
-}
-
 NearestPoint nearest_on_simplex(const SurfaceTree& tree, const SimplexNodes& nodes,
                                 const Vec3& point) noexcept {
   const Vec3& a = tree.position(nodes[0]);
@@ -48,6 +35,19 @@ SimplexNodes nodes_of(const Body& body, Index simplex) noexcept {
   const std::size_t at = d * static_cast<std::size_t>(simplex);
   const std::span<const Index> simplices = body.simplices();
   return {simplices[at], simplices[at + 1], d == 3 ? simplices[at + 2] : -1};
+}
+
+Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept {
+  const Vec3& a = tree.position(nodes[0]);
+  const Vec3& b = tree.position(nodes[1]);
+  Vec3 normal;
+  if (nodes[2] < 0) {
+    normal = Vec3(b.y() - a.y(), a.x() - b.x(), 0.0);
+  } else {
+    normal = (b - a).cross(tree.position(nodes[2]) - a);
+  }
+  const double length = normal.norm();
+  return length > 0.0 ? Vec3(normal / length) : Vec3::Zero();
 }
 
 NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,

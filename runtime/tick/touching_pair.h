@@ -22,6 +22,9 @@ struct TouchingPair {
 using SimplexNodes = std::array<Index, 3>;
 SimplexNodes nodes_of(const Body& body, Index simplex) noexcept;
 
+/// Outward unit normal of a simplex where the tree has it; zero without area.
+Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept;
+
 /// Nearest points of a tool's core and a simplex where the tree has it; of a core that is a point, by that.
 NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
                             bool is_point) noexcept;

@@ -15,7 +15,7 @@
 #include "runtime/solve/node_vectors.h"
 #include "tests/support/runtime_model.h"
 
-namespace palpate::held_nodes_test {
+namespace palpate::prescribed_nodes_test {
 namespace {
 
 /// The same static problem by elimination of the prescribed dofs in the sparse K: no Green's function
@@ -354,4 +354,4 @@ TEST(PrescribedNodes, RefusesToBeBuiltWithoutRoom) {
 }
 
 }  // namespace
-}  // namespace palpate::held_nodes_test
+}  // namespace palpate::prescribed_nodes_test
