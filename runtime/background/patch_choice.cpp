@@ -93,7 +93,7 @@ void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t 
   const ToolState& tool = state.tools[number];
   Followed& followed = tools_[number];
   if (!tool.placed) return;
-  const Vec3 moved = tool.device.position - tool.last_device_position;
+  const Vec3 moved = tool.device.position - tool.last_device.position;
   followed.velocity += tuning.patches.smoothing * (moved - followed.velocity);
   if (tool.contacts > 0) {
     followed.centre = touched_centre(body, state, number);

@@ -7,6 +7,12 @@
 namespace palpate {
 namespace {
 
+/// As much of the way from one vector to another as is no longer than `most`.
+double share_of_way(const Vec3& from, const Vec3& to, double most) noexcept {
+  const double way = (to - from).norm();
+  return way > most ? most / way : 1.0;
+}
+
 void hand_over(ToolState& tool, double tick) noexcept {
   const double milliseconds = tick / tuning.hand.usual_tick;
   const Wrench last = tool.wrench;
@@ -14,21 +20,19 @@ void hand_over(ToolState& tool, double tick) noexcept {
   const double size = contact.force.norm();
   tool.recent_force =
       std::max({size, last.force.norm(), std::pow(tuning.hand.memory, milliseconds) * tool.recent_force});
-  const Vec3 moved = tool.device.position - tool.last_device_position - tool.surface_change;
-  const double explained = (tool.local.stiffness * moved).norm();
   const double handed_over =
       milliseconds * (tool.contacts > 0
                           ? tool.tool.hand_over * std::max(size, last.force.norm())
                           : std::max(tool.tool.hand_over, 1.0 / tuning.hand.fade_time) * tool.recent_force);
-  const double change = (contact.force - last.force).norm();
-  if (!(change > explained + handed_over)) {
-    tool.wrench = contact;
-    return;
-  }
-  const double share = (explained + handed_over) / change;
-  tool.wrench.force = last.force + share * (contact.force - last.force);
-  tool.wrench.torque = last.torque + share * (contact.torque - last.torque);
-  tool.status |= StepStatus::handing_over;
+  const double force = share_of_way(last.force, contact.force, tool.explained.force.norm() + handed_over);
+  const double arm = std::max(tool.tool.radius + tool.tool.length, tool.tool.reach);
+  const double torque = tool.contacts > 0 ? share_of_way(last.torque, contact.torque,
+                                                         tool.explained.torque.norm() + arm * handed_over)
+                                          : force;  // what is lost fades as one
+  tool.wrench = contact;
+  if (force < 1.0) tool.wrench.force = last.force + force * (contact.force - last.force);
+  if (torque < 1.0) tool.wrench.torque = last.torque + torque * (contact.torque - last.torque);
+  if (force < 1.0 || torque < 1.0) tool.status |= StepStatus::handing_over;
 }
 
 void limit(ToolState& tool) noexcept {

@@ -20,16 +20,16 @@ Eigen::Matrix3d passive(const Eigen::Matrix3d& stiffness) noexcept {
   return vectors * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * vectors.transpose();
 }
 
-/// Motions along the rows when the device moves by 1 along an axis.
-void fill_row_change(const State& state, Scratch& scratch, Index number, int axis) noexcept {
+/// Motions along the rows when the device moves by `motion`, and is turned by `turn` about its origin.
+void fill_row_change(const State& state, Scratch& scratch, Index number, const Vec3& motion,
+                     const Vec3& turn) noexcept {
   const ContactProblem& problem = scratch.problem;
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
     const auto first = static_cast<std::size_t>(problem.first_row(k));
-    for (Index i = 0; i < problem.rows_of(k); ++i) {
-      scratch.row_change[first + static_cast<std::size_t>(i)] =
-          contact.tool == number ? contact.frame(axis, i) : 0.0;
-    }
+    const Vec3 there = contact.tool == number ? Vec3(motion + turn.cross(contact.arm)) : Vec3::Zero();
+    for (Index i = 0; i < problem.rows_of(k); ++i)
+      scratch.row_change[first + static_cast<std::size_t>(i)] = contact.frame.col(i).dot(there);
   }
 }
 
@@ -41,29 +41,37 @@ void linearise_free(const State& state, ToolState& tool, Index number) noexcept 
   }
 }
 
-/// Change of the tool's force by a motion of 1 along an axis. Contacts that would open by it bound the
-/// radius.
-Vec3 force_change(const State& state, Scratch& scratch, ToolState& tool, Index number) noexcept {
+/// Change of the tool's wrench by what scratch.row_change says.
+Wrench wrench_change(const State& state, Scratch& scratch, Index number) noexcept {
   const ContactProblem& problem = scratch.problem;
   if (problem.frictionless) {
     scratch.active_set.derivative(problem, scratch.row_change, scratch.force_change);
   } else {
     scratch.cone_solver.derivative(problem, scratch.row_change, scratch.force_change);
   }
-  Vec3 change = Vec3::Zero();
+  Wrench change;
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
+    if (contact.tool != number) continue;
     const auto first = static_cast<std::size_t>(problem.first_row(k));
-    if (contact.tool == number) {
-      for (Index i = 0; i < problem.rows_of(k); ++i)
-        change += scratch.force_change[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
-    }
-    if (contact.held) continue;
-    const double rate = std::abs(scratch.force_change[first]);
-    const double normal = problem.lambda[first];
-    if (normal > 0.0 && rate > 0.0) tool.local.radius = std::min(tool.local.radius, normal / rate);
+    Vec3 force = Vec3::Zero();
+    for (Index i = 0; i < problem.rows_of(k); ++i)
+      force += scratch.force_change[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
+    change.force += force;
+    change.torque += contact.arm.cross(force);
   }
   return change;
+}
+
+/// Contacts that would open by the change of forces at a motion of 1 bound the radius.
+void keep_closed_contacts(const State& state, const Scratch& scratch, ToolState& tool) noexcept {
+  for (Index k = 0; k < state.contact_count; ++k) {
+    if (state.contact_points[k].held) continue;
+    const auto first = static_cast<std::size_t>(scratch.problem.first_row(k));
+    const double rate = std::abs(scratch.force_change[first]);
+    const double normal = scratch.problem.lambda[first];
+    if (normal > 0.0 && rate > 0.0) tool.local.radius = std::min(tool.local.radius, normal / rate);
+  }
 }
 
 /// Open contact points of the tool bound the radius by their gaps.
@@ -76,24 +84,48 @@ void keep_open_contacts(const State& state, const ContactProblem& problem, ToolS
   }
 }
 
+/// What the turn of the device in this tick changes of the tool's wrench. Places that are held turn with the
+/// tool.
+Wrench change_by_turning(const State& state, Scratch& scratch, const ToolState& tool, Index number) noexcept {
+  const Eigen::AngleAxisd turned(tool.device.orientation * tool.last_device.orientation.conjugate());
+  const Vec3 turn = turned.angle() * turned.axis();
+  if (turned.angle() == 0.0) return {};
+  fill_row_change(state, scratch, number, Vec3::Zero(), turn);
+  Wrench change = wrench_change(state, scratch, number);
+  for (const ContactPoint& contact : state.contacts()) {
+    if (contact.tool == number && contact.held) change.torque += turn.cross(contact.arm).cross(contact.force);
+  }
+  return change;
+}
+
 void linearise_tool(State& state, Scratch& scratch, Index number) noexcept {
   ToolState& tool = state.tools[number];
   tool.local = {.force = tool.contact_wrench.force,
                 .stiffness = Eigen::Matrix3d::Zero(),
                 .point = tool.device.position,
                 .radius = tool.margin};
+  tool.explained = {};
   if (tool.tool.radius > 0.0)
     tool.local.radius = std::min(tool.local.radius, tuning.hand.curvature_share * tool.tool.radius);
   if (tool.contacts == 0) return linearise_free(state, tool, number);
 
-  Eigen::Matrix3d change = Eigen::Matrix3d::Zero();  // of the force by a motion of the device
+  Eigen::Matrix3d force = Eigen::Matrix3d::Zero();  // change by a motion of the device
+  Eigen::Matrix3d torque = Eigen::Matrix3d::Zero();
   std::fill_n(scratch.row_change.begin(), scratch.problem.rows, 0.0);
   for (int axis = 0; axis < scratch.problem.dimension; ++axis) {
-    fill_row_change(state, scratch, number, axis);
-    change.col(axis) = force_change(state, scratch, tool, number);
+    fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero());
+    const Wrench change = wrench_change(state, scratch, number);
+    force.col(axis) = change.force;
+    torque.col(axis) = change.torque;
+    keep_closed_contacts(state, scratch, tool);
   }
   keep_open_contacts(state, scratch.problem, tool, number);
-  if (change.allFinite()) tool.local.stiffness = passive(-change);
+  if (force.allFinite()) tool.local.stiffness = passive(-force);
+
+  const Vec3 moved = tool.device.position - tool.last_device.position - tool.surface_change;
+  const Wrench turning = change_by_turning(state, scratch, tool, number);
+  tool.explained = {.force = turning.force - tool.local.stiffness * moved,
+                    .torque = turning.torque + torque * moved};
 }
 
 }  // namespace

@@ -27,13 +27,14 @@ struct ToolState {
   Wrench wrench;               ///< on the hand, about the tool's origin: what the device is to display
   LocalModel local;            ///< of wrench.force
   Wrench last_contact_wrench;  ///< of the tick or pass before
-  Vec3 last_device_position = Vec3::Zero();  ///< of the tick before [m]
-  Vec3 surface_change = Vec3::Zero();        ///< free motion of the touched surface since the tick before [m]
-  double recent_force = 0.0;                 ///< running maximum of the contact force, which fades [N]
-  double margin = 0.0;   ///< how far the surface may be from the tool and still be met in this tick [m]
-  Index contacts = 0;    ///< closed contact points
-  bool placed = false;   ///< has had a pose
-  bool engaged = false;  ///< can touch
+  ToolPose last_device;        ///< the device pose of the tick before
+  Vec3 surface_change = Vec3::Zero();  ///< free motion of the touched surface since the tick before [m]
+  Wrench explained;           ///< what the device's motion in this tick changes of the contact's wrench
+  double recent_force = 0.0;  ///< running maximum of the contact force, which fades [N]
+  double margin = 0.0;        ///< how far the surface may be from the tool and still be met in this tick [m]
+  Index contacts = 0;         ///< closed contact points
+  bool placed = false;        ///< has had a pose
+  bool engaged = false;       ///< can touch
   bool has_been_clear = false;  ///< of the body once: nothing is felt before; a tool that is lost in the body
                                 ///< after that is felt again as soon as its core is outside
   bool holding = false;         ///< a grab holds the surface

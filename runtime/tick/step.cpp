@@ -45,11 +45,13 @@ void note_surface_change(const State& state, ToolState& tool, Index number) noex
   if (sum > 0.0) tool.surface_change /= sum;
 }
 
-void give_forces(State& state) noexcept {
-  for (std::size_t k = 0; k < state.tools.size(); ++k) {
+void note_surface_changes(State& state) noexcept {
+  for (std::size_t k = 0; k < state.tools.size(); ++k)
     note_surface_change(state, state.tools[k], static_cast<Index>(k));
-    give_force(state.tools[k], state.tick);
-  }
+}
+
+void give_forces(State& state) noexcept {
+  for (ToolState& tool : state.tools) give_force(tool, state.tick);
 }
 
 StepStatus end_tick(State& state) noexcept {
@@ -67,6 +69,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   remember_contacts(state, scratch);
   update_holds(body, state, scratch);
   if (solve_contact(body, state, scratch)) {
+    note_surface_changes(state);
     linearise(state, scratch);
     give_forces(state);
   }

@@ -50,7 +50,7 @@ bool has_gone_away(const Body& body, const ToolState& tool) noexcept {
 
 void follow_device(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
                    ToolPose wanted) noexcept {
-  tool.last_device_position = tool.device.position;
+  tool.last_device = tool.device;
   if (!make_valid(wanted, body.dimension())) {
     tool.status |= StepStatus::pose_not_finite;
     wanted = tool.device;
@@ -59,7 +59,7 @@ void follow_device(const Body& body, const SurfaceTree& tree, Scratch& scratch, 
   const double size = std::max(body.mean_surface_edge(), tool.tool.radius);
   const double least = tuning.following.margin * body.mean_surface_edge();
   const auto place = [&] {
-    tool.last_device_position = wanted.position;  // nothing that is felt now comes from a motion
+    tool.last_device = wanted;  // nothing that is felt now comes from a motion
     tool.pose = tool.device = wanted;
     tool.margin = least;
     tool.placed = true;

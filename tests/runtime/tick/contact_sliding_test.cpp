@@ -47,7 +47,8 @@ Jumps slide(const Body& body, State& state, const Place& place, int ticks) {
     jumps.largest = std::max(jumps.largest, (force - last).norm() / std::max(force.norm(), last.norm()));
     jumps.least_force = std::min(jumps.least_force, force.norm());
     jumps.largest_force = std::max(jumps.largest_force, force.norm());
-    EXPECT_EQ(has(status, StepStatus::handing_over), force != tool.contact_wrench.force);
+    EXPECT_EQ(has(status, StepStatus::handing_over),
+              force != tool.contact_wrench.force || tool.wrench.torque != tool.contact_wrench.torque);
     last = force;
   }
   return jumps;

@@ -183,7 +183,7 @@ TEST_P(Sliding, FollowsTheToolWithoutAJump) {
     EXPECT_FALSE(has(step(body_, state, pose(0.3 + 0.0005 * tick, 0.05)), StepStatus::older_patch));
     const ToolState& tool = state.tools.front();
     const double explained =
-        (tool.local.stiffness * (tool.device.position - tool.last_device_position)).norm();
+        (tool.local.stiffness * (tool.device.position - tool.last_device.position)).norm();
     largest = std::max(largest, ((tool.wrench.force - last).norm() - explained) / tool.wrench.force.norm());
     last = tool.wrench.force;
   }
