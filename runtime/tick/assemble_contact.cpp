@@ -6,6 +6,7 @@
 
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
+#include "runtime/tick/rolling.h"
 #include "runtime/tick/tool_geometry.h"
 
 namespace palpate {
@@ -25,21 +26,21 @@ ContactRow contact_row(const NearField& near, const ContactPoint& contact, const
                  .body = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()},
                  .tool = contact.tool,
                  .force = direction,
-                 .moment = contact.arm.cross(direction)};
+                 .moment = contact.rolls ? Vec3::Zero() : Vec3(contact.arm.cross(direction))};
   for (std::size_t n = 0; n < 3; ++n) {
     if (row.places[n] >= 0) row.body[n] = contact.weights[n] * direction;
   }
   return row;
 }
 
-/// Radius times the slope along a tangent, as a row.
+/// Radius times the slope along a tangent, as a row; where the contact rolls, with the motion of the tool.
 ContactRow tilt_row(const NearField& near, const ContactPoint& contact, double radius,
                     const Vec3& tangent) noexcept {
   ContactRow row;
+  if (contact.rolls) row = contact_row(near, contact, tangent);
   row.places = places_of(near, contact);
   for (std::size_t n = 0; n < 3; ++n) {
-    if (row.places[n] < 0) continue;
-    row.body[n] = radius * contact.slope[n].dot(tangent) * contact.frame.col(0);
+    if (row.places[n] >= 0) row.body[n] -= radius * contact.slope[n].dot(tangent) * contact.frame.col(0);
   }
   return row;
 }
@@ -112,10 +113,10 @@ double normal_force(const Scratch& scratch, const ContactPoint& contact, const C
   return count > 0.0 ? sum / count : 0.0;
 }
 
-void add_tilt(const State& state, Scratch& scratch, Index number, double force,
-              double least_radius) noexcept {
+void add_tilt(const State& state, Scratch& scratch, Index number, double force, double edge) noexcept {
   const ContactPoint& contact = state.contact_points[number];
-  const double radius = std::max(least_radius, state.tools[contact.tool].tool.radius);
+  const ToolState& tool = state.tools[contact.tool];
+  const double radius = rolling_radius(tool.tool, edge);
   const auto nodes =
       std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
   if (contact.held || nodes < 2 || !(force * radius > 0.0)) return;
@@ -124,6 +125,7 @@ void add_tilt(const State& state, Scratch& scratch, Index number, double force,
     scratch.problem.add_held_row(number);
     scratch.rows[at] = tilt_row(state.surface.near, contact, radius, tangent);
     scratch.problem.b[at] = unloading(state.surface.near, scratch.rows[at]);
+    if (contact.rolls) scratch.problem.b[at] += tangent.dot(tool.device.position - tool.pose.position);
     scratch.tilt_spring[at] = radius / force;
   };
   if (nodes == 3) {
@@ -256,7 +258,7 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
     const ContactPoint& contact = contacts[k];
     const double force =
         normal_force(scratch, contact, same_contact(scratch, contact), tuning.assembly.closed_gap * edge);
-    add_tilt(state, scratch, k, force, tuning.assembly.least_tilt_radius * edge);
+    add_tilt(state, scratch, k, force, edge);
   }
   HighWater& most = scratch.high_water;
   most.contact_points = std::max(most.contact_points, state.contact_count);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/rolling.h"
 
 namespace palpate {
 namespace {
@@ -157,6 +158,19 @@ bool is_held_already(const Body& body, const State& state, const ContactPoint& c
                      });
 }
 
+/// Whether a contact's normal turns as the tool moves: at a vertex, and on an edge or face that carried
+/// force.
+bool rolls(const Scratch& scratch, const Tool& tool, const ContactPoint& contact) noexcept {
+  if (tool.length > 0.0 || contact.friction > 0.0) return false;
+  if (std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; }) == 1)
+    return true;
+  const auto end = scratch.last_contacts.begin() + scratch.last_count;
+  return std::any_of(scratch.last_contacts.begin(), end, [&](const ContactPoint& last) {
+    return last.feature == contact.feature && last.tool == contact.tool &&
+           last.force.dot(last.frame.col(0)) > 0.0;
+  });
+}
+
 void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_number, Index begin,
                    const TouchingPair& pair, bool face_tells) noexcept {
   ToolState& tool = state.tools[tool_number];
@@ -182,6 +196,13 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.frame = frame_of(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
+  contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
+  if (contact.rolls && scratch.is_first_pass) {
+    const Vec3 shift = tuning.assembly.foreseen_share * (tool.device.position - tool.last_device.position);
+    const Vec3 rolled = rolled_normal(normal, shift, rolling_radius(tool.tool, body.mean_surface_edge()));
+    contact.frame = frame_of(rolled, body.dimension());
+    contact.gap = rolled.dot(pair.nearest.on_core - pair.nearest.on_simplex) - tool.tool.radius;
+  }
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
   scratch.candidates[scratch.candidate_count++] = contact;

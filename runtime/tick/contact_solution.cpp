@@ -88,6 +88,24 @@ bool solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
   return true;
 }
 
+void give_contact_force(const Scratch& scratch, Index number, ContactPoint& contact) noexcept {
+  const auto first = static_cast<std::size_t>(scratch.problem.first_row(number));
+  contact.force.setZero();
+  for (Index i = 0; i < scratch.problem.rows_of(number); ++i)
+    contact.force += scratch.problem.lambda[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
+}
+
+/// Turns the forces of contacts that roll as their faces and edges tilt.
+void add_tilt_forces(State& state, const Scratch& scratch) noexcept {
+  const ContactProblem& problem = scratch.problem;
+  for (Index k = state.contact_count; k < problem.contacts; ++k) {
+    ContactPoint& contact = state.contact_points[problem.owner[k]];
+    const Index row = problem.first_row(k);
+    if (contact.rolls && problem.lambda[problem.first_row(problem.owner[k])] > 0.0)
+      contact.force += problem.lambda[row] * scratch.rows[row].force;
+  }
+}
+
 /// Back to the contacts that were solved for.
 void recall_contacts(State& state, const Scratch& scratch) noexcept {
   std::copy_n(scratch.last_contacts.begin(), scratch.last_count, state.contact_points.begin());
@@ -122,26 +140,24 @@ void apply_forces(State& state, const Scratch& scratch) noexcept {
     }
   }
   state.surface.near.displace();
+  for (Index k = 0; k < state.contact_count; ++k) give_contact_force(scratch, k, state.contact_points[k]);
+  add_tilt_forces(state, scratch);
   for (Index k = 0; k < state.contact_count; ++k) {
-    ContactPoint& contact = state.contact_points[k];
-    const auto first = static_cast<std::size_t>(scratch.problem.first_row(k));
-    contact.force.setZero();
-    for (Index i = 0; i < scratch.problem.rows_of(k); ++i)
-      contact.force += scratch.problem.lambda[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
+    const ContactPoint& contact = state.contact_points[k];
     if (contact.force.squaredNorm() == 0.0) continue;
     ToolState& tool = state.tools[contact.tool];
     ++tool.contacts;
     if (contact.rigid) tool.status |= StepStatus::rigid_contact;
     tool.contact_wrench.force += contact.force;
-    tool.contact_wrench.torque += contact.arm.cross(contact.force);
+    if (!contact.rolls) tool.contact_wrench.torque += contact.arm.cross(contact.force);
   }
 }
 
 bool solve_contact(const Body& body, State& state, Scratch& scratch) noexcept {
+  scratch.is_first_pass = true;
   find_contacts(body, state, scratch);
   change_patch(body, state);
   bool rough = is_rough(body, state);
-  scratch.is_first_pass = true;
   bool valid = solve_pass(body, state, scratch);
   scratch.is_first_pass = false;
   const auto wants_pass = [&](int pass) {

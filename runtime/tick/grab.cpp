@@ -9,6 +9,7 @@ void hold_contact(State& state, const ContactPoint& contact) noexcept {
   const ToolState& tool = state.tools[contact.tool];
   ContactPoint held = contact;
   held.held = true;
+  held.rolls = false;
   held.feature = -1 - state.held_count;
   held.frame.setIdentity();
   held.tool_point = tool.pose.orientation.conjugate() * (contact.position - tool.pose.position);

@@ -6,6 +6,8 @@
 #include <limits>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/linearise_rolling.h"
+#include "runtime/tick/rolling.h"
 
 namespace palpate {
 namespace {
@@ -27,10 +29,13 @@ void fill_row_change(const State& state, Scratch& scratch, Index number, const V
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
     const auto first = static_cast<std::size_t>(problem.first_row(k));
-    const Vec3 there = contact.tool == number ? Vec3(motion + turn.cross(contact.arm)) : Vec3::Zero();
+    Vec3 there = contact.tool == number ? motion : Vec3::Zero();
+    if (contact.tool == number && !contact.rolls) there += turn.cross(contact.arm);
     for (Index i = 0; i < problem.rows_of(k); ++i)
       scratch.row_change[first + static_cast<std::size_t>(i)] = contact.frame.col(i).dot(there);
   }
+  for (Index i = problem.first_row(state.contact_count); i < problem.rows; ++i)
+    scratch.row_change[i] = scratch.rows[i].tool == number ? scratch.rows[i].force.dot(motion) : 0.0;
 }
 
 /// How far a free tool may move before it touches: what its nearest contact point leaves.
@@ -58,9 +63,33 @@ Wrench wrench_change(const State& state, Scratch& scratch, Index number) noexcep
     for (Index i = 0; i < problem.rows_of(k); ++i)
       force += scratch.force_change[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
     change.force += force;
-    change.torque += contact.arm.cross(force);
+    if (!contact.rolls) change.torque += contact.arm.cross(force);
+  }
+  for (Index i = problem.first_row(state.contact_count); i < problem.rows; ++i) {
+    if (scratch.rows[i].tool == number) change.force += scratch.force_change[i] * scratch.rows[i].force;
   }
   return change;
+}
+
+/// Change of the tool's wrench by a motion of the device for which scratch.row_change stands, with the
+/// turning of normals by it and by what it moves: a fixed point, of which each pass is as much smaller as the
+/// tool is deep.
+Wrench wrench_change_by_motion(const State& state, Scratch& scratch, Index number, const Vec3& motion,
+                               double radius) noexcept {
+  const Tool& tool = state.tools[number].tool;
+  Wrench change;
+  Vec3 tool_motion = motion;
+  begin_derivative(state, scratch);
+  for (int pass = 1;; ++pass) {
+    const Vec3 turned = turn_normals(state, scratch, number, tool_motion, radius);
+    const Vec3 before = change.force;
+    change = wrench_change(state, scratch, number);
+    change.force += turned;
+    const bool follows = (change.force - before).norm() > tuning.hand.rolling_tolerance * change.force.norm();
+    if (!follows || scratch.rolling_count == 0 || pass == tuning.hand.rolling_passes) return change;
+    follow_forces(state, scratch);
+    tool_motion = motion + change.force / tool.coupling_stiffness;
+  }
 }
 
 /// Contacts that would open by the change of forces at a motion of 1 bound the radius.
@@ -98,7 +127,7 @@ Wrench change_by_turning(const State& state, Scratch& scratch, const ToolState& 
   return change;
 }
 
-void linearise_tool(State& state, Scratch& scratch, Index number) noexcept {
+void linearise_tool(State& state, Scratch& scratch, Index number, double edge) noexcept {
   ToolState& tool = state.tools[number];
   tool.local = {.force = tool.contact_wrench.force,
                 .stiffness = Eigen::Matrix3d::Zero(),
@@ -109,12 +138,15 @@ void linearise_tool(State& state, Scratch& scratch, Index number) noexcept {
     tool.local.radius = std::min(tool.local.radius, tuning.hand.curvature_share * tool.tool.radius);
   if (tool.contacts == 0) return linearise_free(state, tool, number);
 
+  const bool rolls = begin_rolling(state, scratch, number);
+  const double radius = rolling_radius(tool.tool, edge);
   Eigen::Matrix3d force = Eigen::Matrix3d::Zero();  // change by a motion of the device
   Eigen::Matrix3d torque = Eigen::Matrix3d::Zero();
   std::fill_n(scratch.row_change.begin(), scratch.problem.rows, 0.0);
   for (int axis = 0; axis < scratch.problem.dimension; ++axis) {
     fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero());
-    const Wrench change = wrench_change(state, scratch, number);
+    const Wrench change = rolls ? wrench_change_by_motion(state, scratch, number, Vec3::Unit(axis), radius)
+                                : wrench_change(state, scratch, number);
     force.col(axis) = change.force;
     torque.col(axis) = change.torque;
     keep_closed_contacts(state, scratch, tool);
@@ -130,8 +162,9 @@ void linearise_tool(State& state, Scratch& scratch, Index number) noexcept {
 
 }  // namespace
 
-void linearise(State& state, Scratch& scratch) noexcept {
-  for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) linearise_tool(state, scratch, k);
+void linearise(const Body& body, State& state, Scratch& scratch) noexcept {
+  for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k)
+    linearise_tool(state, scratch, k, body.mean_surface_edge());
 }
 
 }  // namespace palpate

@@ -6,6 +6,6 @@
 namespace palpate {
 
 /// Fills the local model of each tool after the contact problem was solved and the forces were applied.
-void linearise(State& state, Scratch& scratch) noexcept;
+void linearise(const Body& body, State& state, Scratch& scratch) noexcept;
 
 }  // namespace palpate

@@ -30,6 +30,13 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       cone_solver(body.dimension() * max_contacts, most_rows(body, max_contacts)),
       row_change(rows.size()),
       force_change(rows.size()),
+      rolling_number(size(near_nodes)),
+      rolling_places(size(tuning.hand.rolling_places)),
+      rolling_response(size(body.dimension() * tuning.hand.rolling_places) *
+                       size(body.dimension() * tuning.hand.rolling_places)),
+      rolling_load(size(body.dimension() * tuning.hand.rolling_places)),
+      rolling_motion(rolling_load.size()),
+      device_change(rows.size()),
       far_displacement(size(body.dimension() * tuning.far.nodes)) {}
 
 }  // namespace palpate

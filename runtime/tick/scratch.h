@@ -44,6 +44,13 @@ struct Scratch {
   ConeSolver cone_solver;                ///< solution with friction
   std::vector<double> row_change;        ///< [rows] linearise: db [m]
   std::vector<double> force_change;      ///< [rows] linearise: dlambda [N]
+  Index rolling_count = 0;               ///< linearise: of rolling_places
+  std::vector<Index> rolling_number;     ///< [near_nodes] linearise: place among rolling_places, -1 for none
+  std::vector<Index> rolling_places;     ///< [rolling_places] linearise: near nodes that carry force
+  std::vector<double> rolling_response;  ///< [(d rolling_places)^2] linearise: Xi of these [m/N]
+  std::vector<double> rolling_load;      ///< [d rolling_places] linearise: change of their forces [N]
+  std::vector<double> rolling_motion;    ///< [d rolling_places] linearise: what the load displaces them [m]
+  std::vector<double> device_change;     ///< [rows] linearise: db without the turning [m]
   std::vector<double> far_displacement;  ///< [d tuning.far.nodes] far surface: the slice that is renewed [m]
   HighWater high_water;                  ///< detection and assembly: since the start
 };

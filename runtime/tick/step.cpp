@@ -70,7 +70,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   update_holds(body, state, scratch);
   if (solve_contact(body, state, scratch)) {
     note_surface_changes(state);
-    linearise(state, scratch);
+    linearise(body, state, scratch);
     give_forces(state);
   }
   release(body, state);

@@ -32,7 +32,7 @@ TickStages time_stages(const Body& body, State& state, const ToolPose& pose) {
   stages.assemble = seconds([&] { assemble_contact(body, state, scratch); });
   stages.solve = seconds([&] { solve_problem(scratch); });
   stages.displace = seconds([&] { apply_forces(state, scratch); });
-  stages.linearise = seconds([&] { linearise(state, scratch); });
+  stages.linearise = seconds([&] { linearise(body, state, scratch); });
   return stages;
 }
 
