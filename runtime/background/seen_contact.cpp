@@ -12,13 +12,18 @@ Vec3 surface_position(const State& state, const ContactPoint& contact) noexcept 
   return position;
 }
 
+/// The normal of a sphere that slides without friction has turned within the tick, and its force with it.
+Vec3 normal_of(const Body& body, const State& state, const ContactPoint& contact) noexcept {
+  if (contact.held) return outward_normal(state.surface.tree, nodes_of(body, contact.simplex));
+  if (contact.rolls && !contact.force.isZero(0.0)) return contact.force.normalized();
+  return contact.frame.col(0);
+}
+
 }  // namespace
 
 SeenContact seen_contact(const Body& body, const State& state, const ContactPoint& contact) noexcept {
-  return {surface_position(state, contact),
-          contact.held ? outward_normal(state.surface.tree, nodes_of(body, contact.simplex))
-                       : Vec3(contact.frame.col(0)),
-          Vec3::Zero() - contact.force, contact.held};
+  return {surface_position(state, contact), normal_of(body, state, contact), Vec3::Zero() - contact.force,
+          contact.held};
 }
 
 }  // namespace palpate

@@ -9,26 +9,16 @@
 #include "runtime/background/surface_frames.h"
 
 namespace palpate {
-namespace {
-
-/// The gap that the tick left, to first order: the contact's normal row of r = b + W lambda.
-double gap_after(const ContactProblem& problem, Index contact) {
-  const Index normal = problem.first_row(contact);
-  double gap = problem.b[static_cast<std::size_t>(normal)];
-  for (Index j = 0; j < problem.rows; ++j)
-    gap += problem.w(normal, j) * problem.lambda[static_cast<std::size_t>(j)];
-  return gap;
-}
-
-}  // namespace
-
 std::string contact_table(const Body& body, const State& state) {
   std::string table = "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held\n";
   const std::span<const ContactPoint> contacts = state.contacts();
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const ContactPoint& contact = contacts[k];
     const auto [x, n, f, held] = seen_contact(body, state, contact);
-    const double gap = held ? 0.0 : gap_after(state.scratch.problem, static_cast<Index>(k));
+    const bool is_left_out = state.scratch.problem.rows_of(static_cast<Index>(k)) == 0;
+    const double gap = held          ? 0.0
+                       : is_left_out ? contact.gap
+                                     : state.scratch.problem.gap(static_cast<Index>(k));
     table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), n.x(), n.y(), n.z(),
                          f.x(), f.y(), f.z(), gap, contact.simplex, held ? 1 : 0);
   }

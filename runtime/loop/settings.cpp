@@ -230,7 +230,7 @@ void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
                 "tool's origin",
                 positive_number, reach.has_value()},
         reach);
-  visit(Setting{"max-contacts", SettingGroup::tool, "N", "", "32",
+  visit(Setting{"max-contacts", SettingGroup::tool, "N", "", "256",
                 "most contact points; where there are more, the deepest are kept", contact_counts},
         max_contacts);
   for_each_body_setting(settings, visit);

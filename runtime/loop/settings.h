@@ -25,7 +25,7 @@ inline constexpr NumberRange tick_rates{1000.0, 5000.0, true, true, "from 1000 t
 struct Settings {
   Tool tool;                    ///< but for its reach
   std::optional<double> reach;  ///< [m]; else the longest edge of the surface
-  Index max_contacts = 32;
+  Index max_contacts = 256;
   ContactModel contact = ContactModel::quasi_static;
   double load_scale = 1.0;                                   ///< of the file's loads
   double stiffness_scale = 1.0;                              ///< of all Young's moduli

@@ -71,6 +71,34 @@ struct ConeTuning {
                             ///< 220, the rest to 2e-4 of the force
 };
 
+/// The solver for contact of many points. The numbers are those of a comparison of solvers on the demo's
+/// bodies (docs/decisions).
+struct ManyTuning {
+  int few_contacts = 32;          ///< contact points that the direct solvers have room for, where some rub,
+  int few_closed = 10;            ///< of which so many may be closed;
+  int few_frictionless = 160;     ///< and contact points where none rubs
+  double open_gap = 0.002;        ///< [edge] a contact without force that is farther is left out of the tick
+  double least_residual = 2e-8;   ///< [largest force] of the guess: nothing is to be done
+  double reduction = 0.01;        ///< [residual of the guess] that a tick reaches at least: rest is reached
+  double tolerance = 2e-5;        ///< [largest force]
+  double rough_tolerance = 3e-4;  ///< [largest force] beyond `smooth_work`
+  double smooth_work = 3e6;       ///< multiplications
+  double accepted = 3e-3;         ///< [largest force] at the end of the budget
+  int most_rounds = 20;           ///< steps of Newton's method, each with its sweeps
+  double most_work = 1.4e7;       ///< multiplications
+  double easy_share = 0.2;        ///< [most_work] less leaves time for another pass
+  int sweeps = 2;                 ///< block Gauss-Seidel sweeps before and after a step of Newton's method
+  int local_rounds = 8;           ///< for the direction of a contact that slips
+  float local_tolerance = 1e-4F;
+  int fewest_steps = 16;  ///< of GMRES
+  int most_steps = 48;
+  double step_work = 6e6;  ///< multiplications of GMRES, between these bounds
+  float linear_tolerance = 0.01F;
+  double gain = 0.7;       ///< [residual before] a step of Newton's method that gains less has failed
+  double slipping = 1e-5;  ///< [1] nearer to the cone's edge, a contact slips
+  int most_failures = 5;   ///< from here on there are sweeps alone
+};
+
 /// What the hand is given.
 struct HandTuning {
   double usual_tick = 0.001;         ///< [s] the unit of the shares a millisecond
@@ -116,6 +144,7 @@ struct TickTuning {
   AssemblyTuning assembly;
   PassTuning passes;
   ConeTuning cone;
+  ManyTuning many;
   HandTuning hand;
   FarTuning far;
   BodyTuning body;

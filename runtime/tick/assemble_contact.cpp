@@ -75,9 +75,48 @@ const ContactPoint* same_contact(const Scratch& scratch, const ContactPoint& con
   return found == end ? nullptr : &*found;
 }
 
-void add_contact(const State& state, Scratch& scratch, const ContactPoint& contact,
-                 const ContactPoint* last) noexcept {
+/// What a contact's tool and surface move against each other in the tick if no force changes, and how far
+/// they are apart: along n, the gap.
+Vec3 motion_of(const State& state, const Scratch& scratch, const ContactPoint& contact,
+               const ContactPoint* last) noexcept {
+  const ToolState& tool = state.tools[contact.tool];
+  Vec3 motion = device_motion(tool.pose, tool.device, contact.arm);
+  if (contact.held) return motion + tool.pose.position + contact.arm - contact.position;
+  const Vec3 n = contact.frame.col(0);
+  motion += contact.gap * n;
+  if (!scratch.is_first_pass) return motion;
+  Vec3 slip = Vec3::Zero();
+  for (int i = 1; i < scratch.problem.dimension; ++i)
+    slip -= free_slip(state.surface, contact, contact.frame.col(i)) * contact.frame.col(i);
+  if (last != nullptr) slip += last->carry - n.dot(last->carry) * n;
+  return motion + slip;
+}
+
+/// Where contacts are many, those with friction and those that are held have a row for each axis: their
+/// compliance is that of their nodes as it stands, however the normals turn.
+void add_one_of_many(const State& state, Scratch& scratch, const ContactPoint& contact,
+                     const ContactPoint* last, double least_gap) noexcept {
   ContactProblem& problem = scratch.problem;
+  const Index first = problem.rows;
+  const Vec3 motion = motion_of(state, scratch, contact, last);
+  if (!contact.held && (last == nullptr || last->force.isZero(0.0)) &&
+      motion.dot(contact.frame.col(0)) > least_gap)
+    return problem.add_open();
+  const bool has_axes = contact.held || contact.friction > 0.0;
+  problem.add(contact.friction, contact.held, has_axes ? Vec3(contact.frame.col(0)) : Vec3::UnitX());
+  for (Index i = first; i < problem.rows; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const Vec3 direction = has_axes ? Vec3::Unit(i - first) : Vec3(contact.frame.col(0));
+    scratch.rows[at] = contact_row(state.surface.near, contact, direction);
+    problem.b[at] = direction.dot(motion);
+    if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
+  }
+}
+
+void add_contact(const State& state, Scratch& scratch, const ContactPoint& contact, const ContactPoint* last,
+                 double least_gap) noexcept {
+  ContactProblem& problem = scratch.problem;
+  if (problem.many) return add_one_of_many(state, scratch, contact, last, least_gap);
   const Index first = problem.rows;
   problem.add(contact.friction, contact.held);
   const ToolState& tool = state.tools[contact.tool];
@@ -119,12 +158,12 @@ void add_tilt(const State& state, Scratch& scratch, Index number, double force, 
   const double radius = rolling_radius(tool.tool, edge);
   const auto nodes =
       std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; });
-  if (contact.held || nodes < 2 || !(force * radius > 0.0)) return;
+  if (contact.held || scratch.problem.rows_of(number) == 0 || nodes < 2 || !(force * radius > 0.0)) return;
   const auto add = [&](const Vec3& tangent) {
     const auto at = static_cast<std::size_t>(scratch.problem.rows);
     scratch.problem.add_held_row(number);
     scratch.rows[at] = tilt_row(state.surface.near, contact, radius, tangent);
-    scratch.problem.b[at] = unloading(state.surface.near, scratch.rows[at]);
+    if (!scratch.problem.many) scratch.problem.b[at] = unloading(state.surface.near, scratch.rows[at]);
     if (contact.rolls) scratch.problem.b[at] += tangent.dot(tool.device.position - tool.pose.position);
     scratch.tilt_spring[at] = radius / force;
   };
@@ -169,15 +208,41 @@ void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept 
   }
 }
 
+/// What the body gives way at a contact along its normal, or where it gives way least of one that is held.
+double least_give(const ContactProblem& problem, const ContactPoint& contact, Index k) noexcept {
+  const Index first = problem.first_row(k);
+  const Index rows = problem.rows_of(k);
+  const auto diagonal = [&](Index i) { return problem.many ? problem.single_row(i)[i] : problem.w(i, i); };
+  if (problem.many && !contact.held && rows > 1) {
+    double give = 0.0;
+    for (Index i = 0; i < rows; ++i) {
+      for (Index j = 0; j < rows; ++j)
+        give += problem.normal[k][i] * problem.normal[k][j] * problem.single_row(first + i)[first + j];
+    }
+    return give;
+  }
+  double give = diagonal(first);
+  for (Index i = first + 1; contact.held && i < first + rows; ++i) give = std::min<double>(give, diagonal(i));
+  return give;
+}
+
 /// Which contacts press on what the body does not give way at, or hold it. Before the couplings are in W.
 void note_rigid_contacts(State& state, const ContactProblem& problem) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
     ContactPoint& contact = state.contact_points[k];
-    const Index first = problem.first_row(k);
-    const Index rows = contact.held ? problem.rows_of(k) : 1;
-    contact.rigid = false;
-    for (Index i = first; i < first + rows; ++i)
-      contact.rigid = contact.rigid || problem.w(i, i) < state.surface.least_compliance;
+    contact.rigid =
+        problem.rows_of(k) > 0 && least_give(problem, contact, k) < state.surface.least_compliance;
+  }
+}
+
+void add_coupling_row(Scratch& scratch, Index j, const Tool& tool) noexcept {
+  const ContactRow& by = scratch.rows[j];
+  const Vec3 force = by.force / tool.coupling_stiffness;
+  const Vec3 moment = by.moment / tool.coupling_torsion;
+  float* w = scratch.problem.single_row(j);
+  for (Index i = 0; i < scratch.problem.rows; ++i) {
+    const ContactRow& at = scratch.rows[i];
+    if (at.tool == by.tool) w[i] += static_cast<float>(at.force.dot(force) + at.moment.dot(moment));
   }
 }
 
@@ -189,6 +254,10 @@ void add_coupling_compliance(const State& state, Scratch& scratch) noexcept {
     if (by.tool < 0) continue;
     const Tool& tool = state.tools[by.tool].tool;
     if (std::isinf(tool.coupling_stiffness) && std::isinf(tool.coupling_torsion)) continue;
+    if (problem.many) {
+      add_coupling_row(scratch, j, tool);
+      continue;
+    }
     for (Index i = 0; i < problem.rows; ++i) {
       const ContactRow& at = scratch.rows[i];
       if (at.tool != by.tool) continue;
@@ -245,15 +314,108 @@ void regularise(const Body& body, const State& state, Scratch& scratch) noexcept
   }
 }
 
+/// What the surface moves along the rows by as the guess changes the forces that it is under: contact points
+/// have gone, or press on other nodes.
+void add_change_of_forces(const NearField& near, Scratch& scratch) noexcept {
+  ContactProblem& problem = scratch.problem;
+  const int d = near.dimension();
+  const std::ptrdiff_t width = std::ptrdiff_t{d} * near.count();
+  std::fill_n(scratch.guess_force.begin(), width, 0.0);
+  for (Index i = 0; i < problem.rows; ++i) {
+    const ContactRow& row = scratch.rows[i];
+    for (std::size_t n = 0; n < 3; ++n) {
+      if (row.places[n] < 0) continue;
+      for (int axis = 0; axis < d; ++axis)
+        scratch.guess_force[d * row.places[n] + axis] -= problem.lambda[i] * row.body[n][axis];
+    }
+  }
+  std::fill_n(scratch.row_response.begin(), width, 0.0);
+  bool changed = false;
+  for (Index place = 0; place < near.count(); ++place) {
+    const Vec3 force = near.force(place);
+    for (int axis = 0; axis < d; ++axis) {
+      const double change = scratch.guess_force[d * place + axis] - force[axis];
+      if (std::abs(change) <= 1e-12 * force.lpNorm<1>()) continue;
+      add(near.row(d * place + axis).data(), change, scratch.row_response.data(), width);
+      changed = true;
+    }
+  }
+  for (Index i = 0; changed && i < problem.rows; ++i) {
+    const ContactRow& row = scratch.rows[i];
+    for (std::size_t n = 0; n < 3; ++n) {
+      for (int axis = 0; row.places[n] >= 0 && axis < d; ++axis)
+        problem.b[i] -= row.body[n][axis] * scratch.row_response[d * row.places[n] + axis];
+    }
+  }
+}
+
+/// What the couplings are stretched by the guess.
+void add_stretch(const State& state, Scratch& scratch) noexcept {
+  ContactProblem& problem = scratch.problem;
+  for (std::size_t k = 0; k < state.tools.size(); ++k) {
+    const Tool& tool = state.tools[k].tool;
+    Vec3 force = Vec3::Zero();
+    Vec3 torque = Vec3::Zero();
+    const auto is_of_tool = [&](Index i) { return scratch.rows[i].tool == static_cast<Index>(k); };
+    for (Index i = 0; i < problem.rows; ++i) {
+      if (!is_of_tool(i)) continue;
+      force += problem.lambda[i] * scratch.rows[i].force;
+      torque += problem.lambda[i] * scratch.rows[i].moment;
+    }
+    force /= tool.coupling_stiffness;
+    torque /= tool.coupling_torsion;
+    for (Index i = 0; i < problem.rows; ++i) {
+      if (is_of_tool(i))
+        problem.b[i] += scratch.rows[i].force.dot(force) + scratch.rows[i].moment.dot(torque);
+    }
+  }
+}
+
+/// As `regularise`, in single precision.
+void regularise_many(const State& state, Scratch& scratch) noexcept {
+  constexpr double rounding = 4.0 * std::numeric_limits<float>::epsilon();
+  ContactProblem& problem = scratch.problem;
+  for (Index k = 0; k < problem.contacts; ++k) {
+    const Index first = problem.first_row(k);
+    const Index rows = problem.rows_of(k);
+    double give = state.surface.rigid_compliance;
+    if (k < state.contact_count && rows > 0)
+      give = std::max(give, state.surface.least_compliance - least_give(problem, state.contact_points[k], k));
+    const double along_normal = problem.normal_part(k, problem.lambda);
+    for (Index i = first; i < first + rows; ++i) {
+      float& w = problem.single_row(i)[i];
+      w += static_cast<float>(give + rounding * w + scratch.tilt_spring[i]);
+      if (problem.held[k] == 0) problem.b[i] += give * along_normal * problem.normal[k][i - first];
+    }
+  }
+}
+
+/// Whether the contacts are more than the direct solvers take: by the contact points, and by how many of them
+/// are closed or about to be.
+bool are_many(const State& state, const Scratch& scratch) noexcept {
+  const std::span<const ContactPoint> contacts = state.contacts();
+  const bool frictionless = std::all_of(contacts.begin(), contacts.end(), [](const ContactPoint& contact) {
+    return contact.held || contact.friction == 0.0;
+  });
+  if (frictionless) return state.contact_count > tuning.many.few_frictionless;
+  if (state.contact_count > tuning.many.few_contacts) return true;
+  const auto last = std::span(scratch.last_contacts).first(static_cast<std::size_t>(scratch.last_count));
+  const auto closed = std::count_if(last.begin(), last.end(), [](const ContactPoint& contact) {
+    return !contact.held && !contact.force.isZero(0.0);
+  });
+  return closed > tuning.many.few_closed;
+}
+
 }  // namespace
 
 void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept {
-  scratch.problem.clear();
+  scratch.problem.clear(are_many(state, scratch));
   std::fill(scratch.tilt_spring.begin(), scratch.tilt_spring.end(), 0.0);
   const std::span<const ContactPoint> contacts = state.contacts();
-  for (const ContactPoint& contact : contacts)
-    add_contact(state, scratch, contact, same_contact(scratch, contact));
   const double edge = body.mean_surface_edge();
+  for (const ContactPoint& contact : contacts)
+    add_contact(state, scratch, contact, same_contact(scratch, contact), tuning.many.open_gap * edge);
+  const Index first_tilt_row = scratch.problem.rows;
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = contacts[k];
     const double force =
@@ -264,13 +426,22 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
   most.contact_points = std::max(most.contact_points, state.contact_count);
   most.unknowns = std::max(most.unknowns, scratch.problem.rows);
   most.near_nodes = std::max(most.near_nodes, state.surface.near.count());
-  if (body.dimension() == 3) {
+  if (scratch.problem.many) {
+    assemble_single_compliance(state.surface.near, scratch.rows, first_tilt_row, scratch.pattern,
+                               scratch.problem);
+  } else if (body.dimension() == 3) {
     assemble_body_compliance<3>(state.surface.near, scratch);
   } else {
     assemble_body_compliance<2>(state.surface.near, scratch);
   }
   note_rigid_contacts(state, scratch.problem);
   add_coupling_compliance(state, scratch);
+  if (scratch.problem.many) {
+    add_change_of_forces(state.surface.near, scratch);
+    add_stretch(state, scratch);
+    regularise_many(state, scratch);
+    return;
+  }
   regularise(body, state, scratch);
 }
 

@@ -35,6 +35,7 @@ struct ContactPoint {
   Vec3 tool_point =
       Vec3::Zero();           ///< held: the place in the tool's own frame that stays with the surface [m]
   Vec3 force = Vec3::Zero();  ///< on the tool, after the tick [N]
+  Vec3 carry = Vec3::Zero();  ///< sticking: what the solver let it slide in the tick, and is to undo [m]
 };
 
 }  // namespace palpate

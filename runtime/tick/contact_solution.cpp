@@ -61,7 +61,9 @@ bool is_rough(const Body& body, const State& state) noexcept {
 
 /// Whether another pass would be quick, and is not past a release, from which the body swings.
 bool may_repeat(const Body& body, const State& state, const Scratch& scratch) noexcept {
-  return (scratch.problem.frictionless || scratch.cone_solver.was_easy()) && !is_released(body, state);
+  const bool was_easy = scratch.problem.many ? scratch.newton_krylov.was_easy()
+                                             : scratch.problem.frictionless || scratch.cone_solver.was_easy();
+  return was_easy && !is_released(body, state);
 }
 
 /// Takes up the patch that is wanted. Where there is no room for it the old one stays.
@@ -88,11 +90,30 @@ bool solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
   return true;
 }
 
+/// What a contact that sticks slid all the same, as the solver is not exact.
+Vec3 carried_slip(const Scratch& scratch, Index k) noexcept {
+  const ContactProblem& problem = scratch.problem;
+  if (problem.held[k] != 0 || problem.rows_of(k) < 2) return Vec3::Zero();
+  const Vec3& n = problem.normal[k];
+  Vec3 force = Vec3::Zero();
+  Vec3 motion = Vec3::Zero();
+  for (Index i = 0; i < problem.rows_of(k); ++i) {
+    force[i] = problem.lambda[problem.first_row(k) + i];
+    motion[i] = scratch.newton_krylov.motion()[problem.first_row(k) + i];
+  }
+  const double normal = n.dot(force);
+  const double bound = problem.friction[k] * normal * (1.0 - tuning.many.slipping);
+  if (normal <= 0.0 || (force - normal * n).norm() >= bound) return Vec3::Zero();
+  return motion - n.dot(motion) * n;
+}
+
 void give_contact_force(const Scratch& scratch, Index number, ContactPoint& contact) noexcept {
   const auto first = static_cast<std::size_t>(scratch.problem.first_row(number));
   contact.force.setZero();
   for (Index i = 0; i < scratch.problem.rows_of(number); ++i)
-    contact.force += scratch.problem.lambda[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
+    contact.force +=
+        scratch.problem.lambda[first + static_cast<std::size_t>(i)] * scratch.rows[first + i].force;
+  contact.carry = scratch.problem.many ? carried_slip(scratch, number) : Vec3(Vec3::Zero());
 }
 
 /// Turns the forces of contacts that roll as their faces and edges tilt.
@@ -101,7 +122,7 @@ void add_tilt_forces(State& state, const Scratch& scratch) noexcept {
   for (Index k = state.contact_count; k < problem.contacts; ++k) {
     ContactPoint& contact = state.contact_points[problem.owner[k]];
     const Index row = problem.first_row(k);
-    if (contact.rolls && problem.lambda[problem.first_row(problem.owner[k])] > 0.0)
+    if (contact.rolls && problem.normal_part(problem.owner[k], problem.lambda) > 0.0)
       contact.force += problem.lambda[row] * scratch.rows[row].force;
   }
 }
@@ -120,6 +141,7 @@ void remember_contacts(const State& state, Scratch& scratch) noexcept {
 }
 
 bool solve_problem(Scratch& scratch) noexcept {
+  if (scratch.problem.many) return scratch.newton_krylov.solve(scratch.problem);
   return scratch.problem.frictionless ? scratch.active_set.solve(scratch.problem)
                                       : scratch.cone_solver.solve(scratch.problem);
 }

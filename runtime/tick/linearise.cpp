@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/linearise_rolling.h"
@@ -22,20 +23,21 @@ Eigen::Matrix3d passive(const Eigen::Matrix3d& stiffness) noexcept {
   return vectors * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * vectors.transpose();
 }
 
-/// Motions along the rows when the device moves by `motion`, and is turned by `turn` about its origin.
-void fill_row_change(const State& state, Scratch& scratch, Index number, const Vec3& motion,
-                     const Vec3& turn) noexcept {
+/// Motions along the rows when the device moves by `motion`, and is turned by `turn` about its origin:
+/// [rows] of scratch.row_change from `begin` on.
+void fill_row_change(const State& state, Scratch& scratch, Index number, const Vec3& motion, const Vec3& turn,
+                     Index begin = 0) noexcept {
   const ContactProblem& problem = scratch.problem;
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
-    const auto first = static_cast<std::size_t>(problem.first_row(k));
+    const Index first = problem.first_row(k);
     Vec3 there = contact.tool == number ? motion : Vec3::Zero();
     if (contact.tool == number && !contact.rolls) there += turn.cross(contact.arm);
-    for (Index i = 0; i < problem.rows_of(k); ++i)
-      scratch.row_change[first + static_cast<std::size_t>(i)] = contact.frame.col(i).dot(there);
+    for (Index i = first; i < first + problem.rows_of(k); ++i)
+      scratch.row_change[begin + i] = scratch.rows[i].force.dot(there);
   }
   for (Index i = problem.first_row(state.contact_count); i < problem.rows; ++i)
-    scratch.row_change[i] = scratch.rows[i].tool == number ? scratch.rows[i].force.dot(motion) : 0.0;
+    scratch.row_change[begin + i] = scratch.rows[i].tool == number ? scratch.rows[i].force.dot(motion) : 0.0;
 }
 
 /// How far a free tool may move before it touches: what its nearest contact point leaves.
@@ -46,29 +48,43 @@ void linearise_free(const State& state, ToolState& tool, Index number) noexcept 
   }
 }
 
-/// Change of the tool's wrench by what scratch.row_change says.
-Wrench wrench_change(const State& state, Scratch& scratch, Index number) noexcept {
+/// Changes of the forces by the first `changes` that scratch.row_change has, one after the other.
+void find_force_changes(Scratch& scratch, int changes) noexcept {
   const ContactProblem& problem = scratch.problem;
-  if (problem.frictionless) {
+  if (problem.many) {
+    scratch.newton_krylov.derivative(problem, changes, scratch.row_change, scratch.force_change);
+  } else if (problem.frictionless) {
     scratch.active_set.derivative(problem, scratch.row_change, scratch.force_change);
   } else {
     scratch.cone_solver.derivative(problem, scratch.row_change, scratch.force_change);
   }
+}
+
+/// Change of the tool's wrench by the change of forces that begins at `begin` of scratch.force_change.
+Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index begin = 0) noexcept {
+  const ContactProblem& problem = scratch.problem;
   Wrench change;
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
     if (contact.tool != number) continue;
-    const auto first = static_cast<std::size_t>(problem.first_row(k));
+    const Index first = problem.first_row(k);
     Vec3 force = Vec3::Zero();
-    for (Index i = 0; i < problem.rows_of(k); ++i)
-      force += scratch.force_change[first + static_cast<std::size_t>(i)] * contact.frame.col(i);
+    for (Index i = first; i < first + problem.rows_of(k); ++i)
+      force += scratch.force_change[begin + i] * scratch.rows[i].force;
     change.force += force;
     if (!contact.rolls) change.torque += contact.arm.cross(force);
   }
   for (Index i = problem.first_row(state.contact_count); i < problem.rows; ++i) {
-    if (scratch.rows[i].tool == number) change.force += scratch.force_change[i] * scratch.rows[i].force;
+    if (scratch.rows[i].tool == number)
+      change.force += scratch.force_change[begin + i] * scratch.rows[i].force;
   }
   return change;
+}
+
+/// Change of the tool's wrench by what scratch.row_change says.
+Wrench wrench_change(const State& state, Scratch& scratch, Index number) noexcept {
+  find_force_changes(scratch, 1);
+  return wrench_of(state, scratch, number);
 }
 
 /// Change of the tool's wrench by a motion of the device for which scratch.row_change stands, with the
@@ -92,13 +108,17 @@ Wrench wrench_change_by_motion(const State& state, Scratch& scratch, Index numbe
   }
 }
 
-/// Contacts that would open by the change of forces at a motion of 1 bound the radius.
-void keep_closed_contacts(const State& state, const Scratch& scratch, ToolState& tool) noexcept {
+/// Contacts that would open by the change of forces at a motion of 1, which begins at `begin`, bound the
+/// radius.
+void keep_closed_contacts(const State& state, const Scratch& scratch, ToolState& tool,
+                          Index begin = 0) noexcept {
+  const ContactProblem& problem = scratch.problem;
+  const std::span<const double> change =
+      std::span(scratch.force_change).subspan(static_cast<std::size_t>(begin));
   for (Index k = 0; k < state.contact_count; ++k) {
     if (state.contact_points[k].held) continue;
-    const auto first = static_cast<std::size_t>(scratch.problem.first_row(k));
-    const double rate = std::abs(scratch.force_change[first]);
-    const double normal = scratch.problem.lambda[first];
+    const double rate = std::abs(problem.normal_part(k, change));
+    const double normal = problem.normal_part(k, problem.lambda);
     if (normal > 0.0 && rate > 0.0) tool.local.radius = std::min(tool.local.radius, normal / rate);
   }
 }
@@ -108,7 +128,7 @@ void keep_open_contacts(const State& state, const ContactProblem& problem, ToolS
                         Index number) noexcept {
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = state.contact_points[k];
-    if (contact.held || contact.tool != number || problem.lambda[problem.first_row(k)] > 0.0) continue;
+    if (contact.held || contact.tool != number || problem.normal_part(k, problem.lambda) > 0.0) continue;
     tool.local.radius = std::min(tool.local.radius, std::max(0.0, contact.gap));
   }
 }
@@ -138,18 +158,31 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
     tool.local.radius = std::min(tool.local.radius, tuning.hand.curvature_share * tool.tool.radius);
   if (tool.contacts == 0) return linearise_free(state, tool, number);
 
-  const bool rolls = begin_rolling(state, scratch, number);
-  const double radius = rolling_radius(tool.tool, edge);
   Eigen::Matrix3d force = Eigen::Matrix3d::Zero();  // change by a motion of the device
   Eigen::Matrix3d torque = Eigen::Matrix3d::Zero();
-  std::fill_n(scratch.row_change.begin(), scratch.problem.rows, 0.0);
-  for (int axis = 0; axis < scratch.problem.dimension; ++axis) {
-    fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero());
-    const Wrench change = rolls ? wrench_change_by_motion(state, scratch, number, Vec3::Unit(axis), radius)
-                                : wrench_change(state, scratch, number);
+  const auto keep = [&](int axis, const Wrench& change, Index begin) {
     force.col(axis) = change.force;
     torque.col(axis) = change.torque;
-    keep_closed_contacts(state, scratch, tool);
+    keep_closed_contacts(state, scratch, tool, begin);
+  };
+  const int d = scratch.problem.dimension;
+  const bool rolls = begin_rolling(state, scratch, number);
+  if (scratch.problem.many && !rolls) {
+    const Index rows = scratch.problem.rows;
+    for (int axis = 0; axis < d; ++axis)
+      fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero(), axis * rows);
+    find_force_changes(scratch, d);
+    for (int axis = 0; axis < d; ++axis)
+      keep(axis, wrench_of(state, scratch, number, axis * rows), axis * rows);
+  } else {
+    const double radius = rolling_radius(tool.tool, edge);
+    for (int axis = 0; axis < d; ++axis) {
+      fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero());
+      keep(axis,
+           rolls ? wrench_change_by_motion(state, scratch, number, Vec3::Unit(axis), radius)
+                 : wrench_change(state, scratch, number),
+           0);
+    }
   }
   keep_open_contacts(state, scratch.problem, tool, number);
   if (force.allFinite()) tool.local.stiffness = passive(-force);

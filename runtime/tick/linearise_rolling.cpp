@@ -8,7 +8,8 @@ namespace palpate {
 namespace {
 
 bool is_closed(const State& state, const ContactProblem& problem, Index contact) noexcept {
-  return state.contact_points[contact].held || problem.lambda[problem.first_row(contact)] > 0.0;
+  return problem.rows_of(contact) > 0 &&
+         (state.contact_points[contact].held || problem.normal_part(contact, problem.lambda) > 0.0);
 }
 
 /// Numbers the near nodes under closed contacts; false when they are too many.

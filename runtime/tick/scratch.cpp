@@ -1,5 +1,7 @@
 #include "runtime/tick/scratch.h"
 
+#include <algorithm>
+
 #include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
@@ -14,6 +16,22 @@ std::size_t size(Index count) {
   return static_cast<std::size_t>(count);
 }
 
+Index few(Index max_contacts) {
+  return std::min(max_contacts, tuning.many.few_contacts);
+}
+
+/// Rows of the direct solvers' problems: those of few contacts, or of more without friction, which have one
+/// row and those of its tilt.
+Index few_rows(const Body& body, Index max_contacts) {
+  return std::max(most_rows(body, few(max_contacts)),
+                  body.dimension() * std::min(max_contacts, tuning.many.few_frictionless));
+}
+
+/// None where contacts are always few.
+Index many(Index max_contacts) {
+  return max_contacts > tuning.many.few_closed ? max_contacts : 0;
+}
+
 }  // namespace
 
 Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes)
@@ -22,14 +40,18 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       found_distance(body.surface_friction().size()),
       pairs(size(2 * max_contacts)),
       candidates(size(3 * tools) * pairs.size()),
-      problem(body.dimension(), body.dimension() * max_contacts, most_rows(body, max_contacts)),
+      problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
+              most_rows(body, many(max_contacts))),
       rows(size(most_rows(body, max_contacts))),
       row_response(size(body.dimension() * near_nodes)),
+      guess_force(row_response.size()),
+      pattern(most_rows(body, many(max_contacts)), body.dimension() * near_nodes),
       tilt_spring(rows.size()),
-      active_set(most_rows(body, max_contacts)),
-      cone_solver(body.dimension() * max_contacts, most_rows(body, max_contacts)),
-      row_change(rows.size()),
-      force_change(rows.size()),
+      active_set(few_rows(body, max_contacts)),
+      cone_solver(body.dimension() * few(max_contacts), most_rows(body, few(max_contacts))),
+      newton_krylov(body.dimension() * many(max_contacts), most_rows(body, many(max_contacts))),
+      row_change(size(body.dimension()) * rows.size()),
+      force_change(row_change.size()),
       rolling_number(size(near_nodes)),
       rolling_places(size(tuning.hand.rolling_places)),
       rolling_response(size(body.dimension() * tuning.hand.rolling_places) *

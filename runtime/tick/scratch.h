@@ -7,6 +7,8 @@
 #include "runtime/solve/active_set.h"
 #include "runtime/solve/cone_solver.h"
 #include "runtime/solve/contact_problem.h"
+#include "runtime/solve/newton_krylov.h"
+#include "runtime/tick/compliance.h"
 #include "runtime/tick/contact_point.h"
 #include "runtime/tick/contact_row.h"
 #include "runtime/tick/touching_pair.h"
@@ -39,11 +41,14 @@ struct Scratch {
   ContactProblem problem;                ///< [rows] assembly: W and b; solution: lambda
   std::vector<ContactRow> rows;          ///< [rows] assembly: J
   std::vector<double> row_response;      ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
+  std::vector<double> guess_force;       ///< [d near_nodes] assembly of many contacts [N]
+  CompliancePattern pattern;             ///< assembly of many contacts: J by its entries
   std::vector<double> tilt_spring;       ///< [rows] assembly: of edges and faces [m/N]
   ActiveSet active_set;                  ///< solution without friction
   ConeSolver cone_solver;                ///< solution with friction
-  std::vector<double> row_change;        ///< [rows] linearise: db [m]
-  std::vector<double> force_change;      ///< [rows] linearise: dlambda [N]
+  NewtonKrylov newton_krylov;            ///< solution of many contacts
+  std::vector<double> row_change;        ///< [d x rows] linearise: db, an axis after the other [m]
+  std::vector<double> force_change;      ///< [d x rows] linearise: dlambda [N]
   Index rolling_count = 0;               ///< linearise: of rolling_places
   std::vector<Index> rolling_number;     ///< [near_nodes] linearise: place among rolling_places, -1 for none
   std::vector<Index> rolling_places;     ///< [rolling_places] linearise: near nodes that carry force

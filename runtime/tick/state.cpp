@@ -73,8 +73,9 @@ double least_compliance_of_a_node(const Body& body) {
   return least;
 }
 
+/// A contact has up to three nodes; those of many share theirs.
 Index near_room(const StateOptions& options) {
-  return 3 * options.max_contacts + 32;
+  return std::min(3 * options.max_contacts + 32, 2 * options.max_contacts + 96);
 }
 
 SurfaceState make_surface(const Body& body, const StateOptions& options) {

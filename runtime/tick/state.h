@@ -68,9 +68,9 @@ struct SurfaceState {
 
 struct StateOptions {
   std::vector<Tool> tools = {Tool{}};
-  Index max_contacts = 32;  ///< contact points of all tools together; beyond, the deepest are kept
-  Index patch_nodes = 0;    ///< most nodes g of a patch that is to be used
-  double tick = 0.001;      ///< time from one tick to the next [s]
+  Index max_contacts = 256;  ///< contact points of all tools together; beyond, the deepest are kept
+  Index patch_nodes = 0;     ///< most nodes g of a patch that is to be used
+  double tick = 0.001;       ///< time from one tick to the next [s]
 };
 
 /// Everything that a tick changes on one body: the tools, the surface with its contacts, and the tick's

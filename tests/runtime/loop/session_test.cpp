@@ -136,7 +136,9 @@ TEST_F(RecordedFrames, ShowWhatTouchesAndWhatThatDoes) {
       for (std::size_t k = 0; k < 3; ++k) {
         if (contact.nodes[k] < 0) continue;
         const auto node = static_cast<std::size_t>(contact.nodes[k]);
-        pressure[node] += contact.weights[k] * contact.force.dot(contact.frame.col(0)) / stress.areas()[node];
+        pressure[node] += contact.weights[k] *
+                          contact.force.dot(seen_contact(body_, state_, contact).normal) /
+                          stress.areas()[node];
       }
     }
     const SurfaceLoad& load = state_.surface.near.load();

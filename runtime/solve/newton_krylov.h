@@ -1,0 +1,122 @@
+// Contact of many points.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/solve/contact_problem.h"
+
+namespace palpate {
+
+/// Solves a ContactProblem of many contacts: block Gauss-Seidel sweeps, each contact solved exactly with the
+/// others as they are, and between them steps of a semismooth Newton method on Alart & Curnier's equations
+/// (1991) that has three unknowns at a contact that sticks, two at one that slips and one without friction,
+/// and is solved by preconditioned GMRES (Saad & Schultz 1986). Sweeps make the forces smooth and keep them
+/// in the cones; Newton's steps settle what sweeps are slow at. It starts from the guess in lambda, and costs
+/// next to nothing where that is the solution. W and all that is long is in single precision: forces and
+/// motions change little from tick to tick. docs/decisions has what it was compared with. All memory is taken
+/// at construction.
+///
+/// Residual: the largest difference of the two sides of the equations at a contact, against the largest
+/// force. What is felt, the sum, is right to a tenth of it: what is left is rough, and cancels.
+class NewtonKrylov {
+ public:
+  NewtonKrylov(Index max_contacts, Index max_rows);
+
+  /// Fills problem.lambda from the guess in it. False when the residual is over ManyTuning's `accepted` at
+  /// the end of the budget: lambda is then the best that was found, and in the cones.
+  bool solve(ContactProblem& problem) noexcept;
+
+  /// What lambda changes by when b does, to first order, for up to three changes: `db` and `dlambda`
+  /// [changes x rows]. Contacts stay open, sticking or slipping as they are.
+  void derivative(const ContactProblem& problem, int changes, std::span<const double> db,
+                  std::span<double> dlambda) noexcept;
+
+  [[nodiscard]] int products() const noexcept { return products_; }  ///< with W, of the last `solve`
+  [[nodiscard]] double residual() const noexcept {
+    return residual_;
+  }  ///< of the last `solve` [largest force]
+  /// Whether `solve` left time for another.
+  [[nodiscard]] bool was_easy() const noexcept;
+  /// r [rows] at the end of the last `solve` [m].
+  [[nodiscard]] std::span<const float> motion() const noexcept { return r_; }
+
+ private:
+  enum class Kind : std::uint8_t { absent, normal, cone, held };
+  enum class Mode : std::uint8_t { open, stick, slip };
+  static constexpr int most_changes = 3;
+
+  struct Contact {
+    Index first = 0;  // row
+    int rows = 0;
+    Index owner = -1;  // of a held row
+    Kind kind = Kind::held;
+    Mode mode = Mode::open;
+    double mu = 0.0;
+    double w = 0.0;                                         // mean of W's diagonal
+    Vec3 n = Vec3::Zero();                                  // normal in the rows' axes
+    Eigen::Matrix3d D = Eigen::Matrix3d::Identity();        // W at the contact itself
+    Eigen::Matrix3d inverse = Eigen::Matrix3d::Identity();  // of D
+    Vec3 e = Vec3::Zero();                                  // slipping: direction of the tangential force,
+    Vec3 across = Vec3::Zero();                             // and across it
+    double turning = 0.0;                                   // slipping: motion across by a force across [m/N]
+  };
+
+  /// What GMRES keeps of one right-hand side.
+  struct Krylov {
+    std::vector<float> basis;   // [(steps + 1) x stride]
+    std::vector<float> scaled;  // [steps x stride] preconditioned
+    std::vector<float> H, cosine, sine, g;
+    int steps = 0;
+    float size = 0.0F;
+    bool done = false;
+  };
+
+  void load(ContactProblem& problem) noexcept;
+  void enter_cone(const Contact& contact) noexcept;
+  void find_motion(const ContactProblem& problem) noexcept;
+  void move_by_change(const ContactProblem& problem) noexcept;
+  template <typename Real>
+  [[nodiscard]] Vec3 at(const std::vector<Real>& v, const Contact& contact) const noexcept;
+  void change_force(const Contact& contact, const Vec3& change) noexcept;
+  void open(const Contact& contact) noexcept;
+  [[nodiscard]] bool is_present(const Contact& contact) const noexcept;
+  [[nodiscard]] Vec3 suiting_change(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
+  [[nodiscard]] Vec3 slipping_force(const Contact& contact, const Vec3& f, const Vec3& r,
+                                    const Vec3& sticking) const noexcept;
+  [[nodiscard]] Vec3 difference(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
+  void sweep(const ContactProblem& problem) noexcept;
+  [[nodiscard]] double find_residual() const noexcept;
+  void choose_modes() noexcept;
+  void move_to_modes(const ContactProblem& problem) noexcept;
+  bool newton_step(const ContactProblem& problem) noexcept;
+  void lift(const float* y, float* x) const noexcept;
+  void test(const float* v, const float* y, float* out) const noexcept;
+  void precondition(const float* v, float* y) const noexcept;
+  void solve_reduced(const ContactProblem& problem, int systems) noexcept;
+  void expand(Krylov& krylov) noexcept;
+  void solution(const Krylov& krylov, float* x) noexcept;
+  void take_best() noexcept;
+
+  std::ptrdiff_t stride_;  // of vectors
+  std::vector<Contact> contacts_;
+  Index count_ = 0;
+  Index rows_ = 0;
+  std::vector<double> f_,
+      best_f_;  // [rows] forces: the sum of single-precision changes; of the smallest residual
+  std::vector<float> r_, best_r_;  // [rows] motion
+  std::vector<float> change_, product_;
+  std::ptrdiff_t padded_rows_ = 0;
+  bool active_ = false;         // a contact is not open
+  std::vector<Krylov> krylov_;  // [most_changes]
+  std::vector<float> x_, v_;    // [most_changes x stride]
+  std::vector<float> y_;        // [stride]
+  int products_ = 0;
+  int rounds_ = 0;
+  int steps_ = 0;  // of GMRES at most
+  double residual_ = 0.0;
+};
+
+}  // namespace palpate

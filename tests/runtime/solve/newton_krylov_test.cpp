@@ -1,0 +1,274 @@
+// The solver for many contacts, against a slow one in double precision and against the active set.
+#include "runtime/solve/newton_krylov.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "runtime/solve/active_set.h"
+#include "runtime/solve/contact_problem.h"
+#include "runtime/solve/tick_tuning.h"
+
+namespace palpate::newton_krylov_test {
+namespace {
+
+/// A ball on a smooth compliance, on a grid of side x side points one apart, as the tick states it: the
+/// normal is x in a point's frame, which `turned` turns at random.
+struct Grid {
+  Grid(int side, double mu, double depth, double slide, bool turned, double apart = 1.0)
+      : problem(3, side * side, 0, 3 * side * side), rows(mu > 0.0 ? 3 : 1) {
+    const double middle = 0.5 * (side - 1) + 0.1;
+    for (int k = 0; k < side * side; ++k)
+      points.emplace_back(apart * (k % side - middle), apart * (k / side - middle), 0.0);
+    std::mt19937 random(5);
+    std::normal_distribution<double> entry;
+    problem.clear(true);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const Eigen::Quaterniond turn(entry(random), entry(random), entry(random), entry(random));
+      frames.push_back(turned && rows == 3 ? turn.normalized().toRotationMatrix()
+                                           : Eigen::Matrix3d::Identity());
+      problem.add(mu, false, frames.back().col(0));
+    }
+    fill(depth, slide);
+  }
+
+  void fill(double depth, double slide) {
+    W.resize(problem.rows, problem.rows);
+    b.resize(problem.rows);
+    const Eigen::Vector3d give(1.0, 0.8, 0.7);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      for (std::size_t j = 0; j < points.size(); ++j) {
+        const Eigen::Matrix3d w =
+            1e-3 * ((i == j ? 0.2 : 0.0) + 1.0 / std::sqrt(1.0 + (points[i] - points[j]).squaredNorm())) *
+            (frames[i] * give.asDiagonal() * frames[j].transpose());
+        for (int p = 0; p < rows; ++p) {
+          for (int q = 0; q < rows; ++q) W(at(i) + p, at(j) + q) = w(p, q);
+        }
+      }
+      const double gap = 1e-3 * (points[i].squaredNorm() / 40.0 - depth);
+      const Eigen::Vector3d moved = frames[i] * Eigen::Vector3d(gap, 1e-3 * slide, 2e-4 * slide);
+      for (int p = 0; p < rows; ++p) b[at(i) + p] = moved[p];
+    }
+    for (Index i = 0; i < problem.rows; ++i) {
+      for (Index j = 0; j < problem.rows; ++j) problem.single_row(i)[j] = static_cast<float>(W(i, j));
+      problem.b[static_cast<std::size_t>(i)] = b[i];
+    }
+  }
+
+  /// A tick begins: b is r by the forces of the one before.
+  void begin() {
+    const Eigen::VectorXd r = b + W * lambda();
+    std::copy_n(r.data(), problem.rows, problem.b.begin());
+  }
+
+  [[nodiscard]] Eigen::Index at(std::size_t k) const { return static_cast<Eigen::Index>(k) * rows; }
+  [[nodiscard]] Eigen::VectorXd lambda() const {
+    return Eigen::Map<const Eigen::VectorXd>(problem.lambda.data(), problem.rows);
+  }
+  /// The sum of the forces in the points' own frames.
+  [[nodiscard]] Eigen::Vector3d sum(const Eigen::VectorXd& of_rows) const {
+    Eigen::Vector3d total = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      Eigen::Vector3d force = Eigen::Vector3d::Zero();
+      for (int p = 0; p < rows; ++p) force[p] = of_rows[at(k) + p];
+      total += frames[k].transpose() * force;
+    }
+    return total;
+  }
+
+  ContactProblem problem;
+  int rows;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Matrix3d> frames;  // the tick's axes by the point's
+  Eigen::MatrixXd W;
+  Eigen::VectorXd b;
+};
+
+/// Forces by Gauss-Seidel sweeps of Alart & Curnier's projections in double precision until nothing moves.
+Eigen::VectorXd by_sweeps(const Grid& grid, double mu, Eigen::VectorXd lambda) {
+  Eigen::VectorXd r = grid.b + grid.W * lambda;
+  for (int sweep = 0; sweep < 20000; ++sweep) {
+    double most = 0.0;
+    for (std::size_t k = 0; k < grid.points.size(); ++k) {
+      const auto i = grid.at(k);
+      const Eigen::Vector3d n = grid.frames[k].col(0);
+      const double step = 0.9 / grid.W.block(i, i, grid.rows, grid.rows).diagonal().maxCoeff();
+      Eigen::Vector3d z = Eigen::Vector3d::Zero();
+      for (int p = 0; p < grid.rows; ++p) z[p] = lambda[i + p] - step * r[i + p];
+      const double normal = std::max(0.0, grid.rows == 1 ? z[0] : n.dot(z));
+      Eigen::Vector3d tangent = z - n.dot(z) * n;
+      if (tangent.norm() > mu * normal) tangent *= mu * normal / tangent.norm();
+      const Eigen::Vector3d to =
+          grid.rows == 1 ? Eigen::Vector3d(normal, 0.0, 0.0) : Eigen::Vector3d(normal * n + tangent);
+      Eigen::Vector3d change = Eigen::Vector3d::Zero();
+      for (int p = 0; p < grid.rows; ++p) {
+        change[p] = to[p] - lambda[i + p];
+        lambda[i + p] = to[p];
+        r += change[p] * grid.W.col(i + p);
+      }
+      most = std::max(most, change.norm());
+    }
+    if (most < 1e-12) return lambda;
+  }
+  ADD_FAILURE() << "the reference did not converge";
+  return lambda;
+}
+
+void expect_in_cones(const Grid& grid, double mu) {
+  for (std::size_t k = 0; k < grid.points.size(); ++k) {
+    const Eigen::Vector3d force = grid.lambda().segment<3>(grid.at(k));
+    const Eigen::Vector3d n = grid.frames[k].col(0);
+    const double normal = n.dot(force);
+    EXPECT_GE(normal, -1e-6) << k;
+    EXPECT_LE((force - normal * n).norm(), mu * normal + 1e-5) << k;
+  }
+}
+
+class Friction : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Coefficients, Friction, testing::Values(0.1, 0.3, 0.6));
+
+TEST_P(Friction, OfAHundredPointsIsThatOfSweepsInDoublePrecision) {
+  for (const bool turned : {false, true}) {
+    Grid grid(10, GetParam(), 0.6, 0.1, turned);
+    NewtonKrylov solver(100, 300);
+    ASSERT_TRUE(solver.solve(grid.problem));
+    expect_in_cones(grid, GetParam());
+    const Eigen::VectorXd exact = by_sweeps(grid, GetParam(), grid.lambda());
+    const Eigen::Vector3d total = grid.sum(exact);
+    EXPECT_GT(std::hypot(total.y(), total.z()), 0.02 * total.x()) << "the ball slides, so friction is felt";
+    EXPECT_LT((grid.sum(grid.lambda()) - total).norm(), 1e-4 * total.norm());
+    // What is left is rough, where W gives way fifty times less than a point alone.
+    EXPECT_LT((grid.lambda() - exact).lpNorm<Eigen::Infinity>(),
+              50.0 * tuning.many.rough_tolerance * exact.lpNorm<Eigen::Infinity>());
+  }
+}
+
+TEST(NewtonKrylov, WithoutFrictionItIsTheActiveSet) {
+  Grid grid(14, 0.0, 2.0, 0.0, false);
+  NewtonKrylov solver(196, 196);
+  ASSERT_TRUE(solver.solve(grid.problem));
+  ContactProblem whole(3, 196, 196);
+  for (Index k = 0; k < 196; ++k) whole.add(0.0, false);
+  for (Index i = 0; i < 196; ++i) {
+    for (Index j = 0; j < 196; ++j) whole.w(i, j) = grid.W(i, j);
+    whole.b[static_cast<std::size_t>(i)] = grid.b[i];
+  }
+  ActiveSet active_set(196);
+  ASSERT_TRUE(active_set.solve(whole));
+  const Eigen::Map<const Eigen::VectorXd> exact(whole.lambda.data(), 196);
+  EXPECT_GT((exact.array() > 0.0).count(), 40);
+  EXPECT_NEAR(grid.lambda().sum(), exact.sum(), 1e-5 * exact.sum());
+  EXPECT_LT((grid.lambda() - exact).lpNorm<Eigen::Infinity>(), 1e-3 * exact.maxCoeff());
+}
+
+// A tool at rest: the force is constant to 1e-9.
+TEST(NewtonKrylov, ASolutionStaysAsItIs) {
+  Grid grid(10, 0.3, 0.6, 0.1, true);
+  NewtonKrylov solver(100, 300);
+  const auto tick = [&] {
+    grid.begin();
+    return solver.solve(grid.problem);
+  };
+  for (int k = 0; k < 20; ++k) ASSERT_TRUE(tick());
+  const Eigen::Vector3d before = grid.sum(grid.lambda());
+  for (int k = 0; k < 100; ++k) {
+    ASSERT_TRUE(tick());
+    ASSERT_LT((grid.sum(grid.lambda()) - before).norm(), 1e-9 * before.norm()) << k;
+  }
+}
+
+TEST_P(Friction, DerivativeIsThatOfFiniteDifferences) {
+  Grid grid(8, GetParam(), 0.5, 0.05, true);
+  NewtonKrylov solver(64, 192);
+  for (int k = 0; k < 10; ++k) {
+    grid.begin();
+    ASSERT_TRUE(solver.solve(grid.problem));
+  }
+  const auto rows = static_cast<std::size_t>(grid.problem.rows);
+  std::vector<double> db(3 * rows), dlambda(3 * rows);
+  for (std::size_t k = 0; k < grid.points.size(); ++k) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < 3; ++i)
+        db[axis * rows + 3 * k + i] =
+            grid.frames[k](static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(axis));
+    }
+  }
+  solver.derivative(grid.problem, 3, db, dlambda);
+  Eigen::Matrix3d told, measured;
+  const Eigen::VectorXd now = by_sweeps(grid, GetParam(), grid.lambda());
+  const double h = 1e-7;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Map<const Eigen::VectorXd> change(dlambda.data() + axis * grid.problem.rows,
+                                                   grid.problem.rows);
+    told.col(axis) = grid.sum(change);
+    Grid moved = grid;
+    moved.b += h * Eigen::Map<const Eigen::VectorXd>(db.data() + axis * grid.problem.rows, grid.problem.rows);
+    measured.col(axis) = grid.sum(by_sweeps(moved, GetParam(), now) - now) / h;
+  }
+  EXPECT_LT((told - measured).norm(), 0.02 * measured.norm()) << told << "\n\n" << measured;
+}
+
+// Points so near to each other that W is next to singular, and more friction than has an answer for sure:
+// what comes is in the cones, whether the budget sufficed or not.
+TEST(NewtonKrylov, WhatComesIsInTheCones) {
+  Grid grid(12, 1.0, 0.02, 0.02, true, 0.05);
+  NewtonKrylov solver(144, 432);
+  for (int tick = 0; tick < 20; ++tick) {
+    static_cast<void>(solver.solve(grid.problem));
+    ASSERT_TRUE(grid.lambda().allFinite());
+    expect_in_cones(grid, 1.0);
+    grid.fill(0.02 + 1e-3 * tick, 0.02);
+    grid.begin();
+  }
+}
+
+// A grab, and rows that are there for a contact as long as it is closed.
+TEST(NewtonKrylov, HeldRowsAreMetOrLeftOutWithTheirOwners) {
+  Grid points(8, 0.3, 0.6, 0.1, false);
+  ContactProblem problem(3, 74, 0, 3 * 64 + 10);
+  problem.clear(true);
+  for (Index k = 0; k < 64; ++k) problem.add(0.3, k == 27, Vec3::UnitX());
+  for (Index k = 0; k < 10; ++k) problem.add_held_row(6 * k);
+  std::mt19937 random(2);
+  std::normal_distribution<double> entry;
+  const Index n = 3 * 64;
+  const Eigen::MatrixXd B =
+      Eigen::MatrixXd::NullaryExpr(10, n, [&] { return 0.2 * entry(random) / std::sqrt(n); });
+  Eigen::MatrixXd W(problem.rows, problem.rows);
+  W << points.W, points.W * B.transpose(), B * points.W,
+      B * points.W * B.transpose() + 1e-3 * Eigen::MatrixXd::Identity(10, 10);
+  for (Index i = 0; i < problem.rows; ++i) {
+    for (Index j = 0; j < problem.rows; ++j) problem.single_row(i)[j] = static_cast<float>(W(i, j));
+    problem.b[static_cast<std::size_t>(i)] = i < n ? points.b[i] : 1e-4;
+  }
+  NewtonKrylov solver(74, problem.rows);
+  const Eigen::VectorXd b = Eigen::Map<const Eigen::VectorXd>(problem.b.data(), problem.rows);
+  const Eigen::Map<const Eigen::VectorXd> lambda(problem.lambda.data(), problem.rows);
+  Eigen::VectorXd r = b;
+  for (int k = 0; k < 10; ++k) {
+    std::copy_n(r.data(), problem.rows, problem.b.begin());
+    ASSERT_TRUE(solver.solve(problem));
+    r = b + W * lambda;
+  }
+  const double length = 1e-4 * 1e-3 * lambda.lpNorm<Eigen::Infinity>();
+  EXPECT_LT(r.segment<3>(3 * 27).norm(), length);
+  int met = 0;
+  for (Index k = 0; k < 10; ++k) {
+    const bool is_open = lambda.segment<3>(3 * 6 * k).isZero(0.0);
+    if (is_open) {
+      EXPECT_EQ(lambda[n + k], 0.0);
+    } else {
+      EXPECT_LT(std::abs(r[n + k]), length);
+    }
+    met += is_open ? 0 : 1;
+  }
+  EXPECT_GT(met, 2);
+  EXPECT_LT(met, 9);
+}
+
+}  // namespace
+}  // namespace palpate::newton_krylov_test
