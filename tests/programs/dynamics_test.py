@@ -3,6 +3,7 @@
 import ctypes
 import json
 import re
+import time
 import unittest
 
 import h5py
@@ -201,12 +202,14 @@ class OwnLoop(ProgramTest):
             self.assertGreater(held, 0.008)
             step(1.0, 0)
             self.assertAlmostEqual(displacement(), held, delta=1e-6)  # it is where it was
-            seen = []
-            for k in range(3000):
+            # The free motion is computed beside these steps, which are much quicker than real ones.
+            end = time.monotonic() + 60
+            seen = [held]
+            while min(seen) >= 0.5 * held:
+                self.assertLess(time.monotonic(), end, "it does not swing")
                 step(1.0, 0)
                 seen.append(displacement())
-            self.assertLess(min(seen), 0.5 * held)
-            self.assertGreater(max(seen[500:]), 0.0)
+            self.assertGreater(seen[-1], 0.0)
             self.library.palpate_reset(session)
             self.assertEqual(displacement(), 0.0)
             self.library.palpate_destroy(session)
