@@ -123,7 +123,7 @@ void NewtonKrylov::open(const Contact& contact) noexcept {
 
 /// Rows that are there for a contact are gone with it.
 bool NewtonKrylov::is_present(const Contact& contact) const noexcept {
-  return contact.owner < 0 || !at(f_, contacts_[static_cast<std::size_t>(contact.owner)]).isZero(0.0F);
+  return contact.owner < 0 || !at(f_, contacts_[static_cast<std::size_t>(contact.owner)]).isZero(0.0);
 }
 
 /// The guess is in the cone, but for a normal that has turned since.
@@ -172,17 +172,17 @@ void NewtonKrylov::load(ContactProblem& problem) noexcept {
     const Contact& contact = contacts_[static_cast<std::size_t>(k)];
     if (!is_present(contact)) open(contact);
   }
-  std::fill(r_.begin() + rows_, r_.begin() + padded_rows_, 0.0);
+  std::fill(r_.begin() + rows_, r_.begin() + padded_rows_, 0.0F);
 }
 
 /// r = b + W (f - guess). The guess is in the cones, but for normals that have turned since.
 void NewtonKrylov::find_motion(const ContactProblem& problem) noexcept {
   bool moved = false;
-  std::fill_n(change_.begin(), padded_rows_, 0.0);
+  std::fill_n(change_.begin(), padded_rows_, 0.0F);
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) {
     r_[i] = static_cast<float>(problem.b[i]);
     change_[i] = static_cast<float>(f_[i] - problem.guess[i]);
-    moved = moved || change_[i] != 0.0;
+    moved = moved || change_[i] != 0.0F;
   }
   if (moved) move_by_change(problem);
 }
@@ -286,7 +286,7 @@ double NewtonKrylov::find_residual() const noexcept {
     worst = std::max(worst, difference(contact, f, at(r_, contact)).squaredNorm());
     largest = std::max(largest, f.squaredNorm());
   }
-  return std::sqrt(static_cast<double>(worst) / static_cast<double>(largest));
+  return std::sqrt(worst / largest);
 }
 
 void NewtonKrylov::choose_modes() noexcept {
@@ -323,7 +323,7 @@ void NewtonKrylov::choose_modes() noexcept {
 /// Forces of open contacts go, those that slip go to the cone's edge.
 void NewtonKrylov::move_to_modes(const ContactProblem& problem) noexcept {
   bool moved = false;
-  std::fill_n(change_.begin(), padded_rows_, 0.0);
+  std::fill_n(change_.begin(), padded_rows_, 0.0F);
   for (Index k = 0; k < count_; ++k) {
     const Contact& contact = contacts_[static_cast<std::size_t>(k)];
     const Vec3 f = at(f_, contact);
@@ -494,7 +494,7 @@ void NewtonKrylov::solve_reduced(const ContactProblem& problem, int systems) noe
 void NewtonKrylov::solution(const Krylov& krylov, float* x) noexcept {
   const int most = tuning.many.most_steps;
   std::fill_n(y_.begin(), padded_rows_, 0.0F);
-  std::array<float, 64> c{};
+  std::array<float, static_cast<std::size_t>(tuning.many.most_steps)> c{};
   for (int j = krylov.steps; j-- > 0;) {
     float sum = krylov.g[static_cast<std::size_t>(j)];
     for (int t = j + 1; t < krylov.steps; ++t)

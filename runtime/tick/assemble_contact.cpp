@@ -84,9 +84,8 @@ Vec3 motion_of(const State& state, const Scratch& scratch, const ContactPoint& c
   if (contact.held) return motion + tool.pose.position + contact.arm - contact.position;
   const Vec3 n = contact.frame.col(0);
   motion += contact.gap * n;
-  if (!scratch.is_first_pass) return motion;
   Vec3 slip = Vec3::Zero();
-  for (int i = 1; i < scratch.problem.dimension; ++i)
+  for (int i = 1; scratch.is_first_pass && i < scratch.problem.dimension; ++i)
     slip -= free_slip(state.surface, contact, contact.frame.col(i)) * contact.frame.col(i);
   if (last != nullptr) slip += last->carry - n.dot(last->carry) * n;
   return motion + slip;
@@ -391,7 +390,7 @@ void regularise_many(const State& state, Scratch& scratch) noexcept {
 }
 
 /// Whether the contacts are more than the direct solvers take: by the contact points, and by how many of them
-/// are closed or about to be.
+/// carried force.
 bool are_many(const State& state, const Scratch& scratch) noexcept {
   const std::span<const ContactPoint> contacts = state.contacts();
   const bool frictionless = std::all_of(contacts.begin(), contacts.end(), [](const ContactPoint& contact) {

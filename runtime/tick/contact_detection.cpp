@@ -197,12 +197,6 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
   contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
-  if (contact.rolls && scratch.is_first_pass) {
-    const Vec3 shift = tuning.assembly.foreseen_share * (tool.device.position - tool.last_device.position);
-    const Vec3 rolled = rolled_normal(normal, shift, rolling_radius(tool.tool, body.mean_surface_edge()));
-    contact.frame = frame_of(rolled, body.dimension());
-    contact.gap = rolled.dot(pair.nearest.on_core - pair.nearest.on_simplex) - tool.tool.radius;
-  }
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
   scratch.candidates[scratch.candidate_count++] = contact;
@@ -308,6 +302,23 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
     touch_corners(body, state, scratch, touch, simplex, is_segment);
 }
 
+/// Turns the normals of contacts that roll ahead by what the device moves in the tick. Not before all are
+/// found: the same place is known by the normal that it has now.
+void roll_ahead(const Body& body, const ToolState& tool, Scratch& scratch, Index begin) noexcept {
+  const Vec3 shift = tuning.assembly.foreseen_share * (tool.device.position - tool.last_device.position);
+  const double radius = rolling_radius(tool.tool, body.mean_surface_edge());
+  for (Index k = begin; k < scratch.candidate_count; ++k) {
+    ContactPoint& contact = scratch.candidates[k];
+    if (!contact.rolls) continue;
+    const Vec3 normal = contact.frame.col(0);
+    const Vec3 rolled = rolled_normal(normal, shift, radius);
+    const double nearer = (1.0 - rolled.dot(normal)) * (contact.gap + tool.tool.radius);
+    contact.frame = frame_of(rolled, body.dimension());
+    contact.gap -= nearer;
+    contact.free_gap -= nearer;
+  }
+}
+
 /// Contact points of one tool.
 void find_candidates(const Body& body, State& state, Scratch& scratch, Index number) noexcept {
   ToolState& tool = state.tools[number];
@@ -325,6 +336,7 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
     return;
   }
   for (Index k = 0; k < touch.usable; ++k) touch_simplex(body, state, scratch, touch, scratch.pairs[k]);
+  if (scratch.is_first_pass) roll_ahead(body, tool, scratch, touch.first_candidate);
 }
 
 /// Where held contacts are now. Those whose nodes find no room are let go.

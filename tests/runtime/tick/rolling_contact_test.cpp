@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <vector>
 
 #include "runtime/tick/step.h"
@@ -70,6 +72,21 @@ TEST_P(RollingContact, ToldStiffnessIsTheDerivativeAtRest) {
     EXPECT_LT((state.tools[0].local.stiffness - expected).norm(), 0.005 * expected.norm())
         << place.transpose();
   }
+}
+
+// However fast it slides, and whichever face a vertex or edge is seen from.
+TEST_P(RollingContact, EachPlaceIsOneContact) {
+  Vec3 centre;
+  State state = press(Vec3(0.45, 0.5, 1.0), 0.2, centre);
+  std::size_t most = 0;
+  for (int k = 1; k <= 100; ++k) {
+    step(body_, state, pose(centre + Vec3(0.01 * edge_ * k, 0.005 * edge_ * k, 0.0)));
+    std::set<std::int64_t> features;
+    for (const ContactPoint& contact : state.contacts()) features.insert(contact.feature);
+    ASSERT_EQ(std::ssize(features), std::ssize(state.contacts())) << k;
+    most = std::max(most, features.size());
+  }
+  EXPECT_GT(most, 2U);
 }
 
 // What is left of a tick's lag: normals are foreseen by the motion of the tool, not by that of the surface.
