@@ -155,8 +155,7 @@ Vec3 FreeMotion::displacement(const Body& body, Index stored) const noexcept {
   return u;
 }
 
-Vec3 FreeMotion::at(const Body& body, Index surface_node) noexcept {
-  if (!active_) return Vec3::Zero();
+Vec3 FreeMotion::find_at(const Body& body, Index surface_node) noexcept {
   const auto node = static_cast<std::size_t>(surface_node);
   if (stamp_[node] == ticks_) return value_[node];
   const SurfaceParts parts = body.surface_parts(surface_node);

@@ -68,7 +68,9 @@ class FreeMotion {
   void begin_tick(const Body& body) noexcept;
 
   /// Displacement of a surface node in this tick [m].
-  [[nodiscard]] Vec3 at(const Body& body, Index surface_node) noexcept;
+  [[nodiscard]] Vec3 at(const Body& body, Index surface_node) noexcept {
+    return active_ ? find_at(body, surface_node) : Vec3(Vec3::Zero());
+  }
   /// By how much more it is than in the tick before, as far as that is known [m]; after `at`.
   [[nodiscard]] const Vec3& change(Index surface_node) const noexcept { return change_[surface_node]; }
   /// Displacement of a stored node in this tick [m].
@@ -92,6 +94,7 @@ class FreeMotion {
   [[nodiscard]] bool is_late() const noexcept { return ends_step() && job_.step > sample_step_; }
 
  private:
+  [[nodiscard]] Vec3 find_at(const Body& body, Index surface_node) noexcept;
   void begin_modal_step(const Body& body) noexcept;
   void fade_held(double omega) noexcept;
   void add_rate(const NodalLoad& last) noexcept;

@@ -17,7 +17,7 @@ ActiveSet::ActiveSet(Index max_rows)
       active_(max_rows),
       state_(max_rows),
       signed_(max_rows),
-      z_(max_rows),
+      z_(3 * static_cast<std::size_t>(max_rows)),
       entries_(static_cast<std::size_t>(max_rows) + 1) {}
 
 bool ActiveSet::activate(const ContactProblem& problem, Index row) noexcept {
@@ -122,11 +122,20 @@ bool ActiveSet::solve(ContactProblem& problem) noexcept {
   return false;
 }
 
-void ActiveSet::derivative(const ContactProblem& problem, std::span<const double> db,
+void ActiveSet::derivative(const ContactProblem& problem, int changes, std::span<const double> db,
                            std::span<double> dlambda) noexcept {
-  std::fill_n(dlambda.begin(), problem.rows, 0.0);
-  solve_active(db);
-  for (Index k = 0; k < factor_.nodes(); ++k) dlambda[active_[k]] = z_[k];
+  const auto rows = static_cast<std::size_t>(problem.rows);
+  const auto count = static_cast<std::size_t>(factor_.nodes());
+  std::fill_n(dlambda.begin(), static_cast<std::size_t>(changes) * rows, 0.0);
+  for (std::size_t s = 0; s < static_cast<std::size_t>(changes); ++s) {
+    for (std::size_t k = 0; k < count; ++k)
+      z_[s * count + k] = -db[s * rows + static_cast<std::size_t>(active_[k])];
+  }
+  factor_.solve({z_.data(), static_cast<std::size_t>(changes) * count}, changes);
+  for (std::size_t s = 0; s < static_cast<std::size_t>(changes); ++s) {
+    for (std::size_t k = 0; k < count; ++k)
+      dlambda[s * rows + static_cast<std::size_t>(active_[k])] = z_[s * count + k];
+  }
 }
 
 }  // namespace palpate

@@ -22,8 +22,9 @@ class ActiveSet {
   /// (no negative normal force), but a gap may be negative.
   bool solve(ContactProblem& problem) noexcept;
 
-  /// What lambda changes by when b changes by `db` [rows] and closed contacts stay closed: [rows].
-  void derivative(const ContactProblem& problem, std::span<const double> db,
+  /// What lambda changes by when b does and closed contacts stay closed, for up to three changes: `db` and
+  /// `dlambda` [changes x rows].
+  void derivative(const ContactProblem& problem, int changes, std::span<const double> db,
                   std::span<double> dlambda) noexcept;
 
   [[nodiscard]] int rounds() const noexcept { return rounds_; }  ///< of the last `solve`
@@ -41,7 +42,7 @@ class ActiveSet {
   std::vector<Index> active_;         // [factor_.nodes()] rows, in the order of the factor
   std::vector<Row> state_;            // [rows]
   std::vector<std::uint8_t> signed_;  // [rows] of held contacts: their force may have any sign
-  std::vector<double> z_;             // [active] the solution with all gaps of the active rows closed
+  std::vector<double> z_;             // [3 x active] the solution with all gaps of the active rows closed
   std::vector<double> entries_;       // [active + 1] a row of W there
   int rounds_ = 0;
 };

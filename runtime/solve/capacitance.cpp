@@ -173,4 +173,37 @@ void CapacitanceMatrix::solve(std::span<double> x) const noexcept {
   }
 }
 
+/// By the scalar columns of L: the chain of divisions is as long for S right-hand sides as for one.
+template <int S>
+void CapacitanceMatrix::solve_systems(double* x) const noexcept {
+  const std::int64_t m = std::int64_t{dimension_} * nodes_;
+  std::array<double, S> y;
+  for (std::int64_t j = 0; j < m; ++j) {
+    const double* __restrict L = column(j) - j;
+    for (std::int64_t s = 0; s < S; ++s) y[s] = x[s * m + j] /= L[j];
+#pragma omp simd
+    for (std::int64_t i = j + 1; i < m; ++i) {
+      for (std::int64_t s = 0; s < S; ++s) x[s * m + i] -= L[i] * y[s];
+    }
+  }
+  for (std::int64_t j = m; j-- > 0;) {
+    const double* __restrict L = column(j) - j;
+    for (std::int64_t s = 0; s < S; ++s) {
+      double* system = x + s * m;
+      system[j] = (system[j] - dot(L + j + 1, system + j + 1, m - j - 1)) / L[j];
+    }
+  }
+}
+
+void CapacitanceMatrix::solve(std::span<double> x, int systems) const noexcept {
+  switch (systems) {
+    case 1:
+      return solve(x);
+    case 2:
+      return solve_systems<2>(x.data());
+    default:
+      return solve_systems<3>(x.data());
+  }
+}
+
 }  // namespace palpate

@@ -47,6 +47,10 @@ class CapacitanceMatrix {
   /// Solves C f = u in place: `x` [dm] is u [m] before and f [N] after.
   void solve(std::span<double> x) const noexcept;
 
+  /// Solves C f = u for up to three right-hand sides, one after the other in `x` [systems x dm]: L is read
+  /// once.
+  void solve(std::span<double> x, int systems) const noexcept;
+
   /// Entry (i, j), i >= j, of L.
   [[nodiscard]] double factor(std::int64_t i, std::int64_t j) const noexcept { return column(j)[i - j]; }
 
@@ -61,6 +65,8 @@ class CapacitanceMatrix {
   void remove_node(Index k) noexcept;
   template <int D>
   void eliminate(std::int64_t j, double* y, std::int64_t rows) const noexcept;
+  template <int S>
+  void solve_systems(double* x) const noexcept;
 
   int dimension_;
   Index max_nodes_;

@@ -104,9 +104,10 @@ struct HandTuning {
   double usual_tick = 0.001;         ///< [s] the unit of the shares a millisecond
   double fade_time = 20.0;           ///< [ms] in which the force of a lost contact fades
   double memory = 0.98;              ///< [1/ms] of the recent force, the measure of a fade
-  int rolling_passes = 4;            ///< that the turning of normals is followed in the local model
+  int rolling_passes = 3;            ///< that the turning of normals is followed in the local model
   double rolling_tolerance = 0.003;  ///< [change of the force] where they end
-  Index rolling_places = 32;     ///< nodes under the tool; with more the body does not answer to the turning
+  Index most_turning = 32;     ///< closed contacts of a tool whose normals turn; with more the body does not
+  Index most_following = 128;  ///< answer to the turning, nor with more rows of closed contacts
   double curvature_share = 0.1;  ///< [radius] farther, the normals turn too much for the local model
 };
 

@@ -82,8 +82,9 @@ std::array<Vec3, 3> slopes(const SurfaceTree& tree, const SimplexNodes& nodes) n
   return slope;
 }
 
-/// Puts the nodes of a simplex into the near field, at their present places in the tree.
-bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nodes) noexcept {
+/// Puts the nodes of a simplex into the near field, at their present places in the tree; `moved`: where the
+/// tree had one elsewhere.
+bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nodes, bool& moved) noexcept {
   bool room = true;
   for (const Index node : nodes) {
     if (node < 0 || !body.surface_moves(node)) continue;
@@ -92,14 +93,17 @@ bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nod
   if (!room) return false;
   for (const Index node : nodes) {
     if (node < 0 || !body.surface_moves(node)) continue;
-    surface.tree.move(node, unloaded_position(body, surface, node) +
-                                surface.near.displacement(surface.near.place_of(node)));
+    const Vec3 position =
+        unloaded_position(body, surface, node) + surface.near.displacement(surface.near.place_of(node));
+    if (position == surface.tree.position(node)) continue;
+    surface.tree.move(node, position);
+    moved = true;
   }
   return true;
 }
 
 /// The simplices nearest to the tool by what the tree knows, at most as many as may be looked at: fills
-/// scratch.found and returns how many.
+/// scratch.found and `nearest` of scratch.pairs, and returns how many.
 std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
                               const Core& core, double reach) noexcept {
   const std::size_t all = tree.near_segment(core.origin, core.end, reach, scratch.found);
@@ -107,10 +111,11 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
   std::size_t count = 0;
   for (std::size_t k = 0; k < std::min(all, scratch.found.size()); ++k) {
     const Index simplex = scratch.found[k];
-    const double distance = nearest_points(tree, nodes_of(body, simplex), core, is_point).squared_distance;
-    if (distance > reach * reach) continue;
+    const NearestPoint nearest = nearest_points(tree, nodes_of(body, simplex), core, is_point);
+    if (nearest.squared_distance > reach * reach) continue;
     scratch.found[count] = simplex;
-    scratch.found_distance[simplex] = distance;
+    scratch.found_distance[simplex] = nearest.squared_distance;
+    if (count < scratch.pairs.size()) scratch.pairs[count].nearest = nearest;
     ++count;
   }
   scratch.high_water.simplices = std::max(scratch.high_water.simplices, static_cast<Index>(count));
@@ -217,6 +222,7 @@ struct ToolContact {
   double margin;          // [m]
   double lost;            // [m] a core that is deeper than this is lost in the body
   Index usable = 0;       // simplices of scratch.found whose nodes are in the near field
+  bool is_known = true;   // scratch.pairs have the nearest points of the core's origin
   Index first_candidate;  // of this tool
   double nearest_distance = std::numeric_limits<double>::infinity();  // [m] of the core's origin
   bool inside = false;  // the core's origin is behind the surface
@@ -225,14 +231,17 @@ struct ToolContact {
 /// Keeps those of `count` simplices whose nodes find room in the near field.
 void keep_usable(const Body& body, State& state, Scratch& scratch, ToolContact& touch,
                  std::size_t count) noexcept {
+  bool moved = false;
   for (std::size_t k = 0; k < count; ++k) {
     const Index simplex = scratch.found[k];
-    if (!want_nodes(body, state.surface, nodes_of(body, simplex))) {
+    if (!want_nodes(body, state.surface, nodes_of(body, simplex), moved)) {
       state.tools[touch.number].status |= StepStatus::capacity_full;
       continue;
     }
+    scratch.pairs[touch.usable].nearest = scratch.pairs[k].nearest;
     scratch.found[touch.usable++] = simplex;
   }
+  touch.is_known = touch.is_known && !moved;
 }
 
 /// Fills the pairs of the core's origin, and tells on which side of the nearest simplices it is.
@@ -240,7 +249,9 @@ void look_from_origin(const Body& body, const SurfaceTree& tree, Scratch& scratc
                       ToolContact& touch) noexcept {
   for (Index k = 0; k < touch.usable; ++k) {
     TouchingPair& pair = scratch.pairs[k];
-    pair = pair_of_end(body, tree, scratch.found[k], touch.core, 0);
+    const Index simplex = scratch.found[k];
+    pair = touch.is_known ? make_pair(tree, nodes_of(body, simplex), simplex, 0, pair.nearest)
+                          : pair_of_end(body, tree, simplex, touch.core, 0);
     touch.nearest_distance = std::min(touch.nearest_distance, pair.distance);
   }
   const double as_near = touch.nearest_distance + tuning.detection.on_surface * body.mean_surface_edge();
@@ -306,6 +317,7 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
 /// found: the same place is known by the normal that it has now.
 void roll_ahead(const Body& body, const ToolState& tool, Scratch& scratch, Index begin) noexcept {
   const Vec3 shift = tuning.assembly.foreseen_share * (tool.device.position - tool.last_device.position);
+  if (shift.isZero(0.0)) return;
   const double radius = rolling_radius(tool.tool, body.mean_surface_edge());
   for (Index k = begin; k < scratch.candidate_count; ++k) {
     ContactPoint& contact = scratch.candidates[k];
@@ -329,6 +341,7 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
                     .first_candidate = scratch.candidate_count};
   const double reach = std::max(tool.tool.radius + touch.margin, touch.lost);
   const std::size_t count = nearest_simplices(body, state.surface.tree, scratch, tool, touch.core, reach);
+  touch.is_known = tool.tool.length == 0.0 && count < scratch.pairs.size();
   keep_usable(body, state, scratch, touch, count);
   look_from_origin(body, state.surface.tree, scratch, touch);
   if (touch.inside && touch.nearest_distance > touch.lost) {
@@ -345,7 +358,8 @@ void update_held(const Body& body, State& state) noexcept {
   for (Index k = 0; k < state.held_count; ++k) {
     ContactPoint& contact = state.contact_points[k];
     ToolState& tool = state.tools[contact.tool];
-    if (!want_nodes(body, state.surface, contact.nodes)) {
+    bool moved = false;
+    if (!want_nodes(body, state.surface, contact.nodes, moved)) {
       tool.status |= StepStatus::capacity_full;
       continue;
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/assemble_contact.h"
@@ -144,6 +145,21 @@ bool solve_problem(Scratch& scratch) noexcept {
   if (scratch.problem.many) return scratch.newton_krylov.solve(scratch.problem);
   return scratch.problem.frictionless ? scratch.active_set.solve(scratch.problem)
                                       : scratch.cone_solver.solve(scratch.problem);
+}
+
+void find_force_changes(Scratch& scratch, int changes) noexcept {
+  const ContactProblem& problem = scratch.problem;
+  if (problem.many) {
+    scratch.newton_krylov.derivative(problem, changes, scratch.row_change, scratch.force_change);
+  } else if (problem.frictionless) {
+    scratch.active_set.derivative(problem, changes, scratch.row_change, scratch.force_change);
+  } else {
+    for (int s = 0; s < changes; ++s) {
+      const auto begin = static_cast<std::size_t>(s * problem.rows);
+      scratch.cone_solver.derivative(problem, std::span(scratch.row_change).subspan(begin),
+                                     std::span(scratch.force_change).subspan(begin));
+    }
+  }
 }
 
 void apply_forces(State& state, const Scratch& scratch) noexcept {

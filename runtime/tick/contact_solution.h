@@ -12,6 +12,10 @@ void remember_contacts(const State& state, Scratch& scratch) noexcept;
 /// the cone solver. False where it did not reach its tolerance.
 bool solve_problem(Scratch& scratch) noexcept;
 
+/// Changes of lambda by changes of b: the first `changes` that scratch.row_change has, one after the other,
+/// into scratch.force_change. After solve_problem.
+void find_force_changes(Scratch& scratch, int changes) noexcept;
+
 /// Gives scratch.problem.lambda to the contact points, the near field and the tools' contact wrenches.
 void apply_forces(State& state, const Scratch& scratch) noexcept;
 

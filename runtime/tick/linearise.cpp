@@ -7,6 +7,7 @@
 #include <span>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/contact_solution.h"
 #include "runtime/tick/linearise_rolling.h"
 #include "runtime/tick/rolling.h"
 
@@ -48,20 +49,8 @@ void linearise_free(const State& state, ToolState& tool, Index number) noexcept 
   }
 }
 
-/// Changes of the forces by the first `changes` that scratch.row_change has, one after the other.
-void find_force_changes(Scratch& scratch, int changes) noexcept {
-  const ContactProblem& problem = scratch.problem;
-  if (problem.many) {
-    scratch.newton_krylov.derivative(problem, changes, scratch.row_change, scratch.force_change);
-  } else if (problem.frictionless) {
-    scratch.active_set.derivative(problem, scratch.row_change, scratch.force_change);
-  } else {
-    scratch.cone_solver.derivative(problem, scratch.row_change, scratch.force_change);
-  }
-}
-
 /// Change of the tool's wrench by the change of forces that begins at `begin` of scratch.force_change.
-Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index begin = 0) noexcept {
+Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index begin) noexcept {
   const ContactProblem& problem = scratch.problem;
   Wrench change;
   for (Index k = 0; k < state.contact_count; ++k) {
@@ -81,37 +70,9 @@ Wrench wrench_of(const State& state, const Scratch& scratch, Index number, Index
   return change;
 }
 
-/// Change of the tool's wrench by what scratch.row_change says.
-Wrench wrench_change(const State& state, Scratch& scratch, Index number) noexcept {
-  find_force_changes(scratch, 1);
-  return wrench_of(state, scratch, number);
-}
-
-/// Change of the tool's wrench by a motion of the device for which scratch.row_change stands, with the
-/// turning of normals by it and by what it moves: a fixed point, of which each pass is as much smaller as the
-/// tool is deep.
-Wrench wrench_change_by_motion(const State& state, Scratch& scratch, Index number, const Vec3& motion,
-                               double radius) noexcept {
-  const Tool& tool = state.tools[number].tool;
-  Wrench change;
-  Vec3 tool_motion = motion;
-  begin_derivative(state, scratch);
-  for (int pass = 1;; ++pass) {
-    const Vec3 turned = turn_normals(state, scratch, number, tool_motion, radius);
-    const Vec3 before = change.force;
-    change = wrench_change(state, scratch, number);
-    change.force += turned;
-    const bool follows = (change.force - before).norm() > tuning.hand.rolling_tolerance * change.force.norm();
-    if (!follows || scratch.rolling_count == 0 || pass == tuning.hand.rolling_passes) return change;
-    follow_forces(state, scratch);
-    tool_motion = motion + change.force / tool.coupling_stiffness;
-  }
-}
-
 /// Contacts that would open by the change of forces at a motion of 1, which begins at `begin`, bound the
 /// radius.
-void keep_closed_contacts(const State& state, const Scratch& scratch, ToolState& tool,
-                          Index begin = 0) noexcept {
+void keep_closed_contacts(const State& state, const Scratch& scratch, ToolState& tool, Index begin) noexcept {
   const ContactProblem& problem = scratch.problem;
   const std::span<const double> change =
       std::span(scratch.force_change).subspan(static_cast<std::size_t>(begin));
@@ -136,11 +97,12 @@ void keep_open_contacts(const State& state, const ContactProblem& problem, ToolS
 /// What the turn of the device in this tick changes of the tool's wrench. Places that are held turn with the
 /// tool.
 Wrench change_by_turning(const State& state, Scratch& scratch, const ToolState& tool, Index number) noexcept {
+  if (tool.device.orientation.coeffs() == tool.last_device.orientation.coeffs()) return {};
   const Eigen::AngleAxisd turned(tool.device.orientation * tool.last_device.orientation.conjugate());
   const Vec3 turn = turned.angle() * turned.axis();
-  if (turned.angle() == 0.0) return {};
   fill_row_change(state, scratch, number, Vec3::Zero(), turn);
-  Wrench change = wrench_change(state, scratch, number);
+  find_force_changes(scratch, 1);
+  Wrench change = wrench_of(state, scratch, number, 0);
   for (const ContactPoint& contact : state.contacts()) {
     if (contact.tool == number && contact.held) change.torque += turn.cross(contact.arm).cross(contact.force);
   }
@@ -158,31 +120,23 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
     tool.local.radius = std::min(tool.local.radius, tuning.hand.curvature_share * tool.tool.radius);
   if (tool.contacts == 0) return linearise_free(state, tool, number);
 
-  Eigen::Matrix3d force = Eigen::Matrix3d::Zero();  // change by a motion of the device
-  Eigen::Matrix3d torque = Eigen::Matrix3d::Zero();
-  const auto keep = [&](int axis, const Wrench& change, Index begin) {
-    force.col(axis) = change.force;
-    torque.col(axis) = change.torque;
-    keep_closed_contacts(state, scratch, tool, begin);
-  };
   const int d = scratch.problem.dimension;
-  const bool rolls = begin_rolling(state, scratch, number);
-  if (scratch.problem.many && !rolls) {
-    const Index rows = scratch.problem.rows;
-    for (int axis = 0; axis < d; ++axis)
-      fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero(), axis * rows);
-    find_force_changes(scratch, d);
-    for (int axis = 0; axis < d; ++axis)
-      keep(axis, wrench_of(state, scratch, number, axis * rows), axis * rows);
+  const Index rows = scratch.problem.rows;
+  for (int axis = 0; axis < d; ++axis)
+    fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero(), axis * rows);
+  const bool rolls = begin_rolling(state, scratch, number, rolling_radius(tool.tool, edge));
+  Eigen::Matrix3d force = Eigen::Matrix3d::Zero();  // change by a motion of the device
+  if (rolls) {
+    force = force_change_by_rolling(state, scratch, number);
   } else {
-    const double radius = rolling_radius(tool.tool, edge);
-    for (int axis = 0; axis < d; ++axis) {
-      fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero());
-      keep(axis,
-           rolls ? wrench_change_by_motion(state, scratch, number, Vec3::Unit(axis), radius)
-                 : wrench_change(state, scratch, number),
-           0);
-    }
+    find_force_changes(scratch, d);
+  }
+  Eigen::Matrix3d torque = Eigen::Matrix3d::Zero();
+  for (int axis = 0; axis < d; ++axis) {
+    const Wrench change = wrench_of(state, scratch, number, axis * rows);
+    if (!rolls) force.col(axis) = change.force;
+    torque.col(axis) = change.torque;
+    keep_closed_contacts(state, scratch, tool, axis * rows);
   }
   keep_open_contacts(state, scratch.problem, tool, number);
   if (force.allFinite()) tool.local.stiffness = passive(-force);

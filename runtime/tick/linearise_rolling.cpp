@@ -1,138 +1,247 @@
 #include "runtime/tick/linearise_rolling.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/solve/vector_loops.h"
+#include "runtime/tick/contact_solution.h"
 
 namespace palpate {
 namespace {
 
-bool is_closed(const State& state, const ContactProblem& problem, Index contact) noexcept {
-  return problem.rows_of(contact) > 0 &&
-         (state.contact_points[contact].held || problem.normal_part(contact, problem.lambda) > 0.0);
-}
-
-/// Numbers the near nodes under closed contacts; false when they are too many.
-bool number_places(const State& state, Scratch& scratch) noexcept {
-  std::fill_n(scratch.rolling_number.begin(), state.surface.near.count(), Index{-1});
-  scratch.rolling_count = 0;
-  for (Index k = 0; k < state.contact_count; ++k) {
-    if (!is_closed(state, scratch.problem, k)) continue;
-    for (const Index place : scratch.rows[scratch.problem.first_row(k)].places) {
-      if (place < 0 || scratch.rolling_number[place] >= 0) continue;
-      if (scratch.rolling_count == tuning.hand.rolling_places) return false;
-      scratch.rolling_number[place] = scratch.rolling_count;
-      scratch.rolling_places[scratch.rolling_count++] = place;
-    }
+/// What turns and what follows of the closed contacts and their tilt.
+void gather_contacts(const State& state, Scratch& scratch, Index number, double radius) noexcept {
+  const ContactProblem& problem = scratch.problem;
+  RollingScratch& rolling = scratch.rolling;
+  for (Index k = 0; k < problem.contacts; ++k) {
+    const bool is_tilt = k >= state.contact_count;
+    const ContactPoint& contact = state.contact_points[is_tilt ? problem.owner[k] : k];
+    if (contact.force.isZero(0.0)) continue;
+    const Index first = problem.first_row(k);
+    for (Index i = first; i < problem.first_row(k + 1); ++i) rolling.following[rolling.following_count++] = i;
+    if (is_tilt || !contact.rolls || contact.tool != number) continue;
+    rolling.turning[rolling.turning_count++] = {.row = first,
+                                                .weights = contact.weights,
+                                                .normal = contact.frame.col(0),
+                                                .spring = problem.lambda[first] / radius};
   }
-  return true;
 }
 
+/// What the near nodes move by a force along an axis at a turning contact.
+template <int D>
+const double* response(const NearField& near, Scratch& scratch, const RollingScratch::Turning& turning,
+                       int axis) noexcept {
+  const std::array<Index, 3>& places = scratch.rows[turning.row].places;
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (turning.weights[n] == 1.0 && places[n] >= 0) return near.row(D * places[n] + axis).data();
+  }
+  double* y = scratch.row_response.data();
+  const std::ptrdiff_t width = std::ptrdiff_t{D} * near.count();
+  std::fill_n(y, width, 0.0);
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (places[n] >= 0) add(near.row(D * places[n] + axis).data(), turning.weights[n], y, width);
+  }
+  return y;
+}
+
+/// Fills T and B.
+template <int D>
 void gather_response(const NearField& near, Scratch& scratch) noexcept {
-  const int d = near.dimension();
-  double* to = scratch.rolling_response.data();
-  for (Index i = 0; i < scratch.rolling_count; ++i) {
-    for (int axis = 0; axis < d; ++axis) {
-      const double* from = near.row(d * scratch.rolling_places[i] + axis).data();
-      for (Index j = 0; j < scratch.rolling_count; ++j)
-        to = std::copy_n(from + std::ptrdiff_t{d} * scratch.rolling_places[j], d, to);
+  RollingScratch& rolling = scratch.rolling;
+  const std::ptrdiff_t width = std::ptrdiff_t{D} * rolling.turning_count;
+  for (std::ptrdiff_t j = 0; j < width; ++j) {
+    const double* y = response<D>(near, scratch, rolling.turning[j / D], static_cast<int>(j % D));
+    double* to = rolling.T.data() + j * width;
+    for (Index k = 0; k < rolling.turning_count; ++k, to += D) {
+      const RollingScratch::Turning& turning = rolling.turning[k];
+      const std::array<Index, 3>& places = scratch.rows[turning.row].places;
+      std::fill_n(to, D, 0.0);
+      for (std::size_t n = 0; n < 3; ++n) {
+        for (int axis = 0; places[n] >= 0 && axis < D; ++axis)
+          to[axis] += turning.weights[n] * y[D * places[n] + axis];
+      }
+    }
+    for (Index k = 0; k < rolling.following_count; ++k) {
+      const ContactRow& row = scratch.rows[rolling.following[k]];
+      double motion = 0.0;
+      for (std::size_t n = 0; n < 3; ++n) {
+        for (int axis = 0; row.places[n] >= 0 && axis < D; ++axis)
+          motion += row.body[n][axis] * y[D * row.places[n] + axis];
+      }
+      rolling.B[k * width + j] = motion;
     }
   }
 }
 
-/// rolling_motion = sign Xi rolling_load.
-void respond(Scratch& scratch, int dimension, double sign) noexcept {
-  const std::ptrdiff_t width = std::ptrdiff_t{dimension} * scratch.rolling_count;
-  double* __restrict u = scratch.rolling_motion.data();
-  std::fill_n(u, width, 0.0);
-  for (std::ptrdiff_t j = 0; j < width; ++j) {
-    const double load = sign * scratch.rolling_load[static_cast<std::size_t>(j)];
-    const double* __restrict c = scratch.rolling_response.data() + j * width;
-#pragma omp simd
-    for (std::ptrdiff_t i = 0; i < width; ++i) u[i] += load * c[i];
+VectorLanes zero() noexcept {
+  return {Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
+}
+
+Lanes along(const VectorLanes& vectors, const Vec3& direction) noexcept {
+  return vectors[0] * direction[0] + vectors[1] * direction[1] + vectors[2] * direction[2];
+}
+
+void add(const VectorLanes& vectors, VectorLanes& to) noexcept {
+  for (std::size_t axis = 0; axis < 3; ++axis) to[axis] += vectors[axis];
+}
+
+Lanes squared(const VectorLanes& vectors) noexcept {
+  return vectors[0].square() + vectors[1].square() + vectors[2].square();
+}
+
+/// The device's motion along each axis, and what the tool gives way to a change of force.
+VectorLanes tool_motion(const VectorLanes& change, double coupling) noexcept {
+  VectorLanes motion;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    motion[axis] = change[axis] / coupling;
+    motion[axis][static_cast<Eigen::Index>(axis)] += 1.0;
   }
-}
-
-/// Adds factor * vector to the entries of a near node in `to`.
-void add_at(const Scratch& scratch, int dimension, Index place, const Vec3& vector,
-            std::vector<double>& to) noexcept {
-  const Index number = place < 0 ? -1 : scratch.rolling_number[place];
-  if (number < 0) return;
-  for (int axis = 0; axis < dimension; ++axis) to[dimension * number + axis] += vector[axis];
-}
-
-Vec3 motion_at(const Scratch& scratch, int dimension, Index place) noexcept {
-  Vec3 motion = Vec3::Zero();
-  const Index number = place < 0 ? -1 : scratch.rolling_number[place];
-  if (number < 0) return motion;
-  for (int axis = 0; axis < dimension; ++axis)
-    motion[axis] = scratch.rolling_motion[dimension * number + axis];
   return motion;
 }
 
-}  // namespace
-
-bool begin_rolling(const State& state, Scratch& scratch, Index number) noexcept {
-  const auto rolls = [&](Index k) {
-    const ContactPoint& contact = state.contact_points[k];
-    return contact.rolls && contact.tool == number && is_closed(state, scratch.problem, k);
-  };
-  bool any = false;
-  for (Index k = 0; k < state.contact_count; ++k) any = any || rolls(k);
-  if (!any) return false;
-  if (!number_places(state, scratch)) {
-    std::fill_n(scratch.rolling_number.begin(), state.surface.near.count(), Index{-1});
-    scratch.rolling_count = 0;
+/// What a turning contact moves against the tool, which moves by `tool`, by the changes of force so far.
+template <int D>
+VectorLanes relative_motion(const RollingScratch& rolling, Index contact, const VectorLanes& tool) noexcept {
+  VectorLanes motion = tool;
+  if (!rolling.answers) return motion;
+  const std::ptrdiff_t width = std::ptrdiff_t{D} * rolling.turning_count;
+  const double* T = rolling.T.data() + std::ptrdiff_t{D} * contact;
+  const double* B = rolling.B.data() + std::ptrdiff_t{D} * contact;
+  for (std::ptrdiff_t j = 0; j < width; ++j, T += width) {
+    for (std::size_t axis = 0; axis < D; ++axis) motion[axis] += T[axis] * rolling.turning_force[j];
   }
-  gather_response(state.surface.near, scratch);
-  return true;
+  for (Index k = 0; k < rolling.following_count; ++k, B += width) {
+    for (std::size_t axis = 0; axis < D; ++axis) motion[axis] += B[axis] * rolling.row_force[k];
+  }
+  return motion;
 }
 
-void begin_derivative(const State& state, Scratch& scratch) noexcept {
-  std::copy_n(scratch.row_change.begin(), scratch.problem.rows, scratch.device_change.begin());
-  std::fill_n(scratch.rolling_motion.begin(), state.surface.near.dimension() * scratch.rolling_count, 0.0);
+/// The forces by which normals turn; their sum on the tool.
+template <int D>
+VectorLanes turn_normals(RollingScratch& rolling, const VectorLanes& tool) noexcept {
+  VectorLanes sum = zero();
+  for (Index k = 0; k < rolling.turning_count; ++k) {
+    const RollingScratch::Turning& turning = rolling.turning[k];
+    VectorLanes force = relative_motion<D>(rolling, k, tool);
+    const Lanes normal = along(force, turning.normal);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      force[axis] = turning.spring * (force[axis] - turning.normal[axis] * normal);
+    add(force, sum);
+    for (std::size_t axis = 0; axis < D; ++axis) rolling.next_force[D * k + axis] = force[axis];
+  }
+  std::swap(rolling.turning_force, rolling.next_force);
+  return sum;
 }
 
-Vec3 turn_normals(const State& state, Scratch& scratch, Index number, const Vec3& motion,
-                  double radius) noexcept {
-  const ContactProblem& problem = scratch.problem;
-  const int d = state.surface.near.dimension();
-  Vec3 sum = Vec3::Zero();
-  std::fill_n(scratch.rolling_load.begin(), d * scratch.rolling_count, 0.0);
-  for (Index k = 0; k < state.contact_count; ++k) {
-    const ContactPoint& contact = state.contact_points[k];
-    if (!contact.rolls || contact.tool != number || !is_closed(state, problem, k)) continue;
-    const ContactRow& row = scratch.rows[problem.first_row(k)];
-    Vec3 relative = motion;
-    for (std::size_t n = 0; n < 3; ++n) relative -= contact.weights[n] * motion_at(scratch, d, row.places[n]);
-    const Vec3 normal = contact.frame.col(0);
-    const Vec3 force =
-        problem.lambda[problem.first_row(k)] / radius * (relative - relative.dot(normal) * normal);
-    sum += force;
-    for (std::size_t n = 0; n < 3; ++n)
-      add_at(scratch, d, row.places[n], contact.weights[n] * force, scratch.rolling_load);
+/// Motions along the rows: those of the device, and what the turning moves surface and tool by.
+template <int D>
+void add_motion_to_rows(Scratch& scratch, const VectorLanes& given_way, Index number) noexcept {
+  const RollingScratch& rolling = scratch.rolling;
+  const std::ptrdiff_t width = std::ptrdiff_t{D} * rolling.turning_count;
+  for (Index k = 0; k < rolling.following_count; ++k) {
+    const Index i = rolling.following[k];
+    Lanes change = rolling.device_change[k];
+    if (scratch.rows[i].tool == number) change += along(given_way, scratch.rows[i].force);
+    const double* B = rolling.B.data() + k * width;
+    for (std::ptrdiff_t j = 0; rolling.answers && j < width; ++j) change += B[j] * rolling.turning_force[j];
+    for (int s = 0; s < D; ++s) scratch.row_change[s * scratch.problem.rows + i] = change[s];
   }
-  respond(scratch, d, 1.0);
-  const Vec3 given_way = sum / state.tools[number].tool.coupling_stiffness;
-  for (Index i = 0; i < problem.rows; ++i) {
-    const ContactRow& row = scratch.rows[i];
-    double change = scratch.device_change[i];
-    for (std::size_t n = 0; n < 3; ++n) change += row.body[n].dot(motion_at(scratch, d, row.places[n]));
-    if (row.tool == number) change += row.force.dot(given_way);
-    scratch.row_change[i] = change;
+}
+
+/// Takes the change of the contact forces; its sum on the tool.
+template <int D>
+VectorLanes take_forces(Scratch& scratch, Index number) noexcept {
+  RollingScratch& rolling = scratch.rolling;
+  VectorLanes sum = zero();
+  for (Index k = 0; k < rolling.following_count; ++k) {
+    const Index i = rolling.following[k];
+    Lanes by = Lanes::Zero();
+    for (int s = 0; s < D; ++s) by[s] = scratch.force_change[s * scratch.problem.rows + i];
+    rolling.row_force[k] = by;
+    if (scratch.rows[i].tool != number) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += scratch.rows[i].force[axis] * by;
   }
   return sum;
 }
 
-void follow_forces(const State& state, Scratch& scratch) noexcept {
-  const int d = state.surface.near.dimension();
-  for (Index i = 0; i < scratch.problem.rows; ++i) {
-    const ContactRow& row = scratch.rows[i];
-    if (scratch.force_change[i] == 0.0) continue;
-    for (std::size_t n = 0; n < 3; ++n)
-      add_at(scratch, d, row.places[n], scratch.force_change[i] * row.body[n], scratch.rolling_load);
+/// The limits of series of which the last two steps are known, and go on shrinking at that rate.
+void go_to_limit(const VectorLanes& step, const VectorLanes& last_step, VectorLanes& change) noexcept {
+  const Lanes both = step[0] * last_step[0] + step[1] * last_step[1] + step[2] * last_step[2];
+  const Lanes before = squared(last_step).max(std::numeric_limits<double>::min());
+  const Lanes rate = (both / before).max(-0.5).min(0.5);
+  for (std::size_t axis = 0; axis < 3; ++axis) change[axis] += rate / (1.0 - rate) * step[axis];
+}
+
+template <int D>
+void begin_changes(Scratch& scratch) noexcept {
+  RollingScratch& rolling = scratch.rolling;
+  for (Index k = 0; k < rolling.following_count; ++k) {
+    rolling.row_force[k].setZero();
+    rolling.device_change[k].setZero();
+    for (int s = 0; s < D; ++s)
+      rolling.device_change[k][s] = scratch.row_change[s * scratch.problem.rows + rolling.following[k]];
   }
-  respond(scratch, d, -1.0);
+  for (Index j = 0; j < D * rolling.turning_count; ++j) rolling.turning_force[j].setZero();
+}
+
+template <int D>
+VectorLanes change_by_rolling(Scratch& scratch, Index number, double coupling) noexcept {
+  RollingScratch& rolling = scratch.rolling;
+  const double tolerance = tuning.hand.rolling_tolerance * tuning.hand.rolling_tolerance;
+  begin_changes<D>(scratch);
+  VectorLanes change = zero();
+  VectorLanes step = change;
+  for (int pass = 1;; ++pass) {
+    const VectorLanes turned = turn_normals<D>(rolling, tool_motion(change, coupling));
+    VectorLanes given_way = turned;
+    for (Lanes& value : given_way) value /= coupling;
+    add_motion_to_rows<D>(scratch, given_way, number);
+    find_force_changes(scratch, D);
+    const VectorLanes last_step = step;
+    step = take_forces<D>(scratch, number);
+    for (std::size_t axis = 0; axis < 3; ++axis) step[axis] += turned[axis] - change[axis];
+    add(step, change);
+    if (!rolling.answers || (squared(step) <= tolerance * squared(change)).all()) return change;
+    if (pass < tuning.hand.rolling_passes) continue;
+    go_to_limit(step, last_step, change);
+    return change;
+  }
+}
+
+}  // namespace
+
+bool begin_rolling(const State& state, Scratch& scratch, Index number, double radius) noexcept {
+  RollingScratch& rolling = scratch.rolling;
+  rolling.turning_count = 0;
+  rolling.following_count = 0;
+  const auto contacts = state.contacts();
+  if (std::none_of(contacts.begin(), contacts.end(), [&](const ContactPoint& contact) {
+        return contact.rolls && contact.tool == number && !contact.force.isZero(0.0);
+      }))
+    return false;
+  gather_contacts(state, scratch, number, radius);
+  rolling.answers = rolling.turning_count <= tuning.hand.most_turning &&
+                    rolling.following_count <= tuning.hand.most_following;
+  if (!rolling.answers) return true;
+  if (state.surface.near.dimension() == 3) {
+    gather_response<3>(state.surface.near, scratch);
+  } else {
+    gather_response<2>(state.surface.near, scratch);
+  }
+  return true;
+}
+
+Eigen::Matrix3d force_change_by_rolling(const State& state, Scratch& scratch, Index number) noexcept {
+  const double coupling = state.tools[number].tool.coupling_stiffness;
+  const VectorLanes change = scratch.problem.dimension == 3 ? change_by_rolling<3>(scratch, number, coupling)
+                                                            : change_by_rolling<2>(scratch, number, coupling);
+  Eigen::Matrix3d by_motion = Eigen::Matrix3d::Zero();
+  for (int s = 0; s < scratch.problem.dimension; ++s) {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      by_motion(static_cast<Eigen::Index>(axis), s) = change[axis][s];
+  }
+  return by_motion;
 }
 
 }  // namespace palpate

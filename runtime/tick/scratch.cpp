@@ -34,6 +34,16 @@ Index many(Index max_contacts) {
 
 }  // namespace
 
+RollingScratch::RollingScratch(int dimension, Index max_contacts, Index max_rows)
+    : turning(size(max_contacts)),
+      following(size(max_rows)),
+      T(size(dimension * tuning.hand.most_turning) * size(dimension * tuning.hand.most_turning)),
+      B(size(tuning.hand.most_following) * size(dimension * tuning.hand.most_turning)),
+      turning_force(size(dimension * max_contacts)),
+      next_force(turning_force.size()),
+      row_force(following.size()),
+      device_change(following.size()) {}
+
 Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes)
     : last_contacts(size(max_contacts)),
       found(body.surface_friction().size()),
@@ -52,13 +62,7 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       newton_krylov(body.dimension() * many(max_contacts), most_rows(body, many(max_contacts))),
       row_change(size(body.dimension()) * rows.size()),
       force_change(row_change.size()),
-      rolling_number(size(near_nodes)),
-      rolling_places(size(tuning.hand.rolling_places)),
-      rolling_response(size(body.dimension() * tuning.hand.rolling_places) *
-                       size(body.dimension() * tuning.hand.rolling_places)),
-      rolling_load(size(body.dimension() * tuning.hand.rolling_places)),
-      rolling_motion(rolling_load.size()),
-      device_change(rows.size()),
+      rolling(body.dimension(), max_contacts, static_cast<Index>(rows.size())),
       far_displacement(size(body.dimension() * tuning.far.nodes)) {}
 
 }  // namespace palpate

@@ -11,6 +11,7 @@
 #include "runtime/tick/compliance.h"
 #include "runtime/tick/contact_point.h"
 #include "runtime/tick/contact_row.h"
+#include "runtime/tick/rolling_scratch.h"
 #include "runtime/tick/touching_pair.h"
 
 namespace palpate {
@@ -49,13 +50,7 @@ struct Scratch {
   NewtonKrylov newton_krylov;            ///< solution of many contacts
   std::vector<double> row_change;        ///< [d x rows] linearise: db, an axis after the other [m]
   std::vector<double> force_change;      ///< [d x rows] linearise: dlambda [N]
-  Index rolling_count = 0;               ///< linearise: of rolling_places
-  std::vector<Index> rolling_number;     ///< [near_nodes] linearise: place among rolling_places, -1 for none
-  std::vector<Index> rolling_places;     ///< [rolling_places] linearise: near nodes that carry force
-  std::vector<double> rolling_response;  ///< [(d rolling_places)^2] linearise: Xi of these [m/N]
-  std::vector<double> rolling_load;      ///< [d rolling_places] linearise: change of their forces [N]
-  std::vector<double> rolling_motion;    ///< [d rolling_places] linearise: what the load displaces them [m]
-  std::vector<double> device_change;     ///< [rows] linearise: db without the turning [m]
+  RollingScratch rolling;                ///< linearise: the turning of normals
   std::vector<double> far_displacement;  ///< [d tuning.far.nodes] far surface: the slice that is renewed [m]
   HighWater high_water;                  ///< detection and assembly: since the start
 };

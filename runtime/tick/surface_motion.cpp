@@ -1,6 +1,7 @@
 #include "runtime/tick/surface_motion.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "runtime/solve/node_vectors.h"
 #include "runtime/solve/tick_tuning.h"
@@ -14,7 +15,9 @@ void move_far(const Body& body, SurfaceState& surface, Index node, const Vec3& u
   if (surface.near.place_of(node) >= 0) return;
   const Vec3 position = unloaded_position(body, surface, node) + u;
   if (!position.allFinite()) return;
-  surface.sweep.change = std::max(surface.sweep.change, (position - surface.tree.position(node)).norm());
+  const double squared = (position - surface.tree.position(node)).squaredNorm();
+  if (squared == 0.0) return;
+  if (squared > surface.sweep.change * surface.sweep.change) surface.sweep.change = std::sqrt(squared);
   surface.tree.move(node, position);
 }
 

@@ -18,16 +18,6 @@ NearestPoint nearest_to_core(const SurfaceTree& tree, const SimplexNodes& nodes,
                       : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
 }
 
-TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
-                       const NearestPoint& nearest) noexcept {
-  TouchingPair pair{.simplex = simplex, .place = place, .nearest = nearest};
-  pair.normal = outward_normal(tree, nodes);
-  const Vec3 across = nearest.on_core - nearest.on_simplex;
-  pair.height = across.dot(pair.normal);
-  pair.distance = across.norm();
-  return pair;
-}
-
 }  // namespace
 
 SimplexNodes nodes_of(const Body& body, Index simplex) noexcept {
@@ -53,6 +43,16 @@ Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept
 NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
                             bool is_point) noexcept {
   return is_point ? nearest_on_simplex(tree, nodes, core.origin) : nearest_to_core(tree, nodes, core);
+}
+
+TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
+                       const NearestPoint& nearest) noexcept {
+  TouchingPair pair{.simplex = simplex, .place = place, .nearest = nearest};
+  pair.normal = outward_normal(tree, nodes);
+  const Vec3 across = nearest.on_core - nearest.on_simplex;
+  pair.height = across.dot(pair.normal);
+  pair.distance = across.norm();
+  return pair;
 }
 
 TouchingPair pair_of_end(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,

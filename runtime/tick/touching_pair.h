@@ -29,6 +29,10 @@ Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept
 NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
                             bool is_point) noexcept;
 
+/// The pair of a simplex and the core of which these are the nearest points.
+TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
+                       const NearestPoint& nearest) noexcept;
+
 /// The pair of a simplex and an end of the core: 0 its origin, 1 its end.
 TouchingPair pair_of_end(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
                          int place) noexcept;
