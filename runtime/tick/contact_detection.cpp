@@ -143,19 +143,41 @@ bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const V
   return false;
 }
 
-/// Whether a held contact of the same tool is at the same place, or holds all that this one touches.
-bool is_held_already(const Body& body, const State& state, const ContactPoint& contact) noexcept {
+/// Whether a grab of the tool holds a place on a simplex, edge or corner of the surface, or next to it: by
+/// where they are on the body at rest, so that what else is touched doesn't hang on how the surface lies.
+bool is_held(const Body& body, const State& state, Index tool, const SimplexNodes& nodes) noexcept {
+  if (state.held_count == 0) return false;
   const double near = tuning.detection.same_held_place * body.mean_surface_edge();
-  const auto holds = [](const ContactPoint& held, Index node) {
-    return node < 0 || std::find(held.nodes.begin(), held.nodes.end(), node) != held.nodes.end();
+  const double far = near + body.longest_surface_edge();
+  const auto corner = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
+  const auto nearest = [&](const Vec3& place) {
+    if (nodes[1] < 0) return (corner(0) - place).squaredNorm();
+    if (nodes[2] < 0) return nearest_on_line(place, corner(0), corner(1)).squared_distance;
+    return nearest_on_triangle(place, corner(0), corner(1), corner(2)).squared_distance;
   };
   return std::any_of(state.contact_points.begin(), state.contact_points.begin() + state.held_count,
                      [&](const ContactPoint& held) {
-                       return held.tool == contact.tool &&
-                              ((held.position - contact.position).squaredNorm() < near * near ||
-                               std::all_of(contact.nodes.begin(), contact.nodes.end(),
-                                           [&](Index node) { return holds(held, node); }));
+                       return held.tool == tool && (corner(0) - held.rest_point).squaredNorm() < far * far &&
+                              nearest(held.rest_point) < near * near;
                      });
+}
+
+/// How much of a contact is on nodes that its tool holds, of what is on nodes that move.
+double held_share(const Body& body, const State& state, const ContactPoint& contact) noexcept {
+  const auto begin = state.contact_points.begin();
+  double moving = 0.0;
+  double held = 0.0;
+  for (std::size_t n = 0; state.held_count > 0 && n < 3; ++n) {
+    const Index node = contact.nodes[n];
+    if (node < 0 || !body.surface_moves(node)) continue;
+    moving += contact.weights[n];
+    const bool is_held = std::any_of(begin, begin + state.held_count, [&](const ContactPoint& other) {
+      return other.tool == contact.tool &&
+             std::find(other.nodes.begin(), other.nodes.end(), node) != other.nodes.end();
+    });
+    if (is_held) held += contact.weights[n];
+  }
+  return held > 0.0 ? held / moving : 0.0;
 }
 
 /// Whether a contact's normal turns as the tool moves: at a vertex, and on an edge or face that carried
@@ -190,12 +212,12 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.weights = pair.nearest.weights;
   for (std::size_t k = 0; k < 3; ++k) contact.nodes[k] = contact.weights[k] > 0.0 ? nodes[k] : -1;
   contact.position = pair.nearest.on_simplex;
-  if (is_held_already(body, state, contact)) return;
   contact.arm = contact.position - tool.pose.position;
   contact.slope = slopes(state.surface.tree, contact.nodes);
   contact.frame = frame_of(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
+  contact.held_share = held_share(body, state, contact);
   contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
@@ -277,14 +299,33 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
     const int place = is_segment ? 2 : 0;
     touch_pair(body, state, scratch, touch, pair_of_corner(body, tree, simplex, n, touch.core, place));
     if (is_segment && corners == 3)
-      touch_pair(body, state, scratch, touch, pair_of_edge(body, tree, simplex, n, touch.core));
+      touch_pair(body, state, scratch, touch, pair_of_edge(body, tree, simplex, n, touch.core, place));
+  }
+}
+
+/// A simplex that is held in part is touched along its border, except where that is held. What is outside of
+/// the border may turn its back to the tool.
+void touch_border(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+                  const TouchingPair& pair) noexcept {
+  if (pair.height < 0.0) return;
+  const SurfaceTree& tree = state.surface.tree;
+  const SimplexNodes nodes = nodes_of(body, pair.simplex);
+  const bool is_flat = body.dimension() == 2;
+  const int place = state.tools[touch.number].tool.length > 0.0 ? 2 : 0;
+  for (std::size_t n = 0; n < (is_flat ? 2 : 3); ++n) {
+    const SimplexNodes part = {nodes[n], is_flat ? -1 : nodes[(n + 1) % 3], -1};
+    if (is_held(body, state, touch.number, part)) continue;
+    touch_pair(body, state, scratch, touch,
+               is_flat ? pair_of_corner(body, tree, pair.simplex, n, touch.core, place)
+                       : pair_of_edge(body, tree, pair.simplex, n, touch.core, place));
   }
 }
 
 /// Contact points of one tool with one simplex. Between its nodes the surface is smooth: its triangles are
 /// chords of a sphere that is large against them, and would hold it out by edge^2 / 6 R.
 void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
-                   TouchingPair pair) noexcept {
+                   const TouchingPair& nearest) noexcept {
+  TouchingPair pair = nearest;
   const Tool& tool = state.tools[touch.number].tool;
   const SurfaceTree& tree = state.surface.tree;
   const Index simplex = pair.simplex;
@@ -335,7 +376,11 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
     tool.engaged = false;
     return;
   }
-  for (Index k = 0; k < touch.usable; ++k) touch_simplex(body, state, scratch, touch, scratch.pairs[k]);
+  for (Index k = 0; k < touch.usable; ++k) {
+    const TouchingPair& pair = scratch.pairs[k];
+    const bool held = is_held(body, state, number, nodes_of(body, pair.simplex));
+    (held ? touch_border : touch_simplex)(body, state, scratch, touch, pair);
+  }
   if (scratch.is_first_pass) roll_ahead(body, tool, scratch, touch.first_candidate);
 }
 
