@@ -274,6 +274,16 @@ void look_from_origin(const Body& body, const SurfaceTree& tree, Scratch& scratc
   touch.inside = side < 0.0;
 }
 
+/// Whether a face looks away from where it looked at rest: what is sharp can fold the surface over itself,
+/// and would be caught between the two sides by friction, whatever it pulls.
+bool has_turned_over(const Body& body, const TouchingPair& pair) noexcept {
+  const SimplexNodes nodes = nodes_of(body, pair.simplex);
+  const auto corner = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
+  const Vec3 side = corner(1) - corner(0);
+  const Vec3 normal = nodes[2] < 0 ? Vec3(side.y(), -side.x(), 0.0) : Vec3(side.cross(corner(2) - corner(0)));
+  return normal.dot(pair.normal) < 0.0;
+}
+
 /// Makes a candidate of a pair that touches or may touch in this tick. From outside, a simplex is touched
 /// from its outer side: those that turn their back are behind others. From a little inside (rounding, or a
 /// fast tick), the nearest ones and those that carried force push out along their normals.
@@ -285,6 +295,7 @@ void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolCont
                             (carried(scratch, touch.number, pair) && pair.distance < touch.lost));
   const bool face_tells =
       pushes_out || pair.distance < tuning.detection.on_surface * body.mean_surface_edge();
+  if (face_tells && has_turned_over(body, pair)) return;
   if (!face_tells && (pair.height < 0.0 || pair.distance - radius > touch.margin)) return;
   add_candidate(body, state, scratch, touch.number, touch.first_candidate, pair, face_tells);
 }
@@ -360,6 +371,12 @@ void roll_ahead(const Body& body, const ToolState& tool, Scratch& scratch, Index
   }
 }
 
+/// Whether the core is so deep in the body that no simplex would push it out on the side that it came from.
+bool is_lost(const Body& body, const SurfaceTree& tree, const ToolContact& touch) noexcept {
+  if (touch.usable > 0) return touch.inside && touch.nearest_distance > touch.lost;
+  return body.bounds().contains(touch.core.origin) && tree.inside(touch.core.origin);
+}
+
 /// Contact points of one tool.
 void find_candidates(const Body& body, State& state, Scratch& scratch, Index number) noexcept {
   ToolState& tool = state.tools[number];
@@ -372,8 +389,9 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
   const std::size_t count = nearest_simplices(body, state.surface.tree, scratch, tool, touch.core, reach);
   keep_usable(body, state, scratch, touch, count);
   look_from_origin(body, state.surface.tree, scratch, touch);
-  if (touch.inside && touch.nearest_distance > touch.lost) {
+  if (is_lost(body, state.surface.tree, touch)) {
     tool.engaged = false;
+    tool.status |= StepStatus::inside_body;
     return;
   }
   for (Index k = 0; k < touch.usable; ++k) {
