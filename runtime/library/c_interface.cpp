@@ -29,6 +29,7 @@ constexpr bool same(int bit, StepStatus status) {
 }
 static_assert(same(PALPATE_NOTHING_IN_REACH, StepStatus::nothing_in_reach));
 static_assert(same(PALPATE_CAPACITY_FULL, StepStatus::capacity_full));
+static_assert(same(PALPATE_UNSETTLED, StepStatus::unsettled));
 static_assert(same(PALPATE_POSE_NOT_FINITE, StepStatus::pose_not_finite));
 static_assert(same(PALPATE_RESULT_NOT_FINITE, StepStatus::result_not_finite));
 static_assert(same(PALPATE_INSIDE_BODY, StepStatus::inside_body));
@@ -39,7 +40,7 @@ static_assert(same(PALPATE_HANDING_OVER, StepStatus::handing_over));
 static_assert(same(PALPATE_OLDER_PATCH, StepStatus::older_patch));
 static_assert(same(PALPATE_LATE_MOTION, StepStatus::late_motion));
 static_assert(same(PALPATE_RIGID_CONTACT, StepStatus::rigid_contact));
-static_assert(status_names.size() == 12, "these");
+static_assert(status_names.size() == 13, "these");
 
 constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
 

@@ -71,7 +71,7 @@ struct ContactProblem {
   std::vector<float> single_W;     ///< [rows x single_stride] [m/N]
   std::vector<double> b;           ///< [rows] [m]; where contacts are many, r by the guess
   std::vector<double> lambda;      ///< [rows] [N]; before solving: a guess
-  std::vector<double> guess;       ///< [rows] where contacts are many: lambda before solving [N]
+  std::vector<double> guess;       ///< [rows] lambda before solving [N]
 
  private:
   [[nodiscard]] std::size_t place_in_w(Index i, Index j) const noexcept {

@@ -55,9 +55,10 @@ struct PassTuning {
 /// The solver for contact with friction. Budget and tolerances were chosen from problems of tools that slide
 /// over the demo's bodies.
 struct ConeTuning {
-  double tolerance = 1e-6;  ///< [largest force] of the residual
-  double accepted = 1e-4;   ///< [largest force] where `tolerance` is not met
-  int fewest_rounds = 4;    ///< whatever they cost
+  double tolerance = 1e-6;   ///< [largest force] of the residual
+  double accepted = 1e-4;    ///< [largest force] where `tolerance` is not met
+  double no_change = 1e-10;  ///< [largest force] in a tick in which nothing moves
+  int fewest_rounds = 4;     ///< whatever they cost
   int most_rounds = 60;
   double most_work = 6e5;     ///< multiplications; measured: some 0.2 ms
   double easy_share = 0.1;    ///< [most_work] less leaves time for another pass
@@ -74,13 +75,14 @@ struct ConeTuning {
 /// The solver for contact of many points. The numbers are those of a comparison of solvers on the demo's
 /// bodies (docs/decisions).
 struct ManyTuning {
-  int few_contacts = 32;          ///< contact points that the direct solvers have room for, where some rub,
-  int few_closed = 10;            ///< of which so many may be closed;
-  int few_frictionless = 160;     ///< and contact points where none rubs
-  double open_gap = 0.002;        ///< [edge] a contact without force that is farther is left out of the tick
-  double least_residual = 2e-8;   ///< [largest force] of the guess: nothing is to be done
-  double reduction = 0.01;        ///< [residual of the guess] that a tick reaches at least: rest is reached
-  double tolerance = 2e-5;        ///< [largest force]
+  int few_contacts = 32;         ///< contact points that the direct solvers have room for, where some rub,
+  int few_closed = 10;           ///< of which so many may be closed;
+  int few_frictionless = 160;    ///< and contact points where none rubs
+  double open_gap = 0.002;       ///< [edge] a contact without force that is farther is left out of the tick
+  double least_residual = 2e-8;  ///< [largest force] of the guess: nothing is to be done
+  double no_change = 1e-7;  ///< [largest force] in a tick in which nothing moves: rounding changes as much
+  double reduction = 0.01;  ///< [residual of the guess] that a tick reaches at least: rest is reached
+  double tolerance = 2e-5;  ///< [largest force]
   double rough_tolerance = 3e-4;  ///< [largest force] beyond `smooth_work`
   double smooth_work = 3e6;       ///< multiplications
   double accepted = 3e-3;         ///< [largest force] at the end of the budget
@@ -103,6 +105,8 @@ struct ManyTuning {
 struct HandTuning {
   double usual_tick = 0.001;         ///< [s] the unit of the shares a millisecond
   double fade_time = 20.0;           ///< [ms] in which the force of a lost contact fades
+  double patience = 0.3;             ///< [s] that nothing moves, after which the force is expected to rest
+  double settled_share = 1e-6;       ///< [recent force] that it may still change in a tick
   double memory = 0.98;              ///< [1/ms] of the recent force, the measure of a fade
   int rolling_passes = 3;            ///< that the turning of normals is followed in the local model
   double rolling_tolerance = 0.003;  ///< [change of the force] where they end

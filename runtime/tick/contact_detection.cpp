@@ -148,19 +148,41 @@ bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const V
   return false;
 }
 
-/// Whether a held contact of the same tool is at the same place, or holds all that this one touches.
-bool is_held_already(const Body& body, const State& state, const ContactPoint& contact) noexcept {
+/// Whether a grab of the tool holds a place on a simplex, edge or corner of the surface, or next to it: by
+/// where they are on the body at rest, so that what else is touched doesn't hang on how the surface lies.
+bool is_held(const Body& body, const State& state, Index tool, const SimplexNodes& nodes) noexcept {
+  if (state.held_count == 0) return false;
   const double near = tuning.detection.same_held_place * body.mean_surface_edge();
-  const auto holds = [](const ContactPoint& held, Index node) {
-    return node < 0 || std::find(held.nodes.begin(), held.nodes.end(), node) != held.nodes.end();
+  const double far = near + body.longest_surface_edge();
+  const auto corner = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
+  const auto nearest = [&](const Vec3& place) {
+    if (nodes[1] < 0) return (corner(0) - place).squaredNorm();
+    if (nodes[2] < 0) return nearest_on_line(place, corner(0), corner(1)).squared_distance;
+    return nearest_on_triangle(place, corner(0), corner(1), corner(2)).squared_distance;
   };
   return std::any_of(state.contact_points.begin(), state.contact_points.begin() + state.held_count,
                      [&](const ContactPoint& held) {
-                       return held.tool == contact.tool &&
-                              ((held.position - contact.position).squaredNorm() < near * near ||
-                               std::all_of(contact.nodes.begin(), contact.nodes.end(),
-                                           [&](Index node) { return holds(held, node); }));
+                       return held.tool == tool && (corner(0) - held.rest_point).squaredNorm() < far * far &&
+                              nearest(held.rest_point) < near * near;
                      });
+}
+
+/// How much of a contact is on nodes that its tool holds, of what is on nodes that move.
+double held_share(const Body& body, const State& state, const ContactPoint& contact) noexcept {
+  const auto begin = state.contact_points.begin();
+  double moving = 0.0;
+  double held = 0.0;
+  for (std::size_t n = 0; state.held_count > 0 && n < 3; ++n) {
+    const Index node = contact.nodes[n];
+    if (node < 0 || !body.surface_moves(node)) continue;
+    moving += contact.weights[n];
+    const bool is_held = std::any_of(begin, begin + state.held_count, [&](const ContactPoint& other) {
+      return other.tool == contact.tool &&
+             std::find(other.nodes.begin(), other.nodes.end(), node) != other.nodes.end();
+    });
+    if (is_held) held += contact.weights[n];
+  }
+  return held > 0.0 ? held / moving : 0.0;
 }
 
 /// Whether a contact's normal turns as the tool moves: at a vertex, and on an edge or face that carried
@@ -195,12 +217,12 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.weights = pair.nearest.weights;
   for (std::size_t k = 0; k < 3; ++k) contact.nodes[k] = contact.weights[k] > 0.0 ? nodes[k] : -1;
   contact.position = pair.nearest.on_simplex;
-  if (is_held_already(body, state, contact)) return;
   contact.arm = contact.position - tool.pose.position;
   contact.slope = slopes(state.surface.tree, contact.nodes);
   contact.frame = frame_of(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
+  contact.held_share = held_share(body, state, contact);
   contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
@@ -263,6 +285,16 @@ void look_from_origin(const Body& body, const SurfaceTree& tree, Scratch& scratc
   touch.inside = side < 0.0;
 }
 
+/// Whether a face looks away from where it looked at rest: what is sharp can fold the surface over itself,
+/// and would be caught between the two sides by friction, whatever it pulls.
+bool has_turned_over(const Body& body, const TouchingPair& pair) noexcept {
+  const SimplexNodes nodes = nodes_of(body, pair.simplex);
+  const auto corner = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
+  const Vec3 side = corner(1) - corner(0);
+  const Vec3 normal = nodes[2] < 0 ? Vec3(side.y(), -side.x(), 0.0) : Vec3(side.cross(corner(2) - corner(0)));
+  return normal.dot(pair.normal) < 0.0;
+}
+
 /// Makes a candidate of a pair that touches or may touch in this tick. From outside, a simplex is touched
 /// from its outer side: those that turn their back are behind others. From a little inside (rounding, or a
 /// fast tick), the nearest ones and those that carried force push out along their normals.
@@ -274,6 +306,7 @@ void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolCont
                             (carried(scratch, touch.number, pair) && pair.distance < touch.lost));
   const bool face_tells =
       pushes_out || pair.distance < tuning.detection.on_surface * body.mean_surface_edge();
+  if (face_tells && has_turned_over(body, pair)) return;
   if (!face_tells && (pair.height < 0.0 || pair.distance - radius > touch.margin)) return;
   add_candidate(body, state, scratch, touch.number, touch.first_candidate, pair, face_tells);
 }
@@ -288,14 +321,33 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
     const int place = is_segment ? 2 : 0;
     touch_pair(body, state, scratch, touch, pair_of_corner(body, tree, simplex, n, touch.core, place));
     if (is_segment && corners == 3)
-      touch_pair(body, state, scratch, touch, pair_of_edge(body, tree, simplex, n, touch.core));
+      touch_pair(body, state, scratch, touch, pair_of_edge(body, tree, simplex, n, touch.core, place));
+  }
+}
+
+/// A simplex that is held in part is touched along its border, except where that is held. What is outside of
+/// the border may turn its back to the tool.
+void touch_border(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+                  const TouchingPair& pair) noexcept {
+  if (pair.height < 0.0) return;
+  const SurfaceTree& tree = state.surface.tree;
+  const SimplexNodes nodes = nodes_of(body, pair.simplex);
+  const bool is_flat = body.dimension() == 2;
+  const int place = state.tools[touch.number].tool.length > 0.0 ? 2 : 0;
+  for (std::size_t n = 0; n < (is_flat ? 2 : 3); ++n) {
+    const SimplexNodes part = {nodes[n], is_flat ? -1 : nodes[(n + 1) % 3], -1};
+    if (is_held(body, state, touch.number, part)) continue;
+    touch_pair(body, state, scratch, touch,
+               is_flat ? pair_of_corner(body, tree, pair.simplex, n, touch.core, place)
+                       : pair_of_edge(body, tree, pair.simplex, n, touch.core, place));
   }
 }
 
 /// Contact points of one tool with one simplex. Between its nodes the surface is smooth: its triangles are
 /// chords of a sphere that is large against them, and would hold it out by edge^2 / 6 R.
 void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
-                   TouchingPair pair) noexcept {
+                   const TouchingPair& nearest) noexcept {
+  TouchingPair pair = nearest;
   const Tool& tool = state.tools[touch.number].tool;
   const SurfaceTree& tree = state.surface.tree;
   const Index simplex = pair.simplex;
@@ -331,6 +383,12 @@ void roll_ahead(const Body& body, const ToolState& tool, Scratch& scratch, Index
   }
 }
 
+/// Whether the core is so deep in the body that no simplex would push it out on the side that it came from.
+bool is_lost(const Body& body, const SurfaceTree& tree, const ToolContact& touch) noexcept {
+  if (touch.usable > 0) return touch.inside && touch.nearest_distance > touch.lost;
+  return body.bounds().contains(touch.core.origin) && tree.inside(touch.core.origin);
+}
+
 /// Contact points of one tool.
 void find_candidates(const Body& body, State& state, Scratch& scratch, Index number) noexcept {
   ToolState& tool = state.tools[number];
@@ -344,11 +402,16 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
   touch.is_known = tool.tool.length == 0.0 && count < scratch.pairs.size();
   keep_usable(body, state, scratch, touch, count);
   look_from_origin(body, state.surface.tree, scratch, touch);
-  if (touch.inside && touch.nearest_distance > touch.lost) {
+  if (is_lost(body, state.surface.tree, touch)) {
     tool.engaged = false;
+    tool.status |= StepStatus::inside_body;
     return;
   }
-  for (Index k = 0; k < touch.usable; ++k) touch_simplex(body, state, scratch, touch, scratch.pairs[k]);
+  for (Index k = 0; k < touch.usable; ++k) {
+    const TouchingPair& pair = scratch.pairs[k];
+    const bool held = is_held(body, state, number, nodes_of(body, pair.simplex));
+    (held ? touch_border : touch_simplex)(body, state, scratch, touch, pair);
+  }
   if (scratch.is_first_pass) roll_ahead(body, tool, scratch, touch.first_candidate);
 }
 

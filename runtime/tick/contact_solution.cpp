@@ -21,6 +21,17 @@ bool is_finite(const ContactProblem& problem) noexcept {
                      [](double value) { return std::abs(value) < max_plausible_force; });
 }
 
+/// Makes only a share of the last change of forces.
+void retreat(State& state, double share) noexcept {
+  state.surface.near.retreat(share);
+  state.surface.near.displace();
+  for (ToolState& tool : state.tools) {
+    const Wrench& last = tool.last_contact_wrench;
+    tool.contact_wrench.force = last.force + share * (tool.contact_wrench.force - last.force);
+    tool.contact_wrench.torque = last.torque + share * (tool.contact_wrench.torque - last.torque);
+  }
+}
+
 /// A point that slides over the edge of a fold throws the surface from one side of it to the other, and back
 /// in the next tick. Where forces would take the near surface farther than in a step of Newton's method that
 /// can be trusted, only a share of their change is made. A body that is let go does not leap: it stays where
@@ -35,15 +46,18 @@ void retreat_from_leaps(const Body& body, State& state) noexcept {
   }
   double most = tuning.passes.most_motion * body.mean_surface_edge();
   for (const ToolState& tool : state.tools) most += tool.margin;
-  if (!(farthest > most)) return;
-  const double share = most / farthest;
-  state.surface.near.retreat(share);
-  state.surface.near.displace();
-  for (ToolState& tool : state.tools) {
-    const Wrench& last = tool.last_contact_wrench;
-    tool.contact_wrench.force = last.force + share * (tool.contact_wrench.force - last.force);
-    tool.contact_wrench.torque = last.torque + share * (tool.contact_wrench.torque - last.torque);
-  }
+  if (farthest > most) retreat(state, most / farthest);
+}
+
+/// A contact whose point moves from a face over its edge may be thrown back and forth by Newton's method,
+/// which follows one of them at a time. While nothing else moves, it goes half the way when it turns back.
+void halve_return(const Body& body, State& state) noexcept {
+  const bool returns = state.still_ticks > 1 && !is_released(body, state) &&
+                       std::any_of(state.tools.begin(), state.tools.end(), [](const ToolState& tool) {
+                         return (tool.contact_wrench.force - tool.last_force).dot(tool.last_change) < 0.0;
+                       });
+  state.goes_half_way = returns;
+  if (returns) retreat(state, 0.5);
 }
 
 /// Deepest penetration at the contact points, as the tick before or the pass before left it [m].
@@ -76,19 +90,59 @@ void change_patch(const Body& body, State& state) noexcept {
   state.status |= StepStatus::capacity_full;
 }
 
-/// One step of Newton's method about where everything is now. False when the forces are no numbers.
-bool solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
+/// Whether an iterative solver has changed no force of the tick before by more than what is nothing.
+bool changes_nothing(const Scratch& scratch) noexcept {
+  const ContactProblem& problem = scratch.problem;
+  if (problem.frictionless && !problem.many) return false;
+  double largest = 0.0;
+  double all = 0.0;
+  for (Index k = 0; k < scratch.last_count; ++k) {
+    const double squared = scratch.last_contacts[k].force.squaredNorm();
+    largest = std::max(largest, squared);
+    all += squared;
+  }
+  const double most = (problem.many ? tuning.many.no_change : tuning.cone.no_change) * std::sqrt(largest);
+  for (Index i = 0; i < problem.rows; ++i) {
+    if (std::abs(problem.lambda[i] - problem.guess[i]) > most) return false;
+    all -= problem.guess[i] * problem.guess[i];
+  }
+  return all <= most * std::sqrt(largest);  // no contact that had a force has gone
+}
+
+/// Contacts that press on what the body does not give way at.
+void tell_rigid_contacts(State& state) noexcept {
+  for (const ContactPoint& contact : state.contacts()) {
+    if (contact.rigid && !contact.force.isZero(0.0))
+      state.tools[contact.tool].status |= StepStatus::rigid_contact;
+  }
+}
+
+/// Back to the contacts that were solved for.
+void recall_contacts(State& state, const Scratch& scratch) noexcept {
+  std::copy_n(scratch.last_contacts.begin(), scratch.last_count, state.contact_points.begin());
+  state.contact_count = scratch.last_count;
+}
+
+/// One step of Newton's method about where everything is now.
+ContactOutcome solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
   assemble_contact(body, state, scratch);
+  std::copy_n(scratch.problem.lambda.begin(), scratch.problem.rows, scratch.problem.guess.begin());
   if (!solve_problem(scratch)) state.status |= StepStatus::not_converged;
   if (!is_finite(scratch.problem)) {
     state.status |= StepStatus::result_not_finite;
-    return false;
+    return ContactOutcome::not_finite;
+  }
+  if (scratch.is_first_pass && state.still_ticks > 1 && !state.goes_half_way && changes_nothing(scratch)) {
+    recall_contacts(state, scratch);
+    tell_rigid_contacts(state);
+    return ContactOutcome::unchanged;
   }
   apply_forces(state, scratch);
   retreat_from_leaps(body, state);
+  if (scratch.is_first_pass) halve_return(body, state);
   move_tools(body, state);
   move_near_surface(body, state.surface);
-  return true;
+  return ContactOutcome::solved;
 }
 
 /// What a contact that sticks slid all the same, as the solver is not exact.
@@ -126,12 +180,6 @@ void add_tilt_forces(State& state, const Scratch& scratch) noexcept {
     if (contact.rolls && problem.normal_part(problem.owner[k], problem.lambda) > 0.0)
       contact.force += problem.lambda[row] * scratch.rows[row].force;
   }
-}
-
-/// Back to the contacts that were solved for.
-void recall_contacts(State& state, const Scratch& scratch) noexcept {
-  std::copy_n(scratch.last_contacts.begin(), scratch.last_count, state.contact_points.begin());
-  state.contact_count = scratch.last_count;
 }
 
 }  // namespace
@@ -185,33 +233,34 @@ void apply_forces(State& state, const Scratch& scratch) noexcept {
     if (contact.force.squaredNorm() == 0.0) continue;
     ToolState& tool = state.tools[contact.tool];
     ++tool.contacts;
-    if (contact.rigid) tool.status |= StepStatus::rigid_contact;
     tool.contact_wrench.force += contact.force;
     if (!contact.rolls) tool.contact_wrench.torque += contact.arm.cross(contact.force);
   }
+  tell_rigid_contacts(state);
 }
 
-bool solve_contact(const Body& body, State& state, Scratch& scratch) noexcept {
+ContactOutcome solve_contact(const Body& body, State& state, Scratch& scratch) noexcept {
   scratch.is_first_pass = true;
   find_contacts(body, state, scratch);
   change_patch(body, state);
   bool rough = is_rough(body, state);
-  bool valid = solve_pass(body, state, scratch);
+  ContactOutcome outcome = solve_pass(body, state, scratch);
   scratch.is_first_pass = false;
   const auto wants_pass = [&](int pass) {
-    return rough && valid && pass < tuning.passes.most && may_repeat(body, state, scratch);
+    return rough && outcome == ContactOutcome::solved && pass < tuning.passes.most &&
+           may_repeat(body, state, scratch);
   };
   for (int pass = 1; wants_pass(pass); ++pass) {
     remember_contacts(state, scratch);
     find_contacts(body, state, scratch);
     rough = is_rough(body, state);
     if (rough) {
-      valid = solve_pass(body, state, scratch);
+      outcome = solve_pass(body, state, scratch);
     } else {
       recall_contacts(state, scratch);
     }
   }
-  return valid;
+  return outcome;
 }
 
 }  // namespace palpate

@@ -5,14 +5,38 @@
 namespace palpate {
 namespace {
 
-void hold_contact(State& state, const ContactPoint& contact) noexcept {
+/// Where a place of the surface was at the end of the last tick, as the tool's pose was. (A contact point's
+/// own position is that of its beginning.)
+Vec3 last_place(const SurfaceState& surface, const ContactPoint& contact) noexcept {
+  Vec3 place = Vec3::Zero();
+  for (std::size_t n = 0; n < 3; ++n) {
+    const Index node = contact.nodes[n];
+    if (node < 0) continue;
+    place += contact.weights[n] * surface.tree.position(node);
+    if (surface.motion.active()) place -= contact.weights[n] * surface.motion.change(node);
+  }
+  return place;
+}
+
+Vec3 rest_place(const Body& body, const ContactPoint& contact) noexcept {
+  Vec3 place = Vec3::Zero();
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (contact.nodes[n] >= 0) place += contact.weights[n] * body.surface_rest_positions()[contact.nodes[n]];
+  }
+  return place;
+}
+
+void hold_contact(const Body& body, State& state, const ContactPoint& contact) noexcept {
   const ToolState& tool = state.tools[contact.tool];
   ContactPoint held = contact;
   held.held = true;
   held.rolls = false;
   held.feature = -1 - state.held_count;
   held.frame.setIdentity();
-  held.tool_point = tool.pose.orientation.conjugate() * (contact.position - tool.pose.position);
+  held.tool_point =
+      tool.pose.orientation.conjugate() * (last_place(state.surface, contact) - tool.pose.position);
+  held.rest_point = rest_place(body, contact);
+  held.held_share = 0.0;
   state.contact_points[state.held_count++] = held;
 }
 
@@ -34,7 +58,7 @@ bool reach_out(const Body& body, State& state, Index number) noexcept {
     free = free || body.surface_moves(contact.nodes[k]);
   }
   if (!free) return false;
-  hold_contact(state, contact);
+  hold_contact(body, state, contact);
   return true;
 }
 
@@ -45,7 +69,7 @@ void begin_hold(const Body& body, State& state, const Scratch& scratch, Index nu
   for (Index k = 0; k < scratch.last_count && state.held_count < state.max_contacts(); ++k) {
     const ContactPoint& contact = scratch.last_contacts[k];
     if (contact.tool == number && !contact.held && contact.force.dot(contact.frame.col(0)) > 0.0)
-      hold_contact(state, contact);
+      hold_contact(body, state, contact);
   }
   tool.holding = state.held_count > before;
   if (tool.holding || state.held_count == state.max_contacts()) return;

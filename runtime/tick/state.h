@@ -23,11 +23,13 @@ struct ToolState {
   Tool tool;
   ToolPose device;  ///< the device pose that the tick used: the last finite one, approached at bounded speed
   ToolPose pose;    ///< of the tool itself, outside of the body: away from `device` by the coupling's stretch
-  Wrench contact_wrench;       ///< of the contacts on the tool, about its origin
-  Wrench wrench;               ///< on the hand, about the tool's origin: what the device is to display
-  LocalModel local;            ///< of wrench.force
-  Wrench last_contact_wrench;  ///< of the tick or pass before
-  ToolPose last_device;        ///< the device pose of the tick before
+  Wrench contact_wrench;            ///< of the contacts on the tool, about its origin
+  Wrench wrench;                    ///< on the hand, about the tool's origin: what the device is to display
+  LocalModel local;                 ///< of wrench.force
+  Wrench last_contact_wrench;       ///< of the tick or pass before
+  Vec3 last_force = Vec3::Zero();   ///< contact_wrench.force of the tick before [N]
+  Vec3 last_change = Vec3::Zero();  ///< of contact_wrench.force in the tick before [N]
+  ToolPose last_device;             ///< the device pose of the tick before
   Vec3 surface_change = Vec3::Zero();  ///< free motion of the touched surface since the tick before [m]
   Wrench explained;           ///< what the device's motion in this tick changes of the contact's wrench
   double recent_force = 0.0;  ///< running maximum of the contact force, which fades [N]
@@ -87,8 +89,10 @@ struct State {
   }
   [[nodiscard]] Index max_contacts() const noexcept { return static_cast<Index>(contact_points.size()); }
 
-  double tick;                         ///< time from one tick to the next [s]
-  std::int64_t ticks = 0;              ///< taken so far
+  double tick;                   ///< time from one tick to the next [s]
+  std::int64_t ticks = 0;        ///< taken so far
+  std::int64_t still_ticks = 0;  ///< since a device, the body itself or its overlay has moved or changed
+  bool goes_half_way = false;    ///< the last tick made half the change of forces that it found
   StepStatus status = StepStatus::ok;  ///< of the last tick, all tools
   std::vector<ToolState> tools;
   std::vector<ContactPoint> contact_points;  ///< [max_contacts] held ones first

@@ -7,11 +7,12 @@
 
 namespace palpate {
 
-/// What a tick could not do; bits, none set when all is well. Bits 2 and 5 are free.
+/// What a tick could not do; bits, none set when all is well. Bit 5 is free.
 enum class StepStatus : std::uint32_t {
   ok = 0,
   nothing_in_reach = 1U << 0,   ///< grab is set, the tool touches nothing and no surface is within reach
   capacity_full = 1U << 1,      ///< there is no room for another node or contact: the deepest are kept
+  unsettled = 1U << 2,          ///< nothing has moved for long, and the contact forces still change
   pose_not_finite = 1U << 3,    ///< the pose was ignored: the last valid one stands
   result_not_finite = 1U << 4,  ///< the force overflowed: the last valid result stands
   inside_body = 1U << 6,        ///< the tool is inside the body and touches nothing until it is out
@@ -35,9 +36,10 @@ constexpr bool has(StepStatus status, StepStatus bit) noexcept {
 }
 
 /// The bits and their names, for reports.
-inline constexpr std::array<std::pair<StepStatus, const char*>, 12> status_names = {{
+inline constexpr std::array<std::pair<StepStatus, const char*>, 13> status_names = {{
     {StepStatus::nothing_in_reach, "nothing_in_reach"},
     {StepStatus::capacity_full, "capacity_full"},
+    {StepStatus::unsettled, "unsettled"},
     {StepStatus::pose_not_finite, "pose_not_finite"},
     {StepStatus::result_not_finite, "result_not_finite"},
     {StepStatus::inside_body, "inside_body"},

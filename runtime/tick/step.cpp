@@ -1,6 +1,9 @@
 #include "runtime/tick/step.h"
 
+#include <algorithm>
+
 #include "runtime/solve/node_vectors.h"
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/contact_solution.h"
 #include "runtime/tick/grab.h"
 #include "runtime/tick/hand_force.h"
@@ -19,6 +22,8 @@ void begin_tick(State& state) noexcept {
     tool.status = StepStatus::ok;
     tool.touched_last_tick = tool.contacts > 0;
     tool.held_last_tick = tool.holding;
+    tool.last_change = tool.contact_wrench.force - tool.last_force;
+    tool.last_force = tool.contact_wrench.force;
   }
 }
 
@@ -27,6 +32,29 @@ void follow_devices(const Body& body, State& state, Scratch& scratch,
   for (std::size_t k = 0; k < state.tools.size(); ++k)
     follow_device(body, state.surface.tree, scratch, state.tools[k], poses[k]);
   state.surface.near.begin_tick();
+}
+
+bool is_still(const ToolState& tool) noexcept {
+  return tool.device.position == tool.last_device.position &&
+         tool.device.orientation.coeffs() == tool.last_device.orientation.coeffs() &&
+         tool.holding == tool.held_last_tick;
+}
+
+/// Counts the ticks in which nothing moves that could change a contact's force.
+void count_still_ticks(State& state) noexcept {
+  const bool still = !state.surface.motion.active() && state.surface.patch == state.surface.near.patch() &&
+                     std::all_of(state.tools.begin(), state.tools.end(), is_still);
+  state.still_ticks = still ? state.still_ticks + 1 : 0;
+}
+
+/// Tells where contact has not come to rest although nothing has moved for long.
+void note_unsettled_tools(State& state) noexcept {
+  if (static_cast<double>(state.still_ticks) * state.tick < tuning.hand.patience) return;
+  for (ToolState& tool : state.tools) {
+    const Vec3& force = tool.contact_wrench.force;
+    const double most = tuning.hand.settled_share * tool.recent_force;
+    if ((force - tool.last_force).norm() > most) tool.status |= StepStatus::unsettled;
+  }
 }
 
 /// How what a tool touches moves on its own.
@@ -68,11 +96,14 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   follow_devices(body, state, scratch, poses);
   remember_contacts(state, scratch);
   update_holds(body, state, scratch);
-  if (solve_contact(body, state, scratch)) {
+  count_still_ticks(state);
+  const ContactOutcome contact = solve_contact(body, state, scratch);
+  if (contact == ContactOutcome::solved) {
     note_surface_changes(state);
     linearise(body, state, scratch);
-    give_forces(state);
+    note_unsettled_tools(state);
   }
+  if (contact != ContactOutcome::not_finite) give_forces(state);
   release(body, state);
   renew_stored_displacement(body, state.surface);
   renew_far_surface(body, state.surface, scratch);

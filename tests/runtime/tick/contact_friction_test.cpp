@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "meshes/generate.h"
 #include "runtime/solve/cone_solver.h"
 #include "runtime/solve/node_vectors.h"
 #include "runtime/tick/step.h"
@@ -216,6 +217,33 @@ TEST_P(Friction, TorqueAboutASpheresCentreIsThatOfFriction) {
     torque += -radius_ * contact.frame.col(0).cross(friction_force(contact));
   EXPECT_GT(torque.norm(), 0.1 * radius_ * rough.tools[0].wrench.force.norm());
   EXPECT_LT((rough.tools[0].wrench.torque - torque).norm(), 1e-6 * torque.norm());
+}
+
+// Half a cell deep it folds the surface over itself. Caught between the two sides, whose normals are opposed,
+// it pulled five times as much as without friction, as far as it went; a place that it hooks may still pull
+// twice as much.
+TEST(PointTool, IsNotCaughtInAFoldAndSaysWhenItIsInside) {
+  const Body body(test::bake(
+      generate(BoxShape{.size = {12.0, 8.0, 5.0}, .cells = {12, 8, 5}}, ElementType::hex8),
+      [](const Vec3& node) { return node.z() < 1e-9; }, Scope::surface, Precision::double_precision));
+  const Vec3 down(3.3, 4.2, 4.5);
+  const auto largest_force = [&](double friction) {
+    State state(body, {.tools = {plain({.friction = friction})}});
+    go(body, state, down + Vec3(0.0, 0.0, 0.8), pose(down), 200);
+    double largest = 0.0;
+    for (int k = 1; k <= 600; ++k) {
+      step(body, state, pose(down + Vec3(0.01, 0.0003, 0.0) * k));
+      const ToolState& tool = state.tools[0];
+      largest = std::max(largest, tool.contact_wrench.force.norm());
+      EXPECT_TRUE(tool.contacts > 0 || !tool.contact_wrench.force.isZero(0.0) ||
+                  has(state.status, StepStatus::inside_body))
+          << "half a cell deep and nothing said in tick " << k;
+    }
+    return largest;
+  };
+  const double smooth = largest_force(0.0);
+  EXPECT_LT(largest_force(0.1), 1.5 * smooth);
+  EXPECT_LT(largest_force(0.3), 2.0 * smooth);
 }
 
 }  // namespace
