@@ -78,7 +78,8 @@ void change_patch(const Body& body, State& state) noexcept {
 /// One step of Newton's method about where everything is now. False when the forces are no numbers.
 bool solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
   assemble_contact(body, state, scratch);
-  if (!solve_problem(scratch)) state.status |= StepStatus::not_converged;
+  scratch.is_solved = solve_problem(scratch);
+  if (!scratch.is_solved) state.status |= StepStatus::not_converged;
   if (!is_finite(scratch.problem)) {
     state.status |= StepStatus::result_not_finite;
     return false;

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/force_error.h"
 #include "runtime/tick/linearise_rolling.h"
 #include "runtime/tick/rolling.h"
 
@@ -164,6 +165,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
     force.col(axis) = change.force;
     torque.col(axis) = change.torque;
     keep_closed_contacts(state, scratch, tool, begin);
+    note_answer(scratch, number, axis, begin);
   };
   const int d = scratch.problem.dimension;
   const bool rolls = begin_rolling(state, scratch, number);
@@ -196,6 +198,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
 }  // namespace
 
 void linearise(const Body& body, State& state, Scratch& scratch) noexcept {
+  begin_force_error(scratch);
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k)
     linearise_tool(state, scratch, k, body.mean_surface_edge());
 }
