@@ -8,7 +8,7 @@ namespace {
 constexpr double grave_ticks = 0.001;  // of all
 constexpr double grave_error = 0.02;   // of the force
 
-/// Of a share that is 1 where it is more, too.
+/// A share that is 1 where it is more, too.
 std::string percent(double share) {
   return share > 0.99 ? "100 % or more" : fmt::format("{:.2g} %", 100.0 * share);
 }

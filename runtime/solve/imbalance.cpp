@@ -94,8 +94,8 @@ void Imbalance::choose_mode(const ContactProblem& problem, Index contact) noexce
   set_contact(problem, contact, to - f, change_);
 }
 
-/// Of the motion that remains what the contact's equations forbid: all of it where it sticks, what is along
-/// the normal where it slips, which is undone along the cone's edge.
+/// Leaves of the motion what the contact's equations forbid: all of it where it sticks, what is along the
+/// normal where it slips, which is undone along the cone's edge.
 void Imbalance::keep_equations(const ContactProblem& problem, Index contact) noexcept {
   if (mode_[contact] == Mode::stick) return;
   Vec3 left = Vec3::Zero();

@@ -20,7 +20,7 @@ class Imbalance {
  public:
   Imbalance(Index max_contacts, Index max_rows);
 
-  /// Of problem.lambda as a solver left it, by two products with W.
+  /// Takes problem.lambda as a solver left it; two products with W.
   void find(const ContactProblem& problem) noexcept;
 
   [[nodiscard]] std::span<const double> change() const noexcept { return change_; }  ///< [rows] [N]

@@ -1,6 +1,9 @@
 // How the normal of a sphere's contact turns as the sphere moves.
 #pragma once
 
+#include <algorithm>
+
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/contact_point.h"
 #include "runtime/tick/tool.h"
 
@@ -15,9 +18,16 @@ namespace palpate {
 // normal: n + q_t / R, where q_t is foreseen from the motion of the device.
 
 /// Radius by which contacts of a tool turn, on a surface with edges of that mean length [m].
-double rolling_radius(const Tool& tool, double edge) noexcept;
+inline double rolling_radius(const Tool& tool, double edge) noexcept {
+  return std::max(tuning.assembly.least_tilt_radius * edge, tool.radius);
+}
 
 /// A contact's normal after the tool has moved by `shift`.
-Vec3 rolled_normal(const Vec3& normal, const Vec3& shift, double radius) noexcept;
+inline Vec3 rolled_normal(const Vec3& normal, const Vec3& shift, double radius) noexcept {
+  const Vec3 along = shift - shift.dot(normal) * normal;
+  const double most = tuning.assembly.most_roll * radius;
+  const double length = along.norm();
+  return (radius * normal + (length > most ? most / length : 1.0) * along).normalized();
+}
 
 }  // namespace palpate

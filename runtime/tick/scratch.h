@@ -11,8 +11,6 @@
 #include "runtime/solve/newton_krylov.h"
 #include "runtime/tick/compliance.h"
 #include "runtime/tick/contact_point.h"
-#include "runtime/tick/contact_row.h"
-#include "runtime/tick/left_out.h"
 #include "runtime/tick/touching_pair.h"
 
 namespace palpate {
