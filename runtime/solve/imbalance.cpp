@@ -1,6 +1,7 @@
 #include "runtime/solve/imbalance.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace palpate {
 namespace {
@@ -48,6 +49,14 @@ void add_motion(const ContactProblem& problem, const std::vector<double>& forces
   }
 }
 
+/// Alart and Curnier's projection: the normal part at least 0, the tangent within the disc that it allows.
+Vec3 nearest_in_cone(const Vec3& n, const Vec3& force, const Vec3& tangent, double friction) noexcept {
+  const double normal = std::max(0.0, n.dot(force));
+  const double length = tangent.norm();
+  const double share = length > friction * normal ? friction * normal / length : 1.0;
+  return normal * n + share * tangent;
+}
+
 }  // namespace
 
 Imbalance::Imbalance(Index max_contacts, Index max_rows)
@@ -68,16 +77,19 @@ void Imbalance::find_motion(const ContactProblem& problem) noexcept {
 
 void Imbalance::choose_mode(const ContactProblem& problem, Index contact) noexcept {
   const Vec3 f = at_contact(problem, contact, problem.lambda);
+  const Vec3 r = at_contact(problem, contact, motion_) / own_compliance(problem, contact);
   Mode& mode = mode_[contact];
   mode = Mode::stick;
   Vec3 to = f;
   if (problem.held[contact] != 0) {
     const Index owner = problem.owner[contact];
     if (owner >= 0 && mode_[owner] == Mode::open) mode = Mode::open;
+    residual_ += (mode == Mode::open ? f : r).squaredNorm();
   } else {
     const Vec3 n = problem.normal[contact];
-    const Vec3 wanted = f - at_contact(problem, contact, motion_) / own_compliance(problem, contact);
+    const Vec3 wanted = f - r;
     const Vec3 tangent = wanted - n.dot(wanted) * n;
+    residual_ += (nearest_in_cone(n, wanted, tangent, problem.friction[contact]) - f).squaredNorm();
     const double normal = n.dot(f) > 0.0 ? n.dot(f) : n.dot(wanted);
     const double bound = problem.friction[contact] * normal;
     if (n.dot(wanted) <= 0.0) {
@@ -109,10 +121,12 @@ void Imbalance::keep_equations(const ContactProblem& problem, Index contact) noe
 
 void Imbalance::find(const ContactProblem& problem) noexcept {
   find_motion(problem);
+  residual_ = 0.0;
   for (Index k = 0; k < problem.contacts; ++k) {
     mode_[k] = Mode::open;
     if (problem.rows_of(k) > 0) choose_mode(problem, k);
   }
+  residual_ = std::sqrt(residual_);
   const auto rows = change_.begin() + problem.rows;
   if (std::any_of(change_.begin(), rows, [](double by) { return by != 0.0; }))
     add_motion(problem, change_, motion_);

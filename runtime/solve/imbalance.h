@@ -25,6 +25,8 @@ class Imbalance {
 
   [[nodiscard]] std::span<const double> change() const noexcept { return change_; }  ///< [rows] [N]
   [[nodiscard]] std::span<const double> motion() const noexcept { return motion_; }  ///< [rows] [m]
+  /// Root of the sum over the contacts of the squared difference of the equations' two sides [N].
+  [[nodiscard]] double residual() const noexcept { return residual_; }
 
  private:
   enum class Mode : std::uint8_t { open, stick, slip };
@@ -38,6 +40,7 @@ class Imbalance {
   std::vector<double> step_;    // [max rows] forces that W is multiplied by
   std::vector<Mode> mode_;      // [max contacts]
   std::vector<Vec3> edge_;      // [max contacts] slipping: the cone's edge
+  double residual_ = 0.0;
 };
 
 }  // namespace palpate

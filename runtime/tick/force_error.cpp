@@ -122,6 +122,15 @@ double missing_of_left_out(const Body& body, const State& state, Scratch& scratc
   return given_way > depth_there ? depth_there / given_way * sum.norm() : sum.norm();
 }
 
+/// By what a step of Newton's method would change the force. The solver of few contacts is cut short where
+/// such steps run in circles: there they are much too long, the residual says much too little, and the truth
+/// lies between (docs/decisions).
+double error_of_solver(const Scratch& scratch, double step) noexcept {
+  if (scratch.is_solved) return 0.0;
+  return scratch.problem.many ? tuning.hand.error_margin * step
+                              : std::sqrt(step * scratch.imbalance.residual());
+}
+
 }  // namespace
 
 void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, Index tool, const Core& core,
@@ -167,7 +176,7 @@ void find_force_errors(const Body& body, State& state, Scratch& scratch) noexcep
   for (std::size_t k = 0; k < state.tools.size(); ++k) {
     ToolState& tool = state.tools[k];
     const auto number = static_cast<Index>(k);
-    tool.force_error = tuning.hand.error_margin * scratch.missing_force[k].norm();
+    tool.force_error = error_of_solver(scratch, scratch.missing_force[k].norm());
     const Pressed pressed =
         tool.engaged ? count_pressed(state, scratch, number, body.mean_surface_edge()) : Pressed{};
     tool.left_out = static_cast<Index>(std::ceil(pressed.contact_points));

@@ -52,6 +52,41 @@ ContactProblem few_of(const Grid& grid, double mu) {
   return few;
 }
 
+TEST(Imbalance, ResidualOfOneContactByItsFormula) {
+  // Pressed 0.5 mm deep without force, then with twice the force that it takes.
+  ContactProblem one(3, 1, 3);
+  one.add(0.0, false);
+  one.w(0, 0) = 2e-3;
+  one.b[0] = -5e-4;
+  Imbalance imbalance(1, 3);
+  imbalance.find(one);
+  EXPECT_DOUBLE_EQ(imbalance.residual(), 0.25);
+  EXPECT_DOUBLE_EQ(imbalance.change()[0], 0.25);
+  EXPECT_NEAR(imbalance.motion()[0], 0.0, 1e-18);
+  one.lambda[0] = 0.5;
+  imbalance.find(one);
+  EXPECT_DOUBLE_EQ(imbalance.residual(), 0.25);
+  EXPECT_DOUBLE_EQ(imbalance.change()[0], 0.0);
+  EXPECT_DOUBLE_EQ(imbalance.motion()[0], 5e-4);
+  one.b[0] = 2e-3;  // now it is to open
+  imbalance.find(one);
+  EXPECT_DOUBLE_EQ(imbalance.residual(), 0.5);
+  EXPECT_DOUBLE_EQ(imbalance.change()[0], -0.5);
+  EXPECT_DOUBLE_EQ(imbalance.motion()[0], 0.0);
+}
+
+TEST(Imbalance, ResidualOfAContactWhoseFrictionIsTooLarge) {
+  ContactProblem one(3, 1, 3);
+  one.add(0.5, false);
+  for (Index i = 0; i < 3; ++i) one.w(i, i) = 1e-3;
+  one.lambda = {2.0, 0.0, 3.0};
+  one.b = {-2e-3, 0.0, -3e-3};  // r = 0, and 3 N are not within 0.5 times 2 N
+  Imbalance imbalance(1, 3);
+  imbalance.find(one);
+  EXPECT_DOUBLE_EQ(imbalance.residual(), 2.0);
+  EXPECT_DOUBLE_EQ(imbalance.change()[2], -2.0);
+}
+
 TEST(Imbalance, OfExactForcesIsNothing) {
   const Grid grid(10, 0.0, 1.0, 0.0, false);
   ContactProblem few = few_of(grid, 0.0);
