@@ -1,8 +1,13 @@
 // What a tick that had no room for all contact points says of its force, against one that had.
+#include "runtime/tick/force_error.h"
+
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
+#include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/linearise.h"
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
@@ -57,6 +62,26 @@ TEST_P(ForceError, OfContactPointsThatFoundNoRoom) {
       EXPECT_GT(tool_of(state).left_out, 0) << room;
       EXPECT_LE(tool_of(state).left_out, 3 * tool_of(whole).contacts) << room;
     }
+  }
+}
+
+// As if the solver had been stopped with forces that are a hundredth too large.
+TEST_P(ForceError, OfForcesThatAreAHundredthTooLarge) {
+  for (const double friction : {0.0, 0.5}) {
+    State state = pressed({.radius = 0.8, .friction = friction}, depth_, 200);
+    Scratch& scratch = state.scratch;
+    EXPECT_EQ(scratch.problem.many, GetParam() == 3 && friction > 0.0) << "both solvers are looked at";
+    const Vec3 force = tool_of(state).contact_wrench.force;
+    for (Index i = 0; i < scratch.problem.rows; ++i) scratch.problem.lambda[i] *= 1.01;
+    scratch.is_solved = false;
+    linearise(body_, state, scratch);
+    find_force_errors(body_, state, scratch);
+    EXPECT_LT((scratch.missing_force[0] + 0.01 * force).norm(), 1e-3 * force.norm()) << friction;
+    const double step = scratch.missing_force[0].norm();
+    const double said = scratch.problem.many ? tuning.hand.error_margin * step
+                                             : std::sqrt(step * scratch.imbalance.residual());
+    EXPECT_NEAR(tool_of(state).force_error, said, 1e-9 * force.norm());
+    EXPECT_EQ(tool_of(state).left_out, 0);
   }
 }
 
