@@ -32,7 +32,7 @@ std::string in_words(const BestEffort& best_effort, std::int64_t ticks) {
   if (best_effort.ticks == 0) return "";
   std::string text = fmt::format(
       "in {} ticks ({:.2g} %) the force was a best effort, which may be off by about {} of it in the median "
-      "and {} at most ({:.3g} N at {:.3f} s)",
+      "and up to {} ({:.3g} N at {:.3f} s)",
       best_effort.ticks, 100.0 * static_cast<double>(best_effort.ticks) / static_cast<double>(ticks),
       percent(best_effort.median_share()), percent(best_effort.largest_share), best_effort.largest_error,
       best_effort.largest_error_time);

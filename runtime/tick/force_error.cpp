@@ -181,7 +181,8 @@ void find_force_errors(const Body& body, State& state, Scratch& scratch) noexcep
         tool.engaged ? count_pressed(state, scratch, number, body.mean_surface_edge()) : Pressed{};
     tool.left_out = static_cast<Index>(std::ceil(pressed.contact_points));
     if (pressed.places > 0)
-      tool.force_error += missing_of_left_out(body, state, scratch, number, pressed.places);
+      tool.force_error +=
+          tuning.hand.error_margin * missing_of_left_out(body, state, scratch, number, pressed.places);
     if (!std::isfinite(tool.force_error)) tool.force_error = tool.contact_wrench.force.norm();
   }
 }

@@ -57,7 +57,7 @@ TEST(BestEffort, InWordsHasTheReasons) {
   found.add(StepStatus::not_converged, 1.0, 0.01, 0, 0.5);
   const std::string cut = in_words(found, 1000);
   EXPECT_NE(cut.find("in 1 ticks (0.1 %)"), std::string::npos) << cut;
-  EXPECT_NE(cut.find("by about 1 % of it in the median and 1 % at most (0.01 N at 0.500 s): the solver was "
+  EXPECT_NE(cut.find("by about 1 % of it in the median and up to 1 % (0.01 N at 0.500 s): the solver was "
                      "cut short in 1 of them"),
             std::string::npos)
       << cut;
