@@ -46,6 +46,10 @@ struct TickRecord {
   std::uint8_t event = 0;        ///< what the loop was told before the tick: 1 restart, 2 device lost, 4
                                  ///< acknowledged, 8 input lost, 16 lifted, 32 resumed after a pause
   std::int64_t motion_step = 0;  ///< packed dynamics: the last step whose answer had come
+
+  float force_error = 0.0F;   ///< how far `force` may be off, about, where the tick was a best effort; else 0
+                              ///< [N]; recordings from 4.3 on
+  std::int32_t left_out = 0;  ///< contact points that the tool pressed on and that found no room; from 4.3 on
 };
 
 /// The surface of the body at one moment.

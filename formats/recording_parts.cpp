@@ -16,7 +16,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t major_version = 4, minor_version = 2;
+constexpr std::int64_t major_version = 4, minor_version = 3;
 constexpr std::int64_t highest_rate = 1'000'000;  // ticks a second
 constexpr const char* format_name = "palpate-recording";
 constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
@@ -50,11 +50,12 @@ struct RowField {
 std::vector<RowField> row_fields(const RecordingHead& head) {
   const std::int64_t surface_nodes = std::ssize(head.surface.nodes);
   std::vector<RowField> fields;
-  for_each_tick_field([&]<class Member>(const char* name, int components, Member TickRecord::*) {
-    RowField field = {name, hdf5::element_type<Scalar<Member>>(), {}, false};
-    if (components > 1) field.row = {components};
-    fields.push_back(field);
-  });
+  for_each_tick_field(head.has_force_error,
+                      [&]<class Member>(const char* name, int components, Member TickRecord::*) {
+                        RowField field = {name, hdf5::element_type<Scalar<Member>>(), {}, false};
+                        if (components > 1) field.row = {components};
+                        fields.push_back(field);
+                      });
   fields.push_back({"/frames/tick", hdf5::element_type<std::int64_t>(), {}, true});
   fields.push_back({"/frames/time", hdf5::element_type<double>(), {}, true});
   fields.push_back({"/frames/displacement", hdf5::element_type<float>(), {surface_nodes, 3}, true});
@@ -77,10 +78,15 @@ StoredRows write_checked(hdf5::File& file, const char* name, std::span<const std
   return stored;
 }
 
+/// What is written has checksums, whatever it was read from.
+std::int64_t minor_version_of(const RecordingHead& head) {
+  if (!head.has_stress) return 0;
+  return head.has_force_error ? minor_version : 2;
+}
+
 void write_head(hdf5::File& file, const RecordingHead& head) {
   file.write_attribute("/", "format", std::string(format_name));
-  file.write_attribute("/", "version",
-                       std::array{major_version, head.has_stress ? minor_version : std::int64_t{0}});
+  file.write_attribute("/", "version", std::array{major_version, minor_version_of(head)});
   file.write_attribute("/", "generator", head.generator);
   file.write_attribute("/", "units", std::string(units));
   file.write_attribute("/", "model", head.info.model_path);
@@ -274,6 +280,7 @@ RecordingHead read_head(const hdf5::Contents& file) {
   RecordingHead head;
   head.has_stress = (*version)[1] >= 1;
   head.has_checksums = (*version)[1] >= 2;
+  head.has_force_error = (*version)[1] >= 3;
   head.info.model_path = file.text_attribute("/", "model").value_or("");
   head.info.content_hash = file.text_attribute("/", "content_hash").value_or("");
   head.info.device = file.text_attribute("/", "device").value_or("");
@@ -421,7 +428,8 @@ RecordingPart write_part(const std::filesystem::path& path, std::span<const Tick
   RecordingPart part = {path, std::ssize(ticks), std::ssize(frames)};
   write_whole(path, with_suffix(path, ".partial"), false, [&](hdf5::File& file) {
     part.fields.clear();
-    for_each_tick_field([&]<class Member>(const char* name, int components, Member TickRecord::*member) {
+    for_each_tick_field(head.has_force_error, [&]<class Member>(const char* name, int components,
+                                                                Member TickRecord::*member) {
       std::vector<Scalar<Member>> values(ticks.size() * static_cast<std::size_t>(components));
       for (std::size_t i = 0; i < ticks.size(); ++i)
         std::memcpy(&values[i * static_cast<std::size_t>(components)], &(ticks[i].*member), sizeof(Member));

@@ -16,9 +16,10 @@
 
 namespace palpate {
 
-/// One dataset a field of TickRecord: path, number of components, member.
+/// One dataset a field of TickRecord: path, number of components, member. `has_force_error`: as a recording
+/// has them from version 4.3 on.
 template <class Visitor>
-void for_each_tick_field(Visitor&& visit) {
+void for_each_tick_field(bool has_force_error, Visitor&& visit) {
   visit("/ticks/time", 1, &TickRecord::time);
   visit("/ticks/device_position", 3, &TickRecord::device_position);
   visit("/ticks/device_orientation", 4, &TickRecord::device_orientation);
@@ -46,6 +47,9 @@ void for_each_tick_field(Visitor&& visit) {
   visit("/ticks/fault", 1, &TickRecord::fault);
   visit("/ticks/event", 1, &TickRecord::event);
   visit("/ticks/motion_step", 1, &TickRecord::motion_step);
+  if (!has_force_error) return;
+  visit("/ticks/force_error", 1, &TickRecord::force_error);
+  visit("/ticks/left_out", 1, &TickRecord::left_out);
 }
 
 /// The number that a field of TickRecord is, or has several of.
@@ -54,8 +58,9 @@ using Scalar = std::remove_all_extents_t<Member>;
 
 /// What the file says beside its rows.
 struct RecordingHead {
-  bool has_stress = true;     ///< version 4.1 and later: stress and pressure, and where the surface is held
-  bool has_checksums = true;  ///< version 4.2 and later
+  bool has_stress = true;       ///< version 4.1 and later: stress and pressure, and where the surface is held
+  bool has_checksums = true;    ///< version 4.2 and later
+  bool has_force_error = true;  ///< version 4.3 and later, and how many contacts were left out
   SessionInfo info;
   std::string generator;
   RecordedSurface surface;

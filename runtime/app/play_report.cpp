@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "base/json_text.h"
+#include "runtime/app/best_effort_report.h"
 #include "runtime/loop/output.h"
 
 namespace palpate {
@@ -68,6 +69,16 @@ void warn_of_rigid_contact(const PlayedRun& run) {
                             has_coupling ? "what is felt there is its coupling alone"
                                          : "the force there is that of a wall and not the body's; give the "
                                            "tool a --coupling, and a --max-force"));
+}
+
+/// Forces that are not quite the contact's.
+void tell_best_effort(const LoopReport& report) {
+  const std::string words = in_words(report.best_effort, report.ticks);
+  if (is_grave(report.best_effort, report.ticks)) {
+    print_warning(words);
+  } else if (!words.empty()) {
+    fmt::print(stderr, "{}\n", words);
+  }
 }
 
 void print_device(const PlayedRun& run) {
@@ -236,6 +247,7 @@ Json json_replay(const ReplayDifference& replay) {
 void print_report(const PlayedRun& run) {
   print_loop(run.report, run.options.fast);
   warn_of_rigid_contact(run);
+  tell_best_effort(run.report);
   print_device(run);
   if (!run.options.record.empty())
     fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),
@@ -274,6 +286,7 @@ std::string json_report(const PlayedRun& run) {
   json["largest_jump_N"] = report.largest_jump;
   json["largest_jump_time_s"] = report.largest_jump_time;
   json["status_ticks"] = status;
+  json["best_effort"] = to_json(report.best_effort);
   json["room"] = json_room(run.state);
   json["device"] = json_device(run);
   if (run.settings.safety) json["safety"] = json_safety(report);

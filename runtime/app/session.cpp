@@ -11,6 +11,7 @@
 #include "base/json_text.h"
 #include "base/printable.h"
 #include "base/write_file.h"
+#include "runtime/app/best_effort_report.h"
 #include "runtime/app/session_check.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/session_xdmf.h"
@@ -97,6 +98,7 @@ void print_text(const std::filesystem::path& path, const Recording& recording, c
              microseconds(s.worst_lateness));
   fmt::print("faults           {}\n", faults_text(s));
   fmt::print("status           {}\n", status_text(s));
+  if (s.best_effort.ticks > 0) fmt::print("best effort      {}\n", in_words(s.best_effort, s.ticks));
   if (frames == 0) {
     fmt::print("frames           none\n");
   } else {
@@ -139,6 +141,7 @@ void print_json(const std::filesystem::path& path, const Recording& recording, c
                                        {"worst_lateness_ns", s.worst_lateness},
                                        {"faults", faults},
                                        {"status_ticks", status},
+                                       {"best_effort", to_json(s.best_effort)},
                                        {"frames", recording.frames.time.size()},
                                        {"surface_nodes", recording.frames.surface.nodes.size()}};
   fmt::print("{}", json_text(json, 2));
@@ -162,6 +165,8 @@ SessionSummary summarise(const Recording& recording) {
     for (std::size_t bit = 0; bit < status_names.size(); ++bit) {
       if (has(static_cast<StepStatus>(tick.status), status_names[bit].first)) ++summary.status_ticks[bit];
     }
+    summary.best_effort.add(static_cast<StepStatus>(tick.status), length(tick.force), tick.force_error,
+                            tick.left_out, tick.time);
     note_largest(length(tick.force), tick.time, summary.largest_force, summary.largest_force_time);
     note_largest(length(tick.shown_force), tick.time, summary.largest_shown, summary.largest_shown_time);
     summary.worst_lateness = std::max(summary.worst_lateness, tick.begun_ns - due(k));

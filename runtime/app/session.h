@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/recording.h"
+#include "runtime/loop/best_effort.h"
 #include "runtime/loop/histogram.h"
 #include "runtime/safety/fault.h"
 #include "runtime/tick/status.h"
@@ -33,7 +34,8 @@ struct SessionSummary {
   std::int64_t worst_lateness = 0;   ///< from when a tick was due to when it began [ns]
   TimeHistogram compute;             ///< [ns]
   std::array<std::int64_t, status_names.size()>
-      status_ticks{};  ///< ticks with each status bit, in the order of status_names
+      status_ticks{};      ///< ticks with each status bit, in the order of status_names
+  BestEffort best_effort;  ///< recordings from 4.3 on know the errors
   std::vector<SessionFault> faults;
 };
 

@@ -36,6 +36,9 @@ TickNote note_of(const TickRecord& tick, std::int64_t rate) {
           .shown = vector_of(tick.shown_force).norm(),
           .depth = std::numeric_limits<double>::quiet_NaN(),  // is not recorded
           .contacts = tick.contacts,
+          .status = static_cast<StepStatus>(tick.status),
+          .force_error = tick.force_error,
+          .left_out = tick.left_out,
           .phase = static_cast<SafetyPhase>(tick.phase),
           .fault = static_cast<Fault>(tick.fault)};
 }
@@ -71,6 +74,8 @@ SurfacePicture SessionPictures::picture(std::int64_t frame) const {
                     .grab = then->grab != 0};
     picture.on_body = {.force = vector_of(then->force), .torque = vector_of(then->torque)};
     picture.status = static_cast<StepStatus>(then->status);
+    picture.force_error = then->force_error;
+    picture.left_out = then->left_out;
   }
   return picture;
 }

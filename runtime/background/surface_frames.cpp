@@ -80,6 +80,8 @@ void SurfaceFrames::post(const State& state, std::int64_t tick, double time) noe
   next.tool = tool.pose;
   next.on_body = {Vec3::Zero() - tool.wrench.force, Vec3::Zero() - tool.wrench.torque};
   next.status = state.status;
+  next.force_error = tool.force_error;
+  next.left_out = tool.left_out;
   next.tick = tick;
   next.time = time;
   if (options_.in_background) {
@@ -126,6 +128,8 @@ void SurfaceFrames::compute(const Moment& moment) {
   picture.tool = moment.tool;
   picture.on_body = moment.on_body;
   picture.status = moment.status;
+  picture.force_error = moment.force_error;
+  picture.left_out = moment.left_out;
   picture.patch = moment.load.patch;
   SurfaceFrame& frame = picture.frame;
   frame.tick = moment.tick;

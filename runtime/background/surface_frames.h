@@ -31,6 +31,8 @@ struct SurfacePicture {
   ToolPose tool;    ///< where it is
   Wrench on_body;   ///< the opposite of what the hand feels
   StepStatus status = StepStatus::ok;
+  double force_error = 0.0;            ///< how far the force may be off, where it is a best effort [N]
+  Index left_out = 0;                  ///< contact points that found no room
   std::vector<SeenContact> contacts;   ///< those that are closed
   std::shared_ptr<const Patch> patch;  ///< null: no overlay
   /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
@@ -79,6 +81,8 @@ class SurfaceFrames {
     std::int64_t tick = -1;
     double time = 0.0;
     StepStatus status = StepStatus::ok;
+    double force_error = 0.0;
+    Index left_out = 0;
   };
   /// The interior of a body in the plane.
   struct Interior {

@@ -88,6 +88,8 @@ palpate_result to_result(const ToolState& state) noexcept {
     copy(state.local.stiffness.row(row), result.local_stiffness + 3 * row);
   copy(state.local.point, result.local_point);
   result.local_radius = state.local.radius;
+  result.force_error = state.force_error;
+  result.left_out = state.left_out;
   return result;
 }
 

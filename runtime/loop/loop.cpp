@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <utility>
 
 #include "runtime/safety/monotonic_clock.h"
@@ -12,6 +13,7 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t second = 1'000'000'000;  // ns
+constexpr double largest_float = std::numeric_limits<float>::max();
 
 /// Returns early when a signal comes.
 void sleep_until(std::int64_t due) noexcept {
@@ -229,6 +231,7 @@ class Loop {
     for (std::size_t k = 0; k < status_names.size(); ++k) {
       if (has(state.status, status_names[k].first)) ++report_.status_ticks[k];
     }
+    report_.best_effort.add(state.status, force.stableNorm(), tool().force_error, tool().left_out, time());
   }
 
   /// The recording and the monitor.
@@ -242,6 +245,9 @@ class Loop {
                              .depth = parts_.feed != nullptr ? depth() : 0.0,
                              .contacts = tool().contacts,
                              .rigid = has(parts_.state.status, StepStatus::rigid_contact),
+                             .status = parts_.state.status,
+                             .force_error = tool().force_error,
+                             .left_out = tool().left_out,
                              .phase = phase(),
                              .fault = fault_,
                              .events = news_.events};
@@ -298,6 +304,8 @@ class Loop {
     if (parts_.overlays != nullptr && parts_.overlays->centre() >= 0)
       record.patch = parts_.body.mesh_node(parts_.overlays->centre());
     record.motion_step = parts_.state.surface.motion.sample_step();
+    record.force_error = static_cast<float>(std::min<double>(tool().force_error, largest_float));
+    record.left_out = tool().left_out;
 
     set(record.handle_position, news_.state.pose.position);
     set(record.handle_orientation, news_.state.pose.orientation);

@@ -8,6 +8,7 @@
 #include "runtime/background/motion_source.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
+#include "runtime/loop/best_effort.h"
 #include "runtime/loop/histogram.h"
 #include "runtime/loop/monitor.h"
 #include "runtime/loop/recorder.h"
@@ -74,6 +75,7 @@ struct LoopReport {
   double largest_shown = 0.0;           ///< of the force that the device was shown [N]
   std::array<std::int64_t, status_names.size()>
       status_ticks{};  ///< ticks with each status bit, in the order of status_names
+  BestEffort best_effort;
   std::array<std::int64_t, fault_names.size()> faults{};  ///< latched, in the order of fault_names
   std::int64_t opened_again = 0;                          ///< how often a lost device came back
   ReplayDifference replay;                                ///< where a session is replayed

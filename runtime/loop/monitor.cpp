@@ -11,6 +11,8 @@
 #include <cstdio>
 #include <string_view>
 
+#include "runtime/loop/best_effort.h"
+
 namespace palpate {
 namespace {
 
@@ -148,6 +150,8 @@ void Monitor::draw() {
   const double time = static_cast<double>(last_.number) / static_cast<double>(options_.rate);
   std::string line = fmt::format("{:7.1f} s  {:6.3f} N  {:2d} contacts{}", time, last_.force.norm(),
                                  last_.contacts, last_.rigid ? " on what is held" : "");
+  if (is_best_effort(last_.status, last_.left_out))
+    line += fmt::format("  best effort, within {:.2g} N", last_.force_error);
   if (options_.shows_safety) {
     line += fmt::format("  shown {:5.2f} N {}", last_.shown,
                         safety_phase_names[static_cast<std::size_t>(last_.phase)].second);

@@ -12,6 +12,7 @@
 #include "runtime/loop/histogram.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
+#include "runtime/tick/status.h"
 
 namespace palpate {
 
@@ -25,6 +26,9 @@ struct TickNote {
   double depth = 0.0;         ///< how far the contacts press the surface in, at most [m]
   std::int32_t contacts = 0;
   bool rigid = false;  ///< the tool presses on what cannot move
+  StepStatus status = StepStatus::ok;
+  double force_error = 0.0;   ///< how far `force` may be off, where it is a best effort [N]
+  std::int32_t left_out = 0;  ///< contact points that found no room
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
   DeviceEvent events = DeviceEvent::none;

@@ -1,14 +1,24 @@
-// The compliance of many contact points.
+// The rows of the contact problem, and the compliance of many contact points.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
 #include "runtime/body/near_field.h"
 #include "runtime/solve/contact_problem.h"
-#include "runtime/tick/contact_row.h"
 
 namespace palpate {
+
+/// One row of J: a force of 1 along it puts -body[n] on the near node at places[n], and `force` and `moment`
+/// about its origin on the tool.
+struct ContactRow {
+  std::array<Index, 3> places{-1, -1, -1};                             ///< in the near field, -1 for none
+  std::array<Vec3, 3> body{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};  ///< zero where there is no node
+  Index tool = -1;                                                     ///< -1: the row does not act on a tool
+  Vec3 force = Vec3::Zero();
+  Vec3 moment = Vec3::Zero();  ///< [m]
+};
 
 /// The rows of J by what is not zero in them, which is at most d entries at each of three nodes: entry t of
 /// row i is at t rows + i, so that all rows are gone through at once.

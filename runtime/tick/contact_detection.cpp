@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/force_error.h"
 #include "runtime/tick/rolling.h"
 
 namespace palpate {
@@ -120,6 +121,7 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
   }
   scratch.high_water.simplices = std::max(scratch.high_water.simplices, static_cast<Index>(count));
   if (all > scratch.found.size()) tool.status |= StepStatus::capacity_full;
+  scratch.found_count = count;
   if (count > scratch.pairs.size()) {
     tool.status |= StepStatus::capacity_full;
     const auto nearer = [&](Index a, Index b) {
@@ -258,6 +260,7 @@ void keep_usable(const Body& body, State& state, Scratch& scratch, ToolContact& 
     const Index simplex = scratch.found[k];
     if (!want_nodes(body, state.surface, nodes_of(body, simplex), moved)) {
       state.tools[touch.number].status |= StepStatus::capacity_full;
+      leave_out_simplex(body, state, scratch, touch.number, touch.core, simplex);
       continue;
     }
     scratch.pairs[touch.usable].nearest = scratch.pairs[k].nearest;
@@ -400,6 +403,8 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
   const double reach = std::max(tool.tool.radius + touch.margin, touch.lost);
   const std::size_t count = nearest_simplices(body, state.surface.tree, scratch, tool, touch.core, reach);
   touch.is_known = tool.tool.length == 0.0 && count < scratch.pairs.size();
+  for (std::size_t k = count; k < scratch.found_count; ++k)
+    leave_out_simplex(body, state, scratch, number, touch.core, scratch.found[k]);
   keep_usable(body, state, scratch, touch, count);
   look_from_origin(body, state.surface.tree, scratch, touch);
   if (is_lost(body, state.surface.tree, touch)) {
@@ -442,6 +447,7 @@ void update_held(const Body& body, State& state) noexcept {
 void find_contacts(const Body& body, State& state, Scratch& scratch) noexcept {
   update_held(body, state);
   scratch.candidate_count = 0;
+  scratch.left_out_count = 0;
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
     if (state.tools[k].engaged) find_candidates(body, state, scratch, k);
   }
@@ -454,6 +460,8 @@ void find_contacts(const Body& body, State& state, Scratch& scratch) noexcept {
                        return a.free_gap < b.free_gap || (a.free_gap == b.free_gap && a.feature < b.feature);
                      });
     state.status |= StepStatus::capacity_full;
+    for (Index k = room; k < scratch.candidate_count; ++k)
+      leave_out_contact(body, state, scratch, scratch.candidates[k]);
     scratch.candidate_count = room;
   }
   std::copy_n(begin, scratch.candidate_count, state.contact_points.begin() + state.held_count);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "meshes/mesh.h"
@@ -39,5 +40,19 @@ struct ContactPoint {
   Vec3 force = Vec3::Zero();  ///< on the tool, after the tick [N]
   Vec3 carry = Vec3::Zero();  ///< sticking: what the solver let it slide in the tick, and is to undo [m]
 };
+
+/// A place where a tool may press on the surface and for which there was no room: a contact point, or a
+/// simplex that was not looked at. By the node of the surface that is nearest to it.
+struct LeftOut {
+  Index tool = -1;
+  Index node = -1;              ///< of the surface
+  Vec3 normal = Vec3::Zero();   ///< out of the body
+  Vec3 apart = Vec3::Zero();    ///< the tool's place less the node's when it was found [m]
+  double gap = 0.0;             ///< then [m]
+  double contact_points = 1.0;  ///< that it stands for: a vertex has two triangles or one line
+};
+
+/// The most that the size of the force's error is taken from, which then are each n-th of those left out.
+inline constexpr std::size_t most_sampled = 256;
 
 }  // namespace palpate

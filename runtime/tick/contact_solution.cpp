@@ -127,12 +127,14 @@ void recall_contacts(State& state, const Scratch& scratch) noexcept {
 ContactOutcome solve_pass(const Body& body, State& state, Scratch& scratch) noexcept {
   assemble_contact(body, state, scratch);
   std::copy_n(scratch.problem.lambda.begin(), scratch.problem.rows, scratch.problem.guess.begin());
-  if (!solve_problem(scratch)) state.status |= StepStatus::not_converged;
+  scratch.is_solved = solve_problem(scratch);
+  if (!scratch.is_solved) state.status |= StepStatus::not_converged;
   if (!is_finite(scratch.problem)) {
     state.status |= StepStatus::result_not_finite;
     return ContactOutcome::not_finite;
   }
-  if (scratch.is_first_pass && state.still_ticks > 1 && !state.goes_half_way && changes_nothing(scratch)) {
+  if (scratch.is_solved && scratch.is_first_pass && state.still_ticks > 1 && !state.goes_half_way &&
+      changes_nothing(scratch)) {
     recall_contacts(state, scratch);
     tell_rigid_contacts(state);
     return ContactOutcome::unchanged;

@@ -8,6 +8,7 @@
 
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/contact_solution.h"
+#include "runtime/tick/force_error.h"
 #include "runtime/tick/linearise_rolling.h"
 #include "runtime/tick/rolling.h"
 
@@ -137,6 +138,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
     if (!rolls) force.col(axis) = change.force;
     torque.col(axis) = change.torque;
     keep_closed_contacts(state, scratch, tool, axis * rows);
+    note_answer(scratch, number, axis, axis * rows);
   }
   keep_open_contacts(state, scratch.problem, tool, number);
   if (force.allFinite()) tool.local.stiffness = passive(-force);
@@ -150,6 +152,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
 }  // namespace
 
 void linearise(const Body& body, State& state, Scratch& scratch) noexcept {
+  begin_force_error(scratch);
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k)
     linearise_tool(state, scratch, k, body.mean_surface_edge());
 }

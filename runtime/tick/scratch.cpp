@@ -7,6 +7,8 @@
 namespace palpate {
 namespace {
 
+constexpr std::size_t most_simplices_left_out = 2048;  // that are kept: what is beyond is counted alone
+
 /// A contact has up to d rows, and d - 1 for the tilt of its face.
 Index most_rows(const Body& body, Index max_contacts) {
   return (2 * body.dimension() - 1) * max_contacts;
@@ -50,6 +52,7 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       found_distance(body.surface_friction().size()),
       pairs(size(2 * max_contacts)),
       candidates(size(3 * tools) * pairs.size()),
+      left_out(candidates.size() + std::min(most_simplices_left_out, found.size())),
       problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
               most_rows(body, many(max_contacts))),
       rows(size(most_rows(body, max_contacts))),
@@ -60,6 +63,10 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       active_set(few_rows(body, max_contacts)),
       cone_solver(body.dimension() * few(max_contacts), most_rows(body, few(max_contacts))),
       newton_krylov(body.dimension() * many(max_contacts), most_rows(body, many(max_contacts))),
+      imbalance(body.dimension() * max_contacts, most_rows(body, max_contacts)),
+      missing_force(size(tools), Vec3::Zero()),
+      left_out_nodes(most_sampled),
+      left_out_blocks(size(body.dimension() * body.dimension()) * most_sampled),
       row_change(size(body.dimension()) * rows.size()),
       force_change(row_change.size()),
       rolling(body.dimension(), max_contacts, static_cast<Index>(rows.size())),

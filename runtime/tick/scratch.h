@@ -7,11 +7,11 @@
 #include "runtime/solve/active_set.h"
 #include "runtime/solve/cone_solver.h"
 #include "runtime/solve/contact_problem.h"
+#include "runtime/solve/imbalance.h"
 #include "runtime/solve/newton_krylov.h"
 #include "runtime/tick/compliance.h"
 #include "runtime/tick/contact_point.h"
-#include "runtime/tick/contact_row.h"
-#include "runtime/tick/rolling_scratch.h"
+#include "runtime/tick/rolling.h"
 #include "runtime/tick/touching_pair.h"
 
 namespace palpate {
@@ -38,7 +38,11 @@ struct Scratch {
   std::vector<TouchingPair> pairs;       ///< [2 max_contacts] detection
   std::vector<ContactPoint> candidates;  ///< [6 max_contacts tools] detection: before the deepest are chosen
   Index candidate_count = 0;
+  std::size_t found_count = 0;    ///< detection: of `found`, within a tool's reach
+  std::vector<LeftOut> left_out;  ///< detection: places for which there was no room
+  Index left_out_count = 0;
   bool is_first_pass = true;             ///< solve_contact: of the tick's Newton passes
+  bool is_solved = true;                 ///< solution: to its tolerance, in the last pass
   ContactProblem problem;                ///< [rows] assembly: W and b; solution: lambda
   std::vector<ContactRow> rows;          ///< [rows] assembly: J
   std::vector<double> row_response;      ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
@@ -48,6 +52,10 @@ struct Scratch {
   ActiveSet active_set;                  ///< solution without friction
   ConeSolver cone_solver;                ///< solution with friction
   NewtonKrylov newton_krylov;            ///< solution of many contacts
+  Imbalance imbalance;                   ///< force error: of a problem that was not solved
+  std::vector<Vec3> missing_force;       ///< [tools] force error: of the solver [N]
+  std::vector<Index> left_out_nodes;     ///< [sampled] force error: stored nodes
+  std::vector<double> left_out_blocks;   ///< [d x d sampled] force error: Xi of these [m/N]
   std::vector<double> row_change;        ///< [d x rows] linearise: db, an axis after the other [m]
   std::vector<double> force_change;      ///< [d x rows] linearise: dlambda [N]
   RollingScratch rolling;                ///< linearise: the turning of normals

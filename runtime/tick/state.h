@@ -35,6 +35,9 @@ struct ToolState {
   double recent_force = 0.0;  ///< running maximum of the contact force, which fades [N]
   double margin = 0.0;        ///< how far the surface may be from the tool and still be met in this tick [m]
   Index contacts = 0;         ///< closed contact points
+  double force_error = 0.0;   ///< how far contact_wrench.force may be from what it is to be, where the solver
+                              ///< was cut short or contact points were left out; else 0 [N]
+  Index left_out = 0;         ///< contact points that the tool presses on and that found no room
   bool placed = false;        ///< has had a pose
   bool engaged = false;       ///< can touch
   bool has_been_clear = false;  ///< of the body once: nothing is felt before; a tool that is lost in the body

@@ -5,6 +5,7 @@
 #include "runtime/solve/node_vectors.h"
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/contact_solution.h"
+#include "runtime/tick/force_error.h"
 #include "runtime/tick/grab.h"
 #include "runtime/tick/hand_force.h"
 #include "runtime/tick/linearise.h"
@@ -20,6 +21,8 @@ void begin_tick(State& state) noexcept {
   state.status = state.surface.patch_is_older ? StepStatus::older_patch : StepStatus::ok;
   for (ToolState& tool : state.tools) {
     tool.status = StepStatus::ok;
+    tool.force_error = 0.0;
+    tool.left_out = 0;
     tool.touched_last_tick = tool.contacts > 0;
     tool.held_last_tick = tool.holding;
     tool.last_change = tool.contact_wrench.force - tool.last_force;
@@ -102,6 +105,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
     note_surface_changes(state);
     linearise(body, state, scratch);
     note_unsettled_tools(state);
+    find_force_errors(body, state, scratch);
   }
   if (contact != ContactOutcome::not_finite) give_forces(state);
   release(body, state);

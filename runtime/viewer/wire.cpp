@@ -132,6 +132,8 @@ std::string encode_frame(const SurfacePicture& picture, const Scene& scene, cons
   message.add(patch == nullptr ? std::uint32_t{0} : patch->number);
   message.add_count(values.patch_nodes());
   message.add_count(pressures.size());
+  message.add(static_cast<float>(picture.force_error));
+  message.add_count(static_cast<std::size_t>(picture.left_out));
   for (const SeenContact& contact : picture.contacts) {
     message.add_vector(contact.position);
     message.add_vector(contact.normal);
@@ -173,6 +175,9 @@ std::string encode_ticks(std::uint32_t scene, std::span<const TickNote> ticks, s
     message.add(static_cast<float>(1e-3 * static_cast<double>(tick.lateness_ns)));
   for (const TickNote& tick : ticks)
     message.add(static_cast<float>(1e-3 * static_cast<double>(tick.compute_ns)));
+  for (const TickNote& tick : ticks) message.add(static_cast<std::uint32_t>(tick.status));
+  for (const TickNote& tick : ticks) message.add(static_cast<float>(tick.force_error));
+  for (const TickNote& tick : ticks) message.add(static_cast<std::uint32_t>(tick.left_out));
   for (const TickNote& tick : ticks)
     message.add(static_cast<std::uint8_t>(std::clamp(tick.contacts, std::int32_t{0}, std::int32_t{255})));
   return message.take();

@@ -510,13 +510,54 @@ test('a body in the plane lies flat with its mesh, and is pushed from outside', 
   assert.deepEqual(page.complaints, []);
 });
 
-/// Records a scripted push of the cube.
-async function recorded(t, at) {
+test('a best effort is told while it lasts, with the size of its error and marks in the plot', async (t) => {
+  const { page } = await open_cube(t, { cells: 8, args: ['--tool', 'sphere:0.5', '--max-contacts', '3'] });
+  const banner = part(page, 'best-effort');
+  const marks = () =>
+    page.evaluate(() => {
+      const canvas = document.querySelector('[data-testid="plot-force"] canvas');
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      let found = 0; // pixels of #ffb454
+      for (let k = 0; k < data.length; k += 4) if (data[k] === 255 && data[k + 1] === 180 && data[k + 2] === 84) ++found;
+      return found;
+    });
+  await choose(page, 'press', 0.002);
+  const { x, y } = await project(page, top);
+  await page.mouse.move(x, y);
+  assert.ok(await banner.isHidden());
+  await choose(page, 'press', 0.1);
+  await page.mouse.down();
+  await settled(page);
+  await banner.waitFor();
+  assert.match(await banner.innerText(), /^Best effort: force (within about [\d.]+ %|off by 100 % or more) \(\d+ contact points left out\)$/);
+  assert.ok((await marks()) > 0);
+  if (process.env.PALPATE_STORE_BANNER) await page.screenshot({ path: process.env.PALPATE_STORE_BANNER });
+  await page.mouse.up();
+  await until(page, () => window.palpate.lastFrame.contacts === 0);
+  await banner.waitFor({ state: 'hidden' });
+  assert.deepEqual(page.complaints, []);
+});
+
+test('a press with room for all its contacts is no best effort', async (t) => {
+  const { page } = await open_cube(t, { cells: 8, args: ['--tool', 'sphere:0.5'] });
+  await choose(page, 'press', 0.1);
+  const { x, y } = await project(page, top);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await settled(page);
+  assert.ok(await part(page, 'best-effort').isHidden());
+  await page.mouse.up();
+});
+
+/// Records a scripted push of the cube, by a point or a ball.
+async function recorded(t, at, radius = 0, ...options) {
   const file = await bake(at, cube(6));
   const touch = path.join(at, 'touch.csv');
-  await writeFile(touch, 't,x,y,z\n0,0.5,0.5,1.1\n0.5,0.5,0.5,0.95\n1,0.5,0.5,0.95\n1.5,0.5,0.5,1.1\n');
+  const row = (time, z) => `${time},0.5,0.5,${z + radius}\n`;
+  await writeFile(touch, `t,x,y,z\n${row(0, 1.1)}${row(0.5, 0.95)}${row(1, 0.95)}${row(1.5, 1.1)}`);
   const session = path.join(at, 'push.h5');
-  await run(runtime, ['play', file, '--device', `script:${touch}`, '--fast', '--record', session], { cwd: at });
+  const tool = radius > 0 ? `sphere:${radius}` : 'point';
+  await run(runtime, ['play', file, '--device', `script:${touch}`, '--fast', '--record', session, '--tool', tool, ...options], { cwd: at });
   return session;
 }
 
@@ -544,6 +585,23 @@ test('a recording is played, step by step too', async (t) => {
   const at = await folder(t);
   const served = await serve(t, ['view', await recorded(t, at), '--view-address', '127.0.0.1:0'], at);
   await leaf_through(await ready(await visit(t, served.url)));
+});
+
+test('a best effort is told of the frames of a recording that have one', async (t) => {
+  const at = await folder(t);
+  const session = await recorded(t, at, 0.4, '--max-contacts', '2');
+  const html = path.join(at, 'out.html');
+  await run(runtime, ['export', session, '--html', html]);
+  const page = await ready(await visit(t, `file://${html}`));
+  assert.ok(await part(page, 'best-effort').isHidden());
+  const { frames } = await told(page, 'state');
+  await page.evaluate((value) => {
+    const scrub = document.querySelector('[data-testid="scrub"]');
+    scrub.value = String(value);
+    scrub.dispatchEvent(new Event('input'));
+  }, Math.floor(frames / 2));
+  await part(page, 'best-effort').waitFor();
+  assert.match(await part(page, 'best-effort').innerText(), /contact points? left out/);
 });
 
 test('a recording becomes one page that needs nothing', async (t) => {

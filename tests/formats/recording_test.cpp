@@ -55,7 +55,9 @@ TickRecord some_tick(std::size_t i) {
           .phase = static_cast<std::uint8_t>(i % 4),
           .fault = static_cast<std::uint8_t>(i % 9),
           .event = static_cast<std::uint8_t>(i % 16),
-          .motion_step = n / 3};
+          .motion_step = n / 3,
+          .force_error = static_cast<float>(0.125 * x),
+          .left_out = static_cast<std::int32_t>(i % 11)};
 }
 
 std::vector<TickRecord> some_ticks(std::size_t count, std::size_t first = 0) {
@@ -87,7 +89,8 @@ bool same(const TickRecord& a, const TickRecord& b) {
          equal(a.handle_velocity, b.handle_velocity) && a.buttons == b.buttons && a.sequence == b.sequence &&
          a.arrived_ns == b.arrived_ns && a.begun_ns == b.begun_ns && equal(a.shown_force, b.shown_force) &&
          equal(a.shown_torque, b.shown_torque) && a.share == b.share && a.phase == b.phase &&
-         a.fault == b.fault && a.event == b.event && a.motion_step == b.motion_step;
+         a.fault == b.fault && a.event == b.event && a.motion_step == b.motion_step &&
+         a.force_error == b.force_error && a.left_out == b.left_out;
 }
 
 const SessionInfo info = {.model_path = "liver.palpate.hdf",
@@ -101,6 +104,17 @@ const RecordedSurface surface = {
 void expect_ticks(const Recording& read, std::size_t count) {
   ASSERT_EQ(read.ticks.size(), count);
   for (std::size_t i = 0; i < count; ++i) ASSERT_TRUE(same(read.ticks[i], some_tick(i))) << i;
+}
+
+/// As those of a version before 4.3.
+void expect_ticks_without_error(const Recording& read, std::size_t count) {
+  ASSERT_EQ(read.ticks.size(), count);
+  for (std::size_t i = 0; i < count; ++i) {
+    TickRecord expected = some_tick(i);
+    expected.force_error = 0.0F;
+    expected.left_out = 0;
+    ASSERT_TRUE(same(read.ticks[i], expected)) << i;
+  }
 }
 
 /// Bit by bit, as not a number differs from itself.
@@ -233,7 +247,7 @@ TEST(Recording, OfVersion40IsReadAsBefore) {
     EXPECT_EQ(hdf5::Contents::read(folder / "a.h5").integer_attribute("/", "version", 2),
               (std::vector<std::int64_t>{4, 0}));
     const Recording read = read_recording(folder / "a.h5");
-    expect_ticks(read, 30);
+    expect_ticks_without_error(read, 30);
     EXPECT_FALSE(read.frames.has_stress);
     EXPECT_TRUE(read.frames.surface.held.empty());
     for (std::size_t k = 0; k < frames; ++k) {
@@ -449,7 +463,7 @@ TEST(Recording, NamesTheDatasetInWhichABitIsFlipped) {
   record(folder / "good.h5", some_ticks(40), 10);
   std::mt19937 random(20261122);  // NOLINT(cert-msc51-cpp): the same bits in each run
   const std::vector<std::string> datasets = checked_datasets(folder / "good.h5");
-  EXPECT_EQ(datasets.size(), 35U);
+  EXPECT_EQ(datasets.size(), 37U);
   for (const std::string& dataset : datasets) {
     std::filesystem::copy_file(folder / "good.h5", folder / "a.h5",
                                std::filesystem::copy_options::overwrite_existing);
@@ -507,6 +521,11 @@ const Impossible impossible[] = {
      "/ticks/patch, row 7, holds -2"},
     {"Contacts", [](const std::filesystem::path& p) { set_entry<std::int32_t>(p, "/ticks/contacts", 1, -1); },
      "/ticks/contacts, row 1, holds -1"},
+    {"ForceError",
+     [](const std::filesystem::path& p) { set_entry<float>(p, "/ticks/force_error", 4, -1.0F); },
+     "/ticks/force_error, row 4, holds -1"},
+    {"LeftOut", [](const std::filesystem::path& p) { set_entry<std::int32_t>(p, "/ticks/left_out", 5, -7); },
+     "/ticks/left_out, row 5, holds -7"},
     {"Grab", [](const std::filesystem::path& p) { set_entry<std::uint8_t>(p, "/ticks/grab", 3, 2); },
      "/ticks/grab, row 3, holds 2"},
     {"TimeBackwards", [](const std::filesystem::path& p) { set_entry<double>(p, "/ticks/time", 9, 1e-3); },
@@ -582,12 +601,33 @@ TEST(Recording, OfVersion41IsReadWithoutChecksumsAndFinishedWithThem) {
       for (const std::string& dataset : checked_datasets(part.path()))
         remove_attribute(part.path(), dataset, "xxh3");
   }
-  expect_ticks(read_recording(folder / "a.h5"), 30);
+  expect_ticks_without_error(read_recording(folder / "a.h5"), 30);
   EXPECT_TRUE(finish_recording(folder / "a.h5"));
-  expect_ticks(read_recording(folder / "a.h5"), 30);
+  expect_ticks_without_error(read_recording(folder / "a.h5"), 30);
   flip_bit(folder / "a.h5", "/ticks/torque", 5);
   EXPECT_NE(refusal([&] { read_recording(folder / "a.h5"); }).find("/ticks/torque was altered"),
             std::string::npos);
+}
+
+TEST(Recording, OfVersion42IsReadAndFinishedWithoutForceErrors) {
+  const Folder folder;
+  const auto make_42 = [&](const std::filesystem::path& file) {
+    for (const char* name : {"/ticks/force_error", "/ticks/left_out"}) remove_object(file, name);
+  };
+  {
+    RecordingWriter killed(folder / "a.h5", info, surface);
+    append(killed, some_ticks(30), 10);
+  }
+  make_42(folder / "a.h5");
+  set_integers(folder / "a.h5", "version", {4, 2});
+  for (const auto& part : std::filesystem::directory_iterator(folder / "a.h5.parts")) {
+    if (part.path().extension() == ".h5") make_42(part.path());
+  }
+  expect_ticks_without_error(read_recording(folder / "a.h5"), 30);
+  EXPECT_TRUE(finish_recording(folder / "a.h5"));
+  expect_ticks_without_error(read_recording(folder / "a.h5"), 30);
+  EXPECT_EQ(hdf5::Contents::read(folder / "a.h5").integer_attribute("/", "version", 2),
+            (std::vector<std::int64_t>{4, 2}));
 }
 
 TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {

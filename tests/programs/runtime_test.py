@@ -626,10 +626,30 @@ class Tools(ProgramTest):
 
     def test_few_contacts(self):
         file = self.bake(cube_toml(6))
-        report, _, contacts = self.play(file, self.PRESS, "--tool", "sphere:0.2", "--max-contacts", "2")
+        report, ticks, contacts = self.play(file, self.PRESS, "--tool", "sphere:0.2", "--max-contacts", "2")
         self.assertLessEqual(report["most_contacts"], 2)
         self.assertLessEqual(len(contacts), 2)
         self.assertGreater(report["status_ticks"]["capacity_full"], 0)
+        best = report["best_effort"]
+        self.assertGreater(best["ticks"], 0)
+        self.assertEqual(best["ticks"], best["left_out_ticks"])
+        self.assertEqual(best["left_out_ticks"], (ticks["left_out"] > 0).sum())
+        self.assertEqual(best["most_left_out"], ticks["left_out"].max())
+        self.assertAlmostEqual(best["force_error_N"]["largest"] / ticks["force_error"].max(), 1, places=6)
+        self.assertTrue(((ticks["force_error"] > 0) == (ticks["left_out"] > 0)).all())
+        whole, ticks, _ = self.play(file, self.PRESS, "--tool", "sphere:0.2")
+        self.assertEqual(whole["best_effort"]["ticks"], 0)
+        self.assertEqual(ticks["force_error"].max(), 0)
+
+    def test_a_best_effort_is_warned_of(self):
+        file = self.bake(cube_toml(6))
+        script = self.write("touch.csv", self.PRESS)
+        play = (RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--tool", "sphere:0.2")
+        few = run(*play, "--max-contacts", "2", "--record", "few.h5", cwd=self.folder)
+        words = r"in \d+ ticks \(\d+ %\) the force was a best effort, .* contact points found no room"
+        self.assertRegex(few.stderr, "warning: " + words)
+        self.assertNotIn("best effort", run(*play, cwd=self.folder).stderr)
+        self.assertRegex(run(RUNTIME, "session", "few.h5", cwd=self.folder).stdout, "best effort +" + words)
 
 
 class Usage(ProgramTest):

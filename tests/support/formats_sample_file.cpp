@@ -35,7 +35,9 @@ int main(int count, char** arguments) {
                                                       .force = {-x, 0, 1},
                                                       .contacts = i % 5,
                                                       .stiffness = {1, 2, 3, 4, 5, x},
-                                                      .grab = 1}});
+                                                      .grab = 1,
+                                                      .force_error = 0.5F * static_cast<float>(i),
+                                                      .left_out = i % 3}});
       if (i % 500 == 0) {
         recording.append(
             palpate::SurfaceFrame{.tick = i,

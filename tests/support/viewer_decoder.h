@@ -92,6 +92,8 @@ struct DecodedFrame {
   std::vector<float> tool, device, force, torque;
   float unit_u, unit_stress;
   std::uint32_t status, contacts, patch, patch_nodes;
+  float force_error;
+  std::uint32_t left_out;
   std::vector<float> contact;
   std::vector<std::uint32_t> pressure_node;
   std::vector<float> pressure;
@@ -117,6 +119,8 @@ inline DecodedFrame decode_frame(const std::string& message, std::size_t scene_n
   frame.patch = bytes.u32();
   frame.patch_nodes = bytes.u32();
   const std::size_t q = bytes.u32();
+  frame.force_error = bytes.take<float>();
+  frame.left_out = bytes.u32();
   frame.contact = bytes.array<float>(std::size_t{10} * frame.contacts);
   frame.pressure_node = bytes.array<std::uint32_t>(q);
   frame.pressure = bytes.array<float>(q);
@@ -134,7 +138,8 @@ struct DecodedTicks {
   std::uint32_t scene;
   double first;
   std::uint32_t stride;
-  std::vector<float> force, shown, depth, late_us, compute_us;
+  std::vector<float> force, shown, depth, late_us, compute_us, force_error;
+  std::vector<std::uint32_t> status, left_out;
   std::vector<std::uint8_t> contacts;
 };
 
@@ -151,6 +156,9 @@ inline DecodedTicks decode_ticks(const std::string& message) {
   ticks.depth = bytes.array<float>(n);
   ticks.late_us = bytes.array<float>(n);
   ticks.compute_us = bytes.array<float>(n);
+  ticks.status = bytes.array<std::uint32_t>(n);
+  ticks.force_error = bytes.array<float>(n);
+  ticks.left_out = bytes.array<std::uint32_t>(n);
   ticks.contacts = bytes.array<std::uint8_t>(n);
   if (!bytes.at_end()) throw std::invalid_argument("the ticks are too long");
   return ticks;

@@ -1,10 +1,11 @@
 // The samples of the loop that are kept for the plots.
+import { is_marked } from './best_effort';
 import type { Ticks } from './wire';
 
-const columns = ['x', 'y', 'z', 'norm', 'shown', 'depth', 'late', 'compute', 'contacts'] as const;
+const columns = ['x', 'y', 'z', 'norm', 'shown', 'depth', 'late', 'compute', 'contacts', 'best_effort'] as const;
 export type Column = (typeof columns)[number];
 
-/** The last samples, oldest first: times [s], forces [N], depth [m], lateness and compute time [us]. */
+/** The last samples, oldest first: times [s], forces [N], depth [m], lateness and compute time [us]; 1 where the force is a best effort. */
 export class History {
   private capacity_: number;
   private begin_ = 0; // where the oldest is
@@ -56,6 +57,7 @@ export class History {
       v.late[at] = ticks.late_us[i]!;
       v.compute[at] = ticks.compute_us[i]!;
       v.contacts[at] = ticks.contacts[i]!;
+      v.best_effort[at] = is_marked(ticks, i) ? 1 : 0;
     }
   }
 

@@ -1,6 +1,7 @@
 // The viewer's page: what comes from the run is shown, what the person does is said to it.
 import './style.css';
 import { Arrows } from './arrows';
+import { of_frame, RecentEfforts, sentence } from './best_effort';
 import { Body } from './body';
 import { ColourBar } from './colour_bar';
 import { field_traits, Range } from './colours';
@@ -35,6 +36,7 @@ class Page implements Listener {
   private mode_: Mode = 'live';
   private state_: State | null = null;
   private history_ = new History(live_samples, false);
+  private readonly efforts_ = new RecentEfforts();
   private latest_: Frame | null = null; // not drawn yet
   private readonly patches_ = new Map<number, Patch>();
   private readonly range_ = new Range();
@@ -140,6 +142,7 @@ class Page implements Listener {
     } else {
       this.ticks_ += picture.count;
       this.history_.add(picture);
+      this.efforts_.take(picture, performance.now());
       this.want_plots();
     }
   }
@@ -342,6 +345,16 @@ class Page implements Listener {
     const has_depth = this.mode_ === 'live' || this.history_.count === 0 || Number.isFinite(this.history_.value('depth', 0));
     part('depth-plot').hidden = part('depth-number').hidden = !has_depth; // a recording does not have it
     show_felt(this.felt());
+    const text = this.best_effort();
+    write(part('best-effort'), text);
+    part('best-effort').hidden = text === '';
+  }
+
+  /** How far the force may be off: live, of the last moment; of a picture that stands, its own. */
+  private best_effort(): string {
+    const frame = this.body_.frame;
+    if (this.mode_ === 'live' && !this.state_?.paused) return this.efforts_.sentence(performance.now());
+    return frame ? sentence([of_frame(frame)]) : '';
   }
 
   private show_timing(): void {
@@ -359,6 +372,7 @@ class Page implements Listener {
       `depth ${format_si(felt.depth, 'm')}  contacts ${felt.contacts}`,
       `tick ${felt.tick}  time ${format_time(time)}`,
     ];
+    if (this.best_effort() !== '') lines.push(this.best_effort());
     if (this.body_.scale !== 1) lines.push(`displacements × ${short_number(this.body_.scale, 2)}`);
     try {
       this.draw_body();

@@ -7,6 +7,7 @@ import { log_classes, quantile, type Column, type History } from './history';
 const shown_seconds = 10;
 const ink = '#8b98a9';
 const grid = '#1d2530';
+const best_effort_colour = '#ffb454';
 
 interface Line {
   column: Column;
@@ -33,11 +34,13 @@ interface Window {
 class TimePlot {
   private readonly plot_: uPlot;
   private prefix_: [number, string] = [1, ''];
+  private marked_: number[] = []; // times of best efforts [s]
 
   constructor(
     private readonly element_: HTMLElement,
     private readonly lines_: Line[],
     private readonly unit_: string,
+    private readonly marks_: boolean, // best efforts
     height: number,
     cursor: () => number | null,
     on_select: (window: Window) => void,
@@ -70,7 +73,7 @@ class TimePlot {
               plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
             },
           ],
-          draw: [(plot) => draw_cursor(plot, cursor())],
+          draw: [(plot) => draw_marks(plot, this.marked_), (plot) => draw_cursor(plot, cursor())],
         },
       },
       [[0], ...lines_.map(() => [null])] as uPlot.AlignedData,
@@ -89,9 +92,11 @@ class TimePlot {
 
   draw(history: History, rate: number, window: Window): void {
     if (this.element_.offsetParent === null) return; // folded away
-    const columns = this.lines_.map((line) => line.column);
+    const columns: Column[] = [...this.lines_.map((line) => line.column), 'best_effort'];
     const data = history.decimate(window.from * rate, window.to * rate, this.plot_.width, columns);
     data[0] = data[0]!.map((tick) => tick! / rate);
+    const marks = data.pop()!;
+    this.marked_ = this.marks_ ? data[0].filter((_, k) => (marks[k] ?? 0) > 0).map((time) => time!) : [];
     if (data[0].length === 0) data.forEach((row, k) => row.push(k === 0 ? window.from : null));
     let largest = 0;
     for (const row of data.slice(1)) for (const value of row) largest = Math.max(largest, Math.abs(value ?? 0));
@@ -109,6 +114,19 @@ function padded(low: number | null, high: number | null): [number, number] {
   const room = 0.08 * (top - bottom);
   if (room === 0) return [0, 1];
   return [bottom < 0 ? bottom - room : 0, top > 0 ? top + room : 0];
+}
+
+/** A stroke at the lower edge for each of some times. */
+function draw_marks(plot: uPlot, times: number[]): void {
+  const { ctx, bbox } = plot;
+  ctx.save();
+  ctx.fillStyle = best_effort_colour;
+  const [width, height] = [2 * devicePixelRatio, 5 * devicePixelRatio];
+  for (const time of times) {
+    const x = plot.valToPos(time, 'x', true);
+    if (x >= bbox.left && x <= bbox.left + bbox.width) ctx.fillRect(x - width / 2, bbox.top + bbox.height - height, width, height);
+  }
+  ctx.restore();
 }
 
 function draw_cursor(plot: uPlot, time: number | null): void {
@@ -220,12 +238,12 @@ export class Plots {
       elements_.live.hidden = window === null;
       this.changed();
     };
-    const plot = (element: HTMLElement, lines: Line[], unit: string, height: number) => {
+    const plot = (element: HTMLElement, lines: Line[], unit: string, marks: boolean, height: number) => {
       element.addEventListener('dblclick', () => zoom(null));
-      return new TimePlot(element, lines, unit, height, () => this.cursor, zoom, on_seek);
+      return new TimePlot(element, lines, unit, marks, height, () => this.cursor, zoom, on_seek);
     };
-    this.force_ = plot(elements_.force, force_lines, 'N', 164);
-    this.depth_ = plot(elements_.depth, depth_lines, 'm', 112);
+    this.force_ = plot(elements_.force, force_lines, 'N', true, 164);
+    this.depth_ = plot(elements_.depth, depth_lines, 'm', false, 112);
     this.timing_ = new TimingPlot(elements_.timing, 84);
     elements_.live.addEventListener('click', () => zoom(null));
   }

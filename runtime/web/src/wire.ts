@@ -41,6 +41,8 @@ export interface Frame {
   unit_stress: number;
   status: number;
   patch: number;
+  force_error: number; // how far `force` may be off, where it is a best effort [N]
+  left_out: number; // contact points that found no room
   contact: Float32Array; // [10 c]
   pressure_node: Uint32Array; // [q]
   pressure: Float32Array; // [q] [Pa]
@@ -62,6 +64,9 @@ export interface Ticks {
   depth: Float32Array; // [n] [m]
   late_us: Float32Array; // [n]
   compute_us: Float32Array; // [n]
+  status: Uint32Array; // [n]
+  force_error: Float32Array; // [n] as in a frame [N]
+  left_out: Uint32Array; // [n]
   contacts: Uint8Array; // [n] 255: or more
 }
 
@@ -171,6 +176,8 @@ function decode_frame(reader: Reader, scene: number, nodes: number): Frame {
   const patch = reader.u32();
   const patch_nodes = reader.u32();
   const pressures = reader.u32();
+  const force_error = reader.f32();
+  const left_out = reader.u32();
   return {
     kind: 'frame',
     scene,
@@ -184,6 +191,8 @@ function decode_frame(reader: Reader, scene: number, nodes: number): Frame {
     unit_stress,
     status,
     patch,
+    force_error,
+    left_out,
     contact: reader.f32s(floats_of_contact * contacts),
     pressure_node: reader.u32s(pressures),
     pressure: reader.f32s(pressures),
@@ -209,6 +218,9 @@ function decode_ticks(reader: Reader, scene: number): Ticks {
     depth: reader.f32s(count),
     late_us: reader.f32s(count),
     compute_us: reader.f32s(count),
+    status: reader.u32s(count),
+    force_error: reader.f32s(count),
+    left_out: reader.u32s(count),
     contacts: reader.u8s(count),
   };
 }

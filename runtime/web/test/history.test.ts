@@ -8,7 +8,8 @@ function ticks(first: number, count: number): Ticks {
   const zeros = () => new Float32Array(count);
   const depth = Float32Array.from({ length: count }, (_, i) => (first + i) / 1000);
   const force = new Float32Array(3 * count).fill(2);
-  return { kind: 'ticks', scene: 1, first, count, stride: 1, force, shown: zeros(), depth, late_us: zeros(), compute_us: depth, contacts: new Uint8Array(count) };
+  const none = () => new Uint32Array(count);
+  return { kind: 'ticks', scene: 1, first, count, stride: 1, force, shown: zeros(), depth, late_us: zeros(), compute_us: depth, status: none(), force_error: zeros(), left_out: none(), contacts: new Uint8Array(count) };
 }
 
 test('the newest samples are kept', () => {
@@ -46,6 +47,17 @@ test('what is left for a plot keeps the least and the largest, and gaps', () => 
   assert.equal(Math.max(...depth.map((one) => one ?? 0)), 9);
   assert.equal(Math.min(...depth.map((one) => one ?? 0)), -3);
   for (let i = 1; i < times.length; ++i) assert.ok(times[i]! >= times[i - 1]!);
+});
+
+test('one best effort among many ticks is left', () => {
+  const history = new History(5000, false);
+  const one = ticks(0, 1000);
+  one.left_out[517] = 3;
+  history.add(one);
+  const [times, marks] = history.decimate(0, 1000, 100, ['best_effort']) as [number[], number[]];
+  const marked = times.filter((_, k) => marks[k]! > 0);
+  assert.equal(marked.length, 1);
+  assert.ok(Math.abs(marked[0]! - 517) < 10);
 });
 
 test('a gap in the ticks is one in the plot', () => {

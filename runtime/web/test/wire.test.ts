@@ -75,6 +75,8 @@ function frame_message(): ArrayBuffer {
     .f32(4, 5, 6, 0, 0, 1, 0)
     .f32(10, 20, 30, 40, 50, 60, 0.5, 100)
     .u32(9, 1, 4, 1, 2)
+    .f32(0.75)
+    .u32(300)
     .f32(1, 1, 1, 0, 0, 1, 0, 0, -2, 1)
     .u32(0, 3)
     .f32(1000, 2000)
@@ -94,6 +96,7 @@ test('a frame: arrays of two bytes begin at multiples of four', () => {
   assert.deepEqual([...frame.device], [4, 5, 6, 0, 0, 1, 0]);
   assert.deepEqual([...frame.force, ...frame.torque], [10, 20, 30, 40, 50, 60]);
   assert.deepEqual([frame.unit_u, frame.unit_stress, frame.status, frame.patch], [0.5, 100, 9, 4]);
+  assert.deepEqual([frame.force_error, frame.left_out], [0.75, 300]);
   assert.deepEqual([...frame.contact], [1, 1, 1, 0, 0, 1, 0, 0, -2, 1]);
   assert.deepEqual([...frame.pressure_node], [0, 3]);
   assert.deepEqual([...frame.pressure], [1000, 2000]);
@@ -104,7 +107,7 @@ test('a frame: arrays of two bytes begin at multiples of four', () => {
 });
 
 test('ticks', () => {
-  const message = new Writer().u32(4, 7).f64(12).u32(2, 1).f32(1, 2, 3, 4, 5, 6).f32(7, 8).f32(0.5, 0.25).f32(50, 60).f32(9, 10).u8(1, 255).done();
+  const message = new Writer().u32(4, 7).f64(12).u32(2, 1).f32(1, 2, 3, 4, 5, 6).f32(7, 8).f32(0.5, 0.25).f32(50, 60).f32(9, 10).u32(0, 256).f32(0, 0.125).u32(0, 70_000).u8(1, 255).done();
   const ticks = decode(message, scene);
   assert.ok(ticks?.kind === 'ticks');
   assert.deepEqual([ticks.first, ticks.count, ticks.stride], [12, 2, 1]);
@@ -113,6 +116,9 @@ test('ticks', () => {
   assert.deepEqual([...ticks.depth], [0.5, 0.25]);
   assert.deepEqual([...ticks.late_us], [50, 60]);
   assert.deepEqual([...ticks.compute_us], [9, 10]);
+  assert.deepEqual([...ticks.status], [0, 256]);
+  assert.deepEqual([...ticks.force_error], [0, 0.125]);
+  assert.deepEqual([...ticks.left_out], [0, 70_000]);
   assert.deepEqual([...ticks.contacts], [1, 255]);
 });
 

@@ -249,6 +249,8 @@ TEST_P(CInterface, IsTheStepOfCppBitForBit) {
       for (int i = 0; i < 9; ++i) ASSERT_EQ(result.local_stiffness[i], tool.local.stiffness(i / 3, i % 3));
       ASSERT_EQ(vector(result.local_point), tool.local.point) << "tick " << tick;
       ASSERT_EQ(result.local_radius, tool.local.radius) << "tick " << tick;
+      ASSERT_EQ(result.force_error, tool.force_error) << "tick " << tick;
+      ASSERT_EQ(result.left_out, tool.left_out) << "tick " << tick;
       if (result.contacts > 0) ++touching[k];
     }
   }

@@ -148,6 +148,26 @@ TEST_P(Tick, MakesNoHeapCall) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
+TEST_P(Tick, MakesNoHeapCallWhereContactsAreLeftOut) {
+  State few(body_, {.tools = {Tool{.radius = 1.0}}, .max_contacts = 2});
+  ToolPose pose;
+  Index left_out = 0;
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+  counting = true;
+#endif
+  for (int k = 0; k < 100; ++k) {
+    pose.position = test::upright(GetParam(), 0.5, 0.5, 2.01 - 0.002 * k);
+    step(body_, few, pose);
+    left_out = std::max(left_out, few.tools[0].left_out);
+  }
+#if PALPATE_OWN_MALLOC
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+#endif
+  EXPECT_GT(left_out, 0);
+}
+
 /// The same body with a finer surface, and patches that take turns.
 class OverlayTick : public Tick {
  protected:

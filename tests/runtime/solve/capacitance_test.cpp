@@ -5,6 +5,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -107,6 +108,19 @@ TEST_P(CapacitanceMatrices, SolveInvertsC) {
   Eigen::VectorXd f = u;
   capacitance.C_.solve({f.data(), static_cast<std::size_t>(f.size())});
   EXPECT_LT((capacitance.fresh() * f - u).norm(), 1e-12 * u.norm());
+}
+
+TEST_P(CapacitanceMatrices, SolvesSeveralSystemsAtOnce) {
+  const Eigen::MatrixXd xi = random_greens(GetParam(), 12);
+  Capacitance capacitance(xi, GetParam(), 12);
+  for (Index node = 0; node < 12; node += 2) ASSERT_EQ(capacitance.add(node), CapacitanceStatus::ok);
+  const Eigen::MatrixXd C = capacitance.fresh();
+  for (const int systems : {1, 2, 3}) {
+    const Eigen::MatrixXd u = Eigen::MatrixXd::Random(C.rows(), systems);
+    Eigen::MatrixXd f = u;
+    capacitance.C_.solve({f.data(), static_cast<std::size_t>(f.size())}, systems);
+    EXPECT_LT((C * f - u).norm(), 1e-12 * u.norm() * C.norm() * C.inverse().norm()) << systems;
+  }
 }
 
 TEST_P(CapacitanceMatrices, RemovesFirstMiddleAndLast) {

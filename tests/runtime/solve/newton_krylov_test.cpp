@@ -12,81 +12,12 @@
 #include "runtime/solve/active_set.h"
 #include "runtime/solve/contact_problem.h"
 #include "runtime/solve/tick_tuning.h"
+#include "tests/support/contact_grid.h"
 
 namespace palpate::newton_krylov_test {
 namespace {
 
-/// A ball on a smooth compliance, on a grid of side x side points one apart, as the tick states it: the
-/// normal is x in a point's frame, which `turned` turns at random.
-struct Grid {
-  Grid(int side, double mu, double depth, double slide, bool turned, double apart = 1.0)
-      : problem(3, side * side, 0, 3 * side * side), rows(mu > 0.0 ? 3 : 1) {
-    const double middle = 0.5 * (side - 1) + 0.1;
-    for (int k = 0; k < side * side; ++k)
-      points.emplace_back(apart * (k % side - middle), apart * (k / side - middle), 0.0);
-    std::mt19937 random(5);
-    std::normal_distribution<double> entry;
-    problem.clear(true);
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const Eigen::Quaterniond turn(entry(random), entry(random), entry(random), entry(random));
-      frames.push_back(turned && rows == 3 ? turn.normalized().toRotationMatrix()
-                                           : Eigen::Matrix3d::Identity());
-      problem.add(mu, false, frames.back().col(0));
-    }
-    fill(depth, slide);
-  }
-
-  void fill(double depth, double slide) {
-    W.resize(problem.rows, problem.rows);
-    b.resize(problem.rows);
-    const Eigen::Vector3d give(1.0, 0.8, 0.7);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      for (std::size_t j = 0; j < points.size(); ++j) {
-        const Eigen::Matrix3d w =
-            1e-3 * ((i == j ? 0.2 : 0.0) + 1.0 / std::sqrt(1.0 + (points[i] - points[j]).squaredNorm())) *
-            (frames[i] * give.asDiagonal() * frames[j].transpose());
-        for (int p = 0; p < rows; ++p) {
-          for (int q = 0; q < rows; ++q) W(at(i) + p, at(j) + q) = w(p, q);
-        }
-      }
-      const double gap = 1e-3 * (points[i].squaredNorm() / 40.0 - depth);
-      const Eigen::Vector3d moved = frames[i] * Eigen::Vector3d(gap, 1e-3 * slide, 2e-4 * slide);
-      for (int p = 0; p < rows; ++p) b[at(i) + p] = moved[p];
-    }
-    for (Index i = 0; i < problem.rows; ++i) {
-      for (Index j = 0; j < problem.rows; ++j) problem.single_row(i)[j] = static_cast<float>(W(i, j));
-      problem.b[static_cast<std::size_t>(i)] = b[i];
-    }
-  }
-
-  /// A tick begins: b is r by the forces of the one before.
-  void begin() {
-    const Eigen::VectorXd r = b + W * lambda();
-    std::copy_n(r.data(), problem.rows, problem.b.begin());
-  }
-
-  [[nodiscard]] Eigen::Index at(std::size_t k) const { return static_cast<Eigen::Index>(k) * rows; }
-  [[nodiscard]] Eigen::VectorXd lambda() const {
-    return Eigen::Map<const Eigen::VectorXd>(problem.lambda.data(), problem.rows);
-  }
-  /// The sum of the forces in the points' own frames.
-  [[nodiscard]] Eigen::Vector3d sum(const Eigen::VectorXd& of_rows) const {
-    Eigen::Vector3d total = Eigen::Vector3d::Zero();
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      Eigen::Vector3d force = Eigen::Vector3d::Zero();
-      for (int p = 0; p < rows; ++p) force[p] = of_rows[at(k) + p];
-      total += frames[k].transpose() * force;
-    }
-    return total;
-  }
-
-  ContactProblem problem;
-  int rows;
-  std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Matrix3d> frames;  // the tick's axes by the point's
-  Eigen::MatrixXd W;
-  Eigen::VectorXd b;
-};
+using test::Grid;
 
 /// Forces by Gauss-Seidel sweeps of Alart & Curnier's projections in double precision until nothing moves.
 Eigen::VectorXd by_sweeps(const Grid& grid, double mu, Eigen::VectorXd lambda) {

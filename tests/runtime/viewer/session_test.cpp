@@ -128,6 +128,8 @@ TickRecord tick_record(std::int64_t number) {
   tick.compute_ns = 70'000;
   tick.begun_ns = 1'000'000 * number + 5000;
   tick.status = 8;
+  tick.force_error = 0.5F;
+  tick.left_out = 6;
   return tick;
 }
 
@@ -195,6 +197,8 @@ TEST_F(Recorded, APictureShowsItsTick) {
   EXPECT_EQ(seen.on_body.force, Vec3(0, 0, -4));
   EXPECT_EQ(seen.on_body.torque, Vec3(0, 8, 0));
   EXPECT_EQ(static_cast<int>(seen.status), 8);
+  EXPECT_EQ(seen.force_error, 0.5);
+  EXPECT_EQ(seen.left_out, 6);
   EXPECT_EQ(pictures.picture(2).tool.position.x(), 9.0) << "tick 12 was lost: that before it";
   EXPECT_EQ(pictures.picture(3).tool.position.x(), 16.0);
   EXPECT_THROW((void)pictures.picture(4), Error);
@@ -214,6 +218,9 @@ TEST_F(Recorded, TicksWithGapsAreSeveralRuns) {
   EXPECT_EQ(note.force, Vec3(0, 0, -16));
   EXPECT_EQ(note.shown, 80.0);
   EXPECT_EQ(note.contacts, 2);
+  EXPECT_EQ(static_cast<int>(note.status), 8);
+  EXPECT_EQ(note.force_error, 0.5);
+  EXPECT_EQ(note.left_out, 6);
   EXPECT_TRUE(std::isnan(note.depth));
 }
 

@@ -41,6 +41,8 @@ SurfacePicture picture_of(const Body& body) {
   picture.device.orientation = Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5);
   picture.on_body = {Vec3(0.5, 1.5, -2.5), Vec3(7, 8, 9)};
   picture.status = StepStatus::inside_body | StepStatus::pose_limited;
+  picture.force_error = 0.375;
+  picture.left_out = 300;
   return picture;
 }
 
@@ -83,6 +85,8 @@ TEST(ViewerWire, FrameComesBackToItsUnits) {
   EXPECT_EQ(frame.force, (std::vector<float>{0.5, 1.5, -2.5}));
   EXPECT_EQ(frame.torque, (std::vector<float>{7, 8, 9}));
   EXPECT_EQ(frame.status, (1U << 6) | (1U << 7));
+  EXPECT_EQ(frame.force_error, 0.375F);
+  EXPECT_EQ(frame.left_out, 300U);
   EXPECT_EQ(frame.patch, 0U);
   EXPECT_EQ(frame.patch_nodes, 0U);
   ASSERT_EQ(frame.contact.size(), 20U);
@@ -222,6 +226,9 @@ TEST(ViewerWire, TicksComeBack) {
     notes[k].lateness_ns = 2500;
     notes[k].compute_ns = 1500;
     notes[k].contacts = k == 2 ? 1000 : static_cast<std::int32_t>(k);
+    notes[k].status = k == 1 ? StepStatus::not_converged : StepStatus::ok;
+    notes[k].force_error = 0.25 * static_cast<double>(k);
+    notes[k].left_out = k == 2 ? 70'000 : 0;
   }
   const test::DecodedTicks ticks = test::decode_ticks(encode_ticks(8, notes, 4));
   EXPECT_EQ(ticks.scene, 8U);
@@ -233,6 +240,9 @@ TEST(ViewerWire, TicksComeBack) {
   EXPECT_EQ(ticks.late_us, std::vector<float>(3, 2.5F));
   EXPECT_EQ(ticks.compute_us, std::vector<float>(3, 1.5F));
   EXPECT_EQ(ticks.contacts, (std::vector<std::uint8_t>{0, 1, 255}));
+  EXPECT_EQ(ticks.status, (std::vector<std::uint32_t>{0, 1U << 8, 0}));
+  EXPECT_EQ(ticks.force_error, (std::vector<float>{0, 0.25, 0.5}));
+  EXPECT_EQ(ticks.left_out, (std::vector<std::uint32_t>{0, 0, 70'000}));
 }
 
 /// Volume that an STL's triangles enclose.

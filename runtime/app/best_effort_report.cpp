@@ -1,0 +1,56 @@
+#include "runtime/app/best_effort_report.h"
+
+#include <fmt/core.h>
+
+namespace palpate {
+namespace {
+
+constexpr double grave_ticks = 0.001;  // of all
+constexpr double grave_error = 0.02;   // of the force
+
+/// A share that is 1 where it is more, too.
+std::string percent(double share) {
+  return share > 0.99 ? "100 % or more" : fmt::format("{:.2g} %", 100.0 * share);
+}
+
+}  // namespace
+
+nlohmann::ordered_json to_json(const BestEffort& best_effort) {
+  return {{"ticks", best_effort.ticks},
+          {"not_converged_ticks", best_effort.not_converged_ticks},
+          {"left_out_ticks", best_effort.left_out_ticks},
+          {"most_left_out", best_effort.most_left_out},
+          {"force_error_N",
+           {{"median", best_effort.median_error()},
+            {"largest", best_effort.largest_error},
+            {"largest_time_s", best_effort.largest_error_time}}},
+          {"force_error_share",
+           {{"median", best_effort.median_share()}, {"largest", best_effort.largest_share}}}};
+}
+
+std::string in_words(const BestEffort& best_effort, std::int64_t ticks) {
+  if (best_effort.ticks == 0) return "";
+  std::string text = fmt::format(
+      "in {} ticks ({:.2g} %) the force was a best effort, which may be off by about {} of it in the median "
+      "and up to {} ({:.3g} N at {:.3f} s)",
+      best_effort.ticks, 100.0 * static_cast<double>(best_effort.ticks) / static_cast<double>(ticks),
+      percent(best_effort.median_share()), percent(best_effort.largest_share), best_effort.largest_error,
+      best_effort.largest_error_time);
+  if (best_effort.not_converged_ticks > 0)
+    text += fmt::format(": the solver was cut short in {} of them", best_effort.not_converged_ticks);
+  if (best_effort.left_out_ticks > 0) {
+    text += fmt::format(
+        "{} up to {} contact points found no room in {} of them; give it more "
+        "--max-contacts, or a smaller tool",
+        best_effort.not_converged_ticks > 0 ? "," : ":", best_effort.most_left_out,
+        best_effort.left_out_ticks);
+  }
+  return text;
+}
+
+bool is_grave(const BestEffort& best_effort, std::int64_t ticks) {
+  return static_cast<double>(best_effort.ticks) > grave_ticks * static_cast<double>(ticks) ||
+         best_effort.largest_share > grave_error;
+}
+
+}  // namespace palpate

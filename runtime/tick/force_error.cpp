@@ -1,0 +1,190 @@
+#include "runtime/tick/force_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/touching_pair.h"
+
+namespace palpate {
+namespace {
+
+void leave_out(const Body& body, const State& state, Scratch& scratch, LeftOut place,
+               const std::array<Index, 3>& nodes, const std::array<double, 3>& weights) noexcept {
+  if (static_cast<std::size_t>(scratch.left_out_count) == scratch.left_out.size()) return;
+  place.node =
+      nodes[static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin())];
+  if (place.node < 0 || !body.surface_moves(place.node)) return;
+  place.apart = state.tools[place.tool].pose.position - state.surface.tree.position(place.node);
+  scratch.left_out[scratch.left_out_count++] = place;
+}
+
+/// How deep the tool has come to be there [m].
+double depth_now(const State& state, const LeftOut& place) noexcept {
+  const Vec3 apart = state.tools[place.tool].pose.position - state.surface.tree.position(place.node);
+  return -(place.gap + place.normal.dot(apart - place.apart));
+}
+
+/// The stored node that a surface node follows most.
+Index stored_node(const Body& body, Index node) noexcept {
+  const SurfaceParts parts = body.surface_parts(node);
+  const auto most = std::max_element(parts.weights.begin(), parts.weights.end()) - parts.weights.begin();
+  return parts.stored[static_cast<std::size_t>(most)];
+}
+
+double along(const Vec3& n, std::span<const double> block, std::ptrdiff_t stride, int d,
+             const Vec3& m) noexcept {
+  double sum = 0.0;
+  for (int a = 0; a < d; ++a) {
+    for (int b = 0; b < d; ++b) sum += n[a] * m[b] * block[static_cast<std::size_t>(a * stride + b)];
+  }
+  return sum;
+}
+
+/// The force that closes a place alone [N].
+double closing_force(const Body& body, const State& state, const LeftOut& place, double depth) noexcept {
+  const Index node = stored_node(body, place.node);
+  std::array<double, 9> block{};
+  body.greens().gather(node, {&node, 1}, block);
+  const int d = body.dimension();
+  const double give =
+      along(place.normal, block, d, d, place.normal) + 1.0 / state.tools[place.tool].tool.coupling_stiffness;
+  return depth / std::max(give, state.surface.least_compliance);
+}
+
+/// Places that a tool presses on.
+struct Pressed {
+  double contact_points = 0.0;
+  std::size_t places = 0;
+};
+
+/// Those that are deeper than what a tick leaves at contacts, too.
+template <class Visit>
+void for_each_pressed(const State& state, const Scratch& scratch, Index tool, double edge,
+                      Visit&& visit) noexcept {
+  const double least = tuning.passes.penetration * edge;
+  for (Index k = 0; k < scratch.left_out_count; ++k) {
+    const LeftOut& place = scratch.left_out[k];
+    if (place.tool != tool) continue;
+    const double depth = depth_now(state, place);
+    if (depth > least) visit(place, depth);
+  }
+}
+
+Pressed count_pressed(const State& state, const Scratch& scratch, Index tool, double edge) noexcept {
+  Pressed pressed;
+  for_each_pressed(state, scratch, tool, edge, [&](const LeftOut& place, double) {
+    pressed.contact_points += place.contact_points;
+    ++pressed.places;
+  });
+  return pressed;
+}
+
+/// What the places that were left out would add to a tool's force [N].
+double missing_of_left_out(const Body& body, const State& state, Scratch& scratch, Index tool,
+                           std::size_t places) noexcept {
+  const std::size_t stride = (places + most_sampled - 1) / most_sampled;
+  const int d = body.dimension();
+  std::array<double, most_sampled> force;
+  std::array<Vec3, most_sampled> normal;
+  std::size_t seen = 0;
+  std::size_t count = 0;
+  Index deepest = -1;
+  double depth_there = 0.0;
+  for_each_pressed(state, scratch, tool, body.mean_surface_edge(), [&](const LeftOut& place, double depth) {
+    if (seen++ % stride != 0) return;
+    scratch.left_out_nodes[count] = stored_node(body, place.node);
+    force[count] =
+        static_cast<double>(stride) * place.contact_points * closing_force(body, state, place, depth);
+    normal[count] = place.normal;
+    if (depth > depth_there) {
+      depth_there = depth;
+      deepest = static_cast<Index>(count);
+    }
+    ++count;
+  });
+  if (deepest < 0) return 0.0;
+  const std::size_t row = static_cast<std::size_t>(deepest);
+  const std::ptrdiff_t width = d * static_cast<std::ptrdiff_t>(count);
+  const std::span<double> blocks(scratch.left_out_blocks.data(), static_cast<std::size_t>(d * width));
+  body.greens().gather(scratch.left_out_nodes[row], std::span(scratch.left_out_nodes).first(count), blocks);
+  const double coupling = 1.0 / state.tools[tool].tool.coupling_stiffness;
+  Vec3 sum = Vec3::Zero();
+  double given_way = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    sum += force[k] * normal[k];
+    given_way +=
+        force[k] * (along(normal[row], blocks.subspan(static_cast<std::size_t>(d) * k), width, d, normal[k]) +
+                    coupling * normal[row].dot(normal[k]));
+  }
+  return given_way > depth_there ? depth_there / given_way * sum.norm() : sum.norm();
+}
+
+/// By what a step of Newton's method would change the force. The solver of few contacts is cut short where
+/// such steps run in circles: there they are much too long, the residual says much too little, and the truth
+/// lies between (docs/decisions).
+double error_of_solver(const Scratch& scratch, double step) noexcept {
+  if (scratch.is_solved) return 0.0;
+  return scratch.problem.many ? tuning.hand.error_margin * step
+                              : std::sqrt(step * scratch.imbalance.residual());
+}
+
+}  // namespace
+
+void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, Index tool, const Core& core,
+                       Index simplex) noexcept {
+  const Tool& shape = state.tools[tool].tool;
+  const double distance = std::sqrt(scratch.found_distance[simplex]);
+  if (!(distance > 0.0 && distance < shape.radius)) return;
+  const SimplexNodes nodes = nodes_of(body, simplex);
+  const NearestPoint nearest = nearest_points(state.surface.tree, nodes, core, shape.length == 0.0);
+  leave_out(body, state, scratch,
+            {.tool = tool,
+             .normal = (nearest.on_core - nearest.on_simplex) / distance,
+             .gap = distance - shape.radius,
+             .contact_points = 1.0 / (body.dimension() - 1)},
+            nodes, nearest.weights);
+}
+
+void leave_out_contact(const Body& body, const State& state, Scratch& scratch,
+                       const ContactPoint& contact) noexcept {
+  leave_out(body, state, scratch, {.tool = contact.tool, .normal = contact.frame.col(0), .gap = contact.gap},
+            contact.nodes, contact.weights);
+}
+
+void begin_force_error(Scratch& scratch) noexcept {
+  std::fill(scratch.missing_force.begin(), scratch.missing_force.end(), Vec3::Zero());
+  if (scratch.is_solved) return;
+  scratch.imbalance.find(scratch.problem);
+  for (Index i = 0; i < scratch.problem.rows; ++i) {
+    const ContactRow& row = scratch.rows[i];
+    if (row.tool >= 0) scratch.missing_force[row.tool] += scratch.imbalance.change()[i] * row.force;
+  }
+}
+
+void note_answer(Scratch& scratch, Index tool, int axis, Index begin) noexcept {
+  if (scratch.is_solved) return;
+  double sum = 0.0;
+  for (Index i = 0; i < scratch.problem.rows; ++i)
+    sum += scratch.force_change[begin + i] * scratch.imbalance.motion()[i];
+  scratch.missing_force[tool][axis] += sum;
+}
+
+void find_force_errors(const Body& body, State& state, Scratch& scratch) noexcept {
+  for (std::size_t k = 0; k < state.tools.size(); ++k) {
+    ToolState& tool = state.tools[k];
+    const auto number = static_cast<Index>(k);
+    tool.force_error = error_of_solver(scratch, scratch.missing_force[k].norm());
+    const Pressed pressed =
+        tool.engaged ? count_pressed(state, scratch, number, body.mean_surface_edge()) : Pressed{};
+    tool.left_out = static_cast<Index>(std::ceil(pressed.contact_points));
+    if (pressed.places > 0)
+      tool.force_error +=
+          tuning.hand.error_margin * missing_of_left_out(body, state, scratch, number, pressed.places);
+    if (!std::isfinite(tool.force_error)) tool.force_error = tool.contact_wrench.force.norm();
+  }
+}
+
+}  // namespace palpate
