@@ -21,11 +21,10 @@ struct FollowingTuning {
 
 /// Where tools and surface touch.
 struct DetectionTuning {
-  double same_place = 1e-4;       ///< [edge] contact points nearer than this are one
-  double same_direction = 1e-6;   ///< [1] if 1 - cos of their normals is smaller as well
-  double same_held_place = 0.05;  ///< [edge] nothing else is touched nearer to a held place
-  double deepest_inside = 0.25;   ///< [edge] a tool whose core is deeper is lost in the body
-  double smooth_radius = 6.0;     ///< [edge of the simplex] a larger sphere touches corners alone. Its chords
+  double same_place = 1e-4;      ///< [edge] contact points nearer than this are one
+  double same_direction = 1e-6;  ///< [1] if 1 - cos of their normals is smaller as well
+  double deepest_inside = 0.25;  ///< [edge] a tool whose core is deeper is lost in the body
+  double smooth_radius = 6.0;    ///< [edge of the simplex] a larger sphere touches corners alone. Its chords
                                ///< hold it out by edge^2 / 6 R; measured against the half-space: 18 % of the
                                ///< force at R/10, 4 % at R/20, of an indentation of 0.02 R
   double on_surface = 1e-6;  ///< [edge] nearer, the normal is the face's and not the distance's

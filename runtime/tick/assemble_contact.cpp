@@ -289,13 +289,6 @@ double exact_compliance(const Body& body, const NearField& near, const ContactRo
   return dot(left.data(), right.data(), terms);
 }
 
-/// What is added at least to the body's own compliance at a contact, `give`: on nodes that a grab holds the
-/// tool presses on itself, as on a wall.
-double least_give_added(const State& state, Index k, double give) noexcept {
-  const double least = state.surface.least_compliance;
-  return std::max(least - give, least * state.contact_points[k].held_share);
-}
-
 constexpr double exact_rounding = std::numeric_limits<double>::epsilon();
 
 /// Contact points that nearly coincide make W nearly singular; the rounding of Xi must not make it
@@ -313,7 +306,7 @@ void regularise(const Body& body, const State& state, Scratch& scratch) noexcept
       const double exact = exact_compliance(body, state.surface.near, scratch.rows[row]);
       double give = 4.0 * (rounding * std::max(w - exact, 0.0) + exact_rounding * std::abs(exact)) +
                     state.surface.rigid_compliance;
-      if (k < state.contact_count) give = std::max(give, least_give_added(state, k, w));
+      if (k < state.contact_count) give = std::max(give, state.surface.least_compliance - w);
       w += give + scratch.tilt_spring[row];
       if (i > first && problem.held[k] == 0) problem.b[row] -= give * problem.lambda[row];
     }
@@ -386,7 +379,7 @@ void regularise_many(const State& state, Scratch& scratch) noexcept {
     const Index rows = problem.rows_of(k);
     double give = state.surface.rigid_compliance;
     if (k < state.contact_count && rows > 0)
-      give = std::max(give, least_give_added(state, k, least_give(problem, state.contact_points[k], k)));
+      give = std::max(give, state.surface.least_compliance - least_give(problem, state.contact_points[k], k));
     const double along_normal = problem.normal_part(k, problem.lambda);
     for (Index i = first; i < first + rows; ++i) {
       float& w = problem.single_row(i)[i];

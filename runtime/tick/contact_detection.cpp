@@ -150,41 +150,15 @@ bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const V
   return false;
 }
 
-/// Whether a grab of the tool holds a place on a simplex, edge or corner of the surface, or next to it: by
-/// where they are on the body at rest, so that what else is touched doesn't hang on how the surface lies.
-bool is_held(const Body& body, const State& state, Index tool, const SimplexNodes& nodes) noexcept {
-  if (state.held_count == 0) return false;
-  const double near = tuning.detection.same_held_place * body.mean_surface_edge();
-  const double far = near + body.longest_surface_edge();
-  const auto corner = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
-  const auto nearest = [&](const Vec3& place) {
-    if (nodes[1] < 0) return (corner(0) - place).squaredNorm();
-    if (nodes[2] < 0) return nearest_on_line(place, corner(0), corner(1)).squared_distance;
-    return nearest_on_triangle(place, corner(0), corner(1), corner(2)).squared_distance;
-  };
-  return std::any_of(state.contact_points.begin(), state.contact_points.begin() + state.held_count,
-                     [&](const ContactPoint& held) {
-                       return held.tool == tool && (corner(0) - held.rest_point).squaredNorm() < far * far &&
-                              nearest(held.rest_point) < near * near;
-                     });
-}
-
-/// How much of a contact is on nodes that its tool holds, of what is on nodes that move.
-double held_share(const Body& body, const State& state, const ContactPoint& contact) noexcept {
+/// Whether a grab of the tool holds a node of a simplex: there the tool does not push as well, as place and
+/// contact would be levers against each other. What is touched then does not hang on how the surface lies.
+bool is_held(const State& state, Index tool, const SimplexNodes& nodes) noexcept {
   const auto begin = state.contact_points.begin();
-  double moving = 0.0;
-  double held = 0.0;
-  for (std::size_t n = 0; state.held_count > 0 && n < 3; ++n) {
-    const Index node = contact.nodes[n];
-    if (node < 0 || !body.surface_moves(node)) continue;
-    moving += contact.weights[n];
-    const bool is_held = std::any_of(begin, begin + state.held_count, [&](const ContactPoint& other) {
-      return other.tool == contact.tool &&
-             std::find(other.nodes.begin(), other.nodes.end(), node) != other.nodes.end();
-    });
-    if (is_held) held += contact.weights[n];
-  }
-  return held > 0.0 ? held / moving : 0.0;
+  return std::any_of(begin, begin + state.held_count, [&](const ContactPoint& held) {
+    return held.tool == tool && std::any_of(held.nodes.begin(), held.nodes.end(), [&](Index node) {
+             return node >= 0 && std::find(nodes.begin(), nodes.end(), node) != nodes.end();
+           });
+  });
 }
 
 /// Whether a contact's normal turns as the tool moves: at a vertex, and on an edge or face that carried
@@ -224,7 +198,6 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.frame = frame_of(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
-  contact.held_share = held_share(body, state, contact);
   contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
@@ -324,25 +297,7 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
     const int place = is_segment ? 2 : 0;
     touch_pair(body, state, scratch, touch, pair_of_corner(body, tree, simplex, n, touch.core, place));
     if (is_segment && corners == 3)
-      touch_pair(body, state, scratch, touch, pair_of_edge(body, tree, simplex, n, touch.core, place));
-  }
-}
-
-/// A simplex that is held in part is touched along its border, except where that is held. What is outside of
-/// the border may turn its back to the tool.
-void touch_border(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
-                  const TouchingPair& pair) noexcept {
-  if (pair.height < 0.0) return;
-  const SurfaceTree& tree = state.surface.tree;
-  const SimplexNodes nodes = nodes_of(body, pair.simplex);
-  const bool is_flat = body.dimension() == 2;
-  const int place = state.tools[touch.number].tool.length > 0.0 ? 2 : 0;
-  for (std::size_t n = 0; n < (is_flat ? 2 : 3); ++n) {
-    const SimplexNodes part = {nodes[n], is_flat ? -1 : nodes[(n + 1) % 3], -1};
-    if (is_held(body, state, touch.number, part)) continue;
-    touch_pair(body, state, scratch, touch,
-               is_flat ? pair_of_corner(body, tree, pair.simplex, n, touch.core, place)
-                       : pair_of_edge(body, tree, pair.simplex, n, touch.core, place));
+      touch_pair(body, state, scratch, touch, pair_of_edge(body, tree, simplex, n, touch.core));
   }
 }
 
@@ -414,8 +369,8 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
   }
   for (Index k = 0; k < touch.usable; ++k) {
     const TouchingPair& pair = scratch.pairs[k];
-    const bool held = is_held(body, state, number, nodes_of(body, pair.simplex));
-    (held ? touch_border : touch_simplex)(body, state, scratch, touch, pair);
+    if (!is_held(state, number, nodes_of(body, pair.simplex)))
+      touch_simplex(body, state, scratch, touch, pair);
   }
   if (scratch.is_first_pass) roll_ahead(body, tool, scratch, touch.first_candidate);
 }

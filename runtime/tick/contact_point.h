@@ -34,9 +34,7 @@ struct ContactPoint {
                        ///< its force goes through the tool's origin
   bool rigid = false;  ///< the body gives way there by less than SurfaceState::least_compliance
   Vec3 tool_point =
-      Vec3::Zero();  ///< held: the place in the tool's own frame that stays with the surface [m]
-  Vec3 rest_point = Vec3::Zero();  ///< held: where the place is on the body at rest [m]
-  double held_share = 0.0;  ///< of a free contact's weights on nodes that move: on those that its tool holds
+      Vec3::Zero();           ///< held: the place in the tool's own frame that stays with the surface [m]
   Vec3 force = Vec3::Zero();  ///< on the tool, after the tick [N]
   Vec3 carry = Vec3::Zero();  ///< sticking: what the solver let it slide in the tick, and is to undo [m]
 };

@@ -18,15 +18,7 @@ Vec3 last_place(const SurfaceState& surface, const ContactPoint& contact) noexce
   return place;
 }
 
-Vec3 rest_place(const Body& body, const ContactPoint& contact) noexcept {
-  Vec3 place = Vec3::Zero();
-  for (std::size_t n = 0; n < 3; ++n) {
-    if (contact.nodes[n] >= 0) place += contact.weights[n] * body.surface_rest_positions()[contact.nodes[n]];
-  }
-  return place;
-}
-
-void hold_contact(const Body& body, State& state, const ContactPoint& contact) noexcept {
+void hold_contact(State& state, const ContactPoint& contact) noexcept {
   const ToolState& tool = state.tools[contact.tool];
   ContactPoint held = contact;
   held.held = true;
@@ -35,8 +27,6 @@ void hold_contact(const Body& body, State& state, const ContactPoint& contact) n
   held.frame.setIdentity();
   held.tool_point =
       tool.pose.orientation.conjugate() * (last_place(state.surface, contact) - tool.pose.position);
-  held.rest_point = rest_place(body, contact);
-  held.held_share = 0.0;
   state.contact_points[state.held_count++] = held;
 }
 
@@ -58,7 +48,7 @@ bool reach_out(const Body& body, State& state, Index number) noexcept {
     free = free || body.surface_moves(contact.nodes[k]);
   }
   if (!free) return false;
-  hold_contact(body, state, contact);
+  hold_contact(state, contact);
   return true;
 }
 
@@ -69,7 +59,7 @@ void begin_hold(const Body& body, State& state, const Scratch& scratch, Index nu
   for (Index k = 0; k < scratch.last_count && state.held_count < state.max_contacts(); ++k) {
     const ContactPoint& contact = scratch.last_contacts[k];
     if (contact.tool == number && !contact.held && contact.force.dot(contact.frame.col(0)) > 0.0)
-      hold_contact(body, state, contact);
+      hold_contact(state, contact);
   }
   tool.holding = state.held_count > before;
   if (tool.holding || state.held_count == state.max_contacts()) return;

@@ -82,7 +82,7 @@ TouchingPair pair_of_corner(const Body& body, const SurfaceTree& tree, Index sim
 }
 
 TouchingPair pair_of_edge(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
-                          const Core& core, int place) noexcept {
+                          const Core& core) noexcept {
   const SimplexNodes nodes = nodes_of(body, simplex);
   const std::size_t next = (corner + 1) % 3;
   NearestPoint nearest =
@@ -91,7 +91,7 @@ TouchingPair pair_of_edge(const Body& body, const SurfaceTree& tree, Index simpl
   nearest.weights = {};
   nearest.weights[corner] = weights[0];
   nearest.weights[next] = weights[1];
-  return make_pair(tree, nodes, simplex, place, nearest);
+  return make_pair(tree, nodes, simplex, 2, nearest);
 }
 
 }  // namespace palpate

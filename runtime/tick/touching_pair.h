@@ -47,6 +47,6 @@ TouchingPair pair_of_corner(const Body& body, const SurfaceTree& tree, Index sim
 
 /// The pair of a triangle's edge, from a corner to the next one, and the core.
 TouchingPair pair_of_edge(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
-                          const Core& core, int place) noexcept;
+                          const Core& core) noexcept;
 
 }  // namespace palpate
