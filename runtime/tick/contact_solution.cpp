@@ -51,8 +51,9 @@ void retreat_from_leaps(const Body& body, State& state) noexcept {
 
 /// A contact whose point moves from a face over its edge may be thrown back and forth by Newton's method,
 /// which follows one of them at a time. While nothing else moves, it goes half the way when it turns back.
-void halve_return(const Body& body, State& state) noexcept {
-  const bool returns = state.still_ticks > 1 && !is_released(body, state) &&
+/// Not where other contacts find room than in the tick before: half way there belongs to neither.
+void halve_return(const Body& body, State& state, const Scratch& scratch) noexcept {
+  const bool returns = state.still_ticks > 1 && scratch.left_out_count == 0 && !is_released(body, state) &&
                        std::any_of(state.tools.begin(), state.tools.end(), [](const ToolState& tool) {
                          return (tool.contact_wrench.force - tool.last_force).dot(tool.last_change) < 0.0;
                        });
@@ -141,7 +142,7 @@ ContactOutcome solve_pass(const Body& body, State& state, Scratch& scratch) noex
   }
   apply_forces(state, scratch);
   retreat_from_leaps(body, state);
-  if (scratch.is_first_pass) halve_return(body, state);
+  if (scratch.is_first_pass) halve_return(body, state, scratch);
   move_tools(body, state);
   move_near_surface(body, state.surface);
   return ContactOutcome::solved;

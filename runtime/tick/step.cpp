@@ -105,9 +105,11 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
     note_surface_changes(state);
     linearise(body, state, scratch);
     note_unsettled_tools(state);
-    find_force_errors(body, state, scratch);
   }
-  if (contact != ContactOutcome::not_finite) give_forces(state);
+  if (contact != ContactOutcome::not_finite) {
+    find_force_errors(body, state, scratch);
+    give_forces(state);
+  }
   release(body, state);
   renew_stored_displacement(body, state.surface);
   renew_far_surface(body, state.surface, scratch);
