@@ -259,6 +259,7 @@ void NearField::move(Index from, Index to) noexcept {
 
 bool NearField::change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept {
   if (patch != nullptr && std::ssize(patch->stored_nodes()) > patch_room_) return false;
+  ++revision_;
   for (Index place = 0; place < count_; ++place) leave(place);
   const Index before = count_;
   count_ = 0;

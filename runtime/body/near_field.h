@@ -50,6 +50,9 @@ class NearField {
   /// nothing that is touched jumps away: the next forces are those of the new C. Nodes that were not wanted
   /// in this tick are forgotten. False, and nothing happens, when the patch is larger than there is room for.
   bool change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept;
+  /// How often all of C was gathered anew. As long as it is the same, so is what C has between two nodes that
+  /// stay.
+  [[nodiscard]] std::int64_t revision() const noexcept { return revision_; }
   /// Place of a surface node in the patch, -1 when it is beside it.
   [[nodiscard]] Index place_in_patch(Index surface_node) const noexcept {
     return place_in_patch_[surface_node];
@@ -100,6 +103,7 @@ class NearField {
   std::ptrdiff_t patch_stride_;
   Index patch_room_;
   std::int64_t tick_ = 0;
+  std::int64_t revision_ = 0;
   std::vector<Index> place_;           // [S]
   std::vector<Index> place_in_patch_;  // [S]
   std::vector<Index> nodes_;           // [capacity] surface nodes

@@ -14,7 +14,8 @@ ContactProblem::ContactProblem(int d, Index max_contacts, Index few_rows, Index 
       held(max_contacts),
       owner(max_contacts),
       W(static_cast<std::size_t>(stride) * static_cast<std::size_t>(stride)),
-      single_W(static_cast<std::size_t>(single_stride) * static_cast<std::size_t>(single_stride)),
+      body_W(static_cast<std::size_t>(single_stride) * static_cast<std::size_t>(single_stride)),
+      single_W(body_W.size()),
       b(std::max(stride, single_stride)),
       lambda(b.size()),
       guess(b.size()) {}
@@ -24,6 +25,7 @@ void ContactProblem::clear(bool are_many) noexcept {
   rows = 0;
   frictionless = true;
   many = are_many;
+  coupled = false;
 }
 
 void ContactProblem::add(double mu, bool is_held, const Vec3& n) noexcept {

@@ -47,12 +47,16 @@ struct ContactProblem {
   [[nodiscard]] const double* row(Index i) const noexcept {
     return W.data() + static_cast<std::ptrdiff_t>(i) * stride;
   }
-  /// Row i of W where contacts are many.
+  /// Row i of W where contacts are many: what body and couplings give way.
   [[nodiscard]] float* single_row(Index i) noexcept {
-    return single_W.data() + static_cast<std::ptrdiff_t>(i) * single_stride;
+    return (coupled ? single_W : body_W).data() + static_cast<std::ptrdiff_t>(i) * single_stride;
   }
   [[nodiscard]] const float* single_row(Index i) const noexcept {
-    return single_W.data() + static_cast<std::ptrdiff_t>(i) * single_stride;
+    return (coupled ? single_W : body_W).data() + static_cast<std::ptrdiff_t>(i) * single_stride;
+  }
+  /// What the body alone has of it.
+  [[nodiscard]] float* body_row(Index i) noexcept {
+    return body_W.data() + static_cast<std::ptrdiff_t>(i) * single_stride;
   }
 
   int dimension;
@@ -61,14 +65,16 @@ struct ContactProblem {
   Index contacts = 0;
   Index rows = 0;
   bool frictionless = true;        ///< no contact has friction
-  bool many = false;               ///< W is in `single_W`, and friction's rows are along the axes
+  bool many = false;               ///< W is in single precision, and friction's rows are along the axes
+  bool coupled = false;            ///< ... and in `single_W`, else in `body_W`
   std::vector<Index> first;        ///< [contacts + 1]
   std::vector<double> friction;    ///< [contacts] mu
   std::vector<Vec3> normal;        ///< [contacts] in the rows' axes
   std::vector<std::uint8_t> held;  ///< [contacts]
   std::vector<Index> owner;        ///< [contacts] contact that a held row is there for, else -1
   std::vector<double> W;           ///< [rows x stride] [m/N]
-  std::vector<float> single_W;     ///< [rows x single_stride] [m/N]
+  std::vector<float> body_W;       ///< [rows x single_stride] where contacts are many [m/N]
+  std::vector<float> single_W;     ///< [rows x single_stride] with what couplings give way [m/N]
   std::vector<double> b;           ///< [rows] [m]; where contacts are many, r by the guess
   std::vector<double> lambda;      ///< [rows] [N]; before solving: a guess
   std::vector<double> guess;       ///< [rows] lambda before solving [N]

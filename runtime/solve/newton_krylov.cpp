@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/solve/vector_loops.h"
 
 namespace palpate {
 namespace {
@@ -16,18 +17,6 @@ constexpr Index width = 16;  // vectors end on whole registers
 
 Index padded(Index rows) noexcept {
   return (rows + width - 1) / width * width;
-}
-
-float dot(const float* __restrict a, const float* __restrict b, std::ptrdiff_t count) noexcept {
-  float sum = 0.0F;
-#pragma omp simd reduction(+ : sum)
-  for (std::ptrdiff_t i = 0; i < count; ++i) sum += a[i] * b[i];
-  return sum;
-}
-
-void add(const float* __restrict x, float factor, float* __restrict y, std::ptrdiff_t count) noexcept {
-#pragma omp simd
-  for (std::ptrdiff_t i = 0; i < count; ++i) y[i] += factor * x[i];
 }
 
 /// y = A x, four rows at a time.
@@ -52,23 +41,76 @@ void multiply(const float* __restrict A, std::ptrdiff_t stride, const float* __r
   for (; i < rows; ++i) y[i] = dot(A + i * stride, x, columns);
 }
 
-/// Y = A X for three vectors, `apart` from each other: A is read once.
+/// Y = A X for three vectors, `apart` from each other: A is read once, two rows at a time.
 void multiply_three(const float* __restrict A, std::ptrdiff_t stride, const float* __restrict x,
                     float* __restrict y, std::ptrdiff_t apart, std::ptrdiff_t rows,
                     std::ptrdiff_t columns) noexcept {
-  for (std::ptrdiff_t i = 0; i < rows; ++i) {
+  const float* __restrict x1 = x + apart;
+  const float* __restrict x2 = x + 2 * apart;
+  std::ptrdiff_t i = 0;
+  for (; i + 2 <= rows; i += 2) {
     const float* __restrict a = A + i * stride;
-    float s0 = 0.0F, s1 = 0.0F, s2 = 0.0F;
-#pragma omp simd reduction(+ : s0, s1, s2)
+    const float* __restrict b = a + stride;
+    float a0 = 0.0F, a1 = 0.0F, a2 = 0.0F, b0 = 0.0F, b1 = 0.0F, b2 = 0.0F;
+#pragma omp simd reduction(+ : a0, a1, a2, b0, b1, b2)
     for (std::ptrdiff_t k = 0; k < columns; ++k) {
-      s0 += a[k] * x[k];
-      s1 += a[k] * x[apart + k];
-      s2 += a[k] * x[2 * apart + k];
+      a0 += a[k] * x[k];
+      a1 += a[k] * x1[k];
+      a2 += a[k] * x2[k];
+      b0 += b[k] * x[k];
+      b1 += b[k] * x1[k];
+      b2 += b[k] * x2[k];
     }
-    y[i] = s0;
-    y[apart + i] = s1;
-    y[2 * apart + i] = s2;
+    y[i] = a0;
+    y[apart + i] = a1;
+    y[2 * apart + i] = a2;
+    y[i + 1] = b0;
+    y[apart + i + 1] = b1;
+    y[2 * apart + i + 1] = b2;
   }
+  for (; i < rows; ++i) {
+    for (std::ptrdiff_t s = 0; s < 3; ++s) y[s * apart + i] = dot(A + i * stride, x + s * apart, columns);
+  }
+}
+
+/// y += the first `rows` rows of A by their factors, three of them in one pass.
+void add_rows(const float* __restrict A, std::ptrdiff_t stride, int rows, const Vec3& factors,
+              float* __restrict y, std::ptrdiff_t columns) noexcept {
+  const Eigen::Vector3f by = factors.cast<float>();
+  if (rows == 3) {
+    const float f0 = by[0], f1 = by[1], f2 = by[2];
+#pragma omp simd
+    for (std::ptrdiff_t k = 0; k < columns; ++k)
+      y[k] += f0 * A[k] + f1 * A[stride + k] + f2 * A[2 * stride + k];
+    return;
+  }
+  for (int i = 0; i < rows; ++i) {
+    if (by[i] != 0.0F) add(A + i * stride, by[i], y, columns);
+  }
+}
+
+/// out = A v of a matrix by rows, `size` by `size` of 3 by 3.
+void multiply_small(const std::array<float, 9>& A, int size, const float* v, float* out) noexcept {
+  if (size == 3) {
+    const float v0 = v[0], v1 = v[1], v2 = v[2];
+    out[0] = A[0] * v0 + A[1] * v1 + A[2] * v2;
+    out[1] = A[3] * v0 + A[4] * v1 + A[5] * v2;
+    out[2] = A[6] * v0 + A[7] * v1 + A[8] * v2;
+  } else if (size == 2) {
+    const float v0 = v[0], v1 = v[1];
+    out[0] = A[0] * v0 + A[1] * v1;
+    out[1] = A[3] * v0 + A[4] * v1;
+  } else {
+    out[0] = A[0] * v[0];
+  }
+}
+
+std::array<float, 9> by_rows(const Eigen::Matrix3d& A) noexcept {
+  std::array<float, 9> entries{};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) entries[static_cast<std::size_t>(3 * i + j)] = static_cast<float>(A(i, j));
+  }
+  return entries;
 }
 
 Vec3 tangential(const Vec3& v, const Vec3& n) noexcept {
@@ -86,23 +128,20 @@ NewtonKrylov::NewtonKrylov(Index max_contacts, Index max_rows)
       best_r_(f_.size()),
       change_(f_.size()),
       product_(f_.size()),
-      krylov_(most_changes),
+      reduced_(contacts_.size()),
+      gmres_(most_changes, Gmres(stride_, tuning.many.most_steps)),
       x_(most_changes * f_.size()),
       v_(x_.size()),
-      y_(f_.size()) {
-  const auto steps = static_cast<std::size_t>(tuning.many.most_steps);
-  for (Krylov& krylov : krylov_) {
-    krylov.basis.resize((steps + 1) * f_.size());
-    krylov.scaled.resize(steps * f_.size());
-    krylov.H.resize((steps + 1) * steps);
-    krylov.cosine.resize(steps);
-    krylov.sine.resize(steps);
-    krylov.g.resize(steps + 1);
-  }
-}
+      y_(x_.size()),
+      step_(f_.size()) {}
 
 bool NewtonKrylov::was_easy() const noexcept {
-  return products_ * std::pow(rows_, 2) <= tuning.many.easy_share * tuning.many.most_work;
+  return work_ <= tuning.many.easy_share * tuning.many.most_work;
+}
+
+void NewtonKrylov::count_product() noexcept {
+  ++products_;
+  work_ += static_cast<double>(rows_) * static_cast<double>(rows_ + tuning.many.product_overhead);
 }
 
 template <typename Real>
@@ -191,7 +230,7 @@ void NewtonKrylov::find_motion(const ContactProblem& problem) noexcept {
 void NewtonKrylov::move_by_change(const ContactProblem& problem) noexcept {
   multiply(problem.single_row(0), problem.single_stride, change_.data(), product_.data(), rows_,
            padded_rows_);
-  ++products_;
+  count_product();
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) r_[i] += product_[i];
 }
 
@@ -227,8 +266,8 @@ Vec3 NewtonKrylov::slipping_force(const Contact& contact, const Vec3& f, const V
     double slope =
         -e.dot(motion) + normal_change * across.dot(moved) + normal * contact.mu * across.dot(turned);
     if (!(slope > 0.0)) slope = scale;
-    const double angle = std::clamp(-wrong / slope, -0.5, 0.5);
-    e = (std::cos(angle) * e + std::sin(angle) * across).normalized();
+    const double half = 0.5 * std::clamp(-wrong / slope, -0.5, 0.5);  // of the angle, by its tangent
+    e = ((1.0 - half * half) * e + 2.0 * half * across) / (1.0 + half * half);
   }
   return force;
 }
@@ -256,12 +295,11 @@ void NewtonKrylov::sweep(const ContactProblem& problem) noexcept {
     const Vec3 change = is_present(contact) ? suiting_change(contact, f, r) : Vec3(-f);
     change_force(contact, change);
     if (contact.kind != Kind::held && change == -f) open(contact);
-    for (int i = 0; i < contact.rows; ++i) {
-      if (change[i] != 0.0)
-        add(problem.single_row(contact.first + i), static_cast<float>(change[i]), r_.data(), columns);
-    }
+    if (!change.isZero(0.0))
+      add_rows(problem.single_row(contact.first), problem.single_stride, contact.rows, change, r_.data(),
+               columns);
   }
-  ++products_;
+  count_product();
 }
 
 /// Difference of the two sides of the equations.
@@ -290,7 +328,6 @@ double NewtonKrylov::find_residual() const noexcept {
 }
 
 void NewtonKrylov::choose_modes() noexcept {
-  active_ = false;
   for (Index k = 0; k < count_; ++k) {
     Contact& contact = contacts_[static_cast<std::size_t>(k)];
     const Vec3 f = at(f_, contact);
@@ -316,7 +353,6 @@ void NewtonKrylov::choose_modes() noexcept {
         contact.turning = std::min((1.0 - share) * contact.w / (share + 1e-20), 1e4 * contact.w);
       }
     }
-    active_ = active_ || contact.mode != Mode::open;
   }
 }
 
@@ -342,179 +378,117 @@ void NewtonKrylov::move_to_modes(const ContactProblem& problem) noexcept {
   move_by_change(problem);
 }
 
-/// Forces x of the active rows by the unknowns y: along the cone's edge and across where a contact slips.
-void NewtonKrylov::lift(const float* y, float* x) const noexcept {
+/// The contacts that are not open, each with what it gives way itself as its preconditioner.
+void NewtonKrylov::reduce() noexcept {
+  active_ = 0;
   for (Index k = 0; k < count_; ++k) {
     const Contact& contact = contacts_[static_cast<std::size_t>(k)];
-    const float* from = y + contact.first;
-    float* to = x + contact.first;
-    if (contact.mode == Mode::open) {
-      std::fill_n(to, contact.rows, 0.0F);
-    } else if (contact.mode == Mode::slip) {
-      const Vec3 force = from[0] * (contact.n + contact.mu * contact.e) + from[1] * contact.across;
-      for (int i = 0; i < contact.rows; ++i) to[i] = static_cast<float>(force[i]);
-    } else {
-      for (int i = 0; i < contact.rows; ++i) to[i] = from[i];
+    if (contact.mode == Mode::open) continue;
+    Reduced& reduced = reduced_[active_++];
+    reduced.first = contact.first;
+    reduced.rows = contact.rows;
+    reduced.turning = 0.0F;
+    if (contact.mode != Mode::slip) {
+      reduced.image = by_rows(Eigen::Matrix3d::Identity());
+      reduced.test = reduced.image;
+      reduced.inverse = by_rows(contact.inverse);
+      continue;
     }
+    Eigen::Matrix3d image = Eigen::Matrix3d::Zero();
+    image.col(0) = contact.n + contact.mu * contact.e;
+    image.col(1) = contact.across;
+    Eigen::Matrix3d test = Eigen::Matrix3d::Zero();
+    test.row(0) = contact.n;
+    test.row(1) = contact.across;
+    Eigen::Matrix2d local = (test * contact.D * image).topLeftCorner<2, 2>();
+    local(1, 1) += contact.turning;
+    Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
+    inverse.topLeftCorner<2, 2>() = local.inverse();
+    reduced.image = by_rows(image);
+    reduced.test = by_rows(test);
+    reduced.inverse = by_rows(inverse);
+    reduced.turning = static_cast<float>(contact.turning);
   }
 }
 
-/// The equations' left sides by motions v of the active rows.
-void NewtonKrylov::test(const float* v, const float* y, float* out) const noexcept {
-  for (Index k = 0; k < count_; ++k) {
-    const Contact& contact = contacts_[static_cast<std::size_t>(k)];
-    const float* from = v + contact.first;
-    float* to = out + contact.first;
-    if (contact.mode == Mode::open) {
-      std::fill_n(to, contact.rows, 0.0F);
-    } else if (contact.mode == Mode::slip) {
-      Vec3 motion = Vec3::Zero();
-      for (int i = 0; i < contact.rows; ++i) motion[i] = from[i];
-      const double by_force = y != nullptr ? contact.turning * y[contact.first + 1] : 0.0;
-      to[0] = static_cast<float>(contact.n.dot(motion));
-      to[1] = static_cast<float>(contact.across.dot(motion) + by_force);
-      if (contact.rows == 3) to[2] = 0.0F;
-    } else {
-      for (int i = 0; i < contact.rows; ++i) to[i] = from[i];
-    }
-  }
+/// Forces x [rows] by the unknowns: along the cone's edge and across where a contact slips.
+void NewtonKrylov::fill_image(const float* y, float* x) const noexcept {
+  std::fill_n(x, padded_rows_, 0.0F);
+  for (const Reduced& contact : std::span(reduced_).first(active_))
+    multiply_small(contact.image, contact.rows, y + contact.first, x + contact.first);
 }
 
-/// By what a contact gives way itself.
-void NewtonKrylov::precondition(const float* v, float* y) const noexcept {
-  for (Index k = 0; k < count_; ++k) {
-    const Contact& contact = contacts_[static_cast<std::size_t>(k)];
-    const float* from = v + contact.first;
-    float* to = y + contact.first;
-    if (contact.mode == Mode::open) {
-      std::fill_n(to, contact.rows, 0.0F);
-    } else if (contact.mode == Mode::slip) {
-      to[0] = static_cast<float>(from[0] / contact.w);
-      to[1] = static_cast<float>(from[1] / (contact.w + contact.turning));
-      if (contact.rows == 3) to[2] = 0.0F;
-    } else {
-      Vec3 value = Vec3::Zero();
-      for (int i = 0; i < contact.rows; ++i) value[i] = from[i];
-      const Vec3 scaled = contact.inverse * value;
-      for (int i = 0; i < contact.rows; ++i) to[i] = static_cast<float>(scaled[i]);
-    }
-  }
+/// The equations' left sides by motions along the rows.
+void NewtonKrylov::test(const float* motion, float* out) const noexcept {
+  std::fill_n(out, padded_rows_, 0.0F);
+  for (const Reduced& contact : std::span(reduced_).first(active_))
+    multiply_small(contact.test, contact.rows, motion + contact.first, out + contact.first);
 }
 
-/// Takes the newest vector of the basis in (Arnoldi, by modified Gram & Schmidt), and turns the Hessenberg
-/// matrix into a triangular one.
-void NewtonKrylov::expand(Krylov& krylov) noexcept {
-  const int most = tuning.many.most_steps;
-  const int k = krylov.steps;
-  float* next = krylov.basis.data() + (k + 1) * stride_;
-  const auto h = [&](int i, int j) -> float& { return krylov.H[static_cast<std::size_t>(i * most + j)]; };
-  for (int j = 0; j <= k; ++j) {
-    const float* q = krylov.basis.data() + j * stride_;
-    h(j, k) = dot(q, next, padded_rows_);
-    add(q, -h(j, k), next, padded_rows_);
+/// v = W x of the first systems, in step, so that W is read once for all of them.
+void NewtonKrylov::multiply_by_W(const ContactProblem& problem, int systems) noexcept {
+  if (systems == 1) {
+    multiply(problem.single_row(0), problem.single_stride, x_.data(), v_.data(), rows_, padded_rows_);
+  } else {
+    multiply_three(problem.single_row(0), problem.single_stride, x_.data(), v_.data(), stride_, rows_,
+                   padded_rows_);
   }
-  const float length = std::sqrt(dot(next, next, padded_rows_));
-  if (length > 0.0F) {
-    for (std::ptrdiff_t i = 0; i < padded_rows_; ++i) next[i] /= length;
-  }
-  for (int j = 0; j < k; ++j) {
-    const float a = h(j, k);
-    const float b = h(j + 1, k);
-    const auto at = static_cast<std::size_t>(j);
-    h(j, k) = krylov.cosine[at] * a + krylov.sine[at] * b;
-    h(j + 1, k) = -krylov.sine[at] * a + krylov.cosine[at] * b;
-  }
-  const float a = h(k, k);
-  const float size = std::sqrt(a * a + length * length);
-  const auto at = static_cast<std::size_t>(k);
-  if (!(size > 0.0F)) {
-    krylov.done = true;
-    return;
-  }
-  krylov.cosine[at] = a / size;
-  krylov.sine[at] = length / size;
-  h(k, k) = size;
-  krylov.g[at + 1] = -krylov.sine[at] * krylov.g[at];
-  krylov.g[at] *= krylov.cosine[at];
-  ++krylov.steps;
-  krylov.done =
-      krylov.steps == steps_ || std::abs(krylov.g[at + 1]) <= tuning.many.linear_tolerance * krylov.size;
+  count_product();
 }
 
-/// GMRES on the reduced systems whose right-hand sides stand first in krylov_[k].basis, in step, so that W is
-/// read once for all of them.
+/// GMRES on the reduced systems that have begun.
 void NewtonKrylov::solve_reduced(const ContactProblem& problem, int systems) noexcept {
-  const double product = std::pow(rows_, 2);
-  steps_ = static_cast<int>(
-      std::clamp<double>(tuning.many.step_work / product, tuning.many.fewest_steps, tuning.many.most_steps));
-  for (int s = 0; s < systems; ++s) {
-    Krylov& krylov = krylov_[static_cast<std::size_t>(s)];
-    float* first = krylov.basis.data();
-    std::fill(first + rows_, first + padded_rows_, 0.0F);
-    krylov.steps = 0;
-    krylov.size = std::sqrt(dot(first, first, padded_rows_));
-    krylov.done = !(krylov.size > 0.0F) || !std::isfinite(krylov.size);
-    if (krylov.done) continue;
-    for (std::ptrdiff_t i = 0; i < padded_rows_; ++i) first[i] /= krylov.size;
-    krylov.g[0] = krylov.size;
-  }
-  const auto is_done = [&] {
-    return std::all_of(krylov_.begin(), krylov_.begin() + systems,
-                       [](const Krylov& krylov) { return krylov.done; });
-  };
-  while (!is_done()) {
+  const std::span<Gmres> all = std::span(gmres_).first(static_cast<std::size_t>(systems));
+  const auto is_done = [](const Gmres& gmres) { return gmres.done(); };
+  while (!std::all_of(all.begin(), all.end(), is_done)) {
     for (int s = 0; s < systems; ++s) {
-      const Krylov& krylov = krylov_[static_cast<std::size_t>(s)];
+      Gmres& gmres = gmres_[static_cast<std::size_t>(s)];
       float* x = x_.data() + s * stride_;
-      std::fill_n(x, padded_rows_, 0.0F);
-      if (krylov.done) continue;
-      float* scaled = krylov_[static_cast<std::size_t>(s)].scaled.data() + krylov.steps * stride_;
-      precondition(krylov.basis.data() + krylov.steps * stride_, scaled);
-      lift(scaled, x);
+      if (gmres.done()) {
+        std::fill_n(x, padded_rows_, 0.0F);
+        continue;
+      }
+      float* y = gmres.image();
+      std::fill_n(y, padded_rows_, 0.0F);
+      for (const Reduced& contact : std::span(reduced_).first(active_))
+        multiply_small(contact.inverse, contact.rows, gmres.newest() + contact.first, y + contact.first);
+      fill_image(y, x);
     }
-    if (systems == 1) {
-      multiply(problem.single_row(0), problem.single_stride, x_.data(), v_.data(), rows_, padded_rows_);
-    } else {
-      multiply_three(problem.single_row(0), problem.single_stride, x_.data(), v_.data(), stride_, rows_,
-                     padded_rows_);
-    }
-    ++products_;
+    multiply_by_W(problem, systems);
     for (int s = 0; s < systems; ++s) {
-      Krylov& krylov = krylov_[static_cast<std::size_t>(s)];
-      if (krylov.done) continue;
-      float* next = krylov.basis.data() + (krylov.steps + 1) * stride_;
-      std::fill(next + rows_, next + padded_rows_, 0.0F);
-      test(v_.data() + s * stride_, krylov.scaled.data() + krylov.steps * stride_, next);
-      expand(krylov);
+      Gmres& gmres = gmres_[static_cast<std::size_t>(s)];
+      if (gmres.done()) continue;
+      float* next = gmres.next();
+      test(v_.data() + s * stride_, next);
+      for (const Reduced& contact : std::span(reduced_).first(active_)) {
+        if (contact.rows > 1) next[contact.first + 1] += contact.turning * gmres.image()[contact.first + 1];
+      }
+      gmres.expand();
     }
   }
 }
 
-/// Forces [active rows] of a system that was solved.
-void NewtonKrylov::solution(const Krylov& krylov, float* x) noexcept {
-  const int most = tuning.many.most_steps;
-  std::fill_n(y_.begin(), padded_rows_, 0.0F);
-  std::array<float, static_cast<std::size_t>(tuning.many.most_steps)> c{};
-  for (int j = krylov.steps; j-- > 0;) {
-    float sum = krylov.g[static_cast<std::size_t>(j)];
-    for (int t = j + 1; t < krylov.steps; ++t)
-      sum -= krylov.H[static_cast<std::size_t>(j * most + t)] * c[static_cast<std::size_t>(t)];
-    c[static_cast<std::size_t>(j)] = sum / krylov.H[static_cast<std::size_t>(j * most + j)];
-  }
-  for (int j = 0; j < krylov.steps; ++j)
-    add(krylov.scaled.data() + j * stride_, c[static_cast<std::size_t>(j)], y_.data(), padded_rows_);
-  lift(y_.data(), x);
+/// Steps of GMRES that the budget has room for.
+int NewtonKrylov::most_steps() const noexcept {
+  const double product =
+      static_cast<double>(rows_) * static_cast<double>(rows_ + tuning.many.product_overhead);
+  return static_cast<int>(
+      std::clamp<double>(tuning.many.step_work / product, tuning.many.fewest_steps, tuning.many.most_steps));
 }
 
 bool NewtonKrylov::newton_step(const ContactProblem& problem) noexcept {
   choose_modes();
-  if (!active_) return false;
+  reduce();
+  if (active_ == 0) return false;
   move_to_modes(problem);
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) x_[i] = -r_[i];
-  test(x_.data(), nullptr, krylov_[0].basis.data());
+  Gmres& gmres = gmres_[0];
+  test(x_.data(), gmres.first());
+  const float size = std::sqrt(dot(gmres.first(), gmres.first(), padded_rows_));
+  gmres.begin(padded_rows_, most_steps(), tuning.many.linear_tolerance * size);
   solve_reduced(problem, 1);
-  std::fill_n(change_.begin(), padded_rows_, 0.0F);
-  solution(krylov_[0], change_.data());
+  gmres.solve(step_.data());
+  fill_image(step_.data(), change_.data());
   if (!std::all_of(change_.begin(), change_.begin() + rows_, [](float by) { return std::isfinite(by); }))
     return false;
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) f_[i] += change_[i];
@@ -529,6 +503,7 @@ void NewtonKrylov::take_best() noexcept {
 
 bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   products_ = 0;
+  work_ = 0.0;
   rounds_ = 0;
   std::copy_n(problem.lambda.begin(), problem.rows, problem.guess.begin());
   load(problem);
@@ -544,12 +519,12 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   };
   keep();
   bool newton = false;
-  const auto work = [&] { return products_ * std::pow(rows_, 2); };
   const double wanted =
       std::clamp(tuning.many.reduction * best, tuning.many.least_residual, tuning.many.tolerance);
   const auto is_done = [&] {
-    if (best <= wanted || rounds_ >= tuning.many.most_rounds || work() >= tuning.many.most_work) return true;
-    return best <= tuning.many.rough_tolerance && work() >= tuning.many.smooth_work;
+    if (best <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
+    return best <= tuning.many.rough_tolerance &&
+           (work_ >= tuning.many.smooth_work || failures >= tuning.many.rough_failures);
   };
   while (!is_done()) {
     ++rounds_;
@@ -573,24 +548,66 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   return best <= tuning.many.accepted;
 }
 
+/// The unknowns y of each change by the guess in dlambda. False where that is zero.
+bool NewtonKrylov::fill_guess(std::span<const double> dlambda, int changes) noexcept {
+  bool found = false;
+  for (int s = 0; s < changes; ++s) {
+    float* y = y_.data() + s * stride_;
+    std::fill_n(y, padded_rows_, 0.0F);
+    for (const Reduced& contact : std::span(reduced_).first(active_)) {
+      std::array<float, 3> guess{};
+      for (int i = 0; i < contact.rows; ++i)
+        guess[static_cast<std::size_t>(i)] =
+            static_cast<float>(dlambda[static_cast<std::size_t>(s * rows_ + contact.first + i)]);
+      multiply_small(contact.test, contact.rows, guess.data(), y + contact.first);
+      for (int i = 0; i < contact.rows; ++i) found = found || y[contact.first + i] != 0.0F;
+    }
+  }
+  return found;
+}
+
 void NewtonKrylov::derivative(const ContactProblem& problem, int changes, std::span<const double> db,
                               std::span<double> dlambda) noexcept {
-  std::fill_n(dlambda.begin(), changes * rows_, 0.0);
   const int products = products_;
+  const double work = work_;
   choose_modes();
-  if (!active_) return;
+  reduce();
+  const bool guessed = fill_guess(dlambda, changes);
+  std::fill_n(dlambda.begin(), changes * rows_, 0.0);
+  if (active_ == 0) return;
+  if (guessed) {
+    for (int s = 0; s < changes; ++s) fill_image(y_.data() + s * stride_, x_.data() + s * stride_);
+    multiply_by_W(problem, changes);
+  }
   for (int s = 0; s < changes; ++s) {
+    Gmres& gmres = gmres_[static_cast<std::size_t>(s)];
+    const float* y = y_.data() + s * stride_;
+    const float* v = v_.data() + s * stride_;
+    float* wanted = x_.data() + s * stride_;
     const double* change = db.data() + s * rows_;
-    std::transform(change, change + rows_, x_.begin(),
-                   [](double value) { return static_cast<float>(-value); });
-    test(x_.data(), nullptr, krylov_[static_cast<std::size_t>(s)].basis.data());
+    std::transform(change, change + rows_, wanted, [](double value) { return static_cast<float>(-value); });
+    float* first = gmres.first();
+    test(wanted, first);
+    const float size = std::sqrt(dot(first, first, padded_rows_));
+    if (guessed) {
+      for (Index i = 0; i < rows_; ++i) wanted[i] -= v[i];
+      test(wanted, first);
+      for (const Reduced& contact : std::span(reduced_).first(active_)) {
+        if (contact.rows > 1) first[contact.first + 1] -= contact.turning * y[contact.first + 1];
+      }
+    }
+    gmres.begin(padded_rows_, most_steps(), tuning.many.linear_tolerance * size);
   }
   solve_reduced(problem, changes);
   for (int s = 0; s < changes; ++s) {
-    solution(krylov_[static_cast<std::size_t>(s)], x_.data());
+    float* y = y_.data() + s * stride_;
+    gmres_[static_cast<std::size_t>(s)].solve(step_.data());
+    for (Index i = 0; i < rows_; ++i) y[i] += step_[static_cast<std::size_t>(i)];
+    fill_image(y, x_.data());
     std::copy_n(x_.begin(), rows_, dlambda.begin() + s * rows_);
   }
   products_ = products;
+  work_ = work;
 }
 
 }  // namespace palpate

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "runtime/solve/contact_problem.h"
+#include "runtime/solve/gmres.h"
 
 namespace palpate {
 
@@ -30,7 +32,8 @@ class NewtonKrylov {
   bool solve(ContactProblem& problem) noexcept;
 
   /// What lambda changes by when b does, to first order, for up to three changes: `db` and `dlambda`
-  /// [changes x rows]. Contacts stay open, sticking or slipping as they are.
+  /// [changes x rows]; dlambda holds a guess before, which may be zero. Contacts stay open, sticking or
+  /// slipping as they are.
   void derivative(const ContactProblem& problem, int changes, std::span<const double> db,
                   std::span<double> dlambda) noexcept;
 
@@ -64,14 +67,15 @@ class NewtonKrylov {
     double turning = 0.0;                                   // slipping: motion across by a force across [m/N]
   };
 
-  /// What GMRES keeps of one right-hand side.
-  struct Krylov {
-    std::vector<float> basis;   // [(steps + 1) x stride]
-    std::vector<float> scaled;  // [steps x stride] preconditioned
-    std::vector<float> H, cosine, sine, g;
-    int steps = 0;
-    float size = 0.0F;
-    bool done = false;
+  /// A contact that is not open as GMRES has it: three unknowns where it sticks, two where it slips. Matrices
+  /// are stored by rows.
+  struct Reduced {
+    Index first = 0;  // row
+    int rows = 0;
+    std::array<float, 9> image{};    // forces by the unknowns
+    std::array<float, 9> test{};     // equations by the motion
+    std::array<float, 9> inverse{};  // unknowns by the equations, of the contact alone
+    float turning = 0.0F;            // second equation by the second unknown
   };
 
   void load(ContactProblem& problem) noexcept;
@@ -92,12 +96,14 @@ class NewtonKrylov {
   void choose_modes() noexcept;
   void move_to_modes(const ContactProblem& problem) noexcept;
   bool newton_step(const ContactProblem& problem) noexcept;
-  void lift(const float* y, float* x) const noexcept;
-  void test(const float* v, const float* y, float* out) const noexcept;
-  void precondition(const float* v, float* y) const noexcept;
+  void reduce() noexcept;
+  void fill_image(const float* y, float* x) const noexcept;
+  void test(const float* motion, float* out) const noexcept;
+  void multiply_by_W(const ContactProblem& problem, int systems) noexcept;
   void solve_reduced(const ContactProblem& problem, int systems) noexcept;
-  void expand(Krylov& krylov) noexcept;
-  void solution(const Krylov& krylov, float* x) noexcept;
+  bool fill_guess(std::span<const double> dlambda, int changes) noexcept;
+  void count_product() noexcept;
+  [[nodiscard]] int most_steps() const noexcept;
   void take_best() noexcept;
 
   std::ptrdiff_t stride_;  // of vectors
@@ -109,13 +115,15 @@ class NewtonKrylov {
   std::vector<float> r_, best_r_;  // [rows] motion
   std::vector<float> change_, product_;
   std::ptrdiff_t padded_rows_ = 0;
-  bool active_ = false;         // a contact is not open
-  std::vector<Krylov> krylov_;  // [most_changes]
-  std::vector<float> x_, v_;    // [most_changes x stride]
-  std::vector<float> y_;        // [stride]
+  std::vector<Reduced> reduced_;  // [max_contacts], the first active_
+  std::size_t active_ = 0;        // contacts that are not open
+  std::vector<Gmres> gmres_;      // [most_changes]
+  std::vector<float> x_, v_;      // [most_changes x stride] forces, motions by them
+  std::vector<float> y_;          // [most_changes x stride] unknowns
+  std::vector<float> step_;       // [stride]
   int products_ = 0;
+  double work_ = 0.0;  // multiplications
   int rounds_ = 0;
-  int steps_ = 0;  // of GMRES at most
   double residual_ = 0.0;
 };
 

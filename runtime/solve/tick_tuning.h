@@ -24,9 +24,12 @@ struct DetectionTuning {
   double same_place = 1e-4;      ///< [edge] contact points nearer than this are one
   double same_direction = 1e-6;  ///< [1] if 1 - cos of their normals is smaller as well
   double deepest_inside = 0.25;  ///< [edge] a tool whose core is deeper is lost in the body
-  double smooth_radius = 6.0;    ///< [edge of the simplex] a larger sphere touches corners alone. Its chords
-                               ///< hold it out by edge^2 / 6 R; measured against the half-space: 18 % of the
-                               ///< force at R/10, 4 % at R/20, of an indentation of 0.02 R
+  double smooth_radius = 3.0;    ///< [edge of the simplex] a larger sphere touches corners alone. Chords of
+                                 ///< the smooth surface hold it out by edge^2 / 6 R, corners let it sink in.
+                               ///< Force against the half-space, 0.05 and 0.1 R deep, with faces and edges /
+                               ///< corners alone: at 2.6 edges +16 and +21 / -35 and -13 %, at 3.5 +20 and
+                               ///< +20 / -15 and -3, at 4.4 +21 and +10 / -9 and -1, at 5.3 +18 and +10 / 0
+                               ///< and -3
   double on_surface = 1e-6;  ///< [edge] nearer, the normal is the face's and not the distance's
 };
 
@@ -74,19 +77,21 @@ struct ConeTuning {
 /// The solver for contact of many points. The numbers are those of a comparison of solvers on the demo's
 /// bodies (docs/decisions).
 struct ManyTuning {
-  int few_contacts = 32;         ///< contact points that the direct solvers have room for, where some rub,
-  int few_closed = 10;           ///< of which so many may be closed;
+  int few_contacts = 48;         ///< contact points that the direct solvers have room for, where some rub,
+  int few_closed = 16;           ///< of which so many may be closed;
   int few_frictionless = 160;    ///< and contact points where none rubs
   double open_gap = 0.002;       ///< [edge] a contact without force that is farther is left out of the tick
   double least_residual = 2e-8;  ///< [largest force] of the guess: nothing is to be done
   double no_change = 1e-7;  ///< [largest force] in a tick in which nothing moves: rounding changes as much
   double reduction = 0.01;  ///< [residual of the guess] that a tick reaches at least: rest is reached
-  double tolerance = 2e-5;  ///< [largest force]
-  double rough_tolerance = 3e-4;  ///< [largest force] beyond `smooth_work`
-  double smooth_work = 3e6;       ///< multiplications
+  double tolerance = 1e-4;  ///< [largest force]
+  double rough_tolerance = 3e-4;  ///< [largest force] beyond `smooth_work`,
+  double smooth_work = 3e6;       ///< multiplications,
+  int rough_failures = 3;         ///< or where steps of Newton's method have failed so often
   double accepted = 3e-3;         ///< [largest force] at the end of the budget
   int most_rounds = 20;           ///< steps of Newton's method, each with its sweeps
   double most_work = 1.4e7;       ///< multiplications
+  Index product_overhead = 200;   ///< [columns] that a product with W costs beside its own
   double easy_share = 0.2;        ///< [most_work] less leaves time for another pass
   int sweeps = 2;                 ///< block Gauss-Seidel sweeps before and after a step of Newton's method
   int local_rounds = 8;           ///< for the direction of a contact that slips

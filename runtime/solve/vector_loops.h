@@ -7,23 +7,24 @@
 namespace palpate {
 
 /// a . b
-inline double dot(const double* __restrict a, const double* __restrict b, std::ptrdiff_t count) noexcept {
-  double sum = 0.0;
+template <typename Real>
+Real dot(const Real* __restrict a, const Real* __restrict b, std::ptrdiff_t count) noexcept {
+  Real sum = 0;
 #pragma omp simd reduction(+ : sum)
   for (std::ptrdiff_t i = 0; i < count; ++i) sum += a[i] * b[i];
   return sum;
 }
 
 /// y += factor x
-inline void add(const double* __restrict x, double factor, double* __restrict y,
-                std::ptrdiff_t count) noexcept {
+template <typename Real>
+void add(const Real* __restrict x, Real factor, Real* __restrict y, std::ptrdiff_t count) noexcept {
 #pragma omp simd
   for (std::ptrdiff_t i = 0; i < count; ++i) y[i] += factor * x[i];
 }
 
 /// y -= factor x
-inline void subtract(const double* __restrict x, double factor, double* __restrict y,
-                     std::ptrdiff_t count) noexcept {
+template <typename Real>
+void subtract(const Real* __restrict x, Real factor, Real* __restrict y, std::ptrdiff_t count) noexcept {
 #pragma omp simd
   for (std::ptrdiff_t i = 0; i < count; ++i) y[i] -= factor * x[i];
 }

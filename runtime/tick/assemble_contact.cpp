@@ -68,11 +68,8 @@ double free_slip(const SurfaceState& surface, const ContactPoint& contact, const
 
 /// The contact of the tick before that is the same one, null when there is none.
 const ContactPoint* same_contact(const Scratch& scratch, const ContactPoint& contact) noexcept {
-  const auto end = scratch.last_contacts.begin() + scratch.last_count;
-  const auto found = std::find_if(scratch.last_contacts.begin(), end, [&](const ContactPoint& last) {
-    return last.feature == contact.feature && last.tool == contact.tool;
-  });
-  return found == end ? nullptr : &*found;
+  const Index number = last_number(scratch, contact.feature);
+  return number < 0 ? nullptr : &scratch.last_contacts[number];
 }
 
 /// What a contact's tool and surface move against each other in the tick if no force changes, and how far
@@ -91,31 +88,96 @@ Vec3 motion_of(const State& state, const Scratch& scratch, const ContactPoint& c
   return motion + slip;
 }
 
+/// What is known of a contact before it is in the problem.
+UpcomingContact announce(const State& state, const Scratch& scratch, const ContactPoint& contact,
+                         double least_gap) noexcept {
+  UpcomingContact upcoming{.last = last_number(scratch, contact.feature)};
+  const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last_contacts[upcoming.last];
+  upcoming.motion = motion_of(state, scratch, contact, last);
+  upcoming.stays_open = !contact.held && (last == nullptr || last->force.isZero(0.0)) &&
+                        upcoming.motion.dot(contact.frame.col(0)) > least_gap;
+  return upcoming;
+}
+
+/// Who comes to each place, from the first that is not held on: contacts of the tick before keep theirs, so
+/// that their rows of W do; those that stay open come last.
+void choose_order(const State& state, Scratch& scratch) noexcept {
+  const Index begin = state.held_count;
+  const Index count = state.contact_count;
+  const auto upcoming = scratch.upcoming.begin();
+  const auto stays_open = [](const UpcomingContact& contact) { return contact.stays_open; };
+  Index end = count - static_cast<Index>(std::count_if(upcoming + begin, upcoming + count, stays_open));
+  std::fill(scratch.order.begin() + begin, scratch.order.begin() + end, -1);
+  for (Index k = begin; k < count; ++k) {
+    UpcomingContact& contact = scratch.upcoming[k];
+    if (contact.stays_open || contact.last < begin || contact.last >= end) continue;
+    contact.has_place = scratch.order[contact.last] < 0;
+    if (contact.has_place) scratch.order[contact.last] = k;
+  }
+  Index next = begin;
+  for (Index k = begin; k < count; ++k) {
+    const UpcomingContact& contact = scratch.upcoming[k];
+    if (contact.has_place) continue;
+    if (contact.stays_open) {
+      scratch.order[end++] = k;
+      continue;
+    }
+    while (scratch.order[next] >= 0) ++next;
+    scratch.order[next] = k;
+  }
+}
+
+/// Moves what stands at order[k] to k, along the cycles of the order, which is used up.
+void bring_into_order(State& state, Scratch& scratch) noexcept {
+  for (Index first = state.held_count; first < state.contact_count; ++first) {
+    if (scratch.order[first] == first) continue;
+    const ContactPoint contact = state.contact_points[first];
+    const UpcomingContact upcoming = scratch.upcoming[first];
+    Index to = first;
+    for (Index from = scratch.order[to]; from != first; from = scratch.order[to]) {
+      state.contact_points[to] = state.contact_points[from];
+      scratch.upcoming[to] = scratch.upcoming[from];
+      scratch.order[to] = to;
+      to = from;
+    }
+    state.contact_points[to] = contact;
+    scratch.upcoming[to] = upcoming;
+    scratch.order[to] = to;
+  }
+}
+
 /// Where contacts are many, those with friction and those that are held have a row for each axis: their
 /// compliance is that of their nodes as it stands, however the normals turn.
-void add_one_of_many(const State& state, Scratch& scratch, const ContactPoint& contact,
-                     const ContactPoint* last, double least_gap) noexcept {
+void add_one_of_many(const State& state, Scratch& scratch, ContactPoint& contact,
+                     const UpcomingContact& upcoming) noexcept {
   ContactProblem& problem = scratch.problem;
+  const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last_contacts[upcoming.last];
+  contact.response = last != nullptr ? last->response : Eigen::Matrix3d(Eigen::Matrix3d::Zero());
+  if (upcoming.stays_open) return problem.add_open();
   const Index first = problem.rows;
-  const Vec3 motion = motion_of(state, scratch, contact, last);
-  if (!contact.held && (last == nullptr || last->force.isZero(0.0)) &&
-      motion.dot(contact.frame.col(0)) > least_gap)
-    return problem.add_open();
   const bool has_axes = contact.held || contact.friction > 0.0;
   problem.add(contact.friction, contact.held, has_axes ? Vec3(contact.frame.col(0)) : Vec3::UnitX());
   for (Index i = first; i < problem.rows; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const Vec3 direction = has_axes ? Vec3::Unit(i - first) : Vec3(contact.frame.col(0));
     scratch.rows[at] = contact_row(state.surface.near, contact, direction);
-    problem.b[at] = direction.dot(motion);
+    problem.b[at] = direction.dot(upcoming.motion);
     if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
   }
 }
 
-void add_contact(const State& state, Scratch& scratch, const ContactPoint& contact, const ContactPoint* last,
-                 double least_gap) noexcept {
+void add_many(State& state, Scratch& scratch, double least_gap) noexcept {
+  for (Index k = 0; k < state.contact_count; ++k)
+    scratch.upcoming[k] = announce(state, scratch, state.contact_points[k], least_gap);
+  choose_order(state, scratch);
+  bring_into_order(state, scratch);
+  for (Index k = 0; k < state.contact_count; ++k)
+    add_one_of_many(state, scratch, state.contact_points[k], scratch.upcoming[k]);
+}
+
+void add_one_of_few(const State& state, Scratch& scratch, const ContactPoint& contact) noexcept {
   ContactProblem& problem = scratch.problem;
-  if (problem.many) return add_one_of_many(state, scratch, contact, last, least_gap);
+  const ContactPoint* last = same_contact(scratch, contact);
   const Index first = problem.rows;
   problem.add(contact.friction, contact.held);
   const ToolState& tool = state.tools[contact.tool];
@@ -234,15 +296,8 @@ void note_rigid_contacts(State& state, const ContactProblem& problem) noexcept {
   }
 }
 
-void add_coupling_row(Scratch& scratch, Index j, const Tool& tool) noexcept {
-  const ContactRow& by = scratch.rows[j];
-  const Vec3 force = by.force / tool.coupling_stiffness;
-  const Vec3 moment = by.moment / tool.coupling_torsion;
-  float* w = scratch.problem.single_row(j);
-  for (Index i = 0; i < scratch.problem.rows; ++i) {
-    const ContactRow& at = scratch.rows[i];
-    if (at.tool == by.tool) w[i] += static_cast<float>(at.force.dot(force) + at.moment.dot(moment));
-  }
+bool is_coupled(const Tool& tool) noexcept {
+  return std::isfinite(tool.coupling_stiffness) || std::isfinite(tool.coupling_torsion);
 }
 
 /// What the couplings give way: W += J_tool C_tool J_tool^T.
@@ -252,17 +307,55 @@ void add_coupling_compliance(const State& state, Scratch& scratch) noexcept {
     const ContactRow& by = scratch.rows[j];
     if (by.tool < 0) continue;
     const Tool& tool = state.tools[by.tool].tool;
-    if (std::isinf(tool.coupling_stiffness) && std::isinf(tool.coupling_torsion)) continue;
-    if (problem.many) {
-      add_coupling_row(scratch, j, tool);
-      continue;
-    }
+    if (!is_coupled(tool)) continue;
     for (Index i = 0; i < problem.rows; ++i) {
       const ContactRow& at = scratch.rows[i];
       if (at.tool != by.tool) continue;
       problem.w(i, j) +=
           at.force.dot(by.force) / tool.coupling_stiffness + at.moment.dot(by.moment) / tool.coupling_torsion;
     }
+  }
+}
+
+/// Forces and moments of a tool's rows, each by the root of what the coupling gives way to it: one component
+/// after the other.
+void fill_coupling(const Tool& tool, Index number, Scratch& scratch) noexcept {
+  const double force_scale = 1.0 / std::sqrt(tool.coupling_stiffness);
+  const double moment_scale = 1.0 / std::sqrt(tool.coupling_torsion);
+  const Index rows = scratch.problem.rows;
+  for (Index i = 0; i < rows; ++i) {
+    const ContactRow& row = scratch.rows[i];
+    const double is_of_tool = row.tool == number ? 1.0 : 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      scratch.coupling[axis * rows + i] = static_cast<float>(is_of_tool * force_scale * row.force[axis]);
+      scratch.coupling[(3 + axis) * rows + i] =
+          static_cast<float>(is_of_tool * moment_scale * row.moment[axis]);
+    }
+  }
+}
+
+/// The same where contacts are many: W beside the body's, which stays as it is.
+void couple_many(const State& state, Scratch& scratch) noexcept {
+  ContactProblem& problem = scratch.problem;
+  const Index rows = problem.rows;
+  for (std::size_t k = 0; k < state.tools.size(); ++k) {
+    const Tool& tool = state.tools[k].tool;
+    if (!is_coupled(tool)) continue;
+    fill_coupling(tool, static_cast<Index>(k), scratch);
+    const float* __restrict c = scratch.coupling.data();
+    for (Index j = 0; j < rows; ++j) {
+      const float* from = problem.single_row(j);  // itself from the second tool on
+      float* to = problem.single_W.data() + static_cast<std::ptrdiff_t>(j) * problem.single_stride;
+      std::array<float, 6> by{};
+      for (std::size_t axis = 0; axis < 6; ++axis) by[axis] = c[static_cast<Index>(axis) * rows + j];
+#pragma omp simd
+      for (Index i = 0; i < rows; ++i) {
+        to[i] = from[i] + by[0] * c[i] + by[1] * c[rows + i] + by[2] * c[2 * rows + i] +
+                by[3] * c[3 * rows + i] + by[4] * c[4 * rows + i] + by[5] * c[5 * rows + i];
+      }
+      std::fill(to + rows, to + (rows + 15) / 16 * 16, 0.0F);
+    }
+    problem.coupled = true;
   }
 }
 
@@ -412,8 +505,11 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
   std::fill(scratch.tilt_spring.begin(), scratch.tilt_spring.end(), 0.0);
   const std::span<const ContactPoint> contacts = state.contacts();
   const double edge = body.mean_surface_edge();
-  for (const ContactPoint& contact : contacts)
-    add_contact(state, scratch, contact, same_contact(scratch, contact), tuning.many.open_gap * edge);
+  if (scratch.problem.many) {
+    add_many(state, scratch, tuning.many.open_gap * edge);
+  } else {
+    for (const ContactPoint& contact : contacts) add_one_of_few(state, scratch, contact);
+  }
   const Index first_tilt_row = scratch.problem.rows;
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = contacts[k];
@@ -426,21 +522,22 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
   most.unknowns = std::max(most.unknowns, scratch.problem.rows);
   most.near_nodes = std::max(most.near_nodes, state.surface.near.count());
   if (scratch.problem.many) {
-    assemble_single_compliance(state.surface.near, scratch.rows, first_tilt_row, scratch.pattern,
-                               scratch.problem);
-  } else if (body.dimension() == 3) {
+    scratch.compliance.assemble(state.surface.near, scratch.rows, first_tilt_row, scratch.problem);
+    note_rigid_contacts(state, scratch.problem);
+    couple_many(state, scratch);
+    add_change_of_forces(state.surface.near, scratch);
+    add_stretch(state, scratch);
+    regularise_many(state, scratch);
+    return;
+  }
+  scratch.compliance.forget();
+  if (body.dimension() == 3) {
     assemble_body_compliance<3>(state.surface.near, scratch);
   } else {
     assemble_body_compliance<2>(state.surface.near, scratch);
   }
   note_rigid_contacts(state, scratch.problem);
   add_coupling_compliance(state, scratch);
-  if (scratch.problem.many) {
-    add_change_of_forces(state.surface.near, scratch);
-    add_stretch(state, scratch);
-    regularise_many(state, scratch);
-    return;
-  }
   regularise(body, state, scratch);
 }
 

@@ -3,81 +3,99 @@
 #include <algorithm>
 
 namespace palpate {
-namespace {
 
-constexpr int most_entries = 9;  // of a row of J
+BodyCompliance::BodyCompliance(Index max_rows, Index max_near_dofs)
+    : stride_(max_rows),
+      dof_(static_cast<std::size_t>(most_entries_ * max_rows), -1),
+      place_(dof_.size()),
+      factor_(dof_.size()),
+      entries_(static_cast<std::size_t>(max_rows)),
+      is_new_(entries_.size()),
+      diagonal_(entries_.size()),
+      response_(static_cast<std::size_t>(max_near_dofs)) {}
 
-/// Enters a row of J; how many entries it has.
-int enter(const ContactRow& row, int dimension, Index i, CompliancePattern& pattern) noexcept {
-  int entries = 0;
-  const auto put = [&](Index dof, double factor) {
-    const auto at = static_cast<std::size_t>(entries++ * pattern.stride + i);
-    pattern.place[at] = dof;
-    pattern.factor[at] = static_cast<float>(factor);
+/// Enters a row of J; whether it is another than before.
+bool BodyCompliance::enter(const NearField& near, const ContactRow& row, Index i) noexcept {
+  int count = 0;
+  bool changed = false;
+  const auto put = [&](Index dof, Index place, double factor) {
+    const auto at = static_cast<std::size_t>(count++ * stride_ + i);
+    const auto single = static_cast<float>(factor);
+    changed = changed || dof_[at] != dof || factor_[at] != single;
+    dof_[at] = dof;
+    place_[at] = place;
+    factor_[at] = single;
   };
+  const Index d = near.dimension();
   for (std::size_t n = 0; n < 3; ++n) {
-    for (int axis = 0; axis < dimension; ++axis) {
-      if (row.places[n] >= 0 && row.body[n][axis] != 0.0)
-        put(dimension * row.places[n] + axis, row.body[n][axis]);
+    for (int axis = 0; axis < d && row.places[n] >= 0; ++axis) {
+      if (row.body[n][axis] != 0.0)
+        put(d * near.node(row.places[n]) + axis, d * row.places[n] + axis, row.body[n][axis]);
     }
   }
-  const int used = entries;
-  while (entries < most_entries) put(0, 0.0);
-  return used;
+  entries_[static_cast<std::size_t>(i)] = count;
+  while (count < most_entries_) put(-1, 0, 0.0);
+  return changed;
 }
 
 /// A column of Xi J^T.
-void respond(const NearField& near, Index row, int entries, CompliancePattern& pattern) noexcept {
-  float* __restrict y = pattern.response.data();
+void BodyCompliance::respond(const NearField& near, Index row) noexcept {
+  float* __restrict y = response_.data();
   const std::ptrdiff_t width = std::ptrdiff_t{near.dimension()} * near.count();
   std::fill_n(y, width, 0.0F);
-  for (int t = 0; t < entries; ++t) {
-    const auto at = static_cast<std::size_t>(t * pattern.stride + row);
-    const float factor = pattern.factor[at];
-    if (factor == 0.0F) continue;
-    const double* __restrict c = near.row(pattern.place[at]).data();
+  for (int t = 0; t < entries_[static_cast<std::size_t>(row)]; ++t) {
+    const auto at = static_cast<std::size_t>(t * stride_ + row);
+    const float factor = factor_[at];
+    const double* __restrict c = near.row(place_[at]).data();
 #pragma omp simd
     for (std::ptrdiff_t k = 0; k < width; ++k) y[k] += factor * static_cast<float>(c[k]);
   }
 }
 
 /// What rows [begin, end) have of the column.
-void project(const CompliancePattern& pattern, Index begin, Index end, int entries,
-             float* __restrict w) noexcept {
-  const float* __restrict y = pattern.response.data();
+void BodyCompliance::project(Index begin, Index end, int entries, float* __restrict w) const noexcept {
+  const float* __restrict y = response_.data();
   std::fill(w + begin, w + end, 0.0F);
   for (int t = 0; t < entries; ++t) {
-    const Index* __restrict place = pattern.place.data() + t * pattern.stride;
-    const float* __restrict factor = pattern.factor.data() + t * pattern.stride;
+    const Index* __restrict place = place_.data() + t * stride_;
+    const float* __restrict factor = factor_.data() + t * stride_;
 #pragma omp simd
     for (Index i = begin; i < end; ++i) w[i] += factor[i] * y[place[i]];
   }
 }
 
-}  // namespace
-
-CompliancePattern::CompliancePattern(Index max_rows, Index max_near_dofs)
-    : stride(max_rows),
-      place(static_cast<std::size_t>(most_entries * max_rows)),
-      factor(place.size()),
-      response(static_cast<std::size_t>(max_near_dofs)) {}
-
-void assemble_single_compliance(const NearField& near, std::span<const ContactRow> rows, Index first_tilt_row,
-                                CompliancePattern& pattern, ContactProblem& problem) noexcept {
-  int entries = 0;
-  int tilt_entries = 0;
-  for (Index i = 0; i < problem.rows; ++i) {
-    const int used = enter(rows[static_cast<std::size_t>(i)], near.dimension(), i, pattern);
-    int& most = i < first_tilt_row ? entries : tilt_entries;
-    most = std::max(most, used);
+void BodyCompliance::assemble(const NearField& near, std::span<const ContactRow> rows, Index first_tilt_row,
+                              ContactProblem& problem) noexcept {
+  const Index count = problem.rows;
+  if (revision_ != near.revision()) forget();
+  revision_ = near.revision();
+  const auto most_entries = [&](Index begin, Index end) {
+    return begin == end ? 0 : *std::max_element(entries_.begin() + begin, entries_.begin() + end);
+  };
+  for (Index i = 0; i < count; ++i) {
+    const bool changed = enter(near, rows[static_cast<std::size_t>(i)], i);
+    is_new_[static_cast<std::size_t>(i)] = changed || i >= kept_rows_ ? 1 : 0;
   }
-  for (Index j = 0; j < problem.rows; ++j) {
-    respond(near, j, j < first_tilt_row ? entries : tilt_entries, pattern);
-    float* w = problem.single_row(j);
-    project(pattern, 0, first_tilt_row, entries, w);
-    project(pattern, first_tilt_row, problem.rows, tilt_entries, w);
-    std::fill(w + problem.rows, w + (problem.rows + 15) / 16 * 16, 0.0F);
+  const int entries = most_entries(0, first_tilt_row);
+  const int tilt_entries = most_entries(first_tilt_row, count);
+  renewed_ = 0;
+  for (Index j = 0; j < count; ++j) {
+    float* w = problem.body_row(j);
+    if (is_new_[static_cast<std::size_t>(j)] != 0) {
+      ++renewed_;
+      respond(near, j);
+      project(0, first_tilt_row, entries, w);
+      project(first_tilt_row, count, tilt_entries, w);
+      for (Index i = 0; i < count; ++i) {
+        if (is_new_[static_cast<std::size_t>(i)] == 0) problem.body_row(i)[j] = w[i];
+      }
+      diagonal_[static_cast<std::size_t>(j)] = w[j];
+    } else {
+      w[j] = diagonal_[static_cast<std::size_t>(j)];
+    }
+    std::fill(w + count, w + (count + 15) / 16 * 16, 0.0F);
   }
+  kept_rows_ = count;
 }
 
 }  // namespace palpate

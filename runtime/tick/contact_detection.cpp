@@ -137,17 +137,29 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
   return count;
 }
 
+/// Whether a candidate from `begin` on is at the same place with the same normal. `vertex`: the surface node
+/// that the place is, -1 where it is none; candidates there are looked at first.
 bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const Vec3& position,
-                  const Vec3& normal) noexcept {
+                  const Vec3& normal, Index vertex) noexcept {
   const double near = tuning.detection.same_place * body.mean_surface_edge();
-  for (Index k = begin; k < scratch.candidate_count; ++k) {
-    const ContactPoint& other = scratch.candidates[k];
-    if ((other.position - position).squaredNorm() < near * near &&
-        other.frame.col(0).dot(normal) > 1.0 - tuning.detection.same_direction) {
-      return true;
-    }
+  const auto is_same = [&](const ContactPoint& other) {
+    return (other.position - position).squaredNorm() < near * near &&
+           other.frame.col(0).dot(normal) > 1.0 - tuning.detection.same_direction;
+  };
+  if (vertex >= 0) {
+    const Index k = scratch.last_at_node[vertex];
+    if (k >= begin && k < scratch.candidate_count && is_same(scratch.candidates[k])) return true;
   }
-  return false;
+  const auto first = scratch.candidates.begin();
+  return std::any_of(first + begin, first + scratch.candidate_count, is_same);
+}
+
+/// The surface node that a place is, -1 for one within an edge or face.
+Index vertex_of(const SimplexNodes& nodes, const std::array<double, 3>& weights) noexcept {
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (weights[k] == 1.0) return nodes[k];
+  }
+  return -1;
 }
 
 /// Whether a grab of the tool holds a node of a simplex: there the tool does not push as well, as place and
@@ -167,11 +179,10 @@ bool rolls(const Scratch& scratch, const Tool& tool, const ContactPoint& contact
   if (tool.length > 0.0 || contact.friction > 0.0) return false;
   if (std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; }) == 1)
     return true;
-  const auto end = scratch.last_contacts.begin() + scratch.last_count;
-  return std::any_of(scratch.last_contacts.begin(), end, [&](const ContactPoint& last) {
-    return last.feature == contact.feature && last.tool == contact.tool &&
-           last.force.dot(last.frame.col(0)) > 0.0;
-  });
+  const Index last = last_number(scratch, contact.feature);
+  if (last < 0) return false;
+  const ContactPoint& before = scratch.last_contacts[last];
+  return before.force.dot(before.frame.col(0)) > 0.0;
 }
 
 void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_number, Index begin,
@@ -183,8 +194,10 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   }
   const Vec3 normal =
       face_tells ? pair.normal : Vec3((pair.nearest.on_core - pair.nearest.on_simplex) / pair.distance);
-  if (is_duplicate(body, scratch, begin, pair.nearest.on_simplex, normal)) return;
   const std::array<Index, 3> nodes = nodes_of(body, pair.simplex);
+  const Index vertex = vertex_of(nodes, pair.nearest.weights);
+  if (is_duplicate(body, scratch, begin, pair.nearest.on_simplex, normal, vertex)) return;
+  if (vertex >= 0) scratch.last_at_node[vertex] = scratch.candidate_count;
   ContactPoint contact;
   contact.feature =
       feature_of(tool_number, pair.place, pair.simplex, face_tells, nodes, pair.nearest.weights);

@@ -36,7 +36,10 @@ struct ContactPoint {
   Vec3 tool_point =
       Vec3::Zero();           ///< held: the place in the tool's own frame that stays with the surface [m]
   Vec3 force = Vec3::Zero();  ///< on the tool, after the tick [N]
-  Vec3 carry = Vec3::Zero();  ///< sticking: what the solver let it slide in the tick, and is to undo [m]
+  Eigen::Matrix3d response =
+      Eigen::Matrix3d::Zero();  ///< change of the force by a motion of its tool's device
+                                ///< where contacts are many, a column an axis [N/m]
+  Vec3 carry = Vec3::Zero();    ///< sticking: what the solver let it slide in the tick, and is to undo [m]
 };
 
 /// A place where a tool may press on the surface and for which there was no room: a contact point, or a

@@ -187,11 +187,6 @@ void add_tilt_forces(State& state, const Scratch& scratch) noexcept {
 
 }  // namespace
 
-void remember_contacts(const State& state, Scratch& scratch) noexcept {
-  std::copy_n(state.contact_points.begin(), state.contact_count, scratch.last_contacts.begin());
-  scratch.last_count = state.contact_count;
-}
-
 bool solve_problem(Scratch& scratch) noexcept {
   if (scratch.problem.many) return scratch.newton_krylov.solve(scratch.problem);
   return scratch.problem.frictionless ? scratch.active_set.solve(scratch.problem)
@@ -254,7 +249,7 @@ ContactOutcome solve_contact(const Body& body, State& state, Scratch& scratch) n
            may_repeat(body, state, scratch);
   };
   for (int pass = 1; wants_pass(pass); ++pass) {
-    remember_contacts(state, scratch);
+    remember(state.contacts(), scratch);
     find_contacts(body, state, scratch);
     rough = is_rough(body, state);
     if (rough) {

@@ -7,15 +7,12 @@
 
 namespace palpate {
 
-/// Keeps the contact points as those of the tick (or pass) before.
-void remember_contacts(const State& state, Scratch& scratch) noexcept;
-
 /// Fills scratch.problem.lambda for the rows of scratch.problem: the active set where nothing rubs, otherwise
 /// the cone solver. False where it did not reach its tolerance.
 bool solve_problem(Scratch& scratch) noexcept;
 
 /// Changes of lambda by changes of b: the first `changes` that scratch.row_change has, one after the other,
-/// into scratch.force_change. After solve_problem.
+/// into scratch.force_change, which holds a guess before where contacts are many. After solve_problem.
 void find_force_changes(Scratch& scratch, int changes) noexcept;
 
 /// Gives scratch.problem.lambda to the contact points, the near field and the tools' contact wrenches.

@@ -95,6 +95,36 @@ void keep_open_contacts(const State& state, const ContactProblem& problem, ToolS
   }
 }
 
+/// Begins changes of forces by motions of the device with those of the tick before, where contacts are many.
+void guess_force_changes(const State& state, Scratch& scratch, Index number) noexcept {
+  const ContactProblem& problem = scratch.problem;
+  if (!problem.many) return;
+  const int d = problem.dimension;
+  std::fill_n(scratch.force_change.begin(), d * problem.rows, 0.0);
+  for (Index k = 0; k < state.contact_count; ++k) {
+    const ContactPoint& contact = state.contact_points[k];
+    if (contact.tool != number) continue;
+    for (Index i = problem.first_row(k); i < problem.first_row(k) + problem.rows_of(k); ++i) {
+      for (int axis = 0; axis < d; ++axis)
+        scratch.force_change[axis * problem.rows + i] = scratch.rows[i].force.dot(contact.response.col(axis));
+    }
+  }
+}
+
+void keep_force_changes(State& state, const Scratch& scratch, Index number) noexcept {
+  const ContactProblem& problem = scratch.problem;
+  if (!problem.many) return;
+  for (Index k = 0; k < state.contact_count; ++k) {
+    ContactPoint& contact = state.contact_points[k];
+    if (contact.tool != number) continue;
+    contact.response.setZero();
+    for (Index i = problem.first_row(k); i < problem.first_row(k) + problem.rows_of(k); ++i) {
+      for (int axis = 0; axis < problem.dimension; ++axis)
+        contact.response.col(axis) += scratch.force_change[axis * problem.rows + i] * scratch.rows[i].force;
+    }
+  }
+}
+
 /// What the turn of the device in this tick changes of the tool's wrench. Places that are held turn with the
 /// tool.
 Wrench change_by_turning(const State& state, Scratch& scratch, const ToolState& tool, Index number) noexcept {
@@ -102,6 +132,7 @@ Wrench change_by_turning(const State& state, Scratch& scratch, const ToolState& 
   const Eigen::AngleAxisd turned(tool.device.orientation * tool.last_device.orientation.conjugate());
   const Vec3 turn = turned.angle() * turned.axis();
   fill_row_change(state, scratch, number, Vec3::Zero(), turn);
+  std::fill_n(scratch.force_change.begin(), scratch.problem.rows, 0.0);
   find_force_changes(scratch, 1);
   Wrench change = wrench_of(state, scratch, number, 0);
   for (const ContactPoint& contact : state.contacts()) {
@@ -125,6 +156,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
   const Index rows = scratch.problem.rows;
   for (int axis = 0; axis < d; ++axis)
     fill_row_change(state, scratch, number, Vec3::Unit(axis), Vec3::Zero(), axis * rows);
+  guess_force_changes(state, scratch, number);
   const bool rolls = begin_rolling(state, scratch, number, rolling_radius(tool.tool, edge));
   Eigen::Matrix3d force = Eigen::Matrix3d::Zero();  // change by a motion of the device
   if (rolls) {
@@ -132,6 +164,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
   } else {
     find_force_changes(scratch, d);
   }
+  keep_force_changes(state, scratch, number);
   Eigen::Matrix3d torque = Eigen::Matrix3d::Zero();
   for (int axis = 0; axis < d; ++axis) {
     const Wrench change = wrench_of(state, scratch, number, axis * rows);

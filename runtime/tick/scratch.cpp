@@ -1,6 +1,7 @@
 #include "runtime/tick/scratch.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "runtime/solve/tick_tuning.h"
 
@@ -34,6 +35,15 @@ Index many(Index max_contacts) {
   return max_contacts > tuning.many.few_closed ? max_contacts : 0;
 }
 
+/// Twice as many as contacts, so that a feature is soon found.
+std::size_t places_of_features(Index max_contacts) {
+  return std::bit_ceil(size(2 * max_contacts));
+}
+
+std::size_t hash(std::int64_t feature) noexcept {
+  return static_cast<std::size_t>((static_cast<std::uint64_t>(feature) * 0x9E3779B97F4A7C15U) >> 32U);
+}
+
 }  // namespace
 
 RollingScratch::RollingScratch(int dimension, Index max_contacts, Index max_rows)
@@ -48,17 +58,22 @@ RollingScratch::RollingScratch(int dimension, Index max_contacts, Index max_rows
 
 Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes)
     : last_contacts(size(max_contacts)),
+      last_of_feature(places_of_features(max_contacts), -1),
       found(body.surface_friction().size()),
       found_distance(body.surface_friction().size()),
       pairs(size(2 * max_contacts)),
       candidates(size(3 * tools) * pairs.size()),
+      last_at_node(body.surface_rest_positions().size(), -1),
       left_out(candidates.size() + std::min(most_simplices_left_out, found.size())),
       problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
               most_rows(body, many(max_contacts))),
       rows(size(most_rows(body, max_contacts))),
       row_response(size(body.dimension() * near_nodes)),
       guess_force(row_response.size()),
-      pattern(most_rows(body, many(max_contacts)), body.dimension() * near_nodes),
+      upcoming(last_contacts.size()),
+      order(last_contacts.size()),
+      compliance(most_rows(body, many(max_contacts)), body.dimension() * near_nodes),
+      coupling(size(6 * most_rows(body, many(max_contacts)))),
       tilt_spring(rows.size()),
       active_set(few_rows(body, max_contacts)),
       cone_solver(body.dimension() * few(max_contacts), most_rows(body, few(max_contacts))),
@@ -71,5 +86,27 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       force_change(row_change.size()),
       rolling(body.dimension(), max_contacts, static_cast<Index>(rows.size())),
       far_displacement(size(body.dimension() * tuning.far.nodes)) {}
+
+void remember(std::span<const ContactPoint> contacts, Scratch& scratch) noexcept {
+  std::copy(contacts.begin(), contacts.end(), scratch.last_contacts.begin());
+  scratch.last_count = static_cast<Index>(contacts.size());
+  std::fill(scratch.last_of_feature.begin(), scratch.last_of_feature.end(), -1);
+  const std::size_t mask = scratch.last_of_feature.size() - 1;
+  for (Index k = 0; k < scratch.last_count; ++k) {
+    std::size_t at = hash(contacts[size(k)].feature) & mask;
+    while (scratch.last_of_feature[at] >= 0) at = (at + 1) & mask;
+    scratch.last_of_feature[at] = k;
+  }
+}
+
+Index last_number(const Scratch& scratch, std::int64_t feature) noexcept {
+  const std::size_t mask = scratch.last_of_feature.size() - 1;
+  std::size_t at = hash(feature) & mask;
+  while (true) {
+    const Index k = scratch.last_of_feature[at];
+    if (k < 0 || scratch.last_contacts[size(k)].feature == feature) return k;
+    at = (at + 1) & mask;
+  }
+}
 
 }  // namespace palpate

@@ -1,6 +1,8 @@
 // The workspace of a tick.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "runtime/body/body.h"
@@ -24,43 +26,64 @@ struct HighWater {
   Index simplices = 0;       ///< near a tool, of Scratch::pairs; more were there where it is larger
 };
 
+/// A contact point on its way into the contact problem.
+struct UpcomingContact {
+  Index last = -1;          ///< the same one in Scratch::last_contacts
+  bool stays_open = false;  ///< in this tick: it has no rows
+  bool has_place = false;   ///< in Scratch::order
+  Vec3 motion =
+      Vec3::Zero();  ///< of tool and surface against each other if no force changes, and the gap [m]
+};
+
 /// What stages of a tick hand to each other. No tick needs it from the one before: only `high_water` goes on,
-/// and the problem's forces may be read until the next tick. Sized at start. Each member: shape, who fills
+/// and the compliance of many contacts, which would be computed anew otherwise; the problem's forces may be
+/// read until the next tick. Sized at start. Each member: shape, who fills
 /// it.
 struct Scratch {
   /// Room for the tools' contacts: `max_contacts` of all tools together, `near_nodes` nodes near them.
   Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes);
 
-  std::vector<ContactPoint> last_contacts;  ///< [max_contacts] remember_contacts: of the tick or pass before
+  std::vector<ContactPoint> last_contacts;  ///< [max_contacts] `remember`: of the tick or pass before
   Index last_count = 0;
+  std::vector<Index> last_of_feature;    ///< [power of 2] `remember`: their numbers, hashed by feature
   std::vector<Index> found;              ///< [F] detection, free motion: simplices near a tool
   std::vector<double> found_distance;    ///< [F] detection: squared [m^2]
   std::vector<TouchingPair> pairs;       ///< [2 max_contacts] detection
   std::vector<ContactPoint> candidates;  ///< [6 max_contacts tools] detection: before the deepest are chosen
   Index candidate_count = 0;
-  std::size_t found_count = 0;    ///< detection: of `found`, within a tool's reach
-  std::vector<LeftOut> left_out;  ///< detection: places for which there was no room
+  std::vector<Index> last_at_node;  ///< [S] detection: candidate at a surface node that was found last
+  std::size_t found_count = 0;      ///< detection: of `found`, within a tool's reach
+  std::vector<LeftOut> left_out;    ///< detection: places for which there was no room
   Index left_out_count = 0;
-  bool is_first_pass = true;             ///< solve_contact: of the tick's Newton passes
-  bool is_solved = true;                 ///< solution: to its tolerance, in the last pass
-  ContactProblem problem;                ///< [rows] assembly: W and b; solution: lambda
-  std::vector<ContactRow> rows;          ///< [rows] assembly: J
-  std::vector<double> row_response;      ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
-  std::vector<double> guess_force;       ///< [d near_nodes] assembly of many contacts [N]
-  CompliancePattern pattern;             ///< assembly of many contacts: J by its entries
-  std::vector<double> tilt_spring;       ///< [rows] assembly: of edges and faces [m/N]
-  ActiveSet active_set;                  ///< solution without friction
-  ConeSolver cone_solver;                ///< solution with friction
-  NewtonKrylov newton_krylov;            ///< solution of many contacts
-  Imbalance imbalance;                   ///< force error: of a problem that was not solved
-  std::vector<Vec3> missing_force;       ///< [tools] force error: of the solver [N]
-  std::vector<Index> left_out_nodes;     ///< [sampled] force error: stored nodes
-  std::vector<double> left_out_blocks;   ///< [d x d sampled] force error: Xi of these [m/N]
-  std::vector<double> row_change;        ///< [d x rows] linearise: db, an axis after the other [m]
-  std::vector<double> force_change;      ///< [d x rows] linearise: dlambda [N]
-  RollingScratch rolling;                ///< linearise: the turning of normals
+  bool is_first_pass = true;              ///< solve_contact: of the tick's Newton passes
+  bool is_solved = true;                  ///< solution: to its tolerance, in the last pass
+  ContactProblem problem;                 ///< [rows] assembly: W and b; solution: lambda
+  std::vector<ContactRow> rows;           ///< [rows] assembly: J
+  std::vector<double> row_response;       ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
+  std::vector<double> guess_force;        ///< [d near_nodes] assembly of many contacts [N]
+  std::vector<UpcomingContact> upcoming;  ///< [max_contacts] assembly of many contacts
+  std::vector<Index> order;             ///< [max_contacts] assembly of many contacts: who comes to each place
+  BodyCompliance compliance;            ///< assembly of many contacts: the body's
+  std::vector<float> coupling;          ///< [6 x rows] assembly of many contacts: forces and moments
+  std::vector<double> tilt_spring;      ///< [rows] assembly: of edges and faces [m/N]
+  ActiveSet active_set;                 ///< solution without friction
+  ConeSolver cone_solver;               ///< solution with friction
+  NewtonKrylov newton_krylov;           ///< solution of many contacts
+  Imbalance imbalance;                  ///< force error: of a problem that was not solved
+  std::vector<Vec3> missing_force;      ///< [tools] force error: of the solver [N]
+  std::vector<Index> left_out_nodes;    ///< [sampled] force error: stored nodes
+  std::vector<double> left_out_blocks;  ///< [d x d sampled] force error: Xi of these [m/N]
+  std::vector<double> row_change;       ///< [d x rows] linearise: db, an axis after the other [m]
+  std::vector<double> force_change;     ///< [d x rows] linearise: dlambda [N]
+  RollingScratch rolling;               ///< linearise: the turning of normals
   std::vector<double> far_displacement;  ///< [d tuning.far.nodes] far surface: the slice that is renewed [m]
   HighWater high_water;                  ///< detection and assembly: since the start
 };
+
+/// Keeps contact points as those of the tick (or pass) before.
+void remember(std::span<const ContactPoint> contacts, Scratch& scratch) noexcept;
+
+/// Number of the contact of the tick before with this feature, -1 where there was none.
+[[nodiscard]] Index last_number(const Scratch& scratch, std::int64_t feature) noexcept;
 
 }  // namespace palpate

@@ -97,7 +97,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   begin_tick(state);
   follow_free_motion(body, state, scratch);
   follow_devices(body, state, scratch, poses);
-  remember_contacts(state, scratch);
+  remember(state.contacts(), scratch);
   update_holds(body, state, scratch);
   count_still_ticks(state);
   const ContactOutcome contact = solve_contact(body, state, scratch);

@@ -143,6 +143,38 @@ TEST_P(Friction, DerivativeIsThatOfFiniteDifferences) {
   EXPECT_LT((told - measured).norm(), 0.02 * measured.norm()) << told << "\n\n" << measured;
 }
 
+// From a guess that is right already, and from one that is not, the derivative is no other.
+TEST_P(Friction, DerivativeIsTheSameFromAnyGuess) {
+  Grid grid(8, GetParam(), 0.5, 0.05, true);
+  NewtonKrylov solver(64, 192);
+  for (int k = 0; k < 10; ++k) {
+    grid.begin();
+    ASSERT_TRUE(solver.solve(grid.problem));
+  }
+  const auto rows = grid.problem.rows;
+  std::vector<double> db(static_cast<std::size_t>(3 * rows));
+  for (Index i = 0; i < 3 * rows; ++i) db[static_cast<std::size_t>(i)] = i / rows == i % 3 ? 1.0 : 0.0;
+  Eigen::VectorXd without = Eigen::VectorXd::Zero(3 * rows);
+  const auto derive = [&](Eigen::VectorXd from) {
+    solver.derivative(grid.problem, 3, db, {from.data(), static_cast<std::size_t>(from.size())});
+    return from;
+  };
+  without = derive(without);
+  ASSERT_GT(without.norm(), 0.0);
+  const auto is_derivative = [&](const Eigen::VectorXd& other) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3d sum = grid.sum(without.segment(axis * rows, rows));
+      EXPECT_LT((grid.sum(other.segment(axis * rows, rows)) - sum).norm(), 0.02 * sum.norm()) << axis;
+    }
+  };
+  is_derivative(derive(without));
+  is_derivative(derive(0.5 * without));
+  std::mt19937 random(3);
+  std::normal_distribution<double> entry;
+  is_derivative(derive(Eigen::VectorXd::NullaryExpr(
+      3 * rows, [&] { return entry(random) * without.norm() / std::sqrt(3.0 * rows); })));
+}
+
 // Points so near to each other that W is next to singular, and more friction than has an answer for sure:
 // what comes is in the cones, whether the budget sufficed or not.
 TEST(NewtonKrylov, WhatComesIsInTheCones) {

@@ -1,0 +1,262 @@
+// What contact of many points keeps from tick to tick, against the same made anew.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "runtime/tick/compliance.h"
+#include "runtime/tick/step.h"
+#include "tests/support/runtime_model.h"
+#include "tests/support/runtime_tool.h"
+
+namespace palpate::many_contacts_test {
+namespace {
+
+using test::go;
+using test::hold;
+using test::plain;
+using test::pose;
+
+const Body& cube() {
+  static const Body body(test::unit_model(3, 8, Scope::surface, Precision::double_precision));
+  return body;
+}
+
+/// Rows of J between surface nodes that move, and their compliance.
+class Compliance : public testing::Test {
+ protected:
+  Compliance() {
+    for (Index node = 0; node < static_cast<Index>(cube().surface_rest_positions().size()); ++node) {
+      if (cube().surface_moves(node)) nodes_.push_back(node);
+    }
+    std::shuffle(nodes_.begin(), nodes_.end(), random_);
+  }
+
+  /// Of one node, as contact at a vertex has it, or of three.
+  ContactRow row(std::size_t first, int nodes) {
+    ContactRow row;
+    std::normal_distribution<double> entry;
+    for (int n = 0; n < nodes; ++n) {
+      const Index node = nodes_[first + static_cast<std::size_t>(n)];
+      EXPECT_TRUE(near_.want(cube(), node));
+      row.places[static_cast<std::size_t>(n)] = near_.place_of(node);
+      row.body[static_cast<std::size_t>(n)] = nodes == 1
+                                                  ? Vec3::Unit(static_cast<int>(first % 3))
+                                                  : Vec3(entry(random_), entry(random_), entry(random_));
+    }
+    return row;
+  }
+
+  /// Moves the rows' nodes to where they are in the near field now.
+  void find_places() {
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      for (std::size_t n = 0; n < 3; ++n) {
+        if (rows_[i].places[n] >= 0) rows_[i].places[n] = near_.place_of(named_[i][n]);
+      }
+    }
+  }
+  void name_nodes() {
+    named_.clear();
+    for (const ContactRow& row : rows_) {
+      std::array<Index, 3> names{-1, -1, -1};
+      for (std::size_t n = 0; n < 3; ++n) names[n] = row.places[n] < 0 ? -1 : near_.node(row.places[n]);
+      named_.push_back(names);
+    }
+  }
+
+  void assemble(Index tilts) {
+    const auto count = static_cast<Index>(rows_.size());
+    problem_.clear(true);
+    for (Index i = 0; i < count; ++i) problem_.add(0.0, false);
+    compliance_.assemble(near_, rows_, count - tilts, problem_);
+  }
+
+  void expect_exact() {
+    const auto count = static_cast<Eigen::Index>(rows_.size());
+    const Eigen::Index width = 3 * near_.count();
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(count, width), C(width, width);
+    for (Eigen::Index i = 0; i < width; ++i)
+      C.row(i) = Eigen::Map<const Eigen::RowVectorXd>(near_.row(static_cast<Index>(i)).data(), width);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const ContactRow& row = rows_[static_cast<std::size_t>(i)];
+      for (std::size_t n = 0; n < 3; ++n) {
+        if (row.places[n] >= 0) J.row(i).segment<3>(3 * row.places[n]) += row.body[n].transpose();
+      }
+    }
+    const Eigen::MatrixXd exact = J * C * J.transpose();
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const float* w = problem_.single_row(static_cast<Index>(i));
+      for (Eigen::Index j = 0; j < count; ++j)
+        ASSERT_NEAR(w[j], exact(i, j), 2e-6 * std::sqrt(exact(i, i) * exact(j, j))) << i << " " << j;
+      for (Eigen::Index j = count; j < problem_.single_stride && j < (count + 15) / 16 * 16; ++j)
+        ASSERT_EQ(w[j], 0.0F) << i << " " << j;
+    }
+  }
+
+  /// As stages behind do: a spring at the row itself.
+  void change_diagonal() {
+    for (Index i = 0; i < problem_.rows; ++i) problem_.single_row(i)[i] *= 1.5F;
+  }
+
+  std::mt19937 random_{11};
+  std::vector<Index> nodes_;
+  NearField near_{cube(), 90};
+  std::vector<ContactRow> rows_;
+  std::vector<std::array<Index, 3>> named_;
+  ContactProblem problem_{3, 60, 0, 60};
+  BodyCompliance compliance_{60, 3 * 90};
+};
+
+TEST_F(Compliance, IsThatOfTheBodyWhateverIsKept) {
+  near_.begin_tick();
+  for (std::size_t k = 0; k < 30; ++k) rows_.push_back(row(k, 1));
+  for (std::size_t k = 0; k < 6; ++k) rows_.push_back(row(40 + 3 * k, 3));
+  assemble(6);
+  EXPECT_EQ(compliance_.renewed(), 36);
+  expect_exact();
+  change_diagonal();
+  assemble(6);
+  EXPECT_EQ(compliance_.renewed(), 0);
+  expect_exact();
+
+  change_diagonal();
+  rows_[4] = row(31, 1);
+  rows_[33] = row(32, 3);
+  assemble(6);
+  EXPECT_EQ(compliance_.renewed(), 2);
+  expect_exact();
+
+  change_diagonal();
+  rows_.resize(20);  // and fewer
+  assemble(0);
+  EXPECT_EQ(compliance_.renewed(), 0);
+  expect_exact();
+
+  change_diagonal();
+  for (std::size_t k = 0; k < 12; ++k) rows_.push_back(row(60 + k, 1));
+  assemble(0);
+  EXPECT_EQ(compliance_.renewed(), 12);
+  expect_exact();
+}
+
+TEST_F(Compliance, GoesWithNodesThatMoveInTheNearField) {
+  near_.begin_tick();
+  static_cast<void>(row(70, 3));  // comes first, and goes
+  for (std::size_t k = 0; k < 24; ++k) rows_.push_back(row(k, 1));
+  name_nodes();
+  assemble(0);
+  const Index first = near_.place_of(named_[23][0]);
+  for (int tick = 0; tick < 400; ++tick) {
+    near_.begin_tick();
+    for (const auto& names : named_) ASSERT_TRUE(near_.want(cube(), names[0]));
+  }
+  find_places();
+  ASSERT_NE(rows_[23].places[0], first) << "the last one takes the place of one that goes";
+  rows_[3] = row(50, 1);
+  assemble(0);
+  EXPECT_EQ(compliance_.renewed(), 1);
+  expect_exact();
+}
+
+TEST_F(Compliance, IsMadeAnewWithAnotherOverlayAndWhereItWasForgotten) {
+  near_.begin_tick();
+  for (std::size_t k = 0; k < 24; ++k) rows_.push_back(row(k, 1));
+  name_nodes();
+  assemble(0);
+  ASSERT_TRUE(near_.change_patch(cube(), nullptr));
+  find_places();
+  assemble(0);
+  EXPECT_EQ(compliance_.renewed(), 24);
+  compliance_.forget();
+  assemble(0);
+  EXPECT_EQ(compliance_.renewed(), 24);
+  expect_exact();
+}
+
+struct Case {
+  const char* name;
+  double friction;
+  double coupling;
+  int tools;
+};
+
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.name;
+}
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+class ManyContacts : public testing::TestWithParam<Case> {
+ protected:
+  [[nodiscard]] State begin(const Body& body) const {
+    Tool tool =
+        plain({.radius = 2.0, .coupling_stiffness = GetParam().coupling, .friction = GetParam().friction});
+    tool.coupling_torsion = GetParam().coupling;
+    return State(body, {.tools = std::vector<Tool>(static_cast<std::size_t>(GetParam().tools), tool),
+                        .max_contacts = 256});
+  }
+  [[nodiscard]] std::vector<ToolPose> poses(int tick) const {
+    const double x = 0.35 + 0.0006 * std::max(0, tick - 150);
+    const double z = 3.0 + 0.02 - 0.0007 * std::min(150, tick);
+    std::vector<ToolPose> all = {pose({x, 0.5, z})};
+    if (GetParam().tools > 1) all.push_back(pose({3.0 + 0.01 - 0.0004 * std::min(150, tick), 0.5, 0.55}));
+    return all;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Tools, ManyContacts,
+                         testing::Values(Case{"rigid", 0.3, infinite, 1}, Case{"coupled", 0.3, 3.0, 1},
+                                         Case{"two", 0.3, 3.0, 2}, Case{"two rigid", 0.2, infinite, 2}));
+
+// A state that keeps W goes as one that does not, to the last bit, and computes a few rows in a tick.
+TEST_P(ManyContacts, KeepWhatDoesNotChange) {
+  const Body& body = cube();
+  State state = begin(body);
+  std::vector<double> shares;
+  double largest = 0.0;
+  for (int tick = 0; tick < 500; ++tick) {
+    const auto to = poses(tick);
+    State anew = tick > 120 && tick % 10 == 0 ? state : begin(body);
+    step(body, state, to);
+    const Scratch& scratch = state.scratch;
+    largest = std::max(largest, state.tools.front().contact_wrench.force.norm());
+    if (!scratch.problem.many) continue;
+    if (tick > 150)
+      shares.push_back(static_cast<double>(scratch.compliance.renewed()) /
+                       static_cast<double>(scratch.problem.rows));
+    if (tick <= 120 || tick % 10 != 0) continue;
+    anew.scratch.compliance.forget();
+    step(body, anew, to);
+    ASSERT_EQ(anew.scratch.compliance.renewed(), anew.scratch.problem.rows) << tick;
+    for (std::size_t k = 0; k < state.tools.size(); ++k) {
+      ASSERT_EQ(state.tools[k].contact_wrench.force, anew.tools[k].contact_wrench.force) << tick;
+      ASSERT_EQ(state.tools[k].local.stiffness, anew.tools[k].local.stiffness) << tick;
+    }
+  }
+  EXPECT_GT(largest, 0.0);
+  ASSERT_GT(shares.size(), 200U);
+  std::nth_element(shares.begin(), shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2),
+                   shares.end());
+  EXPECT_LT(shares[shares.size() / 2], 0.1);
+}
+
+TEST(Remember, FindsContactsByTheirFeature) {
+  State state(cube(), {.max_contacts = 100});
+  std::mt19937_64 random(4);
+  std::vector<ContactPoint> contacts(100);
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    contacts[k].feature =
+        k < 50 ? static_cast<std::int64_t>(random() >> 1U) : static_cast<std::int64_t>(k) << 40U;
+  remember(contacts, state.scratch);
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    EXPECT_EQ(last_number(state.scratch, contacts[k].feature), static_cast<Index>(k));
+  EXPECT_EQ(last_number(state.scratch, 12345), -1);
+  remember(std::span(contacts).first(30), state.scratch);
+  EXPECT_EQ(last_number(state.scratch, contacts[29].feature), 29);
+  EXPECT_EQ(last_number(state.scratch, contacts[30].feature), -1) << "nothing older is left";
+}
+
+}  // namespace
+}  // namespace palpate::many_contacts_test
