@@ -334,7 +334,7 @@ void fill_coupling(const Tool& tool, Index number, Scratch& scratch) noexcept {
   }
 }
 
-/// The same where contacts are many: W beside the body's, which stays as it is.
+/// What the couplings give way where contacts are many: in a W beside the body's, which stays as it is.
 void couple_many(const State& state, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
   const Index rows = problem.rows;

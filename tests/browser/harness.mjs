@@ -19,7 +19,7 @@ export const run = promisify(execFile);
 /// An empty folder that is gone after the test.
 export async function folder(t) {
   const made = await mkdtemp(path.join(tmpdir(), 'palpate-'));
-  t.after(() => rm(made, { recursive: true, force: true }));
+  t.after(() => rm(made, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 }));
   return made;
 }
 

@@ -20,8 +20,9 @@ BRIDGE = BINARY / "runtime" / "palpate-bridge-example"
 SPRING = 300.0  # of the example's hand [N/m]
 # A cube of 10 cm, as stiff as a soft organ: at its top's middle some 80 N/m to a ball.
 SMALL_CUBE = cube_toml(4, scope="full").replace("size = [1, 1, 1]", "size = [0.1, 0.1, 0.1]").replace("youngs_modulus = 1.0", "youngs_modulus = 3000")
-# This machine may be busy: late ticks and reports have their own tests.
-PATIENT = "late=10,most_late=1e9,stale_life=10,silence=30,silence_fade=20,frozen=100,ramp=0.2,buzz_flips=1000"
+# This machine may be busy: late ticks and reports, and hands that seem to jump meanwhile, have their own tests.
+CALM = "late=10,most_late=1e9,stale_life=10,silence=30,silence_fade=20,frozen=100,ramp=0.2,buzz_flips=1000"
+PATIENT = CALM + ",max_speed=1000"
 
 
 def free_port():
@@ -90,7 +91,7 @@ class Felt(ProgramTest):
         # is the shown one, but for damper and mass, which a slow hand hardly feels.
         def target(t, offset):
             return -0.03 * (0.5 - 0.5 * numpy.cos(2 * numpy.pi * (t + offset) / 8))
-        offsets = numpy.linspace(-1, 2, 3001)
+        offsets = numpy.linspace(-1, 4, 5001)
         errors = [numpy.abs(SPRING * (target(t, offset) - z) + force).max() for offset in offsets]
         self.assertLess(min(errors), 0.05 * force.max())
 
@@ -140,7 +141,7 @@ class Felt(ProgramTest):
         gone, = numpy.nonzero(fault)
         self.assertEqual(shown[gone].max(), 0)
         self.assertGreater(shown[: gone[0]].max(), 0.1)
-        self.assertGreater(shown[gone[-1]:].max(), 0.1, "force has begun again")
+        self.assertGreater(shown[gone[0]:].max(), 0.1, "force has begun again")
 
     def test_a_fault_is_latched_until_enter(self):
         def press_enter(runtime):
@@ -155,7 +156,7 @@ class Felt(ProgramTest):
 
     def fault_is_acknowledged(self, acknowledge):
         runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--origin", "0.05,0.05,0.12", "--safety",
-                             PATIENT + ",max_speed=0.1", "--record", "session.h5", "--report", "report.json")
+                             CALM + ",max_speed=0.1", "--record", "session.h5", "--report", "report.json")
         self.hand(600, 0.0, 3.5, 0.15)  # 0.13 m/s at most, at 0.9 s: free space all the way, slow for half of the time
         self.wait_for(lambda: numpy.any(self.recorded("ticks/fault")), runtime)
 

@@ -235,7 +235,7 @@ bool is_chord(const Model& model, const std::vector<Index>& nodes, const Tool& t
     const auto to = static_cast<std::size_t>(nodes[(n + 1) % nodes.size()]);
     edges += (model.mesh.nodes[to] - model.mesh.nodes[from]).norm();
   }
-  return tool.length == 0.0 && tool.radius > 6.0 * edges / static_cast<double>(pairs);
+  return tool.length == 0.0 && tool.radius > 3.0 * edges / static_cast<double>(pairs);
 }
 
 /// All of the surface stays out of all of the tools: each end of a core from each simplex (its corners where
