@@ -148,11 +148,10 @@ void bring_into_order(State& state, Scratch& scratch) noexcept {
 
 /// Where contacts are many, those with friction and those that are held have a row for each axis: their
 /// compliance is that of their nodes as it stands, however the normals turn.
-void add_one_of_many(const State& state, Scratch& scratch, ContactPoint& contact,
+void add_one_of_many(const State& state, Scratch& scratch, const ContactPoint& contact,
                      const UpcomingContact& upcoming) noexcept {
   ContactProblem& problem = scratch.problem;
   const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last_contacts[upcoming.last];
-  contact.response = last != nullptr ? last->response : Eigen::Matrix3d(Eigen::Matrix3d::Zero());
   if (upcoming.stays_open) return problem.add_open();
   const Index first = problem.rows;
   const bool has_axes = contact.held || contact.friction > 0.0;
@@ -166,6 +165,20 @@ void add_one_of_many(const State& state, Scratch& scratch, ContactPoint& contact
   }
 }
 
+/// The responses of the tick before in the order of this one.
+void hand_on_responses(Scratch& scratch, Index count) noexcept {
+  std::swap(scratch.response, scratch.last_response);
+  for (Index k = 0; k < count; ++k) {
+    const Index last = scratch.upcoming[k].last;
+    if (last >= 0 && last < scratch.response_count) {
+      scratch.response[k] = scratch.last_response[last];
+    } else {
+      scratch.response[k].setZero();
+    }
+  }
+  scratch.response_count = count;
+}
+
 void add_many(State& state, Scratch& scratch, double least_gap) noexcept {
   for (Index k = 0; k < state.contact_count; ++k)
     scratch.upcoming[k] = announce(state, scratch, state.contact_points[k], least_gap);
@@ -173,6 +186,7 @@ void add_many(State& state, Scratch& scratch, double least_gap) noexcept {
   bring_into_order(state, scratch);
   for (Index k = 0; k < state.contact_count; ++k)
     add_one_of_many(state, scratch, state.contact_points[k], scratch.upcoming[k]);
+  hand_on_responses(scratch, state.contact_count);
 }
 
 void add_one_of_few(const State& state, Scratch& scratch, const ContactPoint& contact) noexcept {
@@ -531,6 +545,7 @@ void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept
     return;
   }
   scratch.compliance.forget();
+  scratch.response_count = 0;
   if (body.dimension() == 3) {
     assemble_body_compliance<3>(state.surface.near, scratch);
   } else {

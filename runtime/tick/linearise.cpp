@@ -106,21 +106,22 @@ void guess_force_changes(const State& state, Scratch& scratch, Index number) noe
     if (contact.tool != number) continue;
     for (Index i = problem.first_row(k); i < problem.first_row(k) + problem.rows_of(k); ++i) {
       for (int axis = 0; axis < d; ++axis)
-        scratch.force_change[axis * problem.rows + i] = scratch.rows[i].force.dot(contact.response.col(axis));
+        scratch.force_change[axis * problem.rows + i] =
+            scratch.rows[i].force.dot(scratch.response[k].col(axis));
     }
   }
 }
 
-void keep_force_changes(State& state, const Scratch& scratch, Index number) noexcept {
+void keep_force_changes(const State& state, Scratch& scratch, Index number) noexcept {
   const ContactProblem& problem = scratch.problem;
   if (!problem.many) return;
   for (Index k = 0; k < state.contact_count; ++k) {
-    ContactPoint& contact = state.contact_points[k];
-    if (contact.tool != number) continue;
-    contact.response.setZero();
+    if (state.contact_points[k].tool != number) continue;
+    Eigen::Matrix3d& response = scratch.response[k];
+    response.setZero();
     for (Index i = problem.first_row(k); i < problem.first_row(k) + problem.rows_of(k); ++i) {
       for (int axis = 0; axis < problem.dimension; ++axis)
-        contact.response.col(axis) += scratch.force_change[axis * problem.rows + i] * scratch.rows[i].force;
+        response.col(axis) += scratch.force_change[axis * problem.rows + i] * scratch.rows[i].force;
     }
   }
 }

@@ -72,6 +72,8 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       guess_force(row_response.size()),
       upcoming(last_contacts.size()),
       order(last_contacts.size()),
+      response(last_contacts.size()),
+      last_response(last_contacts.size()),
       compliance(most_rows(body, many(max_contacts)), body.dimension() * near_nodes),
       coupling(size(6 * most_rows(body, many(max_contacts)))),
       tilt_spring(rows.size()),
@@ -88,10 +90,14 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       far_displacement(size(body.dimension() * tuning.far.nodes)) {}
 
 void remember(std::span<const ContactPoint> contacts, Scratch& scratch) noexcept {
+  const std::size_t mask = scratch.last_of_feature.size() - 1;
+  for (Index k = 0; k < scratch.last_count; ++k) {
+    std::size_t at = hash(scratch.last_contacts[size(k)].feature) & mask;
+    while (scratch.last_of_feature[at] != k) at = (at + 1) & mask;
+    scratch.last_of_feature[at] = -1;
+  }
   std::copy(contacts.begin(), contacts.end(), scratch.last_contacts.begin());
   scratch.last_count = static_cast<Index>(contacts.size());
-  std::fill(scratch.last_of_feature.begin(), scratch.last_of_feature.end(), -1);
-  const std::size_t mask = scratch.last_of_feature.size() - 1;
   for (Index k = 0; k < scratch.last_count; ++k) {
     std::size_t at = hash(contacts[size(k)].feature) & mask;
     while (scratch.last_of_feature[at] >= 0) at = (at + 1) & mask;

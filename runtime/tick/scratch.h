@@ -36,9 +36,8 @@ struct UpcomingContact {
 };
 
 /// What stages of a tick hand to each other. No tick needs it from the one before: only `high_water` goes on,
-/// and the compliance of many contacts, which would be computed anew otherwise; the problem's forces may be
-/// read until the next tick. Sized at start. Each member: shape, who fills
-/// it.
+/// the compliance and responses of many contacts, without which they are computed from nothing; the problem's
+/// forces may be read until the next tick. Sized at start. Each member: shape, who fills it.
 struct Scratch {
   /// Room for the tools' contacts: `max_contacts` of all tools together, `near_nodes` nodes near them.
   Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes);
@@ -62,20 +61,24 @@ struct Scratch {
   std::vector<double> row_response;       ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
   std::vector<double> guess_force;        ///< [d near_nodes] assembly of many contacts [N]
   std::vector<UpcomingContact> upcoming;  ///< [max_contacts] assembly of many contacts
-  std::vector<Index> order;             ///< [max_contacts] assembly of many contacts: who comes to each place
-  BodyCompliance compliance;            ///< assembly of many contacts: the body's
-  std::vector<float> coupling;          ///< [6 x rows] assembly of many contacts: forces and moments
-  std::vector<double> tilt_spring;      ///< [rows] assembly: of edges and faces [m/N]
-  ActiveSet active_set;                 ///< solution without friction
-  ConeSolver cone_solver;               ///< solution with friction
-  NewtonKrylov newton_krylov;           ///< solution of many contacts
-  Imbalance imbalance;                  ///< force error: of a problem that was not solved
-  std::vector<Vec3> missing_force;      ///< [tools] force error: of the solver [N]
-  std::vector<Index> left_out_nodes;    ///< [sampled] force error: stored nodes
-  std::vector<double> left_out_blocks;  ///< [d x d sampled] force error: Xi of these [m/N]
-  std::vector<double> row_change;       ///< [d x rows] linearise: db, an axis after the other [m]
-  std::vector<double> force_change;     ///< [d x rows] linearise: dlambda [N]
-  RollingScratch rolling;               ///< linearise: the turning of normals
+  std::vector<Index> order;  ///< [max_contacts] assembly of many contacts: who comes to each place
+  std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] linearise of many contacts: change of the force
+                                          ///< by a motion of the tool's device, a column an axis [N/m]
+  std::vector<Eigen::Matrix3d> last_response;  ///< [max_contacts] of the tick or pass before
+  Index response_count = 0;
+  BodyCompliance compliance;             ///< assembly of many contacts: the body's
+  std::vector<float> coupling;           ///< [6 x rows] assembly of many contacts: forces and moments
+  std::vector<double> tilt_spring;       ///< [rows] assembly: of edges and faces [m/N]
+  ActiveSet active_set;                  ///< solution without friction
+  ConeSolver cone_solver;                ///< solution with friction
+  NewtonKrylov newton_krylov;            ///< solution of many contacts
+  Imbalance imbalance;                   ///< force error: of a problem that was not solved
+  std::vector<Vec3> missing_force;       ///< [tools] force error: of the solver [N]
+  std::vector<Index> left_out_nodes;     ///< [sampled] force error: stored nodes
+  std::vector<double> left_out_blocks;   ///< [d x d sampled] force error: Xi of these [m/N]
+  std::vector<double> row_change;        ///< [d x rows] linearise: db, an axis after the other [m]
+  std::vector<double> force_change;      ///< [d x rows] linearise: dlambda [N]
+  RollingScratch rolling;                ///< linearise: the turning of normals
   std::vector<double> far_displacement;  ///< [d tuning.far.nodes] far surface: the slice that is renewed [m]
   HighWater high_water;                  ///< detection and assembly: since the start
 };
