@@ -33,6 +33,8 @@ class Gmres {
   void solve(float* y) noexcept;
 
   [[nodiscard]] int steps() const noexcept { return steps_; }
+  /// What the y of the last `solve` has of the image of a step.
+  [[nodiscard]] float share(int step) const noexcept { return share_[static_cast<std::size_t>(step)]; }
 
  private:
   [[nodiscard]] float& h(int i, int j) noexcept { return H_[static_cast<std::size_t>(i * most_steps_ + j)]; }

@@ -133,7 +133,8 @@ NewtonKrylov::NewtonKrylov(Index max_contacts, Index max_rows)
       x_(most_changes * f_.size()),
       v_(x_.size()),
       y_(x_.size()),
-      step_(f_.size()) {}
+      step_(f_.size()),
+      motions_(f_.size() * static_cast<std::size_t>(tuning.many.most_steps)) {}
 
 bool NewtonKrylov::was_easy() const noexcept {
   return work_ <= tuning.many.easy_share * tuning.many.most_work;
@@ -359,7 +360,6 @@ void NewtonKrylov::choose_modes() noexcept {
 /// Forces of open contacts go, those that slip go to the cone's edge.
 void NewtonKrylov::move_to_modes(const ContactProblem& problem) noexcept {
   bool moved = false;
-  std::fill_n(change_.begin(), padded_rows_, 0.0F);
   for (Index k = 0; k < count_; ++k) {
     const Contact& contact = contacts_[static_cast<std::size_t>(k)];
     const Vec3 f = at(f_, contact);
@@ -371,11 +371,10 @@ void NewtonKrylov::move_to_modes(const ContactProblem& problem) noexcept {
     moved = true;
     change_force(contact, to - f);
     if (contact.mode == Mode::open) open(contact);
-    for (int i = 0; i < contact.rows; ++i)
-      change_[static_cast<std::size_t>(contact.first + i)] = static_cast<float>(to[i] - f[i]);
+    add_rows(problem.single_row(contact.first), problem.single_stride, contact.rows, to - f, r_.data(),
+             padded_rows_);
   }
-  if (!moved) return;
-  move_by_change(problem);
+  if (moved) count_product();
 }
 
 /// The contacts that are not open, each with what it gives way itself as its preconditioner.
@@ -458,6 +457,7 @@ void NewtonKrylov::solve_reduced(const ContactProblem& problem, int systems) noe
     for (int s = 0; s < systems; ++s) {
       Gmres& gmres = gmres_[static_cast<std::size_t>(s)];
       if (gmres.done()) continue;
+      if (systems == 1) std::copy_n(v_.data(), padded_rows_, motions_.data() + gmres.steps() * stride_);
       float* next = gmres.next();
       test(v_.data() + s * stride_, next);
       for (const Reduced& contact : std::span(reduced_).first(active_)) {
@@ -492,7 +492,8 @@ bool NewtonKrylov::newton_step(const ContactProblem& problem) noexcept {
   if (!std::all_of(change_.begin(), change_.begin() + rows_, [](float by) { return std::isfinite(by); }))
     return false;
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) f_[i] += change_[i];
-  move_by_change(problem);
+  for (int j = 0; j < gmres.steps(); ++j)
+    add(motions_.data() + j * stride_, gmres.share(j), r_.data(), rows_);
   return true;
 }
 

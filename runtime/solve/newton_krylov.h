@@ -121,6 +121,7 @@ class NewtonKrylov {
   std::vector<float> x_, v_;      // [most_changes x stride] forces, motions by them
   std::vector<float> y_;          // [most_changes x stride] unknowns
   std::vector<float> step_;       // [stride]
+  std::vector<float> motions_;    // [most steps x stride] by GMRES' images, of one system
   int products_ = 0;
   double work_ = 0.0;  // multiplications
   int rounds_ = 0;

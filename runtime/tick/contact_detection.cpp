@@ -302,15 +302,16 @@ void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolCont
 
 /// On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
 /// now at the other: all corners under it are contact points, and under a segment the edges.
-void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolContact& touch, Index simplex,
-                   bool is_segment) noexcept {
+void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+                   const TouchingPair& seen, bool is_segment) noexcept {
   const SurfaceTree& tree = state.surface.tree;
+  const SimplexNodes nodes = nodes_of(body, seen.simplex);
   const std::size_t corners = body.dimension() == 2 ? 2 : 3;
   for (std::size_t n = 0; n < corners; ++n) {
     const int place = is_segment ? 2 : 0;
-    touch_pair(body, state, scratch, touch, pair_of_corner(body, tree, simplex, n, touch.core, place));
+    touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
     if (is_segment && corners == 3)
-      touch_pair(body, state, scratch, touch, pair_of_edge(body, tree, simplex, n, touch.core));
+      touch_pair(body, state, scratch, touch, pair_of_edge(tree, nodes, seen, n, touch.core));
   }
 }
 
@@ -333,7 +334,7 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   }
   const bool is_flat = is_segment || is_chord || tool.radius > body.mean_surface_edge();
   if (is_flat && pair.distance - tool.radius <= touch.margin)
-    touch_corners(body, state, scratch, touch, simplex, is_segment);
+    touch_corners(body, state, scratch, touch, pair, is_segment);
 }
 
 /// Turns the normals of contacts that roll ahead by what the device moves in the tick. Not before all are

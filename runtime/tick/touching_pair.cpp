@@ -18,6 +18,17 @@ NearestPoint nearest_to_core(const SurfaceTree& tree, const SimplexNodes& nodes,
                       : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
 }
 
+/// The pair of a simplex with this normal.
+TouchingPair pair_of(Index simplex, const Vec3& normal, int place, const NearestPoint& nearest) noexcept {
+  const Vec3 across = nearest.on_core - nearest.on_simplex;
+  return {.simplex = simplex,
+          .place = place,
+          .nearest = nearest,
+          .normal = normal,
+          .height = across.dot(normal),
+          .distance = across.norm()};
+}
+
 }  // namespace
 
 SimplexNodes nodes_of(const Body& body, Index simplex) noexcept {
@@ -47,12 +58,7 @@ NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, 
 
 TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
                        const NearestPoint& nearest) noexcept {
-  TouchingPair pair{.simplex = simplex, .place = place, .nearest = nearest};
-  pair.normal = outward_normal(tree, nodes);
-  const Vec3 across = nearest.on_core - nearest.on_simplex;
-  pair.height = across.dot(pair.normal);
-  pair.distance = across.norm();
-  return pair;
+  return pair_of(simplex, outward_normal(tree, nodes), place, nearest);
 }
 
 TouchingPair pair_of_end(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
@@ -70,20 +76,19 @@ TouchingPair pair_of_core(const Body& body, const SurfaceTree& tree, Index simpl
   return make_pair(tree, nodes, simplex, 2, nearest_to_core(tree, nodes, core));
 }
 
-TouchingPair pair_of_corner(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
-                            const Core& core, int place) noexcept {
-  const SimplexNodes nodes = nodes_of(body, simplex);
+TouchingPair pair_of_corner(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
+                            std::size_t corner, const Core& core, int place) noexcept {
   NearestPoint nearest;
   nearest.weights[corner] = 1.0;
   nearest.on_simplex = tree.position(nodes[corner]);
-  nearest.on_core = nearest_on_line(nearest.on_simplex, core.origin, core.end).on_simplex;
+  nearest.on_core =
+      place == 0 ? core.origin : nearest_on_line(nearest.on_simplex, core.origin, core.end).on_simplex;
   nearest.squared_distance = (nearest.on_core - nearest.on_simplex).squaredNorm();
-  return make_pair(tree, nodes, simplex, place, nearest);
+  return pair_of(seen.simplex, seen.normal, place, nearest);
 }
 
-TouchingPair pair_of_edge(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
-                          const Core& core) noexcept {
-  const SimplexNodes nodes = nodes_of(body, simplex);
+TouchingPair pair_of_edge(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
+                          std::size_t corner, const Core& core) noexcept {
   const std::size_t next = (corner + 1) % 3;
   NearestPoint nearest =
       nearest_of_segments(core.origin, core.end, tree.position(nodes[corner]), tree.position(nodes[next]));
@@ -91,7 +96,7 @@ TouchingPair pair_of_edge(const Body& body, const SurfaceTree& tree, Index simpl
   nearest.weights = {};
   nearest.weights[corner] = weights[0];
   nearest.weights[next] = weights[1];
-  return make_pair(tree, nodes, simplex, 2, nearest);
+  return pair_of(seen.simplex, seen.normal, 2, nearest);
 }
 
 }  // namespace palpate

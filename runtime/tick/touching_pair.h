@@ -41,12 +41,12 @@ TouchingPair pair_of_end(const Body& body, const SurfaceTree& tree, Index simple
 TouchingPair pair_of_core(const Body& body, const SurfaceTree& tree, Index simplex,
                           const Core& core) noexcept;
 
-/// The pair of a corner of a simplex and the core.
-TouchingPair pair_of_corner(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
-                            const Core& core, int place) noexcept;
+/// The pair of a corner and the core, of the simplex of another pair, which has these nodes.
+TouchingPair pair_of_corner(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
+                            std::size_t corner, const Core& core, int place) noexcept;
 
 /// The pair of a triangle's edge, from a corner to the next one, and the core.
-TouchingPair pair_of_edge(const Body& body, const SurfaceTree& tree, Index simplex, std::size_t corner,
-                          const Core& core) noexcept;
+TouchingPair pair_of_edge(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
+                          std::size_t corner, const Core& core) noexcept;
 
 }  // namespace palpate
