@@ -31,6 +31,7 @@ export async function settled(page) {
     const now = window.palpate.lastFrame;
     const then = window.settling;
     window.settling = now;
+    if (!now) return false;
     const size = Math.hypot(...now.force);
     return then && now.contacts > 0 && now.tick > then.tick && Math.hypot(...now.force.map((f, k) => f - then.force[k])) < 1e-4 * size;
   });
