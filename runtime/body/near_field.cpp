@@ -28,7 +28,7 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       nodes_(at(capacity), -1),
       wanted_(at(capacity), 0),
       C_(stride_ * dimension_ * capacity),
-      force_(dimension_ * capacity),
+      force_(at(dimension_ * capacity)),
       last_force_(force_.size()),
       displacement_(force_.size()),
       blocks_(static_cast<std::size_t>(dimension_) * force_.size()),
@@ -303,6 +303,19 @@ void NearField::load(Index place, const Vec3& force) noexcept {
   }
 }
 
+/// What the force at a place puts on the patch.
+void NearField::load_patch(Index place) noexcept {
+  const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
+  const Index in_patch = patch_place(place);
+  if (in_patch >= 0) load_.add_to_patch(in_patch, f);
+  for (int axis = 0; axis < dimension_; ++axis) {
+    const Index dof = dimension_ * place + axis;
+    const double* on_patch = in_patch >= 0 ? patch()->response(dimension_ * in_patch + axis) : Y(dof);
+    palpate::add(on_patch, f[axis], patch_force_.data(), patch_dofs());
+    if (in_patch < 0) palpate::add(X(dof), f[axis], load_.beside.data(), patch_dofs());
+  }
+}
+
 void NearField::displace() noexcept {
   const std::ptrdiff_t width = std::ptrdiff_t{dimension_} * count_;
   std::fill_n(displacement_.data(), width, 0.0);
@@ -319,15 +332,7 @@ void NearField::displace() noexcept {
       double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
       for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * f[axis];
     }
-    if (patch() == nullptr) continue;
-    const Index in_patch = patch_place(place);
-    if (in_patch >= 0) load_.add_to_patch(in_patch, f);
-    for (int axis = 0; axis < dimension_; ++axis) {
-      const Index dof = dimension_ * place + axis;
-      const double* on_patch = in_patch >= 0 ? patch()->response(dimension_ * in_patch + axis) : Y(dof);
-      palpate::add(on_patch, f[axis], patch_force_.data(), patch_dofs());
-      if (in_patch < 0) palpate::add(X(dof), f[axis], load_.beside.data(), patch_dofs());
-    }
+    if (patch() != nullptr) load_patch(place);
   }
   const auto add = [&](const Index* stored, const double* force, Index count) {
     for (Index k = 0; k < count; ++k) {

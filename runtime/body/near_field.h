@@ -85,6 +85,7 @@ class NearField {
   void connect_within_patch(Index place) noexcept;
   void connect_beside_patch(const Body& body, Index place) noexcept;
   void respond(const Body& body, Index place) noexcept;
+  void load_patch(Index place) noexcept;
   [[nodiscard]] Index longest_unwanted() const noexcept;
   [[nodiscard]] bool is_loaded(Index place) const noexcept;
   [[nodiscard]] Index patch_place(Index place) const noexcept { return place_in_patch(node(place)); }

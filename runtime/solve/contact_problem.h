@@ -54,6 +54,8 @@ struct ContactProblem {
   [[nodiscard]] const float* single_row(Index i) const noexcept {
     return (coupled ? single_W : body_W).data() + static_cast<std::ptrdiff_t>(i) * single_stride;
   }
+  /// Rows as far as single_row's products go: whole registers.
+  [[nodiscard]] std::ptrdiff_t padded_rows() const noexcept { return std::ptrdiff_t{(rows + 15) / 16} * 16; }
   /// What the body alone has of it.
   [[nodiscard]] float* body_row(Index i) noexcept {
     return body_W.data() + static_cast<std::ptrdiff_t>(i) * single_stride;

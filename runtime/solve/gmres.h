@@ -37,7 +37,7 @@ class Gmres {
   [[nodiscard]] float share(int step) const noexcept { return share_[static_cast<std::size_t>(step)]; }
 
  private:
-  [[nodiscard]] float& h(int i, int j) noexcept { return H_[static_cast<std::size_t>(i * most_steps_ + j)]; }
+  [[nodiscard]] float& h(int i, int j) noexcept { return H_[i * most_steps_ + j]; }
   void rotate(int column, float below) noexcept;
 
   std::ptrdiff_t stride_;

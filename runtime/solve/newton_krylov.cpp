@@ -108,7 +108,7 @@ void multiply_small(const std::array<float, 9>& A, int size, const float* v, flo
 std::array<float, 9> by_rows(const Eigen::Matrix3d& A) noexcept {
   std::array<float, 9> entries{};
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) entries[static_cast<std::size_t>(3 * i + j)] = static_cast<float>(A(i, j));
+    for (int j = 0; j < 3; ++j) entries[3 * i + j] = static_cast<float>(A(i, j));
   }
   return entries;
 }
@@ -148,12 +148,12 @@ void NewtonKrylov::count_product() noexcept {
 template <typename Real>
 Vec3 NewtonKrylov::at(const std::vector<Real>& v, const Contact& contact) const noexcept {
   Vec3 value = Vec3::Zero();
-  for (int i = 0; i < contact.rows; ++i) value[i] = v[static_cast<std::size_t>(contact.first + i)];
+  for (int i = 0; i < contact.rows; ++i) value[i] = v[contact.first + i];
   return value;
 }
 
 void NewtonKrylov::change_force(const Contact& contact, const Vec3& change) noexcept {
-  for (int i = 0; i < contact.rows; ++i) f_[static_cast<std::size_t>(contact.first + i)] += change[i];
+  for (int i = 0; i < contact.rows; ++i) f_[contact.first + i] += change[i];
 }
 
 /// Its forces are zero, and not what rounding leaves of them.
@@ -275,7 +275,7 @@ Vec3 NewtonKrylov::slipping_force(const Contact& contact, const Vec3& f, const V
 
 /// What a contact's force changes by to solve its equations, the others being as they are.
 Vec3 NewtonKrylov::suiting_change(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept {
-  const Vec3 to_stick = -(contact.inverse * r);
+  Vec3 to_stick = -(contact.inverse * r);
   if (contact.kind == Kind::held) return to_stick;
   if (contact.kind == Kind::normal) return {std::max(-f[0], -r[0] / contact.w), 0.0, 0.0};
   if (contact.n.dot(r - contact.D * f) >= 0.0) return -f;
@@ -328,17 +328,20 @@ double NewtonKrylov::find_residual() const noexcept {
   return std::sqrt(worst / largest);
 }
 
+/// Whether a contact is there, or will be by its force and motion.
+bool NewtonKrylov::may_press(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept {
+  if (contact.kind == Kind::absent) return false;
+  if (contact.kind == Kind::held) return is_present(contact);
+  return contact.n.dot(f) - contact.n.dot(r) / contact.w > 0.0;
+}
+
 void NewtonKrylov::choose_modes() noexcept {
   for (Index k = 0; k < count_; ++k) {
     Contact& contact = contacts_[static_cast<std::size_t>(k)];
     const Vec3 f = at(f_, contact);
     const Vec3 r = at(r_, contact);
     contact.mode = Mode::stick;
-    if (contact.kind == Kind::absent) {
-      contact.mode = Mode::open;
-    } else if (contact.kind == Kind::held) {
-      if (!is_present(contact)) contact.mode = Mode::open;
-    } else if (contact.n.dot(f) - contact.n.dot(r) / contact.w <= 0.0) {
+    if (!may_press(contact, f, r)) {
       contact.mode = Mode::open;
     } else if (contact.kind == Kind::cone) {
       const Vec3 z = tangential(f, contact.n) - tangential(r, contact.n) / contact.w;
@@ -425,7 +428,7 @@ void NewtonKrylov::test(const float* motion, float* out) const noexcept {
 }
 
 /// v = W x of the first systems, in step, so that W is read once for all of them.
-void NewtonKrylov::multiply_by_W(const ContactProblem& problem, int systems) noexcept {
+void NewtonKrylov::multiply_by_compliance(const ContactProblem& problem, int systems) noexcept {
   if (systems == 1) {
     multiply(problem.single_row(0), problem.single_stride, x_.data(), v_.data(), rows_, padded_rows_);
   } else {
@@ -453,7 +456,7 @@ void NewtonKrylov::solve_reduced(const ContactProblem& problem, int systems) noe
         multiply_small(contact.inverse, contact.rows, gmres.newest() + contact.first, y + contact.first);
       fill_image(y, x);
     }
-    multiply_by_W(problem, systems);
+    multiply_by_compliance(problem, systems);
     for (int s = 0; s < systems; ++s) {
       Gmres& gmres = gmres_[static_cast<std::size_t>(s)];
       if (gmres.done()) continue;
@@ -558,8 +561,7 @@ bool NewtonKrylov::fill_guess(std::span<const double> dlambda, int changes) noex
     for (const Reduced& contact : std::span(reduced_).first(active_)) {
       std::array<float, 3> guess{};
       for (int i = 0; i < contact.rows; ++i)
-        guess[static_cast<std::size_t>(i)] =
-            static_cast<float>(dlambda[static_cast<std::size_t>(s * rows_ + contact.first + i)]);
+        guess[static_cast<std::size_t>(i)] = static_cast<float>(dlambda[s * rows_ + contact.first + i]);
       multiply_small(contact.test, contact.rows, guess.data(), y + contact.first);
       for (int i = 0; i < contact.rows; ++i) found = found || y[contact.first + i] != 0.0F;
     }
@@ -578,14 +580,14 @@ void NewtonKrylov::derivative(const ContactProblem& problem, int changes, std::s
   if (active_ == 0) return;
   if (guessed) {
     for (int s = 0; s < changes; ++s) fill_image(y_.data() + s * stride_, x_.data() + s * stride_);
-    multiply_by_W(problem, changes);
+    multiply_by_compliance(problem, changes);
   }
   for (int s = 0; s < changes; ++s) {
     Gmres& gmres = gmres_[static_cast<std::size_t>(s)];
     const float* y = y_.data() + s * stride_;
     const float* v = v_.data() + s * stride_;
     float* wanted = x_.data() + s * stride_;
-    const double* change = db.data() + s * rows_;
+    const double* change = db.data() + std::ptrdiff_t{s} * rows_;
     std::transform(change, change + rows_, wanted, [](double value) { return static_cast<float>(-value); });
     float* first = gmres.first();
     test(wanted, first);
@@ -605,7 +607,7 @@ void NewtonKrylov::derivative(const ContactProblem& problem, int changes, std::s
     gmres_[static_cast<std::size_t>(s)].solve(step_.data());
     for (Index i = 0; i < rows_; ++i) y[i] += step_[static_cast<std::size_t>(i)];
     fill_image(y, x_.data());
-    std::copy_n(x_.begin(), rows_, dlambda.begin() + s * rows_);
+    std::copy_n(x_.begin(), rows_, dlambda.begin() + std::ptrdiff_t{s} * rows_);
   }
   products_ = products;
   work_ = work;

@@ -93,13 +93,14 @@ class NewtonKrylov {
   [[nodiscard]] Vec3 difference(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
   void sweep(const ContactProblem& problem) noexcept;
   [[nodiscard]] double find_residual() const noexcept;
+  [[nodiscard]] bool may_press(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
   void choose_modes() noexcept;
   void move_to_modes(const ContactProblem& problem) noexcept;
   bool newton_step(const ContactProblem& problem) noexcept;
   void reduce() noexcept;
   void fill_image(const float* y, float* x) const noexcept;
   void test(const float* motion, float* out) const noexcept;
-  void multiply_by_W(const ContactProblem& problem, int systems) noexcept;
+  void multiply_by_compliance(const ContactProblem& problem, int systems) noexcept;
   void solve_reduced(const ContactProblem& problem, int systems) noexcept;
   bool fill_guess(std::span<const double> dlambda, int changes) noexcept;
   void count_product() noexcept;

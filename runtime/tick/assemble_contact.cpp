@@ -367,7 +367,7 @@ void couple_many(const State& state, Scratch& scratch) noexcept {
         to[i] = from[i] + by[0] * c[i] + by[1] * c[rows + i] + by[2] * c[2 * rows + i] +
                 by[3] * c[3 * rows + i] + by[4] * c[4 * rows + i] + by[5] * c[5 * rows + i];
       }
-      std::fill(to + rows, to + (rows + 15) / 16 * 16, 0.0F);
+      std::fill(to + rows, to + problem.padded_rows(), 0.0F);
     }
     problem.coupled = true;
   }

@@ -6,7 +6,7 @@ namespace palpate {
 
 BodyCompliance::BodyCompliance(Index max_rows, Index max_near_dofs)
     : stride_(max_rows),
-      dof_(static_cast<std::size_t>(most_entries_ * max_rows), -1),
+      dof_(static_cast<std::size_t>(most_entries * max_rows), -1),
       place_(dof_.size()),
       factor_(dof_.size()),
       entries_(static_cast<std::size_t>(max_rows)),
@@ -19,7 +19,7 @@ bool BodyCompliance::enter(const NearField& near, const ContactRow& row, Index i
   int count = 0;
   bool changed = false;
   const auto put = [&](Index dof, Index place, double factor) {
-    const auto at = static_cast<std::size_t>(count++ * stride_ + i);
+    const Index at = count++ * stride_ + i;
     const auto single = static_cast<float>(factor);
     changed = changed || dof_[at] != dof || factor_[at] != single;
     dof_[at] = dof;
@@ -34,7 +34,7 @@ bool BodyCompliance::enter(const NearField& near, const ContactRow& row, Index i
     }
   }
   entries_[static_cast<std::size_t>(i)] = count;
-  while (count < most_entries_) put(-1, 0, 0.0);
+  while (count < most_entries) put(-1, 0, 0.0);
   return changed;
 }
 
@@ -44,7 +44,7 @@ void BodyCompliance::respond(const NearField& near, Index row) noexcept {
   const std::ptrdiff_t width = std::ptrdiff_t{near.dimension()} * near.count();
   std::fill_n(y, width, 0.0F);
   for (int t = 0; t < entries_[static_cast<std::size_t>(row)]; ++t) {
-    const auto at = static_cast<std::size_t>(t * stride_ + row);
+    const Index at = t * stride_ + row;
     const float factor = factor_[at];
     const double* __restrict c = near.row(place_[at]).data();
 #pragma omp simd
@@ -57,8 +57,8 @@ void BodyCompliance::project(Index begin, Index end, int entries, float* __restr
   const float* __restrict y = response_.data();
   std::fill(w + begin, w + end, 0.0F);
   for (int t = 0; t < entries; ++t) {
-    const Index* __restrict place = place_.data() + t * stride_;
-    const float* __restrict factor = factor_.data() + t * stride_;
+    const Index* __restrict place = place_.data() + std::ptrdiff_t{t} * stride_;
+    const float* __restrict factor = factor_.data() + std::ptrdiff_t{t} * stride_;
 #pragma omp simd
     for (Index i = begin; i < end; ++i) w[i] += factor[i] * y[place[i]];
   }
@@ -69,15 +69,15 @@ void BodyCompliance::assemble(const NearField& near, std::span<const ContactRow>
   const Index count = problem.rows;
   if (revision_ != near.revision()) forget();
   revision_ = near.revision();
-  const auto most_entries = [&](Index begin, Index end) {
+  const auto most_of = [&](Index begin, Index end) {
     return begin == end ? 0 : *std::max_element(entries_.begin() + begin, entries_.begin() + end);
   };
   for (Index i = 0; i < count; ++i) {
     const bool changed = enter(near, rows[static_cast<std::size_t>(i)], i);
     is_new_[static_cast<std::size_t>(i)] = changed || i >= kept_rows_ ? 1 : 0;
   }
-  const int entries = most_entries(0, first_tilt_row);
-  const int tilt_entries = most_entries(first_tilt_row, count);
+  const int entries = most_of(0, first_tilt_row);
+  const int tilt_entries = most_of(first_tilt_row, count);
   renewed_ = 0;
   for (Index j = 0; j < count; ++j) {
     float* w = problem.body_row(j);
@@ -93,7 +93,7 @@ void BodyCompliance::assemble(const NearField& near, std::span<const ContactRow>
     } else {
       w[j] = diagonal_[static_cast<std::size_t>(j)];
     }
-    std::fill(w + count, w + (count + 15) / 16 * 16, 0.0F);
+    std::fill(w + count, w + problem.padded_rows(), 0.0F);
   }
   kept_rows_ = count;
 }

@@ -42,7 +42,7 @@ class BodyCompliance {
  private:
   /// Entries of J, which are at most d at each of three nodes: entry t of row i is at t rows + i, so that all
   /// rows are gone through at once.
-  static constexpr int most_entries_ = 9;
+  static constexpr int most_entries = 9;
 
   bool enter(const NearField& near, const ContactRow& row, Index i) noexcept;
   void respond(const NearField& near, Index row) noexcept;

@@ -17,8 +17,10 @@ struct Grid {
   Grid(int side, double mu, double depth, double slide, bool turned, double apart = 1.0)
       : problem(3, side * side, 0, 3 * side * side), rows(mu > 0.0 ? 3 : 1) {
     const double middle = 0.5 * (side - 1) + 0.1;
-    for (int k = 0; k < side * side; ++k)
-      points.emplace_back(apart * (k % side - middle), apart * (k / side - middle), 0.0);
+    for (int k = 0; k < side * side; ++k) {
+      const int row = k / side;
+      points.emplace_back(apart * (k % side - middle), apart * (row - middle), 0.0);
+    }
     std::mt19937 random(5);
     std::normal_distribution<double> entry;
     problem.clear(true);

@@ -133,11 +133,12 @@ TEST_P(Friction, DerivativeIsThatOfFiniteDifferences) {
   const Eigen::VectorXd now = by_sweeps(grid, GetParam(), grid.lambda());
   const double h = 1e-7;
   for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Map<const Eigen::VectorXd> change(dlambda.data() + axis * grid.problem.rows,
+    const Eigen::Map<const Eigen::VectorXd> change(dlambda.data() + std::ptrdiff_t{axis} * grid.problem.rows,
                                                    grid.problem.rows);
     told.col(axis) = grid.sum(change);
     Grid moved = grid;
-    moved.b += h * Eigen::Map<const Eigen::VectorXd>(db.data() + axis * grid.problem.rows, grid.problem.rows);
+    moved.b += h * Eigen::Map<const Eigen::VectorXd>(db.data() + std::ptrdiff_t{axis} * grid.problem.rows,
+                                                     grid.problem.rows);
     measured.col(axis) = grid.sum(by_sweeps(moved, GetParam(), now) - now) / h;
   }
   EXPECT_LT((told - measured).norm(), 0.02 * measured.norm()) << told << "\n\n" << measured;
@@ -151,9 +152,9 @@ TEST_P(Friction, DerivativeIsTheSameFromAnyGuess) {
     grid.begin();
     ASSERT_TRUE(solver.solve(grid.problem));
   }
-  const auto rows = grid.problem.rows;
+  const Eigen::Index rows = grid.problem.rows;
   std::vector<double> db(static_cast<std::size_t>(3 * rows));
-  for (Index i = 0; i < 3 * rows; ++i) db[static_cast<std::size_t>(i)] = i / rows == i % 3 ? 1.0 : 0.0;
+  for (Eigen::Index i = 0; i < 3 * rows; ++i) db[static_cast<std::size_t>(i)] = i / rows == i % 3 ? 1.0 : 0.0;
   Eigen::VectorXd without = Eigen::VectorXd::Zero(3 * rows);
   const auto derive = [&](Eigen::VectorXd from) {
     solver.derivative(grid.problem, 3, db, {from.data(), static_cast<std::size_t>(from.size())});
@@ -172,7 +173,7 @@ TEST_P(Friction, DerivativeIsTheSameFromAnyGuess) {
   std::mt19937 random(3);
   std::normal_distribution<double> entry;
   is_derivative(derive(Eigen::VectorXd::NullaryExpr(
-      3 * rows, [&] { return entry(random) * without.norm() / std::sqrt(3.0 * rows); })));
+      3 * rows, [&] { return entry(random) * without.norm() / std::sqrt(3.0 * grid.problem.rows); })));
 }
 
 // Points so near to each other that W is next to singular, and more friction than has an answer for sure:
@@ -218,10 +219,10 @@ TEST(NewtonKrylov, HeldRowsAreMetOrLeftOutWithTheirOwners) {
     r = b + W * lambda;
   }
   const double length = 1e-4 * 1e-3 * lambda.lpNorm<Eigen::Infinity>();
-  EXPECT_LT(r.segment<3>(3 * 27).norm(), length);
+  EXPECT_LT(r.segment<3>(Eigen::Index{3} * 27).norm(), length);
   int met = 0;
   for (Index k = 0; k < 10; ++k) {
-    const bool is_open = lambda.segment<3>(3 * 6 * k).isZero(0.0);
+    const bool is_open = lambda.segment<3>(Eigen::Index{18} * k).isZero(0.0);
     if (is_open) {
       EXPECT_EQ(lambda[n + k], 0.0);
     } else {

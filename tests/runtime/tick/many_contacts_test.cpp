@@ -76,14 +76,15 @@ class Compliance : public testing::Test {
 
   void expect_exact() {
     const auto count = static_cast<Eigen::Index>(rows_.size());
-    const Eigen::Index width = 3 * near_.count();
+    const Eigen::Index width = Eigen::Index{3} * near_.count();
     Eigen::MatrixXd J = Eigen::MatrixXd::Zero(count, width), C(width, width);
     for (Eigen::Index i = 0; i < width; ++i)
       C.row(i) = Eigen::Map<const Eigen::RowVectorXd>(near_.row(static_cast<Index>(i)).data(), width);
     for (Eigen::Index i = 0; i < count; ++i) {
       const ContactRow& row = rows_[static_cast<std::size_t>(i)];
       for (std::size_t n = 0; n < 3; ++n) {
-        if (row.places[n] >= 0) J.row(i).segment<3>(3 * row.places[n]) += row.body[n].transpose();
+        if (row.places[n] >= 0)
+          J.row(i).segment<3>(Eigen::Index{3} * row.places[n]) += row.body[n].transpose();
       }
     }
     const Eigen::MatrixXd exact = J * C * J.transpose();
@@ -183,7 +184,7 @@ struct Case {
   int tools;
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const Case& c, std::ostream* out) {  // NOLINT(readability-identifier-naming): GoogleTest's
   *out << c.name;
 }
 
