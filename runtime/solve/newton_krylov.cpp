@@ -140,9 +140,14 @@ bool NewtonKrylov::was_easy() const noexcept {
   return work_ <= tuning.many.easy_share * tuning.many.most_work;
 }
 
+/// Multiplications of a product with W, and what it costs beside them.
+double NewtonKrylov::product_work() const noexcept {
+  return static_cast<double>(rows_) * static_cast<double>(rows_ + tuning.many.product_overhead);
+}
+
 void NewtonKrylov::count_product() noexcept {
   ++products_;
-  work_ += static_cast<double>(rows_) * static_cast<double>(rows_ + tuning.many.product_overhead);
+  work_ += product_work();
 }
 
 template <typename Real>
@@ -181,7 +186,7 @@ void NewtonKrylov::enter_cone(const Contact& contact) noexcept {
 void NewtonKrylov::load(ContactProblem& problem) noexcept {
   count_ = problem.contacts;
   rows_ = problem.rows;
-  padded_rows_ = padded(rows_);
+  padded_rows_ = problem.padded_rows();
   for (Index k = 0; k < count_; ++k) {
     Contact& contact = contacts_[static_cast<std::size_t>(k)];
     contact.first = problem.first_row(k);
@@ -473,10 +478,8 @@ void NewtonKrylov::solve_reduced(const ContactProblem& problem, int systems) noe
 
 /// Steps of GMRES that the budget has room for.
 int NewtonKrylov::most_steps() const noexcept {
-  const double product =
-      static_cast<double>(rows_) * static_cast<double>(rows_ + tuning.many.product_overhead);
-  return static_cast<int>(
-      std::clamp<double>(tuning.many.step_work / product, tuning.many.fewest_steps, tuning.many.most_steps));
+  return static_cast<int>(std::clamp<double>(tuning.many.step_work / product_work(), tuning.many.fewest_steps,
+                                             tuning.many.most_steps));
 }
 
 bool NewtonKrylov::newton_step(const ContactProblem& problem) noexcept {

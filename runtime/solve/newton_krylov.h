@@ -103,6 +103,7 @@ class NewtonKrylov {
   void multiply_by_compliance(const ContactProblem& problem, int systems) noexcept;
   void solve_reduced(const ContactProblem& problem, int systems) noexcept;
   bool fill_guess(std::span<const double> dlambda, int changes) noexcept;
+  [[nodiscard]] double product_work() const noexcept;
   void count_product() noexcept;
   [[nodiscard]] int most_steps() const noexcept;
   void take_best() noexcept;

@@ -147,7 +147,7 @@ bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const V
            other.frame.col(0).dot(normal) > 1.0 - tuning.detection.same_direction;
   };
   if (vertex >= 0) {
-    const Index k = scratch.last_at_node[vertex];
+    const Index k = scratch.candidate_at_node[vertex];
     if (k >= begin && k < scratch.candidate_count && is_same(scratch.candidates[k])) return true;
   }
   const auto first = scratch.candidates.begin();
@@ -197,7 +197,7 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   const std::array<Index, 3> nodes = nodes_of(body, pair.simplex);
   const Index vertex = vertex_of(nodes, pair.nearest.weights);
   if (is_duplicate(body, scratch, begin, pair.nearest.on_simplex, normal, vertex)) return;
-  if (vertex >= 0) scratch.last_at_node[vertex] = scratch.candidate_count;
+  if (vertex >= 0) scratch.candidate_at_node[vertex] = scratch.candidate_count;
   ContactPoint contact;
   contact.feature =
       feature_of(tool_number, pair.place, pair.simplex, face_tells, nodes, pair.nearest.weights);

@@ -63,7 +63,7 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       found_distance(body.surface_friction().size()),
       pairs(size(2 * max_contacts)),
       candidates(size(3 * tools) * pairs.size()),
-      last_at_node(body.surface_rest_positions().size(), -1),
+      candidate_at_node(body.surface_rest_positions().size(), -1),
       left_out(candidates.size() + std::min(most_simplices_left_out, found.size())),
       problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
               most_rows(body, many(max_contacts))),

@@ -234,6 +234,8 @@ class PlayedDevice : public ::testing::Test {
     const std::int64_t after = static_cast<std::int64_t>(told.size()) - reported("writes") + 1;
     EXPECT_LE(others, reported("writes_without_loop") + reported("dropped_ticks") + after);
     EXPECT_GT(told.size(), 500U);
+    EXPECT_GT(static_cast<std::int64_t>(told.size()) - others, 100)
+        << "ticks are told, and not the writer's own alone";
   }
 
   static fs::path folder;
