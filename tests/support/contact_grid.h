@@ -85,4 +85,36 @@ struct Grid {
   Eigen::VectorXd b;
 };
 
+/// Gauss-Seidel sweeps of Alart & Curnier's projections in double precision over r = b + W lambda, until no
+/// force moves by `tolerance` [N] in one, or `most` of them. What moved most in the last one [N].
+inline double sweep_exactly(const Grid& grid, double mu, Eigen::VectorXd& lambda, int most,
+                            double tolerance) {
+  Eigen::VectorXd r = grid.b + grid.W * lambda;
+  double moved = 0.0;
+  for (int sweep = 0; sweep < most; ++sweep) {
+    moved = 0.0;
+    for (std::size_t k = 0; k < grid.points.size(); ++k) {
+      const auto i = grid.at(k);
+      const Eigen::Vector3d n = grid.frames[k].col(0);
+      const double step = 0.9 / grid.W.block(i, i, grid.rows, grid.rows).diagonal().maxCoeff();
+      Eigen::Vector3d z = Eigen::Vector3d::Zero();
+      for (int p = 0; p < grid.rows; ++p) z[p] = lambda[i + p] - step * r[i + p];
+      const double normal = std::max(0.0, grid.rows == 1 ? z[0] : n.dot(z));
+      Eigen::Vector3d tangent = z - n.dot(z) * n;
+      if (tangent.norm() > mu * normal) tangent *= mu * normal / tangent.norm();
+      const Eigen::Vector3d to =
+          grid.rows == 1 ? Eigen::Vector3d(normal, 0.0, 0.0) : Eigen::Vector3d(normal * n + tangent);
+      Eigen::Vector3d change = Eigen::Vector3d::Zero();
+      for (int p = 0; p < grid.rows; ++p) {
+        change[p] = to[p] - lambda[i + p];
+        lambda[i + p] = to[p];
+        if (change[p] != 0.0) r += change[p] * grid.W.col(i + p);
+      }
+      moved = std::max(moved, change.norm());
+    }
+    if (moved < tolerance) break;
+  }
+  return moved;
+}
+
 }  // namespace palpate::test

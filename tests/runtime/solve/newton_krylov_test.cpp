@@ -19,33 +19,9 @@ namespace {
 
 using test::Grid;
 
-/// Forces by Gauss-Seidel sweeps of Alart & Curnier's projections in double precision until nothing moves.
+/// Forces by sweeps in double precision until nothing moves.
 Eigen::VectorXd by_sweeps(const Grid& grid, double mu, Eigen::VectorXd lambda) {
-  Eigen::VectorXd r = grid.b + grid.W * lambda;
-  for (int sweep = 0; sweep < 20000; ++sweep) {
-    double most = 0.0;
-    for (std::size_t k = 0; k < grid.points.size(); ++k) {
-      const auto i = grid.at(k);
-      const Eigen::Vector3d n = grid.frames[k].col(0);
-      const double step = 0.9 / grid.W.block(i, i, grid.rows, grid.rows).diagonal().maxCoeff();
-      Eigen::Vector3d z = Eigen::Vector3d::Zero();
-      for (int p = 0; p < grid.rows; ++p) z[p] = lambda[i + p] - step * r[i + p];
-      const double normal = std::max(0.0, grid.rows == 1 ? z[0] : n.dot(z));
-      Eigen::Vector3d tangent = z - n.dot(z) * n;
-      if (tangent.norm() > mu * normal) tangent *= mu * normal / tangent.norm();
-      const Eigen::Vector3d to =
-          grid.rows == 1 ? Eigen::Vector3d(normal, 0.0, 0.0) : Eigen::Vector3d(normal * n + tangent);
-      Eigen::Vector3d change = Eigen::Vector3d::Zero();
-      for (int p = 0; p < grid.rows; ++p) {
-        change[p] = to[p] - lambda[i + p];
-        lambda[i + p] = to[p];
-        r += change[p] * grid.W.col(i + p);
-      }
-      most = std::max(most, change.norm());
-    }
-    if (most < 1e-12) return lambda;
-  }
-  ADD_FAILURE() << "the reference did not converge";
+  EXPECT_LT(test::sweep_exactly(grid, mu, lambda, 20000, 1e-12), 1e-12) << "the reference did not converge";
   return lambda;
 }
 
