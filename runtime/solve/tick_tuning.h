@@ -24,12 +24,11 @@ struct DetectionTuning {
   double same_place = 1e-4;      ///< [edge] contact points nearer than this are one
   double same_direction = 1e-6;  ///< [1] if 1 - cos of their normals is smaller as well
   double deepest_inside = 0.25;  ///< [edge] a tool whose core is deeper is lost in the body
-  double smooth_radius = 3.0;    ///< [edge of the simplex] a larger sphere touches corners alone. Chords of
-                                 ///< the smooth surface hold it out by edge^2 / 6 R, corners let it sink in.
-                               ///< Force against the half-space, 0.05 and 0.1 R deep, with faces and edges /
-                               ///< corners alone: at 2.6 edges +16 and +21 / -35 and -13 %, at 3.5 +20 and
-                               ///< +20 / -15 and -3, at 4.4 +21 and +10 / -9 and -1, at 5.3 +18 and +10 / 0
-                               ///< and -3
+  /// [edge of the simplex] A larger sphere touches corners alone: chords of the smooth surface hold it out by
+  /// edge^2 / 6 R, corners let it sink in. Force against the half-space, 0.05 and 0.1 R deep, with faces and
+  /// edges / corners alone: at 2.6 edges +16 and +21 / -35 and -13 %, at 3.5 +20 and +20 / -15 and -3, at 4.4
+  /// +21 and +10 / -9 and -1, at 5.3 +18 and +10 / 0 and -3.
+  double smooth_radius = 3.0;
   double on_surface = 1e-6;  ///< [edge] nearer, the normal is the face's and not the distance's
 };
 

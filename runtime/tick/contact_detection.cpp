@@ -11,13 +11,6 @@
 namespace palpate {
 namespace {
 
-/// Mean length of a simplex's edges at rest [m].
-double mean_edge(const Body& body, const SimplexNodes& nodes) noexcept {
-  const auto at = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
-  const double first = (at(1) - at(0)).norm();
-  return nodes[2] < 0 ? first : (first + (at(2) - at(1)).norm() + (at(0) - at(2)).norm()) / 3.0;
-}
-
 /// Same vertex, edge or face, same place on the same tool: the same number. Faces have the simplex's number;
 /// edges and vertices those of their nodes.
 std::int64_t feature_of(Index tool, int place, Index simplex, bool face_tells, const SimplexNodes& nodes,
@@ -324,8 +317,7 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   const SurfaceTree& tree = state.surface.tree;
   const Index simplex = pair.simplex;
   const bool is_segment = tool.length > 0.0;
-  const bool is_chord =
-      !is_segment && tool.radius > tuning.detection.smooth_radius * mean_edge(body, nodes_of(body, simplex));
+  const bool is_chord = touches_corners_alone(body, tool, nodes_of(body, simplex));
   if (!is_chord) touch_pair(body, state, scratch, touch, pair);
   if (is_segment) {
     touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));

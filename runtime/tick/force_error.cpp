@@ -21,6 +21,19 @@ void leave_out(const Body& body, const State& state, Scratch& scratch, LeftOut p
   scratch.left_out[scratch.left_out_count++] = place;
 }
 
+/// The corner of a simplex that is nearest to the core's origin.
+NearestPoint nearest_corner(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core) noexcept {
+  NearestPoint nearest;
+  nearest.squared_distance = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < 3 && nodes[k] >= 0; ++k) {
+    const double squared = (core.origin - tree.position(nodes[k])).squaredNorm();
+    if (squared >= nearest.squared_distance) continue;
+    nearest = {.on_simplex = tree.position(nodes[k]), .on_core = core.origin, .squared_distance = squared};
+    nearest.weights[k] = 1.0;
+  }
+  return nearest;
+}
+
 /// How deep the tool has come to be there [m].
 double depth_now(const State& state, const LeftOut& place) noexcept {
   const Vec3 apart = state.tools[place.tool].pose.position - state.surface.tree.position(place.node);
@@ -136,10 +149,12 @@ double error_of_solver(const Scratch& scratch, double step) noexcept {
 void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, Index tool, const Core& core,
                        Index simplex) noexcept {
   const Tool& shape = state.tools[tool].tool;
-  const double distance = std::sqrt(scratch.found_distance[simplex]);
-  if (!(distance > 0.0 && distance < shape.radius)) return;
   const SimplexNodes nodes = nodes_of(body, simplex);
-  const NearestPoint nearest = nearest_points(state.surface.tree, nodes, core, shape.length == 0.0);
+  const NearestPoint nearest = touches_corners_alone(body, shape, nodes)
+                                   ? nearest_corner(state.surface.tree, nodes, core)
+                                   : nearest_points(state.surface.tree, nodes, core, shape.length == 0.0);
+  const double distance = std::sqrt(nearest.squared_distance);
+  if (!(distance > 0.0 && distance < shape.radius)) return;
   leave_out(body, state, scratch,
             {.tool = tool,
              .normal = (nearest.on_core - nearest.on_simplex) / distance,

@@ -1,5 +1,7 @@
 #include "runtime/tick/touching_pair.h"
 
+#include "runtime/solve/tick_tuning.h"
+
 namespace palpate {
 namespace {
 
@@ -16,6 +18,13 @@ NearestPoint nearest_to_core(const SurfaceTree& tree, const SimplexNodes& nodes,
   const Vec3& b = tree.position(nodes[1]);
   return nodes[2] < 0 ? nearest_of_segments(core.origin, core.end, a, b)
                       : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
+}
+
+/// Mean length of a simplex's edges at rest [m].
+double mean_edge(const Body& body, const SimplexNodes& nodes) noexcept {
+  const auto at = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
+  const double first = (at(1) - at(0)).norm();
+  return nodes[2] < 0 ? first : (first + (at(2) - at(1)).norm() + (at(0) - at(2)).norm()) / 3.0;
 }
 
 /// The pair of a simplex with this normal.
@@ -36,6 +45,10 @@ SimplexNodes nodes_of(const Body& body, Index simplex) noexcept {
   const std::size_t at = d * static_cast<std::size_t>(simplex);
   const std::span<const Index> simplices = body.simplices();
   return {simplices[at], simplices[at + 1], d == 3 ? simplices[at + 2] : -1};
+}
+
+bool touches_corners_alone(const Body& body, const Tool& tool, const SimplexNodes& nodes) noexcept {
+  return tool.length == 0.0 && tool.radius > tuning.detection.smooth_radius * mean_edge(body, nodes);
 }
 
 Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept {
