@@ -206,13 +206,16 @@ void Body::measure_surface() {
   const auto corners = static_cast<std::size_t>(dimension());
   double sum = 0.0;
   for (std::size_t simplex = 0; simplex < simplices().size(); simplex += corners) {
+    double around = 0.0;
     for (std::size_t k = 0; k < corners; ++k) {
       const auto a = static_cast<std::size_t>(simplices()[simplex + k]);
       const auto b = static_cast<std::size_t>(simplices()[simplex + (k + 1) % corners]);
       const double length = (surface_rest_[a] - surface_rest_[b]).norm();
       longest_surface_edge_ = std::max(longest_surface_edge_, length);
-      sum += length;  // a closed surface has each edge as often
+      around += length;
     }
+    simplex_edges_.push_back(around / static_cast<double>(corners));
+    sum += around;  // a closed surface has each edge as often
   }
   mean_surface_edge_ = sum / static_cast<double>(simplices().size());
 }

@@ -116,6 +116,8 @@ class Body {
   [[nodiscard]] std::vector<Vec3> surface_in_mesh() const;
   /// [F] Coulomb's coefficient of each simplex: that of the material of its element.
   [[nodiscard]] std::span<const double> surface_friction() const noexcept { return surface_friction_; }
+  /// [F] mean length of each simplex's edges at rest [m].
+  [[nodiscard]] std::span<const double> simplex_edges() const noexcept { return simplex_edges_; }
 
  private:
   void order_by_last_part();
@@ -145,6 +147,7 @@ class Body {
   std::vector<Index> followers_;          // surface nodes
   std::vector<Vec3> surface_rest_;        // [S]
   std::vector<double> surface_friction_;  // [F]
+  std::vector<double> simplex_edges_;     // [F]
 };
 
 }  // namespace palpate

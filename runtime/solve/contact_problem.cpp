@@ -18,7 +18,8 @@ ContactProblem::ContactProblem(int d, Index max_contacts, Index few_rows, Index 
       single_W(body_W.size()),
       b(std::max(stride, single_stride)),
       lambda(b.size()),
-      guess(b.size()) {}
+      guess(b.size()),
+      prediction(b.size()) {}
 
 void ContactProblem::clear(bool are_many) noexcept {
   contacts = 0;
@@ -52,6 +53,7 @@ void ContactProblem::append(double mu, bool is_held, Index owner_of, const Vec3&
   for (Index i = rows; i < rows + count; ++i) {
     b[i] = 0.0;
     lambda[i] = 0.0;
+    prediction[i] = 0.0;
   }
   rows += count;
 }

@@ -80,6 +80,7 @@ struct ContactProblem {
   std::vector<double> b;           ///< [rows] [m]; where contacts are many, r by the guess
   std::vector<double> lambda;      ///< [rows] [N]; before solving: a guess
   std::vector<double> guess;       ///< [rows] lambda before solving [N]
+  std::vector<double> prediction;  ///< [rows] where contacts are many: expected change of lambda [N]
 
  private:
   [[nodiscard]] std::size_t place_in_w(Index i, Index j) const noexcept {

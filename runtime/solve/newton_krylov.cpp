@@ -183,6 +183,16 @@ void NewtonKrylov::enter_cone(const Contact& contact) noexcept {
     change_force(contact, (contact.mu * normal / length - 1.0) * tangent);
 }
 
+void NewtonKrylov::enter_cones() noexcept {
+  const std::span<const Contact> all = std::span(contacts_).first(static_cast<std::size_t>(count_));
+  for (const Contact& contact : all) {
+    if (contact.kind != Kind::absent) enter_cone(contact);
+  }
+  for (const Contact& contact : all) {
+    if (contact.kind != Kind::absent && !is_present(contact)) open(contact);
+  }
+}
+
 void NewtonKrylov::load(ContactProblem& problem) noexcept {
   count_ = problem.contacts;
   rows_ = problem.rows;
@@ -211,12 +221,8 @@ void NewtonKrylov::load(ContactProblem& problem) noexcept {
     for (int i = contact.rows; i < 3; ++i) contact.D(i, i) = contact.w;
     contact.inverse = contact.D.inverse();
     std::copy_n(problem.lambda.begin() + contact.first, contact.rows, f_.begin() + contact.first);
-    enter_cone(contact);
   }
-  for (Index k = 0; k < count_; ++k) {
-    const Contact& contact = contacts_[static_cast<std::size_t>(k)];
-    if (!is_present(contact)) open(contact);
-  }
+  enter_cones();
   std::fill(r_.begin() + rows_, r_.begin() + padded_rows_, 0.0F);
 }
 
@@ -321,7 +327,24 @@ Vec3 NewtonKrylov::difference(const Contact& contact, const Vec3& f, const Vec3&
   return f - normal * contact.n - tangent;
 }
 
-double NewtonKrylov::find_residual() const noexcept {
+/// Starts from what is predicted, if that is nearer to the solution than the guess alone.
+void NewtonKrylov::predict(const ContactProblem& problem) noexcept {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) f_[i] += problem.prediction[i];
+  enter_cones();
+  bool moved = false;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) {
+    change_[i] = static_cast<float>(f_[i] - best_f_[i]);
+    moved = moved || change_[i] != 0.0F;
+  }
+  if (!moved) return;
+  const double guessed = best_ * largest_force_;
+  move_by_change(problem);
+  find_residual();
+  if (residual_ * largest_force_ < guessed) return keep_best();
+  take_best();
+}
+
+void NewtonKrylov::find_residual() noexcept {
   double worst = 0.0;
   double largest = std::numeric_limits<double>::min();
   for (Index k = 0; k < count_; ++k) {
@@ -330,7 +353,8 @@ double NewtonKrylov::find_residual() const noexcept {
     worst = std::max(worst, difference(contact, f, at(r_, contact)).squaredNorm());
     largest = std::max(largest, f.squaredNorm());
   }
-  return std::sqrt(worst / largest);
+  largest_force_ = std::sqrt(largest);
+  residual_ = std::sqrt(worst) / largest_force_;
 }
 
 /// Whether a contact is there, or will be by its force and motion.
@@ -503,7 +527,14 @@ bool NewtonKrylov::newton_step(const ContactProblem& problem) noexcept {
   return true;
 }
 
+void NewtonKrylov::keep_best() noexcept {
+  best_ = residual_;
+  std::copy_n(f_.begin(), padded_rows_, best_f_.begin());
+  std::copy_n(r_.begin(), padded_rows_, best_r_.begin());
+}
+
 void NewtonKrylov::take_best() noexcept {
+  residual_ = best_;
   std::copy_n(best_f_.begin(), padded_rows_, f_.begin());
   std::copy_n(best_r_.begin(), padded_rows_, r_.begin());
 }
@@ -515,22 +546,17 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   std::copy_n(problem.lambda.begin(), problem.rows, problem.guess.begin());
   load(problem);
   find_motion(problem);
-  residual_ = find_residual();
-  double best = residual_;
+  find_residual();
+  keep_best();
+  const double wanted =
+      std::clamp(tuning.many.reduction * best_, tuning.many.least_residual, tuning.many.tolerance);
+  if (best_ > wanted) predict(problem);
   double last = std::numeric_limits<double>::infinity();
   int failures = 0;
-  const auto keep = [&] {
-    best = residual_;
-    std::copy_n(f_.begin(), padded_rows_, best_f_.begin());
-    std::copy_n(r_.begin(), padded_rows_, best_r_.begin());
-  };
-  keep();
   bool newton = false;
-  const double wanted =
-      std::clamp(tuning.many.reduction * best, tuning.many.least_residual, tuning.many.tolerance);
   const auto is_done = [&] {
-    if (best <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
-    return best <= tuning.many.rough_tolerance &&
+    if (best_ <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
+    return best_ <= tuning.many.rough_tolerance &&
            (work_ >= tuning.many.smooth_work || failures >= tuning.many.rough_failures);
   };
   while (!is_done()) {
@@ -540,19 +566,19 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
       take_best();
     }
     for (int k = 0; k < tuning.many.sweeps; ++k) sweep(problem);
-    residual_ = find_residual();
-    if (residual_ < best) keep();
-    if (newton && residual_ > tuning.many.gain * last) ++failures;
-    if (!(residual_ <= 4.0 * last)) failures = tuning.many.most_failures;
-    if (failures == tuning.many.most_failures && residual_ > best) take_best();
-    last = std::min(last, residual_);
+    find_residual();
+    const double reached = residual_;
+    if (reached < best_) keep_best();
+    if (newton && reached > tuning.many.gain * last) ++failures;
+    if (!(reached <= 4.0 * last)) failures = tuning.many.most_failures;
+    if (failures == tuning.many.most_failures && reached > best_) take_best();
+    last = std::min(last, reached);
     newton = true;
   }
-  if (residual_ > best) take_best();
-  residual_ = best;
+  if (residual_ > best_) take_best();
   for (Index i = 0; i < rows_; ++i)
     problem.lambda[static_cast<std::size_t>(i)] = f_[static_cast<std::size_t>(i)];
-  return best <= tuning.many.accepted;
+  return best_ <= tuning.many.accepted;
 }
 
 /// The unknowns y of each change by the guess in dlambda. False where that is zero.

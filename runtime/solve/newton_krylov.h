@@ -16,8 +16,9 @@ namespace palpate {
 /// others as they are, and between them steps of a semismooth Newton method on Alart & Curnier's equations
 /// (1991) that has three unknowns at a contact that sticks, two at one that slips and one without friction,
 /// and is solved by preconditioned GMRES (Saad & Schultz 1986). Sweeps make the forces smooth and keep them
-/// in the cones; Newton's steps settle what sweeps are slow at. It starts from the guess in lambda, and costs
-/// next to nothing where that is the solution. W and all that is long is in single precision: forces and
+/// in the cones; Newton's steps settle what sweeps are slow at. It starts from the guess in lambda and what
+/// is predicted of its change, or without that where it is no better, and costs next to nothing where the
+/// guess is the solution. W and all that is long is in single precision: forces and
 /// motions change little from tick to tick. docs/decisions has what it was compared with. All memory is taken
 /// at construction.
 ///
@@ -80,8 +81,11 @@ class NewtonKrylov {
 
   void load(ContactProblem& problem) noexcept;
   void enter_cone(const Contact& contact) noexcept;
+  void enter_cones() noexcept;
   void find_motion(const ContactProblem& problem) noexcept;
   void move_by_change(const ContactProblem& problem) noexcept;
+  void predict(const ContactProblem& problem) noexcept;
+  void keep_best() noexcept;
   template <typename Real>
   [[nodiscard]] Vec3 at(const std::vector<Real>& v, const Contact& contact) const noexcept;
   void change_force(const Contact& contact, const Vec3& change) noexcept;
@@ -92,7 +96,7 @@ class NewtonKrylov {
                                     const Vec3& sticking) const noexcept;
   [[nodiscard]] Vec3 difference(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
   void sweep(const ContactProblem& problem) noexcept;
-  [[nodiscard]] double find_residual() const noexcept;
+  void find_residual() noexcept;
   [[nodiscard]] bool may_press(const Contact& contact, const Vec3& f, const Vec3& r) const noexcept;
   void choose_modes() noexcept;
   void move_to_modes(const ContactProblem& problem) noexcept;
@@ -127,7 +131,9 @@ class NewtonKrylov {
   int products_ = 0;
   double work_ = 0.0;  // multiplications
   int rounds_ = 0;
-  double residual_ = 0.0;
+  double residual_ = 0.0;       // [largest force]
+  double largest_force_ = 0.0;  // [N]
+  double best_ = 0.0;           // residual of best_f_
 };
 
 }  // namespace palpate

@@ -179,6 +179,18 @@ void hand_on_responses(Scratch& scratch, Index count) noexcept {
   scratch.response_count = count;
 }
 
+/// What the forces are expected to change by as the tools move: to first order, as linearise left it.
+void predict(const State& state, Scratch& scratch) noexcept {
+  for (Index k = 0; k < state.contact_count; ++k) {
+    const ContactPoint& contact = state.contact_points[k];
+    const ToolState& tool = state.tools[contact.tool];
+    const Vec3 change = scratch.response[k] * (tool.device.position - tool.last_device.position);
+    const Index first = scratch.problem.first_row(k);
+    for (Index i = first; i < first + scratch.problem.rows_of(k); ++i)
+      scratch.problem.prediction[i] = scratch.rows[i].force.dot(change);
+  }
+}
+
 void add_many(State& state, Scratch& scratch, double least_gap) noexcept {
   for (Index k = 0; k < state.contact_count; ++k)
     scratch.upcoming[k] = announce(state, scratch, state.contact_points[k], least_gap);
@@ -187,6 +199,7 @@ void add_many(State& state, Scratch& scratch, double least_gap) noexcept {
   for (Index k = 0; k < state.contact_count; ++k)
     add_one_of_many(state, scratch, state.contact_points[k], scratch.upcoming[k]);
   hand_on_responses(scratch, state.contact_count);
+  if (scratch.is_first_pass) predict(state, scratch);
 }
 
 void add_one_of_few(const State& state, Scratch& scratch, const ContactPoint& contact) noexcept {

@@ -131,20 +131,25 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
 }
 
 /// Whether a candidate from `begin` on is at the same place with the same normal. `vertex`: the surface node
-/// that the place is, -1 where it is none; candidates there are looked at first.
+/// that the place is, -1 where it is none; at other nodes there is no such candidate.
 bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const Vec3& position,
                   const Vec3& normal, Index vertex) noexcept {
   const double near = tuning.detection.same_place * body.mean_surface_edge();
-  const auto is_same = [&](const ContactPoint& other) {
-    return (other.position - position).squaredNorm() < near * near &&
+  const auto is_same = [&](Index k) {
+    const ContactPoint& other = scratch.candidates[k];
+    return k >= begin && (other.position - position).squaredNorm() < near * near &&
            other.frame.col(0).dot(normal) > 1.0 - tuning.detection.same_direction;
   };
   if (vertex >= 0) {
     const Index k = scratch.candidate_at_node[vertex];
-    if (k >= begin && k < scratch.candidate_count && is_same(scratch.candidates[k])) return true;
+    if (k < scratch.candidate_count && is_same(k)) return true;
+    const auto between = scratch.candidates_between.begin();
+    return std::any_of(between, between + scratch.between_count, is_same);
   }
-  const auto first = scratch.candidates.begin();
-  return std::any_of(first + begin, first + scratch.candidate_count, is_same);
+  for (Index k = begin; k < scratch.candidate_count; ++k) {
+    if (is_same(k)) return true;
+  }
+  return false;
 }
 
 /// The surface node that a place is, -1 for one within an edge or face.
@@ -190,7 +195,11 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   const std::array<Index, 3> nodes = nodes_of(body, pair.simplex);
   const Index vertex = vertex_of(nodes, pair.nearest.weights);
   if (is_duplicate(body, scratch, begin, pair.nearest.on_simplex, normal, vertex)) return;
-  if (vertex >= 0) scratch.candidate_at_node[vertex] = scratch.candidate_count;
+  if (vertex >= 0) {
+    scratch.candidate_at_node[vertex] = scratch.candidate_count;
+  } else {
+    scratch.candidates_between[scratch.between_count++] = scratch.candidate_count;
+  }
   ContactPoint contact;
   contact.feature =
       feature_of(tool_number, pair.place, pair.simplex, face_tells, nodes, pair.nearest.weights);
@@ -317,7 +326,7 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   const SurfaceTree& tree = state.surface.tree;
   const Index simplex = pair.simplex;
   const bool is_segment = tool.length > 0.0;
-  const bool is_chord = touches_corners_alone(body, tool, nodes_of(body, simplex));
+  const bool is_chord = touches_corners_alone(body, tool, simplex);
   if (!is_chord) touch_pair(body, state, scratch, touch, pair);
   if (is_segment) {
     touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
@@ -408,6 +417,7 @@ void update_held(const Body& body, State& state) noexcept {
 void find_contacts(const Body& body, State& state, Scratch& scratch) noexcept {
   update_held(body, state);
   scratch.candidate_count = 0;
+  scratch.between_count = 0;
   scratch.left_out_count = 0;
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
     if (state.tools[k].engaged) find_candidates(body, state, scratch, k);

@@ -150,7 +150,7 @@ void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, I
                        Index simplex) noexcept {
   const Tool& shape = state.tools[tool].tool;
   const SimplexNodes nodes = nodes_of(body, simplex);
-  const NearestPoint nearest = touches_corners_alone(body, shape, nodes)
+  const NearestPoint nearest = touches_corners_alone(body, shape, simplex)
                                    ? nearest_corner(state.surface.tree, nodes, core)
                                    : nearest_points(state.surface.tree, nodes, core, shape.length == 0.0);
   const double distance = std::sqrt(nearest.squared_distance);

@@ -64,6 +64,7 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       pairs(size(2 * max_contacts)),
       candidates(size(3 * tools) * pairs.size()),
       candidate_at_node(body.surface_rest_positions().size(), -1),
+      candidates_between(candidates.size()),
       left_out(candidates.size() + std::min(most_simplices_left_out, found.size())),
       problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
               most_rows(body, many(max_contacts))),

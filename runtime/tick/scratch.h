@@ -50,9 +50,11 @@ struct Scratch {
   std::vector<TouchingPair> pairs;       ///< [2 max_contacts] detection
   std::vector<ContactPoint> candidates;  ///< [6 max_contacts tools] detection: before the deepest are chosen
   Index candidate_count = 0;
-  std::vector<Index> candidate_at_node;  ///< [S] detection: candidate at a surface node that was found last
-  std::size_t found_count = 0;           ///< detection: of `found`, within a tool's reach
-  std::vector<LeftOut> left_out;         ///< detection: places for which there was no room
+  std::vector<Index> candidate_at_node;   ///< [S] detection: candidate at a surface node that was found last
+  std::vector<Index> candidates_between;  ///< [as candidates] detection: those that are no surface node
+  Index between_count = 0;
+  std::size_t found_count = 0;    ///< detection: of `found`, within a tool's reach
+  std::vector<LeftOut> left_out;  ///< detection: places for which there was no room
   Index left_out_count = 0;
   bool is_first_pass = true;              ///< solve_contact: of the tick's Newton passes
   bool is_solved = true;                  ///< solution: to its tolerance, in the last pass

@@ -20,13 +20,6 @@ NearestPoint nearest_to_core(const SurfaceTree& tree, const SimplexNodes& nodes,
                       : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
 }
 
-/// Mean length of a simplex's edges at rest [m].
-double mean_edge(const Body& body, const SimplexNodes& nodes) noexcept {
-  const auto at = [&](std::size_t k) { return body.surface_rest_positions()[nodes[k]]; };
-  const double first = (at(1) - at(0)).norm();
-  return nodes[2] < 0 ? first : (first + (at(2) - at(1)).norm() + (at(0) - at(2)).norm()) / 3.0;
-}
-
 /// The pair of a simplex with this normal.
 TouchingPair pair_of(Index simplex, const Vec3& normal, int place, const NearestPoint& nearest) noexcept {
   const Vec3 across = nearest.on_core - nearest.on_simplex;
@@ -47,8 +40,8 @@ SimplexNodes nodes_of(const Body& body, Index simplex) noexcept {
   return {simplices[at], simplices[at + 1], d == 3 ? simplices[at + 2] : -1};
 }
 
-bool touches_corners_alone(const Body& body, const Tool& tool, const SimplexNodes& nodes) noexcept {
-  return tool.length == 0.0 && tool.radius > tuning.detection.smooth_radius * mean_edge(body, nodes);
+bool touches_corners_alone(const Body& body, const Tool& tool, Index simplex) noexcept {
+  return tool.length == 0.0 && tool.radius > tuning.detection.smooth_radius * body.simplex_edges()[simplex];
 }
 
 Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept {

@@ -24,7 +24,7 @@ SimplexNodes nodes_of(const Body& body, Index simplex) noexcept;
 
 /// Whether a tool is a sphere so large that it touches a simplex at its corners alone, as its edges and face
 /// are chords of the smooth surface.
-bool touches_corners_alone(const Body& body, const Tool& tool, const SimplexNodes& nodes) noexcept;
+bool touches_corners_alone(const Body& body, const Tool& tool, Index simplex) noexcept;
 
 /// Outward unit normal of a simplex where the tree has it; zero without area.
 Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept;

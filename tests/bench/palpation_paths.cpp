@@ -101,6 +101,19 @@ Wish next_wish(const Palpation& palpation, Random& random, std::int64_t now, dou
   return {speed, random.between(0.0, palpation.most_depth), false, ticks(random.between(0.3, 2.0))};
 }
 
+/// Turns the device at this speed about an axis that wanders. Random numbers of its own: the way is the same.
+void turn_device(std::vector<ToolPose>& poses, double speed, std::uint64_t seed) {
+  Random random(seed);
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  Vec3 axis = Vec3::UnitZ();
+  for (ToolPose& pose : poses) {
+    const Vec3 push(random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-1.0, 1.0));
+    axis = (axis + std::sqrt(tick / 0.5) * push).normalized();
+    orientation = (Eigen::AngleAxisd(speed * tick, axis) * orientation).normalized();
+    pose.orientation = orientation;
+  }
+}
+
 /// The sphere's centre where it just touches the body on its way from `from` along `inward`, at most `most`
 /// on.
 std::optional<double> touch(const Body& body, State& rest, const Vec3& from, const Vec3& inward,
@@ -251,6 +264,7 @@ std::vector<ToolPose> palpation_poses(const Body& body, const Palpation& palpati
                      .position = walker.centre(palpation.radius, depth_now),
                      .grab = wish.grab});
   }
+  if (palpation.turning > 0.0) turn_device(poses, palpation.turning, palpation.seed);
   return poses;
 }
 

@@ -50,6 +50,7 @@ struct Palpation {
   double radius = 0.005;      ///< of the sphere [m]
   double most_depth = 0.006;  ///< that it presses in [m]
   double most_speed = 0.2;    ///< of the device [m/s]
+  double turning = 0.0;       ///< of the device, about an axis that changes [rad/s]
   bool steady = false;        ///< always at that depth and speed, without lifting or grabbing
   std::uint64_t seed = 1;
 };

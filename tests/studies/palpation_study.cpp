@@ -1,6 +1,7 @@
 // Random palpation of a baked body at 1 kHz, and what its slowest ticks are made of.
 //
-//   palpation_study MODEL.palpate.hdf [SECONDS [SEED [RADIUS [FRICTION]]]]
+//   palpation_study MODEL.palpate.hdf [--seconds S] [--seed N] [--radius M] [--depth M] [--turning RAD/S]
+//                   [--friction MU]
 //
 // A sphere (5 mm unless told otherwise) presses, slides, lifts and grabs all over the body in real time;
 // every tick is timed. Then the same motion is played twice more without waiting, the same ticks to the bit,
@@ -53,8 +54,10 @@ struct Run {
   std::vector<std::int64_t> compute;   // [ns] of each tick
   std::vector<std::int64_t> lateness;  // [ns] from when a tick was due to when it began
   std::vector<Vec3> force;             // on the hand [N]
+  std::vector<StepStatus> status;
+  Index closed = 0;  // at most
 
-  explicit Run(std::size_t ticks) : compute(ticks), lateness(ticks), force(ticks) {}
+  explicit Run(std::size_t ticks) : compute(ticks), lateness(ticks), force(ticks), status(ticks) {}
 };
 
 Run play(const Body& body, State state, const std::vector<ToolPose>& poses, bool real_time) {
@@ -64,10 +67,11 @@ Run play(const Body& body, State state, const std::vector<ToolPose>& poses, bool
     const std::int64_t due = start + static_cast<std::int64_t>(k) * period;
     if (real_time) sleep_until(due);
     const std::int64_t begin = now();
-    step(body, state, poses[k]);
+    run.status[k] = step(body, state, poses[k]);
     run.compute[k] = now() - begin;
     run.lateness[k] = real_time ? begin - due : 0;
     run.force[k] = state.tools.front().wrench.force;
+    run.closed = std::max(run.closed, state.tools.front().contacts);
   }
   return run;
 }
@@ -240,6 +244,20 @@ double touched_share(const Body& body, const std::vector<ToolPose>& poses, doubl
          static_cast<double>(body.free_surface_nodes().size());
 }
 
+/// What was felt: the largest force, how many contacts, and how often the status said what.
+void print_statuses(const Run& run) {
+  double largest = 0.0;
+  for (const Vec3& force : run.force) largest = std::max(largest, force.norm());
+  fmt::print("\nforce at most {:.3g} N, closed contacts at most {}; ticks by status:", largest, run.closed);
+  for (const auto& [bit, name] : status_names) {
+    const StepStatus of_name = bit;
+    const auto count = std::count_if(run.status.begin(), run.status.end(),
+                                     [of_name](StepStatus status) { return has(status, of_name); });
+    if (count > 0) fmt::print(" {} {}", name, count);
+  }
+  fmt::print("\n");
+}
+
 struct Arguments {
   std::string model;
   double seconds = 600.0;
@@ -292,6 +310,7 @@ void study(const Arguments& arguments) {
   fmt::print("\nreplay: {}\n", real.force == first.force && real.force == again.force
                                    ? "the same forces to the last bit"
                                    : "FORCES DIFFER");
+  print_statuses(first);
 
   const auto own =
       std::count_if(slow.begin(), slow.end(), [&](std::size_t k) { return 2 * alone[k] > real.compute[k]; });
@@ -304,12 +323,30 @@ void study(const Arguments& arguments) {
 }
 
 Arguments read_arguments(int argc, char** argv) {
+  if (argc < 2 || argc % 2 != 0)
+    throw Error("there is no body, or an option without a value", "palpation_study",
+                "see the head of palpation_study.cpp");
   Arguments arguments;
   arguments.model = argv[1];
-  if (argc > 2) arguments.seconds = std::strtod(argv[2], nullptr);
-  if (argc > 3) arguments.palpation.seed = std::strtoull(argv[3], nullptr, 10);
-  if (argc > 4) arguments.palpation.radius = std::strtod(argv[4], nullptr);
-  if (argc > 5) arguments.friction = std::strtod(argv[5], nullptr);
+  for (int k = 2; k < argc; k += 2) {
+    const std::string name = argv[k];
+    const double value = std::strtod(argv[k + 1], nullptr);
+    if (name == "--seconds") {
+      arguments.seconds = value;
+    } else if (name == "--seed") {
+      arguments.palpation.seed = static_cast<std::uint64_t>(value);
+    } else if (name == "--radius") {
+      arguments.palpation.radius = value;
+    } else if (name == "--depth") {
+      arguments.palpation.most_depth = value;
+    } else if (name == "--turning") {
+      arguments.palpation.turning = value;
+    } else if (name == "--friction") {
+      arguments.friction = value;
+    } else {
+      throw Error("is no option", name, "see the head of palpation_study.cpp");
+    }
+  }
   return arguments;
 }
 
@@ -317,10 +354,6 @@ Arguments read_arguments(int argc, char** argv) {
 }  // namespace palpate
 
 int main(int argc, char** argv) {
-  if (argc < 2 || argc > 6) {
-    fmt::print(stderr, "usage: palpation_study MODEL.palpate.hdf [SECONDS [SEED [RADIUS [FRICTION]]]]\n");
-    return 2;
-  }
   try {
     palpate::study(palpate::read_arguments(argc, argv));
   } catch (const palpate::Error& error) {

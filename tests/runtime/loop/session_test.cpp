@@ -201,8 +201,8 @@ TEST(FramesInThePlane, ShowTheInterior) {
       const SurfaceLoad& load = state.surface.near.load();
       const Index stored = body.stored_node(static_cast<Index>(node));
       for (std::size_t k = 0; stored >= 0 && k < load.nodes().size(); ++k)
-        u += body.greens().block(stored, load.nodes()[k]) *
-             Vec3(load.forces()[2 * k], load.forces()[2 * k + 1], 0);
+        u.head<2>() += body.greens().block(stored, load.nodes()[k]) *
+                       Eigen::Vector2d(load.forces()[2 * k], load.forces()[2 * k + 1]);
       for (std::size_t axis = 0; axis < 2; ++axis)
         ASSERT_NEAR(picture.plane_displacement[3 * node + axis], u[static_cast<Eigen::Index>(axis)], 1e-7);
       largest = std::max(largest, static_cast<double>(picture.plane_von_mises[node]));

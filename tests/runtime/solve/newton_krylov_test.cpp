@@ -88,6 +88,34 @@ TEST(NewtonKrylov, ASolutionStaysAsItIs) {
   }
 }
 
+// What is predicted of the forces' change is where it begins: a right prediction costs one product, a wrong
+// one costs no more than that, and changes nothing.
+TEST_P(Friction, BeginsWithThePredictionWhereThatIsNearer) {
+  Grid grid(10, GetParam(), 0.6, 0.1, true);
+  NewtonKrylov solver(100, 300);
+  const auto solve_with = [&](const Eigen::VectorXd& prediction) {
+    std::copy_n(grid.b.data(), grid.problem.rows, grid.problem.b.begin());
+    std::fill(grid.problem.lambda.begin(), grid.problem.lambda.end(), 0.0);
+    std::copy_n(prediction.data(), grid.problem.rows, grid.problem.prediction.begin());
+    EXPECT_TRUE(solver.solve(grid.problem));
+    return grid.lambda();
+  };
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(grid.problem.rows);
+  const Eigen::VectorXd without = solve_with(none);
+  const int products = solver.products();
+  EXPECT_GT(products, 8);
+  const Eigen::VectorXd exact = by_sweeps(grid, GetParam(), without);
+
+  EXPECT_LT((solve_with(exact) - exact).norm(), 1e-6 * exact.norm());
+  EXPECT_EQ(solver.products(), 1);
+  EXPECT_LT((solve_with(0.99 * exact) - exact).norm(), 1e-2 * exact.norm());
+  EXPECT_LT(solver.products(), products);
+  EXPECT_EQ(solve_with(-exact), without) << "is no force at all";
+  EXPECT_EQ(solver.products(), products);
+  EXPECT_EQ(solve_with(100.0 * exact), without);
+  EXPECT_EQ(solver.products(), products + 1);
+}
+
 TEST_P(Friction, DerivativeIsThatOfFiniteDifferences) {
   Grid grid(8, GetParam(), 0.5, 0.05, true);
   NewtonKrylov solver(64, 192);

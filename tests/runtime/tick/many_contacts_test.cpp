@@ -243,6 +243,27 @@ TEST_P(ManyContacts, KeepWhatDoesNotChange) {
   EXPECT_LT(shares[shares.size() / 2], 0.1);
 }
 
+// While tools move, the forces' change is foreseen to first order.
+TEST_P(ManyContacts, ForeseeTheirForces) {
+  State state = begin(cube());
+  std::vector<double> shares;
+  for (int tick = 0; tick < 500; ++tick) {
+    step(cube(), state, poses(tick));
+    const ContactProblem& problem = state.scratch.problem;
+    if (!problem.many || tick < 50) continue;
+    const auto of_rows = [&](const std::vector<double>& values) {
+      return Eigen::Map<const Eigen::VectorXd>(values.data(), problem.rows);
+    };
+    const Eigen::VectorXd change = of_rows(problem.lambda) - of_rows(problem.guess);
+    if (change.isZero(0.0) || of_rows(problem.prediction).isZero(0.0)) continue;  // a second pass
+    shares.push_back((of_rows(problem.prediction) - change).norm() / change.norm());
+  }
+  ASSERT_GT(shares.size(), 200U);
+  const auto median = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
+  std::nth_element(shares.begin(), median, shares.end());
+  EXPECT_LT(*median, 0.5);
+}
+
 TEST(Remember, FindsContactsByTheirFeature) {
   State state(cube(), {.max_contacts = 100});
   std::mt19937_64 random(4);
