@@ -76,10 +76,10 @@ struct ConeTuning {
 /// The solver for contact of many points. The numbers are those of a comparison of solvers on the demo's
 /// bodies (docs/decisions).
 struct ManyTuning {
-  int few_contacts = 48;         ///< contact points that the direct solvers have room for, where some rub,
-  int few_closed = 16;           ///< of which so many may be closed;
+  int few_contacts = 36;         ///< contact points that the direct solvers have room for, where some rub,
+  int few_closed = 10;           ///< of which so many may be closed;
   int few_frictionless = 160;    ///< and contact points where none rubs
-  double open_gap = 0.002;       ///< [edge] a contact without force that is farther is left out of the tick
+  double open_gap = 0.02;        ///< [edge] a contact without force that is farther is left out of the tick
   double least_residual = 2e-8;  ///< [largest force] of the guess: nothing is to be done
   double no_change = 1e-7;  ///< [largest force] in a tick in which nothing moves: rounding changes as much
   double reduction = 0.01;  ///< [residual of the guess] that a tick reaches at least: rest is reached
