@@ -209,6 +209,14 @@ bool has_force(const std::vector<ShownForce>& trace, double from, double to) {
   });
 }
 
+/// Pauses between ticks that are longer than this [ns].
+std::ptrdiff_t pauses(const Felt& felt, std::int64_t longest) {
+  std::ptrdiff_t count = 0;
+  for (std::size_t k = 1; k < felt.computed.size(); ++k)
+    count += felt.computed[k].begun - felt.computed[k - 1].begun > longest ? 1 : 0;
+  return count;
+}
+
 class Faults : public testing::TestWithParam<Case> {};
 
 TEST_P(Faults, StayWithinTheClamps) {
@@ -220,7 +228,10 @@ TEST_P(Faults, StayWithinTheClamps) {
     felt = press(fault);
     ASSERT_NO_FATAL_FAILURE(expect_clamps(fault, felt));
     const auto hang = static_cast<std::int64_t>(1e9 * fault.loop_hangs);
-    if (felt.report.lateness.worst() < away + hang && has_force(felt.trace, 0.0, fault_time)) break;
+    // Beside the pause that is planted there is none.
+    if (felt.report.lateness.worst() < away + hang && pauses(felt, away) <= (hang > 0 ? 1 : 0) &&
+        has_force(felt.trace, 0.0, fault_time))
+      break;
   }
   keep_trace(fault, felt.trace);
 
