@@ -213,9 +213,9 @@ void Body::measure_surface() {
       const double length = (surface_rest_[a] - surface_rest_[b]).norm();
       longest_surface_edge_ = std::max(longest_surface_edge_, length);
       around += length;
+      sum += length;  // a closed surface has each edge as often
     }
     simplex_edges_.push_back(around / static_cast<double>(corners));
-    sum += around;  // a closed surface has each edge as often
   }
   mean_surface_edge_ = sum / static_cast<double>(simplices().size());
 }

@@ -131,7 +131,8 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
 }
 
 /// Whether a candidate from `begin` on is at the same place with the same normal. `vertex`: the surface node
-/// that the place is, -1 where it is none; at other nodes there is no such candidate.
+/// that the place is, -1 where it is none. A node's first candidate is compared with those between nodes
+/// alone: at other nodes there is none like it.
 bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const Vec3& position,
                   const Vec3& normal, Index vertex) noexcept {
   const double near = tuning.detection.same_place * body.mean_surface_edge();
@@ -140,12 +141,14 @@ bool is_duplicate(const Body& body, const Scratch& scratch, Index begin, const V
     return k >= begin && (other.position - position).squaredNorm() < near * near &&
            other.frame.col(0).dot(normal) > 1.0 - tuning.detection.same_direction;
   };
-  if (vertex >= 0) {
-    const Index k = scratch.candidate_at_node[vertex];
-    if (k < scratch.candidate_count && is_same(k)) return true;
+  const Index at_node = vertex < 0 ? -1 : scratch.candidate_at_node[vertex];
+  const bool is_first = vertex >= 0 && (at_node < begin || at_node >= scratch.candidate_count ||
+                                        scratch.candidates[at_node].position != position);
+  if (is_first) {
     const auto between = scratch.candidates_between.begin();
     return std::any_of(between, between + scratch.between_count, is_same);
   }
+  if (at_node >= 0 && is_same(at_node)) return true;
   for (Index k = begin; k < scratch.candidate_count; ++k) {
     if (is_same(k)) return true;
   }
