@@ -183,6 +183,7 @@ void NewtonKrylov::enter_cone(const Contact& contact) noexcept {
     change_force(contact, (contact.mu * normal / length - 1.0) * tangent);
 }
 
+/// All contacts enter their cones; rows that are there for a contact without force go with it.
 void NewtonKrylov::enter_cones() noexcept {
   const std::span<const Contact> all = std::span(contacts_).first(static_cast<std::size_t>(count_));
   for (const Contact& contact : all) {

@@ -101,7 +101,8 @@ Wish next_wish(const Palpation& palpation, Random& random, std::int64_t now, dou
   return {speed, random.between(0.0, palpation.most_depth), false, ticks(random.between(0.3, 2.0))};
 }
 
-/// Turns the device at this speed about an axis that wanders. Random numbers of its own: the way is the same.
+/// Turns the device at this speed [rad/s] about an axis that wanders. It draws random numbers of its own, so
+/// that the way is the same with and without.
 void turn_device(std::vector<ToolPose>& poses, double speed, std::uint64_t seed) {
   Random random(seed);
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();

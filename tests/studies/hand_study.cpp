@@ -213,6 +213,9 @@ int main(int count, char** words) {
   try {
     palpate::study(palpate::read(count, words));
     return 0;
+  } catch (const palpate::Error& error) {
+    std::fputs(palpate::to_text(error).c_str(), stderr);
+    return 1;
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 1;
