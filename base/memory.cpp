@@ -3,8 +3,10 @@
 #include <sys/mman.h>
 
 #include <cstddef>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
+#include <new>
 #include <string>
 
 namespace palpate {
@@ -35,6 +37,19 @@ std::shared_ptr<void> map_memory(std::int64_t bytes) {
   const std::uintptr_t aligned = (address + huge_page - 1) / huge_page * huge_page;
   const std::shared_ptr<void> mapping(base, [size](void* p) { munmap(p, size); });
   return {mapping, static_cast<std::byte*>(base) + (aligned - address)};
+}
+
+void* allocate_large(std::size_t bytes) {
+  const auto page = static_cast<std::size_t>(huge_page);
+  const bool is_large = bytes >= page;
+  void* memory = is_large ? std::aligned_alloc(page, (bytes + page - 1) / page * page) : std::malloc(bytes);
+  if (memory == nullptr && bytes > 0) throw std::bad_alloc();
+  if (is_large) madvise(memory, bytes, MADV_HUGEPAGE);
+  return memory;
+}
+
+void free_large(void* memory) noexcept {
+  std::free(memory);
 }
 
 }  // namespace palpate

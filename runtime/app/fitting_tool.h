@@ -5,7 +5,7 @@
 
 #include "runtime/app/play.h"
 #include "runtime/body/body.h"
-#include "runtime/tick/tool.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate {
 

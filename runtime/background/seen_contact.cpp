@@ -1,14 +1,15 @@
 #include "runtime/background/seen_contact.h"
 
+#include "runtime/touch/contact_nodes.h"
+
 namespace palpate {
 namespace {
 
 /// Where the surface is now at a contact.
-Vec3 surface_position(const State& state, const ContactPoint& contact) noexcept {
+Vec3 surface_position(const Body& body, const State& state, const ContactPoint& contact) noexcept {
   Vec3 position = Vec3::Zero();
-  for (std::size_t k = 0; k < contact.nodes.size(); ++k) {
-    if (contact.nodes[k] >= 0) position += contact.weights[k] * state.surface.tree.position(contact.nodes[k]);
-  }
+  for_each_node(body, state.surface.near, contact,
+                [&](Index node, double weight) { position += weight * state.surface.tree.position(node); });
   return position;
 }
 
@@ -22,8 +23,8 @@ Vec3 normal_of(const Body& body, const State& state, const ContactPoint& contact
 }  // namespace
 
 SeenContact seen_contact(const Body& body, const State& state, const ContactPoint& contact) noexcept {
-  return {surface_position(state, contact), normal_of(body, state, contact), Vec3::Zero() - contact.force,
-          contact.held};
+  return {surface_position(body, state, contact), normal_of(body, state, contact),
+          Vec3::Zero() - contact.force, contact.held};
 }
 
 }  // namespace palpate

@@ -7,6 +7,7 @@
 #include "runtime/background/element_stress.h"
 #include "runtime/body/surface_load.h"
 #include "runtime/solve/node_vectors.h"
+#include "runtime/touch/contact_nodes.h"
 
 namespace palpate {
 namespace {
@@ -44,11 +45,14 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
     : body_(body),
       options_(options),
       sink_(std::move(sink)),
-      moments_(
-          Moment{.load = state.surface.near.load(),
-                 .motion = MotionSnapshot(body),
-                 .touches = std::vector<Touch>(state.contact_points.size()),
-                 .forces = std::vector<NodalForce>(static_cast<std::size_t>(state.surface.near.capacity()))}),
+      moments_(Moment{
+          .load = state.surface.near.load(),
+          .motion = MotionSnapshot(body),
+          .touches = std::vector<SeenContact>(state.contact_points.size()),
+          .presses = std::vector<NodalPress>(3 * state.contact_points.size() +
+                                             static_cast<std::size_t>(state.surface.near.capacity())),
+
+          .forces = std::vector<NodalForce>(2 * static_cast<std::size_t>(state.surface.near.capacity()))}),
       rest_(body.surface_in_mesh()),
       stored_(body.greens().order()),
       u_(rest_.size()),
@@ -93,15 +97,32 @@ void SurfaceFrames::post(const State& state, std::int64_t tick, double time) noe
 
 void SurfaceFrames::take_contacts(const State& state, Moment& moment) const noexcept {
   moment.touch_count = 0;
+  moment.press_count = 0;
   for (const ContactPoint& contact : state.contacts()) {
     if (contact.force.isZero(0.0)) continue;
-    moment.touches[moment.touch_count++] = {seen_contact(body_, state, contact), contact.nodes,
-                                            contact.weights};
+    const SeenContact seen = seen_contact(body_, state, contact);
+    const double normal = -seen.force.dot(seen.normal);
+    moment.touches[moment.touch_count++] = seen;
+    for_each_node(body_, state.surface.near, contact, [&](Index node, double weight) {
+      moment.presses[moment.press_count++] = {node, weight * normal};
+    });
   }
   moment.force_count = 0;
   for (Index place = 0; place < state.surface.near.count(); ++place) {
     const Vec3 force = state.surface.near.force(place);
-    if (!force.isZero(0.0)) moment.forces[moment.force_count++] = {state.surface.near.node(place), force};
+    if (force.isZero(0.0)) continue;
+    const Index node = state.surface.near.node(place);
+    const Index group = body_.aggregate_of(node);
+    if (group < 0) {
+      moment.forces[moment.force_count++] = {node, force};
+      continue;
+    }
+    const std::span<const Index> members = body_.aggregates().members(group);
+    const std::span<const double> weights = state.surface.near.group_weights(place);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      if (weights[k] != 0.0)
+        moment.forces[moment.force_count++] = {members[k], state.surface.near.group_maps(place)[k] * force};
+    }
   }
 }
 
@@ -141,14 +162,14 @@ void SurfaceFrames::compute(const Moment& moment) {
   }
   show_stress(moment, frame);
   show_pressure(moment, frame);
-  for (std::size_t k = 0; k < moment.touch_count; ++k) picture.contacts.push_back(moment.touches[k].seen);
+  for (std::size_t k = 0; k < moment.touch_count; ++k) picture.contacts.push_back(moment.touches[k]);
   if (interior_) show_interior(picture);
   sink_(std::move(picture));
 }
 
 void SurfaceFrames::show_stress(const Moment& moment, SurfaceFrame& frame) {
   const std::span<const NodalForce> forces(moment.forces.data(), moment.force_count);
-  for (const NodalForce& loaded : forces) force_[loaded.node] = loaded.force;
+  for (const NodalForce& loaded : forces) force_[loaded.node] += loaded.force;
   stress_.evaluate(u_, force_, moment.load.patch.get(), nodal_stress_);
   for (const NodalForce& loaded : forces) force_[loaded.node].setZero();
   frame.von_mises.reserve(nodal_stress_.size());
@@ -157,14 +178,9 @@ void SurfaceFrames::show_stress(const Moment& moment, SurfaceFrame& frame) {
 
 void SurfaceFrames::show_pressure(const Moment& moment, SurfaceFrame& frame) const {
   frame.pressure.resize(u_.size());
-  for (std::size_t k = 0; k < moment.touch_count; ++k) {
-    const Touch& touch = moment.touches[k];
-    const double normal = -touch.seen.force.dot(touch.seen.normal);
-    for (std::size_t n = 0; n < touch.nodes.size(); ++n) {
-      if (touch.nodes[n] < 0) continue;
-      const auto node = static_cast<std::size_t>(touch.nodes[n]);
-      frame.pressure[node] += static_cast<float>(touch.weights[n] * normal / stress_.areas()[node]);
-    }
+  for (std::size_t k = 0; k < moment.press_count; ++k) {
+    const auto node = static_cast<std::size_t>(moment.presses[k].node);
+    frame.pressure[node] += static_cast<float>(moment.presses[k].force / stress_.areas()[node]);
   }
 }
 

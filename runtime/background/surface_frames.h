@@ -58,11 +58,10 @@ class SurfaceFrames {
   void post(const State& state, std::int64_t tick, double time) noexcept;
 
  private:
-  /// A closed contact point, and how its force is spread over surface nodes.
-  struct Touch {
-    SeenContact seen;
-    std::array<Index, 3> nodes{-1, -1, -1};
-    std::array<double, 3> weights{};
+  /// What a closed contact point presses a surface node with along its normal [N].
+  struct NodalPress {
+    Index node = -1;
+    double force = 0.0;
   };
   struct NodalForce {
     Index node = -1;  // surface node
@@ -73,9 +72,11 @@ class SurfaceFrames {
     ToolPose tool{};
     SurfaceLoad load;
     MotionSnapshot motion;
-    std::vector<Touch> touches;      // [most contacts] the first `touch_count`
-    std::vector<NodalForce> forces;  // [most nodes near the tools] the first `force_count`
+    std::vector<SeenContact> touches;  // [most contacts] the first `touch_count`
+    std::vector<NodalPress> presses;  // [3 most contacts + most nodes near the tools] the first `press_count`
+    std::vector<NodalForce> forces;   // [2 x most nodes near the tools] the first `force_count`
     std::size_t touch_count = 0;
+    std::size_t press_count = 0;
     std::size_t force_count = 0;
     Wrench on_body{};
     std::int64_t tick = -1;

@@ -107,6 +107,9 @@ Body::Body(Model model, const GreensOptions& options, int refinement, ContactMod
   order_by_last_part();
   find_free_nodes();
   follow_body();
+  std::vector<bool> moves;
+  for (Index node = 0; node < fine_.nodes(); ++node) moves.push_back(refinement_ == 1 && surface_moves(node));
+  aggregates_ = SurfaceAggregates(dimension(), simplices(), moves);
   for (const Index element : fine_.element) {
     const Index material = model_.material_of_element[element];
     surface_friction_.push_back(model_.materials[material].friction);

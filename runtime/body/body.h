@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <span>
 #include <vector>
 
 #include "formats/model.h"
+#include "runtime/body/aggregates.h"
 #include "runtime/body/fine_surface.h"
 #include "runtime/body/greens.h"
 
@@ -98,6 +100,16 @@ class Body {
   [[nodiscard]] bool surface_moves(Index node) const noexcept { return !surface_parts(node).stored.empty(); }
   /// Most stored nodes that a surface node follows.
   [[nodiscard]] Index most_surface_parts() const noexcept { return most_surface_parts_; }
+  /// Groups of neighbouring surface nodes; none of a refined surface, which is for overlays.
+  [[nodiscard]] const SurfaceAggregates& aggregates() const noexcept { return aggregates_; }
+  /// Number of a group among the surface nodes: after all of them.
+  [[nodiscard]] Index aggregate_node(Index group) const noexcept {
+    return static_cast<Index>(surface_rest_.size()) + group;
+  }
+  /// Group that a number stands for, -1 where it is a surface node's.
+  [[nodiscard]] Index aggregate_of(Index node) const noexcept {
+    return std::max<Index>(node - static_cast<Index>(surface_rest_.size()), -1);
+  }
   /// Surface nodes whose last part is a stored node: with it, all that they follow are known.
   [[nodiscard]] std::span<const Index> followers(Index stored) const noexcept {
     const auto first = static_cast<std::size_t>(first_follower_[stored]);
@@ -143,6 +155,7 @@ class Body {
   std::vector<Index> part_stored_;
   std::vector<double> part_weight_;
   Index most_surface_parts_ = 1;
+  SurfaceAggregates aggregates_;
   std::vector<Index> first_follower_;     // [stored + 1]
   std::vector<Index> followers_;          // surface nodes
   std::vector<Vec3> surface_rest_;        // [S]

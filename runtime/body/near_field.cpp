@@ -8,22 +8,16 @@
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
-namespace {
-
-std::size_t at(Index i) noexcept {
-  return static_cast<std::size_t>(i);
-}
-
-}  // namespace
-
 NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
     : dimension_(body.dimension()),
       capacity_(capacity),
-      parts_(body.most_surface_parts()),
+      surface_nodes_(static_cast<Index>(body.surface_rest_positions().size())),
+      parts_(std::max(body.most_surface_parts(), body.aggregates().most_members())),
+      most_members_(body.aggregates().most_members()),
       stride_((static_cast<std::ptrdiff_t>(dimension_) * capacity + 7) / 8 * 8),
       patch_stride_((static_cast<std::ptrdiff_t>(dimension_) * patch_nodes + 7) / 8 * 8),
       patch_room_(patch_nodes),
-      place_(body.surface_rest_positions().size(), -1),
+      place_(at(body.aggregate_node(body.aggregates().count())), -1),
       place_in_patch_(place_.size(), -1),
       nodes_(at(capacity), -1),
       wanted_(at(capacity), 0),
@@ -32,12 +26,14 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       last_force_(force_.size()),
       displacement_(force_.size()),
       blocks_(static_cast<std::size_t>(dimension_) * force_.size()),
-      base_(at(parts_ * capacity)),
+      base_(at(std::min(parts_ * capacity, body.greens().nodes()))),
       base_uses_(base_.size()),
       base_of_stored_(at(body.greens().nodes()), -1),
-      bases_of_(base_.size()),
-      part_weight_(base_.size()),
+      bases_of_(at(parts_ * capacity)),
+      part_weight_(bases_of_.size()),
       part_count_(at(capacity)),
+      group_weight_(at(most_members_ * capacity)),
+      group_map_(group_weight_.size()),
       by_base_(static_cast<std::size_t>(dimension_ * dimension_) * base_.size()),
       gathered_(static_cast<std::size_t>(dimension_ * dimension_) * std::max(base_.size(), at(patch_nodes))),
       base_force_(static_cast<std::size_t>(dimension_) * base_.size()),
@@ -63,15 +59,18 @@ Index NearField::longest_unwanted() const noexcept {
 
 void NearField::begin_tick() noexcept {
   ++tick_;
+  const std::int64_t patience =
+      tuning.body.patience * tuning.body.usual_nodes / std::max(count_, tuning.body.usual_nodes);
   for (int k = 0; k < 2; ++k) {
     const Index place = longest_unwanted();
-    if (place < 0 || wanted_[place] + tuning.body.patience >= tick_) return;
+    if (place < 0 || wanted_[place] + patience >= tick_) return;
     forget(place);
   }
 }
 
 bool NearField::want(const Body& body, Index surface_node) noexcept {
   if (place_of(surface_node) < 0) {
+    if (body.aggregate_of(surface_node) >= 0) return false;  // with which weights?
     if (count_ == capacity_) {
       const Index place = longest_unwanted();
       if (place < 0) return false;
@@ -80,6 +79,26 @@ bool NearField::want(const Body& body, Index surface_node) noexcept {
     add(body, surface_node);
   }
   wanted_[place_of(surface_node)] = tick_;
+  return true;
+}
+
+bool NearField::want_group(const Body& body, Index group, std::span<const double> weights,
+                           std::span<const Eigen::Matrix3d> maps) noexcept {
+  if (patch() != nullptr) return false;
+  const Index node = body.aggregate_node(group);
+  const Index old = place_of(node);
+  if (old >= 0 && is_loaded(old)) return false;
+  if (old >= 0) forget(old);
+  if (count_ == capacity_) {
+    const Index place = longest_unwanted();
+    if (place < 0) return false;
+    forget(place);
+  }
+  const std::ptrdiff_t first = std::ptrdiff_t{most_members_} * count_;
+  std::copy(weights.begin(), weights.end(), group_weight_.begin() + first);
+  std::copy(maps.begin(), maps.end(), group_map_.begin() + first);
+  add(body, node);
+  wanted_[at(place_of(node))] = tick_;
   return true;
 }
 
@@ -99,8 +118,20 @@ void NearField::add(const Body& body, Index surface_node) noexcept {
 void NearField::enter(const Body& body, Index place) noexcept {
   part_count_[at(place)] = 0;
   if (patch_place(place) >= 0) return;
-  const SurfaceParts parts = body.surface_parts(node(place));
-  part_count_[at(place)] = static_cast<Index>(parts.stored.size());
+  if (is_group(place)) {
+    const std::span<const Index> members = body.aggregates().members(body.aggregate_of(node(place)));
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      if (group_weights(place)[k] != 0.0) follow(body, place, members[k]);
+    }
+    return;
+  }
+  follow(body, place, node(place));
+  if (patch() != nullptr) respond(body, place);
+}
+
+/// Enters what a surface node that is at a place, or one of several there, follows.
+void NearField::follow(const Body& body, Index place, Index surface_node) noexcept {
+  const SurfaceParts parts = body.surface_parts(surface_node);
   for (std::size_t k = 0; k < parts.stored.size(); ++k) {
     Index& base = base_of_stored_[at(parts.stored[k])];
     if (base < 0) {
@@ -109,10 +140,10 @@ void NearField::enter(const Body& body, Index place) noexcept {
       base_uses_[at(base)] = 0;
     }
     ++base_uses_[at(base)];
-    bases_of_[at(parts_ * place) + k] = base;
-    part_weight_[at(parts_ * place) + k] = parts.weights[k];
+    const std::size_t part = at(parts_ * place + part_count_[at(place)]++);
+    bases_of_[part] = base;
+    part_weight_[part] = parts.weights[k];
   }
-  if (patch() != nullptr) respond(body, place);
 }
 
 /// Lets go of the stored nodes that nobody else follows; the last one takes the place of one that goes.
@@ -158,6 +189,8 @@ void NearField::respond(const Body& body, Index place) noexcept {
 void NearField::connect(const Body& body, Index place) noexcept {
   if (patch_place(place) >= 0) {
     connect_within_patch(place);
+  } else if (is_group(place)) {
+    connect_by_members(body, place);
   } else {
     connect_beside_patch(body, place);
   }
@@ -168,6 +201,48 @@ void NearField::connect(const Body& body, Index place) noexcept {
     std::copy_n(block, width, C_.data() + (d * place + axis) * stride_);
     double* column = C_.data() + d * place + axis;
     for (std::ptrdiff_t dof = 0; dof < width; ++dof) column[dof * stride_] = block[dof];
+  }
+}
+
+/// From the members' rows: group^T C group.
+void NearField::connect_by_members(const Body& body, Index place) noexcept {
+  const std::span<const Index> members = body.aggregates().members(body.aggregate_of(node(place)));
+  const std::span<const double> weights = group_weights(place);
+  const std::span<const Eigen::Matrix3d> maps = group_maps(place);
+  const std::ptrdiff_t d = dimension_;
+  const std::ptrdiff_t width = d * (place + 1);
+  std::fill_n(blocks_.data(), d * width, 0.0);
+  const auto for_each_entry = [&](auto&& visit) {
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      for (std::ptrdiff_t a = 0; a < d && weights[k] != 0.0; ++a) {
+        for (std::ptrdiff_t i = 0; i < d; ++i) visit(d * place_of(members[k]) + a, i, maps[k](a, i));
+      }
+    }
+  };
+  for_each_entry([&](std::ptrdiff_t dof, std::ptrdiff_t i, double factor) {
+    palpate::add(C_.data() + dof * stride_, factor, blocks_.data() + i * width, d * place);
+  });
+  for_each_entry([&](std::ptrdiff_t dof, std::ptrdiff_t j, double factor) {
+    for (std::ptrdiff_t i = 0; i < d; ++i)
+      blocks_[at(static_cast<Index>(i * width + d * place + j))] +=
+          factor * blocks_[at(static_cast<Index>(i * width + dof))];
+  });
+}
+
+/// What a node that comes is moved by along one axis by a group that is here: `by` has that of stored nodes.
+void NearField::connect_to_group(const Body& body, Index group, const double* by,
+                                 double* block) const noexcept {
+  const std::size_t members = body.aggregates().members(body.aggregate_of(node(group))).size();
+  Index part = parts_ * group;
+  std::fill_n(block, dimension_, 0.0);
+  for (std::size_t k = 0; k < members; ++k) {
+    if (group_weights(group)[k] == 0.0) continue;
+    const double* u = by + std::ptrdiff_t{dimension_} * bases_of_[at(part)];
+    for (int j = 0; j < dimension_; ++j) {
+      for (int a = 0; a < dimension_; ++a)
+        block[j] += part_weight_[at(part)] * group_maps(group)[k](a, j) * u[a];
+    }
+    ++part;
   }
 }
 
@@ -199,6 +274,11 @@ void NearField::connect_beside_patch(const Body& body, Index place) noexcept {
   for (Index i = 0; i < d; ++i) {
     const double* by = by_base_.data() + i * width;
     for (Index other = 0; other <= place; ++other) {
+      if (is_group(other)) {
+        connect_to_group(body, other, by, block);
+        block += d;
+        continue;
+      }
       for (Index j = 0; j < d; ++j) {
         double sum = 0.0;
         if (patch_place(other) >= 0) {
@@ -250,6 +330,12 @@ void NearField::move(Index from, Index to) noexcept {
               bases_of_.begin() + std::ptrdiff_t{parts_} * to);
   std::copy_n(part_weight_.begin() + std::ptrdiff_t{parts_} * from, parts_,
               part_weight_.begin() + std::ptrdiff_t{parts_} * to);
+  if (is_group(from)) {
+    std::copy_n(group_weight_.begin() + std::ptrdiff_t{most_members_} * from, most_members_,
+                group_weight_.begin() + std::ptrdiff_t{most_members_} * to);
+    std::copy_n(group_map_.begin() + std::ptrdiff_t{most_members_} * from, most_members_,
+                group_map_.begin() + std::ptrdiff_t{most_members_} * to);
+  }
   for (std::vector<double>* of_dofs : {&force_, &last_force_, &displacement_}) {
     std::copy_n(of_dofs->begin() + std::ptrdiff_t{dimension_} * from, dimension_,
                 of_dofs->begin() + std::ptrdiff_t{dimension_} * to);
@@ -259,6 +345,9 @@ void NearField::move(Index from, Index to) noexcept {
 
 bool NearField::change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept {
   if (patch != nullptr && std::ssize(patch->stored_nodes()) > patch_room_) return false;
+  for (Index place = 0; patch != nullptr && place < count_; ++place) {
+    if (is_group(place) && wanted_[at(place)] == tick_) return false;
+  }
   ++revision_;
   for (Index place = 0; place < count_; ++place) leave(place);
   const Index before = count_;
@@ -316,6 +405,22 @@ void NearField::load_patch(Index place) noexcept {
   }
 }
 
+/// What the force at a place puts on stored nodes.
+void NearField::load_bases(Index place) noexcept {
+  const Vec3 f = force(place);
+  std::size_t member = 0;
+  for (Index k = 0; k < part_count_[at(place)]; ++k) {
+    const auto part = at(parts_ * place + k);
+    Vec3 on_member = f;
+    if (is_group(place)) {
+      while (group_weights(place)[member] == 0.0) ++member;
+      on_member = group_maps(place)[member++] * f;
+    }
+    double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
+    for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * on_member[axis];
+  }
+}
+
 void NearField::displace() noexcept {
   const std::ptrdiff_t width = std::ptrdiff_t{dimension_} * count_;
   std::fill_n(displacement_.data(), width, 0.0);
@@ -327,11 +432,7 @@ void NearField::displace() noexcept {
     const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
     for (int axis = 0; axis < dimension_; ++axis)
       palpate::add(row(dimension_ * place + axis).data(), f[axis], displacement_.data(), width);
-    for (Index k = 0; k < part_count_[at(place)]; ++k) {
-      const auto part = at(parts_ * place + k);
-      double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
-      for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * f[axis];
-    }
+    load_bases(place);
     if (patch() != nullptr) load_patch(place);
   }
   const auto add = [&](const Index* stored, const double* force, Index count) {

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/memory.h"
 #include "runtime/body/body.h"
 #include "runtime/body/patch.h"
 #include "runtime/body/surface_load.h"
@@ -18,7 +19,9 @@ namespace palpate {
 ///
 /// With a patch, Xi is that of the body with the overlay: between surface nodes of the patch it is there,
 /// between them (H) and others (X = Xi_Q, of forces there without the overlay) it is H X, and between others
-/// Xi + X^T M X (theory.md section 4). All memory is taken at construction.
+/// Xi + X^T M X (theory.md section 4). A group of surface nodes (Body::aggregate_node) has a place as a node
+/// has: its displacement is a mean of the members', its force acts on all of them by the same weights. There
+/// are none with a patch. All memory is taken at construction.
 class NearField {
  public:
   /// Empty, with room for `capacity` nodes and for patches of up to `patch_nodes` nodes g.
@@ -44,11 +47,27 @@ class NearField {
   /// that was not wanted for longest goes. False when all others are wanted or loaded.
   bool want(const Body& body, Index surface_node) noexcept;
 
+  /// Puts a group here: a force f at its place puts maps[k] f on its k-th member, and its displacement is the
+  /// sum of maps[k]^T u_k. `weights`, whose sum is 1, are for whoever wants means; where one is 0 the member
+  /// does not belong to it. The others have to be here. False where there is no room, where the group is here
+  /// already and carries force, or with a patch.
+  bool want_group(const Body& body, Index group, std::span<const double> weights,
+                  std::span<const Eigen::Matrix3d> maps) noexcept;
+  /// Weights of the group's members at a place.
+  [[nodiscard]] std::span<const double> group_weights(Index place) const noexcept {
+    return {group_weight_.data() + std::ptrdiff_t{most_members_} * place, at(most_members_)};
+  }
+  /// Maps of the group's members at a place.
+  [[nodiscard]] std::span<const Eigen::Matrix3d> group_maps(Index place) const noexcept {
+    return {group_map_.data() + std::ptrdiff_t{most_members_} * place, at(most_members_)};
+  }
+
   /// The overlay that is in C, null for none.
   [[nodiscard]] const std::shared_ptr<const Patch>& patch() const noexcept { return load_.patch; }
   /// Gathers all of C anew, with another overlay or none. Forces and displacement stay as they are, so that
   /// nothing that is touched jumps away: the next forces are those of the new C. Nodes that were not wanted
-  /// in this tick are forgotten. False, and nothing happens, when the patch is larger than there is room for.
+  /// in this tick are forgotten. False, and nothing happens, when the patch is larger than there is room for,
+  /// or groups are wanted.
   bool change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept;
   /// How often all of C was gathered anew. As long as it is the same, so is what C has between two nodes that
   /// stay.
@@ -79,12 +98,17 @@ class NearField {
   void add(const Body& body, Index surface_node) noexcept;
   void forget(Index place) noexcept;
   void enter(const Body& body, Index place) noexcept;
+  void follow(const Body& body, Index place, Index surface_node) noexcept;
+  [[nodiscard]] bool is_group(Index place) const noexcept { return node(place) >= surface_nodes_; }
   void leave(Index place) noexcept;
   void move(Index from, Index to) noexcept;
   void connect(const Body& body, Index place) noexcept;
+  void connect_by_members(const Body& body, Index place) noexcept;
+  void connect_to_group(const Body& body, Index group, const double* by, double* block) const noexcept;
   void connect_within_patch(Index place) noexcept;
   void connect_beside_patch(const Body& body, Index place) noexcept;
   void respond(const Body& body, Index place) noexcept;
+  void load_bases(Index place) noexcept;
   void load_patch(Index place) noexcept;
   [[nodiscard]] Index longest_unwanted() const noexcept;
   [[nodiscard]] bool is_loaded(Index place) const noexcept;
@@ -96,37 +120,43 @@ class NearField {
     return dimension_ * std::ssize(load_.patch->stored_nodes());
   }
 
+  static std::size_t at(Index i) noexcept { return static_cast<std::size_t>(i); }
+
   int dimension_;
   Index capacity_;
-  Index parts_;  // room of each node for stored nodes that it follows
+  Index surface_nodes_;  // S
+  Index parts_;          // room of each place for stored nodes that it follows
+  Index most_members_;
   Index count_ = 0;
   std::ptrdiff_t stride_;
   std::ptrdiff_t patch_stride_;
   Index patch_room_;
   std::int64_t tick_ = 0;
   std::int64_t revision_ = 0;
-  std::vector<Index> place_;           // [S]
-  std::vector<Index> place_in_patch_;  // [S]
+  std::vector<Index> place_;           // [S + groups]
+  std::vector<Index> place_in_patch_;  // [S + groups]
   std::vector<Index> nodes_;           // [capacity] surface nodes
   std::vector<std::int64_t> wanted_;   // [capacity] tick in which each was wanted last
-  std::vector<double> C_;              // [d capacity x stride]
+  LargeVector<double> C_;              // [d capacity x stride]
   std::vector<double> force_;          // [d capacity]
   std::vector<double> last_force_;     // [d capacity] before `unload`
   std::vector<double> displacement_;   // [d capacity]
   std::vector<double> blocks_;         // [d x d capacity] block row of a node that comes
   // Stored nodes that those beside the patch follow, each once.
   Index base_count_ = 0;
-  std::vector<Index> base_;            // [parts capacity] stored nodes
-  std::vector<Index> base_uses_;       // [parts capacity] nodes that follow each
-  std::vector<Index> base_of_stored_;  // [stored nodes] -1 for none
-  std::vector<Index> bases_of_;        // [parts x capacity] of each node
-  std::vector<double> part_weight_;    // [parts x capacity]
-  std::vector<Index> part_count_;      // [capacity]
-  std::vector<double> by_base_;        // [d x d parts capacity] displacement of a node that comes
-  std::vector<double> gathered_;       // [d x d max(parts capacity, patch room)]
-  std::vector<double> base_force_;     // [d parts capacity]
-  std::vector<double> X_, Y_;          // [d capacity x patch stride] X and M X of nodes beside the patch
-  std::vector<double> patch_force_;    // [d patch room] on Q
+  std::vector<Index> base_;                 // [parts capacity, of the stored nodes at most] stored nodes
+  std::vector<Index> base_uses_;            // [as base] nodes that follow each
+  std::vector<Index> base_of_stored_;       // [stored nodes] -1 for none
+  std::vector<Index> bases_of_;             // [parts x capacity] of each node
+  std::vector<double> part_weight_;         // [parts x capacity]
+  std::vector<Index> part_count_;           // [capacity]
+  std::vector<double> group_weight_;        // [members x capacity] of places that are groups'
+  std::vector<Eigen::Matrix3d> group_map_;  // [as these]
+  std::vector<double> by_base_;             // [d x d parts capacity] displacement of a node that comes
+  std::vector<double> gathered_;            // [d x d max(parts capacity, patch room)]
+  std::vector<double> base_force_;          // [d parts capacity]
+  LargeVector<double> X_, Y_;               // [d capacity x patch stride] X and M X of nodes beside the patch
+  std::vector<double> patch_force_;         // [d patch room] on Q
   SurfaceLoad load_;
 };
 

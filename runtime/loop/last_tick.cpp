@@ -19,8 +19,22 @@ std::string contact_table(const Body& body, const State& state) {
     const double gap = held          ? 0.0
                        : is_left_out ? contact.gap
                                      : state.scratch.problem.gap(static_cast<Index>(k));
-    table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", x.x(), x.y(), x.z(), n.x(), n.y(), n.z(),
-                         f.x(), f.y(), f.z(), gap, contact.simplex, held ? 1 : 0);
+    const auto add_row = [&, held = held](const Vec3& place, const Vec3& normal, const Vec3& force) {
+      table += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", place.x(), place.y(), place.z(),
+                           normal.x(), normal.y(), normal.z(), force.x(), force.y(), force.z(), gap,
+                           contact.simplex, held ? 1 : 0);
+    };
+    if (contact.aggregate < 0) {
+      add_row(x, n, f);
+      continue;
+    }
+    const Index place = state.surface.near.place_of(body.aggregate_node(contact.aggregate));
+    const std::span<const Index> members = body.aggregates().members(contact.aggregate);
+    for (std::size_t j = 0; j < members.size(); ++j) {
+      const Eigen::Matrix3d& map = state.surface.near.group_maps(place)[j];
+      if (state.surface.near.group_weights(place)[j] != 0.0)
+        add_row(state.surface.tree.position(members[j]), (map * n).normalized(), map * f);
+    }
   }
   return table;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "runtime/safety/monotonic_clock.h"
+#include "runtime/touch/contact_nodes.h"
 
 namespace palpate {
 namespace {
@@ -272,12 +273,10 @@ class Loop {
     for (const ContactPoint& contact : parts_.state.contacts()) {
       if (contact.force.squaredNorm() == 0.0) continue;
       Vec3 moved = Vec3::Zero();  // inward
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Index node = contact.nodes[k];
-        if (node < 0) continue;
+      for_each_node(parts_.body, parts_.state.surface.near, contact, [&](Index node, double weight) {
         const Vec3& rest = parts_.body.surface_rest_positions()[static_cast<std::size_t>(node)];
-        moved += contact.weights[k] * (rest - parts_.state.surface.tree.position(node));
-      }
+        moved += weight * (rest - parts_.state.surface.tree.position(node));
+      });
       deepest =
           std::max(deepest, moved.dot(contact.held ? outward_normal(parts_.state.surface.tree,
                                                                     nodes_of(parts_.body, contact.simplex))

@@ -231,7 +231,10 @@ void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
                 positive_number, reach.has_value()},
         reach);
   visit(Setting{"max-contacts", SettingGroup::tool, "N", "", "256",
-                "most contact points; where there are more, the deepest are kept", contact_counts},
+                "most contact points; where there are nearly as many, neighbours are merged, and of what is "
+                "left the "
+                "deepest are kept",
+                contact_counts},
         max_contacts);
   for_each_body_setting(settings, visit);
   for_each_frame_setting(settings, visit);

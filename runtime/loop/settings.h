@@ -14,7 +14,7 @@
 #include "runtime/loop/loading.h"
 #include "runtime/safety/safety_options.h"
 #include "runtime/safety/workspace.h"
-#include "runtime/tick/tool.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate {
 

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "runtime/tick/local_model.h"
-#include "runtime/tick/tool.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate {
 

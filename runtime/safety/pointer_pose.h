@@ -1,7 +1,7 @@
 // What a pointer on a screen says of a tool.
 #pragma once
 
-#include "runtime/tick/tool.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate {
 

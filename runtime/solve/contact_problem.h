@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "base/memory.h"
 #include "meshes/mesh.h"
 
 namespace palpate {
@@ -75,8 +76,8 @@ struct ContactProblem {
   std::vector<std::uint8_t> held;  ///< [contacts]
   std::vector<Index> owner;        ///< [contacts] contact that a held row is there for, else -1
   std::vector<double> W;           ///< [rows x stride] [m/N]
-  std::vector<float> body_W;       ///< [rows x single_stride] where contacts are many [m/N]
-  std::vector<float> single_W;     ///< [rows x single_stride] with what couplings give way [m/N]
+  LargeVector<float> body_W;       ///< [rows x single_stride] where contacts are many [m/N]
+  LargeVector<float> single_W;     ///< [rows x single_stride] with what couplings give way [m/N]
   std::vector<double> b;           ///< [rows] [m]; where contacts are many, r by the guess
   std::vector<double> lambda;      ///< [rows] [N]; before solving: a guess
   std::vector<double> guess;       ///< [rows] lambda before solving [N]

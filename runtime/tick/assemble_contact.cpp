@@ -6,23 +6,31 @@
 
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
+#include "runtime/tick/contact_merging.h"
 #include "runtime/tick/rolling.h"
-#include "runtime/tick/tool_geometry.h"
+#include "runtime/touch/contact_nodes.h"
+#include "runtime/touch/tool_geometry.h"
 
 namespace palpate {
 namespace {
 
 /// Places of the contact's nodes in the near field.
-std::array<Index, 3> places_of(const NearField& near, const ContactPoint& contact) noexcept {
+std::array<Index, 3> places_of(const Body& body, const NearField& near,
+                               const ContactPoint& contact) noexcept {
   std::array<Index, 3> places{-1, -1, -1};
+  if (contact.aggregate >= 0) {
+    places[0] = near.place_of(body.aggregate_node(contact.aggregate));
+    return places;
+  }
   for (std::size_t n = 0; n < 3; ++n) {
     if (contact.nodes[n] >= 0) places[n] = near.place_of(contact.nodes[n]);
   }
   return places;
 }
 
-ContactRow contact_row(const NearField& near, const ContactPoint& contact, const Vec3& direction) noexcept {
-  ContactRow row{.places = places_of(near, contact),
+ContactRow contact_row(const Body& body, const NearField& near, const ContactPoint& contact,
+                       const Vec3& direction) noexcept {
+  ContactRow row{.places = places_of(body, near, contact),
                  .body = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()},
                  .tool = contact.tool,
                  .force = direction,
@@ -34,11 +42,11 @@ ContactRow contact_row(const NearField& near, const ContactPoint& contact, const
 }
 
 /// Radius times the slope along a tangent, as a row; where the contact rolls, with the motion of the tool.
-ContactRow tilt_row(const NearField& near, const ContactPoint& contact, double radius,
+ContactRow tilt_row(const Body& body, const NearField& near, const ContactPoint& contact, double radius,
                     const Vec3& tangent) noexcept {
   ContactRow row;
-  if (contact.rolls) row = contact_row(near, contact, tangent);
-  row.places = places_of(near, contact);
+  if (contact.rolls) row = contact_row(body, near, contact, tangent);
+  row.places = places_of(body, near, contact);
   for (std::size_t n = 0; n < 3; ++n) {
     if (row.places[n] >= 0) row.body[n] -= radius * contact.slope[n].dot(tangent) * contact.frame.col(0);
   }
@@ -56,13 +64,13 @@ double unloading(const NearField& near, const ContactRow& row) noexcept {
 
 /// Motion along a tangent of the surface itself since the tick before, which the places where the tick begins
 /// have in them already: what slides is the surface under the tool, by whatever it moves.
-double free_slip(const SurfaceState& surface, const ContactPoint& contact, const Vec3& tangent) noexcept {
+double free_slip(const Body& body, const SurfaceState& surface, const ContactPoint& contact,
+                 const Vec3& tangent) noexcept {
   if (!surface.motion.active()) return 0.0;
   double motion = 0.0;
-  for (std::size_t n = 0; n < 3; ++n) {
-    if (contact.nodes[n] >= 0)
-      motion += contact.weights[n] * tangent.dot(surface.motion.change(contact.nodes[n]));
-  }
+  for_each_node(body, surface.near, contact, [&](Index node, double weight) {
+    motion += weight * tangent.dot(surface.motion.change(node));
+  });
   return motion;
 }
 
@@ -74,7 +82,7 @@ const ContactPoint* same_contact(const Scratch& scratch, const ContactPoint& con
 
 /// What a contact's tool and surface move against each other in the tick if no force changes, and how far
 /// they are apart: along n, the gap.
-Vec3 motion_of(const State& state, const Scratch& scratch, const ContactPoint& contact,
+Vec3 motion_of(const Body& body, const State& state, const Scratch& scratch, const ContactPoint& contact,
                const ContactPoint* last) noexcept {
   const ToolState& tool = state.tools[contact.tool];
   Vec3 motion = device_motion(tool.pose, tool.device, contact.arm);
@@ -83,17 +91,17 @@ Vec3 motion_of(const State& state, const Scratch& scratch, const ContactPoint& c
   motion += contact.gap * n;
   Vec3 slip = Vec3::Zero();
   for (int i = 1; scratch.is_first_pass && i < scratch.problem.dimension; ++i)
-    slip -= free_slip(state.surface, contact, contact.frame.col(i)) * contact.frame.col(i);
+    slip -= free_slip(body, state.surface, contact, contact.frame.col(i)) * contact.frame.col(i);
   if (last != nullptr) slip += last->carry - n.dot(last->carry) * n;
   return motion + slip;
 }
 
 /// What is known of a contact before it is in the problem.
-UpcomingContact announce(const State& state, const Scratch& scratch, const ContactPoint& contact,
-                         double least_gap) noexcept {
+UpcomingContact announce(const Body& body, const State& state, const Scratch& scratch,
+                         const ContactPoint& contact, double least_gap) noexcept {
   UpcomingContact upcoming{.last = last_number(scratch, contact.feature)};
   const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last_contacts[upcoming.last];
-  upcoming.motion = motion_of(state, scratch, contact, last);
+  upcoming.motion = motion_of(body, state, scratch, contact, last);
   upcoming.stays_open = !contact.held && (last == nullptr || last->force.isZero(0.0)) &&
                         upcoming.motion.dot(contact.frame.col(0)) > least_gap;
   return upcoming;
@@ -148,7 +156,7 @@ void bring_into_order(State& state, Scratch& scratch) noexcept {
 
 /// Where contacts are many, those with friction and those that are held have a row for each axis: their
 /// compliance is that of their nodes as it stands, however the normals turn.
-void add_one_of_many(const State& state, Scratch& scratch, const ContactPoint& contact,
+void add_one_of_many(const Body& body, const State& state, Scratch& scratch, const ContactPoint& contact,
                      const UpcomingContact& upcoming) noexcept {
   ContactProblem& problem = scratch.problem;
   const ContactPoint* last = upcoming.last < 0 ? nullptr : &scratch.last_contacts[upcoming.last];
@@ -159,7 +167,7 @@ void add_one_of_many(const State& state, Scratch& scratch, const ContactPoint& c
   for (Index i = first; i < problem.rows; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const Vec3 direction = has_axes ? Vec3::Unit(i - first) : Vec3(contact.frame.col(0));
-    scratch.rows[at] = contact_row(state.surface.near, contact, direction);
+    scratch.rows[at] = contact_row(body, state.surface.near, contact, direction);
     problem.b[at] = direction.dot(upcoming.motion);
     if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
   }
@@ -191,18 +199,19 @@ void predict(const State& state, Scratch& scratch) noexcept {
   }
 }
 
-void add_many(State& state, Scratch& scratch, double least_gap) noexcept {
+void add_many(const Body& body, State& state, Scratch& scratch, double least_gap) noexcept {
   for (Index k = 0; k < state.contact_count; ++k)
-    scratch.upcoming[k] = announce(state, scratch, state.contact_points[k], least_gap);
+    scratch.upcoming[k] = announce(body, state, scratch, state.contact_points[k], least_gap);
   choose_order(state, scratch);
   bring_into_order(state, scratch);
   for (Index k = 0; k < state.contact_count; ++k)
-    add_one_of_many(state, scratch, state.contact_points[k], scratch.upcoming[k]);
+    add_one_of_many(body, state, scratch, state.contact_points[k], scratch.upcoming[k]);
   hand_on_responses(scratch, state.contact_count);
   if (scratch.is_first_pass) predict(state, scratch);
 }
 
-void add_one_of_few(const State& state, Scratch& scratch, const ContactPoint& contact) noexcept {
+void add_one_of_few(const Body& body, const State& state, Scratch& scratch,
+                    const ContactPoint& contact) noexcept {
   ContactProblem& problem = scratch.problem;
   const ContactPoint* last = same_contact(scratch, contact);
   const Index first = problem.rows;
@@ -213,11 +222,11 @@ void add_one_of_few(const State& state, Scratch& scratch, const ContactPoint& co
   for (Index i = first; i < problem.rows; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const Vec3 direction = contact.frame.col(i - first);
-    scratch.rows[at] = contact_row(state.surface.near, contact, direction);
+    scratch.rows[at] = contact_row(body, state.surface.near, contact, direction);
     problem.b[at] = direction.dot(motion) + unloading(state.surface.near, scratch.rows[at]);
     if (i == first && !contact.held) problem.b[at] += contact.gap;
     if (i > first && !contact.held && scratch.is_first_pass)
-      problem.b[at] -= free_slip(state.surface, contact, direction);
+      problem.b[at] -= free_slip(body, state.surface, contact, direction);
     if (last != nullptr) problem.lambda[at] = direction.dot(last->force);
   }
 }
@@ -240,7 +249,8 @@ double normal_force(const Scratch& scratch, const ContactPoint& contact, const C
   return count > 0.0 ? sum / count : 0.0;
 }
 
-void add_tilt(const State& state, Scratch& scratch, Index number, double force, double edge) noexcept {
+void add_tilt(const Body& body, const State& state, Scratch& scratch, Index number, double force,
+              double edge) noexcept {
   const ContactPoint& contact = state.contact_points[number];
   const ToolState& tool = state.tools[contact.tool];
   const double radius = rolling_radius(tool.tool, edge);
@@ -250,7 +260,7 @@ void add_tilt(const State& state, Scratch& scratch, Index number, double force, 
   const auto add = [&](const Vec3& tangent) {
     const auto at = static_cast<std::size_t>(scratch.problem.rows);
     scratch.problem.add_held_row(number);
-    scratch.rows[at] = tilt_row(state.surface.near, contact, radius, tangent);
+    scratch.rows[at] = tilt_row(body, state.surface.near, contact, radius, tangent);
     if (!scratch.problem.many) scratch.problem.b[at] = unloading(state.surface.near, scratch.rows[at]);
     if (contact.rolls) scratch.problem.b[at] += tangent.dot(tool.device.position - tool.pose.position);
     scratch.tilt_spring[at] = radius / force;
@@ -394,16 +404,29 @@ double exact_compliance(const Body& body, const NearField& near, const ContactRo
   std::array<double, most_exact_terms> left, right;
   std::fill_n(left.begin(), terms, 0.0);
   std::fill_n(right.begin(), terms, 0.0);
-  for (std::size_t n = 0; n < 3; ++n) {
-    if (row.places[n] < 0) continue;
-    const SurfaceParts parts = body.surface_parts(near.node(row.places[n]));
+  const auto add_node = [&](Index node, const Vec3& e) {
+    const SurfaceParts parts = body.surface_parts(node);
     for (std::size_t k = 0; k < parts.stored.size(); ++k) {
       for (int axis = 0; axis < greens.dimension(); ++axis) {
         const std::int64_t dof = std::int64_t{greens.dimension()} * parts.stored[k] + axis;
-        const double factor = parts.weights[k] * row.body[n][axis];
+        const double factor = parts.weights[k] * e[axis];
         add(greens.exact_left(dof), factor, left.data(), terms);
         add(greens.exact_right(dof), factor, right.data(), terms);
       }
+    }
+  };
+  for (std::size_t n = 0; n < 3; ++n) {
+    if (row.places[n] < 0) continue;
+    const Index node = near.node(row.places[n]);
+    const Index group = body.aggregate_of(node);
+    if (group < 0) {
+      add_node(node, row.body[n]);
+      continue;
+    }
+    const std::span<const Index> members = body.aggregates().members(group);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      if (near.group_weights(row.places[n])[k] != 0.0)
+        add_node(members[k], near.group_maps(row.places[n])[k] * row.body[n]);
     }
   }
   return dot(left.data(), right.data(), terms);
@@ -528,21 +551,22 @@ bool are_many(const State& state, const Scratch& scratch) noexcept {
 }  // namespace
 
 void assemble_contact(const Body& body, State& state, Scratch& scratch) noexcept {
+  hand_over_merged(body, state, scratch);
   scratch.problem.clear(are_many(state, scratch));
   std::fill(scratch.tilt_spring.begin(), scratch.tilt_spring.end(), 0.0);
   const std::span<const ContactPoint> contacts = state.contacts();
   const double edge = body.mean_surface_edge();
   if (scratch.problem.many) {
-    add_many(state, scratch, tuning.many.open_gap * edge);
+    add_many(body, state, scratch, tuning.many.open_gap * edge);
   } else {
-    for (const ContactPoint& contact : contacts) add_one_of_few(state, scratch, contact);
+    for (const ContactPoint& contact : contacts) add_one_of_few(body, state, scratch, contact);
   }
   const Index first_tilt_row = scratch.problem.rows;
   for (Index k = 0; k < state.contact_count; ++k) {
     const ContactPoint& contact = contacts[k];
     const double force =
         normal_force(scratch, contact, same_contact(scratch, contact), tuning.assembly.closed_gap * edge);
-    add_tilt(state, scratch, k, force, edge);
+    add_tilt(body, state, scratch, k, force, edge);
   }
   HighWater& most = scratch.high_water;
   most.contact_points = std::max(most.contact_points, state.contact_count);

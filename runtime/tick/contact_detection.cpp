@@ -5,8 +5,10 @@
 #include <limits>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/tick/contact_merging.h"
 #include "runtime/tick/force_error.h"
 #include "runtime/tick/rolling.h"
+#include "runtime/touch/contact_nodes.h"
 
 namespace palpate {
 namespace {
@@ -34,19 +36,6 @@ Vec3 displacement_of(const Body& body, const NearField& near, const ContactPoint
     u += contact.weights[k] * near.displacement(near.place_of(contact.nodes[k]));
   }
   return u;
-}
-
-/// Two tangents beside the normal: in the plane one within it.
-Eigen::Matrix3d frame_of(const Vec3& normal, int dimension) noexcept {
-  Eigen::Matrix3d frame;
-  frame.col(0) = normal;
-  if (dimension == 2) {
-    frame.col(1) = Vec3(-normal.y(), normal.x(), 0.0);
-  } else {
-    frame.col(1) = normal.unitOrthogonal();
-  }
-  frame.col(2) = frame.col(0).cross(frame.col(1));
-  return frame;
 }
 
 /// Gradients of the barycentric weights that are not zero, along the edge or face that they span.
@@ -165,12 +154,14 @@ Index vertex_of(const SimplexNodes& nodes, const std::array<double, 3>& weights)
 
 /// Whether a grab of the tool holds a node of a simplex: there the tool does not push as well, as place and
 /// contact would be levers against each other. What is touched then does not hang on how the surface lies.
-bool is_held(const State& state, Index tool, const SimplexNodes& nodes) noexcept {
+bool is_held(const Body& body, const State& state, Index tool, const SimplexNodes& nodes) noexcept {
   const auto begin = state.contact_points.begin();
   return std::any_of(begin, begin + state.held_count, [&](const ContactPoint& held) {
-    return held.tool == tool && std::any_of(held.nodes.begin(), held.nodes.end(), [&](Index node) {
-             return node >= 0 && std::find(nodes.begin(), nodes.end(), node) != nodes.end();
-           });
+    bool shares_node = false;
+    for_each_node(body, state.surface.near, held, [&](Index node, double) {
+      shares_node = shares_node || std::find(nodes.begin(), nodes.end(), node) != nodes.end();
+    });
+    return held.tool == tool && shares_node;
   });
 }
 
@@ -213,7 +204,7 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.position = pair.nearest.on_simplex;
   contact.arm = contact.position - tool.pose.position;
   contact.slope = slopes(state.surface.tree, contact.nodes);
-  contact.frame = frame_of(normal, body.dimension());
+  contact.frame = contact_frame(normal, body.dimension());
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
   contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
@@ -353,7 +344,7 @@ void roll_ahead(const Body& body, const ToolState& tool, Scratch& scratch, Index
     const Vec3 normal = contact.frame.col(0);
     const Vec3 rolled = rolled_normal(normal, shift, radius);
     const double nearer = (1.0 - rolled.dot(normal)) * (contact.gap + tool.tool.radius);
-    contact.frame = frame_of(rolled, body.dimension());
+    contact.frame = contact_frame(rolled, body.dimension());
     contact.gap -= nearer;
     contact.free_gap -= nearer;
   }
@@ -387,10 +378,20 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
   }
   for (Index k = 0; k < touch.usable; ++k) {
     const TouchingPair& pair = scratch.pairs[k];
-    if (!is_held(state, number, nodes_of(body, pair.simplex)))
+    if (!is_held(body, state, number, nodes_of(body, pair.simplex)))
       touch_simplex(body, state, scratch, touch, pair);
   }
   if (scratch.is_first_pass) roll_ahead(body, tool, scratch, touch.first_candidate);
+}
+
+/// Puts the nodes that a held contact moves with into the near field; whether they find room.
+bool want_held(const Body& body, SurfaceState& surface, const ContactPoint& held) noexcept {
+  bool moved = false;
+  bool room = true;
+  for_each_node(body, surface.near, held, [&](Index node, double) {
+    room = want_nodes(body, surface, {node, -1, -1}, moved) && room;
+  });
+  return room && (held.aggregate < 0 || surface.near.want(body, body.aggregate_node(held.aggregate)));
 }
 
 /// Where held contacts are now. Those whose nodes find no room are let go.
@@ -399,16 +400,14 @@ void update_held(const Body& body, State& state) noexcept {
   for (Index k = 0; k < state.held_count; ++k) {
     ContactPoint& contact = state.contact_points[k];
     ToolState& tool = state.tools[contact.tool];
-    bool moved = false;
-    if (!want_nodes(body, state.surface, contact.nodes, moved)) {
+    if (!want_held(body, state.surface, contact)) {
       tool.status |= StepStatus::capacity_full;
       continue;
     }
     contact.position.setZero();
-    for (std::size_t n = 0; n < 3; ++n) {
-      if (contact.nodes[n] >= 0)
-        contact.position += contact.weights[n] * state.surface.tree.position(contact.nodes[n]);
-    }
+    for_each_node(body, state.surface.near, contact, [&](Index node, double weight) {
+      contact.position += weight * state.surface.tree.position(node);
+    });
     contact.arm = tool.pose.orientation * contact.tool_point;
     state.contact_points[kept++] = contact;
   }
@@ -425,6 +424,7 @@ void find_contacts(const Body& body, State& state, Scratch& scratch) noexcept {
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k) {
     if (state.tools[k].engaged) find_candidates(body, state, scratch, k);
   }
+  merge_contacts(body, state, scratch);
 
   const Index room = state.max_contacts() - state.held_count;
   const auto begin = scratch.candidates.begin();

@@ -41,6 +41,7 @@ void retreat_from_leaps(const Body& body, State& state) noexcept {
   double farthest = 0.0;
   for (Index place = 0; place < state.surface.near.count(); ++place) {
     const Index node = state.surface.near.node(place);
+    if (body.aggregate_of(node) >= 0) continue;
     const Vec3 to = unloaded_position(body, state.surface, node) + state.surface.near.displacement(place);
     farthest = std::max(farthest, (to - state.surface.tree.position(node)).norm());
   }
@@ -94,7 +95,7 @@ void change_patch(const Body& body, State& state) noexcept {
 /// Whether an iterative solver has changed no force of the tick before by more than what is nothing.
 bool changes_nothing(const Scratch& scratch) noexcept {
   const ContactProblem& problem = scratch.problem;
-  if (problem.frictionless && !problem.many) return false;
+  if ((problem.frictionless && !problem.many) || scratch.merging.has_changed) return false;
   double largest = 0.0;
   double all = 0.0;
   for (Index k = 0; k < scratch.last_count; ++k) {

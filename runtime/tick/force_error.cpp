@@ -6,7 +6,7 @@
 #include <span>
 
 #include "runtime/solve/tick_tuning.h"
-#include "runtime/tick/touching_pair.h"
+#include "runtime/touch/touching_pair.h"
 
 namespace palpate {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "runtime/tick/state.h"
-#include "runtime/tick/tool_geometry.h"
+#include "runtime/touch/tool_geometry.h"
 
 namespace palpate {
 

@@ -2,23 +2,23 @@
 
 #include <algorithm>
 
+#include "runtime/touch/contact_nodes.h"
+
 namespace palpate {
 namespace {
 
 /// Where a place of the surface was at the end of the last tick, as the tool's pose was. (A contact point's
 /// own position is that of its beginning.)
-Vec3 last_place(const SurfaceState& surface, const ContactPoint& contact) noexcept {
+Vec3 last_place(const Body& body, const SurfaceState& surface, const ContactPoint& contact) noexcept {
   Vec3 place = Vec3::Zero();
-  for (std::size_t n = 0; n < 3; ++n) {
-    const Index node = contact.nodes[n];
-    if (node < 0) continue;
-    place += contact.weights[n] * surface.tree.position(node);
-    if (surface.motion.active()) place -= contact.weights[n] * surface.motion.change(node);
-  }
+  for_each_node(body, surface.near, contact, [&](Index node, double weight) {
+    place += weight * surface.tree.position(node);
+    if (surface.motion.active()) place -= weight * surface.motion.change(node);
+  });
   return place;
 }
 
-void hold_contact(State& state, const ContactPoint& contact) noexcept {
+void hold_contact(const Body& body, State& state, const ContactPoint& contact) noexcept {
   const ToolState& tool = state.tools[contact.tool];
   ContactPoint held = contact;
   held.held = true;
@@ -26,7 +26,7 @@ void hold_contact(State& state, const ContactPoint& contact) noexcept {
   held.feature = -1 - state.held_count;
   held.frame.setIdentity();
   held.tool_point =
-      tool.pose.orientation.conjugate() * (last_place(state.surface, contact) - tool.pose.position);
+      tool.pose.orientation.conjugate() * (last_place(body, state.surface, contact) - tool.pose.position);
   state.contact_points[state.held_count++] = held;
 }
 
@@ -48,7 +48,7 @@ bool reach_out(const Body& body, State& state, Index number) noexcept {
     free = free || body.surface_moves(contact.nodes[k]);
   }
   if (!free) return false;
-  hold_contact(state, contact);
+  hold_contact(body, state, contact);
   return true;
 }
 
@@ -59,7 +59,7 @@ void begin_hold(const Body& body, State& state, const Scratch& scratch, Index nu
   for (Index k = 0; k < scratch.last_count && state.held_count < state.max_contacts(); ++k) {
     const ContactPoint& contact = scratch.last_contacts[k];
     if (contact.tool == number && !contact.held && contact.force.dot(contact.frame.col(0)) > 0.0)
-      hold_contact(state, contact);
+      hold_contact(body, state, contact);
   }
   tool.holding = state.held_count > before;
   if (tool.holding || state.held_count == state.max_contacts()) return;

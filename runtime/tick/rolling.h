@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "runtime/solve/tick_tuning.h"
-#include "runtime/tick/contact_point.h"
-#include "runtime/tick/tool.h"
+#include "runtime/touch/contact_point.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate {
 

@@ -56,15 +56,24 @@ RollingScratch::RollingScratch(int dimension, Index max_contacts, Index max_rows
       row_force(following.size()),
       device_change(following.size()) {}
 
+MergingScratch::MergingScratch(Index surface_nodes, Index groups, Index most_members, Index max_contacts)
+    : candidate_of_node(size(surface_nodes), -1),
+      merged(size(max_contacts)),
+      weights(size(most_members)),
+      maps(weights.size(), Eigen::Matrix3d::Zero()),
+      feature(size(groups), -1) {}
+
 Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes)
     : last_contacts(size(max_contacts)),
       last_of_feature(places_of_features(max_contacts), -1),
       found(body.surface_friction().size()),
       found_distance(body.surface_friction().size()),
-      pairs(size(2 * max_contacts)),
+      pairs(size(std::min(8 * max_contacts, static_cast<Index>(body.surface_friction().size())))),
       candidates(size(3 * tools) * pairs.size()),
       candidate_at_node(body.surface_rest_positions().size(), -1),
       candidates_between(candidates.size()),
+      merging(static_cast<Index>(candidate_at_node.size()), body.aggregates().count(),
+              body.aggregates().most_members(), max_contacts),
       left_out(candidates.size() + std::min(most_simplices_left_out, found.size())),
       problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
               most_rows(body, many(max_contacts))),
@@ -99,11 +108,14 @@ void remember(std::span<const ContactPoint> contacts, Scratch& scratch) noexcept
   }
   std::copy(contacts.begin(), contacts.end(), scratch.last_contacts.begin());
   scratch.last_count = static_cast<Index>(contacts.size());
-  for (Index k = 0; k < scratch.last_count; ++k) {
-    std::size_t at = hash(contacts[size(k)].feature) & mask;
-    while (scratch.last_of_feature[at] >= 0) at = (at + 1) & mask;
-    scratch.last_of_feature[at] = k;
-  }
+  for (Index k = 0; k < scratch.last_count; ++k) enter_feature(scratch, k);
+}
+
+void enter_feature(Scratch& scratch, Index number) noexcept {
+  const std::size_t mask = scratch.last_of_feature.size() - 1;
+  std::size_t at = hash(scratch.last_contacts[size(number)].feature) & mask;
+  while (scratch.last_of_feature[at] >= 0) at = (at + 1) & mask;
+  scratch.last_of_feature[at] = number;
 }
 
 Index last_number(const Scratch& scratch, std::int64_t feature) noexcept {

@@ -12,9 +12,9 @@
 #include "runtime/solve/imbalance.h"
 #include "runtime/solve/newton_krylov.h"
 #include "runtime/tick/compliance.h"
-#include "runtime/tick/contact_point.h"
 #include "runtime/tick/rolling.h"
-#include "runtime/tick/touching_pair.h"
+#include "runtime/touch/contact_point.h"
+#include "runtime/touch/touching_pair.h"
 
 namespace palpate {
 
@@ -35,6 +35,24 @@ struct UpcomingContact {
       Vec3::Zero();  ///< of tool and surface against each other if no force changes, and the gap [m]
 };
 
+/// A group of surface nodes that were one contact point in the tick before.
+struct MergedGroup {
+  Index last = -1;      ///< in Scratch::last_contacts
+  double defect = 0.0;  ///< how much its members' gaps differ from their mean at most [m]
+};
+
+/// For merging.
+struct MergingScratch {
+  MergingScratch(Index surface_nodes, Index groups, Index most_members, Index max_contacts);
+
+  std::vector<Index> candidate_of_node;  ///< [S] the candidate at a surface node, -1 none, -2 several
+  std::vector<MergedGroup> merged;       ///< [max_contacts] in the tick before
+  std::vector<double> weights;           ///< [members] of the group that is merged
+  std::vector<Eigen::Matrix3d> maps;     ///< [members] of it
+  std::vector<std::int64_t> feature;     ///< [groups] of the contact point of each, -1 none
+  bool has_changed = false;              ///< other nodes are merged than in the tick or pass before
+};
+
 /// What stages of a tick hand to each other. No tick needs it from the one before: only `high_water` goes on,
 /// the compliance and responses of many contacts, without which they are computed from nothing; the problem's
 /// forces may be read until the next tick. Sized at start. Each member: shape, who fills it.
@@ -47,12 +65,14 @@ struct Scratch {
   std::vector<Index> last_of_feature;    ///< [power of 2] `remember`: their numbers, hashed by feature
   std::vector<Index> found;              ///< [F] detection, free motion: simplices near a tool
   std::vector<double> found_distance;    ///< [F] detection: squared [m^2]
-  std::vector<TouchingPair> pairs;       ///< [2 max_contacts] detection
-  std::vector<ContactPoint> candidates;  ///< [6 max_contacts tools] detection: before the deepest are chosen
+  std::vector<TouchingPair> pairs;       ///< [8 max_contacts] detection
+  std::vector<ContactPoint> candidates;  ///< [24 max_contacts tools] detection: before they are merged, and
+                                         ///< the deepest chosen
   Index candidate_count = 0;
   std::vector<Index> candidate_at_node;   ///< [S] detection: candidate at a surface node that was found last
   std::vector<Index> candidates_between;  ///< [as candidates] detection: those that are no surface node
   Index between_count = 0;
+  MergingScratch merging;         ///< merging
   std::size_t found_count = 0;    ///< detection: of `found`, within a tool's reach
   std::vector<LeftOut> left_out;  ///< detection: places for which there was no room
   Index left_out_count = 0;
@@ -87,6 +107,9 @@ struct Scratch {
 
 /// Keeps contact points as those of the tick (or pass) before.
 void remember(std::span<const ContactPoint> contacts, Scratch& scratch) noexcept;
+
+/// Enters scratch.last_contacts[number] into the table of features; not for one that is in it.
+void enter_feature(Scratch& scratch, Index number) noexcept;
 
 /// Number of the contact of the tick before with this feature, -1 where there was none.
 [[nodiscard]] Index last_number(const Scratch& scratch, std::int64_t feature) noexcept;

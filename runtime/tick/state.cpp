@@ -73,13 +73,15 @@ double least_compliance_of_a_node(const Body& body) {
   return least;
 }
 
-/// A contact has up to three nodes; those of many share theirs.
-Index near_room(const StateOptions& options) {
-  return std::min(3 * options.max_contacts + 32, 2 * options.max_contacts + 96);
+/// A contact has up to three nodes; those of many share theirs, and are merged where no overlay is.
+Index near_room(const Body& body, const StateOptions& options) {
+  const Index m = options.max_contacts;
+  const Index most = options.patch_nodes > 0 ? std::min(3 * m + 32, 2 * m + 96) : 4 * m + 96;
+  return std::min(most, body.aggregate_node(body.aggregates().count()));
 }
 
 SurfaceState make_surface(const Body& body, const StateOptions& options) {
-  NearField near(body, near_room(options), options.patch_nodes);
+  NearField near(body, near_room(body, options), options.patch_nodes);
   FreeMotion motion(body, options.tick, static_cast<Index>(near.load().node.size()));
   return {.tree = SurfaceTree(body.simplices(), body.dimension(), body.surface_rest_positions(),
                               tuning.far.tree_margin * body.mean_surface_edge()),
@@ -99,6 +101,6 @@ State::State(const Body& body, const StateOptions& options)
       tools(make_tools(options)),
       contact_points(options.max_contacts),
       surface(make_surface(body, options)),
-      scratch(body, static_cast<Index>(tools.size()), options.max_contacts, near_room(options)) {}
+      scratch(body, static_cast<Index>(tools.size()), options.max_contacts, near_room(body, options)) {}
 
 }  // namespace palpate

@@ -10,11 +10,11 @@
 #include "runtime/body/free_motion.h"
 #include "runtime/body/near_field.h"
 #include "runtime/solve/surface_tree.h"
-#include "runtime/tick/contact_point.h"
 #include "runtime/tick/local_model.h"
 #include "runtime/tick/scratch.h"
 #include "runtime/tick/status.h"
-#include "runtime/tick/tool.h"
+#include "runtime/touch/contact_point.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate {
 
@@ -73,7 +73,7 @@ struct SurfaceState {
 
 struct StateOptions {
   std::vector<Tool> tools = {Tool{}};
-  Index max_contacts = 256;  ///< contact points of all tools together; beyond, the deepest are kept
+  Index max_contacts = 256;  ///< contact points of all tools together, merged; beyond, the deepest are kept
   Index patch_nodes = 0;     ///< most nodes g of a patch that is to be used
   double tick = 0.001;       ///< time from one tick to the next [s]
 };

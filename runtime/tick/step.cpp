@@ -12,6 +12,7 @@
 #include "runtime/tick/release.h"
 #include "runtime/tick/surface_motion.h"
 #include "runtime/tick/tool_motion.h"
+#include "runtime/touch/contact_nodes.h"
 
 namespace palpate {
 namespace {
@@ -61,24 +62,23 @@ void note_unsettled_tools(State& state) noexcept {
 }
 
 /// How what a tool touches moves on its own.
-void note_surface_change(const State& state, ToolState& tool, Index number) noexcept {
+void note_surface_change(const Body& body, const State& state, ToolState& tool, Index number) noexcept {
   tool.surface_change.setZero();
   if (!state.surface.motion.active()) return;
   double sum = 0.0;
   for (const ContactPoint& contact : state.contacts()) {
     const double force = contact.tool == number ? contact.force.norm() : 0.0;
-    for (std::size_t n = 0; n < 3; ++n) {
-      if (contact.nodes[n] >= 0)
-        tool.surface_change += force * contact.weights[n] * state.surface.motion.change(contact.nodes[n]);
-    }
+    for_each_node(body, state.surface.near, contact, [&](Index node, double weight) {
+      tool.surface_change += force * weight * state.surface.motion.change(node);
+    });
     sum += force;
   }
   if (sum > 0.0) tool.surface_change /= sum;
 }
 
-void note_surface_changes(State& state) noexcept {
+void note_surface_changes(const Body& body, State& state) noexcept {
   for (std::size_t k = 0; k < state.tools.size(); ++k)
-    note_surface_change(state, state.tools[k], static_cast<Index>(k));
+    note_surface_change(body, state, state.tools[k], static_cast<Index>(k));
 }
 
 void give_forces(State& state) noexcept {
@@ -102,7 +102,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   count_still_ticks(state);
   const ContactOutcome contact = solve_contact(body, state, scratch);
   if (contact == ContactOutcome::solved) {
-    note_surface_changes(state);
+    note_surface_changes(body, state);
     linearise(body, state, scratch);
     note_unsettled_tools(state);
   }

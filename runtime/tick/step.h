@@ -6,7 +6,7 @@
 #include "runtime/body/body.h"
 #include "runtime/tick/state.h"
 #include "runtime/tick/status.h"
-#include "runtime/tick/tool.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate {
 

@@ -5,7 +5,7 @@
 
 #include "runtime/solve/node_vectors.h"
 #include "runtime/solve/tick_tuning.h"
-#include "runtime/tick/tool_geometry.h"
+#include "runtime/touch/tool_geometry.h"
 
 namespace palpate {
 namespace {
@@ -35,6 +35,7 @@ Vec3 stored_displacement(const Body& body, const SurfaceState& surface, Index no
 void move_near_surface(const Body& body, SurfaceState& surface) noexcept {
   for (Index place = 0; place < surface.near.count(); ++place) {
     const Index node = surface.near.node(place);
+    if (body.aggregate_of(node) >= 0) continue;
     const Vec3 position = unloaded_position(body, surface, node) + surface.near.displacement(place);
     if (position.allFinite()) surface.tree.move(node, position);
   }

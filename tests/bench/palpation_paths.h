@@ -7,7 +7,7 @@
 
 #include "runtime/body/body.h"
 #include "runtime/solve/surface_tree.h"
-#include "runtime/tick/tool.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate::test {
 

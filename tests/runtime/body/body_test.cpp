@@ -296,5 +296,42 @@ TEST_P(Bodies, RefuseThePartsOfAnotherBody) {
   }
 }
 
+// All nodes that move are in one group each, with neighbours of its first one.
+TEST(SurfaceAggregates, HaveEachNodeThatMovesOnce) {
+  for (const int d : {2, 3}) {
+    const Body body(test::unit_model(d, d == 3 ? 6 : 16, Scope::surface, Precision::double_precision));
+    const SurfaceAggregates& groups = body.aggregates();
+    std::vector<int> seen(body.surface_rest_positions().size(), 0);
+    std::vector<std::set<Index>> beside(seen.size());
+    const auto corners = static_cast<std::size_t>(d);
+    for (std::size_t at = 0; at < body.simplices().size(); ++at) {
+      const std::size_t first = at / corners * corners;
+      for (std::size_t k = 0; k < corners; ++k)
+        beside[static_cast<std::size_t>(body.simplices()[at])].insert(body.simplices()[first + k]);
+    }
+    for (Index group = 0; group < groups.count(); ++group) {
+      const std::span<const Index> members = groups.members(group);
+      EXPECT_LE(std::ssize(members), groups.most_members());
+      for (const Index member : members) {
+        ++seen[static_cast<std::size_t>(member)];
+        EXPECT_EQ(groups.of_node(member), group);
+        const bool touches = std::any_of(members.begin(), members.end(), [&](Index other) {
+          return other != member && beside[static_cast<std::size_t>(member)].count(other) > 0;
+        });
+        EXPECT_TRUE(touches || members.size() == 1);
+      }
+    }
+    for (std::size_t node = 0; node < seen.size(); ++node)
+      EXPECT_EQ(seen[node], body.surface_moves(static_cast<Index>(node)) ? 1 : 0) << node;
+    EXPECT_GT(static_cast<double>(seen.size()), (d == 3 ? 5.0 : 2.0) * groups.count()) << "they are large";
+  }
+}
+
+// A surface that overlays refine has none: their nodes follow several of the body's.
+TEST(SurfaceAggregates, AreNotOfARefinedSurface) {
+  const Body body(test::unit_model(2, 8, Scope::surface, Precision::double_precision), {}, 2);
+  EXPECT_EQ(body.aggregates().count(), 0);
+}
+
 }  // namespace
 }  // namespace palpate::body_test

@@ -142,6 +142,111 @@ TEST_P(NearFieldTest, RetreatMakesAShareOfTheChange) {
     EXPECT_LT((between[k] - (0.75 * before[k] + 0.25 * after[k])).norm(), 1e-14 * after[k].norm());
 }
 
+/// A group of nodes with weights and maps, two of its nodes left out.
+struct Group {
+  Group(const Body& body, Index group, unsigned seed)
+      : number(group),
+        members(body.aggregates().members(group)),
+        weights(members.size()),
+        maps(members.size()) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> entry(-1.0, 1.0);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      weights[k] = k == 1 || k == members.size() - 1 ? 0.0 : 1.0 + entry(random);
+      for (double& value : maps[k].reshaped()) value = entry(random);
+    }
+  }
+
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      if (weights[k] != 0.0) visit(members[k], maps[k]);
+    }
+  }
+
+  Index number;
+  std::span<const Index> members;
+  std::vector<double> weights;
+  std::vector<Eigen::Matrix3d> maps;
+};
+
+// A group's compliance is that of its members through their maps, whoever came first, and its force acts on
+// them.
+TEST_P(NearFieldTest, AGroupMovesAndIsLoadedThroughItsMembers) {
+  const int d = GetParam();
+  NearField near(body_, 60);
+  const Group a(body_, 0, 3);
+  const Group b(body_, body_.aggregates().count() - 1, 4);
+  near.begin_tick();
+  EXPECT_FALSE(near.want(body_, body_.aggregate_node(0))) << "its weights are not known";
+  const std::vector<Index> others = free_nodes(8);
+  near.want(body_, others[0]);
+  for (const Group* group : {&a, &b}) {
+    group->for_each([&](Index node, const Eigen::Matrix3d&) { ASSERT_TRUE(near.want(body_, node)); });
+    ASSERT_TRUE(near.want_group(body_, group->number, group->weights, group->maps));
+    EXPECT_TRUE(near.want(body_, body_.aggregate_node(group->number)));
+  }
+  for (std::size_t k = 1; k < 6; ++k) near.want(body_, others[k]);  // these come after the groups
+
+  // J^T of a place: from its force to those on nodes.
+  const auto nodes = static_cast<Index>(body_.surface_stored_nodes().size());
+  const auto of_place = [&](Index place) {
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(body_.greens().order(), d);
+    const Index node = near.node(place);
+    if (node < nodes) J.middleRows(Eigen::Index{d} * stored(node), d).setIdentity();
+    for (const Group* group : {&a, &b}) {
+      if (node != body_.aggregate_node(group->number)) continue;
+      group->for_each([&](Index member, const Eigen::Matrix3d& map) {
+        J.middleRows(Eigen::Index{d} * stored(member), d) = map.topLeftCorner(d, d);
+      });
+    }
+    return J;
+  };
+  Eigen::MatrixXd Xi(body_.greens().order(), body_.greens().order());
+  for (Index i = 0; i < body_.greens().nodes(); ++i) {
+    for (Index j = 0; j < body_.greens().nodes(); ++j)
+      Xi.block(Eigen::Index{d} * i, Eigen::Index{d} * j, d, d) = body_.greens().block(i, j);
+  }
+  const auto expect_exact = [&] {
+    for (Index i = 0; i < near.count(); ++i) {
+      for (Index j = 0; j < near.count(); ++j) {
+        const Eigen::MatrixXd C = of_place(i).transpose() * Xi * of_place(j);
+        for (int p = 0; p < d; ++p) {
+          for (int q = 0; q < d; ++q)
+            ASSERT_NEAR(near.row(d * i + p)[static_cast<std::size_t>(d * j + q)], C(p, q), 1e-13 * Xi(0, 0))
+                << i << " " << j;
+        }
+      }
+    }
+  };
+  expect_exact();
+
+  near.load(near.place_of(body_.aggregate_node(a.number)), test::upright(d, 0.3, 0.0, -0.2));
+  near.load(near.place_of(others[2]), test::upright(d, 0.1, 0.0, 0.4));
+  near.displace();
+  EXPECT_FALSE(near.want_group(body_, a.number, a.weights, a.maps)) << "it carries force";
+  Eigen::VectorXd f = Eigen::VectorXd::Zero(Xi.rows());
+  for (Index place = 0; place < near.count(); ++place) f += of_place(place) * near.force(place).head(d);
+  const Eigen::VectorXd u = Xi * f;
+  for (Index place = 0; place < near.count(); ++place)
+    EXPECT_LT((near.displacement(place).head(d) - of_place(place).transpose() * u).norm(), 1e-13 * u.norm());
+  std::vector<double> whole(static_cast<std::size_t>(Xi.rows()));
+  body_.greens().displacement(near.load().nodes(), near.load().forces(), whole);
+  EXPECT_LT((Eigen::Map<const Eigen::VectorXd>(whole.data(), Xi.rows()) - u).norm(), 1e-13 * u.norm());
+
+  // Others go, and the last places move.
+  near.unload();
+  near.displace();
+  for (int tick = 0; tick < 600; ++tick) {
+    near.begin_tick();
+    b.for_each([&](Index node, const Eigen::Matrix3d&) { near.want(body_, node); });
+    EXPECT_TRUE(near.want(body_, body_.aggregate_node(b.number)));
+  }
+  EXPECT_LT(near.place_of(body_.aggregate_node(a.number)), 0);
+  near.want(body_, others[4]);
+  expect_exact();
+}
+
 /// Contact points of a sphere that presses on the top: nearest points of all simplices of the surface that
 /// are as near, by a search without tree, near field or margins.
 TEST_P(NearFieldTest, ContactPointsAreTheNearestPointsOfTheDeformedSurface) {

@@ -51,7 +51,7 @@ TEST_P(ForceError, OfContactPointsThatFoundNoRoom) {
   for (const double coupling : {std::numeric_limits<double>::infinity(), 2.0}) {
     const Tool tool{.radius = 0.8, .coupling_stiffness = coupling};
     const State whole = pressed(tool, depth_, 200);
-    for (const Index room : {2, 3, 5, 8}) {
+    for (const Index room : {2, 3}) {
       if (room >= tool_of(whole).contacts) continue;
       const State state = pressed(tool, depth_, room);
       ASSERT_TRUE(has(state.status, StepStatus::capacity_full)) << room;
@@ -67,7 +67,7 @@ TEST_P(ForceError, OfContactPointsThatFoundNoRoom) {
 
 // A tick that changes no force has the error of the one before.
 TEST_P(ForceError, IsToldAtRest) {
-  State state = pressed({.radius = 0.8, .friction = 0.5}, depth_, GetParam() == 3 ? 8 : 5);
+  State state = pressed({.radius = 0.8, .friction = 0.5}, depth_, GetParam() == 3 ? 4 : 3);
   hold(body_, state, tool_of(state).device, 200);
   const Vec3 force = tool_of(state).contact_wrench.force;
   hold(body_, state, tool_of(state).device, 1);

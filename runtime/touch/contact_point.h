@@ -20,6 +20,8 @@ struct ContactPoint {
   Index simplex = -1;
   std::array<Index, 3> nodes{-1, -1, -1};  ///< surface nodes; -1 where the weight is 0
   std::array<double, 3> weights{};
+  Index aggregate = -1;  ///< the group of surface nodes (Body::aggregates) that it stands for, by one of its
+                         ///< members; position, gap and the like are means, the force acts on all. -1: none
   Vec3 position = Vec3::Zero();  ///< of the surface there, at the beginning of the tick [m]
   Vec3 arm = Vec3::Zero();       ///< from the tool's origin to it [m]
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  ///< columns: normal, out of the body; two tangents
@@ -36,10 +38,7 @@ struct ContactPoint {
   Vec3 tool_point =
       Vec3::Zero();           ///< held: the place in the tool's own frame that stays with the surface [m]
   Vec3 force = Vec3::Zero();  ///< on the tool, after the tick [N]
-  Eigen::Matrix3d response =
-      Eigen::Matrix3d::Zero();  ///< change of the force by a motion of its tool's device
-                                ///< where contacts are many, a column an axis [N/m]
-  Vec3 carry = Vec3::Zero();    ///< sticking: what the solver let it slide in the tick, and is to undo [m]
+  Vec3 carry = Vec3::Zero();  ///< sticking: what the solver let it slide in the tick, and is to undo [m]
 };
 
 /// A place where a tool may press on the surface and for which there was no room: a contact point, or a

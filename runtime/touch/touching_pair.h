@@ -4,7 +4,7 @@
 #include "runtime/body/body.h"
 #include "runtime/solve/nearest_point.h"
 #include "runtime/solve/surface_tree.h"
-#include "runtime/tick/tool_geometry.h"
+#include "runtime/touch/tool_geometry.h"
 
 namespace palpate {
 
@@ -52,5 +52,8 @@ TouchingPair pair_of_corner(const SurfaceTree& tree, const SimplexNodes& nodes, 
 /// The pair of a triangle's edge, from a corner to the next one, and the core.
 TouchingPair pair_of_edge(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
                           std::size_t corner, const Core& core) noexcept;
+
+/// A contact's axes as columns: the normal, and two tangents beside it; in the plane the first is within it.
+[[nodiscard]] Eigen::Matrix3d contact_frame(const Vec3& normal, int dimension) noexcept;
 
 }  // namespace palpate

@@ -1,7 +1,7 @@
 // Where the points of a tool are.
 #pragma once
 
-#include "runtime/tick/tool.h"
+#include "runtime/touch/tool.h"
 
 namespace palpate {
 

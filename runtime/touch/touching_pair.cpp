@@ -1,4 +1,4 @@
-#include "runtime/tick/touching_pair.h"
+#include "runtime/touch/touching_pair.h"
 
 #include "runtime/solve/tick_tuning.h"
 
@@ -103,6 +103,18 @@ TouchingPair pair_of_edge(const SurfaceTree& tree, const SimplexNodes& nodes, co
   nearest.weights[corner] = weights[0];
   nearest.weights[next] = weights[1];
   return pair_of(seen.simplex, seen.normal, 2, nearest);
+}
+
+Eigen::Matrix3d contact_frame(const Vec3& normal, int dimension) noexcept {
+  Eigen::Matrix3d frame;
+  frame.col(0) = normal;
+  if (dimension == 2) {
+    frame.col(1) = Vec3(-normal.y(), normal.x(), 0.0);
+  } else {
+    frame.col(1) = normal.unitOrthogonal();
+  }
+  frame.col(2) = frame.col(0).cross(frame.col(1));
+  return frame;
 }
 
 }  // namespace palpate

@@ -1,0 +1,31 @@
+// The surface nodes that a contact point acts on.
+#pragma once
+
+#include <cstddef>
+
+#include "runtime/body/near_field.h"
+#include "runtime/touch/contact_point.h"
+
+namespace palpate {
+
+/// Calls visit(surface node, weight) for each node that a contact point moves with; a group has to be in the
+/// near field.
+template <class Visit>
+void for_each_node(const Body& body, const NearField& near, const ContactPoint& contact,
+                   Visit&& visit) noexcept {
+  if (contact.aggregate < 0) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (contact.nodes[k] >= 0) visit(contact.nodes[k], contact.weights[k]);
+    }
+    return;
+  }
+  const std::span<const Index> members = body.aggregates().members(contact.aggregate);
+  const Index place = near.place_of(body.aggregate_node(contact.aggregate));
+  if (place < 0) return;
+  const std::span<const double> weights = near.group_weights(place);
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    if (weights[k] != 0.0) visit(members[k], weights[k]);
+  }
+}
+
+}  // namespace palpate
