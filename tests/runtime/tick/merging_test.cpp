@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "runtime/tick/step.h"
@@ -206,6 +208,86 @@ TEST_P(Merging, DoesNotJump) {
   ASSERT_GT(other.size(), 5U);
   EXPECT_LT(*std::max_element(when_changed.begin(), when_changed.end()),
             1.3 * *std::max_element(other.begin(), other.end()));
+}
+
+/// What a merged contact point is to be, from its nodes.
+struct Expected {
+  double gap = 0.0;  // where the tick began
+  double weights = 0.0;
+  double mean_normal = 0.0;    // length of it
+  double along_normals = 1.0;  // least cosine of a node's force and its own normal
+  Vec3 force = Vec3::Zero();   // sum of what a force of 1 along the group's normal is at the nodes
+};
+
+Expected expected(const State& state, const ContactPoint& contact, const std::vector<Vec3>& places,
+                  const Vec3& tool) {
+  const Index place = state.surface.near.place_of(cube().aggregate_node(contact.aggregate));
+  const std::span<const Index> members = cube().aggregates().members(contact.aggregate);
+  Expected result;
+  Vec3 normals = Vec3::Zero();
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const double weight = state.surface.near.group_weights(place)[k];
+    if (weight == 0.0) continue;
+    const Vec3 across = tool - places[static_cast<std::size_t>(members[k])];
+    const Vec3 force = state.surface.near.group_maps(place)[k] * contact.frame.col(0);
+    result.gap += weight * (across.norm() - radius);
+    result.weights += weight;
+    result.force += force;
+    normals += weight * across.normalized();
+    result.along_normals = std::min(result.along_normals, force.normalized().dot(across.normalized()));
+  }
+  result.mean_normal = normals.norm();
+  result.gap /= result.mean_normal;
+  return result;
+}
+
+// A merged contact point's gap is the mean of its nodes', and each of them is pressed along its own normal.
+TEST(MergingPoint, StandsForItsNodes) {
+  State state = begin(0.3, 256);
+  int seen = 0;
+  int other_gaps = 0;  // of a tick's second pass
+  double least_mean = 1.0;
+  for (int tick = 0; tick < ticks; ++tick) {
+    std::vector<Vec3> places;
+    for (Index node = 0; node < static_cast<Index>(cube().surface_rest_positions().size()); ++node)
+      places.push_back(state.surface.tree.position(node));
+    const Vec3 tool = state.tools.front().pose.position;
+    step(cube(), state, pose(centre(tick)));
+    for (const ContactPoint& contact : state.contacts()) {
+      if (contact.aggregate < 0) continue;
+      const Expected right = expected(state, contact, places, tool);
+      ++seen;
+      if (std::abs(contact.gap - right.gap) > 1e-12) ++other_gaps;
+      EXPECT_NEAR(right.weights, 1.0, 1e-12);
+      EXPECT_NEAR(right.force.dot(contact.frame.col(0)), 1.0, 2e-3) << "as it was when they were merged";
+      EXPECT_GT(right.along_normals, 0.9998) << tick;
+      least_mean = std::min(least_mean, right.mean_normal);
+    }
+  }
+  EXPECT_GT(seen, 1000);
+  EXPECT_LT(other_gaps, seen / 5);
+  EXPECT_LT(least_mean, 0.999) << "normals differ by more than a node's force from its own";
+}
+
+// The solver begins with the forces that there were, however they are merged now.
+TEST_P(Merging, BeginsWithTheForcesOfTheTickBefore) {
+  State state = begin(GetParam().friction, GetParam().room);
+  Vec3 last = Vec3::Zero();
+  int seen = 0;
+  for (int tick = 0; tick < 200; ++tick) {
+    step(cube(), state, pose(centre(tick)));
+    const Scratch& scratch = state.scratch;
+    if (scratch.merging.has_changed) {
+      Vec3 guess = Vec3::Zero();
+      for (Index i = 0; i < scratch.problem.rows; ++i)
+        guess += scratch.problem.guess[static_cast<std::size_t>(i)] *
+                 scratch.rows[static_cast<std::size_t>(i)].force;
+      EXPECT_LT((guess - last).norm(), 0.05 * last.norm()) << tick;
+      ++seen;
+    }
+    last = state.tools.front().contact_wrench.force;
+  }
+  EXPECT_GT(seen, GetParam().tolerance > 1e-4 ? 5 : -1);
 }
 
 // A tool that rests is held by a force that rests.
