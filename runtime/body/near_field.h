@@ -47,6 +47,11 @@ class NearField {
   /// that was not wanted for longest goes. False when all others are wanted or loaded.
   bool want(const Body& body, Index surface_node) noexcept;
 
+  /// Whether a surface node was wanted in this tick.
+  [[nodiscard]] bool is_wanted(Index surface_node) const noexcept {
+    const Index place = place_of(surface_node);
+    return place >= 0 && wanted_[at(place)] == tick_;
+  }
   /// Puts a group here: a force f at its place puts maps[k] f on its k-th member, and its displacement is the
   /// sum of maps[k]^T u_k. `weights`, whose sum is 1, are for whoever wants means; where one is 0 the member
   /// does not belong to it. The others have to be here. False where there is no room, where the group is here

@@ -109,7 +109,7 @@ struct ManyTuning {
 /// to 0.9 / 0.4 to 0.75 / 0.4 to 0.7 of the time without, and 99 % of the forces are within 0.02 to 0.1 /
 /// 0.06 / 0.2 % of those without (docs/decisions).
 struct MergingTuning {
-  Index from = 64;                  ///< contact points from which on they are merged where some rub,
+  Index from = 80;                  ///< contact points from which on they are merged where some rub,
   Index from_frictionless = 160;    ///< and where none does; of room for fewer, three quarters of the room.
                                     ///< They are parted again where a quarter less is left
   Index fewest = 3;                 ///< closed contact points of a group that is worth it
@@ -118,8 +118,8 @@ struct MergingTuning {
   double sticking = 0.7;  ///< [friction that a contact can bear] with less, nodes that stick are merged, and
   double no_longer_sticking = 0.85;  ///< parted with more,
   double slipping = 0.9999;          ///< but for those that slip
-  Index most_new = 4;     ///< groups that are merged in a tick, as long as all contact points have room
-  Index most_parted = 2;  ///< groups that are parted in a tick as they have become wrong
+  Index most_new = 2;     ///< groups that are merged in a tick, as long as all contact points have room
+  Index most_parted = 1;  ///< groups that are parted in a tick as they have become wrong
   double defect = 0.01;   ///< [edge] that the gaps of merged contact points may differ from their mean
 };
 

@@ -275,10 +275,51 @@ void add_tilt(const Body& body, const State& state, Scratch& scratch, Index numb
   }
 }
 
+/// Which of a row's nodes it has where it has one; -1 where it has more or none.
+int only_node(const ContactRow& row) noexcept {
+  int only = -1;
+  for (int n = 0; n < 3; ++n) {
+    if (row.places[static_cast<std::size_t>(n)] < 0) continue;
+    if (only >= 0) return -1;
+    only = n;
+  }
+  return only;
+}
+
+/// W = J Xi J^T of rows that have one node each: of Xi only what is asked for.
+template <int D>
+void assemble_between_nodes(const NearField& near, Scratch& scratch) noexcept {
+  ContactProblem& problem = scratch.problem;
+  for (Index j = 0; j < problem.rows; ++j) {
+    const ContactRow& by = scratch.rows[j];
+    const auto from = static_cast<std::size_t>(only_node(by));
+    const Vec3& f = by.body[from];
+    std::array<const double*, D> c;
+    for (int axis = 0; axis < D; ++axis)
+      c[static_cast<std::size_t>(axis)] = near.row(D * by.places[from] + axis).data();
+    for (Index i = j; i < problem.rows; ++i) {
+      const ContactRow& at = scratch.rows[i];
+      const auto to = static_cast<std::size_t>(only_node(at));
+      const std::ptrdiff_t first = std::ptrdiff_t{D} * at.places[to];
+      double w = 0.0;
+      for (int a = 0; a < D; ++a) {
+        double u = 0.0;
+        for (int axis = 0; axis < D; ++axis) u += f[axis] * c[static_cast<std::size_t>(axis)][first + a];
+        w += at.body[to][a] * u;
+      }
+      problem.w(i, j) = w;
+      problem.w(j, i) = w;
+    }
+  }
+}
+
 /// W = J Xi J^T, by y = Xi J^T row by row; D is the number of dofs a node.
 template <int D>
 void assemble_body_compliance(const NearField& near, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
+  const auto end = scratch.rows.begin() + problem.rows;
+  if (std::all_of(scratch.rows.begin(), end, [](const ContactRow& row) { return only_node(row) >= 0; }))
+    return assemble_between_nodes<D>(near, scratch);
   double* __restrict y = scratch.row_response.data();
   const std::ptrdiff_t width = std::ptrdiff_t{D} * near.count();
   for (Index j = 0; j < problem.rows; ++j) {

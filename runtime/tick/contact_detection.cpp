@@ -70,19 +70,18 @@ std::array<Vec3, 3> slopes(const SurfaceTree& tree, const SimplexNodes& nodes) n
 bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nodes, bool& moved) noexcept {
   bool room = true;
   for (const Index node : nodes) {
-    if (node < 0 || !body.surface_moves(node)) continue;
-    room = surface.near.want(body, node) && room;
-  }
-  if (!room) return false;
-  for (const Index node : nodes) {
-    if (node < 0 || !body.surface_moves(node)) continue;
+    if (node < 0 || surface.near.is_wanted(node) || !body.surface_moves(node)) continue;
+    if (!surface.near.want(body, node)) {
+      room = false;
+      continue;
+    }
     const Vec3 position =
         unloaded_position(body, surface, node) + surface.near.displacement(surface.near.place_of(node));
     if (position == surface.tree.position(node)) continue;
     surface.tree.move(node, position);
     moved = true;
   }
-  return true;
+  return room;
 }
 
 /// The simplices nearest to the tool by what the tree knows, at most as many as may be looked at: fills
@@ -296,6 +295,17 @@ void touch_pair(const Body& body, State& state, Scratch& scratch, const ToolCont
   add_candidate(body, state, scratch, touch.number, touch.first_candidate, pair, face_tells);
 }
 
+/// Whether a node has the candidate already that the core's origin makes of it, from another simplex.
+bool is_found(const Scratch& scratch, const ToolContact& touch, const SurfaceTree& tree,
+              Index node) noexcept {
+  const Index k = scratch.candidate_at_node[node];
+  if (k < touch.first_candidate || k >= scratch.candidate_count) return false;
+  const ContactPoint& candidate = scratch.candidates[k];
+  if (candidate.position != tree.position(node)) return false;
+  const Vec3 across = touch.core.origin - candidate.position;
+  return candidate.frame.col(0).dot(across) > (1.0 - tuning.detection.same_direction) * across.norm();
+}
+
 /// On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
 /// now at the other: all corners under it are contact points, and under a segment the edges.
 void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
@@ -303,8 +313,10 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
   const SurfaceTree& tree = state.surface.tree;
   const SimplexNodes nodes = nodes_of(body, seen.simplex);
   const std::size_t corners = body.dimension() == 2 ? 2 : 3;
+  const bool seen_from_outside = seen.height >= 0.0 && !touch.inside;
   for (std::size_t n = 0; n < corners; ++n) {
     const int place = is_segment ? 2 : 0;
+    if (!is_segment && seen_from_outside && is_found(scratch, touch, tree, nodes[n])) continue;
     touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
     if (is_segment && corners == 3)
       touch_pair(body, state, scratch, touch, pair_of_edge(tree, nodes, seen, n, touch.core));

@@ -25,6 +25,7 @@
 #include "base/error.h"
 #include "formats/model_file.h"
 #include "runtime/tick/step.h"
+#include "runtime/touch/contact_nodes.h"
 #include "tests/bench/palpation_paths.h"
 
 namespace palpate {
@@ -39,7 +40,7 @@ struct Options {
   Vec3 along{0.0, 1.0, 0.0};
   Vec3 slide{0.04, 0.0, 0.0};
   double depth = 0.028;
-  std::vector<double> radius = {0.015, 0.03, 0.05};
+  std::vector<double> radius = {0.015, 0.03, 0.05, 0.15, 0.5};
   std::vector<double> friction = {0.2};
   double coupling = std::numeric_limits<double>::infinity();
   Index max_contacts = 256;
@@ -124,7 +125,17 @@ struct Tick {
   StepStatus status = StepStatus::ok;
   Index points = 0;
   Index closed = 0;
+  Index nodes = 0;  // that closed contact points press on
 };
+
+Index pressed_nodes(const Body& body, const State& state) {
+  Index count = 0;
+  for (const ContactPoint& contact : state.contacts()) {
+    if (!contact.force.isZero(0.0))
+      for_each_node(body, state.surface.near, contact, [&](Index, double) { ++count; });
+  }
+  return count;
+}
 
 std::vector<Tick> play(const Body& body, const Options& options, const std::vector<ToolPose>& poses,
                        double radius, double friction) {
@@ -147,6 +158,7 @@ std::vector<Tick> play(const Body& body, const Options& options, const std::vect
       tick.status = status;
       tick.points = state.contact_count;
       tick.closed = state.tools.front().contacts;
+      tick.nodes = pressed_nodes(body, state);
     }
   }
   return ticks;
@@ -155,7 +167,7 @@ std::vector<Tick> play(const Body& body, const Options& options, const std::vect
 void print(const std::vector<Tick>& ticks, double radius, double friction) {
   std::vector<double> times;
   double largest_force = 0.0, jump = 0.0;
-  Index points = 0, closed = 0;
+  Index points = 0, closed = 0, nodes = 0;
   int full = 0, rough = 0, late = 0;
   for (std::size_t k = 0; k < ticks.size(); ++k) {
     const Tick& tick = ticks[k];
@@ -164,6 +176,7 @@ void print(const std::vector<Tick>& ticks, double radius, double friction) {
     if (k > 0) jump = std::max(jump, (tick.force - ticks[k - 1].force).norm());
     points = std::max(points, tick.points);
     closed = std::max(closed, tick.closed);
+    nodes = std::max(nodes, tick.nodes);
     full += has(tick.status, StepStatus::capacity_full) ? 1 : 0;
     rough += has(tick.status, StepStatus::not_converged) ? 1 : 0;
     late += tick.seconds > 1e-3 ? 1 : 0;
@@ -174,8 +187,8 @@ void print(const std::vector<Tick>& ticks, double radius, double friction) {
                          : times[static_cast<std::size_t>(share * static_cast<double>(times.size() - 1))];
   };
   fmt::print(
-      "| {:.0f} | {:g} | {} / {} | {:.4f} | {:.1f} | {} | {} | {:.0f} / {:.0f} / {:.0f} | {} of {} |\n",
-      1e3 * radius, friction, closed, points, largest_force, 1e3 * jump, rough, full, quantile(0.5),
+      "| {:.0f} | {:g} | {} / {} / {} | {:.4f} | {:.1f} | {} | {} | {:.0f} / {:.0f} / {:.0f} | {} of {} |\n",
+      1e3 * radius, friction, nodes, closed, points, largest_force, 1e3 * jump, rough, full, quantile(0.5),
       quantile(0.999), quantile(1.0), late, ticks.size());
   std::fflush(stdout);
 }
@@ -185,7 +198,8 @@ void study(const Options& options) {
   fmt::print("{}: {} surface nodes, edges of {:.2f} mm\n\n", options.body,
              body.surface_rest_positions().size(), 1e3 * body.mean_surface_edge());
   fmt::print(
-      "| R [mm] | friction | closed / points at most | force at most [N] | largest change in a tick [mN] | "
+      "| R [mm] | friction | nodes pressed / closed / points at most | force at most [N] | largest change in "
+      "a tick [mN] | "
       "not converged "
       "| capacity full | tick: median / 99.9 % / largest [us] | over 1 ms "
       "|\n|---|---|---|---|---|---|---|---|---|\n");
