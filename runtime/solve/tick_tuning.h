@@ -105,13 +105,12 @@ struct ManyTuning {
 };
 
 /// Merging of contact points at neighbouring nodes (runtime/tick/contact_merging.h). Measured on the liver
-/// with edges of 3.6 mm, spheres of 50 to 500 mm: with a defect of 0.003 / 0.01 / 0.03 edges a tick takes 0.8
-/// to 0.9 / 0.4 to 0.75 / 0.4 to 0.7 of the time without, and 99 % of the forces are within 0.02 to 0.1 /
-/// 0.06 / 0.2 % of those without (docs/decisions).
+/// with edges of 3.6 mm, spheres of 150 and 500 mm that merge from 64 contact points on: with a defect of
+/// 0.003 / 0.01 / 0.03 edges a tick takes 0.55 to 0.7 / 0.4 to 0.6 / 0.35 to 0.6 of the time without, and no
+/// force is farther from that without than 0.14 / 0.24 / 0.26 % of the largest (docs/decisions).
 struct MergingTuning {
-  Index from = 80;                  ///< contact points from which on they are merged where some rub,
-  Index from_frictionless = 160;    ///< and where none does; of room for fewer, three quarters of the room.
-                                    ///< They are parted again where a quarter less is left
+  Index from = 160;  ///< pressed nodes from which on they are merged; or where contact points fill three
+                     ///< quarters of their room. They are parted again where a quarter less is left
   Index fewest = 3;                 ///< closed contact points of a group that is worth it
   double least_mean_normal = 0.98;  ///< [1] length of the mean of a group's normals
   Index crowd = 200;  ///< contact points from which on nodes are merged whether they stick or slip; before

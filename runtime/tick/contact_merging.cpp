@@ -63,15 +63,18 @@ class Merging {
 
   [[nodiscard]] bool is_wanted() const noexcept {
     if (state_.surface.patch != nullptr || state_.surface.near.patch() != nullptr) return false;
-    const auto last = std::span(scratch_.last_contacts).first(static_cast<std::size_t>(scratch_.last_count));
-    const auto candidates =
-        std::span(scratch_.candidates).first(static_cast<std::size_t>(scratch_.candidate_count));
-    const bool rubs = std::any_of(candidates.begin(), candidates.end(),
-                                  [](const ContactPoint& contact) { return contact.friction > 0.0; });
-    const Index from =
-        std::min(rubs ? tuning.merging.from : tuning.merging.from_frictionless, room_ - room_ / 4);
-    const bool has_merged = std::any_of(last.begin(), last.end(), is_group);
-    return scratch_.candidate_count > (has_merged ? from - from / 4 : from);
+    Index pressed = 0;  // nodes, in the tick before
+    bool has_merged = false;
+    for (Index k = 0; k < scratch_.last_count; ++k) {
+      const ContactPoint& last = scratch_.last_contacts[k];
+      if (last.held || last.force.isZero(0.0)) continue;
+      has_merged = has_merged || is_group(last);
+      for_each_node(body_, state_.surface.near, last, [&](Index, double) { ++pressed; });
+    }
+    const auto is_above = [&](Index count, Index most) {
+      return count > (has_merged ? most - most / 4 : most);
+    };
+    return is_above(pressed, tuning.merging.from) || is_above(scratch_.candidate_count, room_ - room_ / 4);
   }
 
   void run() noexcept {
