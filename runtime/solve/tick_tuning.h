@@ -111,7 +111,7 @@ struct ManyTuning {
 struct MergingTuning {
   Index from = 160;  ///< pressed nodes from which on they are merged; or where contact points fill three
                      ///< quarters of their room. They are parted again where a quarter less is left
-  Index fewest = 3;                 ///< closed contact points of a group that is worth it
+  Index fewest = 3;  ///< closed contact points of a group that is worth it
   double least_mean_normal = 0.98;  ///< [1] length of the mean of a group's normals
   Index crowd = 200;  ///< contact points from which on nodes are merged whether they stick or slip; before
   double sticking = 0.7;  ///< [friction that a contact can bear] with less, nodes that stick are merged, and
