@@ -24,7 +24,7 @@ void free_large(void* memory) noexcept;
 /// Allocator of it.
 template <class T>
 struct LargeAllocator {
-  using value_type = T;
+  using value_type = T;  // NOLINT(readability-identifier-naming): the standard library asks for it
 
   LargeAllocator() = default;
   template <class U>
