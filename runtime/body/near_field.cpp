@@ -87,7 +87,7 @@ bool NearField::want_group(const Body& body, Index group, std::span<const double
   if (patch() != nullptr) return false;
   const Index node = body.aggregate_node(group);
   const Index old = place_of(node);
-  if (old >= 0 && is_loaded(old)) return false;
+  if (old >= 0 && (is_loaded(old) || wanted_[at(old)] == tick_)) return false;
   if (old >= 0) forget(old);
   if (count_ == capacity_) {
     const Index place = longest_unwanted();

@@ -55,7 +55,7 @@ class NearField {
   /// Puts a group here: a force f at its place puts maps[k] f on its k-th member, and its displacement is the
   /// sum of maps[k]^T u_k. `weights`, whose sum is 1, are for whoever wants means; where one is 0 the member
   /// does not belong to it. The others have to be here. False where there is no room, where the group is here
-  /// already and carries force, or with a patch.
+  /// already and carries force or was wanted in this tick (by other members), or with a patch.
   bool want_group(const Body& body, Index group, std::span<const double> weights,
                   std::span<const Eigen::Matrix3d> maps) noexcept;
   /// Weights of the group's members at a place.

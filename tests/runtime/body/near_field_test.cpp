@@ -185,6 +185,8 @@ TEST_P(NearFieldTest, AGroupMovesAndIsLoadedThroughItsMembers) {
     group->for_each([&](Index node, const Eigen::Matrix3d&) { ASSERT_TRUE(near.want(body_, node)); });
     ASSERT_TRUE(near.want_group(body_, group->number, group->weights, group->maps));
     EXPECT_TRUE(near.want(body_, body_.aggregate_node(group->number)));
+    EXPECT_FALSE(near.want_group(body_, group->number, group->weights, group->maps))
+        << "others have it in this tick";
   }
   for (std::size_t k = 1; k < 6; ++k) near.want(body_, others[k]);  // these come after the groups
 
