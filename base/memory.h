@@ -1,4 +1,4 @@
-// How much memory there is.
+// How much memory there is, and memory on huge pages.
 #pragma once
 
 #include <cstddef>
@@ -19,9 +19,10 @@ std::shared_ptr<void> map_memory(std::int64_t bytes);
 /// Memory for containers, on huge pages where it is large and the kernel gives them: who goes through a
 /// column of a matrix touches a page for each row. Throws std::bad_alloc.
 void* allocate_large(std::size_t bytes);
+/// Frees what allocate_large gave.
 void free_large(void* memory) noexcept;
 
-/// Allocator of it.
+/// The standard library's allocator over allocate_large.
 template <class T>
 struct LargeAllocator {
   using value_type = T;  // NOLINT(readability-identifier-naming): the standard library asks for it

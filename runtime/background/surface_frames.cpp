@@ -51,7 +51,6 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
           .touches = std::vector<SeenContact>(state.contact_points.size()),
           .presses = std::vector<NodalPress>(3 * state.contact_points.size() +
                                              static_cast<std::size_t>(state.surface.near.capacity())),
-
           .forces = std::vector<NodalForce>(2 * static_cast<std::size_t>(state.surface.near.capacity()))}),
       rest_(body.surface_in_mesh()),
       stored_(body.greens().order()),
@@ -112,17 +111,13 @@ void SurfaceFrames::take_contacts(const State& state, Moment& moment) const noex
     const Vec3 force = state.surface.near.force(place);
     if (force.isZero(0.0)) continue;
     const Index node = state.surface.near.node(place);
-    const Index group = body_.aggregate_of(node);
-    if (group < 0) {
-      moment.forces[moment.force_count++] = {node, force};
+    const auto add = [&](Index loaded, const Vec3& f) { moment.forces[moment.force_count++] = {loaded, f}; };
+    if (!state.surface.near.is_group(place)) {
+      add(node, force);
       continue;
     }
-    const std::span<const Index> members = body_.aggregates().members(group);
-    const std::span<const double> weights = state.surface.near.group_weights(place);
-    for (std::size_t k = 0; k < members.size(); ++k) {
-      if (weights[k] != 0.0)
-        moment.forces[moment.force_count++] = {members[k], state.surface.near.group_maps(place)[k] * force};
-    }
+    state.surface.near.for_each_member(
+        place, [&](Index member, double, const Eigen::Matrix3d& map) { add(member, map * force); });
   }
 }
 

@@ -32,8 +32,10 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       bases_of_(at(parts_ * capacity)),
       part_weight_(bases_of_.size()),
       part_count_(at(capacity)),
-      group_weight_(at(most_members_ * capacity)),
-      group_map_(group_weight_.size()),
+      member_count_(at(capacity)),
+      member_(at(most_members_ * capacity)),
+      member_weight_(member_.size()),
+      member_map_(member_.size()),
       by_base_(static_cast<std::size_t>(dimension_ * dimension_) * base_.size()),
       gathered_(static_cast<std::size_t>(dimension_ * dimension_) * std::max(base_.size(), at(patch_nodes))),
       base_force_(static_cast<std::size_t>(dimension_) * base_.size()),
@@ -94,9 +96,16 @@ bool NearField::want_group(const Body& body, Index group, std::span<const double
     if (place < 0) return false;
     forget(place);
   }
-  const std::ptrdiff_t first = std::ptrdiff_t{most_members_} * count_;
-  std::copy(weights.begin(), weights.end(), group_weight_.begin() + first);
-  std::copy(maps.begin(), maps.end(), group_map_.begin() + first);
+  const std::span<const Index> members = body.aggregates().members(group);
+  Index& count = member_count_[at(count_)];
+  count = 0;
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    if (weights[k] == 0.0) continue;
+    const std::size_t to = at(most_members_ * count_ + count++);
+    member_[to] = members[k];
+    member_weight_[to] = weights[k];
+    member_map_[to] = maps[k];
+  }
   add(body, node);
   wanted_[at(place_of(node))] = tick_;
   return true;
@@ -119,10 +128,8 @@ void NearField::enter(const Body& body, Index place) noexcept {
   part_count_[at(place)] = 0;
   if (patch_place(place) >= 0) return;
   if (is_group(place)) {
-    const std::span<const Index> members = body.aggregates().members(body.aggregate_of(node(place)));
-    for (std::size_t k = 0; k < members.size(); ++k) {
-      if (group_weights(place)[k] != 0.0) follow(body, place, members[k]);
-    }
+    for_each_member(place,
+                    [&](Index member, double, const Eigen::Matrix3d&) { follow(body, place, member); });
     return;
   }
   follow(body, place, node(place));
@@ -190,7 +197,7 @@ void NearField::connect(const Body& body, Index place) noexcept {
   if (patch_place(place) >= 0) {
     connect_within_patch(place);
   } else if (is_group(place)) {
-    connect_by_members(body, place);
+    connect_by_members(place);
   } else {
     connect_beside_patch(body, place);
   }
@@ -204,20 +211,17 @@ void NearField::connect(const Body& body, Index place) noexcept {
   }
 }
 
-/// From the members' rows: group^T C group.
-void NearField::connect_by_members(const Body& body, Index place) noexcept {
-  const std::span<const Index> members = body.aggregates().members(body.aggregate_of(node(place)));
-  const std::span<const double> weights = group_weights(place);
-  const std::span<const Eigen::Matrix3d> maps = group_maps(place);
+/// From the members' rows: A^T C A of their maps A.
+void NearField::connect_by_members(Index place) noexcept {
   const std::ptrdiff_t d = dimension_;
   const std::ptrdiff_t width = d * (place + 1);
   std::fill_n(blocks_.data(), d * width, 0.0);
   const auto for_each_entry = [&](auto&& visit) {
-    for (std::size_t k = 0; k < members.size(); ++k) {
-      for (std::ptrdiff_t a = 0; a < d && weights[k] != 0.0; ++a) {
-        for (std::ptrdiff_t i = 0; i < d; ++i) visit(d * place_of(members[k]) + a, i, maps[k](a, i));
+    for_each_member(place, [&](Index member, double, const Eigen::Matrix3d& map) {
+      for (std::ptrdiff_t a = 0; a < d; ++a) {
+        for (std::ptrdiff_t i = 0; i < d; ++i) visit(d * place_of(member) + a, i, map(a, i));
       }
-    }
+    });
   };
   for_each_entry([&](std::ptrdiff_t dof, std::ptrdiff_t i, double factor) {
     palpate::add(C_.data() + dof * stride_, factor, blocks_.data() + i * width, d * place);
@@ -230,20 +234,16 @@ void NearField::connect_by_members(const Body& body, Index place) noexcept {
 }
 
 /// What a node that comes is moved by along one axis by a group that is here: `by` has that of stored nodes.
-void NearField::connect_to_group(const Body& body, Index group, const double* by,
-                                 double* block) const noexcept {
-  const std::size_t members = body.aggregates().members(body.aggregate_of(node(group))).size();
-  Index part = parts_ * group;
+void NearField::connect_to_group(Index group, const double* by, double* block) const noexcept {
+  Index part = parts_ * group;  // each member follows one stored node
   std::fill_n(block, dimension_, 0.0);
-  for (std::size_t k = 0; k < members; ++k) {
-    if (group_weights(group)[k] == 0.0) continue;
+  for_each_member(group, [&](Index, double, const Eigen::Matrix3d& map) {
     const double* u = by + std::ptrdiff_t{dimension_} * bases_of_[at(part)];
     for (int j = 0; j < dimension_; ++j) {
-      for (int a = 0; a < dimension_; ++a)
-        block[j] += part_weight_[at(part)] * group_maps(group)[k](a, j) * u[a];
+      for (int a = 0; a < dimension_; ++a) block[j] += part_weight_[at(part)] * map(a, j) * u[a];
     }
     ++part;
-  }
+  });
 }
 
 void NearField::connect_within_patch(Index place) noexcept {
@@ -275,7 +275,7 @@ void NearField::connect_beside_patch(const Body& body, Index place) noexcept {
     const double* by = by_base_.data() + i * width;
     for (Index other = 0; other <= place; ++other) {
       if (is_group(other)) {
-        connect_to_group(body, other, by, block);
+        connect_to_group(other, by, block);
         block += d;
         continue;
       }
@@ -331,10 +331,14 @@ void NearField::move(Index from, Index to) noexcept {
   std::copy_n(part_weight_.begin() + std::ptrdiff_t{parts_} * from, parts_,
               part_weight_.begin() + std::ptrdiff_t{parts_} * to);
   if (is_group(from)) {
-    std::copy_n(group_weight_.begin() + std::ptrdiff_t{most_members_} * from, most_members_,
-                group_weight_.begin() + std::ptrdiff_t{most_members_} * to);
-    std::copy_n(group_map_.begin() + std::ptrdiff_t{most_members_} * from, most_members_,
-                group_map_.begin() + std::ptrdiff_t{most_members_} * to);
+    const auto move_members = [&](auto& of_members) {
+      std::copy_n(of_members.begin() + std::ptrdiff_t{most_members_} * from, member_count_[at(from)],
+                  of_members.begin() + std::ptrdiff_t{most_members_} * to);
+    };
+    member_count_[at(to)] = member_count_[at(from)];
+    move_members(member_);
+    move_members(member_weight_);
+    move_members(member_map_);
   }
   for (std::vector<double>* of_dofs : {&force_, &last_force_, &displacement_}) {
     std::copy_n(of_dofs->begin() + std::ptrdiff_t{dimension_} * from, dimension_,
@@ -405,20 +409,21 @@ void NearField::load_patch(Index place) noexcept {
   }
 }
 
+/// Adds a force to a part of what a place follows.
+void NearField::load_base(std::size_t part, const Vec3& f) noexcept {
+  double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
+  for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * f[axis];
+}
+
 /// What the force at a place puts on stored nodes.
 void NearField::load_bases(Index place) noexcept {
   const Vec3 f = force(place);
-  std::size_t member = 0;
-  for (Index k = 0; k < part_count_[at(place)]; ++k) {
-    const auto part = at(parts_ * place + k);
-    Vec3 on_member = f;
-    if (is_group(place)) {
-      while (group_weights(place)[member] == 0.0) ++member;
-      on_member = group_maps(place)[member++] * f;
-    }
-    double* on_base = base_force_.data() + std::ptrdiff_t{dimension_} * bases_of_[part];
-    for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * on_member[axis];
+  std::size_t part = at(parts_ * place);
+  if (is_group(place)) {
+    for_each_member(place, [&](Index, double, const Eigen::Matrix3d& map) { load_base(part++, map * f); });
+    return;
   }
+  for (Index k = 0; k < part_count_[at(place)]; ++k) load_base(part++, f);
 }
 
 void NearField::displace() noexcept {

@@ -53,18 +53,20 @@ class NearField {
     return place >= 0 && wanted_[at(place)] == tick_;
   }
   /// Puts a group here: a force f at its place puts maps[k] f on its k-th member, and its displacement is the
-  /// sum of maps[k]^T u_k. `weights`, whose sum is 1, are for whoever wants means; where one is 0 the member
-  /// does not belong to it. The others have to be here. False where there is no room, where the group is here
-  /// already and carries force or was wanted in this tick (by other members), or with a patch.
+  /// sum of maps[k]^T u_k. `weights` and `maps` are by Body::aggregates' members; `weights`, whose sum is 1,
+  /// are for whoever wants means, and where one is 0 the member does not belong to it. The others have to be
+  /// here. False where there is no room, where the group is here already and carries force or was wanted in
+  /// this tick (by other members), or with a patch.
   bool want_group(const Body& body, Index group, std::span<const double> weights,
                   std::span<const Eigen::Matrix3d> maps) noexcept;
-  /// Weights of the group's members at a place.
-  [[nodiscard]] std::span<const double> group_weights(Index place) const noexcept {
-    return {group_weight_.data() + std::ptrdiff_t{most_members_} * place, at(most_members_)};
-  }
-  /// Maps of the group's members at a place.
-  [[nodiscard]] std::span<const Eigen::Matrix3d> group_maps(Index place) const noexcept {
-    return {group_map_.data() + std::ptrdiff_t{most_members_} * place, at(most_members_)};
+  /// Whether a place is that of a group.
+  [[nodiscard]] bool is_group(Index place) const noexcept { return node(place) >= surface_nodes_; }
+  /// Calls visit(surface node, weight, map) for the nodes that belong to the group at a place.
+  template <class Visit>
+  void for_each_member(Index place, Visit&& visit) const noexcept {
+    const std::size_t first = at(most_members_ * place);
+    for (std::size_t k = first; k < first + at(member_count_[at(place)]); ++k)
+      visit(member_[k], member_weight_[k], member_map_[k]);
   }
 
   /// The overlay that is in C, null for none.
@@ -104,15 +106,15 @@ class NearField {
   void forget(Index place) noexcept;
   void enter(const Body& body, Index place) noexcept;
   void follow(const Body& body, Index place, Index surface_node) noexcept;
-  [[nodiscard]] bool is_group(Index place) const noexcept { return node(place) >= surface_nodes_; }
   void leave(Index place) noexcept;
   void move(Index from, Index to) noexcept;
   void connect(const Body& body, Index place) noexcept;
-  void connect_by_members(const Body& body, Index place) noexcept;
-  void connect_to_group(const Body& body, Index group, const double* by, double* block) const noexcept;
+  void connect_by_members(Index place) noexcept;
+  void connect_to_group(Index group, const double* by, double* block) const noexcept;
   void connect_within_patch(Index place) noexcept;
   void connect_beside_patch(const Body& body, Index place) noexcept;
   void respond(const Body& body, Index place) noexcept;
+  void load_base(std::size_t part, const Vec3& f) noexcept;
   void load_bases(Index place) noexcept;
   void load_patch(Index place) noexcept;
   [[nodiscard]] Index longest_unwanted() const noexcept;
@@ -149,19 +151,21 @@ class NearField {
   std::vector<double> blocks_;         // [d x d capacity] block row of a node that comes
   // Stored nodes that those beside the patch follow, each once.
   Index base_count_ = 0;
-  std::vector<Index> base_;                 // [parts capacity, of the stored nodes at most] stored nodes
-  std::vector<Index> base_uses_;            // [as base] nodes that follow each
-  std::vector<Index> base_of_stored_;       // [stored nodes] -1 for none
-  std::vector<Index> bases_of_;             // [parts x capacity] of each node
-  std::vector<double> part_weight_;         // [parts x capacity]
-  std::vector<Index> part_count_;           // [capacity]
-  std::vector<double> group_weight_;        // [members x capacity] of places that are groups'
-  std::vector<Eigen::Matrix3d> group_map_;  // [as these]
-  std::vector<double> by_base_;             // [d x d parts capacity] displacement of a node that comes
-  std::vector<double> gathered_;            // [d x d max(parts capacity, patch room)]
-  std::vector<double> base_force_;          // [d parts capacity]
-  LargeVector<double> X_, Y_;               // [d capacity x patch stride] X and M X of nodes beside the patch
-  std::vector<double> patch_force_;         // [d patch room] on Q
+  std::vector<Index> base_;                  // [parts capacity, of the stored nodes at most] stored nodes
+  std::vector<Index> base_uses_;             // [as base] nodes that follow each
+  std::vector<Index> base_of_stored_;        // [stored nodes] -1 for none
+  std::vector<Index> bases_of_;              // [parts x capacity] of each node
+  std::vector<double> part_weight_;          // [parts x capacity]
+  std::vector<Index> part_count_;            // [capacity]
+  std::vector<Index> member_count_;          // [capacity] of places that are groups'
+  std::vector<Index> member_;                // [members x capacity] surface nodes of the group
+  std::vector<double> member_weight_;        // [as these]
+  std::vector<Eigen::Matrix3d> member_map_;  // [as these]
+  std::vector<double> by_base_;              // [d x d parts capacity] displacement of a node that comes
+  std::vector<double> gathered_;             // [d x d max(parts capacity, patch room)]
+  std::vector<double> base_force_;           // [d parts capacity]
+  LargeVector<double> X_, Y_;        // [d capacity x patch stride] X and M X of nodes beside the patch
+  std::vector<double> patch_force_;  // [d patch room] on Q
   SurfaceLoad load_;
 };
 

@@ -42,7 +42,7 @@ static_assert(same(PALPATE_LATE_MOTION, StepStatus::late_motion));
 static_assert(same(PALPATE_RIGID_CONTACT, StepStatus::rigid_contact));
 static_assert(status_names.size() == 13, "these");
 
-constexpr int most_contacts = 256;  // the compliance between their nodes takes 46 MB
+constexpr int most_contacts = 256;  // the compliance between the nodes near them takes up to 90 MB
 
 constexpr palpate_tool default_tool = PALPATE_TOOL_INIT;
 constexpr palpate_pose default_pose = PALPATE_POSE_INIT;

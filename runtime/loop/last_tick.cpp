@@ -29,12 +29,9 @@ std::string contact_table(const Body& body, const State& state) {
       continue;
     }
     const Index place = state.surface.near.place_of(body.aggregate_node(contact.aggregate));
-    const std::span<const Index> members = body.aggregates().members(contact.aggregate);
-    for (std::size_t j = 0; j < members.size(); ++j) {
-      const Eigen::Matrix3d& map = state.surface.near.group_maps(place)[j];
-      if (state.surface.near.group_weights(place)[j] != 0.0)
-        add_row(state.surface.tree.position(members[j]), (map * n).normalized(), map * f);
-    }
+    state.surface.near.for_each_member(place, [&](Index node, double, const Eigen::Matrix3d& map) {
+      add_row(state.surface.tree.position(node), (map * n).normalized(), map * f);
+    });
   }
   return table;
 }

@@ -458,16 +458,12 @@ double exact_compliance(const Body& body, const NearField& near, const ContactRo
   };
   for (std::size_t n = 0; n < 3; ++n) {
     if (row.places[n] < 0) continue;
-    const Index node = near.node(row.places[n]);
-    const Index group = body.aggregate_of(node);
-    if (group < 0) {
-      add_node(node, row.body[n]);
-      continue;
-    }
-    const std::span<const Index> members = body.aggregates().members(group);
-    for (std::size_t k = 0; k < members.size(); ++k) {
-      if (near.group_weights(row.places[n])[k] != 0.0)
-        add_node(members[k], near.group_maps(row.places[n])[k] * row.body[n]);
+    if (near.is_group(row.places[n])) {
+      near.for_each_member(row.places[n], [&](Index node, double, const Eigen::Matrix3d& map) {
+        add_node(node, map * row.body[n]);
+      });
+    } else {
+      add_node(near.node(row.places[n]), row.body[n]);
     }
   }
   return dot(left.data(), right.data(), terms);

@@ -8,6 +8,7 @@
 #include "runtime/tick/contact_merging.h"
 #include "runtime/tick/force_error.h"
 #include "runtime/tick/rolling.h"
+#include "runtime/touch/contact_feature.h"
 #include "runtime/touch/contact_nodes.h"
 
 namespace palpate {
@@ -22,11 +23,9 @@ std::int64_t feature_of(Index tool, int place, Index simplex, bool face_tells, c
   for (std::size_t k = 0; k < 3; ++k) {
     if (weights[k] > 0.0) used[count++] = nodes[k];
   }
-  const std::int64_t head = (std::int64_t{tool} * 4 + place) * 4;
-  constexpr std::int64_t room = std::int64_t{1} << 26;
-  if (face_tells || count == 3) return (head + 3) * room * room + simplex;
-  if (count == 1) return (head + 1) * room * room + used[0];
-  return (head + 2) * room * room + std::min(used[0], used[1]) * room + std::max(used[0], used[1]);
+  if (face_tells || count == 3) return contact_feature(tool, place, FeatureKind::face, simplex);
+  if (count == 1) return contact_feature(tool, place, FeatureKind::vertex, used[0]);
+  return contact_feature(tool, place, FeatureKind::edge, used[0], used[1]);
 }
 
 Vec3 displacement_of(const Body& body, const NearField& near, const ContactPoint& contact) noexcept {

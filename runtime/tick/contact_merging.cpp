@@ -7,6 +7,7 @@
 #include <span>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/touch/contact_feature.h"
 #include "runtime/touch/contact_nodes.h"
 
 namespace palpate {
@@ -15,16 +16,17 @@ namespace {
 constexpr Index none = -1;
 constexpr Index several = -2;
 
-// What a feature's number has above that of its vertex: tool, place on it, and that it is a vertex. A group
-// has one less (contact_detection.cpp).
-constexpr int head_shift = 52;
-
 std::int64_t feature_of_group(std::int64_t of_vertex, Index group) noexcept {
-  return (((of_vertex >> head_shift) - 1) << head_shift) + group;
+  return with_kind(of_vertex, FeatureKind::group, group);
 }
 
 std::int64_t feature_of_vertex(std::int64_t of_group, Index node) noexcept {
-  return (((of_group >> head_shift) + 1) << head_shift) + node;
+  return with_kind(of_group, FeatureKind::vertex, node);
+}
+
+/// A feature that no contact point has; held ones count from -1 down.
+std::int64_t feature_of_nobody(Index number) noexcept {
+  return std::numeric_limits<std::int64_t>::min() + number;
 }
 
 bool is_group(const ContactPoint& contact) noexcept {
@@ -219,8 +221,7 @@ class Merging {
   /// candidate's kind.
   [[nodiscard]] const ContactPoint* last_at(Index node, const ContactPoint& candidate) const noexcept {
     const ContactPoint* at = candidate_at(node);
-    if (at == nullptr || at->friction != candidate.friction ||
-        at->feature >> head_shift != candidate.feature >> head_shift)
+    if (at == nullptr || at->friction != candidate.friction || !are_alike(at->feature, candidate.feature))
       return nullptr;
     const Index number = last_number(scratch_, at->feature);
     if (number == none) return nullptr;
@@ -277,24 +278,14 @@ void list_features(Scratch& scratch) noexcept {
   for (Index k = 0; k < scratch.last_count; ++k) enter_feature(scratch, k);
 }
 
-/// Calls visit(node, map) for the nodes of a contact point that is a group.
-template <class Visit>
-void for_each_map(const Body& body, const NearField& near, const ContactPoint& group,
-                  Visit&& visit) noexcept {
-  const std::span<const Index> members = body.aggregates().members(group.aggregate);
-  const Index place = near.place_of(body.aggregate_node(group.aggregate));
-  if (place < 0) return;
-  for (std::size_t k = 0; k < members.size(); ++k) {
-    if (near.group_weights(place)[k] != 0.0) visit(members[k], near.group_maps(place)[k]);
-  }
-}
-
 /// Shares a group's force out among its nodes. Where there is no room for all, some begin without.
 void part_last(const Body& body, const NearField& near, Scratch& scratch, Index number) noexcept {
   const ContactPoint group = scratch.last_contacts[number];
   const Eigen::Matrix3d response = scratch.response[number];
+  const Index place = near.place_of(body.aggregate_node(group.aggregate));
+  if (place < 0) return;
   bool is_first = true;
-  for_each_map(body, near, group, [&](Index node, const Eigen::Matrix3d& map) {
+  near.for_each_member(place, [&](Index node, double, const Eigen::Matrix3d& map) {
     if (!is_first && static_cast<std::size_t>(scratch.last_count) == scratch.last_contacts.size()) return;
     const Index to = is_first ? number : scratch.last_count++;
     ContactPoint& part = scratch.last_contacts[to];
@@ -325,7 +316,7 @@ bool merge_last(const Body& body, const NearField& near, Scratch& scratch,
     carry += weight * from.carry;
     if (last < scratch.response_count) response += scratch.response[last];
     from.force.setZero();
-    from.feature = -(std::int64_t{1} << head_shift) - last;  // that of nobody
+    from.feature = feature_of_nobody(last);
     if (first == none) first = last;
   });
   if (first == none) return false;

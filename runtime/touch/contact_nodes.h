@@ -19,13 +19,10 @@ void for_each_node(const Body& body, const NearField& near, const ContactPoint& 
     }
     return;
   }
-  const std::span<const Index> members = body.aggregates().members(contact.aggregate);
   const Index place = near.place_of(body.aggregate_node(contact.aggregate));
   if (place < 0) return;
-  const std::span<const double> weights = near.group_weights(place);
-  for (std::size_t k = 0; k < members.size(); ++k) {
-    if (weights[k] != 0.0) visit(members[k], weights[k]);
-  }
+  near.for_each_member(place,
+                       [&](Index node, double weight, const Eigen::Matrix3d&) { visit(node, weight); });
 }
 
 }  // namespace palpate

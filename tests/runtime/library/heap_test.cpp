@@ -168,6 +168,27 @@ TEST_P(Tick, MakesNoHeapCallWhereContactsAreLeftOut) {
   EXPECT_GT(left_out, 0);
 }
 
+TEST_P(Tick, MakesNoHeapCallWhereContactsAreMergedAndParted) {
+  State few(body_,
+            {.tools = {Tool{.radius = 2.0, .friction = 0.3}}, .max_contacts = GetParam() == 3 ? 16 : 4});
+  ToolPose pose;
+  int changes = 0;
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+  counting = true;
+#endif
+  for (int k = 0; k < 200; ++k) {
+    pose.position = test::upright(GetParam(), 0.5, 0.5, 3.01 - 0.002 * std::min(k, 199 - k));
+    step(body_, few, pose);
+    changes += few.scratch.merging.has_changed ? 1 : 0;
+  }
+#if PALPATE_OWN_MALLOC
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+#endif
+  EXPECT_GT(changes, 1);
+}
+
 /// The same body with a finer surface, and patches that take turns.
 class OverlayTick : public Tick {
  protected:

@@ -51,7 +51,7 @@ TEST_P(ForceError, OfContactPointsThatFoundNoRoom) {
   for (const double coupling : {std::numeric_limits<double>::infinity(), 2.0}) {
     const Tool tool{.radius = 0.8, .coupling_stiffness = coupling};
     const State whole = pressed(tool, depth_, 200);
-    for (const Index room : {2, 3}) {
+    for (const Index room : {2, 3}) {  // too little for three nodes that could be merged
       if (room >= tool_of(whole).contacts) continue;
       const State state = pressed(tool, depth_, room);
       ASSERT_TRUE(has(state.status, StepStatus::capacity_full)) << room;

@@ -217,7 +217,6 @@ TEST_P(ManyContacts, KeepWhatDoesNotChange) {
   State state = begin(body);
   std::vector<double> shares;
   double largest = 0.0;
-  int second_passes = 0;  // keep what the first one has computed
   for (int tick = 0; tick < 500; ++tick) {
     const auto to = poses(tick);
     State anew = tick > 120 && tick % 10 == 0 ? state : begin(body);
@@ -231,14 +230,13 @@ TEST_P(ManyContacts, KeepWhatDoesNotChange) {
     if (tick <= 120 || tick % 10 != 0) continue;
     anew.scratch.compliance.forget();
     step(body, anew, to);
-    if (anew.scratch.compliance.renewed() < anew.scratch.problem.rows) ++second_passes;
+    ASSERT_EQ(anew.scratch.compliance.renewed(), anew.scratch.problem.rows) << tick;
     for (std::size_t k = 0; k < state.tools.size(); ++k) {
       ASSERT_EQ(state.tools[k].contact_wrench.force, anew.tools[k].contact_wrench.force) << tick;
       ASSERT_EQ(state.tools[k].local.stiffness, anew.tools[k].local.stiffness) << tick;
     }
   }
   EXPECT_GT(largest, 0.0);
-  EXPECT_LE(second_passes, 2);
   ASSERT_GT(shares.size(), 200U);
   std::nth_element(shares.begin(), shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2),
                    shares.end());

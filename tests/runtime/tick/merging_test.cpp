@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -222,20 +221,17 @@ struct Expected {
 Expected expected(const State& state, const ContactPoint& contact, const std::vector<Vec3>& places,
                   const Vec3& tool) {
   const Index place = state.surface.near.place_of(cube().aggregate_node(contact.aggregate));
-  const std::span<const Index> members = cube().aggregates().members(contact.aggregate);
   Expected result;
   Vec3 normals = Vec3::Zero();
-  for (std::size_t k = 0; k < members.size(); ++k) {
-    const double weight = state.surface.near.group_weights(place)[k];
-    if (weight == 0.0) continue;
-    const Vec3 across = tool - places[static_cast<std::size_t>(members[k])];
-    const Vec3 force = state.surface.near.group_maps(place)[k] * contact.frame.col(0);
+  state.surface.near.for_each_member(place, [&](Index node, double weight, const Eigen::Matrix3d& map) {
+    const Vec3 across = tool - places[static_cast<std::size_t>(node)];
+    const Vec3 force = map * contact.frame.col(0);
     result.gap += weight * (across.norm() - radius);
     result.weights += weight;
     result.force += force;
     normals += weight * across.normalized();
     result.along_normals = std::min(result.along_normals, force.normalized().dot(across.normalized()));
-  }
+  });
   result.mean_normal = normals.norm();
   result.gap /= result.mean_normal;
   return result;
