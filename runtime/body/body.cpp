@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "runtime/body/modal_newmark.h"
 #include "runtime/body/surface_numbering.h"
+#include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
 namespace {
@@ -108,8 +109,14 @@ Body::Body(Model model, const GreensOptions& options, int refinement, ContactMod
   find_free_nodes();
   follow_body();
   std::vector<bool> moves;
-  for (Index node = 0; node < fine_.nodes(); ++node) moves.push_back(refinement_ == 1 && surface_moves(node));
+  std::vector<Index> follows;
+  for (Index node = 0; node < fine_.nodes(); ++node) {
+    const SurfaceParts parts = surface_parts(node);
+    moves.push_back(refinement_ == 1 && surface_moves(node));
+    follows.push_back(parts.stored.empty() ? -1 : parts.stored.back());
+  }
   aggregates_ = SurfaceAggregates(dimension(), simplices(), moves);
+  runs_ = NodeRuns(tuning.far.run, greens_.nodes(), dimension(), simplices(), follows);
   for (const Index element : fine_.element) {
     const Index material = model_.material_of_element[element];
     surface_friction_.push_back(model_.materials[material].friction);

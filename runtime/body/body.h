@@ -10,6 +10,7 @@
 #include "runtime/body/aggregates.h"
 #include "runtime/body/fine_surface.h"
 #include "runtime/body/greens.h"
+#include "runtime/body/node_runs.h"
 
 namespace palpate {
 
@@ -102,6 +103,8 @@ class Body {
   [[nodiscard]] Index most_surface_parts() const noexcept { return most_surface_parts_; }
   /// Groups of neighbouring surface nodes; none of a refined surface, which is for overlays.
   [[nodiscard]] const SurfaceAggregates& aggregates() const noexcept { return aggregates_; }
+  /// Runs of stored nodes by which the far surface is renewed.
+  [[nodiscard]] const NodeRuns& runs() const noexcept { return runs_; }
   /// Number of a group among the surface nodes: after all of them.
   [[nodiscard]] Index aggregate_node(Index group) const noexcept {
     return static_cast<Index>(surface_rest_.size()) + group;
@@ -156,6 +159,7 @@ class Body {
   std::vector<double> part_weight_;
   Index most_surface_parts_ = 1;
   SurfaceAggregates aggregates_;
+  NodeRuns runs_;
   std::vector<Index> first_follower_;     // [stored + 1]
   std::vector<Index> followers_;          // surface nodes
   std::vector<Vec3> surface_rest_;        // [S]

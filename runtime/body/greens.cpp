@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::int64_t cache_line = 64;
 constexpr std::int64_t tile = 64;  // scalars: two tiles of doubles fit into the first-level cache
+constexpr std::size_t nodes_ahead = 4;
 constexpr std::int64_t u_chunk =
     2048;  // doubles of u that stay in the first-level cache while all rows pass by
 constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is fetched
@@ -96,8 +97,8 @@ void gather_from_packed(const PackedGreens& packed, int dimension, Index row, st
 /// u += f^T rows over `count` entries of the D rows of a node; meanwhile what comes later in them is called
 /// into the cache.
 template <int D, class T>
-void add_rows(const T* rows, std::int64_t stride, const double* f, double* __restrict u,
-              std::int64_t count) noexcept {
+void add_rows(const T* rows, std::int64_t stride, const double* f, double* __restrict u, std::int64_t count,
+              const T* next_rows) noexcept {
   constexpr std::int64_t step = cache_line / static_cast<std::int64_t>(sizeof(T));
   constexpr std::int64_t ahead = ahead_bytes / static_cast<std::int64_t>(sizeof(T));
   std::array<const T*, D> row;
@@ -113,7 +114,10 @@ void add_rows(const T* rows, std::int64_t stride, const double* f, double* __res
   };
   std::int64_t i = 0;
   for (; i + step <= count; i += step) {
-    for (const T* xi : row) __builtin_prefetch(xi + i + ahead);
+    for (std::size_t p = 0; p < D; ++p) {
+      const T* later = i + ahead < count ? row[p] + ahead : next_rows + static_cast<std::int64_t>(p) * stride;
+      __builtin_prefetch(later + i);
+    }
 #pragma omp simd
     for (std::int64_t k = i; k < i + step; ++k) add(k);
   }
@@ -130,8 +134,10 @@ void displacement_from_square(const T* square, std::int64_t stride, std::span<co
     double* chunk = u.data() + begin;
     std::fill_n(chunk, count, 0.0);
     for (std::size_t k = 0; k < nodes.size(); ++k) {
-      const T* rows = square + D * std::int64_t{nodes[k]} * stride + first + begin;
-      add_rows<D>(rows, stride, f + D * k, chunk, count);
+      const auto rows = [&](std::size_t n) {
+        return square + D * std::int64_t{nodes[std::min(n, nodes.size() - 1)]} * stride + first + begin;
+      };
+      add_rows<D>(rows(k), stride, f + D * k, chunk, count, rows(k + nodes_ahead));
     }
   }
 }

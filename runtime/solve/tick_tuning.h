@@ -142,11 +142,15 @@ struct HandTuning {
 
 /// How much of the far surface a tick renews.
 struct FarTuning {
-  Index nodes = 64;          ///< of the body, whose displacement a tick renews
-  Index patch_nodes = 8;     ///< of the patch's surface
-  Index blocks = 512;        ///< pairs of loaded and renewed nodes
-  Index moves = 64;          ///< surface nodes that are moved with them
-  double tree_margin = 0.1;  ///< [edge] how much larger the tree's boxes are
+  Index nodes = 64;             ///< of the body, whose displacement a tick renews
+  Index patch_nodes = 8;        ///< of the patch's surface
+  Index blocks = 8192;          ///< pairs of loaded and renewed nodes
+  Index moves = 64;             ///< surface nodes that are moved with them
+  Index run = 16;               ///< stored nodes of a run; near tools, runs are renewed more often, as a node
+                                ///< that lies where it was is met too early or too late
+  std::int64_t patience = 200;  ///< ticks that a run without near nodes counts as near
+  std::int64_t all_stride = 4;  ///< one tick out of so many goes on with the whole body
+  double tree_margin = 0.1;     ///< [edge] how much larger the tree's boxes are
 };
 
 /// The near field and the free motion.

@@ -88,7 +88,7 @@ SurfaceState make_surface(const Body& body, const StateOptions& options) {
           .near = std::move(near),
           .motion = std::move(motion),
           .stored_displacement = std::vector<double>(static_cast<std::size_t>(body.greens().order())),
-          .sweep = {},
+          .sweep = FarSweep(body.runs().count()),
           .patch = nullptr,
           .rigid_compliance = tuning.assembly.coincident_share * mean_compliance(body),
           .least_compliance = tuning.assembly.wall_share * least_compliance_of_a_node(body)};

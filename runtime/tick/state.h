@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -50,10 +51,22 @@ struct ToolState {
 
 /// The slices in which ticks renew the surface far from the tools.
 struct FarSweep {
-  Index next_node = 0;        ///< stored node from which the next tick goes on
-  Index next_patch_node = 0;  ///< place in the patch from which it goes on there
-  double change = 0.0;        ///< how far a node was moved at most in this sweep [m]
-  double last_change = 0.0;   ///< and in the one before: how wrong a far node can be [m]
+  explicit FarSweep(Index runs)
+      : last_near(static_cast<std::size_t>(runs), never), taken(last_near), near_runs(last_near.size()) {}
+
+  static constexpr std::int64_t never = std::numeric_limits<std::int64_t>::min() / 2;
+  Index next_node = 0;                  ///< stored node from which the next tick goes on
+  Index next_patch_node = 0;            ///< place in the patch from which it goes on there
+  double change = 0.0;                  ///< how far a node was moved at most in this sweep [m]
+  double last_change = 0.0;             ///< and in the one before: how wrong a far node can be [m]
+  std::int64_t count = 0;               ///< ticks so far
+  std::int64_t near_tick = never;       ///< tick in which there was a near node last,
+  std::vector<std::int64_t> last_near;  ///< [runs of stored nodes] and in each run
+  std::vector<std::int64_t> taken;      ///< [runs] tick in which each was put into near_runs
+  std::vector<Index> near_runs;         ///< [runs] those that are renewed more often
+  Index near_run_count = 0;
+  Index next_near_run = 0;  ///< place in near_runs from which the next tick goes on,
+  Index done_of_run = 0;    ///< and nodes of it that are renewed already
 };
 
 /// The deformed surface, as it goes from tick to tick. Each member: shape, who changes it.

@@ -30,6 +30,62 @@ Vec3 stored_displacement(const Body& body, const SurfaceState& surface, Index no
   return sum;
 }
 
+/// Renews the displacement of stored nodes, and moves the surface nodes that follow them until none of
+/// `moves` is left; where it ends.
+Index renew_nodes(const Body& body, SurfaceState& surface, Scratch& scratch, Index first, Index end,
+                  Index& moves) noexcept {
+  const int d = body.dimension();
+  const SurfaceLoad& load = surface.near.load();
+  const std::span<double> u(scratch.far_displacement.data(), static_cast<std::size_t>(d * (end - first)));
+  body.greens().displacement(load.nodes(), load.forces(), first, u);
+  std::copy(u.begin(), u.end(), surface.stored_displacement.begin() + std::ptrdiff_t{d} * first);
+  Index stored = first;
+  for (; stored < end && moves > 0; ++stored) {
+    moves -= static_cast<Index>(body.followers(stored).size());
+    for (const Index node : body.followers(stored)) {
+      if (surface.near.place_in_patch(node) >= 0) continue;
+      move_far(body, surface, node, stored_displacement(body, surface, node));
+    }
+  }
+  return stored;
+}
+
+/// Fills sweep.near_runs: runs that had a near node of late, and those beside them.
+void find_near_runs(const NodeRuns& runs, FarSweep& sweep) noexcept {
+  sweep.near_run_count = 0;
+  const auto take = [&](Index run) {
+    if (sweep.taken[run] == sweep.count) return;
+    sweep.taken[run] = sweep.count;
+    sweep.near_runs[sweep.near_run_count++] = run;
+  };
+  for (Index run = 0; run < runs.count(); ++run) {
+    if (sweep.last_near[run] + tuning.far.patience < sweep.count) continue;
+    take(run);
+    for (const Index other : runs.beside(run)) take(other);
+  }
+}
+
+/// Renews `most` nodes of the near runs, which take turns, each once at most.
+void renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, Index most) noexcept {
+  const NodeRuns& runs = body.runs();
+  FarSweep& sweep = surface.sweep;
+  if (sweep.next_near_run >= sweep.near_run_count) {
+    find_near_runs(runs, sweep);
+    sweep.next_near_run = 0;
+  }
+  Index moves = tuning.far.moves;
+  for (Index left = most; left > 0 && moves > 0 && sweep.next_near_run < sweep.near_run_count;) {
+    const Index run = sweep.near_runs[sweep.next_near_run];
+    const Index first = runs.begin(run) + sweep.done_of_run;
+    const Index stopped = renew_nodes(body, surface, scratch, first, runs.end(run), moves);
+    left -= stopped - first;
+    sweep.done_of_run = stopped - runs.begin(run);
+    if (stopped < runs.end(run)) continue;
+    sweep.done_of_run = 0;
+    ++sweep.next_near_run;
+  }
+}
+
 }  // namespace
 
 void move_near_surface(const Body& body, SurfaceState& surface) noexcept {
@@ -64,38 +120,31 @@ void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexce
 }
 
 void renew_stored_displacement(const Body& body, SurfaceState& surface) noexcept {
+  ++surface.sweep.count;
   for (Index place = 0; place < surface.near.count(); ++place) {
     const auto node = static_cast<std::size_t>(surface.near.node(place));
     if (node >= body.surface_stored_nodes().size()) continue;
-    set_vector(surface.stored_displacement, body.dimension(), body.surface_stored_nodes()[node],
-               surface.near.displacement(place));
+    const Index stored = body.surface_stored_nodes()[node];
+    set_vector(surface.stored_displacement, body.dimension(), stored, surface.near.displacement(place));
+    surface.sweep.last_near[body.runs().of(stored)] = surface.sweep.count;
+    surface.sweep.near_tick = surface.sweep.count;
   }
 }
 
 void renew_far_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept {
-  const int d = body.dimension();
-  const SurfaceLoad& load = surface.near.load();
-  const auto most = [&](Index budget) {
-    return std::min(budget, tuning.far.blocks / std::max<Index>(load.count, 1) + 1);
-  };
-  const Index first = surface.sweep.next_node;
-  const Index end = std::min(first + most(tuning.far.nodes), body.greens().nodes());
-  const std::span<double> u(scratch.far_displacement.data(), static_cast<std::size_t>(d * (end - first)));
-  body.greens().displacement(load.nodes(), load.forces(), first, u);
-  std::copy(u.begin(), u.end(), surface.stored_displacement.begin() + std::ptrdiff_t{d} * first);
-  Index moves = 0;
-  Index stored = first;
-  for (; stored < end && moves < tuning.far.moves; ++stored) {
-    moves += static_cast<Index>(body.followers(stored).size());
-    for (const Index node : body.followers(stored)) {
-      if (surface.near.place_in_patch(node) >= 0) continue;
-      move_far(body, surface, node, stored_displacement(body, surface, node));
-    }
-  }
-  surface.sweep.next_node = stored % body.greens().nodes();
-  if (surface.sweep.next_node != 0) return;
-  surface.sweep.last_change = surface.sweep.change;
-  surface.sweep.change = 0.0;
+  FarSweep& sweep = surface.sweep;
+  const Index nodes = body.greens().nodes();
+  const Index most =
+      std::min(tuning.far.nodes, tuning.far.blocks / std::max<Index>(surface.near.load().count, 1) + 1);
+  const bool is_near = sweep.near_tick + tuning.far.patience >= sweep.count;
+  if (is_near && sweep.count % tuning.far.all_stride != 0)
+    return renew_near_runs(body, surface, scratch, most);
+  const Index end = std::min(sweep.next_node + most, nodes);
+  Index moves = tuning.far.moves;
+  sweep.next_node = renew_nodes(body, surface, scratch, sweep.next_node, end, moves) % nodes;
+  if (sweep.next_node != 0) return;
+  sweep.last_change = sweep.change;
+  sweep.change = 0.0;
 }
 
 void renew_patch_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept {

@@ -37,17 +37,17 @@ std::vector<Eigen::Index> dofs_of(int dimension, std::span<const Index> nodes) {
   return dofs;
 }
 
-Mesh unit_mesh(ElementType element, int cells) {
-  if (traits(element).dimension == 2) return generate(RectangleShape{.cells = {cells, cells}}, element);
-  const BoxShape box{.cells = {cells, cells, cells}};
-  return element == ElementType::hex8 ? generate(box, element) : with_elements(generate(box), element, "box");
-}
-
 double height(const Model& model, std::size_t node) {
   return model.mesh.nodes[node][model.dimension() - 1];
 }
 
 }  // namespace
+
+Mesh unit_mesh(ElementType element, int cells) {
+  if (traits(element).dimension == 2) return generate(RectangleShape{.cells = {cells, cells}}, element);
+  const BoxShape box{.cells = {cells, cells, cells}};
+  return element == ElementType::hex8 ? generate(box, element) : with_elements(generate(box), element, "box");
+}
 
 Eigen::MatrixXd assemble_stiffness(const Model& model) {
   const auto order = static_cast<Eigen::Index>(model.mesh.nodes.size()) * model.dimension();
@@ -87,7 +87,8 @@ Eigen::MatrixXd random_definite(Eigen::Index order, unsigned seed) {
   return A;
 }
 
-Model bake(Mesh mesh, const std::function<bool(const Vec3&)>& clamped, Scope scope, Precision precision) {
+Model bake(Mesh mesh, const std::function<bool(const Vec3&)>& clamped, Scope scope, Precision precision,
+           bool scrambled) {
   Model model;
   model.name = "box";
   model.mesh = std::move(mesh);
@@ -113,7 +114,7 @@ Model bake(Mesh mesh, const std::function<bool(const Vec3&)>& clamped, Scope sco
       model.stored_nodes.push_back(node);
     }
   }
-  std::shuffle(model.stored_nodes.begin(), model.stored_nodes.end(), std::mt19937(7));
+  if (scrambled) std::shuffle(model.stored_nodes.begin(), model.stored_nodes.end(), std::mt19937(7));
 
   const std::vector<Eigen::Index> free_dofs = dofs_of(d, free);
   const Eigen::MatrixXd K = assemble_stiffness(model)(free_dofs, free_dofs);

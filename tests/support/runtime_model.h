@@ -19,11 +19,14 @@ PackedGreens pack(const Eigen::MatrixXd& matrix, Precision precision);
 Eigen::MatrixXd random_definite(Eigen::Index order, unsigned seed);
 
 /// A body of one material, E = 1 Pa, nu = 0.3, in the plane in plane stress, clamped where `clamped` says so,
-/// without loads; stored nodes in a scrambled order.
-Model bake(Mesh mesh, const std::function<bool(const Vec3&)>& clamped, Scope scope, Precision precision);
+/// without loads; stored nodes in a scrambled order, or as the mesh has them.
+Model bake(Mesh mesh, const std::function<bool(const Vec3&)>& clamped, Scope scope, Precision precision,
+           bool scrambled = true);
 
-/// The unit cube of cells^3 cells (tet4, tet10 or hex8) or the unit square of cells^2 (quad4 or tri3),
-/// clamped at the bottom (z = 0, in the plane y = 0).
+/// The unit cube of cells^3 cells (tet4, tet10 or hex8) or the unit square of cells^2 (quad4 or tri3).
+Mesh unit_mesh(ElementType element, int cells);
+
+/// That, clamped at the bottom (z = 0, in the plane y = 0).
 Model unit_model(ElementType element, int cells, Scope scope, Precision precision);
 
 /// That of tet4 or, with two dimensions, of quad4.

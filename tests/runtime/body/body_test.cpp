@@ -333,5 +333,23 @@ TEST(SurfaceAggregates, AreNotOfARefinedSurface) {
   EXPECT_EQ(body.aggregates().count(), 0);
 }
 
+// Two runs are beside each other where a simplex has nodes of both.
+TEST(NodeRuns, LieBesideThoseThatShareSimplices) {
+  // Five nodes in a row, joined to triangles in turn; node 4 follows nothing.
+  const std::vector<Index> simplices = {0, 1, 2, 1, 2, 3, 2, 3, 4};
+  const std::vector<Index> stored = {0, 1, 4, 5, -1};
+  const NodeRuns runs(2, 7, 3, simplices, stored);
+  ASSERT_EQ(runs.count(), 4) << "the last has one node";
+  EXPECT_EQ(runs.of(5), 2);
+  EXPECT_EQ(runs.begin(3), 6);
+  EXPECT_EQ(runs.end(3), 7);
+  const auto beside = [&](Index run) {
+    return std::vector<Index>(runs.beside(run).begin(), runs.beside(run).end());
+  };
+  EXPECT_EQ(beside(0), std::vector<Index>{2});
+  EXPECT_EQ(beside(1), std::vector<Index>{});
+  EXPECT_EQ(beside(2), std::vector<Index>{0});
+}
+
 }  // namespace
 }  // namespace palpate::body_test
