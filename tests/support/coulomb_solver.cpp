@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace palpate::test {
@@ -31,7 +32,9 @@ double CoulombSolver::residual(const VectorXd& force) const {
   for (Eigen::Index k = 0; k < contacts(); ++k) {
     const VectorXd now = force.segment(d_ * k, d_);
     const VectorXd next = projected(k, now, motion.segment(d_ * k, d_));
-    change = std::max(change, (next - now).norm());
+    const double difference = (next - now).norm();
+    if (!std::isfinite(difference)) return std::numeric_limits<double>::infinity();
+    change = std::max(change, difference);
     largest = std::max({largest, now.norm(), next.norm()});
   }
   return change / largest;

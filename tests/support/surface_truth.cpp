@@ -1,5 +1,6 @@
 #include "tests/support/surface_truth.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -20,7 +21,7 @@ using Sparse = Eigen::SparseMatrix<double>;
 constexpr double sight = 0.35;                 // [edge] pieces nearer than this are looked at in a tick
 constexpr double margin = 0.06;                // [edge] contact points nearer than this are in the problem
 constexpr Eigen::Index most_stiffened = 1100;  // [dofs] with more, normals that turn are followed by passes
-constexpr int most_passes = 60;
+constexpr int most_passes = 150;
 
 int count_of(const std::array<Index, 4>& piece) {
   return piece[1] < 0 ? 1 : piece[2] < 0 ? 2 : 3;
@@ -303,25 +304,41 @@ void SurfaceTruth::find_contacts() {
   }
 }
 
-/// What the nodal forces change by as the nodes move and the normal forces stay.
-Sparse SurfaceTruth::geometric_stiffness() const {
+/// What the nodal forces change by as the nodes move and the normal forces stay, of contact points that may
+/// slide; less springs along the normals, which what is shut does not move against: they keep the compliance
+/// positive definite where the normals alone keep the nodes from slipping aside.
+Sparse SurfaceTruth::geometric_stiffness(double share) const {
+  constexpr double spring = 3.0;  // [stiffness of the contact point alone]
   std::vector<Eigen::Triplet<double>> entries;
   for (const Contact& contact : contacts_) {
     const double force = contact.force.dot(contact.normal);
-    if (force <= 0.0) continue;
-    const MatrixXd H = force * curvature(core(), contact.piece, corners_of(contact.piece, u_),
-                                         1e-4 * body_.mean_surface_edge());
-    const auto dof = [&](Eigen::Index i) {
-      return Eigen::Index{3} * near_place_.at(contact.piece[static_cast<std::size_t>(i / 3)]) + i % 3;
-    };
-    for (Eigen::Index i = 0; i < H.rows(); ++i) {
-      for (Eigen::Index j = 0; j < H.cols(); ++j)
-        entries.emplace_back(static_cast<int>(dof(i)), static_cast<int>(dof(j)), H(i, j));
+    if (force <= 0.0 || sticks(contact)) continue;
+    const Corners at = corners_of(contact.piece, u_);
+    const VectorXd G = gradient(core(), contact.piece, at);
+    std::vector<Eigen::Index> dofs;
+    for (Eigen::Index i = 0; i < G.size(); ++i)
+      dofs.push_back(Eigen::Index{3} * near_place_.at(contact.piece[static_cast<std::size_t>(i / 3)]) +
+                     i % 3);
+    const double give = G.dot(C_near_(dofs, dofs) * G);
+    const MatrixXd H =
+        share * force * curvature(core(), contact.piece, at, 1e-4 * body_.mean_surface_edge()) -
+        spring / give * G * G.transpose();
+    for (Eigen::Index i = 0; i < G.size(); ++i) {
+      for (Eigen::Index j = 0; j < G.size(); ++j)
+        entries.emplace_back(static_cast<int>(dofs[static_cast<std::size_t>(i)]),
+                             static_cast<int>(dofs[static_cast<std::size_t>(j)]), H(i, j));
     }
   }
   Sparse A(u_.size(), u_.size());
   A.setFromTriplets(entries.begin(), entries.end());
   return A;
+}
+
+/// Whether a contact point had friction to spare: its force follows no normal.
+bool SurfaceTruth::sticks(const Contact& contact) const {
+  const double along = contact.force.dot(contact.normal);
+  const double across = (contact.force - along * contact.normal).norm();
+  return across < (1.0 - 1e-6) * solver_.friction * along;
 }
 
 /// The nodes' motion to that of the contact points along their axes.
@@ -383,6 +400,14 @@ double SurfaceTruth::solve_pass(const Vec3& way, double tolerance) {
   const VectorXd u = contacts_.empty() ? VectorXd(VectorXd::Zero(u_.size()))
                                        : VectorXd(-(stiffened_ * (J_.transpose() * solver_.p + A_ * u_)));
   const double move = u_.size() > 0 ? (u - u_).lpNorm<Eigen::Infinity>() : 0.0;
+  if (!(move < 1e10)) {
+    fprintf(stderr,
+            "NaN: contacts %zu rows %ld residual %g pass %d u0 %d W %d b %d p %d stiff %d A %d C %d\n",
+            contacts_.size(), (long)u_.size(), residual_, passes_, (int)u_.allFinite(),
+            (int)solver_.W.allFinite(), (int)solver_.b.allFinite(), (int)solver_.p.allFinite(),
+            (int)stiffened_.allFinite(), (int)MatrixXd(A_).allFinite(), (int)C_near_.allFinite());
+    exit(1);
+  }
   u_ = u;
   take_forces();
   return move;
@@ -438,11 +463,17 @@ Wrench SurfaceTruth::wrench(const Vec3& origin) const {
 void SurfaceTruth::stiffen() {
   A_ = Sparse(u_.size(), u_.size());
   stiffened_ = C_near_;
-  if (rule_ == TruthRule::begin || u_.size() > most_stiffened) return;
-  A_ = geometric_stiffness();
-  if (A_.nonZeros() == 0) return;
-  const MatrixXd M = MatrixXd::Identity(u_.size(), u_.size()) - C_near_ * A_;
-  stiffened_ = M.partialPivLu().solve(C_near_);
+  if (rule_ == TruthRule::begin || (getenv("TRUTH_PLAIN") || u_.size() > most_stiffened)) return;
+  // Where normals that turn let nodes slip aside by themselves, less of it: Newton's steps then go downhill.
+  for (const double share : {1.0, 0.7, 0.4}) {
+    A_ = geometric_stiffness(share);
+    if (A_.nonZeros() == 0) return;
+    const MatrixXd M = MatrixXd::Identity(u_.size(), u_.size()) - C_near_ * A_;
+    stiffened_ = M.partialPivLu().solve(C_near_);
+    if (MatrixXd(0.5 * (stiffened_ + stiffened_.transpose())).llt().info() == Eigen::Success) return;
+  }
+  A_.setZero();
+  stiffened_ = C_near_;
 }
 
 /// What may touch where the tool and the surface are.
@@ -455,17 +486,23 @@ void SurfaceTruth::look() {
 
 void SurfaceTruth::settle(const Vec3& way) {
   constexpr double still = 1e-10;  // [m]
-  passes_ = 0;
+  const double most = 0.3 * body_.mean_surface_edge();
   double last = std::numeric_limits<double>::infinity();
-  int turns = 0;
+  double share = 1.0;
+  passes_ = 0;
   do {
     find_contacts();
-    if (passes_ == 0 || passes_ % 4 == 0) stiffen();
+    if (passes_ < 4 || passes_ % 3 == 0) stiffen();
     const VectorXd u = u_;
     last_move_ = solve_pass(way, 1e-11);
+    if (getenv("TRUTH_TRACE"))
+      fprintf(stderr, "pass %d contacts %zu closed %zu move %.3e res %.1e steps %d W1 %g\n", passes_,
+              contacts_.size(), last_.size(), last_move_, residual_, solver_.steps(),
+              stiffened_.size() ? stiffened_.diagonal().maxCoeff() / C_near_.diagonal().maxCoeff() : 0.);
     // Feet that go to and fro over an edge: a part of the way.
-    if (passes_ > 6 && last_move_ > 0.7 * last) ++turns;
-    if (turns > 0) u_ = u + std::pow(0.7, turns) * (u_ - u);
+    if (passes_ > 20 && last_move_ > 0.9 * last) share = std::max(0.1, 0.7 * share);
+    const double part = std::min(share, most / std::max(last_move_, 1e-30));
+    if (part < 1.0) u_ = u + part * (u_ - u);
     last = last_move_;
     ++passes_;
   } while (last_move_ > still && passes_ < most_passes);
