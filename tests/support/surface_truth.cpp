@@ -304,15 +304,15 @@ void SurfaceTruth::find_contacts() {
   }
 }
 
-/// What the nodal forces change by as the nodes move and the normal forces stay, of contact points that may
-/// slide; less springs along the normals, which what is shut does not move against: they keep the compliance
-/// positive definite where the normals alone keep the nodes from slipping aside.
+/// What the nodal forces change by as the nodes move and the normal forces stay, less springs along the
+/// normals, which what is shut does not move against: they keep the compliance positive definite where the
+/// normals alone keep the nodes from slipping aside.
 Sparse SurfaceTruth::geometric_stiffness(double share) const {
   constexpr double spring = 3.0;  // [stiffness of the contact point alone]
   std::vector<Eigen::Triplet<double>> entries;
   for (const Contact& contact : contacts_) {
     const double force = contact.force.dot(contact.normal);
-    if (force <= 0.0 || sticks(contact)) continue;
+    if (force <= 0.0) continue;
     const Corners at = corners_of(contact.piece, u_);
     const VectorXd G = gradient(core(), contact.piece, at);
     std::vector<Eigen::Index> dofs;
@@ -332,13 +332,6 @@ Sparse SurfaceTruth::geometric_stiffness(double share) const {
   Sparse A(u_.size(), u_.size());
   A.setFromTriplets(entries.begin(), entries.end());
   return A;
-}
-
-/// Whether a contact point had friction to spare: its force follows no normal.
-bool SurfaceTruth::sticks(const Contact& contact) const {
-  const double along = contact.force.dot(contact.normal);
-  const double across = (contact.force - along * contact.normal).norm();
-  return across < (1.0 - 1e-6) * solver_.friction * along;
 }
 
 /// The nodes' motion to that of the contact points along their axes.
@@ -400,14 +393,6 @@ double SurfaceTruth::solve_pass(const Vec3& way, double tolerance) {
   const VectorXd u = contacts_.empty() ? VectorXd(VectorXd::Zero(u_.size()))
                                        : VectorXd(-(stiffened_ * (J_.transpose() * solver_.p + A_ * u_)));
   const double move = u_.size() > 0 ? (u - u_).lpNorm<Eigen::Infinity>() : 0.0;
-  if (!(move < 1e10)) {
-    fprintf(stderr,
-            "NaN: contacts %zu rows %ld residual %g pass %d u0 %d W %d b %d p %d stiff %d A %d C %d\n",
-            contacts_.size(), (long)u_.size(), residual_, passes_, (int)u_.allFinite(),
-            (int)solver_.W.allFinite(), (int)solver_.b.allFinite(), (int)solver_.p.allFinite(),
-            (int)stiffened_.allFinite(), (int)MatrixXd(A_).allFinite(), (int)C_near_.allFinite());
-    exit(1);
-  }
   u_ = u;
   take_forces();
   return move;
@@ -463,7 +448,7 @@ Wrench SurfaceTruth::wrench(const Vec3& origin) const {
 void SurfaceTruth::stiffen() {
   A_ = Sparse(u_.size(), u_.size());
   stiffened_ = C_near_;
-  if (rule_ == TruthRule::begin || (getenv("TRUTH_PLAIN") || u_.size() > most_stiffened)) return;
+  if (rule_ == TruthRule::begin || solver_.friction > 0.0 || u_.size() > most_stiffened) return;
   // Where normals that turn let nodes slip aside by themselves, less of it: Newton's steps then go downhill.
   for (const double share : {1.0, 0.7, 0.4}) {
     A_ = geometric_stiffness(share);
@@ -485,7 +470,7 @@ void SurfaceTruth::look() {
 }
 
 void SurfaceTruth::settle(const Vec3& way) {
-  constexpr double still = 1e-10;  // [m]
+  const double still = solver_.friction > 0.0 ? 1e-9 : 1e-10;  // [m]
   const double most = 0.3 * body_.mean_surface_edge();
   double last = std::numeric_limits<double>::infinity();
   double share = 1.0;
@@ -495,10 +480,6 @@ void SurfaceTruth::settle(const Vec3& way) {
     if (passes_ < 4 || passes_ % 3 == 0) stiffen();
     const VectorXd u = u_;
     last_move_ = solve_pass(way, 1e-11);
-    if (getenv("TRUTH_TRACE"))
-      fprintf(stderr, "pass %d contacts %zu closed %zu move %.3e res %.1e steps %d W1 %g\n", passes_,
-              contacts_.size(), last_.size(), last_move_, residual_, solver_.steps(),
-              stiffened_.size() ? stiffened_.diagonal().maxCoeff() / C_near_.diagonal().maxCoeff() : 0.);
     // Feet that go to and fro over an edge: a part of the way.
     if (passes_ > 20 && last_move_ > 0.9 * last) share = std::max(0.1, 0.7 * share);
     const double part = std::min(share, most / std::max(last_move_, 1e-30));

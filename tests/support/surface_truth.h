@@ -74,7 +74,6 @@ class SurfaceTruth {
   [[nodiscard]] Corners corners_of(const Piece& piece, const Eigen::VectorXd& u) const;
   void find_contacts();
   [[nodiscard]] Eigen::SparseMatrix<double> geometric_stiffness(double share) const;
-  [[nodiscard]] bool sticks(const Contact& contact) const;
   [[nodiscard]] Eigen::SparseMatrix<double, Eigen::RowMajor> rows() const;
   void state_problem(const Vec3& way);
   double solve_pass(const Vec3& way, double tolerance);
