@@ -308,7 +308,8 @@ void print(const std::string& name, const Shape& made, double friction, Index ro
     nodes.push_back(tick.nodes);
   }
   fmt::print(
-      "| {} | {:g} | {} | {:.0f} / {:.0f} | {:.4f} | {} | {} | {} | {} | {} | {} | {} | {:.0f} / {:.0f} | "
+      "| {} | {:g} | {} | {:.0f} / {:.0f} | {:.4f} | {} | {} | {} | {} | {} of {} | {} | {} | {:.0f} / "
+      "{:.0f} | "
       "{:.0f} / {:.0f} | {:.0e} / {:.0e} / {:.0e} |\n",
       name, friction, room, quantile(nodes, 0.5), quantile(nodes, 1.0), largest, three(errors.force),
       three(errors.torque), three(of_begin.force), ticks.size(), known.size() - unknown, known.size(), rough,
