@@ -5,12 +5,14 @@
 //               [--every N] [--dense N] [--ticks N] [--csv FILE.csv]
 //
 // A tool is s15, a sphere of 15 mm, or c20x80, a capsule of radius 20 mm and 80 mm between its ends' middles,
-// across --along. It comes along --along through --at, presses in by --depth [m] at half of --speed and
-// slides by --slide, then by half of it back and by --deeper deeper, and back the whole way. Without friction
-// the truth is that of a tool and a surface, whatever way led there: it is found in every --every-th tick.
-// With friction it goes the whole way beside the runtime, with its own forces. Times are those of the tick's
-// own thread (its processor time); the dense solver is timed in every --dense-th tick. A line of a table for
-// each tool, friction and room. scripts/studies/truth runs it.
+// across --along and --slide. It comes along --along through --at, presses in by --depth [m] (0.8 radii at
+// most) at half of --speed and slides by --slide, then by half of it back and by --deeper deeper (0.2 radii
+// at most), and back the whole way. The truth (tests/support/surface_truth.h) goes the same way beside the
+// runtime, with its own forces, twice: linear about where tool and surface are after each tick, which is what
+// is asked for, and about where they were before it. Without friction the former can be had in every
+// --every-th tick alone; where a tool is deep enough for more than one equilibrium that may find another.
+// Times are those of the tick's own thread (its processor time); the dense solver is timed in every
+// --dense-th tick. A line of a table for each tool, friction and room. scripts/studies/truth runs it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -48,7 +50,7 @@ struct Options {
   double depth = 0.02;
   double deeper = 0.01;
   double speed = 0.05;
-  int every = 10;
+  int every = 1;
   int dense = 10;
   int ticks = std::numeric_limits<int>::max();
   std::string csv;
@@ -155,9 +157,11 @@ std::vector<Vec3> path(const Body& body, const Options& options, const Shape& ma
     for (int k = 1; k <= ticks; ++k) places.push_back(place + way * k / ticks);
     place += way;
   };
-  go((options.depth + first_gap) * options.along, 0.5 * options.speed);
+  const double depth = std::min(options.depth, 0.8 * made.tool.radius);
+  const double deeper = std::min(options.deeper, 0.2 * made.tool.radius);
+  go((depth + first_gap) * options.along, 0.5 * options.speed);
   go(options.slide, options.speed);
-  go(options.deeper * options.along - 0.5 * options.slide, options.speed);
+  go(deeper * options.along - 0.5 * options.slide, options.speed);
   go(-0.5 * options.slide, options.speed);
   if (std::ssize(places) > options.ticks) places.resize(static_cast<std::size_t>(options.ticks));
   return places;

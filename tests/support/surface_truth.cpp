@@ -445,10 +445,11 @@ Wrench SurfaceTruth::wrench(const Vec3& origin) const {
   return sum;
 }
 
-void SurfaceTruth::stiffen() {
+/// The compliance that the passes go by; `turning`: with what normals that turn change.
+void SurfaceTruth::stiffen(bool turning) {
   A_ = Sparse(u_.size(), u_.size());
   stiffened_ = C_near_;
-  if (rule_ == TruthRule::begin || solver_.friction > 0.0 || u_.size() > most_stiffened) return;
+  if (!turning || solver_.friction > 0.0 || u_.size() > most_stiffened) return;
   // Where normals that turn let nodes slip aside by themselves, less of it: Newton's steps then go downhill.
   for (const double share : {1.0, 0.7, 0.4}) {
     A_ = geometric_stiffness(share);
@@ -466,7 +467,7 @@ void SurfaceTruth::look() {
   find_pieces();
   number_near_nodes();
   find_contacts();
-  stiffen();
+  stiffen(false);
 }
 
 void SurfaceTruth::settle(const Vec3& way) {
@@ -474,16 +475,19 @@ void SurfaceTruth::settle(const Vec3& way) {
   const double most = 0.3 * body_.mean_surface_edge();
   double last = std::numeric_limits<double>::infinity();
   double share = 1.0;
+  bool is_slow = false;
   passes_ = 0;
   do {
     find_contacts();
-    if (passes_ < 4 || passes_ % 3 == 0) stiffen();
+    if (passes_ == 0 || is_slow) stiffen(is_slow);
     const VectorXd u = u_;
     last_move_ = solve_pass(way, 1e-11);
     // Feet that go to and fro over an edge: a part of the way.
     if (passes_ > 20 && last_move_ > 0.9 * last) share = std::max(0.1, 0.7 * share);
     const double part = std::min(share, most / std::max(last_move_, 1e-30));
     if (part < 1.0) u_ = u + part * (u_ - u);
+    // Normals that turn are followed by passes where these close in on them fast enough.
+    is_slow = is_slow || (passes_ > 1 && last_move_ > 0.5 * last);
     last = last_move_;
     ++passes_;
   } while (last_move_ > still && passes_ < most_passes);

@@ -81,7 +81,7 @@ class SurfaceTruth {
   void renew_surface();
   bool is_out_of_sight();
   void look();
-  void stiffen();
+  void stiffen(bool turning);
   void settle(const Vec3& way);
   [[nodiscard]] Wrench wrench(const Vec3& origin) const;
 
