@@ -259,6 +259,25 @@ struct Errors {
   }
 };
 
+/// Largest change of force from one compared tick to the next [N]: where nodes lose their hold, the truth
+/// leaps to another equilibrium.
+struct Jumps {
+  double of_truth = 0.0, of_runtime = 0.0;
+};
+
+Jumps jumps_of(const std::vector<Tick>& ticks, const std::vector<True>& known) {
+  Jumps jumps;
+  for (std::size_t k = 1; k < known.size(); ++k) {
+    const True& now = known[k];
+    const True& last = known[k - 1];
+    if (!is_known(now) || !is_known(last)) continue;
+    jumps.of_truth = std::max(jumps.of_truth, (now.end.force - last.end.force).norm());
+    jumps.of_runtime =
+        std::max(jumps.of_runtime, (ticks[now.tick].wrench.force - ticks[last.tick].wrench.force).norm());
+  }
+  return jumps;
+}
+
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
   std::ranges::sort(values);
@@ -275,10 +294,11 @@ void print_head(const Body& body, const Options& options) {
              body.surface_rest_positions().size(), 1e3 * body.mean_surface_edge());
   fmt::print(
       "| tool | friction | room | nodes pressed: median / most | force at most [N] | off: force (median / "
-      "99.9 % / largest) | torque | force, linear about the tick's begin | ticks | compared | not converged "
+      "99.9 % / largest) | torque | force, linear about the tick's begin | change in a tick at most: truth / "
+      "runtime | ticks | compared | not converged "
       "| "
       "capacity full | tick: median / 99.9 % [us] | dense: median / 99.9 % [us] | left over / moved [um] / "
-      "inside [um] |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "inside [um] |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   std::fflush(stdout);
 }
 
@@ -303,6 +323,7 @@ void print(const std::string& name, const Shape& made, double friction, Index ro
     move.push_back(now.move);
     inside.push_back(now.penetration);
   }
+  const Jumps jumps = jumps_of(ticks, known);
   int rough = 0, full = 0;
   for (const Tick& tick : ticks) {
     rough += has(tick.status, StepStatus::not_converged) ? 1 : 0;
@@ -312,13 +333,15 @@ void print(const std::string& name, const Shape& made, double friction, Index ro
     nodes.push_back(tick.nodes);
   }
   fmt::print(
-      "| {} | {:g} | {} | {:.0f} / {:.0f} | {:.4f} | {} | {} | {} | {} | {} of {} | {} | {} | {:.0f} / "
+      "| {} | {:g} | {} | {:.0f} / {:.0f} | {:.4f} | {} | {} | {} | {:.1e} / {:.1e} | {} | {} of {} | {} | "
+      "{} | {:.0f} / "
       "{:.0f} | "
       "{:.0f} / {:.0f} | {:.0e} / {:.0e} / {:.0e} |\n",
       name, friction, room, quantile(nodes, 0.5), quantile(nodes, 1.0), largest, three(errors.force),
-      three(errors.torque), three(of_begin.force), ticks.size(), known.size() - unknown, known.size(), rough,
-      full, quantile(times, 0.5), quantile(times, 0.999), quantile(dense, 0.5), quantile(dense, 0.999),
-      quantile(left_over, 1.0), 1e6 * quantile(move, 1.0), 1e6 * quantile(inside, 1.0));
+      three(errors.torque), three(of_begin.force), jumps.of_truth / largest, jumps.of_runtime / largest,
+      ticks.size(), known.size() - unknown, known.size(), rough, full, quantile(times, 0.5),
+      quantile(times, 0.999), quantile(dense, 0.5), quantile(dense, 0.999), quantile(left_over, 1.0),
+      1e6 * quantile(move, 1.0), 1e6 * quantile(inside, 1.0));
   std::fflush(stdout);
 }
 
