@@ -169,6 +169,7 @@ void SurfaceTruth::add_pieces_of(std::size_t triangle, std::map<Piece, bool>& fo
   if (std::max(normal.dot(ends[0] - at[0]), normal.dot(ends[1] - at[0])) <= 0.0) return;
   const double far = sight * body_.mean_surface_edge();
   std::vector<Piece> pieces;
+  pieces.reserve(8);
   for (const Index node : nodes) pieces.push_back({node, -1, -1, -1});
   const bool nodes_alone =
       tool_.length == 0.0 && tool_.radius > tuning.detection.smooth_radius * body_.simplex_edges()[triangle];
@@ -501,7 +502,7 @@ Wrench SurfaceTruth::step(const Vec3& place) {
   if (rule_ == TruthRule::begin) {
     look();
     last_move_ = solve_pass(way, 1e-11);
-    const Wrench sum = wrench(place_);
+    Wrench sum = wrench(place_);
     place_ = place;
     renew_surface();
     return sum;
