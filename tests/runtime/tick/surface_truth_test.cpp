@@ -1,0 +1,94 @@
+// Capsules and spheres that press and slide, tick by tick, against contact over the whole surface in double
+// precision (tests/support/surface_truth.h): none of the tick's detection, near field or solvers.
+#include "tests/support/surface_truth.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "runtime/tick/step.h"
+#include "tests/support/runtime_model.h"
+#include "tests/support/runtime_tool.h"
+
+namespace palpate::surface_truth_test {
+namespace {
+
+using test::SurfaceTruth;
+using test::TruthRule;
+
+const Body& cube() {
+  static const Body body(test::unit_model(3, 8, Scope::surface, Precision::double_precision));
+  return body;
+}
+
+struct Case {
+  const char* name;
+  double radius;
+  double length;
+  double friction;
+  TruthRule rule;
+  double tolerance;  // most that force and torque are off, of the largest
+  int closed;
+};
+
+void PrintTo(const Case& c, std::ostream* out) {  // NOLINT(readability-identifier-naming): GoogleTest's
+  *out << c.name;
+}
+
+/// Presses in, slides across and turns back.
+Vec3 place(const Case& c, int tick) {
+  const int slide = std::clamp(tick - 80, 0, 60) - std::clamp(tick - 140, 0, 40);
+  const double lower = 0.05 * c.length;
+  return {0.41 + 0.0005 * slide, 0.31, 1.0 + c.radius + lower + 0.002 - 0.0007 * std::min(tick, 80)};
+}
+
+/// Along y, its far end 0.05 rad lower.
+Eigen::Quaterniond orientation() {
+  return Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3(0.0, std::cos(0.05), -std::sin(0.05)));
+}
+
+class WholeSurface : public testing::TestWithParam<Case> {};
+
+double largest_difference(const Case& c, TruthRule rule, int& closed) {
+  const Tool tool = test::plain({.radius = c.radius, .length = c.length, .friction = c.friction});
+  State state(cube(), {.tools = {tool}});
+  SurfaceTruth truth(cube(), tool, c.friction, rule, orientation());
+  double largest = 0.0;
+  double difference = 0.0;
+  double left_over = 0.0;
+  for (int tick = 0; tick < 180; ++tick) {
+    ToolPose pose = test::pose(place(c, tick));
+    pose.orientation = orientation();
+    EXPECT_EQ(step(cube(), state, pose), StepStatus::ok) << tick;
+    const Wrench expected = truth.step(place(c, tick));
+    const Wrench& found = state.tools.front().contact_wrench;
+    left_over = std::max(left_over, truth.residual());
+    largest = std::max(largest, expected.force.norm());
+    difference = std::max({difference, (found.force - expected.force).norm(),
+                           (found.torque - expected.torque).norm() / c.radius});
+    closed = std::max(closed, truth.closed());
+  }
+  EXPECT_LT(left_over, 1e-6);
+  return difference / largest;
+}
+
+// The forces of a press and a slide are those of contact at all of the surface.
+TEST_P(WholeSurface, GivesTheSameForces) {
+  int closed = 0;
+  const double difference = largest_difference(GetParam(), GetParam().rule, closed);
+  EXPECT_LT(difference, GetParam().tolerance);
+  EXPECT_GE(closed, GetParam().closed);
+  RecordProperty("relative_difference", std::to_string(difference));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Cases, WholeSurface,
+    testing::Values(Case{"capsule", 0.25, 0.4, 0.3, TruthRule::end, 1e-3, 4},
+                    Case{"frictionless_capsule", 0.25, 0.4, 0.0, TruthRule::end, 7e-3, 6},
+                    Case{"sphere", 0.6, 0.0, 0.3, TruthRule::end, 2e-3, 4},
+                    Case{"sphere_linear_as_a_tick", 0.6, 0.0, 0.3, TruthRule::begin, 3e-5, 4}),
+    [](const testing::TestParamInfo<Case>& c) { return std::string(c.param.name); });
+
+}  // namespace
+}  // namespace palpate::surface_truth_test
