@@ -25,6 +25,8 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       force_(at(dimension_ * capacity)),
       last_force_(force_.size()),
       displacement_(force_.size()),
+      begun_(force_.size()),
+      last_motion_(force_.size()),
       blocks_(static_cast<std::size_t>(dimension_) * force_.size()),
       base_(at(std::min(parts_ * capacity, body.greens().nodes()))),
       base_uses_(base_.size()),
@@ -61,6 +63,10 @@ Index NearField::longest_unwanted() const noexcept {
 
 void NearField::begin_tick() noexcept {
   ++tick_;
+  for (std::size_t dof = 0; dof < at(dimension_ * count_); ++dof) {
+    last_motion_[dof] = displacement_[dof] - begun_[dof];
+    begun_[dof] = displacement_[dof];
+  }
   const std::int64_t patience =
       tuning.body.patience * tuning.body.usual_nodes / std::max(count_, tuning.body.usual_nodes);
   for (int k = 0; k < 2; ++k) {
@@ -120,6 +126,8 @@ void NearField::add(const Body& body, Index surface_node) noexcept {
   for (Index dof = dimension_ * place; dof < dimension_ * (place + 1); ++dof) {
     force_[at(dof)] = 0.0;
     displacement_[at(dof)] = dot(row(dof).data(), force_.data(), std::ptrdiff_t{dimension_} * place);
+    begun_[at(dof)] = displacement_[at(dof)];
+    last_motion_[at(dof)] = 0.0;
   }
 }
 
@@ -340,7 +348,7 @@ void NearField::move(Index from, Index to) noexcept {
     move_members(member_weight_);
     move_members(member_map_);
   }
-  for (std::vector<double>* of_dofs : {&force_, &last_force_, &displacement_}) {
+  for (std::vector<double>* of_dofs : {&force_, &last_force_, &displacement_, &begun_, &last_motion_}) {
     std::copy_n(of_dofs->begin() + std::ptrdiff_t{dimension_} * from, dimension_,
                 of_dofs->begin() + std::ptrdiff_t{dimension_} * to);
   }
@@ -459,6 +467,10 @@ Vec3 NearField::force(Index place) const noexcept {
 
 Vec3 NearField::displacement(Index place) const noexcept {
   return vector_at(displacement_, dimension_, place);
+}
+
+Vec3 NearField::last_motion(Index place) const noexcept {
+  return vector_at(last_motion_, dimension_, place);
 }
 
 }  // namespace palpate

@@ -40,7 +40,8 @@ class NearField {
             static_cast<std::size_t>(dimension_ * count_)};
   }
 
-  /// Forgets a node or two that were not wanted for long. Call once a tick, before `want`.
+  /// Takes down how far nodes have moved, and forgets one or two that were not wanted for long. Call once a
+  /// tick, before `want`.
   void begin_tick() noexcept;
 
   /// Sees to it that a node is here, with its displacement, in this tick; where there is no room the node
@@ -98,6 +99,8 @@ class NearField {
   [[nodiscard]] Vec3 force(Index place) const noexcept;
   /// Displacement at a place by the forces of the last `displace` [m].
   [[nodiscard]] Vec3 displacement(Index place) const noexcept;
+  /// What the displacement at a place changed by in the tick before [m]; zero where it was not here.
+  [[nodiscard]] Vec3 last_motion(Index place) const noexcept;
   /// The forces of the last `displace`.
   [[nodiscard]] const SurfaceLoad& load() const noexcept { return load_; }
 
@@ -148,6 +151,8 @@ class NearField {
   std::vector<double> force_;          // [d capacity]
   std::vector<double> last_force_;     // [d capacity] before `unload`
   std::vector<double> displacement_;   // [d capacity]
+  std::vector<double> begun_;          // [d capacity] displacement at the tick's begin
+  std::vector<double> last_motion_;    // [d capacity]
   std::vector<double> blocks_;         // [d x d capacity] block row of a node that comes
   // Stored nodes that those beside the patch follow, each once.
   Index base_count_ = 0;

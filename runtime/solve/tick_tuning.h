@@ -36,10 +36,6 @@ struct DetectionTuning {
 struct AssemblyTuning {
   double closed_gap = 0.01;        ///< [edge] a contact with a smaller gap may be closed
   double least_tilt_radius = 0.5;  ///< [edge] a sharper tool's contact slides on its face as if it were this
-  double foreseen_share =
-      0.9;                  ///< [device's motion] by which normals turn ahead: the surface goes with the tool
-                            ///< a little, and to foresee too much is to push it on. Measured, sphere of 2
-                            ///< edges, 0.2 R deep: of 1, work of a closed loop is -2.6 % of the lag's
   double most_roll = 0.25;  ///< [1] that a contact's normal turns in a tick by the device's motion
   double coincident_share = 1e-9;  ///< [mean compliance] added to every contact, so that points that coincide
                                    ///< share the force

@@ -175,6 +175,11 @@ bool rolls(const Scratch& scratch, const Tool& tool, const ContactPoint& contact
   return before.force.dot(before.frame.col(0)) > 0.0;
 }
 
+/// Whether a tool is so blunt that the normal at a node turns little as it passes over it.
+bool is_blunt(const Body& body, const Tool& tool) noexcept {
+  return tool.radius >= tuning.assembly.least_tilt_radius * body.mean_surface_edge();
+}
+
 void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_number, Index begin,
                    const TouchingPair& pair, bool face_tells) noexcept {
   ToolState& tool = state.tools[tool_number];
@@ -206,6 +211,7 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
   contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
+  contact.turns = contact.rolls || (!face_tells && vertex >= 0 && is_blunt(body, tool.tool));
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
   scratch.candidates[scratch.candidate_count++] = contact;
@@ -343,19 +349,54 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
     touch_corners(body, state, scratch, touch, pair, is_segment);
 }
 
-/// Turns the normals of contacts that roll ahead by what the device moves in the tick. Not before all are
-/// found: the same place is known by the normal that it has now.
-void roll_ahead(const Body& body, const ToolState& tool, Scratch& scratch, Index begin) noexcept {
-  const Vec3 shift = tuning.assembly.foreseen_share * (tool.device.position - tool.last_device.position);
-  if (shift.isZero(0.0)) return;
+/// How much of what the surface moved in the tick before it is to move in this one: as the device does.
+double going_on(const ToolState& tool) noexcept {
+  const double squared = tool.last_motion.squaredNorm();
+  if (squared == 0.0) return 0.0;
+  const Vec3 motion = tool.device.position - tool.last_device.position;
+  return std::clamp(motion.dot(tool.last_motion) / squared, 0.0, 1.0);
+}
+
+/// How far the surface moved at a contact point in the tick before [m].
+Vec3 last_motion(const Body& body, const NearField& near, const ContactPoint& contact) noexcept {
+  Vec3 motion = Vec3::Zero();
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (contact.nodes[k] < 0 || !body.surface_moves(contact.nodes[k])) continue;
+    motion += contact.weights[k] * near.last_motion(near.place_of(contact.nodes[k]));
+  }
+  return motion;
+}
+
+/// How far the core's point over a contact point goes with the device in this tick [m]: not along the core of
+/// a capsule, which is the same there.
+Vec3 core_motion(const ToolState& tool, const Core& core, const ContactPoint& contact) noexcept {
+  if (tool.tool.length == 0.0) return tool.device.position - tool.last_device.position;
+  const Vec3 arm = contact.arm + (contact.gap + tool.tool.radius) * contact.frame.col(0);
+  const Vec3 motion = device_motion(tool.last_device, tool.device, arm);
+  const Vec3 axis = core.end - core.origin;
+  const double share = axis.dot(arm) / axis.squaredNorm();
+  const double end = tuning.detection.same_place;
+  return share > end && share < 1.0 - end ? Vec3(motion - motion.dot(axis) / axis.squaredNorm() * axis)
+                                          : motion;
+}
+
+/// Turns the normals of contacts ahead by what the device moves in the tick. Not before all are found: the
+/// same place is known by the normal that it has now.
+void turn_ahead(const Body& body, const NearField& near, const ToolState& tool, const Core& core,
+                Scratch& scratch, Index begin) noexcept {
+  if (tool.device.position == tool.last_device.position &&
+      tool.device.orientation.coeffs() == tool.last_device.orientation.coeffs())
+    return;
   const double radius = rolling_radius(tool.tool, body.mean_surface_edge());
+  const double share = going_on(tool);
   for (Index k = begin; k < scratch.candidate_count; ++k) {
     ContactPoint& contact = scratch.candidates[k];
-    if (!contact.rolls) continue;
+    if (!contact.turns) continue;
     const Vec3 normal = contact.frame.col(0);
-    const Vec3 rolled = rolled_normal(normal, shift, radius);
-    const double nearer = (1.0 - rolled.dot(normal)) * (contact.gap + tool.tool.radius);
-    contact.frame = contact_frame(rolled, body.dimension());
+    const Vec3 foreseen = core_motion(tool, core, contact) - share * last_motion(body, near, contact);
+    const Vec3 turned = rolled_normal(normal, foreseen, radius);
+    const double nearer = (1.0 - turned.dot(normal)) * (contact.gap + tool.tool.radius);
+    contact.frame = contact_frame(turned, body.dimension());
     contact.gap -= nearer;
     contact.free_gap -= nearer;
   }
@@ -392,7 +433,8 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
     if (!is_held(body, state, number, nodes_of(body, pair.simplex)))
       touch_simplex(body, state, scratch, touch, pair);
   }
-  if (scratch.is_first_pass) roll_ahead(body, tool, scratch, touch.first_candidate);
+  if (scratch.is_first_pass)
+    turn_ahead(body, state.surface.near, tool, touch.core, scratch, touch.first_candidate);
 }
 
 /// Puts the nodes that a held contact moves with into the near field; whether they find room.

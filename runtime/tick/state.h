@@ -31,6 +31,7 @@ struct ToolState {
   Vec3 last_force = Vec3::Zero();   ///< contact_wrench.force of the tick before [N]
   Vec3 last_change = Vec3::Zero();  ///< of contact_wrench.force in the tick before [N]
   ToolPose last_device;             ///< the device pose of the tick before
+  Vec3 last_motion = Vec3::Zero();  ///< of the device in the tick before [m]
   Vec3 surface_change = Vec3::Zero();  ///< free motion of the touched surface since the tick before [m]
   Wrench explained;           ///< what the device's motion in this tick changes of the contact's wrench
   double recent_force = 0.0;  ///< running maximum of the contact force, which fades [N]

@@ -50,6 +50,7 @@ bool has_gone_away(const Body& body, const ToolState& tool) noexcept {
 
 void follow_device(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
                    ToolPose wanted) noexcept {
+  tool.last_motion = tool.device.position - tool.last_device.position;
   tool.last_device = tool.device;
   if (!make_valid(wanted, body.dimension())) {
     tool.status |= StepStatus::pose_not_finite;

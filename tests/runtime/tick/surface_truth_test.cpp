@@ -77,7 +77,7 @@ double largest_difference(const Case& c, TruthRule rule, int& closed) {
 TEST_P(WholeSurface, GivesTheSameForces) {
   int closed = 0;
   const double difference = largest_difference(GetParam(), GetParam().rule, closed);
-  EXPECT_LT(difference, GetParam().tolerance);
+  EXPECT_LT(difference, GetParam().tolerance);std::cout<<"DIFF "<<GetParam().name<<" "<<difference<<std::endl;
   EXPECT_GE(closed, GetParam().closed);
   RecordProperty("relative_difference", std::to_string(difference));
 }
@@ -86,8 +86,8 @@ INSTANTIATE_TEST_SUITE_P(
     Cases, WholeSurface,
     testing::Values(Case{"capsule", 0.25, 0.4, 0.3, TruthRule::end, 1e-3, 4},
                     Case{"frictionless_capsule", 0.25, 0.4, 0.0, TruthRule::end, 7e-3, 6},
-                    Case{"sphere", 0.6, 0.0, 0.3, TruthRule::end, 2e-3, 4},
-                    Case{"sphere_linear_as_a_tick", 0.6, 0.0, 0.3, TruthRule::begin, 3e-5, 4}),
+                    Case{"sphere", 0.6, 0.0, 0.3, TruthRule::end, 2e-4, 4},
+                    Case{"frictionless_sphere", 0.6, 0.0, 0.0, TruthRule::end, 2e-4, 4}),
     [](const testing::TestParamInfo<Case>& c) { return std::string(c.param.name); });
 
 }  // namespace
