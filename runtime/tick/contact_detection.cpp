@@ -87,8 +87,8 @@ bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nod
 /// scratch.found and `nearest` of scratch.pairs, and returns how many.
 std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
                               const Core& core, double reach) noexcept {
-  const std::size_t all = tree.near_segment(core.origin, core.end, reach, scratch.found);
-  const bool is_point = tool.tool.length == 0.0;
+  const std::size_t all = near_core(tree, core, reach, scratch.found);
+  const bool is_point = has_point_core(tool.tool);
   std::size_t count = 0;
   for (std::size_t k = 0; k < std::min(all, scratch.found.size()); ++k) {
     const Index simplex = scratch.found[k];
@@ -166,7 +166,7 @@ bool is_held(const Body& body, const State& state, Index tool, const SimplexNode
 /// Whether a contact's normal turns as the tool moves: at a vertex, and on an edge or face that carried
 /// force.
 bool rolls(const Scratch& scratch, const Tool& tool, const ContactPoint& contact) noexcept {
-  if (tool.length > 0.0 || contact.friction > 0.0) return false;
+  if (!has_point_core(tool) || contact.friction > 0.0) return false;
   if (std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; }) == 1)
     return true;
   const Index last = last_number(scratch, contact.feature);
@@ -305,19 +305,35 @@ bool is_found(const Scratch& scratch, const ToolContact& touch, const SurfaceTre
   return candidate.frame.col(0).dot(across) > (1.0 - tuning.detection.same_direction) * across.norm();
 }
 
-/// On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
-/// now at the other: all corners under it are contact points, and under a segment the edges.
+/// Contact points of a disc's rim: over the edges and, where the disc is not large against the triangle, at
+/// its quarters over the face. Between them and the corners the face is under the whole disc.
+void touch_rim(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+               const TouchingPair& seen) noexcept {
+  const SurfaceTree& tree = state.surface.tree;
+  const SimplexNodes nodes = nodes_of(body, seen.simplex);
+  std::array<TouchingPair, 2> over_edge;
+  for (std::size_t n = 0; n < 3; ++n) {
+    const std::size_t count = pairs_over_rim(tree, nodes, seen, n, touch.core, over_edge);
+    for (std::size_t k = 0; k < count; ++k) touch_pair(body, state, scratch, touch, over_edge[k]);
+  }
+  if (touch.core.disc_radius > tuning.detection.large_disc * body.simplex_edges()[seen.simplex]) return;
+  for (int quarter = 0; quarter < 4; ++quarter)
+    touch_pair(body, state, scratch, touch, pair_of_quarter(body, tree, seen.simplex, touch.core, quarter));
+}
+
+/// On what is flat as seen from it, a segment, disc or large sphere has its one nearest point now at the one
+/// side, now at the other: all corners under it are contact points, and under a segment or disc the edges.
 void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
-                   const TouchingPair& seen, bool is_segment) noexcept {
+                   const TouchingPair& seen, bool is_extended) noexcept {
   const SurfaceTree& tree = state.surface.tree;
   const SimplexNodes nodes = nodes_of(body, seen.simplex);
   const std::size_t corners = body.dimension() == 2 ? 2 : 3;
   const bool seen_from_outside = seen.height >= 0.0 && !touch.inside;
   for (std::size_t n = 0; n < corners; ++n) {
-    const int place = is_segment ? 2 : 0;
-    if (!is_segment && seen_from_outside && is_found(scratch, touch, tree, nodes[n])) continue;
+    const int place = is_extended ? 2 : 0;
+    if (!is_extended && seen_from_outside && is_found(scratch, touch, tree, nodes[n])) continue;
     touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
-    if (is_segment && corners == 3)
+    if (is_extended && corners == 3)
       touch_pair(body, state, scratch, touch, pair_of_edge(tree, nodes, seen, n, touch.core));
   }
 }
@@ -330,17 +346,20 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   const Tool& tool = state.tools[touch.number].tool;
   const SurfaceTree& tree = state.surface.tree;
   const Index simplex = pair.simplex;
-  const bool is_segment = tool.length > 0.0;
+  const bool is_disc = touch.core.disc_radius > 0.0;
+  const bool is_extended = !has_point_core(tool);
   const bool is_chord = touches_corners_alone(body, tool, simplex);
-  if (!is_chord) touch_pair(body, state, scratch, touch, pair);
-  if (is_segment) {
-    touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
+  // The middle of a disc is no more in the way than what is around it, unless it has to be pushed out.
+  if (!is_chord && (!is_disc || touch.inside)) touch_pair(body, state, scratch, touch, pair);
+  if (is_extended) {
+    if (!is_disc) touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
     pair = pair_of_core(body, tree, simplex, touch.core);
     touch_pair(body, state, scratch, touch, pair);
   }
-  const bool is_flat = is_segment || is_chord || tool.radius > body.mean_surface_edge();
-  if (is_flat && pair.distance - tool.radius <= touch.margin)
-    touch_corners(body, state, scratch, touch, pair, is_segment);
+  const bool is_flat = is_extended || is_chord || tool.radius > body.mean_surface_edge();
+  if (!is_flat || pair.distance - tool.radius > touch.margin) return;
+  touch_corners(body, state, scratch, touch, pair, is_extended);
+  if (is_disc) touch_rim(body, state, scratch, touch, pair);
 }
 
 /// Turns the normals of contacts that roll ahead by what the device moves in the tick. Not before all are
@@ -377,7 +396,7 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
                     .first_candidate = scratch.candidate_count};
   const double reach = std::max(tool.tool.radius + touch.margin, touch.lost);
   const std::size_t count = nearest_simplices(body, state.surface.tree, scratch, tool, touch.core, reach);
-  touch.is_known = tool.tool.length == 0.0 && count < scratch.pairs.size();
+  touch.is_known = has_point_core(tool.tool) && count < scratch.pairs.size();
   for (std::size_t k = count; k < scratch.found_count; ++k)
     leave_out_simplex(body, state, scratch, number, touch.core, scratch.found[k]);
   keep_usable(body, state, scratch, touch, count);
