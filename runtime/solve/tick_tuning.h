@@ -29,8 +29,10 @@ struct DetectionTuning {
   /// edges / corners alone: at 2.6 edges +16 and +21 / -35 and -13 %, at 3.5 +20 and +20 / -15 and -3, at 4.4
   /// +21 and +10 / -9 and -1, at 5.3 +18 and +10 / 0 and -3.
   double smooth_radius = 3.0;
-  double large_disc = 2.0;   ///< [edge of the simplex] a larger one needs no points of its rim within faces:
-                             ///< the arc between two edges is within 1/16 of an edge of its chord
+  double large_disc = 2.0;   ///< [edge of the simplex] of a larger one no points of the rim within faces are
+                             ///< needed: its arc between two edges is within 1/16 of an edge of its chord
+  double rim_apart = 0.1;    ///< [edge of the simplex] where an edge passes over a disc's rim is a contact
+                             ///< point of its own if this far from where the two are nearest
   double on_surface = 1e-6;  ///< [edge] nearer, the normal is the face's and not the distance's
 };
 

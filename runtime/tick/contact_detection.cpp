@@ -305,20 +305,36 @@ bool is_found(const Scratch& scratch, const ToolContact& touch, const SurfaceTre
   return candidate.frame.col(0).dot(across) > (1.0 - tuning.detection.same_direction) * across.norm();
 }
 
-/// Contact points of a disc's rim: over the edges and, where the disc is not large against the triangle, at
-/// its quarters over the face. Between them and the corners the face is under the whole disc.
-void touch_rim(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
-               const TouchingPair& seen) noexcept {
+/// Contact points of a triangle's edge: where the core is nearest and, under a disc, where it passes over the
+/// rim, as what is nearest of a flat edge is now at the one end of what is under the disc, now at the other.
+void touch_edge(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+                const TouchingPair& seen, std::size_t corner) noexcept {
   const SurfaceTree& tree = state.surface.tree;
   const SimplexNodes nodes = nodes_of(body, seen.simplex);
-  std::array<TouchingPair, 2> over_edge;
-  for (std::size_t n = 0; n < 3; ++n) {
-    const std::size_t count = pairs_over_rim(tree, nodes, seen, n, touch.core, over_edge);
-    for (std::size_t k = 0; k < count; ++k) touch_pair(body, state, scratch, touch, over_edge[k]);
+  const TouchingPair edge = pair_of_edge(tree, nodes, seen, corner, touch.core);
+  touch_pair(body, state, scratch, touch, edge);
+  if (touch.core.disc_radius == 0.0) return;
+  std::array<TouchingPair, 2> over_rim;
+  const std::size_t count = pairs_over_rim(tree, nodes, seen, corner, touch.core, over_rim);
+  const double apart = tuning.detection.rim_apart * body.simplex_edges()[seen.simplex];
+  for (std::size_t k = 0; k < count; ++k) {
+    const double squared = (over_rim[k].nearest.on_simplex - edge.nearest.on_simplex).squaredNorm();
+    if (squared > apart * apart) touch_pair(body, state, scratch, touch, over_rim[k]);
   }
-  if (touch.core.disc_radius > tuning.detection.large_disc * body.simplex_edges()[seen.simplex]) return;
-  for (int quarter = 0; quarter < 4; ++quarter)
-    touch_pair(body, state, scratch, touch, pair_of_quarter(body, tree, seen.simplex, touch.core, quarter));
+}
+
+/// Whether a disc is so large that the arc of its rim over a triangle is nearly its chord: there what is
+/// under the disc is known by its corners and edges.
+bool is_large_disc(const Body& body, const ToolContact& touch, Index simplex) noexcept {
+  return touch.core.disc_radius > tuning.detection.large_disc * body.simplex_edges()[simplex];
+}
+
+/// Whether a pair is of a face's inside under the rim of a large disc, and not where the disc cuts it.
+bool is_under_arc(const Body& body, const ToolContact& touch, const TouchingPair& pair) noexcept {
+  const std::array<double, 3>& weights = pair.nearest.weights;
+  return is_large_disc(body, touch, pair.simplex) && !touch.inside && pair.height > 0.0 &&
+         *std::min_element(weights.begin(), weights.end()) > 0.0 &&
+         pair.distance > tuning.detection.on_surface * body.mean_surface_edge();
 }
 
 /// On what is flat as seen from it, a segment, disc or large sphere has its one nearest point now at the one
@@ -333,8 +349,7 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
     const int place = is_extended ? 2 : 0;
     if (!is_extended && seen_from_outside && is_found(scratch, touch, tree, nodes[n])) continue;
     touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
-    if (is_extended && corners == 3)
-      touch_pair(body, state, scratch, touch, pair_of_edge(tree, nodes, seen, n, touch.core));
+    if (is_extended && corners == 3) touch_edge(body, state, scratch, touch, seen, n);
   }
 }
 
@@ -354,12 +369,14 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   if (is_extended) {
     if (!is_disc) touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
     pair = pair_of_core(body, tree, simplex, touch.core);
-    touch_pair(body, state, scratch, touch, pair);
+    if (!is_under_arc(body, touch, pair)) touch_pair(body, state, scratch, touch, pair);
   }
   const bool is_flat = is_extended || is_chord || tool.radius > body.mean_surface_edge();
   if (!is_flat || pair.distance - tool.radius > touch.margin) return;
   touch_corners(body, state, scratch, touch, pair, is_extended);
-  if (is_disc) touch_rim(body, state, scratch, touch, pair);
+  if (!is_disc || is_large_disc(body, touch, simplex)) return;
+  for (int quarter = 0; quarter < 4; ++quarter)
+    touch_pair(body, state, scratch, touch, pair_of_quarter(body, tree, simplex, touch.core, quarter));
 }
 
 /// Turns the normals of contacts that roll ahead by what the device moves in the tick. Not before all are
