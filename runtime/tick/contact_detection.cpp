@@ -323,18 +323,23 @@ void touch_edge(const Body& body, State& state, Scratch& scratch, const ToolCont
   }
 }
 
-/// Whether a disc is so large that the arc of its rim over a triangle is nearly its chord: there what is
-/// under the disc is known by its corners and edges.
-bool is_large_disc(const Body& body, const ToolContact& touch, Index simplex) noexcept {
-  return touch.core.disc_radius > tuning.detection.large_disc * body.simplex_edges()[simplex];
+/// Whether a pair is of a disc's rim and the inside of a face that lies flat under it: what is nearest of the
+/// rim is then now here, now there, and all of it as near.
+bool is_flat_under_rim(const Body& body, const ToolContact& touch, const TouchingPair& pair) noexcept {
+  return touch.core.disc_radius > 0.0 && !touch.inside && is_within_face(pair) && pair.height > 0.0 &&
+         pair.distance > tuning.detection.on_surface * body.mean_surface_edge() &&
+         pair.normal.cross(touch.core.axis).norm() < tuning.detection.steep;
 }
 
-/// Whether a pair is of a face's inside under the rim of a large disc, and not where the disc cuts it.
-bool is_under_arc(const Body& body, const ToolContact& touch, const TouchingPair& pair) noexcept {
-  const std::array<double, 3>& weights = pair.nearest.weights;
-  return is_large_disc(body, touch, pair.simplex) && !touch.inside && pair.height > 0.0 &&
-         *std::min_element(weights.begin(), weights.end()) > 0.0 &&
-         pair.distance > tuning.detection.on_surface * body.mean_surface_edge();
+/// Contact points around a disc's rim within a face. Of one that is large against the triangle there need be
+/// none: its arc over the triangle is nearly its chord, whose ends are over the edges.
+void touch_rim(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+               Index simplex) noexcept {
+  if (touch.core.disc_radius > tuning.detection.large_disc * body.simplex_edges()[simplex]) return;
+  for (int place = 0; place < places_on_rim; ++place) {
+    const TouchingPair pair = pair_on_rim(body, state.surface.tree, simplex, touch.core, place);
+    if (is_within_face(pair)) touch_pair(body, state, scratch, touch, pair);
+  }
 }
 
 /// On what is flat as seen from it, a segment, disc or large sphere has its one nearest point now at the one
@@ -369,14 +374,12 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   if (is_extended) {
     if (!is_disc) touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
     pair = pair_of_core(body, tree, simplex, touch.core);
-    if (!is_under_arc(body, touch, pair)) touch_pair(body, state, scratch, touch, pair);
+    if (!is_flat_under_rim(body, touch, pair)) touch_pair(body, state, scratch, touch, pair);
   }
   const bool is_flat = is_extended || is_chord || tool.radius > body.mean_surface_edge();
   if (!is_flat || pair.distance - tool.radius > touch.margin) return;
   touch_corners(body, state, scratch, touch, pair, is_extended);
-  if (!is_disc || is_large_disc(body, touch, simplex)) return;
-  for (int quarter = 0; quarter < 4; ++quarter)
-    touch_pair(body, state, scratch, touch, pair_of_quarter(body, tree, simplex, touch.core, quarter));
+  if (is_disc) touch_rim(body, state, scratch, touch, simplex);
 }
 
 /// Turns the normals of contacts that roll ahead by what the device moves in the tick. Not before all are

@@ -1,5 +1,6 @@
 #include "runtime/touch/touching_pair.h"
 
+#include <cmath>
 #include <utility>
 
 #include "runtime/solve/nearest_on_disc.h"
@@ -154,12 +155,13 @@ std::size_t pairs_over_rim(const SurfaceTree& tree, const SimplexNodes& nodes, c
   return count;
 }
 
-TouchingPair pair_of_quarter(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
-                             int quarter) noexcept {
-  const Vec3 along = quarter % 2 == 0 ? core.diameter : Vec3(core.axis.cross(core.diameter));
+TouchingPair pair_on_rim(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
+                         int place) noexcept {
+  const double angle = 2.0 * M_PI * place / places_on_rim;
+  const Vec3 outward = std::cos(angle) * core.diameter + std::sin(angle) * core.axis.cross(core.diameter);
   const SimplexNodes nodes = nodes_of(body, simplex);
-  const Vec3 on_rim = core.origin + (quarter < 2 ? core.disc_radius : -core.disc_radius) * along;
-  return make_pair(tree, nodes, simplex, 4 + quarter, nearest_on_simplex(tree, nodes, on_rim));
+  return make_pair(tree, nodes, simplex, 4 + place,
+                   nearest_on_simplex(tree, nodes, core.origin + core.disc_radius * outward));
 }
 
 Eigen::Matrix3d contact_frame(const Vec3& normal, int dimension) noexcept {

@@ -12,7 +12,7 @@ namespace palpate {
 struct TouchingPair {
   Index simplex = -1;
   int place = 0;  ///< on the core: 0 its origin, 1 its end, 2 anywhere; on a disc's rim 1 and 3 over an
-                  ///< edge, 4 to 7 the quarters
+                  ///< edge, from 4 on the eight
   NearestPoint nearest;
   Vec3 normal = Vec3::Zero();  ///< of the simplex, outward, unit
   double height = 0.0;         ///< of the core's point over the simplex's plane [m]
@@ -63,9 +63,16 @@ TouchingPair pair_of_edge(const SurfaceTree& tree, const SimplexNodes& nodes, co
 std::size_t pairs_over_rim(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
                            std::size_t corner, const Core& core, std::array<TouchingPair, 2>& pairs) noexcept;
 
-/// The pair of a simplex and one of the four quarters of a disc's rim.
-TouchingPair pair_of_quarter(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
-                             int quarter) noexcept;
+/// The pair of a simplex and one of eight places around a disc's rim.
+constexpr int places_on_rim = 8;
+TouchingPair pair_on_rim(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
+                         int place) noexcept;
+
+/// Whether the nearest point is within a triangle, at neither a corner nor an edge.
+inline bool is_within_face(const TouchingPair& pair) noexcept {
+  const std::array<double, 3>& weights = pair.nearest.weights;
+  return weights[0] > 0.0 && weights[1] > 0.0 && weights[2] > 0.0;
+}
 
 /// A contact's axes as columns: the normal, and two tangents beside it; in the plane the first is within it.
 [[nodiscard]] Eigen::Matrix3d contact_frame(const Vec3& normal, int dimension) noexcept;
