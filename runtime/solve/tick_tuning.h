@@ -32,7 +32,7 @@ struct DetectionTuning {
   double large_disc = 2.0;   ///< [edge of the simplex] of a larger one no points of the rim within faces are
                              ///< needed: its arc between two edges is within 1/16 of an edge of its chord
   double steep = 0.1;        ///< [sin] a disc's rim touches the inside of a face that is steeper to the disc
-                             ///< where it is nearest, a flatter one at eight places
+                             ///< where it is nearest (half as steep if it did), a flatter one at eight places
   double rim_apart = 0.1;    ///< [edge of the simplex] where an edge passes over a disc's rim is a contact
                              ///< point of its own if this far from where the two are nearest
   double on_surface = 1e-6;  ///< [edge] nearer, the normal is the face's and not the distance's

@@ -324,11 +324,16 @@ void touch_edge(const Body& body, State& state, Scratch& scratch, const ToolCont
 }
 
 /// Whether a pair is of a disc's rim and the inside of a face that lies flat under it: what is nearest of the
-/// rim is then now here, now there, and all of it as near.
-bool is_flat_under_rim(const Body& body, const ToolContact& touch, const TouchingPair& pair) noexcept {
-  return touch.core.disc_radius > 0.0 && !touch.inside && is_within_face(pair) && pair.height > 0.0 &&
-         pair.distance > tuning.detection.on_surface * body.mean_surface_edge() &&
-         pair.normal.cross(touch.core.axis).norm() < tuning.detection.steep;
+/// rim is then now here, now there, and all of it as near. One that was a contact point may be flatter, as
+/// what it does to the surface must not undo it.
+bool is_flat_under_rim(const Body& body, const Scratch& scratch, const ToolContact& touch,
+                       const TouchingPair& pair) noexcept {
+  if (touch.core.disc_radius == 0.0 || touch.inside || !is_within_face(pair) || pair.height <= 0.0 ||
+      pair.distance <= tuning.detection.on_surface * body.mean_surface_edge())
+    return false;
+  const std::int64_t feature = contact_feature(touch.number, pair.place, FeatureKind::face, pair.simplex);
+  const double least = (last_number(scratch, feature) < 0 ? 1.0 : 0.5) * tuning.detection.steep;
+  return pair.normal.cross(touch.core.axis).norm() < least;
 }
 
 /// Contact points around a disc's rim within a face. Of one that is large against the triangle there need be
@@ -374,7 +379,7 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   if (is_extended) {
     if (!is_disc) touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
     pair = pair_of_core(body, tree, simplex, touch.core);
-    if (!is_flat_under_rim(body, touch, pair)) touch_pair(body, state, scratch, touch, pair);
+    if (!is_flat_under_rim(body, scratch, touch, pair)) touch_pair(body, state, scratch, touch, pair);
   }
   const bool is_flat = is_extended || is_chord || tool.radius > body.mean_surface_edge();
   if (!is_flat || pair.distance - tool.radius > touch.margin) return;

@@ -102,8 +102,8 @@ TEST_P(DiscContact, TiltedIsTurnedBackAndItsWrenchIsThatOfItsContacts) {
       ASSERT_GT(up(wrench.force), 0.0) << angle;
       // With friction the solver of many contacts stops earlier.
       const double rest = friction > 0.0 ? 0.01 : 1e-6;
-      EXPECT_LT((wrench.force - sum.force).norm(), rest * sum.force.norm());
-      EXPECT_LT((wrench.torque - sum.torque).norm(), rest * radius_ * sum.force.norm());
+      EXPECT_LT((wrench.force - sum.force).norm(), rest * sum.force.norm()) << angle;
+      EXPECT_LT((wrench.torque - sum.torque).norm(), rest * radius_ * sum.force.norm()) << angle;
       // What lowers the side of +x turns about +y, in the plane about -z.
       const double back = d() == 3 ? -wrench.torque.y() : wrench.torque.z();
       EXPECT_GT(back * angle, 0.3 * radius_ * std::abs(angle) * std::cos(angle) * up(wrench.force));
@@ -216,8 +216,8 @@ class SpatialDisc : public testing::Test {
 /// force at its distance from the axis.
 TEST_F(SpatialDisc, TurnedAboutItsAxisIsHeldBackByFriction) {
   const double friction = 0.3;
-  State state(body_, {.tools = {plain({.radius = 0.03, .disc_radius = 0.3, .friction = friction})}});
-  ToolPose now = pose(Vec3(0.5, 0.5, 1.01));
+  State state(body_, {.tools = {plain({.radius = 0.02, .disc_radius = 0.2, .friction = friction})}});
+  ToolPose now = pose(Vec3(0.5, 0.5, 1.0));
   go(body_, state, now.position + Vec3(0, 0, 0.05), now, 100);
   hold(body_, state, now, 100);
   int unsettled = 0;
@@ -226,7 +226,7 @@ TEST_F(SpatialDisc, TurnedAboutItsAxisIsHeldBackByFriction) {
     if (has(step(body_, state, now), StepStatus::not_converged)) ++unsettled;
     EXPECT_LT(state.tools[0].force_error, 0.02 * state.tools[0].wrench.force.norm()) << tick;
   }
-  EXPECT_LE(unsettled, 20) << "of 400 ticks";
+  EXPECT_LE(unsettled, 40) << "of 400 ticks";
   double most = 0.0;
   for (const ContactPoint& contact : state.contacts()) {
     const Vec3 arm = contact.position - now.position;
