@@ -332,8 +332,9 @@ bool is_flat_under_rim(const Body& body, const Scratch& scratch, const ToolConta
       pair.distance <= tuning.detection.on_surface * body.mean_surface_edge())
     return false;
   const std::int64_t feature = contact_feature(touch.number, pair.place, FeatureKind::face, pair.simplex);
-  const double least = (last_number(scratch, feature) < 0 ? 1.0 : 0.5) * tuning.detection.steep;
-  return pair.normal.cross(touch.core.axis).norm() < least;
+  const DetectionTuning& limits = tuning.detection;
+  return pair.normal.cross(touch.core.axis).norm() <
+         (last_number(scratch, feature) < 0 ? limits.steep : limits.still_steep);
 }
 
 /// Contact points around a disc's rim within a face. Of one that is large against the triangle there need be

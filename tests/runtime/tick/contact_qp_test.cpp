@@ -312,7 +312,7 @@ Constraints constraints_at(const Model& model, const std::vector<Press>& presses
         }
         const Vec3 normal =
             (place_of(nodes[1]) - place_of(nodes[0])).cross(place_of(nodes[2]) - place_of(nodes[0]));
-        if (normal.normalized().cross(core.axis).norm() > 0.1) {
+        if (normal.normalized().cross(core.axis).norm() > 0.2) {
           add_pair(k, 2, nearest_of, nodes);
           continue;
         }
@@ -566,7 +566,7 @@ std::vector<ContactCase> contact_cases() {
       {"disc", ElementType::tet4, 8, {disc(3, 0.32, 0.05, 0.47, 0.56, 0.7, 0.005, 0.02)}, 12},
       {"tilted_disc", ElementType::tet4, 8, {disc(3, 0.32, 0.06, 0.47, 0.56, 0.7, 0.06, 0.01)}, 5},
       {"disc_on_its_edge", ElementType::tet4, 8, {disc(3, 0.3, 0.1, 0.4, 0.53, 0.4, 0.9, -0.11)}, 3},
-      {"small_disc", ElementType::tet4, 4, {disc(3, 0.12, 0.04, 0.33, 0.56, 0.3, 0.2, 0.005)}, 1},
+      {"small_disc", ElementType::tet4, 4, {disc(3, 0.12, 0.04, 0.33, 0.56, 0.3, 0.3, 0.005)}, 1},
       {"disc_in_the_plane", ElementType::quad4, 24, {disc(2, 0.27, 0.05, 0.46, 0.0, 0.0, 0.03, 0.02)}, 6},
       {"capsule_along_edges", ElementType::tet4, 8, {capsule(3, 0.25, 0.4, 0.3, 0.5, 0.0, 0.05, 0.04)}, 7},
   };
