@@ -26,7 +26,7 @@ double fitting_radius(const Body& body) {
 }
 
 std::string too_large(const Tool& tool, double size) {
-  const double length = 2.0 * tool.radius + tool.length;
+  const double length = tool.disc_radius > 0.0 ? 2.0 * tool.disc_radius : 2.0 * tool.radius + tool.length;
   if (!(length > size)) return "";
   return fmt::format("the tool is {:.4g} m long, and the whole body {:.4g} m", length, size);
 }

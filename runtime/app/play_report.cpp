@@ -156,6 +156,7 @@ Json json_room(const State& state) {
 Json json_tool(const Tool& tool) {
   return {{"radius_m", tool.radius},
           {"length_m", tool.length},
+          {"disc_radius_m", tool.disc_radius},
           {"reach_m", tool.reach},
           {"friction", tool.friction ? Json(*tool.friction) : Json()},
           {"coupling_N_per_m", tool.coupling_stiffness},

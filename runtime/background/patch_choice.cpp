@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/touch/tool_geometry.h"
 
 namespace palpate {
 namespace {
@@ -101,7 +102,7 @@ void PatchChoice::follow_tool(const Body& body, const State& state, std::size_t 
   }
   if (ticks_ % tuning.patches.look_stride != 0) return;
   const NearestSimplex found = state.surface.tree.nearest(tool.pose.position);
-  const double most = reach_ + tool.tool.radius + tool.tool.length;
+  const double most = reach_ + tool.tool.radius + core_extent(tool.tool);
   followed.centre = tool.engaged && found.nearest.squared_distance < most * most
                         ? nearest_centre(body, found, followed.centre)
                         : -1;

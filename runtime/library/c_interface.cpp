@@ -52,6 +52,7 @@ constexpr palpate_options default_options = PALPATE_OPTIONS_INIT;
 Tool to_tool(const palpate_tool& tool) {
   Tool result{.radius = tool.radius,
               .length = tool.length,
+              .disc_radius = tool.disc_radius,
               .coupling_stiffness = tool.coupling_stiffness,
               .coupling_torsion = tool.coupling_torsion,
               .max_force = tool.max_force,

@@ -31,7 +31,8 @@ extern "C" {
 typedef struct palpate_session palpate_session;
 
 /* A rigid tool: all points within `radius` of its core, the segment of `length` from the tool's origin along
- * its own z axis (in the plane: its own y axis). With length 0 it is a sphere, with radius 0 too a point. It
+ * its own z axis (in the plane: its own y axis), or a flat disc around the origin, normal to that axis, that
+ * makes the whole tool as wide as `disc_radius`. With neither it is a sphere, with radius 0 too a point. It
  * hangs on the device by a spring, the virtual coupling, in series with the body: what the hand feels is
  * never stiffer than that. */
 typedef struct palpate_tool {
@@ -45,12 +46,13 @@ typedef struct palpate_tool {
   double reach;              /* [m] a grab that touches nothing holds the nearest surface within this */
   double hand_over;          /* share of the force that may change in a millisecond without the tool's motion
                               * explaining it; HUGE_VAL: any, then contact that slips is felt as a kick */
+  double disc_radius;        /* [m] of a disc with its edge, which is rounded by `radius`; 0: no disc */
 } palpate_tool;
 
 /* A point without a coupling or limit, with the material's friction, no reach and a hand-over of
  * 0.005. */
 #define PALPATE_TOOL_INIT \
-  { sizeof(palpate_tool), 0.0, 0.0, HUGE_VAL, HUGE_VAL, HUGE_VAL, -1.0, 0.0, 0.005 }
+  { sizeof(palpate_tool), 0.0, 0.0, HUGE_VAL, HUGE_VAL, HUGE_VAL, -1.0, 0.0, 0.005, 0.0 }
 
 /* Where the device wants a tool. */
 typedef struct palpate_pose {

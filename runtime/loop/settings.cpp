@@ -23,6 +23,8 @@ constexpr NumberRange positive_or_infinite{0.0, std::numeric_limits<double>::inf
                                            "greater than 0, or inf"};
 constexpr bool protects_hand = true;
 
+constexpr double usual_edge = 0.1;  // [radius] by which the edge of a disc is rounded
+
 /// A part NAME=VALUE.
 struct Part {
   std::string_view name;
@@ -47,6 +49,7 @@ std::string text_of(std::size_t bytes) {
   return std::to_string(bytes >> 20);
 }
 std::string text_of(const Tool& tool) {
+  if (tool.disc_radius > 0.0) return fmt::format("disc:{},{}", tool.disc_radius, tool.radius);
   if (tool.length > 0.0) return fmt::format("capsule:{},{}", tool.radius, tool.length);
   return tool.radius > 0.0 ? fmt::format("sphere:{}", tool.radius) : "point";
 }
@@ -102,6 +105,7 @@ void read_value(const Setting&, const std::string& text, Tool& tool) {
   const Tool shape = parse_shape(text);
   tool.radius = shape.radius;
   tool.length = shape.length;
+  tool.disc_radius = shape.disc_radius;
 }
 
 void read_value(const Setting& setting, const std::string& text, ContactModel& contact) {
@@ -138,12 +142,14 @@ void read_value(const Setting& setting, const std::string& text, std::optional<V
 /// Visits the settings that are members of the tool; its reach is that of the settings.
 template <class SomeTool, class Visitor>
 void for_each_tool_setting(SomeTool& tool, Visitor&& visit) {
-  auto& [radius, length, coupling, torsion, max_force, hand_over, reach, friction] = tool;
+  auto& [radius, length, disc_radius, coupling, torsion, max_force, hand_over, reach, friction] = tool;
   constexpr SettingGroup group = SettingGroup::tool;
-  visit(Setting{"tool", group, "point|sphere:RADIUS|capsule:RADIUS,LENGTH", "m",
+  visit(Setting{"tool", group, "point|sphere:RADIUS|capsule:RADIUS,LENGTH|disc:RADIUS[,EDGE]", "m",
                 "a ball that suits the body, in scripts a point",
-                "its shape: a point, a ball about the tool's origin, or all within the radius of a segment "
-                "that begins there and goes along the tool's z axis (in the plane y)"},
+                "its shape: a point, a ball about the tool's origin, all within the radius of a segment "
+                "that begins there and goes along the tool's z axis (in the plane y), or a flat punch "
+                "normal to that axis whose edge is rounded by EDGE, half its thickness (a tenth of the "
+                "radius where it is left out)"},
         tool);
   visit(Setting{"friction", group, "MU", "", "the materials'", "Coulomb's coefficient", number_from_zero,
                 friction.has_value()},
@@ -317,9 +323,11 @@ Tool parse_shape(const std::string& text) {
   const std::vector<std::string_view> sizes = split_commas(rest);
   const bool sphere = text.starts_with("sphere:") && sizes.size() == 1;
   const bool capsule = text.starts_with("capsule:") && sizes.size() == 2;
-  if (!sphere && !capsule) {
-    throw Error("'" + text + "' is none of point, sphere:RADIUS and capsule:RADIUS,LENGTH", "--tool",
-                "lengths are metres");
+  const bool disc = text.starts_with("disc:") && (sizes.size() == 1 || sizes.size() == 2);
+  if (!sphere && !capsule && !disc) {
+    throw Error(
+        "'" + text + "' is none of point, sphere:RADIUS, capsule:RADIUS,LENGTH and disc:RADIUS[,EDGE]",
+        "--tool", "lengths are metres");
   }
   const auto size = [&](std::string_view number) {
     const std::optional<double> metres = parse_number(number);
@@ -327,6 +335,13 @@ Tool parse_shape(const std::string& text) {
     throw Error(fmt::format("'{}' of '{}' is not a positive number of metres", number, text), "--tool",
                 "write for instance sphere:0.005");
   };
+  if (disc) {
+    tool.disc_radius = size(sizes[0]);
+    tool.radius = sizes.size() == 2 ? size(sizes[1]) : usual_edge * tool.disc_radius;
+    if (tool.radius <= tool.disc_radius) return tool;
+    throw Error(fmt::format("the edge of '{}' is rounded by more than the radius", text), "--tool",
+                "write for instance disc:0.01,0.001");
+  }
   tool.radius = size(sizes[0]);
   if (capsule) tool.length = size(sizes[1]);
   return tool;

@@ -79,7 +79,7 @@ using SettingsText = std::map<std::string, std::string>;
 
 // Of one option each; they throw Error whose `where` is the option.
 
-/// "point", "sphere:RADIUS" or "capsule:RADIUS,LENGTH" [m].
+/// "point", "sphere:RADIUS", "capsule:RADIUS,LENGTH", "disc:RADIUS" or "disc:RADIUS,EDGE" [m].
 [[nodiscard]] Tool parse_shape(const std::string& text);
 /// "r=3,rings=2", either part with its default when it is left out. `where`: the option.
 [[nodiscard]] OverlayOptions parse_overlay(const std::string& text, const std::string& where);

@@ -29,7 +29,15 @@ struct DetectionTuning {
   /// edges / corners alone: at 2.6 edges +16 and +21 / -35 and -13 %, at 3.5 +20 and +20 / -15 and -3, at 4.4
   /// +21 and +10 / -9 and -1, at 5.3 +18 and +10 / 0 and -3.
   double smooth_radius = 3.0;
-  double on_surface = 1e-6;  ///< [edge] nearer, the normal is the face's and not the distance's
+  double large_disc = 2.0;    ///< [edge of the simplex] of a larger one no points of the rim within faces are
+                              ///< needed: its arc between two edges is within 1/16 of an edge of its chord
+  double steep = 0.2;         ///< [sin] a disc's rim touches the inside of a face that is steeper to the disc
+                              ///< where it is nearest, a flatter one at eight places. Measured, disc of two
+                              ///< edges: nearest points of faces at 0.12 to 0.15 ran to and fro by 0.3 %
+  double still_steep = 0.15;  ///< [sin] where it touched so in the tick before
+  double rim_apart = 0.1;     ///< [edge of the simplex] where an edge passes over a disc's rim is a contact
+                              ///< point of its own if this far from where the two are nearest
+  double on_surface = 1e-6;   ///< [edge] nearer, the normal is the face's and not the distance's
 };
 
 /// The contact problem about where everything is.

@@ -10,10 +10,10 @@ namespace {
 /// Whether no simplex is within a distance of a tool's core, nor cut by it.
 bool keeps_distance(const Body& body, const SurfaceTree& tree, Scratch& scratch, const Tool& tool,
                     const Core& core, double distance) noexcept {
-  const std::size_t count = tree.near_segment(core.origin, core.end, distance, scratch.found);
+  const std::size_t count = near_core(tree, core, distance, scratch.found);
   return std::all_of(
       scratch.found.begin(), scratch.found.begin() + static_cast<std::ptrdiff_t>(count), [&](Index simplex) {
-        const NearestPoint pair = nearest_points(tree, nodes_of(body, simplex), core, tool.length == 0.0);
+        const NearestPoint pair = nearest_points(tree, nodes_of(body, simplex), core, has_point_core(tool));
         return pair.squared_distance > 0.0 && pair.squared_distance >= distance * distance;
       });
 }
@@ -24,7 +24,7 @@ bool is_outside(const Body& body, const SurfaceTree& tree, Scratch& scratch, con
                 const ToolPose& pose) noexcept {
   const Core core = core_of(tool, pose, body.dimension());
   return !tree.inside(core.origin) &&
-         (tool.length == 0.0 ||
+         (has_point_core(tool) ||
           (!tree.inside(core.end) && keeps_distance(body, tree, scratch, tool, core, 0.0)));
 }
 

@@ -87,8 +87,8 @@ bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nod
 /// scratch.found and `nearest` of scratch.pairs, and returns how many.
 std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
                               const Core& core, double reach) noexcept {
-  const std::size_t all = tree.near_segment(core.origin, core.end, reach, scratch.found);
-  const bool is_point = tool.tool.length == 0.0;
+  const std::size_t all = near_core(tree, core, reach, scratch.found);
+  const bool is_point = has_point_core(tool.tool);
   std::size_t count = 0;
   for (std::size_t k = 0; k < std::min(all, scratch.found.size()); ++k) {
     const Index simplex = scratch.found[k];
@@ -166,7 +166,7 @@ bool is_held(const Body& body, const State& state, Index tool, const SimplexNode
 /// Whether a contact's normal turns as the tool moves: at a vertex, and on an edge or face that carried
 /// force.
 bool rolls(const Scratch& scratch, const Tool& tool, const ContactPoint& contact) noexcept {
-  if (tool.length > 0.0 || contact.friction > 0.0) return false;
+  if (!has_point_core(tool) || contact.friction > 0.0) return false;
   if (std::count_if(contact.nodes.begin(), contact.nodes.end(), [](Index node) { return node >= 0; }) == 1)
     return true;
   const Index last = last_number(scratch, contact.feature);
@@ -311,20 +311,62 @@ bool is_found(const Scratch& scratch, const ToolContact& touch, const SurfaceTre
   return candidate.frame.col(0).dot(across) > (1.0 - tuning.detection.same_direction) * across.norm();
 }
 
-/// On what is flat as seen from it, a segment or large sphere has its one nearest point now at the one side,
-/// now at the other: all corners under it are contact points, and under a segment the edges.
+/// Contact points of a triangle's edge: where the core is nearest and, under a disc, where it passes over the
+/// rim, as what is nearest of a flat edge is now at the one end of what is under the disc, now at the other.
+void touch_edge(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+                const TouchingPair& seen, std::size_t corner) noexcept {
+  const SurfaceTree& tree = state.surface.tree;
+  const SimplexNodes nodes = nodes_of(body, seen.simplex);
+  const TouchingPair edge = pair_of_edge(tree, nodes, seen, corner, touch.core);
+  touch_pair(body, state, scratch, touch, edge);
+  if (touch.core.disc_radius == 0.0) return;
+  std::array<TouchingPair, 2> over_rim;
+  const std::size_t count = pairs_over_rim(tree, nodes, seen, corner, touch.core, over_rim);
+  const double apart = tuning.detection.rim_apart * body.simplex_edges()[seen.simplex];
+  for (std::size_t k = 0; k < count; ++k) {
+    const double squared = (over_rim[k].nearest.on_simplex - edge.nearest.on_simplex).squaredNorm();
+    if (squared > apart * apart) touch_pair(body, state, scratch, touch, over_rim[k]);
+  }
+}
+
+/// Whether a pair is of a disc's rim and the inside of a face that lies flat under it: what is nearest of the
+/// rim is then now here, now there, and all of it as near. One that was a contact point may be flatter, as
+/// what it does to the surface must not undo it.
+bool is_flat_under_rim(const Body& body, const Scratch& scratch, const ToolContact& touch,
+                       const TouchingPair& pair) noexcept {
+  if (touch.core.disc_radius == 0.0 || touch.inside || !is_within_face(pair) || pair.height <= 0.0 ||
+      pair.distance <= tuning.detection.on_surface * body.mean_surface_edge())
+    return false;
+  const std::int64_t feature = contact_feature(touch.number, pair.place, FeatureKind::face, pair.simplex);
+  const DetectionTuning& limits = tuning.detection;
+  return pair.normal.cross(touch.core.axis).norm() <
+         (last_number(scratch, feature) < 0 ? limits.steep : limits.still_steep);
+}
+
+/// Contact points around a disc's rim within a face. Of one that is large against the triangle there need be
+/// none: its arc over the triangle is nearly its chord, whose ends are over the edges.
+void touch_rim(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+               Index simplex) noexcept {
+  if (touch.core.disc_radius > tuning.detection.large_disc * body.simplex_edges()[simplex]) return;
+  for (int place = 0; place < places_on_rim; ++place) {
+    const TouchingPair pair = pair_on_rim(body, state.surface.tree, simplex, touch.core, place);
+    if (is_within_face(pair)) touch_pair(body, state, scratch, touch, pair);
+  }
+}
+
+/// On what is flat as seen from it, a segment, disc or large sphere has its one nearest point now at the one
+/// side, now at the other: all corners under it are contact points, and under a segment or disc the edges.
 void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
-                   const TouchingPair& seen, bool is_segment) noexcept {
+                   const TouchingPair& seen, bool is_extended) noexcept {
   const SurfaceTree& tree = state.surface.tree;
   const SimplexNodes nodes = nodes_of(body, seen.simplex);
   const std::size_t corners = body.dimension() == 2 ? 2 : 3;
   const bool seen_from_outside = seen.height >= 0.0 && !touch.inside;
   for (std::size_t n = 0; n < corners; ++n) {
-    const int place = is_segment ? 2 : 0;
-    if (!is_segment && seen_from_outside && is_found(scratch, touch, tree, nodes[n])) continue;
+    const int place = is_extended ? 2 : 0;
+    if (!is_extended && seen_from_outside && is_found(scratch, touch, tree, nodes[n])) continue;
     touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
-    if (is_segment && corners == 3)
-      touch_pair(body, state, scratch, touch, pair_of_edge(tree, nodes, seen, n, touch.core));
+    if (is_extended && corners == 3) touch_edge(body, state, scratch, touch, seen, n);
   }
 }
 
@@ -336,17 +378,20 @@ void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolC
   const Tool& tool = state.tools[touch.number].tool;
   const SurfaceTree& tree = state.surface.tree;
   const Index simplex = pair.simplex;
-  const bool is_segment = tool.length > 0.0;
+  const bool is_disc = touch.core.disc_radius > 0.0;
+  const bool is_extended = !has_point_core(tool);
   const bool is_chord = touches_corners_alone(body, tool, simplex);
-  if (!is_chord) touch_pair(body, state, scratch, touch, pair);
-  if (is_segment) {
-    touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
+  // The middle of a disc is no more in the way than what is around it, unless it has to be pushed out.
+  if (!is_chord && (!is_disc || touch.inside)) touch_pair(body, state, scratch, touch, pair);
+  if (is_extended) {
+    if (!is_disc) touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
     pair = pair_of_core(body, tree, simplex, touch.core);
-    touch_pair(body, state, scratch, touch, pair);
+    if (!is_flat_under_rim(body, scratch, touch, pair)) touch_pair(body, state, scratch, touch, pair);
   }
-  const bool is_flat = is_segment || is_chord || tool.radius > body.mean_surface_edge();
-  if (is_flat && pair.distance - tool.radius <= touch.margin)
-    touch_corners(body, state, scratch, touch, pair, is_segment);
+  const bool is_flat = is_extended || is_chord || tool.radius > body.mean_surface_edge();
+  if (!is_flat || pair.distance - tool.radius > touch.margin) return;
+  touch_corners(body, state, scratch, touch, pair, is_extended);
+  if (is_disc) touch_rim(body, state, scratch, touch, simplex);
 }
 
 /// How much of what the surface moved in the tick before it is to move in this one: as the device does.
@@ -418,7 +463,7 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
                     .first_candidate = scratch.candidate_count};
   const double reach = std::max(tool.tool.radius + touch.margin, touch.lost);
   const std::size_t count = nearest_simplices(body, state.surface.tree, scratch, tool, touch.core, reach);
-  touch.is_known = tool.tool.length == 0.0 && count < scratch.pairs.size();
+  touch.is_known = has_point_core(tool.tool) && count < scratch.pairs.size();
   for (std::size_t k = count; k < scratch.found_count; ++k)
     leave_out_simplex(body, state, scratch, number, touch.core, scratch.found[k]);
   keep_usable(body, state, scratch, touch, count);

@@ -152,7 +152,7 @@ void leave_out_simplex(const Body& body, const State& state, Scratch& scratch, I
   const SimplexNodes nodes = nodes_of(body, simplex);
   const NearestPoint nearest = touches_corners_alone(body, shape, simplex)
                                    ? nearest_corner(state.surface.tree, nodes, core)
-                                   : nearest_points(state.surface.tree, nodes, core, shape.length == 0.0);
+                                   : nearest_points(state.surface.tree, nodes, core, has_point_core(shape));
   const double distance = std::sqrt(nearest.squared_distance);
   if (!(distance > 0.0 && distance < shape.radius)) return;
   leave_out(body, state, scratch,

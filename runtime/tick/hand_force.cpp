@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "runtime/solve/tick_tuning.h"
+#include "runtime/touch/tool_geometry.h"
+
 namespace palpate {
 namespace {
 
@@ -25,7 +27,7 @@ void hand_over(ToolState& tool, double tick) noexcept {
                           ? tool.tool.hand_over * std::max(size, last.force.norm())
                           : std::max(tool.tool.hand_over, 1.0 / tuning.hand.fade_time) * tool.recent_force);
   const double force = share_of_way(last.force, contact.force, tool.explained.force.norm() + handed_over);
-  const double arm = std::max(tool.tool.radius + tool.tool.length, tool.tool.reach);
+  const double arm = std::max(extent(tool.tool), tool.tool.reach);
   const double torque = tool.contacts > 0 ? share_of_way(last.torque, contact.torque,
                                                          tool.explained.torque.norm() + arm * handed_over)
                                           : force;  // what is lost fades as one

@@ -27,6 +27,10 @@ void check(const Tool& tool, std::size_t number) {
   };
   size("radius", tool.radius);
   size("length", tool.length);
+  size("disc radius", tool.disc_radius);
+  check("disc radius", tool.disc_radius,
+        tool.disc_radius == 0.0 || (tool.disc_radius >= tool.radius && tool.length == 0.0),
+        "give at least the radius, and no length, or 0");
   size("reach", tool.reach);
   size("friction", tool.friction.value_or(0.0));
   bound("coupling stiffness", tool.coupling_stiffness);

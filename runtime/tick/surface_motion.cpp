@@ -5,7 +5,7 @@
 
 #include "runtime/solve/node_vectors.h"
 #include "runtime/solve/tick_tuning.h"
-#include "runtime/touch/tool_geometry.h"
+#include "runtime/touch/touching_pair.h"
 
 namespace palpate {
 namespace {
@@ -109,8 +109,8 @@ void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexce
     const Core core = core_of(tool.tool, tool.pose, body.dimension());
     const double reach =
         tool.tool.radius + tool.margin + 2.0 * std::max(surface.sweep.last_change, surface.sweep.change);
-    const std::size_t found = std::min(surface.tree.near_segment(core.origin, core.end, reach, scratch.found),
-                                       scratch.pairs.size());
+    const std::size_t found =
+        std::min(near_core(surface.tree, core, reach, scratch.found), scratch.pairs.size());
     for (std::size_t k = 0; k < found; ++k) {
       for (const Index node : body.simplices().subspan(d * static_cast<std::size_t>(scratch.found[k]), d)) {
         if (body.surface_moves(node)) move_far(body, surface, node, stored_displacement(body, surface, node));

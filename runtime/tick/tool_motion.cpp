@@ -5,6 +5,7 @@
 
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/clearance.h"
+#include "runtime/touch/tool_geometry.h"
 
 namespace palpate {
 namespace {
@@ -28,9 +29,8 @@ bool make_valid(ToolPose& pose, int dimension) noexcept {
 
 /// How far a tool's points move at most from one pose to another.
 double motion(const Tool& tool, const ToolPose& from, const ToolPose& to) noexcept {
-  const double turned =
-      tool.length > 0.0 || tool.radius > 0.0 ? from.orientation.angularDistance(to.orientation) : 0.0;
-  return (to.position - from.position).norm() + turned * (tool.length + tool.radius);
+  const double turned = extent(tool) > 0.0 ? from.orientation.angularDistance(to.orientation) : 0.0;
+  return (to.position - from.position).norm() + turned * extent(tool);
 }
 
 ToolPose between(const ToolPose& from, const ToolPose& to, double share) noexcept {
@@ -43,7 +43,7 @@ ToolPose between(const ToolPose& from, const ToolPose& to, double share) noexcep
 /// surface, or behind the body on a soft spring.
 bool has_gone_away(const Body& body, const ToolState& tool) noexcept {
   const double distance = body.bounds().exteriorDistance(tool.device.position);
-  return !tool.holding && distance > tool.tool.radius + tool.tool.length + body.bounds().diagonal().norm();
+  return !tool.holding && distance > extent(tool.tool) + body.bounds().diagonal().norm();
 }
 
 }  // namespace
@@ -79,7 +79,7 @@ void follow_device(const Body& body, const SurfaceTree& tree, Scratch& scratch, 
   double most = tuning.following.most_motion * size;
   if (wanted_motion > most && tool.contacts == 0 && !tool.holding) {
     const double free = std::sqrt(tree.nearest(tool.device.position).nearest.squared_distance) -
-                        tool.tool.radius - tool.tool.length - least;
+                        tool.tool.radius - core_extent(tool.tool) - least;
     most = std::max(most, free);
     if (wanted_motion <= free) return place();
   }

@@ -11,12 +11,15 @@
 namespace palpate {
 
 /// A rigid tool: all points within `radius` of its core, the segment of `length` from the tool's origin along
-/// its own z axis (in the plane: its own y axis). With length 0 it is a sphere, with radius 0 a point or a
+/// its own z axis (in the plane: its own y axis), or a flat disc around the origin, normal to that axis, that
+/// makes the whole tool as wide as `disc_radius`. With neither it is a sphere, with radius 0 a point or a
 /// needle. It hangs on the device by a spring, the virtual coupling, which is in series with the body: what
 /// the hand feels is never stiffer than the coupling.
 struct Tool {
-  double radius = 0.0;  ///< [m]
-  double length = 0.0;  ///< [m]
+  double radius = 0.0;       ///< [m]
+  double length = 0.0;       ///< [m]
+  double disc_radius = 0.0;  ///< of a disc with its edge, which is rounded by `radius`: at least that, and
+                             ///< the length is 0 [m]
   double coupling_stiffness =
       std::numeric_limits<double>::infinity();  ///< [N/m]; infinite: the tool is where the device is
   double coupling_torsion =

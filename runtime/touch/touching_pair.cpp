@@ -1,5 +1,9 @@
 #include "runtime/touch/touching_pair.h"
 
+#include <cmath>
+#include <utility>
+
+#include "runtime/solve/nearest_on_disc.h"
 #include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
@@ -13,9 +17,25 @@ NearestPoint nearest_on_simplex(const SurfaceTree& tree, const SimplexNodes& nod
                       : nearest_on_triangle(point, a, b, tree.position(nodes[2]));
 }
 
+Disc disc_of(const Core& core) noexcept {
+  return {core.origin, core.axis, core.disc_radius};
+}
+
+NearestPoint nearest_to_edge(const Core& core, const Vec3& a, const Vec3& b) noexcept {
+  return core.disc_radius > 0.0 ? nearest_of_disc_and_line(disc_of(core), a, b)
+                                : nearest_of_segments(core.origin, core.end, a, b);
+}
+
+Vec3 nearest_on_core(const Core& core, const Vec3& point) noexcept {
+  return core.disc_radius > 0.0 ? nearest_on_disc(disc_of(core), point)
+                                : nearest_on_line(point, core.origin, core.end).on_simplex;
+}
+
 NearestPoint nearest_to_core(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core) noexcept {
   const Vec3& a = tree.position(nodes[0]);
   const Vec3& b = tree.position(nodes[1]);
+  if (core.disc_radius > 0.0)
+    return nearest_of_disc_and_triangle(disc_of(core), a, b, tree.position(nodes[2]));
   return nodes[2] < 0 ? nearest_of_segments(core.origin, core.end, a, b)
                       : nearest_of_segment_and_triangle(core.origin, core.end, a, b, tree.position(nodes[2]));
 }
@@ -41,7 +61,14 @@ SimplexNodes nodes_of(const Body& body, Index simplex) noexcept {
 }
 
 bool touches_corners_alone(const Body& body, const Tool& tool, Index simplex) noexcept {
-  return tool.length == 0.0 && tool.radius > tuning.detection.smooth_radius * body.simplex_edges()[simplex];
+  return has_point_core(tool) && tool.radius > tuning.detection.smooth_radius * body.simplex_edges()[simplex];
+}
+
+std::size_t near_core(const SurfaceTree& tree, const Core& core, double reach,
+                      std::span<Index> found) noexcept {
+  if (core.disc_radius == 0.0) return tree.near_segment(core.origin, core.end, reach, found);
+  const Vec3 half = core.disc_radius * (1.0 - core.axis.array().square()).max(0.0).sqrt().matrix();
+  return tree.near_segment(core.origin - half, core.origin + half, reach, found);
 }
 
 Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept {
@@ -87,8 +114,7 @@ TouchingPair pair_of_corner(const SurfaceTree& tree, const SimplexNodes& nodes, 
   NearestPoint nearest;
   nearest.weights[corner] = 1.0;
   nearest.on_simplex = tree.position(nodes[corner]);
-  nearest.on_core =
-      place == 0 ? core.origin : nearest_on_line(nearest.on_simplex, core.origin, core.end).on_simplex;
+  nearest.on_core = place == 0 ? core.origin : nearest_on_core(core, nearest.on_simplex);
   nearest.squared_distance = (nearest.on_core - nearest.on_simplex).squaredNorm();
   return pair_of(seen.simplex, seen.normal, place, nearest);
 }
@@ -96,13 +122,46 @@ TouchingPair pair_of_corner(const SurfaceTree& tree, const SimplexNodes& nodes, 
 TouchingPair pair_of_edge(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
                           std::size_t corner, const Core& core) noexcept {
   const std::size_t next = (corner + 1) % 3;
-  NearestPoint nearest =
-      nearest_of_segments(core.origin, core.end, tree.position(nodes[corner]), tree.position(nodes[next]));
+  NearestPoint nearest = nearest_to_edge(core, tree.position(nodes[corner]), tree.position(nodes[next]));
   const std::array<double, 3> weights = nearest.weights;
   nearest.weights = {};
   nearest.weights[corner] = weights[0];
   nearest.weights[next] = weights[1];
   return pair_of(seen.simplex, seen.normal, 2, nearest);
+}
+
+std::size_t pairs_over_rim(const SurfaceTree& tree, const SimplexNodes& nodes, const TouchingPair& seen,
+                           std::size_t corner, const Core& core,
+                           std::array<TouchingPair, 2>& pairs) noexcept {
+  // From the lower node, so that both triangles of an edge give a place the same number.
+  std::size_t from = corner;
+  std::size_t to = (corner + 1) % 3;
+  if (nodes[from] > nodes[to]) std::swap(from, to);
+  const Vec3& a = tree.position(nodes[from]);
+  const Vec3& b = tree.position(nodes[to]);
+  const std::array<double, 2> shares = shares_over_rim(disc_of(core), a, b);
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double share = shares[k];
+    if (!(share > 0.0 && share < 1.0)) continue;
+    NearestPoint nearest;
+    nearest.weights[from] = 1.0 - share;
+    nearest.weights[to] = share;
+    nearest.on_simplex = (1.0 - share) * a + share * b;
+    nearest.on_core = nearest_on_core(core, nearest.on_simplex);
+    nearest.squared_distance = (nearest.on_core - nearest.on_simplex).squaredNorm();
+    pairs[count++] = pair_of(seen.simplex, seen.normal, k == 0 ? 1 : 3, nearest);
+  }
+  return count;
+}
+
+TouchingPair pair_on_rim(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
+                         int place) noexcept {
+  const double angle = 2.0 * M_PI * place / places_on_rim;
+  const Vec3 outward = std::cos(angle) * core.diameter + std::sin(angle) * core.axis.cross(core.diameter);
+  const SimplexNodes nodes = nodes_of(body, simplex);
+  return make_pair(tree, nodes, simplex, 4 + place,
+                   nearest_on_simplex(tree, nodes, core.origin + core.disc_radius * outward));
 }
 
 Eigen::Matrix3d contact_frame(const Vec3& normal, int dimension) noexcept {

@@ -612,6 +612,20 @@ class Tools(ProgramTest):
         numpy.testing.assert_allclose(numpy.cross(x - ticks["tool_position"][-1], f).sum(axis=0), torque,
                                       atol=0.02 * numpy.linalg.norm(torque))
 
+    def test_a_disc_is_normal_to_its_own_z(self):
+        file = self.bake(cube_toml(6))
+        script = "t,x,y,z\n0,0.5,0.5,1.2\n0.1,0.5,0.5,1.0\n0.2,0.5,0.5,1.0\n"
+        report, flat, contacts = self.play(file, script, "--tool", "disc:0.3,0.02")
+        self.assertEqual((report["tool"]["disc_radius_m"], report["tool"]["radius_m"], report["tool"]["length_m"]), (0.3, 0.02, 0))
+        self.assertLess(flat["force"][-1][2], 0)  # on the body
+        self.assertGreater(flat["contacts"][-1], 8)
+        self.assertLess(numpy.hypot(contacts["x"] - 0.5, contacts["y"] - 0.5).max(), 0.31)
+        turn = f"{numpy.sqrt(0.5)},0,{numpy.sqrt(0.5)},0"  # upright: it stands on its edge, as deep as the flat one was
+        script = f"t,x,y,z,qw,qx,qy,qz\n0,0.5,0.5,1.5,{turn}\n0.1,0.5,0.5,1.28,{turn}\n0.2,0.5,0.5,1.28,{turn}\n"
+        _, upright, _ = self.play(file, script, "--tool", "disc:0.3,0.02")
+        self.assertLess(upright["force"][-1][2], 0)
+        self.assertGreater(upright["force"][-1][2], 0.5 * flat["force"][-1][2])
+
     def test_grab_holds_what_is_touched_and_pulls(self):
         file = self.bake(cube_toml(6))
         script = "t,x,y,z,grab\n0,0.5,0.5,1.4,0\n0.2,0.5,0.5,1.15,1\n0.4,0.5,0.5,1.3,1\n"
@@ -710,6 +724,7 @@ class Usage(ProgramTest):
                                     ("--tool", "sphere:", "'' of 'sphere:'"), ("--tool", "sphere:5mm", "'5mm'"),
                                     ("--tool", "sphere:0", "'0' of 'sphere:0' is not a positive"), ("--tool", "sphere:-1", "'-1'"),
                                     ("--tool", "capsule:0.1", "is none of"), ("--tool", "capsule:0.1,nan", "'nan'"),
+                                    ("--tool", "disc:0.1,0.2", "rounded by more than the radius"), ("--tool", "disc:0.1,x", "'x'"),
                                     ("--tool", "point:1", "is none of"), ("--friction", "-0.1", "'-0.1'"),
                                     ("--friction", "inf", "'inf'"), ("--friction", "", "''"), ("--coupling", "0", "N/m"), ("--coupling-torsion", "x", "N m/rad"),
                                     ("--max-force", "-3", "greater than 0 [N]"), ("--max-contacts", "0", "from 1 to"),

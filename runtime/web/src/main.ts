@@ -196,11 +196,11 @@ class Page implements Listener {
     return this.mode_ === 'live' && state?.you === 'controller' && state.pointer;
   }
 
-  /** Where a press begins: as the body suggests, but no deeper than the tool is round. */
+  /** Where a press begins: as the body suggests, but no deeper than the tool is round or a disc is wide. */
   private usual_depth(): number {
     const suggested = this.state_?.defaults.depth ?? 0;
-    const { radius } = parse_tool(this.state_?.settings.tool);
-    return radius > 0 ? Math.min(radius, suggested) : suggested;
+    const { radius, disc_radius } = parse_tool(this.state_?.settings.tool);
+    return radius > 0 ? Math.min(Math.max(radius, disc_radius), suggested) : suggested;
   }
 
   private hand_settings(): HandSettings | string | null {

@@ -4,22 +4,38 @@ import type { Quaternion, Vec3 } from './words';
 export interface ToolShape {
   radius: number; // 0: a point
   length: number; // of a capsule's segment, from the origin along its own axis
+  disc_radius: number; // of a disc, normal to its own axis, with its edge, which is rounded by `radius`; 0: no disc
 }
 
-/** Of the option `tool`: "point", "sphere:R" or "capsule:R,L". */
+/** Of the radius: by what the edge of a disc is rounded where the option does not say. */
+const usual_edge = 0.1;
+
+/** Of the option `tool`: "point", "sphere:R", "capsule:R,L", "disc:R" or "disc:R,EDGE". */
 export function parse_tool(text: string | undefined): ToolShape {
   const [kind = '', sizes = ''] = (text ?? 'point').split(':');
-  const [radius = 0, length = 0] = sizes.split(',').map(Number);
-  if (kind === 'sphere') return { radius, length: 0 };
-  if (kind === 'capsule') return { radius, length };
-  return { radius: 0, length: 0 };
+  const [radius = 0, second] = sizes.split(',').map(Number);
+  if (kind === 'sphere') return { radius, length: 0, disc_radius: 0 };
+  if (kind === 'capsule') return { radius, length: second ?? 0, disc_radius: 0 };
+  if (kind === 'disc') return { radius: second ?? usual_edge * radius, length: 0, disc_radius: radius };
+  return { radius: 0, length: 0, disc_radius: 0 };
 }
 
-/** As the option `tool` has it. */
-export function tool_text(kind: string, radius: number, length: number): string {
+/** As the option `tool` has it; of a disc the edge is the usual one unless it is given. */
+export function tool_text(kind: string, radius: number, length: number, edge?: number): string {
   if (kind === 'sphere') return `sphere:${radius}`;
   if (kind === 'capsule') return `capsule:${radius},${length}`;
+  if (kind === 'disc') return edge === undefined ? `disc:${radius}` : `disc:${radius},${edge}`;
   return 'point';
+}
+
+/** Outline of a disc from the lower middle round its edge to the upper: pairs of distance from the axis and height. */
+export function disc_profile(disc_radius: number, edge: number, steps: number): [number, number][] {
+  const core = disc_radius - edge;
+  const round = Array.from({ length: steps + 1 }, (_, k): [number, number] => {
+    const angle = Math.PI * (k / steps - 0.5);
+    return [core + edge * Math.cos(angle), edge * Math.sin(angle)];
+  });
+  return [[0, -edge], ...round, [0, edge]];
 }
 
 export const plus = (a: Vec3, b: Vec3, scale = 1): Vec3 => [a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2]];

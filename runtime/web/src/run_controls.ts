@@ -34,6 +34,7 @@ export class RunControls {
     select('tool-kind').addEventListener('change', () => this.change_tool());
     input('radius').addEventListener('change', () => this.change_tool());
     input('length').addEventListener('change', () => this.change_tool());
+    input('edge').addEventListener('change', () => this.change_tool());
     this.on_number('friction', 'friction', 0);
     this.on_number('load-scale', 'load-scale', -Infinity);
     this.on_number('stiffness-scale', 'stiffness-scale', 1e-9);
@@ -110,7 +111,9 @@ export class RunControls {
     show_value(select('tool-kind'), kind);
     part('radius-label').hidden = kind === 'point';
     part('length-label').hidden = kind !== 'capsule';
-    show_value(input('radius'), millimetres(shape.radius || defaults.radius));
+    part('edge-label').hidden = kind !== 'disc';
+    show_value(input('radius'), millimetres(shape.disc_radius || shape.radius || defaults.radius));
+    show_value(input('edge'), kind === 'disc' ? millimetres(shape.radius) : '');
     show_value(input('length'), millimetres(shape.length || Number((4 * defaults.radius).toPrecision(3))));
     show_value(input('friction'), settings.friction ?? '');
     input('friction').placeholder = format_number(defaults.friction, 2);
@@ -196,11 +199,19 @@ export class RunControls {
     const defaults = this.state_?.defaults;
     const radius = typed_number(input('radius').value, 1e-9);
     const length = typed_number(input('length').value, 1e-9);
-    if (kind !== 'point' && (radius === null || (kind === 'capsule' && length === null))) {
-      this.show_refused('Radius and length are numbers above 0, in millimetres');
+    const edge = typed_number(input('edge').value, 1e-9);
+    const has_edge = kind === 'disc' && input('edge').value.trim() !== '';
+    if (kind !== 'point' && (radius === null || (kind === 'capsule' && length === null) || (has_edge && edge === null))) {
+      this.show_refused('Radius, length and edge are numbers above 0, in millimetres');
       return;
     }
-    this.change('tool', tool_text(kind, radius ? metres(radius) : (defaults?.radius ?? 0), length ? metres(length) : 0));
+    const text = tool_text(
+      kind,
+      radius ? metres(radius) : (defaults?.radius ?? 0),
+      length ? metres(length) : 0,
+      has_edge && edge ? metres(edge) : undefined,
+    );
+    this.change('tool', text);
     select('tool-kind').blur();
   }
 

@@ -2,14 +2,21 @@
 import {
   CapsuleGeometry,
   Group,
+  LatheGeometry,
   Mesh,
   MeshStandardMaterial,
   SphereGeometry,
+  Vector2,
   type BufferGeometry,
 } from 'three';
-import type { ToolShape } from './pose';
+import { disc_profile, type ToolShape } from './pose';
 
 const size_of_point = 0.008; // of the body's
+
+/** A disc normal to y, round at its edge. */
+function disc_geometry(disc_radius: number, edge: number): BufferGeometry {
+  return new LatheGeometry(disc_profile(disc_radius, edge, 12).map(([r, y]) => new Vector2(r, y)), 64);
+}
 
 export class ToolView {
   readonly group = new Group();
@@ -32,7 +39,10 @@ export class ToolView {
   take_shape(shape: ToolShape, body_size: number, dimension: 2 | 3): void {
     this.size_ = shape.radius > 0 ? shape.radius : size_of_point * body_size;
     let geometry: BufferGeometry;
-    if (shape.length > 0) {
+    if (shape.disc_radius > 0) {
+      geometry = disc_geometry(shape.disc_radius, shape.radius);
+      if (dimension === 3) geometry.rotateX(Math.PI / 2);
+    } else if (shape.length > 0) {
       geometry = new CapsuleGeometry(shape.radius, shape.length, 12, 32).translate(0, shape.length / 2, 0);
       if (dimension === 3) geometry.rotateX(Math.PI / 2);
     } else {

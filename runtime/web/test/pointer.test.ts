@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { boundary_edges, pick_boundary, pick_surface, thickness_below } from '../src/pick';
-import { dot, minus, norm, normalised, parse_tool, plus, pressed_position, ray_meets_plane, tool_text, turn_onto, turned_depth } from '../src/pose';
+import { disc_profile, dot, minus, norm, normalised, parse_tool, plus, pressed_position, ray_meets_plane, tool_text, turn_onto, turned_depth } from '../src/pose';
 import { frame_at } from '../src/replay_bar';
 import { scale_of } from '../src/view_controls';
 import type { Quaternion, Vec3 } from '../src/words';
@@ -112,11 +112,25 @@ test('the wheel turns the depth by tenths, never out of the surface', () => {
 });
 
 test('shapes as the option has them', () => {
-  assert.deepEqual(parse_tool('capsule:0.004,0.02'), { radius: 0.004, length: 0.02 });
-  assert.deepEqual(parse_tool('sphere:5e-3'), { radius: 0.005, length: 0 });
-  assert.deepEqual(parse_tool(undefined), { radius: 0, length: 0 });
+  assert.deepEqual(parse_tool('capsule:0.004,0.02'), { radius: 0.004, length: 0.02, disc_radius: 0 });
+  assert.deepEqual(parse_tool('sphere:5e-3'), { radius: 0.005, length: 0, disc_radius: 0 });
+  assert.deepEqual(parse_tool(undefined), { radius: 0, length: 0, disc_radius: 0 });
   assert.equal(tool_text('capsule', 0.004, 0.02), 'capsule:0.004,0.02');
   assert.equal(tool_text('point', 0.004, 0.02), 'point');
+  assert.deepEqual(parse_tool('disc:0.01,0.002'), { radius: 0.002, length: 0, disc_radius: 0.01 });
+  assert.deepEqual(parse_tool('disc:0.01'), { radius: 0.001, length: 0, disc_radius: 0.01 });
+  assert.equal(tool_text('disc', 0.01, 0.02), 'disc:0.01');
+  assert.equal(tool_text('disc', 0.01, 0.02, 0.002), 'disc:0.01,0.002');
+});
+
+test('a disc is drawn flat, round at its edge and as wide as it is', () => {
+  const profile = disc_profile(0.01, 0.002, 8);
+  assert.deepEqual([profile[0], profile.at(-1)], [[0, -0.002], [0, 0.002]]);
+  assert.equal(Math.max(...profile.map(([r]) => r)), 0.01);
+  for (const [r, height] of profile) {
+    const from_core = Math.hypot(Math.max(0, r - 0.008), height);
+    assert.ok(Math.abs(from_core - 0.002) < 1e-15);
+  }
 });
 
 test('a slider of displacements is logarithmic, true to scale in the middle', () => {

@@ -322,6 +322,8 @@ TEST_F(ViewedPlayTest, RefusesAToolThatIsLargerThanTheBody) {
   EXPECT_EQ(refused("capsule:0.1,1.54"), "--tool");
   EXPECT_EQ(refused("sphere:0.86"), "");
   EXPECT_EQ(refused("capsule:0.1,1.53"), "");
+  EXPECT_EQ(refused("disc:0.87"), "--tool");
+  EXPECT_EQ(refused("disc:0.86"), "");
 }
 
 TEST(FittingTool, IsAsLargeAsTheSurfacesEdgesWithinBounds) {

@@ -161,6 +161,7 @@ class CInterface : public testing::TestWithParam<const char*> {
     for (const palpate_tool& tool : tools_) {
       tools.push_back({.radius = tool.radius,
                        .length = tool.length,
+                       .disc_radius = tool.disc_radius,
                        .coupling_stiffness = tool.coupling_stiffness,
                        .coupling_torsion = tool.coupling_torsion,
                        .max_force = tool.max_force,
@@ -440,6 +441,7 @@ TEST(CInterfaceSizes, InitsAreTheDefaultsOfCpp) {
   EXPECT_EQ(tool.size, sizeof tool);
   EXPECT_EQ(tool.radius, cpp.radius);
   EXPECT_EQ(tool.length, cpp.length);
+  EXPECT_EQ(tool.disc_radius, cpp.disc_radius);
   EXPECT_EQ(tool.coupling_stiffness, cpp.coupling_stiffness);
   EXPECT_EQ(tool.coupling_torsion, cpp.coupling_torsion);
   EXPECT_EQ(tool.max_force, cpp.max_force);
@@ -450,6 +452,27 @@ TEST(CInterfaceSizes, InitsAreTheDefaultsOfCpp) {
   EXPECT_EQ(options.tick, StateOptions{}.tick);
   const palpate_overlay overlay = PALPATE_OVERLAY_INIT;
   EXPECT_EQ(overlay.memory, PatchSourceOptions{}.memory);
+}
+
+/// The wider the flat tool, the more it has to push away.
+TEST(CInterfaceDisc, IsWiderThanItsEdge) {
+  double last = 0.0;
+  for (const double disc_radius : {0.05, 0.2, 0.4}) {
+    palpate_tool tool = sphere(0.05);
+    tool.disc_radius = disc_radius;
+    tool.hand_over = HUGE_VAL;
+    const Session session = open("cube2", {tool});
+    for (const double z : {1.2, 1.03, 1.03}) {
+      const palpate_pose pose{sizeof(palpate_pose), {0.5, 0.5, z}, {1.0, 0.0, 0.0, 0.0}, 0};
+      for (int tick = 0; tick < 20; ++tick) palpate_step(session.get(), &pose);
+    }
+    const double force = result_of(session.get(), 0).force[2];
+    EXPECT_GT(force, 1.2 * last) << disc_radius;
+    last = force;
+  }
+  palpate_tool narrow = sphere(0.1);
+  narrow.disc_radius = 0.05;
+  EXPECT_NE(refusal(golden("cube2").c_str(), &narrow, 1, 8).find("disc radius"), std::string::npos);
 }
 
 TEST(CInterfaceSizes, SmallerStructsOfAnOlderProgramTakeDefaults) {

@@ -47,10 +47,13 @@ TEST(SettingsTable, HasEachMember) {
   EXPECT_NE(origin, origin2);
   EXPECT_NE(axes, axes2);
   EXPECT_NE(safety.has_value(), safety2.has_value());
-  const auto& [radius, length, coupling, torsion, most, hand_over, unset, friction] = tool;
-  const auto& [radius2, length2, coupling2, torsion2, most2, hand_over2, unset2, friction2] = tool2;
+  const auto& [radius, length, disc_radius, coupling, torsion, most, hand_over, unset, friction] = tool;
+  const auto& [radius2, length2, disc_radius2, coupling2, torsion2, most2, hand_over2, unset2, friction2] =
+      tool2;
   EXPECT_NE(radius, radius2);
   EXPECT_NE(length, length2);
+  EXPECT_EQ(disc_radius, disc_radius2) << "no tool has both";
+  EXPECT_NE(disc_radius, read_settings({{"tool", "disc:0.25,0.125"}}).tool.disc_radius);
   EXPECT_NE(coupling, coupling2);
   EXPECT_NE(torsion, torsion2);
   EXPECT_NE(most, most2);
@@ -65,6 +68,34 @@ TEST(SettingsTable, TellsEachAsItIsWritten) {
   EXPECT_EQ(std::exchange(told["safety"], "max_force=2").substr(0, 12), "max_force=2,");
   EXPECT_EQ(told, others);
   for (const Setting& setting : settings_table()) EXPECT_TRUE(others.contains(setting.name)) << setting.name;
+}
+
+TEST(SettingsTable, ReadsADiscAndTellsItToTheLastBit) {
+  const Tool disc = read_settings({{"tool", "disc:0.02,0.005"}}).tool;
+  EXPECT_EQ(disc.disc_radius, 0.02);
+  EXPECT_EQ(disc.radius, 0.005);
+  EXPECT_EQ(disc.length, 0.0);
+  EXPECT_EQ(parse_shape("disc:0.02").radius, 0.1 * 0.02) << "the usual edge";
+  EXPECT_EQ(parse_shape("disc:0.02,0.02").radius, 0.02) << "as round as a sphere";
+  for (const char* text : {"disc:0.1,0.03", "disc:0.30000000000000004", "disc:1e-07,3.3e-08"}) {
+    const Settings read = read_settings({{"tool", text}});
+    const Tool again = read_settings(split_settings(to_text(read))).tool;
+    EXPECT_EQ(again.disc_radius, read.tool.disc_radius) << text;
+    EXPECT_EQ(again.radius, read.tool.radius) << text;
+  }
+  const auto problem = [](const char* text) -> std::string {
+    try {
+      static_cast<void>(parse_shape(text));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  for (const char* text : {"disc:", "disc:0", "disc:0.1,0", "disc:0.1,-0.01", "disc:5mm", "disc:0.1,inf"})
+    EXPECT_NE(problem(text).find("is not a positive number of metres"), std::string::npos) << text;
+  EXPECT_NE(problem("disc:0.1,0.11").find("rounded by more than the radius"), std::string::npos);
+  for (const char* text : {"disc", "disk:0.1", "disc:0.1,0.01,0.01"})
+    EXPECT_NE(problem(text).find("is none of"), std::string::npos) << text;
 }
 
 TEST(SettingsTable, HasTheDefaults) {

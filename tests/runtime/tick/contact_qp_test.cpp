@@ -16,8 +16,10 @@
 #include "runtime/body/body.h"
 #include "runtime/solve/active_set.h"
 #include "runtime/solve/contact_problem.h"
+#include "runtime/solve/nearest_on_disc.h"
 #include "runtime/tick/contact_detection.h"
 #include "runtime/tick/step.h"
+#include "runtime/touch/tool_geometry.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::contact_qp_test {
@@ -221,6 +223,21 @@ Pair nearest(const std::vector<Vec3>& core, const std::vector<Vec3>& piece) {
   return best;
 }
 
+/// Where a disc and a corner, edge or triangle are nearest; nearest_on_disc_test has what it is nearest by.
+Pair nearest_to_disc(const Core& core, const std::vector<Vec3>& piece) {
+  const Disc disc{core.origin, core.axis, core.disc_radius};
+  const NearestPoint found = piece.size() == 3
+                                 ? nearest_of_disc_and_triangle(disc, piece[0], piece[1], piece[2])
+                                 : nearest_of_disc_and_line(disc, piece.front(), piece.back());
+  Pair pair{.weights = Eigen::VectorXd::Zero(std::ssize(piece)),
+            .on_core = found.on_core,
+            .on_piece = found.on_simplex,
+            .distance = (found.on_core - found.on_simplex).norm()};
+  for (Eigen::Index k = 0; k < pair.weights.size(); ++k)
+    pair.weights[k] = piece.size() == 1 ? 1.0 : found.weights[static_cast<std::size_t>(k)];
+  return pair;
+}
+
 struct Press {
   Tool tool;
   ToolPose pose;
@@ -235,23 +252,25 @@ bool is_chord(const Model& model, const std::vector<Index>& nodes, const Tool& t
     const auto to = static_cast<std::size_t>(nodes[(n + 1) % nodes.size()]);
     edges += (model.mesh.nodes[to] - model.mesh.nodes[from]).norm();
   }
-  return tool.length == 0.0 && tool.radius > 3.0 * edges / static_cast<double>(pairs);
+  return has_point_core(tool) && tool.radius > 3.0 * edges / static_cast<double>(pairs);
 }
 
 /// All of the surface stays out of all of the tools: each end of a core from each simplex (its corners where
-/// it is a chord), and a core that is a segment from each corner and edge of it.
+/// it is a chord), and a core that is a segment or disc from each corner and edge of it, a disc from its
+/// face.
 Constraints constraints_at(const Model& model, const std::vector<Press>& presses, const Eigen::VectorXd& u) {
   const int d = model.dimension();
   Constraints constraints;
-  const auto add = [&](std::size_t tool, std::size_t place, const std::vector<Vec3>& core,
-                       const std::vector<Index>& nodes) {
+  const auto place_of = [&](Index node) {
+    Vec3 place = model.mesh.nodes[static_cast<std::size_t>(node)];
+    place.head(d) += u.segment(Eigen::Index{d} * node, d);
+    return place;
+  };
+  const auto add_pair = [&](std::size_t tool, std::size_t place, const auto& nearest_of,
+                            const std::vector<Index>& nodes) {
     std::vector<Vec3> corners;
-    for (const Index node : nodes) {
-      Vec3 corner = model.mesh.nodes[static_cast<std::size_t>(node)];
-      corner.head(d) += u.segment(Eigen::Index{d} * node, d);
-      corners.push_back(corner);
-    }
-    const Pair pair = nearest(core, corners);
+    for (const Index node : nodes) corners.push_back(place_of(node));
+    const Pair pair = nearest_of(corners);
     Constraint constraint;
     constraint.tool = tool;
     constraint.direction = (pair.on_core - pair.on_piece) / pair.distance;
@@ -270,6 +289,11 @@ Constraints constraints_at(const Model& model, const std::vector<Press>& presses
     std::sort(feature.second.begin(), feature.second.end());
     constraints.emplace(feature, constraint);
   };
+  const auto add = [&](std::size_t tool, std::size_t place, const std::vector<Vec3>& core,
+                       const std::vector<Index>& nodes) {
+    add_pair(
+        tool, place, [&](const std::vector<Vec3>& corners) { return nearest(core, corners); }, nodes);
+  };
   const auto corners = static_cast<std::size_t>(d);
   for (std::size_t simplex = 0; simplex < model.surface.size(); simplex += corners) {
     const std::vector<Index> nodes(model.surface.begin() + static_cast<std::ptrdiff_t>(simplex),
@@ -280,8 +304,27 @@ Constraints constraints_at(const Model& model, const std::vector<Press>& presses
         for (const Index node : nodes) add(k, 0, {core.origin}, {node});
         continue;
       }
+      if (core.disc_radius > 0.0) {
+        const auto nearest_of = [&](const std::vector<Vec3>& piece) { return nearest_to_disc(core, piece); };
+        for (std::size_t n = 0; n < corners; ++n) {
+          add_pair(k, 2, nearest_of, {nodes[n]});
+          add_pair(k, 2, nearest_of, {nodes[n], nodes[(n + 1) % 3]});
+        }
+        const Vec3 normal =
+            (place_of(nodes[1]) - place_of(nodes[0])).cross(place_of(nodes[2]) - place_of(nodes[0]));
+        if (normal.normalized().cross(core.axis).norm() > 0.2) {
+          add_pair(k, 2, nearest_of, nodes);
+          continue;
+        }
+        for (int place = 0; place < 8; ++place) {
+          const Eigen::AngleAxisd turn(0.25 * M_PI * place, core.axis);
+          const Vec3 on_rim = core.origin + core.disc_radius * (turn * core.diameter);
+          add(k, 3 + static_cast<std::size_t>(place), {on_rim}, nodes);
+        }
+        continue;
+      }
       add(k, 0, {core.origin}, nodes);
-      if (presses[k].tool.length == 0.0) continue;
+      if (has_point_core(presses[k].tool)) continue;
       add(k, 1, {core.end}, nodes);
       for (std::size_t n = 0; n < corners; ++n) {
         add(k, 2, {core.origin, core.end}, {nodes[n]});
@@ -455,8 +498,7 @@ TEST_P(WholeMeshContact, GivesTheSameForcesAndDisplacements) {
     const double scale = expected[k].force.norm();
     EXPECT_GT(scale, 1e-3);
     EXPECT_LE((wrench.force - expected[k].force).norm(), 1e-6 * scale);
-    EXPECT_LE((wrench.torque - expected[k].torque).norm(),
-              1e-6 * scale * (tools[k].radius + tools[k].length));
+    EXPECT_LE((wrench.torque - expected[k].torque).norm(), 1e-6 * scale * extent(tools[k]));
   }
 
   Eigen::VectorXd u(body.greens().order());
@@ -490,6 +532,18 @@ Press capsule(int dimension, double radius, double length, double x, double y, d
   return {.tool = {.radius = radius, .length = length, .hand_over = infinity}, .pose = pose};
 }
 
+/// On the top, `steep` radians lower on the side that `turned` says; its middle at (x, y), its face there
+/// `depth` under the top.
+Press disc(int dimension, double radius, double edge, double x, double y, double turned, double steep,
+           double depth) {
+  const Vec3 axis = test::upright(dimension, std::sin(steep) * std::cos(turned),
+                                  std::sin(steep) * std::sin(turned), std::cos(steep));
+  ToolPose pose;
+  pose.position = test::upright(dimension, x, y, 1.0 + edge - depth);
+  pose.orientation = Eigen::Quaterniond::FromTwoVectors(dimension == 3 ? Vec3::UnitZ() : Vec3::UnitY(), axis);
+  return {.tool = {.radius = edge, .disc_radius = radius, .hand_over = infinity}, .pose = pose};
+}
+
 std::vector<ContactCase> contact_cases() {
   return {
       {"two_spheres",
@@ -509,6 +563,11 @@ std::vector<ContactCase> contact_cases() {
        8},
       {"capsule", ElementType::tet4, 8, {capsule(3, 0.25, 0.4, 0.28, 0.33, 0.6, 0.1, 0.04)}, 7},
       {"capsule_in_the_plane", ElementType::quad4, 24, {capsule(2, 0.2, 0.3, 0.33, 0.0, 0.0, 0.1, 0.03)}, 11},
+      {"disc", ElementType::tet4, 8, {disc(3, 0.32, 0.05, 0.47, 0.56, 0.7, 0.005, 0.02)}, 12},
+      {"tilted_disc", ElementType::tet4, 8, {disc(3, 0.32, 0.06, 0.47, 0.56, 0.7, 0.06, 0.01)}, 5},
+      {"disc_on_its_edge", ElementType::tet4, 8, {disc(3, 0.3, 0.1, 0.4, 0.53, 0.4, 0.9, -0.11)}, 3},
+      {"small_disc", ElementType::tet4, 4, {disc(3, 0.12, 0.04, 0.33, 0.56, 0.3, 0.3, 0.005)}, 1},
+      {"disc_in_the_plane", ElementType::quad4, 24, {disc(2, 0.27, 0.05, 0.46, 0.0, 0.0, 0.03, 0.02)}, 6},
       {"capsule_along_edges", ElementType::tet4, 8, {capsule(3, 0.25, 0.4, 0.3, 0.5, 0.0, 0.05, 0.04)}, 7},
   };
 }

@@ -343,6 +343,9 @@ TEST(State, RefusesNonsense) {
   refused({.max_contacts = 0}, "room for 0 contacts");
   refused({.tools = {Tool{.radius = -1.0}}}, "radius of tool 0");
   refused({.tools = {Tool{}, Tool{.length = nan}}}, "length of tool 1");
+  refused({.tools = {Tool{.disc_radius = nan}}}, "disc radius of tool 0");
+  refused({.tools = {Tool{.radius = 0.2, .disc_radius = 0.1}}}, "disc radius of tool 0");
+  refused({.tools = {Tool{.radius = 0.1, .length = 0.1, .disc_radius = 0.2}}}, "disc radius of tool 0");
   refused({.tools = {Tool{.reach = infinity}}}, "reach");
   refused({.tools = {Tool{.coupling_stiffness = 0.0}}}, "coupling stiffness");
   refused({.tools = {Tool{.coupling_torsion = nan}}}, "coupling torsion");
