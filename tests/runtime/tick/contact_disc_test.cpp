@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include "runtime/tick/step.h"
 #include "runtime/touch/tool_geometry.h"
+#include "runtime/touch/touching_pair.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"
 
@@ -244,7 +246,7 @@ TEST(DiscOnACoarseSurface, IsHeldFlatByItsRim) {
     for (const double angle : {0.0, 0.05, -0.05}) {
       State state(body, {.tools = {plain({.radius = 0.01, .disc_radius = 0.1})}});
       const Vec3 axis(std::cos(turned), std::sin(turned), 0.0);
-      ToolPose lean = pose(Vec3(0.7, 0.35, 1.01 - 0.01 + 0.09 * std::abs(std::sin(angle))));
+      ToolPose lean = pose(Vec3(0.8, 0.5, 1.01 - 0.004 + 0.09 * std::abs(std::sin(angle))));
       lean.orientation = Eigen::AngleAxisd(angle, axis);
       go(body, state, lean.position + Vec3(0, 0, 0.03), lean, 60);
       hold(body, state, lean, 100);
@@ -261,6 +263,32 @@ TEST(DiscOnACoarseSurface, IsHeldFlatByItsRim) {
       EXPECT_LT(depth.z(), 0.0);
     }
   }
+}
+
+/// Both triangles of an edge have the same two contact points, with numbers of their own.
+TEST(DiscsRim, IsPassedByAnEdgeAtTwoPlaces) {
+  const std::vector<Vec3> places = {{-2, 0, 0}, {2, 0, 0}, {0, 3, 0}, {0, -3, 0}};
+  const std::vector<Index> triangles = {0, 1, 2, 1, 0, 3};
+  const SurfaceTree tree(triangles, 3, places, 0.1);
+  const Vec3 middle(0.1, 0.0, 1.0);
+  const Core core{middle, middle, 1.0, Vec3::UnitZ(), Vec3::UnitX()};
+  std::array<TouchingPair, 2> one;
+  std::array<TouchingPair, 2> other;
+  ASSERT_EQ(pairs_over_rim(tree, {0, 1, 2}, TouchingPair{}, 0, core, one), 2U);
+  ASSERT_EQ(pairs_over_rim(tree, {1, 0, 3}, TouchingPair{}, 0, core, other), 2U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_EQ(one[k].place, other[k].place);
+    EXPECT_EQ(one[k].nearest.on_simplex, other[k].nearest.on_simplex);
+    EXPECT_LT((one[k].nearest.on_simplex - Vec3(k == 0 ? -0.9 : 1.1, 0, 0)).norm(), 1e-15);
+  }
+  EXPECT_NE(one[0].place, one[1].place);
+  EXPECT_EQ(pairs_over_rim(tree, {0, 1, 2}, TouchingPair{}, 1, core, one), 0U) << "it is beside that edge";
+}
+
+TEST(DiscsRim, TouchesEdgesHoweverRoundItIs) {
+  const Body body(test::unit_model(ElementType::tet4, 4, Scope::surface, Precision::double_precision));
+  EXPECT_TRUE(touches_corners_alone(body, {.radius = 2.0}, 0));
+  EXPECT_FALSE(touches_corners_alone(body, {.radius = 2.0, .disc_radius = 3.0}, 0));
 }
 
 }  // namespace
