@@ -175,9 +175,11 @@ bool rolls(const Scratch& scratch, const Tool& tool, const ContactPoint& contact
   return before.force.dot(before.frame.col(0)) > 0.0;
 }
 
-/// Whether a tool is so blunt that the normal at a node turns little as it passes over it.
+/// Whether a tool is so blunt that the normal at a node turns little as it passes over it. Over a disc's flat
+/// side it does not turn at all.
 bool is_blunt(const Body& body, const Tool& tool) noexcept {
-  return tool.radius >= tuning.assembly.least_tilt_radius * body.mean_surface_edge();
+  return tool.disc_radius <= tool.radius &&
+         tool.radius >= tuning.assembly.least_tilt_radius * body.mean_surface_edge();
 }
 
 void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_number, Index begin,

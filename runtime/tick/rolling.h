@@ -18,7 +18,8 @@ namespace palpate {
 // second derivative of the gap times lambda),
 //   lambda / 2 R ((R theta + q_A)^2 - q_t^2),
 // the first term of which is the tilt row's, implicit; the second, a spring that pushes, is taken into the
-// normal: n + q_t / R, where q_t is foreseen from the motion of the device.
+// normal: n + q_t / R, where q_t is foreseen from the motion of the device less the surface's in the tick
+// before.
 
 /// Radius by which contacts of a tool turn, on a surface with edges of that mean length [m].
 inline double rolling_radius(const Tool& tool, double edge) noexcept {

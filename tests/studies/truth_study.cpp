@@ -8,10 +8,9 @@
 // across --along and --slide. It comes along --along through --at, presses in by --depth [m] (0.8 radii at
 // most) at half of --speed and slides by --slide, then by half of it back and by --deeper deeper (0.2 radii
 // at most), and back the whole way. The truth (tests/support/surface_truth.h) goes the same way beside the
-// runtime, with its own forces, twice: linear about where tool and surface are after each tick, which is what
-// is asked for, and about where they were before it. Without friction the former can be had in every
-// --every-th tick alone; where a tool is deep enough for more than one equilibrium that may find another.
-// Times are those of the tick's own thread (its processor time); the dense solver is timed in every
+// runtime, with its own forces. Without friction it can be had in every --every-th tick alone; where a tool
+// is deep enough for more than one equilibrium that may find another. Times are those of the tick's own
+// thread (its processor time); the dense solver is timed in every
 // --dense-th tick. A line of a table for each tool, friction and room. scripts/studies/truth runs it.
 #include <fmt/format.h>
 
@@ -215,8 +214,7 @@ std::vector<Tick> play(const Body& body, const Shape& made, double friction, Ind
 /// What the runtime's tick is compared with.
 struct True {
   std::size_t tick = 0;
-  Wrench end;    // where tool and surface are after the tick
-  Wrench begin;  // linear about where they were before it
+  Wrench wrench;
   double residual = 0.0;
   double move = 0.0;         // of the last pass [m]
   double penetration = 0.0;  // [m]
@@ -231,21 +229,18 @@ bool is_known(const True& now) {
 std::vector<True> truths(const Body& body, const Options& options, const Shape& made, double friction,
                          const std::vector<Vec3>& places) {
   using test::SurfaceTruth;
-  using test::TruthRule;
-  SurfaceTruth of_end(body, made.tool, friction, TruthRule::end, made.orientation);
-  SurfaceTruth of_begin(body, made.tool, friction, TruthRule::begin, made.orientation);
+  SurfaceTruth truth(body, made.tool, friction, made.orientation);
   std::vector<True> found;
   for (std::size_t k = 0; k < places.size(); ++k) {
     True now;
     now.tick = k;
     if (k % static_cast<std::size_t>(options.dense) == 0)
-      now.seconds = of_begin.dense_seconds(places[k], dense_tolerance);
-    now.begin = of_begin.step(places[k]);
+      now.seconds = truth.dense_seconds(places[k], dense_tolerance);
     if (friction == 0.0 && k % static_cast<std::size_t>(options.every) != 0) continue;
-    now.end = of_end.step(places[k]);
-    now.residual = of_end.residual();
-    now.move = of_end.last_move();
-    now.penetration = of_end.penetration();
+    now.wrench = truth.step(places[k]);
+    now.residual = truth.residual();
+    now.move = truth.last_move();
+    now.penetration = truth.penetration();
     found.push_back(now);
   }
   return found;
@@ -271,7 +266,7 @@ Jumps jumps_of(const std::vector<Tick>& ticks, const std::vector<True>& known) {
     const True& now = known[k];
     const True& last = known[k - 1];
     if (!is_known(now) || !is_known(last)) continue;
-    jumps.of_truth = std::max(jumps.of_truth, (now.end.force - last.end.force).norm());
+    jumps.of_truth = std::max(jumps.of_truth, (now.wrench.force - last.wrench.force).norm());
     jumps.of_runtime =
         std::max(jumps.of_runtime, (ticks[now.tick].wrench.force - ticks[last.tick].wrench.force).norm());
   }
@@ -294,11 +289,11 @@ void print_head(const Body& body, const Options& options) {
              body.surface_rest_positions().size(), 1e3 * body.mean_surface_edge());
   fmt::print(
       "| tool | friction | room | nodes pressed: median / most | force at most [N] | off: force (median / "
-      "99.9 % / largest) | torque | force, linear about the tick's begin | change in a tick at most: truth / "
+      "99.9 % / largest) | torque | change in a tick at most: truth / "
       "runtime | ticks | compared | not converged "
       "| "
       "capacity full | tick: median / 99.9 % [us] | dense: median / 99.9 % [us] | left over / moved [um] / "
-      "inside [um] |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "inside [um] |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   std::fflush(stdout);
 }
 
@@ -306,9 +301,9 @@ void print(const std::string& name, const Shape& made, double friction, Index ro
            const std::vector<Tick>& ticks, const std::vector<True>& known) {
   double largest = std::numeric_limits<double>::min();
   for (const True& now : known) {
-    if (is_known(now)) largest = std::max(largest, now.end.force.norm());
+    if (is_known(now)) largest = std::max(largest, now.wrench.force.norm());
   }
-  Errors errors, of_begin;
+  Errors errors;
   std::vector<double> times, dense, nodes, left_over, move, inside;
   std::size_t unknown = 0;
   for (const True& now : known) {
@@ -317,8 +312,7 @@ void print(const std::string& name, const Shape& made, double friction, Index ro
       ++unknown;
       continue;
     }
-    errors.add(ticks[now.tick].wrench, now.end, largest, made.tool.radius);
-    of_begin.add(ticks[now.tick].wrench, now.begin, largest, made.tool.radius);
+    errors.add(ticks[now.tick].wrench, now.wrench, largest, made.tool.radius);
     left_over.push_back(now.residual);
     move.push_back(now.move);
     inside.push_back(now.penetration);
@@ -333,15 +327,15 @@ void print(const std::string& name, const Shape& made, double friction, Index ro
     nodes.push_back(tick.nodes);
   }
   fmt::print(
-      "| {} | {:g} | {} | {:.0f} / {:.0f} | {:.4f} | {} | {} | {} | {:.1e} / {:.1e} | {} | {} of {} | {} | "
+      "| {} | {:g} | {} | {:.0f} / {:.0f} | {:.4f} | {} | {} | {:.1e} / {:.1e} | {} | {} of {} | {} | "
       "{} | {:.0f} / "
       "{:.0f} | "
       "{:.0f} / {:.0f} | {:.0e} / {:.0e} / {:.0e} |\n",
       name, friction, room, quantile(nodes, 0.5), quantile(nodes, 1.0), largest, three(errors.force),
-      three(errors.torque), three(of_begin.force), jumps.of_truth / largest, jumps.of_runtime / largest,
-      ticks.size(), known.size() - unknown, known.size(), rough, full, quantile(times, 0.5),
-      quantile(times, 0.999), quantile(dense, 0.5), quantile(dense, 0.999), quantile(left_over, 1.0),
-      1e6 * quantile(move, 1.0), 1e6 * quantile(inside, 1.0));
+      three(errors.torque), jumps.of_truth / largest, jumps.of_runtime / largest, ticks.size(),
+      known.size() - unknown, known.size(), rough, full, quantile(times, 0.5), quantile(times, 0.999),
+      quantile(dense, 0.5), quantile(dense, 0.999), quantile(left_over, 1.0), 1e6 * quantile(move, 1.0),
+      1e6 * quantile(inside, 1.0));
   std::fflush(stdout);
 }
 
@@ -354,11 +348,11 @@ void write(std::ofstream& csv, const std::string& name, double friction, Index r
   if (!csv) return;
   for (const True& now : known) {
     const Tick& tick = ticks[now.tick];
-    csv << fmt::format("{},{},{},{},{},{:.2f},{:.2f},{},{},{},{},{},{},{:.1e},{:.1e},{:.1e}\n", name,
-                       friction, room, now.tick, tick.nodes, 1e6 * tick.seconds, 1e6 * now.seconds,
+    csv << fmt::format("{},{},{},{},{},{:.2f},{:.2f},{},{},{},{},{},{:.1e},{:.1e},{:.1e}\n", name, friction,
+                       room, now.tick, tick.nodes, 1e6 * tick.seconds, 1e6 * now.seconds,
                        static_cast<unsigned>(tick.status), row_of(tick.wrench.force),
-                       row_of(tick.wrench.torque), row_of(now.end.force), row_of(now.end.torque),
-                       row_of(now.begin.force), now.residual, now.move, now.penetration);
+                       row_of(tick.wrench.torque), row_of(now.wrench.force), row_of(now.wrench.torque),
+                       now.residual, now.move, now.penetration);
   }
   csv.flush();
 }
@@ -369,7 +363,7 @@ void study(const Options& options) {
   if (!options.csv.empty()) {
     csv.open(options.csv);
     csv << "tool,friction,room,tick,nodes,us,dense_us,status,fx,fy,fz,tx,ty,tz,true_fx,true_fy,true_fz,"
-           "true_tx,true_ty,true_tz,begin_fx,begin_fy,begin_fz,left_over,moved,inside\n";
+           "true_tx,true_ty,true_tz,left_over,moved,inside\n";
   }
   print_head(body, options);
   for (const std::string& name : options.tools) {

@@ -123,11 +123,10 @@ double processor_time() {
 
 }  // namespace
 
-SurfaceTruth::SurfaceTruth(const Body& body, const Tool& tool, double friction, TruthRule rule,
+SurfaceTruth::SurfaceTruth(const Body& body, const Tool& tool, double friction,
                            const Eigen::Quaterniond& orientation)
     : body_(body),
       tool_(tool),
-      rule_(rule),
       orientation_(orientation),
       margin_(margin * body.mean_surface_edge()),
       at_(body.surface_rest_positions().begin(), body.surface_rest_positions().end()),
@@ -370,7 +369,7 @@ void SurfaceTruth::state_problem(const Vec3& way) {
     const Contact& contact = contacts_[k];
     const Matrix3d frame = axes(contact.normal);
     const Eigen::Index at = d * static_cast<Eigen::Index>(k);
-    solver_.b[at] += contact.gap + (rule_ == TruthRule::begin ? way.dot(contact.normal) : 0.0);
+    solver_.b[at] += contact.gap + (is_linear_ ? way.dot(contact.normal) : 0.0);
     for (int i = 1; i < d; ++i) solver_.b[at + i] += frame.col(i).dot(way) - moved[at + i];
     for (int i = 0; i < d; ++i) solver_.p[at + i] = frame.col(i).dot(contact.force);
   }
@@ -499,14 +498,6 @@ Wrench SurfaceTruth::step(const Vec3& place) {
   placed_ = true;
   const Vec3 way = place - place_;
   previous_ = at_;
-  if (rule_ == TruthRule::begin) {
-    look();
-    last_move_ = solve_pass(way, 1e-11);
-    Wrench sum = wrench(place_);
-    place_ = place;
-    renew_surface();
-    return sum;
-  }
   place_ = place;
   for (int times = 0; times < 4; ++times) {
     find_pieces();
@@ -520,7 +511,7 @@ Wrench SurfaceTruth::step(const Vec3& place) {
 
 double SurfaceTruth::dense_seconds(const Vec3& place, double tolerance) const {
   SurfaceTruth other(*this);
-  other.rule_ = TruthRule::begin;
+  other.is_linear_ = true;
   other.previous_ = other.at_;
   other.look();
   const double begin = processor_time();

@@ -14,12 +14,6 @@
 
 namespace palpate::test {
 
-/// About which place of tool and surface a tick is linear.
-enum class TruthRule {
-  end,   ///< where they are after it: gaps, normals and Coulomb's slip of the deformed surface, exactly
-  begin  ///< where they were before it, as the runtime's first pass has it
-};
-
 /// The statement, for a sphere or capsule that moves without turning and is stiff against the body: no point
 /// of the deformed surface is in the tool; the forces are along the normals where the two touch and push.
 /// With friction, what the tool slides over the surface in a tick is opposed by it (Coulomb, implicit), or it
@@ -32,7 +26,7 @@ enum class TruthRule {
 /// differences.
 class SurfaceTruth {
  public:
-  SurfaceTruth(const Body& body, const Tool& tool, double friction, TruthRule rule,
+  SurfaceTruth(const Body& body, const Tool& tool, double friction,
                const Eigen::Quaterniond& orientation = Eigen::Quaterniond::Identity());
 
   /// A tick that takes the tool to `place` [m]. What it feels, about its origin.
@@ -87,9 +81,9 @@ class SurfaceTruth {
 
   const Body& body_;
   Tool tool_;
-  TruthRule rule_;
   Eigen::Quaterniond orientation_;
-  double margin_;  // [m] what may come to touch in a tick
+  double margin_;           // [m] what may come to touch in a tick
+  bool is_linear_ = false;  // the problem is stated about where the tick began
   bool placed_ = false;
   Vec3 place_ = Vec3::Zero();
   std::vector<Vec3> at_;               // [S] the surface
