@@ -44,7 +44,7 @@ struct DetectionTuning {
 struct AssemblyTuning {
   double closed_gap = 0.01;        ///< [edge] a contact with a smaller gap may be closed
   double least_tilt_radius = 0.5;  ///< [edge] a sharper tool's contact slides on its face as if it were this
-  double most_roll = 0.25;  ///< [1] that a contact's normal turns in a tick by the device's motion
+  double most_roll = 0.25;         ///< [1] that a contact's normal turns in a tick by the device's motion
   double coincident_share = 1e-9;  ///< [mean compliance] added to every contact, so that points that coincide
                                    ///< share the force
   double wall_share = 0.01;        ///< [compliance of the stiffest node] what a fixed boundary gives way by
