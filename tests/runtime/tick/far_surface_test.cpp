@@ -52,8 +52,8 @@ class FarSurface : public testing::Test {
 
   static constexpr double radius = 0.4, speed = 0.0005;
   Body body_{test::bake(
-      test::unit_mesh(ElementType::tet4, 8), [](const Vec3& node) { return node.z() < 1e-12; }, Scope::surface,
-      Precision::double_precision, false)};
+      test::unit_mesh(ElementType::tet4, 8), [](const Vec3& node) { return node.z() < 1e-12; },
+      Scope::surface, Precision::double_precision, false)};
   State state_{body_, {.tools = {Tool{.radius = radius}}}};
   std::vector<std::vector<double>> history_;
 };
