@@ -20,7 +20,8 @@ namespace {
 
 constexpr std::int64_t cache_line = 64;
 constexpr std::int64_t tile = 64;  // scalars: two tiles of doubles fit into the first-level cache
-constexpr std::size_t nodes_ahead = 4;
+constexpr std::size_t nodes_ahead =
+    4;  // of a slice of u, loaded nodes ahead of their use that rows are fetched
 constexpr std::int64_t u_chunk =
     2048;  // doubles of u that stay in the first-level cache while all rows pass by
 constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is fetched
@@ -95,7 +96,7 @@ void gather_from_packed(const PackedGreens& packed, int dimension, Index row, st
 }
 
 /// u += f^T rows over `count` entries of the D rows of a node; meanwhile what comes later in them is called
-/// into the cache.
+/// into the cache, or at their end the same entries of `next_rows`, those of a node that comes soon.
 template <int D, class T>
 void add_rows(const T* rows, std::int64_t stride, const double* f, double* __restrict u, std::int64_t count,
               const T* next_rows) noexcept {
