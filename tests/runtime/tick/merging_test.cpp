@@ -237,8 +237,8 @@ Expected expected(const State& state, const ContactPoint& contact, const std::ve
   return result;
 }
 
-// A merged contact point's gap is the mean of its nodes', and each of them is pressed along its own normal. In
-// each second tick the tool stays, so that normals are those of where it is and not of where it is to be.
+// A merged contact point's gap is the mean of its nodes', and each of them is pressed along its own normal.
+// In each second tick the tool stays, so that normals are those of where it is and not of where it is to be.
 TEST(MergingPoint, StandsForItsNodes) {
   State state = begin(0.3, 100);
   int seen = 0;
