@@ -152,7 +152,6 @@ struct FarTuning {
   Index moves = 64;             ///< surface nodes that are moved with them
   Index run = 16;               ///< stored nodes of a run; near tools, runs are renewed more often, as a node
                                 ///< that lies where it was is met too early or too late
-  std::int64_t patience = 200;  ///< ticks that a run without near nodes counts as near
   std::int64_t all_stride = 4;  ///< one tick out of so many goes on with the whole body
   double tree_margin = 0.1;     ///< [edge] how much larger the tree's boxes are
 };

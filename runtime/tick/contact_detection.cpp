@@ -175,13 +175,6 @@ bool rolls(const Scratch& scratch, const Tool& tool, const ContactPoint& contact
   return before.force.dot(before.frame.col(0)) > 0.0;
 }
 
-/// Whether a tool is so blunt that the normal at a node turns little as it passes over it. Over a disc's flat
-/// side it does not turn at all.
-bool is_blunt(const Body& body, const Tool& tool) noexcept {
-  return tool.disc_radius <= tool.radius &&
-         tool.radius >= tuning.assembly.least_tilt_radius * body.mean_surface_edge();
-}
-
 void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_number, Index begin,
                    const TouchingPair& pair, bool face_tells) noexcept {
   ToolState& tool = state.tools[tool_number];
@@ -213,7 +206,6 @@ void add_candidate(const Body& body, State& state, Scratch& scratch, Index tool_
   contact.gap = (face_tells ? pair.height : pair.distance) - tool.tool.radius;
   contact.friction = tool.tool.friction.value_or(body.surface_friction()[pair.simplex]);
   contact.rolls = !face_tells && rolls(scratch, tool.tool, contact);
-  contact.turns = contact.rolls || (!face_tells && vertex >= 0 && is_blunt(body, tool.tool));
   contact.free_gap = contact.gap + normal.dot(device_motion(tool.pose, tool.device, contact.arm) +
                                               displacement_of(body, state.surface.near, contact));
   scratch.candidates[scratch.candidate_count++] = contact;
@@ -427,6 +419,13 @@ Vec3 core_motion(const ToolState& tool, const Core& core, const ContactPoint& co
                                           : motion;
 }
 
+/// Whether a tool is so blunt that the normal at a node turns little as it passes over it. Over a disc's flat
+/// side it does not turn at all.
+bool is_blunt(const Body& body, const Tool& tool) noexcept {
+  return tool.disc_radius <= tool.radius &&
+         tool.radius >= tuning.assembly.least_tilt_radius * body.mean_surface_edge();
+}
+
 /// Turns the normals of contacts ahead by what the device moves in the tick. Not before all are found: the
 /// same place is known by the normal that it has now.
 void turn_ahead(const Body& body, const NearField& near, const ToolState& tool, const Core& core,
@@ -435,10 +434,11 @@ void turn_ahead(const Body& body, const NearField& near, const ToolState& tool, 
       tool.device.orientation.coeffs() == tool.last_device.orientation.coeffs())
     return;
   const double radius = rolling_radius(tool.tool, body.mean_surface_edge());
+  const bool blunt = is_blunt(body, tool.tool);
   const double share = going_on(tool);
   for (Index k = begin; k < scratch.candidate_count; ++k) {
     ContactPoint& contact = scratch.candidates[k];
-    if (!contact.turns) continue;
+    if (!contact.rolls && !(blunt && kind_of(contact.feature) == FeatureKind::vertex)) continue;
     const Vec3 normal = contact.frame.col(0);
     const Vec3 foreseen = core_motion(tool, core, contact) - share * last_motion(body, near, contact);
     const Vec3 turned = rolled_normal(normal, foreseen, radius);

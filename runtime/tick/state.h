@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -50,24 +49,23 @@ struct ToolState {
   StepStatus status = StepStatus::ok;  ///< of the last tick
 };
 
+/// Where a run of stored nodes (Body::runs) lies: with near nodes, beside such a run, or far.
+enum class RunPlace : std::uint8_t { far, beside, near };
+
 /// The slices in which ticks renew the surface far from the tools.
 struct FarSweep {
-  explicit FarSweep(Index runs)
-      : last_near(static_cast<std::size_t>(runs), never), taken(last_near), near_runs(last_near.size()) {}
+  explicit FarSweep(Index run_count)
+      : near_runs(static_cast<std::size_t>(run_count)), runs(near_runs.size()) {}
 
-  static constexpr std::int64_t never = std::numeric_limits<std::int64_t>::min() / 2;
-  Index next_node = 0;                  ///< stored node from which the next tick goes on
-  Index next_patch_node = 0;            ///< place in the patch from which it goes on there
-  double change = 0.0;                  ///< how far a node was moved at most in this sweep [m]
-  double last_change = 0.0;             ///< and in the one before: how wrong a far node can be [m]
-  std::int64_t count = 0;               ///< ticks so far
-  std::int64_t near_tick = never;       ///< tick in which there was a near node last,
-  std::vector<std::int64_t> last_near;  ///< [runs of stored nodes] and in each run
-  std::vector<std::int64_t> taken;      ///< [runs] tick in which each was put into near_runs
-  std::vector<Index> near_runs;         ///< [runs] those that are renewed more often
-  Index near_run_count = 0;
-  Index next_near_run = 0;  ///< place in near_runs from which the next tick goes on,
-  Index done_of_run = 0;    ///< and nodes of it that are renewed already
+  Index next_node = 0;           ///< stored node from which the sweep of the whole body goes on
+  Index next_patch_node = 0;     ///< place in the patch from which it goes on there
+  double change = 0.0;           ///< how far a node was moved at most in this sweep [m]
+  double last_change = 0.0;      ///< and in the one before: how wrong a far node can be [m]
+  std::vector<Index> near_runs;  ///< [Body::runs] those that are renewed more often, in their order
+  Index near_run_count = 0;      ///< how many of them
+  Index next_near_run = 0;       ///< place in near_runs from which the next tick goes on,
+  Index done_of_run = 0;         ///< and nodes of it that are renewed already
+  std::vector<RunPlace> runs;    ///< [Body::runs] when near_runs was filled
 };
 
 /// The deformed surface, as it goes from tick to tick. Each member: shape, who changes it.

@@ -112,7 +112,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   }
   release(body, state);
   renew_stored_displacement(body, state.surface);
-  renew_far_surface(body, state.surface, scratch);
+  renew_far_surface(body, state.surface, scratch, state.ticks);
   renew_patch_surface(body, state.surface, scratch);
   return end_tick(state);
 }

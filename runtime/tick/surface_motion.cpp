@@ -50,29 +50,36 @@ Index renew_nodes(const Body& body, SurfaceState& surface, Scratch& scratch, Ind
   return stored;
 }
 
-/// Fills sweep.near_runs: runs that had a near node of late, and those beside them.
-void find_near_runs(const NodeRuns& runs, FarSweep& sweep) noexcept {
-  sweep.near_run_count = 0;
-  const auto take = [&](Index run) {
-    if (sweep.taken[run] == sweep.count) return;
-    sweep.taken[run] = sweep.count;
-    sweep.near_runs[sweep.near_run_count++] = run;
-  };
+/// Fills sweep.near_runs: the runs of stored nodes that are near, and those beside them.
+void find_near_runs(const Body& body, const NearField& near, FarSweep& sweep) noexcept {
+  const NodeRuns& runs = body.runs();
+  std::fill(sweep.runs.begin(), sweep.runs.end(), RunPlace::far);
+  for (Index place = 0; place < near.count(); ++place) {
+    const auto node = static_cast<std::size_t>(near.node(place));
+    if (node < body.surface_stored_nodes().size())
+      sweep.runs[runs.of(body.surface_stored_nodes()[node])] = RunPlace::near;
+  }
   for (Index run = 0; run < runs.count(); ++run) {
-    if (sweep.last_near[run] + tuning.far.patience < sweep.count) continue;
-    take(run);
-    for (const Index other : runs.beside(run)) take(other);
+    if (sweep.runs[run] != RunPlace::near) continue;
+    for (const Index other : runs.beside(run)) {
+      if (sweep.runs[other] == RunPlace::far) sweep.runs[other] = RunPlace::beside;
+    }
+  }
+  sweep.near_run_count = 0;
+  for (Index run = 0; run < runs.count(); ++run) {
+    if (sweep.runs[run] != RunPlace::far) sweep.near_runs[sweep.near_run_count++] = run;
   }
 }
 
-/// Renews `most` nodes of the near runs, which take turns, each once at most.
-void renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, Index most) noexcept {
+/// Renews `most` nodes of the near runs, which take turns, each once at most. False where there are none.
+bool renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, Index most) noexcept {
   const NodeRuns& runs = body.runs();
   FarSweep& sweep = surface.sweep;
   if (sweep.next_near_run >= sweep.near_run_count) {
-    find_near_runs(runs, sweep);
+    find_near_runs(body, surface.near, sweep);
     sweep.next_near_run = 0;
   }
+  if (sweep.near_run_count == 0) return false;
   Index moves = tuning.far.moves;
   for (Index left = most; left > 0 && moves > 0 && sweep.next_near_run < sweep.near_run_count;) {
     const Index run = sweep.near_runs[sweep.next_near_run];
@@ -84,6 +91,19 @@ void renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, 
     sweep.done_of_run = 0;
     ++sweep.next_near_run;
   }
+  return true;
+}
+
+/// Renews the next `most` nodes of the whole body.
+void renew_all_in_turn(const Body& body, SurfaceState& surface, Scratch& scratch, Index most) noexcept {
+  FarSweep& sweep = surface.sweep;
+  const Index nodes = body.greens().nodes();
+  Index moves = tuning.far.moves;
+  const Index end = std::min(sweep.next_node + most, nodes);
+  sweep.next_node = renew_nodes(body, surface, scratch, sweep.next_node, end, moves) % nodes;
+  if (sweep.next_node != 0) return;
+  sweep.last_change = sweep.change;
+  sweep.change = 0.0;
 }
 
 }  // namespace
@@ -120,31 +140,21 @@ void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexce
 }
 
 void renew_stored_displacement(const Body& body, SurfaceState& surface) noexcept {
-  ++surface.sweep.count;
   for (Index place = 0; place < surface.near.count(); ++place) {
     const auto node = static_cast<std::size_t>(surface.near.node(place));
     if (node >= body.surface_stored_nodes().size()) continue;
-    const Index stored = body.surface_stored_nodes()[node];
-    set_vector(surface.stored_displacement, body.dimension(), stored, surface.near.displacement(place));
-    surface.sweep.last_near[body.runs().of(stored)] = surface.sweep.count;
-    surface.sweep.near_tick = surface.sweep.count;
+    set_vector(surface.stored_displacement, body.dimension(), body.surface_stored_nodes()[node],
+               surface.near.displacement(place));
   }
 }
 
-void renew_far_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept {
-  FarSweep& sweep = surface.sweep;
-  const Index nodes = body.greens().nodes();
+void renew_far_surface(const Body& body, SurfaceState& surface, Scratch& scratch,
+                       std::int64_t tick) noexcept {
   const Index most =
       std::min(tuning.far.nodes, tuning.far.blocks / std::max<Index>(surface.near.load().count, 1) + 1);
-  const bool is_near = sweep.near_tick + tuning.far.patience >= sweep.count;
-  if (is_near && sweep.count % tuning.far.all_stride != 0)
-    return renew_near_runs(body, surface, scratch, most);
-  const Index end = std::min(sweep.next_node + most, nodes);
-  Index moves = tuning.far.moves;
-  sweep.next_node = renew_nodes(body, surface, scratch, sweep.next_node, end, moves) % nodes;
-  if (sweep.next_node != 0) return;
-  sweep.last_change = sweep.change;
-  sweep.change = 0.0;
+  const bool is_turn_of_near = tick % tuning.far.all_stride != 0;
+  if (is_turn_of_near && renew_near_runs(body, surface, scratch, most)) return;
+  renew_all_in_turn(body, surface, scratch, most);
 }
 
 void renew_patch_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept {

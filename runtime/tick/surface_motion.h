@@ -1,6 +1,8 @@
 // The surface that the tools meet: where the body's free motion and the contact forces take it.
 #pragma once
 
+#include <cstdint>
+
 #include "runtime/tick/state.h"
 
 namespace palpate {
@@ -16,8 +18,9 @@ void move_near_surface(const Body& body, SurfaceState& surface) noexcept;
 void renew_stored_displacement(const Body& body, SurfaceState& surface) noexcept;
 
 /// Moves the next slice of the far surface, by u = Xi E f of as many stored nodes as the tick has time for
-/// (theory.md section 3): so the whole surface follows within tens of ticks.
-void renew_far_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept;
+/// (theory.md section 3). `tick`: its number. Around the near nodes the surface follows within tens of ticks
+/// where hundreds of nodes are loaded; for the whole body one tick out of tuning.far.all_stride is left.
+void renew_far_surface(const Body& body, SurfaceState& surface, Scratch& scratch, std::int64_t tick) noexcept;
 
 /// Moves the next slice of the overlay patch's surface; nothing where there is none.
 void renew_patch_surface(const Body& body, SurfaceState& surface, Scratch& scratch) noexcept;

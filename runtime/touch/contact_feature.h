@@ -22,6 +22,11 @@ constexpr std::int64_t contact_feature(Index tool, int place, FeatureKind kind, 
   return (head << 48) + (std::int64_t{low} << 24) + high;
 }
 
+/// The kind of a feature.
+constexpr FeatureKind kind_of(std::int64_t feature) noexcept {
+  return static_cast<FeatureKind>((feature >> 48) & 3);
+}
+
 /// Whether two features are of the same kind and place on the same tool.
 constexpr bool are_alike(std::int64_t a, std::int64_t b) noexcept {
   return a >> 48 == b >> 48;

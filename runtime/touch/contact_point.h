@@ -34,7 +34,6 @@ struct ContactPoint {
   bool held = false;                        ///< by a grab: bilateral, and it does not slide
   bool rolls = false;  ///< of a sphere without friction: its normal turns with the tool's motion (rolling.h),
                        ///< its force goes through the tool's origin
-  bool turns = false;  ///< its normal is foreseen to turn in the tick
   bool rigid = false;  ///< the body gives way there by less than SurfaceState::least_compliance
   Vec3 tool_point =
       Vec3::Zero();           ///< held: the place in the tool's own frame that stays with the surface [m]

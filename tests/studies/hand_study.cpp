@@ -10,10 +10,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -25,8 +23,8 @@
 #include "base/error.h"
 #include "formats/model_file.h"
 #include "runtime/tick/step.h"
-#include "runtime/touch/contact_nodes.h"
 #include "tests/bench/palpation_paths.h"
+#include "tests/support/study.h"
 
 namespace palpate {
 namespace {
@@ -48,43 +46,20 @@ struct Options {
   std::string ticks;
 };
 
-std::vector<double> numbers(const std::string& text) {
-  std::vector<double> found;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    found.push_back(std::strtod(text.substr(begin, end - begin).c_str(), nullptr));
-    begin = end + 1;
-  }
-  return found;
-}
-
-Vec3 vector(const std::string& text) {
-  const std::vector<double> parts = numbers(text);
-  if (parts.size() != 3) throw Error("is not X,Y,Z", text, "give three numbers");
-  return {parts[0], parts[1], parts[2]};
-}
-
 Options read(int count, char** words) {
   Options options;
-  if (count < 2) throw Error("no body is given", "", "hand_study BODY.palpate.hdf");
-  options.body = words[1];
   const std::map<std::string, std::function<void(const std::string&)>> known = {
-      {"--at", [&](const std::string& text) { options.at = vector(text); }},
-      {"--along", [&](const std::string& text) { options.along = vector(text).normalized(); }},
-      {"--slide", [&](const std::string& text) { options.slide = vector(text); }},
-      {"--depth", [&](const std::string& text) { options.depth = numbers(text)[0]; }},
-      {"--radius", [&](const std::string& text) { options.radius = numbers(text); }},
-      {"--friction", [&](const std::string& text) { options.friction = numbers(text); }},
-      {"--coupling", [&](const std::string& text) { options.coupling = numbers(text)[0]; }},
+      {"--at", [&](const std::string& text) { options.at = test::vector(text); }},
+      {"--along", [&](const std::string& text) { options.along = test::vector(text).normalized(); }},
+      {"--slide", [&](const std::string& text) { options.slide = test::vector(text); }},
+      {"--depth", [&](const std::string& text) { options.depth = test::numbers(text)[0]; }},
+      {"--radius", [&](const std::string& text) { options.radius = test::numbers(text); }},
+      {"--friction", [&](const std::string& text) { options.friction = test::numbers(text); }},
+      {"--coupling", [&](const std::string& text) { options.coupling = test::numbers(text)[0]; }},
       {"--max-contacts", [&](const std::string& text) { options.max_contacts = std::atoi(text.c_str()); }},
       {"--repeat", [&](const std::string& text) { options.repeat = std::atoi(text.c_str()); }},
       {"--ticks", [&](const std::string& text) { options.ticks = text; }}};
-  for (int k = 2; k < count; k += 2) {
-    const auto option = known.find(words[k]);
-    if (option == known.end() || k + 1 == count)
-      throw Error("is no option with a value", words[k], "see the head of hand_study.cpp");
-    option->second(words[k + 1]);
-  }
+  options.body = test::read_options(count, words, known);
   return options;
 }
 
@@ -113,12 +88,6 @@ std::vector<ToolPose> path(const Body& body, const Options& options, double radi
   return poses;
 }
 
-double processor_time() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 struct Tick {
   double seconds = std::numeric_limits<double>::infinity();
   Vec3 force = Vec3::Zero();
@@ -127,15 +96,6 @@ struct Tick {
   Index closed = 0;
   Index nodes = 0;  // that closed contact points press on
 };
-
-Index pressed_nodes(const Body& body, const State& state) {
-  Index count = 0;
-  for (const ContactPoint& contact : state.contacts()) {
-    if (!contact.force.isZero(0.0))
-      for_each_node(body, state.surface.near, contact, [&](Index, double) { ++count; });
-  }
-  return count;
-}
 
 std::vector<Tick> play(const Body& body, const Options& options, const std::vector<ToolPose>& poses,
                        double radius, double friction) {
@@ -147,10 +107,10 @@ std::vector<Tick> play(const Body& body, const Options& options, const std::vect
   for (int run = 0; run < options.repeat; ++run) {
     State state(body, {.tools = {tool}, .max_contacts = options.max_contacts});
     for (std::size_t k = 0; k < poses.size(); ++k) {
-      const double begin = processor_time();
+      const double begin = test::processor_time();
       const StepStatus status = step(body, state, poses[k]);
       Tick& tick = ticks[k];
-      tick.seconds = std::min(tick.seconds, processor_time() - begin);
+      tick.seconds = std::min(tick.seconds, test::processor_time() - begin);
       const Vec3& force = state.tools.front().contact_wrench.force;
       if (run > 0 && tick.force != force)
         throw std::runtime_error(fmt::format("tick {} is not the same again", k));
@@ -158,7 +118,7 @@ std::vector<Tick> play(const Body& body, const Options& options, const std::vect
       tick.status = status;
       tick.points = state.contact_count;
       tick.closed = state.tools.front().contacts;
-      tick.nodes = pressed_nodes(body, state);
+      tick.nodes = test::pressed_nodes(body, state);
     }
   }
   return ticks;

@@ -54,10 +54,12 @@ struct Run {
   std::vector<std::int64_t> compute;   // [ns] of each tick
   std::vector<std::int64_t> lateness;  // [ns] from when a tick was due to when it began
   std::vector<Vec3> force;             // on the hand [N]
+  std::vector<Vec3> torque;            // [N m]
   std::vector<StepStatus> status;
   Index closed = 0;  // at most
 
-  explicit Run(std::size_t ticks) : compute(ticks), lateness(ticks), force(ticks), status(ticks) {}
+  explicit Run(std::size_t ticks)
+      : compute(ticks), lateness(ticks), force(ticks), torque(ticks), status(ticks) {}
 };
 
 Run play(const Body& body, State state, const std::vector<ToolPose>& poses, bool real_time) {
@@ -71,6 +73,7 @@ Run play(const Body& body, State state, const std::vector<ToolPose>& poses, bool
     run.compute[k] = now() - begin;
     run.lateness[k] = real_time ? begin - due : 0;
     run.force[k] = state.tools.front().wrench.force;
+    run.torque[k] = state.tools.front().wrench.torque;
     run.closed = std::max(run.closed, state.tools.front().contacts);
   }
   return run;
@@ -258,6 +261,53 @@ void print_statuses(const Run& run) {
   fmt::print("\n");
 }
 
+/// What the hand does between two times at which it feels nothing: work [J] of its own, and without regard to
+/// the direction.
+struct Touch {
+  double work = 0.0;
+  double turnover = 0.0;
+};
+
+/// All touches of a run, by the mean of a tick's forces at its two ends. The body is at rest before and after
+/// one, so whatever the way, it cannot have given work away.
+std::vector<Touch> touches(const Run& run, const std::vector<ToolPose>& poses) {
+  std::vector<Touch> found;
+  bool was_touched = false;
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    const bool is_touched = !run.force[k].isZero(0.0) || !run.torque[k].isZero(0.0);
+    if (is_touched && !was_touched) found.emplace_back();
+    if (is_touched || was_touched) {
+      const Eigen::AngleAxisd turned(poses[k].orientation * poses[k - 1].orientation.conjugate());
+      const double work =
+          -0.5 * (run.force[k] + run.force[k - 1]).dot(poses[k].position - poses[k - 1].position) -
+          0.5 * (run.torque[k] + run.torque[k - 1]).dot(turned.angle() * turned.axis());
+      found.back().work += work;
+      found.back().turnover += std::abs(work);
+    }
+    was_touched = is_touched;
+  }
+  if (was_touched) found.pop_back();  // it does not end
+  return found;
+}
+
+void print_touches(const std::vector<Touch>& found) {
+  double least = std::numeric_limits<double>::infinity();
+  double least_share = least;
+  double sum = 0.0;
+  std::int64_t negative = 0;
+  for (const Touch& touch : found) {
+    least = std::min(least, touch.work);
+    least_share = std::min(least_share, touch.work / touch.turnover);
+    sum += touch.work;
+    negative += touch.work < 0.0 ? 1 : 0;
+  }
+  fmt::print(
+      "\n{} touches from free to free: the hand's work is {:.3g} J in all, {:.3g} J at least in one ({:.2g} "
+      "of "
+      "what went to and fro there), negative in {}\n",
+      found.size(), sum, least, least_share, negative);
+}
+
 struct Arguments {
   std::string model;
   double seconds = 600.0;
@@ -311,6 +361,7 @@ void study(const Arguments& arguments) {
                                    ? "the same forces to the last bit"
                                    : "FORCES DIFFER");
   print_statuses(first);
+  print_touches(touches(first, poses));
 
   const auto own =
       std::count_if(slow.begin(), slow.end(), [&](std::size_t k) { return 2 * alone[k] > real.compute[k]; });

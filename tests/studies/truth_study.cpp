@@ -17,7 +17,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -28,7 +27,7 @@
 #include "base/error.h"
 #include "formats/model_file.h"
 #include "runtime/tick/step.h"
-#include "runtime/touch/contact_nodes.h"
+#include "tests/support/study.h"
 #include "tests/support/surface_truth.h"
 
 namespace palpate {
@@ -55,56 +54,23 @@ struct Options {
   std::string csv;
 };
 
-std::vector<std::string> words_of(const std::string& text) {
-  std::vector<std::string> found;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    found.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return found;
-}
-
-double number(const std::string& text) {
-  return std::strtod(text.c_str(), nullptr);
-}
-
-std::vector<double> numbers(const std::string& text) {
-  std::vector<double> found;
-  for (const std::string& word : words_of(text)) found.push_back(number(word));
-  return found;
-}
-
-Vec3 vector(const std::string& text) {
-  const std::vector<double> parts = numbers(text);
-  if (parts.size() != 3) throw Error("is not X,Y,Z", text, "give three numbers");
-  return {parts[0], parts[1], parts[2]};
-}
-
 Options read(int count, char** words) {
   Options options;
-  if (count < 2) throw Error("no body is given", "", "truth_study BODY.palpate.hdf");
-  options.body = words[1];
   const std::map<std::string, std::function<void(const std::string&)>> known = {
-      {"--tools", [&](const std::string& text) { options.tools = words_of(text); }},
-      {"--friction", [&](const std::string& text) { options.friction = numbers(text); }},
-      {"--max-contacts", [&](const std::string& text) { options.max_contacts = numbers(text); }},
-      {"--at", [&](const std::string& text) { options.at = vector(text); }},
-      {"--along", [&](const std::string& text) { options.along = vector(text).normalized(); }},
-      {"--slide", [&](const std::string& text) { options.slide = vector(text); }},
-      {"--depth", [&](const std::string& text) { options.depth = number(text); }},
-      {"--deeper", [&](const std::string& text) { options.deeper = number(text); }},
-      {"--speed", [&](const std::string& text) { options.speed = number(text); }},
+      {"--tools", [&](const std::string& text) { options.tools = test::words_of(text); }},
+      {"--friction", [&](const std::string& text) { options.friction = test::numbers(text); }},
+      {"--max-contacts", [&](const std::string& text) { options.max_contacts = test::numbers(text); }},
+      {"--at", [&](const std::string& text) { options.at = test::vector(text); }},
+      {"--along", [&](const std::string& text) { options.along = test::vector(text).normalized(); }},
+      {"--slide", [&](const std::string& text) { options.slide = test::vector(text); }},
+      {"--depth", [&](const std::string& text) { options.depth = test::number(text); }},
+      {"--deeper", [&](const std::string& text) { options.deeper = test::number(text); }},
+      {"--speed", [&](const std::string& text) { options.speed = test::number(text); }},
       {"--every", [&](const std::string& text) { options.every = std::max(1, std::atoi(text.c_str())); }},
       {"--dense", [&](const std::string& text) { options.dense = std::max(1, std::atoi(text.c_str())); }},
       {"--ticks", [&](const std::string& text) { options.ticks = std::atoi(text.c_str()); }},
       {"--csv", [&](const std::string& text) { options.csv = text; }}};
-  for (int k = 2; k < count; k += 2) {
-    const auto option = known.find(words[k]);
-    if (option == known.end() || k + 1 == count)
-      throw Error("is no option with a value", words[k], "see the head of truth_study.cpp");
-    option->second(words[k + 1]);
-  }
+  options.body = test::read_options(count, words, known);
   return options;
 }
 
@@ -120,12 +86,12 @@ Shape shape(const std::string& name, const Options& options) {
   if (!is_capsule && !name.starts_with("s"))
     throw Error("is no tool", name, "a sphere is s15 and a capsule c20x80");
   Shape made;
-  made.tool.radius = 1e-3 * number(name.substr(1));
+  made.tool.radius = 1e-3 * test::number(name.substr(1));
   made.tool.hand_over = std::numeric_limits<double>::infinity();
   const std::size_t by = name.find('x');
   if (is_capsule && by == std::string::npos) throw Error("is no capsule", name, "c20x80 is one");
   if (!is_capsule) return made;
-  made.tool.length = 1e-3 * number(name.substr(by + 1));
+  made.tool.length = 1e-3 * test::number(name.substr(by + 1));
   const Vec3 axis = options.along.cross(options.slide).normalized();
   made.orientation = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis);
   made.middle = 0.5 * made.tool.length * axis;
@@ -166,12 +132,6 @@ std::vector<Vec3> path(const Body& body, const Options& options, const Shape& ma
   return places;
 }
 
-double processor_time() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 /// A tick of the runtime.
 struct Tick {
   double seconds = 0.0;
@@ -179,16 +139,6 @@ struct Tick {
   StepStatus status = StepStatus::ok;
   Index nodes = 0;  // that closed contact points press on
 };
-
-Index pressed_nodes(const Body& body, const State& state) {
-  std::vector<Index> nodes;
-  for (const ContactPoint& contact : state.contacts()) {
-    if (!contact.force.isZero(0.0))
-      for_each_node(body, state.surface.near, contact, [&](Index node, double) { nodes.push_back(node); });
-  }
-  std::ranges::sort(nodes);
-  return static_cast<Index>(std::unique(nodes.begin(), nodes.end()) - nodes.begin());
-}
 
 std::vector<Tick> play(const Body& body, const Shape& made, double friction, Index room,
                        const std::vector<Vec3>& places) {
@@ -201,11 +151,11 @@ std::vector<Tick> play(const Body& body, const Shape& made, double friction, Ind
     pose.position = place;
     pose.orientation = made.orientation;
     Tick tick;
-    const double begin = processor_time();
+    const double begin = test::processor_time();
     tick.status = step(body, state, pose);
-    tick.seconds = processor_time() - begin;
+    tick.seconds = test::processor_time() - begin;
     tick.wrench = state.tools.front().contact_wrench;
-    tick.nodes = pressed_nodes(body, state);
+    tick.nodes = test::pressed_nodes(body, state);
     ticks.push_back(tick);
   }
   return ticks;

@@ -4,10 +4,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 #include "runtime/solve/tick_tuning.h"
+#include "tests/support/study.h"
 
 namespace palpate::test {
 namespace {
@@ -113,12 +113,6 @@ Matrix3d axes(const Vec3& normal) {
   result.col(1) = normal.unitOrthogonal();
   result.col(2) = normal.cross(result.col(1));
   return result;
-}
-
-double processor_time() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 }  // namespace
