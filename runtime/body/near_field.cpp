@@ -211,11 +211,13 @@ void NearField::connect(const Body& body, Index place) noexcept {
   }
   const std::ptrdiff_t d = dimension_;
   const std::ptrdiff_t width = d * (place + 1);
-  for (std::ptrdiff_t axis = 0; axis < d; ++axis) {
-    const double* block = blocks_.data() + axis * width;
-    std::copy_n(block, width, C_.data() + (d * place + axis) * stride_);
-    double* column = C_.data() + d * place + axis;
-    for (std::ptrdiff_t dof = 0; dof < width; ++dof) column[dof * stride_] = block[dof];
+  for (std::ptrdiff_t axis = 0; axis < d; ++axis)
+    std::copy_n(blocks_.data() + axis * width, width, C_.data() + (d * place + axis) * stride_);
+  // The node's columns go into each row at once: a row is a place in memory of its own.
+  for (std::ptrdiff_t dof = 0; dof < width; ++dof) {
+    double* entries = C_.data() + dof * stride_ + d * place;
+    for (std::ptrdiff_t axis = 0; axis < d; ++axis)
+      entries[axis] = blocks_[at(static_cast<Index>(axis * width + dof))];
   }
 }
 

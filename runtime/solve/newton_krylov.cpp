@@ -126,6 +126,8 @@ NewtonKrylov::NewtonKrylov(Index max_contacts, Index max_rows)
       best_f_(f_.size()),
       r_(f_.size()),
       best_r_(f_.size()),
+      few_b_(f_.size()),
+      few_guess_(f_.size()),
       change_(f_.size()),
       product_(f_.size()),
       reduced_(contacts_.size()),
@@ -580,6 +582,28 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   for (Index i = 0; i < rows_; ++i)
     problem.lambda[static_cast<std::size_t>(i)] = f_[static_cast<std::size_t>(i)];
   return best_ <= tuning.many.accepted;
+}
+
+bool NewtonKrylov::improve_few(ContactProblem& problem) noexcept {
+  const auto rows = static_cast<std::ptrdiff_t>(problem.rows);
+  if (rows > problem.single_stride || std::ssize(contacts_) < problem.contacts) return false;
+  std::copy_n(problem.b.begin(), rows, few_b_.begin());
+  std::copy_n(problem.guess.begin(), rows, few_guess_.begin());
+  std::fill_n(problem.prediction.begin(), rows, 0.0);
+  problem.many = true;
+  problem.coupled = false;
+  for (Index i = 0; i < problem.rows; ++i) {
+    float* single = problem.single_row(i);
+    std::transform(problem.row(i), problem.row(i) + rows, single,
+                   [](double value) { return static_cast<float>(value); });
+    std::fill(single + rows, single + problem.padded_rows(), 0.0F);
+    problem.b[i] += dot(problem.row(i), problem.lambda.data(), rows);
+  }
+  const bool solved = solve(problem);
+  problem.many = false;
+  std::copy_n(few_b_.begin(), rows, problem.b.begin());
+  std::copy_n(few_guess_.begin(), rows, problem.guess.begin());
+  return solved;
 }
 
 /// The unknowns y of each change by the guess in dlambda. False where that is zero.

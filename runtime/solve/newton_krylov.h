@@ -32,6 +32,10 @@ class NewtonKrylov {
   /// the end of the budget: lambda is then the best that was found, and in the cones.
   bool solve(ContactProblem& problem) noexcept;
 
+  /// Makes lambda of a problem of few contacts, W in double precision, better: to what single precision tells
+  /// apart, as `solve` does. False when there is no room, or the residual is over `accepted`.
+  bool improve_few(ContactProblem& problem) noexcept;
+
   /// What lambda changes by when b does, to first order, for up to three changes: `db` and `dlambda`
   /// [changes x rows]; dlambda holds a guess before, which may be zero. Contacts stay open, sticking or
   /// slipping as they are.
@@ -118,7 +122,8 @@ class NewtonKrylov {
   Index rows_ = 0;
   std::vector<double> f_,
       best_f_;  // [rows] forces: the sum of single-precision changes; of the smallest residual
-  std::vector<float> r_, best_r_;  // [rows] motion
+  std::vector<float> r_, best_r_;          // [rows] motion
+  std::vector<double> few_b_, few_guess_;  // [rows] of a problem of few contacts
   std::vector<float> change_, product_;
   std::ptrdiff_t padded_rows_ = 0;
   std::vector<Reduced> reduced_;  // [max_contacts], the first active_

@@ -80,7 +80,7 @@ bool is_rough(const Body& body, const State& state) noexcept {
 bool may_repeat(const Body& body, const State& state, const Scratch& scratch) noexcept {
   const bool was_easy = scratch.problem.many ? scratch.newton_krylov.was_easy()
                                              : scratch.problem.frictionless || scratch.cone_solver.was_easy();
-  return was_easy && !is_released(body, state);
+  return was_easy && !scratch.was_improved && !is_released(body, state);
 }
 
 /// Takes up the patch that is wanted. Where there is no room for it the old one stays.
@@ -189,9 +189,14 @@ void add_tilt_forces(State& state, const Scratch& scratch) noexcept {
 }  // namespace
 
 bool solve_problem(Scratch& scratch) noexcept {
+  scratch.was_improved = false;
   if (scratch.problem.many) return scratch.newton_krylov.solve(scratch.problem);
-  return scratch.problem.frictionless ? scratch.active_set.solve(scratch.problem)
-                                      : scratch.cone_solver.solve(scratch.problem);
+  if (scratch.problem.frictionless) return scratch.active_set.solve(scratch.problem);
+  if (scratch.cone_solver.solve(scratch.problem)) return true;
+  // Newton's steps run in circles on nearly singular W where sweeps go on. From there they settle the rest.
+  scratch.was_improved = true;
+  scratch.newton_krylov.improve_few(scratch.problem);
+  return scratch.cone_solver.solve(scratch.problem);
 }
 
 void find_force_changes(Scratch& scratch, int changes) noexcept {

@@ -78,6 +78,7 @@ struct Scratch {
   Index left_out_count = 0;
   bool is_first_pass = true;              ///< solve_contact: of the tick's Newton passes
   bool is_solved = true;                  ///< solution: to its tolerance, in the last pass
+  bool was_improved = false;              ///< solution: few contacts took a second solver, in the last pass
   ContactProblem problem;                 ///< [rows] assembly: W and b; solution: lambda
   std::vector<ContactRow> rows;           ///< [rows] assembly: J
   std::vector<double> row_response;       ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
