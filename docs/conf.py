@@ -4,8 +4,8 @@ import pathlib
 import re
 import sys
 
-HERE = pathlib.Path(__file__).resolve().parent  # build/docs/source
-ROOT = HERE.parents[2]
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = (HERE.parent / "README.md").resolve().parent  # beside the copy are links to what stands beside docs/
 sys.path.insert(0, str(HERE / "site"))
 
 project = "Palpate"
@@ -95,6 +95,14 @@ def outside(app, env, node, contnode):
     return contnode if is_outside else None
 
 
+def mend_style(app, problem):
+    """Debian's Furo takes a part of its style from a web server's root."""
+    style = pathlib.Path(app.outdir) / "_static" / "styles" / "furo.css"
+    if problem is None:
+        style.write_text(style.read_text().replace("/javascript/normalize.css/normalize.css", "../normalize.css"))
+
+
 def setup(app):
     app.connect("source-read", add_contents)
     app.connect("missing-reference", outside)
+    app.connect("build-finished", mend_style)
