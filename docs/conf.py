@@ -68,7 +68,7 @@ CHAPTERS = {
         "contributing",
     ],
 }
-MEASUREMENTS = ["precompute", "accuracy", "overlays", "contact", "hands", "devices", "viewer"]
+MEASUREMENTS = ["precompute", "accuracy", "overlays", "contact", "hands", "dynamics", "devices", "viewer"]
 
 
 def toctree(folder, pages, caption=""):
