@@ -1,0 +1,19 @@
+// Tables in Markdown.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace palpate {
+
+/// A cell as a table can hold it: on one line, with its bars escaped.
+[[nodiscard]] std::string cell(const std::string& text);
+
+/// As code, empty where the text is.
+[[nodiscard]] std::string code(const std::string& text);
+
+/// A table with a line of titles, ended by an empty line. Columns that are empty in all rows are left out.
+[[nodiscard]] std::string markdown_table(const std::vector<std::string>& titles,
+                                         const std::vector<std::vector<std::string>>& rows);
+
+}  // namespace palpate
