@@ -118,8 +118,8 @@ class Shapes(unittest.TestCase):
         self.assertEqual(measure.table(1, below=True)(output), "| b |\n|---|\n| 2 |\n\nIt is two.")
         self.assertEqual(measure.table(0)(output), "| a |\n|---|\n| 1 |")
 
-    def test_minus_signs(self):
-        self.assertEqual(measure.typeset("| -1.5 % | 2e-5 | (-3) | a-4 |"), "| −1.5 % | 2e-5 | (−3) | a-4 |")
+    def test_minus_signs_and_units(self):
+        self.assertEqual(measure.typeset("| -1.5 % | 2e-5 | (-3) | a-4 |"), "| −1.5\N{NO-BREAK SPACE}% | 2e-5 | (−3) | a-4 |")
 
 
 if __name__ == "__main__":
