@@ -12,18 +12,22 @@ project = "Palpate"
 version = release = re.search(r"project\(palpate VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text()).group(1)
 html_title = f"Palpate {version}"
 
-extensions = ["myst_parser", "breathe", "mathml"]
+extensions = ["myst_parser", "breathe", "mathml", "mend_furo"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 5
 html_math_renderer = "mathml"
 highlight_language = "text"
-exclude_patterns = ["site", "pictures"]
+exclude_patterns = ["describe", "pictures", "site"]
 breathe_projects = {"palpate": str(HERE.parent / "doxygen" / "xml")}
 breathe_default_project = "palpate"
 breathe_domain_by_file_pattern = {"*/palpate.h": "c"}
 
 html_theme = "furo"
-html_static_path = ["site/book.css", "/usr/share/javascript/normalize.css/normalize.css"]
+html_static_path = [
+    "site/book.css",
+    "/usr/share/javascript/normalize.css/normalize.css",
+    "/usr/share/fonts/truetype/dejavu/DejaVuMathTeXGyre.ttf",
+]
 html_css_files = ["book.css"]
 html_copy_source = False
 html_show_sphinx = False
@@ -61,6 +65,8 @@ CHAPTERS = {
         "how-it-works",
         "measurements/index",
         "theory",
+        "theory-*",
+        "theory-contact",
         "comparison",
         "architecture",
         "decisions",
@@ -95,14 +101,6 @@ def outside(app, env, node, contnode):
     return contnode if is_outside else None
 
 
-def mend_style(app, problem):
-    """Debian's Furo takes a part of its style from a web server's root."""
-    style = pathlib.Path(app.outdir) / "_static" / "styles" / "furo.css"
-    if problem is None:
-        style.write_text(style.read_text().replace("/javascript/normalize.css/normalize.css", "../normalize.css"))
-
-
 def setup(app):
     app.connect("source-read", add_contents)
     app.connect("missing-reference", outside)
-    app.connect("build-finished", mend_style)

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t largest_file = 16U << 20U;  // [bytes]
 
-constexpr std::array<std::pair<std::string_view, const char*>, 9> content_types = {{
+constexpr std::array<std::pair<std::string_view, const char*>, 10> content_types = {{
     {".html", "text/html; charset=utf-8"},
     {".css", "text/css; charset=utf-8"},
     {".js", "text/javascript; charset=utf-8"},
@@ -24,6 +24,7 @@ constexpr std::array<std::pair<std::string_view, const char*>, 9> content_types 
     {".webp", "image/webp"},
     {".gif", "image/gif"},
     {".json", "application/json"},
+    {".ttf", "font/ttf"},
 }};
 
 bool is_name_character(char c) {

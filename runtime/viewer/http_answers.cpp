@@ -119,7 +119,8 @@ Response book_answer(const Request& request, const std::filesystem::path& book) 
   response.set(http::field::content_type, file->content_type);
   response.set("Content-Security-Policy",
                "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
-               "img-src 'self' data:; base-uri 'none'; form-action 'self'; frame-ancestors 'none'");
+               "img-src 'self' data:; font-src 'self'; base-uri 'none'; form-action 'self'; "
+               "frame-ancestors 'none'");
   response.body() = std::move(file->bytes);
   return guarded(std::move(response));
 }
