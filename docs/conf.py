@@ -65,7 +65,6 @@ CHAPTERS = {
         "how-it-works",
         "measurements/index",
         "theory",
-        "theory-*",
         "theory-contact",
         "comparison",
         "architecture",
