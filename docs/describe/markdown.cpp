@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <regex>
+#include <sstream>
 
 namespace palpate {
 namespace {
+
+constexpr std::size_t widest = 110;  // bytes of a line
 
 std::string line(const std::vector<std::string>& cells) {
   std::string text = "|";
@@ -45,6 +48,22 @@ std::string markdown_table(const std::vector<std::string>& titles,
     text += line(kept(row, keep));
   }
   return text + "\n";
+}
+
+std::string with_short_lines(const std::string& text) {
+  std::string result;
+  std::istringstream lines(text);
+  for (std::string one; std::getline(lines, one);) {
+    const std::size_t most = one.starts_with('|') || one.starts_with('#') ? one.size() : widest;
+    while (one.size() > most) {
+      const std::size_t space = std::min(one.rfind(' ', most), one.find(' ', most));
+      if (space == std::string::npos) break;
+      result += one.substr(0, space) + "\n";
+      one.erase(0, space + 1);
+    }
+    result += one + "\n";
+  }
+  return result.substr(0, result.find_last_not_of('\n') + 1) + "\n";
 }
 
 }  // namespace palpate

@@ -16,4 +16,8 @@ namespace palpate {
 [[nodiscard]] std::string markdown_table(const std::vector<std::string>& titles,
                                          const std::vector<std::vector<std::string>>& rows);
 
+/// The text with its paragraphs broken after at most 110 bytes where there are spaces; tables and headings
+/// stay. It ends in one line feed.
+[[nodiscard]] std::string with_short_lines(const std::string& text);
+
 }  // namespace palpate

@@ -23,10 +23,7 @@ struct Page {
 [[nodiscard]] Page tuning_page();
 [[nodiscard]] Page exit_statuses_page();
 
-/// Every page.
-[[nodiscard]] inline std::vector<Page> reference_pages() {
-  return {model_keys_page(),       play_options_page(), safety_bounds_page(), file_fields_page(),
-          recording_fields_page(), status_bits_page(),  tuning_page(),        exit_statuses_page()};
-}
+/// Every page as its file has it: paragraphs in lines of bearable width, and who wrote it.
+[[nodiscard]] std::vector<Page> reference_pages();
 
 }  // namespace palpate

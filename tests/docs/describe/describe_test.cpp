@@ -136,6 +136,16 @@ TEST(Reference, ReadsMembersAsTheirHeaderDeclaresThem) {
   EXPECT_THROW(static_cast<void>(declaration(header, "Nothing")), Error);
 }
 
+TEST(Reference, BreaksParagraphsAlone) {
+  const std::string words = "eleven byte", row = "| " + std::string(200, 'x') + " |";
+  std::string paragraph = words;
+  for (int k = 0; k < 12; ++k) paragraph += " " + words;
+  const std::string text = with_short_lines(row + "\n\n" + paragraph + "\n\n");
+  EXPECT_EQ(text.substr(0, row.size() + 2), row + "\n\n");
+  EXPECT_EQ(std::ranges::count(text, '\n'), 4);
+  EXPECT_LE(text.find('\n', row.size() + 2) - (row.size() + 2), 110U);
+}
+
 TEST(Reference, EscapesBarsAndLeavesEmptyColumnsOut) {
   EXPECT_EQ(markdown_table({"a", "b", "c"}, {{"1|2", "", "3\n4"}, {"5", "", ""}}),
             "| a | c |\n|---|---|\n| 1\\|2 | 3 4 |\n| 5 | |\n\n");
