@@ -15,12 +15,12 @@ namespace {
 std::vector<std::string> option_row(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   return {code(option.get_name(false, true) + (type.empty() ? "" : " " + type)), "", "",
-          option.get_description()};
+          with_options_as_code(option.get_description())};
 }
 
 std::vector<std::string> setting_row(const Setting& setting) {
-  return {code(fmt::format("--{} {}", setting.name, setting.value)), setting.unit, setting.otherwise,
-          setting.meaning};
+  return {code(fmt::format("--{} {}", setting.name, setting.value)), setting.unit,
+          with_options_as_code(setting.otherwise), with_options_as_code(setting.meaning)};
 }
 
 std::string group_table(const CLI::App& play, const std::string& group) {

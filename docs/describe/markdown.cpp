@@ -34,6 +34,10 @@ std::string code(const std::string& text) {
   return text.empty() ? "" : "`" + text + "`";
 }
 
+std::string with_options_as_code(const std::string& text) {
+  return std::regex_replace(text, std::regex("(^|[ (])(--[a-z][a-z-]*)"), "$1`$2`");
+}
+
 std::string markdown_table(const std::vector<std::string>& titles,
                            const std::vector<std::vector<std::string>>& rows) {
   std::vector<bool> keep(titles.size());

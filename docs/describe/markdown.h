@@ -12,6 +12,9 @@ namespace palpate {
 /// As code, empty where the text is.
 [[nodiscard]] std::string code(const std::string& text);
 
+/// The text with options such as --fast as code, whose dashes would else become one long one.
+[[nodiscard]] std::string with_options_as_code(const std::string& text);
+
 /// A table with a line of titles, ended by an empty line. Columns that are empty in all rows are left out.
 [[nodiscard]] std::string markdown_table(const std::vector<std::string>& titles,
                                          const std::vector<std::vector<std::string>>& rows);

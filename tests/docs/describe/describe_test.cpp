@@ -77,7 +77,7 @@ TEST(Reference, HasARowForEachSettingOfPlay) {
   for (const Setting& setting : settings_table()) {
     const std::string option = cell(code(fmt::format("--{} {}", setting.name, setting.value)));
     EXPECT_EQ(rows_of(page, option), 1) << option;
-    EXPECT_NE(page.find(cell(setting.meaning)), std::string::npos) << setting.name;
+    EXPECT_NE(page.find(cell(with_options_as_code(setting.meaning))), std::string::npos) << setting.name;
   }
   for (const char* other : {"--device", "--view", "--record", "--fast", "--report"})
     EXPECT_NE(page.find(std::string("| `") + other), std::string::npos) << other;
@@ -144,6 +144,10 @@ TEST(Reference, BreaksParagraphsAlone) {
   EXPECT_EQ(text.substr(0, row.size() + 2), row + "\n\n");
   EXPECT_EQ(std::ranges::count(text, '\n'), 4);
   EXPECT_LE(text.find('\n', row.size() + 2) - (row.size() + 2), 110U);
+}
+
+TEST(Reference, ShowsOptionsAsCode) {
+  EXPECT_EQ(with_options_as_code("--fast or (--view), a -- b, x--y"), "`--fast` or (`--view`), a -- b, x--y");
 }
 
 TEST(Reference, EscapesBarsAndLeavesEmptyColumnsOut) {
