@@ -92,6 +92,11 @@ def add_contents(app, docname, source):
         source[0] += toctree(HERE / "measurements", MEASUREMENTS)
 
 
+def name_files(app, docname, source):
+    """A block that tests write to a file has the file's name above it."""
+    source[0] = re.sub(r"^<!-- file: (\S+) -->\n```(\w+)\n", r"```{code-block} \2\n:caption: \1\n\n", source[0], flags=re.MULTILINE)
+
+
 def outside(app, env, node, contnode):
     """A link to a folder or a Markdown file of the repository that is no page of the book: its text alone."""
     page = ROOT / "docs" / node.get("refdoc", "")
@@ -102,4 +107,5 @@ def outside(app, env, node, contnode):
 
 def setup(app):
     app.connect("source-read", add_contents)
+    app.connect("source-read", name_files)
     app.connect("missing-reference", outside)
