@@ -284,7 +284,7 @@ def main():
     parser.add_argument("pages", nargs="+", type=pathlib.Path, metavar="PAGE")
     parser.add_argument("--build", type=pathlib.Path, metavar="DIR", help="build folder with the programs")
     parser.add_argument("--runnable", action="store_true", help="only print which pages have something to run")
-    parser.add_argument("--limit", type=float, default=120, metavar="S", help="longest a block may take (120)")
+    parser.add_argument("--limit", type=float, default=240, metavar="S", help="longest a block may take (240)")
     options = parser.parse_args()
     if options.runnable:
         print(*filter(is_runnable, options.pages), sep="\n")
