@@ -42,17 +42,15 @@ def anchors(page):
     return set(names)
 
 
-def broken_links(root, generated):
-    """Links to files or headings that are not there. `generated`: folder of docs/reference with the pages that programs write."""
+def broken_links(root):
+    """Links to files or headings that are not there."""
     for page in pages(root):
         for link in links(page):
             if IS_REMOTE.match(link):
                 continue
             path, _, anchor = urllib.parse.unquote(link).partition("#")
             target = pathlib.Path(os.path.normpath(page.parent / path)) if path else page
-            if not target.exists() and target.parent == root / "docs" / "reference":
-                target = generated / target.name
-            if not target.exists() or root not in (target, *target.parents) and generated not in target.parents:
+            if not target.exists() or root not in (target, *target.parents):
                 yield f"{page.relative_to(root)}: {link} is not there"
             elif anchor and target.suffix == ".md" and anchor not in anchors(target):
                 yield f"{page.relative_to(root)}: {link}: no such heading"
