@@ -47,7 +47,7 @@ ValueChoice choice_of(std::string_view text) {
   const std::string_view rest = text.substr(length);
   if (word.empty()) return {.word = "", .file_pattern = pattern_of(rest)};
   if (rest.empty() || rest.front() == '[') return {.word = word, .file_pattern = ""};
-  return {.word = word + rest.front(), .file_pattern = pattern_of(rest.substr(1)), .is_beginning = true};
+  return {.word = word + rest.front(), .file_pattern = pattern_of(rest.substr(1))};
 }
 
 /// The parts between bars that stand in no brackets.

@@ -34,9 +34,8 @@ struct CommandText {
 
 /// One of the things that may be written for a value.
 struct ValueChoice {
-  std::string word;           ///< a word, or what it begins with: "dynamic", "sphere:"; "" for files alone
-  std::string file_pattern;   ///< "*.csv" or "*" where the name of a file follows, else ""
-  bool is_beginning = false;  ///< more is to be typed behind the word
+  std::string word;          ///< a word, or what it begins with: "dynamic", "sphere:"; "" for files alone
+  std::string file_pattern;  ///< "*.csv" or "*" where the name of a file follows, else ""
 };
 
 /// Choices in a value as help shows it, such as "script:TOUCH.csv|hid[:WHICH]|mouse": words in small letters
