@@ -23,6 +23,7 @@ breathe_default_project = "palpate"
 breathe_domain_by_file_pattern = {"*/palpate.h": "c"}
 
 html_theme = "furo"
+html_favicon = "site/icon.svg"
 html_static_path = [
     "site/book.css",
     "/usr/share/javascript/normalize.css/normalize.css",
