@@ -1,5 +1,6 @@
 // The pages that palpate-describe writes: each member of each table of the code is in them, and
 // docs/reference/ holds them as they are.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -114,9 +115,8 @@ TEST(Reference, HasARowForEachTunedNumber) {
   };
   EXPECT_GT(count(header, member), 90);
   EXPECT_EQ(count(page, row), count(header, member));
-  EXPECT_NE(
-      page.find(fmt::format("| `same_place` | 1e-4 | edge | contact points nearer than this are one |")),
-      std::string::npos);
+  EXPECT_NE(page.find("| `same_place` | 1e-4 | edge | contact points nearer than this are one |"),
+            std::string::npos);
   EXPECT_EQ(tuning.detection.same_place, 1e-4);
 }
 
