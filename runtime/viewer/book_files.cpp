@@ -55,7 +55,7 @@ bool is_book(const fs::path& folder) {
 fs::path find_book() {
   std::error_code unknown;
   const fs::path program = fs::read_symlink("/proc/self/exe", unknown);
-  if (const fs::path installed = (program.parent_path() / PALPATE_INSTALLED_BOOK).lexically_normal();
+  if (fs::path installed = (program.parent_path() / PALPATE_INSTALLED_BOOK).lexically_normal();
       is_book(installed))
     return installed;
   return is_book(PALPATE_BUILT_BOOK) ? PALPATE_BUILT_BOOK : "";
