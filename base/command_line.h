@@ -5,6 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "base/command_pages.h"
+#include "base/command_tree.h"
+
 namespace palpate {
 
 /// Help pages: descriptions wrapped beside the options, options under the headings of their groups in the
@@ -14,7 +17,7 @@ class HelpFormatter : public CLI::Formatter {
   HelpFormatter() {
     label("Positionals", "Arguments");
     label("SUBCOMMAND", "COMMAND");
-    label("REQUIRED", "(needed)");
+    label("REQUIRED", "(required)");
   }
 
   [[nodiscard]] std::string make_description(const CLI::App* app) const override {
@@ -86,11 +89,25 @@ inline const CLI::App* find_command(const CLI::App& app, const std::string& name
   return commands.empty() ? nullptr : commands.front();
 }
 
-/// Adds `help [COMMAND]`.
-inline CLI::App* add_help_command(CLI::App& app, std::string& about) {
-  CLI::App* help = app.add_subcommand("help", "print this page, or that of a command");
-  help->add_option("COMMAND", about, "whose page")->type_name("");
+/// What `help` was given.
+struct HelpArguments {
+  std::string command;
+  std::string format = "text";
+};
+
+/// Adds `help [COMMAND]`, which writes manual pages and completions too.
+inline CLI::App* add_help_command(CLI::App& app, HelpArguments& arguments) {
+  CLI::App* help = app.add_subcommand("help", "print this page, or the page of a command");
+  help->add_option("COMMAND", arguments.command, "the command to explain")->type_name("");
+  help->add_option("--format", arguments.format,
+                   "print a manual page (man), or a completion script for a shell, of the whole program; "
+                   "default: text")
+      ->option_text("text|man|bash|zsh|fish")
+      ->check(CLI::IsMember({"text", "man", "bash", "zsh", "fish"}));
   for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) command->group("Commands");
+  help->footer("Examples:\n  " + app.get_name() + " help help\n  source <(" + app.get_name() +
+               " help --format bash)    complete in this shell with the Tab key\n  " + app.get_name() +
+               " help --format man > page.1; man ./page.1");
   return help;
 }
 
@@ -102,6 +119,20 @@ inline std::string help_page(const CLI::App& app, const std::string& command) {
   if (found == nullptr)
     throw CLI::ParseError("there is no command '" + command + "'", CLI::ExitCodes::ExtrasError);
   return formatter->make_help(found, app.get_name() + " " + command, CLI::AppFormatMode::Normal);
+}
+
+/// What `help` prints. Throws CLI::ParseError for a command that there is not.
+inline std::string help_page(const CLI::App& app, const HelpArguments& arguments) {
+  if (arguments.format == "text") return help_page(app, arguments.command);
+  if (!arguments.command.empty())
+    throw CLI::ParseError(
+        "--format " + arguments.format + " is of the whole program: leave out '" + arguments.command + "'",
+        CLI::ExitCodes::ExtrasError);
+  const CommandText program = command_tree(app);
+  if (arguments.format == "man")
+    return man_page(program, PALPATE_VERSION, {"palpate-precompute", "palpate-runtime"});
+  if (arguments.format == "bash") return bash_completion(program);
+  return arguments.format == "zsh" ? zsh_completion(program) : fish_completion(program);
 }
 
 }  // namespace palpate

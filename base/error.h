@@ -32,13 +32,13 @@ std::string to_text(const Error& error);
 /// for a hint, everything else is a mistake in the program. `where` is the place of these two.
 [[nodiscard]] Error handled_error(const std::string& where, const std::string& if_no_memory);
 
-/// Exit statuses of both programs (documented in the README).
+/// Exit statuses of both programs. The reference of the book shows these comments.
 enum ExitCode : int {
-  exit_ok = 0,
-  exit_input_error = 1,    ///< bad input, bad file, not enough disk or memory: nothing was changed
-  exit_usage = 2,          ///< unknown or missing command-line argument
-  exit_differs = 3,        ///< `verify` or a replay found a difference
-  exit_interrupted = 130,  ///< Ctrl-C or SIGTERM: temporary files were removed
+  exit_ok = 0,           ///< done
+  exit_input_error = 1,  ///< bad input, bad file, no memory, full disk; or what was written is incomplete
+  exit_usage = 2,        ///< unknown, missing or wrong argument
+  exit_differs = 3,  ///< `verify` found a difference or changed sources; a replay differs from its session
+  exit_interrupted = 130,  ///< Ctrl-C, SIGTERM or SIGHUP
 };
 
 }  // namespace palpate

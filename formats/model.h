@@ -38,7 +38,7 @@ struct Probe {
 };
 
 /// Worst relative error of the forces of touches with a packed matrix stored in each Precision, measured when
-/// it was computed (README, "Precision"); infinity where a capacitance matrix is not positive definite.
+/// it was computed (docs/model-toml.md); infinity where a capacitance matrix is not positive definite.
 struct ForceErrors {
   static constexpr double not_measured = -1.0;
   std::array<double, 3> of_precision = {not_measured, not_measured, not_measured};

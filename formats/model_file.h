@@ -1,4 +1,4 @@
-// NAME.palpate.hdf: writer, reader and validator. The layout is documented in the README ("The file").
+// NAME.palpate.hdf: writer, reader and validator. The layout is documented in docs/file-format.md.
 #pragma once
 
 #include <atomic>

@@ -12,44 +12,49 @@
 
 namespace palpate {
 
-/// What is kept of one tick. What is called device is in the body's frame, what is called handle or shown in
-/// the device's own.
+/// What is kept of one tick. Names with "device" are in the body's frame; names with "handle" or "shown" in
+/// the device's own. The reference of the book shows these comments.
 struct TickRecord {
   double time = 0.0;                            ///< since the start of the run [s]
-  double device_position[3] = {};               ///< where the device wanted the tool [m]
-  double device_orientation[4] = {1, 0, 0, 0};  ///< w, x, y, z
-  double tool_position[3] = {};               ///< where the tool itself was, which the body keeps outside [m]
-  double tool_orientation[4] = {1, 0, 0, 0};  ///< w, x, y, z
-  double force[3] = {};       ///< the opposite of what the hand feels [N]: that on the body, but where it is
-                              ///< limited or handed over
-  double torque[3] = {};      ///< on the body about the tool's origin [N m]
+  double device_position[3] = {};               ///< where the device wants the tool, in the body's frame [m]
+  double device_orientation[4] = {1, 0, 0, 0};  ///< how the device wants the tool turned: w, x, y, z
+  /// where the tool is: outside of the body, and with a coupling not where the device is [m]
+  double tool_position[3] = {};
+  double tool_orientation[4] = {1, 0, 0, 0};  ///< how the tool is turned: w, x, y, z
+  /// the opposite of what the hand feels: the force on the body, except where it is limited or handed over
+  /// (see `status`) [N]
+  double force[3] = {};
+  double torque[3] = {};      ///< on the body, about the tool's origin [N m]
   std::int32_t contacts = 0;  ///< closed contact points
-  double stiffness[6] = {};   ///< that the hand feels, xx, yy, zz, xy, yz, zx [N/m]
-  std::uint32_t status = 0;   ///< StepStatus bits
-  std::uint32_t compute_ns =
-      0;  ///< time that `step` took; 0 in a run without waiting, so that two such runs are equal
-  std::uint8_t grab = 0;    ///< grab button
-  std::int32_t patch = -1;  ///< mesh node that the overlay lies round, -1: none
+  double stiffness[6] = {};   ///< that the hand feels: xx, yy, zz, xy, yz, zx [N/m]
+  std::uint32_t status = 0;   ///< status bits of the tick (StepStatus)
+  /// time that `step` took [ns]; 0 with `--fast`, so that two such runs are equal
+  std::uint32_t compute_ns = 0;
+  std::uint8_t grab = 0;    ///< 1 while the grab button is pressed
+  std::int32_t patch = -1;  ///< mesh node that the overlay is centred on; -1: none
 
-  double handle_position[3] = {};               ///< where the device says that its handle is [m]
-  double handle_orientation[4] = {1, 0, 0, 0};  ///< w, x, y, z
-  double handle_velocity[3] = {};               ///< [m/s]
-  std::uint32_t buttons = 0;                    ///< of the device, a bit each
-  std::uint32_t sequence = 0;                   ///< of the device's report
-  std::int64_t arrived_ns = 0;                  ///< when that report arrived, since the start of the run
-  std::int64_t begun_ns = 0;                    ///< when the tick began, since the start of the run
-  double shown_force[3] = {};                   ///< on the hand: what the device was told to show [N]
-  double shown_torque[3] = {};                  ///< [N m]
-  double share = 1.0;                           ///< of the force that the safety rules let pass [0, 1]
-  std::uint8_t phase = 0;                       ///< SafetyPhase
-  std::uint8_t fault = 0;                       ///< Fault
-  std::uint8_t event = 0;        ///< what the loop was told before the tick: 1 restart, 2 device lost, 4
-                                 ///< acknowledged, 8 input lost, 16 lifted, 32 resumed after a pause
-  std::int64_t motion_step = 0;  ///< packed dynamics: the last step whose answer had come
+  double handle_position[3] = {};               ///< of the handle, as the device reports it [m]
+  double handle_orientation[4] = {1, 0, 0, 0};  ///< of the handle: w, x, y, z
+  double handle_velocity[3] = {};               ///< of the handle [m/s]
+  std::uint32_t buttons = 0;                    ///< of the device, one bit each
+  std::uint32_t sequence = 0;                   ///< number of the device's report
+  std::int64_t arrived_ns = 0;                  ///< when that report arrived, since the start of the run [ns]
+  /// when the tick began, since the start of the run [ns]; with `--fast` when it was due
+  std::int64_t begun_ns = 0;
+  double shown_force[3] = {};   ///< what the device was commanded to exert on the hand [N]
+  double shown_torque[3] = {};  ///< what the device was commanded to exert on the hand [N m]
+  double share = 1.0;           ///< of the force that the safety rules let pass, 0 to 1
+  std::uint8_t phase = 0;       ///< of safety (SafetyPhase)
+  std::uint8_t fault = 0;       ///< of safety (Fault)
+  /// what happened before the tick: 1 restart, 2 device lost, 4 fault acknowledged, 8 input lost, 16 tool
+  /// lifted, 32 resumed after a pause
+  std::uint8_t event = 0;
+  std::int64_t motion_step = 0;  ///< packed dynamics: the last step whose answer had arrived
 
-  float force_error = 0.0F;   ///< how far `force` may be off, about, where the tick was a best effort; else 0
-                              ///< [N]; recordings from 4.3 on
-  std::int32_t left_out = 0;  ///< contact points that the tool pressed on and that found no room; from 4.3 on
+  /// estimate of the error of `force` where the tick was a best effort, else 0 [N]; recordings from 4.3 on
+  float force_error = 0.0F;
+  /// contact points that the tool pressed on and that found no room; recordings from 4.3 on
+  std::int32_t left_out = 0;
 };
 
 /// The surface of the body at one moment.

@@ -53,38 +53,47 @@ int run_compare(const std::string& a, const std::string& b, const palpate::Compa
 
 /// As they were written.
 struct Arguments {
-  std::string model, file, other_file, about;
+  std::string model, file, other_file;
   palpate::BakeOptions bake;
   palpate::CompareOptions compare;
+  palpate::HelpArguments help;
 };
 
 void add_bake(CLI::App& app, Arguments& arguments) {
   palpate::BakeOptions& options = arguments.bake;
   options.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   app.add_option("MODEL.toml", arguments.model, "description of the body")->type_name("");
-  app.add_option("-o,--output", options.output, "file to write; else NAME.palpate.hdf in this folder")
+  app.add_option("-o,--output", options.output,
+                 "file to write; default: NAME.palpate.hdf in the current folder")
       ->type_name("FILE");
-  app.add_option("-j,--jobs", options.jobs, "threads; else as many as there are processors")
+  app.add_option("-j,--jobs", options.jobs, "number of threads; default: one per processor")
       ->option_text("N")
       ->check(CLI::Range(1, 1024));
-  app.add_flag("--dry-run", options.dry_run, "say what it would take (dofs, bytes, time) and stop");
-  app.add_flag("--force", options.force, "let the output take the place of any other file");
-  app.add_flag("--discard", options.discard,
-               "begin anew; else a run that was interrupted or killed goes on with the columns that it has");
+  app.add_flag("--dry-run", options.dry_run,
+               "print what it would need (degrees of freedom, bytes, time) and stop");
+  app.add_flag("--force", options.force, "overwrite the output even if it is not an earlier model");
+  app.add_flag(
+      "--discard", options.discard,
+      "start over; by default a run that was interrupted or killed resumes with the columns it has finished");
   app.footer(
       "Examples:\n"
       "  palpate-precompute meshes/models/cube/model.toml    writes cube.palpate.hdf\n"
       "  palpate-precompute help verify                      more about a command\n"
-      "Then: palpate-runtime play cube.palpate.hdf --view\n"
-      "Ctrl-C keeps the columns that are done in FILE.partial and FILE.progress; the same command goes on.\n"
-      "Exit status: 0 done, 1 bad input or no room, 2 wrong arguments, 3 not verified, 130 interrupted.");
+      "  palpate-runtime play cube.palpate.hdf --view        then: push it in a browser\n"
+      "Ctrl-C keeps the finished columns in FILE.partial and FILE.progress; give the same command to "
+      "resume.\n"
+      "Exit status: 0 done, 1 bad input or not enough room, 2 wrong arguments, 3 not verified, 130 "
+      "interrupted.");
 }
 
 CLI::App* add_inspect(CLI::App& app, Arguments& arguments) {
-  CLI::App* command = app.add_subcommand("inspect", "print what is in a file");
-  command->add_option("FILE", arguments.file, "NAME.palpate.hdf")->required()->type_name("");
+  CLI::App* command = app.add_subcommand("inspect", "print what a file contains");
+  command->add_option("FILE", arguments.file, "precomputed model, NAME.palpate.hdf")
+      ->required()
+      ->type_name("");
   command->footer(
-      "Material, mesh and its quality, what is held and stored, overlays, dynamics, sources.\n"
+      "Prints materials, mesh and mesh quality, fixed and stored nodes, overlays, dynamics and source "
+      "files.\n"
       "Example:\n"
       "  palpate-precompute inspect cube.palpate.hdf");
   return command;
@@ -94,9 +103,11 @@ CLI::App* add_verify(CLI::App& app, Arguments& arguments) {
   CLI::App* command = app.add_subcommand(
       "verify",
       "check a file: checksums, probes, sampled columns against K, and whether its sources have changed");
-  command->add_option("FILE", arguments.file, "NAME.palpate.hdf")->required()->type_name("");
+  command->add_option("FILE", arguments.file, "precomputed model, NAME.palpate.hdf")
+      ->required()
+      ->type_name("");
   command->footer(
-      "One line a check, with the measured error and its bound. Exit status 3 where one fails.\n"
+      "Prints one line per check, with the measured error and its bound. Exit status 3 if one fails.\n"
       "Example:\n"
       "  palpate-precompute verify cube.palpate.hdf && palpate-runtime play cube.palpate.hdf --view");
   return command;
@@ -106,21 +117,22 @@ CLI::App* add_compare(CLI::App& app, Arguments& arguments) {
   palpate::CompareOptions& options = arguments.compare;
   CLI::App* command = app.add_subcommand(
       "compare",
-      "press the same finger tip on two files of one body and print how force and displacement differ");
-  command->add_option("A", arguments.file, "NAME.palpate.hdf")->required()->type_name("");
-  command->add_option("B", arguments.other_file, "another, the finer one as a rule")
+      "press the same fingertip on two files of one body and print how force and displacement differ");
+  command->add_option("A", arguments.file, "precomputed model, NAME.palpate.hdf")->required()->type_name("");
+  command->add_option("B", arguments.other_file, "another model NAME.palpate.hdf, usually the finer one")
       ->required()
       ->type_name("");
-  command->add_option("--touches", options.touches, "places, spread over the boundary; else 20")
+  command->add_option("--touches", options.touches, "number of places, spread over the surface; default: 20")
       ->option_text("N")
       ->check(CLI::Range(1, 10000));
   command
       ->add_option("--radius", options.radius,
-                   "of the finger tip [m]; 0 is a single node; else three mean edges of the coarser file")
+                   "radius of the fingertip [m]; 0: a single node; default: three mean edge lengths of the "
+                   "coarser file")
       ->option_text("METRES")
       ->check(CLI::NonNegativeNumber);
   command->footer(
-      "Shows what a mesh, an element or a precision costs: bake the body twice and compare.\n"
+      "Shows the effect of another mesh, element or precision: precompute the body twice, then compare.\n"
       "Examples:\n"
       "  palpate-precompute compare coarse.palpate.hdf fine.palpate.hdf\n"
       "  palpate-precompute compare tet4.palpate.hdf tet10.palpate.hdf --touches 50 --radius 0.01");
@@ -133,6 +145,7 @@ std::string usage_hint(const CLI::App& app, const std::string& first_word) {
   if (!app.get_subcommands().empty() && !of_help) {
     return "See palpate-precompute " + app.get_subcommands().front()->get_name() + " --help";
   }
+  if (of_help) return "See palpate-precompute --help";
   const auto command = palpate::meant(first_word, {"inspect", "verify", "compare", "help"});
   if (command && !std::filesystem::exists(first_word))
     return "Did you mean palpate-precompute " + *command + "? See palpate-precompute --help";
@@ -141,8 +154,8 @@ std::string usage_hint(const CLI::App& app, const std::string& first_word) {
 
 int run(int argc, char** argv) {
   CLI::App app{
-      "Meshes a body, assembles its stiffness and stores the Green's functions that palpate-runtime feels "
-      "with.",
+      "Meshes an elastic body, assembles its stiffness and stores the Green's functions from which "
+      "palpate-runtime computes forces.",
       "palpate-precompute"};
   app.formatter(std::make_shared<palpate::HelpFormatter>());
   app.set_version_flag("--version", "palpate-precompute " PALPATE_VERSION);
@@ -152,11 +165,11 @@ int run(int argc, char** argv) {
   const CLI::App* inspect_command = add_inspect(app, arguments);
   const CLI::App* verify_command = add_verify(app, arguments);
   const CLI::App* compare_command = add_compare(app, arguments);
-  const CLI::App* help_command = palpate::add_help_command(app, arguments.about);
+  const CLI::App* help_command = palpate::add_help_command(app, arguments.help);
   try {
     app.parse(argc, argv);
     if (help_command->parsed()) {
-      std::fputs(palpate::help_page(app, arguments.about).c_str(), stdout);
+      std::fputs(palpate::help_page(app, arguments.help).c_str(), stdout);
       return palpate::exit_ok;
     }
     if (app.get_subcommands().empty() && arguments.model.empty())

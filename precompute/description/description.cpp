@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/regular_file.h"
 #include "base/toml_text.h"
+#include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
@@ -101,20 +102,16 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   result.text = text;
   const toml::table table = parse_toml(result.text, file);
   const toml::table empty;
-  const TomlTable root(table, "", file,
-                       {"name", "plane", "thickness", "geometry", "mesh", "material", "fixed", "load",
-                        "storage", "overlay", "dynamics"});
+  const TomlTable root(table, "", file, keys_of(""));
   const auto optional_table = [&](std::string_view key, const Keys& keys) {
     return root.has(key) ? root.table(key, keys)
                          : TomlTable(empty, std::string("[").append(key).append("]"), file, keys);
   };
 
-  Keys geometry_keys = geometry_kinds;
-  geometry_keys.insert(geometry_keys.end(), {"labels", "scale"});
-  const TomlTable geometry = root.table("geometry", geometry_keys);
-  const TomlTable mesh = optional_table("mesh", mesh_keys);
-  const TomlTable storage = optional_table("storage", {"scope", "layers", "precision"});
-  const std::string_view kind = geometry.only_one_of(geometry_kinds);
+  const TomlTable geometry = root.table("geometry", keys_of("[geometry]"));
+  const TomlTable mesh = optional_table("mesh", keys_of("[mesh]"));
+  const TomlTable storage = optional_table("storage", keys_of("[storage]"));
+  const std::string_view kind = geometry.only_one_of(alternatives_of("[geometry]"));
 
   result.name = read_name(root);
   result.geometry = read_geometry(geometry, kind, path.parent_path());
@@ -132,10 +129,10 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   result.precision = read_precision(storage);
   if (root.has("overlay")) {
     result.overlay =
-        read_overlay(root.table("overlay", overlay_keys), dimension, result.scope, result.layers);
+        read_overlay(root.table("overlay", keys_of("[overlay]")), dimension, result.scope, result.layers);
   }
   if (root.has("dynamics")) {
-    result.dynamics = read_dynamics(root.table("dynamics", dynamics_keys), result.scope);
+    result.dynamics = read_dynamics(root.table("dynamics", keys_of("[dynamics]")), result.scope);
   }
   return result;
 }

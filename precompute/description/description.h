@@ -1,4 +1,4 @@
-// model.toml: what a person writes to describe a body. Keys are documented in the README.
+// model.toml: what a person writes to describe a body. Keys are documented in docs/model-toml.md.
 #pragma once
 
 #include <filesystem>

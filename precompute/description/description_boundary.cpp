@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
@@ -46,7 +47,7 @@ Fixing read_fixing(const TomlTable& entry, int dimension) {
 }
 
 Load read_load(const TomlTable& entry, int dimension) {
-  const std::string_view kind = entry.only_one_of({"nodal_force", "traction", "gravity"});
+  const std::string_view kind = entry.only_one_of(alternatives_of("[[load]]"));
   const Vec3 value = read_vector(entry, kind, dimension);
   if (kind == "gravity") {
     if (const std::string_view where = entry.at_most_one_of(selection_kinds); !where.empty()) {
@@ -77,13 +78,11 @@ std::vector<Fixing> read_fixed(const TomlTable& root, int dimension) {
     root.fail("fixed", "no region is fixed: the body would fly away at the first touch", hint);
   }
   std::vector<Fixing> result;
-  for (const TomlTable& entry : root.tables("fixed", with_selections({"axes", "displacement"}), hint)) {
+  for (const TomlTable& entry : root.tables("fixed", with_selections(keys_of("[[fixed]]")), hint)) {
     result.push_back(read_fixing(entry, dimension));
   }
   return result;
 }
-
-const Keys overlay_keys = {"refinement", "rings", "region"};
 
 OverlayRegions read_overlay(const TomlTable& overlay, int dimension, Scope scope, Index layers) {
   OverlayRegions result;
@@ -115,7 +114,7 @@ std::vector<Load> read_loads(const TomlTable& root, int dimension) {
   if (!root.has("load")) {
     return result;
   }
-  const Keys keys = with_selections({"nodal_force", "traction", "gravity"});
+  const Keys keys = with_selections(keys_of("[[load]]"));
   const std::string hint = "write for example\n[[load]]\ngravity = " +
                            std::string(dimension == 3 ? "[0, 0, -9.81]" : "[0, -9.81]");
   for (const TomlTable& entry : root.tables("load", keys, hint)) {

@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
@@ -89,8 +90,7 @@ Rayleigh read_ratios(const TomlTable& damping) {
 }
 
 Rayleigh read_damping(const TomlTable& dynamics) {
-  const Keys keys = {"mass", "stiffness", "ratios", "frequencies"};
-  const TomlTable damping = dynamics.table("damping", keys);
+  const TomlTable damping = dynamics.table("damping", keys_of("[dynamics] damping"));
   const bool by_ratios = damping.has("ratios") || damping.has("frequencies");
   if (!by_ratios) {
     return {.mass = not_negative(damping, "mass"), .stiffness = not_negative(damping, "stiffness")};
@@ -105,8 +105,6 @@ Rayleigh read_damping(const TomlTable& dynamics) {
 }
 
 }  // namespace
-
-const Keys dynamics_keys = {"method", "time_step", "alpha", "delta", "mass", "damping", "modes"};
 
 DynamicsOptions read_dynamics(const TomlTable& dynamics, Scope scope) {
   DynamicsOptions result;

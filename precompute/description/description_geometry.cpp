@@ -2,6 +2,7 @@
 #include <array>
 #include <limits>
 
+#include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
@@ -71,9 +72,6 @@ SphereShape read_sphere(const TomlTable& sphere) {
 
 }  // namespace
 
-const Keys geometry_kinds = {"surface", "image",     "volume",  "box",    "cylinder",
-                             "sphere",  "rectangle", "polygon", "picture"};
-
 bool is_plane(std::string_view geometry_kind) {
   return geometry_kind == "rectangle" || geometry_kind == "polygon" || geometry_kind == "picture";
 }
@@ -109,18 +107,18 @@ Geometry read_geometry(const TomlTable& geometry, std::string_view kind,
     return PictureGeometry{file()};
   }
   if (kind == "polygon") {
-    return read_polygon(geometry.table(kind, {"points", "holes"}));
+    return read_polygon(geometry.table(kind, keys_of("[geometry] polygon")));
   }
   if (kind == "rectangle") {
-    return read_rectangle(geometry.table(kind, {"origin", "size", "cells"}));
+    return read_rectangle(geometry.table(kind, keys_of("[geometry] rectangle")));
   }
   if (kind == "box") {
-    return read_box(geometry.table(kind, {"origin", "size", "cells"}));
+    return read_box(geometry.table(kind, keys_of("[geometry] box")));
   }
   if (kind == "cylinder") {
-    return read_cylinder(geometry.table(kind, {"radius", "height", "cells_across", "cells_along"}));
+    return read_cylinder(geometry.table(kind, keys_of("[geometry] cylinder")));
   }
-  return read_sphere(geometry.table(kind, {"radius", "cells_across"}));
+  return read_sphere(geometry.table(kind, keys_of("[geometry] sphere")));
 }
 
 }  // namespace palpate

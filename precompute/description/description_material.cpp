@@ -3,12 +3,13 @@
 #include <algorithm>
 
 #include "meshes/material_fields.h"
+#include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
 namespace {
 
-const Keys claim_kinds = {"regions", "box", "half_space", "sphere", "lowest"};
+const Keys claim_kinds = alternatives_of("[material]");
 
 /// One constant, where it is given; in the plane a list has no strains across it.
 void read_field(const TomlTable& material, const MaterialField& field, std::span<double> values,

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
@@ -9,57 +10,16 @@ bool holds(const Keys& keys, std::string_view key) {
   return std::find(keys.begin(), keys.end(), key) != keys.end();
 }
 
-/// Elements that a kind of geometry can be made of.
-Keys elements_of(std::string_view kind) {
-  if (kind == "volume") {
-    return {"tri3", "quad4", "tet4", "tet10", "hex8"};
-  }
-  if (kind == "box") {
-    return {"tet4", "tet10", "hex8"};
-  }
-  if (kind == "rectangle") {
-    return {"quad4", "tri3"};
-  }
-  return is_plane(kind) ? Keys{"tri3"} : Keys{"tet4", "tet10"};
-}
-
-/// Meshers that a kind of geometry can choose from, the default first.
-Keys meshers_of(std::string_view kind) {
-  if (kind == "surface") {
-    return {"tetgen", "cgal"};
-  }
-  return kind == "image" ? Keys{"cgal", "tetgen"} : Keys{};
-}
-
-/// The keys of [mesh] that mean something.
-Keys keys_of(std::string_view kind, std::string_view mesher) {
-  Keys keys = {"element"};
-  if (kind == "polygon" || kind == "picture") {
-    keys.insert(keys.end(), {"edge_length", "grading", "optimize"});
-  }
-  if (kind == "surface" || kind == "image") {
-    keys.insert(keys.end(), {"mesher", "edge_length", "grading", "radius_edge"});
-    keys.push_back(mesher == "tetgen" ? "min_dihedral" : "optimize");
-  }
-  if (kind == "surface") {
-    keys.push_back(mesher == "tetgen" ? "remesh" : "feature_angle");
-  }
-  if (kind == "image" || mesher == "cgal") {
-    keys.push_back("facet_distance");
-  }
-  return keys;
-}
-
 void check_keys(const TomlTable& mesh, std::string_view kind, std::string_view mesher) {
-  const Keys keys = keys_of(kind, mesher);
-  for (const std::string_view key : mesh_keys) {
+  const Keys keys = mesh_keys_of(kind, mesher);
+  for (const std::string_view key : keys_of("[mesh]")) {
     if (!mesh.has(key) || holds(keys, key)) {
       continue;
     }
     std::string what = mesh.name_of(key) + " does not apply to geometry of kind " + std::string(kind);
     std::string hint = "remove it; what applies is " + comma_list(keys);
     for (const std::string_view other : meshers_of(kind)) {
-      if (other != mesher && holds(keys_of(kind, other), key)) {
+      if (other != mesher && holds(mesh_keys_of(kind, other), key)) {
         what += " with mesher \"" + std::string(mesher) + "\"";
         hint = "remove it, or set mesher = \"" + std::string(other) + "\"";
       }
@@ -96,8 +56,43 @@ void read_optimize(const TomlTable& mesh, std::string_view kind, MeshOptions& op
 
 }  // namespace
 
-const Keys mesh_keys = {"element",     "mesher",       "edge_length",    "remesh",        "grading",
-                        "radius_edge", "min_dihedral", "facet_distance", "feature_angle", "optimize"};
+Keys elements_of(std::string_view kind) {
+  if (kind == "volume") {
+    return {"tri3", "quad4", "tet4", "tet10", "hex8"};
+  }
+  if (kind == "box") {
+    return {"tet4", "tet10", "hex8"};
+  }
+  if (kind == "rectangle") {
+    return {"quad4", "tri3"};
+  }
+  return is_plane(kind) ? Keys{"tri3"} : Keys{"tet4", "tet10"};
+}
+
+Keys meshers_of(std::string_view kind) {
+  if (kind == "surface") {
+    return {"tetgen", "cgal"};
+  }
+  return kind == "image" ? Keys{"cgal", "tetgen"} : Keys{};
+}
+
+Keys mesh_keys_of(std::string_view kind, std::string_view mesher) {
+  Keys keys = {"element"};
+  if (kind == "polygon" || kind == "picture") {
+    keys.insert(keys.end(), {"edge_length", "grading", "optimize"});
+  }
+  if (kind == "surface" || kind == "image") {
+    keys.insert(keys.end(), {"mesher", "edge_length", "grading", "radius_edge"});
+    keys.push_back(mesher == "tetgen" ? "min_dihedral" : "optimize");
+  }
+  if (kind == "surface") {
+    keys.push_back(mesher == "tetgen" ? "remesh" : "feature_angle");
+  }
+  if (kind == "image" || mesher == "cgal") {
+    keys.push_back("facet_distance");
+  }
+  return keys;
+}
 
 MeshOptions read_mesh_options(const TomlTable& mesh, std::string_view kind) {
   const Keys meshers = meshers_of(kind);

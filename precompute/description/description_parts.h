@@ -10,15 +10,18 @@
 
 namespace palpate {
 
-/// The keys of [geometry] that say what it is: one of them is given.
-extern const Keys geometry_kinds;
-/// Those that lie in the plane. A volume file can be either.
+/// Whether a geometry lies in the plane. A volume file can be either.
 bool is_plane(std::string_view geometry_kind);
 
-/// [geometry]; `kind` is the one of geometry_kinds that it has.
+/// [geometry]; `kind` is the one that it has of its alternatives.
 Geometry read_geometry(const TomlTable& geometry, std::string_view kind, const std::filesystem::path& folder);
 
-extern const Keys mesh_keys;
+/// Elements that a kind of geometry can be made of, the usual one first; a volume has what is in its file.
+Keys elements_of(std::string_view geometry_kind);
+/// Meshers that a kind of geometry can choose from, the usual one first.
+Keys meshers_of(std::string_view geometry_kind);
+/// The keys of [mesh] that mean something for a kind of geometry; `mesher` is empty where there is no choice.
+Keys mesh_keys_of(std::string_view geometry_kind, std::string_view mesher);
 /// [mesh], for a kind of geometry.
 MeshOptions read_mesh_options(const TomlTable& mesh, std::string_view geometry_kind);
 
@@ -33,10 +36,8 @@ Selection read_selection(const TomlTable& entry, std::string_view kind, int dime
 std::vector<MaterialPart> read_materials(const TomlTable& root, int dimension);
 /// Every [[fixed]]: at least one.
 std::vector<Fixing> read_fixed(const TomlTable& root, int dimension);
-extern const Keys overlay_keys;
 /// [overlay], for what [storage] keeps.
 OverlayRegions read_overlay(const TomlTable& overlay, int dimension, Scope scope, Index layers);
-extern const Keys dynamics_keys;
 /// [dynamics], for what [storage] keeps.
 DynamicsOptions read_dynamics(const TomlTable& dynamics, Scope scope);
 /// Every [[load]], possibly none.

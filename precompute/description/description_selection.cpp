@@ -1,3 +1,4 @@
+#include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
 namespace palpate {
@@ -40,17 +41,17 @@ Vec3 read_vector(const TomlTable& table, std::string_view key, int dimension) {
                                      : "in the plane write " + name + " = [x, y]");
 }
 
-const Keys selection_kinds = {"box", "half_space", "sphere", "nodes", "tag", "lowest"};
+const Keys selection_kinds = alternatives_of(selection_title);
 
 Selection read_selection(const TomlTable& entry, std::string_view kind, int dimension) {
   if (kind == "box") {
-    return read_box(entry.table(kind, {"min", "max"}), dimension);
+    return read_box(entry.table(kind, keys_of("selection box")), dimension);
   }
   if (kind == "half_space") {
-    return read_half_space(entry.table(kind, {"point", "normal"}), dimension);
+    return read_half_space(entry.table(kind, keys_of("selection half_space")), dimension);
   }
   if (kind == "sphere") {
-    const TomlTable sphere = entry.table(kind, {"center", "radius"});
+    const TomlTable sphere = entry.table(kind, keys_of("selection sphere"));
     return SelectSphere{read_vector(sphere, "center", dimension), sphere.positive("radius")};
   }
   if (kind == "nodes") {
@@ -59,7 +60,7 @@ Selection read_selection(const TomlTable& entry, std::string_view kind, int dime
   if (kind == "tag") {
     return SelectTag{entry.integer(kind)};
   }
-  return read_lowest(entry.table(kind, {"axis", "percent"}), dimension);
+  return read_lowest(entry.table(kind, keys_of("selection lowest")), dimension);
 }
 
 }  // namespace palpate

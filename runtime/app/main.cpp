@@ -39,11 +39,13 @@ struct Arguments {
   DevicesOptions devices;
   ExportOptions exported;
   std::string view_address = "127.0.0.1:8017";
-  std::string about;
+  HelpArguments help;
 };
 
 void add_file(CLI::App& command, Arguments& arguments) {
-  command.add_option("FILE", arguments.file, "baked model, NAME.palpate.hdf")->required()->type_name("");
+  command.add_option("FILE", arguments.file, "precomputed model, NAME.palpate.hdf")
+      ->required()
+      ->type_name("");
   command
       .add_option("--model", arguments.model_toml, "fail unless FILE was made from exactly this model.toml")
       ->type_name("FILE");
@@ -55,31 +57,29 @@ CLI::Option* add_repeatable(CLI::App& command, const std::string& name, std::vec
 }
 
 CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
-  CLI::App* probe = app.add_subcommand("probe", "displace nodes and print the forces that this takes");
+  CLI::App* probe = app.add_subcommand("probe", "displace nodes and print the forces this takes");
   add_file(*probe, arguments);
   add_repeatable(*probe, "--at", arguments.at, "X,Y,Z",
-                 "the free surface node that rests nearest to this place [m]; repeatable");
+                 "the free surface node nearest to this point of the body at rest [m]; repeatable");
   add_repeatable(*probe, "--node", arguments.node, "N", "the node with this number in the mesh; repeatable");
   add_repeatable(*probe, "--displace", arguments.displace, "DX,DY,DZ",
                  "its displacement [m]; one for each --at and --node, in the same order")
       ->required();
   probe
-      ->add_option(
-          "--overlay", arguments.overlay,
-          "a finer mesh over the elements in N rings round those nodes, each cut into R to the power "
-          "of the dimension (s-FEM)")
+      ->add_option("--overlay", arguments.overlay,
+                   "a finer mesh (s-FEM): each element within N rings of those nodes is cut into R to the "
+                   "power of the dimension")
       ->type_name("r=R,rings=N");
   probe->add_flag("--json", arguments.json, "print JSON");
   probe
-      ->add_option(
-          "--field", arguments.field,
-          "write the displacement at rest and by the probe: a table of the stored nodes, or a grid for "
-          "ParaView")
+      ->add_option("--field", arguments.field,
+                   "write the displacements at rest and due to the probe: a table of the stored nodes, or a "
+                   "grid for ParaView")
       ->type_name("OUT.csv|OUT.vtu");
   probe->add_flag("--force", arguments.force, force_help);
   probe->footer(
       "Forces are those on the body, in newtons; the hand feels the opposite. Displacements are relative to\n"
-      "the body as it rests under its loads. For a body in the plane give X,Y and DX,DY.\n"
+      "the body at rest under its loads. For a body in the plane give X,Y and DX,DY.\n"
       "Example:\n  palpate-runtime probe liver.palpate.hdf --at 0.1,0.05,0.12 --displace 0,0,-0.005 --field "
       "liver.vtu");
   return probe;
@@ -88,15 +88,14 @@ CLI::App* add_probe(CLI::App& app, Arguments& arguments) {
 CLI::App* add_devices(CLI::App& app, Arguments& arguments) {
   CLI::App* devices = app.add_subcommand("devices", "list the HID devices and the profiles that fit them");
   devices->add_flag("--json", arguments.devices.json, "print JSON");
-  devices
-      ->add_option("--profile", arguments.devices.profile, "a profile of your own beside the built-in ones")
+  devices->add_option("--profile", arguments.devices.profile, "also try this profile of your own")
       ->type_name("FILE.toml");
   devices
       ->add_option("--print-profile", arguments.devices.print_profile,
                    "print a built-in profile, to copy and edit")
       ->type_name("NAME");
   devices->footer(
-      "One that is listed with a profile is taken by palpate-runtime play FILE --device hid.\n"
+      "A device that is listed with a profile can be used by palpate-runtime play FILE --device hid.\n"
       "Examples:\n"
       "  palpate-runtime devices\n"
       "  palpate-runtime devices --print-profile spacemouse > mine.toml");
@@ -104,8 +103,10 @@ CLI::App* add_devices(CLI::App& app, Arguments& arguments) {
 }
 
 CLI::App* add_session(CLI::App& app, Arguments& arguments) {
-  CLI::App* session = app.add_subcommand("session", "say what is in a recording of play");
-  session->add_option("SESSION.h5", arguments.file, "recording; one that was killed is made one file")
+  CLI::App* session = app.add_subcommand("session", "print what a recording contains");
+  session
+      ->add_option("SESSION.h5", arguments.file,
+                   "recording of play; if the run was killed, its parts are first merged into one file")
       ->required()
       ->type_name("");
   session->add_flag("--json", arguments.json, "print JSON");
@@ -117,9 +118,9 @@ CLI::App* add_session(CLI::App& app, Arguments& arguments) {
 }
 
 CLI::App* add_view(CLI::App& app, Arguments& arguments) {
-  CLI::App* view = app.add_subcommand("view", "show a recording of play in a browser");
+  CLI::App* view = app.add_subcommand("view", "show a recording in a browser");
   view->add_option("SESSION.h5", arguments.file, "recording")->required()->type_name("");
-  view->add_option("--view-address", arguments.view_address, "where the page is served")
+  view->add_option("--view-address", arguments.view_address, "address at which the page is served")
       ->type_name("[ADDRESS:]PORT")
       ->capture_default_str();
   view->footer(
@@ -135,19 +136,20 @@ std::string check_number(const std::string& text) {
 }
 
 CLI::App* add_export(CLI::App& app, ExportOptions& options) {
-  CLI::App* exported = app.add_subcommand("export", "write a recording of play as one page for any browser");
+  CLI::App* exported =
+      app.add_subcommand("export", "write a recording as one web page that needs no program");
   exported->add_option("SESSION.h5", options.recording, "recording")->required()->type_name("");
-  exported->add_option("--html", options.html, "the page")->required()->type_name("OUT.html");
+  exported->add_option("--html", options.html, "file to write")->required()->type_name("OUT.html");
   exported->add_flag("--force", options.force, force_help);
-  exported->add_option("--fps", options.fps, "pictures a second at most; else 30")
+  exported->add_option("--fps", options.fps, "most pictures per second; default: 30")
       ->option_text("N")
       ->check(CLI::PositiveNumber)
       ->check(check_number);
-  exported->add_option("--from", options.from, "begin there")
+  exported->add_option("--from", options.from, "time at which the page starts [s]")
       ->option_text("S")
       ->check(CLI::NonNegativeNumber)
       ->check(check_number);
-  exported->add_option("--to", options.to, "end there")
+  exported->add_option("--to", options.to, "time at which the page ends [s]")
       ->option_text("S")
       ->check(CLI::NonNegativeNumber)
       ->check(check_number);
@@ -216,7 +218,8 @@ int play_and_name_next(const PlayOptions& options) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("Touches a precomputed body and answers with finite-element forces.", "palpate-runtime");
+  CLI::App app("Lets a tool touch a precomputed elastic body and computes the finite-element forces.",
+               "palpate-runtime");
   app.formatter(std::make_shared<HelpFormatter>());
   app.set_version_flag("--version", "palpate-runtime " PALPATE_VERSION);
   app.require_subcommand(0, 1);
@@ -232,7 +235,7 @@ int run(int argc, char** argv) {
   const CLI::App* session_command = add_session(app, arguments);
   const CLI::App* export_command = add_export(app, arguments.exported);
   const CLI::App* devices_command = add_devices(app, arguments);
-  const CLI::App* help_command = add_help_command(app, arguments.about);
+  const CLI::App* help_command = add_help_command(app, arguments.help);
   const std::string first_word = argc > 1 ? argv[1] : "";
   if (const std::string hint = meant_by(app, first_word); !hint.empty()) {
     return tell_usage("'" + first_word + "' is no command", hint);
@@ -241,7 +244,7 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
     if (app.get_subcommands().empty()) throw CLI::RequiredError(std::string(commands));
     if (help_command->parsed()) {
-      std::fputs(help_page(app, arguments.about).c_str(), stdout);
+      std::fputs(help_page(app, arguments.help).c_str(), stdout);
       return exit_ok;
     }
     if (devices_command->parsed()) return devices(arguments.devices);

@@ -29,32 +29,31 @@ void add_settings(CLI::App& play, PlayArguments& arguments, SettingGroup group, 
   }
 }
 
-constexpr const char* input_group = "What moves the tool";
-constexpr const char* viewer_group = "In a browser";
+constexpr const char* input_group = "Input device";
+constexpr const char* viewer_group = "Viewer";
 constexpr const char* body_group = "The body";
 constexpr const char* loop_group = "The loop";
-constexpr const char* output_group = "What is written";
+constexpr const char* output_group = "Output files";
 
 void add_input(CLI::App& play, PlayArguments& arguments) {
-  play.add_option(
-          "--device", arguments.device,
-          "the hand: a CSV with the columns t,x,y,z[,qw,qx,qy,qz][,grab] (s, m, quaternion, 0 or 1); a "
-          "recorded session; a HID device (palpate-runtime devices lists them); another process; with "
-          "--view the pointer in the browser, which is what is taken then if nothing is said")
+  play.add_option("--device", arguments.device,
+                  "what moves the tool: a CSV with the columns t,x,y,z[,qw,qx,qy,qz][,grab] (s, m, "
+                  "quaternion, 0 or 1); a recording; a HID device (palpate-runtime devices lists them); "
+                  "another process; or, with --view, the pointer in the browser, which is then the default")
       ->type_name("script:TOUCH.csv|replay:SESSION.h5|hid[:WHICH]|bridge[:[ADDRESS:]PORT]|mouse")
       ->group(input_group);
   play.add_option("--profile", arguments.profile,
-                  "what a HID device is, where its ids do not say: a name or a file")
+                  "profile of the HID device if its ids do not tell: a built-in name or a file")
       ->type_name("NAME|FILE.toml")
       ->group(input_group);
 }
 
 void add_viewer(CLI::App& play, PlayArguments& arguments) {
   play.add_flag("--view", arguments.view,
-                "show it in a browser; without --device the browser's pointer moves the tool")
+                "show the body in a browser; without --device the browser's pointer moves the tool")
       ->group(viewer_group);
   play.add_option("--view-address", arguments.view_address,
-                  "where the browser finds it, with --view; else 127.0.0.1:8017; port 0: any that is free")
+                  "address at which --view serves the page; default: 127.0.0.1:8017; port 0: any free one")
       ->type_name("[ADDRESS:]PORT")
       ->group(viewer_group);
 }
@@ -67,28 +66,28 @@ void add_body(CLI::App& play, PlayArguments& arguments) {
 }
 
 void add_loop(CLI::App& play, PlayArguments& arguments) {
-  play.add_option("--duration", arguments.duration, "stop after so many seconds")
+  play.add_option("--duration", arguments.duration, "stop after this time [s]")
       ->type_name("S")
       ->group(loop_group);
   add_settings(play, arguments, SettingGroup::loop, loop_group);
-  play.add_option("--cpu", arguments.cpu, "a processor that the loop has for itself within this program")
+  play.add_option("--cpu", arguments.cpu,
+                  "processor for the loop; the program's other threads leave it alone")
       ->type_name("N")
       ->group(loop_group);
   play.add_flag("--fast", arguments.fast,
-                "do not wait for the clock: deterministic, equal runs leave equal recordings")
+                "do not wait for the clock; runs are deterministic: the same input gives the same recording")
       ->group(loop_group);
 }
 
 void add_outputs(CLI::App& play, PlayArguments& arguments) {
-  play.add_option("--record", arguments.record, "write every tick to this HDF5 file")
+  play.add_option("--record", arguments.record, "record every tick in this HDF5 file")
       ->type_name("OUT.h5")
       ->group(output_group);
   play.add_option("--record-frames", arguments.record_frames,
-                  "how often the surface is written there; else 60 times a second; 0: never")
+                  "how often the surface is recorded [1/s]; 0: never; default: 60")
       ->type_name("HZ")
       ->group(output_group);
-  play.add_option("--report", arguments.report,
-                  "write a report in JSON, to the standard output where this is -")
+  play.add_option("--report", arguments.report, "write a report as JSON; -: to standard output")
       ->type_name("OUT.json|-")
       ->group(output_group);
   play.add_option(
@@ -197,28 +196,25 @@ ViewerOptions read_view_address(const std::string& text) {
 }
 
 CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
-  CLI::App* play = app.add_subcommand("play", "run the haptic loop with a tool and report on it");
-  play->add_option("FILE", arguments.file, "baked model, NAME.palpate.hdf")->required()->type_name("");
+  CLI::App* play = app.add_subcommand("play", "run the haptic loop: a tool touches the body in real time");
+  play->add_option("FILE", arguments.file, "precomputed model, NAME.palpate.hdf")->required()->type_name("");
   add_input(*play, arguments);
   add_viewer(*play, arguments);
   add_settings(*play, arguments, SettingGroup::tool, "The tool");
   add_body(*play, arguments);
   add_loop(*play, arguments);
   add_outputs(*play, arguments);
-  add_settings(*play, arguments, SettingGroup::workspace, "Where the device is in the body's frame");
+  add_settings(*play, arguments, SettingGroup::workspace, "Workspace of the device");
   play->get_help_ptr()->group("");
-  add_settings(*play, arguments, SettingGroup::safety, "Safety of the hand");
+  add_settings(*play, arguments, SettingGroup::safety, "Safety");
   play->footer(
-      safety_help() +
-      "\nThe tool pushes what it touches and slides along it; while grab is set it holds what it "
-      "touched, or the\n"
-      "nearest surface within --reach, and carries it along. It must begin outside of the body. "
-      "Lengths are metres.\n"
-      "A capsule reaches from the tool's origin along its own z axis (in the plane y), to which a disc, a "
-      "flat punch,\n"
-      "is normal; EDGE rounds its edge and is half its thickness, a tenth of its radius by default. On a "
-      "body in the\n"
-      "plane z is ignored. Ctrl-C ends a run, with no force; Enter or SIGUSR1 acknowledges a fault.\n"
+      "    bound            default unit   meaning\n" + safety_help() +
+      "\nThe tool pushes what it touches and slides along it. While grab is set, it holds what it touches, "
+      "or\n"
+      "the nearest surface within --reach, and carries it along. It must start outside the body. For a body "
+      "in\n"
+      "the plane z is ignored. Lengths are metres. Ctrl-C ends a run, with no force; Enter or SIGUSR1\n"
+      "acknowledges a fault.\n"
       "\nExamples:\n"
       "  palpate-runtime play liver.palpate.hdf --view --tool sphere:0.008\n"
       "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool sphere:0.005 --record "

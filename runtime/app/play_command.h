@@ -29,7 +29,7 @@ struct PlayArguments {
   bool force = false;
 };
 
-constexpr const char* force_help = "let the files that are written take the place of any others";
+constexpr const char* force_help = "overwrite output files even if they are not earlier outputs of the same kind";
 
 /// Adds the subcommand.
 CLI::App* add_play(CLI::App& app, PlayArguments& arguments);

@@ -145,30 +145,30 @@ void for_each_tool_setting(SomeTool& tool, Visitor&& visit) {
   auto& [radius, length, disc_radius, coupling, torsion, max_force, hand_over, reach, friction] = tool;
   constexpr SettingGroup group = SettingGroup::tool;
   visit(Setting{"tool", group, "point|sphere:RADIUS|capsule:RADIUS,LENGTH|disc:RADIUS[,EDGE]", "m",
-                "a ball that suits the body, in scripts a point",
-                "its shape: a point, a ball about the tool's origin, all within the radius of a segment "
-                "that begins there and goes along the tool's z axis (in the plane y), or a flat punch "
-                "normal to that axis whose edge is rounded by EDGE, half its thickness (a tenth of the "
-                "radius where it is left out)"},
+                "for a pointer or a device a sphere sized to the body, for a script a point",
+                "shape: a point; a sphere around the tool's origin; a capsule, all points within RADIUS of a "
+                "segment of LENGTH that starts at the origin and runs along the tool's z axis (y for bodies "
+                "in the plane); or a disc, a flat punch normal to that axis with its rim rounded by EDGE, "
+                "half its thickness (a tenth of the radius unless given)"},
         tool);
-  visit(Setting{"friction", group, "MU", "", "the materials'", "Coulomb's coefficient", number_from_zero,
-                friction.has_value()},
+  visit(Setting{"friction", group, "MU", "", "the material's", "Coulomb friction coefficient",
+                number_from_zero, friction.has_value()},
         friction);
-  visit(Setting{"coupling", group, "N_PER_M", "N/m", "none, with a device what it can show",
-                "stiffness of the spring between device and tool, in series with the body: what the hand "
-                "feels is never stiffer",
+  visit(Setting{"coupling", group, "N_PER_M", "N/m",
+                "none; with a device, the largest stiffness that it can render",
+                "stiffness of the spring between device and tool, in series with the body: the hand never "
+                "feels more than this",
                 positive_number, std::isfinite(coupling), protects_hand},
         coupling);
   visit(Setting{"coupling-torsion", group, "NM_PER_RAD", "N m/rad", "none",
-                "stiffness of that spring against turning", positive_number, std::isfinite(torsion),
-                protects_hand},
+                "torsional stiffness of that spring", positive_number, std::isfinite(torsion), protects_hand},
         torsion);
-  visit(Setting{"max-force", group, "N", "N", "any", "the largest force that the hand is given",
-                positive_number, std::isfinite(max_force), protects_hand},
+  visit(Setting{"max-force", group, "N", "N", "unlimited", "largest force on the hand", positive_number,
+                std::isfinite(max_force), protects_hand},
         max_force);
   visit(Setting{"hand-over", group, "SHARE", "", "0.005",
-                "share of the force that may change in a millisecond without the tool's motion explaining "
-                "it: less is smoother where contact slips; inf for the contact's own force, with its kicks",
+                "share of the force by which it may change per millisecond beyond what the tool's motion "
+                "explains; smaller values smooth contacts that slip, inf passes on every jump",
                 positive_or_infinite, true, protects_hand},
         hand_over);
 }
@@ -178,26 +178,25 @@ template <class SomeSettings, class Visitor>
 void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
   constexpr SettingGroup group = SettingGroup::body;
   visit(Setting{"contact", group, "quasi-static|dynamic", "", "quasi-static",
-                "quasi-static: the tool meets the body's stiffness; dynamic: its inertia and viscosity too, "
+                "quasi-static: the tool meets the body's stiffness; dynamic: also its inertia and damping, "
                 "for files with [dynamics] and a time step of one tick"},
         s.contact);
   visit(Setting{"load-scale", group, "S", "", "1",
-                "share of the file's loads (forces, prescribed displacements, initial strains) that the body "
-                "rests under; 0 is without them",
+                "fraction of the file's loads (forces, prescribed displacements, initial strains) under "
+                "which the body rests; 0: none",
                 number_from_zero, s.load_scale != 1.0},
         s.load_scale);
   visit(Setting{"stiffness-scale", group, "S", "", "1",
-                "what all Young's moduli are multiplied by, exactly, without precomputing again",
-                positive_number, s.stiffness_scale != 1.0},
+                "factor on all Young's moduli, exact, without precomputing again", positive_number,
+                s.stiffness_scale != 1.0},
         s.stiffness_scale);
-  visit(
-      Setting{"overlay", group, "r=R,rings=N", "", "none",
-              fmt::format("a finer mesh under the tool: each element within N rings round it, from 1 to {}, "
-                          "is cut into R to the power of the dimension (s-FEM), R from {} to {}",
-                          most_rings, least_refinement, most_refinement),
-              any_number, s.overlay.has_value()},
-      s.overlay);
-  visit(Setting{"overlay-memory", group, "MB", "MB", "512", "most that overlays may take", megabytes,
+  visit(Setting{"overlay", group, "r=R,rings=N", "", "none",
+                fmt::format("a finer mesh under the tool (s-FEM): each element within N rings of it, from 1 "
+                            "to {}, is cut into R to the power of the dimension, R from {} to {}",
+                            most_rings, least_refinement, most_refinement),
+                any_number, s.overlay.has_value()},
+        s.overlay);
+  visit(Setting{"overlay-memory", group, "MB", "MB", "512", "most memory that overlays may use", megabytes,
                 s.overlay.has_value()},
         s.overlay_memory);
 }
@@ -206,21 +205,22 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
 template <class SomeSettings, class Visitor>
 void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
   constexpr SettingGroup group = SettingGroup::workspace;
-  visit(Setting{"rate", SettingGroup::loop, "HZ", "1/s", "1000", "ticks a second, 1000 to 5000", tick_rates},
-        s.rate);
-  visit(Setting{"motion-scale", group, "S", "", "1", "metres in the body's frame for one of the device",
+  visit(
+      Setting{"rate", SettingGroup::loop, "HZ", "1/s", "1000", "ticks per second, 1000 to 5000", tick_rates},
+      s.rate);
+  visit(Setting{"motion-scale", group, "S", "", "1", "metres of tool motion per metre of device motion",
                 positive_number},
         s.motion_scale);
   visit(Setting{"force-scale", group, "C", "", "1",
-                "newtons on the hand for one on the tool; limits of the device are scaled with both",
+                "newtons on the hand per newton on the tool; the limits of the device are scaled with both",
                 positive_number},
         s.force_scale);
   visit(Setting{"origin", group, "X,Y,Z", "m",
-                "0,0,0; for devices above the body, half the workspace's radius from touch",
-                "where the device's origin lies in the body's frame", any_number, s.origin.has_value()},
+                "0,0,0; with a device, above the body, half the radius of the workspace from touching it",
+                "position of the device's origin in the body's frame", any_number, s.origin.has_value()},
         s.origin);
   visit(Setting{"axes", group, "AXES", "", "x,y,z",
-                "the body's axes along which the device's right, away-from-you and up point"},
+                "axes of the body along which the device's right, away-from-you and up point"},
         s.axes);
 }
 
@@ -237,20 +237,18 @@ void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
                 positive_number, reach.has_value()},
         reach);
   visit(Setting{"max-contacts", SettingGroup::tool, "N", "", "256",
-                "most contact points; where there are nearly as many, neighbours are merged, and of what is "
-                "left the "
-                "deepest are kept",
+                "most contact points; when there are nearly as many, neighbours are merged, and beyond that "
+                "the deepest are kept",
                 contact_counts},
         max_contacts);
   for_each_body_setting(settings, visit);
   for_each_frame_setting(settings, visit);
-  visit(
-      Setting{
-          "safety", SettingGroup::safety, "NAME=VALUE,...", "",
-          "on for devices with a hand in them, off for scripts",
-          "other values of the bounds that protect the hand, each by its name; the word default keeps all",
-          any_number, safety.has_value(), protects_hand},
-      safety);
+  visit(Setting{"safety", SettingGroup::safety, "NAME=VALUE,...", "",
+                "on for devices held by a hand, off for scripts",
+                "changes bounds of the safety rules by name; the word default turns the rules on with all "
+                "their defaults",
+                any_number, safety.has_value(), protects_hand},
+        safety);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// What ended the force, until somebody acknowledges it.
+/// What ended the force, until it is acknowledged. The reference of the book shows these comments.
 enum class Fault : std::uint8_t {
   none = 0,
   too_fast = 1,         ///< the device moved faster than the speed limit, or its position jumped
@@ -15,9 +15,9 @@ enum class Fault : std::uint8_t {
   device_frozen = 3,    ///< new reports, always the same numbers
   deadline_missed = 4,  ///< too many late ticks
   buzzing = 5,          ///< force or hand chattered until no force was left
-  device_lost = 6,      ///< told from outside: unplugged, or it cannot be read or written
-  input_lost = 7,       ///< told from outside: the viewer that moved the tool is gone
-  stopped = 8,          ///< told from outside: emergency stop
+  device_lost = 6,      ///< the device was unplugged, or cannot be read or written
+  input_lost = 7,       ///< the viewer that moved the tool is gone
+  stopped = 8,          ///< emergency stop
 };
 
 /// The faults and their names, for reports.
@@ -33,7 +33,7 @@ inline constexpr std::array<std::pair<Fault, const char*>, 9> fault_names = {{
     {Fault::stopped, "stopped"},
 }};
 
-/// Whether the hand feels anything, and if not, what it waits for.
+/// Whether the hand feels anything, and if not, what it waits for. The reference shows these comments.
 enum class SafetyPhase : std::uint8_t {
   waiting = 0,    ///< for the tool to be clear of the body and the force to be small
   ramping = 1,    ///< force on its way from zero

@@ -56,37 +56,42 @@ void for_each_safety_field(SomeOptions&& options, Visitor&& visit) {
   using F = SafetyField;
   visit(F{"max_force", "N", from_zero, "largest force on the hand"}, max_force);
   visit(F{"max_torque", "N m", from_zero, "largest torque on the hand"}, max_torque);
-  visit(F{"max_force_rate", "N/s", from_zero, "how fast the force may change"}, max_force_rate);
-  visit(F{"max_torque_rate", "N m/s", from_zero, "how fast the torque may change"}, max_torque_rate);
+  visit(F{"max_force_rate", "N/s", from_zero, "fastest change of the force"}, max_force_rate);
+  visit(F{"max_torque_rate", "N m/s", from_zero, "fastest change of the torque"}, max_torque_rate);
   visit(F{"max_stiffness", "N/m", from_zero, "largest stiffness of the local model"}, max_stiffness);
-  visit(F{"max_damping", "N s/m", from_zero, "most that the passivity controller adds; 0: it only observes"},
+  visit(F{"max_damping", "N s/m", from_zero,
+          "largest damping that the passivity controller adds; 0: it only observes"},
         max_damping);
-  visit(F{"max_speed", "m/s", from_zero, "of the device; faster is a fault"}, max_speed);
-  visit(F{"ramp", "s", from_zero, "from no to whole force, at the start and after a fault"}, ramp);
-  visit(F{"small_force", "N", from_zero, "force begins only where it was below this"}, small_force);
-  visit(F{"calm_time", "s", from_zero, "for so long"}, calm_time);
-  visit(F{"late", "s", from_zero, "a tick that begins so much late is a miss"}, late);
-  visit(F{"late_fade", "s", positive, "from whole to no force while ticks are late"}, late_fade);
-  visit(F{"late_recovery", "s", positive, "and back, while they are in time"}, late_recovery);
-  visit(F{"most_late", "ticks", positive, "misses that are a fault"}, most_late);
-  visit(F{"forgiveness", "ticks", from_zero, "misses that a tick in time makes good"}, forgiveness);
-  visit(F{"silence", "s", positive, "without a report of the device: a fault"}, silent);
-  visit(F{"silence_fade", "s", from_zero, "the force fades from here on, to nothing at silence"},
+  visit(F{"max_speed", "m/s", from_zero, "largest speed of the device; faster is a fault"}, max_speed);
+  visit(F{"ramp", "s", from_zero, "time from no force to full force, at the start and after a fault"}, ramp);
+  visit(F{"small_force", "N", from_zero, "force starts only after it would have been below this"},
+        small_force);
+  visit(F{"calm_time", "s", from_zero, "for at least this long"}, calm_time);
+  visit(F{"late", "s", from_zero, "a tick that starts this much late is a miss"}, late);
+  visit(F{"late_fade", "s", positive, "time to fade out while ticks are late"}, late_fade);
+  visit(F{"late_recovery", "s", positive, "time to fade back in once they are on time"}, late_recovery);
+  visit(F{"most_late", "ticks", positive, "number of misses that is a fault"}, most_late);
+  visit(F{"forgiveness", "ticks", from_zero, "misses forgiven per tick that is on time"}, forgiveness);
+  visit(F{"silence", "s", positive, "time without a device report that is a fault"}, silent);
+  visit(F{"silence_fade", "s", from_zero,
+          "time without a report after which the force fades; it is gone at silence"},
         silence_fade);
-  visit(F{"frozen", "s", positive, "with the same numbers in every report: a fault"}, frozen);
+  visit(F{"frozen", "s", positive, "time with the same numbers in every report that is a fault"}, frozen);
   visit(F{"frozen_force", "N", from_zero, "but only while the force is above this"}, frozen_force);
-  visit(F{"stale", "s", from_zero, "up to this age a solution is of this tick"}, fresh);
-  visit(F{"stale_life", "s", from_zero, "up to this age an older one is extrapolated"}, stale_life);
-  visit(F{"stale_fade", "s", positive, "then from whole to no force"}, stale_fade);
-  visit(F{"stale_damping", "N s/m", from_zero, "damping of a solution that is not fresh"}, stale_damping);
-  visit(F{"buzz_speed", "m/s", from_zero, "amplitude of the device's speed that counts as buzzing"},
+  visit(F{"stale", "s", from_zero, "age up to which a solution counts as current"}, fresh);
+  visit(F{"stale_life", "s", from_zero, "age up to which an older solution is extrapolated"}, stale_life);
+  visit(F{"stale_fade", "s", positive, "time to fade out after that"}, stale_fade);
+  visit(F{"stale_damping", "N s/m", from_zero, "damping added to a solution that is extrapolated"},
+        stale_damping);
+  visit(F{"buzz_speed", "m/s", from_zero, "amplitude of the device speed that counts as buzzing"},
         buzz_speed);
-  visit(F{"buzz_force", "N", from_zero, "amplitude of the force about its mean that counts"}, buzz_force);
-  visit(F{"buzz_mean", "s", positive, "of that mean"}, buzz_mean);
-  visit(F{"buzz_window", "s", positive, "in which changes of sign are counted"}, buzz_window);
-  visit(F{"buzz_flips", "", count, "so many in the window are buzzing"}, buzz_flips);
-  visit(F{"buzz_fade", "s", positive, "from whole to no force while it buzzes; then a fault"}, buzz_fade);
-  visit(F{"buzz_recovery", "s", positive, "and back, while it does not"}, buzz_recovery);
+  visit(F{"buzz_force", "N", from_zero, "amplitude of the force about its mean that counts as buzzing"},
+        buzz_force);
+  visit(F{"buzz_mean", "s", positive, "averaging time of that mean"}, buzz_mean);
+  visit(F{"buzz_window", "s", positive, "time window in which sign changes are counted"}, buzz_window);
+  visit(F{"buzz_flips", "", count, "sign changes in the window that are buzzing"}, buzz_flips);
+  visit(F{"buzz_fade", "s", positive, "time to fade out while it buzzes; then a fault"}, buzz_fade);
+  visit(F{"buzz_recovery", "s", positive, "time to fade back in once it has stopped"}, buzz_recovery);
 }
 
 }  // namespace palpate

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "runtime/viewer/admission.h"
+#include "runtime/viewer/book_files.h"
 #include "runtime/viewer/seen_surface.h"
 #include "runtime/web/page.h"
 
@@ -18,6 +19,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 
 constexpr unsigned http_version = 11;  // 1.1
+constexpr std::string_view book_path = "/book/";
 
 std::string_view view(beast::string_view text) {
   return {text.data(), text.size()};
@@ -74,6 +76,10 @@ Response surface_file(bool is_stl, const DrawnPicture& shown) {
 
 }  // namespace
 
+bool wants_book(const Request& request) {
+  return target_of(request).path.starts_with(book_path);
+}
+
 bool wants_socket(const Request& request) {
   return target_of(request).path == "/socket" && beast::websocket::is_upgrade(request);
 }
@@ -90,7 +96,7 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
     response.set(http::field::allow, "GET, HEAD");
     return response;
   }
-  if (!is_same_token(target_of(request).token, served.token))
+  if (!wants_book(request) && !is_same_token(target_of(request).token, served.token))
     return guarded(
         plain(http::status::forbidden, "Open the whole address that the runtime printed, with its token."));
   if (wants_socket(request)) {
@@ -104,6 +110,19 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
 Response full_house() {
   return guarded(plain(http::status::service_unavailable,
                        "Too many pages are open: close one, then load this one anew."));
+}
+
+Response book_answer(const Request& request, const std::filesystem::path& book) {
+  std::optional<BookFile> file = read_book_file(book, target_of(request).path.substr(book_path.size()));
+  if (!file) return guarded(plain(http::status::not_found, "There is no such page in the book."));
+  Response response(http::status::ok, http_version);
+  response.set(http::field::content_type, file->content_type);
+  response.set("Content-Security-Policy",
+               "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
+               "img-src 'self' data:; font-src 'self'; base-uri 'none'; form-action 'self'; "
+               "frame-ancestors 'none'");
+  response.body() = std::move(file->bytes);
+  return guarded(std::move(response));
 }
 
 Response answer(const Request& request, const std::optional<DrawnPicture>& shown) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/beast/http.hpp>
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -24,6 +25,12 @@ Response full_house();
 
 /// Whether it wants to go on as a WebSocket.
 bool wants_socket(const Request& request);
+
+/// Whether it asks for the book, which is the same for everybody and needs no token.
+bool wants_book(const Request& request);
+
+/// A file of the book, or that it is not there.
+Response book_answer(const Request& request, const std::filesystem::path& book);
 
 /// To all other requests that are not refused: the page, the surface as it is seen, or that it is not there.
 Response answer(const Request& request, const std::optional<DrawnPicture>& shown);

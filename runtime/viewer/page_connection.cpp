@@ -48,6 +48,7 @@ void PageConnection::answer_request() {
   if (std::optional<Response> refused = refusal(request, server_.served())) {
     return respond(std::move(*refused));
   }
+  if (wants_book(request)) return respond(book_answer(request, server_.served().book));
   if (!server_.has_room()) return respond(full_house());
   is_admitted_ = true;
   if (wants_socket(request)) {

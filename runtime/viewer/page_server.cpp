@@ -149,7 +149,7 @@ void PageServer::join(PageConnection& page) {
   open_.insert(&page);
   if (open_.size() == 1) controller_ = &page;
   broadcast_.touch_state();
-  page.say(hello_word(is_replay_ ? "replay" : "live", ++joined_));
+  page.say(hello_word(is_replay_ ? "replay" : "live", ++joined_, !served_.book.empty()));
   show_all();
 }
 

@@ -13,9 +13,13 @@ constexpr double highest_rate = 1e5;
 
 }  // namespace
 
-std::string hello_word(const char* mode, std::uint64_t page) {
-  return json_text(
-      Json{{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", mode}, {"id", page}});
+std::string hello_word(const char* mode, std::uint64_t page, bool has_book) {
+  return json_text(Json{{"type", "hello"},
+                        {"protocol", 1},
+                        {"version", PALPATE_VERSION},
+                        {"mode", mode},
+                        {"id", page},
+                        {"book", has_book}});
 }
 
 Json error_members(const Error& error) {

@@ -16,8 +16,8 @@ struct PageRole {
   std::size_t pages = 0;    ///< all that watch
 };
 
-/// The first message of all. `mode`: live, replay or file.
-std::string hello_word(const char* mode, std::uint64_t page);
+/// The first message of all. `mode`: live, replay or file. `has_book`: the page's help can open the book.
+std::string hello_word(const char* mode, std::uint64_t page, bool has_book = false);
 
 /// What is wrong, where, and what to do about it: the members `what`, `where` and `hint`.
 nlohmann::json error_members(const Error& error);

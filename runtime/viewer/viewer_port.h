@@ -2,21 +2,26 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
+
+#include "runtime/viewer/book_files.h"
 
 namespace palpate {
 
 /// Where a viewer is to be served.
 struct ViewerOptions {
   std::string address = "127.0.0.1";
-  std::uint16_t port = 8017;  ///< 0: any that is free
+  std::uint16_t port = 8017;                 ///< 0: any that is free
+  std::filesystem::path book = find_book();  ///< folder of the book's site; empty: none is served
 };
 
-/// Where it is served, and the secret that each request must show.
+/// Where it is served, the secret that each request must show, and the book beside it.
 struct ServedAddress {
   std::string address;
   std::uint16_t port = 0;
-  std::string token;  ///< 128 random bits as hexadecimal digits
+  std::string token;           ///< 128 random bits as hexadecimal digits
+  std::filesystem::path book;  ///< empty: there is none
 };
 
 /// An address that is taken, so that what comes next cannot fail for it: who connects waits until a

@@ -1,9 +1,10 @@
 // Pages that come, go, watch and attack, in a real browser against the real runtime.
 import assert from 'node:assert/strict';
 import { createServer, request } from 'node:http';
+import { existsSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
 import { after, test } from 'node:test';
-import { close, example, open, project, ready, serve, told, until, visit } from './harness.mjs';
+import { close, example, open, project, ready, serve, source, told, until, visit } from './harness.mjs';
 import { open_cube, part, settled, top } from './steps.mjs';
 
 after(close);
@@ -66,6 +67,25 @@ test('a program that was started anew has another address, which the page says',
   await page.getByText('the program was started anew: open the address that it printed').waitFor();
   await page.goto(again.url);
   await ready(page);
+});
+
+test('the help opens the book, if scripts/docs has built it, and the book can be searched', async (t) => {
+  const { page } = await open_cube(t);
+  await part(page, 'help').click();
+  const is_built = existsSync(`${source}/build/docs/html/index.html`);
+  assert.equal(await part(page, 'book').isVisible(), is_built);
+  if (!is_built) return;
+  const [book] = await Promise.all([page.waitForEvent('popup'), part(page, 'book').getByRole('link').click()]);
+  const refused = [];
+  book.on('console', (said) => said.type() === 'error' && refused.push(said.text()));
+  book.on('pageerror', (error) => refused.push(String(error)));
+  await book.getByRole('heading', { level: 1 }).waitFor();
+  await book.getByPlaceholder('Search').fill('overlay');
+  await book.getByPlaceholder('Search').press('Enter');
+  await book.getByRole('link', { name: /overlay/i }).first().waitFor();
+  await book.locator('.theme-toggle:visible').first().click();
+  assert.notEqual(await book.evaluate(() => document.body.dataset.theme), 'auto');
+  assert.deepEqual(refused, []);
 });
 
 test('foreign pages are refused', async (t) => {

@@ -231,7 +231,7 @@ class Felt(ProgramTest):
                 self.assertGreater(len(session["ticks/time"]), 100)
 
     def test_the_example_finds_the_body_by_itself(self):
-        """README's two commands: without --to the hand goes down until it feels something."""
+        """docs/devices.md's two commands: without --to the hand goes down until it feels something."""
         runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--safety", PATIENT, "--duration", "6",
                              "--report", "report.json")
         hand = self.start(BRIDGE, "--port", self.port, "--rate", 2000, "--seconds", 60)

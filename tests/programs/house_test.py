@@ -22,7 +22,7 @@ class Rules(unittest.TestCase):
         self.write("meshes/mesh.h", '#include "base/error.h"\n#include <vector>\n')
         self.write("meshes/mesh.cpp", '#include "meshes/mesh.h"\n// theory.md section 1\n')
         self.write("docs/theory.md", "# Theory\n\n## 1. Linear elastostatics\n")
-        self.write("docs/house.svg", PICTURE)
+        self.write("docs/pictures/house.svg", PICTURE)
 
     def write(self, name, text):
         file = self.root / name
@@ -92,8 +92,8 @@ class Rules(unittest.TestCase):
             self.refused("base/error.h:", ": a hint that ends in a full stop")
 
     def test_a_picture_of_other_sources_is_refused(self):
-        self.write("docs/house.svg", PICTURE.replace("base", "formats"))
-        self.refused("docs/house.svg: is not of these sources")
+        self.write("docs/pictures/house.svg", PICTURE.replace("base", "formats"))
+        self.refused("docs/pictures/house.svg: is not of these sources")
 
 
 if __name__ == "__main__":

@@ -137,8 +137,11 @@ class Library(unittest.TestCase):
         share = self.prefix / "share"
         documents = share / "doc" / "palpate"
         self.assertEqual((documents / "LICENSE").read_text(), (SOURCE / "LICENSE").read_text())
-        for link in re.findall(r"\]\((?!http)([^)#]+)\)", (documents / "README.md").read_text()):
-            self.assertTrue((documents / link).exists(), link)
+        for page in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "runtime/devices/README.md"):
+            for link in re.findall(r"\]\((?!http)([^)#]+)(?:#[^)]*)?\)", (documents / page).read_text()):
+                self.assertTrue((documents / page).parent.joinpath(link).exists(), f"{page}: {link}")
+        pictures = [picture.name for picture in documents.rglob("*") if picture.suffix in (".png", ".webp")]
+        self.assertEqual(len(pictures), len(set(pictures)), "no picture is there twice")
         models = share / "palpate" / "models"
         self.assertEqual({model.parent.name for model in models.glob("*/model.toml")},
                          {model.parent.name for model in (SOURCE / "meshes" / "models").glob("*/model.toml")})

@@ -128,14 +128,14 @@ class Usage(ProgramTest):
     def test_options_of_play_stand_in_groups_in_the_order_of_use(self):
         page = run(RUNTIME, "play", "--help").stdout
         headings = re.findall(r"^([A-Z][^\n]*):$", page, re.MULTILINE)
-        self.assertEqual(headings, ["Arguments", "What moves the tool", "In a browser", "The tool", "The body", "The loop",
-                                    "What is written", "Where the device is in the body's frame", "Safety of the hand", "Examples"])
+        self.assertEqual(headings, ["Arguments", "Input device", "Viewer", "The tool", "The body", "The loop", "Output files",
+                                    "Workspace of the device", "Safety", "Examples"])
         groups = dict(re.findall(r"^([A-Z][^\n]*):\n(.*?)(?=^[A-Z][^\n]*:$|\Z)", page, re.MULTILINE | re.DOTALL))
-        for option, heading in (("--device", "What moves the tool"), ("--view", "In a browser"), ("--tool", "The tool"),
-                                ("--overlay", "The body"), ("--rate", "The loop"), ("--record", "What is written"),
-                                ("--origin", "Where the device is in the body's frame"), ("--safety", "Safety of the hand")):
+        for option, heading in (("--device", "Input device"), ("--view", "Viewer"), ("--tool", "The tool"),
+                                ("--overlay", "The body"), ("--rate", "The loop"), ("--record", "Output files"),
+                                ("--origin", "Workspace of the device"), ("--safety", "Safety")):
             self.assertRegex(groups[heading], rf"(?m)^  {option} ")
-        bounds = re.findall(r"^    (\w+) +([\d.e-]+) (.{6}) (\w.*)$", groups["Safety of the hand"], re.MULTILINE)
+        bounds = re.findall(r"^    (\w+) +([\d.e-]+) (.{6}) (\w.*)$", groups["Safety"], re.MULTILINE)
         self.assertEqual(len(bounds), 30)
         self.assertIn(("max_force", "3", "N     ", "largest force on the hand"), bounds)
         for name, _, unit, meaning in bounds:

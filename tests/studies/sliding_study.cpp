@@ -157,7 +157,7 @@ class StaleSolver {
   ConeSolver cone_solver_;
 };
 
-/// Of SOFA's simulation steps (README, "A contact set that is new every tick"), in ticks.
+/// Of SOFA's simulation steps (docs/measurements/contact.md), in ticks.
 struct Age {
   double milliseconds;
   std::size_t ticks;

@@ -1,31 +1,28 @@
-// The documentation, for tests that hold tables of the code against it.
+// Pages of the book, for tests that try what they show.
 #pragma once
 
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
-#include <string_view>
+#include <vector>
 
 namespace palpate::test {
 
-/// README.md, the pages of docs/ and the devices' page, one after the other.
-inline std::string documentation() {
-  const std::filesystem::path root = PALPATE_SOURCE_DIR;
-  std::ostringstream text;
-  const auto add = [&text](const std::filesystem::path& page) {
-    text << std::ifstream(page).rdbuf() << "\n";
-  };
-  add(root / "README.md");
-  add(root / "runtime/devices/README.md");
-  for (const auto& page : std::filesystem::directory_iterator(root / "docs"))
-    if (page.path().extension() == ".md") add(page.path());
-  return text.str();
-}
-
-/// A table's row stands in `pages` as a line of its own.
-inline bool has_row(const std::string& pages, const std::string& row) {
-  return pages.find("\n" + row + "\n") != std::string::npos;
+/// What stands in the fenced blocks of a language on a page: ```toml ... ```
+inline std::vector<std::string> fenced_blocks(const std::filesystem::path& page,
+                                              const std::string& language) {
+  std::ifstream lines(std::filesystem::path(PALPATE_SOURCE_DIR) / page);
+  std::vector<std::string> blocks;
+  bool inside = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("```")) {
+      inside = !inside && line == "```" + language;
+      if (inside) blocks.emplace_back();
+    } else if (inside) {
+      blocks.back() += line + "\n";
+    }
+  }
+  return blocks;
 }
 
 }  // namespace palpate::test

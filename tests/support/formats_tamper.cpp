@@ -58,7 +58,7 @@ std::string attribute_text(hid_t attribute) {
   return text;
 }
 
-/// README.md, "Checksums", for arrays of one chunk.
+/// docs/file-format.md, "Checksums", for arrays of one chunk.
 std::string dataset_checksum(hid_t dataset) {
   std::vector<std::byte> bytes;
   const Id type(H5Dget_type(dataset), H5Tclose);

@@ -1,5 +1,5 @@
 // Changes a baked file behind the writer's back and makes its checksums right again, by the rules of
-// README.md and not by the code under test: so that a reader's checks are met, and not only its
+// docs/file-format.md and not by the code under test: so that a reader's checks are met, and not only its
 // checksums.
 #pragma once
 

@@ -1,7 +1,7 @@
 /* A device behind a bridge: this process has the device, palpate-runtime the body; they speak by UDP over
  * loopback. As it stands the device is a simulated hand, a mass that a spring and a damper draw to a target.
  * For yours replace the four device_ functions by calls of your SDK, and where it calls you a thousand times
- * a second, let it call bridge_cycle: README, "Your device behind a bridge". Build: cc bridge.c -lm -o bridge
+ * a second, let it call bridge_cycle: docs/devices.md. Build: cc bridge.c -lm -o bridge
  * Usage: bridge [--address 127.0.0.1] [--port 4270] [--key FILE] [--rate 1000 Hz] [--seconds 10]
  *               [--from X,Y,Z m] [--to X,Y,Z m] [--period 0 s]
  * The target goes from `from` to `to` and back once a period (0: it stays). Without --to it goes straight

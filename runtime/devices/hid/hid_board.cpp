@@ -33,7 +33,7 @@ void HidBoard::start(HidDevice& device) {
   const int size = device.get_feature(report);
   if (size < 0) {
     throw Error("the board does not answer to feature report 3", device_,
-                "its firmware must send its limits when it is asked (runtime/devices/README.md)");
+                "its firmware must send its limits when it is asked (devices-protocol.md, \"Boards\")");
   }
   const auto feature =
       decode_board_feature(std::span(report).first(std::min(report.size(), static_cast<std::size_t>(size))));

@@ -111,6 +111,7 @@ class Page implements Listener {
       if (message.protocol !== 1) toast(`This page does not know protocol ${message.protocol}`, 'Load the page anew.');
       this.take_mode(message.mode);
       write(part('version'), message.version);
+      part('book').hidden = message.book !== true;
     } else if (message.type === 'error') {
       if (message.about === 'change') {
         this.run_.show_refused(sentences(message));

@@ -10,6 +10,7 @@ export interface Hello {
   version: string;
   mode: Mode;
   id?: number;
+  book?: boolean; // is served beside the page
 }
 
 export interface Model {

@@ -1,8 +1,11 @@
 // From model.toml to a checked body; the sample models.
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "meshes/element.h"
 #include "precompute/numerics/meshed_body.h"
+#include "tests/support/documentation.h"
 #include "tests/support/geometry_shapes.h"
 
 namespace palpate::body_test {
@@ -91,35 +94,42 @@ TEST(Models, AllAreReadable) {
   EXPECT_GE(count, 6);
 }
 
-/// Indented blocks of the README that begin with a model's name.
-std::vector<std::string> readme_examples() {
-  std::ifstream readme(std::filesystem::path(PALPATE_SOURCE_DIR) / "README.md");
-  std::vector<std::string> examples;
-  bool inside = false;
-  for (std::string line; std::getline(readme, line);) {
-    if (line.starts_with("    name = ")) {
-      examples.emplace_back();
-      inside = true;
-    }
-    inside = inside && line.starts_with("    ");
-    if (inside) {
-      examples.back() += line.substr(4) + "\n";
-    }
+/// The models that docs/model-toml.md shows, by name. What it shows of a part is made whole.
+std::map<std::string, std::string> shown_models() {
+  std::map<std::string, std::string> shown;
+  for (std::string text : test::fenced_blocks("docs/model-toml.md", "toml")) {
+    const auto lacks = [&](const std::string& key) { return text.find(key) == std::string::npos; };
+    const std::string plane = lacks("picture =") ? "" : "plane = \"stress\"\n";
+    if (!text.starts_with("name = "))
+      text = "name = \"part" + std::to_string(shown.size()) + "\"\n" + plane + text;
+    if (lacks("[geometry]")) text += "[geometry]\n" + block + "\n";
+    if (lacks("[material]") && lacks("[[material]]")) text += one_material;
+    if (lacks("[[fixed]]")) text += "[[fixed]]\nlowest = {axis = \"y\", percent = 5}\n";
+    shown[text.substr(8, text.find('"', 8) - 8)] = text;
   }
-  return examples;
+  return shown;
 }
 
-TEST(Models, ExamplesOfTheReadme) {
+TEST(Models, ThoseOfTheBookAreDescriptions) {
+  const std::map<std::string, std::string> shown = shown_models();
+  EXPECT_GE(shown.size(), 10U);
+  for (const auto& [name, text] : shown)
+    EXPECT_NO_THROW(EXPECT_EQ(parse_description(text, "model.toml").name, name)) << text;
+}
+
+TEST(Models, NoduleOfTheBook) {
   const TempFolder folder;
-  const std::vector<std::string> examples = readme_examples();
-  ASSERT_EQ(examples.size(), 2U);
-  const MeshedBody nodule = body_of(folder.write("model.toml", examples[0]));
+  const MeshedBody nodule = body_of(folder.write("model.toml", shown_models()["nodule"]));
   EXPECT_EQ(nodule.mesh.elements(), 32 * 24 * 16);
   const auto stiff = std::count(nodule.material_of_element.begin(), nodule.material_of_element.end(), 1);
   // Its centre is a node and its radius three cells: a cell of each octant counts by its half odd numbers
   // a^2 + b^2 + c^2 <= 9, which 17 of 27 triples of 1/2, 3/2, 5/2 meet.
   EXPECT_EQ(stiff, 8 * 17);
-  const MeshedBody plate = body_of(folder.write("model.toml", examples[1]));
+}
+
+TEST(Models, StretchedPlateOfTheBook) {
+  const TempFolder folder;
+  const MeshedBody plate = body_of(folder.write("model.toml", shown_models()["stretched"]));
   EXPECT_NEAR(volume(plate.mesh), 0.04 * 0.02 - 0.004 * 0.004, 1e-9);
   for (std::size_t i = 0; i < plate.mesh.nodes.size(); ++i) {
     const Vec3& x = plate.mesh.nodes[i];

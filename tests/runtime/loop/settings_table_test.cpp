@@ -1,14 +1,11 @@
-// The tables of settings and of safety bounds: each member stands in them, and the documentation has their
-// rows.
+// The tables of settings and of safety bounds: each member stands in them.
 #include <gtest/gtest.h>
 
-#include <regex>
 #include <set>
 
 #include "base/error.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/safety.h"
-#include "tests/support/documentation.h"
 
 namespace palpate {
 namespace {
@@ -22,11 +19,6 @@ const SettingsText others = {
     {"overlay-memory", "64"},     {"rate", "5000"},         {"motion-scale", "0.5"},
     {"force-scale", "4"},         {"origin", "1,2,3"},      {"axes", "x,-z,y"},
     {"safety", "max_force=2"}};
-
-/// In a table of the documentation.
-std::string escaped(const std::string& text) {
-  return std::regex_replace(text, std::regex("\\|"), "\\|");
-}
 
 TEST(SettingsTable, HasEachMember) {
   const auto& [tool, reach, contacts, contact, load, stiffness, overlay, memory, rate, motion, force, origin,
@@ -116,15 +108,6 @@ TEST(SettingsTable, HasTheDefaults) {
   EXPECT_EQ(to_text(read), to_text(made));
 }
 
-TEST(SettingsTable, IsTheDocumentations) {
-  const std::string pages = test::documentation();
-  for (const Setting& setting : settings_table()) {
-    const std::string row = fmt::format("| `--{} {}` | {} | {} | {} |", setting.name, escaped(setting.value),
-                                        setting.unit, setting.otherwise, escaped(setting.meaning));
-    EXPECT_TRUE(test::has_row(pages, std::regex_replace(row, std::regex("  +"), " "))) << row;
-  }
-}
-
 TEST(SafetyFields, AreAllMembers) {
   const SafetyOptions options;
   std::set<const void*> members = {&options.period};
@@ -150,15 +133,6 @@ TEST(SafetyFields, AreReadInTheirRanges) {
   });
   EXPECT_EQ(where("buzz_flips=7.5"), "--safety");
   EXPECT_EQ(where("buzz_flips=1e10"), "--safety");
-}
-
-TEST(SafetyFields, AreRowsOfTheDocumentation) {
-  const std::string pages = test::documentation();
-  for_each_safety_field(SafetyOptions{}, [&](const SafetyField& field, const auto& number) {
-    const std::string row =
-        fmt::format("| `{}` | {} | {} | {} |", field.name, number, field.unit, field.meaning);
-    EXPECT_TRUE(test::has_row(pages, std::regex_replace(row, std::regex("  +"), " "))) << row;
-  });
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "runtime/body/patch_maker.h"
 #include "runtime/viewer/viewer_server.h"
 #include "runtime/web/page.h"
+#include "tests/support/meshes_files.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/viewer_client.h"
 #include "tests/support/viewer_decoder.h"
@@ -145,6 +146,43 @@ TEST_F(Viewer, RefusesForeignHostsAndPages) {
   EXPECT_EQ(Client(served(), {.subprotocol = "palpate.2"}).status, 400U);
   EXPECT_EQ(Client(served(), {.subprotocol = "palpate.2, palpate.1"}).subprotocol, "palpate.1");
   EXPECT_EQ(Client(served(), {.subprotocol = ""}).status, 101U);
+}
+
+TEST_F(Viewer, ServesTheBookToEveryPageOfThisAddress) {
+  const test::ScratchFolder book;
+  (void)book.write("index.html", "the book");
+  (void)book.write("page.css", "");
+  server_ = serve({.port = 0, .book = book.path()});
+  const auto ask = [&](Asking asking, http::verb method = http::verb::get) {
+    asking.query = "";
+    return test::ask(served(), asking, method);
+  };
+  const test::Answer page = ask({.target = "/book/index.html"});
+  EXPECT_EQ(page.result_int(), 200U);
+  EXPECT_EQ(page.body(), "the book");
+  EXPECT_EQ(page[http::field::content_type], "text/html; charset=utf-8");
+  EXPECT_EQ(page["X-Content-Type-Options"], "nosniff");
+  EXPECT_EQ(page["Cross-Origin-Resource-Policy"], "same-origin");
+  EXPECT_TRUE(page["Content-Security-Policy"].starts_with("default-src 'none';"));
+  EXPECT_EQ(ask({.target = "/book/index.html?q=tool"}).body(), "the book");
+  EXPECT_EQ(ask({.target = "/book/page.css"})[http::field::content_type], "text/css; charset=utf-8");
+  EXPECT_EQ(ask({.target = "/book/index.html"}, http::verb::head)[http::field::content_length], "8");
+  for (const char* target : {"/book/", "/book/../index.html", "/book//index.html", "/book/missing.html"})
+    EXPECT_EQ(ask({.target = target}).result_int(), 404U) << target;
+  for (const char* target : {"/book", "/books/index.html", "/x/../book/index.html"})
+    EXPECT_EQ(ask({.target = target}).result_int(), 403U)
+        << target << ": is not the book's, and has no token";
+  const std::string foreign = "evil.example:" + std::to_string(port());
+  EXPECT_EQ(ask({.target = "/book/index.html", .host = foreign}).result_int(), 403U);
+  EXPECT_EQ(ask({.target = "/book/index.html", .origin = "http://evil.example"}).result_int(), 403U);
+  EXPECT_EQ(ask({.target = "/book/index.html"}, http::verb::post).result_int(), 405U);
+  EXPECT_EQ(client().receive("hello").at("book"), true);
+}
+
+TEST_F(Viewer, IsWithoutABookWhereThereIsNone) {
+  server_ = serve({.port = 0, .book = {}});
+  EXPECT_EQ(test::ask(served(), {.target = "/book/index.html"}).result_int(), 404U);
+  EXPECT_EQ(client().receive("hello").at("book"), false);
 }
 
 TEST_F(Viewer, AsksForATokenWhereverItIs) {

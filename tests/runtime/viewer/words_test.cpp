@@ -123,10 +123,14 @@ RC_GTEST_PROP(PageWord, BrokenWordsNeitherCrashNorAreObeyed, ()) {
 
 TEST(RunWords, HelloAndErrors) {
   const Json hello = Json::parse(hello_word("live", 7));
-  EXPECT_EQ(
-      hello,
-      (Json{{"type", "hello"}, {"protocol", 1}, {"version", PALPATE_VERSION}, {"mode", "live"}, {"id", 7}}));
+  EXPECT_EQ(hello, (Json{{"type", "hello"},
+                         {"protocol", 1},
+                         {"version", PALPATE_VERSION},
+                         {"mode", "live"},
+                         {"id", 7},
+                         {"book", false}}));
   EXPECT_EQ(Json::parse(hello_word("replay", 1)).at("mode"), "replay");
+  EXPECT_EQ(Json::parse(hello_word("replay", 1, true)).at("book"), true);
   EXPECT_EQ(Json::parse(error_word("change", Error("what", "where", "hint"))), (Json{{"type", "error"},
                                                                                      {"about", "change"},
                                                                                      {"reason", "value"},

@@ -1,0 +1,148 @@
+"""The book's rules, each as a function that yields a line for what breaks it."""
+
+import html.parser
+import os
+import pathlib
+import re
+import urllib.parse
+
+SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
+MOST_LINES = 400
+MOST_FRONT_LINES = 200
+LEAST_QUESTIONS = 10
+LINK = re.compile(r"\]\(<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)|<(?:img|a)[^>]*\s(?:src|href)=\"([^\"]+)\"")
+IS_REMOTE = re.compile(r"^(?:\w+:)?//|^mailto:|^data:")
+
+
+def pages(root):
+    """All Markdown that people read, the front door first."""
+    front = [root / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "runtime/devices/README.md")]
+    return [page for page in front if page.exists()] + sorted((root / "docs").rglob("*.md"))
+
+
+def prose(text):
+    """Without code, which has brackets of its own."""
+    text = re.sub(r"^( *)(`{3,}|~{3,}).*?^\1\2`*$", "", text, flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"(`+)(?!`).*?(?<!`)\1(?!`)", "``", text, flags=re.DOTALL)
+
+
+def links(page):
+    return [one or other for one, other in LINK.findall(prose(page.read_text()))]
+
+
+def anchors(page):
+    """What a forge calls the headings of a page, and the anchors that it sets itself."""
+    text = re.sub(r"^( *)(`{3,}|~{3,}).*?^\1\2`*$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    names = re.findall(r"<a\s+(?:id|name)=\"([^\"]+)\"", text) + re.findall(r"^\(([\w-]+)\)=$", text, re.MULTILINE)
+    for title in re.findall(r"^#{1,6} +(.+?)[ #]*$", text, re.MULTILINE):
+        title = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", title)
+        name = re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-")
+        count = sum(re.fullmatch(rf"{re.escape(name)}(-\d+)?", other) is not None for other in names)
+        names.append(f"{name}-{count}" if count else name)
+    return set(names)
+
+
+def broken_links(root):
+    """Links to files or headings that are not there."""
+    for page in pages(root):
+        for link in links(page):
+            if IS_REMOTE.match(link):
+                continue
+            path, _, anchor = urllib.parse.unquote(link).partition("#")
+            target = pathlib.Path(os.path.normpath(page.parent / path)) if path else page
+            if not target.exists() or root not in (target, *target.parents):
+                yield f"{page.relative_to(root)}: {link} is not there"
+            elif anchor and target.suffix == ".md" and anchor not in anchors(target):
+                yield f"{page.relative_to(root)}: {link}: no such heading"
+
+
+def long_pages(root):
+    for page in pages(root):
+        if page.name == "CHANGELOG.md":
+            continue
+        lines = len(page.read_text().splitlines())
+        most = MOST_FRONT_LINES if page == root / "README.md" else MOST_LINES
+        if lines > most:
+            yield f"{page.relative_to(root)}: {lines} lines, {most} are the most"
+
+
+def questions(root):
+    """A newcomer's questions: each row of the first table of the FAQ that has one, and the page that its link leads to."""
+    page = root / "docs" / "faq.md"
+    for row in re.findall(r"^\|(.*\?.*)\|$", page.read_text(), re.MULTILINE):
+        question, _, rest = row.partition("|")
+        answers = [one or other for one, other in LINK.findall(rest or question)]
+        yield question.strip(), answers and os.path.normpath(page.parent / answers[0].partition("#")[0])
+
+
+def clicks(root):
+    """Pages by how many links lead to them from the front door, as far as two."""
+    front = str(root / "README.md")
+    reached = {front: 0}
+    for count in (1, 2):
+        for page in [page for page, at in reached.items() if at == count - 1 and page.endswith(".md") and os.path.exists(page)]:
+            for link in links(pathlib.Path(page)):
+                if not IS_REMOTE.match(link):
+                    reached.setdefault(os.path.normpath(os.path.join(os.path.dirname(page), link.partition("#")[0])), count)
+    return reached
+
+
+def far_answers(root):
+    reached = clicks(root)
+    asked = list(questions(root))
+    if len(asked) < LEAST_QUESTIONS:
+        yield f"docs/faq.md: {len(asked)} questions with a page, {LEAST_QUESTIONS} are the least"
+    for question, answer in asked:
+        if not answer or answer not in reached:
+            yield f"docs/faq.md: {question}: {answer or 'no page'} is more than two clicks from README.md"
+
+
+class Html(html.parser.HTMLParser):
+    """Where a page of the site leads, what it loads, and where it can be led to."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.leads, self.loads, self.ids = [], [], set()
+        self.feed(page.read_text())
+
+    def handle_starttag(self, tag, attributes):
+        given = dict(attributes)
+        self.ids.update(value for name, value in attributes if name == "id" or name == "name" and tag == "a")
+        if tag == "a" and given.get("href"):
+            self.leads.append(given["href"])
+        if tag in ("script", "img", "iframe", "source", "object") and given.get("src"):
+            self.loads.append(given["src"])
+        if tag == "link" and given.get("rel") not in ("index", "search", "next", "prev", "author"):
+            self.loads.append(given["href"])
+
+
+def broken_site(site):
+    """What a page of the site loads from elsewhere or misses, and links inside the site that lead nowhere."""
+    read = {page: Html(page) for page in sorted(site.rglob("*.html"))}
+    for page, found in read.items():
+        name = page.relative_to(site)
+        for link in found.loads + found.leads:
+            if IS_REMOTE.match(link):
+                if link in found.loads and not link.startswith("data:"):
+                    yield f"{name}: loads {link}"
+                continue
+            url = urllib.parse.urlsplit(link)
+            target = pathlib.Path(os.path.normpath(page.parent / urllib.parse.unquote(url.path))) if url.path else page
+            anchor = urllib.parse.unquote(url.fragment)
+            if not target.is_file() or site not in target.parents:
+                yield f"{name}: {link} is not there"
+            elif anchor and target in read and anchor not in read[target].ids:
+                yield f"{name}: {link}: no such place"
+    for style in sorted(site.rglob("*.css")):
+        for link in re.findall(r"url\(['\"]?([^)'\"]+)", style.read_text()):
+            if not link.startswith("data:") and not link.startswith("#") and not (style.parent / link).is_file():
+                yield f"{style.relative_to(site)}: loads {link}"
+
+
+def unlisted_pages(root, site):
+    """Pages that the sidebar does not show."""
+    listed = {link.partition("#")[0] for link in Html(site / "index.html").leads} | {"index.html"}
+    for page in sorted((root / "docs").rglob("*.md")):
+        name = page.relative_to(root / "docs").with_suffix(".html")
+        if str(name) not in listed:
+            yield f"docs/{page.relative_to(root / 'docs')}: not in the table of contents"
