@@ -29,7 +29,8 @@ struct PlayArguments {
   bool force = false;
 };
 
-constexpr const char* force_help = "overwrite output files even if they are not earlier outputs of the same kind";
+constexpr const char* force_help =
+    "overwrite output files even if they are not earlier outputs of the same kind";
 
 /// Adds the subcommand.
 CLI::App* add_play(CLI::App& app, PlayArguments& arguments);
