@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #include "meshes/quality.h"
 
 namespace palpate {
+
+struct HierarchicalMatrix;
 
 /// Which rows and columns of Xi are kept (theory.md section 2). All are exact; nodes outside carry no force.
 enum class Scope : std::uint8_t {
@@ -129,7 +132,8 @@ struct Model {
   std::vector<Probe> probes;
   StoredOverlay overlay;
   StoredDynamics dynamics;
-  PackedGreens greens;       ///< Xi of the stored dofs [m/N]
+  PackedGreens greens;       ///< Xi of the stored dofs [m/N]; empty where it is compressed
+  std::shared_ptr<const HierarchicalMatrix> compressed;  ///< Xi in nested low-rank form; else null
   ForceErrors force_errors;  ///< of greens
   std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
 

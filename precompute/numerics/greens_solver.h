@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/supernodal_sweeps.h"
 
 namespace palpate {
 
@@ -17,18 +18,11 @@ namespace palpate {
 ///   block's columns) that
 ///                       hold a stored dof or have one below them,
 ///
-/// and in both, supernode s works only on the columns whose position is not after it. Right-hand sides are
-/// contiguous a dof, so that gathering the rows of a supernode copies whole cache lines. Const: any number of
+/// and in both, supernode s works only on the columns whose position is not after it. Const: any number of
 /// threads may compute blocks.
 class GreensSolver {
  public:
-  /// Scratch of one thread.
-  class Workspace {
-    friend class GreensSolver;
-    std::vector<double> X_;              // [n, width] row-major: row p is the dof at position p of the factor
-    std::vector<double> below_;          // [rows below the largest supernode, width]
-    std::vector<std::uint8_t> on_path_;  // [supernodes]
-  };
+  using Workspace = SupernodalSweeps::Workspace;  ///< scratch of one thread
 
   /// `factor` may be only analysed as long as nothing but the sizes and costs are asked for.
   /// `stored` [n] marks the dofs of K whose rows and columns are wanted, those of a node together;
@@ -55,33 +49,16 @@ class GreensSolver {
   [[nodiscard]] std::int64_t workspace_bytes(std::int64_t width) const;
 
  private:
-  struct Supernode {
-    std::int64_t first;        // position of its first column
-    std::int64_t columns;      // number of columns
-    std::int64_t below;        // rows under the diagonal block
-    std::int64_t rows;         // offset of its row positions in rows_
-    std::int64_t values;       // offset of its entries in the factor
-    std::int64_t parent;       // supernode of the first row below, -1 for a root
-    std::int64_t subtree;      // position of the first column of its subtree
-    std::int64_t last_stored;  // largest stored position <= its last column, -1 if none
-    [[nodiscard]] std::int64_t end() const noexcept { return first + columns; }
-  };
-
   /// Those of the stored dofs [first, first + count) that are free: a range of positions_.
   [[nodiscard]] std::span<const std::int64_t> free_positions(std::int64_t first, std::int64_t count) const;
   void mark_paths(std::span<const std::int64_t> block, std::vector<std::uint8_t>& on_path) const;
-  [[nodiscard]] bool needed(const Supernode& s, std::int64_t first_position) const noexcept;
-  void forward(const Supernode& s, std::int64_t active, std::int64_t width, Workspace& workspace) const;
-  void backward(const Supernode& s, bool on_path, std::int64_t active, std::int64_t width,
-                Workspace& workspace) const;
+  [[nodiscard]] bool needed(std::size_t supernode, std::int64_t first_position) const noexcept;
 
-  const Factor& factor_;
-  std::vector<Supernode> supernodes_;
-  std::vector<std::int64_t> supernode_of_;  // [n] supernode of each position
-  std::vector<std::int64_t> positions_;     // ascending positions in the factor of the free stored dofs
-  std::vector<std::int64_t> place_;         // [order] where a stored dof is in positions_, -1 where held
-  std::vector<std::int64_t> free_before_;   // [order + 1] how many of the stored dofs before it are free
-  std::int64_t max_below_ = 0;
+  SupernodalSweeps sweeps_;
+  std::vector<std::int64_t> last_stored_;  // [supernodes] largest stored position <= its last column, or -1
+  std::vector<std::int64_t> positions_;    // ascending positions in the factor of the free stored dofs
+  std::vector<std::int64_t> place_;        // [order] where a stored dof is in positions_, -1 where held
+  std::vector<std::int64_t> free_before_;  // [order + 1] how many of the stored dofs before it are free
 };
 
 }  // namespace palpate

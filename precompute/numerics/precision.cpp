@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <random>
 
 #include "precompute/numerics/smooth_part.h"
+#include "precompute/numerics/touches.h"
 
 namespace palpate {
 namespace {
@@ -23,12 +23,6 @@ constexpr std::array<std::size_t, 4> touched_nodes = {1, 2, 5, 30};
 constexpr Eigen::Index columns_at_once = 24;
 constexpr double fine_reference = 1e-8;  // error of forces that plain solves may have as the reference
 constexpr double safety = 4.0;           // of what the tick adds, as in assemble_contact
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-/// In [-1, 1), the same on every machine.
-double uniform(std::mt19937_64& random) {
-  return static_cast<double>(random() >> 11) * 0x1p-52 - 1.0;
-}
 
 /// Stored nodes of the surface that are free along every axis, in the order of their mesh nodes.
 std::vector<Index> free_surface_nodes(const Model& model) {
@@ -146,53 +140,6 @@ void solve_place(const Factor& factor, const SparseMatrix& K, std::span<const st
   place.reference = ((place.reference + place.reference.transpose()) / 2.0L).eval();
 }
 
-/// Displacements of the first `nodes` nodes, one a column.
-Matrix displacements(const TouchedPlace& place, int d, Eigen::Index nodes, std::mt19937_64& random) {
-  Matrix u = Matrix::Zero(d * nodes, d + 3);
-  Eigen::Matrix3d gradient;
-  for (double& entry : gradient.reshaped()) entry = uniform(random);
-  const Vec3 shift(uniform(random), uniform(random), uniform(random));
-  double reach = 0.0;
-  for (Eigen::Index node = 0; node < nodes; ++node)
-    reach = std::max(reach, place.arms[static_cast<std::size_t>(node)].norm());
-  for (Eigen::Index node = 0; node < nodes; ++node) {
-    const Vec3 arm = place.arms[static_cast<std::size_t>(node)] / (reach > 0.0 ? reach : 1.0);
-    for (Eigen::Index axis = 0; axis < d; ++axis) {
-      u(d * node + axis, axis) = 1.0;
-      u(d * node + axis, d) = (shift + gradient * arm)[axis];
-      u(d * node + axis, d + 1) = uniform(random);
-      u(d * node + axis, d + 2) = uniform(random);
-    }
-  }
-  return u;
-}
-
-/// The largest force on a node.
-template <class Forces>
-double largest_force(const Forces& f, int d) {
-  double largest = 0.0;
-  for (Eigen::Index node = 0; node < f.size() / d; ++node)
-    largest = std::max(largest, static_cast<double>(f.segment(d * node, d).norm()));
-  return largest;
-}
-
-double touch_error(const TouchedPlace& place, int d, const Matrix& C, const Matrix& u) {
-  const Eigen::Index size = u.rows();
-  const Eigen::LLT<Refined> reference(place.reference.topLeftCorner(size, size));
-  const Eigen::LLT<Matrix> stored(C.topLeftCorner(size, size));
-  if (reference.info() != Eigen::Success || stored.info() != Eigen::Success) return infinity;
-  const Refined f_0 = reference.solve(u.cast<long double>());
-  const Matrix f = stored.solve(u);
-  double worst = 0.0;
-  for (Eigen::Index k = 0; k < u.cols(); ++k) {
-    const Eigen::Matrix<long double, Eigen::Dynamic, 1> difference =
-        f.col(k).cast<long double>() - f_0.col(k);
-    const double error = largest_force(difference, d) / largest_force(f_0.col(k), d);
-    worst = std::isnan(error) ? infinity : std::max(worst, error);
-  }
-  return worst;
-}
-
 StoredEntry split(const SmoothPart& smooth, std::int64_t terms, std::int64_t i, std::int64_t j,
                   double entry) {
   const double *a = smooth.row(i), *b = smooth.row(j);
@@ -249,8 +196,8 @@ double force_error(std::span<const TouchedPlace> places, int dimension, const St
     for (std::size_t k = 0; k < touched_nodes.size(); ++k) {
       const std::size_t nodes = std::min(touched_nodes[k], place.arms.size());
       if (k > 0 && nodes <= touched_nodes[k - 1]) break;
-      const Matrix u = displacements(place, dimension, static_cast<Eigen::Index>(nodes), random);
-      worst = std::max(worst, touch_error(place, dimension, C, u));
+      const Matrix u = touch_displacements(std::span(place.arms).first(nodes), dimension, random);
+      worst = std::max(worst, touch_error(place.reference, C, u, dimension));
     }
   }
   return worst;

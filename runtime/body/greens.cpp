@@ -13,6 +13,8 @@
 
 #include "base/error.h"
 #include "base/memory.h"
+#include "formats/hierarchical.h"
+#include "formats/hierarchical_product.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
@@ -214,6 +216,14 @@ Greens::Greens(PackedGreens packed, int dimension, const GreensOptions& options)
   packed_ = {};
 }
 
+Greens::Greens(std::shared_ptr<const HierarchicalMatrix> compressed)
+    : compressed_(std::move(compressed)),
+      order_(compressed_->order()),
+      dimension_(compressed_->dimension),
+      nodes_(compressed_->tree.nodes),
+      precision_(Precision::single_precision),
+      split_(false) {}
+
 Eigen::MatrixXd Greens::block(Index row, Index column) const {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> xi(dimension_, dimension_);
   gather(row, {&column, 1}, {xi.data(), static_cast<std::size_t>(xi.size())});
@@ -222,6 +232,7 @@ Eigen::MatrixXd Greens::block(Index row, Index column) const {
 
 void Greens::gather_static(Index row, std::span<const Index> columns,
                            std::span<double> blocks) const noexcept {
+  if (compressed()) return gather_blocks(*compressed_, row, columns, blocks);
   if (!unfolded()) {
     gather_from_packed(packed_, dimension_, row, columns, blocks.data());
     return;
@@ -242,6 +253,7 @@ void Greens::displacement(std::span<const Index> nodes, std::span<const double> 
 
 void Greens::displace_statically(std::span<const Index> nodes, std::span<const double> f, Index first_node,
                                  std::span<double> u) const noexcept {
+  if (compressed()) return displace(*compressed_, nodes, f, first_node, u);
   const std::int64_t first = std::int64_t{dimension_} * first_node;
   if (!unfolded()) {
     with_scalars(packed_.data(), precision_, [&]<class T>(const T*) {

@@ -13,6 +13,8 @@
 
 namespace palpate {
 
+struct HierarchicalMatrix;
+
 /// Most terms that come on top of the stored entries.
 inline constexpr std::int64_t most_exact_terms = most_modes + most_smooth_terms;
 
@@ -32,6 +34,9 @@ class Greens {
  public:
   /// `dimension`: dofs a node, 2 or 3. Throws Error when the order is not that many for each of some nodes.
   Greens(PackedGreens packed, int dimension, const GreensOptions& options = {});
+
+  /// Of a matrix in nested low-rank form, which stays as it is.
+  explicit Greens(std::shared_ptr<const HierarchicalMatrix> compressed);
 
   /// From now on Xi + sum_i weights_i phi_i phi_i^T: with weights 1 / k_bar_i - 1 / omega_i^2 that is
   /// K_bar^-1 of the modes, and of what they do not carry the static response (theory.md section 5, modal
@@ -57,7 +62,8 @@ class Greens {
   }
   [[nodiscard]] bool unfolded() const noexcept {
     return square_ != nullptr;
-  }  ///< false: used packed, much slower
+  }  ///< false: used packed, much slower, or compressed
+  [[nodiscard]] bool compressed() const noexcept { return compressed_ != nullptr; }
 
   /// Xi at (row, column) [d, d] [m/N]: displacement of node `row` by unit forces on node `column`. Not for
   /// the tick: takes memory.
@@ -82,7 +88,8 @@ class Greens {
   void displace_statically(std::span<const Index> nodes, std::span<const double> f, Index first_node,
                            std::span<double> u) const noexcept;
 
-  PackedGreens packed_;                 // empty when unfolded: the square has taken its place
+  PackedGreens packed_;  // empty when unfolded: the square has taken its place
+  std::shared_ptr<const HierarchicalMatrix> compressed_;
   std::shared_ptr<const void> square_;  // [n x stride_] rows of the stored scalar
   std::int64_t order_ = 0;
   std::int64_t stride_ = 0;  // scalars from one row of the square to the next

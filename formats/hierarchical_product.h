@@ -1,0 +1,20 @@
+// What a tick asks of a matrix in nested low-rank form.
+#pragma once
+
+#include <span>
+
+#include "formats/hierarchical.h"
+
+namespace palpate {
+
+/// As Greens::gather. Each far column costs its leaf's part of V, and each leaf of columns one way through
+/// the tree.
+void gather_blocks(const HierarchicalMatrix& matrix, Index row, std::span<const Index> columns,
+                   std::span<double> blocks) noexcept;
+
+/// As Greens::displacement of the nodes from `first_node` on: up the tree from the nodes that carry force,
+/// across, and down to those that are asked for.
+void displace(const HierarchicalMatrix& matrix, std::span<const Index> nodes, std::span<const double> f,
+              Index first_node, std::span<double> u) noexcept;
+
+}  // namespace palpate

@@ -1,0 +1,90 @@
+#include "precompute/numerics/certificate.h"
+
+#include <algorithm>
+#include <mutex>
+#include <numeric>
+#include <random>
+
+#include "base/parallel.h"
+#include "formats/hierarchical_product.h"
+#include "precompute/numerics/selected_solver.h"
+#include "precompute/numerics/touches.h"
+
+namespace palpate {
+namespace {
+
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr Index near_share = 16;  // of the nodes near a place, one in so many is touched
+
+/// Nodes of the k-th touch, the first at random.
+std::vector<Index> touched_nodes(std::int64_t k, std::span<const Vec3> points,
+                                 std::span<const Index> touchable, Index count, std::mt19937_64& random) {
+  const auto all = static_cast<Index>(touchable.size());
+  count = std::min(count, all);
+  const Index centre = touchable[random() % touchable.size()];
+  const Index among = k % 3 == 0 ? count : k % 3 == 1 ? std::min(near_share * count, all) : all;
+  std::vector<Index> nodes(touchable.begin(), touchable.end());
+  std::partial_sort(nodes.begin(), nodes.begin() + among, nodes.end(), [&](Index a, Index b) {
+    const Vec3& c = points[static_cast<std::size_t>(centre)];
+    const double da = (points[static_cast<std::size_t>(a)] - c).squaredNorm(),
+                 db = (points[static_cast<std::size_t>(b)] - c).squaredNorm();
+    return da < db || (da == db && a < b);
+  });
+  for (Index chosen = 1; chosen < count; ++chosen) {  // Fisher and Yates, the centre stays
+    const auto other = chosen + static_cast<Index>(random() % static_cast<std::uint64_t>(among - chosen));
+    std::swap(nodes[static_cast<std::size_t>(chosen)], nodes[static_cast<std::size_t>(other)]);
+  }
+  nodes.resize(static_cast<std::size_t>(count));
+  return nodes;
+}
+
+}  // namespace
+
+std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
+                                 std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
+                                 std::span<const Index> touchable, std::int64_t touches, int jobs,
+                                 const std::function<bool(double)>& progress) {
+  const SelectedSolver solver(factor);
+  std::vector<SelectedSolver::Workspace> workspaces(static_cast<std::size_t>(jobs));
+  std::vector<TouchErrors> result;
+  for (const Index nodes : certified_nodes) result.push_back({nodes, {}});
+  std::mutex mutex;
+  std::int64_t done = 0;
+  bool stopped = false;
+  const std::int64_t all = touches * std::ssize(result);
+  parallel_for(all, jobs, [&](std::int64_t item, int worker) {
+    {
+      const std::scoped_lock lock(mutex);
+      if (stopped) return;
+    }
+    TouchErrors& of_count = result[static_cast<std::size_t>(item % std::ssize(result))];
+    std::mt19937_64 random(static_cast<std::uint64_t>(item));
+    const std::vector<Index> nodes =
+        touched_nodes(item / std::ssize(result), points, touchable, of_count.nodes, random);
+    const int d = matrix.dimension;
+    std::vector<std::int64_t> dofs;
+    std::vector<Vec3> arms;
+    for (const Index node : nodes) {
+      for (int axis = 0; axis < d; ++axis)
+        dofs.push_back(stored_dofs[static_cast<std::size_t>(std::int64_t{d} * node + axis)]);
+      arms.push_back(points[static_cast<std::size_t>(node)] -
+                     points[static_cast<std::size_t>(nodes.front())]);
+    }
+    Rows exact(std::ssize(dofs), std::ssize(dofs)), C = exact;
+    solver.solve(dofs, dofs, workspaces[static_cast<std::size_t>(worker)],
+                 {exact.data(), static_cast<std::size_t>(exact.size())});
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      gather_blocks(matrix, nodes[k], nodes,
+                    {C.data() + std::int64_t{d} * static_cast<std::int64_t>(k) * C.cols(),
+                     static_cast<std::size_t>(d * C.cols())});
+    const double error = touch_error(exact.cast<long double>(), C, touch_displacements(arms, d, random), d);
+    const std::scoped_lock lock(mutex);
+    of_count.errors.push_back(error);
+    if (!progress(static_cast<double>(++done) / static_cast<double>(all))) stopped = true;
+  });
+  for (TouchErrors& of_count : result) std::sort(of_count.errors.begin(), of_count.errors.end());
+  return result;
+}
+
+}  // namespace palpate

@@ -1,0 +1,64 @@
+#include "precompute/numerics/selected_solver.h"
+
+#include <algorithm>
+
+namespace palpate {
+
+SelectedSolver::SelectedSolver(const Factor& factor)
+    : sweeps_(factor), position_(static_cast<std::size_t>(factor.order())) {
+  const std::span<const std::int64_t> permutation = factor.permutation();
+  for (std::size_t p = 0; p < permutation.size(); ++p)
+    position_[static_cast<std::size_t>(permutation[p])] = static_cast<std::int64_t>(p);
+}
+
+void SelectedSolver::mark(std::span<const std::int64_t> dofs, std::vector<std::uint8_t>& marks) const {
+  marks.assign(sweeps_.supernodes().size(), 0);
+  for (const std::int64_t dof : dofs)
+    if (dof >= 0) sweeps_.mark_path(position_[static_cast<std::size_t>(dof)], marks);
+}
+
+void SelectedSolver::solve(std::span<const std::int64_t> rows, std::span<const std::int64_t> columns,
+                           Workspace& workspace, std::span<double> block) const {
+  std::fill(block.begin(), block.end(), 0.0);
+  if (columns.empty() || rows.empty()) return;
+  const auto width = static_cast<std::int64_t>(columns.size());
+  SupernodalSweeps::Workspace& sweep = workspace.sweep;
+  sweeps_.prepare(sweep, width);
+  mark(columns, sweep.on_path);
+  mark(rows, workspace.wanted);
+  const std::span<const Supernode> supernodes = sweeps_.supernodes();
+  for (std::size_t s = 0; s < supernodes.size(); ++s) {
+    if (sweep.on_path[s])
+      std::fill_n(sweep.X.begin() + supernodes[s].first * width, supernodes[s].columns * width, 0.0);
+  }
+  for (std::int64_t c = 0; c < width; ++c) {
+    const std::int64_t dof = columns[static_cast<std::size_t>(c)];
+    if (dof >= 0)
+      sweep.X[static_cast<std::size_t>(position_[static_cast<std::size_t>(dof)] * width + c)] = 1.0;
+  }
+  for (std::size_t s = 0; s < supernodes.size(); ++s)
+    if (sweep.on_path[s]) sweeps_.forward(supernodes[s], width, width, sweep);
+  for (std::size_t s = supernodes.size(); s-- > 0;)
+    if (workspace.wanted[s]) sweeps_.backward(supernodes[s], sweep.on_path[s] != 0, width, width, sweep);
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    if (rows[r] < 0) continue;
+    const double* row = sweep.X.data() + position_[static_cast<std::size_t>(rows[r])] * width;
+    std::copy_n(row, width, block.data() + static_cast<std::int64_t>(r) * width);
+  }
+}
+
+double SelectedSolver::flops(std::span<const std::int64_t> rows,
+                             std::span<const std::int64_t> columns) const {
+  std::vector<std::uint8_t> on_path, wanted;
+  mark(columns, on_path);
+  mark(rows, wanted);
+  double total = 0.0;
+  for (std::size_t s = 0; s < on_path.size(); ++s) {
+    const Supernode& node = sweeps_.supernodes()[s];
+    total += static_cast<double>(node.columns * (node.columns + 2 * node.below)) *
+             ((on_path[s] ? 1.0 : 0.0) + (wanted[s] ? 1.0 : 0.0));
+  }
+  return total * static_cast<double>(columns.size());
+}
+
+}  // namespace palpate

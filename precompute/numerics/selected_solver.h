@@ -1,0 +1,44 @@
+// Blocks of Xi = K^-1 for chosen rows and columns, from a supernodal Cholesky factor.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/numerics/supernodal_sweeps.h"
+
+namespace palpate {
+
+/// Entries of Xi at chosen rows and columns: forward substitution visits the paths of the elimination tree
+/// from the columns to the root, backward substitution those from the rows, and nothing else. What is near in
+/// the body shares most of its path. Const: any number of threads may solve.
+class SelectedSolver {
+ public:
+  /// Scratch of one thread.
+  struct Workspace {
+    SupernodalSweeps::Workspace sweep;
+    std::vector<std::uint8_t> wanted;  // [supernodes]
+  };
+
+  explicit SelectedSolver(const Factor& factor);
+
+  /// Xi(rows, columns) [rows x columns] row-major [m/N] to `block`. Rows and columns are dofs of K; those of
+  /// -1 are held and have zeros.
+  void solve(std::span<const std::int64_t> rows, std::span<const std::int64_t> columns, Workspace& workspace,
+             std::span<double> block) const;
+
+  /// Multiplications and additions of `solve`.
+  [[nodiscard]] double flops(std::span<const std::int64_t> rows, std::span<const std::int64_t> columns) const;
+
+  [[nodiscard]] std::int64_t workspace_bytes(std::int64_t columns) const {
+    return sweeps_.workspace_bytes(columns);
+  }
+
+ private:
+  void mark(std::span<const std::int64_t> dofs, std::vector<std::uint8_t>& marks) const;
+
+  SupernodalSweeps sweeps_;
+  std::vector<std::int64_t> position_;  // [n] of each dof of K in the factor
+};
+
+}  // namespace palpate

@@ -1,0 +1,67 @@
+// The steps of forward and backward substitution, a supernode at a time.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/numerics/factor.h"
+
+namespace palpate {
+
+/// Block of columns of a supernodal factor that share their rows.
+struct Supernode {
+  std::int64_t first;    ///< position of its first column
+  std::int64_t columns;  ///< number of columns
+  std::int64_t below;    ///< rows under the diagonal block
+  std::int64_t rows;     ///< offset of its row positions in the factor's
+  std::int64_t values;   ///< offset of its entries in the factor
+  std::int64_t parent;   ///< supernode of the first row below, -1 for a root
+  std::int64_t subtree;  ///< position of the first column of its subtree
+  [[nodiscard]] std::int64_t end() const noexcept { return first + columns; }
+};
+
+/// Substitution with right-hand sides that are contiguous a dof, so that gathering the rows of a supernode
+/// copies whole cache lines: X [n, width] row-major, row p is the dof at position p of the factor. Which
+/// supernodes a solve needs is the caller's to know. Const: any number of threads may sweep.
+class SupernodalSweeps {
+ public:
+  /// Scratch of one thread.
+  struct Workspace {
+    std::vector<double> X;              // [n, width]
+    std::vector<double> below;          // [rows below the largest supernode, width]
+    std::vector<std::uint8_t> on_path;  // [supernodes]
+  };
+
+  /// `factor` may be only analysed as long as nothing is swept.
+  explicit SupernodalSweeps(const Factor& factor);
+
+  [[nodiscard]] const Factor& factor() const noexcept { return factor_; }
+  [[nodiscard]] std::span<const Supernode> supernodes() const noexcept { return supernodes_; }
+  /// Supernode that a position is in.
+  [[nodiscard]] std::int64_t supernode_of(std::int64_t position) const noexcept {
+    return supernode_of_[static_cast<std::size_t>(position)];
+  }
+
+  /// Room for so many right-hand sides.
+  void prepare(Workspace& workspace, std::int64_t width) const;
+  [[nodiscard]] std::int64_t workspace_bytes(std::int64_t width) const;
+
+  /// Marks [supernodes] the supernodes from a position to the root.
+  void mark_path(std::int64_t position, std::vector<std::uint8_t>& marks) const;
+
+  /// X_s := L_ss^-1 X_s, then X_below -= L_bs X_s, of the first `active` of `width` right-hand sides.
+  void forward(const Supernode& s, std::int64_t active, std::int64_t width, Workspace& workspace) const;
+
+  /// X_s := L_ss^-T (X_s - L_bs^T X_below); X_s of a supernode that is not on the path counts as zero.
+  void backward(const Supernode& s, bool on_path, std::int64_t active, std::int64_t width,
+                Workspace& workspace) const;
+
+ private:
+  const Factor& factor_;
+  std::vector<Supernode> supernodes_;
+  std::vector<std::int64_t> supernode_of_;  // [n]
+  std::int64_t max_below_ = 0;
+};
+
+}  // namespace palpate

@@ -1,0 +1,165 @@
+// What compression of the Green's functions costs and how exact it is.
+//
+//   scale_study MODEL.toml [--leaf N] [--eta ETA] [--cut C,C,...] [--touches N] [--jobs N]
+//
+// Meshes the model, factorises K and compresses Xi with each cut; a line of a table for each.
+#include <cblas.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/error.h"
+#include "precompute/numerics/certificate.h"
+#include "precompute/numerics/compression.h"
+#include "precompute/numerics/meshed_body.h"
+#include "precompute/numerics/scope.h"
+#include "tests/support/study.h"
+
+namespace palpate {
+namespace {
+
+struct Options {
+  std::string model;
+  ClusterOptions clusters;
+  std::vector<double> cut = {1e-2};
+  std::int64_t touches = 100;
+  int jobs = static_cast<int>(std::thread::hardware_concurrency());
+};
+
+Options read(int count, char** words) {
+  Options options;
+  const std::map<std::string, std::function<void(const std::string&)>> known = {
+      {"--leaf", [&](const std::string& text) { options.clusters.leaf = std::stoi(text); }},
+      {"--eta", [&](const std::string& text) { options.clusters.eta = std::stod(text); }},
+      {"--cut", [&](const std::string& text) { options.cut = test::numbers(text); }},
+      {"--touches", [&](const std::string& text) { options.touches = std::stoll(text); }},
+      {"--jobs", [&](const std::string& text) { options.jobs = std::stoi(text); }},
+  };
+  options.model = words[1];
+  for (int k = 2; k + 1 < count; k += 2) known.at(words[k])(words[k + 1]);
+  return options;
+}
+
+/// Seconds since it was asked last.
+double lap() {
+  static auto last = std::chrono::steady_clock::now();
+  const auto now = std::chrono::steady_clock::now();
+  const double seconds = std::chrono::duration<double>(now - last).count();
+  last = now;
+  return seconds;
+}
+
+void run(const Options& options) {
+  lap();
+  const Description description = read_description(options.model);
+  MeshedBody meshed = mesh_body(description, [](const std::string&) {});
+  Model model;
+  for (const MaterialPart& part : description.materials) model.materials.push_back(part.material);
+  model.material_of_element = meshed.material_of_element;
+  model.fixed = meshed.fixed;
+  model.mesh = meshed.mesh;
+  model.surface = surface_simplices(meshed.surface);
+  ElasticBody body = elastic_body(model);
+  body.prescribed = meshed.prescribed;
+  const Stiffness stiffness = assemble_stiffness(body);
+  fmt::print("mesh and K: {} nodes, {} dofs, {:.1f} s\n", model.mesh.nodes.size(), stiffness.K.rows(), lap());
+  openblas_set_num_threads(1);
+  Factor factor(stiffness.K, stiffness.node_start);
+  factor.factorize();
+  fmt::print("factor: {:.1f} million entries, {:.1f} s\n", 1e-6 * double(factor.entries()), lap());
+
+  const std::vector<std::uint8_t> stored =
+      stored_dof_marks(model.mesh, meshed.surface, stiffness, description.scope, description.layers);
+  const int d = model.dimension();
+  std::vector<std::int64_t> dof_of_mesh(model.mesh.nodes.size() * std::size_t(d), -1);
+  std::vector<Index> mesh_nodes;
+  for (std::size_t k = 0; k < stored.size(); ++k) {
+    if (!stored[k]) continue;
+    const std::int64_t dof = stiffness.free_dofs[k];
+    dof_of_mesh[std::size_t(dof)] = std::int64_t(k);
+    const auto node = Index(dof / d);
+    if (mesh_nodes.empty() || mesh_nodes.back() != node) mesh_nodes.push_back(node);
+  }
+  std::vector<Vec3> points;
+  for (const Index node : mesh_nodes) points.push_back(model.mesh.nodes[std::size_t(node)]);
+  const ClusteredNodes clusters = cluster_nodes(points, options.clusters);
+  std::vector<std::int64_t> stored_dofs;
+  std::vector<Vec3> ordered;
+  std::vector<Index> touchable;
+  std::vector<bool> on_surface(model.mesh.nodes.size(), false);
+  for (const Index node : model.surface) on_surface[std::size_t(node)] = true;
+  for (const Index k : clusters.order) {
+    const Index node = mesh_nodes[std::size_t(k)];
+    if (on_surface[std::size_t(node)] && model.fixed[std::size_t(node)] == 0)
+      touchable.push_back(Index(ordered.size()));
+    ordered.push_back(points[std::size_t(k)]);
+    for (int axis = 0; axis < d; ++axis) stored_dofs.push_back(dof_of_mesh[std::size_t(d * node + axis)]);
+  }
+  fmt::print("stored nodes: {}, {} levels, {} near and {} far pairs, {:.1f} s\n", points.size(),
+             clusters.tree.levels, clusters.near_pair.size(), clusters.far_pair.size(), lap());
+
+  for (const double cut : options.cut) {
+    const CompressionOptions compression{.cut = cut, .jobs = options.jobs};
+    std::map<CompressionStage, double> seconds;
+    std::map<CompressionStage, double> shares;
+    lap();
+    CompressionStage last = CompressionStage::near;
+    const auto matrix =
+        compress(factor, stored_dofs, d, clusters, compression, [&](CompressionStage stage, double) {
+          if (stage != last) {
+            seconds[last] = lap();
+            last = stage;
+          }
+          return true;
+        });
+    seconds[last] = lap();
+    const auto gigabytes = [](std::int64_t floats) { return 4e-9 * double(floats); };
+    const double dense = 4e-9 * 0.5 * double(matrix->order()) * double(matrix->order());
+    fmt::print("cut {:g}: near {:.1f} s, samples {:.1f} s, far {:.1f} s\n", cut,
+               seconds[CompressionStage::near], seconds[CompressionStage::samples],
+               seconds[CompressionStage::far]);
+    fmt::print(
+        "  near {:.3f} GB, bases {:.3f}, transfers {:.3f}, couplings {:.3f}: {:.3f} GB; packed {:.3f}\n",
+        gigabytes(matrix->near_at.back()), gigabytes(matrix->basis_at.back()),
+        gigabytes(matrix->transfer_at.back()), gigabytes(matrix->coupling_at.back()),
+        1e-9 * double(matrix->bytes()), dense);
+    for (int level = 1; level <= matrix->tree.levels; ++level) {
+      const auto first = matrix->rank.begin() + matrix->tree.first_of_level(level);
+      std::vector<Index> ranks(first, first + (1 << level));
+      std::sort(ranks.begin(), ranks.end());
+      fmt::print("  level {}: ranks {} to {}, median {}\n", level, ranks.front(), ranks.back(),
+                 ranks[ranks.size() / 2]);
+    }
+    const auto errors = certify(*matrix, factor, stored_dofs, ordered, touchable, options.touches,
+                                options.jobs, [](double) { return true; });
+    for (const TouchErrors& e : errors)
+      fmt::print("  touches of {} nodes: median {:.2e}, 99 % {:.2e}, worst {:.2e}\n", e.nodes,
+                 e.quantile(0.5), e.quantile(0.99), e.quantile(1.0));
+    fmt::print("  {:.1f} s\n", lap());
+  }
+}
+
+}  // namespace
+}  // namespace palpate
+
+int main(int count, char** words) {
+  if (count < 2) {
+    std::fputs(
+        "usage: scale_study MODEL.toml [--leaf N] [--eta ETA] [--cut C,...] [--touches N] [--jobs N]\n",
+        stderr);
+    return 2;
+  }
+  try {
+    palpate::run(palpate::read(count, words));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return 1;
+  }
+}
