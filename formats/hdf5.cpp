@@ -154,8 +154,8 @@ File File::create(const std::filesystem::path& path, std::int64_t align_from) {
   return file;
 }
 
-File File::open_to_change(const std::filesystem::path& path) {
-  const Id access = access_properties();
+File File::open_to_change(const std::filesystem::path& path, std::int64_t align_from) {
+  const Id access = access_properties(align_from);
   File file(Id(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.get()), H5Fclose), path);
   if (!file.file_.valid()) file.fail("open the file");
   return file;

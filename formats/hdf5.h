@@ -57,7 +57,7 @@ class File {
   /// of 4096 bytes.
   static File create(const std::filesystem::path& path, std::int64_t align_from = 0);
   /// A file that this program has written, or whose Contents have been read without a mistake.
-  static File open_to_change(const std::filesystem::path& path);
+  static File open_to_change(const std::filesystem::path& path, std::int64_t align_from = 0);
 
   [[nodiscard]] hid_t id() const noexcept { return file_.get(); }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }

@@ -1,5 +1,6 @@
 #include "formats/hierarchical.h"
 
+#include <algorithm>
 #include <numeric>
 
 namespace palpate {
@@ -30,6 +31,13 @@ void list_partners(const std::vector<HierarchicalMatrix::Pair>& pairs, Index fir
 std::int64_t HierarchicalMatrix::bytes() const noexcept {
   return (basis_at.back() + transfer_at.back() + coupling_at.back() + near_at.back()) *
          static_cast<std::int64_t>(sizeof(float));
+}
+
+std::int64_t HierarchicalMatrix::first_near_pair(Index leaf) const noexcept {
+  const Index cluster = tree.first_leaf() + leaf;
+  return std::lower_bound(near_pair.begin(), near_pair.end(), cluster,
+                          [](const Pair& pair, Index c) { return pair[1] < c; }) -
+         near_pair.begin();
 }
 
 void HierarchicalMatrix::index() {

@@ -71,6 +71,10 @@ struct HierarchicalMatrix {
 
   double scale = 1.0;  ///< the matrix is this times what is stored
 
+  double tolerance = 0.0;  ///< most that forces of touches may be off, relative to the largest [-]
+  /// [rows x 5] What was measured: nodes of a touch, touches, and their median, 99 % and worst force error.
+  std::vector<double> certificate;
+
   // What follows from the above: see `index`.
   std::vector<std::int64_t> basis_at;      ///< [leaves + 1] first entry of each leaf's V
   std::vector<std::int64_t> transfer_at;   ///< [clusters + 1]
@@ -83,6 +87,8 @@ struct HierarchicalMatrix {
   std::vector<Pair> neighbour;          ///< as partner, of near pairs
 
   [[nodiscard]] std::int64_t order() const noexcept { return std::int64_t{dimension} * tree.nodes; }
+  /// First near pair whose column is the leaf [0, leaves] or a later one: those of a leaf are side by side.
+  [[nodiscard]] std::int64_t first_near_pair(Index leaf) const noexcept;
   /// Bytes of the four arrays.
   [[nodiscard]] std::int64_t bytes() const noexcept;
   /// Numbers the entries and lists the partners; once tree, ranks and pairs are there.

@@ -132,8 +132,9 @@ struct Model {
   std::vector<Probe> probes;
   StoredOverlay overlay;
   StoredDynamics dynamics;
-  PackedGreens greens;       ///< Xi of the stored dofs [m/N]; empty where it is compressed
-  std::shared_ptr<const HierarchicalMatrix> compressed;  ///< Xi in nested low-rank form; else null
+  /// Xi of the stored dofs [m/N], packed or, with `greens` empty, in nested low-rank form.
+  PackedGreens greens;
+  std::shared_ptr<const HierarchicalMatrix> compressed;
   ForceErrors force_errors;  ///< of greens
   std::string content_hash;  ///< XXH3-128 over all datasets; empty until written
 

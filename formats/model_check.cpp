@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "formats/dynamics_fields.h"
+#include "formats/hierarchical_fields.h"
 #include "meshes/element.h"
 #include "meshes/material_fields.h"
 
@@ -25,6 +26,8 @@ std::int64_t smallest(Count count) {
     case Count::patches:
     case Count::modes:
     case Count::smooth_terms:
+    case Count::near_pairs:
+    case Count::clusters:
       return 1;
     case Count::nodes:
       return 3;
@@ -159,6 +162,7 @@ Counts Counts::of(const Model& model, std::string where) {
     counts.set(Count::modes, model.dynamics.modes(), "/dynamics/modes/omega");
   if (model.greens.smooth() != nullptr)
     counts.set(Count::smooth_terms, model.greens.smooth()->terms, "/greens/smooth");
+  if (model.compressed != nullptr) count_tree(*model.compressed, counts);
   return counts;
 }
 

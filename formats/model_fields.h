@@ -31,9 +31,13 @@ enum class Count : std::uint8_t {
   patch_compliance_entries,
   matrix_entries,  // of M and C_d
   modes,
-  smooth_terms
+  smooth_terms,
+  near_pairs,
+  far_pairs,
+  clusters,
+  certified  // kinds of touches
 };
-inline constexpr std::size_t number_of_counts = 17;
+inline constexpr std::size_t number_of_counts = 21;
 
 /// One dimension of a field: factor * count + plus.
 struct Extent {

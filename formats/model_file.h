@@ -14,7 +14,7 @@
 namespace palpate {
 
 inline constexpr int format_major = 3;  ///< another major version is refused: "precompute it again"
-inline constexpr int format_minor = 3;  ///< newer minor versions are read, what they add is ignored
+inline constexpr int format_minor = 4;  ///< newer minor versions are read, what they add is ignored
 
 /// A packed matrix that is streamed to disk.
 enum class PackedMatrix : std::uint8_t {
@@ -55,8 +55,18 @@ class ModelWriter {
   void write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed,
                      PackedMatrix matrix = PackedMatrix::greens);
 
-  /// Adds the probes, seals and renames. All columns of all matrices must have been written.
-  void finish(const std::vector<Probe>& probes);
+  /// Whether the near pairs in which a leaf [0, leaves) is the column were written, by this run or an earlier
+  /// one. Of a model whose `compressed` has the tree and the pairs.
+  [[nodiscard]] bool has_near(Index leaf) const;
+  /// Reads them back: their entries, pair after pair.
+  void read_near(Index leaf, std::span<float> entries) const;
+  /// Stores them. Thread-safe for different leaves.
+  void write_near(Index leaf, std::span<const float> entries);
+
+  /// Adds the probes, and of a compressed model ranks, certificate, bases and couplings, seals and renames.
+  /// All columns of all matrices, and all near pairs, must have been written.
+  void finish(const std::vector<Probe>& probes,
+              std::shared_ptr<const HierarchicalMatrix> compressed = nullptr);
 
   /// Removes PATH.partial and PATH.progress.
   void discard() noexcept;

@@ -15,6 +15,7 @@
 #include "formats/content_hash.h"
 #include "formats/dynamics_fields.h"
 #include "formats/hdf5_contents.h"
+#include "formats/hierarchical_fields.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
@@ -62,6 +63,10 @@ class Reader {
   template <class T>
   void read_field(const Field<T>& field);
   [[nodiscard]] PackedGreens read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth);
+  void read_compressed();
+  void check_diagonal(const std::string& path, std::int64_t i, double entry) const;
+  [[nodiscard]] std::shared_ptr<const void> read_scalars(const std::string& path, const hdf5::Stored& stored,
+                                                         bool single);
   [[nodiscard]] std::shared_ptr<std::byte> room_for(const hdf5::Stored& packed) const;
   void check_content(const std::vector<std::int64_t>& version);
   void check_stored_checksum(const std::string& path, const std::string& found);
@@ -94,7 +99,11 @@ Model Reader::read() {
     visit_inverse_errors([this](const auto& field) { read_field(field); });
   check_model(model_, where_);
   check_precision(model_, header_.precision, where_);
-  model_.greens = read_packed(greens_path, model_.greens.smooth());
+  if (file_.has(tree_path)) {
+    read_compressed();
+  } else {
+    model_.greens = read_packed(greens_path, model_.greens.smooth());
+  }
   if (model_.dynamics.method == DynamicsMethod::packed)
     model_.dynamics.inverse = read_packed(inverse_path, model_.dynamics.inverse.smooth());
   check_content(version);
@@ -183,18 +192,20 @@ std::shared_ptr<std::byte> Reader::room_for(const hdf5::Stored& packed) const {
   return {memory, static_cast<std::byte*>(memory.get())};
 }
 
-/// Reads or maps a packed matrix of the stored dofs and proves its values.
-PackedGreens Reader::read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth) {
-  const std::int64_t order = model_.stored_dofs();
-  const bool single = has_float_entries(header_.precision);
-  const hdf5::Stored stored =
-      file_.locate(path, single ? hdf5::element_type<float>() : hdf5::element_type<double>(), 1);
-  if (stored.dims[0] != packed_size(order))
-    refuse(where_, path + " has " + std::to_string(stored.dims[0]) + " entries, " +
-                       std::to_string(packed_size(order)) + " are expected by /dofs/stored_nodes");
-  if (stored.offset % bytes_per_scalar(header_.precision) != 0)
-    refuse(where_, path + " does not start at a multiple of its scalar's size");
+/// A dof's own compliance is positive; zero where it is held.
+void Reader::check_diagonal(const std::string& path, std::int64_t i, double entry) const {
+  const Index node = model_.stored_nodes[static_cast<std::size_t>(i / model_.dimension())];
+  const bool held = (model_.fixed[static_cast<std::size_t>(node)] >> i % model_.dimension() & 1) != 0;
+  if (held ? entry != 0.0 : !(entry > 0.0) || std::isinf(entry))
+    refuse(where_, path + ": diagonal entry " + std::to_string(i) + " is not " +
+                       (held ? "zero, though its dof is held" : "positive"));
+}
 
+/// Reads or maps an array of float or double and proves its checksum and that all is finite.
+std::shared_ptr<const void> Reader::read_scalars(const std::string& path, const hdf5::Stored& stored,
+                                                 bool single) {
+  if (stored.offset % (single ? 4 : 8) != 0)
+    refuse(where_, path + " does not start at a multiple of its scalar's size");
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   std::atomic<std::size_t> bad{none};
   ChunkedChecksum found;
@@ -205,17 +216,49 @@ PackedGreens Reader::read_packed(const std::string& path, std::shared_ptr<const 
   if (bad != none)
     refuse(where_, path + " holds a value that is not finite (entry " + std::to_string(bad) + ")");
 
-  const std::shared_ptr<const void> data =
-      memory != nullptr ? memory : map_file(file_.file(), stored.offset, stored.bytes);
-  PackedGreens matrix(data, order, header_.precision, std::move(smooth));
-  for (std::int64_t i = 0; i < order; ++i) {
-    const Index node = model_.stored_nodes[static_cast<std::size_t>(i / model_.dimension())];
-    const bool held = (model_.fixed[static_cast<std::size_t>(node)] >> i % model_.dimension() & 1) != 0;
-    const double entry = matrix(i, i);
-    if (held ? entry != 0.0 : !(entry > 0.0) || std::isinf(entry))
-      refuse(where_, path + ": diagonal entry " + std::to_string(i) + " is not " +
-                         (held ? "zero, though its dof is held" : "positive"));
+  if (memory != nullptr) return memory;
+  return map_file(file_.file(), stored.offset, stored.bytes);
+}
+
+/// Green's functions in nested low-rank form.
+void Reader::read_compressed() {
+  for_each_tree_field([this](const auto& field) { read_field(field); });
+  check_tree(model_, where_);
+  for_each_rank_field([this](const auto& field) { read_field(field); });
+  check_ranks(model_, where_);
+  HierarchicalMatrix& matrix = compressed_to_fill(model_);
+  matrix.index();
+  for (const CompressedArray& array : compressed_arrays) {
+    const hdf5::Stored stored = file_.locate(array.path, hdf5::element_type<float>(), 1);
+    if (const std::int64_t entries = (matrix.*array.at).back(); stored.dims[0] != entries)
+      refuse(where_, std::string(array.path) + " has " + std::to_string(stored.dims[0]) + " entries, " +
+                         std::to_string(entries) + " are expected by pairs and ranks");
+    const std::shared_ptr<const void> scalars = read_scalars(array.path, stored, true);
+    matrix.*array.data = std::shared_ptr<const float[]>(scalars, static_cast<const float*>(scalars.get()));
   }
+  for (std::size_t p = 0; p < matrix.near_pair.size(); ++p) {
+    const auto [row, column] = matrix.near_pair[p];
+    if (row != column) continue;
+    const float* entries = matrix.near.get() + matrix.near_at[p];
+    const std::int64_t first = std::int64_t{matrix.dimension} * matrix.tree.begin(row),
+                       count = std::int64_t{matrix.dimension} * matrix.tree.end(row) - first;
+    for (std::int64_t i = 0; i < count; ++i)
+      check_diagonal(near_path, first + i, static_cast<double>(entries[i * (count + 1)]));
+  }
+}
+
+/// Reads or maps a packed matrix of the stored dofs and proves its values.
+PackedGreens Reader::read_packed(const std::string& path, std::shared_ptr<const SmoothPart> smooth) {
+  const std::int64_t order = model_.stored_dofs();
+  const bool single = has_float_entries(header_.precision);
+  const hdf5::Stored stored =
+      file_.locate(path, single ? hdf5::element_type<float>() : hdf5::element_type<double>(), 1);
+  if (stored.dims[0] != packed_size(order))
+    refuse(where_, path + " has " + std::to_string(stored.dims[0]) + " entries, " +
+                       std::to_string(packed_size(order)) + " are expected by /dofs/stored_nodes");
+
+  PackedGreens matrix(read_scalars(path, stored, single), order, header_.precision, std::move(smooth));
+  for (std::int64_t i = 0; i < order; ++i) check_diagonal(path, i, matrix(i, i));
   return matrix;
 }
 

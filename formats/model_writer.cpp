@@ -12,6 +12,7 @@
 #include "formats/dynamics_fields.h"
 #include "formats/hdf5.h"
 #include "formats/hdf5_contents.h"
+#include "formats/hierarchical_fields.h"
 #include "formats/journal.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
@@ -23,7 +24,9 @@ namespace {
 
 constexpr std::array<std::int64_t, 2> written_version = {format_major, format_minor};
 constexpr std::int64_t metadata_allowance = 1 << 20;  // more than HDF5 needs around our datasets [byte]
-constexpr std::size_t values_at_once = 1 << 15;       // converted and written together
+constexpr std::int64_t aligned_from = 1 << 16;  // of those that come last: smaller ones begin anywhere [byte]
+constexpr std::size_t near_matrix = 0;          // in Impl::matrices, where there is one
+constexpr std::size_t values_at_once = 1 << 15;  // converted and written together
 constexpr std::int64_t window =
     16 * std::int64_t{ChunkedChecksum::chunk};  // of the file, looked at together [byte]
 
@@ -56,6 +59,7 @@ void for_each_known_field(const Model& model, Visitor&& visit) {
   if (model.greens.smooth() != nullptr) for_each_smooth_field(model, visit);
   if (model.force_errors.any()) visit_greens_errors(visit);
   if (model.dynamics.force_errors.any()) visit_inverse_errors(visit);
+  if (model.compressed != nullptr) for_each_tree_field(visit);
 }
 
 void write_attributes(hdf5::File& file, const Model& model, const FileHeader& header) {
@@ -98,15 +102,19 @@ void add_bytes(RunningChecksum& running, const FileDescriptor& file, std::int64_
   }
 }
 
-/// Checksum of all bytes of the file except `gap_bytes` from each of the places.
-std::string checksum_around(const FileDescriptor& file, std::vector<std::int64_t> gaps_at,
-                            std::int64_t gap_bytes) {
-  std::sort(gaps_at.begin(), gaps_at.end());
+/// Bytes of the file from a place on.
+struct Gap {
+  std::int64_t at, bytes;
+};
+
+/// Checksum of all bytes of the file but the gaps.
+std::string checksum_around(const FileDescriptor& file, std::vector<Gap> gaps) {
+  std::sort(gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) { return a.at < b.at; });
   RunningChecksum running;
   std::int64_t from = 0;
-  for (const std::int64_t gap : gaps_at) {
-    add_bytes(running, file, from, gap);
-    from = gap + gap_bytes;
+  for (const Gap& gap : gaps) {
+    add_bytes(running, file, from, gap.at);
+    from = gap.at + gap.bytes;
   }
   add_bytes(running, file, from, file_size(file));
   return running.digits();
@@ -125,12 +133,21 @@ std::vector<double> without(const SmoothPart& smooth, std::int64_t first, std::i
 }  // namespace
 
 struct ModelWriter::Impl {
-  /// A packed matrix that arrives by columns.
+  /// A matrix that arrives in pieces: packed by columns, compressed by leaves of columns.
   struct Streamed {
     const char* path;
     const char* name;
-    std::vector<bool> done;  ///< [n] columns
+    hdf5::ElementType scalar;
+    std::vector<std::int64_t> starts;  ///< [pieces + 1] first entry of each
     std::shared_ptr<const SmoothPart> smooth;
+    std::vector<bool> done{};  ///< [pieces]
+
+    [[nodiscard]] std::int64_t pieces() const { return std::ssize(starts) - 1; }
+    /// Bytes before a piece; of all of them.
+    [[nodiscard]] std::int64_t byte(std::int64_t piece) const {
+      return starts[static_cast<std::size_t>(piece)] * static_cast<std::int64_t>(scalar.bytes);
+    }
+    [[nodiscard]] std::int64_t bytes() const { return byte(pieces()); }
   };
 
   Impl(std::filesystem::path to, const Model& model, Precision precision, Leftovers leftovers);
@@ -140,12 +157,20 @@ struct ModelWriter::Impl {
   [[nodiscard]] bool is_ours(const JournalContents& left) const;
   void start(const Model& model);
   void write_body(const Model& model);
-  template <class T>
-  void store(std::size_t matrix, std::int64_t first, std::int64_t count, std::span<const double> packed);
-  void seal(const std::vector<Probe>& probes);
-  [[nodiscard]] std::int64_t packed_bytes() const;
-  [[nodiscard]] std::int64_t byte_of_column(std::size_t matrix, std::int64_t column) const;
-  [[nodiscard]] std::string packed_checksum(std::size_t matrix) const;
+  [[nodiscard]] static Streamed packed_by_columns(const char* path, const char* name,
+                                                  const PackedGreens& matrix, Precision precision,
+                                                  std::int64_t order);
+  [[nodiscard]] static std::vector<Streamed> streamed(const Model& model, Precision precision);
+  [[nodiscard]] bool has(std::size_t matrix, std::int64_t first, std::int64_t count) const;
+  void expect_piece(std::size_t matrix, std::int64_t first, std::int64_t count, std::int64_t entries) const;
+  template <class T, class From>
+  void store(std::size_t matrix, std::int64_t first, std::int64_t count, std::span<const From> values);
+  void seal(const std::vector<Probe>& probes, const std::shared_ptr<const HierarchicalMatrix>& compressed);
+  void write_compressed(hdf5::File& file, const Model& extra);
+  [[nodiscard]] std::int64_t streamed_bytes() const;
+  [[nodiscard]] std::int64_t place(std::size_t matrix, std::int64_t piece) const;
+  [[nodiscard]] std::vector<Gap> gaps(const JournalFrame& of) const;
+  [[nodiscard]] std::string streamed_checksum(std::size_t matrix) const;
   void mark_done(const JournalRange& range);
   void discard() noexcept;
 
@@ -155,12 +180,44 @@ struct ModelWriter::Impl {
   ContentHash content;
   ElementType element;
   std::int64_t order;
+  std::vector<Streamed> matrices;
   JournalFrame frame;
   Journal journal;
   FileDescriptor data;
   mutable std::mutex mutex;  // guards what is done and the journal
-  std::vector<Streamed> matrices;
 };
+
+ModelWriter::Impl::Streamed ModelWriter::Impl::packed_by_columns(const char* path, const char* name,
+                                                                 const PackedGreens& matrix,
+                                                                 Precision precision, std::int64_t order) {
+  Streamed streamed{path,
+                    name,
+                    has_float_entries(precision) ? hdf5::element_type<float>() : hdf5::element_type<double>(),
+                    {},
+                    matrix.smooth()};
+  for (std::int64_t j = 0; j <= order; ++j) streamed.starts.push_back(packed_column(j, order));
+  return streamed;
+}
+
+std::vector<ModelWriter::Impl::Streamed> ModelWriter::Impl::streamed(const Model& model,
+                                                                     Precision precision) {
+  std::vector<Streamed> matrices;
+  const std::int64_t order = model.stored_dofs();
+  if (const HierarchicalMatrix* compressed = model.compressed.get(); compressed != nullptr) {
+    Streamed near{near_path, "the near pairs", hdf5::element_type<float>(), {}, nullptr};
+    for (Index leaf = 0; leaf <= compressed->tree.leaves(); ++leaf)
+      near.starts.push_back(compressed->near_at[static_cast<std::size_t>(compressed->first_near_pair(leaf))]);
+    matrices.push_back(std::move(near));
+  } else {
+    matrices.push_back(
+        packed_by_columns(greens_path, "the Green's functions", model.greens, precision, order));
+  }
+  if (model.dynamics.method == DynamicsMethod::packed)
+    matrices.push_back(
+        packed_by_columns(inverse_path, "the inverse of K_bar", model.dynamics.inverse, precision, order));
+  for (Streamed& matrix : matrices) matrix.done.assign(matrix.starts.size() - 1, false);
+  return matrices;
+}
 
 ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision,
                         Leftovers leftovers)
@@ -170,12 +227,9 @@ ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision 
       counts(Counts::of(model, path.string())),
       element(model.mesh.element),
       order(model.stored_dofs()),
+      matrices(streamed(model, precision)),
       frame(examine(model)),
       journal(with_suffix(path, ".progress")) {
-  const std::vector<bool> none(static_cast<std::size_t>(order), false);
-  matrices.push_back({greens_path, "the Green's functions", none, model.greens.smooth()});
-  if (model.dynamics.method == DynamicsMethod::packed)
-    matrices.push_back({inverse_path, "the inverse of K_bar", none, model.dynamics.inverse.smooth()});
   if (leftovers == Leftovers::resume && resume()) return;
   try {
     start(model);
@@ -198,10 +252,10 @@ JournalFrame ModelWriter::Impl::examine(const Model& model) {
     bytes += static_cast<std::int64_t>(bytes_of(values).size());
   });
   check_model(model, path.string());
+  if (model.compressed != nullptr) check_tree(model, path.string());
   JournalFrame expected;
   expected.key = content.digits();
-  const int packed_matrices = model.dynamics.method == DynamicsMethod::packed ? 2 : 1;
-  expected.file_bytes = bytes + packed_matrices * packed_bytes() + metadata_allowance;
+  expected.file_bytes = bytes + streamed_bytes() + metadata_allowance;
   return expected;
 }
 
@@ -213,22 +267,23 @@ bool ModelWriter::Impl::resume() {
     return false;
   if (!is_ours(*left)) return false;
   data = open_file(partial, OpenMode::write);
-  const bool inside =
-      std::all_of(left->frame.packed_at.begin(), left->frame.packed_at.end(),
-                  [&](std::int64_t at) { return at <= left->frame.file_bytes - packed_bytes(); });
+  const std::vector<Gap> expected = gaps(left->frame);
+  const bool inside = std::all_of(expected.begin(), expected.end(), [&](const Gap& gap) {
+    return gap.at <= left->frame.file_bytes - gap.bytes;
+  });
   if (file_size(data) != left->frame.file_bytes || !inside ||
-      checksum_around(data, left->frame.packed_at, packed_bytes()) != left->frame.checksum)
+      checksum_around(data, expected) != left->frame.checksum)
     return false;
 
   frame = left->frame;
   std::vector<JournalRange> whole;
   for (const JournalRange& range : left->ranges) {
-    if (range.matrix >= std::ssize(matrices) || range.first > order || range.count > order - range.first)
-      continue;
+    if (range.matrix >= std::ssize(matrices)) continue;
     const auto matrix = static_cast<std::size_t>(range.matrix);
+    const std::int64_t pieces = matrices[matrix].pieces();
+    if (range.first > pieces || range.count > pieces - range.first) continue;
     RunningChecksum stored;
-    add_bytes(stored, data, byte_of_column(matrix, range.first),
-              byte_of_column(matrix, range.first + range.count));
+    add_bytes(stored, data, place(matrix, range.first), place(matrix, range.first + range.count));
     if (stored.digits() != range.checksum) continue;
     mark_done(range);
     whole.push_back(range);
@@ -240,13 +295,12 @@ bool ModelWriter::Impl::resume() {
 /// Whether the HDF5 library can be given what a killed run left, and its packed matrices lie where the
 /// journal says.
 bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
-  const hdf5::ElementType scalar =
-      has_float_entries(header.precision) ? hdf5::element_type<float>() : hdf5::element_type<double>();
   try {
     const hdf5::Contents contents = hdf5::Contents::read(partial);
     for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
-      const hdf5::Stored stored = contents.locate(matrices[matrix].path, scalar, 1);
-      if (stored.offset != left.frame.packed_at[matrix] || stored.bytes != packed_bytes()) return false;
+      const hdf5::Stored stored = contents.locate(matrices[matrix].path, matrices[matrix].scalar, 1);
+      if (stored.offset != left.frame.packed_at[matrix] || stored.bytes != matrices[matrix].bytes())
+        return false;
     }
   } catch (const Error&) {
     return false;
@@ -261,35 +315,65 @@ void ModelWriter::Impl::start(const Model& model) {
   make_anew(partial);
   write_body(model);
   data = open_file(partial, OpenMode::write);
-  for (const std::int64_t at : frame.packed_at) reserve_space(data, at, packed_bytes());
+  for (const Gap& gap : gaps(frame)) reserve_space(data, gap.at, gap.bytes);
   frame.file_bytes = file_size(data);
-  frame.checksum = checksum_around(data, frame.packed_at, packed_bytes());
+  frame.checksum = checksum_around(data, gaps(frame));
   journal.write({frame, {}});
 }
 
 /// Everything but what `finish` brings.
 void ModelWriter::Impl::write_body(const Model& model) {
   const hdf5::Quiet quiet;
-  const bool single = has_float_entries(header.precision);
-  const hdf5::ElementType scalar = single ? hdf5::element_type<float>() : hdf5::element_type<double>();
-  const std::int64_t entries = packed_size(order);
-
-  hdf5::File file = hdf5::File::create(partial, packed_bytes());
+  std::int64_t smallest = matrices.front().bytes();
+  for (const Streamed& matrix : matrices) smallest = std::min(smallest, matrix.bytes());
+  hdf5::File file = hdf5::File::create(partial, smallest);
   write_attributes(file, model, header);
   for_each_known_field(model, [&](const auto& field) { write_field(file, field, model, counts); });
   write_vtk_view(file);
   for (const Streamed& matrix : matrices) {
-    frame.packed_at.push_back(file.write(matrix.path, scalar, std::array{entries}, nullptr));
+    frame.packed_at.push_back(
+        file.write(matrix.path, matrix.scalar, std::array{matrix.starts.back()}, nullptr));
   }
   file.close();
 }
 
-std::int64_t ModelWriter::Impl::packed_bytes() const {
-  return packed_size(order) * bytes_per_scalar(header.precision);
+void ModelWriter::Impl::expect_piece(std::size_t matrix, std::int64_t first, std::int64_t count,
+                                     std::int64_t entries) const {
+  if (matrix < matrices.size() && first >= 0 && count >= 0 && first <= matrices[matrix].pieces() &&
+      count <= matrices[matrix].pieces() - first) {
+    const std::vector<std::int64_t>& starts = matrices[matrix].starts;
+    if (entries == starts[static_cast<std::size_t>(first + count)] - starts[static_cast<std::size_t>(first)])
+      return;
+  }
+  throw Error("columns " + std::to_string(first) + " to " + std::to_string(first + count - 1) + " with " +
+                  std::to_string(entries) + " entries do not fit a matrix of order " + std::to_string(order),
+              path.string(), "This is a mistake in the program; please report it");
 }
 
-std::int64_t ModelWriter::Impl::byte_of_column(std::size_t matrix, std::int64_t column) const {
-  return frame.packed_at[matrix] + packed_column(column, order) * bytes_per_scalar(header.precision);
+std::int64_t ModelWriter::Impl::streamed_bytes() const {
+  std::int64_t bytes = 0;
+  for (const Streamed& matrix : matrices) bytes += matrix.bytes();
+  return bytes;
+}
+
+/// Where a piece begins in the file.
+std::int64_t ModelWriter::Impl::place(std::size_t matrix, std::int64_t piece) const {
+  return frame.packed_at[matrix] + matrices[matrix].byte(piece);
+}
+
+std::vector<Gap> ModelWriter::Impl::gaps(const JournalFrame& of) const {
+  std::vector<Gap> result;
+  for (std::size_t k = 0; k < matrices.size(); ++k) result.push_back({of.packed_at[k], matrices[k].bytes()});
+  return result;
+}
+
+bool ModelWriter::Impl::has(std::size_t matrix, std::int64_t first, std::int64_t count) const {
+  const std::scoped_lock lock(mutex);
+  if (matrix >= matrices.size()) return false;
+  const std::int64_t pieces = matrices[matrix].pieces();
+  if (first < 0 || count < 0 || first > pieces || count > pieces - first) return false;
+  const auto begin = matrices[matrix].done.begin() + first;
+  return std::all_of(begin, begin + count, [](bool done) { return done; });
 }
 
 void ModelWriter::Impl::mark_done(const JournalRange& range) {
@@ -297,15 +381,17 @@ void ModelWriter::Impl::mark_done(const JournalRange& range) {
   std::fill(begin, begin + range.count, true);
 }
 
-template <class T>
+template <class T, class From>
 void ModelWriter::Impl::store(std::size_t matrix, std::int64_t first, std::int64_t count,
-                              std::span<const double> packed) {
+                              std::span<const From> values) {
   RunningChecksum stored;
   std::vector<T> converted;
-  std::int64_t at = byte_of_column(matrix, first);
-  for (auto rest = packed; !rest.empty(); rest = rest.subspan(converted.size())) {
+  std::int64_t at = place(matrix, first);
+  for (auto rest = values; !rest.empty(); rest = rest.subspan(converted.size())) {
     const auto part = rest.first(std::min(values_at_once, rest.size()));
-    converted.assign(part.begin(), part.end());
+    converted.resize(part.size());
+    std::transform(part.begin(), part.end(), converted.begin(),
+                   [](From value) { return static_cast<T>(value); });
     for (T& value : converted)
       if (std::abs(value) < std::numeric_limits<T>::min()) value = T{0};
     if (!std::all_of(converted.begin(), converted.end(), [](T value) { return std::isfinite(value); })) {
@@ -325,9 +411,9 @@ void ModelWriter::Impl::store(std::size_t matrix, std::int64_t first, std::int64
 }
 
 /// Window by window, so that the file does not fill the memory.
-std::string ModelWriter::Impl::packed_checksum(std::size_t matrix) const {
+std::string ModelWriter::Impl::streamed_checksum(std::size_t matrix) const {
   ChunkedChecksum running;
-  const std::int64_t end = byte_of_column(matrix, order);
+  const std::int64_t end = place(matrix, matrices[matrix].pieces());
   for (std::int64_t at = frame.packed_at[matrix]; at < end; at += window) {
     const std::int64_t bytes = std::min(window, end - at);
     const std::shared_ptr<const void> mapped = map_file(data, at, bytes);
@@ -336,8 +422,34 @@ std::string ModelWriter::Impl::packed_checksum(std::size_t matrix) const {
   return running.digits();
 }
 
-void ModelWriter::Impl::seal(const std::vector<Probe>& probes) {
+/// Ranks, certificate, bases and couplings.
+void ModelWriter::Impl::write_compressed(hdf5::File& file, const Model& extra) {
+  const HierarchicalMatrix& matrix = *extra.compressed;
+  counts.set(Count::certified, std::ssize(matrix.certificate) / 5, "/greens/certificate");
+  for_each_rank_field([&](const auto& field) {
+    const auto values = field.take(extra);
+    check_values(field, values, counts);
+    content.add_dataset(field.path, checksum_of(values));
+    write_field(file, field, extra, counts);
+  });
+  for (const CompressedArray& array : compressed_arrays) {
+    if (array.path == near_path) continue;  // streamed
+    const std::int64_t entries = (matrix.*array.at).back();
+    const float* numbers = (matrix.*array.data).get();
+    if (!std::all_of(numbers, numbers + entries, [](float value) { return std::isfinite(value); }))
+      refuse(path.string(), std::string(array.path) + " holds a value that is not finite");
+    file.write(array.path, hdf5::element_type<float>(), std::array{entries}, numbers);
+    ChunkedChecksum running;
+    running.append(std::as_bytes(std::span(numbers, static_cast<std::size_t>(entries))));
+    file.write_attribute(array.path, "xxh3", running.digits());
+    content.add_dataset(array.path, running.digits());
+  }
+}
+
+void ModelWriter::Impl::seal(const std::vector<Probe>& probes,
+                             const std::shared_ptr<const HierarchicalMatrix>& compressed) {
   Model extra;
+  extra.compressed = compressed;
   extra.mesh.element = element;
   extra.probes = probes;
   counts.set(Count::probes, static_cast<std::int64_t>(probes.size()), "/probes/forces");
@@ -349,11 +461,11 @@ void ModelWriter::Impl::seal(const std::vector<Probe>& probes) {
 
   std::vector<std::string> checksums;
   for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
-    checksums.push_back(packed_checksum(matrix));
+    checksums.push_back(streamed_checksum(matrix));
     content.add_dataset(matrices[matrix].path, checksums.back());
   }
   const hdf5::Quiet quiet;
-  hdf5::File file = hdf5::File::open_to_change(partial);
+  hdf5::File file = hdf5::File::open_to_change(partial, aligned_from);
   for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix)
     file.write_attribute(matrices[matrix].path, "xxh3", checksums[matrix]);
   for_each_probe_field(element, [&](const auto& field) {
@@ -362,6 +474,7 @@ void ModelWriter::Impl::seal(const std::vector<Probe>& probes) {
     content.add_dataset(field.path, checksum_of(values));
     write_field(file, field, extra, counts);
   });
+  if (compressed != nullptr) write_compressed(file, extra);
   file.write_attribute("/", "content_hash", content.digits());
   file.close();
   rename_durably(partial, path);
@@ -381,30 +494,18 @@ ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precisi
 ModelWriter::~ModelWriter() = default;
 
 bool ModelWriter::has_columns(std::int64_t first, std::int64_t count, PackedMatrix matrix) const {
-  const std::scoped_lock lock(impl_->mutex);
-  const auto which = static_cast<std::size_t>(matrix);
-  if (which >= impl_->matrices.size() || first < 0 || count < 0 || first > impl_->order ||
-      count > impl_->order - first)
-    return false;
-  const auto begin = impl_->matrices[which].done.begin() + first;
-  return std::all_of(begin, begin + count, [](bool done) { return done; });
+  return impl_->has(static_cast<std::size_t>(matrix), first, count);
 }
 
 void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::span<const double> packed,
                                 PackedMatrix matrix) {
-  const std::int64_t n = impl_->order;
   const auto which = static_cast<std::size_t>(matrix);
-  if (which >= impl_->matrices.size() || first < 0 || count < 0 || first > n || count > n - first ||
-      static_cast<std::int64_t>(packed.size()) != packed_column(first + count, n) - packed_column(first, n)) {
-    throw Error("columns " + std::to_string(first) + " to " + std::to_string(first + count - 1) + " with " +
-                    std::to_string(packed.size()) + " entries do not fit a matrix of order " +
-                    std::to_string(n),
-                impl_->path.string(), "This is a mistake in the program; please report it");
-  }
+  impl_->expect_piece(which, first, count, std::ssize(packed));
   try {
-    if (const SmoothPart* smooth = impl_->matrices[which].smooth.get(); smooth != nullptr)
-      impl_->store<float>(which, first, count, without(*smooth, first, n, packed));
-    else if (has_float_entries(impl_->header.precision))
+    const Impl::Streamed& to = impl_->matrices[which];
+    if (to.smooth != nullptr)
+      impl_->store<float, double>(which, first, count, without(*to.smooth, first, impl_->order, packed));
+    else if (to.scalar.bytes == sizeof(float))
       impl_->store<float>(which, first, count, packed);
     else
       impl_->store<double>(which, first, count, packed);
@@ -414,7 +515,27 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
   }
 }
 
-void ModelWriter::finish(const std::vector<Probe>& probes) {
+bool ModelWriter::has_near(Index leaf) const {
+  return impl_->has(near_matrix, leaf, 1);
+}
+
+void ModelWriter::read_near(Index leaf, std::span<float> entries) const {
+  impl_->expect_piece(near_matrix, leaf, 1, std::ssize(entries));
+  read_exactly(impl_->data, std::as_writable_bytes(entries), impl_->place(near_matrix, leaf));
+}
+
+void ModelWriter::write_near(Index leaf, std::span<const float> entries) {
+  impl_->expect_piece(near_matrix, leaf, 1, std::ssize(entries));
+  try {
+    impl_->store<float>(near_matrix, leaf, 1, entries);
+  } catch (...) {
+    discard();
+    throw;
+  }
+}
+
+void ModelWriter::finish(const std::vector<Probe>& probes,
+                         std::shared_ptr<const HierarchicalMatrix> compressed) {
   for (const Impl::Streamed& matrix : impl_->matrices) {
     const auto missing = std::find(matrix.done.begin(), matrix.done.end(), false);
     if (missing != matrix.done.end()) {
@@ -424,7 +545,7 @@ void ModelWriter::finish(const std::vector<Probe>& probes) {
     }
   }
   try {
-    impl_->seal(probes);
+    impl_->seal(probes, compressed);
   } catch (...) {
     discard();
     throw;

@@ -48,6 +48,8 @@ Scope read_scope(const TomlTable& storage, int dimension) {
   return scope == "layers" ? Scope::layers : Scope::full;
 }
 
+constexpr double least_tolerance = 1e-4;  // of compression: below it packed storage is no larger
+
 Index read_layers(const TomlTable& storage, Scope scope) {
   if (scope == Scope::layers) {
     return storage.has("layers") ? storage.count("layers") : 1;
@@ -67,6 +69,29 @@ std::optional<Precision> read_precision(const TomlTable& storage) {
        {Precision::single_precision, Precision::split_precision, Precision::double_precision})
     if (name == name_of(precision)) return precision;
   return std::nullopt;
+}
+
+StorageForm read_form(const TomlTable& storage) {
+  if (!storage.has("compression")) return StorageForm::automatic;
+  const std::string name = storage.choice("compression", {"auto", "none", "h2"});
+  if (name == "none") return StorageForm::packed;
+  if (name == "auto") return StorageForm::automatic;
+  if (storage.has("precision") &&
+      storage.choice("precision", {"auto", "single", "split", "double"}) != "auto")
+    storage.fail("precision", "[storage] precision applies to Green's functions that are not compressed",
+                 "remove precision, or set compression = \"none\"");
+  return StorageForm::compressed;
+}
+
+double read_tolerance(const TomlTable& storage, StorageForm form) {
+  const double tolerance = storage.positive("tolerance", Description{}.tolerance);
+  if (form == StorageForm::packed && storage.has("tolerance"))
+    storage.fail("tolerance", "[storage] tolerance applies to compressed Green's functions only",
+                 "remove tolerance, or set compression = \"h2\"");
+  if (tolerance < least_tolerance || tolerance > 1.0)
+    storage.fail("tolerance", "[storage] tolerance must be 1e-4 to 1",
+                 "it is the largest relative error that forces may have; compression = \"none\" has none");
+  return tolerance;
 }
 
 /// The name becomes a file name.
@@ -127,6 +152,8 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   result.scope = read_scope(storage, dimension);
   result.layers = read_layers(storage, result.scope);
   result.precision = read_precision(storage);
+  result.form = read_form(storage);
+  result.tolerance = read_tolerance(storage, result.form);
   if (root.has("overlay")) {
     result.overlay =
         read_overlay(root.table("overlay", keys_of("[overlay]")), dimension, result.scope, result.layers);

@@ -122,6 +122,13 @@ struct DynamicsOptions {
   std::string place;           ///< of `modes`, else of the table: file, line and column, for errors
 };
 
+/// How the Green's functions are stored.
+enum class StorageForm : std::uint8_t {
+  automatic,   ///< compressed where there are many stored nodes
+  packed,      ///< every entry
+  compressed,  ///< in nested low-rank form, H^2
+};
+
 /// The whole model.toml, checked.
 struct Description {
   std::filesystem::path file;  ///< model.toml itself
@@ -138,6 +145,8 @@ struct Description {
   Scope scope = Scope::layers;
   Index layers = 1;
   std::optional<Precision> precision;  ///< empty: the first that is good enough (precision.h)
+  StorageForm form = StorageForm::automatic;
+  double tolerance = 0.005;  ///< compressed: most that forces may be off, relative to the largest [-]
   std::optional<OverlayRegions> overlay;
   std::optional<DynamicsOptions> dynamics;
 };

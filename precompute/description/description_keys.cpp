@@ -181,7 +181,13 @@ KeyTable storage() {
         "nodes whose Green's functions are kept: `\"surface\"`, `\"layers\"` (the surface and what is close "
         "below) or `\"full\"`"},
        {"layers", "", shown(Description{}.layers), "scope `\"layers\"`: how many elements deep"},
-       {"precision", "", "`\"auto\"`", "`\"auto\"`, `\"single\"`, `\"split\"` or `\"double\"`"}}};
+       {"precision", "", "`\"auto\"`", "`\"auto\"`, `\"single\"`, `\"split\"` or `\"double\"`"},
+       {"compression", "", "`\"auto\"`",
+        "`\"none\"`: every entry; `\"h2\"`: in nested low-rank form; `\"auto\"`: that from 5 000 stored "
+        "nodes "
+        "on, where neither precision nor packed dynamics are asked for"},
+       {"tolerance", "", shown(Description{}.tolerance),
+        "compressed: largest relative error that forces may have, 1e-4 to 1"}}};
 }
 
 KeyTable overlay() {

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <mutex>
 #include <random>
 #include <vector>
@@ -19,6 +20,9 @@ using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using Dofs = std::vector<std::int64_t>;
 
 constexpr Index spare_samples = 12;         // more than the largest rank: what they say of it is certain
+constexpr Index samples = most_rank;        // random loads
+constexpr Index coupled_at_once = 4;        // clusters whose couplings are solved together
+constexpr Index leaves_estimated = 64;      // whose flops are counted for an estimate
 constexpr std::int64_t loads_at_once = 32;  // solved together
 
 std::size_t at(std::int64_t i) {
@@ -59,30 +63,23 @@ std::shared_ptr<float[]> floats(std::int64_t count) {
   return std::shared_ptr<float[]>(new float[at(std::max<std::int64_t>(count, 1))]);
 }
 
-class Compressor {
- public:
-  Compressor(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
-             const ClusteredNodes& nodes, const CompressionOptions& options,
-             const CompressionProgress& progress)
-      : factor_(factor),
-        solver_(factor),
-        stored_dofs_(stored_dofs),
-        options_(options),
-        progress_(progress),
-        workspaces_(at(options.jobs)) {
-    matrix_.dimension = dimension;
-    matrix_.tree = nodes.tree;
-    matrix_.near_pair = nodes.near_pair;
-    matrix_.far_pair = nodes.far_pair;
-    matrix_.rank.assign(at(nodes.tree.clusters()), 0);
-    matrix_.index();
-  }
+}  // namespace
 
-  std::optional<HierarchicalMatrix> run() {
-    if (!solve_near() || !sample() || !climb()) return std::nullopt;
-    pack();
-    return std::move(matrix_);
-  }
+struct Compression::Impl {
+ public:
+  Impl(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
+       const ClusteredNodes& nodes, int jobs, CompressionProgress progress)
+      : solver_(factor),
+        stored_dofs_(stored_dofs),
+        jobs_(jobs),
+        progress_(std::move(progress)),
+        matrix_(compression_frame(nodes, dimension)),
+        workspaces_(at(jobs)) {}
+
+  bool solve_near(const NearStore& store);
+  bool sample();
+  bool climb(double cut);
+  [[nodiscard]] HierarchicalMatrix packed() const;
 
  private:
   /// What is known of a cluster while its level is worked on.
@@ -127,22 +124,17 @@ class Compressor {
     return stopped_;
   }
 
-  bool solve_near();
-  void solve_near_of(Index leaf, SelectedSolver::Workspace& workspace);
-  bool sample();
+  void solve_near_of(Index leaf, std::span<float> entries, SelectedSolver::Workspace& workspace);
   Front leaf_front(Index leaf) const;
   Front joined_front(Index c);
-  void thin_out(Index c, Front& front) const;
-  bool climb();
-  void couple(Index c, SelectedSolver::Workspace& workspace);
+  void thin_out(Index c, double cut, Front& front) const;
+  void couple(Index first, Index end, SelectedSolver::Workspace& workspace);
   void take_off(Index c);
-  void pack();
 
-  const Factor& factor_;
   SelectedSolver solver_;
   std::span<const std::int64_t> stored_dofs_;
-  CompressionOptions options_;
-  const CompressionProgress& progress_;
+  int jobs_;
+  CompressionProgress progress_;
   HierarchicalMatrix matrix_;
   std::shared_ptr<float[]> near_;
   Eigen::VectorXd root_;             // [order] of D, 0 where held
@@ -155,13 +147,20 @@ class Compressor {
   bool stopped_ = false;
 };
 
-bool Compressor::solve_near() {
+bool Compression::Impl::solve_near(const NearStore& store) {
   near_ = floats(matrix_.near_at.back());
   const Index leaves = matrix_.tree.leaves();
   done_ = 0;
-  parallel_for(leaves, options_.jobs, [&](std::int64_t leaf, int worker) {
+  parallel_for(leaves, jobs_, [&](std::int64_t i, int worker) {
     if (stopped()) return;
-    solve_near_of(matrix_.tree.first_leaf() + static_cast<Index>(leaf), workspaces_[at(worker)]);
+    const auto leaf = static_cast<Index>(i);
+    const std::int64_t first = matrix_.near_at[at(matrix_.first_near_pair(leaf))],
+                       end = matrix_.near_at[at(matrix_.first_near_pair(leaf + 1))];
+    const std::span<float> entries(near_.get() + first, at(end - first));
+    if (!store.fetch || !store.fetch(leaf, entries)) {
+      solve_near_of(matrix_.tree.first_leaf() + leaf, entries, workspaces_[at(worker)]);
+      if (store.keep) store.keep(leaf, entries);
+    }
     tick(CompressionStage::near, leaves);
   });
   matrix_.near = near_;
@@ -177,7 +176,8 @@ bool Compressor::solve_near() {
 }
 
 /// The pairs in which the leaf is the column.
-void Compressor::solve_near_of(Index leaf, SelectedSolver::Workspace& workspace) {
+void Compression::Impl::solve_near_of(Index leaf, std::span<float> entries,
+                                      SelectedSolver::Workspace& workspace) {
   const std::int64_t width = end_dof(leaf) - first_dof(leaf);
   Dofs rows;
   for (const auto& [row, pair] : neighbours(leaf)) {
@@ -186,22 +186,15 @@ void Compressor::solve_near_of(Index leaf, SelectedSolver::Workspace& workspace)
   }
   std::vector<double> block(rows.size() * at(width));
   solver_.solve(rows, stored_dofs_.subspan(at(first_dof(leaf)), at(width)), workspace, block);
-  const double* from = block.data();
-  for (const auto& [row, pair] : neighbours(leaf)) {
-    if (row < leaf) continue;
-    const std::int64_t count = width * (end_dof(row) - first_dof(row));
-    float* to = near_.get() + matrix_.near_at[at(pair)];
-    std::transform(from, from + count, to, [](double value) { return static_cast<float>(value); });
-    from += count;
-    if (row != leaf) continue;
-    for (std::int64_t i = 0; i < width; ++i)
-      for (std::int64_t j = i + 1; j < width; ++j) to[i * width + j] = to[j * width + i];
-  }
+  std::transform(block.begin(), block.end(), entries.begin(),
+                 [](double value) { return static_cast<float>(value); });
+  for (std::int64_t i = 0; i < width; ++i)  // the leaf itself comes first
+    for (std::int64_t j = i + 1; j < width; ++j) entries[at(i * width + j)] = entries[at(j * width + i)];
 }
 
 /// Loads of +-1 over the root of D on every stored dof, and what they do.
-bool Compressor::sample() {
-  const std::int64_t n = matrix_.order(), m = options_.samples;
+bool Compression::Impl::sample() {
+  const std::int64_t n = matrix_.order(), m = samples;
   load_.resize(n, m);
   response_.resize(n, m);
   std::mt19937_64 random(20261125);
@@ -209,27 +202,22 @@ bool Compressor::sample() {
     for (std::int64_t k = 0; k < m; ++k)
       load_(i, k) = root_[i] > 0.0 ? ((random() >> 63) != 0 ? 1.0 : -1.0) / root_[i] : 0.0;
   done_ = 0;
-  for (std::int64_t first = 0; first < m; first += loads_at_once) {
-    const std::int64_t count = std::min(loads_at_once, m - first);
-    std::vector<double> f(at(factor_.order() * count), 0.0);
-    for (std::int64_t i = 0; i < n; ++i) {
-      if (stored_dofs_[at(i)] < 0) continue;
-      for (std::int64_t k = 0; k < count; ++k)
-        f[at(k * factor_.order() + stored_dofs_[at(i)])] = load_(i, first + k);
-    }
-    const std::vector<double> u = factor_.solve(f, count);
-    for (std::int64_t i = 0; i < n; ++i) {
-      for (std::int64_t k = 0; k < count; ++k)
-        response_(i, first + k) = root_[i] > 0.0 ? u[at(k * factor_.order() + stored_dofs_[at(i)])] : 0.0;
-    }
-    tick(CompressionStage::samples, (m + loads_at_once - 1) / loads_at_once);
-    if (stopped_) return false;
-  }
-  return true;
+  const std::int64_t blocks = m / loads_at_once;
+  parallel_for(blocks, jobs_, [&](std::int64_t block, int worker) {
+    if (stopped()) return;
+    const std::int64_t first = block * loads_at_once;
+    const Rows f = load_.middleCols(first, loads_at_once);
+    Rows u(n, loads_at_once);
+    solver_.multiply(stored_dofs_, loads_at_once, {f.data(), at(f.size())}, workspaces_[at(worker)],
+                     {u.data(), at(u.size())});
+    response_.middleCols(first, loads_at_once) = u;
+    tick(CompressionStage::samples, blocks);
+  });
+  return !stopped_;
 }
 
 /// All dofs of a leaf, loads on its neighbours taken off.
-Compressor::Front Compressor::leaf_front(Index leaf) const {
+Compression::Impl::Front Compression::Impl::leaf_front(Index leaf) const {
   Front front;
   const std::int64_t first = first_dof(leaf), n = end_dof(leaf) - first;
   for (std::int64_t i = 0; i < n; ++i) front.skeleton.push_back(first + i);
@@ -253,12 +241,12 @@ Compressor::Front Compressor::leaf_front(Index leaf) const {
 }
 
 /// The skeletons of both children.
-Compressor::Front Compressor::joined_front(Index c) {
+Compression::Impl::Front Compression::Impl::joined_front(Index c) {
   Front front;
   const Front &a = fronts_[at(2 * c + 1)], &b = fronts_[at(2 * c + 2)];
   front.skeleton = a.skeleton;
   front.skeleton.insert(front.skeleton.end(), b.skeleton.begin(), b.skeleton.end());
-  const Eigen::Index m = options_.samples;
+  const Eigen::Index m = samples;
   front.response.resize(a.response.rows() + b.response.rows(), m);
   front.response << a.response, b.response;
   front.load.resize(front.response.rows(), m);
@@ -267,11 +255,10 @@ Compressor::Front Compressor::joined_front(Index c) {
 }
 
 /// Chooses the skeleton among the dofs of the front and carries loads and responses over to it.
-void Compressor::thin_out(Index c, Front& front) const {
-  const Interpolation chosen =
-      interpolate(front.response, options_.cut * std::sqrt(double(options_.samples)));
+void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
+  const Interpolation chosen = interpolate(front.response, cut * std::sqrt(double(samples)));
   const auto rank = std::ssize(chosen.skeleton);
-  if (rank > std::min<std::int64_t>(options_.samples - spare_samples, most_rank)) {
+  if (rank > std::min<std::int64_t>(samples - spare_samples, most_rank)) {
     throw Error("a cluster of " + std::to_string(matrix_.tree.end(c) - matrix_.tree.begin(c)) +
                     " stored nodes needs more than " + std::to_string(rank - 1) +
                     " terms, so the Green's functions cannot be compressed this exactly",
@@ -280,7 +267,7 @@ void Compressor::thin_out(Index c, Front& front) const {
   Front thin;
   thin.V = chosen.follow;  // of rows over the root of D
   for (Eigen::Index i = 0; i < thin.V.rows(); ++i) thin.V.row(i) *= root_[front.skeleton[at(i)]];
-  thin.response.resize(rank, options_.samples);
+  thin.response.resize(rank, samples);
   for (std::int64_t k = 0; k < rank; ++k) {
     const std::int64_t i = chosen.skeleton[at(k)];
     const std::int64_t dof = front.skeleton[at(i)];
@@ -292,26 +279,35 @@ void Compressor::thin_out(Index c, Front& front) const {
   front = std::move(thin);
 }
 
-/// The couplings of the far pairs in which the cluster is the column.
-void Compressor::couple(Index c, SelectedSolver::Workspace& workspace) {
-  Dofs rows;
-  for (const auto& [row, pair] : partners(c)) {
-    if (row > c) rows.insert(rows.end(), fronts_[at(row)].skeleton.begin(), fronts_[at(row)].skeleton.end());
+/// The couplings of the far pairs in which the clusters [first, end) are columns: side by side in the body,
+/// they share most of a solve.
+void Compression::Impl::couple(Index first, Index end, SelectedSolver::Workspace& workspace) {
+  Dofs columns, rows;
+  std::map<Index, std::int64_t> row_of;  // where a cluster's skeleton begins
+  for (Index c = first; c < end; ++c) {
+    const Dofs& skeleton = fronts_[at(c)].skeleton;
+    columns.insert(columns.end(), skeleton.begin(), skeleton.end());
+    for (const auto& [row, pair] : partners(c)) {
+      if (row < c || !row_of.emplace(row, std::ssize(rows)).second) continue;
+      rows.insert(rows.end(), fronts_[at(row)].skeleton.begin(), fronts_[at(row)].skeleton.end());
+    }
   }
-  const Dofs columns = dofs_of(fronts_[at(c)].skeleton);
-  std::vector<double> block(rows.size() * columns.size());
-  solver_.solve(dofs_of(rows), columns, workspace, block);
-  const double* from = block.data();
-  for (const auto& [row, pair] : partners(c)) {
-    if (row < c) continue;
-    const auto height = std::ssize(fronts_[at(row)].skeleton);
-    coupling_[at(pair)] = Eigen::Map<const Rows>(from, height, std::ssize(columns)).cast<float>();
-    from += height * std::ssize(columns);
+  Rows block(std::ssize(rows), std::ssize(columns));
+  solver_.solve(dofs_of(rows), dofs_of(columns), workspace, {block.data(), at(block.size())});
+  std::int64_t column = 0;
+  for (Index c = first; c < end; ++c) {
+    const auto width = std::ssize(fronts_[at(c)].skeleton);
+    for (const auto& [row, pair] : partners(c)) {
+      if (row > c)
+        coupling_[at(pair)] =
+            block.block(row_of[row], column, std::ssize(fronts_[at(row)].skeleton), width).cast<float>();
+    }
+    column += width;
   }
 }
 
 /// Takes the loads on the cluster's partners off its response.
-void Compressor::take_off(Index c) {
+void Compression::Impl::take_off(Index c) {
   Front& front = fronts_[at(c)];
   Rows by_partners = Rows::Zero(front.response.rows(), front.response.cols());
   for (const auto& [other, pair] : partners(c)) {
@@ -326,10 +322,10 @@ void Compressor::take_off(Index c) {
     front.response.row(i) -= by_partners.row(i) / root_[front.skeleton[at(i)]];
 }
 
-bool Compressor::climb() {
+bool Compression::Impl::climb(double cut) {
   const ClusterTree& tree = matrix_.tree;
-  fronts_.resize(at(tree.clusters()));
-  coupling_.resize(matrix_.far_pair.size());
+  fronts_.assign(at(tree.clusters()), {});
+  coupling_.assign(matrix_.far_pair.size(), {});
   std::vector<bool> needed(at(tree.clusters()), false);
   std::int64_t count = 0;
   for (Index c = 1; c < tree.clusters(); ++c) {
@@ -340,16 +336,21 @@ bool Compressor::climb() {
   for (int level = tree.levels; level > 0; --level) {
     const Index first = tree.first_of_level(level), clusters = Index{1} << level;
     const auto for_each = [&](auto&& work) {
-      parallel_for(clusters, options_.jobs, [&](std::int64_t i, int worker) {
+      parallel_for(clusters, jobs_, [&](std::int64_t i, int worker) {
         if (const Index c = first + static_cast<Index>(i); needed[at(c)] && !stopped()) work(c, worker);
       });
     };
     for_each([&](Index c, int) {
       Front front = level == tree.levels ? leaf_front(c) : joined_front(c);
-      thin_out(c, front);
+      thin_out(c, cut, front);
       fronts_[at(c)] = std::move(front);
     });
-    for_each([&](Index c, int worker) { couple(c, workspaces_[at(worker)]); });
+    parallel_for((clusters + coupled_at_once - 1) / coupled_at_once, jobs_,
+                 [&](std::int64_t group, int worker) {
+                   const auto c = first + static_cast<Index>(group) * coupled_at_once;
+                   if (!stopped())
+                     couple(c, std::min(c + coupled_at_once, first + clusters), workspaces_[at(worker)]);
+                 });
     for_each([&](Index c, int) {
       take_off(c);
       tick(CompressionStage::far, count);
@@ -363,13 +364,14 @@ bool Compressor::climb() {
 }
 
 /// Puts bases and couplings one after the other.
-void Compressor::pack() {
+HierarchicalMatrix Compression::Impl::packed() const {
   const ClusterTree& tree = matrix_.tree;
+  HierarchicalMatrix matrix = matrix_;
   for (Index c = 0; c < tree.clusters(); ++c)
-    matrix_.rank[at(c)] = static_cast<Index>(fronts_[at(c)].skeleton.size());
-  matrix_.index();
-  const auto basis = floats(matrix_.basis_at.back()), transfer = floats(matrix_.transfer_at.back()),
-             coupling = floats(matrix_.coupling_at.back());
+    matrix.rank[at(c)] = static_cast<Index>(fronts_[at(c)].skeleton.size());
+  matrix.index();
+  const auto basis = floats(matrix.basis_at.back()), transfer = floats(matrix.transfer_at.back()),
+             coupling = floats(matrix.coupling_at.back());
   const auto put = [](const auto& block, float* to) {
     Eigen::Map<FloatRows>(to, block.rows(), block.cols()) = block.template cast<float>();
   };
@@ -377,26 +379,71 @@ void Compressor::pack() {
     const Eigen::MatrixXd& V = fronts_[at(c)].V;
     if (V.cols() == 0) continue;
     if (c >= tree.first_leaf()) {
-      put(V, basis.get() + matrix_.basis_at[at(c - tree.first_leaf())]);
+      put(V, basis.get() + matrix.basis_at[at(c - tree.first_leaf())]);
     } else {
-      put(V.topRows(matrix_.rank[at(2 * c + 1)]), transfer.get() + matrix_.transfer_at[at(2 * c + 1)]);
-      put(V.bottomRows(matrix_.rank[at(2 * c + 2)]), transfer.get() + matrix_.transfer_at[at(2 * c + 2)]);
+      put(V.topRows(matrix.rank[at(2 * c + 1)]), transfer.get() + matrix.transfer_at[at(2 * c + 1)]);
+      put(V.bottomRows(matrix.rank[at(2 * c + 2)]), transfer.get() + matrix.transfer_at[at(2 * c + 2)]);
     }
   }
   for (std::size_t p = 0; p < coupling_.size(); ++p)
-    put(coupling_[p], coupling.get() + matrix_.coupling_at[p]);
-  matrix_.basis = basis;
-  matrix_.transfer = transfer;
-  matrix_.coupling = coupling;
+    put(coupling_[p], coupling.get() + matrix.coupling_at[p]);
+  matrix.basis = basis;
+  matrix.transfer = transfer;
+  matrix.coupling = coupling;
+  return matrix;
 }
 
-}  // namespace
+Compression::Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
+                         const ClusteredNodes& nodes, int jobs, CompressionProgress progress)
+    : impl_(std::make_unique<Impl>(factor, stored_dofs, dimension, nodes, jobs, std::move(progress))) {}
 
-std::optional<HierarchicalMatrix> compress(const Factor& factor, std::span<const std::int64_t> stored_dofs,
-                                           int dimension, const ClusteredNodes& nodes,
-                                           const CompressionOptions& options,
-                                           const CompressionProgress& progress) {
-  return Compressor(factor, stored_dofs, dimension, nodes, options, progress).run();
+Compression::~Compression() = default;
+
+bool Compression::prepare(const NearStore& store) {
+  return impl_->solve_near(store) && impl_->sample();
+}
+
+std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {
+  if (!impl_->climb(cut)) return nullptr;
+  return std::make_shared<HierarchicalMatrix>(impl_->packed());
+}
+
+HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension) {
+  HierarchicalMatrix frame;
+  frame.dimension = dimension;
+  frame.tree = nodes.tree;
+  frame.near_pair = nodes.near_pair;
+  frame.far_pair = nodes.far_pair;
+  frame.rank.assign(at(nodes.tree.clusters()), 0);
+  frame.index();
+  return frame;
+}
+
+double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dofs,
+                  const HierarchicalMatrix& frame) {
+  const SelectedSolver solver(factor);
+  const ClusterTree& tree = frame.tree;
+  const auto dofs_of = [&](Index c) {
+    return stored_dofs.subspan(at(std::int64_t{frame.dimension} * tree.begin(c)),
+                               at(std::int64_t{frame.dimension} * (tree.end(c) - tree.begin(c))));
+  };
+  const Index step = std::max<Index>(1, tree.leaves() / leaves_estimated);
+  double flops = 0.0;
+  Index counted = 0;
+  for (Index leaf = 0; leaf < tree.leaves(); leaf += step, ++counted) {
+    Dofs rows;
+    for (std::int64_t p = frame.first_near_pair(leaf); p < frame.first_near_pair(leaf + 1); ++p) {
+      const auto more = dofs_of(frame.near_pair[at(p)][0]);
+      rows.insert(rows.end(), more.begin(), more.end());
+    }
+    flops += solver.flops(rows, dofs_of(tree.first_leaf() + leaf));
+  }
+  return flops * static_cast<double>(tree.leaves()) / static_cast<double>(counted);
+}
+
+std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame) {
+  const std::int64_t leaf = frame.tree.nodes / frame.tree.leaves() + 1;
+  return SelectedSolver(factor).workspace_bytes(frame.dimension * leaf);
 }
 
 }  // namespace palpate

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 #include <functional>
-#include <optional>
+#include <memory>
 #include <span>
 
 #include "formats/hierarchical.h"
@@ -12,34 +12,58 @@
 
 namespace palpate {
 
-/// What decides how good and how large the compressed matrix is.
-struct CompressionOptions {
-  /// Where low rank is cut off: of D^-1/2 Xi D^-1/2, D the diagonal of Xi, times random loads of +-1 on all
-  /// that is far [-].
-  double cut = 1e-2;
-  Index samples = most_rank;  ///< random loads
-  int jobs = 1;               ///< threads; the result does not depend on it
-};
-
 /// The parts that a compression has.
 enum class CompressionStage : std::uint8_t { near, samples, far };
 
 /// Told which share of a part is done; false stops.
 using CompressionProgress = std::function<bool(CompressionStage, double)>;
 
-/// Xi of the stored dofs as a HierarchicalMatrix. `stored_dofs` [d N] are dofs of K, d a node, in the order
-/// of `nodes`, -1 where held.
+/// Where near pairs are kept, leaf [0, leaves) by leaf of their columns: what an earlier run has solved need
+/// not be solved again. Called by several threads at once.
+struct NearStore {
+  std::function<bool(Index leaf, std::span<float> entries)> fetch;  ///< false: it has none
+  std::function<void(Index leaf, std::span<const float> entries)> keep;
+};
+
+/// Xi of the stored dofs as a HierarchicalMatrix.
 ///
 /// Near pairs and the couplings of far ones are entries of Xi, exact but for their rounding to single. What
 /// is cut off is in the bases: of each cluster some dofs, its skeleton, are chosen by a pivoted QR of what
 /// random loads on all that is far from it do to it, and the rows of V say how the others follow them. What
 /// loads on the near do is taken off with the near pairs and, going up the tree, with the couplings of each
-/// level, so that the same random loads serve all levels (Boukaram and others, arXiv 2506.16759).
-///
-/// Nothing when `progress` said stop. Throws Error where a rank would be above what the samples can tell.
-std::optional<HierarchicalMatrix> compress(const Factor& factor, std::span<const std::int64_t> stored_dofs,
-                                           int dimension, const ClusteredNodes& nodes,
-                                           const CompressionOptions& options,
-                                           const CompressionProgress& progress);
+/// level, so that the same random loads serve all levels (Boukaram and others, arXiv 2506.16759). The result
+/// depends on neither `jobs` nor what a store had.
+class Compression {
+ public:
+  /// `stored_dofs` [d N] are dofs of K, d a node, in the order of `nodes`, -1 where held. All are kept by
+  /// reference.
+  Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
+              const ClusteredNodes& nodes, int jobs, CompressionProgress progress);
+  ~Compression();
+  Compression(const Compression&) = delete;
+  Compression& operator=(const Compression&) = delete;
+
+  /// Solves for near pairs and random loads. False when `progress` said stop.
+  bool prepare(const NearStore& store = {});
+
+  /// The matrix, cut off where rows of D^-1/2 Xi D^-1/2, D the diagonal of Xi, are moved by at most `cut` by
+  /// random loads of +-1 on all that is far. Once prepared, for any number of cuts. Null when `progress` said
+  /// stop. Throws Error where a rank would be above what the random loads can tell.
+  std::shared_ptr<HierarchicalMatrix> compress(double cut);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Tree and pairs of a matrix before it is made.
+HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension);
+
+/// Multiplications and additions of the near pairs, from some of the leaves.
+double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dofs,
+                  const HierarchicalMatrix& frame);
+
+/// Bytes of one thread's workspace.
+std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame);
 
 }  // namespace palpate

@@ -36,15 +36,40 @@ void SelectedSolver::solve(std::span<const std::int64_t> rows, std::span<const s
     if (dof >= 0)
       sweep.X[static_cast<std::size_t>(position_[static_cast<std::size_t>(dof)] * width + c)] = 1.0;
   }
-  for (std::size_t s = 0; s < supernodes.size(); ++s)
-    if (sweep.on_path[s]) sweeps_.forward(supernodes[s], width, width, sweep);
-  for (std::size_t s = supernodes.size(); s-- > 0;)
-    if (workspace.wanted[s]) sweeps_.backward(supernodes[s], sweep.on_path[s] != 0, width, width, sweep);
+  this->sweep(width, workspace);
   for (std::size_t r = 0; r < rows.size(); ++r) {
     if (rows[r] < 0) continue;
     const double* row = sweep.X.data() + position_[static_cast<std::size_t>(rows[r])] * width;
     std::copy_n(row, width, block.data() + static_cast<std::int64_t>(r) * width);
   }
+}
+
+/// Both substitutions over what is marked.
+void SelectedSolver::sweep(std::int64_t width, Workspace& workspace) const {
+  SupernodalSweeps::Workspace& sweep = workspace.sweep;
+  const std::span<const Supernode> supernodes = sweeps_.supernodes();
+  for (std::size_t s = 0; s < supernodes.size(); ++s)
+    if (sweep.on_path[s]) sweeps_.forward(supernodes[s], width, width, sweep);
+  for (std::size_t s = supernodes.size(); s-- > 0;)
+    if (workspace.wanted[s]) sweeps_.backward(supernodes[s], sweep.on_path[s] != 0, width, width, sweep);
+}
+
+void SelectedSolver::multiply(std::span<const std::int64_t> dofs, std::int64_t columns,
+                              std::span<const double> f, Workspace& workspace, std::span<double> u) const {
+  sweeps_.prepare(workspace.sweep, columns);
+  mark(dofs, workspace.sweep.on_path);
+  workspace.wanted = workspace.sweep.on_path;
+  std::vector<double>& X = workspace.sweep.X;
+  std::fill(X.begin(), X.end(), 0.0);
+  const auto row = [&](std::size_t i) {
+    return X.begin() + position_[static_cast<std::size_t>(dofs[i])] * columns;
+  };
+  for (std::size_t i = 0; i < dofs.size(); ++i)
+    if (dofs[i] >= 0) std::copy_n(f.begin() + static_cast<std::int64_t>(i) * columns, columns, row(i));
+  sweep(columns, workspace);
+  std::fill(u.begin(), u.end(), 0.0);
+  for (std::size_t i = 0; i < dofs.size(); ++i)
+    if (dofs[i] >= 0) std::copy_n(row(i), columns, u.begin() + static_cast<std::int64_t>(i) * columns);
 }
 
 double SelectedSolver::flops(std::span<const std::int64_t> rows,

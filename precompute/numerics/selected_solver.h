@@ -27,6 +27,10 @@ class SelectedSolver {
   void solve(std::span<const std::int64_t> rows, std::span<const std::int64_t> columns, Workspace& workspace,
              std::span<double> block) const;
 
+  /// u = Xi f for loads f [dofs x columns] on some dofs, and their displacements u, both row-major.
+  void multiply(std::span<const std::int64_t> dofs, std::int64_t columns, std::span<const double> f,
+                Workspace& workspace, std::span<double> u) const;
+
   /// Multiplications and additions of `solve`.
   [[nodiscard]] double flops(std::span<const std::int64_t> rows, std::span<const std::int64_t> columns) const;
 
@@ -35,6 +39,7 @@ class SelectedSolver {
   }
 
  private:
+  void sweep(std::int64_t width, Workspace& workspace) const;
   void mark(std::span<const std::int64_t> dofs, std::vector<std::uint8_t>& marks) const;
 
   SupernodalSweeps sweeps_;

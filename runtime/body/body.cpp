@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "formats/hierarchical.h"
 #include "runtime/body/modal_newmark.h"
 #include "runtime/body/surface_numbering.h"
 #include "runtime/solve/tick_tuning.h"
@@ -21,9 +22,11 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 void check_sizes(const Model& model) {
   const std::size_t nodes = model.mesh.nodes.size();
   const auto in_mesh = [nodes](Index node) { return node >= 0 && static_cast<std::size_t>(node) < nodes; };
-  if (model.greens.order() != model.stored_dofs() ||
+  const std::int64_t order =
+      model.compressed != nullptr ? model.compressed->order() : model.greens.order();
+  if (order != model.stored_dofs() ||
       !std::all_of(model.stored_nodes.begin(), model.stored_nodes.end(), in_mesh)) {
-    throw Error("the Green's functions of " + std::to_string(model.greens.order()) +
+    throw Error("the Green's functions of " + std::to_string(order) +
                     " dofs do not belong to the " + std::to_string(model.stored_nodes.size()) +
                     " stored nodes of a mesh of " + std::to_string(nodes),
                 model.name, "precompute the model again");
@@ -66,6 +69,7 @@ FineSurface surface_as_it_is(const Model& model) {
 Greens take_greens(Model& model, const GreensOptions& options, ContactModel contact) {
   check_sizes(model);
   PackedGreens greens = std::exchange(model.greens, {});
+  const std::shared_ptr<const HierarchicalMatrix> compressed = std::exchange(model.compressed, nullptr);
   if (contact == ContactModel::dynamic) {
     if (model.dynamics.method == DynamicsMethod::none) {
       throw Error("the file has no dynamics, which dynamic contact needs", model.name,
@@ -73,6 +77,7 @@ Greens take_greens(Model& model, const GreensOptions& options, ContactModel cont
     }
     if (model.dynamics.method == DynamicsMethod::packed) greens = model.dynamics.inverse;
   }
+  if (compressed != nullptr) return Greens(compressed);
   return Greens(std::move(greens), model.dimension(), options);
 }
 

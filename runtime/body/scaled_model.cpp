@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "formats/hierarchical.h"
 
 namespace palpate {
 namespace {
@@ -61,6 +62,11 @@ void scale_stiffness(Model& model, double scale) {
   scale_rest(model, scale);
   for (Material& material : model.materials) material.youngs_modulus *= scale;
   model.greens = model.greens.scaled(1.0 / scale);
+  if (model.compressed != nullptr) {
+    auto scaled = std::make_shared<HierarchicalMatrix>(*model.compressed);  // of the same arrays
+    scaled->scale /= scale;
+    model.compressed = scaled;
+  }
   for (Probe& probe : model.probes) {
     for (double& u : probe.displacement) u /= scale;
   }

@@ -105,26 +105,16 @@ void run(const Options& options) {
   fmt::print("stored nodes: {}, {} levels, {} near and {} far pairs, {:.1f} s\n", points.size(),
              clusters.tree.levels, clusters.near_pair.size(), clusters.far_pair.size(), lap());
 
+  Compression compression(factor, stored_dofs, d, clusters, options.jobs,
+                          [](CompressionStage, double) { return true; });
+  compression.prepare();
+  fmt::print("near pairs and random loads: {:.1f} s\n", lap());
+  std::fflush(stdout);
   for (const double cut : options.cut) {
-    const CompressionOptions compression{.cut = cut, .jobs = options.jobs};
-    std::map<CompressionStage, double> seconds;
-    std::map<CompressionStage, double> shares;
-    lap();
-    CompressionStage last = CompressionStage::near;
-    const auto matrix =
-        compress(factor, stored_dofs, d, clusters, compression, [&](CompressionStage stage, double) {
-          if (stage != last) {
-            seconds[last] = lap();
-            last = stage;
-          }
-          return true;
-        });
-    seconds[last] = lap();
+    const auto matrix = compression.compress(cut);
+    fmt::print("cut {:g}: {:.1f} s\n", cut, lap());
     const auto gigabytes = [](std::int64_t floats) { return 4e-9 * double(floats); };
     const double dense = 4e-9 * 0.5 * double(matrix->order()) * double(matrix->order());
-    fmt::print("cut {:g}: near {:.1f} s, samples {:.1f} s, far {:.1f} s\n", cut,
-               seconds[CompressionStage::near], seconds[CompressionStage::samples],
-               seconds[CompressionStage::far]);
     fmt::print(
         "  near {:.3f} GB, bases {:.3f}, transfers {:.3f}, couplings {:.3f}: {:.3f} GB; packed {:.3f}\n",
         gigabytes(matrix->near_at.back()), gigabytes(matrix->basis_at.back()),
