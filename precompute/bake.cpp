@@ -17,6 +17,7 @@
 #include "formats/model_file.h"
 #include "formats/output_paths.h"
 #include "meshes/quality.h"
+#include "precompute/compressed_greens.h"
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/factor.h"
 #include "precompute/numerics/greens_solver.h"
@@ -36,7 +37,7 @@ constexpr std::int64_t large_file =
     4'000'000'000;  // [byte] more than many computers can load beside all else
 
 void print_plan(const Plan& plan, const Model& model, const Description& description,
-                const BakeOptions& options, Progress& progress) {
+                const BakeOptions& options, bool compressed, Progress& progress) {
   const QualityReport& quality = model.quality;
   progress.line(fmt::format("{} nodes, {} elements ({}), {} free dofs, {} stored dofs", plan.nodes,
                             plan.elements, traits(model.mesh.element).name, plan.free_dofs,
@@ -45,6 +46,18 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
       fmt::format("angles {:.1f} to {:.1f} degrees, worst shape {:.3f} at ({:.4g}, {:.4g}, {:.4g}) m",
                   quality.min_angle, quality.max_angle, quality.min_shape, quality.worst_centroid.x(),
                   quality.worst_centroid.y(), quality.worst_centroid.z()));
+  if (compressed) {
+    progress.line(fmt::format(
+        "factor: {:.1f} million entries; Green's functions: about {:.1f} MB compressed, {:.1f} "
+        "MB if they were not; tolerance {:g}",
+        static_cast<double>(plan.factor_entries) * 1e-6, static_cast<double>(plan.file_bytes) * 1e-6,
+        2e-6 * static_cast<double>(plan.stored_dofs) * static_cast<double>(plan.stored_dofs),
+        description.tolerance));
+    progress.line(fmt::format("memory: {:.2f} GB; about {} with {} job{}",
+                              static_cast<double>(plan.memory_bytes) * 1e-9, duration_text(plan.seconds),
+                              options.jobs, options.jobs == 1 ? "" : "s"));
+    return;
+  }
   const std::string precision =
       description.precision
           ? fmt::format("{} precision", name_of(*description.precision))
@@ -71,18 +84,25 @@ constexpr const char* column_stage(PackedMatrix matrix) {
 
 struct Plans {
   Plan plan;
+  std::optional<CompressionPlan> compression;
   OverlayPlan overlays;
   DynamicsPlan dynamics;
 };
 
 /// What follows the plan.
 std::vector<Stage> stages_of(const Plans& plans, int jobs) {
-  const auto& [plan, overlays, dynamics] = plans;
+  const auto& [plan, compression, overlays, dynamics] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
     stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs)});
   if (dynamics.method == DynamicsMethod::modal)
     stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
+  if (compression) {
+    const std::vector<Stage> more = compression_stages(*compression);
+    stages.insert(stages.end(), more.begin(), more.end());
+    stages.push_back({write_stage, plan.write_seconds});
+    return stages;
+  }
   const bool packed = dynamics.method == DynamicsMethod::packed;
   stages.push_back({precision_stage, plan.precision_seconds * (packed ? 2.0 : 1.0) +
                                          plan.factor_seconds * (packed ? 1.0 : 0.0)});
@@ -107,11 +127,11 @@ std::string size_advice(const Description& description) {
   return advice;
 }
 
-/// Mesh node of each stored node, in the order of the columns, which comes from the factor.
-std::vector<Index> stored_nodes(const GreensSolver& solver, const Stiffness& stiffness, int dimension) {
+/// The stored nodes in the order of the columns, which comes from the factor.
+StoredNumbering number_stored(const GreensSolver& solver, const Stiffness& stiffness, int dimension) {
   const std::vector<std::int64_t> columns = solver.stored_dofs();
   const auto d = static_cast<std::size_t>(dimension);
-  std::vector<Index> nodes(columns.size() / d, -1);
+  std::vector<Index> nodes(columns.size() / d, -1);  // of the mesh
   for (std::size_t k = 0; k < columns.size(); ++k) {
     if (columns[k] < 0) continue;
     const std::int64_t dof = stiffness.free_dofs[static_cast<std::size_t>(columns[k])];
@@ -121,7 +141,7 @@ std::vector<Index> stored_nodes(const GreensSolver& solver, const Stiffness& sti
       throw std::logic_error("the elimination order has separated the dofs of a node");
     }
   }
-  return nodes;
+  return {nodes, columns};
 }
 
 /// Everything that the file holds but Green's functions, probes and the rest state.
@@ -313,13 +333,28 @@ DynamicsPlan announce_dynamics(const Description& description, const Plan& plan,
   return dynamics;
 }
 
+/// What the compression takes, in place of all columns.
+void take_over(const CompressionPlan& compression, Plan& plan) {
+  const std::int64_t near_bytes = compression.frame.bytes();
+  plan.file_bytes = near_bytes + compression.far_bytes;
+  plan.memory_bytes =
+      plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) + compression.memory_bytes;
+  plan.seconds = 0.0;
+  for (const Stage& stage : compression_stages(compression)) plan.seconds += stage.seconds;
+}
+
 /// Plans all stages and says what they will take.
 Plans announce_plans(const Description& description, const BakeOptions& options, const Model& model,
                      const Stiffness& stiffness, const Factor& factor, const GreensSolver& solver,
                      Progress& progress) {
-  Plans plans{make_plan(model.mesh, factor, solver, description.precision, options.jobs), {}, {}};
+  Plans plans{make_plan(model.mesh, factor, solver, description.precision, options.jobs), {}, {}, {}};
   Plan& plan = plans.plan;
-  print_plan(plan, model, description, options, progress);
+  if (wants_compression(description, plan.stored_dofs / model.dimension())) {
+    const StoredNumbering stored = number_stored(solver, stiffness, model.dimension());
+    plans.compression = plan_compression(description, model, stored, factor, plan, options.jobs);
+    take_over(*plans.compression, plan);
+  }
+  print_plan(plan, model, description, options, plans.compression.has_value(), progress);
   if (plan.file_bytes > large_file) {
     progress.line(
         fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with, and grow with "
@@ -436,7 +471,9 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
   progress.plan(stages_of(plans, options.jobs));
   progress.begin(factor_stage);
   factor->factorize();
-  model.stored_nodes = stored_nodes(solver, stiffness, model.dimension());
+  const StoredNumbering stored_as =
+      plans.compression ? plans.compression->stored : number_stored(solver, stiffness, model.dimension());
+  model.stored_nodes = stored_as.nodes;
   model.rest_force = loads;
   model.rest_displacement = rest_displacement(*factor, stiffness, loads, prescribed, model.dimension());
   const InterruptGuard interrupt;
@@ -445,23 +482,34 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
     progress.line("interrupted: nothing was written");
     return BakeResult::interrupted;
   }
-  const std::vector<std::int64_t> stored_dofs = solver.stored_dofs();
-  add_dynamics(description, plans.dynamics, elastic, stiffness, *factor, stored_dofs, model, progress);
-  progress.begin(precision_stage);
-  const Precision precision =
-      decide_precision(description, elastic, stiffness, *factor, stored_dofs, model, progress);
+  add_dynamics(description, plans.dynamics, elastic, stiffness, *factor, stored_as.dofs, model, progress);
+  Precision precision = Precision::single_precision;
+  if (plans.compression) {
+    model.compressed = std::make_shared<const HierarchicalMatrix>(plans.compression->frame);
+  } else {
+    progress.begin(precision_stage);
+    precision = decide_precision(description, elastic, stiffness, *factor, stored_as.dofs, model, progress);
+  }
   ModelWriter writer(options.output, model, precision,
                      options.discard ? Leftovers::discard : Leftovers::resume);
   model.overlay = {};  // written by now
   model.dynamics = {};
-  const auto probes = solve_matrices(description, elastic, stiffness, std::move(factor), solver, stored,
-                                     plans, options.jobs, writer, progress, interrupt);
+  std::shared_ptr<const HierarchicalMatrix> compressed;
+  std::optional<std::vector<Probe>> probes;
+  if (plans.compression) {
+    compressed = compress_greens(*plans.compression, *factor, options.jobs, writer, progress,
+                                 [&] { return interrupt.requested(); });
+    if (compressed != nullptr) probes = make_probes(*factor, stored_as.dofs);
+  } else {
+    probes = solve_matrices(description, elastic, stiffness, std::move(factor), solver, stored, plans,
+                            options.jobs, writer, progress, interrupt);
+  }
   if (!probes) {
     progress.line(interruption_text(options.output));
     return BakeResult::interrupted;
   }
   progress.begin(write_stage);
-  writer.finish(*probes);
+  writer.finish(*probes, compressed);
   progress.line(fmt::format("{} written", options.output.string()));
   if (!warning.empty()) progress.warn(warning);
   return BakeResult::done;

@@ -8,6 +8,7 @@
 
 #include "base/printable.h"
 #include "meshes/material_fields.h"
+#include "precompute/compressed_greens.h"
 #include "precompute/numerics/precision.h"
 
 namespace palpate {
@@ -86,6 +87,22 @@ std::string precision_text(const Model& model) {
   return text;
 }
 
+std::string compressed_text(const Model& model) {
+  const HierarchicalMatrix& matrix = *model.compressed;
+  const auto megabytes = [](std::int64_t floats) { return 4e-6 * static_cast<double>(floats); };
+  return fmt::format(
+      "  Green's functions {}: {} nodes, {} dofs, compressed to {:.1f} MB\n"
+      "    near pairs      {} of leaves of up to {} nodes, {:.1f} MB\n"
+      "    far pairs       {} on {} levels, ranks up to {}: couplings {:.1f} MB, bases {:.1f} MB\n"
+      "    tolerance       {:g}; force errors of random touches, measured:\n{}\n",
+      scope_text(model), model.stored_nodes.size(), model.stored_dofs(),
+      1e-6 * static_cast<double>(matrix.bytes()), matrix.near_pair.size(),
+      (matrix.tree.nodes + matrix.tree.leaves() - 1) / matrix.tree.leaves(), megabytes(matrix.near_at.back()),
+      matrix.far_pair.size(), matrix.tree.levels, *std::max_element(matrix.rank.begin(), matrix.rank.end()),
+      megabytes(matrix.coupling_at.back()), megabytes(matrix.basis_at.back() + matrix.transfer_at.back()),
+      matrix.tolerance, certificate_text(matrix));
+}
+
 /// Nothing where none are stored.
 std::string overlay_text(const Model& model) {
   const StoredOverlay& overlay = model.overlay;
@@ -162,12 +179,16 @@ std::string inspect(const Model& model) {
   text += fmt::format("  analysis          {}\n", analysis_text(model));
   text += materials_text(model);
   text += rest_text(model);
-  text += fmt::format(
-      "  Green's functions {}: {} nodes, {} dofs, {} precision, {:.1f} MB packed\n", scope_text(model),
-      model.stored_nodes.size(), model.stored_dofs(), name_of(model.greens.precision()),
-      static_cast<double>(packed_size(model.stored_dofs()) * bytes_per_scalar(model.greens.precision())) *
-          1e-6);
-  text += precision_text(model);
+  if (model.compressed != nullptr) {
+    text += compressed_text(model);
+  } else {
+    text += fmt::format(
+        "  Green's functions {}: {} nodes, {} dofs, {} precision, {:.1f} MB packed\n", scope_text(model),
+        model.stored_nodes.size(), model.stored_dofs(), name_of(model.greens.precision()),
+        static_cast<double>(packed_size(model.stored_dofs()) * bytes_per_scalar(model.greens.precision())) *
+            1e-6);
+    text += precision_text(model);
+  }
   text += overlay_text(model);
   text += dynamics_text(model);
   text += fmt::format("  probes            {}\n", model.probes.size());

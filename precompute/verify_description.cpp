@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "formats/hierarchical.h"
 #include "meshes/material_fields.h"
 #include "precompute/description/description.h"
 #include "precompute/geometry/material_parts.h"
@@ -65,6 +66,11 @@ class Comparison {
     if (asked_.mesh.element)
       compare<std::string>("the attribute element", traits(model_.mesh.element).name,
                            traits(*asked_.mesh.element).name);
+    const bool compressed = model_.compressed != nullptr;
+    if (asked_.form != StorageForm::automatic)
+      compare("whether the Green's functions are compressed", compressed,
+              asked_.form == StorageForm::compressed);
+    if (compressed) compare("/greens/tolerance", model_.compressed->tolerance, asked_.tolerance);
     if (asked_.precision)
       compare<std::string>("the precision", name_of(model_.greens.precision()), name_of(*asked_.precision));
   }

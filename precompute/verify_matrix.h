@@ -35,4 +35,11 @@ std::vector<Check> verify_matrix(const Model& model, const PackedGreens& stored,
                                  std::span<const std::int64_t> stored_dofs, double solver,
                                  const std::string& name, int samples);
 
+/// Checks of Green's functions in nested low-rank form against solves with `factor`: "columns", `samples` of
+/// them as above, near pairs against two roundings and a hundred times `solver`, far ones, like "probes" and
+/// "energy", against the tolerance of the file; "touches": the worst force error of random touches against
+/// the tolerance.
+std::vector<Check> verify_compressed(const Model& model, const Factor& factor,
+                                     std::span<const std::int64_t> stored_dofs, double solver, int samples);
+
 }  // namespace palpate

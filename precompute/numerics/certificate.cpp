@@ -43,8 +43,8 @@ std::vector<Index> touched_nodes(std::int64_t k, std::span<const Vec3> points,
 
 std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
-                                 std::span<const Index> touchable, std::int64_t touches, int jobs,
-                                 const std::function<bool(double)>& progress) {
+                                 std::span<const Index> touchable, std::int64_t touches, std::uint64_t seed,
+                                 int jobs, const std::function<bool(double)>& progress) {
   const SelectedSolver solver(factor);
   std::vector<SelectedSolver::Workspace> workspaces(static_cast<std::size_t>(jobs));
   std::vector<TouchErrors> result;
@@ -59,7 +59,7 @@ std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor&
       if (stopped) return;
     }
     TouchErrors& of_count = result[static_cast<std::size_t>(item % std::ssize(result))];
-    std::mt19937_64 random(static_cast<std::uint64_t>(item));
+    std::mt19937_64 random(seed + static_cast<std::uint64_t>(item));
     const std::vector<Index> nodes =
         touched_nodes(item / std::ssize(result), points, touchable, of_count.nodes, random);
     const int d = matrix.dimension;

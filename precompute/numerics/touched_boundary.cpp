@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "formats/hierarchical_product.h"
+
 namespace palpate {
 namespace {
 
@@ -107,12 +109,18 @@ Tip TouchedBoundary::tip(const Vec3& place, double radius) const {
 }
 
 Vec3 TouchedBoundary::node_displacement(Index stored, const Tip& tip, const Vec3& direction) const {
-  const std::int64_t d = model_.dimension();
+  const std::int64_t d = model_.dimension(), width = d * std::ssize(tip.stored);
+  std::vector<double> Xi(static_cast<std::size_t>(d * width));
+  if (model_.compressed != nullptr) gather_blocks(*model_.compressed, stored, tip.stored, Xi);
   Vec3 u = Vec3::Zero();
   for (std::size_t k = 0; k < tip.stored.size(); ++k) {
     for (std::int64_t i = 0; i < d; ++i) {
       for (std::int64_t j = 0; j < d; ++j) {
-        u[i] += tip.share[k] * direction[j] * model_.greens(d * stored + i, d * tip.stored[k] + j);
+        const double entry =
+            model_.compressed != nullptr
+                ? Xi[static_cast<std::size_t>(i * width + j) + static_cast<std::size_t>(d) * k]
+                : model_.greens(d * stored + i, d * tip.stored[k] + j);
+        u[i] += tip.share[k] * direction[j] * entry;
       }
     }
   }

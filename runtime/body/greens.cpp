@@ -288,6 +288,10 @@ void Greens::add_modes(const Modes& modes, std::span<const double> weights) {
   right_ = right;
 }
 
+std::int64_t Greens::compressed_bytes() const noexcept {
+  return compressed() ? compressed_->bytes() : 0;
+}
+
 double Greens::rounding() const noexcept {
   return has_float_entries(precision_) ? double{std::numeric_limits<float>::epsilon()}
                                        : std::numeric_limits<double>::epsilon();

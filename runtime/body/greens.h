@@ -64,6 +64,7 @@ class Greens {
     return square_ != nullptr;
   }  ///< false: used packed, much slower, or compressed
   [[nodiscard]] bool compressed() const noexcept { return compressed_ != nullptr; }
+  [[nodiscard]] std::int64_t compressed_bytes() const noexcept;  ///< 0 where it is not
 
   /// Xi at (row, column) [d, d] [m/N]: displacement of node `row` by unit forces on node `column`. Not for
   /// the tick: takes memory.

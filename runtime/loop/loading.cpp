@@ -18,10 +18,14 @@ namespace palpate {
 namespace {
 
 void print_loaded(const Body& body, double seconds) {
-  fmt::print(stderr, "{}: {} free surface nodes, {} dofs in {} precision, loaded in {:.2f} s\n",
-             printable(body.model().name), body.free_surface_nodes().size(), body.greens().order(),
-             name_of(body.greens().precision()), seconds);
-  if (!body.greens().unfolded()) {
+  const std::string stored = body.greens().compressed()
+                                 ? fmt::format("compressed to {:.1f} MB",
+                                               1e-6 * static_cast<double>(body.greens().compressed_bytes()))
+                                 : fmt::format("in {} precision", name_of(body.greens().precision()));
+  fmt::print(stderr, "{}: {} free surface nodes, {} dofs {}, loaded in {:.2f} s\n",
+             printable(body.model().name), body.free_surface_nodes().size(), body.greens().order(), stored,
+             seconds);
+  if (!body.greens().unfolded() && !body.greens().compressed()) {
     print_warning(
         "the Green's functions do not fit into half of the free memory as a full square; used packed, which "
         "is slower");

@@ -127,7 +127,7 @@ void run(const Options& options) {
       fmt::print("  level {}: ranks {} to {}, median {}\n", level, ranks.front(), ranks.back(),
                  ranks[ranks.size() / 2]);
     }
-    const auto errors = certify(*matrix, factor, stored_dofs, ordered, touchable, options.touches,
+    const auto errors = certify(*matrix, factor, stored_dofs, ordered, touchable, options.touches, 100000,
                                 options.jobs, [](double) { return true; });
     for (const TouchErrors& e : errors)
       fmt::print("  touches of {} nodes: median {:.2e}, 99 % {:.2e}, worst {:.2e}\n", e.nodes,

@@ -1,0 +1,185 @@
+#include "precompute/compressed_greens.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "precompute/numerics/certificate.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t many_nodes = 5000;  // from there on compressed
+constexpr double cut_of_tolerance = 0.06;  // forces are off by several times the cut (scripts/studies/scale)
+constexpr double finer = 0.3;              // the next cut, where touches are off by more than the tolerance
+constexpr int most_cuts = 3;
+constexpr std::uint64_t certificate_seed = 41;
+constexpr std::int64_t touches = 64;   // of each number of nodes
+constexpr double typical_rank = 50.0;  // of the default tolerance (measured)
+constexpr double random_loads = 128.0;
+constexpr double far_share = 0.8;    // of the time of near pairs (measured)
+constexpr double touch_share = 0.3;  // likewise
+
+constexpr const char* near_stage = "near pairs";
+constexpr const char* sample_stage = "random loads";
+constexpr const char* far_stage = "far pairs";
+constexpr const char* touch_stage = "touches";
+
+constexpr const char* name_of(CompressionStage stage) {
+  return stage == CompressionStage::near      ? near_stage
+         : stage == CompressionStage::samples ? sample_stage
+                                              : far_stage;
+}
+
+/// The dofs of nodes in another order.
+StoredNumbering reordered(const StoredNumbering& stored, const std::vector<Index>& order) {
+  const std::size_t d = stored.dofs.size() / stored.nodes.size();
+  StoredNumbering result;
+  for (const Index k : order) {
+    const auto node = static_cast<std::size_t>(k);
+    result.nodes.push_back(stored.nodes[node]);
+    for (std::size_t axis = 0; axis < d; ++axis) result.dofs.push_back(stored.dofs[d * node + axis]);
+  }
+  return result;
+}
+
+/// Prints what a stage has done.
+class StageProgress {
+ public:
+  StageProgress(Progress& progress, std::function<bool()> interrupted)
+      : progress_(progress), interrupted_(std::move(interrupted)) {}
+
+  bool reach(const char* stage, double share) {
+    if (stage != stage_) progress_.begin(stage_ = stage);
+    progress_.reach(share);
+    return !interrupted_();
+  }
+
+ private:
+  Progress& progress_;
+  std::function<bool()> interrupted_;
+  const char* stage_ = nullptr;
+};
+
+std::vector<double> table_of(const std::vector<TouchErrors>& errors) {
+  std::vector<double> table;
+  for (const TouchErrors& e : errors) {
+    for (const double value : {static_cast<double>(e.nodes), static_cast<double>(e.errors.size()),
+                               e.quantile(0.5), e.quantile(0.99), e.quantile(1.0)})
+      table.push_back(value);
+  }
+  return table;
+}
+
+double worst_of(const std::vector<TouchErrors>& errors) {
+  double worst = 0.0;
+  for (const TouchErrors& e : errors) worst = std::max(worst, e.quantile(1.0));
+  return worst;
+}
+
+}  // namespace
+
+bool wants_compression(const Description& description, std::int64_t stored_nodes) {
+  const bool packed_dynamics = description.dynamics && description.dynamics->method == DynamicsMethod::packed;
+  if (description.form == StorageForm::compressed && packed_dynamics)
+    throw Error("[storage] compression = \"h2\" does not go with [dynamics] method = \"packed\"",
+                description.file.string(), "set method = \"modal\", or compression = \"none\"");
+  if (description.form != StorageForm::automatic) return description.form == StorageForm::compressed;
+  return stored_nodes >= many_nodes && !description.precision && !packed_dynamics;
+}
+
+CompressionPlan plan_compression(const Description& description, const Model& model,
+                                 const StoredNumbering& stored, const Factor& factor, const Plan& dense,
+                                 int jobs) {
+  CompressionPlan plan;
+  std::vector<Vec3> points;
+  for (const Index node : stored.nodes) points.push_back(model.mesh.nodes[static_cast<std::size_t>(node)]);
+  plan.clusters = cluster_nodes(points);
+  plan.stored = reordered(stored, plan.clusters.order);
+  std::vector<bool> on_surface(model.mesh.nodes.size(), false);
+  for (const Index node : model.surface) on_surface[static_cast<std::size_t>(node)] = true;
+  for (const Index node : plan.stored.nodes) {
+    const auto k = static_cast<std::size_t>(node);
+    if (on_surface[k] && model.fixed[k] == 0)
+      plan.touchable.push_back(static_cast<Index>(plan.points.size()));
+    plan.points.push_back(model.mesh.nodes[k]);
+  }
+  plan.frame = compression_frame(plan.clusters, model.dimension());
+  plan.frame.tolerance = description.tolerance;
+
+  const auto order = static_cast<double>(plan.frame.order());
+  plan.far_bytes = static_cast<std::int64_t>(
+      4.0 * typical_rank *
+      (order + typical_rank * static_cast<double>(plan.frame.far_pair.size() +
+                                                  std::size_t(plan.frame.tree.clusters()))));
+  plan.memory_bytes = jobs * compression_workspace(factor, plan.frame) + plan.frame.bytes() +
+                      2 * plan.far_bytes + static_cast<std::int64_t>(4.0 * 8.0 * random_loads * order);
+  const double seconds_per_flop = dense.flops > 0.0 ? dense.seconds / dense.flops : 0.0;
+  plan.near_seconds = seconds_per_flop * near_flops(factor, plan.stored.dofs, plan.frame);
+  plan.sample_seconds = seconds_per_flop * random_loads * 4.0 * static_cast<double>(factor.entries());
+  plan.far_seconds = far_share * plan.near_seconds;
+  plan.touch_seconds = touch_share * plan.near_seconds;
+  return plan;
+}
+
+std::vector<Stage> compression_stages(const CompressionPlan& plan) {
+  return {{near_stage, plan.near_seconds},
+          {sample_stage, plan.sample_seconds},
+          {far_stage, plan.far_seconds},
+          {touch_stage, plan.touch_seconds}};
+}
+
+std::shared_ptr<const HierarchicalMatrix> compress_greens(const CompressionPlan& plan, const Factor& factor,
+                                                          int jobs, ModelWriter& writer, Progress& progress,
+                                                          const std::function<bool()>& interrupted) {
+  StageProgress stages(progress, interrupted);
+  Compression compression(
+      factor, plan.stored.dofs, plan.frame.dimension, plan.clusters, jobs,
+      [&](CompressionStage stage, double share) { return stages.reach(name_of(stage), share); });
+  const NearStore store = {
+      [&](Index leaf, std::span<float> entries) {
+        if (!writer.has_near(leaf)) return false;
+        writer.read_near(leaf, entries);
+        return true;
+      },
+      [&](Index leaf, std::span<const float> entries) { writer.write_near(leaf, entries); }};
+  if (!compression.prepare(store)) return nullptr;
+  double cut = cut_of_tolerance * plan.frame.tolerance;
+  for (int attempt = 1;; ++attempt, cut *= finer) {
+    const std::shared_ptr<HierarchicalMatrix> matrix = compression.compress(cut);
+    if (matrix == nullptr) return nullptr;
+    const std::vector<TouchErrors> errors =
+        certify(*matrix, factor, plan.stored.dofs, plan.points, plan.touchable, touches, certificate_seed,
+                jobs, [&](double share) { return stages.reach(touch_stage, share); });
+    if (interrupted()) return nullptr;
+    const double worst = worst_of(errors);
+    if (worst <= plan.frame.tolerance) {
+      matrix->tolerance = plan.frame.tolerance;
+      matrix->certificate = table_of(errors);
+      progress.line(fmt::format("compressed to {:.1f} MB; force errors of random touches:\n{}",
+                                1e-6 * static_cast<double>(matrix->bytes()), certificate_text(*matrix)));
+      return matrix;
+    }
+    if (attempt == most_cuts)
+      throw Error(
+          fmt::format(
+              "forces of random touches are off by up to {:.2g} of the largest, the tolerance is {:.2g}",
+              worst, plan.frame.tolerance),
+          "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
+    progress.line(
+        fmt::format("force errors up to {:.1e} at a cut of {:.1e}: again with more terms", worst, cut));
+  }
+}
+
+std::string certificate_text(const HierarchicalMatrix& matrix) {
+  std::string text;
+  for (std::size_t row = 0; row + 5 <= matrix.certificate.size(); row += 5) {
+    const double* e = matrix.certificate.data() + row;
+    text += fmt::format("{}    {:.0f} node{}: median {:.1e}, 99 % {:.1e}, largest {:.1e} of {:.0f}",
+                        row == 0 ? "" : "\n", e[0], e[0] == 1.0 ? "" : "s", e[2], e[3], e[4], e[1]);
+  }
+  return text;
+}
+
+}  // namespace palpate

@@ -1,0 +1,61 @@
+// Green's functions in nested low-rank form: when, what they take, and how they are made and judged.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/model.h"
+#include "formats/model_file.h"
+#include "precompute/description/description.h"
+#include "precompute/numerics/compression.h"
+#include "precompute/numerics/factor.h"
+#include "precompute/plan.h"
+#include "precompute/progress.h"
+
+namespace palpate {
+
+/// Stored nodes in the order of a file: mesh node of each, and dof of K of each of their dofs, -1 where held.
+struct StoredNumbering {
+  std::vector<Index> nodes;
+  std::vector<std::int64_t> dofs;
+};
+
+/// Whether the description asks for compressed Green's functions of so many nodes. Throws Error where it asks
+/// for what does not go together.
+bool wants_compression(const Description& description, std::int64_t stored_nodes);
+
+/// What is decided before anything is solved.
+struct CompressionPlan {
+  ClusteredNodes clusters;
+  StoredNumbering stored;         ///< in the order of the clusters
+  std::vector<Vec3> points;       ///< [N] of the stored nodes [m]
+  std::vector<Index> touchable;   ///< stored nodes of the surface that are free along every axis
+  HierarchicalMatrix frame;       ///< tree, pairs and tolerance
+  std::int64_t far_bytes = 0;     ///< of bases and couplings, estimated
+  std::int64_t memory_bytes = 0;  ///< beside the factor
+  double near_seconds = 0.0, sample_seconds = 0.0, far_seconds = 0.0, touch_seconds = 0.0;  ///< estimates
+};
+
+/// `model`: mesh, surface and held nodes. `factor` may be only analysed. `dense` is the plan of all columns,
+/// of which the rate of this machine is taken.
+CompressionPlan plan_compression(const Description& description, const Model& model,
+                                 const StoredNumbering& stored, const Factor& factor, const Plan& dense,
+                                 int jobs);
+
+/// The stages of `compress_greens`, with the seconds that they are expected to take.
+std::vector<Stage> compression_stages(const CompressionPlan& plan);
+
+/// Makes the matrix with near pairs by way of the writer, and measures random touches; where their forces are
+/// off by more than the tolerance, again with more terms. Null when `interrupted`. Throws Error where the
+/// tolerance is out of reach.
+std::shared_ptr<const HierarchicalMatrix> compress_greens(const CompressionPlan& plan, const Factor& factor,
+                                                          int jobs, ModelWriter& writer, Progress& progress,
+                                                          const std::function<bool()>& interrupted);
+
+/// The certificate as a table, a line for each number of nodes.
+std::string certificate_text(const HierarchicalMatrix& matrix);
+
+}  // namespace palpate

@@ -1,0 +1,108 @@
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <thread>
+
+#include "formats/hierarchical_product.h"
+#include "precompute/numerics/certificate.h"
+#include "precompute/numerics/selected_solver.h"
+#include "precompute/verify_matrix.h"
+
+namespace palpate {
+namespace {
+
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Vector = Eigen::VectorXd;
+
+constexpr double solver_safety = 100.0;
+constexpr double sum_rounding = 1e-13;
+constexpr std::int64_t touches = 16;     // of each number of nodes
+constexpr std::uint64_t seed = 1 << 20;  // others than those of the certificate
+
+std::vector<Check> check_probes(const Model& model) {
+  const double tolerance = model.compressed->tolerance;
+  Check probes{"probes", 0.0, tolerance}, energy{"energy", 0.0, tolerance};
+  std::vector<Index> nodes(model.stored_nodes.size());
+  std::iota(nodes.begin(), nodes.end(), 0);
+  for (const Probe& probe : model.probes) {
+    Vector Xi_f(std::ssize(probe.force));
+    displace(*model.compressed, nodes, probe.force, 0, {Xi_f.data(), probe.force.size()});
+    const Eigen::Map<const Vector> f(probe.force.data(), Xi_f.size()),
+        u(probe.displacement.data(), Xi_f.size());
+    const double work = f.dot(Xi_f);
+    probes.error = std::max(probes.error, (Xi_f - u).lpNorm<Eigen::Infinity>() / u.lpNorm<Eigen::Infinity>());
+    energy.error = std::max(energy.error, work > 0.0 ? std::abs(work - f.dot(u)) / work : INFINITY);
+  }
+  return {probes, energy};
+}
+
+/// Columns of random nodes, by what of them is near and what is far.
+std::vector<Check> check_columns(const Model& model, const Factor& factor,
+                                 std::span<const std::int64_t> stored_dofs, double solver, int samples) {
+  const HierarchicalMatrix& matrix = *model.compressed;
+  Check near{"near pairs", 0.0,
+             2.0 * unit_roundoff(Precision::single_precision) + sum_rounding + solver_safety * solver},
+      far{"far pairs", 0.0, matrix.tolerance};
+  const SelectedSolver solve(factor);
+  SelectedSolver::Workspace workspace;
+  const int d = matrix.dimension;
+  std::vector<Index> nodes(model.stored_nodes.size());
+  std::iota(nodes.begin(), nodes.end(), 0);
+  Rows blocks(d, matrix.order()), exact(matrix.order(), d);
+  std::mt19937_64 random(7);
+  for (int sample = 0; sample < samples; ++sample) {
+    const auto node = static_cast<Index>(random() % nodes.size());
+    gather_blocks(matrix, node, nodes, {blocks.data(), static_cast<std::size_t>(blocks.size())});
+    solve.solve(stored_dofs,
+                stored_dofs.subspan(static_cast<std::size_t>(d * node), static_cast<std::size_t>(d)),
+                workspace, {exact.data(), static_cast<std::size_t>(exact.size())});
+    const double largest = exact.cwiseAbs().maxCoeff();
+    const std::size_t leaf = static_cast<std::size_t>(matrix.tree.leaf_of(node) - matrix.tree.first_leaf());
+    std::vector<bool> is_near(nodes.size(), false);
+    for (std::int64_t p = matrix.near_from[leaf]; p < matrix.near_from[leaf + 1]; ++p) {
+      const Index other = matrix.neighbour[static_cast<std::size_t>(p)][0];
+      std::fill(is_near.begin() + matrix.tree.begin(other), is_near.begin() + matrix.tree.end(other), true);
+    }
+    for (const Index other : nodes) {
+      const double difference = (blocks.middleCols(d * other, d).transpose() - exact.middleRows(d * other, d))
+                                    .cwiseAbs()
+                                    .maxCoeff();
+      Check& check = is_near[static_cast<std::size_t>(other)] ? near : far;
+      check.error = std::isnan(difference) ? INFINITY : std::max(check.error, difference / largest);
+    }
+  }
+  return {near, far};
+}
+
+Check check_touches(const Model& model, const Factor& factor, std::span<const std::int64_t> stored_dofs) {
+  std::vector<bool> on_surface(model.mesh.nodes.size(), false);
+  for (const Index node : model.surface) on_surface[static_cast<std::size_t>(node)] = true;
+  std::vector<Vec3> points;
+  std::vector<Index> touchable;
+  for (const Index node : model.stored_nodes) {
+    const auto k = static_cast<std::size_t>(node);
+    if (on_surface[k] && model.fixed[k] == 0) touchable.push_back(static_cast<Index>(points.size()));
+    points.push_back(model.mesh.nodes[k]);
+  }
+  const int jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  Check check{"touches", 0.0, model.compressed->tolerance};
+  for (const TouchErrors& errors : certify(*model.compressed, factor, stored_dofs, points, touchable, touches,
+                                           seed, jobs, [](double) { return true; }))
+    check.error = std::max(check.error, errors.quantile(1.0));
+  return check;
+}
+
+}  // namespace
+
+std::vector<Check> verify_compressed(const Model& model, const Factor& factor,
+                                     std::span<const std::int64_t> stored_dofs, double solver, int samples) {
+  std::vector<Check> checks = check_probes(model);
+  for (const Check& check : check_columns(model, factor, stored_dofs, solver, samples))
+    checks.push_back(check);
+  checks.push_back(check_touches(model, factor, stored_dofs));
+  return checks;
+}
+
+}  // namespace palpate
