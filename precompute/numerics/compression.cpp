@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "precompute/numerics/recompression.h"
 #include "precompute/numerics/selected_solver.h"
 
 namespace palpate {
@@ -20,7 +21,8 @@ using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using Dofs = std::vector<std::int64_t>;
 
 constexpr Index spare_samples = 12;         // more than the largest rank: what they say of it is certain
-constexpr Index samples = most_rank;        // random loads
+constexpr double skeleton_share = 0.4;      // of the cut: skeletons are not to add to the error
+constexpr Index samples = 192;              // random loads
 constexpr Index coupled_at_once = 4;        // clusters whose couplings are solved together
 constexpr Index leaves_estimated = 64;      // whose flops are counted for an estimate
 constexpr std::int64_t loads_at_once = 32;  // solved together
@@ -76,6 +78,7 @@ struct Compression::Impl {
         matrix_(compression_frame(nodes, dimension)),
         workspaces_(at(jobs)) {}
 
+  [[nodiscard]] int jobs() const noexcept { return jobs_; }
   bool solve_near(const NearStore& store);
   bool sample();
   bool climb(double cut);
@@ -164,14 +167,8 @@ bool Compression::Impl::solve_near(const NearStore& store) {
     tick(CompressionStage::near, leaves);
   });
   matrix_.near = near_;
-  root_.resize(matrix_.order());
-  for (std::size_t p = 0; p < matrix_.near_pair.size(); ++p) {
-    const auto [row, column] = matrix_.near_pair[p];
-    if (row != column) continue;
-    const std::int64_t n = end_dof(row) - first_dof(row);
-    for (std::int64_t i = 0; i < n; ++i)
-      root_[first_dof(row) + i] = std::sqrt(double{near_[matrix_.near_at[p] + i * (n + 1)]});
-  }
+  const std::vector<double> root = root_of_diagonal(matrix_);
+  root_ = Eigen::Map<const Eigen::VectorXd>(root.data(), std::ssize(root));
   return !stopped_;
 }
 
@@ -258,7 +255,7 @@ Compression::Impl::Front Compression::Impl::joined_front(Index c) {
 void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
   const Interpolation chosen = interpolate(front.response, cut * std::sqrt(double(samples)));
   const auto rank = std::ssize(chosen.skeleton);
-  if (rank > std::min<std::int64_t>(samples - spare_samples, most_rank)) {
+  if (rank > samples - spare_samples) {
     throw Error("a cluster of " + std::to_string(matrix_.tree.end(c) - matrix_.tree.begin(c)) +
                     " stored nodes needs more than " + std::to_string(rank - 1) +
                     " terms, so the Green's functions cannot be compressed this exactly",
@@ -404,8 +401,8 @@ bool Compression::prepare(const NearStore& store) {
 }
 
 std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {
-  if (!impl_->climb(cut)) return nullptr;
-  return std::make_shared<HierarchicalMatrix>(impl_->packed());
+  if (!impl_->climb(skeleton_share * cut)) return nullptr;
+  return std::make_shared<HierarchicalMatrix>(recompressed(impl_->packed(), cut, impl_->jobs()));
 }
 
 HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension) {

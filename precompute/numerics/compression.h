@@ -27,12 +27,13 @@ struct NearStore {
 
 /// Xi of the stored dofs as a HierarchicalMatrix.
 ///
-/// Near pairs and the couplings of far ones are entries of Xi, exact but for their rounding to single. What
-/// is cut off is in the bases: of each cluster some dofs, its skeleton, are chosen by a pivoted QR of what
-/// random loads on all that is far from it do to it, and the rows of V say how the others follow them. What
-/// loads on the near do is taken off with the near pairs and, going up the tree, with the couplings of each
-/// level, so that the same random loads serve all levels (Boukaram and others, arXiv 2506.16759). The result
-/// depends on neither `jobs` nor what a store had.
+/// Near pairs are entries of Xi, exact but for their rounding to single. Of each cluster some dofs, its
+/// skeleton, are chosen by a pivoted QR of what random loads on all that is far from it do to it, and the
+/// rows of V say how the others follow them; the coupling of a far pair is then the block of Xi between two
+/// skeletons. What loads on the near do is taken off with the near pairs and, going up the tree, with the
+/// couplings of each level, so that the same random loads serve all levels (Boukaram and others, arXiv
+/// 2506.16759). Bases and couplings that are too fine so far are recompressed at last. The result depends on
+/// neither `jobs` nor what a store had.
 class Compression {
  public:
   /// `stored_dofs` [d N] are dofs of K, d a node, in the order of `nodes`, -1 where held. All are kept by

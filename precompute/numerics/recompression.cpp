@@ -1,0 +1,182 @@
+#include "precompute/numerics/recompression.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/error.h"
+#include "base/parallel.h"
+
+namespace palpate {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+std::size_t at(std::int64_t i) {
+  return static_cast<std::size_t>(i);
+}
+
+Matrix block(const std::shared_ptr<const float[]>& entries, std::int64_t first, Eigen::Index rows,
+             Eigen::Index columns) {
+  return Eigen::Map<const FloatRows>(entries.get() + first, rows, columns).cast<double>();
+}
+
+class Recompression {
+ public:
+  Recompression(const HierarchicalMatrix& matrix, double cut, int jobs)
+      : from_(matrix),
+        cut_(cut),
+        jobs_(jobs),
+        root_(root_of_diagonal(matrix)),
+        Q_(at(matrix.tree.clusters())),
+        R_(Q_.size()),
+        U_(Q_.size()),
+        S_(matrix.far_pair.size()) {}
+
+  HierarchicalMatrix run() {
+    for (int level = from_.tree.levels; level >= 0; --level)
+      for_level(level, [&](Index c) { orthogonalise(c); });
+    parallel_for(std::ssize(S_), jobs_, [&](std::int64_t p, int) {
+      const auto [row, column] = from_.far_pair[at(p)];
+      S_[at(p)] = R_[at(row)] * block(from_.coupling, from_.coupling_at[at(p)], rank(row), rank(column)) *
+                  R_[at(column)].transpose();
+    });
+    weights_.resize(Q_.size());
+    for (int level = 0; level <= from_.tree.levels; ++level) for_level(level, [&](Index c) { weigh(c); });
+    return packed();
+  }
+
+ private:
+  [[nodiscard]] Eigen::Index rank(Index c) const { return from_.rank[at(c)]; }
+  [[nodiscard]] bool is_leaf(Index c) const { return c >= from_.tree.first_leaf(); }
+
+  template <class Work>
+  void for_level(int level, Work&& work) {
+    const Index first = from_.tree.first_of_level(level);
+    parallel_for(Index{1} << level, jobs_, [&](std::int64_t i, int) {
+      if (const Index c = first + static_cast<Index>(i); rank(c) > 0) work(c);
+    });
+  }
+
+  /// Q R of a leaf's V over the root of D, and of the children's R E.
+  void orthogonalise(Index c) {
+    Matrix V;
+    if (is_leaf(c)) {
+      const std::int64_t first = std::int64_t{from_.dimension} * from_.tree.begin(c),
+                         end = std::int64_t{from_.dimension} * from_.tree.end(c);
+      V = block(from_.basis, from_.basis_at[at(c - from_.tree.first_leaf())], end - first, rank(c));
+      for (std::int64_t i = 0; i < end - first; ++i)
+        V.row(i) *= root_[at(first + i)] > 0.0 ? 1.0 / root_[at(first + i)] : 0.0;
+    } else {
+      const Index a = 2 * c + 1, b = 2 * c + 2;
+      V.resize(R_[at(a)].rows() + R_[at(b)].rows(), rank(c));
+      V << R_[at(a)] * block(from_.transfer, from_.transfer_at[at(a)], rank(a), rank(c)),
+          R_[at(b)] * block(from_.transfer, from_.transfer_at[at(b)], rank(b), rank(c));
+    }
+    const Eigen::HouseholderQR<Matrix> qr(V);
+    const Eigen::Index k = std::min(V.rows(), V.cols());
+    Q_[at(c)] = qr.householderQ() * Matrix::Identity(V.rows(), k);
+    R_[at(c)] = qr.matrixQR().topRows(k).triangularView<Eigen::Upper>();
+  }
+
+  /// What far loads of +-1 do to a cluster, in its orthonormal basis: their covariance. Kept are its
+  /// directions above the cut.
+  void weigh(Index c) {
+    const Eigen::Index k = Q_[at(c)].cols();
+    Matrix G = Matrix::Zero(k, k);
+    for (std::int64_t p = from_.partner_from[at(c)]; p < from_.partner_from[at(c) + 1]; ++p) {
+      const auto [other, pair] = from_.partner[at(p)];
+      const Matrix& S = S_[at(pair)];
+      if (c > other) {
+        G.noalias() += S * S.transpose();
+      } else {
+        G.noalias() += S.transpose() * S;
+      }
+    }
+    if (const Index parent = ClusterTree::parent(c); c > 0 && rank(parent) > 0) {
+      const Matrix E = part(parent, c);
+      G.noalias() += E * weights_[at(parent)] * E.transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(G);
+    Eigen::Index kept = 0;
+    while (kept < k && eigen.eigenvalues()[k - 1 - kept] > cut_ * cut_) ++kept;
+    if (kept > most_rank)
+      throw Error("a cluster of " + std::to_string(from_.tree.end(c) - from_.tree.begin(c)) +
+                      " stored nodes needs " + std::to_string(kept) + " terms, " + std::to_string(most_rank) +
+                      " are possible",
+                  "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
+    U_[at(c)] = eigen.eigenvectors().rightCols(kept).rowwise().reverse();
+    weights_[at(c)] = std::move(G);
+  }
+
+  /// The rows of a parent's Q that belong to a child.
+  [[nodiscard]] Matrix part(Index parent, Index child) const {
+    const Matrix& Q = Q_[at(parent)];
+    const Eigen::Index first = Q_[at(2 * parent + 1)].cols();
+    return child == 2 * parent + 1 ? Q.topRows(first) : Q.bottomRows(Q.rows() - first);
+  }
+
+  [[nodiscard]] HierarchicalMatrix packed() const {
+    HierarchicalMatrix matrix = from_;
+    for (std::size_t c = 0; c < U_.size(); ++c) matrix.rank[c] = static_cast<Index>(U_[c].cols());
+    matrix.index();
+    const auto floats = [](std::int64_t count) {
+      return std::shared_ptr<float[]>(new float[at(std::max<std::int64_t>(count, 1))]);
+    };
+    const auto put = [](const Matrix& entries, float* to) {
+      Eigen::Map<FloatRows>(to, entries.rows(), entries.cols()) = entries.cast<float>();
+    };
+    const auto basis = floats(matrix.basis_at.back()), transfer = floats(matrix.transfer_at.back()),
+               coupling = floats(matrix.coupling_at.back());
+    for (Index c = 0; c < matrix.tree.clusters(); ++c) {
+      if (is_leaf(c) && U_[at(c)].cols() > 0) {
+        Matrix V = Q_[at(c)] * U_[at(c)];
+        const std::int64_t first = std::int64_t{matrix.dimension} * matrix.tree.begin(c);
+        for (Eigen::Index i = 0; i < V.rows(); ++i) V.row(i) *= root_[at(first + i)];
+        put(V, basis.get() + matrix.basis_at[at(c - matrix.tree.first_leaf())]);
+      }
+      const Index parent = ClusterTree::parent(c);
+      if (c > 0 && rank(parent) > 0 && U_[at(c)].cols() > 0)
+        put(U_[at(c)].transpose() * part(parent, c) * U_[at(parent)],
+            transfer.get() + matrix.transfer_at[at(c)]);
+    }
+    for (std::size_t p = 0; p < S_.size(); ++p) {
+      const auto [row, column] = matrix.far_pair[p];
+      put(U_[at(row)].transpose() * S_[p] * U_[at(column)], coupling.get() + matrix.coupling_at[p]);
+    }
+    matrix.basis = basis;
+    matrix.transfer = transfer;
+    matrix.coupling = coupling;
+    return matrix;
+  }
+
+  const HierarchicalMatrix& from_;
+  double cut_;
+  int jobs_;
+  std::vector<double> root_;
+  std::vector<Matrix> Q_, R_, U_, weights_;  // [clusters]
+  std::vector<Matrix> S_;                    // [far pairs] between orthonormal bases
+};
+
+}  // namespace
+
+std::vector<double> root_of_diagonal(const HierarchicalMatrix& matrix) {
+  std::vector<double> root(at(matrix.order()));
+  for (std::size_t p = 0; p < matrix.near_pair.size(); ++p) {
+    const auto [row, column] = matrix.near_pair[p];
+    if (row != column) continue;
+    const std::int64_t first = std::int64_t{matrix.dimension} * matrix.tree.begin(row),
+                       count = std::int64_t{matrix.dimension} * matrix.tree.end(row) - first;
+    for (std::int64_t i = 0; i < count; ++i)
+      root[at(first + i)] = std::sqrt(double{matrix.near[matrix.near_at[p] + i * (count + 1)]});
+  }
+  return root;
+}
+
+HierarchicalMatrix recompressed(const HierarchicalMatrix& matrix, double cut, int jobs) {
+  return Recompression(matrix, cut, jobs).run();
+}
+
+}  // namespace palpate
