@@ -78,6 +78,26 @@ constexpr FieldMeaning model_fields[] = {
      "force errors that were measured in single, split and double precision; −1: not measured; infinity: C "
      "is "
      "not positive definite. From 3.3 on"},
+    {"/greens/levels",
+     "compressed, as all that follows to `/greens/couplings` (from 3.4 on): L, the leaves of the tree of "
+     "clusters are on this level. Cluster *i* of level *l* is number 2^*l* − 1 + *i* and has the stored "
+     "nodes "
+     "⌊*i S* / 2^*l*⌋ to ⌊(*i* + 1) *S* / 2^*l*⌋ − 1"},
+    {"/greens/tolerance", "most that forces of touches may be off, relative to the largest"},
+    {"/greens/near_pairs", "leaves, row and column, row ≥ column; by columns, then rows"},
+    {"/greens/far_pairs", "clusters of one level, row and column, row > column; by columns, then rows"},
+    {"/greens/ranks", "columns of V of each cluster"},
+    {"/greens/certificate",
+     "measured when the file was written: nodes of a touch, touches, and the median, 99 % and largest of "
+     "their "
+     "force errors"},
+    {"/greens/near",
+     "blocks of Ξ of the near pairs [m/N], one after another, by rows; starts at a multiple of 4096 bytes"},
+    {"/greens/bases", "V of the leaves, one after another, by rows"},
+    {"/greens/transfers",
+     "E of the clusters, one after another, by rows: V of a parent is V E of its children, one under the "
+     "other"},
+    {"/greens/couplings", "S of the far pairs [m/N], one after another, by rows: their block of Ξ is V S Vᵀ"},
     {"/dynamics/method", "1 packed, 2 modal"},
     {"/dynamics/lumped", "1 where M is diagonal"},
     {"/dynamics/newmark", "α, δ and Δt [s]"},

@@ -12,6 +12,7 @@
 #include "docs/describe/markdown.h"
 #include "docs/describe/pages.h"
 #include "formats/dynamics_fields.h"
+#include "formats/hierarchical_fields.h"
 #include "formats/model_file.h"
 #include "formats/precision_fields.h"
 #include "formats/recording_parts.h"
@@ -50,6 +51,8 @@ class Datasets {
       for_each_smooth_field(model, take);
     }
     visit_inverse_errors(take);
+    for_each_tree_field(take);
+    for_each_rank_field(take);
     for_each_probe_field(element, take);
   }
 
@@ -101,6 +104,14 @@ std::string symbol_of(Count count) {
       return "m";
     case Count::smooth_terms:
       return "w";
+    case Count::near_pairs:
+      return "a";
+    case Count::far_pairs:
+      return "b";
+    case Count::clusters:
+      return "c";
+    case Count::certified:
+      return "t";
   }
   return "";
 }
@@ -184,6 +195,8 @@ Rows dataset_rows() {
   for (const std::string path : {greens_path, inverse_path})  // mapped and not copied: in no table
     rows.push_back(
         {code(path), "float32 or float64", "*n* (*n* + 1) / 2", meaning_of(model_field_meanings(), path)});
+  for (const CompressedArray& array : compressed_arrays)  // mapped and not copied, too
+    rows.push_back({code(array.path), "float32", "*length*", meaning_of(model_field_meanings(), array.path)});
   expect_all(model_field_meanings(), rows);
   return rows;
 }
@@ -217,7 +230,8 @@ Rows tick_rows() {
 constexpr const char* model_letters =
     "*N* nodes, *E* elements of *k* nodes, *d* dimensions, *F* surface simplices, *M* materials, *S* stored "
     "nodes, *n* = *d S* stored dofs, *P* probes, *O* overlays of *g* nodes and *q* surface nodes, *m* modes, "
-    "*e* entries of the mass matrix, *w* smooth terms. Nodes and vectors have three components in the plane "
+    "*e* entries of the mass matrix, *w* smooth terms, *a* near and *b* far pairs of *c* clusters, *t* kinds "
+    "of touches. Nodes and vectors have three components in the plane "
     "too; the third is 0 there.";
 
 }  // namespace

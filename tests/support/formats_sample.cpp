@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "formats/hierarchical.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
 
@@ -261,6 +262,44 @@ Model write_split_sample(const std::filesystem::path& path, DynamicsMethod metho
   if (method == DynamicsMethod::packed)
     writer.write_columns(0, n, sample_inverse_columns(0, n, n), PackedMatrix::inverse);
   writer.finish(model.probes);
+  return model;
+}
+
+Model compressed_sample() {
+  Model model = sample_model();
+  auto matrix = std::make_shared<HierarchicalMatrix>();
+  matrix->tree = {static_cast<Index>(model.stored_nodes.size()), 1};
+  matrix->near_pair = {{1, 1}, {2, 2}};
+  matrix->far_pair = {{2, 1}};
+  matrix->rank = {0, 2, 3};
+  matrix->tolerance = 0.01;
+  matrix->certificate = {1, 10, 1e-4, 2e-4, 3e-4, 5, 20, 2e-4, 3e-4, 4e-4};
+  matrix->index();
+  const auto fill = [](std::int64_t count, auto&& entry) {
+    const std::shared_ptr<float[]> values(new float[static_cast<std::size_t>(count)]);
+    for (std::int64_t k = 0; k < count; ++k) values[k] = static_cast<float>(entry(k));
+    return values;
+  };
+  const std::int64_t half = matrix->order() / 2;
+  matrix->near = fill(matrix->near_at.back(), [&](std::int64_t k) {
+    const std::int64_t leaf = k / (half * half), i = k / half % half, j = k % half;
+    return sample_entry(leaf * half + std::max(i, j), leaf * half + std::min(i, j));
+  });
+  matrix->basis = fill(matrix->basis_at.back(), [](std::int64_t k) { return std::cos(0.3 * double(k)); });
+  matrix->transfer = fill(0, [](std::int64_t) { return 0.0; });
+  matrix->coupling = fill(matrix->coupling_at.back(), [](std::int64_t k) { return 1e-5 * double(k + 1); });
+  model.compressed = matrix;
+  return model;
+}
+
+Model write_compressed_sample(const std::filesystem::path& path) {
+  Model model = compressed_sample();
+  const HierarchicalMatrix& matrix = *model.compressed;
+  ModelWriter writer(path, model, Precision::single_precision);
+  for (Index leaf = 0; leaf < 2; ++leaf)
+    writer.write_near(leaf, {matrix.near.get() + matrix.near_at[static_cast<std::size_t>(leaf)],
+                             static_cast<std::size_t>(matrix.near_at.back() / 2)});
+  writer.finish(model.probes, model.compressed);
   return model;
 }
 

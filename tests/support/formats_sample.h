@@ -31,6 +31,12 @@ Model split_sample(DynamicsMethod method);
 /// Writes the whole of `split_sample`.
 Model write_split_sample(const std::filesystem::path& path, DynamicsMethod method = DynamicsMethod::none);
 
+/// `sample_model` with Green's functions in nested low-rank form: two leaves that are far from each other.
+Model compressed_sample();
+
+/// Writes `compressed_sample` and returns what was written.
+Model write_compressed_sample(const std::filesystem::path& path);
+
 /// Writes the whole of `sample_model` and returns what was written.
 Model write_sample(const std::filesystem::path& path, Precision precision = Precision::double_precision,
                    ElementType element = ElementType::tet4, int cells = 2);

@@ -1,7 +1,7 @@
 // Writes files for the tests in Python: formats_sample_file FOLDER makes FOLDER/ELEMENT.palpate.hdf of every
 // kind of element, FOLDER/single.palpate.hdf (tet4 in single precision), FOLDER/packed.palpate.hdf and
-// FOLDER/modal.palpate.hdf (with dynamics), FOLDER/split.palpate.hdf (in split precision) and
-// FOLDER/recording.h5.
+// FOLDER/modal.palpate.hdf (with dynamics), FOLDER/split.palpate.hdf (in split precision),
+// FOLDER/compressed.palpate.hdf (compressed) and FOLDER/recording.h5.
 #include <array>
 #include <cmath>
 #include <iostream>
@@ -23,6 +23,7 @@ int main(int count, char** arguments) {
                                          palpate::Precision::single_precision);
     palpate::test::write_swinging_sample(folder / "modal.palpate.hdf", palpate::DynamicsMethod::modal);
     palpate::test::write_split_sample(folder / "split.palpate.hdf", palpate::DynamicsMethod::packed);
+    palpate::test::write_compressed_sample(folder / "compressed.palpate.hdf");
     palpate::RecordingWriter recording(
         folder / "recording.h5",
         {.model_path = "tet4.palpate.hdf", .content_hash = "00ff", .device = "none", .options = ""},
