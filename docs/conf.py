@@ -30,6 +30,7 @@ html_static_path = [
     "/usr/share/fonts/truetype/dejavu/DejaVuMathTeXGyre.ttf",
 ]
 html_css_files = ["book.css"]
+html_use_index = False  # of the C interface alone, whose page lists it too
 html_copy_source = False
 html_show_sphinx = False
 html_show_copyright = False
@@ -106,7 +107,29 @@ def outside(app, env, node, contnode):
     return contnode if is_outside else None
 
 
+CODE = r"(?:<a [^>]*>)?<code (?:(?!</code>).)*</code>(?:</a>)?"
+
+
+def fit_cell(cell):
+    """A cell of a table: numbers such as 1e-6 stay whole, and words make a wide column."""
+    keep = lambda part: part[0] if part[0].startswith("<") else f'<span class="kept">{part[0]}</span>'
+    words = ' class="words"' if len(re.sub("<[^>]*>", "", cell[1])) > 40 else ""
+    return f"<td{words}>" + re.sub(r"<[^>]*>|\b\d[\d.]*e-\d+", keep, cell[1])
+
+
+def fit_phones(app, pagename, templatename, context, doctree):
+    """What narrow columns and small screens need: long names that may break behind / and _, numbers and punctuation
+    that stay whole, columns of words that can be told from columns of numbers, and pictures that open in full size."""
+    if "body" not in context:
+        return
+    body = re.sub(r'<span class="pre">[^<]+', lambda name: re.sub(r"(?<=\w)([/_])(?=\w)", r"\1<wbr>", name[0]), context["body"])
+    body = re.sub(rf"\({CODE}[,;.:)]*|{CODE}[,;.:)]+", r'<span class="kept">\g<0></span>', body, flags=re.DOTALL)
+    body = re.sub(r"<td>((?:(?!</td>).)*)", fit_cell, body, flags=re.DOTALL)
+    context["body"] = re.sub(r'<img [^>]*src="([^"]+)"[^>]*>', r'<a class="picture" href="\1">\g<0></a>', body)
+
+
 def setup(app):
+    app.connect("html-page-context", fit_phones)
     app.connect("source-read", add_contents)
     app.connect("source-read", name_files)
     app.connect("missing-reference", outside)

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <regex>
 
 #include "base/error.h"
 #include "docs/describe/header_members.h"
@@ -21,9 +22,9 @@ struct Meaning {
 };
 
 Meaning split_unit(const std::string& comment) {
-  const std::size_t end = comment.find("] ");
+  const std::size_t end = comment.find(']');
   if (!comment.starts_with('[') || end == std::string::npos) return {"", comment};
-  return {comment.substr(1, end - 1), comment.substr(end + 2)};
+  return {comment.substr(1, end - 1), comment.substr(std::min(end + 2, comment.size()))};
 }
 
 /// The rows of a table of names in the code, each with its comment in the header.
@@ -54,23 +55,33 @@ std::vector<std::vector<std::string>> status_rows() {
   return rows;
 }
 
+/// A number or several of them, without what only the compiler needs.
+std::string value_of(const std::string& initializer) {
+  return std::regex_replace(initializer, std::regex("[{}]|F$"), "");
+}
+
+/// A comment names the page of decisions as a file of the tree.
+std::string linked(const std::string& comment) {
+  return std::regex_replace(comment, std::regex("docs/decisions"), "[decisions](../decisions.md)");
+}
+
 std::vector<std::vector<std::string>> tuning_rows(const Declaration& group) {
   std::vector<std::vector<std::string>> rows;
   for (const Member& member : group.members) {
     const auto [unit, meaning] = split_unit(member.comment);
-    rows.push_back({code(member.name), member.value, unit, meaning});
+    rows.push_back({code(member.name), value_of(member.value), unit, linked(meaning)});
   }
   return rows;
 }
 
-/// The first sentence, as a heading has it.
+/// The first sentence, as a heading has it: without the header that it may name in parentheses.
 std::string heading_of(const std::string& comment) {
-  return comment.substr(0, comment.find('.'));
+  return std::regex_replace(comment.substr(0, comment.find(". ")), std::regex(R"( \([\w/]+\.h\)|\.$)"), "");
 }
 
 std::string rest_of(const std::string& comment) {
   const std::size_t end = comment.find(". ");
-  return end == std::string::npos ? "" : comment.substr(end + 2) + "\n\n";
+  return end == std::string::npos ? "" : linked(comment.substr(end + 2)) + "\n\n";
 }
 
 }  // namespace

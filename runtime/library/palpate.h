@@ -67,7 +67,7 @@ typedef struct palpate_pose {
   { sizeof(palpate_pose), {0.0, 0.0, 0.0}, {1.0, 0.0, 0.0, 0.0}, 0 }
 
 /* What palpate_step could not do; bits, 0 when all is well. Whatever they say, the forces are finite. */
-enum {
+enum palpate_status {
   PALPATE_NOTHING_IN_REACH = 1 << 0,  /* grab is set, but the tool touches nothing and nothing is in reach */
   PALPATE_CAPACITY_FULL = 1 << 1,     /* more contacts than there is room for, merged: the deepest are kept */
   PALPATE_UNSETTLED = 1 << 2,         /* nothing has moved for long, and the contact forces still change */
