@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "base/error.h"
@@ -33,6 +34,7 @@ struct Interpolation {
 
 /// Of the rows of A, cut off where what is left of them is at most `cut`.
 Interpolation interpolate(const Rows& A, double cut) {
+  if (A.rows() == 0) return {};  // of children that need no terms
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A.transpose());
   const auto& R = qr.matrixR();
   Eigen::Index rank = 0;
