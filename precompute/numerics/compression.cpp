@@ -273,7 +273,9 @@ void Compressor::thin_out(Index c, Front& front) const {
   const Interpolation chosen =
       interpolate(front.response, options_.cut * std::sqrt(double(options_.samples)));
   const auto rank = std::ssize(chosen.skeleton);
-  if (rank > std::min<std::int64_t>(options_.samples - spare_samples, most_rank)) {
+  // Where all are in it nothing is cut off, whatever the samples say.
+  const std::int64_t told = rank == front.response.rows() ? most_rank : options_.samples - spare_samples;
+  if (rank > std::min<std::int64_t>(told, most_rank)) {
     throw Error("a cluster of " + std::to_string(matrix_.tree.end(c) - matrix_.tree.begin(c)) +
                     " stored nodes needs more than " + std::to_string(rank - 1) +
                     " terms, so the Green's functions cannot be compressed this exactly",
