@@ -32,7 +32,7 @@ struct Interpolation {
   Eigen::MatrixXd follow;              ///< [rows x skeleton], the identity in the skeleton
 };
 
-/// Of the rows of A, cut off where what is left of them is at most `cut`.
+/// Interpolation of the rows of A, cut off where what is left of them is at most `cut`.
 Interpolation interpolate(const Rows& A, double cut) {
   if (A.rows() == 0) return {};  // of children that need no terms
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A.transpose());
