@@ -52,7 +52,7 @@ std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor&
   std::mutex mutex;
   std::int64_t done = 0;
   bool stopped = false;
-  const std::int64_t all = touches * std::ssize(result);
+  const std::int64_t all = touchable.empty() ? 0 : touches * std::ssize(result);
   parallel_for(all, jobs, [&](std::int64_t item, int worker) {
     {
       const std::scoped_lock lock(mutex);

@@ -29,8 +29,8 @@ inline constexpr std::array<Index, 4> certified_nodes = {1, 5, 30, 100};
 /// Force errors of `touches` random touches for each of certified_nodes (as many as there are nodes):
 /// those nearest to a random node, some of those near it, and some of all, in turns. Displacements and error
 /// as in touch_error; the reference is solved with the factor. `touchable` are stored nodes that are free
-/// along every axis, `points` [N] of all stored nodes; `seed` chooses the touches. `progress` is told the
-/// share that is done, and says false to stop: then what is there is given.
+/// along every axis (none: no errors), `points` [N] of all stored nodes; `seed` chooses the touches.
+/// `progress` is told the share that is done, and says false to stop: then what is there is given.
 std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
                                  std::span<const Index> touchable, std::int64_t touches, std::uint64_t seed,

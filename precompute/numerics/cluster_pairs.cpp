@@ -57,10 +57,12 @@ class Clustering {
     split(2 * c + 2);
   }
 
+  /// Where both sides are equal but for rounding, as on a grid, that must not decide: machines differ in it.
   [[nodiscard]] bool far(Index a, Index b) const {
     const Box &A = boxes_[static_cast<std::size_t>(a)], &B = boxes_[static_cast<std::size_t>(b)];
     const double diameter = std::max(A.diagonal().norm(), B.diagonal().norm());
-    return diameter <= options_.eta * A.exteriorDistance(B);
+    const double distance = A.exteriorDistance(B);
+    return distance > 0.0 && diameter <= (1.0 + 1e-9) * options_.eta * distance;
   }
 
   /// a >= b

@@ -6,6 +6,7 @@
 #include <map>
 #include <mutex>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "base/error.h"
@@ -37,8 +38,9 @@ struct Interpolation {
   Eigen::MatrixXd follow;              ///< [rows x skeleton], the identity in the skeleton
 };
 
-/// Of the rows of A, cut off where what is left of them is at most `cut`.
+/// Interpolation of the rows of A, cut off where what is left of them is at most `cut`.
 Interpolation interpolate(const Rows& A, double cut) {
+  if (A.rows() == 0) return {};  // of children that need no terms
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A.transpose());
   const auto& R = qr.matrixR();
   Eigen::Index rank = 0;
@@ -255,7 +257,8 @@ Compression::Impl::Front Compression::Impl::joined_front(Index c) {
 void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
   const Interpolation chosen = interpolate(front.response, cut * std::sqrt(double(samples)));
   const auto rank = std::ssize(chosen.skeleton);
-  if (rank > samples - spare_samples) {
+  // Where all are in it nothing is cut off, whatever the samples say.
+  if (rank > samples - spare_samples && rank < front.response.rows()) {
     throw Error("a cluster of " + std::to_string(matrix_.tree.end(c) - matrix_.tree.begin(c)) +
                     " stored nodes needs more than " + std::to_string(rank - 1) +
                     " terms, so the Green's functions cannot be compressed this exactly",

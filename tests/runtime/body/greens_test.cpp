@@ -6,6 +6,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "tests/support/hierarchical_sample.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::greens_test {
@@ -140,6 +141,94 @@ TEST(Greens, RefusesAnOrderThatIsNotThatOfSomeNodes) {
 
 TEST(Greens, IsUnfoldedByDefaultWhenItIsSmall) {
   EXPECT_TRUE(Greens(test::pack(test::random_definite(30, 1), Precision::single_precision), 3).unfolded());
+}
+
+/// Nested low-rank form beside the matrix it stands for.
+class CompressedGreens : public testing::TestWithParam<int> {
+ protected:
+  /// Shapes of some modes of a body with as many stored dofs.
+  [[nodiscard]] Modes modes() {
+    Model model = test::unit_model(GetParam(), d_ == 3 ? 4 : 10, Scope::full, Precision::double_precision);
+    model.stored_nodes.resize(static_cast<std::size_t>(matrix_->tree.nodes));
+    model.dynamics.method = DynamicsMethod::modal;
+    model.dynamics.omega = {20.0, 30.0, 50.0, 80.0};
+    for (std::int64_t k = 0; k < 3 * matrix_->order(); ++k)
+      model.dynamics.shapes.push_back(test::random_number(random_));
+    return Modes(model);
+  }
+  /// What every way of reading says beside a matrix.
+  void expect_matrix(const Greens& greens, const Eigen::MatrixXd& xi) {
+    const double tolerance = 1e-13 * xi.cwiseAbs().maxCoeff();
+    const Index nodes = greens.nodes();
+    for (Index a = 0; a < nodes; a += 3) {
+      for (Index b = 0; b < nodes; b += 2)
+        ASSERT_LE((greens.block(a, b) - xi.block(d_ * a, d_ * b, d_, d_)).cwiseAbs().maxCoeff(), tolerance);
+    }
+    const std::vector<Index> columns = {nodes - 1, 0, nodes / 2, 0};
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> gathered(d_, 4 * d_);
+    greens.gather(nodes / 3, columns, {gathered.data(), static_cast<std::size_t>(gathered.size())});
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      EXPECT_LE((gathered.middleCols(d_ * k, d_) -
+                 xi.block(d_ * (nodes / 3), d_ * columns[static_cast<std::size_t>(k)], d_, d_))
+                    .cwiseAbs()
+                    .maxCoeff(),
+                tolerance);
+    }
+    const Eigen::VectorXd f =
+        Eigen::VectorXd::NullaryExpr(4 * d_, [this] { return test::random_number(random_); });
+    Eigen::VectorXd expected = Eigen::VectorXd::Zero(xi.rows());
+    for (Eigen::Index k = 0; k < 4; ++k)
+      expected += xi.middleCols(d_ * columns[static_cast<std::size_t>(k)], d_) * f.segment(d_ * k, d_);
+    const std::span<const double> forces(f.data(), static_cast<std::size_t>(f.size()));
+    Eigen::VectorXd u = Eigen::VectorXd::Constant(xi.rows(), 1e30);
+    greens.displacement(columns, forces, {u.data(), static_cast<std::size_t>(u.size())});
+    EXPECT_LE((u - expected).cwiseAbs().maxCoeff(), 10.0 * tolerance);
+    u.setConstant(7.0);
+    greens.displacement(columns, forces, 5, {u.data() + 5 * d_, static_cast<std::size_t>(20 * d_)});
+    expected.head(5 * d_).setConstant(7.0);
+    expected.tail(xi.rows() - 25 * d_).setConstant(7.0);
+    EXPECT_LE((u - expected).cwiseAbs().maxCoeff(), 10.0 * tolerance);
+    greens.displacement({}, {}, {u.data(), static_cast<std::size_t>(u.size())});
+    EXPECT_EQ(u, Eigen::VectorXd::Zero(xi.rows()));
+  }
+
+  Eigen::Index d_ = GetParam();
+  std::mt19937_64 random_{5};
+  std::shared_ptr<const HierarchicalMatrix> matrix_ = std::make_shared<const HierarchicalMatrix>(
+      test::random_hierarchical({.dimension = GetParam(), .nodes = 83, .levels = 4, .scale = 0.25}, 3));
+  Eigen::MatrixXd xi_ = test::written_out(*matrix_);
+};
+
+INSTANTIATE_TEST_SUITE_P(Dimension, CompressedGreens, testing::Values(2, 3));
+
+TEST_P(CompressedGreens, AreReadAsTheMatrixTheyStandFor) {
+  const Greens greens(matrix_);
+  EXPECT_TRUE(greens.compressed());
+  EXPECT_FALSE(greens.unfolded());
+  EXPECT_FALSE(greens.split());
+  EXPECT_EQ(greens.order(), xi_.rows());
+  EXPECT_EQ(greens.nodes(), 83);
+  EXPECT_EQ(greens.dimension(), d_);
+  EXPECT_EQ(greens.exact_terms(), 0);
+  EXPECT_EQ(greens.precision(), Precision::single_precision);
+  expect_matrix(greens, xi_);
+}
+
+TEST_P(CompressedGreens, TakeModesOnTop) {
+  const Modes modes = this->modes();
+  Greens greens(matrix_);
+  const std::vector<double> weights = {0.5, -0.25, 2.0};
+  greens.add_modes(modes, weights);
+  EXPECT_EQ(greens.exact_terms(), 3);
+  Eigen::MatrixXd xi = xi_;
+  for (Eigen::Index i = 0; i < xi.rows(); ++i)
+    for (Eigen::Index j = 0; j < xi.cols(); ++j)
+      for (std::size_t k = 0; k < 3; ++k) xi(i, j) += weights[k] * modes.row(i)[k] * modes.row(j)[k];
+  expect_matrix(greens, xi);
+  // A second time: both are on top.
+  greens.add_modes(modes, std::vector<double>{-0.5, 0.25, -2.0});
+  EXPECT_EQ(greens.exact_terms(), 6);
+  expect_matrix(greens, xi_);
 }
 
 }  // namespace

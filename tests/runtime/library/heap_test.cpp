@@ -25,6 +25,7 @@
 #include "runtime/body/prescribed_nodes.h"
 #include "runtime/library/palpate.h"
 #include "runtime/tick/step.h"
+#include "tests/support/hierarchical_sample.h"
 #include "tests/support/runtime_model.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -383,6 +384,51 @@ TEST_P(MovingTick, MakesNoSystemCall) {
     exercise_motion();
     return state_.surface.motion.active();
   });
+#endif
+}
+
+/// Rows and displacements of compressed Green's functions, more at once than is kept of them.
+class CompressedGreens : public testing::TestWithParam<int> {
+ protected:
+  bool exercise_products() {
+    for (Index row = 0; row < greens_.nodes(); row += 17) greens_.gather(row, nodes_, blocks_);
+    greens_.displacement(nodes_, f_, u_);
+    greens_.displacement({nodes_.data(), 30}, {f_.data(), 30 * d_}, 100, {u_.data(), 64 * d_});
+    return std::isfinite(u_.front()) && std::isfinite(blocks_.back());
+  }
+
+  std::size_t d_ = static_cast<std::size_t>(GetParam());
+  Greens greens_{std::make_shared<const HierarchicalMatrix>(
+      test::random_hierarchical({.dimension = GetParam(), .nodes = 331, .levels = 5}, 1))};
+  std::vector<Index> nodes_ = [] {
+    std::vector<Index> nodes;
+    for (Index k = 0; k < 700; ++k) nodes.push_back(k * 37 % 331);
+    return nodes;
+  }();
+  std::vector<double> f_ = std::vector<double>(d_ * nodes_.size(), 1.0), u_ = std::vector<double>(d_ * 331),
+                      blocks_ = std::vector<double>(d_ * d_ * nodes_.size());
+};
+
+INSTANTIATE_TEST_SUITE_P(Dimension, CompressedGreens, testing::Values(2, 3));
+
+TEST_P(CompressedGreens, MakeNoHeapCall) {
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+  counting = true;
+  const bool finite = exercise_products();
+  counting = false;
+  EXPECT_EQ(heap_calls, 0);
+#else
+  const bool finite = exercise_products();
+#endif
+  EXPECT_TRUE(finite);
+}
+
+TEST_P(CompressedGreens, MakeNoSystemCall) {
+#if !PALPATE_OWN_MALLOC
+  GTEST_SKIP() << "sanitizers make system calls";
+#else
+  expect_no_system_call([&] { return exercise_products(); });
 #endif
 }
 
