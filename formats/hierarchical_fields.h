@@ -3,9 +3,9 @@
 
 #include <array>
 
-#include "formats/hierarchical.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
+#include "matrices/hierarchical.h"
 
 namespace palpate {
 

@@ -15,7 +15,7 @@
 #include "base/error.h"
 #include "base/interrupt.h"
 #include "formats/model_file.h"
-#include "formats/output_paths.h"
+#include "formats/outputs/output_paths.h"
 #include "meshes/quality.h"
 #include "precompute/compressed_greens.h"
 #include "precompute/numerics/dynamics.h"

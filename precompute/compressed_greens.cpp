@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "precompute/numerics/certificate.h"
+#include "precompute/compression/certificate.h"
 
 namespace palpate {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "formats/model.h"
 #include "formats/model_file.h"
+#include "precompute/compression/compression.h"
 #include "precompute/description/description.h"
-#include "precompute/numerics/compression.h"
 #include "precompute/numerics/factor.h"
 #include "precompute/plan.h"
 #include "precompute/progress.h"

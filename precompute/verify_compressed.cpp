@@ -5,9 +5,9 @@
 #include <random>
 #include <thread>
 
-#include "formats/hierarchical_product.h"
-#include "precompute/numerics/certificate.h"
-#include "precompute/numerics/selected_solver.h"
+#include "matrices/hierarchical_product.h"
+#include "precompute/compression/certificate.h"
+#include "precompute/compression/selected_solver.h"
 #include "precompute/verify_matrix.h"
 
 namespace palpate {

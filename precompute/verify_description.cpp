@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 #include "meshes/material_fields.h"
 #include "precompute/description/description.h"
 #include "precompute/geometry/material_parts.h"

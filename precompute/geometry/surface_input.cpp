@@ -31,7 +31,7 @@
 #include "base/error.h"
 #include "base/regular_file.h"
 #include "base/write_file.h"
-#include "formats/output_paths.h"
+#include "formats/outputs/output_paths.h"
 
 namespace palpate {
 namespace {

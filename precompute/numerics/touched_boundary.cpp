@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "formats/hierarchical_product.h"
+#include "matrices/hierarchical_product.h"
 
 namespace palpate {
 namespace {

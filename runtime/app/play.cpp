@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "formats/output_paths.h"
+#include "formats/outputs/output_paths.h"
 #include "formats/recording_parts.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/app/input_source.h"

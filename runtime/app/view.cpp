@@ -11,7 +11,7 @@
 #include "base/error.h"
 #include "base/json_text.h"
 #include "base/write_file.h"
-#include "formats/output_paths.h"
+#include "formats/outputs/output_paths.h"
 #include "formats/recording_parts.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/viewer/page_archive.h"

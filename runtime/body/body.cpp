@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 #include "runtime/body/modal_newmark.h"
 #include "runtime/body/surface_numbering.h"
 #include "runtime/solve/tick_tuning.h"
@@ -22,13 +22,12 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 void check_sizes(const Model& model) {
   const std::size_t nodes = model.mesh.nodes.size();
   const auto in_mesh = [nodes](Index node) { return node >= 0 && static_cast<std::size_t>(node) < nodes; };
-  const std::int64_t order =
-      model.compressed != nullptr ? model.compressed->order() : model.greens.order();
+  const std::int64_t order = model.compressed != nullptr ? model.compressed->order() : model.greens.order();
   if (order != model.stored_dofs() ||
       !std::all_of(model.stored_nodes.begin(), model.stored_nodes.end(), in_mesh)) {
-    throw Error("the Green's functions of " + std::to_string(order) +
-                    " dofs do not belong to the " + std::to_string(model.stored_nodes.size()) +
-                    " stored nodes of a mesh of " + std::to_string(nodes),
+    throw Error("the Green's functions of " + std::to_string(order) + " dofs do not belong to the " +
+                    std::to_string(model.stored_nodes.size()) + " stored nodes of a mesh of " +
+                    std::to_string(nodes),
                 model.name, "precompute the model again");
   }
   const auto check_nodal = [&](const char* what, std::size_t size) {

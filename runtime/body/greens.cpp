@@ -13,8 +13,8 @@
 
 #include "base/error.h"
 #include "base/memory.h"
-#include "formats/hierarchical.h"
-#include "formats/hierarchical_product.h"
+#include "matrices/hierarchical.h"
+#include "matrices/hierarchical_product.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {

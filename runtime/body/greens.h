@@ -35,7 +35,7 @@ class Greens {
   /// `dimension`: dofs a node, 2 or 3. Throws Error when the order is not that many for each of some nodes.
   Greens(PackedGreens packed, int dimension, const GreensOptions& options = {});
 
-  /// Of a matrix in nested low-rank form, which stays as it is.
+  /// A matrix in nested low-rank form, which stays as it is.
   explicit Greens(std::shared_ptr<const HierarchicalMatrix> compressed);
 
   /// From now on Xi + sum_i weights_i phi_i phi_i^T: with weights 1 / k_bar_i - 1 / omega_i^2 that is

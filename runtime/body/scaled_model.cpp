@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 
 namespace palpate {
 namespace {

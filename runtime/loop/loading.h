@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "formats/output_paths.h"
+#include "formats/outputs/output_paths.h"
 #include "runtime/body/body.h"
 
 namespace palpate {

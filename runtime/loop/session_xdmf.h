@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "formats/output_paths.h"
+#include "formats/outputs/output_paths.h"
 #include "formats/recording.h"
 
 namespace palpate {

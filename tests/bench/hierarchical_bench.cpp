@@ -21,10 +21,10 @@
 
 #include "base/parallel.h"
 #include "meshes/generate.h"
-#include "precompute/numerics/compression.h"
+#include "precompute/compression/compression.h"
+#include "precompute/compression/selected_solver.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
-#include "precompute/numerics/selected_solver.h"
 #include "runtime/body/greens.h"
 #include "tests/support/clustered_body.h"
 #include "tests/support/precompute_case.h"

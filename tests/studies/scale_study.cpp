@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "base/error.h"
-#include "precompute/numerics/certificate.h"
-#include "precompute/numerics/compression.h"
+#include "precompute/compression/certificate.h"
+#include "precompute/compression/compression.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
 #include "tests/support/study.h"

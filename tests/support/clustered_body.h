@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "precompute/compression/cluster_pairs.h"
 #include "precompute/numerics/assembly.h"
-#include "precompute/numerics/cluster_pairs.h"
 
 namespace palpate::test {
 

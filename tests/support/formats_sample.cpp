@@ -10,7 +10,7 @@
 #include <limits>
 
 #include "base/error.h"
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
 

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <random>
 
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 
 namespace palpate::test {
 

@@ -1,4 +1,4 @@
-#include "formats/output_paths.h"
+#include "formats/outputs/output_paths.h"
 
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-#include "precompute/numerics/recompression.h"
+#include "precompute/compression/recompression.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

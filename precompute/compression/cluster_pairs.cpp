@@ -1,4 +1,4 @@
-#include "precompute/numerics/cluster_pairs.h"
+#include "precompute/compression/cluster_pairs.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -13,7 +13,7 @@
 #include <random>
 
 #include "base/error.h"
-#include "formats/hierarchical_product.h"
+#include "matrices/hierarchical_product.h"
 #include "precompute/compressed_greens.h"
 #include "precompute/inspect.h"
 #include "precompute/verify.h"

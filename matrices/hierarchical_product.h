@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 
 namespace palpate {
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 #include "meshes/mesh.h"
 #include "precompute/numerics/factor.h"
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 #include "meshes/mesh.h"
 
 namespace palpate {

@@ -1,5 +1,5 @@
 // Products with a matrix in nested low-rank form against the same matrix with all entries written out.
-#include "formats/hierarchical_product.h"
+#include "matrices/hierarchical_product.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Selected blocks of K^-1 against the dense inverse.
-#include "precompute/numerics/selected_solver.h"
+#include "precompute/compression/selected_solver.h"
 
 #include <cblas.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // What is known again as an output of ours, and where outputs may be written; both programs do more of it in
 // programs_outputs_test.py.
-#include "formats/output_paths.h"
+#include "formats/outputs/output_paths.h"
 
 #include <gtest/gtest.h>
 

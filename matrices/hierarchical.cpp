@@ -1,4 +1,4 @@
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "precompute/numerics/certificate.h"
+#include "precompute/compression/certificate.h"
 
 #include <algorithm>
 #include <mutex>
@@ -6,8 +6,8 @@
 #include <random>
 
 #include "base/parallel.h"
-#include "formats/hierarchical_product.h"
-#include "precompute/numerics/selected_solver.h"
+#include "matrices/hierarchical_product.h"
+#include "precompute/compression/selected_solver.h"
 #include "precompute/numerics/touches.h"
 
 namespace palpate {

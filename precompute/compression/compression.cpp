@@ -1,4 +1,4 @@
-#include "precompute/numerics/compression.h"
+#include "precompute/compression/compression.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "precompute/numerics/recompression.h"
-#include "precompute/numerics/selected_solver.h"
+#include "precompute/compression/recompression.h"
+#include "precompute/compression/selected_solver.h"
 
 namespace palpate {
 namespace {

@@ -1,5 +1,5 @@
 // The tree of clusters and its pairs against what their definitions say, node by node.
-#include "precompute/numerics/cluster_pairs.h"
+#include "precompute/compression/cluster_pairs.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "formats/hierarchical_product.h"
+#include "matrices/hierarchical_product.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "precompute/numerics/selected_solver.h"
+#include "precompute/compression/selected_solver.h"
 
 #include <algorithm>
 

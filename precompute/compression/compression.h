@@ -6,8 +6,8 @@
 #include <memory>
 #include <span>
 
-#include "formats/hierarchical.h"
-#include "precompute/numerics/cluster_pairs.h"
+#include "matrices/hierarchical.h"
+#include "precompute/compression/cluster_pairs.h"
 #include "precompute/numerics/factor.h"
 
 namespace palpate {

@@ -1,11 +1,11 @@
 // Fewer terms for a matrix in nested low-rank form.
 #pragma once
 
-#include "formats/hierarchical.h"
+#include "matrices/hierarchical.h"
 
 namespace palpate {
 
-/// The same matrix with orthonormal bases of the least ranks (Börm, Efficient Numerical Methods for Non-local
+/// A matrix with orthonormal bases of the least ranks (Börm, Efficient Numerical Methods for Non-local
 /// Operators, EMS 2010, chapters 5 and 6): of each cluster the directions are kept in which random loads of
 /// +-1 on all that is far move it by more than `cut`, both in units of the root of D, the diagonal. Shares
 /// the near pairs.
