@@ -289,8 +289,9 @@ class ColumnsOfLeaves {
 template <int D>
 class FieldOfLeaves {
  public:
-  FieldOfLeaves(const HierarchicalMatrix& matrix, Index first_node, std::span<double> u) noexcept
-      : walk_{matrix}, first_(first_node), end_(first_node + static_cast<Index>(u.size() / D)), u_(u) {}
+  FieldOfLeaves(const HierarchicalMatrix& matrix, std::span<const NodeRange> ranges,
+                std::span<double> u) noexcept
+      : walk_{matrix}, ranges_(ranges), u_(u) {}
 
   /// False when there is no more room.
   bool take(Index node, const double* f) noexcept {
@@ -312,7 +313,14 @@ class FieldOfLeaves {
     if (nodes_ == 0) return;
     sort();
     climb();
-    descend(0, 0, false);
+    double* u = u_.data();
+    for (const NodeRange& range : ranges_) {
+      first_ = range.first;
+      end_ = range.end;
+      to_ = u;
+      descend(0, 0, false);
+      u += std::int64_t{D} * (end_ - first_);
+    }
     nodes_ = leaves_ = terms_ = 0;
   }
 
@@ -426,7 +434,7 @@ class FieldOfLeaves {
   void move(Index leaf, const Terms& terms) noexcept {
     const auto [from, to] = asked(leaf);
     const Index rank = walk_.rank(leaf);
-    double* u = u_.data() + std::int64_t{D} * (from - first_);
+    double* u = to_ + std::int64_t{D} * (from - first_);
     for (Index node = from; node < to; ++node) {
       const float* V = walk_.basis(leaf, std::int64_t{D} * (node - walk_.matrix.tree.begin(leaf)));
       std::array<const float*, D> rows;
@@ -458,7 +466,7 @@ class FieldOfLeaves {
     const std::int64_t first = std::int64_t{D} * (from - m.tree.begin(leaf)),
                        count = std::int64_t{D} * (to - from), before = std::int64_t{D} * m.tree.begin(other);
     const float* entries = m.near.get() + m.near_at[at(pair)];
-    double* u = u_.data() + std::int64_t{D} * (from - first_);
+    double* u = to_ + std::int64_t{D} * (from - first_);
     const std::span<const Source> sources(sources_.data() + source_from_[slot],
                                           sources_.data() + source_from_[slot + 1]);
     if (leaf > other) {  // rows of the pair are rows of u
@@ -478,8 +486,10 @@ class FieldOfLeaves {
   }
 
   Walk walk_;
-  Index first_, end_;
+  std::span<const NodeRange> ranges_;
   std::span<double> u_;
+  Index first_ = 0, end_ = 0;  // the range under way
+  double* to_ = nullptr;       // its displacement
   std::size_t nodes_ = 0, leaves_ = 0;
   std::size_t terms_ = 0;  // at most, of the leaves and all above them
   std::array<Source, nodes_at_once> sources_;
@@ -509,8 +519,8 @@ void gather_dimension(const HierarchicalMatrix& matrix, Index row, std::span<con
 
 template <int D>
 void displace_dimension(const HierarchicalMatrix& matrix, std::span<const Index> nodes, const double* f,
-                        Index first_node, std::span<double> u) noexcept {
-  FieldOfLeaves<D> field(matrix, first_node, u);
+                        std::span<const NodeRange> ranges, std::span<double> u) noexcept {
+  FieldOfLeaves<D> field(matrix, ranges, u);
   for (std::size_t k = 0; k < nodes.size(); ++k) {
     if (field.take(nodes[k], f + D * k)) continue;
     field.spread();
@@ -531,12 +541,12 @@ void gather_blocks(const HierarchicalMatrix& matrix, Index row, std::span<const 
 }
 
 void displace(const HierarchicalMatrix& matrix, std::span<const Index> nodes, std::span<const double> f,
-              Index first_node, std::span<double> u) noexcept {
+              std::span<const NodeRange> ranges, std::span<double> u) noexcept {
   std::fill(u.begin(), u.end(), 0.0);
   if (matrix.dimension == 2) {
-    displace_dimension<2>(matrix, nodes, f.data(), first_node, u);
+    displace_dimension<2>(matrix, nodes, f.data(), ranges, u);
   } else {
-    displace_dimension<3>(matrix, nodes, f.data(), first_node, u);
+    displace_dimension<3>(matrix, nodes, f.data(), ranges, u);
   }
 }
 

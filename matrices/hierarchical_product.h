@@ -4,6 +4,7 @@
 #include <span>
 
 #include "matrices/hierarchical.h"
+#include "matrices/node_range.h"
 
 namespace palpate {
 
@@ -12,9 +13,9 @@ namespace palpate {
 void gather_blocks(const HierarchicalMatrix& matrix, Index row, std::span<const Index> columns,
                    std::span<double> blocks) noexcept;
 
-/// As Greens::displacement of the nodes from `first_node` on: up the tree from the nodes that carry force,
-/// across, and down to those that are asked for.
+/// As Greens::displacement of ranges of nodes: up the tree from the nodes that carry force, once for all
+/// ranges, across, and down to those that are asked for.
 void displace(const HierarchicalMatrix& matrix, std::span<const Index> nodes, std::span<const double> f,
-              Index first_node, std::span<double> u) noexcept;
+              std::span<const NodeRange> ranges, std::span<double> u) noexcept;
 
 }  // namespace palpate

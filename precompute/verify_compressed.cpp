@@ -28,7 +28,8 @@ std::vector<Check> check_probes(const Model& model) {
   std::iota(nodes.begin(), nodes.end(), 0);
   for (const Probe& probe : model.probes) {
     Vector Xi_f(std::ssize(probe.force));
-    displace(*model.compressed, nodes, probe.force, 0, {Xi_f.data(), probe.force.size()});
+    const NodeRange all{0, model.compressed->tree.nodes};
+    displace(*model.compressed, nodes, probe.force, {&all, 1}, {Xi_f.data(), probe.force.size()});
     const Eigen::Map<const Vector> f(probe.force.data(), Xi_f.size()),
         u(probe.displacement.data(), Xi_f.size());
     const double work = f.dot(Xi_f);

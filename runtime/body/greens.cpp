@@ -253,7 +253,6 @@ void Greens::displacement(std::span<const Index> nodes, std::span<const double> 
 
 void Greens::displace_statically(std::span<const Index> nodes, std::span<const double> f, Index first_node,
                                  std::span<double> u) const noexcept {
-  if (compressed()) return displace(*compressed_, nodes, f, first_node, u);
   const std::int64_t first = std::int64_t{dimension_} * first_node;
   if (!unfolded()) {
     with_scalars(packed_.data(), precision_, [&]<class T>(const T*) {
@@ -269,6 +268,17 @@ void Greens::displace_statically(std::span<const Index> nodes, std::span<const d
       displacement_from_square<3>(square, stride_, nodes, f.data(), first, u);
     }
   });
+}
+
+void Greens::displace_statically(std::span<const Index> nodes, std::span<const double> f,
+                                 std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
+  if (compressed()) return displace(*compressed_, nodes, f, ranges, u);
+  std::size_t done = 0;
+  for (const NodeRange& range : ranges) {
+    const auto count = static_cast<std::size_t>(dimension_ * (range.end - range.first));
+    displace_statically(nodes, f, range.first, u.subspan(done, count));
+    done += count;
+  }
 }
 
 void Greens::add_modes(const Modes& modes, std::span<const double> weights) {
@@ -313,8 +323,18 @@ void Greens::gather(Index row, std::span<const Index> columns, std::span<double>
 
 void Greens::displacement(std::span<const Index> nodes, std::span<const double> f, Index first_node,
                           std::span<double> u) const noexcept {
-  displace_statically(nodes, f, first_node, u);
-  if (terms_ == 0) return;
+  const NodeRange range{first_node, first_node + static_cast<Index>(std::ssize(u) / dimension_)};
+  displacement(nodes, f, {&range, 1}, u);
+}
+
+void Greens::displacement(std::span<const Index> nodes, std::span<const double> f,
+                          std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
+  displace_statically(nodes, f, ranges, u);
+  if (terms_ > 0) add_exact_terms(nodes, f, ranges, u);
+}
+
+void Greens::add_exact_terms(std::span<const Index> nodes, std::span<const double> f,
+                             std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
   const std::int64_t d = dimension_;
   std::array<double, most_exact_terms> sum;
   std::fill_n(sum.begin(), terms_, 0.0);
@@ -322,10 +342,13 @@ void Greens::displacement(std::span<const Index> nodes, std::span<const double> 
     const std::int64_t dof = d * nodes[i / static_cast<std::size_t>(d)] + static_cast<std::int64_t>(i) % d;
     add(left_.get() + dof * terms_, f[i], sum.data(), terms_);
   }
-  const double* row = right_.get() + d * first_node * terms_;
-  for (double& ui : u) {
-    ui += dot(row, sum.data(), terms_);
-    row += terms_;
+  auto ui = u.begin();
+  for (const NodeRange& range : ranges) {
+    const double* row = right_.get() + d * range.first * terms_;
+    for (std::int64_t dof = d * range.first; dof < d * range.end; ++dof) {
+      *ui++ += dot(row, sum.data(), terms_);
+      row += terms_;
+    }
   }
 }
 

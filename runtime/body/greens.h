@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "formats/packed.h"
+#include "matrices/node_range.h"
 #include "meshes/mesh.h"
 #include "runtime/body/modes.h"
 
@@ -84,10 +85,18 @@ class Greens {
   void displacement(std::span<const Index> nodes, std::span<const double> f, Index first_node,
                     std::span<double> u) const noexcept;
 
+  /// Displacement of ranges of nodes, one after the other in `u`.
+  void displacement(std::span<const Index> nodes, std::span<const double> f,
+                    std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
+
  private:
   void gather_static(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
+  void displace_statically(std::span<const Index> nodes, std::span<const double> f,
+                           std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
   void displace_statically(std::span<const Index> nodes, std::span<const double> f, Index first_node,
                            std::span<double> u) const noexcept;
+  void add_exact_terms(std::span<const Index> nodes, std::span<const double> f,
+                       std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
 
   PackedGreens packed_;  // empty when unfolded: the square has taken its place
   std::shared_ptr<const HierarchicalMatrix> compressed_;

@@ -97,7 +97,7 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       row_change(size(body.dimension()) * rows.size()),
       force_change(row_change.size()),
       rolling(body.dimension(), max_contacts, static_cast<Index>(rows.size())),
-      far_displacement(size(body.dimension() * tuning.far.nodes)) {}
+      far_displacement(size(body.dimension() * (tuning.far.nodes + tuning.far.run))) {}
 
 void remember(std::span<const ContactPoint> contacts, Scratch& scratch) noexcept {
   const std::size_t mask = scratch.last_of_feature.size() - 1;

@@ -102,7 +102,7 @@ struct Scratch {
   std::vector<double> row_change;        ///< [d x rows] linearise: db, an axis after the other [m]
   std::vector<double> force_change;      ///< [d x rows] linearise: dlambda [N]
   RollingScratch rolling;                ///< linearise: the turning of normals
-  std::vector<double> far_displacement;  ///< [d tuning.far.nodes] far surface: the slice that is renewed [m]
+  std::vector<double> far_displacement;  ///< [d nodes] far surface: what is renewed in a tick [m]
   HighWater high_water;                  ///< detection and assembly: since the start
 };
 

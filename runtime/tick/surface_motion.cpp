@@ -1,6 +1,7 @@
 #include "runtime/tick/surface_motion.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "runtime/solve/node_vectors.h"
@@ -9,6 +10,8 @@
 
 namespace palpate {
 namespace {
+
+constexpr std::size_t most_ranges = 256;  // of near runs that are renewed in one tick
 
 /// Moves a surface node that is not near a tool.
 void move_far(const Body& body, SurfaceState& surface, Index node, const Vec3& u) noexcept {
@@ -30,15 +33,23 @@ Vec3 stored_displacement(const Body& body, const SurfaceState& surface, Index no
   return sum;
 }
 
-/// Renews the displacement of stored nodes, and moves the surface nodes that follow them until none of
-/// `moves` is left; where it ends.
-Index renew_nodes(const Body& body, SurfaceState& surface, Scratch& scratch, Index first, Index end,
+/// What the near field's load moves ranges of stored nodes by.
+void displace_ranges(const Body& body, const SurfaceState& surface, Scratch& scratch,
+                     std::span<const NodeRange> ranges) noexcept {
+  std::size_t nodes = 0;
+  for (const NodeRange& range : ranges) nodes += static_cast<std::size_t>(range.end - range.first);
+  const SurfaceLoad& load = surface.near.load();
+  body.greens().displacement(
+      load.nodes(), load.forces(), ranges,
+      std::span(scratch.far_displacement).first(static_cast<std::size_t>(body.dimension()) * nodes));
+}
+
+/// Renews the displacement of stored nodes [first, end) to u, and moves the surface nodes that follow them
+/// until none of `moves` is left; where it ends.
+Index renew_nodes(const Body& body, SurfaceState& surface, const double* u, Index first, Index end,
                   Index& moves) noexcept {
   const int d = body.dimension();
-  const SurfaceLoad& load = surface.near.load();
-  const std::span<double> u(scratch.far_displacement.data(), static_cast<std::size_t>(d * (end - first)));
-  body.greens().displacement(load.nodes(), load.forces(), first, u);
-  std::copy(u.begin(), u.end(), surface.stored_displacement.begin() + std::ptrdiff_t{d} * first);
+  std::copy_n(u, d * (end - first), surface.stored_displacement.begin() + std::ptrdiff_t{d} * first);
   Index stored = first;
   for (; stored < end && moves > 0; ++stored) {
     moves -= static_cast<Index>(body.followers(stored).size());
@@ -80,14 +91,24 @@ bool renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, 
     sweep.next_near_run = 0;
   }
   if (sweep.near_run_count == 0) return false;
+  std::array<NodeRange, most_ranges> ranges;
+  std::size_t count = 0;
+  for (Index left = most, run = sweep.next_near_run, done = sweep.done_of_run;
+       left > 0 && run < sweep.near_run_count && count < ranges.size(); ++run, done = 0) {
+    const Index begin = runs.begin(sweep.near_runs[run]) + done, end = runs.end(sweep.near_runs[run]);
+    ranges[count++] = {begin, end};
+    left -= end - begin;
+  }
+  displace_ranges(body, surface, scratch, std::span(ranges).first(count));
   Index moves = tuning.far.moves;
-  for (Index left = most; left > 0 && moves > 0 && sweep.next_near_run < sweep.near_run_count;) {
+  const double* u = scratch.far_displacement.data();
+  for (std::size_t k = 0; k < count && moves > 0; ++k) {
+    const auto [begin, end] = ranges[k];
     const Index run = sweep.near_runs[sweep.next_near_run];
-    const Index first = runs.begin(run) + sweep.done_of_run;
-    const Index stopped = renew_nodes(body, surface, scratch, first, runs.end(run), moves);
-    left -= stopped - first;
+    const Index stopped = renew_nodes(body, surface, u, begin, end, moves);
+    u += body.dimension() * (end - begin);
     sweep.done_of_run = stopped - runs.begin(run);
-    if (stopped < runs.end(run)) continue;
+    if (stopped < end) break;
     sweep.done_of_run = 0;
     ++sweep.next_near_run;
   }
@@ -100,7 +121,10 @@ void renew_all_in_turn(const Body& body, SurfaceState& surface, Scratch& scratch
   const Index nodes = body.greens().nodes();
   Index moves = tuning.far.moves;
   const Index end = std::min(sweep.next_node + most, nodes);
-  sweep.next_node = renew_nodes(body, surface, scratch, sweep.next_node, end, moves) % nodes;
+  const NodeRange range{sweep.next_node, end};
+  displace_ranges(body, surface, scratch, {&range, 1});
+  sweep.next_node =
+      renew_nodes(body, surface, scratch.far_displacement.data(), sweep.next_node, end, moves) % nodes;
   if (sweep.next_node != 0) return;
   sweep.last_change = sweep.change;
   sweep.change = 0.0;

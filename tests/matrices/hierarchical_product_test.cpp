@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <random>
 #include <string>
@@ -45,17 +46,34 @@ class HierarchicalProduct : public testing::TestWithParam<test::HierarchicalKind
   }
   /// The displacement of `count` nodes from `first` on beside that of the matrix written out.
   void expect_displacement(const std::vector<Index>& nodes, Index first, Index count) {
+    const NodeRange all{first, first + count};
+    expect_displacement(nodes, {&all, 1}, first, count);
+    // In three pieces, the last one first.
+    const Index third = first + count / 3, half = first + count / 2;
+    const std::array<NodeRange, 4> pieces = {
+        {{half, first + count}, {first, third}, {third, third}, {third, half}}};
+    expect_displacement(nodes, pieces, first, count);
+  }
+  void expect_displacement(const std::vector<Index>& nodes, std::span<const NodeRange> ranges, Index first,
+                           Index count) {
     const Eigen::VectorXd f = random_vector(d_ * std::ssize(nodes), random_);
     Eigen::VectorXd expected = Eigen::VectorXd::Zero(d_ * count);
     for (std::size_t k = 0; k < nodes.size(); ++k)
       expected += full_.block(d_ * first, d_ * nodes[k], d_ * count, d_) *
                   f.segment(d_ * static_cast<Eigen::Index>(k), d_);
     Eigen::VectorXd u = Eigen::VectorXd::Constant(d_ * count + 2, 1e30);
-    displace(matrix_, nodes, {f.data(), static_cast<std::size_t>(f.size())}, first,
+    displace(matrix_, nodes, {f.data(), static_cast<std::size_t>(f.size())}, ranges,
              {u.data() + 1, static_cast<std::size_t>(d_ * count)});
     EXPECT_EQ(u[0], 1e30);
     EXPECT_EQ(u[d_ * count + 1], 1e30);
-    ASSERT_LE((u.segment(1, d_ * count) - expected).norm(), 1e-14 * full_.norm() * std::max(f.norm(), 1.0))
+    Eigen::VectorXd in_place = Eigen::VectorXd::Constant(d_ * count, 1e30);
+    Eigen::Index from = 1;
+    for (const NodeRange& range : ranges) {
+      const Eigen::Index length = d_ * (range.end - range.first);
+      in_place.segment(d_ * (range.first - first), length) = u.segment(from, length);
+      from += length;
+    }
+    ASSERT_LE((in_place - expected).norm(), 1e-14 * full_.norm() * std::max(f.norm(), 1.0))
         << nodes.size() << " nodes with force, " << count << " from " << first << " on";
   }
 

@@ -1,0 +1,13 @@
+// Ranges of nodes.
+#pragma once
+
+#include "meshes/mesh.h"
+
+namespace palpate {
+
+/// Nodes [first, end).
+struct NodeRange {
+  Index first = 0, end = 0;
+};
+
+}  // namespace palpate
