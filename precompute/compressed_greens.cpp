@@ -11,13 +11,13 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t many_nodes = 5000;  // from there on compressed
-constexpr double cut_of_tolerance = 0.08;  // forces are off by several times the cut (scripts/studies/scale)
+constexpr double cut_of_tolerance = 0.05;  // forces are off by several times the cut (scripts/studies/scale)
 constexpr double finer = 0.3;              // the next cut, where touches are off by more than the tolerance
 constexpr int most_cuts = 3;
 constexpr std::uint64_t certificate_seed = 41;
 constexpr std::int64_t touches = 64;   // of each number of nodes
 constexpr double typical_rank = 45.0;  // of the default tolerance (measured)
-constexpr double random_loads = 192.0;
+constexpr double random_loads = 256.0;
 constexpr double far_share = 0.8;    // of the time of near pairs (measured)
 constexpr double touch_share = 0.3;  // likewise
 

@@ -22,8 +22,8 @@ using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using Dofs = std::vector<std::int64_t>;
 
 constexpr Index spare_samples = 12;         // more than the largest rank: what they say of it is certain
-constexpr double skeleton_share = 0.4;      // of the cut: skeletons are not to add to the error
-constexpr Index samples = 192;              // random loads
+constexpr double skeleton_share = 0.5;      // of the cut: skeletons are not to add to the error
+constexpr Index samples = 256;              // random loads
 constexpr Index coupled_at_once = 4;        // clusters whose couplings are solved together
 constexpr Index leaves_estimated = 64;      // whose flops are counted for an estimate
 constexpr std::int64_t loads_at_once = 32;  // solved together

@@ -33,6 +33,8 @@ class Recompression {
         Q_(at(matrix.tree.clusters())),
         R_(Q_.size()),
         U_(Q_.size()),
+        weights_(Q_.size()),
+        rows_(Q_.size()),
         S_(matrix.far_pair.size()) {}
 
   HierarchicalMatrix run() {
@@ -43,8 +45,8 @@ class Recompression {
       S_[at(p)] = R_[at(row)] * block(from_.coupling, from_.coupling_at[at(p)], rank(row), rank(column)) *
                   R_[at(column)].transpose();
     });
-    weights_.resize(Q_.size());
     for (int level = 0; level <= from_.tree.levels; ++level) for_level(level, [&](Index c) { weigh(c); });
+    for (int level = from_.tree.levels; level >= 0; --level) for_level(level, [&](Index c) { truncate(c); });
     return packed();
   }
 
@@ -81,8 +83,7 @@ class Recompression {
     R_[at(c)] = qr.matrixQR().topRows(k).triangularView<Eigen::Upper>();
   }
 
-  /// What far loads of +-1 do to a cluster, in its orthonormal basis: their covariance. Kept are its
-  /// directions above the cut.
+  /// What far loads of +-1 do to a cluster, in its orthonormal basis: their covariance.
   void weigh(Index c) {
     const Eigen::Index k = Q_[at(c)].cols();
     Matrix G = Matrix::Zero(k, k);
@@ -99,16 +100,38 @@ class Recompression {
       const Matrix E = part(parent, c);
       G.noalias() += E * weights_[at(parent)] * E.transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(G);
-    Eigen::Index kept = 0;
-    while (kept < k && eigen.eigenvalues()[k - 1 - kept] > cut_ * cut_) ++kept;
-    if (kept > most_rank)
+    weights_[at(c)] = std::move(G);
+  }
+
+  /// Drops the directions without which no row of the cluster is moved by more than the cut.
+  void truncate(Index c) {
+    rows_[at(c)] = spread_out(c);
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(weights_[at(c)]);
+    const Matrix V = rows_[at(c)] * eigen.eigenvectors();  // least first
+    const Eigen::Index k = V.cols();
+    Eigen::ArrayXd tail = Eigen::ArrayXd::Zero(V.rows());
+    Eigen::Index dropped = 0;
+    for (; dropped < k; ++dropped) {
+      tail += std::max(eigen.eigenvalues()[dropped], 0.0) * V.col(dropped).array().square();
+      if (tail.maxCoeff() > cut_ * cut_) break;
+    }
+    if (const Eigen::Index kept = k - dropped; kept > most_rank)
       throw Error("a cluster of " + std::to_string(from_.tree.end(c) - from_.tree.begin(c)) +
                       " stored nodes needs " + std::to_string(kept) + " terms, " + std::to_string(most_rank) +
                       " are possible",
                   "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
-    U_[at(c)] = eigen.eigenvectors().rightCols(kept).rowwise().reverse();
-    weights_[at(c)] = std::move(G);
+    U_[at(c)] = eigen.eigenvectors().rightCols(k - dropped).rowwise().reverse();
+  }
+
+  /// The orthonormal basis of a cluster, a row for each of its dofs.
+  [[nodiscard]] Matrix spread_out(Index c) {
+    if (is_leaf(c)) return Q_[at(c)];
+    Matrix &a = rows_[at(2 * c + 1)], &b = rows_[at(2 * c + 2)];
+    Matrix V(a.rows() + b.rows(), Q_[at(c)].cols());
+    V << a * part(c, 2 * c + 1), b * part(c, 2 * c + 2);
+    a.resize(0, 0);
+    b.resize(0, 0);
+    return V;
   }
 
   /// The rows of a parent's Q that belong to a child.
@@ -156,8 +179,8 @@ class Recompression {
   double cut_;
   int jobs_;
   std::vector<double> root_;
-  std::vector<Matrix> Q_, R_, U_, weights_;  // [clusters]
-  std::vector<Matrix> S_;                    // [far pairs] between orthonormal bases
+  std::vector<Matrix> Q_, R_, U_, weights_, rows_;  // [clusters]
+  std::vector<Matrix> S_;                           // [far pairs] between orthonormal bases
 };
 
 }  // namespace

@@ -70,10 +70,10 @@ Forms make_forms(const ElasticBody& body, const Surface& surface) {
   factor.factorize();
   const test::ClusteredBody stored(body.mesh, stiffness,
                                    stored_dof_marks(body.mesh, surface, stiffness, Scope::surface, 0), {});
-  auto matrix = std::make_shared<const HierarchicalMatrix>(
-      compress(factor, stored.dofs, body.mesh.dimension(), stored.clusters, {.jobs = processors()},
-               [](CompressionStage, double) { return true; })
-          .value());
+  Compression compression(factor, stored.dofs, body.mesh.dimension(), stored.clusters, processors(),
+                          [](CompressionStage, double) { return true; });
+  compression.prepare();
+  std::shared_ptr<const HierarchicalMatrix> matrix = compression.compress(4e-4);
   Forms forms;
   forms.points = stored.points;
   forms.compressed_bytes = matrix->bytes();
