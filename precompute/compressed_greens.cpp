@@ -161,12 +161,14 @@ std::shared_ptr<const HierarchicalMatrix> compress_greens(const CompressionPlan&
                                 1e-6 * static_cast<double>(matrix->bytes()), certificate_text(*matrix)));
       return matrix;
     }
-    if (attempt == most_cuts)
+    if (attempt == most_cuts) {
+      writer.discard();
       throw Error(
           fmt::format(
               "forces of random touches are off by up to {:.2g} of the largest, the tolerance is {:.2g}",
               worst, plan.frame.tolerance),
           "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
+    }
     progress.line(
         fmt::format("force errors up to {:.1e} at a cut of {:.1e}: again with more terms", worst, cut));
   }

@@ -26,7 +26,7 @@ constexpr double skeleton_share = 0.5;      // of the cut: skeletons are not to 
 constexpr Index samples = 256;              // random loads
 constexpr Index coupled_at_once = 4;        // clusters whose couplings are solved together
 constexpr Index leaves_estimated = 64;      // whose flops are counted for an estimate
-constexpr std::int64_t loads_at_once = 32;  // solved together
+constexpr std::int64_t loads_at_once = 64;  // solved together
 
 std::size_t at(std::int64_t i) {
   return static_cast<std::size_t>(i);

@@ -333,6 +333,31 @@ TEST_F(AlteredFile, AKilledRunGoesOn) {
   EXPECT_TRUE(read_bytes(file_) == once);
 }
 
+/// So slender that rounding to single spoils the forces of neighbouring nodes, whatever the cut.
+TEST_F(AlteredFile, IsNotWrittenWhereForcesAreOffByMoreThanTheTolerance) {
+  std::filesystem::remove(file_);
+  const std::string said = refusal([&] {
+    bake_body(R"(name = "thread"
+[geometry]
+box = {size = [0.3, 0.003, 0.003], cells = [40, 1, 1]}
+[mesh]
+element = "hex8"
+[material]
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+[[fixed]]
+lowest = {axis = "x", percent = 0.1}
+[storage]
+compression = "h2"
+tolerance = 1e-4
+)");
+  });
+  testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("forces of random touches are off by up to"), std::string::npos) << said;
+  EXPECT_FALSE(std::filesystem::exists(file_));
+  EXPECT_FALSE(std::filesystem::exists(file_.string() + ".partial"));
+}
+
 TEST(CompressedDescription, RefusesWhatDoesNotGoTogether) {
   const auto said = [&](const std::string& text) {
     return refusal(
