@@ -75,7 +75,7 @@ CHAPTERS = {
         "contributing",
     ],
 }
-MEASUREMENTS = ["precompute", "accuracy", "overlays", "contact", "hands", "dynamics", "devices", "viewer"]
+MEASUREMENTS = ["precompute", "size", "accuracy", "overlays", "contact", "hands", "dynamics", "devices", "viewer"]
 
 
 def toctree(folder, pages, caption=""):

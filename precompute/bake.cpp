@@ -356,11 +356,12 @@ Plans announce_plans(const Description& description, const BakeOptions& options,
   }
   print_plan(plan, model, description, options, plans.compression.has_value(), progress);
   if (plan.file_bytes > large_file) {
-    progress.line(
-        fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with, and grow with "
-                    "the square of the "
-                    "stored dofs: {}",
-                    static_cast<double>(plan.file_bytes) * 1e-9, size_advice(description)));
+    progress.line(fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with{}: {}",
+                              static_cast<double>(plan.file_bytes) * 1e-9,
+                              plans.compression ? "" : ", and grow with the square of the stored dofs",
+                              plans.compression ? size_advice(description)
+                                                : "leave out precision and compression in [storage], or " +
+                                                      size_advice(description)));
   }
   if (description.overlay) {
     plans.overlays = announce_overlays(description, model, progress);

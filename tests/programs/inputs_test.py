@@ -75,10 +75,16 @@ class Surfaces(ProgramTest):
         self.assertNotIn(note, remeshed.stderr)
 
     def test_a_huge_file_comes_with_advice(self):
-        self.write("model.toml", 'name = "a"\n[geometry]\nbox = {size = [1, 1, 1], cells = [50, 50, 50]}\n' + BODY + '[storage]\nscope = "layers"\n')
+        self.write("model.toml", 'name = "a"\n[geometry]\nbox = {size = [1, 1, 1], cells = [50, 50, 50]}\n' + BODY + '[storage]\nscope = "layers"\ncompression = "none"\n')
         planned = run(PRECOMPUTE, "model.toml", "--dry-run", "--jobs", "1", cwd=self.folder)
         self.assertRegex(planned.stderr, r"note: Green's functions of \d+\.\d GB")
-        self.assertIn("use a coarser mesh, or scope = \"surface\" in [storage]", planned.stderr)
+        self.assertIn("leave out precision and compression in [storage], or use a coarser mesh, or scope = \"surface\" in [storage]", planned.stderr)
+
+    def test_many_nodes_are_compressed(self):
+        self.write("model.toml", 'name = "a"\n[geometry]\nbox = {size = [1, 1, 1], cells = [36, 36, 36]}\n' + BODY + '[storage]\nscope = "surface"\n')
+        planned = run(PRECOMPUTE, "model.toml", "--dry-run", "--jobs", "1", cwd=self.folder)
+        self.assertEqual(planned.returncode, 0, planned.stderr)
+        self.assertRegex(planned.stderr, r"about \d+\.\d MB compressed, \d+\.\d MB if they were not; tolerance 0.005")
 
 
 class Fuzzed(ProgramTest):
