@@ -67,7 +67,7 @@ class SessionView : public ViewedRun {
   ViewerServer server_;
 };
 
-/// Of a page's pictures one in so many is whole; from it the page makes those after it that it jumps to.
+/// One in so many of a page's pictures is whole; from it the page makes those after it that it jumps to.
 constexpr std::size_t pictures_per_whole = 30;
 
 /// Numbers of the frames that go into the page.

@@ -51,7 +51,7 @@ void add_nodes(WireMessage& message, const std::vector<std::array<Index, corners
   }
 }
 
-/// Of each node its place in the scene's order.
+/// The place of each node in the order of the scene.
 std::vector<std::uint32_t> places_in_order(const Scene& scene) {
   std::vector<std::uint32_t> places(scene.order.size());
   for (std::size_t k = 0; k < places.size(); ++k)
