@@ -201,7 +201,7 @@ Message PageConnection::next_picture() {
   if (std::exchange(patch_, number) != number && number != 0) return shown.patch_message();
   pictures_ = shown.pictures();
   ticks_first_ = true;
-  const Message message = shown.frame_message(base_.get());
+  Message message = shown.frame_message(base_.get());
   base_ = shown.values();
   picture_due_ = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(message.bytes->size()) *
                                                          nanoseconds_per_byte);
