@@ -11,7 +11,7 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t many_nodes = 5000;  // from there on compressed
-constexpr double cut_of_tolerance = 0.05;  // forces are off by several times the cut (scripts/studies/scale)
+constexpr double cut_of_tolerance = 0.04;  // forces are off by several times the cut (scripts/studies/scale)
 constexpr double finer = 0.3;              // the next cut, where touches are off by more than the tolerance
 constexpr int most_cuts = 3;
 constexpr std::uint64_t certificate_seed = 41;

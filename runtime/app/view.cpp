@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -66,6 +67,9 @@ class SessionView : public ViewedRun {
   ViewerServer server_;
 };
 
+/// One in so many of a page's pictures is whole; from it the page makes those after it that it jumps to.
+constexpr std::size_t pictures_per_whole = 30;
+
 /// Numbers of the frames that go into the page.
 std::vector<std::int64_t> choose(const SessionPictures& pictures, const ExportOptions& options) {
   std::vector<std::int64_t> chosen;
@@ -121,8 +125,14 @@ int export_html(const ExportOptions& options) {
   archive.add_binary(encode_scene(scene));
   for (const TickRun& run : pictures.ticks())
     archive.add_binary(encode_ticks(scene.number, run.notes, run.stride));
-  for (const std::int64_t frame : chosen)
-    archive.add_binary(encode_frame(pictures.picture(frame), scene, nullptr));
+  std::optional<WireValues> base;
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const SurfacePicture picture = pictures.picture(chosen[k]);
+    WireValues values = wire_values(picture, scene, nullptr, static_cast<std::uint32_t>(k + 1));
+    const bool is_whole = k % pictures_per_whole == 0;
+    archive.add_binary(encode_frame(picture, scene, nullptr, values, is_whole ? nullptr : &*base));
+    base = std::move(values);
+  }
   const std::string page = archive.page(viewer_page());
   write_file(html, page);
   fmt::print(stderr, "{}: {} pictures, {:.1f} s, {:.1f} MB\n", options.html.string(), chosen.size(),

@@ -27,7 +27,7 @@ void Broadcast::set_scene(std::shared_ptr<const Scene> scene) {
   scene_ = std::move(scene);
   scene_message_ = binary_message(encode_scene(*scene_));
   picture_.reset();
-  frame_ = {};
+  forget_frames();
   ticks_.clear();
   ++scenes_;
   touch_state();  // which has the scene's number
@@ -37,7 +37,7 @@ void Broadcast::set_picture(DrawnPicture picture) {
   if (picture.scene != scene_) return;  // of the body before
   if (!picture_ || picture_->patch != picture.patch) patch_message_ = {};
   picture_ = std::move(picture);
-  frame_ = {};
+  forget_frames();
   ++pictures_;
 }
 
@@ -66,9 +66,27 @@ const Message& Broadcast::patch_message() {
   return patch_message_;
 }
 
-const Message& Broadcast::frame_message() {
-  if (!frame_) frame_ = binary_message(encode_frame(picture_->picture, *scene_, picture_->patch.get()));
-  return frame_;
+const std::shared_ptr<const WireValues>& Broadcast::values() {
+  if (!values_) {
+    values_ = std::make_shared<const WireValues>(wire_values(
+        picture_->picture, *scene_, picture_->patch.get(), static_cast<std::uint32_t>(pictures_)));
+  }
+  return values_;
+}
+
+const Message& Broadcast::frame_message(const WireValues* base) {
+  const std::uint32_t number = base == nullptr ? 0 : base->number;
+  for (const Frame& frame : frames_) {
+    if (frame.base == number) return frame.message;
+  }
+  frames_.push_back({number, binary_message(encode_frame(picture_->picture, *scene_, picture_->patch.get(),
+                                                         *values(), base))});
+  return frames_.back().message;
+}
+
+void Broadcast::forget_frames() {
+  values_.reset();
+  frames_.clear();
 }
 
 Message Broadcast::ticks_message(std::int64_t& place) {

@@ -11,6 +11,7 @@
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/scene.h"
 #include "runtime/viewer/tick_history.h"
+#include "runtime/viewer/wire_values.h"
 
 namespace palpate {
 
@@ -55,12 +56,22 @@ class Broadcast {
   // Of what there is, see above.
   [[nodiscard]] const Message& scene_message() const noexcept { return scene_message_; }
   [[nodiscard]] const Message& patch_message();
-  [[nodiscard]] const Message& frame_message();
+  /// For a page that has `base`, which is null or of this scene. Pages that have the same share it.
+  [[nodiscard]] const Message& frame_message(const WireValues* base);
+  /// What a page has of the picture once it is sent.
+  [[nodiscard]] const std::shared_ptr<const WireValues>& values();
   /// The message of the ticks from `place` on, which it moves on.
   [[nodiscard]] Message ticks_message(std::int64_t& place);
   [[nodiscard]] Message state_message(const PageRole& role, bool is_first) const;
 
  private:
+  struct Frame {
+    std::uint32_t base;  // 0: none
+    Message message;
+  };
+
+  void forget_frames();
+
   std::shared_ptr<const Scene> scene_;
   std::optional<DrawnPicture> picture_;
   TickHistory ticks_;
@@ -72,8 +83,9 @@ class Broadcast {
   std::chrono::steady_clock::time_point state_touched_;
   Message scene_message_;
   Message patch_message_;
-  Message frame_;
-  Message run_message_;  // of the ticks that a page was sent last
+  std::shared_ptr<const WireValues> values_;  // of the picture, once a page wants it
+  std::vector<Frame> frames_;                 // of the picture
+  Message run_message_;                       // of the ticks that a page was sent last
   std::int64_t run_begin_ = 0;
   std::int64_t run_end_ = 0;
   std::int64_t run_last_ = 0;  // end of all ticks then

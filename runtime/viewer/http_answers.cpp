@@ -102,7 +102,7 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
   if (wants_socket(request)) {
     const auto offered = request.find(http::field::sec_websocket_protocol);
     if (offered != request.end() && !http::token_list(offered->value()).exists(subprotocol))
-      return guarded(plain(http::status::bad_request, "The socket speaks palpate.1 only."));
+      return guarded(plain(http::status::bad_request, "The socket speaks palpate.2 only."));
   }
   return std::nullopt;
 }

@@ -15,7 +15,7 @@ using Request = boost::beast::http::request<boost::beast::http::empty_body>;
 using Response = boost::beast::http::response<boost::beast::http::string_body>;
 
 /// Subprotocol of the WebSocket.
-inline constexpr const char* subprotocol = "palpate.1";
+inline constexpr const char* subprotocol = "palpate.2";
 
 /// Why a request is not answered at all: its host, page, method, token or subprotocol.
 std::optional<Response> refusal(const Request& request, const ServedAddress& served);

@@ -25,7 +25,8 @@ constexpr auto idle_time = 30s;                  // half of it: a ping
 constexpr auto stall_time = 10s;                 // that a message may wait for its page to read
 constexpr std::size_t most_unread = 32U << 20U;  // [bytes] of what a page must not miss
 constexpr int send_buffer = 256 << 10;           // small, so that a slow page sees what is, not what was
-constexpr std::size_t longest_reason = 120;      // that a closing frame has room for
+constexpr std::int64_t nanoseconds_per_byte = 1000 / 6;  // of pictures: 6 MB/s
+constexpr std::size_t longest_reason = 120;              // that a closing frame has room for
 
 }  // namespace
 
@@ -180,20 +181,39 @@ Message PageConnection::next_message() {
   if (scenes_ != shown.scenes()) {
     scenes_ = shown.scenes();
     patch_ = 0;
+    base_.reset();
     return shown.scene_message();
   }
   const bool has_ticks = shown.ticks().has_from(ticks_);
   if (shown.picture() && pictures_ != shown.pictures() && !(has_ticks && ticks_first_)) {
-    const ScenePatch* patch = shown.picture()->patch.get();
-    const std::uint32_t number = patch == nullptr ? 0 : patch->number;
-    if (std::exchange(patch_, number) != number && number != 0) return shown.patch_message();
-    pictures_ = shown.pictures();
-    ticks_first_ = true;
-    return shown.frame_message();
+    if (Clock::now() >= picture_due_) return next_picture();
+    wait_for_picture();
   }
   if (!has_ticks) return {};
   ticks_first_ = false;
   return shown.ticks_message(ticks_);
+}
+
+Message PageConnection::next_picture() {
+  Broadcast& shown = server_.broadcast();
+  const ScenePatch* patch = shown.picture()->patch.get();
+  const std::uint32_t number = patch == nullptr ? 0 : patch->number;
+  if (std::exchange(patch_, number) != number && number != 0) return shown.patch_message();
+  pictures_ = shown.pictures();
+  ticks_first_ = true;
+  Message message = shown.frame_message(base_.get());
+  base_ = shown.values();
+  picture_due_ = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(message.bytes->size()) *
+                                                         nanoseconds_per_byte);
+  return message;
+}
+
+void PageConnection::wait_for_picture() {
+  if (picture_timer_.expiry() == picture_due_) return;  // it waits already
+  picture_timer_.expires_at(picture_due_);
+  picture_timer_.async_wait([self = shared_from_this()](const ErrorCode& problem) {
+    if (!problem) self->send_news();
+  });
 }
 
 }  // namespace palpate

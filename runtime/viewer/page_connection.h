@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
@@ -24,7 +25,7 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
  public:
   /// `server` must live as long.
   PageConnection(boost::asio::ip::tcp::socket socket, PageServer& server)
-      : stream_(std::move(socket)), server_(server) {}
+      : stream_(std::move(socket)), server_(server), picture_timer_(stream_.get_executor()) {}
 
   void start();
   /// Without a word.
@@ -48,6 +49,8 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   void receive(const ErrorCode& problem);
   void close(boost::beast::websocket::close_code code, std::string reason);
   Message next_message();
+  Message next_picture();
+  void wait_for_picture();
 
   boost::beast::tcp_stream stream_;
   std::optional<boost::beast::websocket::stream<boost::beast::tcp_stream>> socket_;
@@ -69,7 +72,10 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   std::int64_t states_ = 0;
   std::int64_t ticks_ = 0;
   std::uint32_t patch_ = 0;
-  bool ticks_first_ = true;  // else pictures
+  std::shared_ptr<const WireValues> base_;  // of the last picture; null: none of this scene
+  boost::asio::steady_timer picture_timer_;
+  std::chrono::steady_clock::time_point picture_due_;  // no picture before: what was sent has its time
+  bool ticks_first_ = true;                            // else pictures
 };
 
 }  // namespace palpate

@@ -15,7 +15,7 @@ constexpr double highest_rate = 1e5;
 
 std::string hello_word(const char* mode, std::uint64_t page, bool has_book) {
   return json_text(Json{{"type", "hello"},
-                        {"protocol", 1},
+                        {"protocol", 2},
                         {"version", PALPATE_VERSION},
                         {"mode", mode},
                         {"id", page},

@@ -5,6 +5,7 @@
 #include "meshes/surface.h"
 #include "meshes/topology.h"
 #include "runtime/body/surface_numbering.h"
+#include "runtime/viewer/node_order.h"
 
 namespace palpate {
 namespace {
@@ -132,6 +133,7 @@ Scene make_scene(const Body& body, std::uint32_t number) {
   } else {
     fill_surface(body, scene);
   }
+  scene.order = order_along_curve(scene.nodes);
   return scene;
 }
 
@@ -179,6 +181,7 @@ Scene make_scene(const RecordedSurface& surface, std::uint32_t number) {
     scene.triangles = grouped<3>(surface.simplices);
     scene.edges = unique(edges_of(scene.triangles));
   }
+  scene.order = order_along_curve(scene.nodes);
   return scene;
 }
 

@@ -24,6 +24,7 @@ struct Scene {
   std::vector<Index> elements;                  ///< [T] that each is on; in a recording unknown: empty
   std::vector<std::array<Index, 2>> edges;      ///< of the elements, each once
   std::vector<std::uint8_t> held;               ///< [S] as Model::fixed
+  std::vector<Index> order;  ///< [S] of the nodes in messages: neighbours follow each other
 };
 
 /// The finer surface of an overlay, in place of some of a scene's triangles.

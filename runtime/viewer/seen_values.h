@@ -50,7 +50,9 @@ class SeenValues {
 
  private:
   [[nodiscard]] std::size_t value(std::size_t k) const {
-    return k < scene_nodes() ? k : static_cast<std::size_t>(patch_->surface_nodes[k - scene_nodes()]);
+    return patch_ == nullptr || k < scene_nodes()
+               ? k
+               : static_cast<std::size_t>(patch_->surface_nodes[k - scene_nodes()]);
   }
   [[nodiscard]] static float at(const std::vector<float>& values, std::size_t k) {
     return k < values.size() ? values[k] : std::numeric_limits<float>::quiet_NaN();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 
 #include "runtime/viewer/seen_values.h"
 
@@ -13,9 +12,7 @@ static_assert(std::endian::native == std::endian::little, "numbers are sent as t
 
 enum class Kind : std::uint32_t { scene = 1, patch = 2, frame = 3, ticks = 4 };
 
-constexpr std::size_t alignment = 4;
-constexpr float largest_displacement = 32767.0F;
-constexpr float largest_stress = 65534.0F;
+constexpr std::size_t message_head = 256;  // bytes, about
 
 class WireMessage {
  public:
@@ -28,6 +25,7 @@ class WireMessage {
   void add(Number number) {
     bytes_.append(reinterpret_cast<const char*>(&number), sizeof number);
   }
+  void add_bytes(std::string_view bytes) { bytes_.append(bytes); }
   void add_count(std::size_t count) { add(static_cast<std::uint32_t>(count)); }
   void add_vector(const Vec3& v) {
     for (const double x : v) add(static_cast<float>(x));
@@ -37,8 +35,6 @@ class WireMessage {
     for (const double part : pose.orientation.coeffs()) add(static_cast<float>(part));  // x, y, z, w
   }
 
-  /// Before each array whose numbers may be smaller than the alignment, and after it.
-  void align() { bytes_.resize((bytes_.size() + alignment - 1) / alignment * alignment, '\0'); }
   void reserve(std::size_t bytes) { bytes_.reserve(bytes); }
   [[nodiscard]] std::string take() { return std::move(bytes_); }
 
@@ -47,20 +43,20 @@ class WireMessage {
 };
 
 template <std::size_t corners>
-void add_nodes(WireMessage& message, const std::vector<std::array<Index, corners>>& simplices) {
+void add_nodes(WireMessage& message, const std::vector<std::array<Index, corners>>& simplices,
+               std::span<const std::uint32_t> places = {}) {
   for (const std::array<Index, corners>& nodes : simplices) {
-    for (const Index node : nodes) message.add(static_cast<std::uint32_t>(node));
+    for (const Index node : nodes)
+      message.add(places.empty() ? static_cast<std::uint32_t>(node) : places[static_cast<std::size_t>(node)]);
   }
 }
 
-/// So that the largest value is the largest number.
-float unit_of(float largest_value, float largest_number) {
-  return largest_value > 0.0F ? largest_value / largest_number : 0.0F;
-}
-
-float in_unit(float value, float unit, float largest_number) {
-  if (!std::isfinite(value) || unit == 0.0F) return 0.0F;
-  return std::clamp(std::round(value / unit), -largest_number, largest_number);
+/// The place of each node in the order of the scene.
+std::vector<std::uint32_t> places_in_order(const Scene& scene) {
+  std::vector<std::uint32_t> places(scene.order.size());
+  for (std::size_t k = 0; k < places.size(); ++k)
+    places[static_cast<std::size_t>(scene.order[k])] = static_cast<std::uint32_t>(k);
+  return places;
 }
 
 }  // namespace
@@ -71,10 +67,13 @@ std::string encode_scene(const Scene& scene) {
   message.add_count(scene.nodes.size());
   message.add_count(scene.triangles.size());
   message.add_count(scene.edges.size());
-  for (const Vec3& node : scene.nodes) message.add_vector(node);
-  add_nodes(message, scene.triangles);
-  add_nodes(message, scene.edges);
-  for (const std::uint8_t axes : scene.held) message.add(axes);
+  const std::vector<std::uint32_t> places = places_in_order(scene);
+  message.reserve(message_head + 13 * scene.nodes.size() + 12 * scene.triangles.size() +
+                  8 * scene.edges.size());
+  for (const Index node : scene.order) message.add_vector(scene.nodes[static_cast<std::size_t>(node)]);
+  add_nodes(message, scene.triangles, places);
+  add_nodes(message, scene.edges, places);
+  for (const Index node : scene.order) message.add(scene.held[static_cast<std::size_t>(node)]);
   return message.take();
 }
 
@@ -100,37 +99,28 @@ bool fits(const SurfacePicture& picture, const Scene& scene, const ScenePatch* p
          picture.frame.displacement.size() >= 3 * (static_cast<std::size_t>(patch->surface_nodes.back()) + 1);
 }
 
-std::string encode_frame(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch) {
-  const SeenValues values(picture, scene, patch);
-  const std::size_t nodes = values.scene_nodes();
-  const std::size_t all_nodes = nodes + values.patch_nodes();
-  float largest_u = 0.0F;
-  float largest_von_mises = 0.0F;
-  for (std::size_t k = 0; k < all_nodes; ++k) {
-    for (const float u : std::span(values.displacement(k), 3)) {
-      if (std::isfinite(u)) largest_u = std::max(largest_u, std::abs(u));
-    }
-    if (std::isfinite(values.von_mises(k)))
-      largest_von_mises = std::max(largest_von_mises, values.von_mises(k));
-  }
-  const float unit_u = unit_of(largest_u, largest_displacement);
-  const float unit_stress = unit_of(largest_von_mises, largest_stress);
-  const std::vector<SeenValues::Pressure> pressures = values.pressures();
+std::string encode_frame(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch,
+                         const WireValues& values, const WireValues* base) {
+  const SeenValues seen(picture, scene, patch);
+  const std::vector<SeenValues::Pressure> pressures = seen.pressures();
+  const std::string bits = encode_values(values, base);
 
   WireMessage message(Kind::frame, scene.number);
-  message.reserve(256 + 40 * picture.contacts.size() + 8 * pressures.size() + 8 * all_nodes);
+  message.reserve(message_head + 40 * picture.contacts.size() + 8 * pressures.size() + bits.size());
   message.add(static_cast<double>(picture.frame.tick));
   message.add(picture.frame.time);
+  message.add(values.number);
+  message.add(base == nullptr ? std::uint32_t{0} : base->number);
+  message.add(values.exponent_u);
+  message.add(values.exponent_stress);
   message.add_pose(picture.tool);
   message.add_pose(picture.device);
   message.add_vector(picture.on_body.force);
   message.add_vector(picture.on_body.torque);
-  message.add(unit_u);
-  message.add(unit_stress);
   message.add(static_cast<std::uint32_t>(picture.status));
   message.add_count(picture.contacts.size());
-  message.add(patch == nullptr ? std::uint32_t{0} : patch->number);
-  message.add_count(values.patch_nodes());
+  message.add(values.patch);
+  message.add_count(seen.patch_nodes());
   message.add_count(pressures.size());
   message.add(static_cast<float>(picture.force_error));
   message.add_count(static_cast<std::size_t>(picture.left_out));
@@ -140,27 +130,19 @@ std::string encode_frame(const SurfacePicture& picture, const Scene& scene, cons
     message.add_vector(contact.force);
     message.add(contact.held ? 1.0F : 0.0F);
   }
-  for (const SeenValues::Pressure& pressure : pressures)
-    message.add(static_cast<std::uint32_t>(pressure.node));
+  std::vector<std::uint32_t> places;
+  if (!pressures.empty()) places = places_in_order(scene);
+  for (const SeenValues::Pressure& pressure : pressures) {
+    const auto node = static_cast<std::size_t>(pressure.node);
+    message.add(node < places.size() ? places[node] : static_cast<std::uint32_t>(node));
+  }
   for (const SeenValues::Pressure& pressure : pressures) message.add(pressure.value);
-
-  const auto add_values = [&](std::size_t first, std::size_t end) {
-    for (std::size_t k = first; k < end; ++k) {
-      for (const float u : std::span(values.displacement(k), 3))
-        message.add(static_cast<std::int16_t>(in_unit(u, unit_u, largest_displacement)));
-    }
-    message.align();
-    for (std::size_t k = first; k < end; ++k) {
-      const float stress = values.von_mises(k);
-      message.add(std::isfinite(stress) ? static_cast<std::uint16_t>(
-                                              std::max(0.0F, in_unit(stress, unit_stress, largest_stress)))
-                                        : unknown_stress);
-    }
-  };
-  add_values(0, nodes);
-  message.align();
-  add_values(nodes, all_nodes);
+  message.add_bytes(bits);
   return message.take();
+}
+
+std::string encode_frame(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch) {
+  return encode_frame(picture, scene, patch, wire_values(picture, scene, patch, 1), nullptr);
 }
 
 std::string encode_ticks(std::uint32_t scene, std::span<const TickNote> ticks, std::int64_t stride) {

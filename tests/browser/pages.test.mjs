@@ -93,7 +93,7 @@ test('foreign pages are refused', async (t) => {
   const { search } = new URL(served.url);
   const status = (headers, query = search) =>
     new Promise((resolve, reject) => {
-      const asked = request({ host: '127.0.0.1', port: served.port, path: `/socket${query}`, headers: { Connection: 'Upgrade', Upgrade: 'websocket', 'Sec-WebSocket-Version': '13', 'Sec-WebSocket-Key': 'AAAAAAAAAAAAAAAAAAAAAA==', 'Sec-WebSocket-Protocol': 'palpate.1', ...headers } });
+      const asked = request({ host: '127.0.0.1', port: served.port, path: `/socket${query}`, headers: { Connection: 'Upgrade', Upgrade: 'websocket', 'Sec-WebSocket-Version': '13', 'Sec-WebSocket-Key': 'AAAAAAAAAAAAAAAAAAAAAA==', 'Sec-WebSocket-Protocol': 'palpate.2', ...headers } });
       asked.on('upgrade', (response, socket) => (socket.destroy(), resolve(response.statusCode)));
       asked.on('response', (response) => resolve(response.statusCode));
       asked.on('error', reject);
@@ -115,7 +115,7 @@ test('foreign pages are refused', async (t) => {
   const outcome = await page.evaluate(
     (url) =>
       new Promise((resolve) => {
-        const socket = new WebSocket(url, 'palpate.1');
+        const socket = new WebSocket(url, 'palpate.2');
         socket.onopen = () => resolve('open');
         socket.onerror = () => resolve('refused');
       }),
@@ -131,7 +131,7 @@ test('malformed and huge messages end their own connection and nothing else', as
     other.evaluate(
       ([url, said]) =>
         new Promise((resolve) => {
-          const socket = new WebSocket(url, 'palpate.1');
+          const socket = new WebSocket(url, 'palpate.2');
           socket.onopen = () => socket.send(said.repeat ? said : new Uint8Array(said));
           socket.onclose = (event) => resolve({ code: event.code, reason: event.reason });
         }),

@@ -176,7 +176,7 @@ test('with a hand in the device its faults and its safety are not the page\'s', 
   const answer = await page.evaluate(
     (url) =>
       new Promise((resolve) => {
-        const socket = new WebSocket(url, 'palpate.1');
+        const socket = new WebSocket(url, 'palpate.2');
         const told = [];
         const wanted = [{ type: 'acknowledge' }, { type: 'change', settings: { safety: 'max_force=1000' } }, { type: 'change', settings: { coupling: '1e9' } }];
         socket.onmessage = (event) => {

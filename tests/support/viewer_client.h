@@ -44,7 +44,7 @@ struct Asking {
   std::optional<std::string> query{};  ///< else that of the address
   std::string host{};                  ///< else 127.0.0.1 with the port
   std::string origin{};                ///< else none is sent
-  std::string subprotocol = "palpate.1";
+  std::string subprotocol = "palpate.2";
 };
 
 inline std::string target_of(const Served& served, const Asking& asking) {

@@ -105,6 +105,12 @@ export class Body {
   private u_ = new Float32Array(0);
   private value_ = new Float32Array(0);
   private known_ = new Float32Array(0);
+  private placed_: { topology: Topology | null; frame_u: Int16Array | undefined; version: number; scale: number } = {
+    topology: null,
+    frame_u: undefined,
+    version: 0,
+    scale: 1,
+  };
 
   private readonly maps_ = { sequential: map_texture('sequential'), diverging: map_texture('diverging') };
   private readonly uniforms_: BodyUniforms = {
@@ -186,20 +192,34 @@ export class Body {
       this.known_.fill(this.field === 'none' ? 1 : 0);
       this.shown.largest = this.shown.usual = 0;
     }
-    const position = this.attribute('position');
     const values = this.attribute('shown');
-    const place = position.array as Float32Array;
     const shown = values.array as Float32Array;
+    const { node } = topology;
+    for (let v = 0; v < node.length; ++v) {
+      const i = node[v]!;
+      shown[3 * v] = this.value_[i]!;
+      shown[3 * v + 1] = this.known_[i]!;
+    }
+    values.needsUpdate = true;
+    this.place(topology);
+  }
+
+  /** Positions and normals, which stay while no displacement changes. */
+  private place(topology: Topology): void {
+    const placed = this.placed_;
+    const version = this.frame_?.version ?? 0;
+    if (placed.topology === topology && placed.frame_u === this.frame_?.u && placed.version === version && placed.scale === this.scale) return;
+    this.placed_ = { topology, frame_u: this.frame_?.u, version, scale: this.scale };
+    const position = this.attribute('position');
+    const place = position.array as Float32Array;
     const { node, rest } = topology;
     for (let v = 0; v < node.length; ++v) {
       const i = node[v]!;
       for (let k = 0; k < 3; ++k) place[3 * v + k] = rest[3 * i + k]! + this.scale * this.u_[3 * i + k]!;
-      shown[3 * v] = this.value_[i]!;
-      shown[3 * v + 1] = this.known_[i]!;
     }
     const normal = this.attribute('normal');
     vertex_normals(place, topology.triangle, normal.array as Float32Array);
-    position.needsUpdate = values.needsUpdate = normal.needsUpdate = true;
+    position.needsUpdate = normal.needsUpdate = true;
   }
 
   /** Colours by the numbers from `low` to `high`. */

@@ -20,7 +20,7 @@ function fill_stress(frame: Frame, topology: Topology, value: Float32Array, know
   const take = (stress: Uint16Array, from: number, count: number) => {
     for (let i = 0; i < count; ++i) {
       known[from + i] = stress[i] === unknown_stress ? 0 : 1;
-      value[from + i] = known[from + i]! * stress[i]! * frame.unit_stress;
+      value[from + i] = known[from + i]! * (stress[i]! - 1) * frame.unit_stress;
     }
   };
   take(frame.stress, 0, Math.min(frame.stress.length, topology.scene_nodes));

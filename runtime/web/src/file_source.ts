@@ -1,10 +1,13 @@
 // A session that stands in the page itself, as `export --html` wrote it.
 import type { Listener, Source } from './source';
+import { NodeValues } from './values';
 import { decode, split_messages, type Frame, type Patch, type Scene } from './wire';
 import type { Said, State, Word } from './words';
 
 interface StoredFrame {
-  frame: Frame;
+  message: ArrayBuffer;
+  time: number;
+  base: number; // 0: it is whole
   scene: Scene;
   patch: Patch | null;
 }
@@ -22,6 +25,9 @@ async function inflate(base64: string): Promise<Uint8Array> {
 
 export class FileSource implements Source {
   private readonly frames_: StoredFrame[] = [];
+  private readonly values_ = new NodeValues();
+  private shown_: Frame | null = null;
+  private shown_at_ = -1; // in frames_
   private shown_scene_: Scene | null = null;
   private shown_patch_: Patch | null = null;
 
@@ -61,12 +67,13 @@ export class FileSource implements Source {
       } else if (picture?.kind === 'patch') {
         patches.set(picture.number, picture);
       } else if (picture?.kind === 'frame' && scene) {
-        this.frames_.push({ frame: picture, scene, patch: patches.get(picture.patch) ?? null });
+        const { time, base } = picture;
+        this.frames_.push({ message, time, base, scene, patch: patches.get(picture.patch) ?? null });
       } else if (picture?.kind === 'ticks') {
         this.listener_.pictured(picture);
       }
     }
-    const times = this.frames_.map(({ frame }) => frame.time);
+    const times = this.frames_.map(({ time }) => time);
     this.listener_.said({
       ...state,
       type: 'state',
@@ -86,12 +93,27 @@ export class FileSource implements Source {
   }
 
   private seek(frame: number): void {
-    const stored = this.frames_[Math.max(0, Math.min(this.frames_.length - 1, Math.round(frame)))];
+    const at = Math.max(0, Math.min(this.frames_.length - 1, Math.round(frame)));
+    const stored = this.frames_[at];
     if (!stored) return;
     this.show_scene(stored.scene);
     if (stored.patch && stored.patch !== this.shown_patch_) this.listener_.pictured(stored.patch);
     this.shown_patch_ = stored.patch;
-    this.listener_.pictured(stored.frame);
-    this.listener_.said({ type: 'state', frame: this.frames_.indexOf(stored) });
+    this.make(at);
+    if (this.shown_) this.listener_.pictured(this.shown_);
+    this.listener_.said({ type: 'state', frame: at });
+  }
+
+  /** From the picture that is shown, or from the last whole one before. */
+  private make(at: number): void {
+    let from = at;
+    while (from > 0 && from !== this.shown_at_ + 1 && this.frames_[from]!.base !== 0) --from;
+    if (at === this.shown_at_) return;
+    this.shown_at_ = -1;
+    for (let k = from; k <= at; ++k) {
+      const { message, scene } = this.frames_[k]!;
+      this.shown_ = decode(message, scene, this.values_) as Frame;
+    }
+    this.shown_at_ = at;
   }
 }

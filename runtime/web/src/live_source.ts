@@ -1,5 +1,6 @@
 // A run at the other end of a WebSocket, connected anew when it was lost.
 import type { Listener, Source } from './source';
+import { NodeValues } from './values';
 import { decode, type Scene } from './wire';
 import type { Said, Word } from './words';
 
@@ -10,6 +11,7 @@ const most_waiting = 1 << 16; // bytes in the socket's buffer: what comes on top
 export class LiveSource implements Source {
   private socket_: WebSocket | null = null;
   private scene_: Scene | null = null;
+  private readonly values_ = new NodeValues();
   private wait_ = first_wait;
 
   constructor(
@@ -27,7 +29,7 @@ export class LiveSource implements Source {
   }
 
   private connect(): void {
-    const socket = new WebSocket(this.url_, 'palpate.1');
+    const socket = new WebSocket(this.url_, 'palpate.2');
     socket.binaryType = 'arraybuffer';
     this.socket_ = socket;
     socket.onopen = () => {
@@ -63,7 +65,7 @@ export class LiveSource implements Source {
         this.listener_.said(JSON.parse(data) as Said);
         return;
       }
-      const picture = decode(data, this.scene_);
+      const picture = decode(data, this.scene_, this.values_);
       if (picture?.kind === 'scene') this.scene_ = picture;
       if (picture) this.listener_.pictured(picture);
     } catch (error) {

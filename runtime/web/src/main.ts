@@ -108,7 +108,7 @@ class Page implements Listener {
 
   said(message: Said): void {
     if (message.type === 'hello') {
-      if (message.protocol !== 1) toast(`This page does not know protocol ${message.protocol}`, 'Load the page anew.');
+      if (message.protocol !== 2) toast(`This page does not know protocol ${message.protocol}`, 'Load the page anew.');
       this.take_mode(message.mode);
       write(part('version'), message.version);
       part('book').hidden = message.book !== true;

@@ -204,6 +204,11 @@ export function make_topology(scene: Scene, patch: Patch | null): Topology {
   const edge_key = (a: number, b: number) => Math.min(a, b) * nodes + Math.max(a, b);
   const is_plane = scene.dimension === 2 && corners > 0;
   if (is_plane && outline.length > 0) ({ corner: all, cut } = follow_boundary(all, outline, scene_nodes, edge_key));
+  const { vertex, node } = split_at_creases(rest, all, nodes);
+  if (!patch) {
+    const area = node_areas(rest, all, scene.edge, nodes);
+    return { nodes, scene_nodes, node, triangle: vertex, corner: all, edge: scene.edge, outline, welded, rest, area };
+  }
   const edge: number[] = fine.length > 0 || is_plane ? [...outline] : [];
   const sides = triangles_beside(scene);
   for (let e = 0; e < scene.edge.length; e += 2) {
@@ -217,7 +222,6 @@ export function make_topology(scene: Scene, patch: Patch | null): Topology {
     const b = fine[at - (at % 3) + ((at + 1) % 3)]!;
     if (a < b) edge.push(drawn(a), drawn(b));
   }
-  const { vertex, node } = split_at_creases(rest, all, nodes);
   const edges = Uint32Array.from(edge);
   const area = node_areas(rest, all, edges, nodes);
   return { nodes, scene_nodes, node, triangle: vertex, corner: all, edge: edges, outline, welded, rest, area };

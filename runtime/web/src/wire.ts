@@ -1,4 +1,6 @@
-// The binary messages of the runtime (PROTOCOL.md) as typed arrays. Arrays are views of the message, not copies.
+// The binary messages of the runtime (PROTOCOL.md) as typed arrays. Arrays are views of the message, not copies, except for the numbers at a
+// picture's nodes: those are NodeValues', which the next picture changes.
+import { NodeValues } from './values';
 
 /** What is drawn of a body: nodes without loads [m], triangles outward, edges of the elements. */
 export interface Scene {
@@ -24,10 +26,10 @@ export interface Patch {
 
 /** Floats a contact: position, outward normal, force on the body, 1 where it is held. */
 export const floats_of_contact = 10;
-/** A von Mises stress that is not known. */
-export const unknown_stress = 65535;
+/** In the place of a von Mises stress that is not known; those that are begin at 1. */
+export const unknown_stress = 0;
 
-/** What is seen at one moment: forces on the body [N], displacements times `unit_u` [m], stresses times `unit_stress` [Pa]. */
+/** What is seen at one moment: forces on the body [N], displacements times `unit_u` [m], stresses - 1 times `unit_stress` [Pa]. */
 export interface Frame {
   kind: 'frame';
   scene: number;
@@ -37,8 +39,11 @@ export interface Frame {
   device: Float32Array; // [7]
   force: Float32Array; // [3]
   torque: Float32Array; // [3]
+  number: number; // from 1 on
+  base: number; // of the picture from which it follows; 0: from none
   unit_u: number;
   unit_stress: number;
+  version: number; // equal where no displacement is another
   status: number;
   patch: number;
   force_error: number; // how far `force` may be off, where it is a best effort [N]
@@ -84,6 +89,9 @@ class Reader {
   u32(): number {
     return this.view_.getUint32(this.advance(4), true);
   }
+  i32(): number {
+    return this.view_.getInt32(this.advance(4), true);
+  }
   f32(): number {
     return this.view_.getFloat32(this.advance(4), true);
   }
@@ -93,17 +101,14 @@ class Reader {
   u8s(count: number): Uint8Array {
     return new Uint8Array(this.buffer_, this.advance(count), count);
   }
-  i16s(count: number): Int16Array {
-    return new Int16Array(this.buffer_, this.advance(2 * count), count);
-  }
-  u16s(count: number): Uint16Array {
-    return new Uint16Array(this.buffer_, this.advance(2 * count), count);
-  }
   u32s(count: number): Uint32Array {
     return new Uint32Array(this.buffer_, this.advance(4 * count), count);
   }
   f32s(count: number): Float32Array {
     return new Float32Array(this.buffer_, this.advance(4 * count), count);
+  }
+  rest(): Uint8Array {
+    return new Uint8Array(this.buffer_, this.at_);
   }
 
   private advance(bytes: number): number {
@@ -162,15 +167,17 @@ function decode_patch(reader: Reader, scene: number): Patch {
   return patch;
 }
 
-function decode_frame(reader: Reader, scene: number, nodes: number): Frame {
+function decode_frame(reader: Reader, scene: number, nodes: number, values: NodeValues | null): Frame {
   const tick = reader.f64();
   const time = reader.f64();
+  const number = reader.u32();
+  const base = reader.u32();
+  const exponent_u = reader.i32();
+  const exponent_stress = reader.i32();
   const tool = reader.f32s(7);
   const device = reader.f32s(7);
   const force = reader.f32s(3);
   const torque = reader.f32s(3);
-  const unit_u = reader.f32();
-  const unit_stress = reader.f32();
   const status = reader.u32();
   const contacts = reader.u32();
   const patch = reader.u32();
@@ -178,6 +185,12 @@ function decode_frame(reader: Reader, scene: number, nodes: number): Frame {
   const pressures = reader.u32();
   const force_error = reader.f32();
   const left_out = reader.u32();
+  const contact = reader.f32s(floats_of_contact * contacts);
+  const pressure_node = reader.u32s(pressures);
+  const pressure = reader.f32s(pressures);
+  const shown = values ?? new NodeValues();
+  values?.take({ number, base, exponent_u, exponent_stress, nodes, patch, patch_nodes }, reader.rest());
+  const { u, stress, patch_u, patch_stress, version } = shown;
   return {
     kind: 'frame',
     scene,
@@ -187,19 +200,22 @@ function decode_frame(reader: Reader, scene: number, nodes: number): Frame {
     device,
     force,
     torque,
-    unit_u,
-    unit_stress,
+    number,
+    base,
+    unit_u: 2 ** exponent_u,
+    unit_stress: 2 ** exponent_stress,
+    version,
     status,
     patch,
     force_error,
     left_out,
-    contact: reader.f32s(floats_of_contact * contacts),
-    pressure_node: reader.u32s(pressures),
-    pressure: reader.f32s(pressures),
-    u: reader.i16s(3 * nodes),
-    stress: reader.u16s(nodes),
-    patch_u: reader.i16s(3 * patch_nodes),
-    patch_stress: reader.u16s(patch_nodes),
+    contact,
+    pressure_node,
+    pressure,
+    u,
+    stress,
+    patch_u,
+    patch_stress,
   };
 }
 
@@ -226,17 +242,18 @@ function decode_ticks(reader: Reader, scene: number): Ticks {
 }
 
 /**
- * A binary message. `scene` is the last one announced: a frame's lengths follow from it. Gives null for messages of another
- * scene; throws RangeError where the message is not what PROTOCOL.md says.
+ * A binary message. `scene` is the last one announced: a frame's lengths follow from it. `values` are those of the frame before, which
+ * become this one's; without them a frame has no numbers at nodes. Gives null for messages of another scene; throws RangeError where
+ * the message is not what PROTOCOL.md says.
  */
-export function decode(message: ArrayBuffer, scene: Scene | null): Picture | null {
+export function decode(message: ArrayBuffer, scene: Scene | null, values: NodeValues | null = null): Picture | null {
   const reader = new Reader(message);
   const kind = reader.u32();
   const number = reader.u32();
   if (kind === 1) return decode_scene(reader, number);
   if (number !== scene?.number) return null;
   if (kind === 2) return decode_patch(reader, number);
-  if (kind === 3) return decode_frame(reader, number, scene.held.length);
+  if (kind === 3) return decode_frame(reader, number, scene.held.length, values);
   if (kind === 4) return decode_ticks(reader, number);
   throw new RangeError(`a message of unknown kind ${kind}`);
 }

@@ -85,13 +85,13 @@ test('edges that only hidden triangles have are not drawn', () => {
 const frame: Frame = {
   kind: 'frame', scene: 1, tick: 1, time: 0, patch: 1, status: 0, force_error: 0, left_out: 0,
   tool: new Float32Array(7), device: new Float32Array(7), force: new Float32Array(3), torque: new Float32Array(3),
-  unit_u: 0.5, unit_stress: 10,
+  number: 1, base: 0, version: 1, unit_u: 0.5, unit_stress: 10,
   contact: new Float32Array(0),
   pressure_node: Uint32Array.from([1, 8 + 1, 8 + 4]), pressure: Float32Array.from([7, 30, 20]),
   u: Int16Array.from({ length: 24 }, (_, i) => i),
-  stress: Uint16Array.from([1, 2, 3, 65535, 5, 6, 7, 8]),
+  stress: Uint16Array.from([2, 3, 4, 0, 6, 7, 8, 9]),
   patch_u: Int16Array.from({ length: 15 }, (_, i) => -i),
-  patch_stress: Uint16Array.from([50, 65535, 52, 53, 54]),
+  patch_stress: Uint16Array.from([51, 0, 53, 54, 55]),
 };
 
 test('numbers of a welded node are the patch’s', () => {

@@ -6,10 +6,13 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <optional>
+#include <random>
 #include <thread>
 
 #include "base/error.h"
 #include "runtime/body/patch_maker.h"
+#include "runtime/viewer/node_order.h"
 #include "runtime/viewer/viewer_server.h"
 #include "runtime/web/page.h"
 #include "tests/support/meshes_files.h"
@@ -143,8 +146,8 @@ TEST_F(Viewer, RefusesForeignHostsAndPages) {
   const std::string name = "localhost:" + std::to_string(port());
   EXPECT_EQ(Client(served(), {.host = name, .origin = "http://" + name}).status, 101U);
   EXPECT_EQ(Client(served(), {.target = "/other"}).status, 404U);
-  EXPECT_EQ(Client(served(), {.subprotocol = "palpate.2"}).status, 400U);
-  EXPECT_EQ(Client(served(), {.subprotocol = "palpate.2, palpate.1"}).subprotocol, "palpate.1");
+  EXPECT_EQ(Client(served(), {.subprotocol = "palpate.1"}).status, 400U);
+  EXPECT_EQ(Client(served(), {.subprotocol = "palpate.3, palpate.2"}).subprotocol, "palpate.2");
   EXPECT_EQ(Client(served(), {.subprotocol = ""}).status, 101U);
 }
 
@@ -422,32 +425,67 @@ class SlowPages : public Viewer {
     large.number = 1;
     large.nodes.assign(nodes, Vec3::Zero());
     large.held.assign(nodes, 0);
+    large.order = order_along_curve(large.nodes);
     scene_ = std::make_shared<const Scene>(large);
     server_->show_scene(scene_);
   }
+  /// Of a page, from one picture to the next.
+  struct Follower {
+    Client& page;
+    std::optional<test::DecodedFrame> frame{};
+    std::size_t bytes = 0;
+
+    void take(const std::string& message) {
+      frame = test::decode_frame(message, nodes, frame ? &*frame : nullptr);
+      bytes += message.size();
+    }
+    void follow_to(std::int64_t tick) {
+      do take(page.receive(3));
+      while (frame->tick != static_cast<double>(tick));
+    }
+  };
+  void expect_last_picture(const test::DecodedFrame& frame) const {
+    ASSERT_EQ(frame.u.size(), last_.size());
+    for (std::size_t k = 0; k < nodes; k += 37) {
+      const auto node = static_cast<std::size_t>(scene_->order[k]);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(frame.u[3 * k + axis], last_[3 * node + axis], 0.5 * frame.unit_u);
+    }
+  }
+
   void show(std::int64_t tick) {
     SurfacePicture next;
     next.frame.tick = tick;
-    next.frame.displacement.assign(3 * nodes, 0.001F);
+    next.frame.displacement.resize(3 * nodes);
+    for (float& u : next.frame.displacement) u = static_cast<float>(random_() % 1000);  // all of them move
+    last_ = next.frame.displacement;
     server_->show_picture(std::move(next));
     std::vector<TickNote> notes(ticks_a_picture);
     for (std::size_t k = 0; k < notes.size(); ++k)
       notes[k].number = ticks_a_picture * tick + static_cast<std::int64_t>(k);
     server_->show_ticks(notes);
   }
+
+  std::vector<float> last_;  // displacements of the last picture
+
+ private:
+  std::mt19937 random_{5};
 };
 
 TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
-  constexpr std::int64_t pictures = 50;  // of 0.16 MB; a page that reads nothing for ten seconds is cut
+  constexpr std::int64_t pictures = 50;  // of 0.12 MB; a page that reads nothing for ten seconds is cut
   Client slow = client();
   slow.connection().set_option(test::asio::socket_base::receive_buffer_size(1 << 16));
   Client quick = client();
   slow.receive(1);
   quick.receive(1);
+  Follower of_quick{quick};
   for (std::int64_t tick = 0; tick < pictures; ++tick) {
     show(tick);
-    hear_frame(quick, tick);  // each of them
+    of_quick.follow_to(tick);  // each of them
   }
+  expect_last_picture(*of_quick.frame);
+  Follower of_slow{slow};
   std::int64_t frames = 0;
   std::int64_t most_ticks = 0;
   std::int64_t last_tick = -1;
@@ -455,7 +493,8 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
   while (last != pictures - 1 || last_tick != ticks_a_picture * pictures - 1) {
     const Client::Said said = slow.receive();
     if (said.kind() == 3) {
-      const double tick = tick_of(said.bytes);
+      of_slow.take(said.bytes);
+      const double tick = of_slow.frame->tick;
       EXPECT_GT(tick, last);
       last = tick;
       ++frames;
@@ -467,7 +506,27 @@ TEST_F(SlowPages, MissPicturesAndHoldUpNobody) {
     }
   }
   EXPECT_LT(frames, pictures / 2);
+  expect_last_picture(*of_slow.frame);
   EXPECT_EQ(most_ticks, 2000);  // two seconds in one message
+}
+
+TEST_F(SlowPages, AreSentSixMegabytesASecondAtMost) {
+  Client page = client();
+  page.receive(1);
+  Follower follower{page};
+  show(0);
+  follower.follow_to(0);
+  const auto begun = std::chrono::steady_clock::now();
+  const std::size_t first = follower.bytes;
+  std::size_t before_last = 0;  // its own time comes after it
+  for (std::int64_t tick = 1; tick <= 20; ++tick) {
+    before_last = follower.bytes;
+    show(tick);
+    follower.follow_to(tick);
+  }
+  const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begun;
+  EXPECT_GT(before_last - first, 1'000'000U);
+  EXPECT_LT(static_cast<double>(before_last - first), 6.1e6 * passed.count());
 }
 
 TEST_F(SlowPages, MissTheTicksOfTheBodyBefore) {

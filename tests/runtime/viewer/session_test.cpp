@@ -309,6 +309,7 @@ class Export : public Recorded {
     EXPECT_GE(messages.size(), 3U);
     Exported found{{}, {}, Json::parse(messages.at(0).bytes), Json::parse(messages.at(1).bytes)};
     const test::DecodedScene scene = test::decode_scene(messages.at(2).bytes);
+    std::optional<test::DecodedFrame> last;
     EXPECT_EQ(scene.scene, found.state.at("scene"));
     for (std::size_t k = 3; k < messages.size(); ++k) {
       EXPECT_EQ(messages[k].kind, 1U);
@@ -316,8 +317,14 @@ class Export : public Recorded {
         found.runs.push_back(test::decode_ticks(messages[k].bytes).shown.size());
         continue;
       }
-      const test::DecodedFrame frame = test::decode_frame(messages[k].bytes, 3);
+      const test::DecodedFrame frame = test::decode_frame(messages[k].bytes, 3, last ? &*last : nullptr);
+      last = frame;
       EXPECT_EQ(frame.tick, 1000.0 * frame.time);
+      EXPECT_EQ(frame.base == 0, found.pictures.size() % 30 == 0) << "one in 30 pictures is whole";
+      for (std::size_t node = 0; node < 3; ++node) {  // the third one, at y = 1, goes up with time
+        const double up = scene.position.at(3 * node + 1) == 1.0F ? frame.tick : 0.0;
+        EXPECT_NEAR(frame.u.at(3 * node + 2), up, 1e-4 * up);
+      }
       found.pictures.push_back(frame.tick);
     }
     return found;

@@ -3,11 +3,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <optional>
+#include <random>
 
 #include "base/error.h"
 #include "runtime/body/patch_maker.h"
+#include "runtime/viewer/node_order.h"
 #include "runtime/viewer/seen_surface.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/viewer_decoder.h"
@@ -15,7 +20,7 @@
 namespace palpate::wire_test {
 namespace {
 
-constexpr double half_unit = 0.502;  // to which values are rounded, and what float adds to that
+constexpr double half_unit = 0.5 + 1e-9;  // to which values are rounded
 constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
 
 Body body_of(ElementType element, int refinement = 1, int cells = 3) {
@@ -46,21 +51,44 @@ SurfacePicture picture_of(const Body& body) {
   return picture;
 }
 
+std::size_t node_at(const Scene& scene, std::size_t place) {
+  return static_cast<std::size_t>(scene.order.at(place));
+}
+
+std::vector<Index> all_of(std::vector<Index> order) {
+  std::sort(order.begin(), order.end());
+  return order;
+}
+
+/// Each displacement of the scene's nodes within half a unit of `displacement` [S x 3], which is the body's
+/// order.
+void expect_displacements(const test::DecodedFrame& frame, const Scene& scene,
+                          const std::vector<float>& displacement) {
+  ASSERT_GE(frame.u.size(), 3 * scene.nodes.size());
+  for (std::size_t k = 0; k < 3 * scene.nodes.size(); ++k)
+    EXPECT_NEAR(frame.u[k], displacement[3 * node_at(scene, k / 3) + k % 3], half_unit * frame.unit_u);
+}
+
 TEST(ViewerWire, SceneComesBack) {
   const Scene scene = make_scene(body_of(ElementType::tet4), 9);
   const test::DecodedScene decoded = test::decode_scene(encode_scene(scene));
   EXPECT_EQ(decoded.scene, 9U);
   EXPECT_EQ(decoded.dimension, 3U);
+  const std::vector<Index> sorted = all_of(scene.order);
+  for (std::size_t k = 0; k < sorted.size(); ++k) EXPECT_EQ(sorted[k], static_cast<Index>(k));
   ASSERT_EQ(decoded.position.size(), 3 * scene.nodes.size());
   for (std::size_t k = 0; k < decoded.position.size(); ++k)
-    EXPECT_EQ(decoded.position[k], static_cast<float>(scene.nodes[k / 3][static_cast<Eigen::Index>(k % 3)]));
+    EXPECT_EQ(decoded.position[k],
+              static_cast<float>(scene.nodes[node_at(scene, k / 3)][static_cast<Eigen::Index>(k % 3)]));
   ASSERT_EQ(decoded.triangle.size(), 3 * scene.triangles.size());
   for (std::size_t k = 0; k < decoded.triangle.size(); ++k)
-    EXPECT_EQ(decoded.triangle[k], static_cast<std::uint32_t>(scene.triangles[k / 3][k % 3]));
+    EXPECT_EQ(node_at(scene, decoded.triangle[k]), static_cast<std::size_t>(scene.triangles[k / 3][k % 3]));
   ASSERT_EQ(decoded.edge.size(), 2 * scene.edges.size());
   for (std::size_t k = 0; k < decoded.edge.size(); ++k)
-    EXPECT_EQ(decoded.edge[k], static_cast<std::uint32_t>(scene.edges[k / 2][k % 2]));
-  EXPECT_EQ(decoded.held, scene.held);
+    EXPECT_EQ(node_at(scene, decoded.edge[k]), static_cast<std::size_t>(scene.edges[k / 2][k % 2]));
+  ASSERT_EQ(decoded.held.size(), scene.held.size());
+  for (std::size_t k = 0; k < decoded.held.size(); ++k)
+    EXPECT_EQ(decoded.held[k], scene.held[node_at(scene, k)]);
 }
 
 TEST(ViewerWire, FrameComesBackToItsUnits) {
@@ -93,14 +121,20 @@ TEST(ViewerWire, FrameComesBackToItsUnits) {
   EXPECT_EQ(std::vector<float>(frame.contact.begin(), frame.contact.begin() + 10),
             (std::vector<float>{1, 2, 3, 0, 0, 1, 4, 5, 6, 1}));
   EXPECT_EQ(frame.contact[19], 0.0F);
-  EXPECT_EQ(frame.pressure_node, std::vector<std::uint32_t>{4});
+  ASSERT_EQ(frame.pressure_node.size(), 1U);
+  EXPECT_EQ(node_at(scene, frame.pressure_node[0]), 4U);
   EXPECT_EQ(frame.pressure, std::vector<float>{12.5F});
-  EXPECT_FLOAT_EQ(frame.unit_u, 0.2F / 32767.0F);
-  for (std::size_t k = 0; k < 3 * nodes; ++k)
-    EXPECT_NEAR(frame.u[k], picture.frame.displacement[k], half_unit * frame.unit_u);
-  EXPECT_FLOAT_EQ(frame.unit_stress, 1.0F);
-  EXPECT_EQ(std::vector<float>(frame.stress.begin(), frame.stress.begin() + 5),
-            (std::vector<float>{100, -1, 0, 65534, 100}));
+  EXPECT_EQ(frame.exponent_u, -15);  // 0.2 is 6554 units
+  expect_displacements(frame, scene, picture.frame.displacement);
+  EXPECT_EQ(frame.unit_stress, 8.0);  // 65534 is 8192 units, nearly
+  for (std::size_t k = 0; k < nodes; ++k) {
+    const float stress = picture.frame.von_mises[node_at(scene, k)];
+    if (std::isnan(stress)) {
+      EXPECT_EQ(frame.stress[k], -1.0);
+    } else {
+      EXPECT_NEAR(frame.stress[k], stress, half_unit * frame.unit_stress);
+    }
+  }
 }
 
 TEST(ViewerWire, FrameOfUnknownStressOfRestAndOfWhatIsNotFinite) {
@@ -109,15 +143,17 @@ TEST(ViewerWire, FrameOfUnknownStressOfRestAndOfWhatIsNotFinite) {
   SurfacePicture picture = picture_of(body);
   picture.frame.displacement.assign(3 * scene.nodes.size(), 0.0F);
   test::DecodedFrame frame = test::decode_frame(encode_frame(picture, scene, nullptr), scene.nodes.size());
-  EXPECT_EQ(frame.u, std::vector<float>(3 * scene.nodes.size(), 0.0F));
-  EXPECT_EQ(frame.stress, std::vector<float>(scene.nodes.size(), -1.0F));
+  EXPECT_EQ(frame.u, std::vector<double>(3 * scene.nodes.size(), 0.0));
+  EXPECT_EQ(frame.stress, std::vector<double>(scene.nodes.size(), -1.0));
   picture.frame.displacement[0] = not_a_number;
   picture.frame.displacement[1] = std::numeric_limits<float>::infinity();
   picture.frame.displacement[2] = -2.0F;
   frame = test::decode_frame(encode_frame(picture, scene, nullptr), scene.nodes.size());
-  EXPECT_EQ(frame.u[0], 0.0F);
-  EXPECT_EQ(frame.u[1], 0.0F);
-  EXPECT_FLOAT_EQ(frame.u[2], -2.0F);
+  const auto first =
+      static_cast<std::size_t>(std::find(scene.order.begin(), scene.order.end(), 0) - scene.order.begin());
+  EXPECT_EQ(frame.u[3 * first], 0.0);
+  EXPECT_EQ(frame.u[3 * first + 1], 0.0);
+  EXPECT_EQ(frame.u[3 * first + 2], -2.0);
 }
 
 TEST(ViewerWire, PicturesOfOtherBodiesDoNotFit) {
@@ -179,9 +215,10 @@ TEST(ViewerWire, PatchAndItsFrameComeBack) {
   const std::vector<float> expected = sheared(patch.nodes);
   for (std::size_t k = 0; k < expected.size(); ++k)
     EXPECT_NEAR(frame.u[3 * S + k], expected[k], half_unit * frame.unit_u);
-  EXPECT_EQ(frame.pressure_node,
-            (std::vector<std::uint32_t>{static_cast<std::uint32_t>(of_body), static_cast<std::uint32_t>(S),
-                                        static_cast<std::uint32_t>(S + patch.nodes.size() - 1)}));
+  ASSERT_EQ(frame.pressure_node.size(), 3U);
+  EXPECT_EQ(node_at(patched.scene, frame.pressure_node[0]), of_body);
+  EXPECT_EQ(frame.pressure_node[1], S);
+  EXPECT_EQ(frame.pressure_node[2], S + patch.nodes.size() - 1);
   EXPECT_EQ(frame.pressure, (std::vector<float>{2, 2, 3}));
 }
 
@@ -195,11 +232,11 @@ TEST(ViewerWire, FrameOfAPlateHasAllItsNodes) {
   picture.frame.pressure.back() = 4.0F;
   const test::DecodedFrame frame =
       test::decode_frame(encode_frame(picture, scene, nullptr), scene.nodes.size());
-  for (std::size_t k = 0; k < frame.u.size(); ++k)
-    EXPECT_NEAR(frame.u[k], picture.plane_displacement[k], half_unit * frame.unit_u);
-  EXPECT_FLOAT_EQ(frame.stress.back(), 3.0F);
-  EXPECT_EQ(frame.pressure_node,
-            std::vector<std::uint32_t>{static_cast<std::uint32_t>(plate.surface_mesh_nodes().back())});
+  expect_displacements(frame, scene, picture.plane_displacement);
+  EXPECT_EQ(frame.stress.back(), 3.0);
+  ASSERT_EQ(frame.pressure_node.size(), 1U);
+  EXPECT_EQ(node_at(scene, frame.pressure_node[0]),
+            static_cast<std::size_t>(plate.surface_mesh_nodes().back()));
 }
 
 TEST(ViewerWire, PatchOfAPlateOfAnOddNumberOfNodesComesBack) {
@@ -214,6 +251,131 @@ TEST(ViewerWire, PatchOfAPlateOfAnOddNumberOfNodesComesBack) {
   const std::vector<float> expected = sheared(patched.patch.nodes);
   for (std::size_t k = 0; k < expected.size(); ++k)
     EXPECT_NEAR(frame.u[3 * S + k], expected[k], half_unit * frame.unit_u);
+}
+
+/// A picture of a body of some nodes, of displacements and stresses as `value` has them.
+struct Numbers {
+  Scene scene;
+  SurfacePicture picture;
+
+  Numbers(std::size_t nodes, const std::function<float(std::size_t node, std::size_t axis)>& value) {
+    scene.number = 1;
+    for (std::size_t k = 0; k < nodes; ++k)
+      scene.nodes.emplace_back(static_cast<double>(k * 7 % nodes), static_cast<double>(k * k % 13), 0.0);
+    scene.order = order_along_curve(scene.nodes);
+    scene.held.resize(nodes);
+    for (std::size_t k = 0; k < nodes; ++k) {
+      for (std::size_t axis = 0; axis < 3; ++axis) picture.frame.displacement.push_back(value(k, axis));
+      picture.frame.von_mises.push_back(value(k, 3));
+    }
+  }
+  [[nodiscard]] WireValues values(std::uint32_t number) const {
+    return wire_values(picture, scene, nullptr, number);
+  }
+  [[nodiscard]] test::DecodedFrame decoded(const WireValues& own, const WireValues* base,
+                                           const test::DecodedFrame* base_frame) const {
+    return test::decode_frame(encode_frame(picture, scene, nullptr, own, base), scene.nodes.size(),
+                              base_frame);
+  }
+};
+
+TEST(ViewerWire, PicturesAreOffByATenThousandthOfTheLargest) {
+  for (const double largest : {1e-12, 4.999e-3, 5.001e-3, 0.0078, 3.0, 1e6}) {
+    const Numbers numbers(500, [&](std::size_t node, std::size_t axis) {
+      return static_cast<float>(largest * std::sin(static_cast<double>(3 * node + axis) + 1.0));
+    });
+    const test::DecodedFrame frame = numbers.decoded(numbers.values(1), nullptr, nullptr);
+    for (std::size_t k = 0; k < 500; ++k) {
+      const std::size_t node = node_at(numbers.scene, k);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(frame.u[3 * k + axis], numbers.picture.frame.displacement[3 * node + axis],
+                    1e-4 * largest);
+      EXPECT_NEAR(frame.stress[k], std::max(0.0F, numbers.picture.frame.von_mises[node]), largest / 8192.0);
+    }
+  }
+}
+
+/// As they come one after the other, each is what it is alone: whatever the units were before, and where
+/// stresses become known or are so no more.
+TEST(ViewerWire, PicturesFollowFromTheOneBefore) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> any(-1.0F, 1.0F);
+  constexpr std::size_t nodes = 333;
+  std::optional<WireValues> base;
+  std::optional<test::DecodedFrame> base_frame;
+  std::uint32_t number = 0;
+  for (const float largest : {1.0F, 1.0F, 2.9F, 0.3F, 1e-3F, 0.0F, 0.1F, 300.0F, 310.0F, 1e-30F, 5.0F}) {
+    const Numbers numbers(nodes, [&](std::size_t node, std::size_t axis) {
+      return axis == 3 && (node + number) % 50 == 0 ? not_a_number : largest * any(random);
+    });
+    const WireValues values = numbers.values(++number);
+    const test::DecodedFrame alone = numbers.decoded(values, nullptr, nullptr);
+    const test::DecodedFrame next =
+        numbers.decoded(values, base ? &*base : nullptr, base_frame ? &*base_frame : nullptr);
+    EXPECT_EQ(next.base, number - 1);
+    EXPECT_EQ(alone.base, 0U);
+    for (std::size_t c = 0; c < 4; ++c) EXPECT_EQ(next.numbers[c], alone.numbers[c]) << number << ' ' << c;
+    base = values;
+    base_frame = next;
+  }
+}
+
+TEST(ViewerWire, PicturesAreAsLargeAsWhatMoved) {
+  constexpr std::size_t nodes = 100'000;
+  const auto still = [](std::size_t node, std::size_t axis) {
+    return 1e-3F * static_cast<float>((node * 17 + axis * 5) % 1000);
+  };
+  const Numbers before(nodes, still);
+  const Numbers same(nodes, still);
+  const WireValues base = before.values(1);
+  const std::string head = encode_frame(Numbers(0, still).picture, Numbers(0, still).scene, nullptr);
+  EXPECT_LE(encode_frame(same.picture, same.scene, nullptr, same.values(2), &base).size(), head.size() + 30);
+  Numbers moved(nodes, still);  // one node in a thousand, by half of the largest
+  for (std::size_t k = 0; k < nodes; k += 1000) moved.picture.frame.displacement[3 * k + 1] += 0.3F;
+  const std::size_t bytes = encode_frame(moved.picture, moved.scene, nullptr, moved.values(2), &base).size();
+  EXPECT_LE(bytes, head.size() + std::size_t{100} * 50);  // 100 of 12 500 blocks, and what lies between
+}
+
+/// Of a patch that goes on the change is sent, of one that comes anew all.
+TEST(ViewerWire, PatchesFollowFromTheOneBefore) {
+  Patched patched(ElementType::tet4);
+  const std::size_t S = patched.scene.nodes.size();
+  SurfacePicture picture = picture_of(patched.body);
+  const WireValues base = wire_values(picture, patched.scene, &patched.patch, 1);
+  const test::DecodedFrame first =
+      test::decode_frame(encode_frame(picture, patched.scene, &patched.patch, base, nullptr), S);
+  for (float& u : picture.frame.displacement) u *= 1.25F;
+  for (const std::uint32_t number : {5U, 6U}) {
+    patched.patch.number = number;
+    const WireValues values = wire_values(picture, patched.scene, &patched.patch, 2);
+    const test::DecodedFrame frame =
+        test::decode_frame(encode_frame(picture, patched.scene, &patched.patch, values, &base), S, &first);
+    const std::vector<float> expected = sheared(patched.patch.nodes);
+    for (std::size_t k = 0; k < expected.size(); ++k)
+      EXPECT_NEAR(frame.u[3 * S + k], 1.25 * expected[k], half_unit * frame.unit_u + 1e-7);
+  }
+}
+
+TEST(NodeOrder, NeighboursFollowEachOther) {
+  for (const bool is_plane : {true, false}) {
+    std::vector<Vec3> nodes;
+    for (int x = 0; x < 16; ++x) {
+      for (int y = 0; y < 16; ++y) {
+        for (int z = 0; z < (is_plane ? 1 : 16); ++z) nodes.emplace_back(x * 7 % 16, y * 5 % 16, z);
+      }
+    }
+    const std::vector<Index> order = order_along_curve(nodes);
+    const std::vector<Index> sorted = all_of(order);
+    for (std::size_t k = 0; k < nodes.size(); ++k) EXPECT_EQ(sorted[k], static_cast<Index>(k));
+    double way = 0.0;
+    for (std::size_t k = 1; k < nodes.size(); ++k)
+      way +=
+          (nodes[static_cast<std::size_t>(order[k])] - nodes[static_cast<std::size_t>(order[k - 1])]).norm();
+    // A curve through all cells goes from each to one beside it; a plane cuts off some of its ways.
+    EXPECT_LE(way / static_cast<double>(nodes.size() - 1), is_plane ? 1.5 : 1.0 + 1e-9);
+  }
+  EXPECT_TRUE(order_along_curve({}).empty());
+  EXPECT_EQ(order_along_curve(std::vector<Vec3>(3, Vec3::Ones())), (std::vector<Index>{0, 1, 2}));
 }
 
 TEST(ViewerWire, TicksComeBack) {

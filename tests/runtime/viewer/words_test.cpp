@@ -124,7 +124,7 @@ RC_GTEST_PROP(PageWord, BrokenWordsNeitherCrashNorAreObeyed, ()) {
 TEST(RunWords, HelloAndErrors) {
   const Json hello = Json::parse(hello_word("live", 7));
   EXPECT_EQ(hello, (Json{{"type", "hello"},
-                         {"protocol", 1},
+                         {"protocol", 2},
                          {"version", PALPATE_VERSION},
                          {"mode", "live"},
                          {"id", 7},
