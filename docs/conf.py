@@ -71,6 +71,7 @@ CHAPTERS = {
         "comparison",
         "architecture",
         "decisions",
+        "decisions-contact",
         "glossary",
         "contributing",
     ],

@@ -62,7 +62,7 @@ std::string value_of(const std::string& initializer) {
 
 /// A comment names the page of decisions as a file of the tree.
 std::string linked(const std::string& comment) {
-  return std::regex_replace(comment, std::regex("docs/decisions"), "[decisions](../decisions.md)");
+  return std::regex_replace(comment, std::regex("docs/decisions"), "[decisions](../decisions-contact.md)");
 }
 
 std::vector<std::vector<std::string>> tuning_rows(const Declaration& group) {
