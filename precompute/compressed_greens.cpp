@@ -11,9 +11,10 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t many_nodes = 5000;  // from there on compressed
-constexpr double cut_of_tolerance = 0.04;  // forces are off by several times the cut (scripts/studies/scale)
-constexpr double finer = 0.3;              // the next cut, where touches are off by more than the tolerance
-constexpr int most_cuts = 3;
+constexpr double cut_of_tolerance = 0.08;  // where forces are likely to be off by half the tolerance
+constexpr double accepted = 0.7;  // of the tolerance: more touches than are measured find larger errors
+constexpr double finer = 0.55;    // the next cut, where touches are off by more
+constexpr int most_cuts = 5;
 constexpr std::uint64_t certificate_seed = 41;
 constexpr std::int64_t touches = 64;   // of each number of nodes
 constexpr double typical_rank = 45.0;  // of the default tolerance (measured)
@@ -154,7 +155,7 @@ std::shared_ptr<const HierarchicalMatrix> compress_greens(const CompressionPlan&
                 jobs, [&](double share) { return stages.reach(touch_stage, share); });
     if (interrupted()) return nullptr;
     const double worst = worst_of(errors);
-    if (worst <= plan.frame.tolerance) {
+    if (worst <= accepted * plan.frame.tolerance) {
       matrix->tolerance = plan.frame.tolerance;
       matrix->certificate = table_of(errors);
       progress.line(fmt::format("compressed to {:.1f} MB; force errors of random touches:\n{}",

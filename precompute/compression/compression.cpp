@@ -21,12 +21,12 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Dofs = std::vector<std::int64_t>;
 
-constexpr Index spare_samples = 12;         // more than the largest rank: what they say of it is certain
-constexpr double skeleton_share = 0.5;      // of the cut: skeletons are not to add to the error
-constexpr Index samples = 256;              // random loads
-constexpr Index coupled_at_once = 4;        // clusters whose couplings are solved together
-constexpr Index leaves_estimated = 64;      // whose flops are counted for an estimate
-constexpr std::int64_t loads_at_once = 64;  // solved together
+constexpr Index spare_samples = 12;           // more than the largest rank: what they say of it is certain
+constexpr double skeleton_share = 0.5;        // of the cut: skeletons are not to add to the error
+constexpr Index samples = 256;                // random loads
+constexpr std::size_t columns_at_once = 200;  // of couplings, solved together
+constexpr Index leaves_estimated = 64;        // whose flops are counted for an estimate
+constexpr std::int64_t loads_at_once = 64;    // solved together
 
 std::size_t at(std::int64_t i) {
   return static_cast<std::size_t>(i);
@@ -84,7 +84,7 @@ struct Compression::Impl {
   bool solve_near(const NearStore& store);
   bool sample();
   bool climb(double cut);
-  [[nodiscard]] HierarchicalMatrix packed() const;
+  [[nodiscard]] HierarchicalMatrix packed();
 
  private:
   /// What is known of a cluster while its level is worked on.
@@ -133,6 +133,7 @@ struct Compression::Impl {
   Front leaf_front(Index leaf) const;
   Front joined_front(Index c);
   void thin_out(Index c, double cut, Front& front) const;
+  [[nodiscard]] std::vector<Index> groups_of(Index first, Index clusters) const;
   void couple(Index first, Index end, SelectedSolver::Workspace& workspace);
   void take_off(Index c);
 
@@ -279,6 +280,20 @@ void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
   front = std::move(thin);
 }
 
+/// Where groups of clusters of a level begin that are solved together, and where the last one ends.
+std::vector<Index> Compression::Impl::groups_of(Index first, Index clusters) const {
+  std::vector<Index> starts = {first};
+  std::size_t columns = 0;
+  for (Index c = first; c < first + clusters; ++c) {
+    columns += fronts_[at(c)].skeleton.size();
+    if (columns <= columns_at_once || c == starts.back()) continue;
+    starts.push_back(c);
+    columns = fronts_[at(c)].skeleton.size();
+  }
+  starts.push_back(first + clusters);
+  return starts;
+}
+
 /// The couplings of the far pairs in which the clusters [first, end) are columns: side by side in the body,
 /// they share most of a solve.
 void Compression::Impl::couple(Index first, Index end, SelectedSolver::Workspace& workspace) {
@@ -345,12 +360,10 @@ bool Compression::Impl::climb(double cut) {
       thin_out(c, cut, front);
       fronts_[at(c)] = std::move(front);
     });
-    parallel_for((clusters + coupled_at_once - 1) / coupled_at_once, jobs_,
-                 [&](std::int64_t group, int worker) {
-                   const auto c = first + static_cast<Index>(group) * coupled_at_once;
-                   if (!stopped())
-                     couple(c, std::min(c + coupled_at_once, first + clusters), workspaces_[at(worker)]);
-                 });
+    const std::vector<Index> groups = groups_of(first, clusters);
+    parallel_for(std::ssize(groups) - 1, jobs_, [&](std::int64_t group, int worker) {
+      if (!stopped()) couple(groups[at(group)], groups[at(group + 1)], workspaces_[at(worker)]);
+    });
     for_each([&](Index c, int) {
       take_off(c);
       tick(CompressionStage::far, count);
@@ -364,7 +377,7 @@ bool Compression::Impl::climb(double cut) {
 }
 
 /// Puts bases and couplings one after the other.
-HierarchicalMatrix Compression::Impl::packed() const {
+HierarchicalMatrix Compression::Impl::packed() {
   const ClusterTree& tree = matrix_.tree;
   HierarchicalMatrix matrix = matrix_;
   for (Index c = 0; c < tree.clusters(); ++c)
@@ -387,6 +400,8 @@ HierarchicalMatrix Compression::Impl::packed() const {
   }
   for (std::size_t p = 0; p < coupling_.size(); ++p)
     put(coupling_[p], coupling.get() + matrix.coupling_at[p]);
+  fronts_ = {};
+  coupling_ = {};
   matrix.basis = basis;
   matrix.transfer = transfer;
   matrix.coupling = coupling;

@@ -42,8 +42,8 @@ class Recompression {
       for_level(level, [&](Index c) { orthogonalise(c); });
     parallel_for(std::ssize(S_), jobs_, [&](std::int64_t p, int) {
       const auto [row, column] = from_.far_pair[at(p)];
-      S_[at(p)] = R_[at(row)] * block(from_.coupling, from_.coupling_at[at(p)], rank(row), rank(column)) *
-                  R_[at(column)].transpose();
+      const Matrix S = block(from_.coupling, from_.coupling_at[at(p)], rank(row), rank(column));
+      S_[at(p)] = (R_[at(row)] * S * R_[at(column)].transpose()).cast<float>();
     });
     for (int level = 0; level <= from_.tree.levels; ++level) for_level(level, [&](Index c) { weigh(c); });
     for (int level = from_.tree.levels; level >= 0; --level) for_level(level, [&](Index c) { truncate(c); });
@@ -89,7 +89,7 @@ class Recompression {
     Matrix G = Matrix::Zero(k, k);
     for (std::int64_t p = from_.partner_from[at(c)]; p < from_.partner_from[at(c) + 1]; ++p) {
       const auto [other, pair] = from_.partner[at(p)];
-      const Matrix& S = S_[at(pair)];
+      const Matrix S = S_[at(pair)].cast<double>();
       if (c > other) {
         G.noalias() += S * S.transpose();
       } else {
@@ -167,7 +167,8 @@ class Recompression {
     }
     for (std::size_t p = 0; p < S_.size(); ++p) {
       const auto [row, column] = matrix.far_pair[p];
-      put(U_[at(row)].transpose() * S_[p] * U_[at(column)], coupling.get() + matrix.coupling_at[p]);
+      put(U_[at(row)].transpose() * S_[p].cast<double>() * U_[at(column)],
+          coupling.get() + matrix.coupling_at[p]);
     }
     matrix.basis = basis;
     matrix.transfer = transfer;
@@ -180,7 +181,7 @@ class Recompression {
   int jobs_;
   std::vector<double> root_;
   std::vector<Matrix> Q_, R_, U_, weights_, rows_;  // [clusters]
-  std::vector<Matrix> S_;                           // [far pairs] between orthonormal bases
+  std::vector<FloatRows> S_;                        // [far pairs] between orthonormal bases
 };
 
 }  // namespace
