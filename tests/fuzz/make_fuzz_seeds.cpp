@@ -20,6 +20,8 @@ int main(int count, char** arguments) {
     test::write_swinging_sample(temporary / name, method, Precision::double_precision, ElementType::tri3);
     test::write_bytes(folder / name, raw + test::read_bytes(temporary / name));
   }
+  test::write_compressed_sample(temporary / "compressed");
+  test::write_bytes(folder / "compressed", raw + test::read_bytes(temporary / "compressed"));
   const std::string whole = test::read_bytes(temporary / "double");
   test::write_bytes(folder / "single", raw + test::read_bytes(temporary / "single"));
   test::write_bytes(folder / "double", raw + whole);

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 #include <set>
+#include <vector>
 
 #include "base/error.h"
 #include "formats/hdf5.h"
 #include "formats/model_file.h"
+#include "matrices/hierarchical_product.h"
 #include "tests/fuzz/fuzz_input.h"
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
@@ -49,6 +52,18 @@ bool finite(const std::vector<Vec3>& rows, const Model& model) {
          });
 }
 
+/// Reads every entry, by rows and by a load on all nodes.
+void use_compressed(const HierarchicalMatrix& matrix, std::int64_t order) {
+  require(order > 0 && matrix.order() == order);
+  std::vector<Index> nodes(static_cast<std::size_t>(matrix.tree.nodes));
+  std::iota(nodes.begin(), nodes.end(), 0);
+  std::vector<double> row(static_cast<std::size_t>(matrix.dimension * order)),
+      f(static_cast<std::size_t>(order)), u(f.size());
+  for (const Index node : nodes) gather_blocks(matrix, node, nodes, row);
+  const NodeRange all{0, matrix.tree.nodes};
+  displace(matrix, nodes, f, {&all, 1}, u);
+}
+
 /// What the runtime takes for granted.
 void use(const Model& model) {
   const std::size_t nodes = model.mesh.nodes.size();
@@ -72,6 +87,10 @@ void use(const Model& model) {
   std::set<Index> stored;
   for (const Index node : model.stored_nodes)
     require(model.fixed[static_cast<std::size_t>(node)] != (1U << d) - 1 && stored.insert(node).second);
+  if (model.compressed != nullptr) {
+    use_compressed(*model.compressed, model.stored_dofs());
+    return;
+  }
   require(!stored.empty() && model.greens.order() == model.stored_dofs());
   for (std::int64_t i = 0; i < model.greens.order(); ++i) {
     require(model.greens(i, i) >= 0);
