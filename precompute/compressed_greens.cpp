@@ -11,6 +11,8 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t many_nodes = 5000;  // from there on compressed
+constexpr double largest_ratio =
+    0.47;  // Poisson's, that "auto" compresses: at 0.49 the tolerance is out of reach
 constexpr double cut_of_tolerance = 0.08;  // where forces are likely to be off by half the tolerance
 constexpr double accepted = 0.7;  // of the tolerance: more touches than are measured find larger errors
 constexpr double finer = 0.55;    // the next cut, where touches are off by more
@@ -87,7 +89,10 @@ bool wants_compression(const Description& description, std::int64_t stored_nodes
     throw Error("[storage] compression = \"h2\" does not go with [dynamics] method = \"packed\"",
                 description.file.string(), "set method = \"modal\", or compression = \"none\"");
   if (description.form != StorageForm::automatic) return description.form == StorageForm::compressed;
-  return stored_nodes >= many_nodes && !description.precision && !packed_dynamics;
+  const bool nearly_incompressible =
+      std::any_of(description.materials.begin(), description.materials.end(),
+                  [](const MaterialPart& part) { return part.material.poissons_ratio > largest_ratio; });
+  return stored_nodes >= many_nodes && !description.precision && !packed_dynamics && !nearly_incompressible;
 }
 
 CompressionPlan plan_compression(const Description& description, const Model& model,

@@ -384,6 +384,9 @@ TEST(CompressedDescription, DecidesByTheNumberOfNodes) {
   EXPECT_FALSE(wants("[storage]\ncompression = \"none\"\n", 500000));
   EXPECT_FALSE(wants("[storage]\nprecision = \"double\"\n", 5000));
   EXPECT_TRUE(wants("[storage]\ncompression = \"h2\"\n", 10));
+  std::string rubber = small;
+  rubber.replace(rubber.find("= 0.3"), 5, "= 0.49");
+  EXPECT_FALSE(wants_compression(parse_description(rubber, "model.toml"), 5000));
 }
 
 }  // namespace
