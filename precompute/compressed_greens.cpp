@@ -20,9 +20,8 @@ constexpr int most_cuts = 5;
 constexpr std::uint64_t certificate_seed = 41;
 constexpr std::int64_t touches = 64;   // of each number of nodes
 constexpr double typical_rank = 45.0;  // of the default tolerance (measured)
-constexpr double random_loads = 256.0;
-constexpr double far_share = 0.8;    // of the time of near pairs (measured)
-constexpr double touch_share = 0.3;  // likewise
+constexpr double far_share = 0.8;      // of the time of near pairs (measured)
+constexpr double touch_share = 0.3;    // likewise
 
 constexpr const char* near_stage = "near pairs";
 constexpr const char* sample_stage = "random loads";
@@ -103,14 +102,7 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
   for (const Index node : stored.nodes) points.push_back(model.mesh.nodes[static_cast<std::size_t>(node)]);
   plan.clusters = cluster_nodes(points);
   plan.stored = reordered(stored, plan.clusters.order);
-  std::vector<bool> on_surface(model.mesh.nodes.size(), false);
-  for (const Index node : model.surface) on_surface[static_cast<std::size_t>(node)] = true;
-  for (const Index node : plan.stored.nodes) {
-    const auto k = static_cast<std::size_t>(node);
-    if (on_surface[k] && model.fixed[k] == 0)
-      plan.touchable.push_back(static_cast<Index>(plan.points.size()));
-    plan.points.push_back(model.mesh.nodes[k]);
-  }
+  plan.places = touchable_points(model, plan.stored.nodes);
   plan.frame = compression_frame(plan.clusters, model.dimension());
   plan.frame.tolerance = description.tolerance;
 
@@ -156,8 +148,8 @@ std::shared_ptr<const HierarchicalMatrix> compress_greens(const CompressionPlan&
     const std::shared_ptr<HierarchicalMatrix> matrix = compression.compress(cut);
     if (matrix == nullptr) return nullptr;
     const std::vector<TouchErrors> errors =
-        certify(*matrix, factor, plan.stored.dofs, plan.points, plan.touchable, touches, certificate_seed,
-                jobs, [&](double share) { return stages.reach(touch_stage, share); });
+        certify(*matrix, factor, plan.stored.dofs, plan.places.points, plan.places.touchable, touches,
+                certificate_seed, jobs, [&](double share) { return stages.reach(touch_stage, share); });
     if (interrupted()) return nullptr;
     const double worst = worst_of(errors);
     if (worst <= accepted * plan.frame.tolerance) {

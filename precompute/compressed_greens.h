@@ -9,6 +9,7 @@
 
 #include "formats/model.h"
 #include "formats/model_file.h"
+#include "precompute/compression/certificate.h"
 #include "precompute/compression/compression.h"
 #include "precompute/description/description.h"
 #include "precompute/numerics/factor.h"
@@ -31,8 +32,7 @@ bool wants_compression(const Description& description, std::int64_t stored_nodes
 struct CompressionPlan {
   ClusteredNodes clusters;
   StoredNumbering stored;         ///< in the order of the clusters
-  std::vector<Vec3> points;       ///< [N] of the stored nodes [m]
-  std::vector<Index> touchable;   ///< stored nodes of the surface that are free along every axis
+  TouchablePoints places;         ///< of the stored nodes
   HierarchicalMatrix frame;       ///< tree, pairs and tolerance
   std::int64_t far_bytes = 0;     ///< of bases and couplings, estimated
   std::int64_t memory_bytes = 0;  ///< beside the factor

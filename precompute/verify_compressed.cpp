@@ -16,8 +16,6 @@ namespace {
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Vector = Eigen::VectorXd;
 
-constexpr double solver_safety = 100.0;
-constexpr double sum_rounding = 1e-13;
 constexpr std::int64_t touches = 16;     // of each number of nodes
 constexpr std::uint64_t seed = 1 << 20;  // others than those of the certificate
 
@@ -78,15 +76,7 @@ std::vector<Check> check_columns(const Model& model, const Factor& factor,
 }
 
 Check check_touches(const Model& model, const Factor& factor, std::span<const std::int64_t> stored_dofs) {
-  std::vector<bool> on_surface(model.mesh.nodes.size(), false);
-  for (const Index node : model.surface) on_surface[static_cast<std::size_t>(node)] = true;
-  std::vector<Vec3> points;
-  std::vector<Index> touchable;
-  for (const Index node : model.stored_nodes) {
-    const auto k = static_cast<std::size_t>(node);
-    if (on_surface[k] && model.fixed[k] == 0) touchable.push_back(static_cast<Index>(points.size()));
-    points.push_back(model.mesh.nodes[k]);
-  }
+  const auto [points, touchable] = touchable_points(model, model.stored_nodes);
   const int jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   Check check{"touches", 0.0, model.compressed->tolerance};
   for (const TouchErrors& errors : certify(*model.compressed, factor, stored_dofs, points, touchable, touches,

@@ -13,8 +13,6 @@ using Vector = Eigen::VectorXd;
 
 constexpr int vectors = 4;          // of random signs
 constexpr double deviations = 8.0;  // of a sum of roundings: exceeded once in 10^13
-constexpr double solver_safety = 100.0;
-constexpr double sum_rounding = 1e-13;  // of sums of products, relative to the largest
 constexpr double touch_safety = 4.0;
 using Signs = Eigen::Array<double, vectors, 1>;
 

@@ -11,6 +11,9 @@
 
 namespace palpate {
 
+inline constexpr double solver_safety = 100.0;  ///< times `solver_error` may a column be wrong by
+inline constexpr double sum_rounding = 1e-13;   ///< of sums of products, relative to the largest
+
 /// Rounding of one stored entry, relative to what is stored (R with split precision).
 double unit_roundoff(Precision precision) noexcept;
 

@@ -41,6 +41,19 @@ std::vector<Index> touched_nodes(std::int64_t k, std::span<const Vec3> points,
 
 }  // namespace
 
+TouchablePoints touchable_points(const Model& model, std::span<const Index> stored_nodes) {
+  std::vector<bool> on_surface(model.mesh.nodes.size(), false);
+  for (const Index node : model.surface) on_surface[static_cast<std::size_t>(node)] = true;
+  TouchablePoints result;
+  for (const Index node : stored_nodes) {
+    const auto k = static_cast<std::size_t>(node);
+    if (on_surface[k] && model.fixed[k] == 0)
+      result.touchable.push_back(static_cast<Index>(result.points.size()));
+    result.points.push_back(model.mesh.nodes[k]);
+  }
+  return result;
+}
+
 std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
                                  std::span<const Index> touchable, std::int64_t touches, std::uint64_t seed,

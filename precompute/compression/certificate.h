@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "formats/model.h"
 #include "matrices/hierarchical.h"
 #include "meshes/mesh.h"
 #include "precompute/numerics/factor.h"
@@ -25,6 +26,15 @@ struct TouchErrors {
 
 /// Touches with so many nodes are measured.
 inline constexpr std::array<Index, 4> certified_nodes = {1, 5, 30, 100};
+
+/// What touches of a body need to know of its stored nodes.
+struct TouchablePoints {
+  std::vector<Vec3> points;      ///< [N] of all stored nodes [m]
+  std::vector<Index> touchable;  ///< stored nodes of the surface that are free along every axis
+};
+
+/// `stored_nodes` [N] are nodes of the model's mesh, in the order of the matrix.
+TouchablePoints touchable_points(const Model& model, std::span<const Index> stored_nodes);
 
 /// Force errors of `touches` random touches for each of certified_nodes (as many as there are nodes):
 /// those nearest to a random node, some of those near it, and some of all, in turns. Displacements and error

@@ -21,9 +21,9 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Dofs = std::vector<std::int64_t>;
 
-constexpr Index spare_samples = 12;           // more than the largest rank: what they say of it is certain
-constexpr double skeleton_share = 0.5;        // of the cut: skeletons are not to add to the error
-constexpr Index samples = 256;                // random loads
+constexpr Index spare_samples = 12;     // more than the largest rank: what they say of it is certain
+constexpr double skeleton_share = 0.5;  // of the cut: skeletons are not to add to the error
+constexpr Index samples = random_loads;
 constexpr std::size_t columns_at_once = 200;  // of couplings, solved together
 constexpr Index leaves_estimated = 64;        // whose flops are counted for an estimate
 constexpr std::int64_t loads_at_once = 64;    // solved together

@@ -12,6 +12,9 @@
 
 namespace palpate {
 
+/// Loads that act on the whole body.
+inline constexpr Index random_loads = 256;
+
 /// The parts that a compression has.
 enum class CompressionStage : std::uint8_t { near, samples, far };
 
