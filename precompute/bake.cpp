@@ -4,16 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <random>
-#include <thread>
 
 #include "base/error.h"
 #include "base/interrupt.h"
+#include "base/parallel.h"
 #include "formats/model_file.h"
 #include "formats/outputs/output_paths.h"
 #include "meshes/quality.h"
@@ -221,38 +219,25 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, Model
     progress.expect(name, plan.seconds * kept.flops / plan.flops);
   }
   progress.begin(name);
-  std::atomic<std::int64_t> next{0};
-  std::atomic<bool> failed{false};
-  std::exception_ptr failure;
   double done_flops = 0.0;
-  std::mutex mutex;  // progress, its counter and failure
-
-  const auto work = [&] {
+  std::mutex mutex;  // progress and its counter
+  struct Scratch {
     GreensSolver::Workspace workspace;
     std::vector<double> packed;
-    try {
-      for (std::int64_t block = next++; block < blocks && !failed && !interrupt.requested(); block = next++) {
-        const std::int64_t first = block * plan.block_columns;
-        const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
-        if (writer.has_columns(first, count, matrix)) continue;
-        solver.columns(first, count, workspace, packed);
-        writer.write_columns(first, count, packed, matrix);
-        const double flops = solver.flops(first, count);
-        const std::scoped_lock lock(mutex);
-        done_flops += flops;
-        progress.reach(done_flops / kept.flops);
-      }
-    } catch (...) {
-      const std::scoped_lock lock(mutex);
-      if (!failed.exchange(true)) failure = std::current_exception();
-    }
   };
-  {
-    std::vector<std::jthread> threads;
-    for (int job = 1; job < jobs; ++job) threads.emplace_back(work);
-    work();
-  }
-  if (failure) std::rethrow_exception(failure);
+  std::vector<Scratch> scratch(static_cast<std::size_t>(jobs));
+  parallel_for(blocks, jobs, [&](std::int64_t block, int worker) {
+    const std::int64_t first = block * plan.block_columns;
+    const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
+    if (interrupt.requested() || writer.has_columns(first, count, matrix)) return;
+    auto& [workspace, packed] = scratch[static_cast<std::size_t>(worker)];
+    solver.columns(first, count, workspace, packed);
+    writer.write_columns(first, count, packed, matrix);
+    const double flops = solver.flops(first, count);
+    const std::scoped_lock lock(mutex);
+    done_flops += flops;
+    progress.reach(done_flops / kept.flops);
+  });
   return !interrupt.requested();
 }
 

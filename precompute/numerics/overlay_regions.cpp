@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <exception>
 #include <mutex>
-#include <thread>
+#include <optional>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "formats/packed.h"
 #include "meshes/selection.h"
 #include "overlay/condensation.h"
@@ -82,32 +82,19 @@ StoredOverlay condense_overlays(const Model& model, const OverlayRegions& overla
   StoredOverlay result{overlay.refinement, overlay.rings, centres,
                        std::vector<CondensedPatch>(centres.size())};
   const ElementsAtNodes at(model.mesh);
-  std::atomic<std::size_t> next{0};
   std::atomic<bool> stopped{false};
   std::size_t finished = 0;
-  std::exception_ptr failure;
-  std::mutex mutex;  // progress, its counter and failure
-
-  const auto work = [&] {
-    PatchMeshes meshes(model, at, overlay);
-    try {
-      for (std::size_t k = next++; k < centres.size() && !stopped; k = next++) {
-        result.patches[k] = condense(model, meshes.round(centres[k]));
-        const std::scoped_lock lock(mutex);
-        if (!done(static_cast<double>(++finished) / static_cast<double>(centres.size()))) stopped = true;
-      }
-    } catch (...) {
-      const std::scoped_lock lock(mutex);
-      if (!failure) failure = std::current_exception();
-      stopped = true;
-    }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (int job = 1; job < jobs; ++job) threads.emplace_back(work);
-    work();
-  }
-  if (failure) std::rethrow_exception(failure);
+  std::mutex mutex;  // progress and its counter
+  std::vector<std::optional<PatchMeshes>> meshes(static_cast<std::size_t>(jobs));
+  parallel_for(std::ssize(centres), jobs, [&](std::int64_t item, int worker) {
+    if (stopped) return;
+    const auto k = static_cast<std::size_t>(item);
+    std::optional<PatchMeshes>& own = meshes[static_cast<std::size_t>(worker)];
+    if (!own) own.emplace(model, at, overlay);
+    result.patches[k] = condense(model, own->round(centres[k]));
+    const std::scoped_lock lock(mutex);
+    if (!done(static_cast<double>(++finished) / static_cast<double>(centres.size()))) stopped = true;
+  });
   return result;
 }
 
