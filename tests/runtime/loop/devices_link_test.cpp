@@ -1,6 +1,7 @@
 // The loop's side of a device whose wire is made up.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -151,12 +152,19 @@ TEST_F(DeviceLinkTest, HandsReportsToTheLoopAndCommandsToTheDevice) {
 
   DeviceCommand command;
   command.wrench = {.force = {1, 2, 3}, .torque = {4, 5, 6}};
-  link->display(command, news.state, now());
-  wait_for([&] { return !wire_->trace().empty(); });
-  const Written first = wire_->trace().front();
-  EXPECT_EQ(first.command.wrench.force, Vec3(1, 2, 3));
-  EXPECT_EQ(first.command.wrench.torque, Vec3(4, 5, 6));
-  EXPECT_EQ(first.state.sequence, 8U);
+  // A command that the writing thread finds too late goes out as its field, extrapolated: on a busy machine
+  // one has to be shown more than once.
+  const auto as_it_was_shown = [&] {
+    const std::vector<Written> trace = wire_->trace();
+    return std::any_of(trace.begin(), trace.end(), [](const Written& each) {
+      return each.command.wrench.force == Vec3(1, 2, 3) && each.command.wrench.torque == Vec3(4, 5, 6) &&
+             each.state.sequence == 8;
+    });
+  };
+  wait_for([&] {
+    link->display(command, news.state, now());
+    return as_it_was_shown();
+  });
 }
 
 TEST_F(DeviceLinkTest, RefusesADeviceThatCannotBeOpened) {
