@@ -228,6 +228,8 @@ class Loop {
     note_largest(force.stableNorm(), time(), report_.largest_force, report_.largest_force_time);
     note_largest((force - force_before).stableNorm(), time(), report_.largest_jump,
                  report_.largest_jump_time);
+    note_largest(tool().greens_error, time(), report_.largest_greens_error,
+                 report_.largest_greens_error_time);
     report_.largest_shown = std::max(report_.largest_shown, shown_.wrench.force.stableNorm());
     for (std::size_t k = 0; k < status_names.size(); ++k) {
       if (has(state.status, status_names[k].first)) ++report_.status_ticks[k];
