@@ -15,10 +15,10 @@
 
 #include "base/error.h"
 #include "base/file_io.h"
+#include "base/program.h"
 #include "formats/hdf5_contents.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
-#include "formats/shrunk_file.h"
 #include "matrices/hierarchical_product.h"
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
