@@ -61,6 +61,7 @@ struct RecordingHead {
   bool has_stress = true;       ///< version 4.1 and later: stress and pressure, and where the surface is held
   bool has_checksums = true;    ///< version 4.2 and later
   bool has_force_error = true;  ///< version 4.3 and later, and how many contacts were left out
+  bool has_compressed_frames = true;  ///< version 4.4 and later
   SessionInfo info;
   std::string generator;
   RecordedSurface surface;
@@ -68,8 +69,10 @@ struct RecordingHead {
 
 /// Where a plain file has the rows of a dataset.
 struct StoredRows {
-  std::int64_t offset = 0;  ///< of the first byte
-  std::string checksum;     ///< empty where none is stored
+  std::int64_t offset = 0;                 ///< of the first byte
+  std::int64_t bytes = 0;                  ///< of all rows as they are stored
+  std::vector<std::int64_t> row_starts{};  ///< [rows + 1] in the file where they are compressed; else empty
+  std::string checksum{};                  ///< of those bytes; empty where none is stored
 };
 
 /// A plain file with rows.

@@ -284,8 +284,11 @@ Page recording_fields_page() {
   text += markdown_table({"root attribute", "value"}, attributes);
   text +=
       "## Ticks\n\nOne row per tick.\n\n" + markdown_table({"dataset", "type", "shape", "what"}, tick_rows());
-  text += "## Surface and frames\n\nFrames are taken at display rate (`--record-frames`).\n\n" +
-          markdown_table({"dataset", "type", "shape", "what"}, surface);
+  text +=
+      "## Surface and frames\n\nFrames are taken at display rate (`--record-frames`). Displacement, stress "
+      "and "
+      "pressure are [compressed](../recordings.md#compressed-frames) from 4.4 on.\n\n" +
+      markdown_table({"dataset", "type", "shape", "what"}, surface);
   return {"recording-fields", text};
 }
 

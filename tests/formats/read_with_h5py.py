@@ -136,7 +136,7 @@ def enclosed(nodes, surface):
 def check_recording(path):
     with h5py.File(path) as file:
         expect(file.attrs["format"] == b"palpate-recording" and file.attrs["model"] == b"tet4.palpate.hdf", "recording")
-        expect(list(file.attrs["version"]) == [4, 3], "version of a recording")
+        expect(list(file.attrs["version"]) == [4, 4], "version of a recording")
         expect(file.attrs["rate"] == 1000 and file.attrs["device"] == b"none" and file.attrs["options"] == b"", "attributes")
         ticks = file["/ticks"]
         widths = {"time": 1, "device_position": 3, "device_orientation": 4, "tool_position": 3, "tool_orientation": 4, "force": 3,
@@ -162,6 +162,11 @@ def check_recording(path):
         expect(np.array_equal(file["/surface/held"], [7, 0, 0]) and file["/surface/held"].dtype == np.uint8, "held")
         expect(frames["von_mises"].dtype == np.float32 and np.array_equal(frames["von_mises"][9], [np.nan, 1, 4500], equal_nan=True), "stress")
         expect(frames["pressure"].dtype == np.float32 and np.array_equal(frames["pressure"][9], [0, -4500, 2]), "pressure")
+        for name in ("displacement", "von_mises", "pressure"):
+            dataset = frames[name]
+            expect(dataset.chunks == (1, *dataset.shape[1:]) and dataset.shuffle and dataset.compression == "gzip", "compression")
+            chunks = [dataset.id.get_chunk_info(k) for k in range(len(dataset))]
+            expect(all(a.byte_offset + a.size == b.byte_offset for a, b in zip(chunks, chunks[1:])), "rows one after another")
         datasets = [dataset for group in ("/ticks", "/frames", "/surface") for dataset in file[group].values()]
         expect(all(re.fullmatch("[0-9a-f]{32}", dataset.attrs["xxh3"].decode()) for dataset in datasets), "checksums")
         print(f"{path.name}: 5000 ticks, 10 frames")

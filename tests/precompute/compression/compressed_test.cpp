@@ -7,7 +7,6 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <limits>
 #include <numeric>
 #include <random>
@@ -62,11 +61,6 @@ lowest = {axis = "z", percent = 1}
 
 std::string stored(const std::string& text, const std::string& how) {
   return text + "[storage]\nscope = \"layers\"\nlayers = 1\n" + how + "\n";
-}
-
-std::string read_bytes(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 std::string refusal(const std::function<void()>& run) {
@@ -285,14 +279,14 @@ TEST_F(AlteredFile, IsVerifiedUntilThen) {
 }
 
 TEST_F(AlteredFile, EveryDatasetIsWatched) {
-  const std::string whole = read_bytes(file_);
+  const std::string whole = bytes();
   int watched = 0;
   for (const std::string& dataset : test::checked_datasets(file_)) {
     if (!dataset.starts_with("/greens/")) continue;
     ++watched;
     const char flipped = 0x55;
     ASSERT_TRUE(test::set_bytes(file_, dataset, 0, &flipped, 1)) << dataset;
-    if (read_bytes(file_) == whole) continue;
+    if (bytes() == whole) continue;
     const std::string said = refusal([&] { load_model(file_); });
     EXPECT_NE(said.find(dataset), std::string::npos) << dataset << ": " << said;
     std::ofstream(file_, std::ios::binary) << whole;
@@ -302,7 +296,7 @@ TEST_F(AlteredFile, EveryDatasetIsWatched) {
 
 /// Resealed, so that the checksums are right.
 TEST_F(AlteredFile, WhatWasMadeUpIsRefused) {
-  const std::string whole = read_bytes(file_);
+  const std::string whole = bytes();
   const auto expect_refused = [&](const std::string& what, auto&& change) {
     change();
     test::reseal(file_);
@@ -341,15 +335,15 @@ TEST_F(AlteredFile, VerifyFindsCouplingsOfNothing) {
 }
 
 TEST_F(AlteredFile, BytesDependOnNoJobs) {
-  const std::string once = read_bytes(file_);
+  const std::string once = bytes();
   bake_body(stored(small, "compression = \"h2\""), 3);
-  EXPECT_TRUE(read_bytes(file_) == once);
+  EXPECT_TRUE(bytes() == once);
 }
 
 /// A run that was killed leaves near pairs; the next one takes them, and what it did not leave is solved.
 TEST_F(AlteredFile, AKilledRunGoesOn) {
   const Model model = load_model(file_);
-  const std::string once = read_bytes(file_);
+  const std::string once = bytes();
   std::filesystem::remove(file_);
   const HierarchicalMatrix& matrix = *model.compressed;
   const auto entries = [&](Index leaf) {
@@ -364,28 +358,14 @@ TEST_F(AlteredFile, AKilledRunGoesOn) {
     EXPECT_TRUE(killed.has_near(2));
   }
   bake_body(stored(small, "compression = \"h2\""));
-  EXPECT_TRUE(read_bytes(file_) == once);
+  EXPECT_TRUE(bytes() == once);
 }
 
-/// So slender that rounding to single spoils the forces of neighbouring nodes, whatever the cut.
+// Whatever the cut: rounding to single is too much for it.
 TEST_F(AlteredFile, IsNotWrittenWhereForcesAreOffByMoreThanTheTolerance) {
   std::filesystem::remove(file_);
-  const std::string said = refusal([&] {
-    bake_body(R"(name = "thread"
-[geometry]
-box = {size = [0.3, 0.003, 0.003], cells = [40, 1, 1]}
-[mesh]
-element = "hex8"
-[material]
-youngs_modulus = 1e6
-poissons_ratio = 0.3
-[[fixed]]
-lowest = {axis = "x", percent = 0.1}
-[storage]
-compression = "h2"
-tolerance = 1e-4
-)");
-  });
+  const std::string said = refusal(
+      [&] { bake_body(std::string(test::thread) + "[storage]\ncompression = \"h2\"\ntolerance = 1e-4\n"); });
   testing::internal::GetCapturedStderr();
   EXPECT_NE(said.find("forces of random touches are off by up to"), std::string::npos) << said;
   EXPECT_FALSE(std::filesystem::exists(file_));
