@@ -55,12 +55,11 @@ struct RowField {
 std::vector<RowField> row_fields(const RecordingHead& head) {
   const std::int64_t surface_nodes = std::ssize(head.surface.nodes);
   std::vector<RowField> fields;
-  for_each_tick_field(head.has_force_error,
-                      [&]<class Member>(const char* name, int components, Member TickRecord::*) {
-                        RowField field = {name, hdf5::element_type<Scalar<Member>>(), {}, false};
-                        if (components > 1) field.row = {components};
-                        fields.push_back(field);
-                      });
+  for_each_tick_field(head, [&]<class Member>(const char* name, int components, Member TickRecord::*) {
+    RowField field = {name, hdf5::element_type<Scalar<Member>>(), {}, false};
+    if (components > 1) field.row = {components};
+    fields.push_back(field);
+  });
   fields.push_back({"/frames/tick", hdf5::element_type<std::int64_t>(), {}, true});
   fields.push_back({"/frames/time", hdf5::element_type<double>(), {}, true});
   fields.push_back({"/frames/displacement",
@@ -355,6 +354,7 @@ RecordingHead read_head(const hdf5::Contents& file) {
   head.has_checksums = (*version)[1] >= 2;
   head.has_force_error = (*version)[1] >= 3;
   head.has_compressed_frames = (*version)[1] >= 4;
+  head.has_greens_error = (*version)[1] >= 4;
   head.info.model_path = file.text_attribute("/", "model").value_or("");
   head.info.content_hash = file.text_attribute("/", "content_hash").value_or("");
   head.info.device = file.text_attribute("/", "device").value_or("");
@@ -502,8 +502,8 @@ RecordingPart write_part(const std::filesystem::path& path, std::span<const Tick
   RecordingPart part = {path, std::ssize(ticks), std::ssize(frames)};
   write_whole(path, with_suffix(path, ".partial"), false, [&](hdf5::File& file) {
     part.fields.clear();
-    for_each_tick_field(head.has_force_error, [&]<class Member>(const char* name, int components,
-                                                                Member TickRecord::*member) {
+    for_each_tick_field(head, [&]<class Member>(const char* name, int components,
+                                                Member TickRecord::*member) {
       std::vector<Scalar<Member>> values(ticks.size() * static_cast<std::size_t>(components));
       for (std::size_t i = 0; i < ticks.size(); ++i)
         std::memcpy(&values[i * static_cast<std::size_t>(components)], &(ticks[i].*member), sizeof(Member));

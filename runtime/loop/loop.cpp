@@ -307,6 +307,7 @@ class Loop {
     record.motion_step = parts_.state.surface.motion.sample_step();
     record.force_error = static_cast<float>(std::min<double>(tool().force_error, largest_float));
     record.left_out = tool().left_out;
+    record.greens_error = static_cast<float>(std::min<double>(tool().greens_error, largest_float));
 
     set(record.handle_position, news_.state.pose.position);
     set(record.handle_orientation, news_.state.pose.orientation);

@@ -143,12 +143,13 @@ def check_recording(path):
                   "torque": 3, "contacts": 1, "stiffness": 6, "status": 1, "compute_ns": 1, "grab": 1, "patch": 1,
                   "handle_position": 3, "handle_orientation": 4, "handle_velocity": 3, "buttons": 1, "sequence": 1, "arrived_ns": 1,
                   "begun_ns": 1, "shown_force": 3, "shown_torque": 3, "share": 1, "phase": 1, "fault": 1, "event": 1, "motion_step": 1,
-                  "force_error": 1, "left_out": 1}
+                  "force_error": 1, "left_out": 1, "greens_error": 1}
         expect({name: ticks[name].shape for name in ticks} ==
                {name: (5000,) if width == 1 else (5000, width) for name, width in widths.items()}, "shapes")
         expect(np.array_equal(ticks["time"], 1e-3 * np.arange(5000)), "time")
         expect(np.array_equal(ticks["tool_position"][:, 1], 2.0 * np.arange(5000)), "tool_position")
         expect(ticks["force_error"].dtype == np.float32 and np.array_equal(ticks["force_error"], 0.5 * np.arange(5000)), "force_error")
+        expect(ticks["greens_error"].dtype == np.float32 and np.array_equal(ticks["greens_error"], 0.25 * np.arange(5000)), "greens_error")
         expect(ticks["left_out"].dtype == np.int32 and np.array_equal(ticks["left_out"], np.arange(5000) % 3), "left_out")
         expect(np.array_equal(ticks["contacts"], np.arange(5000) % 5), "contacts")
         expect(np.array_equal(ticks["stiffness"][4999], [1, 2, 3, 4, 5, 4999]), "stiffness")

@@ -57,7 +57,8 @@ TickRecord some_tick(std::size_t i) {
           .event = static_cast<std::uint8_t>(i % 16),
           .motion_step = n / 3,
           .force_error = static_cast<float>(0.125 * x),
-          .left_out = static_cast<std::int32_t>(i % 11)};
+          .left_out = static_cast<std::int32_t>(i % 11),
+          .greens_error = static_cast<float>(0.0625 * x)};
 }
 
 std::vector<TickRecord> some_ticks(std::size_t count, std::size_t first = 0) {
@@ -90,7 +91,7 @@ bool same(const TickRecord& a, const TickRecord& b) {
          a.arrived_ns == b.arrived_ns && a.begun_ns == b.begun_ns && equal(a.shown_force, b.shown_force) &&
          equal(a.shown_torque, b.shown_torque) && a.share == b.share && a.phase == b.phase &&
          a.fault == b.fault && a.event == b.event && a.motion_step == b.motion_step &&
-         a.force_error == b.force_error && a.left_out == b.left_out;
+         a.force_error == b.force_error && a.left_out == b.left_out && a.greens_error == b.greens_error;
 }
 
 const SessionInfo info = {.model_path = "liver.palpate.hdf",
@@ -112,6 +113,7 @@ void expect_ticks_without_error(const Recording& read, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     TickRecord expected = some_tick(i);
     expected.force_error = 0.0F;
+    expected.greens_error = 0.0F;
     expected.left_out = 0;
     ASSERT_TRUE(same(read.ticks[i], expected)) << i;
   }
@@ -568,6 +570,9 @@ const Impossible impossible[] = {
     {"ForceError",
      [](const std::filesystem::path& p) { set_entry<float>(p, "/ticks/force_error", 4, -1.0F); },
      "/ticks/force_error, row 4, holds -1"},
+    {"GreensError",
+     [](const std::filesystem::path& p) { set_entry<float>(p, "/ticks/greens_error", 2, -3.0F); },
+     "/ticks/greens_error, row 2, holds -3"},
     {"LeftOut", [](const std::filesystem::path& p) { set_entry<std::int32_t>(p, "/ticks/left_out", 5, -7); },
      "/ticks/left_out, row 5, holds -7"},
     {"Grab", [](const std::filesystem::path& p) { set_entry<std::uint8_t>(p, "/ticks/grab", 3, 2); },
@@ -662,7 +667,8 @@ TEST(Recording, OfVersion41IsReadWithoutChecksumsAndFinishedWithThem) {
 TEST(Recording, OfVersion42IsReadAndFinishedWithoutForceErrors) {
   const Folder folder;
   const auto make_42 = [&](const std::filesystem::path& file) {
-    for (const char* name : {"/ticks/force_error", "/ticks/left_out"}) remove_object(file, name);
+    for (const char* name : {"/ticks/force_error", "/ticks/left_out", "/ticks/greens_error"})
+      remove_object(file, name);
   };
   {
     RecordingWriter killed(folder / "a.h5", info, surface);
@@ -688,11 +694,20 @@ TEST(Recording, OfVersion43IsReadAndFinishedWithItsFramesAsTheyWere) {
     RecordingWriter killed(path, info, surface);
     append(killed, some_ticks(200), 10);  // 20 parts, 16 of them merged into one
   }
-  for_each_part(path, unpack_frames);
+  remove_object(path, "/ticks/greens_error");
+  for_each_part(path, [](const std::filesystem::path& part) {
+    unpack_frames(part);
+    remove_object(part, "/ticks/greens_error");
+  });
   set_integers(path, "version", {4, 3});
   for (int pass = 0; pass < 2; ++pass) {  // as it was left, then as one file
     const Recording read = read_recording(path);
-    expect_ticks(read, 200);
+    ASSERT_EQ(read.ticks.size(), 200U);
+    for (std::size_t i = 0; i < 200; ++i) {
+      TickRecord expected = some_tick(i);
+      expected.greens_error = 0.0F;
+      ASSERT_TRUE(same(read.ticks[i], expected)) << i;
+    }
     expect_frames(path, read, 20);
     const auto contents = hdf5::Contents::read(path);
     EXPECT_EQ(contents.integer_attribute("/", "version", 2), (std::vector<std::int64_t>{4, 3}));
