@@ -53,7 +53,7 @@ class ErrorBound {
     }
   };
 
-  /// Of an entry of a pair.
+  /// What the square of an entry of a pair, so weighed, is in the mean.
   [[nodiscard]] double mean_square(Index pair) const noexcept;
   void weigh(std::span<const Index> nodes, std::span<const double> f, Load& load) noexcept;
   [[nodiscard]] double squared_of_leaf(Index leaf, std::span<const Index> places,

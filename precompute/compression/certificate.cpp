@@ -41,7 +41,7 @@ std::vector<Index> touched_nodes(std::int64_t k, std::span<const Vec3> points,
   return nodes;
 }
 
-/// Of a touch's total force; 0 where the bound is 0.
+/// Share of its bound that the error of a touch's total force is; 0 where the bound is 0.
 double bound_share(const HierarchicalMatrix& matrix, std::span<const Index> nodes, const Rows& exact,
                    const Rows& C, const Eigen::MatrixXd& u) {
   const int d = matrix.dimension;

@@ -130,12 +130,12 @@ std::string case_name(const testing::TestParamInfo<test::HierarchicalKind>& info
          std::to_string(info.param.levels) + "_levels";
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Kinds, ErrorBoundTest,
-    testing::Values(test::HierarchicalKind{.dimension = 3, .nodes = 7, .levels = 0},
-                    test::HierarchicalKind{.dimension = 2, .nodes = 43, .levels = 3},
-                    test::HierarchicalKind{.dimension = 3, .nodes = 101, .levels = 5, .scale = 3.0}),
-    case_name);
+INSTANTIATE_TEST_SUITE_P(Kinds, ErrorBoundTest,
+                         testing::Values(test::HierarchicalKind{.dimension = 3, .nodes = 7, .levels = 0},
+                                         test::HierarchicalKind{.dimension = 2, .nodes = 43, .levels = 3},
+                                         test::HierarchicalKind{
+                                             .dimension = 3, .nodes = 101, .levels = 5, .scale = 3.0}),
+                         case_name);
 
 }  // namespace
 }  // namespace palpate::error_bound_test
