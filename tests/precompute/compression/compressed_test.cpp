@@ -214,7 +214,8 @@ Slide slide(Model model, double radius = 0.02) {
   ToolPose tool;
   Slide result;
   for (int tick = 0; tick <= 600; ++tick) {
-    tool.position = Vec3(0.06 + 5e-5 * std::max(0, tick - 300), 0.075, 0.0601 + radius - 2e-5 * std::min(tick, 300));
+    tool.position =
+        Vec3(0.06 + 5e-5 * std::max(0, tick - 300), 0.075, 0.0601 + radius - 2e-5 * std::min(tick, 300));
     step(body, state, tool);
     result.force.push_back(state.tools[0].wrench.force);
     result.contact_force.push_back(state.tools[0].contact_wrench.force);
