@@ -393,12 +393,12 @@ bool Compression::Impl::climb(double cut) {
     });
     const std::vector<Index> groups = groups_of(first, clusters);
     parallel_for(std::ssize(groups) - 1, jobs_, [&](std::int64_t group, int worker) {
-      if (!stopped()) couple(groups[at(group)], groups[at(group + 1)], workspaces_[at(worker)]);
+      if (stopped()) return;
+      couple(groups[at(group)], groups[at(group + 1)], workspaces_[at(worker)]);
+      for (Index c = groups[at(group)]; c < groups[at(group + 1)]; ++c)
+        if (needed[at(c)] && !stopped()) tick(CompressionStage::far, count);
     });
-    for_each([&](Index c, int) {
-      take_off(c);
-      tick(CompressionStage::far, count);
-    });
+    for_each([&](Index c, int) { take_off(c); });
     if (stopped_) return false;
     if (level == tree.levels) continue;
     const Index below = tree.first_of_level(level + 1);
