@@ -346,6 +346,8 @@ class Page implements Listener {
     const has_depth = this.mode_ === 'live' || this.history_.count === 0 || Number.isFinite(this.history_.value('depth', 0));
     part('depth-plot').hidden = part('depth-number').hidden = !has_depth; // a recording does not have it
     show_felt(this.felt());
+    const bound = this.body_.frame?.greens_error ?? 0;
+    write(part('greens-error'), bound > 0 ? `± ${format_si(bound, 'N', 2)}` : '');
     const text = this.best_effort();
     write(part('best-effort'), text);
     part('best-effort').hidden = text === '';
