@@ -16,7 +16,7 @@ std::size_t at(std::int64_t i) noexcept {
 }  // namespace
 
 ErrorBound::ErrorBound(const HierarchicalMatrix& matrix, std::size_t most_nodes)
-    : matrix_(&matrix), places_(most_nodes) {
+    : matrix_(&matrix), places_(most_nodes), sorted_nodes_(most_nodes) {
   for (Load* load : {&carried_, &tried_}) load->clusters.resize(most_nodes * at(matrix.tree.levels + 1));
 }
 
@@ -53,9 +53,14 @@ double ErrorBound::mean_square(Index pair) const noexcept {
 /// The leaves that carry force, and the clusters above them.
 void ErrorBound::weigh(std::span<const Index> nodes, std::span<const double> f, Load& load) noexcept {
   const ClusterTree& tree = matrix_->tree;
-  const auto places = std::span(places_).first(std::min(nodes.size(), places_.size()));
-  std::iota(places.begin(), places.end(), 0);
-  std::sort(places.begin(), places.end(), [&](Index a, Index b) { return nodes[at(a)] < nodes[at(b)]; });
+  nodes = nodes.first(std::min(nodes.size(), places_.size()));
+  const std::span<Index> places = std::span(places_).first(nodes.size());
+  if (!std::ranges::equal(nodes, std::span(sorted_nodes_).first(sorted_))) {
+    std::iota(places.begin(), places.end(), 0);
+    std::sort(places.begin(), places.end(), [&](Index a, Index b) { return nodes[at(a)] < nodes[at(b)]; });
+    std::copy(nodes.begin(), nodes.end(), sorted_nodes_.begin());
+    sorted_ = nodes.size();
+  }
   std::size_t next = 0;
   for (std::size_t k = 0; k < places.size();) {
     const Index leaf = tree.leaf_of(nodes[at(places[k])]);
@@ -89,15 +94,19 @@ double ErrorBound::squared_of_leaf(Index leaf, std::span<const Index> places, st
   const float* near =
       matrix_->near.get() + matrix_->near_at[at(matrix_->first_near_pair(leaf - tree.first_leaf()))];
   double sum = 0.0;
-  for (const Index i : places) {
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const Index i = places[k];
     for (int a = 0; a < d; ++a) {
       const float* row = near + (std::int64_t{d} * (nodes[at(i)] - tree.begin(leaf)) + a) * width;
-      double u = 0.0;
-      for (const Index j : places) {
+      const auto u_by = [&](Index j) {
         const float* entry = row + std::int64_t{d} * (nodes[at(j)] - tree.begin(leaf));
+        double u = 0.0;
         for (int b = 0; b < d; ++b) u += double{entry[b]} * f[at(std::int64_t{d} * j + b)];
-      }
-      sum += f[at(std::int64_t{d} * i + a)] * u;
+        return u;
+      };
+      double u = 0.0;  // the block is symmetric: what comes after i counts twice
+      for (const Index j : places.subspan(k + 1)) u += u_by(j);
+      sum += f[at(std::int64_t{d} * i + a)] * (u_by(i) + 2.0 * u);
     }
   }
   return std::max(matrix_->scale * sum, 0.0);

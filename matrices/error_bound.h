@@ -61,7 +61,9 @@ class ErrorBound {
                                        std::span<const double> f) const noexcept;
 
   const HierarchicalMatrix* matrix_;
-  std::vector<Index> places_;  // [most nodes] of a load's nodes, by leaves
+  std::vector<Index> places_;        // [most nodes] of the nodes of the load that was weighed last, by leaves
+  std::vector<Index> sorted_nodes_;  // [most nodes] its nodes: those of f and y are mostly the same
+  std::size_t sorted_ = 0;
   Load carried_, tried_;
 };
 
