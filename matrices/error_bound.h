@@ -20,7 +20,7 @@ namespace palpate {
 ///   s^2 = sum over far pairs of e_ab^2 / (n_a n_b) (|y_a|^2 |f_b|^2 + |y_b|^2 |f_a|^2)
 ///
 /// is the square of what is to be expected, and the bound is 24 s. It is no proof. Largest of many thousand
-/// measured errors were 16 s (docs/measurements/size.md), and precompute makes pair_error so large that what
+/// measured errors were 21 s (docs/measurements/size.md), and precompute makes pair_error so large that what
 /// it measures stays below half of the bound.
 ///
 /// Nothing is allocated once it is made.
