@@ -22,23 +22,31 @@ ErrorBound::ErrorBound(const HierarchicalMatrix& matrix, std::size_t most_nodes)
 
 void ErrorBound::carry(std::span<const Index> nodes, std::span<const double> f) noexcept {
   weigh(nodes, f, carried_);
+  stays_near_ = mean_square(carried_, carried_) == 0.0;
 }
 
 double ErrorBound::work(std::span<const Index> nodes, std::span<const double> y) noexcept {
+  const bool on_the_same = std::ranges::equal(nodes, std::span(sorted_nodes_).first(sorted_));
+  if (on_the_same && stays_near_) return 0.0;
+  stays_near_ = stays_near_ && on_the_same;  // from now on others are sorted
   weigh(nodes, y, tried_);
+  return deviations * std::sqrt(mean_square(tried_, carried_));
+}
+
+double ErrorBound::mean_square(const Load& y, const Load& f) const noexcept {
   double sum = 0.0;
   for (int level = 1; level <= matrix_->tree.levels; ++level) {
-    for (const auto& [cluster, squared] : tried_.level(level)) {
+    for (const auto& [cluster, squared] : y.level(level)) {
       auto partner = matrix_->partner.begin() + matrix_->partner_from[at(cluster)];
       const auto end = matrix_->partner.begin() + matrix_->partner_from[at(cluster) + 1];
-      for (const Loaded& other : carried_.level(level)) {
+      for (const Loaded& other : f.level(level)) {
         while (partner != end && (*partner)[0] < other.cluster) ++partner;
         if (partner == end) break;
         if ((*partner)[0] == other.cluster) sum += mean_square((*partner)[1]) * squared * other.squared;
       }
     }
   }
-  return deviations * std::sqrt(sum);
+  return sum;
 }
 
 double ErrorBound::mean_square(Index pair) const noexcept {

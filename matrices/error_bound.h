@@ -55,6 +55,8 @@ class ErrorBound {
 
   /// What the square of an entry of a pair, so weighed, is in the mean.
   [[nodiscard]] double mean_square(Index pair) const noexcept;
+  /// s^2 of two loads.
+  [[nodiscard]] double mean_square(const Load& y, const Load& f) const noexcept;
   void weigh(std::span<const Index> nodes, std::span<const double> f, Load& load) noexcept;
   [[nodiscard]] double squared_of_leaf(Index leaf, std::span<const Index> places,
                                        std::span<const Index> nodes,
@@ -64,6 +66,7 @@ class ErrorBound {
   std::vector<Index> places_;        // [most nodes] of the nodes of the load that was weighed last, by leaves
   std::vector<Index> sorted_nodes_;  // [most nodes] its nodes: those of f and y are mostly the same
   std::size_t sorted_ = 0;
+  bool stays_near_ = false;  // no nodes of f are far from each other, and they were sorted last
   Load carried_, tried_;
 };
 

@@ -106,6 +106,21 @@ TEST_P(ErrorBoundTest, OfANodeThatIsThereTwiceIsThatOfTheSum) {
   expect_bound(bound, random_load(7), twice);
 }
 
+// Nodes of one leaf are near each other, others may be far from it.
+TEST_P(ErrorBoundTest, OfOtherNodesThanThoseThatCarryForce) {
+  ErrorBound bound(matrix_, 20);
+  const Index leaf = matrix_.tree.first_leaf();
+  Load f = random_load(4);
+  for (Index& node : f.nodes)
+    node = matrix_.tree.begin(leaf) + node % (matrix_.tree.end(leaf) - matrix_.tree.begin(leaf));
+  const Load y = random_load(20);
+  bound.carry(f.nodes, f.f);
+  EXPECT_EQ(bound.work(f.nodes, f.f), 0.0);
+  for (int k = 0; k < 2; ++k)
+    EXPECT_NEAR(bound.work(y.nodes, y.f), expected(f, y), 1e-5 * expected(f, y)) << "call " << k;
+  EXPECT_EQ(bound.work(f.nodes, f.f), 0.0);
+}
+
 TEST_P(ErrorBoundTest, ACopyIsIndependent) {
   ErrorBound bound(matrix_, 20);
   const Load f = random_load(20), y = random_load(20), other = random_load(3);
