@@ -40,7 +40,7 @@ export class ReplayBar {
   show(times: number[], frame: number, may_seek: boolean): void {
     this.times_ = times;
     this.may_seek_ = may_seek;
-    for (const id of ['replay-play', 'replay-back', 'replay-forward']) button(id).disabled = !may_seek;
+    for (const id of ['replay-play', 'replay-back', 'replay-forward', 'save-video']) button(id).disabled = !may_seek;
     input('scrub').disabled = !may_seek;
     if (!may_seek) this.last_beat_ = null;
     part('replay').hidden = times.length === 0;
@@ -72,13 +72,29 @@ export class ReplayBar {
     requestAnimationFrame((now) => this.beat(now));
   }
 
+  /** From the beginning to the end; then, or where it is stopped, `ended` is called. */
+  play_once(ended: () => void): void {
+    if (!this.can_move) return;
+    this.stop();
+    this.go(0);
+    this.ended_ = ended;
+    this.toggle();
+  }
+  halt(): void {
+    this.stop();
+  }
+  private ended_: (() => void) | null = null;
+
   private frame(): number {
     return frame_at(this.times_, this.time_ + 1e-9);
   }
 
   private stop(): void {
+    if (this.last_beat_ !== null) this.time_ = this.times_[this.frame()] ?? 0; // of what is shown
     this.last_beat_ = null;
     this.write();
+    this.ended_?.();
+    this.ended_ = null;
   }
 
   private go(frame: number): void {
