@@ -7,6 +7,7 @@ import {
   LineBasicMaterial,
   LineSegments,
   Mesh,
+  type Plane,
   Points,
   PointsMaterial,
   type Vector4,
@@ -69,7 +70,8 @@ export class Body {
     new PointsMaterial({ color: 0x8fa3bd, size: 3, sizeAttenuation: false }),
   );
 
-  constructor(light: Light, cut: { value: Vector4 }) {
+  constructor(light: Light, cut: { value: Vector4 }, planes: Plane[]) {
+    for (const part of [this.edges_, this.outline_, this.held_]) part.material.clippingPlanes = planes;
     this.material_ = new BodyMaterial(light, cut);
     this.mesh_ = new Mesh(new BufferGeometry(), this.material_);
     this.interior_ = new Interior(light, cut);
@@ -93,14 +95,16 @@ export class Body {
     this.outline_.visible = on;
   }
   show_held(on: boolean): void {
-    this.held_.visible = on;
+    this.shows_held_ = on;
     this.material_.set({ shows_held: on ? 1 : 0 });
   }
+  private shows_held_ = true;
   /** The surface as a veil, through which other materials are seen. */
   show_through(on: boolean): void {
     const flat = this.scene_?.dimension === 2;
     this.material_.set_see_through(on && !flat, flat || this.is_cut);
     this.interior_.mesh.visible = on && !flat;
+    this.held_.visible = this.shows_held_ && !on;
     if (on) this.mesh_.layers.disable(shape_layer);
     else this.mesh_.layers.enable(shape_layer);
   }

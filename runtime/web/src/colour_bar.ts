@@ -2,7 +2,7 @@
 import type { Colouring } from './body';
 import { field_traits, map_colour, material_colours, share_of, type Field } from './colours';
 import { part, write } from './dom';
-import { nice_ticks, short_number, si_prefix } from './format';
+import { format_si, nice_ticks, short_number, si_prefix } from './format';
 
 /** What a bar shows; null: nothing is coloured. */
 export interface Scale {
@@ -34,6 +34,9 @@ export function make_scale(field: Field, low: number, high: number, largest: num
   };
 }
 
+/** Materials have no names: they are told by number and stiffness. */
+export const material_name = (modulus: number, number: number): string => `${number + 1}: E = ${format_si(modulus, 'Pa', 2)}`;
+
 export class ColourBar {
   scale: Scale | null = null;
   /** Names of the materials, where the body is coloured by them. */
@@ -41,9 +44,9 @@ export class ColourBar {
   private shown_ = '';
 
   /** `largest` absolute value in the picture, which may be beyond `high`. */
-  show(field: Field, low: number, high: number, largest: number, colouring: Colouring, materials: string[]): void {
+  show(field: Field, low: number, high: number, largest: number, colouring: Colouring, moduli: number[]): void {
     this.scale = make_scale(field, low, high, largest, colouring);
-    this.show_materials(field === 'material' ? materials : []);
+    this.show_materials(field === 'material' ? moduli.map(material_name) : []);
     part('colour-bar').hidden = this.scale === null;
     if (!this.scale) return;
     write(part('colour-largest'), this.scale.largest);

@@ -311,7 +311,10 @@ class Page implements Listener {
       'Shift+ArrowDown': () => eye.turn(0, -0.1),
       ...fields,
     });
-    this.picture_.view.canvas.addEventListener('keydown', (event) => {
+    const { canvas } = this.picture_.view;
+    canvas.addEventListener('pointerdown', () => canvas.classList.add('by-pointer'), { capture: true }); // its focus needs no ring
+    window.addEventListener('keydown', () => canvas.classList.remove('by-pointer'));
+    canvas.addEventListener('keydown', (event) => {
       if (event.key !== 'Enter') return;
       event.preventDefault();
       this.hand_.key_press();
@@ -362,6 +365,7 @@ class Page implements Listener {
     if (!kept) return;
     this.drawing_.kept = kept.look;
     if (kept.place) this.picture_.view.eye.place = kept.place;
+    this.picture_.face_section();
   }
 
   private get kept(): Kept {

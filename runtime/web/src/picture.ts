@@ -31,7 +31,7 @@ export function looks_same(a: Frame, b: Frame, size: number): boolean {
 export class Picture {
   private readonly section_ = new Section();
   readonly view = new View(part('stage'), this.section_);
-  readonly body = new Body(this.view.light, this.section_.cut);
+  readonly body = new Body(this.view.light, this.section_.cut, this.section_.planes);
   readonly marks: Marks;
   readonly bar = new ColourBar();
   /** Whether the tool is drawn: a pointer's is not until it has been at the body. */
@@ -111,12 +111,20 @@ export class Picture {
     const axis: SectionAxis = body.scene?.dimension === 2 ? 'off' : drawn.section;
     body.is_cut = axis !== 'off';
     body.show_through(drawn.through);
+    const was = this.section_.axis;
     this.section_.set(axis, drawn.section_at, drawn.section_flip);
+    if (axis !== was) this.face_section();
     view.show_grid(drawn.grid, 0x7a8798);
     view.eye.set_upright(drawn.up);
     view.eye.set_parallel(drawn.parallel);
     body.update();
     view.draw();
+  }
+
+  /** Cuts off the half that is towards the camera. */
+  face_section(): void {
+    this.section_.face(this.view.eye.place.towards);
+    this.view.draw();
   }
 
   set_ink(ink: string, is_light: boolean): void {

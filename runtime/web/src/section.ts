@@ -11,6 +11,7 @@ import {
   IncrementWrapStencilOp,
   Mesh,
   NotEqualStencilFunc,
+  Plane,
   PlaneGeometry,
   ShaderMaterial,
   Vector3,
@@ -76,6 +77,9 @@ export class Section {
   readonly group = new Group();
   /** Not drawn is what lies on the outer side of it: normal x y z, distance. */
   readonly cut = { value: nowhere.clone() };
+  /** The same, for materials that are three.js's own: empty while nothing is cut. */
+  readonly planes: Plane[] = [];
+  private faces_ = 1; // along the axis: the side that who looks is on
   private axis_: SectionAxis = 'off';
   private share_ = 0.5;
   private is_flipped_ = false;
@@ -86,6 +90,9 @@ export class Section {
   private readonly count_back_ = counting(BackSide, this.cut);
   private readonly count_front_ = counting(FrontSide, this.cut);
 
+  get axis(): SectionAxis {
+    return this.axis_;
+  }
   get is_on(): boolean {
     return this.axis_ !== 'off';
   }
@@ -100,6 +107,13 @@ export class Section {
     this.axis_ = axis;
     this.share_ = share;
     this.is_flipped_ = is_flipped;
+    this.place();
+  }
+
+  /** The half towards the camera is what is cut off, as seen from `towards`. */
+  face(towards: Vec3): void {
+    const axis = 'xyz'.indexOf(this.axis_);
+    this.faces_ = axis >= 0 && towards[axis]! < 0 ? -1 : 1;
     this.place();
   }
 
@@ -142,14 +156,16 @@ export class Section {
     this.group.visible = this.is_on;
     if (!this.is_on) {
       this.cut.value.copy(nowhere);
+      this.planes.length = 0;
       return;
     }
     const axis = 'xyz'.indexOf(this.axis_);
     const room = 0.002 * (this.high_[axis]! - this.low_[axis]!);
     const at = this.low_[axis]! - room + this.share_ * (this.high_[axis]! - this.low_[axis]! + 2 * room);
-    const sign = this.is_flipped_ ? -1 : 1;
+    const sign = this.is_flipped_ ? -this.faces_ : this.faces_;
     const normal = new Vector3().setComponent(axis, sign);
     this.cut.value.set(normal.x, normal.y, normal.z, sign * at);
+    this.planes[0] = new Plane(normal.clone().negate(), sign * at);
     const centre = new Vector3(...this.low_).add(new Vector3(...this.high_)).multiplyScalar(0.5);
     centre.setComponent(axis, at);
     const size = 2 * new Vector3(...this.high_).distanceTo(new Vector3(...this.low_)) + 1e-9;

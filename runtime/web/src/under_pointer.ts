@@ -1,5 +1,6 @@
 // The number of the surface under the pointer, beside it.
 import type { Body } from './body';
+import { material_name } from './colour_bar';
 import { field_traits } from './colours';
 import { part, write } from './dom';
 import { format_si } from './format';
@@ -46,7 +47,7 @@ export class UnderPointer {
     const hit = pick_surface(this.body_.surface, origin, direction);
     if (!hit) return '';
     const found = this.body_.value_at(hit);
-    if (field === 'material') return this.model?.materials?.[found.material] ?? '';
+    if (field === 'material') return material_name(this.model?.materials?.[found.material] ?? NaN, found.material);
     return found.is_known ? format_si(found.value, field_traits[field].unit) : 'not known: held';
   }
 }

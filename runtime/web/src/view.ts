@@ -50,6 +50,7 @@ export class View {
   ) {
     this.renderer_.setClearAlpha(0);
     this.renderer_.autoClear = false;
+    this.renderer_.localClippingEnabled = true;
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute('role', 'application');
     this.canvas.setAttribute('aria-label', 'The body. Arrow keys move the tool, Enter presses and lifts it, Shift and arrows turn the view; ? lists all keys');

@@ -28,7 +28,7 @@ export interface Model {
   loads: boolean;
   overlay_rings?: number; // the most that an overlay may have; 0: none may be
   overlay_refinement?: [number, number]; // least and most
-  materials?: string[]; // in the order of their numbers; absent: not known
+  materials?: number[]; // Young's moduli [Pa] in the order of their numbers; absent: not known
 }
 
 /** How the run is. What a message leaves out is as it was. */
