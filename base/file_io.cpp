@@ -7,13 +7,17 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
+#include <cstdint>
 #include <system_error>
 #include <thread>
 #include <utility>
 
 #include "base/error.h"
+#include "base/printable.h"
 #include "base/regular_file.h"
 
 namespace palpate {
@@ -42,6 +46,36 @@ const char* hint_for(int error) {
 
 [[noreturn]] void fail(const std::string& doing, const std::filesystem::path& path, int error) {
   throw Error("cannot " + doing + ": " + reason(error), path.string(), hint_for(error));
+}
+
+/// What is mapped where, as a signal handler can read it: without locks, in memory that is always there.
+struct NamedMapping {
+  std::atomic<bool> taken = false;
+  std::atomic<std::uintptr_t> begin = 0, end = 0;  // nothing while end is 0
+  std::array<char, 512> name = {};
+
+  [[nodiscard]] bool holds(const void* address) const noexcept {
+    const auto at = reinterpret_cast<std::uintptr_t>(address);
+    return at < end.load(std::memory_order_acquire) && at >= begin.load(std::memory_order_relaxed);
+  }
+  void forget() noexcept {
+    end = 0;
+    taken = false;
+  }
+};
+std::array<NamedMapping, 32> named_mappings;
+
+/// Null where there are too many.
+NamedMapping* name_mapping(const void* base, std::size_t length, const std::filesystem::path& file) {
+  for (NamedMapping& mapping : named_mappings) {
+    if (mapping.taken.exchange(true)) continue;
+    const std::string name = printable(file.string());
+    mapping.name[name.copy(mapping.name.data(), mapping.name.size() - 1)] = '\0';
+    mapping.begin = reinterpret_cast<std::uintptr_t>(base);
+    mapping.end.store(mapping.begin + length, std::memory_order_release);
+    return &mapping;
+  }
+  return nullptr;
 }
 
 /// Something that no run of ours can have left has the name of a file that we write on the way.
@@ -157,8 +191,18 @@ std::shared_ptr<const void> map_file(const FileDescriptor& file, std::int64_t of
   void* base = ::mmap(nullptr, length, PROT_READ, MAP_PRIVATE, file.get(), offset - lead);
   if (base == MAP_FAILED) fail("map " + std::to_string(bytes) + " bytes", file.path(), errno);
   ::madvise(base, length, MADV_WILLNEED);
-  const std::shared_ptr<const void> owner(base, [length](void* p) { ::munmap(p, length); });
+  NamedMapping* const named = name_mapping(base, length, file.path());
+  const std::shared_ptr<const void> owner(base, [length, named](void* p) {
+    if (named != nullptr) named->forget();
+    ::munmap(p, length);
+  });
   return {owner, static_cast<const char*>(base) + lead};
+}
+
+const char* mapped_file_at(const void* address) noexcept {
+  for (const NamedMapping& mapping : named_mappings)
+    if (mapping.holds(address)) return mapping.name.data();
+  return nullptr;
 }
 
 void check_free_space(const std::filesystem::path& path, std::int64_t needed) {

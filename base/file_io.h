@@ -67,6 +67,10 @@ void append_text(const FileDescriptor& file, std::string_view text);
 /// inside the file.
 std::shared_ptr<const void> map_file(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes);
 
+/// Name of the file that `map_file` has mapped at an address, fit for a terminal; null where there is none,
+/// or it was one of very many. Signal handlers may ask.
+const char* mapped_file_at(const void* address) noexcept;
+
 /// Throws Error (needed, free) unless `needed` bytes fit beside `path`; what a file at `path` occupies counts
 /// as free.
 void check_free_space(const std::filesystem::path& path, std::int64_t needed);

@@ -18,4 +18,9 @@ namespace palpate {
 /// Tells what is wrong with the command line and what to do; returns exit_usage.
 [[nodiscard]] int tell_usage(const std::string& what, const std::string& hint);
 
+/// From now on SIGBUS, which is what reading a mapped file gives that was cut off meanwhile or whose disk
+/// failed, ends the program with an error line that names the file, and exit_input_error, in place of a
+/// crash. A device's guardian then takes its force to zero. For programs, not for libraries.
+void end_with_an_error_on_shrunk_files();
+
 }  // namespace palpate

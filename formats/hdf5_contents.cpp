@@ -11,6 +11,7 @@
 
 #include "base/child_process.h"
 #include "base/error.h"
+#include "formats/compressed_row.h"
 
 namespace palpate::hdf5 {
 namespace {
@@ -22,6 +23,8 @@ constexpr std::size_t longest_text = 4096;
 constexpr hssize_t most_integers = 16;       // of an attribute
 constexpr std::size_t most_dims = 4;         // that are reported
 constexpr std::size_t most_things = 10'000;  // groups, datasets, attributes and sources of a file
+constexpr hsize_t most_rows = 10'000'000;    // that are compressed
+constexpr hsize_t most_row_bytes = hsize_t{4} << 30;
 constexpr int deepest = 8;
 constexpr std::chrono::seconds longest_look{5};  // of the processor: whole files take milliseconds
 constexpr std::int64_t most_memory = std::int64_t{512} << 20;
@@ -164,7 +167,53 @@ class Walk {
     described.offset = offset == HADDR_UNDEF ? std::numeric_limits<std::uint64_t>::max() : offset;
     described.is_in_one_piece = layout == H5D_CONTIGUOUS && H5Pget_external_count(creation.get()) == 0;
     if (layout == H5D_VIRTUAL) described.sources = sources_of(creation);
+    if (layout == H5D_CHUNKED) describe_rows(dataset, space, creation, described);
     described.is_readable = true;
+  }
+
+  /// Whether each row is a chunk, shuffled and deflated.
+  static bool has_compressed_rows(const Id& creation, const std::vector<std::uint64_t>& dims) {
+    std::array<hsize_t, H5S_MAX_RANK> chunk = {};
+    const int rank = H5Pget_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data());
+    if (rank != std::ssize(dims) || rank < 1 || chunk[0] != 1) return false;
+    if (!std::equal(dims.begin() + 1, dims.end(), chunk.begin() + 1)) return false;
+    const auto filter = [&](unsigned k) {
+      unsigned flags = 0, values = 0;
+      std::size_t count = 0;
+      return H5Pget_filter2(creation.get(), k, &flags, &count, &values, 0, nullptr, nullptr);
+    };
+    return H5Pget_nfilters(creation.get()) == 2 && filter(0) == H5Z_FILTER_SHUFFLE &&
+           filter(1) == H5Z_FILTER_DEFLATE;
+  }
+
+  /// Rows that lie one after another. To ask for the place of each would take the library through all before
+  /// it; that of the last one and all sizes tell as much.
+  static void describe_rows(const Id& dataset, const Id& space, const Id& creation,
+                            Contents::Object& described) {
+    const std::vector<std::uint64_t>& dims = described.dims;
+    if (described.rank != std::ssize(dims) || dims.empty() || dims[0] < 1 || dims[0] > most_rows) return;
+    if (!has_compressed_rows(creation, dims)) return;
+    std::array<hsize_t, most_dims> start = {};
+    std::vector<std::uint64_t> sizes;
+    hsize_t size = 0, sum = 0;
+    for (hsize_t row = 0; row < dims[0]; ++row) {
+      start[0] = row;
+      if (H5Dget_chunk_storage_size(dataset.get(), start.data(), &size) < 0 || size == 0) return;
+      if (size > most_row_bytes) return;
+      sizes.push_back(size);
+      sum += size;
+    }
+    const auto place_of = [&](hsize_t row) {
+      unsigned skipped = 0;
+      haddr_t at = HADDR_UNDEF;
+      hsize_t bytes = 0;
+      H5Dget_chunk_info(dataset.get(), space.get(), row, start.data(), &skipped, &at, &bytes);
+      return at;
+    };
+    const haddr_t first = place_of(0), last = place_of(dims[0] - 1);
+    if (first == HADDR_UNDEF || last != first + sum - size) return;
+    described.offset = first;
+    described.row_bytes = std::move(sizes);
   }
 
   std::vector<std::string> sources_of(const Id& creation) {
@@ -215,6 +264,7 @@ void pack(Bytes& bytes, const Contents::Object& object) {
   pack(bytes, static_cast<std::uint64_t>(object.rank));
   append_array(bytes, std::span(object.dims));
   pack(bytes, object.offset);
+  append_array(bytes, std::span(object.row_bytes));
   pack(bytes, object.sources.size());
   for (const std::string& source : object.sources) pack(bytes, source);
 }
@@ -264,6 +314,7 @@ class Unpacker {
     object.rank = static_cast<std::int64_t>(number());
     object.dims = take_array<std::uint64_t>(rest_);
     object.offset = number();
+    object.row_bytes = take_array<std::uint64_t>(rest_);
     for (std::uint64_t left = number(); left > 0; --left) object.sources.push_back(text());
     return object;
   }
@@ -327,13 +378,13 @@ const Contents::Object& Contents::dataset(const std::string& path) const {
   return found->second;
 }
 
-Stored Contents::locate(const std::string& path, const ElementType& type, std::size_t rank) const {
+/// Its dimensions, and the bytes of all its numbers.
+Stored Contents::shape(const std::string& path, const ElementType& type, std::size_t rank) const {
   const auto refuse = [&](const std::string& what) {
     throw Error(path + " " + what, this->path().string(), altered_hint);
   };
   const Object& found = dataset(path);
   if (found.type != type.name) refuse("holds " + found.type + ", " + type.name + " is expected");
-  if (!found.is_in_one_piece) refuse("is not stored in one piece");
   if (found.rank != static_cast<std::int64_t>(rank))
     refuse("has " + std::to_string(found.rank) + " dimensions, " + std::to_string(rank) + " are expected");
   if (found.dims.size() != rank) refuse("has no shape");
@@ -346,25 +397,73 @@ Stored Contents::locate(const std::string& path, const ElementType& type, std::s
         __builtin_mul_overflow(stored.bytes, stored.dims.back(), &stored.bytes))
       refuse("has impossible sizes: " + text_of(stored.dims));
   }
-  if (stored.bytes == 0) return stored;
+  return stored;
+}
 
+/// With its offset, where all of its bytes are in the file.
+Stored Contents::inside(const std::string& path, Stored stored, const Object& found) const {
+  if (stored.bytes == 0) return stored;
   const auto file_bytes = static_cast<std::uint64_t>(file_size(file_));
   if (found.offset > file_bytes || static_cast<std::uint64_t>(stored.bytes) > file_bytes - found.offset)
-    refuse("(" + text_of(stored.dims) + ") needs " + std::to_string(stored.bytes) +
-           " bytes, more than the file holds (" + std::to_string(file_bytes) + "): the file is truncated");
+    throw Error(path + " (" + text_of(stored.dims) + ") needs " + std::to_string(stored.bytes) +
+                    " bytes, more than the file holds (" + std::to_string(file_bytes) +
+                    "): the file is truncated",
+                this->path().string(), altered_hint);
   stored.offset = static_cast<std::int64_t>(found.offset);
+  return stored;
+}
+
+Stored Contents::locate(const std::string& path, const ElementType& type, std::size_t rank) const {
+  const Object& found = dataset(path);
+  Stored stored = shape(path, type, rank);
+  if (!found.is_in_one_piece)
+    throw Error(path + " is not stored in one piece", this->path().string(), altered_hint);
+  return inside(path, std::move(stored), found);
+}
+
+Stored Contents::locate_rows(const std::string& path, const ElementType& type, std::size_t rank) const {
+  const Object& found = dataset(path);
+  if (found.row_bytes.empty()) return locate(path, type, rank);
+  Stored stored = shape(path, type, rank);
+  const auto wrong = [&] {
+    return Error(path + " has rows of impossible sizes", this->path().string(), altered_hint);
+  };
+  if (stored.dims.empty() || std::ssize(found.row_bytes) != stored.dims[0]) throw wrong();
+  stored.bytes = 0;
+  for (const std::uint64_t bytes : found.row_bytes) {
+    if (bytes > most_row_bytes || __builtin_add_overflow(stored.bytes, bytes, &stored.bytes)) throw wrong();
+  }
+  stored = inside(path, std::move(stored), found);
+  stored.row_starts = {stored.offset};
+  for (const std::uint64_t bytes : found.row_bytes)
+    stored.row_starts.push_back(stored.row_starts.back() + static_cast<std::int64_t>(bytes));
   return stored;
 }
 
 void Contents::read_rows(const std::string& path, const ElementType& type, std::int64_t first,
                          std::int64_t rows, void* data) const {
-  const Stored stored = locate(path, type, dataset(path).dims.size());
+  const Stored stored = locate_rows(path, type, dataset(path).dims.size());
   if (rows == 0) return;
   if (stored.dims.empty() || first < 0 || rows < 0 || first > stored.dims[0] || rows > stored.dims[0] - first)
     throw Error(path + " has not so many rows", this->path().string(), altered_hint);
-  const std::int64_t row = stored.bytes / stored.dims[0];
-  read_exactly(file_, {static_cast<std::byte*>(data), static_cast<std::size_t>(rows * row)},
-               stored.offset + first * row);
+  auto row_bytes = static_cast<std::int64_t>(type.bytes);
+  for (std::size_t k = 1; k < stored.dims.size(); ++k) row_bytes *= stored.dims[k];
+  auto* into = static_cast<std::byte*>(data);
+  if (stored.row_starts.empty()) {
+    read_exactly(file_, {into, static_cast<std::size_t>(rows * row_bytes)},
+                 stored.offset + first * row_bytes);
+    return;
+  }
+  std::vector<std::byte> compressed;
+  for (std::int64_t row = first; row < first + rows; ++row, into += row_bytes) {
+    const std::int64_t begin = stored.row_starts[static_cast<std::size_t>(row)],
+                       end = stored.row_starts[static_cast<std::size_t>(row) + 1];
+    compressed.resize(static_cast<std::size_t>(end - begin));
+    read_exactly(file_, compressed, begin);
+    if (!expand_row(compressed, type.bytes, {into, static_cast<std::size_t>(row_bytes)}))
+      throw Error(path + ", row " + std::to_string(row) + ", is damaged: it does not expand",
+                  this->path().string(), altered_hint);
+  }
 }
 
 std::vector<std::string> Contents::virtual_sources(const std::string& path) const {

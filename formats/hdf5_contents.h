@@ -19,7 +19,9 @@ namespace palpate::hdf5 {
 struct Stored {
   std::vector<std::int64_t> dims;
   std::int64_t offset = 0;  ///< of its first byte
-  std::int64_t bytes = 0;
+  std::int64_t bytes = 0;   ///< in the file
+  /// Where the rows begin in the file, [rows + 1], where each is compressed (shuffle, deflate); else empty.
+  std::vector<std::int64_t> row_starts{};
 };
 
 /// Groups, datasets and attributes of a file. The HDF5 library crashes on crafted files and may take all
@@ -44,7 +46,11 @@ class Contents {
   /// Finds a dataset and proves that it has this type and rank, lies in one piece, and inside the file.
   [[nodiscard]] Stored locate(const std::string& dataset, const ElementType& type, std::size_t rank) const;
 
-  /// Rows [first, first + rows) of a dataset that `locate` finds.
+  /// Finds a dataset of compressed rows, or one that `locate` finds.
+  [[nodiscard]] Stored locate_rows(const std::string& dataset, const ElementType& type,
+                                   std::size_t rank) const;
+
+  /// Rows [first, first + rows) of a dataset that `locate_rows` finds, as they were before compression.
   void read_rows(const std::string& dataset, const ElementType& type, std::int64_t first, std::int64_t rows,
                  void* data) const;
 
@@ -66,12 +72,15 @@ class Contents {
   struct Object {
     std::map<std::string, Attribute> attributes{};
     bool is_dataset = false;
-    bool is_readable = false;            ///< that dataset
-    bool is_in_one_piece = false;        ///< in this file
-    std::string type{};                  ///< ElementType::name, or "another type"
-    std::int64_t rank = 0;               ///< -1: of no simple shape
-    std::vector<std::uint64_t> dims{};   ///< of the first few dimensions
-    std::uint64_t offset = 0;            ///< of what lies in one piece and is not empty
+    bool is_readable = false;           ///< that dataset
+    bool is_in_one_piece = false;       ///< in this file
+    std::string type{};                 ///< ElementType::name, or "another type"
+    std::int64_t rank = 0;              ///< -1: of no simple shape
+    std::vector<std::uint64_t> dims{};  ///< of the first few dimensions
+    std::uint64_t offset = 0;           ///< of what lies in one piece and is not empty
+    /// Stored bytes of the rows, where each is a compressed chunk and they lie one after another from
+    /// `offset` on.
+    std::vector<std::uint64_t> row_bytes{};
     std::vector<std::string> sources{};  ///< of a virtual dataset
   };
   using Objects = std::map<std::string, Object>;  ///< by path
@@ -79,6 +88,8 @@ class Contents {
  private:
   Contents(FileDescriptor file, Objects objects) : file_(std::move(file)), objects_(std::move(objects)) {}
   [[nodiscard]] const Object& dataset(const std::string& path) const;
+  [[nodiscard]] Stored shape(const std::string& path, const ElementType& type, std::size_t rank) const;
+  [[nodiscard]] Stored inside(const std::string& path, Stored stored, const Object& found) const;
   [[nodiscard]] const Attribute* attribute(const std::string& object, const std::string& name) const;
 
   FileDescriptor file_;

@@ -18,6 +18,11 @@ std::vector<Pair> pairs_of(const std::vector<std::int32_t>& values) {
   return pairs;
 }
 
+void refuse_negative(const std::vector<double>& values) {
+  if (!std::all_of(values.begin(), values.end(), [](double v) { return v >= 0.0 && std::isfinite(v); }))
+    throw Unreadable{"holds a number that is negative or not finite"};
+}
+
 /// Clusters in [first, end), the row on the column's level and not before it, each pair once.
 void check_pairs(const std::vector<Pair>& pairs, Index first, Index end, bool with_itself,
                  const std::string& path, const std::string& where) {
@@ -99,9 +104,13 @@ void put_ranks(Model& model, const std::vector<std::int32_t>& values) {
   compressed_to_fill(model).rank.assign(values.begin(), values.end());
 }
 
+void put_pair_errors(Model& model, const std::vector<double>& values) {
+  refuse_negative(values);
+  compressed_to_fill(model).pair_error = values;
+}
+
 void put_certificate(Model& model, const std::vector<double>& values) {
-  if (std::any_of(values.begin(), values.end(), [](double v) { return v < 0.0; }))
-    throw Unreadable{"holds a negative number"};
+  refuse_negative(values);
   compressed_to_fill(model).certificate = values;
 }
 
@@ -109,7 +118,7 @@ void count_tree(const HierarchicalMatrix& matrix, Counts& counts) {
   counts.set(Count::near_pairs, std::ssize(matrix.near_pair), "/greens/near_pairs");
   counts.set(Count::far_pairs, std::ssize(matrix.far_pair), "/greens/far_pairs");
   counts.set(Count::clusters, matrix.tree.clusters(), tree_path);
-  counts.set(Count::certified, std::ssize(matrix.certificate) / 5, "/greens/certificate");
+  counts.set(Count::certified, std::ssize(matrix.certificate) / 6, "/greens/certificate");
 }
 
 void check_tree(const Model& model, const std::string& where) {

@@ -19,6 +19,7 @@ void put_tolerance(Model& model, const std::vector<double>& values);
 void put_near_pairs(Model& model, const std::vector<std::int32_t>& values);
 void put_far_pairs(Model& model, const std::vector<std::int32_t>& values);
 void put_ranks(Model& model, const std::vector<std::int32_t>& values);
+void put_pair_errors(Model& model, const std::vector<double>& values);
 void put_certificate(Model& model, const std::vector<double>& values);
 
 /// What is known before the entries.
@@ -55,8 +56,12 @@ void for_each_rank_field(Visitor&& visit) {
                             },
                             put_ranks,
                             {Count::one, most_rank + 1, 0}});
+  visit(Field<double>{"/greens/pair_errors",
+                      {{Count::far_pairs}},
+                      [](const Model& m) { return m.compressed->pair_error; },
+                      put_pair_errors});
   visit(Field<double>{"/greens/certificate",
-                      {{Count::certified}, {Count::one, 5, 0}},
+                      {{Count::certified}, {Count::one, 6, 0}},
                       [](const Model& m) { return m.compressed->certificate; },
                       put_certificate});
 }

@@ -425,7 +425,7 @@ std::string ModelWriter::Impl::streamed_checksum(std::size_t matrix) const {
 /// Ranks, certificate, bases and couplings.
 void ModelWriter::Impl::write_compressed(hdf5::File& file, const Model& extra) {
   const HierarchicalMatrix& matrix = *extra.compressed;
-  counts.set(Count::certified, std::ssize(matrix.certificate) / 5, "/greens/certificate");
+  counts.set(Count::certified, std::ssize(matrix.certificate) / 6, "/greens/certificate");
   for_each_rank_field([&](const auto& field) {
     const auto values = field.take(extra);
     check_values(field, values, counts);

@@ -26,18 +26,17 @@ hdf5::Contents open_master(const std::filesystem::path& path) {
 
 // ---- rows ----
 
-void read_ticks(const hdf5::Contents& part, bool has_force_error, std::vector<TickRecord>& ticks) {
+void read_ticks(const hdf5::Contents& part, const RecordingHead& head, std::vector<TickRecord>& ticks) {
   const auto before = ticks.size();
   const std::int64_t rows = part.locate("/ticks/time", hdf5::element_type<double>(), 1).dims[0];
   ticks.resize(before + static_cast<std::size_t>(rows));
-  for_each_tick_field(has_force_error,
-                      [&]<class Member>(const char* name, int components, Member TickRecord::*member) {
-                        const auto width = static_cast<std::size_t>(components);
-                        std::vector<Scalar<Member>> values(static_cast<std::size_t>(rows) * width);
-                        part.read_rows(name, hdf5::element_type<Scalar<Member>>(), 0, rows, values.data());
-                        for (std::size_t i = 0; i < static_cast<std::size_t>(rows); ++i)
-                          std::memcpy(&(ticks[before + i].*member), &values[i * width], sizeof(Member));
-                      });
+  for_each_tick_field(head, [&]<class Member>(const char* name, int components, Member TickRecord::*member) {
+    const auto width = static_cast<std::size_t>(components);
+    std::vector<Scalar<Member>> values(static_cast<std::size_t>(rows) * width);
+    part.read_rows(name, hdf5::element_type<Scalar<Member>>(), 0, rows, values.data());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(rows); ++i)
+      std::memcpy(&(ticks[before + i].*member), &values[i * width], sizeof(Member));
+  });
 }
 
 std::int64_t count_frames(const hdf5::Contents& part) {
@@ -130,6 +129,8 @@ void check_ticks(const std::vector<TickRecord>& ticks, const Checker& check) {
     check.expect(tick.contacts >= 0, "/ticks/contacts", k, tick.contacts, "a number of contacts");
     check.expect(std::isfinite(tick.force_error) && tick.force_error >= 0.0F, "/ticks/force_error", k,
                  tick.force_error, "the size of an error");
+    check.expect(std::isfinite(tick.greens_error) && tick.greens_error >= 0.0F, "/ticks/greens_error", k,
+                 tick.greens_error, "the size of an error");
     check.expect(tick.left_out >= 0, "/ticks/left_out", k, tick.left_out, "a number of contacts");
     check.expect(tick.patch >= -1, "/ticks/patch", k, tick.patch, "a node, or -1 for none");
     check.expect(tick.grab <= 1, "/ticks/grab", k, int{tick.grab}, "0 or 1");
@@ -156,8 +157,7 @@ Recording read_once(const std::filesystem::path& path, const RecordingFiles& fil
   recording.frames.surface = files.head.surface;
   recording.frames.has_stress = files.head.has_stress;
   recording.finished = !std::filesystem::exists(parts_folder(path));
-  for (const std::size_t file : files.tick_files)
-    read_ticks(files.files[file], files.head.has_force_error, recording.ticks);
+  for (const std::size_t file : files.tick_files) read_ticks(files.files[file], files.head, recording.ticks);
   for (const std::size_t file : files.frame_files) {
     append_column(files.files[file], "/frames/tick", recording.frames.tick);
     append_column(files.files[file], "/frames/time", recording.frames.time);

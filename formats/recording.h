@@ -55,6 +55,9 @@ struct TickRecord {
   float force_error = 0.0F;
   /// contact points that the tool pressed on and that found no room; recordings from 4.3 on
   std::int32_t left_out = 0;
+  /// what `force` may be off by at most as compressed Green's functions are not exact; 0 where they are [N];
+  /// recordings from 4.4 on
+  float greens_error = 0.0F;
 };
 
 /// The surface of the body at one moment.

@@ -12,11 +12,12 @@
 #include "base/error.h"
 #include "base/write_file.h"
 #include "formats/checksum.h"
+#include "formats/compressed_row.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::int64_t major_version = 4, minor_version = 3;
+constexpr std::int64_t major_version = 4, minor_version = 4;
 constexpr std::int64_t highest_rate = 1'000'000;  // ticks a second
 constexpr const char* format_name = "palpate-recording";
 constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
@@ -31,6 +32,7 @@ struct RowField {
   hdf5::ElementType type;
   std::vector<std::int64_t> row;  // shape
   bool of_frame;
+  bool is_compressed = false;  // row by row, unless there are none
 
   [[nodiscard]] std::int64_t row_bytes() const {
     auto bytes = static_cast<std::int64_t>(type.bytes);
@@ -39,6 +41,9 @@ struct RowField {
   }
   [[nodiscard]] std::int64_t rows(const RecordingPart& part) const {
     return of_frame ? part.frames : part.ticks;
+  }
+  [[nodiscard]] bool compresses(std::int64_t rows) const {
+    return is_compressed && rows > 0 && row_bytes() > 0;
   }
   [[nodiscard]] std::vector<std::int64_t> dims(std::int64_t rows) const {
     std::vector<std::int64_t> result = {rows};
@@ -50,18 +55,22 @@ struct RowField {
 std::vector<RowField> row_fields(const RecordingHead& head) {
   const std::int64_t surface_nodes = std::ssize(head.surface.nodes);
   std::vector<RowField> fields;
-  for_each_tick_field(head.has_force_error,
-                      [&]<class Member>(const char* name, int components, Member TickRecord::*) {
-                        RowField field = {name, hdf5::element_type<Scalar<Member>>(), {}, false};
-                        if (components > 1) field.row = {components};
-                        fields.push_back(field);
-                      });
+  for_each_tick_field(head, [&]<class Member>(const char* name, int components, Member TickRecord::*) {
+    RowField field = {name, hdf5::element_type<Scalar<Member>>(), {}, false};
+    if (components > 1) field.row = {components};
+    fields.push_back(field);
+  });
   fields.push_back({"/frames/tick", hdf5::element_type<std::int64_t>(), {}, true});
   fields.push_back({"/frames/time", hdf5::element_type<double>(), {}, true});
-  fields.push_back({"/frames/displacement", hdf5::element_type<float>(), {surface_nodes, 3}, true});
+  fields.push_back({"/frames/displacement",
+                    hdf5::element_type<float>(),
+                    {surface_nodes, 3},
+                    true,
+                    head.has_compressed_frames});
   if (head.has_stress) {
     for (const char* name : {"/frames/von_mises", "/frames/pressure"})
-      fields.push_back({name, hdf5::element_type<float>(), {surface_nodes}, true});
+      fields.push_back(
+          {name, hdf5::element_type<float>(), {surface_nodes}, true, head.has_compressed_frames});
   }
   return fields;
 }
@@ -72,8 +81,33 @@ StoredRows write_checked(hdf5::File& file, const char* name, std::span<const std
                          const std::vector<T>& values) {
   ChunkedChecksum running;
   running.append(std::as_bytes(std::span(values)));
-  const StoredRows stored = {file.write(name, hdf5::element_type<T>(), dims, values.data()),
-                             running.digits()};
+  const StoredRows stored = {.offset = file.write(name, hdf5::element_type<T>(), dims, values.data()),
+                             .bytes = static_cast<std::int64_t>(values.size() * sizeof(T)),
+                             .checksum = running.digits()};
+  file.write_attribute(name, "xxh3", stored.checksum);
+  return stored;
+}
+
+/// Writes rows [dims] of floats, compressed unless there are none, with their checksum. `row_of` gives each.
+StoredRows write_compressed(hdf5::File& file, const char* name, std::span<const std::int64_t> dims,
+                            const std::function<std::vector<float>(std::size_t)>& row_of) {
+  ChunkedChecksum running;
+  StoredRows stored;
+  if (std::ranges::find(dims, 0) != dims.end()) {
+    stored.offset = file.write(name, hdf5::element_type<float>(), dims, nullptr);
+  } else {
+    hdf5::CompressedRows rows = file.write_compressed(name, hdf5::element_type<float>(), dims);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(dims[0]); ++k) {
+      const std::vector<float> values = row_of(k);
+      const std::vector<std::byte> row = compress_row(std::as_bytes(std::span(values)), sizeof(float));
+      rows.append(row);
+      running.append(row);
+    }
+    stored.row_starts = rows.starts();
+    stored.offset = stored.row_starts.front();
+    stored.bytes = stored.row_starts.back() - stored.offset;
+  }
+  stored.checksum = running.digits();
   file.write_attribute(name, "xxh3", stored.checksum);
   return stored;
 }
@@ -81,7 +115,8 @@ StoredRows write_checked(hdf5::File& file, const char* name, std::span<const std
 /// What is written has checksums, whatever it was read from.
 std::int64_t minor_version_of(const RecordingHead& head) {
   if (!head.has_stress) return 0;
-  return head.has_force_error ? minor_version : 2;
+  if (!head.has_force_error) return 2;
+  return head.has_compressed_frames ? minor_version : 3;
 }
 
 void write_head(hdf5::File& file, const RecordingHead& head) {
@@ -163,57 +198,94 @@ std::string stored_checksum(const hdf5::Contents& file, const std::string& datas
   return *stored;
 }
 
-/// Copies the rows of a field of a part to `first` and on of that of `to`, and proves their checksum. Returns
-/// their number.
-std::int64_t copy_rows(hdf5::File& to, std::int64_t first, const FileDescriptor& from,
-                       const RecordingPart& part, const RowField& field, const StoredRows& stored,
-                       ChunkedChecksum& written) {
-  const std::int64_t rows = field.rows(part), row_bytes = field.row_bytes();
-  if (row_bytes == 0) return 0;
-  const std::int64_t at_once = std::max<std::int64_t>(block / row_bytes, 1);
-  std::vector<std::byte> bytes;
-  ChunkedChecksum found;
-  for (std::int64_t done = 0; done < rows; done += at_once) {
-    const std::int64_t now = std::min(at_once, rows - done);
-    bytes.resize(static_cast<std::size_t>(now * row_bytes));
-    read_exactly(from, bytes, stored.offset + done * row_bytes);
-    to.write_rows(field.name, field.type, first + done, now, bytes.data());
-    found.append(bytes);
-    written.append(bytes);
+/// Bytes of a file, one piece after another, with their checksum.
+class RowBytes {
+ public:
+  RowBytes(const FileDescriptor& file, ChunkedChecksum& written) : file_(file), written_(written) {}
+
+  std::span<const std::byte> read(std::int64_t offset, std::int64_t bytes) {
+    bytes_.resize(static_cast<std::size_t>(bytes));
+    read_exactly(file_, bytes_, offset);
+    found_.append(bytes_);
+    written_.append(bytes_);
+    return bytes_;
   }
-  if (!stored.checksum.empty()) expect_checksum(part.file, field.name, found.digits(), stored.checksum);
-  return rows;
+  [[nodiscard]] std::string digits() const { return found_.digits(); }
+
+ private:
+  const FileDescriptor& file_;
+  ChunkedChecksum& written_;  // of several parts
+  ChunkedChecksum found_;
+  std::vector<std::byte> bytes_;
+};
+
+/// Writes the rows of a field of all parts as one dataset, and proves their checksums. `files` are the parts.
+StoredRows copy_rows(hdf5::File& to, const RowField& field, std::size_t number,
+                     std::span<const RecordingPart> parts, std::span<const FileDescriptor> files) {
+  const std::int64_t rows = count_rows(parts, field), row_bytes = field.row_bytes();
+  const std::int64_t at_once = std::max<std::int64_t>(block / std::max<std::int64_t>(row_bytes, 1), 1);
+  StoredRows copied;
+  std::optional<hdf5::CompressedRows> compressed;
+  if (field.compresses(rows)) {
+    compressed = to.write_compressed(field.name, field.type, field.dims(rows));
+  } else {
+    copied.offset = to.write(field.name, field.type, field.dims(rows), nullptr);
+  }
+  ChunkedChecksum written;
+  std::int64_t first = 0;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const StoredRows& stored = parts[p].fields[number];
+    const std::int64_t here = field.rows(parts[p]);
+    if (here == 0 || row_bytes == 0) continue;
+    RowBytes bytes(files[p], written);
+    if (compressed) {
+      for (std::size_t k = 0; k + 1 < stored.row_starts.size(); ++k)
+        compressed->append(bytes.read(stored.row_starts[k], stored.row_starts[k + 1] - stored.row_starts[k]));
+    } else {
+      for (std::int64_t done = 0; done < here; done += at_once) {
+        const std::int64_t now = std::min(at_once, here - done);
+        to.write_rows(field.name, field.type, first + done, now,
+                      bytes.read(stored.offset + done * row_bytes, now * row_bytes).data());
+      }
+    }
+    if (!stored.checksum.empty()) expect_checksum(parts[p].file, field.name, bytes.digits(), stored.checksum);
+    first += here;
+    copied.bytes += stored.bytes;
+  }
+  if (compressed) copied.row_starts = compressed->starts();
+  copied.checksum = written.digits();
+  return copied;
 }
 
 std::vector<StoredRows> write_rows_of(hdf5::File& to, std::span<const RecordingPart> parts,
                                       const RecordingHead& head) {
+  std::vector<FileDescriptor> files;
+  for (const RecordingPart& part : parts) files.push_back(open_file(part.file, OpenMode::read));
   const std::vector<RowField> fields = row_fields(head);
-  std::vector<StoredRows> stored(fields.size());
-  for (std::size_t k = 0; k < fields.size(); ++k)
-    stored[k].offset =
-        to.write(fields[k].name, fields[k].type, fields[k].dims(count_rows(parts, fields[k])), nullptr);
-  std::vector<std::int64_t> written(fields.size());
-  std::vector<ChunkedChecksum> running(fields.size());
-  for (const RecordingPart& part : parts) {
-    const FileDescriptor from = open_file(part.file, OpenMode::read);
-    for (std::size_t k = 0; k < fields.size(); ++k)
-      if (fields[k].rows(part) > 0)
-        written[k] += copy_rows(to, written[k], from, part, fields[k], part.fields[k], running[k]);
-  }
+  std::vector<StoredRows> copied;
   for (std::size_t k = 0; k < fields.size(); ++k) {
-    stored[k].checksum = running[k].digits();
-    to.write_attribute(fields[k].name, "xxh3", stored[k].checksum);
+    copied.push_back(copy_rows(to, fields[k], k, parts, files));
+    to.write_attribute(fields[k].name, "xxh3", copied.back().checksum);
   }
-  return stored;
+  return copied;
 }
 
 /// Where a plain file has the rows of a field, and how many. Throws Error unless all of it is there.
 std::pair<StoredRows, std::int64_t> locate_rows(const hdf5::Contents& file, const RowField& field,
                                                 bool has_checksums) {
-  const hdf5::Stored stored = file.locate(field.name, field.type, 1 + field.row.size());
+  const std::size_t rank = 1 + field.row.size();
+  const hdf5::Stored stored = field.is_compressed ? file.locate_rows(field.name, field.type, rank)
+                                                  : file.locate(field.name, field.type, rank);
   if (!std::equal(field.row.begin(), field.row.end(), stored.dims.begin() + 1))
     throw Error(std::string(field.name) + " has rows of another size", file.path().string(), altered_hint);
-  return {{stored.offset, has_checksums ? stored_checksum(file, field.name) : ""}, stored.dims[0]};
+  if (field.compresses(stored.dims[0]) && stored.row_starts.empty())
+    throw Error(std::string(field.name) + " has rows that are not compressed", file.path().string(),
+                altered_hint);
+  return {{.offset = stored.offset,
+           .bytes = stored.bytes,
+           .row_starts = stored.row_starts,
+           .checksum = has_checksums ? stored_checksum(file, field.name) : ""},
+          stored.dims[0]};
 }
 
 /// All of one kind of field have as many rows.
@@ -281,6 +353,8 @@ RecordingHead read_head(const hdf5::Contents& file) {
   head.has_stress = (*version)[1] >= 1;
   head.has_checksums = (*version)[1] >= 2;
   head.has_force_error = (*version)[1] >= 3;
+  head.has_compressed_frames = (*version)[1] >= 4;
+  head.has_greens_error = (*version)[1] >= 4;
   head.info.model_path = file.text_attribute("/", "model").value_or("");
   head.info.content_hash = file.text_attribute("/", "content_hash").value_or("");
   head.info.device = file.text_attribute("/", "device").value_or("");
@@ -415,7 +489,7 @@ void check_rows(const RecordingFiles& recording) {
       const StoredRows& stored = *at++;
       if (stored.checksum.empty()) continue;
       ChunkedChecksum found;
-      found.append_file(file.file(), stored.offset, rows * field.row_bytes(), nullptr);
+      found.append_file(file.file(), stored.offset, stored.bytes, nullptr);
       expect_checksum(file.path(), field.name, found.digits(), stored.checksum);
     }
   };
@@ -428,8 +502,8 @@ RecordingPart write_part(const std::filesystem::path& path, std::span<const Tick
   RecordingPart part = {path, std::ssize(ticks), std::ssize(frames)};
   write_whole(path, with_suffix(path, ".partial"), false, [&](hdf5::File& file) {
     part.fields.clear();
-    for_each_tick_field(head.has_force_error, [&]<class Member>(const char* name, int components,
-                                                                Member TickRecord::*member) {
+    for_each_tick_field(head, [&]<class Member>(const char* name, int components,
+                                                Member TickRecord::*member) {
       std::vector<Scalar<Member>> values(ticks.size() * static_cast<std::size_t>(components));
       for (std::size_t i = 0; i < ticks.size(); ++i)
         std::memcpy(&values[i * static_cast<std::size_t>(components)], &(ticks[i].*member), sizeof(Member));
@@ -445,22 +519,13 @@ RecordingPart write_part(const std::filesystem::path& path, std::span<const Tick
     }
     part.fields.push_back(write_checked(file, "/frames/tick", std::array{part.frames}, tick));
     part.fields.push_back(write_checked(file, "/frames/time", std::array{part.frames}, time));
-    const std::size_t surface_nodes = head.surface.nodes.size();
-    const auto nodes = static_cast<std::int64_t>(surface_nodes);
+    const auto nodes = std::ssize(head.surface.nodes);
     const auto write_nodal = [&](const char* name, std::vector<std::int64_t> dims,
                                  std::vector<float> SurfaceFrame::*member, float absent) {
-      StoredRows stored = {file.write(name, hdf5::element_type<float>(), dims, nullptr), {}};
-      ChunkedChecksum running;
-      const std::vector<float> none(surface_nodes, absent);
-      for (std::int64_t k = 0; k < part.frames && nodes > 0; ++k) {
-        const std::vector<float>& values = frames[static_cast<std::size_t>(k)].*member;
-        const std::vector<float>& row = values.empty() ? none : values;
-        file.write_rows(name, hdf5::element_type<float>(), k, 1, row.data());
-        running.append(std::as_bytes(std::span(row)));
-      }
-      stored.checksum = running.digits();
-      file.write_attribute(name, "xxh3", stored.checksum);
-      part.fields.push_back(std::move(stored));
+      part.fields.push_back(write_compressed(file, name, dims, [&](std::size_t k) {
+        const std::vector<float>& values = frames[k].*member;
+        return values.empty() ? std::vector<float>(head.surface.nodes.size(), absent) : values;
+      }));
     };
     write_nodal("/frames/displacement", {part.frames, nodes, 3}, &SurfaceFrame::displacement, 0.0F);
     write_nodal("/frames/von_mises", {part.frames, nodes}, &SurfaceFrame::von_mises,

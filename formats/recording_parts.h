@@ -16,10 +16,26 @@
 
 namespace palpate {
 
-/// One dataset a field of TickRecord: path, number of components, member. `has_force_error`: as a recording
-/// has them from version 4.3 on.
+/// The number that a field of TickRecord is, or has several of.
+template <class Member>
+using Scalar = std::remove_all_extents_t<Member>;
+
+/// What the file says beside its rows.
+struct RecordingHead {
+  bool has_stress = true;       ///< version 4.1 and later: stress and pressure, and where the surface is held
+  bool has_checksums = true;    ///< version 4.2 and later
+  bool has_force_error = true;  ///< version 4.3 and later, and how many contacts were left out
+  bool has_compressed_frames = true;  ///< version 4.4 and later
+  bool has_greens_error = true;       ///< version 4.4 and later
+  SessionInfo info;
+  std::string generator;
+  RecordedSurface surface;
+};
+
+/// One dataset a field of TickRecord: path, number of components, member. As far as a recording
+/// of the head's version has them.
 template <class Visitor>
-void for_each_tick_field(bool has_force_error, Visitor&& visit) {
+void for_each_tick_field(const RecordingHead& head, Visitor&& visit) {
   visit("/ticks/time", 1, &TickRecord::time);
   visit("/ticks/device_position", 3, &TickRecord::device_position);
   visit("/ticks/device_orientation", 4, &TickRecord::device_orientation);
@@ -47,29 +63,19 @@ void for_each_tick_field(bool has_force_error, Visitor&& visit) {
   visit("/ticks/fault", 1, &TickRecord::fault);
   visit("/ticks/event", 1, &TickRecord::event);
   visit("/ticks/motion_step", 1, &TickRecord::motion_step);
-  if (!has_force_error) return;
+  if (!head.has_force_error) return;
   visit("/ticks/force_error", 1, &TickRecord::force_error);
   visit("/ticks/left_out", 1, &TickRecord::left_out);
+  if (!head.has_greens_error) return;
+  visit("/ticks/greens_error", 1, &TickRecord::greens_error);
 }
-
-/// The number that a field of TickRecord is, or has several of.
-template <class Member>
-using Scalar = std::remove_all_extents_t<Member>;
-
-/// What the file says beside its rows.
-struct RecordingHead {
-  bool has_stress = true;       ///< version 4.1 and later: stress and pressure, and where the surface is held
-  bool has_checksums = true;    ///< version 4.2 and later
-  bool has_force_error = true;  ///< version 4.3 and later, and how many contacts were left out
-  SessionInfo info;
-  std::string generator;
-  RecordedSurface surface;
-};
 
 /// Where a plain file has the rows of a dataset.
 struct StoredRows {
-  std::int64_t offset = 0;  ///< of the first byte
-  std::string checksum;     ///< empty where none is stored
+  std::int64_t offset = 0;                 ///< of the first byte
+  std::int64_t bytes = 0;                  ///< of all rows as they are stored
+  std::vector<std::int64_t> row_starts{};  ///< [rows + 1] in the file where they are compressed; else empty
+  std::string checksum{};                  ///< of those bytes; empty where none is stored
 };
 
 /// A plain file with rows.

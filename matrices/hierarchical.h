@@ -69,10 +69,15 @@ struct HierarchicalMatrix {
   std::shared_ptr<const float[]> coupling;  ///< S of the far pairs [rank of row x rank of column] [m/N]
   std::shared_ptr<const float[]> near;      ///< entries of the near pairs by rows [m/N]
 
+  /// [far pairs] By how much each pair is off [-], about: Frobenius' norm of L_row^-1 (what it is to be -
+  /// what is stored) L_column^-T, with L L^T = Xi of each leaf, one after the other. See ErrorBound.
+  std::vector<double> pair_error;
+
   double scale = 1.0;  ///< the matrix is this times what is stored
 
   double tolerance = 0.0;  ///< most that forces of touches may be off, relative to the largest [-]
-  /// [rows x 5] What was measured: nodes of a touch, touches, and their median, 99 % and worst force error.
+  /// [rows x 6] What was measured: nodes of a touch, touches, their median, 99 % and worst force error, and
+  /// the largest share that a total force's error has of its ErrorBound.
   std::vector<double> certificate;
 
   // What follows from the above: see `index`.

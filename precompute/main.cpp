@@ -10,7 +10,6 @@
 #include "base/program.h"
 #include "base/spelling.h"
 #include "formats/model_file.h"
-#include "formats/shrunk_file.h"
 #include "precompute/bake.h"
 #include "precompute/compare.h"
 #include "precompute/description/not_a_description.h"

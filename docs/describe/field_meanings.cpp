@@ -87,10 +87,12 @@ constexpr FieldMeaning model_fields[] = {
     {"/greens/near_pairs", "leaves, row and column, row ≥ column; by columns, then rows"},
     {"/greens/far_pairs", "clusters of one level, row and column, row > column; by columns, then rows"},
     {"/greens/ranks", "columns of V of each cluster"},
+    {"/greens/pair_errors",
+     "by how much each far pair is off, about: Frobenius' norm of L⁻¹ (Ξ − stored) L⁻ᵀ, with L Lᵀ = Ξ of the "
+     "leaves (theory, section 2.3)"},
     {"/greens/certificate",
-     "measured when the file was written: nodes of a touch, touches, and the median, 99 % and largest of "
-     "their "
-     "force errors"},
+     "measured when the file was written: nodes of a touch, touches, the median, 99 % and largest of their "
+     "force errors, and the largest share that total forces' errors have of a tick's bound"},
     {"/greens/near",
      "blocks of Ξ of the near pairs [m/N], one after another, by rows; starts at a multiple of 4096 bytes"},
     {"/greens/bases", "V of the leaves, one after another, by rows"},

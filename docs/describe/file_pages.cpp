@@ -216,14 +216,15 @@ Rows tick_rows() {
   const std::vector<Declaration> header = declarations_of("formats/recording.h");
   const std::vector<Member>& members = declaration(header, "TickRecord").members;
   Rows rows;
-  for_each_tick_field(true, [&]<class T>(const std::string& path, int components, T TickRecord::*) {
-    const std::string name = path.substr(path.rfind('/') + 1);
-    const auto member = std::ranges::find(members, name, &Member::name);
-    if (member == members.end() || member->comment.empty())
-      throw Error("has no doc comment", "TickRecord::" + name, "add it to formats/recording.h");
-    rows.push_back({code(path), type_name<Scalar<T>>(),
-                    components == 1 ? "*T*" : fmt::format("*T*, {}", components), member->comment});
-  });
+  for_each_tick_field(
+      RecordingHead{}, [&]<class T>(const std::string& path, int components, T TickRecord::*) {
+        const std::string name = path.substr(path.rfind('/') + 1);
+        const auto member = std::ranges::find(members, name, &Member::name);
+        if (member == members.end() || member->comment.empty())
+          throw Error("has no doc comment", "TickRecord::" + name, "add it to formats/recording.h");
+        rows.push_back({code(path), type_name<Scalar<T>>(),
+                        components == 1 ? "*T*" : fmt::format("*T*, {}", components), member->comment});
+      });
   return rows;
 }
 
@@ -284,8 +285,11 @@ Page recording_fields_page() {
   text += markdown_table({"root attribute", "value"}, attributes);
   text +=
       "## Ticks\n\nOne row per tick.\n\n" + markdown_table({"dataset", "type", "shape", "what"}, tick_rows());
-  text += "## Surface and frames\n\nFrames are taken at display rate (`--record-frames`).\n\n" +
-          markdown_table({"dataset", "type", "shape", "what"}, surface);
+  text +=
+      "## Surface and frames\n\nFrames are taken at display rate (`--record-frames`). Displacement, stress "
+      "and "
+      "pressure are [compressed](../recordings.md#compressed-frames) from 4.4 on.\n\n" +
+      markdown_table({"dataset", "type", "shape", "what"}, surface);
   return {"recording-fields", text};
 }
 

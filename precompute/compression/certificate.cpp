@@ -1,11 +1,13 @@
 #include "precompute/compression/certificate.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <mutex>
 #include <numeric>
 #include <random>
 
 #include "base/parallel.h"
+#include "matrices/error_bound.h"
 #include "matrices/hierarchical_product.h"
 #include "precompute/compression/selected_solver.h"
 #include "precompute/numerics/touches.h"
@@ -37,6 +39,27 @@ std::vector<Index> touched_nodes(std::int64_t k, std::span<const Vec3> points,
   }
   nodes.resize(static_cast<std::size_t>(count));
   return nodes;
+}
+
+/// Share of its bound that the error of a touch's total force is; 0 where the bound is 0.
+double bound_share(const HierarchicalMatrix& matrix, std::span<const Index> nodes, const Rows& exact,
+                   const Rows& C, const Eigen::MatrixXd& u) {
+  const int d = matrix.dimension;
+  const Eigen::LLT<Eigen::MatrixXd> reference(exact), stored(C);
+  const Eigen::MatrixXd f_0 = reference.solve(u), f = stored.solve(u);
+  ErrorBound bound(matrix, nodes.size());
+  double largest = 0.0;
+  for (Eigen::Index k = 0; k < u.cols(); ++k) {
+    bound.carry(nodes, {f.col(k).data(), static_cast<std::size_t>(f.rows())});
+    for (int axis = 0; axis < d; ++axis) {
+      // The first displacements are motions by 1 along the axes.
+      const double most = bound.work(nodes, {f.col(axis).data(), static_cast<std::size_t>(f.rows())});
+      double off = 0.0;
+      for (Eigen::Index i = axis; i < f.rows(); i += d) off += f(i, k) - f_0(i, k);
+      if (most > 0.0) largest = std::max(largest, std::abs(off) / most);
+    }
+  }
+  return largest;
 }
 
 }  // namespace
@@ -91,12 +114,18 @@ std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor&
       gather_blocks(matrix, nodes[k], nodes,
                     {C.data() + std::int64_t{d} * static_cast<std::int64_t>(k) * C.cols(),
                      static_cast<std::size_t>(d * C.cols())});
-    const double error = touch_error(exact.cast<long double>(), C, touch_displacements(arms, d, random), d);
+    const Eigen::MatrixXd u = touch_displacements(arms, d, random);
+    const double error = touch_error(exact.cast<long double>(), C, u, d);
+    const double share = bound_share(matrix, nodes, exact, C, u);
     const std::scoped_lock lock(mutex);
     of_count.errors.push_back(error);
+    if (share > 0.0) of_count.bound_shares.push_back(share);
     if (!progress(static_cast<double>(++done) / static_cast<double>(all))) stopped = true;
   });
-  for (TouchErrors& of_count : result) std::sort(of_count.errors.begin(), of_count.errors.end());
+  for (TouchErrors& of_count : result) {
+    std::sort(of_count.errors.begin(), of_count.errors.end());
+    std::sort(of_count.bound_shares.begin(), of_count.bound_shares.end());
+  }
   return result;
 }
 

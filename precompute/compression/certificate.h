@@ -18,7 +18,13 @@ namespace palpate {
 struct TouchErrors {
   Index nodes = 0;
   std::vector<double> errors;  ///< ascending
+  /// What the touches' total forces are off by over what ErrorBound says they are at most, ascending; of
+  /// those where it says anything, the largest over axes and displacements.
+  std::vector<double> bound_shares{};
 
+  [[nodiscard]] double largest_bound_share() const {
+    return bound_shares.empty() ? 0.0 : bound_shares.back();
+  }
   [[nodiscard]] double quantile(double share) const {
     return errors.empty() ? 0.0 : errors[static_cast<std::size_t>(share * double(errors.size() - 1))];
   }

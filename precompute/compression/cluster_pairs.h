@@ -11,7 +11,7 @@ namespace palpate {
 
 /// How nodes are put into clusters.
 struct ClusterOptions {
-  Index leaf = 48;   ///< most nodes of a leaf; one more where N is not a multiple of the leaves
+  Index leaf = 32;   ///< most nodes of a leaf; one more where N is not a multiple of the leaves
   double eta = 2.0;  ///< clusters are far when the larger diameter is at most eta times their distance
 };
 

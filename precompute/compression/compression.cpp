@@ -5,12 +5,14 @@
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <numeric>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "matrices/hierarchical_product.h"
 #include "precompute/compression/recompression.h"
 #include "precompute/compression/selected_solver.h"
 
@@ -22,11 +24,12 @@ using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using Dofs = std::vector<std::int64_t>;
 
 constexpr Index spare_samples = 12;     // more than the largest rank: what they say of it is certain
-constexpr double skeleton_share = 0.5;  // of the cut: skeletons are not to add to the error
+constexpr double skeleton_share = 0.2;  // of the cut: skeletons are not to add to the error
 constexpr Index samples = random_loads;
 constexpr std::size_t columns_at_once = 200;  // of couplings, solved together
 constexpr Index leaves_estimated = 64;        // whose flops are counted for an estimate
-constexpr std::int64_t loads_at_once = 64;    // solved together
+constexpr std::int64_t loads_at_once = 32;    // solved together
+constexpr Index checks = 32;                  // more loads, that tell how far off the pairs are
 
 std::size_t at(std::int64_t i) {
   return static_cast<std::size_t>(i);
@@ -38,15 +41,24 @@ struct Interpolation {
   Eigen::MatrixXd follow;              ///< [rows x skeleton], the identity in the skeleton
 };
 
-/// Interpolation of the rows of A, cut off where what is left of them is at most `cut`.
-Interpolation interpolate(const Rows& A, double cut) {
+/// Interpolation of the rows of A by as few of them as leave of W (A - follow A) at most `cut`, Frobenius'
+/// norm.
+Interpolation interpolate(const Rows& A, const Eigen::MatrixXd& W, double cut) {
   if (A.rows() == 0) return {};  // of children that need no terms
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(A.transpose());
-  const auto& R = qr.matrixR();
-  Eigen::Index rank = 0;
-  while (rank < std::min(R.rows(), R.cols()) && std::abs(R(rank, rank)) > cut) ++rank;
-  const Eigen::Index rows = A.rows();
+  const Eigen::Index rows = A.rows(), most = std::min(A.rows(), A.cols());
+  const Eigen::MatrixXd R = qr.matrixR().topRows(most).triangularView<Eigen::Upper>();
   const auto& order = qr.colsPermutation().indices();
+  const Eigen::MatrixXd weights = W * qr.colsPermutation();
+  const auto left = [&](Eigen::Index rank) {
+    const auto others = weights.rightCols(rows - rank);
+    return (others * R.bottomRightCorner(most - rank, rows - rank).transpose()).norm();
+  };
+  Eigen::Index rank = 0;
+  for (Eigen::Index end = most; rank < end;) {  // the first with which little enough is left
+    const Eigen::Index middle = (rank + end) / 2;
+    left(middle) <= cut ? end = middle : rank = middle + 1;
+  }
   Interpolation result;
   result.follow = Eigen::MatrixXd::Zero(rows, rank);
   const Eigen::MatrixXd T = R.topLeftCorner(rank, rank)
@@ -85,13 +97,17 @@ struct Compression::Impl {
   bool sample();
   bool climb(double cut);
   [[nodiscard]] HierarchicalMatrix packed();
+  void check(HierarchicalMatrix& matrix);
 
  private:
   /// What is known of a cluster while its level is worked on.
   struct Front {
-    Dofs skeleton;      ///< stored dofs
-    Rows response;      ///< [skeleton x samples] to loads that are far, each row over the root of D
-    Rows load;          ///< [skeleton x samples]
+    Dofs skeleton;  ///< stored dofs
+    Rows response;  ///< [skeleton x samples] to loads that are far, each row over the root of D
+    Rows load;      ///< [skeleton x samples]
+    /// What an error of the responses is on the leaves: W e is as long as L^-1 times what the dofs of the
+    /// cluster are off by, L the roots of the leaves.
+    Eigen::MatrixXd W;
     Eigen::MatrixXd V;  ///< of a leaf V, of others E of both children, one under the other
   };
 
@@ -144,7 +160,7 @@ struct Compression::Impl {
   HierarchicalMatrix matrix_;
   std::shared_ptr<float[]> near_;
   Eigen::VectorXd root_;             // [order] of D, 0 where held
-  Rows response_, load_;             // [order x samples]
+  Rows response_, load_;             // [order x (samples + checks)]
   std::vector<Front> fronts_;        // [clusters]
   std::vector<FloatRows> coupling_;  // [far pairs]
   std::vector<SelectedSolver::Workspace> workspaces_;
@@ -192,15 +208,21 @@ void Compression::Impl::solve_near_of(Index leaf, std::span<float> entries,
     for (std::int64_t j = i + 1; j < width; ++j) entries[at(i * width + j)] = entries[at(j * width + i)];
 }
 
-/// Loads of +-1 over the root of D on every stored dof, and what they do.
+/// Loads L^-T (+-1) on every leaf, L its root, and what they do.
 bool Compression::Impl::sample() {
-  const std::int64_t n = matrix_.order(), m = samples;
+  const std::int64_t n = matrix_.order(), m = samples + checks;
   load_.resize(n, m);
   response_.resize(n, m);
   std::mt19937_64 random(20261125);
   for (std::int64_t i = 0; i < n; ++i)
     for (std::int64_t k = 0; k < m; ++k)
-      load_(i, k) = root_[i] > 0.0 ? ((random() >> 63) != 0 ? 1.0 : -1.0) / root_[i] : 0.0;
+      load_(i, k) = root_[i] > 0.0 ? ((random() >> 63) != 0 ? 1.0 : -1.0) : 0.0;
+  parallel_for(matrix_.tree.leaves(), jobs_, [&](std::int64_t leaf, int) {
+    const Index c = matrix_.tree.first_leaf() + static_cast<Index>(leaf);
+    auto of_leaf = load_.middleRows(first_dof(c), end_dof(c) - first_dof(c));
+    const Eigen::MatrixXd L = root_of_leaf(matrix_, static_cast<Index>(leaf));
+    L.transpose().triangularView<Eigen::Upper>().solveInPlace(of_leaf);
+  });
   done_ = 0;
   const std::int64_t blocks = m / loads_at_once;
   parallel_for(blocks, jobs_, [&](std::int64_t block, int worker) {
@@ -221,12 +243,12 @@ Compression::Impl::Front Compression::Impl::leaf_front(Index leaf) const {
   Front front;
   const std::int64_t first = first_dof(leaf), n = end_dof(leaf) - first;
   for (std::int64_t i = 0; i < n; ++i) front.skeleton.push_back(first + i);
-  front.response = response_.middleRows(first, n);
-  front.load = load_.middleRows(first, n);
+  front.response = response_.block(first, 0, n, samples);
+  front.load = load_.block(first, 0, n, samples);
   for (const auto& [other, pair] : neighbours(leaf)) {
     const std::int64_t width = end_dof(other) - first_dof(other);
     const float* near = near_.get() + matrix_.near_at[at(pair)];
-    const auto loads = load_.middleRows(first_dof(other), width);
+    const auto loads = load_.block(first_dof(other), 0, width, samples);
     if (leaf >= other) {
       const FloatRows block = Eigen::Map<const FloatRows>(near, n, width);
       front.response.noalias() -= block.cast<double>() * loads;
@@ -237,6 +259,9 @@ Compression::Impl::Front Compression::Impl::leaf_front(Index leaf) const {
   }
   for (std::int64_t i = 0; i < n; ++i)
     front.response.row(i) *= root_[first + i] > 0.0 ? 1.0 / root_[first + i] : 0.0;
+  front.W = root_of_leaf(matrix_, leaf - matrix_.tree.first_leaf())
+                .triangularView<Eigen::Lower>()
+                .solve(Eigen::MatrixXd(root_.segment(first, n).asDiagonal()));
   return front;
 }
 
@@ -251,12 +276,16 @@ Compression::Impl::Front Compression::Impl::joined_front(Index c) {
   front.response << a.response, b.response;
   front.load.resize(front.response.rows(), m);
   front.load << a.load, b.load;
+  front.W = Eigen::MatrixXd::Zero(a.W.rows() + b.W.rows(), a.W.cols() + b.W.cols());
+  front.W.topLeftCorner(a.W.rows(), a.W.cols()) = a.W;
+  front.W.bottomRightCorner(b.W.rows(), b.W.cols()) = b.W;
   return front;
 }
 
 /// Chooses the skeleton among the dofs of the front and carries loads and responses over to it.
 void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
-  const Interpolation chosen = interpolate(front.response, cut * std::sqrt(double(samples)));
+  const Interpolation chosen = interpolate(
+      front.response, front.W, cut * std::sqrt(double(samples) * double(end_dof(c) - first_dof(c))));
   const auto rank = std::ssize(chosen.skeleton);
   // Where all are in it nothing is cut off, whatever the samples say.
   if (rank > samples - spare_samples && rank < front.response.rows()) {
@@ -277,6 +306,8 @@ void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
     thin.response.row(k) = front.response.row(i);
   }
   thin.load = thin.V.transpose() * front.load;
+  const Eigen::MatrixXd W = front.W * chosen.follow;
+  thin.W = W.householderQr().matrixQR().topRows(std::min(W.rows(), W.cols())).triangularView<Eigen::Upper>();
   front = std::move(thin);
 }
 
@@ -362,16 +393,19 @@ bool Compression::Impl::climb(double cut) {
     });
     const std::vector<Index> groups = groups_of(first, clusters);
     parallel_for(std::ssize(groups) - 1, jobs_, [&](std::int64_t group, int worker) {
-      if (!stopped()) couple(groups[at(group)], groups[at(group + 1)], workspaces_[at(worker)]);
+      if (stopped()) return;
+      couple(groups[at(group)], groups[at(group + 1)], workspaces_[at(worker)]);
+      for (Index c = groups[at(group)]; c < groups[at(group + 1)]; ++c)
+        if (needed[at(c)] && !stopped()) tick(CompressionStage::far, count);
     });
-    for_each([&](Index c, int) {
-      take_off(c);
-      tick(CompressionStage::far, count);
-    });
+    for_each([&](Index c, int) { take_off(c); });
     if (stopped_) return false;
     if (level == tree.levels) continue;
     const Index below = tree.first_of_level(level + 1);
-    for (Index c = below; c < below + 2 * clusters; ++c) fronts_[at(c)].response = fronts_[at(c)].load = {};
+    for (Index c = below; c < below + 2 * clusters; ++c) {
+      fronts_[at(c)].response = fronts_[at(c)].load = {};
+      fronts_[at(c)].W = {};
+    }
   }
   return true;
 }
@@ -408,6 +442,41 @@ HierarchicalMatrix Compression::Impl::packed() {
   return matrix;
 }
 
+/// Skeletons have errors of their own: what loads that chose nothing tell beyond what pair_error has is
+/// shared out in proportion to the pairs. Their bases are orthonormal, but for L.
+void Compression::Impl::check(HierarchicalMatrix& matrix) {
+  std::vector<Index> nodes(at(matrix.tree.nodes));
+  std::iota(nodes.begin(), nodes.end(), 0);
+  const NodeRange all{0, matrix.tree.nodes};
+  Rows missing(matrix.order(), checks);
+  parallel_for(checks, jobs_, [&](std::int64_t k, int) {
+    const Eigen::VectorXd f = load_.col(samples + k);
+    Eigen::VectorXd u(f.size());
+    displace(matrix, nodes, {f.data(), at(f.size())}, {&all, 1}, {u.data(), at(u.size())});
+    missing.col(k) = response_.col(samples + k) - u;
+  });
+  std::vector<double> squared(at(matrix.tree.leaves()));
+  parallel_for(matrix.tree.leaves(), jobs_, [&](std::int64_t leaf, int) {
+    const Index c = matrix.tree.first_leaf() + static_cast<Index>(leaf);
+    Rows of_leaf = missing.middleRows(first_dof(c), end_dof(c) - first_dof(c));
+    root_of_leaf(matrix, static_cast<Index>(leaf)).triangularView<Eigen::Lower>().solveInPlace(of_leaf);
+    squared[at(leaf)] = of_leaf.squaredNorm() / double(checks);
+  });
+  const double measured = std::accumulate(squared.begin(), squared.end(), 0.0);
+  std::vector<double> of_pair(matrix.pair_error.size());
+  for (std::size_t p = 0; p < of_pair.size(); ++p) {
+    const std::span entries(matrix.coupling.get() + matrix.coupling_at[p],
+                            matrix.coupling.get() + matrix.coupling_at[p + 1]);
+    for (const float entry : entries) of_pair[p] += double{entry} * double{entry};
+  }
+  const double whole = std::accumulate(of_pair.begin(), of_pair.end(), 0.0);
+  double known = 0.0;
+  for (const double e : matrix.pair_error) known += e * e;
+  const double share = whole > 0.0 ? std::max(0.5 * measured - known, 0.0) / whole : 0.0;
+  for (std::size_t p = 0; p < of_pair.size(); ++p)
+    matrix.pair_error[p] = std::hypot(matrix.pair_error[p], std::sqrt(share * of_pair[p]));
+}
+
 Compression::Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
                          const ClusteredNodes& nodes, int jobs, CompressionProgress progress)
     : impl_(std::make_unique<Impl>(factor, stored_dofs, dimension, nodes, jobs, std::move(progress))) {}
@@ -420,7 +489,9 @@ bool Compression::prepare(const NearStore& store) {
 
 std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {
   if (!impl_->climb(skeleton_share * cut)) return nullptr;
-  return std::make_shared<HierarchicalMatrix>(recompressed(impl_->packed(), cut, impl_->jobs()));
+  auto matrix = std::make_shared<HierarchicalMatrix>(recompressed(impl_->packed(), cut, impl_->jobs()));
+  impl_->check(*matrix);
+  return matrix;
 }
 
 HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension) {

@@ -50,9 +50,9 @@ class Compression {
   /// Solves for near pairs and random loads. False when `progress` said stop.
   bool prepare(const NearStore& store = {});
 
-  /// The matrix, cut off where rows of D^-1/2 Xi D^-1/2, D the diagonal of Xi, are moved by at most `cut` by
-  /// random loads of +-1 on all that is far. Once prepared, for any number of cuts. Null when `progress` said
-  /// stop. Throws Error where a rank would be above what the random loads can tell.
+  /// The matrix, cut off where rows of L^-1 Xi L^-T, L the roots of the leaves, are moved by at most `cut` by
+  /// random loads of +-1 on all that is far (see `recompressed`). Once prepared, for any number of cuts. Null
+  /// when `progress` said stop. Throws Error where a rank would be above what the random loads can tell.
   std::shared_ptr<HierarchicalMatrix> compress(double cut);
 
  private:

@@ -23,13 +23,20 @@ Matrix block(const std::shared_ptr<const float[]>& entries, std::int64_t first, 
   return Eigen::Map<const FloatRows>(entries.get() + first, rows, columns).cast<double>();
 }
 
+/// The block of Xi of a leaf with itself.
+Matrix own_block(const HierarchicalMatrix& matrix, Index leaf) {
+  const Index c = matrix.tree.first_leaf() + leaf;
+  const Eigen::Index n = matrix.dimension * (matrix.tree.end(c) - matrix.tree.begin(c));
+  return block(matrix.near, matrix.near_at[at(matrix.first_near_pair(leaf))], n, n);
+}
+
 class Recompression {
  public:
   Recompression(const HierarchicalMatrix& matrix, double cut, int jobs)
       : from_(matrix),
         cut_(cut),
         jobs_(jobs),
-        root_(root_of_diagonal(matrix)),
+        L_(at(matrix.tree.leaves())),
         Q_(at(matrix.tree.clusters())),
         R_(Q_.size()),
         U_(Q_.size()),
@@ -38,6 +45,9 @@ class Recompression {
         S_(matrix.far_pair.size()) {}
 
   HierarchicalMatrix run() {
+    parallel_for(std::ssize(L_), jobs_, [&](std::int64_t leaf, int) {
+      L_[at(leaf)] = root_of_leaf(from_, static_cast<Index>(leaf));
+    });
     for (int level = from_.tree.levels; level >= 0; --level)
       for_level(level, [&](Index c) { orthogonalise(c); });
     parallel_for(std::ssize(S_), jobs_, [&](std::int64_t p, int) {
@@ -62,15 +72,14 @@ class Recompression {
     });
   }
 
-  /// Q R of a leaf's V over the root of D, and of the children's R E.
+  /// Q R of a leaf's L^-1 V, and of the children's R E.
   void orthogonalise(Index c) {
     Matrix V;
     if (is_leaf(c)) {
-      const std::int64_t first = std::int64_t{from_.dimension} * from_.tree.begin(c),
-                         end = std::int64_t{from_.dimension} * from_.tree.end(c);
-      V = block(from_.basis, from_.basis_at[at(c - from_.tree.first_leaf())], end - first, rank(c));
-      for (std::int64_t i = 0; i < end - first; ++i)
-        V.row(i) *= root_[at(first + i)] > 0.0 ? 1.0 / root_[at(first + i)] : 0.0;
+      const std::int64_t leaf = c - from_.tree.first_leaf();
+      const Matrix& L = L_[at(leaf)];
+      V = L.triangularView<Eigen::Lower>().solve(
+          block(from_.basis, from_.basis_at[at(leaf)], L.rows(), rank(c)));
     } else {
       const Index a = 2 * c + 1, b = 2 * c + 2;
       V.resize(R_[at(a)].rows() + R_[at(b)].rows(), rank(c));
@@ -83,7 +92,7 @@ class Recompression {
     R_[at(c)] = qr.matrixQR().topRows(k).triangularView<Eigen::Upper>();
   }
 
-  /// What far loads of +-1 do to a cluster, in its orthonormal basis: their covariance.
+  /// What far loads do to a cluster, in its orthonormal basis: their covariance.
   void weigh(Index c) {
     const Eigen::Index k = Q_[at(c)].cols();
     Matrix G = Matrix::Zero(k, k);
@@ -103,7 +112,7 @@ class Recompression {
     weights_[at(c)] = std::move(G);
   }
 
-  /// Drops the directions without which no row of the cluster is moved by more than the cut.
+  /// Drops the directions without which no row of the cluster's leaves is moved by more than the cut.
   void truncate(Index c) {
     rows_[at(c)] = spread_out(c);
     const Eigen::SelfAdjointEigenSolver<Matrix> eigen(weights_[at(c)]);
@@ -141,8 +150,64 @@ class Recompression {
     return child == 2 * parent + 1 ? Q.topRows(first) : Q.bottomRows(Q.rows() - first);
   }
 
-  [[nodiscard]] HierarchicalMatrix packed() const {
+  /// E of a child with the bases that are kept.
+  [[nodiscard]] Matrix transfer_of(Index parent, Index child) const {
+    return U_[at(child)].transpose() * part(parent, child) * U_[at(parent)];
+  }
+
+  /// S of a pair with these bases.
+  [[nodiscard]] Matrix coupling_of(std::size_t pair) const {
+    const auto [row, column] = from_.far_pair[pair];
+    return U_[at(row)].transpose() * S_[pair].cast<double>() * U_[at(column)];
+  }
+
+  /// With V' the basis of a cluster that is kept, nested as it is stored, and V that of before: V^T V' and
+  /// V'^T V'.
+  struct Products {
+    Matrix with_old, with_itself;
+  };
+
+  [[nodiscard]] std::vector<Products> products() {
+    std::vector<Products> all(U_.size());
+    for (int level = from_.tree.levels; level >= 0; --level) {
+      for_level(level, [&](Index c) {
+        Products& of = all[at(c)];
+        const Eigen::Index kept = U_[at(c)].cols();
+        if (is_leaf(c)) {
+          of = {U_[at(c)], Matrix::Identity(kept, kept)};
+          return;
+        }
+        of = {Matrix::Zero(Q_[at(c)].cols(), kept), Matrix::Zero(kept, kept)};
+        for (const Index child : {2 * c + 1, 2 * c + 2}) {
+          if (rank(child) == 0) continue;
+          const Matrix E = transfer_of(c, child);
+          of.with_old.noalias() += part(c, child).transpose() * all[at(child)].with_old * E;
+          of.with_itself.noalias() += E.transpose() * all[at(child)].with_itself * E;
+        }
+      });
+    }
+    return all;
+  }
+
+  /// |V S V^T - V' S' V'^T| of each pair, Frobenius' norm.
+  [[nodiscard]] std::vector<double> pair_errors() {
+    const std::vector<Products> all = products();
+    std::vector<double> errors(S_.size());
+    parallel_for(std::ssize(S_), jobs_, [&](std::int64_t p, int) {
+      const auto [row, column] = from_.far_pair[at(p)];
+      const Products &a = all[at(row)], &b = all[at(column)];
+      const Matrix S = S_[at(p)].cast<double>(), kept = coupling_of(at(p));
+      const double squared = S.squaredNorm() -
+                             2.0 * (a.with_old.transpose() * S * b.with_old).cwiseProduct(kept).sum() +
+                             (a.with_itself * kept * b.with_itself).cwiseProduct(kept).sum();
+      errors[at(p)] = std::sqrt(std::max(squared, 0.0));
+    });
+    return errors;
+  }
+
+  [[nodiscard]] HierarchicalMatrix packed() {
     HierarchicalMatrix matrix = from_;
+    matrix.pair_error = pair_errors();
     for (std::size_t c = 0; c < U_.size(); ++c) matrix.rank[c] = static_cast<Index>(U_[c].cols());
     matrix.index();
     const auto floats = [](std::int64_t count) {
@@ -155,21 +220,18 @@ class Recompression {
                coupling = floats(matrix.coupling_at.back());
     for (Index c = 0; c < matrix.tree.clusters(); ++c) {
       if (is_leaf(c) && U_[at(c)].cols() > 0) {
-        Matrix V = Q_[at(c)] * U_[at(c)];
-        const std::int64_t first = std::int64_t{matrix.dimension} * matrix.tree.begin(c);
-        for (Eigen::Index i = 0; i < V.rows(); ++i) V.row(i) *= root_[at(first + i)];
-        put(V, basis.get() + matrix.basis_at[at(c - matrix.tree.first_leaf())]);
+        const std::int64_t leaf = c - matrix.tree.first_leaf();
+        const Matrix own = own_block(matrix, static_cast<Index>(leaf));
+        Matrix V = L_[at(leaf)].triangularView<Eigen::Lower>() * (Q_[at(c)] * U_[at(c)]);
+        for (Eigen::Index i = 0; i < V.rows(); ++i)
+          if (own(i, i) == 0.0) V.row(i).setZero();  // held: but for rounding it is zero
+        put(V, basis.get() + matrix.basis_at[at(leaf)]);
       }
       const Index parent = ClusterTree::parent(c);
       if (c > 0 && rank(parent) > 0 && U_[at(c)].cols() > 0)
-        put(U_[at(c)].transpose() * part(parent, c) * U_[at(parent)],
-            transfer.get() + matrix.transfer_at[at(c)]);
+        put(transfer_of(parent, c), transfer.get() + matrix.transfer_at[at(c)]);
     }
-    for (std::size_t p = 0; p < S_.size(); ++p) {
-      const auto [row, column] = matrix.far_pair[p];
-      put(U_[at(row)].transpose() * S_[p].cast<double>() * U_[at(column)],
-          coupling.get() + matrix.coupling_at[p]);
-    }
+    for (std::size_t p = 0; p < S_.size(); ++p) put(coupling_of(p), coupling.get() + matrix.coupling_at[p]);
     matrix.basis = basis;
     matrix.transfer = transfer;
     matrix.coupling = coupling;
@@ -179,7 +241,7 @@ class Recompression {
   const HierarchicalMatrix& from_;
   double cut_;
   int jobs_;
-  std::vector<double> root_;
+  std::vector<Matrix> L_;                           // [leaves]
   std::vector<Matrix> Q_, R_, U_, weights_, rows_;  // [clusters]
   std::vector<FloatRows> S_;                        // [far pairs] between orthonormal bases
 };
@@ -197,6 +259,18 @@ std::vector<double> root_of_diagonal(const HierarchicalMatrix& matrix) {
       root[at(first + i)] = std::sqrt(double{matrix.near[matrix.near_at[p] + i * (count + 1)]});
   }
   return root;
+}
+
+Matrix root_of_leaf(const HierarchicalMatrix& matrix, Index leaf) {
+  Matrix Xi = own_block(matrix, leaf);
+  for (double& own : Xi.diagonal())
+    if (own == 0.0) own = 1.0;  // held
+  const Eigen::LLT<Matrix> factor(Xi);
+  if (factor.info() != Eigen::Success)
+    throw Error("the compliance of " + std::to_string(Xi.rows()) +
+                    " dofs of the surface that are side by side is not positive definite in single precision",
+                "[storage] compression", "Set compression = \"none\"");
+  return factor.matrixL();
 }
 
 HierarchicalMatrix recompressed(const HierarchicalMatrix& matrix, double cut, int jobs) {

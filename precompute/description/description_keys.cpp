@@ -184,8 +184,7 @@ KeyTable storage() {
        {"precision", "", "`\"auto\"`", "`\"auto\"`, `\"single\"`, `\"split\"` or `\"double\"`"},
        {"compression", "", "`\"auto\"`",
         "`\"none\"`: every entry; `\"h2\"`: in nested low-rank form; `\"auto\"`: that from 5 000 stored "
-        "nodes "
-        "on, where neither precision nor packed dynamics are asked for and no Poisson's ratio is above 0.47"},
+        "nodes on, where neither precision nor packed dynamics are asked for"},
        {"tolerance", "", shown(Description{}.tolerance),
         "compressed: largest relative error that forces may have, 1e-4 to 1"}}};
 }

@@ -12,7 +12,6 @@
 #include "base/error.h"
 #include "base/program.h"
 #include "base/spelling.h"
-#include "formats/shrunk_file.h"
 #include "runtime/app/devices_command.h"
 #include "runtime/app/play_command.h"
 #include "runtime/app/probe.h"

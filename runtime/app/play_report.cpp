@@ -52,6 +52,10 @@ void print_loop(const LoopReport& report, bool fast) {
   }
   fmt::print(stderr, "largest force {:.6g} N at {:.3f} s, largest jump between ticks {:.6g} N at {:.3f} s\n",
              report.largest_force, report.largest_force_time, report.largest_jump, report.largest_jump_time);
+  if (report.largest_greens_error > 0.0) {
+    fmt::print(stderr, "compressed Green's functions: forces are off by at most {:.2g} N, at {:.3f} s\n",
+               report.largest_greens_error, report.largest_greens_error_time);
+  }
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     if (report.status_ticks[k] > 0)
       fmt::print(stderr, "{}: {} ticks\n", status_names[k].second, report.status_ticks[k]);
@@ -286,6 +290,10 @@ std::string json_report(const PlayedRun& run) {
   json["largest_force_time_s"] = report.largest_force_time;
   json["largest_jump_N"] = report.largest_jump;
   json["largest_jump_time_s"] = report.largest_jump_time;
+  if (report.largest_greens_error > 0.0) {
+    json["largest_greens_error_N"] = report.largest_greens_error;
+    json["largest_greens_error_time_s"] = report.largest_greens_error_time;
+  }
   json["status_ticks"] = status;
   json["best_effort"] = to_json(report.best_effort);
   json["room"] = json_room(run.state);

@@ -76,6 +76,7 @@ SurfacePicture SessionPictures::picture(std::int64_t frame) const {
     picture.status = static_cast<StepStatus>(then->status);
     picture.force_error = then->force_error;
     picture.left_out = then->left_out;
+    picture.greens_error = then->greens_error;
   }
   return picture;
 }

@@ -96,9 +96,8 @@ int view(const std::filesystem::path& recording, const ViewerOptions& options) {
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
-  ViewerPort port(options);
-  const SessionPictures pictures(recording);
-  const SessionView session(pictures, std::move(port));
+  const SessionPictures pictures(recording);  // a broken file is told whatever else uses the port
+  const SessionView session(pictures, ViewerPort(options));
   fmt::print(stderr, "{}: {} pictures, {:.3f} s\nopen {} in a browser; Ctrl-C ends\n", recording.string(),
              pictures.frames(), pictures.time(pictures.frames() - 1), session.url());
   int signal = 0;

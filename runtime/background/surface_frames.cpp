@@ -85,6 +85,7 @@ void SurfaceFrames::post(const State& state, std::int64_t tick, double time) noe
   next.status = state.status;
   next.force_error = tool.force_error;
   next.left_out = tool.left_out;
+  next.greens_error = tool.greens_error;
   next.tick = tick;
   next.time = time;
   if (options_.in_background) {
@@ -146,6 +147,7 @@ void SurfaceFrames::compute(const Moment& moment) {
   picture.status = moment.status;
   picture.force_error = moment.force_error;
   picture.left_out = moment.left_out;
+  picture.greens_error = moment.greens_error;
   picture.patch = moment.load.patch;
   SurfaceFrame& frame = picture.frame;
   frame.tick = moment.tick;

@@ -33,6 +33,7 @@ struct SurfacePicture {
   StepStatus status = StepStatus::ok;
   double force_error = 0.0;            ///< how far the force may be off, where it is a best effort [N]
   Index left_out = 0;                  ///< contact points that found no room
+  double greens_error = 0.0;           ///< ToolState::greens_error [N]
   std::vector<SeenContact> contacts;   ///< those that are closed
   std::shared_ptr<const Patch> patch;  ///< null: no overlay
   /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
@@ -84,6 +85,7 @@ class SurfaceFrames {
     StepStatus status = StepStatus::ok;
     double force_error = 0.0;
     Index left_out = 0;
+    double greens_error = 0.0;
   };
   /// The interior of a body in the plane.
   struct Interior {

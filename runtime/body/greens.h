@@ -66,6 +66,8 @@ class Greens {
   }  ///< false: used packed, much slower, or compressed
   [[nodiscard]] bool compressed() const noexcept { return compressed_ != nullptr; }
   [[nodiscard]] std::int64_t compressed_bytes() const noexcept;  ///< 0 where it is not
+  /// The stored form, null where it is not compressed.
+  [[nodiscard]] const HierarchicalMatrix* compressed_form() const noexcept { return compressed_.get(); }
 
   /// Xi at (row, column) [d, d] [m/N]: displacement of node `row` by unit forces on node `column`. Not for
   /// the tick: takes memory.

@@ -406,17 +406,12 @@ void NearField::load(Index place, const Vec3& force) noexcept {
   }
 }
 
-/// What the force at a place puts on the patch.
+/// What the force at a place puts on the patch, for those who want the displacement there.
 void NearField::load_patch(Index place) noexcept {
   const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
-  const Index in_patch = patch_place(place);
-  if (in_patch >= 0) load_.add_to_patch(in_patch, f);
-  for (int axis = 0; axis < dimension_; ++axis) {
-    const Index dof = dimension_ * place + axis;
-    const double* on_patch = in_patch >= 0 ? patch()->response(dimension_ * in_patch + axis) : Y(dof);
-    palpate::add(on_patch, f[axis], patch_force_.data(), patch_dofs());
-    if (in_patch < 0) palpate::add(X(dof), f[axis], load_.beside.data(), patch_dofs());
-  }
+  if (patch_place(place) >= 0) return load_.add_to_patch(patch_place(place), f);
+  for (int axis = 0; axis < dimension_; ++axis)
+    palpate::add(X(dimension_ * place + axis), f[axis], load_.beside.data(), patch_dofs());
 }
 
 /// Adds a force to a part of what a place follows.
@@ -425,9 +420,8 @@ void NearField::load_base(std::size_t part, const Vec3& f) noexcept {
   for (int axis = 0; axis < dimension_; ++axis) on_base[axis] += part_weight_[part] * f[axis];
 }
 
-/// What the force at a place puts on stored nodes.
-void NearField::load_bases(Index place) noexcept {
-  const Vec3 f = force(place);
+/// What a force at a place puts on stored nodes.
+void NearField::load_bases(Index place, const Vec3& f) noexcept {
   std::size_t part = at(parts_ * place);
   if (is_group(place)) {
     for_each_member(place, [&](Index, double, const Eigen::Matrix3d& map) { load_base(part++, map * f); });
@@ -436,31 +430,59 @@ void NearField::load_bases(Index place) noexcept {
   for (Index k = 0; k < part_count_[at(place)]; ++k) load_base(part++, f);
 }
 
+/// What forces [d m] put on stored nodes and on Q.
+void NearField::spread(std::span<const double> forces) noexcept {
+  std::fill_n(base_force_.data(), dimension_ * base_count_, 0.0);
+  std::fill(patch_force_.begin(), patch_force_.end(), 0.0);
+  for (Index place = 0; place < count_; ++place) {
+    const Vec3 f = vector_at(forces, dimension_, place);
+    if (f.isZero(0.0)) continue;
+    load_bases(place, f);
+    if (patch() == nullptr) continue;
+    const Index in_patch = patch_place(place);
+    for (int axis = 0; axis < dimension_; ++axis) {
+      const double* on_patch =
+          in_patch >= 0 ? patch()->response(dimension_ * in_patch + axis) : Y(dimension_ * place + axis);
+      palpate::add(on_patch, f[axis], patch_force_.data(), patch_dofs());
+    }
+  }
+}
+
+/// Calls visit(stored node, force) for what `spread` found.
+template <class Visit>
+void NearField::for_each_stored_force(Visit&& visit) const noexcept {
+  const auto go = [&](const Index* stored, const double* force, Index count) {
+    for (Index k = 0; k < count; ++k) {
+      const double* f = force + std::ptrdiff_t{dimension_} * k;
+      if (std::any_of(f, f + dimension_, [](double value) { return value != 0.0; })) visit(stored[k], f);
+    }
+  };
+  go(base_.data(), base_force_.data(), base_count_);
+  if (patch() == nullptr) return;
+  const std::span<const Index> Q = patch()->stored_nodes();
+  go(Q.data(), patch_force_.data(), static_cast<Index>(Q.size()));
+}
+
 void NearField::displace() noexcept {
   const std::ptrdiff_t width = std::ptrdiff_t{dimension_} * count_;
   std::fill_n(displacement_.data(), width, 0.0);
-  std::fill_n(base_force_.data(), dimension_ * base_count_, 0.0);
-  std::fill(patch_force_.begin(), patch_force_.end(), 0.0);
   load_.clear();
   for (Index place = 0; place < count_; ++place) {
     if (!is_loaded(place)) continue;
     const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
     for (int axis = 0; axis < dimension_; ++axis)
       palpate::add(row(dimension_ * place + axis).data(), f[axis], displacement_.data(), width);
-    load_bases(place);
     if (patch() != nullptr) load_patch(place);
   }
-  const auto add = [&](const Index* stored, const double* force, Index count) {
-    for (Index k = 0; k < count; ++k) {
-      const double* f = force + std::ptrdiff_t{dimension_} * k;
-      if (std::any_of(f, f + dimension_, [](double value) { return value != 0.0; })) load_.add(stored[k], f);
-    }
-  };
-  add(base_.data(), base_force_.data(), base_count_);
-  if (patch() != nullptr) {
-    const std::span<const Index> Q = patch()->stored_nodes();
-    add(Q.data(), patch_force_.data(), static_cast<Index>(Q.size()));
-  }
+  spread(force_);
+  for_each_stored_force([this](Index stored, const double* f) { load_.add(stored, f); });
+}
+
+void NearField::put_on_stored_nodes(std::span<const double> forces, NodalLoad& stored) noexcept {
+  spread(forces);
+  for_each_stored_force([&](Index node, const double* f) {
+    stored.add({&node, 1}, {f, static_cast<std::size_t>(dimension_)}, 1.0);
+  });
 }
 
 Vec3 NearField::force(Index place) const noexcept {

@@ -8,6 +8,7 @@
 
 #include "base/memory.h"
 #include "runtime/body/body.h"
+#include "runtime/body/nodal_load.h"
 #include "runtime/body/patch.h"
 #include "runtime/body/surface_load.h"
 
@@ -95,6 +96,10 @@ class NearField {
   /// from.
   void displace() noexcept;
 
+  /// Adds what forces [d m] at the places here put on stored nodes, as `load` has it of the forces that are
+  /// here; as many as there is room for.
+  void put_on_stored_nodes(std::span<const double> forces, NodalLoad& stored) noexcept;
+
   /// Force on the body at a place [N].
   [[nodiscard]] Vec3 force(Index place) const noexcept;
   /// Displacement at a place by the forces of the last `displace` [m].
@@ -117,9 +122,12 @@ class NearField {
   void connect_within_patch(Index place) noexcept;
   void connect_beside_patch(const Body& body, Index place) noexcept;
   void respond(const Body& body, Index place) noexcept;
+  void spread(std::span<const double> forces) noexcept;
   void load_base(std::size_t part, const Vec3& f) noexcept;
-  void load_bases(Index place) noexcept;
+  void load_bases(Index place, const Vec3& f) noexcept;
   void load_patch(Index place) noexcept;
+  template <class Visit>
+  void for_each_stored_force(Visit&& visit) const noexcept;
   [[nodiscard]] Index longest_unwanted() const noexcept;
   [[nodiscard]] bool is_loaded(Index place) const noexcept;
   [[nodiscard]] Index patch_place(Index place) const noexcept { return place_in_patch(node(place)); }

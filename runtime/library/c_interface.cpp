@@ -91,6 +91,7 @@ palpate_result to_result(const ToolState& state) noexcept {
   result.local_radius = state.local.radius;
   result.force_error = state.force_error;
   result.left_out = state.left_out;
+  result.greens_error = state.greens_error;
   return result;
 }
 

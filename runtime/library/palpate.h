@@ -158,13 +158,15 @@ typedef struct palpate_result {
   double force_error;         /* how far `force` may be from what the contact asks for, about, where the tick
                                * was a best effort (PALPATE_NOT_CONVERGED, or left_out is not 0); else 0 [N] */
   int left_out;               /* contact points that the tool presses on and that found no room */
+  double greens_error;        /* what `force` may be off by at most as compressed Green's functions are not
+                               * exact; 0 where they are [N] */
 } palpate_result;
 
 /* All zero. */
 #define PALPATE_RESULT_INIT                                                                             \
   {                                                                                                     \
     sizeof(palpate_result), {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, 0, \
-        {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0, 0                     \
+        {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0, 0, 0.0                \
   }
 
 /* Fills the members that `result` has for tool 0, 1, ... Returns 0; -1 where the number is none, and all is

@@ -228,6 +228,8 @@ class Loop {
     note_largest(force.stableNorm(), time(), report_.largest_force, report_.largest_force_time);
     note_largest((force - force_before).stableNorm(), time(), report_.largest_jump,
                  report_.largest_jump_time);
+    note_largest(tool().greens_error, time(), report_.largest_greens_error,
+                 report_.largest_greens_error_time);
     report_.largest_shown = std::max(report_.largest_shown, shown_.wrench.force.stableNorm());
     for (std::size_t k = 0; k < status_names.size(); ++k) {
       if (has(state.status, status_names[k].first)) ++report_.status_ticks[k];
@@ -305,6 +307,7 @@ class Loop {
     record.motion_step = parts_.state.surface.motion.sample_step();
     record.force_error = static_cast<float>(std::min<double>(tool().force_error, largest_float));
     record.left_out = tool().left_out;
+    record.greens_error = static_cast<float>(std::min<double>(tool().greens_error, largest_float));
 
     set(record.handle_position, news_.state.pose.position);
     set(record.handle_orientation, news_.state.pose.orientation);

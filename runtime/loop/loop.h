@@ -63,16 +63,18 @@ struct LoopReport {
   std::int64_t rate = default_rate;
   std::int64_t ticks = 0;
   std::int64_t ticks_in_contact = 0;
-  std::int64_t ticks_begun_inside = 0;  ///< from the first on, until the tool was out of the body
-  Index most_contacts = 0;              ///< closed contact points in one tick
-  std::int64_t deadline_misses = 0;     ///< ticks that were not done when the next one was due
-  TimeHistogram lateness;               ///< from when a tick was due to when it began [ns]
-  TimeHistogram compute;                ///< of the choice of the overlay and `step` [ns]
-  double largest_force = 0.0;           ///< computed, on the body's side [N]
-  double largest_force_time = 0.0;      ///< [s]
-  double largest_jump = 0.0;            ///< of it between two ticks [N]
-  double largest_jump_time = 0.0;       ///< of the second one [s]
-  double largest_shown = 0.0;           ///< of the force that the device was shown [N]
+  std::int64_t ticks_begun_inside = 0;     ///< from the first on, until the tool was out of the body
+  Index most_contacts = 0;                 ///< closed contact points in one tick
+  std::int64_t deadline_misses = 0;        ///< ticks that were not done when the next one was due
+  TimeHistogram lateness;                  ///< from when a tick was due to when it began [ns]
+  TimeHistogram compute;                   ///< of the choice of the overlay and `step` [ns]
+  double largest_force = 0.0;              ///< computed, on the body's side [N]
+  double largest_force_time = 0.0;         ///< [s]
+  double largest_jump = 0.0;               ///< of it between two ticks [N]
+  double largest_jump_time = 0.0;          ///< of the second one [s]
+  double largest_greens_error = 0.0;       ///< of ToolState::greens_error [N]
+  double largest_greens_error_time = 0.0;  ///< [s]
+  double largest_shown = 0.0;              ///< of the force that the device was shown [N]
   std::array<std::int64_t, status_names.size()>
       status_ticks{};  ///< ticks with each status bit, in the order of status_names
   BestEffort best_effort;

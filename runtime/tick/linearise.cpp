@@ -9,6 +9,7 @@
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/contact_solution.h"
 #include "runtime/tick/force_error.h"
+#include "runtime/tick/greens_error.h"
 #include "runtime/tick/linearise_rolling.h"
 #include "runtime/tick/rolling.h"
 
@@ -173,6 +174,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
     torque.col(axis) = change.torque;
     keep_closed_contacts(state, scratch, tool, axis * rows);
     note_answer(scratch, number, axis, axis * rows);
+    note_greens_error(state.surface.near, scratch, tool, axis * rows);
   }
   keep_open_contacts(state, scratch.problem, tool, number);
   if (force.allFinite()) tool.local.stiffness = passive(-force);
@@ -187,6 +189,7 @@ void linearise_tool(State& state, Scratch& scratch, Index number, double edge) n
 
 void linearise(const Body& body, State& state, Scratch& scratch) noexcept {
   begin_force_error(scratch);
+  begin_greens_error(state.surface.near, scratch);
   for (Index k = 0; k < static_cast<Index>(state.tools.size()); ++k)
     linearise_tool(state, scratch, k, body.mean_surface_edge());
 }

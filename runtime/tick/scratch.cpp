@@ -63,7 +63,7 @@ MergingScratch::MergingScratch(Index surface_nodes, Index groups, Index most_mem
       maps(weights.size(), Eigen::Matrix3d::Zero()),
       feature(size(groups), -1) {}
 
-Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes)
+Scratch::Scratch(const Body& body, Index tools, Index max_contacts, const NearField& near)
     : last_contacts(size(max_contacts)),
       last_of_feature(places_of_features(max_contacts), -1),
       found(body.surface_friction().size()),
@@ -78,13 +78,13 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
               most_rows(body, many(max_contacts))),
       rows(size(most_rows(body, max_contacts))),
-      row_response(size(body.dimension() * near_nodes)),
+      row_response(size(body.dimension() * near.capacity())),
       guess_force(row_response.size()),
       upcoming(last_contacts.size()),
       order(last_contacts.size()),
       response(last_contacts.size()),
       last_response(last_contacts.size()),
-      compliance(most_rows(body, many(max_contacts)), body.dimension() * near_nodes),
+      compliance(most_rows(body, many(max_contacts)), body.dimension() * near.capacity()),
       coupling(size(6 * most_rows(body, many(max_contacts)))),
       tilt_spring(rows.size()),
       active_set(few_rows(body, max_contacts)),
@@ -94,6 +94,7 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, Index near_n
       missing_force(size(tools), Vec3::Zero()),
       left_out_nodes(most_sampled),
       left_out_blocks(size(body.dimension() * body.dimension()) * most_sampled),
+      greens_error(body, near),
       row_change(size(body.dimension()) * rows.size()),
       force_change(row_change.size()),
       rolling(body.dimension(), max_contacts, static_cast<Index>(rows.size())),

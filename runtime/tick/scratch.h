@@ -12,6 +12,7 @@
 #include "runtime/solve/imbalance.h"
 #include "runtime/solve/newton_krylov.h"
 #include "runtime/tick/compliance.h"
+#include "runtime/tick/greens_error.h"
 #include "runtime/tick/rolling.h"
 #include "runtime/touch/contact_point.h"
 #include "runtime/touch/touching_pair.h"
@@ -57,8 +58,8 @@ struct MergingScratch {
 /// the compliance and responses of many contacts, without which they are computed from nothing; the problem's
 /// forces may be read until the next tick. Sized at start. Each member: shape, who fills it.
 struct Scratch {
-  /// Room for the tools' contacts: `max_contacts` of all tools together, `near_nodes` nodes near them.
-  Scratch(const Body& body, Index tools, Index max_contacts, Index near_nodes);
+  /// Room for the tools' contacts: `max_contacts` of all tools together, and what fits into the near field.
+  Scratch(const Body& body, Index tools, Index max_contacts, const NearField& near);
 
   std::vector<ContactPoint> last_contacts;  ///< [max_contacts] `remember`: of the tick or pass before
   Index last_count = 0;
@@ -99,6 +100,7 @@ struct Scratch {
   std::vector<Vec3> missing_force;       ///< [tools] force error: of the solver [N]
   std::vector<Index> left_out_nodes;     ///< [sampled] force error: stored nodes
   std::vector<double> left_out_blocks;   ///< [d x d sampled] force error: Xi of these [m/N]
+  GreensErrorScratch greens_error;       ///< linearise: of compressed Green's functions
   std::vector<double> row_change;        ///< [d x rows] linearise: db, an axis after the other [m]
   std::vector<double> force_change;      ///< [d x rows] linearise: dlambda [N]
   RollingScratch rolling;                ///< linearise: the turning of normals

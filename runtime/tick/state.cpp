@@ -105,6 +105,6 @@ State::State(const Body& body, const StateOptions& options)
       tools(make_tools(options)),
       contact_points(options.max_contacts),
       surface(make_surface(body, options)),
-      scratch(body, static_cast<Index>(tools.size()), options.max_contacts, near_room(body, options)) {}
+      scratch(body, static_cast<Index>(tools.size()), options.max_contacts, surface.near) {}
 
 }  // namespace palpate

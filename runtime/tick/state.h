@@ -38,6 +38,8 @@ struct ToolState {
   Index contacts = 0;         ///< closed contact points
   double force_error = 0.0;   ///< how far contact_wrench.force may be from what it is to be, where the solver
                               ///< was cut short or contact points were left out; else 0 [N]
+  double greens_error = 0.0;  ///< what contact_wrench.force may be off by as compressed Green's functions are
+                              ///< not exact, at most (ErrorBound); 0 where they are [N]
   Index left_out = 0;         ///< contact points that the tool presses on and that found no room
   bool placed = false;        ///< has had a pose
   bool engaged = false;       ///< can touch

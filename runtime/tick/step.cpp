@@ -23,6 +23,7 @@ void begin_tick(State& state) noexcept {
   for (ToolState& tool : state.tools) {
     tool.status = StepStatus::ok;
     tool.force_error = 0.0;
+    tool.greens_error = 0.0;
     tool.left_out = 0;
     tool.touched_last_tick = tool.contacts > 0;
     tool.held_last_tick = tool.holding;

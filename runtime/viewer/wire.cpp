@@ -145,6 +145,7 @@ std::string encode_frame(const SurfacePicture& picture, const Scene& scene, cons
   message.add_count(pressures.size());
   message.add(static_cast<float>(picture.force_error));
   message.add_count(static_cast<std::size_t>(picture.left_out));
+  message.add(static_cast<float>(picture.greens_error));
   for (const SeenContact& contact : picture.contacts) {
     message.add_vector(contact.position);
     message.add_vector(contact.normal);

@@ -5,11 +5,19 @@
 //
 // A generated block with 4 000 free surface nodes, and the liver where meshes/models/liver/liver.inr.gz is
 // (scripts/demo and scripts/test put it there). PALPATE_BENCH_MODEL=DIR/model.toml measures that body
-// instead.
+// instead. PALPATE_BENCH_MODEL=NAME.palpate.hdf, a compressed model, measures new_node/... alone: there is
+// nothing dense beside 100 000 surface nodes.
+//
+// new_node/N: what a node that comes into contact costs beside N that are: its blocks at them and itself.
+// /walk: the nodes come one after another around a place, as under a tool that moves; /cold: each comes at
+// another place, and nothing of the matrix is in a cache. Counters: median, 99.9 % and worst [us];
+// work_99.9%: of the least time of each arrival in ten rounds, without what else the machine does. The times
+// of /cold are with what empties the caches.
 #include <benchmark/benchmark.h>
 #include <cblas.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -19,7 +27,9 @@
 #include <thread>
 #include <vector>
 
+#include "base/error.h"
 #include "base/parallel.h"
+#include "formats/model_file.h"
 #include "meshes/generate.h"
 #include "precompute/compression/compression.h"
 #include "precompute/compression/selected_solver.h"
@@ -161,6 +171,117 @@ void displace(benchmark::State& run, const Forms& forms, const Greens& greens, I
   }
 }
 
+/// A tool that moves: N nodes in contact, and one that comes.
+struct Arrival {
+  Index node;
+  std::vector<Index> contacts;  ///< the node itself is the last
+};
+
+/// Nodes in the order of their distance from places of the body, so many of each place.
+std::vector<std::vector<Index>> neighbourhoods(const std::vector<Vec3>& points, std::size_t size) {
+  constexpr std::size_t places = 200;
+  std::mt19937 random(5);
+  std::uniform_int_distribution<std::size_t> any(0, points.size() - 1);
+  std::vector<std::vector<Index>> all(places, std::vector<Index>(points.size()));
+  for (std::vector<Index>& nodes : all) {
+    const Vec3 centre = points[any(random)];
+    std::iota(nodes.begin(), nodes.end(), 0);
+    const auto distance = [&](Index node) {
+      return (points[static_cast<std::size_t>(node)] - centre).squaredNorm();
+    };
+    std::partial_sort(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(size), nodes.end(),
+                      [&](Index a, Index b) { return distance(a) < distance(b); });
+    nodes.resize(size);
+    nodes.shrink_to_fit();
+  }
+  return all;
+}
+
+/// At each place the next nodes come one after another.
+std::vector<Arrival> arrivals_at(const std::vector<Vec3>& points, std::size_t contacts) {
+  constexpr std::size_t steps = 30;
+  std::vector<Arrival> arrivals;
+  for (const std::vector<Index>& nodes : neighbourhoods(points, contacts + steps)) {
+    for (std::size_t k = 0; k < steps; ++k) {
+      const auto first = nodes.begin() + static_cast<std::ptrdiff_t>(k);
+      const auto end = first + static_cast<std::ptrdiff_t>(contacts) + 1;
+      arrivals.push_back({*std::prev(end), {first, end}});
+    }
+  }
+  return arrivals;
+}
+
+/// Puts other memory into the caches.
+class OtherMemory {
+ public:
+  void read() {
+    for (std::size_t k = 0; k < bytes_.size(); k += 64) ++bytes_[k];
+    benchmark::ClobberMemory();
+  }
+
+ private:
+  std::vector<unsigned char> bytes_ = std::vector<unsigned char>(std::size_t{64} << 20);
+};
+
+double quantile(std::vector<double> values, double part) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1))];
+}
+
+/// Least time of each arrival, of several rounds of all.
+std::vector<double> least_of_each(const std::vector<double>& took, std::size_t arrivals) {
+  std::vector<double> least(took.begin(), took.begin() + static_cast<std::ptrdiff_t>(arrivals));
+  for (std::size_t k = arrivals; k < took.size(); ++k)
+    least[k % arrivals] = std::min(least[k % arrivals], took[k]);
+  return least;
+}
+
+void new_node(benchmark::State& run, const Greens& greens, const std::vector<Arrival>& arrivals, bool cold) {
+  using Clock = std::chrono::steady_clock;
+  const auto d = static_cast<std::size_t>(greens.dimension());
+  std::vector<double> blocks(d * d * arrivals.front().contacts.size());
+  std::vector<double> took;
+  OtherMemory other;
+  std::size_t next = 0;
+  for (auto _ : run) {  // NOLINT(clang-analyzer-deadcode.DeadStores)
+    const Arrival& arrival = arrivals[next++ * (cold ? 31 : 1) % arrivals.size()];
+    if (cold) other.read();
+    const Clock::time_point begin = Clock::now();
+    greens.gather(arrival.node, arrival.contacts, blocks);
+    benchmark::DoNotOptimize(blocks.data());
+    benchmark::ClobberMemory();
+    took.push_back(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());
+  }
+  run.counters["median"] = quantile(took, 0.5);
+  run.counters["99.9%"] = quantile(took, 0.999);
+  run.counters["worst"] = quantile(took, 1.0);
+  if (!cold) run.counters["work_99.9%"] = quantile(least_of_each(took, arrivals.size()), 0.999);
+  run.counters["nodes"] = greens.nodes();
+}
+
+void register_new_nodes(const std::filesystem::path& file) {
+  const Model model = load_model(file);
+  if (model.compressed == nullptr) throw Error("is not compressed", file.string(), "Give a compressed model");
+  const auto greens = std::make_shared<const Greens>(model.compressed);
+  std::vector<Vec3> points;
+  for (const Index node : model.stored_nodes)
+    points.push_back(model.mesh.nodes[static_cast<std::size_t>(node)]);
+  for (const std::size_t contacts : {10, 30, 100, 200}) {
+    const auto arrivals = std::make_shared<const std::vector<Arrival>>(arrivals_at(points, contacts));
+    for (const bool cold : {false, true}) {
+      const std::string name =
+          "new_node/" + model.name + "/" + std::to_string(contacts) + (cold ? "/cold" : "/walk");
+#ifndef __clang_analyzer__  // takes what the library keeps for ever for a leak
+      benchmark::RegisterBenchmark(
+          name.c_str(),
+          [greens, arrivals, cold](benchmark::State& run) { new_node(run, *greens, *arrivals, cold); })
+          ->Unit(benchmark::kMicrosecond)
+          ->Iterations(cold ? 2'000 : 60'000);
+#endif
+    }
+  }
+}
+
 void register_body(const std::string& name, Forms made) {
   const auto forms = std::make_shared<const Forms>(std::move(made));
   const auto add = [&](const std::string& title, auto function) {
@@ -200,7 +321,10 @@ int main(int argc, char** argv) {
   openblas_set_num_threads(1);
   benchmark::Initialize(&argc, argv);
   const std::filesystem::path liver = PALPATE_SOURCE_DIR "/meshes/models/liver";
-  if (const char* file = std::getenv("PALPATE_BENCH_MODEL")) {
+  const char* file = std::getenv("PALPATE_BENCH_MODEL");
+  if (file != nullptr && std::string(file).ends_with(".palpate.hdf")) {
+    palpate::register_new_nodes(file);
+  } else if (file != nullptr) {
     palpate::register_body(std::filesystem::absolute(file).parent_path().filename(), palpate::forms_of(file));
   } else {
     palpate::register_body("block", palpate::forms_of_block());

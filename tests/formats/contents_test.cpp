@@ -14,10 +14,12 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/file_io.h"
+#include "base/program.h"
 #include "formats/hdf5_contents.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
-#include "formats/shrunk_file.h"
+#include "matrices/hierarchical_product.h"
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 
@@ -172,17 +174,61 @@ TEST(LoadedModel, IsMappedWhereItDoesNotFitIntoMemory) {
   }
 }
 
+/// What a program says and ends with when the file of a model is cut off that it has mapped.
+void expect_a_plain_end(const std::filesystem::path& file, const std::function<double(const Model&)>& entry) {
+  int ends[2] = {};
+  ASSERT_EQ(pipe(ends), 0);
+  const int status = status_of_child([&] {
+    dup2(ends[1], STDERR_FILENO);
+    end_with_an_error_on_shrunk_files();
+    const Model model = load_model(file, {.most_in_memory = 0});
+    std::filesystem::resize_file(file, 0);
+    if (entry(model) != 0.0) _exit(77);
+  });
+  close(ends[1]);
+  std::array<char, 1000> text = {};
+  ASSERT_GT(read(ends[0], text.data(), text.size() - 1), 0);
+  close(ends[0]);
+  ASSERT_TRUE(WIFEXITED(status)) << "signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), exit_input_error);
+  EXPECT_EQ(std::string(text.data()),
+            "error: " + file.string() +
+                ": was cut off while it was in use, or its disk failed (bus error)\n"
+                "hint: Leave files alone while a program reads them, and start it again\n");
+}
+
 TEST(LoadedModel, ThatIsMappedEndsAProgramPlainlyWhereItsFileIsCutOff) {
   const Folder folder;
   write_sample(folder / "a.palpate.hdf");
-  const int status = status_of_child([&] {
-    end_with_an_error_on_shrunk_files();
-    const Model model = load_model(folder / "a.palpate.hdf", {.most_in_memory = 0});
-    std::filesystem::resize_file(folder / "a.palpate.hdf", 0);
-    if (model.greens(0, 0) == sample_entry(0, 0)) _exit(77);
+  expect_a_plain_end(folder / "a.palpate.hdf", [](const Model& model) { return model.greens(0, 0); });
+  write_compressed_sample(folder / "b.palpate.hdf");
+  expect_a_plain_end(folder / "b.palpate.hdf", [](const Model& model) {
+    std::array<double, 9> block = {};
+    const Index node = 0;
+    gather_blocks(*model.compressed, node, {&node, 1}, block);
+    return block[0];
   });
-  ASSERT_TRUE(WIFEXITED(status)) << "signal " << WTERMSIG(status);
-  EXPECT_EQ(WEXITSTATUS(status), exit_input_error);
+}
+
+TEST(MappedFile, IsKnownByItsNameForAsLongAsItIsMapped) {
+  const Folder folder;
+  write_bytes(folder / "a\nb", std::string(10'000, 'x'));
+  const FileDescriptor file = open_file(folder / "a\nb", OpenMode::read);
+  const char* bytes = nullptr;
+  for (int round = 0; round < 100; ++round) {
+    const std::shared_ptr<const void> mapped = map_file(file, 100, 9'900);
+    bytes = static_cast<const char*>(mapped.get());
+    for (const char* at : {bytes, bytes + 9'899}) {
+      ASSERT_NE(mapped_file_at(at), nullptr) << round;
+      EXPECT_EQ(mapped_file_at(at), (folder.path() / "a\\nb").string());
+    }
+    EXPECT_EQ(mapped_file_at(bytes + 9'900 + 4096), nullptr);
+  }
+  EXPECT_EQ(mapped_file_at(bytes), nullptr);
+  std::vector<std::shared_ptr<const void>> many;
+  for (int k = 0; k < 100; ++k) many.push_back(map_file(file, 0, 10'000));
+  EXPECT_NE(mapped_file_at(many.front().get()), nullptr);
+  EXPECT_NO_THROW(many.clear());
 }
 
 TEST(Contents, OfWhatIsNoFileAreRefusedAtOnce) {

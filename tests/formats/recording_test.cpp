@@ -57,7 +57,8 @@ TickRecord some_tick(std::size_t i) {
           .event = static_cast<std::uint8_t>(i % 16),
           .motion_step = n / 3,
           .force_error = static_cast<float>(0.125 * x),
-          .left_out = static_cast<std::int32_t>(i % 11)};
+          .left_out = static_cast<std::int32_t>(i % 11),
+          .greens_error = static_cast<float>(0.0625 * x)};
 }
 
 std::vector<TickRecord> some_ticks(std::size_t count, std::size_t first = 0) {
@@ -90,7 +91,7 @@ bool same(const TickRecord& a, const TickRecord& b) {
          a.arrived_ns == b.arrived_ns && a.begun_ns == b.begun_ns && equal(a.shown_force, b.shown_force) &&
          equal(a.shown_torque, b.shown_torque) && a.share == b.share && a.phase == b.phase &&
          a.fault == b.fault && a.event == b.event && a.motion_step == b.motion_step &&
-         a.force_error == b.force_error && a.left_out == b.left_out;
+         a.force_error == b.force_error && a.left_out == b.left_out && a.greens_error == b.greens_error;
 }
 
 const SessionInfo info = {.model_path = "liver.palpate.hdf",
@@ -112,6 +113,7 @@ void expect_ticks_without_error(const Recording& read, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     TickRecord expected = some_tick(i);
     expected.force_error = 0.0F;
+    expected.greens_error = 0.0F;
     expected.left_out = 0;
     ASSERT_TRUE(same(read.ticks[i], expected)) << i;
   }
@@ -169,7 +171,12 @@ void flip_bit(const std::filesystem::path& path, const std::string& dataset, std
   const auto file = hdf5::File::open_to_change(path);
   const hdf5::Id opened(H5Dopen2(file.id(), dataset.c_str(), H5P_DEFAULT), H5Dclose);
   const std::uint64_t bit = number % (8 * H5Dget_storage_size(opened.get()));
-  char& byte = bytes.at(H5Dget_offset(opened.get()) + bit / 8);
+  haddr_t first = H5Dget_offset(opened.get());
+  if (first == HADDR_UNDEF) {  // compressed rows, one after another
+    const hdf5::Id space(H5Dget_space(opened.get()), H5Sclose);
+    H5Dget_chunk_info(opened.get(), space.get(), 0, nullptr, nullptr, &first, nullptr);
+  }
+  char& byte = bytes.at(first + bit / 8);
   byte = static_cast<char>(static_cast<unsigned char>(byte) ^ (1U << bit % 8));
   write_bytes(path, bytes);
 }
@@ -234,8 +241,36 @@ TEST(Recording, OfFramesWithoutStressSaysThatItIsNotKnown) {
   EXPECT_EQ(read_recording(folder / "a.h5").frames.surface.held, std::vector<std::uint8_t>(surface_nodes));
 }
 
+/// Writes the values of a part's frames as they were stored before version 4.4: as they are, in one piece.
+void unpack_frames(const std::filesystem::path& path) {
+  const auto frames = hdf5::Contents::read(path);
+  for (const std::string name : {"/frames/displacement", "/frames/von_mises", "/frames/pressure"}) {
+    std::vector<hsize_t> dims = {0, surface_nodes};
+    if (name == "/frames/displacement") dims.push_back(3);
+    const auto stored = frames.locate_rows(name, hdf5::element_type<float>(), dims.size());
+    if (stored.row_starts.empty()) continue;  // no rows, or shown by a master
+    dims[0] = static_cast<hsize_t>(stored.dims[0]);
+    std::vector<float> values(dims[0] * surface_nodes * 3);
+    frames.read_rows(name, hdf5::element_type<float>(), 0, stored.dims[0], values.data());
+    replace(path, name, H5T_IEEE_F32LE, dims, values.data());
+  }
+  reseal(path);
+}
+
+/// Calls it for each file that a recording which was killed is made of, the master last.
+void for_each_part(const std::filesystem::path& recording,
+                   const std::function<void(const std::filesystem::path&)>& change) {
+  for (const auto& part : std::filesystem::directory_iterator(recording.string() + ".parts"))
+    if (part.path().extension() == ".h5") change(part.path());
+}
+
 /// Makes it one of version 4.0, which had neither stress nor pressure.
 void make_older(const std::filesystem::path& path) {
+  if (std::filesystem::exists(path.string() + ".parts")) {
+    for_each_part(path, unpack_frames);
+  } else {
+    unpack_frames(path);
+  }
   for (const char* name : {"/frames/von_mises", "/frames/pressure", "/surface/held"})
     remove_object(path, name);
   set_integers(path, "version", {4, 0});
@@ -457,13 +492,24 @@ TEST(Recording, ThatCannotBeStartedLeavesNothing) {
   expect_ticks(read_recording(folder / "a.h5"), 20);
 }
 
+TEST(Recording, NamesTheFrameThatDoesNotExpand) {
+  const Folder folder;
+  record(folder / "a.h5", some_ticks(40), 10);
+  for (std::uint64_t bit = 3; bit < 40; bit += 4) flip_bit(folder / "a.h5", "/frames/displacement", bit);
+  reseal(folder / "a.h5");
+  const RecordingFile file(folder / "a.h5");
+  const std::string text = refusal([&] { static_cast<void>(file.frame(0)); });
+  EXPECT_NE(text.find("/frames/displacement, row 0, is damaged"), std::string::npos) << text;
+  expect_frame(file.frame(1), some_frame(1));
+}
+
 // One flipped bit anywhere in the data is noticed, and the dataset named.
 TEST(Recording, NamesTheDatasetInWhichABitIsFlipped) {
   const Folder folder;
   record(folder / "good.h5", some_ticks(40), 10);
   std::mt19937 random(20261122);  // NOLINT(cert-msc51-cpp): the same bits in each run
   const std::vector<std::string> datasets = checked_datasets(folder / "good.h5");
-  EXPECT_EQ(datasets.size(), 37U);
+  EXPECT_EQ(datasets.size(), 38U);
   for (const std::string& dataset : datasets) {
     std::filesystem::copy_file(folder / "good.h5", folder / "a.h5",
                                std::filesystem::copy_options::overwrite_existing);
@@ -524,6 +570,9 @@ const Impossible impossible[] = {
     {"ForceError",
      [](const std::filesystem::path& p) { set_entry<float>(p, "/ticks/force_error", 4, -1.0F); },
      "/ticks/force_error, row 4, holds -1"},
+    {"GreensError",
+     [](const std::filesystem::path& p) { set_entry<float>(p, "/ticks/greens_error", 2, -3.0F); },
+     "/ticks/greens_error, row 2, holds -3"},
     {"LeftOut", [](const std::filesystem::path& p) { set_entry<std::int32_t>(p, "/ticks/left_out", 5, -7); },
      "/ticks/left_out, row 5, holds -7"},
     {"Grab", [](const std::filesystem::path& p) { set_entry<std::uint8_t>(p, "/ticks/grab", 3, 2); },
@@ -554,16 +603,23 @@ const Impossible impossible[] = {
      "/surface/held, row 2, holds 8"},
     {"RowsOfTicks", [](const std::filesystem::path& p) { replace(p, "/ticks/phase", H5T_STD_U8LE, {29}); },
      "/ticks/phase has 29 rows, /ticks/time has 30"},
-    {"RowsOfFrames",
-     [](const std::filesystem::path& p) {
-       replace(p, "/frames/pressure", H5T_IEEE_F32LE, {4, surface_nodes});
-     },
-     "/frames/pressure has 4 rows, /frames/tick has 3"},
+    {"RowsOfFrames", [](const std::filesystem::path& p) { replace(p, "/frames/time", H5T_IEEE_F64LE, {4}); },
+     "/frames/time has 4 rows, /frames/tick has 3"},
     {"SizeOfRows",
      [](const std::filesystem::path& p) {
        replace(p, "/frames/displacement", H5T_IEEE_F32LE, {3, surface_nodes + 1, 3});
      },
      "/frames/displacement has rows of another size"},
+    {"FramesInOnePiece",
+     [](const std::filesystem::path& p) {
+       replace(p, "/frames/pressure", H5T_IEEE_F32LE, {3, surface_nodes});
+     },
+     "/frames/pressure has rows that are not compressed"},
+    {"FramesInOneChunk",
+     [](const std::filesystem::path& p) {
+       replace(p, "/frames/pressure", H5T_IEEE_F32LE, {3, surface_nodes}, nullptr, true);
+     },
+     "/frames/pressure is not stored in one piece"},
     {"Chunked",
      [](const std::filesystem::path& p) {
        replace(p, "/ticks/force", H5T_IEEE_F64LE, {30, 3}, nullptr, true);
@@ -595,12 +651,11 @@ TEST(Recording, OfVersion41IsReadWithoutChecksumsAndFinishedWithThem) {
     RecordingWriter killed(folder / "a.h5", info, surface);
     append(killed, some_ticks(30), 10);
   }
+  for_each_part(folder / "a.h5", unpack_frames);
   set_integers(folder / "a.h5", "version", {4, 1});
-  for (const auto& part : std::filesystem::directory_iterator(folder / "a.h5.parts")) {
-    if (part.path().extension() == ".h5")
-      for (const std::string& dataset : checked_datasets(part.path()))
-        remove_attribute(part.path(), dataset, "xxh3");
-  }
+  for_each_part(folder / "a.h5", [](const std::filesystem::path& part) {
+    for (const std::string& dataset : checked_datasets(part)) remove_attribute(part, dataset, "xxh3");
+  });
   expect_ticks_without_error(read_recording(folder / "a.h5"), 30);
   EXPECT_TRUE(finish_recording(folder / "a.h5"));
   expect_ticks_without_error(read_recording(folder / "a.h5"), 30);
@@ -612,7 +667,8 @@ TEST(Recording, OfVersion41IsReadWithoutChecksumsAndFinishedWithThem) {
 TEST(Recording, OfVersion42IsReadAndFinishedWithoutForceErrors) {
   const Folder folder;
   const auto make_42 = [&](const std::filesystem::path& file) {
-    for (const char* name : {"/ticks/force_error", "/ticks/left_out"}) remove_object(file, name);
+    for (const char* name : {"/ticks/force_error", "/ticks/left_out", "/ticks/greens_error"})
+      remove_object(file, name);
   };
   {
     RecordingWriter killed(folder / "a.h5", info, surface);
@@ -620,14 +676,104 @@ TEST(Recording, OfVersion42IsReadAndFinishedWithoutForceErrors) {
   }
   make_42(folder / "a.h5");
   set_integers(folder / "a.h5", "version", {4, 2});
-  for (const auto& part : std::filesystem::directory_iterator(folder / "a.h5.parts")) {
-    if (part.path().extension() == ".h5") make_42(part.path());
-  }
+  for_each_part(folder / "a.h5", [&](const std::filesystem::path& part) {
+    unpack_frames(part);
+    make_42(part);
+  });
   expect_ticks_without_error(read_recording(folder / "a.h5"), 30);
   EXPECT_TRUE(finish_recording(folder / "a.h5"));
   expect_ticks_without_error(read_recording(folder / "a.h5"), 30);
   EXPECT_EQ(hdf5::Contents::read(folder / "a.h5").integer_attribute("/", "version", 2),
             (std::vector<std::int64_t>{4, 2}));
+}
+
+TEST(Recording, OfVersion43IsReadAndFinishedWithItsFramesAsTheyWere) {
+  const Folder folder;
+  const std::filesystem::path path = folder / "a.h5";
+  {
+    RecordingWriter killed(path, info, surface);
+    append(killed, some_ticks(200), 10);  // 20 parts, 16 of them merged into one
+  }
+  remove_object(path, "/ticks/greens_error");
+  for_each_part(path, [](const std::filesystem::path& part) {
+    unpack_frames(part);
+    remove_object(part, "/ticks/greens_error");
+  });
+  set_integers(path, "version", {4, 3});
+  for (int pass = 0; pass < 2; ++pass) {  // as it was left, then as one file
+    const Recording read = read_recording(path);
+    ASSERT_EQ(read.ticks.size(), 200U);
+    for (std::size_t i = 0; i < 200; ++i) {
+      TickRecord expected = some_tick(i);
+      expected.greens_error = 0.0F;
+      ASSERT_TRUE(same(read.ticks[i], expected)) << i;
+    }
+    expect_frames(path, read, 20);
+    const auto contents = hdf5::Contents::read(path);
+    EXPECT_EQ(contents.integer_attribute("/", "version", 2), (std::vector<std::int64_t>{4, 3}));
+    if (pass == 1) {
+      EXPECT_NO_THROW(
+          static_cast<void>(contents.locate("/frames/displacement", hdf5::element_type<float>(), 3)));
+    }
+    ASSERT_TRUE(finish_recording(path));
+  }
+}
+
+TEST(Recording, OfThisVersionHasCompressedFrames) {
+  const Folder folder;
+  record(folder / "a.h5", some_ticks(30), 10);
+  unpack_frames(folder / "a.h5");
+  EXPECT_NE(refusal([&] { read_recording(folder / "a.h5"); }).find("has rows that are not compressed"),
+            std::string::npos);
+}
+
+// Small rows lie among what the library keeps of a file, and its list of rows grows with their number.
+TEST(Recording, OfManySmallFramesIsReadBack) {
+  const Folder folder;
+  for (const std::size_t at_once : {1U, 2U, 7U, 2500U}) {
+    RecordingWriter writer(folder / "a.h5", info, surface);
+    for (std::size_t k = 0; k < 2500; ++k) {
+      writer.append(some_frame(k));
+      if (k % at_once == 0 && k / at_once < 40) writer.checkpoint();
+    }
+    writer.finish();
+    expect_frames(folder / "a.h5", read_recording(folder / "a.h5"), 2500);
+  }
+}
+
+/// A sheet of N x N nodes that a sphere presses: a smooth dent, a stress with it, and pressure in its middle.
+SurfaceFrame dented(std::size_t N, double depth) {
+  SurfaceFrame frame = {.tick = 0, .time = 0.0};
+  for (std::size_t i = 0; i < N * N; ++i) {
+    const double x = static_cast<double>(i % N) / static_cast<double>(N) - 0.5,
+                 y = static_cast<double>(i / N) / static_cast<double>(N) - 0.5;
+    const double dent = depth / (1.0 + 40.0 * (x * x + y * y));
+    for (const double u : {x * dent, y * dent, -dent}) frame.displacement.push_back(static_cast<float>(u));
+    frame.von_mises.push_back(static_cast<float>(1e6 * dent * dent));
+    frame.pressure.push_back(x * x + y * y < 0.01 ? static_cast<float>(1e5 * dent) : 0.0F);
+  }
+  return frame;
+}
+
+// Of four bytes of a number, those of sign and exponent hardly differ from node to node, and no two mantissas
+// are alike: of 20 bytes a node a smooth field is to take less than 15, and what rests next to nothing.
+TEST(Recording, OfASmoothFieldIsAQuarterSmaller) {
+  const Folder folder;
+  constexpr std::size_t N = 60, frames = 20;
+  RecordedSurface sheet = {.nodes = std::vector<Vec3>(N * N, Vec3::Zero()), .corners = 3, .simplices = {}};
+  const auto bytes_per_node = [&](double depth) {
+    std::int64_t files[2] = {};
+    for (const std::size_t count : {std::size_t{1}, 1 + frames}) {
+      RecordingWriter writer(folder / "a.h5", info, sheet);
+      for (std::size_t k = 0; k < count; ++k)
+        writer.append(dented(N, depth * (1.0 + 0.1 * static_cast<double>(k))));
+      writer.finish();
+      files[count > 1] = static_cast<std::int64_t>(std::filesystem::file_size(folder / "a.h5"));
+    }
+    return static_cast<double>(files[1] - files[0]) / static_cast<double>(frames * N * N);
+  };
+  EXPECT_LT(bytes_per_node(0.005), 15.0);
+  EXPECT_LT(bytes_per_node(0.0), 0.6);
 }
 
 TEST(Recording, AnotherMajorVersionIsRefusedAndANewerMinorIsRead) {

@@ -11,7 +11,6 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <random>
 #include <sstream>
 
@@ -23,18 +22,7 @@
 namespace palpate::precision_forces_test {
 namespace {
 
-/// 30 times as long as high: bending along the whole length is 6e4 times softer than one node alone.
-constexpr const char* slender_beam = R"(name = "beam"
-[geometry]
-box = {size = [0.3, 0.01, 0.01], cells = [40, 1, 1]}
-[mesh]
-element = "hex8"
-[material]
-youngs_modulus = 1e6
-poissons_ratio = 0.3
-[[fixed]]
-lowest = {axis = "x", percent = 1}
-)";
+using test::slender_beam;
 
 /// A block on a foam that is a million times softer.
 constexpr const char* stiff_on_soft = R"(name = "stiff_on_soft"
@@ -65,13 +53,7 @@ std::string with_precision(const std::string& text, const std::string& precision
   return text + "[storage]\nprecision = \"" + precision + "\"\n";
 }
 
-class Baked : public testing::Test, public test::BakedBody {
- protected:
-  [[nodiscard]] std::string bytes() const {
-    std::ifstream in(file_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
-};
+class Baked : public testing::Test, public test::BakedBody {};
 
 /// Reactions of K when some stored nodes are displaced by u: an own solve with those held.
 class Reactions {

@@ -1,6 +1,8 @@
 """Models, recordings, scripts and profiles that are damaged, crafted, or no files at all."""
 
 import os
+import re
+import resource
 import signal
 import subprocess
 import time
@@ -8,7 +10,7 @@ import time
 import h5py
 import numpy
 
-from programs import PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
+from programs import BINARY, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
 
 TOUCH = "t,x,y,z\n0,0.4,0.5,1.3\n0.1,0.4,0.5,1.1\n0.2,0.4,0.5,1.3\n"
 TOOL = ("--tool", "sphere:0.15")
@@ -48,7 +50,8 @@ class Recordings(FilesTest):
         model, recording = self.record("--overlay", "r=2,rings=1")
         whole = recording.read_bytes()
         with h5py.File(recording) as file:
-            places = {name: file[name].id.get_offset() for name in ("/ticks/patch", "/ticks/force", "/frames/displacement", "/surface/nodes")}
+            places = {name: file[name].id.get_offset() for name in ("/ticks/patch", "/ticks/force", "/surface/nodes")}
+            places["/frames/displacement"] = file["/frames/displacement"].id.get_chunk_info(0).byte_offset  # compressed rows follow it
         for name, offset in places.items():
             damaged = bytearray(whole)
             damaged[offset + 402] ^= 0x40
@@ -65,8 +68,12 @@ class Recordings(FilesTest):
                                 f"/ticks/patch, row 30, {says}", str(model))
 
     def set_tick(self, recording, name, row, value):
-        """A recording of version 4.1, which had no checksums."""
+        """A recording of version 4.1, which had no checksums and did not compress."""
         with h5py.File(recording, "r+", libver=("v110", "v110")) as file:
+            for field in ("/frames/displacement", "/frames/von_mises", "/frames/pressure"):
+                values = file[field][:]
+                del file[field]
+                file[field] = values
             file["/ticks/" + name][row] = value
             del file.attrs["version"]
             file.attrs["version"] = [4, 1]
@@ -159,6 +166,27 @@ class Truncated(FilesTest):
         process.send_signal(signal.SIGINT)
         self.assertEqual(process.wait(), 130, process.stderr.read())
         process.communicate()
+
+    def test_while_it_is_mapped_ends_the_run_with_the_reason(self):
+        """A matrix that does not fit into memory is mapped: here 90 MB of it, where a process may have 80."""
+        if re.search(r"^PALPATE_SANITIZE:\w+=.+$", (BINARY / "CMakeCache.txt").read_text(), re.MULTILINE):
+            self.skipTest("a sanitizer takes more memory than that")
+
+        def little_memory():
+            resource.setrlimit(resource.RLIMIT_DATA, (80_000_000, 80_000_000))
+            resource.setrlimit(resource.RLIMIT_STACK, (1_000_000, 1_000_000))
+
+        self.write("touch.csv", "t,x,y,z\n0,0.5,0.5,1.3\n0.1,0.5,0.5,1.05\n80000,0.51,0.5,1.05\n")
+        file = self.bake(cube_toml(18))
+        process = subprocess.Popen([RUNTIME, "play", file.name, "--device", "script:touch.csv", *TOOL, "--max-contacts", "4", "--fast"], cwd=self.folder,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=little_memory, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"})
+        self.addCleanup(process.kill)
+        while "used packed" not in process.stderr.readline():
+            self.assertIsNone(process.poll())
+        os.truncate(file, 0)
+        _, messages = process.communicate()
+        self.assertEqual(process.returncode, 1, messages)
+        self.assertRegex(messages, r"error: model\.palpate\.hdf: was cut off while it was in use, or its disk failed \(bus error\)\nhint: [^\n]+\n\Z")
 
     def test_during_the_load_is_an_error(self):
         file = self.bake(cube_toml(3))

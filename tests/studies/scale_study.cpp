@@ -130,8 +130,12 @@ void run(const Options& options) {
     const auto errors = certify(*matrix, factor, stored_dofs, ordered, touchable, options.touches, 100000,
                                 options.jobs, [](double) { return true; });
     for (const TouchErrors& e : errors)
-      fmt::print("  touches of {} nodes: median {:.2e}, 99 % {:.2e}, worst {:.2e}\n", e.nodes,
-                 e.quantile(0.5), e.quantile(0.99), e.quantile(1.0));
+      fmt::print(
+          "  touches of {} nodes: median {:.2e}, 99 % {:.2e}, worst {:.2e}; {} bounds, force off by {:.3f} "
+          "(median) to {:.2f} of them\n",
+          e.nodes, e.quantile(0.5), e.quantile(0.99), e.quantile(1.0), e.bound_shares.size(),
+          e.bound_shares.empty() ? 0.0 : e.bound_shares[e.bound_shares.size() / 2],
+          e.bound_shares.empty() ? 0.0 : e.bound_shares.back());
     fmt::print("  {:.1f} s\n", lap());
   }
 }

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 
 #include "formats/model_file.h"
@@ -13,6 +14,33 @@
 #include "precompute/description/description.h"
 
 namespace palpate::test {
+
+/// 30 times as long as high: bending along the whole length is 6e4 times softer than one node alone.
+inline constexpr const char* slender_beam = R"(name = "beam"
+[geometry]
+box = {size = [0.3, 0.01, 0.01], cells = [40, 1, 1]}
+[mesh]
+element = "hex8"
+[material]
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+[[fixed]]
+lowest = {axis = "x", percent = 1}
+)";
+
+/// So slender that solves in double are wrong in the ninth figure, columns by 2e-9, and that rounding to
+/// single spoils the forces of neighbouring nodes.
+inline constexpr const char* thread = R"(name = "thread"
+[geometry]
+box = {size = [0.3, 0.003, 0.003], cells = [40, 1, 1]}
+[mesh]
+element = "hex8"
+[material]
+youngs_modulus = 1e6
+poissons_ratio = 0.3
+[[fixed]]
+lowest = {axis = "x", percent = 0.1}
+)";
 
 /// A folder for one baked body, which goes with its contents.
 class BakedBody {
@@ -32,6 +60,12 @@ class BakedBody {
   }
 
  protected:
+  /// Of the file.
+  [[nodiscard]] std::string bytes() const {
+    std::ifstream in(file_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
   std::filesystem::path folder_ =
       std::filesystem::temp_directory_path() / ("palpate-baked-" + std::to_string(getpid()));
   std::filesystem::path file_ = folder_ / "body.palpate.hdf";

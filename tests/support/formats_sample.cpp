@@ -273,7 +273,8 @@ Model compressed_sample() {
   matrix->far_pair = {{2, 1}};
   matrix->rank = {0, 2, 3};
   matrix->tolerance = 0.01;
-  matrix->certificate = {1, 10, 1e-4, 2e-4, 3e-4, 5, 20, 2e-4, 3e-4, 4e-4};
+  matrix->pair_error = {2e-3};
+  matrix->certificate = {1, 10, 1e-4, 2e-4, 3e-4, 0.0, 5, 20, 2e-4, 3e-4, 4e-4, 0.3};
   matrix->index();
   const auto fill = [](std::int64_t count, auto&& entry) {
     const std::shared_ptr<float[]> values(new float[static_cast<std::size_t>(count)]);

@@ -40,7 +40,8 @@ int main(int count, char** arguments) {
                                                       .stiffness = {1, 2, 3, 4, 5, x},
                                                       .grab = 1,
                                                       .force_error = 0.5F * static_cast<float>(i),
-                                                      .left_out = i % 3}});
+                                                      .left_out = i % 3,
+                                                      .greens_error = 0.25F * static_cast<float>(i)}});
       if (i % 500 == 0) {
         recording.append(
             palpate::SurfaceFrame{.tick = i,

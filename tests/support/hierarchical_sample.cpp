@@ -98,6 +98,8 @@ HierarchicalMatrix random_hierarchical(const HierarchicalKind& kind, unsigned se
   matrix.coupling = random_entries(matrix.coupling_at.back(), 1, random);
   matrix.near = random_entries(matrix.near_at.back(), 1, random);
   mirror_diagonal(matrix, const_cast<float*>(matrix.near.get()));  // made above
+  for (std::size_t p = 0; p < matrix.far_pair.size(); ++p)
+    matrix.pair_error.push_back(1.0 + random_number(random));
   return matrix;
 }
 

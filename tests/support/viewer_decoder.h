@@ -158,6 +158,7 @@ struct DecodedFrame {
   std::uint32_t status, contacts, patch, patch_nodes;
   float force_error;
   std::uint32_t left_out;
+  float greens_error;
   std::vector<float> contact;
   std::vector<std::uint32_t> pressure_node;
   std::vector<float> pressure;
@@ -199,6 +200,7 @@ inline DecodedFrame decode_frame(const std::string& message, std::size_t scene_n
   const std::size_t q = bytes.u32();
   frame.force_error = bytes.take<float>();
   frame.left_out = bytes.u32();
+  frame.greens_error = bytes.take<float>();
   frame.contact = bytes.array<float>(std::size_t{10} * frame.contacts);
   frame.pressure_node = bytes.array<std::uint32_t>(q);
   frame.pressure = bytes.array<float>(q);

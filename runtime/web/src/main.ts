@@ -444,6 +444,8 @@ class Page implements Listener {
   private show_numbers(): void {
     part('depth-plot').hidden = part('depth-number').hidden = !this.has_depth();
     show_felt(this.felt());
+    const bound = this.body_.frame?.greens_error ?? 0;
+    write(part('greens-error'), bound > 0 ? `± ${format_si(bound, 'N', 2)}` : '');
     const text = this.best_effort();
     write(part('best-effort'), text);
     part('best-effort').hidden = text === '';

@@ -59,6 +59,7 @@ export interface Frame {
   patch: number;
   force_error: number; // how far `force` may be off, where it is a best effort [N]
   left_out: number; // contact points that found no room
+  greens_error: number; // what compressed Green's functions may move `force` by, at most [N]
   contact: Float32Array; // [10 c]
   pressure_node: Uint32Array; // [q]
   pressure: Float32Array; // [q] [Pa]
@@ -218,6 +219,7 @@ function decode_frame(reader: Reader, scene: number, nodes: number, values: Node
   const pressures = reader.u32();
   const force_error = reader.f32();
   const left_out = reader.u32();
+  const greens_error = reader.f32();
   const contact = reader.f32s(floats_of_contact * contacts);
   const pressure_node = reader.u32s(pressures);
   const pressure = reader.f32s(pressures);
@@ -242,6 +244,7 @@ function decode_frame(reader: Reader, scene: number, nodes: number, values: Node
     patch,
     force_error,
     left_out,
+    greens_error,
     contact,
     pressure_node,
     pressure,

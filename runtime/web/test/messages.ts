@@ -84,6 +84,7 @@ export function numbered({ number, base, exponents, patch = 0, patch_nodes = 0, 
     .u32(9, 1, patch, patch_nodes, 2)
     .f32(0.75)
     .u32(300)
+    .f32(0.125)
     .f32(1, 1, 1, 0, 0, 1, 0, 0, -2, 1)
     .u32(0, 3)
     .f32(1000, 2000)

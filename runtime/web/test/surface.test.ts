@@ -99,7 +99,7 @@ test('edges that only hidden triangles have are not drawn', () => {
 });
 
 const frame: Frame = {
-  kind: 'frame', scene: 1, tick: 1, time: 0, patch: 1, status: 0, force_error: 0, left_out: 0,
+  kind: 'frame', scene: 1, tick: 1, time: 0, patch: 1, status: 0, force_error: 0, left_out: 0, greens_error: 0,
   tool: new Float32Array(7), device: new Float32Array(7), force: new Float32Array(3), torque: new Float32Array(3),
   number: 1, base: 0, version: 1, unit_u: 0.5, unit_stress: 10,
   contact: new Float32Array(0),

@@ -59,7 +59,7 @@ test('a frame', () => {
   assert.deepEqual([...frame.force, ...frame.torque], [10, 20, 30, 40, 50, 60]);
   assert.deepEqual([frame.number, frame.base], [1, 0]);
   assert.deepEqual([frame.unit_u, frame.unit_stress, frame.status, frame.patch], [0.5, 128, 9, 4]);
-  assert.deepEqual([frame.force_error, frame.left_out], [0.75, 300]);
+  assert.deepEqual([frame.force_error, frame.left_out, frame.greens_error], [0.75, 300, 0.125]);
   assert.deepEqual([...frame.contact], [1, 1, 1, 0, 0, 1, 0, 0, -2, 1]);
   assert.deepEqual([...frame.pressure_node], [0, 3]);
   assert.deepEqual([...frame.pressure], [1000, 2000]);

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <limits>
 #include <numeric>
 #include <random>
@@ -62,11 +61,6 @@ lowest = {axis = "z", percent = 1}
 
 std::string stored(const std::string& text, const std::string& how) {
   return text + "[storage]\nscope = \"layers\"\nlayers = 1\n" + how + "\n";
-}
-
-std::string read_bytes(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 std::string refusal(const std::function<void()>& run) {
@@ -192,34 +186,40 @@ TEST(Compressed, ForcesOfTouchesAreWithinTheTolerance) {
 
 TEST(Compressed, TheCertificateIsInTheFileAndTold) {
   const std::vector<double>& table = compressed().compressed->certificate;
-  ASSERT_EQ(table.size(), 20U);
+  ASSERT_EQ(table.size(), 24U);
   for (std::size_t row = 0; row < 4; ++row) {
-    EXPECT_GE(table[5 * row + 1], 50.0) << "touches";
-    EXPECT_LE(table[5 * row + 2], table[5 * row + 3]);
-    EXPECT_LE(table[5 * row + 4], tolerance);
+    EXPECT_GE(table[6 * row + 1], 50.0) << "touches";
+    EXPECT_LE(table[6 * row + 2], table[6 * row + 3]);
+    EXPECT_LE(table[6 * row + 4], tolerance);
+    EXPECT_LE(table[6 * row + 5], 0.5) << "of the bound";
   }
+  EXPECT_GT(table[6 * 3 + 5], 0.01) << "100 nodes reach as far as far pairs";
   EXPECT_NE(inspect(compressed()).find("100 nodes: median"), std::string::npos) << inspect(compressed());
 }
 
 /// The force of a sphere that is pressed in and slides, tick by tick.
 struct Slide {
-  std::vector<Vec3> force;
+  std::vector<Vec3> force, contact_force;
+  std::vector<double> greens_error;
   double largest = 0.0;
 };
 
-Slide slide(Model model, int refinement = 1) {
-  const Body body(std::move(model), {}, refinement);
+Slide slide(Model model, double radius = 0.02) {
+  const Body body(std::move(model));
   Tool sphere;
-  sphere.radius = 0.02;
+  sphere.radius = radius;
   sphere.friction = 0.3;
   sphere.hand_over = std::numeric_limits<double>::infinity();
   State state(body, {.tools = {sphere}});
   ToolPose tool;
   Slide result;
   for (int tick = 0; tick <= 600; ++tick) {
-    tool.position = Vec3(0.06 + 5e-5 * std::max(0, tick - 300), 0.075, 0.0801 - 2e-5 * std::min(tick, 300));
+    tool.position =
+        Vec3(0.06 + 5e-5 * std::max(0, tick - 300), 0.075, 0.0601 + radius - 2e-5 * std::min(tick, 300));
     step(body, state, tool);
     result.force.push_back(state.tools[0].wrench.force);
+    result.contact_force.push_back(state.tools[0].contact_wrench.force);
+    result.greens_error.push_back(state.tools[0].greens_error);
     result.largest = std::max(result.largest, result.force.back().norm());
   }
   EXPECT_GE(state.tools[0].contacts, 5);
@@ -236,11 +236,37 @@ TEST(Compressed, TicksAreThoseOfThePackedBody) {
   EXPECT_GT(worst, 0.0);
 }
 
+// A sphere that is pressed in, and one that slides: the state of friction goes its own way.
+TEST(Compressed, TheBoundOfATickHolds) {
+  const Slide expected = slide(packed(), 0.1), found = slide(compressed(), 0.1);
+  double largest = 0.0;
+  for (std::size_t k = 0; k < expected.force.size(); ++k) {
+    EXPECT_EQ(expected.greens_error[k], 0.0) << "packed functions are exact";
+    EXPECT_LE((found.contact_force[k] - expected.contact_force[k]).norm(),
+              found.greens_error[k] + 1e-4 * expected.largest)
+        << "tick " << k;
+    largest = std::max(largest, found.greens_error[k]);
+  }
+  EXPECT_GT(largest, 1e-4 * expected.largest);
+  EXPECT_LT(largest, 20.0 * tolerance * expected.largest);
+}
+
 TEST(Compressed, AStifferBodyIsStiffer) {
   Model twice = compressed();
   scale_stiffness(twice, 2.0);
   const Slide once = slide(compressed()), stiff = slide(std::move(twice));
   EXPECT_NEAR(stiff.largest, 2.0 * once.largest, 1e-6 * once.largest);
+}
+
+// Its forces answer to some displacements a hundred times as much as to others.
+TEST(Compressed, ANearlyIncompressibleBodyKeepsItsTolerance) {
+  std::string rubber = small;
+  rubber.replace(rubber.find("= 0.3"), 5, "= 0.49");
+  rubber.replace(rubber.find("[10, 10, 4]"), 11, "[16, 16, 5]");
+  const Model model = test::BakedBody().bake_body(stored(rubber, "compression = \"h2\""), 2);
+  ASSERT_GT(model.compressed->far_pair.size(), 50U);
+  for (std::size_t row = 0; row < 4; ++row)
+    EXPECT_LE(model.compressed->certificate[6 * row + 4], tolerance) << row;
 }
 
 class AlteredFile : public testing::Test, public test::BakedBody {
@@ -254,24 +280,24 @@ TEST_F(AlteredFile, IsVerifiedUntilThen) {
 }
 
 TEST_F(AlteredFile, EveryDatasetIsWatched) {
-  const std::string whole = read_bytes(file_);
+  const std::string whole = bytes();
   int watched = 0;
   for (const std::string& dataset : test::checked_datasets(file_)) {
     if (!dataset.starts_with("/greens/")) continue;
     ++watched;
     const char flipped = 0x55;
     ASSERT_TRUE(test::set_bytes(file_, dataset, 0, &flipped, 1)) << dataset;
-    if (read_bytes(file_) == whole) continue;
+    if (bytes() == whole) continue;
     const std::string said = refusal([&] { load_model(file_); });
     EXPECT_NE(said.find(dataset), std::string::npos) << dataset << ": " << said;
     std::ofstream(file_, std::ios::binary) << whole;
   }
-  EXPECT_EQ(watched, 10);
+  EXPECT_EQ(watched, 11);
 }
 
 /// Resealed, so that the checksums are right.
 TEST_F(AlteredFile, WhatWasMadeUpIsRefused) {
-  const std::string whole = read_bytes(file_);
+  const std::string whole = bytes();
   const auto expect_refused = [&](const std::string& what, auto&& change) {
     change();
     test::reseal(file_);
@@ -294,6 +320,9 @@ TEST_F(AlteredFile, WhatWasMadeUpIsRefused) {
                  [&] { set("/greens/couplings", 3, std::numeric_limits<float>::quiet_NaN()); });
   expect_refused("/greens/near: diagonal", [&] { set("/greens/near", 0, -1.0F); });
   expect_refused("/greens/certificate", [&] { set("/greens/certificate", 4, -1.0); });
+  expect_refused("/greens/pair_errors", [&] { set("/greens/pair_errors", 7, -1e-3); });
+  expect_refused("/greens/pair_errors",
+                 [&] { set("/greens/pair_errors", 0, std::numeric_limits<double>::infinity()); });
 }
 
 TEST_F(AlteredFile, VerifyFindsCouplingsOfNothing) {
@@ -307,15 +336,15 @@ TEST_F(AlteredFile, VerifyFindsCouplingsOfNothing) {
 }
 
 TEST_F(AlteredFile, BytesDependOnNoJobs) {
-  const std::string once = read_bytes(file_);
+  const std::string once = bytes();
   bake_body(stored(small, "compression = \"h2\""), 3);
-  EXPECT_TRUE(read_bytes(file_) == once);
+  EXPECT_TRUE(bytes() == once);
 }
 
 /// A run that was killed leaves near pairs; the next one takes them, and what it did not leave is solved.
 TEST_F(AlteredFile, AKilledRunGoesOn) {
   const Model model = load_model(file_);
-  const std::string once = read_bytes(file_);
+  const std::string once = bytes();
   std::filesystem::remove(file_);
   const HierarchicalMatrix& matrix = *model.compressed;
   const auto entries = [&](Index leaf) {
@@ -330,28 +359,14 @@ TEST_F(AlteredFile, AKilledRunGoesOn) {
     EXPECT_TRUE(killed.has_near(2));
   }
   bake_body(stored(small, "compression = \"h2\""));
-  EXPECT_TRUE(read_bytes(file_) == once);
+  EXPECT_TRUE(bytes() == once);
 }
 
-/// So slender that rounding to single spoils the forces of neighbouring nodes, whatever the cut.
+// Whatever the cut: rounding to single is too much for it.
 TEST_F(AlteredFile, IsNotWrittenWhereForcesAreOffByMoreThanTheTolerance) {
   std::filesystem::remove(file_);
-  const std::string said = refusal([&] {
-    bake_body(R"(name = "thread"
-[geometry]
-box = {size = [0.3, 0.003, 0.003], cells = [40, 1, 1]}
-[mesh]
-element = "hex8"
-[material]
-youngs_modulus = 1e6
-poissons_ratio = 0.3
-[[fixed]]
-lowest = {axis = "x", percent = 0.1}
-[storage]
-compression = "h2"
-tolerance = 1e-4
-)");
-  });
+  const std::string said = refusal(
+      [&] { bake_body(std::string(test::thread) + "[storage]\ncompression = \"h2\"\ntolerance = 1e-4\n"); });
   testing::internal::GetCapturedStderr();
   EXPECT_NE(said.find("forces of random touches are off by up to"), std::string::npos) << said;
   EXPECT_FALSE(std::filesystem::exists(file_));
@@ -384,9 +399,6 @@ TEST(CompressedDescription, DecidesByTheNumberOfNodes) {
   EXPECT_FALSE(wants("[storage]\ncompression = \"none\"\n", 500000));
   EXPECT_FALSE(wants("[storage]\nprecision = \"double\"\n", 5000));
   EXPECT_TRUE(wants("[storage]\ncompression = \"h2\"\n", 10));
-  std::string rubber = small;
-  rubber.replace(rubber.find("= 0.3"), 5, "= 0.49");
-  EXPECT_FALSE(wants_compression(parse_description(rubber, "model.toml"), 5000));
 }
 
 }  // namespace

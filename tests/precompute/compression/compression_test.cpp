@@ -15,6 +15,7 @@
 #include "meshes/generate.h"
 #include "meshes/surface.h"
 #include "precompute/compression/certificate.h"
+#include "precompute/compression/recompression.h"
 #include "precompute/numerics/scope.h"
 #include "precompute/numerics/touches.h"
 #include "tests/support/clustered_body.h"
@@ -293,6 +294,53 @@ TEST(Compression, OfFullRankIsTheInverse) {
   const HierarchicalMatrix matrix = body.compressed({.cut = 1e-30});
   EXPECT_GE(*std::max_element(matrix.rank.begin(), matrix.rank.end()), 18) << "of 24 dofs";
   EXPECT_LT(worst_row(body, test::written_out(matrix)), 1e-6);
+}
+
+/// L^-1 (Xi - stored) L^-T with the roots L of the leaves.
+Eigen::MatrixXd weighed_error(const Body& body, const HierarchicalMatrix& matrix) {
+  Eigen::MatrixXd error = body.Xi() - test::written_out(matrix);
+  for (Index leaf = 0; leaf < matrix.tree.leaves(); ++leaf) {
+    const Index c = matrix.tree.first_leaf() + leaf;
+    const Eigen::Index first = matrix.dimension * matrix.tree.begin(c),
+                       n = matrix.dimension * matrix.tree.end(c) - first;
+    const Eigen::MatrixXd Xi = body.Xi().block(first, first, n, n), L = root_of_leaf(matrix, leaf);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j)
+        EXPECT_NEAR((L * L.transpose())(i, j), Xi(i, j) == 0.0 && i == j ? 1.0 : Xi(i, j),
+                    1e-6 * Xi.cwiseAbs().maxCoeff());
+    }
+    const auto lower = L.triangularView<Eigen::Lower>();
+    error.middleRows(first, n) = lower.solve(Eigen::MatrixXd(error.middleRows(first, n)));
+    error.middleCols(first, n) =
+        lower.solve(Eigen::MatrixXd(error.middleCols(first, n).transpose())).transpose();
+  }
+  return error;
+}
+
+// All together they are what random loads tell of it; each alone is off where its skeletons are better or
+// worse than others are.
+TEST(Compression, ErrorsOfThePairsAreThoseOfTheInverse) {
+  for (const Body* body : {&clamped_bar(), &bar_on_rollers(), &plate()}) {
+    for (const double cut : {1e-1, 1e-2, 1e-3}) {
+      const HierarchicalMatrix matrix = body->compressed({.cut = cut});
+      ASSERT_EQ(matrix.pair_error.size(), matrix.far_pair.size());
+      const Eigen::MatrixXd error = weighed_error(*body, matrix);
+      double all = 0.0, exact = 0.0;
+      for (std::size_t p = 0; p < matrix.far_pair.size(); ++p) {
+        const auto [a, b] = matrix.far_pair[p];
+        const auto first = [&](Index c) { return Eigen::Index{matrix.dimension} * matrix.tree.begin(c); };
+        const auto dofs = [&](Index c) {
+          return matrix.dimension * (matrix.tree.end(c) - matrix.tree.begin(c));
+        };
+        const double of_pair = error.block(first(a), first(b), dofs(a), dofs(b)).norm();
+        EXPECT_LT(of_pair, 3.0 * matrix.pair_error[p] + 1e-6) << p << " at a cut of " << cut;
+        all += matrix.pair_error[p] * matrix.pair_error[p];
+        exact += of_pair * of_pair;
+      }
+      EXPECT_NEAR(std::sqrt(all), std::sqrt(exact), 0.2 * std::sqrt(exact)) << cut;
+      EXPECT_LT(error.rowwise().norm().maxCoeff(), 3.0 * cut) << cut;
+    }
+  }
 }
 
 TEST(Compression, RefusesMoreTermsThanThereIsRoomFor) {

@@ -93,6 +93,17 @@ TEST_P(NearFieldTest, ForgetsWhatIsNotWantedForLong) {
   EXPECT_EQ(near.node(0), nodes[7]);
 }
 
+/// put_on_stored_nodes of the forces that are here is what they load.
+void expect_load_of(NearField& near) {
+  std::vector<double> f;
+  for (Index place = 0; place < near.count(); ++place)
+    for (int axis = 0; axis < near.dimension(); ++axis) f.push_back(near.force(place)[axis]);
+  NodalLoad stored(near.dimension(), static_cast<Index>(near.load().node.size()));
+  near.put_on_stored_nodes(f, stored);
+  EXPECT_TRUE(std::ranges::equal(stored.nodes(), near.load().nodes()));
+  EXPECT_TRUE(std::ranges::equal(stored.forces(), near.load().forces()));
+}
+
 TEST_P(NearFieldTest, DisplacementIsThatOfTheGreensFunctions) {
   NearField near(body_, 20);
   const std::vector<Index> nodes = free_nodes(5);
@@ -104,6 +115,7 @@ TEST_P(NearFieldTest, DisplacementIsThatOfTheGreensFunctions) {
   }
   near.displace();
   EXPECT_EQ(near.load().nodes().size(), 3U);
+  expect_load_of(near);
   for (std::size_t k = 6; k < 12; ++k) near.want(body_, nodes[k]);  // these come after the forces
   std::vector<double> u(static_cast<std::size_t>(body_.greens().order()));
   body_.greens().displacement(near.load().nodes(), near.load().forces(), u);
@@ -227,6 +239,7 @@ TEST_P(NearFieldTest, AGroupMovesAndIsLoadedThroughItsMembers) {
   near.load(near.place_of(others[2]), test::upright(d, 0.1, 0.0, 0.4));
   near.displace();
   EXPECT_FALSE(near.want_group(body_, a.number, a.weights, a.maps)) << "it carries force";
+  expect_load_of(near);
   Eigen::VectorXd f = Eigen::VectorXd::Zero(Xi.rows());
   for (Index place = 0; place < near.count(); ++place) f += of_place(place) * near.force(place).head(d);
   const Eigen::VectorXd u = Xi * f;

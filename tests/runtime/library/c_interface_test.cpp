@@ -252,6 +252,7 @@ TEST_P(CInterface, IsTheStepOfCppBitForBit) {
       ASSERT_EQ(result.local_radius, tool.local.radius) << "tick " << tick;
       ASSERT_EQ(result.force_error, tool.force_error) << "tick " << tick;
       ASSERT_EQ(result.left_out, tool.left_out) << "tick " << tick;
+      ASSERT_EQ(result.greens_error, tool.greens_error) << "tick " << tick;
       if (result.contacts > 0) ++touching[k];
     }
   }

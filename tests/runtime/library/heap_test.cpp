@@ -394,12 +394,15 @@ class CompressedGreens : public testing::TestWithParam<int> {
     for (Index row = 0; row < greens_.nodes(); row += 17) greens_.gather(row, nodes_, blocks_);
     greens_.displacement(nodes_, f_, u_);
     greens_.displacement({nodes_.data(), 30}, {f_.data(), 30 * d_}, 100, {u_.data(), 64 * d_});
-    return std::isfinite(u_.front()) && std::isfinite(blocks_.back());
+    bound_.carry(nodes_, f_);
+    return std::isfinite(u_.front()) && std::isfinite(blocks_.back()) &&
+           std::isfinite(bound_.work(nodes_, f_));
   }
 
   std::size_t d_ = static_cast<std::size_t>(GetParam());
   Greens greens_{std::make_shared<const HierarchicalMatrix>(
       test::random_hierarchical({.dimension = GetParam(), .nodes = 331, .levels = 5}, 1))};
+  ErrorBound bound_{*greens_.compressed_form(), 500};
   std::vector<Index> nodes_ = [] {
     std::vector<Index> nodes;
     for (Index k = 0; k < 700; ++k) nodes.push_back(k * 37 % 331);

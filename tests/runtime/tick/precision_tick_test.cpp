@@ -10,18 +10,8 @@ namespace palpate::precision_tick_test {
 namespace {
 
 Model bake_beam(const std::string& precision) {
-  return test::BakedBody().bake_body(R"(name = "beam"
-[geometry]
-box = {size = [0.3, 0.01, 0.01], cells = [40, 1, 1]}
-[mesh]
-element = "hex8"
-[material]
-youngs_modulus = 1e6
-poissons_ratio = 0.3
-[[fixed]]
-lowest = {axis = "x", percent = 1}
-[storage]
-precision = ")" + precision + "\"\n");
+  return test::BakedBody().bake_body(std::string(test::slender_beam) + "[storage]\nprecision = \"" +
+                                     precision + "\"\n");
 }
 
 /// A sphere pressed on the free end.

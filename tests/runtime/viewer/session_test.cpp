@@ -130,6 +130,7 @@ TickRecord tick_record(std::int64_t number) {
   tick.status = 8;
   tick.force_error = 0.5F;
   tick.left_out = 6;
+  tick.greens_error = 0.25F;
   return tick;
 }
 
@@ -199,6 +200,7 @@ TEST_F(Recorded, APictureShowsItsTick) {
   EXPECT_EQ(static_cast<int>(seen.status), 8);
   EXPECT_EQ(seen.force_error, 0.5);
   EXPECT_EQ(seen.left_out, 6);
+  EXPECT_EQ(seen.greens_error, 0.25);
   EXPECT_EQ(pictures.picture(2).tool.position.x(), 9.0) << "tick 12 was lost: that before it";
   EXPECT_EQ(pictures.picture(3).tool.position.x(), 16.0);
   EXPECT_THROW((void)pictures.picture(4), Error);

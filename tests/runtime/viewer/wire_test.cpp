@@ -48,6 +48,7 @@ SurfacePicture picture_of(const Body& body) {
   picture.status = StepStatus::inside_body | StepStatus::pose_limited;
   picture.force_error = 0.375;
   picture.left_out = 300;
+  picture.greens_error = 0.0625;
   return picture;
 }
 
@@ -128,6 +129,7 @@ TEST(ViewerWire, FrameComesBackToItsUnits) {
   EXPECT_EQ(frame.status, (1U << 6) | (1U << 7));
   EXPECT_EQ(frame.force_error, 0.375F);
   EXPECT_EQ(frame.left_out, 300U);
+  EXPECT_EQ(frame.greens_error, 0.0625F);
   EXPECT_EQ(frame.patch, 0U);
   EXPECT_EQ(frame.patch_nodes, 0U);
   ASSERT_EQ(frame.contact.size(), 20U);
