@@ -444,7 +444,7 @@ class Page implements Listener {
   private show_numbers(): void {
     part('depth-plot').hidden = part('depth-number').hidden = !this.has_depth();
     show_felt(this.felt());
-    const bound = this.body_.frame?.greens_error ?? 0;
+    const bound = this.picture_.frame?.greens_error ?? 0;
     write(part('greens-error'), bound > 0 ? `± ${format_si(bound, 'N', 2)}` : '');
     const text = this.best_effort();
     write(part('best-effort'), text);
