@@ -1,9 +1,8 @@
 // What the body's surface looks like: plain and a little wet, or in colours that say numbers.
 import { Color, DataTexture, DoubleSide, FrontSide, LinearFilter, NearestFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace, Vector2, Vector4 } from 'three';
-import { map_texels, material_colours, tint, type MapName } from './colours';
+import { map_texels, material_colours, tint, tissue, type MapName } from './colours';
 import { light_glsl, type Light } from './light';
 
-const tissue = 0xab5b4a;
 const most_materials = 256;
 
 function map_texture(name: MapName): DataTexture {

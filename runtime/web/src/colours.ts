@@ -7,9 +7,12 @@ function anchors(hex: string): Rgb[] {
   return hex.split(' ').map((one) => [0, 2, 4].map((at) => parseInt(one.slice(at, at + 2), 16)) as Rgb);
 }
 
+/** Of a body that nothing colours. */
+export const tissue = 0xab5b4a;
+
 /** Of a body that numbers colour, where they are far below the range: it stands out from a dark and from a light ground. */
 export const tint: Rgb = [0x79, 0x73, 0x70];
-const tinted = 0.07; // share of the range in which the tint fades
+const tinted = 0.2; // share of the range in which the tint fades
 
 /**
  * matplotlib's viridis, cividis and inferno from where they are as light as the tint, each at equal distances: lightness grows all the way, for

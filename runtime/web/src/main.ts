@@ -186,7 +186,7 @@ class Page implements Listener {
     this.drawing_.show_model(state.model.dimension, state.model.materials?.length ?? 1);
     this.show_kept(state.model.file);
     this.show_state();
-    if (this.mode_ !== 'live') this.replay_.show(state.times ?? [], state.frame ?? 0, this.mode_ === 'file' || state.you === 'controller');
+    if (this.mode_ !== 'live') this.replay_.show(state.times ?? [], state.frame ?? 0, this.lost_ === '', state.alone === true);
   }
 
   /** What stands over the picture, and which controls can act. */
@@ -253,6 +253,7 @@ class Page implements Listener {
     });
     button('fit').addEventListener('click', () => this.picture_.view.eye.fit());
     button('save-video').addEventListener('click', () => this.film());
+    button('follow').addEventListener('click', () => this.follow());
     select('look-from').addEventListener('change', () => {
       if (select('look-from').value) this.picture_.view.eye.look_from(select('look-from').value);
       select('look-from').value = '';
@@ -312,15 +313,15 @@ class Page implements Listener {
       ...fields,
     });
     const { canvas } = this.picture_.view;
-    canvas.addEventListener('pointerdown', () => canvas.classList.add('by-pointer'), { capture: true }); // its focus needs no ring
+    window.addEventListener('pointerdown', () => canvas.classList.add('by-pointer'), { capture: true }); // its focus needs no ring
     window.addEventListener('keydown', () => canvas.classList.remove('by-pointer'));
     canvas.addEventListener('keydown', (event) => {
       if (event.key !== 'Enter') return;
       event.preventDefault();
       this.hand_.key_press();
     });
-    this.picture_.view.canvas.addEventListener('pointerdown', () => this.state_?.paused && this.mode_ === 'live' && nudge(), { capture: true });
-    this.picture_.view.canvas.addEventListener('blur', () => this.hand_.release_key());
+    window.addEventListener('pointerdown', ({ target }) => target === canvas && this.state_?.paused && this.mode_ === 'live' && nudge(), { capture: true });
+    canvas.addEventListener('blur', () => this.hand_.release_key());
   }
 
   private escape(): void {
@@ -393,7 +394,7 @@ class Page implements Listener {
     const { clientWidth: width, clientHeight: height } = part('stage');
     const rem = parseFloat(getComputedStyle(document.documentElement).fontSize);
     const is_small = width < 700 || height < 420;
-    return { top: (is_small ? 3 : 3.4) * rem, bottom: (is_small ? 3.4 : 4.2) * rem, left: (is_small ? 0.5 : 1.5) * rem, right: (is_small ? 3.6 : 5.2) * rem };
+    return { top: (is_small ? 3 : 3.4) * rem, bottom: (is_small ? 3.4 : 4.2) * rem, left: (is_small ? 0.5 : 1.5) * rem, right: (width < 480 ? 4.2 : 5.2) * rem };
   }
 
   /** Plays all of a recording once, and saves what is seen. */
@@ -408,6 +409,12 @@ class Page implements Listener {
     });
     this.picture_.view.is_whole = true;
     this.saving_.film(this.state_?.model?.name ?? 'Palpate');
+  }
+
+  /** Sees again what the page that steers shows. */
+  private follow(): void {
+    this.replay_.halt();
+    this.send({ type: 'follow' });
   }
 
   // --- drawing ---
@@ -466,6 +473,7 @@ class Page implements Listener {
   private show_timing(): void {
     this.plots_.draw_timing(this.history_, this.state_?.rate ?? 1000, this.mode_ !== 'live');
     const ticks = this.mode_ === 'live' ? this.state_?.ticks : this.history_.last + 1;
+    part('ticks-plot').hidden = this.mode_ !== 'live' && !(this.plots_.timing.compute[1] > 0); // a script's has no times
     show_timing(this.plots_.timing, this.state_?.misses ?? 0, ticks ?? 0);
   }
 

@@ -170,7 +170,7 @@ export class Picture {
   private colour(drawn: Drawn): void {
     const { shown } = this.body;
     const is_log = drawn.log && !field_traits[drawn.field].is_signed;
-    const automatic = this.range_.follow(is_log ? shown.largest : shown.usual, performance.now() / 1000);
+    const automatic = this.range_.follow(is_log || drawn.largest ? shown.largest : shown.usual, performance.now() / 1000);
     const high = drawn.range ?? automatic;
     const low = field_traits[drawn.field].is_signed ? -high : is_log ? high / log_span : 0;
     const colouring: Colouring = { map: drawn.map, is_log, isolines: drawn.isolines ? 12 : 0 };

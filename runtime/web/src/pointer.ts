@@ -73,6 +73,7 @@ export class Hand {
       requestAnimationFrame(beat);
     };
     requestAnimationFrame(beat);
+    setInterval(() => this.beat(performance.now()), longest_wait / 2); // pictures may take longer than the runtime waits
   }
 
   get is_pressed(): boolean {

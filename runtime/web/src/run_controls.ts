@@ -22,7 +22,7 @@ const most_refinement = 6;
 /** Who moves the tool, in a few words. */
 function role_of(state: State, mode: Mode, is_connected: boolean): string {
   if (!is_connected) return 'last picture';
-  if (mode === 'replay') return state.you === 'controller' ? 'recording, you steer' : 'recording, watching';
+  if (mode === 'replay') return state.you === 'controller' ? 'recording, you steer' : state.alone ? 'recording, on your own' : 'recording, watching';
   return state.you === 'controller' ? `you steer, by ${state.device}` : 'watching';
 }
 
@@ -90,7 +90,7 @@ export class RunControls {
     part('fault-hand').hidden = part('hand-note').hidden = !state.hand;
     part('busy').hidden = !state.busy;
     write(part('busy-text'), state.busy ?? '');
-    part('locked').hidden = !state.locked;
+    part('locked').hidden = !state.locked || mode !== 'live';
     write(part('locked'), state.locked ?? '');
     this.show_facts(state);
   }

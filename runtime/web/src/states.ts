@@ -17,7 +17,10 @@ export function told_of(state: State | null, mode: Mode, lost: string): Told | n
   }
   if (!state?.model) return null;
   if (mode === 'file') return null;
-  if (mode === 'replay') return state.you === 'controller' ? null : { kind: 'quiet', text: 'You look through this recording for yourself', hint: '' };
+  if (mode === 'replay') {
+    if (state.you === 'controller' || state.alone || !state.controlled) return null;
+    return { kind: 'quiet', text: 'You see what another page shows', hint: 'Move the slider to look for yourself.' };
+  }
   if (state.paused) return { kind: 'paused', text: 'Paused', hint: 'Space or “Go on” continues, . makes a single tick. The tool moves then.' };
   if (state.you === 'controller') return null;
   const hint = state.controlled ? 'Another page steers.' : 'Nobody steers: “Take control” lets you touch the body.';

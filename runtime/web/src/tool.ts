@@ -1,5 +1,6 @@
 // The tool where it is, and as a rim where the hand wants it.
-import { CapsuleGeometry, Group, LatheGeometry, Mesh, ShaderMaterial, SphereGeometry, Vector2, Vector3, type BufferGeometry, type Camera } from 'three';
+import { CapsuleGeometry, Color, Group, LatheGeometry, Mesh, ShaderMaterial, SphereGeometry, Vector2, Vector3, type BufferGeometry, type Camera } from 'three';
+import { tissue, tint } from './colours';
 import { light_glsl, type Light } from './light';
 import { disc_profile, type ToolShape } from './pose';
 
@@ -17,6 +18,7 @@ void main() {
 const steel = /* glsl */ `
 varying vec3 v_normal, v_place;
 uniform float clear, size;
+uniform vec3 body_colour;
 ${light_glsl}
 void main() {
   vec3 eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-v_place);
@@ -24,13 +26,15 @@ void main() {
   vec4 shape = texture2D(shape_map, gl_FragCoord.xy / picture_size);
   float behind = depth_range.x + depth_range.y * (shape.b + shape.a / 255.0) + v_place.z;
   float near_body = shape.b > 0.997 ? 0.0 : 1.0 - smoothstep(0.0, 0.55 * size, behind);
-  float sky = 1.0 - 0.75 * near_body * near_body;
-  Lit lit = light_at(v_place, normal, eye, sky, 1.0 - 0.5 * near_body);
+  float deep = near_body * near_body;
+  float sky = 1.0 - 0.8 * deep;
+  Lit lit = light_at(v_place, normal, eye, sky, 1.0 - 0.7 * near_body);
   vec3 seen = reflect(-eye, normal);
   vec3 room = mix(vec3(0.16, 0.15, 0.16), vec3(0.85, 0.9, 0.98), smoothstep(-0.35, 0.75, seen.y + 0.25 * seen.x));
-  room = mix(room, vec3(0.55, 0.26, 0.19), 0.45 * near_body * smoothstep(0.3, -0.6, seen.y));
+  float sees_body = shape.b > 0.997 ? 0.0 : smoothstep(0.25, -0.55, seen.z) * smoothstep(6.0, 0.0, behind / size);
+  room = mix(room, body_colour * mix(0.75, 0.22, deep), 0.85 * sees_body);
   float edge = pow(1.0 - max(0.0, dot(normal, eye)), 3.0);
-  vec3 colour = vec3(0.46, 0.50, 0.56) * lit.diffuse * 0.75 + room * mix(0.22, 0.75, edge) * sky + vec3(1.4 * lit.shine);
+  vec3 colour = vec3(0.46, 0.50, 0.56) * lit.diffuse * 0.75 + room * mix(0.22, 0.75, edge) * mix(1.0, 0.7, deep) + vec3(1.4 * lit.shine);
   float alpha = mix(1.0, mix(0.20, 0.92, edge) + 0.8 * lit.shine, clear);
   gl_FragColor = vec4(colour, clamp(alpha, 0.0, 1.0));
   #include <colorspace_fragment>
@@ -60,7 +64,7 @@ export class ToolView {
   private readonly ghost_: Mesh<BufferGeometry, ShaderMaterial>;
 
   constructor(private readonly light_: Light) {
-    const uniforms = { ...light_.uniforms, clear: { value: 0 }, size: { value: 1 } };
+    const uniforms = { ...light_.uniforms, clear: { value: 0 }, size: { value: 1 }, body_colour: { value: new Color(tissue) } };
     const geometry = new SphereGeometry(1);
     this.tool_ = new Mesh(geometry, new ShaderMaterial({ vertexShader: vertex, fragmentShader: steel, uniforms, transparent: true }));
     this.ghost_ = new Mesh(geometry, new ShaderMaterial({ vertexShader: vertex, fragmentShader: rim, transparent: true, depthTest: false, depthWrite: false }));
@@ -92,6 +96,7 @@ export class ToolView {
 
   /** As glass, so that colours below it can be read. */
   set_clear(is_clear: boolean): void {
+    (this.tool_.material.uniforms.body_colour!.value as Color).set(is_clear ? `rgb(${tint.join()})` : tissue);
     this.tool_.material.uniforms.clear!.value = is_clear ? 1 : 0;
     this.tool_.material.depthWrite = !is_clear;
   }

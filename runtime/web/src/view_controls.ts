@@ -14,7 +14,7 @@ export function scale_of(slider: number): number {
   return most_scaled ** ((slider - 50) / 50);
 }
 
-const toggles = ['edges', 'outline', 'held', 'tool', 'arrows', 'grid', 'through', 'log', 'isolines', 'parallel', 'section-flip'] as const;
+const toggles = ['edges', 'outline', 'held', 'tool', 'arrows', 'grid', 'through', 'log', 'largest', 'isolines', 'parallel', 'section-flip'] as const;
 type Toggle = (typeof toggles)[number];
 
 export interface Drawn {
@@ -34,6 +34,7 @@ export interface Drawn {
   grid: boolean;
   through: boolean;
   log: boolean;
+  largest: boolean; // the range ends there
   isolines: boolean;
   parallel: boolean;
 }
@@ -80,6 +81,7 @@ export class ViewControls {
       grid: on('grid'),
       through: on('through'),
       log: on('log'),
+      largest: on('largest'),
       isolines: on('isolines'),
       parallel: on('parallel'),
     };

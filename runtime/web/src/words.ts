@@ -56,6 +56,7 @@ export interface State {
   defaults: { radius: number; reach: number; friction: number; depth: number };
   frames?: number;
   frame?: number;
+  alone?: boolean; // of a replay it sees another frame than the page that steers
   duration?: number;
   times?: number[];
 }
@@ -90,4 +91,5 @@ export type Word =
   | { type: 'change'; settings: Record<string, string | null> }
   | { type: 'record'; on: boolean }
   | { type: 'control'; take: boolean }
-  | { type: 'seek'; frame: number };
+  | { type: 'seek'; frame: number }
+  | { type: 'follow' };
