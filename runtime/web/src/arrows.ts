@@ -1,5 +1,5 @@
 // Arrows of the forces on the body: of each contact, and of all together at the tool. They are as long on the screen as forces are large.
-import { ConeGeometry, CylinderGeometry, GreaterDepth, Group, InstancedMesh, Matrix4, MeshBasicMaterial, Quaternion, Vector3 } from 'three';
+import { BackSide, ConeGeometry, CylinderGeometry, GreaterDepth, Group, InstancedMesh, Matrix4, MeshBasicMaterial, Quaternion, Vector3 } from 'three';
 import { nice_ceiling } from './format';
 import { floats_of_contact, type Frame } from './wire';
 
@@ -7,6 +7,7 @@ const most = 256;
 const head = 12; // pixels
 const longest = 110; // pixels
 const shortest = 3; // pixels that are drawn
+const border = 1; // pixels
 const up = new Vector3(0, 1, 0);
 
 /** Metres that a pixel shows at a place. */
@@ -25,7 +26,8 @@ class ArrowSet {
   ) {
     const plain = new MeshBasicMaterial({ color: colour });
     const hidden = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.3, depthFunc: GreaterDepth, depthWrite: false });
-    const sets = (geometry: CylinderGeometry | ConeGeometry) => [plain, hidden].map((material) => new InstancedMesh(geometry, material, most));
+    const dark = new MeshBasicMaterial({ color: 0x3a2608, side: BackSide });
+    const sets = (geometry: CylinderGeometry | ConeGeometry) => [dark, plain, hidden].map((material) => new InstancedMesh(geometry, material, most));
     this.shafts_ = sets(new CylinderGeometry(1, 1, 1, 10).translate(0, 0.5, 0));
     this.heads_ = sets(new ConeGeometry(1, 1, 16).translate(0, 0.5, 0));
     for (const part of [...this.shafts_, ...this.heads_]) {
@@ -48,17 +50,21 @@ class ArrowSet {
     const size = Math.min(head, 0.6 * pixels) * (this.thickness_ / 2.4) ** 0.5 * pixel;
     const thick = Math.min(this.thickness_, 0.12 * pixels) * pixel;
     const shaft = pixels * pixel - size;
-    this.put(this.shafts_, new Matrix4().compose(tail, turn, new Vector3(thick, shaft, thick)));
-    this.put(this.heads_, new Matrix4().compose(tail.clone().addScaledVector(way, shaft), turn, new Vector3(0.36 * size, size, 0.36 * size)));
+    const rim = border * Math.min(pixel, 0.4 * thick);
+    const neck = tail.clone().addScaledVector(way, shaft);
+    this.put(this.shafts_, tail, turn, new Vector3(thick, shaft, thick), tail.clone().addScaledVector(way, -rim), new Vector3(thick + rim, shaft, thick + rim));
+    const wide = 0.36 * size;
+    this.put(this.heads_, neck, turn, new Vector3(wide, size, wide), neck.clone().addScaledVector(way, -rim), new Vector3(wide + 1.6 * rim, size + 3.5 * rim, wide + 1.6 * rim));
     ++this.count_;
   }
 
-  private put(parts: InstancedMesh[], matrix: Matrix4): void {
-    for (const part of parts) {
-      part.setMatrixAt(this.count_, matrix);
+  /** The first of the parts is the border: a little larger. */
+  private put(parts: InstancedMesh[], place: Vector3, turn: Quaternion, size: Vector3, border_place: Vector3, border_size: Vector3): void {
+    parts.forEach((part, k) => {
+      part.setMatrixAt(this.count_, new Matrix4().compose(k === 0 ? border_place : place, turn, k === 0 ? border_size : size));
       part.count = this.count_ + 1;
       part.instanceMatrix.needsUpdate = true;
-    }
+    });
   }
 }
 

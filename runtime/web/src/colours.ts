@@ -11,19 +11,19 @@ function anchors(hex: string): Rgb[] {
 export const tissue = 0xab5b4a;
 
 /** Of a body that numbers colour, where they are far below the range: it stands out from a dark and from a light ground. */
-export const tint: Rgb = [0x79, 0x73, 0x70];
-const tinted = 0.2; // share of the range in which the tint fades
+export const tint: Rgb = [0x8a, 0x6e, 0x66];
+const tinted = 0.28; // share of the range in which the tint fades
 
 /**
  * matplotlib's viridis, cividis and inferno from where they are as light as the tint, each at equal distances: lightness grows all the way, for
  * all eyes. The diverging map grows lighter to both sides.
  */
 const maps = {
-  viridis: anchors('2f6b8e 2a788e 21918c 22a884 44bf70 7ad151 bddf26 fde725'),
-  cividis: anchors('7a7873 868077 948b77 a59c74 b4a76f c3b369 d2c060 e1cc55 f0da48 fee838'),
-  inferno: anchors('c63d4d cf4446 de5638 ed6925 f68013 fb9b06 fab61c f7d13d f8ea71 fcffa4'),
-  grey: anchors('6e6e6e 808080 939393 a6a6a6 bababa cfcfcf e4e4e4 fafafa'),
-  diverging: anchors('b5defe 93c8f7 74b0e8 5d97d0 5b84ae 6b7c92 797370 957559 b27c3f d08a2c ea9d32 fab658 ffd38f'),
+  viridis: anchors('26818e 20938c 22a785 3aba76 60ca60 93d741 cae11f fde725'),
+  cividis: anchors('757575 828079 918b78 9f9775 aea371 bfb06b cfbd62 dfca57 f0d846 fee838'),
+  inferno: anchors('e05536 eb6628 f57b17 fa9008 fca80d fac026 f5d949 f1ef75 fcffa4'),
+  grey: anchors('747474 868686 989898 ababab bebebe d1d1d1 e5e5e5 f9f9f9'),
+  diverging: anchors('b5defe 93c8f7 74b0e8 5d97d0 5b84ae 6f7a8c 8a6e66 987452 b27c3f d08a2c ea9d32 fab658 ffd38f'),
 };
 export type MapName = keyof typeof maps;
 export const sequential_maps = ['viridis', 'cividis', 'inferno', 'grey'] as const;
@@ -40,7 +40,18 @@ export function map_colour(name: MapName, share: number): Rgb {
   const colour = mixed(colours[below]!, colours[below + 1]!, place - below);
   if (name === 'diverging' || at >= tinted) return colour;
   const rise = at / tinted;
-  return mixed(tint, colour, rise * rise * (3 - 2 * rise));
+  const part = rise * rise * (3 - 2 * rise);
+  return with_luminance(luminance(tint) + rise * (luminance(colour) - luminance(tint)), mixed(tint, colour, part));
+}
+
+const to_linear = (channel: number): number => (channel <= 10 ? channel / 255 / 12.92 : ((channel / 255 + 0.055) / 1.055) ** 2.4);
+const to_srgb = (linear: number): number => Math.round(255 * Math.min(1, linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
+const luminance = ([r, g, b]: Rgb): number => 0.2126 * to_linear(r) + 0.7152 * to_linear(g) + 0.0722 * to_linear(b);
+
+/** `colour`, made lighter or darker. */
+function with_luminance(wanted: number, colour: Rgb): Rgb {
+  const factor = wanted / luminance(colour);
+  return colour.map((channel) => to_srgb(factor * to_linear(channel))) as Rgb;
 }
 
 /** `width` texels RGBA of a map. */

@@ -80,7 +80,7 @@ float tool_open(vec3 place, vec3 normal) {
   float l = max(length(way), 1e-9);
   float h = max(l / size, 1.0);
   float facing = dot(normal, way) / l;
-  float crease = 0.62 * exp(-max(0.0, l - tool_radius) / (0.32 * size)) * smoothstep(-0.9, -0.1, facing);
+  float crease = 0.75 * exp(-max(0.0, l - tool_radius) / (0.42 * size)) * smoothstep(-0.9, -0.1, facing);
   return (1.0 - clamp(facing, 0.0, 1.0) / (h * h)) * (1.0 - crease);
 }
 

@@ -96,6 +96,8 @@ class Page implements Listener {
       if (this.mode_ !== 'live') this.want_plots(); // the playhead is where the picture is
     };
     view.margins = () => this.margins();
+    const watch = new ResizeObserver(() => view.eye.resize());
+    for (const id of ['hand', 'replay']) watch.observe(part(id));
     view.eye.taken = () => this.want_keep();
     this.listen();
     this.listen_keys();
@@ -390,11 +392,21 @@ class Page implements Listener {
     }
   }
 
+  /** How much of the stage is above what stands at its bottom [px]. */
+  private free_above_bottom(): number | null {
+    const tops = ['hand', 'replay', 'scale-bar']
+      .map((id) => part(id))
+      .filter((card) => card.offsetHeight > 0)
+      .map((card) => card.getBoundingClientRect().top);
+    return tops.length > 0 ? Math.min(...tops) - part('stage').getBoundingClientRect().top : null;
+  }
+
   private margins(): { top: number; bottom: number; left: number; right: number } {
     const { clientWidth: width, clientHeight: height } = part('stage');
     const rem = parseFloat(getComputedStyle(document.documentElement).fontSize);
     const is_small = width < 700 || height < 420;
-    return { top: (is_small ? 3 : 3.4) * rem, bottom: (is_small ? 3.4 : 4.2) * rem, left: (is_small ? 0.5 : 1.5) * rem, right: (width < 480 ? 4.2 : 5.2) * rem };
+    const free = this.free_above_bottom() ?? height - (is_small ? 3.4 : 4.2) * rem;
+    return { top: (is_small ? 3 : 3.4) * rem, bottom: height - free + 0.4 * rem, left: (is_small ? 0.5 : 1.5) * rem, right: (width < 480 ? 4.2 : 5.2) * rem };
   }
 
   /** Plays all of a recording once, and saves what is seen. */

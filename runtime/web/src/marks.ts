@@ -1,6 +1,6 @@
 // What stands beside the body in the picture: the axes, a bar of known length, and how long arrows are.
 import { Vector3 } from 'three';
-import { part, write } from './dom';
+import { part, rem, write } from './dom';
 import type { Eye } from './eye';
 import { format_si, short_number } from './format';
 
@@ -40,14 +40,14 @@ export class Marks {
   /** As the camera is now; the legend of the arrows, whose force is 0 where there are none. */
   show(legend: { force: number; pixels: number }): void {
     const pixel = this.eye_.metres_of_pixel();
-    const length = round_below(bar_most * pixel);
+    const length = round_below(bar_most * rem() * pixel);
     this.bar = { pixels: length / pixel, text: format_length(length) };
     write(part('scale-bar-text'), this.bar.text);
     part('scale-bar-line').style.width = `${this.bar.pixels.toFixed(1)}px`;
     part('arrow-legend').hidden = !(legend.force > 0);
     if (legend.force > 0) {
       write(part('arrow-legend-text'), format_si(legend.force, 'N', 2));
-      part('arrow-legend-line').style.width = `${legend.pixels}px`;
+      part('arrow-legend-line').style.width = `${legend.pixels.toFixed(1)}px`;
     }
     this.show_axes();
   }

@@ -4,7 +4,7 @@ import { Arrows } from './arrows';
 import { Body, type Colouring } from './body';
 import { ColourBar } from './colour_bar';
 import { field_traits, log_span, Range } from './colours';
-import { part } from './dom';
+import { part, rem } from './dom';
 import { Marks } from './marks';
 import { Section, type SectionAxis } from './section';
 import { parse_tool } from './pose';
@@ -53,7 +53,10 @@ export class Picture {
     this.body.shows = (place) => this.section_.shows(place);
     this.view.scene.add(this.body.group, this.section_.group, this.tool_.group, this.arrows_.group);
     this.view.before_drawing = () => this.prepare();
-    this.view.after_drawing = () => this.marks.show(this.drawn_?.arrows && this.arrows_.group.visible ? this.arrows_.legend : { force: 0, pixels: 0 });
+    this.view.after_drawing = () => {
+      const { force, pixels } = this.arrows_.legend;
+      this.marks.show(this.arrows_.group.visible ? { force, pixels: pixels * this.arrow_unit } : { force: 0, pixels: 0 });
+    };
     this.body.rebuilt = () => {
       this.regions_wanted_ = true;
     };
@@ -152,6 +155,12 @@ export class Picture {
     this.colour(drawn);
   }
 
+  /** Pixels of the page for one of an arrow: more on large screens, fewer on phones. */
+  private get arrow_unit(): number {
+    const { clientWidth, clientHeight } = this.view.element;
+    return rem() * Math.min(1, Math.max(0.5, Math.min(clientWidth, clientHeight) / (560 * rem())));
+  }
+
   private place_tool(drawn: Drawn): void {
     const frame = this.body.frame;
     const { eye } = this.view;
@@ -159,7 +168,7 @@ export class Picture {
     const is_seen = frame !== null && drawn.scale === 1; // beside a body that is drawn larger they would be in the wrong place
     if (frame) {
       this.tool_.show(frame.tool, frame.device);
-      this.arrows_.show(frame, this.tool_.radius, (place: Vector3) => eye.pixel_at(place));
+      this.arrows_.show(frame, this.tool_.radius, (place: Vector3) => this.arrow_unit * eye.pixel_at(place));
     }
     this.tool_.group.visible = is_seen && drawn.tool && this.has_tool && frame.tool.every(Number.isFinite);
     this.arrows_.group.visible = is_seen && drawn.arrows;

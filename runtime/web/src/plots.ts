@@ -1,6 +1,7 @@
 // Force and depth over time, and how long ticks took.
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
+import { rem } from './dom';
 import { short_number, si_prefix } from './format';
 import { css_colour } from './theme';
 import { log_classes, quantile, type Column, type History } from './history';
@@ -8,8 +9,6 @@ import { log_classes, quantile, type Column, type History } from './history';
 const shown_seconds = 10;
 const ink = () => css_colour('dim');
 const grid = () => css_colour('grid');
-/** Lengths in style.css grow with large screens: pixels of what is one at the usual size. */
-const rem = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
 const font = () => `${Math.round(11 * rem())}px system-ui, sans-serif`;
 
 interface Line {

@@ -25,7 +25,7 @@ void main() {
   vec3 normal = normalize(v_normal);
   vec4 shape = texture2D(shape_map, gl_FragCoord.xy / picture_size);
   float behind = depth_range.x + depth_range.y * (shape.b + shape.a / 255.0) + v_place.z;
-  float near_body = shape.b > 0.997 ? 0.0 : 1.0 - smoothstep(0.0, 0.55 * size, behind);
+  float near_body = shape.b > 0.997 ? 0.0 : 1.0 - smoothstep(0.0, 0.8 * size, behind);
   float deep = near_body * near_body;
   float sky = 1.0 - 0.8 * deep;
   Lit lit = light_at(v_place, normal, eye, sky, 1.0 - 0.7 * near_body);
@@ -34,7 +34,7 @@ void main() {
   float sees_body = shape.b > 0.997 ? 0.0 : smoothstep(0.25, -0.55, seen.z) * smoothstep(6.0, 0.0, behind / size);
   room = mix(room, body_colour * mix(0.75, 0.22, deep), 0.85 * sees_body);
   float edge = pow(1.0 - max(0.0, dot(normal, eye)), 3.0);
-  vec3 colour = vec3(0.46, 0.50, 0.56) * lit.diffuse * 0.75 + room * mix(0.22, 0.75, edge) * mix(1.0, 0.7, deep) + vec3(1.4 * lit.shine);
+  vec3 colour = vec3(0.46, 0.50, 0.56) * lit.diffuse * 0.75 * (1.0 - 0.75 * sees_body) + room * mix(mix(0.22, 0.75, edge), 0.75, sees_body) * mix(1.0, 0.7, deep) + vec3(1.4 * lit.shine);
   float alpha = mix(1.0, mix(0.20, 0.92, edge) + 0.8 * lit.shine, clear);
   gl_FragColor = vec4(colour, clamp(alpha, 0.0, 1.0));
   #include <colorspace_fragment>
