@@ -200,7 +200,7 @@ export class Body {
     });
     this.colour_edges();
     this.material_.set_map(traits.is_signed ? 'diverging' : colouring.map);
-    this.material_.set_range(high > 0 ? low : -Number(low < 0), high > 0 ? high : 1); // where all is 0, 0 has its colour too
+    this.material_.set_range(high > 0 ? low : -Number(traits.is_signed), high > 0 ? high : 1); // where all is 0, 0 has its colour too
   }
 
   /** In the ink of the page where the inside is not known, so that they are all there is. */

@@ -32,6 +32,11 @@ const timing_wait = 500;
 const keep_wait = 500; // [ms] before how a model is looked at is kept
 const key_pixels = 8; // that an arrow key moves the tool
 
+/** Whether the tool has taken hold of the body, so that nothing is pressed in. */
+function holds(frame: Frame | null): boolean {
+  return frame !== null && frame.contact.length > 0 && frame.contact[floats_of_contact - 1]! > 0;
+}
+
 class Page implements Listener {
   private mode_: Mode = 'live';
   private state_: State | null = null;
@@ -244,11 +249,11 @@ class Page implements Listener {
 
   private listen(): void {
     input('depth').addEventListener('change', () => {
+      input('depth').blur();
       this.typed_depth_ = typed_number(input('depth').value, 0) !== null;
       if (!this.typed_depth_ && this.state_) {
         show_value(input('depth'), short_number(1000 * this.usual_depth(), 2));
       }
-      input('depth').blur();
     });
     button('screenshot').addEventListener('click', () => {
       void this.saving_.save_picture(`${this.state_?.model?.name ?? 'Palpate'}-${this.felt().tick}`);
@@ -448,7 +453,7 @@ class Page implements Listener {
     const sample = frame ? Math.max(0, Math.min(this.history_.count - 1, this.history_.from(frame.tick))) : 0;
     return {
       force: frame ? [frame.force[0]!, frame.force[1]!, frame.force[2]!] : [0, 0, 0],
-      depth: this.history_.count > 0 ? this.history_.value('depth', sample) : 0,
+      depth: holds(frame) ? NaN : this.history_.count > 0 ? this.history_.value('depth', sample) : 0,
       contacts: this.felt_contacts(frame, sample),
       tick: frame?.tick ?? 0,
     };
@@ -494,7 +499,7 @@ class Page implements Listener {
     const scale = this.picture_.body.scale;
     const lines = [
       `force ${format_si(Math.hypot(...felt.force), 'N')}  (${felt.force.map((one) => format_si(one, 'N')).join(', ')})`,
-      this.has_depth() ? `depth ${format_si(felt.depth, 'm')}  contacts ${felt.contacts}` : `contacts ${felt.contacts}`,
+      this.has_depth() && Number.isFinite(felt.depth) ? `depth ${format_si(felt.depth, 'm')}  contacts ${felt.contacts}` : `contacts ${felt.contacts}`,
       `tick ${felt.tick}  time ${format_time(this.picture_.frame?.time ?? 0)}`,
     ];
     if (this.best_effort() !== '') lines.push(this.best_effort());
@@ -521,6 +526,12 @@ class Page implements Listener {
       },
       get eye() {
         return page.picture_.view.eye.place;
+      },
+      get playhead() {
+        return page.plots_.cursor; // [s], where plots have it
+      },
+      get time() {
+        return page.picture_.frame?.time ?? null; // [s], of the picture
       },
       get frames() {
         return page.frames_;

@@ -452,7 +452,7 @@ TEST(SeenSurface, StlHoldsTheVolumeOfTheStretchedCube) {
     EXPECT_EQ(stl.size(), 84 + 50 * triangles);
     const std::string vtu = surface_vtu(picture, patched.scene, patch);
     EXPECT_NE(vtu.find("NumberOfCells=\"" + std::to_string(triangles) + "\""), std::string::npos);
-    for (const char* name : {"displacement", "von_mises", "contact_pressure"})
+    for (const char* name : {"displacement", "von_mises", "pressure"})
       EXPECT_NE(vtu.find(std::string("Name=\"") + name + "\""), std::string::npos) << name;
   }
 }
