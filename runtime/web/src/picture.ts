@@ -62,8 +62,9 @@ export class Picture {
     };
   }
 
+  /** What came last: what looks as it did before is not drawn. */
   get frame(): Frame | null {
-    return this.body.frame;
+    return this.latest_ ?? this.body.frame;
   }
 
   take_scene(scene: Scene): void {

@@ -105,9 +105,10 @@ function draw_marks(context: Context, { bar, arms }: Caption, inks: Inks, height
   context.fillText(bar.text, x + 61 + bar.pixels / 2, height - 36);
 }
 
-/** Draws it all over a canvas of the size of `view`, whose page is `page_width` wide. */
-export function compose_onto(canvas: HTMLCanvasElement, view: HTMLCanvasElement, page_width: number, caption: Caption, inks: Inks): void {
-  if (canvas.width !== view.width || canvas.height !== view.height) Object.assign(canvas, { width: view.width, height: view.height });
+/** Draws it all over a canvas, `shrink` times smaller than `view`, whose page is `page_width` wide. */
+export function compose_onto(canvas: HTMLCanvasElement, view: HTMLCanvasElement, shrink: number, page_width: number, caption: Caption, inks: Inks): void {
+  const [view_width, view_height] = [Math.round(view.width / shrink), Math.round(view.height / shrink)];
+  if (canvas.width !== view_width || canvas.height !== view_height) Object.assign(canvas, { width: view_width, height: view_height });
   const context = canvas.getContext('2d')!;
   context.resetTransform();
   context.clearRect(0, 0, canvas.width, canvas.height);
@@ -119,8 +120,9 @@ export function compose_onto(canvas: HTMLCanvasElement, view: HTMLCanvasElement,
     context.fillStyle = lit;
     context.fillRect(0, 0, w, h);
   }
-  context.drawImage(view, 0, 0);
-  const unit = view.width / Math.max(1, page_width);
+  context.imageSmoothingQuality = 'high';
+  context.drawImage(view, 0, 0, canvas.width, canvas.height);
+  const unit = canvas.width / Math.max(1, page_width);
   context.scale(unit, unit);
   const [width, height] = [canvas.width / unit, canvas.height / unit];
   context.textBaseline = 'top';

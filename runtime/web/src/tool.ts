@@ -87,7 +87,7 @@ export class ToolView {
       geometry = new CapsuleGeometry(shape.radius, shape.length, 12, 32).translate(0, shape.length / 2, 0);
       if (dimension === 3) geometry.rotateX(Math.PI / 2);
     } else {
-      geometry = new SphereGeometry(this.radius, 48, 32);
+      geometry = new SphereGeometry(this.radius, 36, 22);
     }
     this.tool_.material.uniforms.size!.value = this.radius;
     this.tool_.geometry.dispose();

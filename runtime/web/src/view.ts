@@ -9,6 +9,9 @@ import type { Scene as SceneMessage } from './wire';
 
 const rest_after = 220; // [ms] without a change a whole picture is drawn
 const most_pixels = 2; // of the drawing for one of the page, along a side
+const most_drawn = 6e6; // pixels of the drawing
+const least_drawn = 1.1e5;
+const smooth = 1.5; // pixels along a side that become one of a picture that rests
 const shade_reach = 0.16; // of half the body's diagonal
 
 /** How often and how finely is drawn, for tests and measurements. */
@@ -33,7 +36,7 @@ export class View {
   /** Every picture is drawn whole, as for a video. */
   is_whole = false;
 
-  private readonly renderer_ = new WebGLRenderer({ antialias: true, alpha: true, stencil: true });
+  private readonly renderer_ = new WebGLRenderer({ antialias: false, alpha: true, stencil: true });
   private readonly shade_: Shade;
   private readonly pace_ = new Pace();
   private grid_: GridHelper | null = null;
@@ -77,7 +80,7 @@ export class View {
       this.is_wanted_ = false;
       this.pace_.note(now - Math.max(this.drawn_at_, this.wanted_at_));
       this.drawn_at_ = performance.now();
-      this.picture(this.is_whole ? 1 : this.pace_.share, this.is_whole);
+      this.picture(this.is_whole ? Math.min(smooth, this.pace_.most) : this.pace_.share, this.is_whole);
       clearTimeout(this.rest_timer_);
       this.rest_timer_ = window.setTimeout(() => this.rest(), rest_after);
     });
@@ -91,6 +94,7 @@ export class View {
     const { clientWidth: width, clientHeight: height } = this.element;
     if (width === 0 || height === 0) return;
     this.size_ = '';
+    this.set_bounds(width, height);
     this.canvas.style.width = `${width}px`;
     this.canvas.style.height = `${height}px`;
     this.eye.resize();
@@ -116,12 +120,14 @@ export class View {
     this.draw();
   }
 
-  /** Draws at once, so many times as fine as the page, and gives what was drawn, without a ground. */
-  take_picture(fineness: number): HTMLCanvasElement {
+  /** Draws at once, without a ground: `shrink` pixels along a side are to become one of a picture `fineness` times as fine as the page. */
+  take_picture(fineness: number): { canvas: HTMLCanvasElement; shrink: number } {
     const largest = Math.min(8192, this.renderer_.capabilities.maxTextureSize) / Math.max(this.element.clientWidth, this.element.clientHeight);
-    this.picture(Math.min(fineness, largest) / this.screen_pixels(), true);
+    const wanted = Math.min(fineness, largest);
+    const shrink = Math.min(fineness > 2 ? 1.5 : 2, largest / wanted);
+    this.picture((wanted * shrink) / this.screen_pixels(), true);
     this.draw(); // as it was
-    return this.canvas;
+    return { canvas: this.canvas, shrink };
   }
 
   private floor(box: Box3, up: Vector3, cell: number): Vector3 {
@@ -131,6 +137,13 @@ export class View {
     return place.addScaledVector(up, low.dot(up) - place.dot(up));
   }
 
+  /** Bounds of how finely is drawn: edges are smooth where more is drawn than is shown. */
+  private set_bounds(width: number, height: number): void {
+    const screen = this.screen_pixels();
+    this.pace_.most = Math.min(Math.max(1, most_pixels / screen), Math.sqrt(most_drawn / (width * height)) / screen);
+    this.pace_.least = Math.min(0.4, Math.sqrt(least_drawn / (width * height)) / screen);
+  }
+
   private screen_pixels(): number {
     return Math.min(most_pixels, window.devicePixelRatio);
   }
@@ -138,7 +151,7 @@ export class View {
   private rest(): void {
     if (this.is_wanted_) return;
     const begun = performance.now();
-    this.picture(this.pace_.rest_share, true);
+    this.picture(Math.min(smooth, this.pace_.most) * this.pace_.rest_share, true);
     requestAnimationFrame(() => requestAnimationFrame((now) => this.pace_.note_rest(now - begun)));
   }
 
