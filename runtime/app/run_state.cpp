@@ -44,7 +44,7 @@ bool has_loads(const Model& model) {
          std::any_of(model.rest_force.begin(), model.rest_force.end(), is_there);
 }
 
-/// Of the materials, in the order of their numbers [Pa].
+/// Young's moduli of the materials, in the order of their numbers [Pa].
 nlohmann::json youngs_moduli(const Model& model) {
   nlohmann::json moduli = nlohmann::json::array();
   for (const Material& material : model.materials) moduli.push_back(material.youngs_modulus);

@@ -139,6 +139,7 @@ test('a stiffer ball within is seen: by material, cut open, and through the surf
     }, name);
   };
   await part(page, 'theme').selectOption('light', { force: true });
+  await part(page, 'show-held').evaluate((box) => box.click()); // its dots are bluish
   await set_field(page, 'material');
   await part(page, 'materials').locator('li').first().waitFor();
   assert.deepEqual(await part(page, 'materials').locator('li').allInnerTexts(), ['1: E = 3.0 kPa', '2: E = 30 kPa']);
