@@ -12,12 +12,13 @@ export async function bare(page) {
 
 /// The picture came to rest: it is drawn whole, and nothing changes it.
 export async function rest(page) {
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))); // what was asked for is drawn
   await page.waitForFunction(() => {
     const now = window.palpate.picture;
     const same = window.rested?.pictures === now.pictures && now.rests;
     window.rested = now;
     return same;
-  }, undefined, { polling: 300 });
+  }, undefined, { polling: 120 });
 }
 
 /// Keeps the pixels of the stage in the page under `name`; `bare` first.

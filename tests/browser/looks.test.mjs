@@ -34,7 +34,7 @@ async function open_block(t, options = {}) {
   return { at, served, page: await ready(await visit(t, served.url, options)) };
 }
 
-const small = { viewport: { width: 900, height: 560 } }; // quick to draw
+const small = { viewport: { width: 760, height: 500 } }; // quick to draw
 
 const set_field = (page, field) => part(page, 'field').selectOption(field);
 
@@ -169,7 +169,7 @@ test('no text is cut off or covered, and every target is large enough, at five s
     const options = { viewport: { width, height }, hasTouch, isMobile: hasTouch };
     const target = hasTouch ? 44 : 24;
     const check = async (page, what) => {
-      await page.waitForTimeout(300);
+      await page.waitForTimeout(120);
       const faults = await faults_of_layout(page, target);
       assert.deepEqual(faults, [], `${width} × ${height}, ${what}`);
     };
