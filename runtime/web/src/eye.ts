@@ -113,7 +113,8 @@ export class Eye {
     }
     const height = Math.max(1, this.canvas_.clientHeight);
     const { width: wide, height: high } = this.opening();
-    const shares = { wide: (wide / height) * 0.94, high: (high / height) * 0.94 };
+    const full = this.is_flat ? 0.84 : 0.94; // a tool stands beside a body in the plane
+    const shares = { wide: (wide / height) * full, high: (high / height) * full };
     const towards: Vec3 = this.is_flat ? [0, 0, 1] : this.towards_;
     const up: Vec3 = this.is_flat ? [0, 1, 0] : this.up_;
     const slope = Math.tan((this.perspective_.fov * Math.PI) / 360);

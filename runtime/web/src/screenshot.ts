@@ -125,13 +125,14 @@ export function compose_onto(canvas: HTMLCanvasElement, view: HTMLCanvasElement,
   const unit = canvas.width / Math.max(1, page_width);
   context.scale(unit, unit);
   const [width, height] = [canvas.width / unit, canvas.height / unit];
+  context.shadowColor = inks.ground || '#ffffff'; // texts can be read over the body
+  context.shadowBlur = 5 * unit;
   context.textBaseline = 'top';
   context.textAlign = 'left';
   context.fillStyle = inks.ink;
   context.font = '600 16px system-ui, sans-serif';
   context.fillText(caption.title, 16, 14);
   context.font = '13px ui-monospace, monospace';
-  context.fillStyle = inks.dim;
   caption.lines.forEach((line, i) => context.fillText(line, 16, 40 + 18 * i));
   if (caption.scale) draw_scale(context, caption.scale, inks, width, height);
   if (caption.materials.length > 0) draw_materials(context, caption.materials, inks, width, height);
