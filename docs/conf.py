@@ -76,7 +76,7 @@ CHAPTERS = {
         "contributing",
     ],
 }
-MEASUREMENTS = ["precompute", "size", "accuracy", "overlays", "contact", "hands", "dynamics", "devices", "viewer"]
+MEASUREMENTS = ["precompute", "size", "accuracy", "overlays", "contact", "hands", "dynamics", "devices", "viewer", "viewer-looks"]
 
 
 def toctree(folder, pages, caption=""):

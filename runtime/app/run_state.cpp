@@ -44,6 +44,13 @@ bool has_loads(const Model& model) {
          std::any_of(model.rest_force.begin(), model.rest_force.end(), is_there);
 }
 
+/// Young's moduli of the materials, in the order of their numbers [Pa].
+nlohmann::json youngs_moduli(const Model& model) {
+  nlohmann::json moduli = nlohmann::json::array();
+  for (const Material& material : model.materials) moduli.push_back(material.youngs_modulus);
+  return moduli;
+}
+
 }  // namespace
 
 nlohmann::json to_json(const RunState& state) {
@@ -81,6 +88,7 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
           {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
           {"moves", model.dynamics.method != DynamicsMethod::none},
           {"loads", has_loads(model)},
+          {"materials", youngs_moduli(model)},
           {"overlay_rings", overlay_rings(body)},
           {"overlay_refinement", {least_refinement, most_refinement}}};
 }

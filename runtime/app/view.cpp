@@ -17,6 +17,7 @@
 #include "runtime/app/session_pictures.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
+#include "runtime/viewer/viewed_run.h"
 #include "runtime/viewer/viewer_server.h"
 #include "runtime/viewer/wire.h"
 #include "runtime/web/page.h"
@@ -41,10 +42,14 @@ class SessionView : public ViewedRun {
 
   void seek(std::int64_t frame) override {
     const std::lock_guard lock(mutex_);
-    const std::int64_t shown = std::clamp<std::int64_t>(frame, 0, pictures_.frames() - 1);
+    const std::int64_t shown = nearest(frame);
     server_.show_picture(pictures_.picture(shown));
     state_["frame"] = shown;
     server_.show_state(json_text(state_));
+  }
+  std::optional<Leaf> leaf(std::int64_t frame) override {
+    const std::lock_guard lock(mutex_);
+    return Leaf{nearest(frame), pictures_.picture(nearest(frame))};
   }
   void point(const PointerPose&) override {}
   void lose_pointer() override {}
@@ -59,6 +64,10 @@ class SessionView : public ViewedRun {
   [[noreturn]] static void refuse() {
     throw Error("cannot be done with a recording", "palpate-runtime view",
                 "touch the body itself: palpate-runtime play MODEL.palpate.hdf --view");
+  }
+
+  [[nodiscard]] std::int64_t nearest(std::int64_t frame) const {
+    return std::clamp<std::int64_t>(frame, 0, pictures_.frames() - 1);
   }
 
   const SessionPictures& pictures_;

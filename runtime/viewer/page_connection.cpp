@@ -6,6 +6,7 @@
 
 #include "runtime/viewer/page_server.h"
 #include "runtime/viewer/page_word.h"
+#include "runtime/viewer/wire.h"
 
 namespace palpate {
 namespace {
@@ -173,19 +174,22 @@ Message PageConnection::next_message() {
     said_.pop_front();
     return message;
   }
-  if (states_ != shown.states()) {
+  if (states_ != shown.states() || !is_role_sent_) {
     const bool is_first = states_ == 0;
     states_ = shown.states();
+    is_role_sent_ = true;
     return shown.state_message(server_.role(*this), is_first);
   }
   if (scenes_ != shown.scenes()) {
     scenes_ = shown.scenes();
     patch_ = 0;
     base_.reset();
+    alone_.reset();
     return shown.scene_message();
   }
   const bool has_ticks = shown.ticks().has_from(ticks_);
-  if (shown.picture() && pictures_ != shown.pictures() && !(has_ticks && ticks_first_)) {
+  const bool is_new = alone_ ? !alone_->is_sent : shown.picture() && pictures_ != shown.pictures();
+  if (is_new && !(has_ticks && ticks_first_)) {
     if (Clock::now() >= picture_due_) return next_picture();
     wait_for_picture();
   }
@@ -194,7 +198,48 @@ Message PageConnection::next_message() {
   return shown.ticks_message(ticks_);
 }
 
+void PageConnection::look_alone(DrawnPicture picture, std::int64_t frame) {
+  alone_ = Alone{std::move(picture), frame};
+  is_role_sent_ = false;
+  send_news();
+}
+
+void PageConnection::follow() {
+  if (!alone_) return;
+  alone_.reset();
+  pictures_ = 0;
+  base_.reset();  // which is none of those that all have been sent
+  is_role_sent_ = false;
+  send_news();
+}
+
+std::optional<std::int64_t> PageConnection::leaf() const noexcept {
+  if (!alone_) return std::nullopt;
+  return alone_->frame;
+}
+
+Message PageConnection::own_picture() {
+  alone_->is_sent = true;
+  ticks_first_ = true;
+  const DrawnPicture& own = alone_->picture;
+  const std::uint32_t number = base_ ? base_->number + 1 : 1;
+  auto values = std::make_shared<const WireValues>(wire_values(own.picture, *own.scene, nullptr, number));
+  Message message{std::make_shared<const std::string>(
+                      encode_frame(own.picture, *own.scene, nullptr, *values, base_.get())),
+                  false};
+  base_ = std::move(values);
+  note_picture(message);
+  return message;
+}
+
+/// The next one has its time by how long this one is.
+void PageConnection::note_picture(const Message& message) {
+  picture_due_ = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(message.bytes->size()) *
+                                                         nanoseconds_per_byte);
+}
+
 Message PageConnection::next_picture() {
+  if (alone_) return own_picture();
   Broadcast& shown = server_.broadcast();
   const ScenePatch* patch = shown.picture()->patch.get();
   const std::uint32_t number = patch == nullptr ? 0 : patch->number;
@@ -203,8 +248,7 @@ Message PageConnection::next_picture() {
   ticks_first_ = true;
   Message message = shown.frame_message(base_.get());
   base_ = shown.values();
-  picture_due_ = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(message.bytes->size()) *
-                                                         nanoseconds_per_byte);
+  note_picture(message);
   return message;
 }
 

@@ -34,6 +34,12 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   void send_news();
   /// A text that it must not miss.
   void say(std::string text);
+  /// It sees this from now on, whatever is shown to all.
+  void look_alone(DrawnPicture picture, std::int64_t frame);
+  /// It sees what is shown to all.
+  void follow();
+  /// The frame that it sees alone.
+  [[nodiscard]] std::optional<std::int64_t> leaf() const noexcept;
   /// It has shown the token, and there is room for it.
   [[nodiscard]] bool is_admitted() const noexcept { return is_admitted_; }
   /// It does not read.
@@ -50,6 +56,8 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   void close(boost::beast::websocket::close_code code, std::string reason);
   Message next_message();
   Message next_picture();
+  Message own_picture();
+  void note_picture(const Message& message);
   void wait_for_picture();
 
   boost::beast::tcp_stream stream_;
@@ -73,6 +81,13 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   std::int64_t ticks_ = 0;
   std::uint32_t patch_ = 0;
   std::shared_ptr<const WireValues> base_;  // of the last picture; null: none of this scene
+  struct Alone {
+    DrawnPicture picture;
+    std::int64_t frame = 0;
+    bool is_sent = false;
+  };
+  std::optional<Alone> alone_;  // what it sees in the place of what all see
+  bool is_role_sent_ = true;
   boost::asio::steady_timer picture_timer_;
   std::chrono::steady_clock::time_point picture_due_;  // no picture before: what was sent has its time
   bool ticks_first_ = true;                            // else pictures

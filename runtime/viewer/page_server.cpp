@@ -36,6 +36,7 @@ struct Ask {
   void operator()(const RecordWord& word) const { run.record(word.on); }
   void operator()(const ControlWord&) const {}  // is between pages
   void operator()(const SeekWord& word) const { run.seek(word.frame); }
+  void operator()(const FollowWord&) const {}  // is the page's own
 };
 
 tcp protocol_of(const std::string& address) {
@@ -145,6 +146,10 @@ void PageServer::show_all() {
   for (PageConnection* page : pages) page->send_news();
 }
 
+PageRole PageServer::role(const PageConnection& page) const {
+  return {controller_ == &page, controller_ != nullptr, open_.size(), page.leaf()};
+}
+
 void PageServer::join(PageConnection& page) {
   open_.insert(&page);
   if (open_.size() == 1) controller_ = &page;
@@ -175,6 +180,7 @@ void PageServer::hand_over(PageConnection& page, bool take) {
     if (controller_ == &page) release();
   } else if (controller_ == nullptr) {
     controller_ = &page;
+    page.follow();
     show_state_anew();
   } else if (controller_ != &page) {
     page.say(error_word("control", PageError(PageRefusal::control, "another page has control", "",
@@ -182,17 +188,32 @@ void PageServer::hand_over(PageConnection& page, bool take) {
   }
 }
 
+/// Who only watches a replay still looks at what it likes.
+void PageServer::leaf(PageConnection& page, std::int64_t frame) {
+  std::optional<Leaf> leaf = run_.leaf(frame);
+  if (leaf && broadcast_.picture()) {
+    page.look_alone({broadcast_.picture()->scene, nullptr, std::move(leaf->picture)}, leaf->frame);
+  }
+}
+
 void PageServer::obey(PageConnection& page, const PageWord& word) {
   if (const auto* control = std::get_if<ControlWord>(&word)) return hand_over(page, control->take);
+  if (std::holds_alternative<FollowWord>(word)) return page.follow();
   const char* name = name_of(word);
-  if (controller_ != &page) {
+  const auto* seek = std::get_if<SeekWord>(&word);
+  const bool leafs = is_replay_ && seek != nullptr && controller_ != &page;
+  if (controller_ != &page && !leafs) {
     page.say(error_word(
         name, PageError(PageRefusal::control, "this page only watches", "",
                         controller_ == nullptr ? "take control first" : "another page has control")));
     return;
   }
   try {
-    std::visit(Ask{run_}, word);
+    if (leafs) {
+      leaf(page, seek->frame);
+    } else {
+      std::visit(Ask{run_}, word);
+    }
   } catch (const Error& error) {
     page.say(error_word(name, error));
   } catch (const std::exception& error) {  // no memory, say: the run goes on

@@ -48,9 +48,7 @@ class PageServer {
   [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
   [[nodiscard]] bool is_replay() const noexcept { return is_replay_; }
   [[nodiscard]] Broadcast& broadcast() noexcept { return broadcast_; }
-  [[nodiscard]] PageRole role(const PageConnection& page) const {
-    return {controller_ == &page, controller_ != nullptr, open_.size()};
-  }
+  [[nodiscard]] PageRole role(const PageConnection& page) const;
   /// Whether another connection that has shown the token may be answered.
   [[nodiscard]] bool has_room() const;
   /// It is a socket now: the only one of all has control.
@@ -72,6 +70,7 @@ class PageServer {
   void show_all();
   void hand_over(PageConnection& page, bool take);
   void release();
+  void leaf(PageConnection& page, std::int64_t frame);
 
   ViewedRun& run_;
   bool is_replay_;

@@ -15,8 +15,8 @@ constexpr double farthest = 1e6;  // [m]
 constexpr double quaternion_error = 0.01;
 constexpr std::int64_t most_frames = std::int64_t{1} << 53;  // integers that JavaScript has
 
-constexpr std::array<const char*, 9> names = {"point",  "pause",  "step",    "reset", "acknowledge",
-                                              "change", "record", "control", "seek"};
+constexpr std::array<const char*, 10> names = {"point",  "pause",  "step",    "reset", "acknowledge",
+                                               "change", "record", "control", "seek",  "follow"};
 static_assert(names.size() == std::variant_size_v<PageWord>);
 
 /// What is wrong with a word; only in here.
@@ -111,8 +111,9 @@ PageWord word_of(const Json& object) {
     expect_members(object, {"take"});
     return ControlWord{boolean(object, "take")};
   }
-  if (type == "step" || type == "reset" || type == "acknowledge") {
+  if (type == "step" || type == "reset" || type == "acknowledge" || type == "follow") {
     expect_members(object, {});
+    if (type == "follow") return FollowWord{};
     if (type == "step") return StepWord{};
     if (type == "reset") return ResetWord{};
     return AcknowledgeWord{};

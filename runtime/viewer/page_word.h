@@ -35,9 +35,10 @@ struct ControlWord {
 struct SeekWord {
   std::int64_t frame;
 };
+struct FollowWord {};
 
 using PageWord = std::variant<PointWord, PauseWord, StepWord, ResetWord, AcknowledgeWord, ChangeWord,
-                              RecordWord, ControlWord, SeekWord>;
+                              RecordWord, ControlWord, SeekWord, FollowWord>;
 
 /// What a word is called in messages: its `type`.
 const char* name_of(const PageWord& word) noexcept;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "runtime/viewer/viewed_run.h"
@@ -12,8 +13,9 @@ namespace palpate {
 /// What a page is to the run.
 struct PageRole {
   bool is_controller = false;
-  bool controlled = false;  ///< whether any page is
-  std::size_t pages = 0;    ///< all that watch
+  bool controlled = false;                ///< whether any page is
+  std::size_t pages = 0;                  ///< all that watch
+  std::optional<std::int64_t> leaf = {};  ///< the frame of a recording that it sees alone
 };
 
 /// The first message of all. `mode`: live, replay or file. `has_book`: the page's help can open the book.

@@ -5,6 +5,7 @@
 #include "meshes/surface.h"
 #include "meshes/topology.h"
 #include "runtime/body/surface_numbering.h"
+#include "runtime/viewer/inner_surface.h"
 #include "runtime/viewer/node_order.h"
 
 namespace palpate {
@@ -94,6 +95,10 @@ void fill_surface(const Body& body, Scene& scene) {
   }
   scene.triangles = grouped<3>(simplices);
   scene.elements = surface_elements(model);
+  if (model.materials.size() > 1) {
+    for (const Index e : scene.elements) scene.materials.push_back(material_number(model, e));
+    scene.inner = make_inner_surface(model);
+  }
   const Surface surface = extract_surface(model.mesh);
   std::vector<Line> edges;
   for (Index f = 0; f < surface.count(); ++f) {
@@ -150,8 +155,10 @@ ScenePatch make_scene_patch(const Body& body, const Scene& scene, const Patch& p
   const FineSurface& fine = body.fine_surface();
   const auto d = static_cast<std::size_t>(body.dimension());
   std::vector<Index> simplices;  // in the patch's numbering
+  const bool has_materials = !scene.materials.empty();
   for (std::size_t s = 0; s < fine.element.size(); ++s) {
     if (!refined(fine.element[s])) continue;
+    if (has_materials) drawn.materials.push_back(material_number(body.model(), fine.element[s]));
     for (const Index node : body.simplices().subspan(d * s, d))
       simplices.push_back(
           static_cast<Index>(std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin()));

@@ -12,6 +12,14 @@
 
 namespace palpate {
 
+/// Where materials meet within a body in space, at rest. Its nodes are not those of the surface.
+struct InnerSurface {
+  std::vector<Vec3> nodes;                      ///< [I] without loads [m]
+  std::vector<std::array<Index, 3>> triangles;  ///< [J] outward of `inside`
+  std::vector<std::uint8_t> inside;             ///< [J] number of the material on the one side
+  std::vector<std::uint8_t> outside;            ///< [J] and on the other
+};
+
 /// In space the surface as the elements have it; in the plane all elements, where their displacement is known
 /// (all free nodes are stored), else the boundary.
 struct Scene {
@@ -24,6 +32,8 @@ struct Scene {
   std::vector<Index> elements;                  ///< [T] that each is on; in a recording unknown: empty
   std::vector<std::array<Index, 2>> edges;      ///< of the elements, each once
   std::vector<std::uint8_t> held;               ///< [S] as Model::fixed
+  std::vector<std::uint8_t> materials;          ///< [T] in space, where there are several; else empty
+  InnerSurface inner;
   std::vector<Index> order;  ///< [S] of the nodes in messages: neighbours follow each other
 };
 
@@ -35,6 +45,7 @@ struct ScenePatch {
   std::vector<Vec3> nodes;                      ///< [m] without loads [m]
   std::vector<std::array<Index, 3>> triangles;  ///< of its own nodes
   std::vector<std::array<Index, 2>> outline;    ///< in the plane: the boundary
+  std::vector<std::uint8_t> materials;          ///< [t] as a scene's
 };
 
 /// The scene of a body. Throws Error when the model's surface is not that of its mesh.

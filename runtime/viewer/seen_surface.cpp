@@ -89,7 +89,7 @@ std::string surface_vtu(const SurfacePicture& picture, const Scene& scene, const
     for (const std::array<Index, 2>& edge : scene.edges) cells.insert(cells.end(), edge.begin(), edge.end());
   }
   const std::array<NodalField, 3> fields = {
-      {{"displacement", 3, displacement}, {"von_mises", 1, von_mises}, {"contact_pressure", 1, pressure}}};
+      {{"displacement", 3, displacement}, {"von_mises", 1, von_mises}, {"pressure", 1, pressure}}};
   return vtu_text(positions, element, cells, fields);
 }
 

@@ -12,7 +12,7 @@ namespace palpate {
 std::string surface_stl(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch);
 
 /// VTK XML of the same, in the plane without triangles of the boundary's lines, with nodal `displacement`
-/// without loads to there [m], `von_mises` [Pa] (not a number where it is not known) and `contact_pressure`
+/// without loads to there [m], `von_mises` [Pa] (not a number where it is not known) and `pressure`
 /// [Pa].
 std::string surface_vtu(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch);
 

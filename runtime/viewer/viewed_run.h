@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "runtime/safety/pointer_pose.h"
+#include "runtime/viewer/scene.h"
 
 namespace palpate {
 
@@ -44,6 +45,12 @@ class PageError : public Error {
   PageRefusal reason_;
 };
 
+/// A frame of a recording.
+struct Leaf {
+  std::int64_t frame = 0;
+  SurfacePicture picture;
+};
+
 /// Called by the server's thread; no call waits for the loop. Those that can be wrong throw Error, whose text
 /// the page is shown.
 class ViewedRun {
@@ -59,6 +66,12 @@ class ViewedRun {
   virtual void change(const SettingsChange& settings) = 0;
   virtual void record(bool on) = 0;
   virtual void seek(std::int64_t frame) = 0;  ///< in a replay
+  /// The nearest frame that a replay has, for a page that leafs for itself; all others see what they saw.
+  /// Nothing where there is no replay.
+  virtual std::optional<Leaf> leaf(std::int64_t frame) {
+    static_cast<void>(frame);
+    return std::nullopt;
+  }
 };
 
 }  // namespace palpate

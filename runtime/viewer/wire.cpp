@@ -26,6 +26,7 @@ class WireMessage {
     bytes_.append(reinterpret_cast<const char*>(&number), sizeof number);
   }
   void add_bytes(std::string_view bytes) { bytes_.append(bytes); }
+  void pad() { bytes_.resize((bytes_.size() + 3) / 4 * 4); }
   void add_count(std::size_t count) { add(static_cast<std::uint32_t>(count)); }
   void add_vector(const Vec3& v) {
     for (const double x : v) add(static_cast<float>(x));
@@ -51,6 +52,24 @@ void add_nodes(WireMessage& message, const std::vector<std::array<Index, corners
   }
 }
 
+void add_bytes_of(WireMessage& message, const std::vector<std::uint8_t>& numbers) {
+  message.pad();
+  for (const std::uint8_t number : numbers) message.add(number);
+}
+
+/// What follows a scene of several materials.
+void add_materials(WireMessage& message, const Scene& scene) {
+  const InnerSurface& inner = scene.inner;
+  message.pad();
+  message.add_count(inner.nodes.size());
+  message.add_count(inner.triangles.size());
+  for (const Vec3& node : inner.nodes) message.add_vector(node);
+  add_nodes(message, inner.triangles);
+  add_bytes_of(message, scene.materials);
+  add_bytes_of(message, inner.inside);
+  add_bytes_of(message, inner.outside);
+}
+
 /// The place of each node in the order of the scene.
 std::vector<std::uint32_t> places_in_order(const Scene& scene) {
   std::vector<std::uint32_t> places(scene.order.size());
@@ -74,6 +93,7 @@ std::string encode_scene(const Scene& scene) {
   add_nodes(message, scene.triangles, places);
   add_nodes(message, scene.edges, places);
   for (const Index node : scene.order) message.add(scene.held[static_cast<std::size_t>(node)]);
+  if (!scene.materials.empty()) add_materials(message, scene);
   return message.take();
 }
 
@@ -88,6 +108,7 @@ std::string encode_patch(std::uint32_t scene, const ScenePatch& patch) {
   for (const Vec3& node : patch.nodes) message.add_vector(node);
   add_nodes(message, patch.triangles);
   add_nodes(message, patch.outline);
+  if (!patch.materials.empty()) add_bytes_of(message, patch.materials);
   return message.take();
 }
 

@@ -117,7 +117,7 @@ export async function close() {
 
 /// A page of its own context, which notes what goes wrong in it: errors of scripts, and requests to anywhere but the runtime.
 export async function visit(t, url, options = {}, before = null) {
-  const context = await (await open()).newContext({ viewport: { width: 1280, height: 800 }, ...options });
+  const context = await (await open()).newContext({ viewport: { width: 1280, height: 800 }, colorScheme: 'dark', ...options });
   t.after(() => context.close());
   const page = await context.newPage();
   page.setDefaultTimeout(120_000); // guards against what never comes, not against a busy machine

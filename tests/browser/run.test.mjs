@@ -14,7 +14,7 @@ test('the page comes whole from the runtime and asks nobody else', async (t) => 
   await assert.doesNotReject(part(page, 'stage').locator('canvas').first().waitFor());
   assert.equal(await part(page, 'model').innerText(), 'cube');
   assert.equal(await part(page, 'connection').innerText(), 'connected');
-  assert.match(await part(page, 'role').innerText(), /controller, mouse/);
+  assert.match(await part(page, 'role').innerText(), /you steer, by mouse/);
   assert.deepEqual(page.complaints, []);
 });
 

@@ -135,6 +135,18 @@ Model unit_model(ElementType element, int cells, Scope scope, Precision precisio
       unit_mesh(element, cells), [up](const Vec3& node) { return node[up] < 1e-12; }, scope, precision);
 }
 
+Model two_materials(ElementType element, int cells) {
+  Model model = unit_model(element, cells, Scope::full, Precision::double_precision);
+  model.materials.push_back(model.materials.front());
+  for (Index e = 0; e < model.mesh.elements(); ++e) {
+    double height = 0.0;
+    for (const Index node : model.mesh.element_nodes(e)) height += model.mesh.nodes[node].z();
+    if (height < 0.5 * static_cast<double>(model.mesh.element_nodes(e).size()))
+      model.material_of_element[e] = 1;
+  }
+  return model;
+}
+
 Model unit_model(int dimension, int cells, Scope scope, Precision precision) {
   return unit_model(dimension == 2 ? ElementType::quad4 : ElementType::tet4, cells, scope, precision);
 }

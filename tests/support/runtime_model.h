@@ -29,6 +29,9 @@ Mesh unit_mesh(ElementType element, int cells);
 /// That, clamped at the bottom (z = 0, in the plane y = 0).
 Model unit_model(ElementType element, int cells, Scope scope, Precision precision);
 
+/// A cube whose elements with their middle below z = 1/2 count as a second material. Forces are those of one.
+Model two_materials(ElementType element, int cells);
+
 /// That of tet4 or, with two dimensions, of quad4.
 Model unit_model(int dimension, int cells, Scope scope, Precision precision);
 

@@ -45,6 +45,9 @@ struct DecodedScene {
   std::vector<float> position;
   std::vector<std::uint32_t> triangle, edge;
   std::vector<std::uint8_t> held;
+  std::vector<float> inner_position;  // of a body of several materials
+  std::vector<std::uint32_t> inner_triangle;
+  std::vector<std::uint8_t> material, inside, outside;
 };
 
 inline DecodedScene decode_scene(const std::string& message) {
@@ -60,6 +63,16 @@ inline DecodedScene decode_scene(const std::string& message) {
   scene.triangle = bytes.array<std::uint32_t>(3 * T);
   scene.edge = bytes.array<std::uint32_t>(2 * E);
   scene.held = bytes.array<std::uint8_t>(S);
+  if (!bytes.at_end()) {
+    bytes.array<std::uint8_t>(0);  // to the next multiple of 4 bytes
+    const std::size_t I = bytes.u32();
+    const std::size_t J = bytes.u32();
+    scene.inner_position = bytes.array<float>(3 * I);
+    scene.inner_triangle = bytes.array<std::uint32_t>(3 * J);
+    scene.material = bytes.array<std::uint8_t>(T);
+    scene.inside = bytes.array<std::uint8_t>(J);
+    scene.outside = bytes.array<std::uint8_t>(J);
+  }
   if (!bytes.at_end()) throw std::invalid_argument("the scene is too long");
   return scene;
 }
@@ -69,6 +82,7 @@ struct DecodedPatch {
   std::vector<std::uint32_t> hidden;
   std::vector<float> position;
   std::vector<std::uint32_t> triangle, outline;
+  std::vector<std::uint8_t> material;  // of a body of several
 };
 
 inline DecodedPatch decode_patch(const std::string& message) {
@@ -85,6 +99,7 @@ inline DecodedPatch decode_patch(const std::string& message) {
   patch.position = bytes.array<float>(3 * m);
   patch.triangle = bytes.array<std::uint32_t>(3 * t);
   patch.outline = bytes.array<std::uint32_t>(2 * o);
+  if (!bytes.at_end()) patch.material = bytes.array<std::uint8_t>(t);
   if (!bytes.at_end()) throw std::invalid_argument("the patch is too long");
   return patch;
 }

@@ -1,27 +1,36 @@
-// Arrows of the forces on the body: of each contact, and of all together at the tool.
-import { ConeGeometry, CylinderGeometry, Group, InstancedMesh, Matrix4, MeshBasicMaterial, Quaternion, Vector3 } from 'three';
+// Arrows of the forces on the body: of each contact, and of all together at the tool. They are as long on the screen as forces are large.
+import { BackSide, ConeGeometry, CylinderGeometry, GreaterDepth, Group, InstancedMesh, Matrix4, MeshBasicMaterial, Quaternion, Vector3 } from 'three';
 import { nice_ceiling } from './format';
 import { floats_of_contact, type Frame } from './wire';
 
 const most = 256;
-const head = 0.28; // share of the length
+const head = 12; // pixels
+const longest = 110; // pixels
+const shortest = 3; // pixels that are drawn
+const border = 1; // pixels
 const up = new Vector3(0, 1, 0);
 
-/** Arrows of one colour; an arrow of length 1 stands on the origin along y. */
+/** Metres that a pixel shows at a place. */
+export type PixelSize = (place: Vector3) => number;
+
+/** Arrows of one colour: shafts and heads of length 1 along y; hidden parts are drawn faintly. */
 class ArrowSet {
   readonly group = new Group();
-  private readonly shafts_: InstancedMesh;
-  private readonly heads_: InstancedMesh;
+  private readonly shafts_: InstancedMesh[];
+  private readonly heads_: InstancedMesh[];
   private count_ = 0;
 
   constructor(
     colour: number,
-    private readonly thickness_: number,
+    private readonly thickness_: number, // pixels
   ) {
-    const material = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 1, depthTest: false });
-    this.shafts_ = new InstancedMesh(new CylinderGeometry(1, 1, 1 - head, 10).translate(0, (1 - head) / 2, 0), material, most);
-    this.heads_ = new InstancedMesh(new ConeGeometry(2.6, head, 14).translate(0, 1 - head / 2, 0), material, most);
-    for (const part of [this.shafts_, this.heads_]) {
+    const plain = new MeshBasicMaterial({ color: colour });
+    const hidden = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.3, depthFunc: GreaterDepth, depthWrite: false });
+    const dark = new MeshBasicMaterial({ color: 0x3a2608, side: BackSide });
+    const sets = (geometry: CylinderGeometry | ConeGeometry) => [dark, plain, hidden].map((material) => new InstancedMesh(geometry, material, most));
+    this.shafts_ = sets(new CylinderGeometry(1, 1, 1, 10).translate(0, 0.5, 0));
+    this.heads_ = sets(new ConeGeometry(1, 1, 16).translate(0, 0.5, 0));
+    for (const part of [...this.shafts_, ...this.heads_]) {
       part.frustumCulled = false;
       part.renderOrder = 5;
       this.group.add(part);
@@ -30,52 +39,84 @@ class ArrowSet {
   }
 
   clear(): void {
-    this.count_ = this.shafts_.count = this.heads_.count = 0;
+    this.count_ = 0;
+    for (const part of [...this.shafts_, ...this.heads_]) part.count = 0;
   }
 
-  add(from: Vector3, along: Vector3, body_size: number): void {
-    const length = along.length();
-    if (this.count_ === most || !(length > 1e-4 * body_size)) return;
-    const turn = new Quaternion().setFromUnitVectors(up, along.clone().divideScalar(length));
-    const thick = Math.min(this.thickness_ * body_size, 0.07 * length);
-    const matrix = new Matrix4().compose(from, turn, new Vector3(thick, length, thick));
-    for (const part of [this.shafts_, this.heads_]) {
-      part.setMatrixAt(this.count_, matrix);
+  /** From `tail` so many pixels along `way`, of length 1. */
+  add(tail: Vector3, way: Vector3, pixels: number, pixel: number): void {
+    if (this.count_ === most || !(pixels > shortest)) return;
+    const turn = new Quaternion().setFromUnitVectors(up, way);
+    const size = Math.min(head, 0.6 * pixels) * (this.thickness_ / 2.4) ** 0.5 * pixel;
+    const thick = Math.min(this.thickness_, 0.12 * pixels) * pixel;
+    const shaft = pixels * pixel - size;
+    const rim = border * Math.min(pixel, 0.4 * thick);
+    const neck = tail.clone().addScaledVector(way, shaft);
+    this.put(this.shafts_, tail, turn, new Vector3(thick, shaft, thick), tail.clone().addScaledVector(way, -rim), new Vector3(thick + rim, shaft, thick + rim));
+    const wide = 0.36 * size;
+    this.put(this.heads_, neck, turn, new Vector3(wide, size, wide), neck.clone().addScaledVector(way, -rim), new Vector3(wide + 1.6 * rim, size + 3.5 * rim, wide + 1.6 * rim));
+    ++this.count_;
+  }
+
+  /** The first of the parts is the border: a little larger. */
+  private put(parts: InstancedMesh[], place: Vector3, turn: Quaternion, size: Vector3, border_place: Vector3, border_size: Vector3): void {
+    parts.forEach((part, k) => {
+      part.setMatrixAt(this.count_, new Matrix4().compose(k === 0 ? border_place : place, turn, k === 0 ? border_size : size));
       part.count = this.count_ + 1;
       part.instanceMatrix.needsUpdate = true;
-    }
-    ++this.count_;
+    });
   }
 }
 
 export class Arrows {
   readonly group = new Group();
-  private readonly contacts_ = new ArrowSet(0xff9b5e, 0.0022);
-  private readonly whole_ = new ArrowSet(0xffe08a, 0.004);
-  private scale_ = 0; // force that is a quarter of the body long [N]
+  private readonly contacts_ = new ArrowSet(0xf07c3e, 1.3);
+  private readonly whole_ = new ArrowSet(0xf2c14e, 2.4);
+  private full_ = 0; // force of the longest arrow [N]
 
   constructor() {
     this.group.add(this.contacts_.group, this.whole_.group);
   }
 
-  /** The longest arrow is up to a quarter of the body; the scale follows as forces grow, and shrinks far below. */
-  show(frame: Frame, body_size: number): void {
+  /** What the legend says: a force [N] and how many pixels long it is; 0: there is none. */
+  get legend(): { force: number; pixels: number } {
+    return { force: 0.5 * this.full_, pixels: 0.5 * longest };
+  }
+
+  /** Forgets how long forces were. */
+  forget(): void {
+    this.full_ = 0;
+  }
+
+  /** `radius` of the tool [m], which the whole force's arrow does not hide in. The scale follows as forces grow, and shrinks far below. */
+  show(frame: Frame, radius: number, pixel_at: PixelSize): void {
     this.contacts_.clear();
     this.whole_.clear();
     const force = new Vector3().fromArray(frame.force);
     const size = force.length();
-    if (size > this.scale_ || size < 0.02 * this.scale_) this.scale_ = nice_ceiling(size);
-    if (!(this.scale_ > 0)) return;
-    const metres = (0.25 * body_size) / this.scale_;
+    if (size > this.full_ || (size > 0 && size < 0.02 * this.full_)) this.full_ = nice_ceiling(size);
+    if (!(this.full_ > 0)) return;
+    let inwards = 0;
     for (let c = 0; c < frame.contact.length; c += floats_of_contact) {
       const place = new Vector3().fromArray(frame.contact, c);
       const normal = new Vector3().fromArray(frame.contact, c + 3);
-      const along = new Vector3().fromArray(frame.contact, c + 6).multiplyScalar(metres);
+      const along = new Vector3().fromArray(frame.contact, c + 6);
+      const own = along.length();
+      inwards -= normal.dot(along);
+      if (!(own > 0)) continue;
+      const pixel = pixel_at(place);
+      const pixels = (longest * own) / this.full_;
+      const way = along.divideScalar(own);
       // Outside of the body, where it can be seen: the tip of one that presses, the tail of one that pulls.
-      this.contacts_.add(along.dot(normal) < 0 ? place.sub(along) : place, along, body_size);
+      this.contacts_.add(way.dot(normal) < 0 ? place.addScaledVector(way, -pixels * pixel) : place, way, pixels, pixel);
     }
-    const along = force.multiplyScalar(metres);
+    if (!(size > 0)) return;
     const tool = new Vector3().fromArray(frame.tool);
-    this.whole_.add(tool.sub(along), along, body_size);
+    const pixel = pixel_at(tool);
+    const pixels = (longest * size) / this.full_;
+    const way = force.divideScalar(size);
+    const presses = frame.contact.length === 0 || inwards > 0;
+    const gap = radius + 3 * pixel;
+    this.whole_.add(presses ? tool.addScaledVector(way, -gap - pixels * pixel) : tool.addScaledVector(way, gap), way, pixels, pixel);
   }
 }

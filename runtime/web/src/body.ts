@@ -2,88 +2,33 @@
 import {
   BufferAttribute,
   BufferGeometry,
-  DataTexture,
-  DoubleSide,
   DynamicDrawUsage,
-  FrontSide,
   Group,
-  LinearFilter,
   LineBasicMaterial,
   LineSegments,
   Mesh,
-  MeshStandardMaterial,
+  type Plane,
   Points,
   PointsMaterial,
-  RGBAFormat,
-  SRGBColorSpace,
-  Vector2,
+  type Vector4,
 } from 'three';
-import { field_traits, map_texels, type Field, type MapName } from './colours';
+import { BodyMaterial } from './body_material';
+import { field_traits, type Field, type SequentialMap } from './colours';
 import { displacements, fill_field, usual_largest } from './field';
-import { boundary_edges, type Surface } from './pick';
+import type { Light } from './light';
+import { boundary_edges, type Hit, type Surface } from './pick';
+import { Interior } from './interior';
+import type { Region } from './section';
+import { shape_layer } from './shade';
 import { make_topology, vertex_normals, type Topology } from './topology';
 import type { Frame, Patch, Scene } from './wire';
+import type { Vec3 } from './words';
 
-function map_texture(name: MapName): DataTexture {
-  const texture = new DataTexture(map_texels(name, 256), 256, 1, RGBAFormat);
-  texture.colorSpace = SRGBColorSpace;
-  texture.magFilter = texture.minFilter = LinearFilter;
-  texture.needsUpdate = true;
-  return texture;
-}
-
-interface BodyUniforms {
-  colour_map: { value: DataTexture };
-  range: { value: Vector2 };
-  coloured: { value: number };
-  hatch: { value: number };
-  even: { value: number };
-  shading: { value: number };
-}
-
-/** Looks up the colour by the vertex's number, and hatches where all corners are held. */
-function coloured_material(uniforms: BodyUniforms): MeshStandardMaterial {
-  const material = new MeshStandardMaterial({
-    color: 0xc9b8a8,
-    roughness: 0.62,
-    metalness: 0,
-    polygonOffset: true,
-    polygonOffsetFactor: 2,
-    polygonOffsetUnits: 4,
-  });
-  material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, uniforms);
-    shader.vertexShader = shader.vertexShader
-      .replace('#include <common>', '#include <common>\nattribute vec3 shown;\nvarying vec3 v_shown;')
-      .replace('#include <begin_vertex>', '#include <begin_vertex>\nv_shown = shown;');
-    shader.fragmentShader = shader.fragmentShader
-      .replace(
-        '#include <common>',
-        '#include <common>\nvarying vec3 v_shown;\nuniform sampler2D colour_map;\nuniform vec2 range;\nuniform float coloured, hatch, even, shading;',
-      )
-      .replace(
-        '#include <color_fragment>',
-        `#include <color_fragment>
-        if (coloured > 0.5) {
-          float share = clamp((v_shown.x - range.x) / max(range.y - range.x, 1e-30), 0.0, 1.0);
-          vec3 looked_up = texture2D(colour_map, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
-          diffuseColor.rgb = v_shown.y > 0.999 ? looked_up : vec3(0.18);
-        }
-        if (hatch > 0.5 && v_shown.z > 0.999) {
-          float stripe = step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0));
-          diffuseColor.rgb *= 0.45 + 0.25 * stripe;
-        }`,
-      )
-      // Colours that are to be read off a bar are those of the bar where the light falls, and a little darker on the far side: shape is seen.
-      .replace(
-        '#include <opaque_fragment>',
-        `float away = 0.5 - 0.5 * dot(normalize(normal), normalize(vec3(-0.4, 0.5, 0.8)));
-        float rim = shading * pow(1.0 - abs(normalize(normal).z), 6.0);
-        if (even > 0.5) outgoingLight = diffuseColor.rgb * (1.0 - shading * away) + 0.12 * rim;
-        #include <opaque_fragment>`,
-      );
-  };
-  return material;
+/** How numbers become colours. */
+export interface Colouring {
+  map: SequentialMap;
+  is_log: boolean;
+  isolines: number; // how many; 0: none
 }
 
 export class Body {
@@ -112,29 +57,26 @@ export class Body {
     scale: 1,
   };
 
-  private readonly maps_ = { sequential: map_texture('sequential'), diverging: map_texture('diverging') };
-  private readonly uniforms_: BodyUniforms = {
-    colour_map: { value: this.maps_.sequential },
-    range: { value: new Vector2(0, 1) },
-    coloured: { value: 0 },
-    hatch: { value: 1 },
-    even: { value: 0 },
-    shading: { value: 0 },
-  };
-  private readonly material_ = coloured_material(this.uniforms_);
-  private readonly mesh_ = new Mesh(new BufferGeometry(), this.material_);
+  private readonly material_: BodyMaterial;
+  private readonly mesh_: Mesh<BufferGeometry, BodyMaterial>;
+  private readonly interior_: Interior;
   private readonly edges_ = new LineSegments(
     new BufferGeometry(),
-    new LineBasicMaterial({ color: 0x0a0d12, transparent: true, opacity: 0.45 }),
+    new LineBasicMaterial({ color: 0x0a0d12, transparent: true, opacity: 0.3 }),
   );
   private readonly outline_ = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0xffb454 }));
   private readonly held_ = new Points(
     new BufferGeometry(),
-    new PointsMaterial({ color: 0x7d8ba1, size: 4, sizeAttenuation: false }),
+    new PointsMaterial({ color: 0x8fa3bd, size: 3, sizeAttenuation: false }),
   );
 
-  constructor() {
-    this.group.add(this.mesh_, this.edges_, this.outline_, this.held_);
+  constructor(light: Light, cut: { value: Vector4 }, planes: Plane[]) {
+    for (const part of [this.edges_, this.outline_, this.held_]) part.material.clippingPlanes = planes;
+    this.material_ = new BodyMaterial(light, cut);
+    this.mesh_ = new Mesh(new BufferGeometry(), this.material_);
+    this.interior_ = new Interior(light, cut);
+    this.mesh_.layers.enable(shape_layer);
+    this.group.add(this.mesh_, this.edges_, this.outline_, this.held_, this.interior_.mesh);
     for (const part of this.group.children) part.frustumCulled = false;
     this.edges_.visible = false;
   }
@@ -153,17 +95,42 @@ export class Body {
     this.outline_.visible = on;
   }
   show_held(on: boolean): void {
-    this.held_.visible = on;
-    this.uniforms_.hatch.value = on ? 1 : 0;
+    this.shows_held_ = on;
+    this.material_.set({ shows_held: on ? 1 : 0 });
+  }
+  private shows_held_ = true;
+  /** The surface as a veil, through which other materials are seen. */
+  show_through(on: boolean): void {
+    const flat = this.scene_?.dimension === 2;
+    this.material_.set_see_through(on && !flat, flat || this.is_cut);
+    this.interior_.mesh.visible = on && !flat;
+    this.held_.visible = this.shows_held_ && !on;
+    if (on) this.mesh_.layers.disable(shape_layer);
+    else this.mesh_.layers.enable(shape_layer);
+  }
+  /** Whether a place is there to be touched. */
+  shows: (place: Vec3) => boolean = () => true;
+  /** A section shows the inside of what is left. */
+  is_cut = false;
+
+  set_pixel(pixel: number): void {
+    this.material_.set({ pixel });
+    this.held_.material.size = 3 * pixel;
+  }
+
+  /** Closed surfaces of each material. */
+  regions(): Region[] {
+    const topology = this.topology_;
+    if (!topology || topology.triangle.length === 0) return [];
+    return this.interior_.regions(topology, this.attribute('position'));
   }
 
   take_scene(scene: Scene): void {
     this.scene_ = scene;
     this.patch_ = null;
     this.frame_ = null;
-    const flat = scene.dimension === 2;
-    this.material_.side = flat ? DoubleSide : FrontSide;
-    this.material_.needsUpdate = true;
+    this.interior_.take(scene);
+    this.material_.set({ is_flat: scene.dimension === 2 ? 1 : 0 });
     this.rebuild();
   }
 
@@ -197,8 +164,8 @@ export class Body {
     const { node } = topology;
     for (let v = 0; v < node.length; ++v) {
       const i = node[v]!;
-      shown[3 * v] = this.value_[i]!;
-      shown[3 * v + 1] = this.known_[i]!;
+      shown[4 * v] = this.value_[i]!;
+      shown[4 * v + 1] = this.known_[i]!;
     }
     values.needsUpdate = true;
     this.place(topology);
@@ -220,32 +187,43 @@ export class Body {
     const normal = this.attribute('normal');
     vertex_normals(place, topology.triangle, normal.array as Float32Array);
     position.needsUpdate = normal.needsUpdate = true;
+    this.interior_.place(this.u_, this.scale);
   }
 
   /** Colours by the numbers from `low` to `high`. */
-  show_range(low: number, high: number): void {
-    this.uniforms_.coloured.value = this.field === 'none' ? 0 : 1;
+  show_range(low: number, high: number, colouring: Colouring): void {
+    const traits = field_traits[this.field];
+    this.material_.set({
+      colouring: this.field === 'material' ? 2 : traits.has_range ? 1 : 0,
+      is_log: colouring.is_log && !traits.is_signed ? 1 : 0,
+      lines: colouring.isolines,
+    });
     this.colour_edges();
-    this.uniforms_.colour_map.value = this.maps_[field_traits[this.field].map];
-    this.uniforms_.range.value.set(high > 0 ? low : -Number(low < 0), high > 0 ? high : 1); // where all is 0, 0 has its colour too
-    const flat = this.scene_?.dimension === 2;
-    this.uniforms_.even.value = flat || this.field !== 'none' ? 1 : 0;
-    this.uniforms_.shading.value = flat ? 0 : 0.6; // linear light: a fifth of what is seen
+    this.material_.set_map(traits.is_signed ? 'diverging' : colouring.map);
+    this.material_.set_range(high > 0 ? low : -Number(traits.is_signed), high > 0 ? high : 1); // where all is 0, 0 has its colour too
   }
 
-  /** Light on dark colours and dark on light ones; alone where the inside is not known. */
+  /** In the ink of the page where the inside is not known, so that they are all there is. */
+  ink = 0xc9b8a8;
   private colour_edges(): void {
     const flat = this.scene_?.dimension === 2;
     const is_alone = flat && this.scene_?.triangle.length === 0;
-    const is_dark = this.field !== 'none' && field_traits[this.field].map === 'sequential';
-    this.edges_.material.color.set(is_alone ? 0xc9b8a8 : is_dark ? 0xe6edf5 : 0x0a0d12);
-    this.edges_.material.opacity = is_alone ? 1 : (flat ? 0.7 : 0.45) * (is_dark ? 0.6 : 1);
+    this.edges_.material.color.set(is_alone ? this.ink : 0x0a0d12);
+    this.edges_.material.opacity = is_alone ? 1 : flat ? 0.6 : 0.38;
+  }
+
+  /** The number that colours a place of the surface. */
+  value_at({ corner, weight }: Hit): { value: number; is_known: boolean; material: number } {
+    if (!corner || !weight) return { value: NaN, is_known: false, material: 0 };
+    const shown = this.attribute('shown').array;
+    const value = corner.reduce((sum, vertex, k) => sum + weight[k]! * shown[4 * vertex]!, 0);
+    return { value, is_known: corner.every((vertex) => shown[4 * vertex + 1]! > 0.999), material: shown[4 * corner[0] + 3]! };
   }
 
   /** The surface as it is now, for as long as a press lasts. */
   snapshot(): Surface {
-    const { position, normal, triangle } = this.surface;
-    return { position: Float32Array.from(position), normal: Float32Array.from(normal), triangle };
+    const { position, normal } = this.surface;
+    return { ...this.surface, position: Float32Array.from(position), normal: Float32Array.from(normal) };
   }
 
   private attribute(name: string): BufferAttribute {
@@ -263,30 +241,35 @@ export class Body {
     const vertices = topology.node.length;
     const dynamic = () => new BufferAttribute(new Float32Array(3 * vertices), 3).setUsage(DynamicDrawUsage);
     const position = dynamic();
+    const shown_of_vertex = new BufferAttribute(new Float32Array(4 * vertices), 4).setUsage(DynamicDrawUsage);
     const geometry = (index: Uint32Array) => new BufferGeometry().setAttribute('position', position).setIndex(new BufferAttribute(index, 1));
     const replace = (part: { geometry: BufferGeometry }, by: BufferGeometry) => {
       part.geometry.dispose();
       part.geometry = by;
     };
-    replace(this.mesh_, geometry(topology.triangle).setAttribute('normal', dynamic()).setAttribute('shown', dynamic()));
+    replace(this.mesh_, geometry(topology.triangle).setAttribute('normal', dynamic()).setAttribute('shown', shown_of_vertex));
     const all_held = this.scene_.dimension === 2 ? 3 : 7;
     const held: number[] = [];
     this.scene_.held.forEach((axes, i) => axes !== 0 && held.push(i));
     const shown = this.attribute('shown').array as Float32Array;
     topology.node.forEach((i, v) => {
-      shown[3 * v + 2] = ((this.scene_!.held[i] ?? 0) & all_held) === all_held ? 1 : 0;
+      shown[4 * v + 2] = ((this.scene_!.held[i] ?? 0) & all_held) === all_held ? 1 : 0;
+      shown[4 * v + 3] = topology.material[v]!;
     });
     replace(this.edges_, geometry(topology.edge));
     replace(this.outline_, geometry(topology.outline));
     replace(this.held_, geometry(Uint32Array.from(held)));
 
     const normal = this.attribute('normal').array as Float32Array;
-    this.surface = { position: position.array as Float32Array, normal, triangle: topology.triangle };
+    this.surface = { position: position.array as Float32Array, normal, triangle: topology.triangle, shows: this.shows };
     this.boundary = new Uint32Array(0);
     if (this.scene_.dimension === 2) {
       this.boundary =
         topology.corner.length > 0 ? boundary_edges(topology.corner, topology.nodes) : Uint32Array.from(topology.edge);
     }
     this.update();
+    this.rebuilt();
   }
+  /** Triangles are others now. */
+  rebuilt: () => void = () => undefined;
 }

@@ -1,7 +1,8 @@
-// The bar beside the picture that says what colours mean.
-import { field_traits, map_colour, type Field } from './colours';
+// The bar beside the picture that says what colours mean, or the list of materials.
+import type { Colouring } from './body';
+import { field_traits, map_colour, material_colours, share_of, type Field } from './colours';
 import { part, write } from './dom';
-import { nice_ticks, short_number, si_prefix } from './format';
+import { format_si, nice_ticks, short_number, si_prefix } from './format';
 
 /** What a bar shows; null: nothing is coloured. */
 export interface Scale {
@@ -12,15 +13,18 @@ export interface Scale {
   colours: string[]; // from the bottom up, at equal distances
 }
 
-export function make_scale(field: Field, low: number, high: number, largest: number): Scale | null {
-  if (field === 'none') return null;
+export function make_scale(field: Field, low: number, high: number, largest: number, colouring: Colouring): Scale | null {
   const traits = field_traits[field];
+  if (!traits.has_range) return null;
   const [factor, prefix] = si_prefix(Math.max(Math.abs(low), Math.abs(high)));
-  const ticks = nice_ticks(low / factor, high / factor).map((value) => ({
-    share: high > low ? (value * factor - low) / (high - low) : 0,
+  const is_log = colouring.is_log && low > 0 && high > 0;
+  const wanted = is_log ? [0, 1, 2, 3].map((k) => high / factor / 10 ** k) : nice_ticks(low / factor, high / factor);
+  const ticks = wanted.map((value) => ({
+    share: share_of(value * factor, low, high, is_log),
     text: short_number(Math.abs(value) < 1e-9 ? 0 : value),
   }));
-  const colours = Array.from({ length: 21 }, (_, i) => `rgb(${map_colour(traits.map, i / 20).join(' ')})`);
+  const map = traits.is_signed ? 'diverging' : colouring.map;
+  const colours = Array.from({ length: 33 }, (_, i) => `rgb(${map_colour(map, i / 32).join(' ')})`);
   return {
     title: `${traits.label} [${prefix}${traits.unit}]`,
     largest: `${low < 0 ? 'largest ±' : 'largest '}${short_number(largest / factor)}`,
@@ -30,19 +34,25 @@ export function make_scale(field: Field, low: number, high: number, largest: num
   };
 }
 
+/** Materials have no names: they are told by number and stiffness. */
+export const material_name = (modulus: number, number: number): string => `${number + 1}: E = ${format_si(modulus, 'Pa', 2)}`;
+
 export class ColourBar {
   scale: Scale | null = null;
+  /** Names of the materials, where the body is coloured by them. */
+  materials: string[] = [];
   private shown_ = '';
 
   /** `largest` absolute value in the picture, which may be beyond `high`. */
-  show(field: Field, low: number, high: number, largest: number): void {
-    this.scale = make_scale(field, low, high, largest);
+  show(field: Field, low: number, high: number, largest: number, colouring: Colouring, moduli: number[]): void {
+    this.scale = make_scale(field, low, high, largest, colouring);
+    this.show_materials(field === 'material' ? moduli.map(material_name) : []);
     part('colour-bar').hidden = this.scale === null;
     if (!this.scale) return;
     write(part('colour-largest'), this.scale.largest);
     part('colour-bar').classList.toggle('cut', this.scale.is_cut);
     part('colour-bar').classList.toggle('both', this.scale.is_cut && low < 0);
-    const key = `${field} ${low} ${high}`;
+    const key = `${field} ${low} ${high} ${colouring.map} ${colouring.is_log}`;
     if (key === this.shown_) return;
     this.shown_ = key;
     part('colour-bar').style.setProperty('--top', this.scale.colours.at(-1)!);
@@ -55,6 +65,24 @@ export class ColourBar {
         tick.textContent = text;
         tick.style.bottom = `${100 * share}%`;
         return tick;
+      }),
+    );
+  }
+
+  private show_materials(materials: string[]): void {
+    this.materials = materials;
+    const list = part('materials');
+    list.hidden = materials.length === 0;
+    const key = materials.join('\n');
+    if (list.dataset.shown === key) return;
+    list.dataset.shown = key;
+    list.replaceChildren(
+      ...materials.map((name, k) => {
+        const line = document.createElement('li');
+        const swatch = document.createElement('i');
+        swatch.style.background = `rgb(${material_colours[k % material_colours.length]!.join(' ')})`;
+        line.append(swatch, name);
+        return line;
       }),
     );
   }

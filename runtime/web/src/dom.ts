@@ -22,6 +22,9 @@ export function show_value(element: HTMLInputElement | HTMLSelectElement, value:
   if (document.activeElement !== element && element.value !== value) element.value = value;
 }
 
+/** Lengths in style.css grow with large screens: pixels of what is one at the usual size. */
+export const rem = (): number => parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+
 /** Lets a file be saved. */
 export function save(blob: Blob, name: string): void {
   const link = document.createElement('a');

@@ -1,57 +1,60 @@
 // The viewer's page: what comes from the run is shown, what the person does is said to it.
 import './style.css';
-import { Arrows } from './arrows';
 import { of_frame, RecentEfforts, sentence } from './best_effort';
-import { Body } from './body';
-import { ColourBar } from './colour_bar';
-import { field_traits, Range } from './colours';
-import { button, input, part, save, show_value, toast, write } from './dom';
+import { button, input, part, select, show_value, toast, write } from './dom';
 import { FileSource, stored_session } from './file_source';
 import { format_si, format_time, short_number } from './format';
 import { History } from './history';
+import { as_hash, keep, keep_theme, kept_of, kept_theme, of_hash, type Kept } from './kept';
 import { on_keys } from './keyboard';
 import { LiveSource, socket_url } from './live_source';
 import { show_felt, show_timing, type Felt } from './numbers';
+import { Picture } from './picture';
 import { Plots } from './plots';
 import { Hand, pointer_modes, type HandSettings, type PointerMode } from './pointer';
 import { parse_tool } from './pose';
 import { headline, is_news, sentences } from './problem';
 import { ReplayBar } from './replay_bar';
 import { metres, RunControls, typed_number } from './run_controls';
-import { compose } from './screenshot';
+import { Saving } from './saving';
 import type { Listener, Source } from './source';
-import { ToolView } from './tool';
-import { View } from './view';
-import { ViewControls, type Drawn } from './view_controls';
-import { floats_of_contact, type Frame, type Patch, type Picture } from './wire';
+import { nudge, show_told, told_of } from './states';
+import { css_colour, ThemeChoice, themes, type Theme } from './theme';
+import { UnderPointer } from './under_pointer';
+import { ViewControls } from './view_controls';
+import { floats_of_contact, type Frame, type Picture as Message } from './wire';
 import type { Mode, Said, State, Word } from './words';
 
 const live_samples = 60_000; // more than ten seconds at the highest rate
 const plot_wait = 50; // [ms] between drawings of the plots
 const numbers_wait = 100;
 const timing_wait = 500;
-const kept_patches = 4;
+const keep_wait = 500; // [ms] before how a model is looked at is kept
+const key_pixels = 8; // that an arrow key moves the tool
+
+/** Whether the tool has taken hold of the body, so that nothing is pressed in. */
+function holds(frame: Frame | null): boolean {
+  return frame !== null && frame.contact.length > 0 && frame.contact[floats_of_contact - 1]! > 0;
+}
 
 class Page implements Listener {
   private mode_: Mode = 'live';
   private state_: State | null = null;
   private history_ = new History(live_samples, false);
   private readonly efforts_ = new RecentEfforts();
-  private latest_: Frame | null = null; // not drawn yet
-  private readonly patches_ = new Map<number, Patch>();
-  private readonly range_ = new Range();
   private frames_ = 0;
   private ticks_ = 0;
   private plots_wanted_ = false;
-  private shape_ = ''; // of the tool that is drawn, with the body that it is drawn for
+  private lost_ = 'the program'; // why there is no connection; empty: there is one
+  private kept_for_ = ''; // the model whose look is shown
+  private keep_timer_ = 0;
   private depth_for_ = ''; // the model and tool that the depth suits
   private typed_depth_ = false;
 
-  private readonly view_ = new View(part('stage'));
-  private readonly body_ = new Body();
-  private readonly tool_ = new ToolView();
-  private readonly arrows_ = new Arrows();
-  private readonly bar_ = new ColourBar();
+  private readonly theme_ = new ThemeChoice();
+  private readonly picture_ = new Picture();
+  private readonly saving_ = new Saving(this.picture_, () => this.caption_words());
+  private readonly under_pointer_ = new UnderPointer(this.picture_.view, this.picture_.body);
   private readonly plots_: Plots;
   private readonly run_ = new RunControls((word) => this.send(word));
   private readonly replay_ = new ReplayBar((frame) => this.send({ type: 'seek', frame }));
@@ -60,8 +63,7 @@ class Page implements Listener {
   private readonly source_: Source;
 
   constructor() {
-    this.view_.scene.add(this.body_.group, this.tool_.group, this.arrows_.group);
-    this.view_.before_drawing = () => this.draw_body();
+    const { view } = this.picture_;
     this.plots_ = new Plots(
       {
         force: part('plot-force'),
@@ -74,19 +76,37 @@ class Page implements Listener {
       (time) => this.replay_.seek_time(time),
     );
     this.plots_.changed = () => this.want_plots();
-    this.drawing_ = new ViewControls(
-      (drawn) => this.take_drawn(drawn),
-      () => this.view_.fit(),
-    );
+    this.drawing_ = new ViewControls((drawn) => {
+      this.picture_.take(drawn);
+      this.want_keep();
+    });
     this.hand_ = new Hand(
-      this.view_,
-      this.body_,
+      view,
+      this.picture_.body,
       () => this.hand_settings(),
       (word) => this.send(word),
       (depth) => this.show_hand_depth(depth),
       (text) => toast(text, '', 'note'),
     );
+    const prepared = view.before_drawing;
+    view.before_drawing = () => {
+      this.picture_.has_tool = !this.is_hand() || this.hand_.has_moved; // until then it waits far from the body
+      prepared();
+      this.drawing_.show_range_unit(this.picture_.automatic_range);
+    };
+    const marked = view.after_drawing;
+    view.after_drawing = () => {
+      marked();
+      this.saving_.drawn();
+      if (this.mode_ !== 'live') this.want_plots(); // the playhead is where the picture is
+    };
+    view.margins = () => this.margins();
+    const watch = new ResizeObserver(() => view.eye.resize());
+    for (const id of ['hand', 'replay']) watch.observe(part(id));
+    view.eye.taken = () => this.want_keep();
     this.listen();
+    this.listen_keys();
+    this.choose_theme(kept_theme() as Theme);
     this.drawing_.tell();
     setInterval(() => this.show_numbers(), numbers_wait);
     setInterval(() => this.show_timing(), timing_wait);
@@ -102,8 +122,10 @@ class Page implements Listener {
   connected(is_connected: boolean, note: string): void {
     const badge = part('connection');
     badge.dataset.state = is_connected ? 'live' : 'lost';
-    write(badge, is_connected ? (this.mode_ === 'file' ? 'recorded' : 'connected') : note);
+    write(badge, is_connected ? (this.mode_ === 'file' ? 'recorded' : 'connected') : 'not connected');
+    this.lost_ = is_connected ? '' : note;
     if (!is_connected) this.hand_.release();
+    this.show_state();
   }
 
   said(message: Said): void {
@@ -115,7 +137,7 @@ class Page implements Listener {
     } else if (message.type === 'error') {
       if (message.about === 'change') {
         this.run_.show_refused(sentences(message));
-        if (this.state_?.model) this.run_.show(this.state_, this.mode_); // what was typed is not what is
+        if (this.state_?.model) this.run_.show(this.state_, this.mode_, this.lost_ === ''); // what was typed is not what is
       } else {
         toast(headline(message), message.hint);
       }
@@ -124,26 +146,18 @@ class Page implements Listener {
     }
   }
 
-  pictured(picture: Picture): void {
-    if (picture.kind === 'scene') {
-      this.patches_.clear();
-      this.latest_ = null;
-      this.range_.forget();
-      this.body_.take_scene(picture);
-      this.view_.take_body(picture);
-      this.view_.draw();
-    } else if (picture.kind === 'patch') {
-      if (picture.number !== 0) this.patches_.set(picture.number, picture);
-      while (this.patches_.size > kept_patches) this.patches_.delete(this.patches_.keys().next().value!);
-    } else if (picture.kind === 'frame') {
+  pictured(message: Message): void {
+    if (message.kind === 'scene') {
+      this.picture_.take_scene(message);
+    } else if (message.kind === 'patch') {
+      this.picture_.take_patch(message);
+    } else if (message.kind === 'frame') {
       ++this.frames_;
-      this.latest_ = picture;
-      this.view_.draw();
-      if (this.mode_ !== 'live') this.want_plots();
+      this.picture_.take_frame(message);
     } else {
-      this.ticks_ += picture.count;
-      this.history_.add(picture);
-      this.efforts_.take(picture, performance.now());
+      this.ticks_ += message.count;
+      this.history_.add(message);
+      this.efforts_.take(message, performance.now());
       this.want_plots();
     }
   }
@@ -168,22 +182,28 @@ class Page implements Listener {
     if (recorded && !state.recording && state.model && !state.refused) toast(`Recorded ${recorded}`, `palpate-runtime view ${recorded}`, 'note');
     this.state_ = state;
     if (!state.model) return;
-    const shape = `${state.settings.tool} ${state.model.size} ${state.model.dimension}`;
-    if (shape !== this.shape_) {
-      this.shape_ = shape;
-      this.tool_.take_shape(parse_tool(state.settings.tool), state.model.size, state.model.dimension);
-      this.view_.draw();
-    }
+    this.picture_.take_model(state.model, state.settings.tool);
+    this.under_pointer_.model = state.model;
     const suits = `${state.model.file} ${state.settings.tool}`;
     if (this.depth_for_ !== suits) {
       this.depth_for_ = suits;
       this.typed_depth_ = false;
       show_value(input('depth'), short_number(1000 * this.usual_depth(), 2));
     }
-    this.run_.show(state, this.mode_);
-    this.drawing_.show_dimension(state.model.dimension);
+    this.drawing_.show_model(state.model.dimension, state.model.materials?.length ?? 1);
+    this.show_kept(state.model.file);
+    this.show_state();
+    if (this.mode_ !== 'live') this.replay_.show(state.times ?? [], state.frame ?? 0, this.lost_ === '', state.alone === true);
+  }
+
+  /** What stands over the picture, and which controls can act. */
+  private show_state(): void {
+    const state = this.state_;
+    show_told(told_of(state, this.mode_, this.lost_));
+    if (!state?.model) return;
+    this.run_.show(state, this.mode_, this.lost_ === '');
     part('hand').hidden = !this.is_hand();
-    if (this.mode_ !== 'live') this.replay_.show(state.times ?? [], state.frame ?? 0, this.mode_ === 'file' || state.you === 'controller');
+    document.body.classList.toggle('lost', this.lost_ !== '');
   }
 
   // --- to the run ---
@@ -194,7 +214,7 @@ class Page implements Listener {
 
   private is_hand(): boolean {
     const state = this.state_;
-    return this.mode_ === 'live' && state?.you === 'controller' && state.pointer;
+    return this.mode_ === 'live' && this.lost_ === '' && state?.you === 'controller' && state.pointer;
   }
 
   /** Where a press begins: as the body suggests, but no deeper than the tool is round or a disc is wide. */
@@ -207,7 +227,7 @@ class Page implements Listener {
   private hand_settings(): HandSettings | string | null {
     const state = this.state_;
     if (!state?.model || !this.is_hand() || state.busy) return null;
-    if (this.body_.scale !== 1) return 'The body is touched where it is: draw displacements true to scale (× 1)';
+    if (this.picture_.body.scale !== 1) return 'The body is touched where it is: draw displacements true to scale (× 1)';
     const shape = parse_tool(state.settings.tool);
     const mode = pointer_modes.find((one) => input(`mode-${one}`).checked) ?? ('press' as PointerMode);
     const typed = this.typed_depth_ ? typed_number(input('depth').value, 0) : null;
@@ -229,13 +249,26 @@ class Page implements Listener {
 
   private listen(): void {
     input('depth').addEventListener('change', () => {
+      input('depth').blur();
       this.typed_depth_ = typed_number(input('depth').value, 0) !== null;
       if (!this.typed_depth_ && this.state_) {
         show_value(input('depth'), short_number(1000 * this.usual_depth(), 2));
       }
-      input('depth').blur();
     });
-    button('screenshot').addEventListener('click', () => void this.save_picture());
+    button('screenshot').addEventListener('click', () => {
+      void this.saving_.save_picture(`${this.state_?.model?.name ?? 'Palpate'}-${this.felt().tick}`);
+    });
+    button('fit').addEventListener('click', () => this.picture_.view.eye.fit());
+    button('save-video').addEventListener('click', () => this.film());
+    button('follow').addEventListener('click', () => this.follow());
+    select('look-from').addEventListener('change', () => {
+      if (select('look-from').value) this.picture_.view.eye.look_from(select('look-from').value);
+      select('look-from').value = '';
+      this.want_keep();
+    });
+    select('theme').addEventListener('change', () => this.choose_theme(select('theme').value as Theme));
+    this.theme_.changed = () => this.show_theme();
+    button('copy-link').addEventListener('click', () => void this.copy_link());
     for (const kind of ['stl', 'vtu']) {
       button(`save-${kind}`).addEventListener('click', () => {
         const link = document.createElement('a');
@@ -244,74 +277,164 @@ class Page implements Listener {
         link.click();
       });
     }
-    const toggle_panel = () => {
-      const is_folded = document.body.classList.toggle('folded');
-      button('toggle-panel').setAttribute('aria-pressed', String(!is_folded));
-      this.want_plots();
+    button('toggle-panel').addEventListener('click', () => this.toggle_panel());
+    button('help').addEventListener('click', () => this.show_help(part('help-text').hidden));
+    button('help-close').addEventListener('click', () => this.show_help(false));
+  }
+
+  private listen_keys(): void {
+    const { eye } = this.picture_.view;
+    const fields = Object.fromEntries([1, 2, 3, 4, 5, 6, 7, 8].map((n) => [String(n), () => this.drawing_.choose(n)]));
+    const arrow = (right: number, down: number) => () => {
+      if (this.mode_ !== 'live') this.replay_.move(right);
+      else if (this.is_hand()) this.hand_.key_move(key_pixels * right, key_pixels * down);
+      else eye.turn(-0.1 * right, -0.1 * down);
     };
-    const show_help = (on: boolean) => {
-      part('help-text').hidden = !on;
-      button('help').setAttribute('aria-expanded', String(on));
-      (on ? part('help-text') : button('help')).focus();
-    };
-    button('toggle-panel').addEventListener('click', toggle_panel);
-    button('help').addEventListener('click', () => show_help(part('help-text').hidden));
-    button('help-close').addEventListener('click', () => show_help(false));
-    const fields = Object.fromEntries([1, 2, 3, 4, 5, 6, 7].map((n) => [String(n), () => this.drawing_.choose(n)]));
     on_keys({
       ' ': () => (this.mode_ === 'live' ? this.run_.toggle_pause() : this.replay_.toggle()),
       '.': () => (this.mode_ === 'live' ? this.run_.step() : this.replay_.move(1)),
       r: () => this.run_.reset(),
       e: () => this.drawing_.toggle('edges'),
-      f: () => this.view_.fit(),
-      p: toggle_panel,
-      '?': () => show_help(part('help-text').hidden),
-      Escape: () => part('help-text').hidden || show_help(false),
-      ArrowLeft: () => this.replay_.move(-1),
-      ArrowRight: () => this.replay_.move(1),
+      x: () => this.drawing_.toggle('through'),
+      o: () => this.drawing_.toggle('parallel'),
+      c: () => this.drawing_.next_section(),
+      v: () => this.drawing_.show_menu(part('view-card').hidden),
+      f: () => eye.fit(),
+      t: () => eye.look_from('top'),
+      b: () => eye.look_from('usual'),
+      p: () => this.toggle_panel(),
+      '+': () => eye.zoom(1.15),
+      '-': () => eye.zoom(1 / 1.15),
+      '[': () => this.hand_.key_deepen(-1),
+      ']': () => this.hand_.key_deepen(1),
+      '?': () => this.show_help(part('help-text').hidden),
+      Escape: () => this.escape(),
+      ArrowLeft: arrow(-1, 0),
+      ArrowRight: arrow(1, 0),
+      ArrowUp: arrow(0, -1),
+      ArrowDown: arrow(0, 1),
+      'Shift+ArrowLeft': () => eye.turn(0.1, 0),
+      'Shift+ArrowRight': () => eye.turn(-0.1, 0),
+      'Shift+ArrowUp': () => eye.turn(0, 0.1),
+      'Shift+ArrowDown': () => eye.turn(0, -0.1),
       ...fields,
     });
+    const { canvas } = this.picture_.view;
+    window.addEventListener('pointerdown', () => canvas.classList.add('by-pointer'), { capture: true }); // its focus needs no ring
+    window.addEventListener('keydown', () => canvas.classList.remove('by-pointer'));
+    canvas.addEventListener('keydown', (event) => {
+      if (event.key !== 'Enter') return;
+      event.preventDefault();
+      this.hand_.key_press();
+    });
+    window.addEventListener('pointerdown', ({ target }) => target === canvas && this.state_?.paused && this.mode_ === 'live' && nudge(), { capture: true });
+    canvas.addEventListener('blur', () => this.hand_.release_key());
+  }
+
+  private escape(): void {
+    if (!part('help-text').hidden) this.show_help(false);
+    else if (!part('view-card').hidden) this.drawing_.show_menu(false);
+    else this.hand_.release();
+  }
+
+  private toggle_panel(): void {
+    const is_folded = document.body.classList.toggle('folded');
+    button('toggle-panel').setAttribute('aria-pressed', String(!is_folded));
+    this.want_plots();
+  }
+
+  private show_help(on: boolean): void {
+    part('help-text').hidden = !on;
+    button('help').setAttribute('aria-expanded', String(on));
+    (on ? part('help-text') : button('help')).focus();
+  }
+
+  // --- how it is looked at ---
+
+  private choose_theme(theme: Theme): void {
+    const known = themes.includes(theme) ? theme : 'auto';
+    select('theme').value = known;
+    this.theme_.choose(known);
+    keep_theme(known);
+    this.show_theme();
+  }
+
+  private show_theme(): void {
+    this.picture_.set_ink(css_colour('ink'), this.theme_.is_light);
+    this.want_plots();
+    this.show_timing();
+  }
+
+  /** What the address says counts before what was kept of this model. */
+  private show_kept(model: string): void {
+    if (this.kept_for_ === model || this.picture_.body.scene === null) return;
+    const kept = (this.kept_for_ === '' ? of_hash(location.hash) : null) ?? kept_of(model);
+    this.kept_for_ = model;
+    if (!kept) return;
+    this.drawing_.kept = kept.look;
+    if (kept.place) this.picture_.view.eye.place = kept.place;
+    this.picture_.face_section();
+  }
+
+  private get kept(): Kept {
+    const { eye } = this.picture_.view;
+    return { look: this.drawing_.kept, place: eye.is_fitted ? null : eye.place };
+  }
+
+  private want_keep(): void {
+    clearTimeout(this.keep_timer_);
+    this.keep_timer_ = window.setTimeout(() => this.kept_for_ && keep(this.kept_for_, this.kept), keep_wait);
+  }
+
+  private async copy_link(): Promise<void> {
+    const link = `${location.href.replace(/#.*/, '')}#${as_hash(this.kept)}`;
+    history.replaceState(null, '', link);
+    try {
+      await navigator.clipboard.writeText(link);
+      toast('The address of this view is copied', '', 'note');
+    } catch {
+      toast('The address of this view is in the browser’s bar', '', 'note');
+    }
+  }
+
+  /** How much of the stage is above what stands at its bottom [px]. */
+  private free_above_bottom(): number | null {
+    const tops = ['hand', 'replay', 'scale-bar']
+      .map((id) => part(id))
+      .filter((card) => card.offsetHeight > 0)
+      .map((card) => card.getBoundingClientRect().top);
+    return tops.length > 0 ? Math.min(...tops) - part('stage').getBoundingClientRect().top : null;
+  }
+
+  private margins(): { top: number; bottom: number; left: number; right: number } {
+    const { clientWidth: width, clientHeight: height } = part('stage');
+    const rem = parseFloat(getComputedStyle(document.documentElement).fontSize);
+    const is_small = width < 700 || height < 420;
+    const free = this.free_above_bottom() ?? height - (is_small ? 3.4 : 4.2) * rem;
+    return { top: (is_small ? 3 : 3.4) * rem, bottom: height - free + 0.4 * rem, left: (is_small ? 0.5 : 1.5) * rem, right: (width < 480 ? 4.2 : 5.2) * rem };
+  }
+
+  /** Plays all of a recording once, and saves what is seen. */
+  private film(): void {
+    if (this.saving_.is_filming) {
+      this.replay_.halt();
+      return;
+    }
+    this.replay_.play_once(() => {
+      this.saving_.stop();
+      this.picture_.view.is_whole = false;
+    });
+    this.picture_.view.is_whole = true;
+    this.saving_.film(this.state_?.model?.name ?? 'Palpate');
+  }
+
+  /** Sees again what the page that steers shows. */
+  private follow(): void {
+    this.replay_.halt();
+    this.send({ type: 'follow' });
   }
 
   // --- drawing ---
-
-  private take_drawn(drawn: Drawn): void {
-    const body = this.body_;
-    if (body.field !== drawn.field) this.range_.forget();
-    body.field = drawn.field;
-    body.scale = drawn.scale;
-    body.show_edges(drawn.edges || body.scene?.dimension === 2);
-    body.show_outline(drawn.outline);
-    body.show_held(drawn.held);
-    this.view_.show_grid(drawn.grid);
-    body.update();
-    this.view_.draw();
-  }
-
-  private draw_body(): void {
-    const frame = this.latest_;
-    const drawn = this.drawing_.drawn;
-    if (frame) {
-      this.latest_ = null;
-      this.body_.take_frame(frame, this.patches_.get(frame.patch) ?? null);
-    }
-    this.body_.show_edges(drawn.edges || this.body_.scene?.dimension === 2);
-    const last = this.body_.frame;
-    const is_seen = last !== null && drawn.scale === 1; // beside a body that is drawn larger they would be in the wrong place
-    if (last) {
-      this.tool_.show(last.tool, last.device);
-      this.arrows_.show(last, this.state_?.model?.size ?? 1);
-    }
-    this.tool_.group.visible = is_seen && drawn.tool && (!this.is_hand() || this.hand_.has_moved); // until then it waits far from the body
-    this.arrows_.group.visible = is_seen && drawn.arrows;
-
-    const automatic = this.range_.follow(this.body_.shown.usual, performance.now() / 1000);
-    const high = drawn.range ?? automatic;
-    const low = field_traits[drawn.field].map === 'diverging' ? -high : 0;
-    this.body_.show_range(low, high);
-    this.bar_.show(drawn.field, low, high, this.body_.shown.largest);
-    this.drawing_.show_range_unit(automatic);
-  }
 
   private want_plots(): void {
     if (this.plots_wanted_) return;
@@ -319,18 +442,18 @@ class Page implements Listener {
     setTimeout(() => {
       requestAnimationFrame(() => {
         this.plots_wanted_ = false;
-        this.plots_.cursor = this.mode_ === 'live' ? null : (this.body_.frame?.time ?? null);
+        this.plots_.cursor = this.mode_ === 'live' ? null : (this.picture_.frame?.time ?? null);
         this.plots_.draw(this.history_, this.state_?.rate ?? 1000, this.mode_ !== 'live');
       });
     }, plot_wait);
   }
 
   private felt(): Felt {
-    const frame = this.body_.frame;
+    const { frame } = this.picture_;
     const sample = frame ? Math.max(0, Math.min(this.history_.count - 1, this.history_.from(frame.tick))) : 0;
     return {
       force: frame ? [frame.force[0]!, frame.force[1]!, frame.force[2]!] : [0, 0, 0],
-      depth: this.history_.count > 0 ? this.history_.value('depth', sample) : 0,
+      depth: holds(frame) ? NaN : this.history_.count > 0 ? this.history_.value('depth', sample) : 0,
       contacts: this.felt_contacts(frame, sample),
       tick: frame?.tick ?? 0,
     };
@@ -343,19 +466,23 @@ class Page implements Listener {
   }
 
   private show_numbers(): void {
-    const has_depth = this.mode_ === 'live' || this.history_.count === 0 || Number.isFinite(this.history_.value('depth', 0));
-    part('depth-plot').hidden = part('depth-number').hidden = !has_depth; // a recording does not have it
+    part('depth-plot').hidden = part('depth-number').hidden = !this.has_depth();
     show_felt(this.felt());
-    const bound = this.body_.frame?.greens_error ?? 0;
+    const bound = this.picture_.frame?.greens_error ?? 0;
     write(part('greens-error'), bound > 0 ? `± ${format_si(bound, 'N', 2)}` : '');
     const text = this.best_effort();
     write(part('best-effort'), text);
     part('best-effort').hidden = text === '';
   }
 
+  /** A recording does not have it, and a grab has none. */
+  private has_depth(): boolean {
+    return this.mode_ === 'live' || this.history_.count === 0 || Number.isFinite(this.history_.value('depth', 0));
+  }
+
   /** How far the force may be off: live, of the last moment; of a picture that stands, its own. */
   private best_effort(): string {
-    const frame = this.body_.frame;
+    const { frame } = this.picture_;
     if (this.mode_ === 'live' && !this.state_?.paused) return this.efforts_.sentence(performance.now());
     return frame ? sentence([of_frame(frame)]) : '';
   }
@@ -363,27 +490,21 @@ class Page implements Listener {
   private show_timing(): void {
     this.plots_.draw_timing(this.history_, this.state_?.rate ?? 1000, this.mode_ !== 'live');
     const ticks = this.mode_ === 'live' ? this.state_?.ticks : this.history_.last + 1;
+    part('ticks-plot').hidden = this.mode_ !== 'live' && !(this.plots_.timing.compute[1] > 0); // a script's has no times
     show_timing(this.plots_.timing, this.state_?.misses ?? 0, ticks ?? 0);
   }
 
-  private async save_picture(): Promise<void> {
-    const state = this.state_;
+  private caption_words(): { title: string; lines: string[] } {
     const felt = this.felt();
-    const time = this.body_.frame?.time ?? 0;
+    const scale = this.picture_.body.scale;
     const lines = [
       `force ${format_si(Math.hypot(...felt.force), 'N')}  (${felt.force.map((one) => format_si(one, 'N')).join(', ')})`,
-      `depth ${format_si(felt.depth, 'm')}  contacts ${felt.contacts}`,
-      `tick ${felt.tick}  time ${format_time(time)}`,
+      this.has_depth() && Number.isFinite(felt.depth) ? `depth ${format_si(felt.depth, 'm')}  contacts ${felt.contacts}` : `contacts ${felt.contacts}`,
+      `tick ${felt.tick}  time ${format_time(this.picture_.frame?.time ?? 0)}`,
     ];
     if (this.best_effort() !== '') lines.push(this.best_effort());
-    if (this.body_.scale !== 1) lines.push(`displacements × ${short_number(this.body_.scale, 2)}`);
-    try {
-      this.draw_body();
-      const title = state?.model?.name ?? 'Palpate';
-      save(await compose(this.view_.take_picture(), { title, lines, scale: this.bar_.scale }), `${title}-${felt.tick}.png`);
-    } catch (error) {
-      toast('The picture could not be saved', String(error));
-    }
+    if (scale !== 1) lines.push(`displacements × ${short_number(scale, 2)}`);
+    return { title: this.state_?.model?.name ?? 'Palpate', lines };
   }
 
   /** What browser tests read: `window.palpate`. */
@@ -394,8 +515,23 @@ class Page implements Listener {
         return structuredClone(page.state_);
       },
       get lastFrame() {
-        const frame = page.body_.frame;
+        const frame = page.picture_.frame;
         return frame ? { ...page.felt(), tool: [...frame.tool], device: [...frame.device] } : null;
+      },
+      get picture() {
+        return { ...page.picture_.view.drawing };
+      },
+      get underPointer() {
+        return page.under_pointer_.text;
+      },
+      get eye() {
+        return page.picture_.view.eye.place;
+      },
+      get playhead() {
+        return page.plots_.cursor; // [s], where plots have it
+      },
+      get time() {
+        return page.picture_.frame?.time ?? null; // [s], of the picture
       },
       get frames() {
         return page.frames_;
@@ -404,9 +540,9 @@ class Page implements Listener {
         return page.ticks_;
       },
       get ready() {
-        return page.state_?.model !== undefined && page.body_.frame !== null;
+        return page.state_?.model !== undefined && page.picture_.frame !== null;
       },
-      project: (x: number, y: number, z: number) => page.view_.project(x, y, z),
+      project: (x: number, y: number, z: number) => page.picture_.view.eye.project(x, y, z),
     };
     Object.defineProperty(window, 'palpate', { value: Object.freeze(offered), writable: false });
   }

@@ -5,7 +5,7 @@ import type { Timing } from './plots';
 
 export interface Felt {
   force: [number, number, number]; // on the body [N]
-  depth: number; // [m]
+  depth: number; // [m], not a number where the tool holds the body
   contacts: number;
   tick: number;
 }
@@ -17,7 +17,7 @@ export function show_felt(felt: Felt): void {
   write(part('force'), format_si(norm, 'N'));
   // What is rounding beside the whole is 0.
   (['x', 'y', 'z'] as const).forEach((axis, i) => write(part(`force-${axis}`), signed(Math.abs(felt.force[i]!) > 1e-6 * norm ? felt.force[i]! : 0)));
-  write(part('depth-felt'), format_si(felt.depth, 'm'));
+  write(part('depth-felt'), Number.isFinite(felt.depth) ? format_si(felt.depth, 'm') : '–');
   write(part('contacts'), felt.contacts >= 255 ? '255+' : String(felt.contacts));
 }
 

@@ -5,6 +5,8 @@ import type { Vec3 } from './words';
 export interface Hit {
   point: Vec3;
   normal: Vec3; // outward, of length 1
+  corner?: [number, number, number]; // vertices of the triangle ...
+  weight?: Vec3; // ... and how near each is
 }
 
 /** A surface as it is at one moment. */
@@ -12,6 +14,7 @@ export interface Surface {
   position: ArrayLike<number>; // [3 V]
   normal: ArrayLike<number>; // [3 V]
   triangle: ArrayLike<number>; // [3 T]
+  shows?: (place: Vec3) => boolean; // what is cut away is not there
 }
 
 const same_side = Math.cos((35 * Math.PI) / 180); // beyond it a vertex normal is that of an edge, and the facet's counts
@@ -52,6 +55,7 @@ function first_crossing(surface: Surface, origin: Vec3, direction: Vec3, side: 1
     if (gamma < 0 || beta + gamma > determinant) continue;
     const way = (vx * qx + vy * qy + vz * qz) / determinant;
     if (way <= 0 || way >= nearest) continue;
+    if (surface.shows && !surface.shows(plus(origin, direction, way))) continue;
     nearest = way;
     found = t;
     weight_b = beta / determinant;
@@ -70,7 +74,12 @@ export function pick_surface(surface: Surface, origin: Vec3, direction: Vec3): H
   const facet = normalised(cross(minus(at(p, b), at(p, a)), minus(at(p, c), at(p, a))));
   const n = surface.normal;
   const smooth = normalised(plus(plus(plus([0, 0, 0], at(n, a), 1 - weight_b - weight_c), at(n, b), weight_b), at(n, c), weight_c));
-  return { point: plus(origin, direction, crossing.way), normal: dot(smooth, facet) > same_side ? smooth : facet };
+  return {
+    point: plus(origin, direction, crossing.way),
+    normal: dot(smooth, facet) > same_side ? smooth : facet,
+    corner: [a, b, c],
+    weight: [1 - weight_b - weight_c, weight_b, weight_c],
+  };
 }
 
 /** How far it is from a point of the surface through the body, against its normal; Infinity where there is no other side. */

@@ -1,28 +1,31 @@
 // Force and depth over time, and how long ticks took.
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
+import { rem } from './dom';
 import { short_number, si_prefix } from './format';
+import { css_colour } from './theme';
 import { log_classes, quantile, type Column, type History } from './history';
 
 const shown_seconds = 10;
-const ink = '#8b98a9';
-const grid = '#1d2530';
-const best_effort_colour = '#ffb454';
+const ink = () => css_colour('dim');
+const grid = () => css_colour('grid');
+const font = () => `${Math.round(11 * rem())}px system-ui, sans-serif`;
 
 interface Line {
   column: Column;
   label: string;
-  colour: string;
+  colour: string; // as style.css names it
   width?: number;
+  dash?: number[];
 }
 
 const force_lines: Line[] = [
-  { column: 'norm', label: '|f|', colour: '#f2f5f9', width: 1.6 },
-  { column: 'x', label: 'x', colour: '#ff6b6b' },
-  { column: 'y', label: 'y', colour: '#69db7c' },
-  { column: 'z', label: 'z', colour: '#74a9ff' },
+  { column: 'norm', label: 'size', colour: 'ink', width: 1.6 },
+  { column: 'x', label: 'x', colour: 'x' },
+  { column: 'y', label: 'y', colour: 'y', dash: [7, 3] },
+  { column: 'z', label: 'z', colour: 'z', dash: [2, 2] },
 ];
-const depth_lines: Line[] = [{ column: 'depth', label: 'depth', colour: '#ffb454', width: 1.4 }];
+const depth_lines: Line[] = [{ column: 'depth', label: 'depth', colour: 'warm', width: 1.4 }];
 
 /** Seconds that are shown: all plots share them. */
 interface Window {
@@ -46,7 +49,7 @@ class TimePlot {
     on_select: (window: Window) => void,
     on_click: (time: number) => void,
   ) {
-    const axis = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { show: false }, font: '11px system-ui, sans-serif' };
+    const axis = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { show: false }, font: font() };
     this.plot_ = new uPlot(
       {
         width: Math.max(50, element_.clientWidth),
@@ -57,12 +60,19 @@ class TimePlot {
         select: { show: true, left: 0, top: 0, width: 0, height: 0 },
         scales: { x: { time: false, auto: false, range: (_, low, high) => [low, high] }, y: { range: (_, low, high) => padded(low, high) } },
         axes: [
-          { ...axis, size: 20, gap: 4, values: (_, ticks) => ticks.map((tick) => short_number(tick, 5)) },
-          { ...axis, size: 46, gap: 3, space: 22, values: (_, ticks) => ticks.map((tick) => short_number(tick / this.prefix_[0])) },
+          { ...axis, size: 20 * rem(), gap: 4, values: (_, ticks) => ticks.map((tick) => short_number(tick, 5)) },
+          { ...axis, size: 46 * rem(), gap: 3, space: 22 * rem(), values: (_, ticks) => ticks.map((tick) => short_number(tick / this.prefix_[0])) },
         ],
         series: [
           {},
-          ...lines_.map((line) => ({ label: line.label, stroke: line.colour, width: line.width ?? 1, points: { show: false }, spanGaps: false })),
+          ...lines_.map((line) => ({
+            label: line.label,
+            stroke: () => css_colour(line.colour),
+            width: line.width ?? 1,
+            ...(line.dash ? { dash: line.dash } : {}),
+            points: { show: false },
+            spanGaps: false,
+          })),
         ],
         hooks: {
           setSelect: [
@@ -120,7 +130,7 @@ function padded(low: number | null, high: number | null): [number, number] {
 function draw_marks(plot: uPlot, times: number[]): void {
   const { ctx, bbox } = plot;
   ctx.save();
-  ctx.fillStyle = best_effort_colour;
+  ctx.fillStyle = css_colour('warm');
   const [width, height] = [2 * devicePixelRatio, 5 * devicePixelRatio];
   for (const time of times) {
     const x = plot.valToPos(time, 'x', true);
@@ -135,7 +145,7 @@ function draw_cursor(plot: uPlot, time: number | null): void {
   const { ctx, bbox } = plot;
   if (!(x >= bbox.left && x <= bbox.left + bbox.width)) return;
   ctx.save();
-  ctx.strokeStyle = '#6cb6ff';
+  ctx.strokeStyle = css_colour('accent');
   ctx.lineWidth = devicePixelRatio;
   ctx.beginPath();
   ctx.moveTo(x, bbox.top);
@@ -169,11 +179,11 @@ class TimingPlot {
     const context = canvas.getContext('2d')!;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
-    const [left, bottom, top] = [8, height - 16, 6];
+    const [left, bottom, top] = [8, height - 16 * rem(), 6];
     const span = width - 16;
-    context.font = '11px system-ui, sans-serif';
-    context.fillStyle = ink;
-    context.strokeStyle = grid;
+    context.font = font();
+    context.fillStyle = ink();
+    context.strokeStyle = grid();
     context.textAlign = 'center';
     const classes = 4 * per_decade + 2;
     ['1 µs', '10 µs', '100 µs', '1 ms', '10 ms'].forEach((text, decade) => {
@@ -188,15 +198,17 @@ class TimingPlot {
       const counts = log_classes(values, per_decade);
       const most = Math.log1p(Math.max(1, ...counts));
       context.fillStyle = colour;
+      context.globalAlpha = 0.65;
       counts.forEach((count, k) => {
         if (count === 0) return;
         const size = Math.max(1.5, ((bottom - top) * Math.log1p(count)) / most);
         context.fillRect(left + (span * k) / classes + 0.5, bottom - size, span / classes - 1, size);
       });
+      context.globalAlpha = 1;
     };
-    bars(late, 'rgba(255, 180, 84, 0.6)');
-    bars(compute, 'rgba(108, 182, 255, 0.6)');
-    context.strokeStyle = '#38445a';
+    bars(late, css_colour('warm'));
+    bars(compute, css_colour('accent'));
+    context.strokeStyle = css_colour('edge');
     context.beginPath();
     context.moveTo(left, bottom + 0.5);
     context.lineTo(left + span, bottom + 0.5);
@@ -242,9 +254,9 @@ export class Plots {
       element.addEventListener('dblclick', () => zoom(null));
       return new TimePlot(element, lines, unit, marks, height, () => this.cursor, zoom, on_seek);
     };
-    this.force_ = plot(elements_.force, force_lines, 'N', true, 164);
-    this.depth_ = plot(elements_.depth, depth_lines, 'm', false, 112);
-    this.timing_ = new TimingPlot(elements_.timing, 84);
+    this.force_ = plot(elements_.force, force_lines, 'N', true, 164 * rem());
+    this.depth_ = plot(elements_.depth, depth_lines, 'm', false, 112 * rem());
+    this.timing_ = new TimingPlot(elements_.timing, 84 * rem());
     elements_.live.addEventListener('click', () => zoom(null));
   }
 

@@ -10,6 +10,7 @@ export type PointerMode = (typeof pointer_modes)[number];
 
 const least_wait = 8; // [ms] from one word to the next
 const longest_wait = 250; // while pressed: the runtime gives up a pointer that is silent for a second
+const key_id = -1; // in the place of a pointer's
 const reach_in_plane = 24; // pixels from the boundary that still touch it
 
 export interface HandSettings {
@@ -72,6 +73,7 @@ export class Hand {
       requestAnimationFrame(beat);
     };
     requestAnimationFrame(beat);
+    setInterval(() => this.beat(performance.now()), longest_wait / 2); // pictures may take longer than the runtime waits
   }
 
   get is_pressed(): boolean {
@@ -101,21 +103,26 @@ export class Hand {
       return;
     }
     if (event.button !== 0 || !event.isPrimary) return;
-    const settings = this.settings_();
-    if (settings === null) return;
-    const hit = this.hit(event.clientX, event.clientY, this.body_.surface);
-    if (!hit) return;
-    if (typeof settings === 'string') {
-      this.hint_(settings);
-      return;
-    }
+    if (!this.begin(event.clientX, event.clientY, event.pointerId)) return;
     event.stopPropagation();
     event.preventDefault();
     this.view_.canvas.setPointerCapture(event.pointerId);
     this.view_.canvas.style.cursor = 'grabbing';
     this.view_.canvas.focus({ preventScroll: true });
+  }
+
+  /** Presses what is there in the window; gives whether that is a body that may be touched. */
+  private begin(x: number, y: number, id: number): boolean {
+    const settings = this.settings_();
+    if (settings === null) return false;
+    const hit = this.hit(x, y, this.body_.surface);
+    if (!hit) return false;
+    if (typeof settings === 'string') {
+      this.hint_(settings);
+      return false;
+    }
     this.press_ = {
-      id: event.pointerId,
+      id,
       mode: settings.mode,
       start: hit,
       now: hit,
@@ -123,14 +130,55 @@ export class Hand {
       surface: this.body_.snapshot(),
       depth: Math.min(settings.depth, settings.share_of_thickness * this.thickness(hit)),
       pushed: 0,
-      client: { x: event.clientX, y: event.clientY },
-      plane_start: this.on_screen_plane(event.clientX, event.clientY, hit.point) ?? hit.point,
+      client: { x, y },
+      plane_start: this.on_screen_plane(x, y, hit.point) ?? hit.point,
       pinch: null,
     };
     // The tool comes to where it touches, not through the body: a finger has not hovered, and a grab holds on from there.
     this.want_hover(settings, hit, this.press_.orientation, settings.mode === 'grab' ? settings.contact : settings.clearance);
     this.say();
     this.want_press(settings);
+    return true;
+  }
+
+  // --- by keys: a place in the window that arrows move ---
+
+  private key_place_: { x: number; y: number } | null = null;
+
+  /** Moves the tool along the screen by so many pixels. */
+  key_move(right: number, down: number): void {
+    const at = (this.key_place_ ??= this.middle());
+    at.x += right;
+    at.y += down;
+    if (this.press_?.id === key_id) this.slide(at.x, at.y);
+    else if (!this.press_) this.hover_ = { ...at };
+  }
+
+  /** Presses where the tool is, or lets go. */
+  key_press(): void {
+    if (this.press_) {
+      this.release();
+      return;
+    }
+    const at = (this.key_place_ ??= this.middle());
+    this.begin(at.x, at.y, key_id);
+  }
+
+  /** Lets go of what keys press. */
+  release_key(): void {
+    if (this.press_?.id === key_id) this.release();
+  }
+
+  /** As the wheel does, by so many notches. */
+  key_deepen(notches: number): void {
+    this.deepen(-100 * notches);
+  }
+
+  private middle(): { x: number; y: number } {
+    const { position } = this.body_.surface;
+    const sum: Vec3 = [0, 0, 0];
+    for (let i = 0; i < position.length; ++i) sum[i % 3]! += (3 * position[i]!) / position.length;
+    return this.view_.eye.project(...sum);
   }
 
   private move(event: PointerEvent): void {
@@ -149,10 +197,17 @@ export class Hand {
     if (press.pinch?.id === event.pointerId) {
       this.pinch(event, settings);
     } else if (press.id === event.pointerId) {
-      press.client = { x: event.clientX, y: event.clientY };
-      if (press.mode === 'press') press.now = this.hit(event.clientX, event.clientY, press.surface) ?? press.now;
+      this.slide(event.clientX, event.clientY);
     }
     this.want_press(settings);
+  }
+
+  private slide(x: number, y: number): void {
+    const press = this.press_!;
+    const settings = this.settings_();
+    press.client = { x, y };
+    if (press.mode === 'press') press.now = this.hit(x, y, press.surface) ?? press.now;
+    if (settings && typeof settings !== 'string') this.want_press(settings);
   }
 
   private up(event: PointerEvent): void {
@@ -165,12 +220,16 @@ export class Hand {
   }
 
   private wheel(event: WheelEvent): void {
+    if (!this.press_) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.deepen(event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : 33 * event.deltaY);
+  }
+
+  private deepen(pixels: number): void {
     const press = this.press_;
     const settings = this.settings_();
     if (!press || !settings || typeof settings === 'string') return;
-    event.preventDefault();
-    event.stopPropagation();
-    const pixels = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : 33 * event.deltaY;
     if (press.mode === 'press') press.depth = turned_depth(press.depth, pixels, settings.unit_depth);
     else press.pushed -= (pixels / 100) * 0.1 * settings.unit_depth;
     this.want_press(settings);
@@ -197,10 +256,10 @@ export class Hand {
 
   private hit(x: number, y: number, surface: Surface): Hit | null {
     if (this.dimension() === 2) {
-      const place = this.view_.place_in_plane(x, y);
-      return pick_boundary(surface.position, this.body_.boundary, place, reach_in_plane * this.view_.metres_of_pixel());
+      const place = this.view_.eye.place_in_plane(x, y);
+      return pick_boundary(surface.position, this.body_.boundary, place, reach_in_plane * this.view_.eye.metres_of_pixel());
     }
-    const { origin, direction } = this.view_.ray(x, y);
+    const { origin, direction } = this.view_.eye.ray(x, y);
     return pick_surface(surface, origin, direction);
   }
 
@@ -210,9 +269,9 @@ export class Hand {
   }
 
   private on_screen_plane(x: number, y: number, through: Vec3): Vec3 | null {
-    if (this.dimension() === 2) return this.view_.place_in_plane(x, y);
-    const { origin, direction } = this.view_.ray(x, y);
-    return ray_meets_plane(origin, direction, through, this.view_.looking());
+    if (this.dimension() === 2) return this.view_.eye.place_in_plane(x, y);
+    const { origin, direction } = this.view_.eye.ray(x, y);
+    return ray_meets_plane(origin, direction, through, this.view_.eye.looking());
   }
 
   private want_press(settings: HandSettings): void {
@@ -224,7 +283,7 @@ export class Hand {
       this.changed_(press.depth);
     } else {
       const now = this.on_screen_plane(press.client.x, press.client.y, press.start.point) ?? press.plane_start;
-      const away: Vec3 = this.dimension() === 2 ? [0, 0, 0] : this.view_.looking();
+      const away: Vec3 = this.dimension() === 2 ? [0, 0, 0] : this.view_.eye.looking();
       const way = plus(minus(now, press.plane_start), away, press.pushed);
       const from = pressed_position(press.start.point, press.start.normal, radius, press.mode === 'push' ? press.depth : 0);
       position = plus(from, way);

@@ -36,14 +36,15 @@ export class ReplayBar {
     return this.may_seek_ && this.times_.length > 0;
   }
 
-  /** The times of all frames [s], which is shown, and whether this page may choose another. */
-  show(times: number[], frame: number, may_seek: boolean): void {
+  /** The times of all frames [s], which is shown, whether this page may choose another, and whether it sees another than all. */
+  show(times: number[], frame: number, may_seek: boolean, is_alone: boolean): void {
     this.times_ = times;
     this.may_seek_ = may_seek;
-    for (const id of ['replay-play', 'replay-back', 'replay-forward']) button(id).disabled = !may_seek;
+    for (const id of ['replay-play', 'replay-back', 'replay-forward', 'save-video']) button(id).disabled = !may_seek;
     input('scrub').disabled = !may_seek;
     if (!may_seek) this.last_beat_ = null;
     part('replay').hidden = times.length === 0;
+    button('follow').hidden = !is_alone;
     input('scrub').max = String(Math.max(0, times.length - 1));
     if (this.last_beat_ === null && this.asked_ < 0) this.time_ = times[frame] ?? 0;
     if (this.asked_ === frame) this.asked_ = -1;
@@ -72,13 +73,29 @@ export class ReplayBar {
     requestAnimationFrame((now) => this.beat(now));
   }
 
+  /** From the beginning to the end; then, or where it is stopped, `ended` is called. */
+  play_once(ended: () => void): void {
+    if (!this.can_move) return;
+    this.stop();
+    this.go(0);
+    this.ended_ = ended;
+    this.toggle();
+  }
+  halt(): void {
+    this.stop();
+  }
+  private ended_: (() => void) | null = null;
+
   private frame(): number {
     return frame_at(this.times_, this.time_ + 1e-9);
   }
 
   private stop(): void {
+    if (this.last_beat_ !== null) this.time_ = this.times_[this.frame()] ?? 0; // of what is shown
     this.last_beat_ = null;
     this.write();
+    this.ended_?.();
+    this.ended_ = null;
   }
 
   private go(frame: number): void {

@@ -19,6 +19,13 @@ const millimetres = (value: number): string => String(Number((value * 1000).toPr
 const most_rings = 4;
 const most_refinement = 6;
 
+/** Who moves the tool, in a few words. */
+function role_of(state: State, mode: Mode, is_connected: boolean): string {
+  if (!is_connected) return 'last picture';
+  if (mode === 'replay') return state.you === 'controller' ? 'recording, you steer' : state.alone ? 'recording, on your own' : 'recording, watching';
+  return state.you === 'controller' ? `you steer, by ${state.device}` : 'watching';
+}
+
 export class RunControls {
   private state_: State | null = null;
 
@@ -58,15 +65,16 @@ export class RunControls {
     part('refused').hidden = text === '';
   }
 
-  show(state: State, mode: Mode): void {
+  /** While there is no connection nothing can be changed. */
+  show(state: State, mode: Mode, is_connected: boolean): void {
     this.state_ = state;
-    const steers = mode === 'live' && state.you === 'controller';
+    const steers = mode === 'live' && state.you === 'controller' && is_connected;
     write(part('model'), state.model.name);
     document.title = `${state.model.name} – Palpate`;
     part('role').hidden = mode === 'file';
-    write(part('role'), mode === 'replay' ? `replay, ${state.you}` : steers ? `controller, ${state.device}` : 'watcher');
+    write(part('role'), role_of(state, mode, is_connected));
     part('watchers').hidden = mode === 'file' || state.watchers < 2;
-    write(part('watchers'), `${state.watchers} pages`);
+    write(part('watchers'), `${state.watchers} pages open`);
     part('phase').hidden = mode !== 'live' || !state.phase || state.phase === 'active';
     write(part('phase'), state.phase ?? '');
 
@@ -75,12 +83,14 @@ export class RunControls {
     part('fault').hidden = !state.fault;
     write(part('fault-name'), (state.fault?.name ?? '').replaceAll('_', ' '));
     write(part('fault-remedy'), state.fault?.remedy ?? '');
+    for (const id of ['save-stl', 'save-vtu', 'control']) button(id).disabled = !is_connected;
+    if (is_connected) button('control').disabled = state.you !== 'controller' && state.controlled;
     button('acknowledge').disabled = !steers;
     button('acknowledge').hidden = Boolean(state.hand); // a hand's faults are not a page's to acknowledge
     part('fault-hand').hidden = part('hand-note').hidden = !state.hand;
     part('busy').hidden = !state.busy;
     write(part('busy-text'), state.busy ?? '');
-    part('locked').hidden = !state.locked;
+    part('locked').hidden = !state.locked || mode !== 'live';
     write(part('locked'), state.locked ?? '');
     this.show_facts(state);
   }
@@ -99,7 +109,6 @@ export class RunControls {
       : state.recording
       ? `Finish ${state.recording}`
       : 'Begin anew from the untouched body, and write every tick to a file';
-    button('control').disabled = state.you !== 'controller' && state.controlled;
     write(button('control'), state.you === 'controller' ? 'Leave control' : state.controlled ? 'Controlled elsewhere' : 'Take control');
   }
 
@@ -157,7 +166,7 @@ export class RunControls {
       ['Surface', `${model.surface_nodes} nodes${model.dofs ? `, ${model.dofs} dofs` : ''}`],
       ['Size', `${format_number(model.size * 1000)} mm`],
       ['Moved by', state.device],
-      ['Rate', `${state.rate} /s`],
+      ['Rate', `${state.rate} ticks per second`],
     );
     const key = JSON.stringify(facts);
     if (part('facts').dataset.shown === key) return;

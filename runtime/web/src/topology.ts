@@ -13,6 +13,7 @@ export interface Topology {
   nodes: number; // N
   scene_nodes: number; // S
   node: Uint32Array; // [V] of each vertex
+  material: Uint8Array; // [V] that the vertex' triangles are of
   triangle: Uint32Array; // [3 T] vertices; neither hidden ones nor any of no area
   corner: Uint32Array; // [3 T] nodes of the same triangles
   edge: Uint32Array; // [2 E] nodes
@@ -64,23 +65,31 @@ function facet_normals(rest: Float32Array, corner: Uint32Array): Float32Array {
   return normals;
 }
 
-/** Of each corner the group of facets at its node that have about the same normal: node i's first is vertex i. */
-function split_at_creases(rest: Float32Array, corner: Uint32Array, nodes: number): { vertex: Uint32Array; node: Uint32Array } {
+interface Split {
+  vertex: Uint32Array;
+  node: Uint32Array;
+  material: Uint8Array;
+}
+
+/** Of each corner the group of facets at its node that have about the same normal and one material: node i's first is vertex i. */
+function split_at_creases(rest: Float32Array, corner: Uint32Array, nodes: number, material_of: Uint8Array): Split {
   const normal = facet_normals(rest, corner);
   const vertex = new Uint32Array(corner.length);
   const node = new Uint32Array(nodes + corner.length);
   const sum = new Float32Array(3 * node.length); // of each group's facet normals
   const next = new Int32Array(node.length).fill(-1); // group of the same node
+  const material = new Uint8Array(node.length);
   let count = nodes;
   for (let i = 0; i < nodes; ++i) node[i] = i;
   for (let at = 0; at < corner.length; ++at) {
     const t = at - (at % 3);
     const x = normal[t]!, y = normal[t + 1]!, z = normal[t + 2]!;
     let group = corner[at]!;
+    const own = material_of[t / 3] ?? 0;
     for (;;) {
       const a = sum[3 * group]!, b = sum[3 * group + 1]!, c = sum[3 * group + 2]!;
       const size = Math.sqrt(a * a + b * b + c * c);
-      if (size === 0 || a * x + b * y + c * z > crease * size) break;
+      if (size === 0 || (a * x + b * y + c * z > crease * size && material[group] === own)) break;
       if (next[group]! < 0) {
         node[count] = corner[at]!;
         next[group] = count++;
@@ -91,8 +100,9 @@ function split_at_creases(rest: Float32Array, corner: Uint32Array, nodes: number
     sum[3 * group + 1]! += y;
     sum[3 * group + 2]! += z;
     vertex[at] = group;
+    material[group] = own;
   }
-  return { vertex, node: node.slice(0, count) };
+  return { vertex, node: node.slice(0, count), material: material.slice(0, count) };
 }
 
 const beside = new WeakMap<Scene, Int32Array>();
@@ -191,11 +201,14 @@ export function make_topology(scene: Scene, patch: Patch | null): Topology {
   const hidden = new Uint8Array(scene.triangle.length / 3);
   if (patch && fine.length > 0) for (const t of patch.hidden) hidden[t] = 1;
   const corner = new Uint32Array(scene.triangle.length + fine.length);
+  const material_of = new Uint8Array(corner.length / 3);
   let corners = 0;
   for (let t = 0; t < hidden.length; ++t) {
     if (hidden[t]) continue;
+    material_of[corners / 3] = scene.material[t] ?? 0;
     for (let i = 0; i < 3; ++i) corner[corners++] = scene.triangle[3 * t + i]!;
   }
+  for (let t = 0; t < fine.length / 3; ++t) material_of[corners / 3 + t] = patch?.material[t] ?? 0;
   for (let i = 0; i < fine.length; ++i) corner[corners++] = drawn(fine[i]!);
 
   const outline = Uint32Array.from(patch?.outline ?? [], drawn);
@@ -204,10 +217,10 @@ export function make_topology(scene: Scene, patch: Patch | null): Topology {
   const edge_key = (a: number, b: number) => Math.min(a, b) * nodes + Math.max(a, b);
   const is_plane = scene.dimension === 2 && corners > 0;
   if (is_plane && outline.length > 0) ({ corner: all, cut } = follow_boundary(all, outline, scene_nodes, edge_key));
-  const { vertex, node } = split_at_creases(rest, all, nodes);
+  const { vertex, node, material } = split_at_creases(rest, all, nodes, material_of);
   if (!patch) {
     const area = node_areas(rest, all, scene.edge, nodes);
-    return { nodes, scene_nodes, node, triangle: vertex, corner: all, edge: scene.edge, outline, welded, rest, area };
+    return { nodes, scene_nodes, node, material, triangle: vertex, corner: all, edge: scene.edge, outline, welded, rest, area };
   }
   const edge: number[] = fine.length > 0 || is_plane ? [...outline] : [];
   const sides = triangles_beside(scene);
@@ -224,7 +237,7 @@ export function make_topology(scene: Scene, patch: Patch | null): Topology {
   }
   const edges = Uint32Array.from(edge);
   const area = node_areas(rest, all, edges, nodes);
-  return { nodes, scene_nodes, node, triangle: vertex, corner: all, edge: edges, outline, welded, rest, area };
+  return { nodes, scene_nodes, node, material, triangle: vertex, corner: all, edge: edges, outline, welded, rest, area };
 }
 
 /** Vertex normals [3 V] of length 1: means of the triangles' by their areas. */

@@ -11,6 +11,16 @@ export interface Scene {
   triangle: Uint32Array; // [3 T]
   edge: Uint32Array; // [2 E]
   held: Uint8Array; // [S] bit `axis` is set where a node is held along it
+  material: Uint8Array; // [T] of each triangle's element; empty where there is one only, or none is known
+  inner: Inner;
+}
+
+/** Where materials meet within the body. */
+export interface Inner {
+  position: Float32Array; // [3 I]
+  triangle: Uint32Array; // [3 J] outward of `inside`
+  inside: Uint8Array; // [J] material on the one side
+  outside: Uint8Array; // [J] and on the other
 }
 
 /** The overlay's finer surface in place of the scene's `hidden` triangles. */
@@ -22,6 +32,7 @@ export interface Patch {
   position: Float32Array; // [3 m]
   triangle: Uint32Array; // [3 t]
   outline: Uint32Array; // [2 o]
+  material: Uint8Array; // [t] as a scene's
 }
 
 /** Floats a contact: position, outward normal, force on the body, 1 where it is held. */
@@ -111,6 +122,9 @@ class Reader {
   rest(): Uint8Array {
     return new Uint8Array(this.buffer_, this.at_);
   }
+  get at_end(): boolean {
+    return this.at_ >= this.buffer_.byteLength;
+  }
 
   private advance(bytes: number): number {
     const at = this.at_;
@@ -128,21 +142,39 @@ function check_indices(indices: Uint32Array, count: number, what: string): void 
   }
 }
 
+const one_material = (): Pick<Scene, 'material' | 'inner'> => ({
+  material: new Uint8Array(0),
+  inner: { position: new Float32Array(0), triangle: new Uint32Array(0), inside: new Uint8Array(0), outside: new Uint8Array(0) },
+});
+
+/** What follows a scene of several materials. */
+function decode_materials(reader: Reader, triangles: number): Pick<Scene, 'material' | 'inner'> {
+  if (reader.at_end) return one_material();
+  const nodes = reader.u32();
+  const facets = reader.u32();
+  const position = reader.f32s(3 * nodes);
+  const triangle = reader.u32s(3 * facets);
+  check_indices(triangle, nodes, "the inner surface's node");
+  const material = reader.u8s(triangles);
+  return { material, inner: { position, triangle, inside: reader.u8s(facets), outside: reader.u8s(facets) } };
+}
+
 function decode_scene(reader: Reader, number: number): Scene {
   const dimension = reader.u32();
   if (dimension !== 2 && dimension !== 3) throw new RangeError(`a scene of dimension ${dimension}`);
   const nodes = reader.u32();
   const triangles = reader.u32();
   const edges = reader.u32();
-  const scene: Scene = {
-    kind: 'scene',
+  const outer = {
+    kind: 'scene' as const,
     number,
-    dimension,
+    dimension: dimension as 2 | 3,
     position: reader.f32s(3 * nodes),
     triangle: reader.u32s(3 * triangles),
     edge: reader.u32s(2 * edges),
     held: reader.u8s(nodes),
   };
+  const scene: Scene = { ...outer, ...decode_materials(reader, triangles) };
   check_indices(scene.triangle, nodes, 'node');
   check_indices(scene.edge, nodes, 'node');
   return scene;
@@ -162,6 +194,7 @@ function decode_patch(reader: Reader, scene: number): Patch {
     position: reader.f32s(3 * nodes),
     triangle: reader.u32s(3 * triangles),
     outline: reader.u32s(2 * outline),
+    material: reader.at_end ? new Uint8Array(0) : reader.u8s(triangles),
   };
   check_indices(patch.triangle, nodes, "the patch's node");
   check_indices(patch.outline, nodes, "the patch's node");

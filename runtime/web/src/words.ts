@@ -28,6 +28,7 @@ export interface Model {
   loads: boolean;
   overlay_rings?: number; // the most that an overlay may have; 0: none may be
   overlay_refinement?: [number, number]; // least and most
+  materials?: number[]; // Young's moduli [Pa] in the order of their numbers; absent: not known
 }
 
 /** How the run is. What a message leaves out is as it was. */
@@ -55,6 +56,7 @@ export interface State {
   defaults: { radius: number; reach: number; friction: number; depth: number };
   frames?: number;
   frame?: number;
+  alone?: boolean; // of a replay it sees another frame than the page that steers
   duration?: number;
   times?: number[];
 }
@@ -89,4 +91,5 @@ export type Word =
   | { type: 'change'; settings: Record<string, string | null> }
   | { type: 'record'; on: boolean }
   | { type: 'control'; take: boolean }
-  | { type: 'seek'; frame: number };
+  | { type: 'seek'; frame: number }
+  | { type: 'follow' };

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { usual_largest } from '../src/field';
-import { first_direction, fit_places } from '../src/outlook';
+import { first_direction, fit_places, guessed_up, turned_up } from '../src/outlook';
 import { dot, minus } from '../src/pose';
 import type { Scene } from '../src/wire';
 import type { Vec3 } from '../src/words';
@@ -18,6 +18,8 @@ function cube(is_held: (place: Vec3) => boolean): Scene {
     triangle: Uint32Array.from(triangle),
     edge: new Uint32Array(0),
     held: Uint8Array.from(places, (place) => (is_held(place) ? 7 : 0)),
+    material: new Uint8Array(0),
+    inner: { position: new Float32Array(0), triangle: new Uint32Array(0), inside: new Uint8Array(0), outside: new Uint8Array(0) },
   };
 }
 
@@ -62,4 +64,19 @@ test('a hot spot does not set the range, and zeros do not count', () => {
   known[0] = 0;
   assert.ok(usual_largest(value, known, area, 1, 0.004) === 1);
   assert.equal(usual_largest(new Float32Array(3), known.slice(0, 3), area.slice(0, 3), 0, 0.004), 0);
+});
+
+test('a body that stands on what holds it along y has y up, any other z', () => {
+  assert.deepEqual(guessed_up(cube(([, y]) => y === 0)), [0, 1, 0]);
+  assert.deepEqual(guessed_up(cube(([, , z]) => z === 0)), [0, 0, 1]);
+  assert.deepEqual(guessed_up(cube(([x]) => x === 0)), [0, 0, 1]); // a beam is not set on its end
+  assert.deepEqual(guessed_up(cube(() => false)), [0, 0, 1]);
+});
+
+test('directions with another axis up are turned, not mirrored', () => {
+  for (const up of [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]] as Vec3[]) {
+    const [x, y, z] = ([[1, 0, 0], [0, 1, 0], [0, 0, 1]] as Vec3[]).map((axis) => turned_up(axis, up)) as [Vec3, Vec3, Vec3];
+    assert.equal(dot(z, up), 1);
+    assert.ok(Math.abs(dot([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]], z) - 1) < 1e-12);
+  }
 });

@@ -5,6 +5,11 @@ import { boundary_edges } from '../src/pick';
 import { make_topology, vertex_normals } from '../src/topology';
 import type { Frame, Patch, Scene } from '../src/wire';
 
+const one_material = {
+  material: new Uint8Array(0),
+  inner: { position: new Float32Array(0), triangle: new Uint32Array(0), inside: new Uint8Array(0), outside: new Uint8Array(0) },
+};
+
 // The unit cube, each face two triangles.
 const corners = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [i & 1, (i >> 1) & 1, i >> 2]);
 const facets = [
@@ -18,6 +23,7 @@ const cube: Scene = {
   triangle: Uint32Array.from(facets),
   edge: Uint32Array.from([0, 1, 4, 5, 0, 4, 4, 6]),
   held: new Uint8Array(8),
+  ...one_material,
 };
 // The top, whose triangles are 2 and 3, by four triangles about its middle.
 const patch: Patch = {
@@ -28,6 +34,7 @@ const patch: Patch = {
   position: Float32Array.from([0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1, 0.5, 0.5, 1]),
   triangle: Uint32Array.from([0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4]),
   outline: Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]),
+  material: new Uint8Array(0),
 };
 
 test('each side of a cube has its own normals', () => {
@@ -70,6 +77,15 @@ test('a patch closes the hole of what it hides', () => {
     assert.equal(count, 1);
     assert.equal(sides.get(edge.split(',').reverse().join(',')), 1);
   }
+});
+
+test('sides of two materials do not share vertices', () => {
+  const material = Uint8Array.from({ length: 12 }, (_, t) => (t === 2 ? 1 : 0)); // one half of the top
+  const topology = make_topology({ ...cube, material }, null);
+  const of = (t: number) => [0, 1, 2].map((k) => topology.triangle[3 * t + k]!);
+  assert.ok(of(2).every((vertex) => topology.material[vertex] === 1));
+  assert.ok(of(3).every((vertex) => topology.material[vertex] === 0));
+  assert.equal(topology.node.length, 24 + 2); // the two nodes of the diagonal once more
 });
 
 test('edges that only hidden triangles have are not drawn', () => {
@@ -118,12 +134,13 @@ test('in the plane the body ends where a patch has its boundary', () => {
   const square: Scene = {
     kind: 'scene', number: 1, dimension: 2,
     position: Float32Array.from([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0]),
-    triangle: Uint32Array.from([0, 1, 2, 0, 2, 3]), edge: Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]), held: new Uint8Array(4),
+    triangle: Uint32Array.from([0, 1, 2, 0, 2, 3]), edge: Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]), held: new Uint8Array(4), ...one_material,
   };
   const upper: Patch = {
     kind: 'patch', scene: 1, number: 1, hidden: new Uint32Array(0), triangle: new Uint32Array(0),
     position: Float32Array.from([1, 1, 0, 0.7, 1, 0, 0.3, 1, 0, 0, 1, 0, 0, 0.5, 0, 0, 0, 0]), // from the right upper corner, left and down
     outline: Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 4, 4, 5]),
+    material: new Uint8Array(0),
   };
   const { corner, edge, area } = make_topology(square, upper);
   const boundary = boundary_edges(corner, 10);

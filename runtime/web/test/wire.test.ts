@@ -18,6 +18,18 @@ test('a scene', () => {
   assert.deepEqual([...scene.held], [7, 0, 4]);
 });
 
+test('a scene of two materials, and where they meet', () => {
+  const message = three_nodes().pad().u32(3, 1).f32(0, 0, 1, 1, 0, 1, 0, 1, 1).u32(0, 2, 1).u8(1).u8(1).u8(0).done();
+  const { material, inner, held } = decode(message, null) as Scene;
+  assert.deepEqual([...held], [7, 0, 4]);
+  assert.deepEqual([...material], [1]);
+  assert.deepEqual([...inner.position.slice(3, 6)], [1, 0, 1]);
+  assert.deepEqual([...inner.triangle], [0, 2, 1]);
+  assert.deepEqual([[...inner.inside], [...inner.outside]], [[1], [0]]);
+  const beyond = three_nodes().pad().u32(1, 1).f32(0, 0, 1).u32(0, 2, 1).u8(1).u8(1).u8(0).done();
+  assert.throws(() => decode(beyond, null), /inner surface's node/);
+});
+
 test('a patch', () => {
   const message = new Writer().u32(2, 7, 4, 1, 2, 1, 1).u32(0).f32(1, 2, 3, 4, 5, 6).u32(0, 1, 1).u32(1, 0).done();
   const patch = decode(message, scene);

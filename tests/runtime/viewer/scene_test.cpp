@@ -141,6 +141,31 @@ TEST_P(ScenePatches, TakeThePlaceOfWhatTheyHide) {
   }
 }
 
+TEST(Scene, MaterialsMeetInAPlane) {
+  for (const ElementType element : {ElementType::tet4, ElementType::tet10, ElementType::hex8}) {
+    const Body body(test::two_materials(element, 2), {}, 2);
+    const Scene scene = make_scene(body, 1);
+    ASSERT_EQ(scene.materials.size(), scene.triangles.size());
+    EXPECT_NEAR(area(scene.inner.nodes, scene.inner.triangles), 1.0, 1e-12);
+    for (const Vec3& node : scene.inner.nodes) EXPECT_NEAR(node.z(), 0.5, 1e-12);
+    for (std::size_t t = 0; t < scene.inner.triangles.size(); ++t) {
+      const auto& [a, b, c] = scene.inner.triangles[t];
+      const std::vector<Vec3>& nodes = scene.inner.nodes;
+      const double up = (nodes[b] - nodes[a]).cross(nodes[c] - nodes[a]).z();
+      EXPECT_EQ(scene.inner.inside[t], up > 0.0 ? 1 : 0);  // below is the second material
+      EXPECT_EQ(scene.inner.outside[t], up > 0.0 ? 0 : 1);
+    }
+    for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
+      const auto& nodes = scene.triangles[t];
+      const double height = (scene.nodes[nodes[0]] + scene.nodes[nodes[1]] + scene.nodes[nodes[2]]).z() / 3.0;
+      EXPECT_EQ(scene.materials[t], height < 0.5 ? 1 : 0);
+    }
+    const ScenePatch patch = make_scene_patch(body, scene, *patch_at_top(body, 1));
+    EXPECT_EQ(patch.materials.size(), patch.triangles.size());
+  }
+  EXPECT_TRUE(make_scene(cube(ElementType::tet4, 2), 1).materials.empty());
+}
+
 TEST(Scene, PlateShowsItsElementsWhereAllIsStored) {
   for (const ElementType element : {ElementType::quad4, ElementType::tri3}) {
     SCOPED_TRACE(traits(element).name);

@@ -47,6 +47,13 @@ class Asked : public ViewedRun {
   }
   void record(bool on) override { note(on ? "record" : "record no more"); }
   void seek(std::int64_t frame) override { note("seek " + std::to_string(frame)); }
+  std::optional<Leaf> leaf(std::int64_t frame) override {
+    Leaf leaf{std::min<std::int64_t>(frame, 99), {}};
+    leaf.picture.frame.tick = 1000 + leaf.frame;
+    leaf.picture.frame.displacement.assign(displacements, static_cast<float>(leaf.frame));
+    return leaf;
+  }
+  std::size_t displacements = 0;
 
   /// Waits for it, which may be among what was asked already.
   void wait_for(const std::string& word, std::ptrdiff_t times = 1) {
@@ -596,6 +603,53 @@ TEST_F(Viewer, ReplayKeepsTicksAndTimesForLaterPages) {
     EXPECT_EQ(ticks.stride, 4U);
     EXPECT_FALSE(page.receive("state").contains("times"));
   }
+}
+
+TEST_F(Viewer, WatchersOfAReplayLeafForThemselves) {
+  server_ = serve({.port = 0}, true);
+  run_.displacements = 3 * body_.surface_rest_positions().size();
+  server_->show_state(R"({"frames":100,"frame":0})");
+  server_->show_scene(scene_);
+  server_->show_picture(picture(1));
+  Client steers = client();
+  steers.receive("state", is_controller);
+  hear_frame(steers, 1);
+  Client watches = client();
+  hear_frame(watches, 1);
+  const auto is_alone = [](const Json& state) { return state.at("alone") == true; };
+  for (const int frame : {7, 40, 5000}) {
+    watches.say(R"({"type":"seek","frame":)" + std::to_string(frame) + "}");
+    const int shown = std::min(frame, 99);
+    const Json state =
+        watches.receive("state", [&](const Json& s) { return is_alone(s) && s.at("frame") == shown; });
+    EXPECT_EQ(state.at("you"), "watcher");
+    hear_frame(watches, 1000 + shown);
+  }
+  // What all see goes on without the one that looks alone, until it follows.
+  server_->show_picture(picture(2));
+  hear_frame(steers, 2);
+  server_->show_picture(picture(3));
+  hear_frame(steers, 3);
+  watches.say(R"({"type":"seek","frame":8})");
+  EXPECT_EQ(tick_of(watches.receive(3)), 1008.0);
+  watches.say(R"({"type":"follow"})");
+  EXPECT_EQ(watches.receive("state", [&](const Json& s) { return !is_alone(s); }).at("frame"), 0);
+  EXPECT_EQ(tick_of(watches.receive(3)), 3.0);
+  // Who steers moves all.
+  steers.say(R"({"type":"seek","frame":9})");
+  run_.wait_for("seek 9");
+  EXPECT_EQ(run_.words(), std::vector<std::string>{"seek 9"});
+}
+
+TEST_F(Viewer, WatchersOfARunDoNotLeaf) {
+  server_->show_state("{}");
+  server_->show_scene(scene_);
+  server_->show_picture(picture(1));
+  Client steers = client();
+  steers.receive("state", is_controller);
+  Client watches = client();
+  watches.say(R"({"type":"seek","frame":8})");
+  EXPECT_EQ(watches.receive("error").at("reason"), "control");
 }
 
 /// Connections that say nothing, or nothing that is enough.

@@ -41,6 +41,7 @@ TEST(PageWord, ThoseOfTheProtocolAreUnderstood) {
   EXPECT_TRUE(std::get<ControlWord>(parsed(R"({"type":"control","take":true})")).take);
   EXPECT_EQ(std::get<SeekWord>(parsed(R"({"type":"seek","frame":123})")).frame, 123);
   EXPECT_STREQ(name_of(parsed(R"({"type":"seek","frame":0})")), "seek");
+  EXPECT_STREQ(name_of(parsed(R"({"type":"follow"})")), "follow");
   EXPECT_STREQ(name_of(parsed(R"({"type":"control","take":true})")), "control");
 }
 
@@ -154,12 +155,16 @@ TEST(RunWords, StateIsTheRunsAndThePages) {
                               {"you", "controller"},
                               {"controlled", true},
                               {"watchers", 2},
+                              {"alone", false},
                               {"pointer", true},
                               {"rate", 4000},
                               {"times", {0, 1}}}));
   const Json watcher = Json::parse(state.for_page(3, {false, true, 2}, {}));
   EXPECT_EQ(watcher.at("you"), "watcher");
   EXPECT_EQ(watcher.at("pointer"), false);
+  const Json alone = Json::parse(state.for_page(3, {false, true, 2, 7}, {}));
+  EXPECT_EQ(alone.at("alone"), true);
+  EXPECT_EQ(alone.at("frame"), 7);
   EXPECT_FALSE(watcher.contains("times"));
   EXPECT_EQ(StateWord("{}").rate(), 1000.0);
   EXPECT_THROW(StateWord("[]"), Error);

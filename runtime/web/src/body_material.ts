@@ -1,0 +1,162 @@
+// What the body's surface looks like: plain and a little wet, or in colours that say numbers.
+import { Color, DataTexture, DoubleSide, FrontSide, LinearFilter, NearestFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace, Vector2, Vector4 } from 'three';
+import { map_texels, material_colours, tint, tissue, type MapName } from './colours';
+import { light_glsl, type Light } from './light';
+
+const most_materials = 256;
+
+function map_texture(name: MapName): DataTexture {
+  const texture = new DataTexture(map_texels(name, 256), 256, 1, RGBAFormat);
+  texture.colorSpace = SRGBColorSpace;
+  texture.magFilter = texture.minFilter = LinearFilter;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+function materials_texture(): DataTexture {
+  const texels = new Uint8Array(4 * most_materials);
+  for (let i = 0; i < most_materials; ++i) texels.set([...material_colours[i % material_colours.length]!, 255], 4 * i);
+  const texture = new DataTexture(texels, most_materials, 1, RGBAFormat);
+  texture.colorSpace = SRGBColorSpace;
+  texture.magFilter = texture.minFilter = NearestFilter;
+  texture.needsUpdate = true;
+  return texture;
+}
+
+const vertex = /* glsl */ `
+attribute vec4 shown;
+varying vec4 v_shown;
+varying vec3 v_normal, v_place, v_world;
+void main() {
+  vec4 place = modelViewMatrix * vec4(position, 1.0);
+  v_shown = shown;
+  v_world = position;
+  v_place = place.xyz;
+  v_normal = normalMatrix * normal;
+  gl_Position = projectionMatrix * place;
+}`;
+
+const fragment = /* glsl */ `
+varying vec4 v_shown; // number, 1 where it is known, 1 where it is held, material
+varying vec3 v_normal, v_place, v_world;
+uniform sampler2D colour_map, materials;
+uniform vec2 range;
+uniform vec4 cut;
+uniform vec3 tissue, tint;
+uniform float colouring, is_log, lines, shows_held, is_flat, veil, pixel;
+${light_glsl}
+
+float share_of(float value) {
+  if (is_log > 0.5) return value > 0.0 && range.y > 0.0 ? 1.0 + log(value / range.y) / log(1000.0) : 0.0;
+  return (value - range.x) / max(range.y - range.x, 1e-30);
+}
+
+vec3 own_colour() {
+  if (colouring < 0.5) return tissue;
+  if (colouring > 1.5) return texture2D(materials, vec2((floor(v_shown.w + 0.5) + 0.5) / 256.0, 0.5)).rgb;
+  if (v_shown.y < 0.999) return tint * 0.8;
+  float share = clamp(share_of(v_shown.x), 0.0, 1.0);
+  vec3 colour = texture2D(colour_map, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
+  if (lines > 0.5) {
+    float place = share * lines;
+    float width = fwidth(place);
+    float apart = abs(fract(place - 0.5) - 0.5);
+    if (width < 0.5) colour *= mix(0.42, 1.0, smoothstep(0.6 * width, 1.4 * width, place < 0.3 ? 1.0 : apart));
+  }
+  return colour;
+}
+
+void main() {
+  if (dot(cut.xyz, v_world) > cut.w) discard;
+  vec3 colour = own_colour();
+  float held = shows_held * step(0.999, v_shown.z);
+  if (held > 0.5) {
+    float stripe = smoothstep(0.35, 0.5, abs(fract((gl_FragCoord.x + gl_FragCoord.y) / (11.0 * pixel)) - 0.5) * 2.0);
+    colour = mix(colour, mix(vec3(dot(colour, vec3(0.3, 0.6, 0.1))), vec3(0.02, 0.025, 0.03), 0.55), 0.35 + 0.5 * stripe);
+  }
+  float alpha = 1.0;
+  if (is_flat < 0.5) {
+    vec3 eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-v_place);
+    vec3 normal = normalize(v_normal);
+    if (!gl_FrontFacing) normal = -normal;
+    vec2 open = texture2D(open_map, gl_FragCoord.xy / picture_size).rg;
+    float near_tool = tool_open(v_place, normal);
+    float sky = open.r * (0.2 + 0.8 * near_tool);
+    float key = open.g * tool_shade(v_place, key_way) * mix(0.4, 1.0, open.r) * mix(0.45, 1.0, near_tool);
+    Lit lit = light_at(v_place, normal, eye, sky, key);
+    if (colouring < 0.5) {
+      float thin = 1.0 - abs(dot(normal, key_way));
+      vec3 glow = vec3(0.10, 0.02, 0.012) * thin * key;
+      colour = colour * lit.diffuse + glow + vec3(1.0, 0.97, 0.93) * (0.75 * lit.shine + 0.16 * lit.gloss) * (1.0 - 0.8 * held);
+    } else {
+      float bright = dot(lit.diffuse, vec3(0.2126, 0.7152, 0.0722));
+      colour = colour * mix(0.35, 1.0, min(1.0, bright)) * mix(1.0, bright, 0.45) + vec3(0.10 * lit.shine + 0.05 * lit.gloss);
+    }
+    if (!gl_FrontFacing) colour *= 0.55;
+    if (veil > 0.0) alpha = mix(0.16, 0.85, pow(1.0 - abs(dot(normal, eye)), 2.0));
+  }
+  gl_FragColor = vec4(colour, alpha);
+  #include <colorspace_fragment>
+}`;
+
+/** One for the body, one each for what lies in it; `set` changes what is shown. */
+export class BodyMaterial extends ShaderMaterial {
+  private static maps_: Record<MapName, DataTexture> | null = null;
+  private static readonly materials_ = materials_texture();
+
+  constructor(light: Light, cut: { value: Vector4 }) {
+    super({
+      vertexShader: vertex,
+      fragmentShader: fragment,
+      uniforms: {
+        ...light.uniforms,
+        cut,
+        colour_map: { value: null },
+        materials: { value: BodyMaterial.materials_ },
+        range: { value: new Vector2(0, 1) },
+        tissue: { value: new Color(tissue) },
+        tint: { value: new Color(`rgb(${tint.join()})`) },
+        colouring: { value: 0 }, // 0: plain, 1: numbers, 2: materials
+        is_log: { value: 0 },
+        lines: { value: 0 },
+        shows_held: { value: 1 },
+        is_flat: { value: 0 },
+        veil: { value: 0 },
+        pixel: { value: 1 }, // pixels of the drawing for one of the page
+      },
+      polygonOffset: true,
+      polygonOffsetFactor: 1,
+      polygonOffsetUnits: 2,
+    });
+    this.set_map('viridis');
+  }
+
+  set(values: Partial<Record<'colouring' | 'is_log' | 'lines' | 'shows_held' | 'is_flat' | 'pixel', number>>): void {
+    for (const [name, value] of Object.entries(values)) this.uniforms[name]!.value = value;
+  }
+
+  set_range(low: number, high: number): void {
+    (this.uniforms.range!.value as Vector2).set(low, high);
+  }
+
+  set_map(name: MapName): void {
+    BodyMaterial.maps_ ??= {
+      viridis: map_texture('viridis'),
+      cividis: map_texture('cividis'),
+      inferno: map_texture('inferno'),
+      grey: map_texture('grey'),
+      diverging: map_texture('diverging'),
+    };
+    this.uniforms.colour_map!.value = BodyMaterial.maps_[name];
+  }
+
+  /** Whether what lies behind is seen through it, and both of its sides are. */
+  set_see_through(veil: boolean, both_sides: boolean): void {
+    const side = both_sides ? DoubleSide : FrontSide;
+    if (this.side !== side || this.transparent !== veil) this.needsUpdate = true;
+    this.side = side;
+    this.transparent = veil;
+    this.depthWrite = !veil;
+    this.uniforms.veil!.value = veil ? 1 : 0;
+  }
+}

@@ -1,0 +1,42 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { round_below } from '../src/marks';
+import { Pace } from '../src/pace';
+
+const times = (count: number, act: () => void) => Array.from({ length: count }, act);
+
+test('pictures that are slow become coarser, and fine again where there is time', () => {
+  const pace = new Pace();
+  times(40, () => pace.note(16));
+  assert.equal(pace.share, 1);
+  times(40, () => pace.note(120));
+  const coarse = pace.share;
+  assert.ok(coarse < 0.6 && coarse >= 0.4, `${coarse}`);
+  times(400, () => pace.note(16));
+  assert.equal(pace.share, 1);
+});
+
+test('one slow picture changes nothing, and what a whole one took does not count', () => {
+  const pace = new Pace();
+  times(3, () => pace.note(16));
+  pace.note(500);
+  times(3, () => pace.note(16));
+  assert.equal(pace.share, 1);
+  for (let k = 0; k < 20; ++k) {
+    pace.note_rest(800);
+    pace.note(800);
+    pace.note(800);
+    pace.note(16);
+  }
+  assert.equal(pace.share, 1);
+  assert.equal(pace.rest_share, 1);
+  pace.note_rest(3000);
+  assert.ok(pace.rest_share < 1);
+});
+
+test('bars of known length are round', () => {
+  assert.equal(round_below(0.037), 0.02);
+  assert.equal(round_below(0.05), 0.05);
+  assert.ok(Math.abs(round_below(0.0099) - 0.005) < 1e-12);
+  assert.equal(round_below(0), 0);
+});

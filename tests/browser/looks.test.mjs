@@ -1,0 +1,233 @@
+// How the page looks: a press is seen, bodies stand out, texts are whole; in a real browser against the real runtime.
+import assert from 'node:assert/strict';
+import path from 'node:path';
+import { after, test } from 'node:test';
+import { bake, close, folder, project, ready, run, runtime, serve, until, visit } from './harness.mjs';
+import { bare, barriers, contrast, difference, faults_of_layout, keep_ground, keep_pixels, rest } from './looks.mjs';
+import { choose, part, recorded, settled } from './steps.mjs';
+
+after(close);
+
+/// A block of soft tissue with a stiffer ball in it.
+const block = `name = "block"
+[geometry]
+box = { origin = [-0.05, -0.05, 0], size = [0.1, 0.1, 0.05], cells = [16, 16, 8] }
+[mesh]
+element = "hex8"
+[[material]]
+youngs_modulus = 3000.0
+poissons_ratio = 0.45
+[[material]]
+youngs_modulus = 30000.0
+poissons_ratio = 0.45
+sphere = { center = [0, 0, 0.03], radius = 0.012 }
+[[fixed]]
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+`;
+const sphere = 0.012; // [m]
+const place = [0.02, -0.015, 0.05];
+
+async function open_block(t, options = {}) {
+  const at = await folder(t);
+  const file = await bake(at, block, 'block');
+  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', '--tool', `sphere:${sphere}`], at);
+  return { at, served, page: await ready(await visit(t, served.url, options)) };
+}
+
+const small = { viewport: { width: 760, height: 500 } }; // quick to draw
+
+const set_field = (page, field) => part(page, 'field').selectOption(field);
+
+test('a body at rest stands out from the ground, 3 to 1, in every colouring and theme', async (t) => {
+  const { page } = await open_block(t, small);
+  await bare(page);
+  const found = {};
+  for (const theme of ['dark', 'light']) {
+    await part(page, 'theme').selectOption(theme, { force: true });
+    await rest(page);
+    await keep_ground(page, 'ground');
+    for (const field of ['none', 'magnitude', 'von-mises', 'pressure', 'z', 'material']) {
+      await set_field(page, field);
+      await rest(page);
+      await keep_pixels(page, field);
+      const { median, share } = await contrast(page, field, 'ground');
+      assert.ok(share > 0.1, `${theme}, ${field}: the body takes ${share} of the picture`);
+      found[`${theme} ${field}`] = median.toFixed(2);
+      assert.ok(median >= 3, `${theme}, ${field}: ${JSON.stringify(found)}`);
+    }
+    for (const map of theme === 'dark' ? ['cividis', 'inferno', 'grey'] : []) { // whose ground is nearer to the maps' dark ends
+      await set_field(page, 'von-mises');
+      await part(page, 'map').selectOption(map, { force: true });
+      await rest(page);
+      await keep_pixels(page, map);
+      found[`${theme} ${map}`] = (await contrast(page, map, 'ground')).median.toFixed(2);
+      assert.ok((await contrast(page, map, 'ground')).median >= 3, `${theme}, ${map}: ${JSON.stringify(found)}`);
+    }
+    await part(page, 'map').selectOption('viridis', { force: true });
+  }
+  t.diagnostic(JSON.stringify(found));
+  assert.deepEqual(page.complaints, []);
+});
+
+test('a press of 5 mm is seen in the plain view: 12 grey levels around the tool', async (t) => {
+  for (const theme of ['dark', 'light']) {
+    const { page } = await open_block(t, { ...small, colorScheme: theme });
+    await bare(page);
+    await rest(page);
+    await keep_pixels(page, 'before');
+    await choose(page, 'press', 0.005);
+    const { x, y } = await project(page, place);
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    const felt = await settled(page);
+    assert.ok(felt.depth > 0.0045 && felt.depth < 0.0055, `pressed ${felt.depth} m`);
+    await rest(page);
+    await keep_pixels(page, 'pressed');
+    await page.mouse.up();
+    // The dent is as wide as three radii of the tool; what the tool itself covers does not count.
+    const { left, top } = await part(page, 'stage').evaluate((stage) => stage.getBoundingClientRect().toJSON());
+    const centre = await project(page, felt.tool.slice(0, 3));
+    const beside = await project(page, [felt.tool[0] + sphere, felt.tool[1], felt.tool[2]]);
+    const radius = Math.hypot(beside.x - centre.x, beside.y - centre.y);
+    const seen = await difference(page, 'before', 'pressed', { x: x - left, y: y - top, from: 1.15 * radius, to: 1.9 * radius });
+    t.diagnostic(`${theme}: ${seen.toFixed(1)} grey levels`);
+    assert.ok(seen >= 12, `${theme}: ${seen} grey levels`);
+    await page.context().close();
+  }
+});
+
+test('arrows keep their size on the screen when the view zooms, and a legend says what they mean', async (t) => {
+  const { page } = await open_block(t);
+  await choose(page, 'press', 0.004);
+  const { x, y } = await project(page, place);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await settled(page);
+  await rest(page);
+  const legend = async () => [await part(page, 'arrow-legend-text').innerText(), (await part(page, 'arrow-legend-line').boundingBox()).width];
+  const first = await legend();
+  assert.match(first[0], /^[\d.]+ m?N$/);
+  const yellow = async () => {
+    await keep_pixels(page, 'arrows');
+    return page.evaluate(() => {
+      const { data } = window.kept_pixels.arrows;
+      let count = 0;
+      for (let k = 0; k < data.length; k += 4) if (data[k] > 225 && data[k + 1] > 170 && data[k + 1] < 215 && data[k + 2] < 110) ++count;
+      return count;
+    });
+  };
+  await bare(page);
+  const before = await yellow();
+  for (let k = 0; k < 4; ++k) await page.keyboard.press('-');
+  await rest(page);
+  const zoomed = await yellow();
+  await page.mouse.up();
+  assert.ok(before > 50 && Math.abs(zoomed / before - 1) < 0.25, `${before} pixels of the arrow, ${zoomed} from farther away`);
+});
+
+test('a stiffer ball within is seen: by material, cut open, and through the surface', async (t) => {
+  const { page } = await open_block(t, small);
+  await bare(page);
+  const blue = async (name) => {
+    await rest(page);
+    await keep_pixels(page, name);
+    return page.evaluate((key) => {
+      const { data } = window.kept_pixels[key];
+      let count = 0;
+      for (let k = 0; k < data.length; k += 4) if (data[k + 2] > data[k] + 25) ++count;
+      return count;
+    }, name);
+  };
+  await part(page, 'theme').selectOption('light', { force: true });
+  await part(page, 'show-held').evaluate((box) => box.click()); // its dots are bluish
+  await set_field(page, 'material');
+  await part(page, 'materials').locator('li').first().waitFor();
+  assert.deepEqual(await part(page, 'materials').locator('li').allInnerTexts(), ['1: E = 3.0 kPa', '2: E = 30 kPa']);
+  const closed = await blue('closed');
+  await part(page, 'section').selectOption('y', { force: true });
+  const cut = await blue('cut');
+  await part(page, 'section').selectOption('off', { force: true });
+  await page.keyboard.press('x');
+  const through = await blue('through');
+  assert.ok(cut > 1000 && through > 1000 && closed < 0.1 * Math.min(cut, through), `blue pixels: closed ${closed}, cut ${cut}, through ${through}`);
+});
+
+const layouts = [
+  [360, 640, true],
+  [640, 360, true],
+  [900, 600, false],
+  [1280, 800, false],
+  [3840, 2160, false],
+];
+
+test('no text is cut off or covered, and every target is large enough, at five sizes', async (t) => {
+  const { at, page: mouse, served } = await open_block(t);
+  await mouse.context().close();
+  const html = path.join(at, 'out.html');
+  await run(runtime, ['export', await recorded(t, at), '--html', html]);
+  for (const [width, height, hasTouch] of layouts) {
+    const options = { viewport: { width, height }, hasTouch, isMobile: hasTouch };
+    const target = hasTouch ? 44 : 24;
+    const check = async (page, what) => {
+      await page.waitForTimeout(120);
+      const faults = await faults_of_layout(page, target);
+      assert.deepEqual(faults, [], `${width} × ${height}, ${what}`);
+    };
+    const page = await ready(await visit(t, served.url, options));
+    await until(page, () => window.palpate.state.you === 'controller');
+    await set_field(page, 'von-mises');
+    const { x, y } = await project(page, place);
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await settled(page);
+    await check(page, 'pressed');
+    await page.mouse.up();
+    await page.mouse.move(1, 1);
+    await page.keyboard.press('v');
+    await check(page, 'with the card of the view');
+    await page.keyboard.press('v');
+    await page.keyboard.press('?');
+    await check(page, 'with the help');
+    await page.context().close();
+    const replay = await ready(await visit(t, `file://${html}`, options));
+    await set_field(replay, 'von-mises');
+    await check(replay, 'a recording');
+    const [first, ...others] = await replay.locator('.numbers > :visible').evaluateAll((tiles) => tiles.map((tile) => tile.getBoundingClientRect().toJSON()));
+    const right = Math.max(first.right, ...others.map((tile) => tile.right));
+    for (const tile of [first, ...others]) {
+      const is_last = ![first, ...others].some((other) => Math.abs(other.top - tile.top) < 2 && other.left > tile.left + 2);
+      if (is_last) assert.ok(right - tile.right < 2, `a row of the numbers has a hole at ${width} × ${height}`);
+    }
+    const scrub = await part(replay, 'scrub').boundingBox();
+    assert.ok(scrub.width >= 90, `a slider of ${scrub.width} px`);
+    assert.deepEqual(replay.complaints, []);
+    await replay.context().close();
+  }
+});
+
+test('axe-core finds nothing serious, in both themes', async (t) => {
+  const { at, page: first, served } = await open_block(t);
+  await first.context().close();
+  const html = path.join(at, 'out.html');
+  await run(runtime, ['export', await recorded(t, at), '--html', html]);
+  for (const colorScheme of ['dark', 'light']) {
+    const page = await ready(await visit(t, served.url, { colorScheme }));
+    await set_field(page, 'von-mises');
+    assert.deepEqual(await barriers(page), [], colorScheme);
+    await page.keyboard.press('v');
+    assert.deepEqual(await barriers(page), [], `${colorScheme}, card of the view`);
+    await page.keyboard.press('v');
+    await page.keyboard.press('?');
+    assert.deepEqual(await barriers(page), [], `${colorScheme}, help`);
+    await page.keyboard.press('Escape');
+    await until(page, () => window.palpate.state.you === 'controller');
+    await part(page, 'pause').click();
+    await until(page, () => window.palpate.state.paused);
+    assert.deepEqual(await barriers(page), [], `${colorScheme}, paused`);
+    await part(page, 'pause').click();
+    await page.context().close();
+    const replay = await ready(await visit(t, `file://${html}`, { colorScheme }));
+    assert.deepEqual(await barriers(replay), [], `${colorScheme}, a recording`);
+    await replay.context().close();
+  }
+});
