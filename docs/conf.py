@@ -60,6 +60,7 @@ CHAPTERS = {
         "devices",
         "safety",
         "embedding",
+        "python",
         "errors",
     ],
     "Reference": ["file-format", "reference/*"],

@@ -166,6 +166,7 @@ class Runner:
 
         # As if the programs and libpalpate were installed.
         before("PATH", build / "precompute", build / "runtime", "/usr/bin")
+        before("PYTHONPATH", SOURCE / "runtime" / "python")
         before("CPATH", SOURCE / "runtime" / "library")
         before("LIBRARY_PATH", build / "runtime")
         before("LD_LIBRARY_PATH", build / "runtime")

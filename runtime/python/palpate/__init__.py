@@ -1,0 +1,17 @@
+"""Palpate from Python: bake a body, press it, read what was recorded.
+
+    import palpate
+    palpate.bake("meshes/models/cube/model.toml", "cube.palpate.hdf")
+    with palpate.Session("cube.palpate.hdf", palpate.Tool(radius=0.1)) as session:
+        felt = session.step((0.5, 0.5, 1.05))
+        print(felt.force)
+
+All units are SI. Needs numpy; files need h5py too. The book describes it on its page "Python"."""
+
+from .files import Body, Recording
+from .library import Error
+from .loop import Loop
+from .programs import bake, probe
+from .session import Felt, Overlay, Session, Tool
+
+__all__ = ["Body", "Error", "Felt", "Loop", "Overlay", "Recording", "Session", "Tool", "bake", "probe"]

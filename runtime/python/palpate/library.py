@@ -1,0 +1,105 @@
+"""libpalpate.so by ctypes: structs and functions of palpate.h, which says what they mean."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import pathlib
+import shutil
+from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_int32, c_size_t, c_uint32, c_void_p
+
+
+class Error(Exception):
+    """What could not be done, and why. `hint`: what to do about it, empty where nothing is known."""
+
+    def __init__(self, reason: str, hint: str = ""):
+        super().__init__(f"{reason}\nhint: {hint}" if hint else reason)
+        self.reason = reason
+        self.hint = hint
+
+    @classmethod
+    def of_text(cls, text: str) -> Error:
+        """By what a program or the library says: lines `error: ...` and `hint: ...`."""
+        lines = text.strip().splitlines()
+        told = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
+        hints = [line.removeprefix("hint: ") for line in lines if line.startswith("hint: ")]
+        return cls("\n".join(told or lines), "\n".join(hints))
+
+
+class CTool(Structure):
+    _fields_ = [("size", c_size_t), ("radius", c_double), ("length", c_double), ("coupling_stiffness", c_double),
+                ("coupling_torsion", c_double), ("max_force", c_double), ("friction", c_double), ("reach", c_double),
+                ("hand_over", c_double), ("disc_radius", c_double)]
+
+
+class CPose(Structure):
+    _fields_ = [("size", c_size_t), ("position", c_double * 3), ("orientation", c_double * 4), ("grab", c_int)]
+
+
+class COverlay(Structure):
+    _fields_ = [("size", c_size_t), ("refinement", c_int), ("rings", c_int), ("memory", c_size_t)]
+
+
+class COptions(Structure):
+    _fields_ = [("size", c_size_t), ("overlay", POINTER(COverlay)), ("dynamic_contact", c_int), ("tick", c_double)]
+
+
+class CResult(Structure):
+    _fields_ = [("size", c_size_t), ("force", c_double * 3), ("torque", c_double * 3), ("tool_position", c_double * 3),
+                ("tool_orientation", c_double * 4), ("contacts", c_int), ("local_stiffness", c_double * 9),
+                ("local_point", c_double * 3), ("local_radius", c_double), ("force_error", c_double),
+                ("left_out", c_int), ("greens_error", c_double)]
+
+
+class CCounts(Structure):
+    _fields_ = [("size", c_size_t), ("nodes", c_int32), ("simplices", c_int32), ("corners", c_int32)]
+
+
+FUNCTIONS = {
+    "palpate_status_name": (c_char_p, [c_uint32]),
+    "palpate_create_with_options": (c_void_p, [c_char_p, POINTER(CTool), c_int, c_int, POINTER(COptions), c_char_p, c_size_t]),
+    "palpate_destroy": (None, [c_void_p]),
+    "palpate_step": (c_uint32, [c_void_p, POINTER(CPose)]),
+    "palpate_get": (c_int, [c_void_p, c_int, POINTER(CResult)]),
+    "palpate_reset": (None, [c_void_p]),
+    "palpate_surface_counts": (c_int, [c_void_p, POINTER(CCounts)]),
+    "palpate_surface_rest": (None, [c_void_p, POINTER(c_double)]),
+    "palpate_surface_simplices": (None, [c_void_p, POINTER(c_int32)]),
+    "palpate_surface_displacement": (None, [c_void_p, POINTER(c_double)]),
+}
+
+
+def prefixes() -> list[pathlib.Path]:
+    """Where Palpate may be installed: around this package, and around the programs on PATH."""
+    here = pathlib.Path(__file__).resolve()
+    found = [parent for parent in here.parents if (parent / "bin" / "palpate-runtime").exists()]
+    on_path = shutil.which("palpate-runtime")
+    return found + ([pathlib.Path(on_path).resolve().parent.parent] if on_path else [])
+
+
+def program(name: str) -> str:
+    """The path of one of Palpate's programs. Throws Error where it is neither installed beside this package nor on PATH."""
+    for prefix in prefixes():
+        for folder in ("bin", name.removeprefix("palpate-")):  # installed; in a build folder
+            if os.access(prefix / folder / name, os.X_OK):
+                return str(prefix / folder / name)
+    on_path = shutil.which(name)
+    if on_path is None:
+        raise Error(f"{name} is not found", "install Palpate, or put the folder of its programs on PATH")
+    return on_path
+
+
+def load() -> ctypes.CDLL:
+    """The library, with the types of its functions. Throws Error where it is not found."""
+    names = [prefix / folder / "libpalpate.so.0" for prefix in prefixes() for folder in ("lib", "lib64", "runtime")]
+    names += [path for prefix in prefixes() for path in sorted(prefix.glob("lib/*/libpalpate.so.0"))]
+    for name in [str(path) for path in names if path.exists()] + ["libpalpate.so.0"]:
+        try:
+            library = ctypes.CDLL(name)  # its calls let other threads of Python go on
+        except OSError:
+            continue
+        for function, (result, arguments) in FUNCTIONS.items():
+            getattr(library, function).restype = result
+            getattr(library, function).argtypes = arguments
+        return library
+    raise Error("libpalpate.so.0 is not found", "install Palpate, or put its folder on LD_LIBRARY_PATH")

@@ -1,0 +1,52 @@
+"""palpate-precompute and palpate-runtime as functions."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Callable, Sequence
+
+import numpy
+
+from .library import Error, program
+
+Path = str | os.PathLike[str]
+
+
+def bake(model: Path, output: Path, *, jobs: int | None = None, force: bool = False,
+         progress: Callable[[str], object] | None = None) -> None:
+    """Makes `output` (NAME.palpate.hdf) of a model.toml by palpate-precompute. `progress` takes each line that it prints.
+    Goes on with what an interrupted run has finished. Throws Error with what the program says."""
+    command = [program("palpate-precompute"), os.fspath(model), "-o", os.fspath(output)]
+    command += ["--jobs", str(jobs)] if jobs else []
+    command += ["--force"] if force else []
+    lines = []
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            lines.append(line)
+            if progress is not None:
+                progress(line.rstrip())
+    if process.returncode != 0:
+        raise Error.of_text("".join(lines))
+
+
+def probe(file: Path, displace: Sequence[Sequence[float]], *, at: Sequence[Sequence[float]] = (),
+          node: Sequence[int] = (), overlay: tuple[int, int] | None = None) -> numpy.ndarray:
+    """Forces on the body [N] that displace nodes by `displace` [K, d] [m], all other nodes being free: of the free surface
+    nodes nearest to the points `at` [m], or of the mesh nodes `node`. `overlay`: refinement and rings of a finer mesh.
+    Throws Error with what palpate-runtime says."""
+    command = [program("palpate-runtime"), "probe", os.fspath(file), "--json"]
+    for point in at:
+        command += ["--at", ",".join(repr(float(x)) for x in point)]
+    for number in node:
+        command += ["--node", str(int(number))]
+    for u in displace:
+        command += ["--displace", ",".join(repr(float(x)) for x in u)]
+    if overlay is not None:
+        command += ["--overlay", f"r={overlay[0]},rings={overlay[1]}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise Error.of_text(done.stderr)
+    return numpy.array([node["force"] for node in json.loads(done.stdout)["nodes"]])

@@ -1,0 +1,191 @@
+"""A body and the tools that touch it, a tick at a time."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import math
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy
+
+from .library import CCounts, COptions, COverlay, CPose, CResult, CTool, Error, load
+
+DOUBLES = ctypes.POINTER(ctypes.c_double)
+POSE = numpy.dtype(CPose)
+
+
+@dataclasses.dataclass
+class Tool:
+    """A rigid tool: all points within `radius` of a point, of a segment of `length` along its z axis, or of a disc normal to
+    that axis that makes it as wide as `disc_radius`; lengths in m. By default it has no spring between it and the hand
+    (`coupling_stiffness` [N/m], `coupling_torsion` [N m/rad]), no largest force [N], and the material's friction
+    (negative). A grab that touches nothing holds the nearest surface within `reach` [m]. `hand_over`: share of the force
+    that may change in a millisecond without the tool's motion explaining it."""
+
+    radius: float = 0.0
+    length: float = 0.0
+    coupling_stiffness: float = math.inf
+    coupling_torsion: float = math.inf
+    max_force: float = math.inf
+    friction: float = -1.0
+    reach: float = 0.0
+    hand_over: float = 0.005
+    disc_radius: float = 0.0
+
+
+@dataclasses.dataclass
+class Overlay:
+    """A finer mesh under the tools: elements within `rings` rings are cut into refinement^3 (in the plane refinement^2)."""
+
+    refinement: int = 3
+    rings: int = 2
+    memory: int = 512 << 20  # [bytes] at most, of all overlays
+
+
+@dataclasses.dataclass
+class Felt:
+    """What a tool feels since the last tick; SI units, arrays of numpy."""
+
+    force: numpy.ndarray  # [3] on the hand
+    torque: numpy.ndarray  # [3] on the hand, about the tool's origin
+    tool_position: numpy.ndarray  # [3] of the tool itself, which the surface keeps outside
+    tool_orientation: numpy.ndarray  # [4] w, x, y, z
+    contacts: int  # places where tool and surface press on each other
+    local_stiffness: numpy.ndarray  # [3, 3] of the force between ticks: force - local_stiffness (x - local_point)
+    local_point: numpy.ndarray  # [3]
+    local_radius: float  # of local_point, within which that holds
+    force_error: float  # how far the force may be off, about, where the tick was a best effort; else 0
+    left_out: int  # contact points that the tool presses on and that found no room
+    greens_error: float  # what the force may be off by at most as compressed Green's functions are not exact
+    status: frozenset[str]  # of the tick, such as "not_converged"; empty where all is well
+
+
+def felt_of(result: CResult, status: frozenset[str]) -> Felt:
+    members: dict[str, Any] = {}
+    for name, kind in CResult._fields_[1:]:
+        value = getattr(result, name)
+        members[name] = numpy.array(value) if isinstance(value, ctypes.Array) else value
+    members["local_stiffness"] = members["local_stiffness"].reshape(3, 3)
+    return Felt(**members, status=status)
+
+
+class Session:
+    """One body and the tools that touch it. One thread steps; one other may draw at the same time.
+
+    `file`: NAME.palpate.hdf; `tools`: one or several; `max_contacts`: room for contact points of all tools, 1 to 256;
+    `overlay`: a finer mesh under the tools; `dynamic_contact`: the tools meet the body's inertia too (the file needs
+    dynamics with a time step of one tick); `tick`: time from one step to the next [s]. Throws Error."""
+
+    def __init__(self, file: str | os.PathLike[str], tools: Tool | Sequence[Tool], *, max_contacts: int = 32,
+                 overlay: Overlay | None = None, dynamic_contact: bool = False, tick: float = 0.001):
+        self.tools = [tools] if isinstance(tools, Tool) else list(tools)
+        self.tick = tick
+        self._library = load()
+        self._session = None
+        c_tools = (CTool * len(self.tools))(*[(ctypes.sizeof(CTool), *dataclasses.astuple(tool)) for tool in self.tools])
+        c_overlay = None if overlay is None else ctypes.pointer(COverlay(ctypes.sizeof(COverlay), *dataclasses.astuple(overlay)))
+        options = COptions(ctypes.sizeof(COptions), c_overlay, dynamic_contact, tick)
+        error = ctypes.create_string_buffer(4096)
+        self._session = self._library.palpate_create_with_options(
+            os.fsencode(file), c_tools, len(self.tools), max_contacts, ctypes.byref(options), error, len(error))
+        if self._session is None:
+            raise Error.of_text(error.value.decode(errors="replace"))
+        self._poses = (CPose * len(self.tools))()
+        for pose in self._poses:
+            pose.size, pose.orientation = ctypes.sizeof(CPose), (1.0, 0.0, 0.0, 0.0)
+        self._view = numpy.frombuffer(self._poses, POSE)  # the same memory
+        self._result = CResult(ctypes.sizeof(CResult))
+        self._names: dict[int, frozenset[str]] = {0: frozenset()}
+
+    def close(self) -> None:
+        """Ends the session; what it gave stays."""
+        if self._session is not None:
+            self._library.palpate_destroy(self._session)
+            self._session = None
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if getattr(self, "_session", None) is not None:
+            self.close()
+
+    def _open(self) -> int:
+        if self._session is None:
+            raise Error("the session is closed", "make another one")
+        return self._session
+
+    def put(self, tool: int, position: Sequence[float], orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+            grab: bool = False) -> None:
+        """Sets where the device wants a tool in the next ticks: position [m], quaternion w, x, y, z, grab."""
+        pose = self._view[tool]
+        pose["position"], pose["orientation"], pose["grab"] = position, orientation, grab
+
+    def step(self, position: Sequence[float] | None = None, orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+             grab: bool = False) -> Felt:
+        """One tick, with the poses that `put` set; of the first tool, the one given here. What the first tool feels.
+        Neither waits nor allocates in the library, and other threads of Python run meanwhile."""
+        session = self._open()
+        if position is not None:
+            self.put(0, position, orientation, grab)
+        self._status = self._library.palpate_step(session, self._poses)
+        return self.felt(0)
+
+    def felt(self, tool: int) -> Felt:
+        """What a tool feels since the last tick. Throws IndexError where there is no such tool."""
+        if self._library.palpate_get(self._open(), tool, ctypes.byref(self._result)) != 0:
+            raise IndexError(f"tool {tool} of {len(self.tools)}")
+        return felt_of(self._result, self.status)
+
+    @property
+    def status(self) -> frozenset[str]:
+        """Names of the status bits of the last tick."""
+        bits = getattr(self, "_status", 0)
+        if bits not in self._names:
+            names = (self._library.palpate_status_name(1 << k) for k in range(32) if bits >> k & 1)
+            self._names[bits] = frozenset(name.decode() for name in names if name)
+        return self._names[bits]
+
+    def play(self, positions: numpy.ndarray) -> numpy.ndarray:
+        """One tick for each row of `positions` [T, 3] of the first tool [m]; the forces on the hand [T, 3] [N]."""
+        forces = numpy.empty((len(positions), 3))
+        for k, position in enumerate(positions):
+            forces[k] = self.step(position).force
+        return forces
+
+    def reset(self) -> None:
+        """Back to a body that nobody has touched."""
+        self._library.palpate_reset(self._open())
+        self._status = 0
+
+    @property
+    def rest(self) -> numpy.ndarray:
+        """Positions of the surface nodes on the body at rest [S, 3] [m]."""
+        rest = numpy.empty((self._counts().nodes, 3))
+        self._library.palpate_surface_rest(self._open(), rest.ctypes.data_as(DOUBLES))
+        return rest
+
+    @property
+    def simplices(self) -> numpy.ndarray:
+        """Surface nodes of the triangles, counter-clockwise seen from outside [F, 3]; in the plane of lines [F, 2]."""
+        counts = self._counts()
+        corners = numpy.empty((counts.simplices, counts.corners), numpy.int32)
+        self._library.palpate_surface_simplices(self._open(), corners.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)))
+        return corners
+
+    def displacement(self) -> numpy.ndarray:
+        """Displacement of the surface nodes from rest in the last tick [S, 3] [m]; another thread may ask while one steps."""
+        u = numpy.empty((self._counts().nodes, 3))
+        self._library.palpate_surface_displacement(self._open(), u.ctypes.data_as(DOUBLES))
+        return u
+
+    def _counts(self) -> CCounts:
+        counts = CCounts(ctypes.sizeof(CCounts))
+        self._library.palpate_surface_counts(self._open(), ctypes.byref(counts))
+        return counts

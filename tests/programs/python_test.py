@@ -1,0 +1,232 @@
+"""The Python package: the same forces as a C client and probe to the last bit, files as h5py sees them, a loop of its own."""
+
+import ctypes
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+import h5py
+import numpy
+
+from programs import BINARY, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
+
+os.environ["PATH"] = os.pathsep.join([str(PRECOMPUTE.parent), str(RUNTIME.parent), os.environ["PATH"]])
+sys.path.insert(0, str(SOURCE / "runtime" / "python"))
+
+import palpate  # noqa: E402
+from palpate import library  # noqa: E402
+
+# Sanitizers must be in the process from its beginning, and Debian's Python has none.
+HAS_SANITIZERS = "PALPATE_SANITIZE:STRING=\n" not in (BINARY / "CMakeCache.txt").read_text()
+STRUCTS = {"palpate_tool": library.CTool, "palpate_pose": library.CPose, "palpate_overlay": library.COverlay,
+           "palpate_options": library.COptions, "palpate_result": library.CResult, "palpate_counts": library.CCounts}
+CLIENT = r"""
+#include <palpate.h>
+#include <stdio.h>
+int main(int count, char** words) {
+  char error[512];
+  double x, y, z;
+  palpate_tool tool = PALPATE_TOOL_INIT;
+  palpate_pose pose = PALPATE_POSE_INIT;
+  palpate_result felt = PALPATE_RESULT_INIT;
+  tool.radius = 0.1;
+  tool.friction = 0.3;
+  palpate_session* session = palpate_create(words[count - 1], &tool, 1, 32, error, sizeof error);
+  if (session == NULL) return 1;
+  while (scanf("%la %la %la", &x, &y, &z) == 3) {
+    pose.position[0] = x;
+    pose.position[1] = y;
+    pose.position[2] = z;
+    palpate_step(session, &pose);
+    palpate_get(session, 0, &felt);
+    printf("%a %a %a\n", felt.force[0], felt.force[1], felt.force[2]);
+  }
+  palpate_destroy(session);
+  return 0;
+}
+"""
+
+
+def compiled(folder, source):
+    """A C program against palpate.h and the library of the build."""
+    (folder / "client.c").write_text(source)
+    runtime = BINARY / "runtime"
+    result = run("cc", folder / "client.c", f"-I{SOURCE / 'runtime' / 'library'}", f"-L{runtime}", f"-Wl,-rpath,{runtime}", "-lpalpate",
+                 "-o", folder / "client")
+    if result.returncode != 0:
+        raise AssertionError(result.stderr)
+    return folder / "client"
+
+
+def rubbed():
+    """Positions of a sphere of 0.1 that comes down on the cube, is pressed in and slides."""
+    down = numpy.column_stack([numpy.full(150, 0.4), numpy.full(150, 0.5), numpy.linspace(1.15, 1.04, 150)])
+    along = numpy.column_stack([numpy.linspace(0.4, 0.6, 200), numpy.full(200, 0.5), numpy.full(200, 1.04)])
+    return numpy.concatenate([down, along])
+
+
+class PythonTest(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        if HAS_SANITIZERS:
+            raise unittest.SkipTest("Debian's Python cannot load a library with sanitizers")
+        temporary = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(temporary.cleanup)
+        cls.shared = pathlib.Path(temporary.name)
+        (cls.shared / "cube.toml").write_text(cube_toml(4))
+        cls.lines = []
+        cls.cube = cls.shared / "cube.palpate.hdf"
+        palpate.bake(cls.shared / "cube.toml", cls.cube, progress=cls.lines.append)
+
+
+class Structs(PythonTest):
+    def test_members_lie_where_the_header_has_them(self):
+        parts = [f'printf("{struct} %zu\\n", sizeof({struct}));' for struct in STRUCTS]
+        parts += [f'printf("{struct}.{field[0]} %zu\\n", offsetof({struct}, {field[0]}));'
+                  for struct, kind in STRUCTS.items() for field in kind._fields_]
+        client = compiled(self.folder, "#include <palpate.h>\n#include <stdio.h>\nint main(void) {" + "\n".join(parts) + "return 0;}")
+        said = dict(line.split() for line in run(client).stdout.splitlines())
+        for struct, kind in STRUCTS.items():
+            self.assertEqual(int(said[struct]), ctypes.sizeof(kind))
+            for field in kind._fields_:
+                self.assertEqual(int(said[f"{struct}.{field[0]}"]), getattr(kind, field[0]).offset, f"{struct}.{field[0]}")
+
+
+class Forces(PythonTest):
+    def test_equal_those_of_a_c_client_to_the_last_bit(self):
+        positions = rubbed()
+        client = compiled(self.folder, CLIENT)
+        words = "\n".join(" ".join(float(x).hex() for x in row) for row in positions)
+        done = subprocess.run([client, self.cube], input=words, text=True, capture_output=True, check=True, timeout=60)
+        of_c = numpy.array([[float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()])
+        with palpate.Session(self.cube, palpate.Tool(radius=0.1, friction=0.3)) as session:
+            of_python = session.play(positions)
+            self.assertGreater(of_python[-1, 2], 0.001)  # it is pressed
+            self.assertLess(of_python[-1, 0], -1e-4)  # and rubs
+            self.assertTrue(numpy.array_equal(of_c, of_python))
+            session.reset()
+            self.assertTrue(numpy.array_equal(session.play(positions), of_python))
+
+    def test_probe_is_the_inverse_of_the_greens_block(self):
+        with palpate.Body(self.cube) as body:
+            nodes = [int(numpy.argmin(numpy.linalg.norm(body.nodes - point, axis=1))) for point in ([0.5, 0.5, 1], [1, 0.5, 1])]
+            block = body.greens(nodes)
+        self.assertTrue(numpy.array_equal(block, block.T))
+        wanted = numpy.array([[0, 0, -0.01], [0.005, 0, 0]])
+        forces = palpate.probe(self.cube, wanted, node=nodes)
+        numpy.testing.assert_allclose(numpy.linalg.solve(block, wanted.ravel()), forces.ravel(), rtol=1e-12)
+        here = palpate.probe(self.cube, wanted, at=[[0.5, 0.5, 1], [1, 0.5, 1]])
+        self.assertTrue(numpy.array_equal(forces, here))
+
+    def test_two_tools_an_overlay_and_a_grab(self):
+        (self.folder / "deep.toml").write_text(cube_toml(4, scope="full"))
+        palpate.bake(self.folder / "deep.toml", self.folder / "deep.palpate.hdf")
+        tools = [palpate.Tool(radius=0.1), palpate.Tool(reach=0.1)]
+        with palpate.Session(self.folder / "deep.palpate.hdf", tools, overlay=palpate.Overlay(2, 1)) as session:
+            session.put(1, (0.5, 1.0, 0.5), grab=True)
+            session.step((0.5, 0.5, 1.2))
+            for pull in range(50):
+                session.put(1, (0.5, 1.0 + 0.001 * pull, 0.5), grab=True)
+                session.step((0.5, 0.5, 1.2 - 0.003 * pull))
+            self.assertGreater(session.felt(0).force[2], 0)
+            self.assertLess(session.felt(1).force[1], 0)
+            self.assertEqual(session.felt(1).contacts, 1)
+            u = session.displacement()
+            self.assertEqual(u.shape, session.rest.shape)
+            held = session.rest[:, 2] == 0
+            self.assertEqual(abs(u[held]).max(), 0)
+            self.assertGreater(abs(u).max(), 0.01)
+            self.assertLess(session.simplices.max(), len(u))
+            with self.assertRaises(IndexError):
+                session.felt(2)
+
+
+class Files(PythonTest):
+    def test_progress_is_told(self):
+        self.assertIn("written", "\n".join(self.lines))
+
+    def test_body_is_what_h5py_reads(self):
+        with h5py.File(self.cube) as file:
+            packed = file["/greens/packed"][:]
+        with palpate.Body(self.cube) as body:
+            self.assertEqual((body.name, body.dimension), ("cube", 3))
+            self.assertEqual(body.elements.shape[1], 4)
+            corners = body.nodes[body.elements]
+            self.assertAlmostEqual(numpy.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 6, 1, 12)
+            self.assertTrue(numpy.array_equal(body.held[:, 2], body.nodes[:, 2] == 0))
+            n = 3 * len(body.stored_nodes)
+            whole = numpy.zeros((n, n))
+            whole[numpy.triu_indices(n)] = packed  # column after column of the lower triangle
+            whole = numpy.maximum(whole, whole.T) + numpy.minimum(whole, whole.T) - numpy.diag(numpy.diag(whole))
+            some = [5, 0, 17]
+            dofs = [3 * place + axis for place in some for axis in range(3)]
+            self.assertTrue(numpy.array_equal(body.greens(body.stored_nodes[some]), whole[numpy.ix_(dofs, dofs)]))
+            inner = [node for node in range(len(body.nodes)) if node not in set(body.stored_nodes)][:1]
+            with self.assertRaises(palpate.Error):
+                body.greens(inner)
+
+    def test_recording_has_the_ticks_of_play(self):
+        script = self.write("touch.csv", "t,x,y,z\n0,0.5,0.5,1.2\n0.1,0.5,0.5,1.05\n")
+        done = run(RUNTIME, "play", self.cube, "--device", f"script:{script}", "--tool", "sphere:0.1", "--fast", "--record", "touch.h5",
+                   cwd=self.folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with palpate.Recording(self.folder / "touch.h5") as recording:
+            self.assertEqual(len(recording), 101)
+            self.assertIn("status", list(recording))
+            self.assertLess(recording["force"][-1, 2], 0)  # on the body
+            self.assertIn("tool", recording.options)
+            self.assertGreater(abs(recording.frames["displacement"][-1]).max(), 0)
+            with self.assertRaisesRegex(KeyError, "force"):
+                recording["forse"]
+
+    def test_open_body_and_session_bear_each_other(self):
+        with palpate.Body(self.cube) as body, palpate.Session(self.cube, palpate.Tool(radius=0.1)) as session:
+            session.step((0.5, 0.5, 1.05))
+            self.assertGreater(len(body.nodes), 0)
+
+    def test_what_is_wrong_is_told_with_a_hint(self):
+        cases = [lambda: palpate.Session(self.folder / "none.palpate.hdf", palpate.Tool()), lambda: palpate.Body(self.folder / "none.h5"),
+                 lambda: palpate.Recording(self.cube), lambda: palpate.bake(self.folder / "none.toml", self.folder / "none.palpate.hdf"),
+                 lambda: palpate.probe(self.cube, [[0, 0, 1]], node=[10**6]), lambda: palpate.Session(self.cube, palpate.Tool(radius=-1))]
+        for case in cases:
+            with self.assertRaises(palpate.Error) as caught:
+                case()
+            self.assertTrue(caught.exception.reason)
+            self.assertTrue(caught.exception.hint, caught.exception.reason)
+        session = palpate.Session(self.cube, palpate.Tool(radius=0.1))
+        session.close()
+        with self.assertRaisesRegex(palpate.Error, "closed"):
+            session.step((0, 0, 2))
+
+
+class Loops(PythonTest):
+    def test_steps_until_it_is_stopped(self):
+        enough = threading.Event()
+        shown = []
+
+        def show(felt):
+            shown.append(felt.force[2])
+            if len(shown) == 100:
+                enough.set()
+
+        with palpate.Session(self.cube, palpate.Tool(radius=0.1)) as session:
+            with palpate.Loop(session, lambda t: (0.5, 0.5, max(1.05, 1.11 - t)), show) as loop:
+                self.assertTrue(enough.wait(60))
+                session.displacement()  # while it steps
+            self.assertEqual(len(loop.late), len(shown))
+            self.assertTrue(all(loop.late >= 0))
+            self.assertGreater(loop.felt.force[2], 0)
+
+    def test_a_failure_reaches_the_one_who_stops_it(self):
+        with palpate.Session(self.cube, palpate.Tool(radius=0.1)) as session:
+            loop = palpate.Loop(session, lambda t: 1 / 0).start()
+            with self.assertRaises(ZeroDivisionError):
+                loop.stop()
+
+
+if __name__ == "__main__":
+    unittest.main()
