@@ -60,6 +60,7 @@ CHAPTERS = {
         "devices",
         "safety",
         "embedding",
+        "cluster",
         "errors",
     ],
     "Reference": ["file-format", "reference/*"],

@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <random>
 
@@ -14,7 +14,9 @@
 #include "base/parallel.h"
 #include "formats/model_file.h"
 #include "formats/outputs/output_paths.h"
+#include "formats/outputs/part_files.h"
 #include "meshes/quality.h"
+#include "precompute/columns.h"
 #include "precompute/compressed_greens.h"
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/factor.h"
@@ -76,15 +78,19 @@ constexpr const char* precision_stage = "choosing the precision";
 constexpr const char* inverse_factor_stage = "factorising K_bar";
 constexpr const char* write_stage = "writing the file";
 
-constexpr const char* column_stage(PackedMatrix matrix) {
-  return matrix == PackedMatrix::greens ? "Green's functions" : "inverse of K_bar";
-}
-
 struct Plans {
   Plan plan;
   std::optional<CompressionPlan> compression;
   OverlayPlan overlays;
   DynamicsPlan dynamics;
+};
+
+/// What the stages that solve columns have in common.
+struct Shared {
+  int jobs;
+  Team& team;
+  Progress& progress;
+  std::function<bool()> interrupted;
 };
 
 /// What follows the plan.
@@ -186,61 +192,6 @@ std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int6
   return probes;
 }
 
-/// How many columns an earlier, unfinished run has left, and what the others take.
-struct Kept {
-  std::int64_t columns = 0;
-  double flops = 0.0;  ///< of the columns that are still to be solved
-};
-
-Kept kept_columns(const GreensSolver& solver, const Plan& plan, const ModelWriter& writer,
-                  PackedMatrix matrix) {
-  Kept kept;
-  for (std::int64_t first = 0; first < plan.stored_dofs; first += plan.block_columns) {
-    const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
-    if (writer.has_columns(first, count, matrix)) {
-      kept.columns += count;
-    } else {
-      kept.flops += solver.flops(first, count);
-    }
-  }
-  return kept;
-}
-
-/// Computes all blocks of columns of a packed matrix that the file does not have yet, `jobs` at a time. False
-/// when interrupted.
-bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, ModelWriter& writer,
-                   PackedMatrix matrix, Progress& progress, const InterruptGuard& interrupt) {
-  const std::string name = column_stage(matrix);
-  const std::int64_t blocks = (plan.stored_dofs + plan.block_columns - 1) / plan.block_columns;
-  const Kept kept = kept_columns(solver, plan, writer, matrix);
-  if (kept.columns > 0) {
-    progress.line(fmt::format("{}: {} of {} columns were kept from an earlier, unfinished run", name,
-                              kept.columns, plan.stored_dofs));
-    progress.expect(name, plan.seconds * kept.flops / plan.flops);
-  }
-  progress.begin(name);
-  double done_flops = 0.0;
-  std::mutex mutex;  // progress and its counter
-  struct Scratch {
-    GreensSolver::Workspace workspace;
-    std::vector<double> packed;
-  };
-  std::vector<Scratch> scratch(static_cast<std::size_t>(jobs));
-  parallel_for(blocks, jobs, [&](std::int64_t block, int worker) {
-    const std::int64_t first = block * plan.block_columns;
-    const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
-    if (interrupt.requested() || writer.has_columns(first, count, matrix)) return;
-    auto& [workspace, packed] = scratch[static_cast<std::size_t>(worker)];
-    solver.columns(first, count, workspace, packed);
-    writer.write_columns(first, count, packed, matrix);
-    const double flops = solver.flops(first, count);
-    const std::scoped_lock lock(mutex);
-    done_flops += flops;
-    progress.reach(done_flops / kept.flops);
-  });
-  return !interrupt.requested();
-}
-
 SparseMatrix stiffness_of_step(const ElasticBody& body, const Stiffness& stiffness,
                                const DynamicsOptions& options) {
   return effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped), options.damping,
@@ -283,17 +234,18 @@ Precision decide_precision(const Description& description, const ElasticBody& bo
 /// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
 bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const DynamicsOptions& options,
                    const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
-                   const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
-                   const InterruptGuard& interrupt) {
+                   const Plan& plan, const PieceRange& columns, const Shared& run, ModelWriter& writer) {
   const SparseMatrix K_bar = stiffness_of_step(body, stiffness, options);
   Factor factor(K_bar, stiffness.node_start);
   const GreensSolver solver(factor, stored, stiffness.free_dofs, body.mesh.dimension());
   if (solver.stored_dofs() != stored_dofs) {
     throw std::logic_error("K_bar and K, of one pattern, have different elimination orders");
   }
-  progress.begin(inverse_factor_stage);
+  if (writer.has_columns(columns.first, columns.end - columns.first, PackedMatrix::inverse)) return true;
+  run.progress.begin(inverse_factor_stage);
   factor.factorize();
-  return solve_columns(solver, plan, jobs, writer, PackedMatrix::inverse, progress, interrupt);
+  return solve_columns(solver, plan, columns, run.jobs, run.team, writer, PackedMatrix::inverse, run.progress,
+                       run.interrupted);
 }
 
 OverlayPlan announce_overlays(const Description& description, const Model& model, Progress& progress) {
@@ -371,23 +323,49 @@ void add_dynamics(const Description& description, const DynamicsPlan& plan, cons
                         assemble_mass(body, stiffness, description.dynamics->lumped), factor, stored_dofs);
 }
 
-/// Computes the columns of the packed matrices and the probes of the first one. Nothing when interrupted.
-std::optional<std::vector<Probe>> solve_matrices(const Description& description, const ElasticBody& body,
-                                                 const Stiffness& stiffness, std::unique_ptr<Factor> factor,
-                                                 const GreensSolver& solver,
-                                                 const std::vector<std::uint8_t>& stored, const Plans& plans,
-                                                 int jobs, ModelWriter& writer, Progress& progress,
-                                                 const InterruptGuard& interrupt) {
+/// What is found once the file is begun.
+struct Solved {
+  std::vector<Probe> probes;
+  std::shared_ptr<const HierarchicalMatrix> compressed;
+};
+
+/// Computes the columns of the packed matrices, of a part or all, and the leader the probes of the first one.
+/// Nothing when interrupted.
+std::optional<Solved> solve_matrices(const Description& description, const ElasticBody& body,
+                                     const Stiffness& stiffness, std::unique_ptr<Factor> factor,
+                                     const GreensSolver& solver, const std::vector<std::uint8_t>& stored,
+                                     const Plans& plans, const std::optional<BakePart>& part,
+                                     const Shared& run, ModelWriter& writer) {
   const std::vector<std::int64_t> stored_dofs = solver.stored_dofs();
-  if (!solve_columns(solver, plans.plan, jobs, writer, PackedMatrix::greens, progress, interrupt)) return {};
-  std::vector<Probe> probes = make_probes(*factor, stored_dofs);
+  const PieceRange columns = part ? part->pieces.front() : PieceRange{0, plans.plan.stored_dofs};
+  if (!solve_columns(solver, plans.plan, columns, run.jobs, run.team, writer, PackedMatrix::greens,
+                     run.progress, run.interrupted))
+    return {};
+  Solved solved;
+  if (run.team.leads() && !part) solved.probes = make_probes(*factor, stored_dofs);
   if (plans.dynamics.method == DynamicsMethod::packed) {
     factor.reset();  // its memory is for that of K_bar
-    if (!solve_inverse(body, stiffness, *description.dynamics, stored, stored_dofs, plans.plan, jobs, writer,
-                       progress, interrupt))
+    if (!solve_inverse(body, stiffness, *description.dynamics, stored, stored_dofs, plans.plan, columns, run,
+                       writer))
       return {};
   }
-  return probes;
+  return solved;
+}
+
+/// Compresses the Green's functions: all ranks share the near pairs, of which a part has some, and the leader
+/// makes the rest. Nothing when interrupted.
+std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor& factor,
+                                       const std::optional<BakePart>& part, const Shared& run,
+                                       ModelWriter& writer) {
+  GreensCompressor compressor(plan, factor, run.jobs, run.progress, run.interrupted);
+  const PieceRange leaves = part ? part->pieces.front() : PieceRange{0, plan.frame.tree.leaves()};
+  if (!compressor.solve_near(leaves, run.team, writer)) return {};
+  Solved solved;
+  if (part || !run.team.leads()) return solved;
+  solved.compressed = compressor.compress(writer);
+  if (solved.compressed == nullptr) return {};
+  solved.probes = make_probes(factor, plan.stored.dofs);
+  return solved;
 }
 
 /// Condenses the overlays that the file is to keep. False when interrupted.
@@ -401,11 +379,11 @@ bool add_overlays(const Description& description, const OverlayPlan& overlays, i
   return !interrupt.requested();
 }
 
-std::string interruption_text(const std::filesystem::path& output) {
+std::string interruption_text(const BakeOptions& options) {
   return fmt::format(
-      "interrupted: the columns that are done are kept in {}.partial; the same command goes on from there, "
+      "interrupted: the columns that are done are kept in {}{}; the same command goes on from there, "
       "with --discard it begins anew",
-      output.string());
+      options.output.string(), options.part ? "" : ".partial");
 }
 
 void check_touchable(const Surface& surface, const Model& model, const Description& description) {
@@ -421,15 +399,63 @@ std::filesystem::path check_output(const Description& description, const BakeOpt
   OutputPaths paths(options.force);
   paths.add_input(description.file, "the description");
   for (const auto& file : input_files(description)) paths.add_input(file, "the geometry");
+  for (const auto& part : options.parts) paths.add_input(part, "a part");
   return paths.add(options.output, OutputKind::model, "--output");
+}
+
+/// The options with the paths that are read and written, which are checked by the leader.
+BakeOptions with_paths(const Description& description, const BakeOptions& asked, Team& team) {
+  BakeOptions options = asked;
+  if (options.join) options.parts = find_parts(options.output, options.parts);
+  if (options.part) options.output = part_path(options.output, options.part->number, options.part->parts);
+  if (options.dry_run) return options;
+  const auto output = team.leads() ? check_output(description, options) : std::filesystem::path();
+  options.output = team.share(output.string());
+  return options;
+}
+
+/// The part that is asked for: of all matrices the same columns.
+std::optional<BakePart> planned_part(const BakeOptions& options, const Plans& plans,
+                                     const GreensSolver& solver) {
+  if (!options.part) return {};
+  const auto [number, parts] = *options.part;
+  const PieceRange pieces =
+      share_of(plans.compression ? near_tiles(plans.compression->frame) : column_tiles(solver, plans.plan),
+               number, parts);
+  const bool two = plans.dynamics.method == DynamicsMethod::packed;
+  return BakePart{number, parts, std::vector<PieceRange>(two ? 2 : 1, pieces)};
+}
+
+/// Begins the file, or goes on with it: a part's own, the leader's, or that which the leader has begun.
+std::unique_ptr<ModelWriter> open_writer(const BakeOptions& options, const std::optional<BakePart>& part,
+                                         const Model& model, Precision precision, Team& team) {
+  const Leftovers leftovers = options.discard ? Leftovers::discard : Leftovers::resume;
+  if (part) return std::make_unique<ModelWriter>(options.output, model, precision, leftovers, *part);
+  if (!team.leads())
+    return std::make_unique<ModelWriter>(options.output, model, precision, team.share(""),
+                                         [&team](const std::string& line) { team.tell(line); });
+  auto writer = std::make_unique<ModelWriter>(options.output, model, precision, leftovers);
+  for (const auto& path : options.parts) writer->add_part(path);
+  team.share(writer->journal_text());
+  team.listen([&to = *writer](const std::string& line) { to.note(line); });
+  return writer;
+}
+
+std::string next_part_text(const BakePart& part, const BakeOptions& options) {
+  return fmt::format("part {} of {} written: {} and {}.progress", part.number, part.parts,
+                     options.output.string(), options.output.filename().string());
 }
 
 }  // namespace
 
-BakeResult bake(const Description& description, const BakeOptions& asked) {
-  BakeOptions options = asked;
-  if (!options.dry_run) options.output = check_output(description, asked);
-  Progress progress;
+BakeResult bake(const Description& description, const BakeOptions& options) {
+  Team alone;
+  return bake(description, options, alone);
+}
+
+BakeResult bake(const Description& description, const BakeOptions& asked, Team& team) {
+  const BakeOptions options = with_paths(description, asked, team);
+  Progress progress(team.leads());
   MeshedBody body = mesh_body(description, [&](const std::string& text) { progress.begin(text); });
   for (const std::string& note : body.notes) progress.line("note: " + note);
   const std::string warning = body.warning;
@@ -453,6 +479,7 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
   if (!warning.empty()) progress.warn(warning);
   check_memory(plans.plan);
   if (options.dry_run) return BakeResult::planned;
+  const std::optional<BakePart> part = planned_part(options, plans, solver);
 
   progress.plan(stages_of(plans, options.jobs));
   progress.begin(factor_stage);
@@ -476,27 +503,27 @@ BakeResult bake(const Description& description, const BakeOptions& asked) {
     progress.begin(precision_stage);
     precision = decide_precision(description, elastic, stiffness, *factor, stored_as.dofs, model, progress);
   }
-  ModelWriter writer(options.output, model, precision,
-                     options.discard ? Leftovers::discard : Leftovers::resume);
+  const std::unique_ptr<ModelWriter> writer = open_writer(options, part, model, precision, team);
   model.overlay = {};  // written by now
   model.dynamics = {};
-  std::shared_ptr<const HierarchicalMatrix> compressed;
-  std::optional<std::vector<Probe>> probes;
-  if (plans.compression) {
-    compressed = compress_greens(*plans.compression, *factor, options.jobs, writer, progress,
-                                 [&] { return interrupt.requested(); });
-    if (compressed != nullptr) probes = make_probes(*factor, stored_as.dofs);
-  } else {
-    probes = solve_matrices(description, elastic, stiffness, std::move(factor), solver, stored, plans,
-                            options.jobs, writer, progress, interrupt);
-  }
-  if (!probes) {
-    progress.line(interruption_text(options.output));
+  const Shared run{options.jobs, team, progress, [&] { return interrupt.requested(); }};
+  const std::optional<Solved> solved =
+      plans.compression ? solve_compressed(*plans.compression, *factor, part, run, *writer)
+                        : solve_matrices(description, elastic, stiffness, std::move(factor), solver, stored,
+                                         plans, part, run, *writer);
+  if (!solved) {
+    progress.line(interruption_text(options));
     return BakeResult::interrupted;
   }
+  if (part) {
+    progress.line(next_part_text(*part, options));
+    return BakeResult::part_done;
+  }
+  if (!team.leads()) return BakeResult::done;
   progress.begin(write_stage);
-  writer.finish(*probes, compressed);
+  writer->finish(solved->probes, solved->compressed);
   progress.line(fmt::format("{} written", options.output.string()));
+  if (!options.keep_parts) remove_parts(options.parts);
   if (!warning.empty()) progress.warn(warning);
   return BakeResult::done;
 }

@@ -21,7 +21,8 @@ std::string duration_text(double seconds);
 /// elsewhere in a line every five seconds, less often as it takes longer. Safe for several threads.
 class Progress {
  public:
-  Progress();
+  /// `prints`: false for one of several processes, another of which prints.
+  explicit Progress(bool prints = true);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -48,6 +49,7 @@ class Progress {
   using Clock = std::chrono::steady_clock;
   [[nodiscard]] double now() const;  // seconds since construction
   [[nodiscard]] std::string stage_text() const;
+  void print(const std::string& text) const;
   void show(const std::string& text);  // of the stage under way
   void write_line(const std::string& text);
   void end_stage();
@@ -55,6 +57,7 @@ class Progress {
   void tick(const std::stop_token& stop);
 
   const Clock::time_point start_ = Clock::now();
+  const bool prints_;
   const bool terminal_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
