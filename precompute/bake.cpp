@@ -90,6 +90,7 @@ struct Shared {
   int jobs;
   Team& team;
   Progress& progress;
+  TileCounts& tiles;
   std::function<bool()> interrupted;
 };
 
@@ -245,7 +246,7 @@ bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const Dy
   run.progress.begin(inverse_factor_stage);
   factor.factorize();
   return solve_columns(solver, plan, columns, run.jobs, run.team, writer, PackedMatrix::inverse, run.progress,
-                       run.interrupted);
+                       run.tiles, run.interrupted);
 }
 
 OverlayPlan announce_overlays(const Description& description, const Model& model, Progress& progress) {
@@ -339,7 +340,7 @@ std::optional<Solved> solve_matrices(const Description& description, const Elast
   const std::vector<std::int64_t> stored_dofs = solver.stored_dofs();
   const PieceRange columns = part ? part->pieces.front() : PieceRange{0, plans.plan.stored_dofs};
   if (!solve_columns(solver, plans.plan, columns, run.jobs, run.team, writer, PackedMatrix::greens,
-                     run.progress, run.interrupted))
+                     run.progress, run.tiles, run.interrupted))
     return {};
   Solved solved;
   if (run.team.leads() && !part) solved.probes = make_probes(*factor, stored_dofs);
@@ -359,7 +360,7 @@ std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor
                                        ModelWriter& writer) {
   GreensCompressor compressor(plan, factor, run.jobs, run.progress, run.interrupted);
   const PieceRange leaves = part ? part->pieces.front() : PieceRange{0, plan.frame.tree.leaves()};
-  if (!compressor.solve_near(leaves, run.team, writer)) return {};
+  if (!compressor.solve_near(leaves, run.team, writer, run.tiles)) return {};
   Solved solved;
   if (part || !run.team.leads()) return solved;
   solved.compressed = compressor.compress(writer);
@@ -397,6 +398,8 @@ void check_touchable(const Surface& surface, const Model& model, const Descripti
 /// Where the model may be written; before any work.
 std::filesystem::path check_output(const Description& description, const BakeOptions& options) {
   OutputPaths paths(options.force);
+  if (!options.report.empty() && options.report != "-")
+    paths.add(options.report, OutputKind::report, "--report");
   paths.add_input(description.file, "the description");
   for (const auto& file : input_files(description)) paths.add_input(file, "the geometry");
   for (const auto& part : options.parts) paths.add_input(part, "a part");
@@ -441,91 +444,157 @@ std::unique_ptr<ModelWriter> open_writer(const BakeOptions& options, const std::
   return writer;
 }
 
-std::string next_part_text(const BakePart& part, const BakeOptions& options) {
-  return fmt::format("part {} of {} written: {} and {}.progress", part.number, part.parts,
-                     options.output.string(), options.output.filename().string());
+/// The stages of a bake, which share all of this.
+class Bake {
+ public:
+  Bake(const Description& description, const BakeOptions& options, Team& team, Progress& progress,
+       InterruptGuard& interrupt)
+      : description_(description),
+        options_(options),
+        team_(team),
+        progress_(progress),
+        interrupt_(interrupt) {}
+
+  BakeResult run() {
+    assemble();
+    if (options_.dry_run) return BakeResult::planned;
+    progress_.plan(stages_of(plans_, options_.jobs));
+    progress_.begin(factor_stage);
+    factor_->factorize();
+    interrupt_.note_from_now_on();
+    if (!describe()) {
+      progress_.line("interrupted: nothing was written");
+      return BakeResult::interrupted;
+    }
+    return solve_and_write();
+  }
+
+  [[nodiscard]] const Plan& plan() const { return plans_.plan; }
+  [[nodiscard]] const TileCounts& tiles() const { return tiles_; }
+
+ private:
+  void assemble();
+  bool describe();
+  BakeResult solve_and_write();
+  std::optional<Solved> solve(ModelWriter& writer);
+
+  const Description& description_;
+  const BakeOptions& options_;
+  Team& team_;
+  Progress& progress_;
+  InterruptGuard& interrupt_;
+
+  Model model_;
+  std::optional<ElasticBody> elastic_;
+  Stiffness stiffness_;
+  std::vector<Vec3> loads_, prescribed_;
+  std::string warning_;
+  std::vector<std::uint8_t> stored_;
+  std::unique_ptr<Factor> factor_;
+  std::optional<GreensSolver> solver_;
+  Plans plans_;
+  std::optional<BakePart> part_;
+  StoredNumbering stored_as_;
+  Precision precision_ = Precision::single_precision;
+  TileCounts tiles_;
+};
+
+/// Mesh, K and the plan.
+void Bake::assemble() {
+  MeshedBody body = mesh_body(description_, [&](const std::string& text) { progress_.begin(text); });
+  for (const std::string& note : body.notes) progress_.line("note: " + note);
+  warning_ = body.warning;
+  progress_.begin("assembling K");
+  loads_ = nodal_loads(description_, body);
+  prescribed_ = body.prescribed;
+  const Surface surface = body.surface;
+  model_ = describe_model(description_, options_, std::move(body));
+  elastic_.emplace(elastic_body(model_));
+  elastic_->prescribed = prescribed_;
+  stiffness_ = assemble_stiffness(*elastic_);
+  openblas_set_num_threads(1);  // blocks of columns are the parallel work: the bytes depend on no `jobs`
+  progress_.begin("ordering K");
+  factor_ = std::make_unique<Factor>(stiffness_.K, stiffness_.node_start);
+  stored_ = stored_dof_marks(model_.mesh, surface, stiffness_, description_.scope, description_.layers);
+  solver_.emplace(*factor_, stored_, stiffness_.free_dofs, model_.dimension());
+  check_touchable(surface, model_, description_);
+  plans_ = announce_plans(description_, options_, model_, stiffness_, *factor_, *solver_, progress_);
+  if (!warning_.empty()) progress_.warn(warning_);
+  check_memory(plans_.plan);
+  part_ = planned_part(options_, plans_, *solver_);
+}
+
+/// All of the model that is known before the columns. False when interrupted.
+bool Bake::describe() {
+  stored_as_ = plans_.compression ? plans_.compression->stored
+                                  : number_stored(*solver_, stiffness_, model_.dimension());
+  model_.stored_nodes = stored_as_.nodes;
+  model_.rest_force = loads_;
+  model_.rest_displacement = rest_displacement(*factor_, stiffness_, loads_, prescribed_, model_.dimension());
+  const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, options_.jobs,
+                                                           model_, progress_, interrupt_);
+  if (team_.any(!whole)) return false;
+  add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_,
+               progress_);
+  if (plans_.compression) {
+    model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
+  } else {
+    progress_.begin(precision_stage);
+    precision_ =
+        decide_precision(description_, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_, progress_);
+  }
+  return true;
+}
+
+std::optional<Solved> Bake::solve(ModelWriter& writer) {
+  const Shared run{options_.jobs, team_, progress_, tiles_, [&] { return interrupt_.requested(); }};
+  if (plans_.compression) return solve_compressed(*plans_.compression, *factor_, part_, run, writer);
+  return solve_matrices(description_, *elastic_, stiffness_, std::move(factor_), *solver_, stored_, plans_,
+                        part_, run, writer);
+}
+
+BakeResult Bake::solve_and_write() {
+  const std::unique_ptr<ModelWriter> writer = open_writer(options_, part_, model_, precision_, team_);
+  model_.overlay = {};  // written by now
+  model_.dynamics = {};
+  const std::optional<Solved> solved = solve(*writer);
+  if (!solved) {
+    progress_.line(interruption_text(options_));
+    return BakeResult::interrupted;
+  }
+  if (part_) {
+    progress_.line(fmt::format("part {} of {} written: {} and {}.progress", part_->number, part_->parts,
+                               options_.output.string(), options_.output.filename().string()));
+    return BakeResult::part_done;
+  }
+  if (!team_.leads()) return BakeResult::done;
+  progress_.begin(write_stage);
+  writer->finish(solved->probes, solved->compressed);
+  progress_.line(fmt::format("{} written", options_.output.string()));
+  if (!options_.keep_parts) remove_parts(options_.parts);
+  if (!warning_.empty()) progress_.warn(warning_);
+  return BakeResult::done;
 }
 
 }  // namespace
 
 BakeResult bake(const Description& description, const BakeOptions& options) {
   Team alone;
-  return bake(description, options, alone);
+  return bake(description, options, alone).result;
 }
 
-BakeResult bake(const Description& description, const BakeOptions& asked, Team& team) {
+BakeSummary bake(const Description& description, const BakeOptions& asked, Team& team) {
+  InterruptGuard interrupt;
   const BakeOptions options = with_paths(description, asked, team);
   Progress progress(team.leads());
-  MeshedBody body = mesh_body(description, [&](const std::string& text) { progress.begin(text); });
-  for (const std::string& note : body.notes) progress.line("note: " + note);
-  const std::string warning = body.warning;
-
-  progress.begin("assembling K");
-  const std::vector<Vec3> loads = nodal_loads(description, body);
-  const std::vector<Vec3> prescribed = body.prescribed;
-  const Surface surface = body.surface;
-  Model model = describe_model(description, options, std::move(body));
-  ElasticBody elastic = elastic_body(model);
-  elastic.prescribed = prescribed;
-  const Stiffness stiffness = assemble_stiffness(elastic);
-  openblas_set_num_threads(1);  // blocks of columns are the parallel work: the bytes depend on no `jobs`
-  progress.begin("ordering K");
-  auto factor = std::make_unique<Factor>(stiffness.K, stiffness.node_start);
-  const std::vector<std::uint8_t> stored =
-      stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers);
-  const GreensSolver solver(*factor, stored, stiffness.free_dofs, model.dimension());
-  check_touchable(surface, model, description);
-  const Plans plans = announce_plans(description, options, model, stiffness, *factor, solver, progress);
-  if (!warning.empty()) progress.warn(warning);
-  check_memory(plans.plan);
-  if (options.dry_run) return BakeResult::planned;
-  const std::optional<BakePart> part = planned_part(options, plans, solver);
-
-  progress.plan(stages_of(plans, options.jobs));
-  progress.begin(factor_stage);
-  factor->factorize();
-  const StoredNumbering stored_as =
-      plans.compression ? plans.compression->stored : number_stored(solver, stiffness, model.dimension());
-  model.stored_nodes = stored_as.nodes;
-  model.rest_force = loads;
-  model.rest_displacement = rest_displacement(*factor, stiffness, loads, prescribed, model.dimension());
-  const InterruptGuard interrupt;
-  if (description.overlay &&
-      !add_overlays(description, plans.overlays, options.jobs, model, progress, interrupt)) {
-    progress.line("interrupted: nothing was written");
-    return BakeResult::interrupted;
-  }
-  add_dynamics(description, plans.dynamics, elastic, stiffness, *factor, stored_as.dofs, model, progress);
-  Precision precision = Precision::single_precision;
-  if (plans.compression) {
-    model.compressed = std::make_shared<const HierarchicalMatrix>(plans.compression->frame);
-  } else {
-    progress.begin(precision_stage);
-    precision = decide_precision(description, elastic, stiffness, *factor, stored_as.dofs, model, progress);
-  }
-  const std::unique_ptr<ModelWriter> writer = open_writer(options, part, model, precision, team);
-  model.overlay = {};  // written by now
-  model.dynamics = {};
-  const Shared run{options.jobs, team, progress, [&] { return interrupt.requested(); }};
-  const std::optional<Solved> solved =
-      plans.compression ? solve_compressed(*plans.compression, *factor, part, run, *writer)
-                        : solve_matrices(description, elastic, stiffness, std::move(factor), solver, stored,
-                                         plans, part, run, *writer);
-  if (!solved) {
-    progress.line(interruption_text(options));
-    return BakeResult::interrupted;
-  }
-  if (part) {
-    progress.line(next_part_text(*part, options));
-    return BakeResult::part_done;
-  }
-  if (!team.leads()) return BakeResult::done;
-  progress.begin(write_stage);
-  writer->finish(solved->probes, solved->compressed);
-  progress.line(fmt::format("{} written", options.output.string()));
-  if (!options.keep_parts) remove_parts(options.parts);
-  if (!warning.empty()) progress.warn(warning);
-  return BakeResult::done;
+  Bake bake(description, options, team, progress, interrupt);
+  BakeSummary summary{description.file.string(), options.output, options.part};
+  summary.result = bake.run();
+  progress.end();
+  summary.plan = bake.plan();
+  summary.tiles = bake.tiles();
+  summary.stages = progress.stages();
+  return summary;
 }
 
 }  // namespace palpate

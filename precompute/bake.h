@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "precompute/description/description.h"
+#include "precompute/plan.h"
 #include "precompute/team.h"
+#include "precompute/time_left.h"
 
 namespace palpate {
 
@@ -28,19 +30,31 @@ struct BakeOptions {
   bool join = false;                 ///< take the columns from parts
   std::vector<std::filesystem::path> parts{};  ///< those, or their folders; none: those beside the output
   bool keep_parts = false;                     ///< leave them there
+  std::filesystem::path report{};              ///< of the run, which is not to be lost; empty: none
 };
 
 /// How a bake ended.
 enum class BakeResult : std::uint8_t { done, part_done, planned, interrupted };
 
 /// Runs the whole precomputation: mesh, K, factor, columns, file. Prints progress to standard error. On
-/// Ctrl-C or SIGTERM it stops at the next block of columns and keeps those that are done, from which the next
-/// run of the same model goes on. Throws Error for bad input, and with the numbers when memory or disk will
-/// not do.
+/// Ctrl-C, SIGTERM or SIGUSR1 it stops at the next block of columns and keeps those that are done, from which
+/// the next run of the same model goes on. Throws Error for bad input, and with the numbers when memory or
+/// disk will not do.
 BakeResult bake(const Description& description, const BakeOptions& options);
+
+/// How a bake went.
+struct BakeSummary {
+  std::string model;  ///< the description's file
+  std::filesystem::path output;
+  std::optional<PartNumber> part{};
+  BakeResult result = BakeResult::planned;
+  Plan plan{};
+  TileCounts tiles{};           ///< of all processes
+  std::vector<Stage> stages{};  ///< with the seconds that they took
+};
 
 /// Runs it with other processes, which call this too: each computes what comes before the columns, all share
 /// these, and the leader alone prints and writes the rest.
-BakeResult bake(const Description& description, const BakeOptions& options, Team& team);
+BakeSummary bake(const Description& description, const BakeOptions& options, Team& team);
 
 }  // namespace palpate

@@ -20,7 +20,7 @@ std::vector<Tile> column_tiles(const GreensSolver& solver, const Plan& plan) {
 }
 
 bool solve_columns(const GreensSolver& solver, const Plan& plan, const PieceRange& part, int jobs, Team& team,
-                   ModelWriter& writer, PackedMatrix matrix, Progress& progress,
+                   ModelWriter& writer, PackedMatrix matrix, Progress& progress, TileCounts& counts,
                    const std::function<bool()>& interrupted) {
   const std::string name = column_stage(matrix);
   std::vector<Tile> tiles;
@@ -30,6 +30,7 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, const PieceRang
     if (tile.first < part.first || tile.first >= part.end) continue;
     if (writer.has_columns(tile.first, tile.count, matrix)) {
       kept += tile.count;
+      ++counts.kept;
     } else {
       cost += tile.cost;
       tiles.push_back(tile);
@@ -52,8 +53,9 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, const PieceRang
                       solver.columns(tile.first, tile.count, workspace, packed);
                       writer.write_columns(tile.first, tile.count, packed, matrix);
                     },
-                    [&](double of_tile) {
-                      done += of_tile;
+                    [&](const Tile& tile) {
+                      done += tile.cost;
+                      ++counts.solved;
                       progress.reach(done / cost);
                     },
                     interrupted});

@@ -19,10 +19,10 @@ const char* column_stage(PackedMatrix matrix);
 /// processes. Their cost is in flops.
 std::vector<Tile> column_tiles(const GreensSolver& solver, const Plan& plan);
 
-/// Computes the columns of a packed matrix, of `part` or all, that the file does not have yet. False when
-/// interrupted.
+/// Computes the columns of a packed matrix, of `part` or all, that the file does not have yet, and adds to
+/// `counts`. False when interrupted.
 bool solve_columns(const GreensSolver& solver, const Plan& plan, const PieceRange& part, int jobs, Team& team,
-                   ModelWriter& writer, PackedMatrix matrix, Progress& progress,
+                   ModelWriter& writer, PackedMatrix matrix, Progress& progress, TileCounts& counts,
                    const std::function<bool()>& interrupted);
 
 }  // namespace palpate

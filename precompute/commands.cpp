@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "formats/model_file.h"
 #include "precompute/allotment.h"
 #include "precompute/bake.h"
+#include "precompute/bake_report.h"
 #include "precompute/compare.h"
 #include "precompute/description/not_a_description.h"
 #include "precompute/inspect.h"
@@ -28,7 +30,12 @@ int run_bake(const std::string& model, BakeOptions options, Team& team) {
   check_is_description(model);
   const Description description = read_description(model);
   if (options.output.empty()) options.output = description.name + ".palpate.hdf";
-  switch (bake(description, options, team)) {
+  const auto start = std::chrono::steady_clock::now();
+  const BakeSummary summary = bake(description, options, team);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (!options.report.empty() && team.leads())
+    write_report(options.report, {summary}, {team.size(), options.jobs, seconds, peak_memory()});
+  switch (summary.result) {
     case BakeResult::interrupted:
       return exit_interrupted;
     case BakeResult::done:
@@ -80,6 +87,13 @@ struct Arguments {
   HelpArguments help;
 };
 
+void add_report(CLI::App& command, BakeOptions& options) {
+  command
+      .add_option("--report", options.report,
+                  "write a report as JSON: sizes, seconds of the stages, memory; -: to standard output")
+      ->type_name("FILE");
+}
+
 void add_bake(CLI::App& app, Arguments& arguments) {
   BakeOptions& options = arguments.bake;
   options.jobs = allotted_processors();
@@ -104,13 +118,15 @@ void add_bake(CLI::App& app, Arguments& arguments) {
       ->check([](const std::string& text) {
         return read_part_number(text) ? "" : "'" + text + "' is not K/N with 1 <= K <= N <= 100000";
       });
+  add_report(app, options);
   app.footer(
       "Examples:\n"
       "  palpate-precompute meshes/models/cube/model.toml    writes cube.palpate.hdf\n"
       "  palpate-precompute help verify                      more about a command\n"
       "  palpate-runtime play cube.palpate.hdf --view        then: push it in a browser\n"
-      "Ctrl-C keeps the finished columns in FILE.partial and FILE.progress; give the same command to "
-      "resume.\n"
+      "Ctrl-C, SIGTERM and SIGUSR1 keep the finished columns in FILE.partial and FILE.progress; give the "
+      "same "
+      "command to resume.\n"
       "Exit status: 0 done, 1 bad input or not enough room, 2 wrong arguments, 3 not verified, 130 "
       "interrupted.");
 }
@@ -134,6 +150,7 @@ CLI::App* add_join(CLI::App& app, Arguments& arguments) {
       ->option_text("N")
       ->check(CLI::Range(1, 1024));
   command->add_flag("--force", options.force, "overwrite the output even if it is not an earlier model");
+  add_report(*command, options);
   command->add_flag("--keep-parts", options.keep_parts, "leave the parts there once the file is written");
   command->footer(
       "The file has the bytes that one run without parts would have written. A run that was interrupted or "

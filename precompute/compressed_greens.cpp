@@ -145,7 +145,8 @@ bool GreensCompressor::reach(const char* stage, double share) {
   return !interrupted_();
 }
 
-bool GreensCompressor::solve_near(const PieceRange& part, Team& team, ModelWriter& writer) {
+bool GreensCompressor::solve_near(const PieceRange& part, Team& team, ModelWriter& writer,
+                                  TileCounts& counts) {
   std::vector<Tile> tiles;
   std::int64_t kept = 0;
   double cost = 0.0, whole = 0.0;
@@ -154,6 +155,7 @@ bool GreensCompressor::solve_near(const PieceRange& part, Team& team, ModelWrite
     if (tile.first < part.first || tile.first >= part.end) continue;
     if (writer.has_near(static_cast<Index>(tile.first))) {
       ++kept;
+      ++counts.kept;
     } else {
       cost += tile.cost;
       tiles.push_back(tile);
@@ -172,8 +174,9 @@ bool GreensCompressor::solve_near(const PieceRange& part, Team& team, ModelWrite
                       compression_.solve_near(static_cast<Index>(tile.first), worker, entries);
                       writer.write_near(static_cast<Index>(tile.first), entries);
                     },
-                    [&](double of_tile) {
-                      done += of_tile;
+                    [&](const Tile& tile) {
+                      done += tile.cost;
+                      ++counts.solved;
                       progress_.reach(done / cost);
                     },
                     interrupted_});

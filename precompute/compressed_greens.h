@@ -60,8 +60,8 @@ class GreensCompressor {
                    std::function<bool()> interrupted);
 
   /// Solves for the near pairs of the leaves of `part` that the writer does not have yet, and writes them.
-  /// False when interrupted.
-  bool solve_near(const PieceRange& part, Team& team, ModelWriter& writer);
+  /// Adds to `counts`. False when interrupted.
+  bool solve_near(const PieceRange& part, Team& team, ModelWriter& writer, TileCounts& counts);
 
   /// Makes the matrix with the near pairs of the writer, which has all, and measures random touches; where
   /// their forces are off by more than the tolerance, again with more terms. Null when interrupted. Throws

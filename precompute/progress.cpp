@@ -103,6 +103,16 @@ void Progress::reach(double share) {
   time_left_.reach(share, now());
 }
 
+void Progress::end() {
+  const std::scoped_lock lock(mutex_);
+  end_stage();
+}
+
+std::vector<Stage> Progress::stages() {
+  const std::scoped_lock lock(mutex_);
+  return over_;
+}
+
 std::string Progress::stage_text() const {
   std::string text = stage_;
   if (share_ >= 0.0) text += fmt::format(": {} %", static_cast<int>(100.0 * share_));
@@ -131,6 +141,7 @@ void Progress::end_stage() {
   const bool said_share = share_ >= 0.0;
   if (line_open_ || said_share)
     write_line(said_share ? fmt::format("{}: {} %", stage_, static_cast<int>(100.0 * share_)) : stage_);
+  if (!stage_.empty()) over_.push_back({stage_, now() - begun_});
   stage_.clear();
   share_ = -1.0;
 }

@@ -42,6 +42,12 @@ class Progress {
   /// A stage begins, and the one before it is over.
   void begin(const std::string& stage);
 
+  /// The last stage is over.
+  void end();
+
+  /// The stages that are over, with the seconds that they took.
+  [[nodiscard]] std::vector<Stage> stages();
+
   /// The share (0..1) of the stage that is done.
   void reach(double share);
 
@@ -62,6 +68,7 @@ class Progress {
   std::mutex mutex_;
   std::condition_variable_any wake_;
   TimeLeft time_left_;
+  std::vector<Stage> over_;
   std::string stage_;       // under way, empty: none
   double share_ = -1.0;     // of it, -1: it does not say
   double begun_ = 0.0;      // when it began [s]

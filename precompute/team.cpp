@@ -37,7 +37,7 @@ bool Team::work(const std::vector<Tile>& tiles, int jobs, const TileWork& work) 
     const Tile& tile = tiles[static_cast<std::size_t>(k)];
     work.solve(tile, worker);
     const std::scoped_lock lock(mutex);
-    work.done(tile.cost);
+    work.done(tile);
   });
   return !work.interrupted();
 }

@@ -20,10 +20,16 @@ struct Tile {
 /// Tiles next to each other that are number `number` of `parts` shares, from 1, of about the same cost.
 PieceRange share_of(const std::vector<Tile>& tiles, std::int64_t number, std::int64_t parts);
 
+/// How many tiles were solved, and how many an earlier run has left.
+struct TileCounts {
+  std::int64_t solved = 0;
+  std::int64_t kept = 0;
+};
+
 /// What is done with tiles.
 struct TileWork {
   std::function<void(const Tile&, int worker)> solve;  ///< by any thread, `worker` in [0, jobs)
-  std::function<void(double cost)> done;               ///< by the leader after each, one at a time
+  std::function<void(const Tile&)> done;               ///< by the leader after each, one at a time
   std::function<bool()> interrupted;                   ///< no more tiles are begun
 };
 
@@ -44,6 +50,9 @@ class Team {
   /// Solves the leader's tiles with `jobs` threads of each process, in their order, and returns in all once
   /// all are done. False, in all, when one was interrupted.
   virtual bool work(const std::vector<Tile>& tiles, int jobs, const TileWork& work);
+
+  /// Whether any process says so.
+  virtual bool any(bool here) { return here; }
 
   /// The leader's text.
   virtual std::string share(std::string text) { return text; }

@@ -60,7 +60,7 @@ TEST(Team, OfThreadsSolvesEachTileOnceAndTellsItsCost) {
                            EXPECT_LT(worker, 3);
                            ++solved[static_cast<std::size_t>(tile.first)];
                          },
-                         [&](double of_tile) { cost += of_tile; }, [] { return false; }}));
+                         [&](const Tile& tile) { cost += tile.cost; }, [] { return false; }}));
   EXPECT_TRUE(std::all_of(solved.begin(), solved.end(), [](const auto& count) { return count == 1; }));
   EXPECT_EQ(cost, 100.0 * 101.0 / 2.0);
 }
@@ -68,8 +68,9 @@ TEST(Team, OfThreadsSolvesEachTileOnceAndTellsItsCost) {
 TEST(Team, StopsWhereItIsInterrupted) {
   int count = 0;
   Team team;
-  EXPECT_FALSE(team.work(triangle(100, 1), 1,
-                         {[&](const Tile&, int) { ++count; }, [](double) {}, [&] { return count == 5; }}));
+  EXPECT_FALSE(
+      team.work(triangle(100, 1), 1,
+                {[&](const Tile&, int) { ++count; }, [](const Tile&) {}, [&] { return count == 5; }}));
   EXPECT_EQ(count, 5);
 }
 

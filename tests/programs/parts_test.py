@@ -1,5 +1,6 @@
 """palpate-precompute in parts: the bytes of one run, whoever computed them, and what is told where parts do not fit."""
 
+import json
 import resource
 import shutil
 import signal
@@ -111,6 +112,53 @@ class Parts(PartsTest):
         process.kill()
         process.wait()
         self.assertEqual(self.join(model), data)
+
+
+class Guest(PartsTest):
+    """Signals and reports, as batch systems want them."""
+
+    def test_signals_before_the_columns_end_it_at_once(self):
+        model = self.write("model.toml", cube_toml(24))
+        for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1):
+            with subprocess.Popen([PRECOMPUTE, model], cwd=self.folder, stderr=subprocess.PIPE, text=True) as process:
+                self.assertIn("generating", process.stderr.readline())
+                process.send_signal(stop)
+                said = process.stderr.read()
+                self.assertEqual(process.wait(), 130)
+            self.assertIn("interrupted: no columns were computed", said)
+            self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
+
+    def test_sigusr1_keeps_the_columns_and_a_report_says_so(self):
+        model, data = self.straight(cube_toml(14))
+        journal, report = self.folder / "cube.palpate.hdf.progress", self.folder / "report.json"
+        process = subprocess.Popen([PRECOMPUTE, model, "--jobs", "1", "--report", report], cwd=self.folder, stderr=subprocess.DEVNULL)
+        self.wait_for(lambda: journal.exists() and "\ncolumns" in journal.read_text(), process)
+        process.send_signal(signal.SIGUSR1)
+        self.assertEqual(process.wait(), 130)
+        stopped = json.loads(report.read_text())["models"][0]
+        self.assertEqual(stopped["result"], "interrupted")
+        self.assertEqual(run(PRECOMPUTE, model, "--report", report, cwd=self.folder).returncode, 0)
+        self.assertEqual((self.folder / "cube.palpate.hdf").read_bytes(), data)
+        done = json.loads(report.read_text())["models"][0]
+        self.assertEqual(done["result"], "done")
+        self.assertEqual(done["tiles_kept"], stopped["tiles_solved"])
+        self.assertGreater(done["tiles_kept"], 0)
+
+    def test_report_of_a_part_and_to_standard_output(self):
+        model = self.write("model.toml", cube_toml(3))
+        said = run(PRECOMPUTE, model, "--part", "1/2", "--report", "-", cwd=self.folder)
+        report = json.loads(said.stdout)
+        bake = report["models"][0]
+        self.assertEqual((bake["result"], bake["part"]), ("part", [1, 2]))
+        self.assertEqual((bake["nodes"], bake["elements"]), (64, 162))
+        self.assertEqual(bake["stages"][-1]["name"], "Green's functions")
+        self.assertEqual(report["ranks"], 1)
+        self.assertGreater(report["peak_memory_bytes"], 1 << 20)
+
+    def test_a_report_takes_the_place_of_nothing_else(self):
+        model = self.write("model.toml", cube_toml(3))
+        self.assert_refused(run(PRECOMPUTE, model, "--report", model, cwd=self.folder), "model.toml")
+        self.assertEqual(model.read_text(), cube_toml(3))
 
 
 class Misfits(PartsTest):
