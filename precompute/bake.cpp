@@ -94,8 +94,8 @@ struct Shared {
   std::function<bool()> interrupted;
 };
 
-/// What follows the plan.
-std::vector<Stage> stages_of(const Plans& plans, int jobs) {
+/// What follows the plan, by so many ranks.
+std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
   const auto& [plan, compression, overlays, dynamics] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
@@ -103,7 +103,7 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs) {
   if (dynamics.method == DynamicsMethod::modal)
     stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
   if (compression) {
-    const std::vector<Stage> more = compression_stages(*compression);
+    const std::vector<Stage> more = compression_stages(*compression, ranks);
     stages.insert(stages.end(), more.begin(), more.end());
     stages.push_back({write_stage, plan.write_seconds});
     return stages;
@@ -111,13 +111,32 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs) {
   const bool packed = dynamics.method == DynamicsMethod::packed;
   stages.push_back({precision_stage, plan.precision_seconds * (packed ? 2.0 : 1.0) +
                                          plan.factor_seconds * (packed ? 1.0 : 0.0)});
-  stages.push_back({column_stage(PackedMatrix::greens), plan.seconds});
+  stages.push_back({column_stage(PackedMatrix::greens), plan.seconds / ranks});
   if (packed) {
     stages.push_back({inverse_factor_stage, plan.factor_seconds});
-    stages.push_back({column_stage(PackedMatrix::inverse), plan.seconds});
+    stages.push_back({column_stage(PackedMatrix::inverse), plan.seconds / ranks});
   }
   stages.push_back({write_stage, plan.write_seconds});
   return stages;
+}
+
+/// What all ranks take together.
+std::string ranks_text(const Plans& plans, const std::vector<Tile>& tiles, int jobs, int ranks) {
+  const Plan& plan = plans.plan;
+  double seconds = 0.0;
+  for (const Stage& stage : stages_of(plans, jobs, ranks)) seconds += stage.seconds;
+  const auto memory =
+      static_cast<double>(plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes) * 1e-9;
+  const auto threads = std::int64_t{jobs} * ranks;
+  std::string text = fmt::format(
+      "{} ranks of {} job{}: {:.2f} GB of memory each, {:.1f} GB in all; about {} from the factor to the "
+      "file, "
+      "{:.1f} hours of a processor",
+      ranks, jobs, jobs == 1 ? "" : "s", memory, memory * ranks, duration_text(seconds),
+      seconds * static_cast<double>(threads) / 3600.0);
+  if (!plans.compression && std::ssize(tiles) < 2 * threads)
+    text += fmt::format("; {} blocks of columns for {} threads: fewer ranks would do", tiles.size(), threads);
+  return text;
 }
 
 /// What makes a large file smaller.
@@ -458,7 +477,7 @@ class Bake {
   BakeResult run() {
     assemble();
     if (options_.dry_run) return BakeResult::planned;
-    progress_.plan(stages_of(plans_, options_.jobs));
+    progress_.plan(stages_of(plans_, options_.jobs, team_.size()));
     progress_.begin(factor_stage);
     factor_->factorize();
     interrupt_.note_from_now_on();
@@ -519,8 +538,11 @@ void Bake::assemble() {
   solver_.emplace(*factor_, stored_, stiffness_.free_dofs, model_.dimension());
   check_touchable(surface, model_, description_);
   plans_ = announce_plans(description_, options_, model_, stiffness_, *factor_, *solver_, progress_);
+  const int ranks = options_.ranks > 0 ? options_.ranks : team_.size();
+  if (ranks > 1)
+    progress_.line(ranks_text(plans_, column_tiles(*solver_, plans_.plan), options_.jobs, ranks));
   if (!warning_.empty()) progress_.warn(warning_);
-  check_memory(plans_.plan);
+  check_memory(plans_.plan, team_.size_here());
   part_ = planned_part(options_, plans_, *solver_);
 }
 
@@ -586,9 +608,12 @@ BakeResult bake(const Description& description, const BakeOptions& options) {
 BakeSummary bake(const Description& description, const BakeOptions& asked, Team& team) {
   InterruptGuard interrupt;
   const BakeOptions options = with_paths(description, asked, team);
-  Progress progress(team.leads());
+  Progress progress(team.prints());
   Bake bake(description, options, team, progress, interrupt);
-  BakeSummary summary{description.file.string(), options.output, options.part};
+  BakeSummary summary{.model = description.file.string(),
+                      .output = options.output,
+                      .part = options.part,
+                      .jobs = options.jobs};
   summary.result = bake.run();
   progress.end();
   summary.plan = bake.plan();

@@ -30,6 +30,7 @@ struct BakeOptions {
   bool join = false;                 ///< take the columns from parts
   std::vector<std::filesystem::path> parts{};  ///< those, or their folders; none: those beside the output
   bool keep_parts = false;                     ///< leave them there
+  int ranks = 0;                               ///< that the plan is for; 0: as many as the team has
   std::filesystem::path report{};              ///< of the run, which is not to be lost; empty: none
 };
 
@@ -48,6 +49,7 @@ struct BakeSummary {
   std::filesystem::path output;
   std::optional<PartNumber> part{};
   BakeResult result = BakeResult::planned;
+  int jobs = 1;
   Plan plan{};
   TileCounts tiles{};           ///< of all processes
   std::vector<Stage> stages{};  ///< with the seconds that they took

@@ -36,6 +36,10 @@ Json json_of(const BakeSummary& bake) {
 
 }  // namespace
 
+std::string json_text_of(const BakeSummary& bake) {
+  return json_text(json_of(bake));
+}
+
 std::string name_of(BakeResult result) {
   switch (result) {
     case BakeResult::done:
@@ -50,7 +54,7 @@ std::string name_of(BakeResult result) {
   return "";
 }
 
-void write_report(const std::filesystem::path& file, const std::vector<BakeSummary>& bakes,
+void write_report(const std::filesystem::path& file, const std::vector<std::string>& bakes,
                   const RunFigures& run) {
   Json json = {{"generator", "palpate-precompute " PALPATE_VERSION},
                {"ranks", run.ranks},
@@ -58,7 +62,7 @@ void write_report(const std::filesystem::path& file, const std::vector<BakeSumma
                {"seconds", run.seconds},
                {"peak_memory_bytes", run.peak_memory},
                {"models", Json::array()}};
-  for (const BakeSummary& bake : bakes) json["models"].push_back(json_of(bake));
+  for (const std::string& bake : bakes) json["models"].push_back(Json::parse(bake));
   const std::string text = json_text(json, 2);
   if (file == "-") {
     std::fputs(text.c_str(), stdout);

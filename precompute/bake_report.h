@@ -20,8 +20,11 @@ struct RunFigures {
 /// "done", "part", "planned" or "interrupted".
 [[nodiscard]] std::string name_of(BakeResult result);
 
-/// Writes the report to a file, a pipe, or with "-" to standard output. Throws Error.
-void write_report(const std::filesystem::path& file, const std::vector<BakeSummary>& bakes,
+/// A bake's entry of a report, JSON in one line.
+[[nodiscard]] std::string json_text_of(const BakeSummary& bake);
+
+/// Writes the report, with entries of bakes, to a file, a pipe, or with "-" to standard output. Throws Error.
+void write_report(const std::filesystem::path& file, const std::vector<std::string>& bakes,
                   const RunFigures& run);
 
 /// Most memory that this process has had [byte].

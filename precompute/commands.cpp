@@ -13,7 +13,6 @@
 #include "base/program.h"
 #include "base/spelling.h"
 #include "formats/model_file.h"
-#include "precompute/allotment.h"
 #include "precompute/bake.h"
 #include "precompute/bake_report.h"
 #include "precompute/compare.h"
@@ -26,32 +25,6 @@ namespace {
 
 constexpr std::int64_t most_parts = 100'000;
 
-int run_bake(const std::string& model, BakeOptions options, Team& team) {
-  check_is_description(model);
-  const Description description = read_description(model);
-  if (options.output.empty()) options.output = description.name + ".palpate.hdf";
-  const auto start = std::chrono::steady_clock::now();
-  const BakeSummary summary = bake(description, options, team);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (!options.report.empty() && team.leads())
-    write_report(options.report, {summary}, {team.size(), options.jobs, seconds, peak_memory()});
-  switch (summary.result) {
-    case BakeResult::interrupted:
-      return exit_interrupted;
-    case BakeResult::done:
-      if (team.leads())
-        std::fprintf(stderr, "next: palpate-precompute verify %s\n      palpate-runtime play %s --view\n",
-                     options.output.c_str(), options.output.c_str());
-      break;
-    case BakeResult::part_done:
-      std::fprintf(stderr, "next, once all parts are there: palpate-precompute join %s\n", model.c_str());
-      break;
-    case BakeResult::planned:
-      break;
-  }
-  return exit_ok;
-}
-
 /// "3/16"; nothing when it is no part.
 std::optional<PartNumber> read_part_number(const std::string& text) {
   PartNumber part;
@@ -63,6 +36,66 @@ std::optional<PartNumber> read_part_number(const std::string& text) {
       part.parts > most_parts)
     return {};
   return part;
+}
+
+void add_report(CLI::App& command, BakeOptions& options) {
+  command
+      .add_option("--report", options.report,
+                  "write a report as JSON: sizes, seconds of the stages, memory; -: to standard output")
+      ->type_name("FILE");
+}
+
+void add_jobs(CLI::App& command, BakeOptions& options) {
+  options.jobs = 0;
+  command
+      .add_option("-j,--jobs", options.jobs, "number of threads; default: one per processor that it may use")
+      ->option_text("N")
+      ->check(CLI::Range(1, 1024));
+}
+
+}  // namespace
+
+void add_bake_options(CLI::App& app, BakeOptions& options) {
+  app.add_option("-o,--output", options.output,
+                 "file to write; default: NAME.palpate.hdf in the current folder")
+      ->type_name("FILE");
+  add_jobs(app, options);
+  app.add_flag("--dry-run", options.dry_run,
+               "print what it would need (degrees of freedom, bytes, time) and stop");
+  app.add_flag("--force", options.force, "overwrite the output even if it is not an earlier model");
+  app.add_flag(
+      "--discard", options.discard,
+      "start over; by default a run that was interrupted or killed resumes with the columns it has finished");
+  add_report(app, options);
+}
+
+BakeSummary bake_model(const std::string& model, BakeOptions options, Team& team) {
+  check_is_description(model);
+  const Description description = read_description(model);
+  if (options.output.empty()) options.output = description.name + ".palpate.hdf";
+  if (options.jobs == 0) options.jobs = team.default_jobs();
+  return bake(description, options, team);
+}
+
+std::string next_steps(const BakeSummary& bake) {
+  const std::string output = bake.output.string();
+  if (bake.result == BakeResult::part_done)
+    return "next, once all parts are there: palpate-precompute join " + bake.model + "\n";
+  if (bake.result != BakeResult::done) return "";
+  return "next: palpate-precompute verify " + output + "\n      palpate-runtime play " + output + " --view\n";
+}
+
+namespace {
+
+int run_bake(const std::string& model, const BakeOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  Team alone;
+  const BakeSummary summary = bake_model(model, options, alone);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (!options.report.empty())
+    write_report(options.report, {json_text_of(summary)}, {1, summary.jobs, seconds, peak_memory()});
+  std::fputs(next_steps(summary).c_str(), stderr);
+  return summary.result == BakeResult::interrupted ? exit_interrupted : exit_ok;
 }
 
 int run_verify(const std::string& file) {
@@ -87,29 +120,9 @@ struct Arguments {
   HelpArguments help;
 };
 
-void add_report(CLI::App& command, BakeOptions& options) {
-  command
-      .add_option("--report", options.report,
-                  "write a report as JSON: sizes, seconds of the stages, memory; -: to standard output")
-      ->type_name("FILE");
-}
-
 void add_bake(CLI::App& app, Arguments& arguments) {
-  BakeOptions& options = arguments.bake;
-  options.jobs = allotted_processors();
   app.add_option("MODEL.toml", arguments.model, "description of the body")->type_name("");
-  app.add_option("-o,--output", options.output,
-                 "file to write; default: NAME.palpate.hdf in the current folder")
-      ->type_name("FILE");
-  app.add_option("-j,--jobs", options.jobs, "number of threads; default: one per processor that it may use")
-      ->option_text("N")
-      ->check(CLI::Range(1, 1024));
-  app.add_flag("--dry-run", options.dry_run,
-               "print what it would need (degrees of freedom, bytes, time) and stop");
-  app.add_flag("--force", options.force, "overwrite the output even if it is not an earlier model");
-  app.add_flag(
-      "--discard", options.discard,
-      "start over; by default a run that was interrupted or killed resumes with the columns it has finished");
+  add_bake_options(app, arguments.bake);
   app.add_option(
          "--part", arguments.part,
          "compute only the K-th of N shares of the columns, into FILE.part-K-of-N; 'join' makes one file "
@@ -118,15 +131,13 @@ void add_bake(CLI::App& app, Arguments& arguments) {
       ->check([](const std::string& text) {
         return read_part_number(text) ? "" : "'" + text + "' is not K/N with 1 <= K <= N <= 100000";
       });
-  add_report(app, options);
   app.footer(
       "Examples:\n"
       "  palpate-precompute meshes/models/cube/model.toml    writes cube.palpate.hdf\n"
       "  palpate-precompute help verify                      more about a command\n"
       "  palpate-runtime play cube.palpate.hdf --view        then: push it in a browser\n"
-      "Ctrl-C, SIGTERM and SIGUSR1 keep the finished columns in FILE.partial and FILE.progress; give the "
-      "same "
-      "command to resume.\n"
+      "Ctrl-C, SIGTERM or SIGUSR1 keeps finished columns in FILE.partial and .progress; the same command "
+      "resumes.\n"
       "Exit status: 0 done, 1 bad input or not enough room, 2 wrong arguments, 3 not verified, 130 "
       "interrupted.");
 }
@@ -145,10 +156,7 @@ CLI::App* add_join(CLI::App& app, Arguments& arguments) {
       ->add_option("-o,--output", options.output,
                    "file to write; default: NAME.palpate.hdf in the current folder")
       ->type_name("FILE");
-  command
-      ->add_option("-j,--jobs", options.jobs, "number of threads; default: one per processor that it may use")
-      ->option_text("N")
-      ->check(CLI::Range(1, 1024));
+  add_jobs(*command, options);
   command->add_flag("--force", options.force, "overwrite the output even if it is not an earlier model");
   add_report(*command, options);
   command->add_flag("--keep-parts", options.keep_parts, "leave the parts there once the file is written");
@@ -230,7 +238,7 @@ std::string usage_hint(const CLI::App& app, const std::string& first_word) {
 
 }  // namespace
 
-int run_commands(int argc, char** argv, Team& team) {
+int run_commands(int argc, char** argv) {
   CLI::App app{
       "Meshes an elastic body, assembles its stiffness and stores the Green's functions from which "
       "palpate-runtime computes forces.",
@@ -270,7 +278,7 @@ int run_commands(int argc, char** argv, Team& team) {
   if (verify_command->parsed()) return run_verify(arguments.file);
   arguments.bake.part = read_part_number(arguments.part);
   arguments.bake.join = join_command->parsed();
-  return run_bake(arguments.bake.join ? arguments.file : arguments.model, arguments.bake, team);
+  return run_bake(arguments.bake.join ? arguments.file : arguments.model, arguments.bake);
 }
 
 }  // namespace palpate

@@ -112,8 +112,8 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
   return plan;
 }
 
-std::vector<Stage> compression_stages(const CompressionPlan& plan) {
-  return {{near_stage, plan.near_seconds},
+std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks) {
+  return {{near_stage, plan.near_seconds / ranks},
           {sample_stage, plan.sample_seconds},
           {far_stage, plan.far_seconds},
           {touch_stage, plan.touch_seconds}};

@@ -47,7 +47,7 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
                                  int jobs);
 
 /// The stages of `compress_greens`, with the seconds that they are expected to take.
-std::vector<Stage> compression_stages(const CompressionPlan& plan);
+std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks = 1);
 
 /// Leaves of near pairs, whose cost is the number of their entries.
 std::vector<Tile> near_tiles(const HierarchicalMatrix& frame);

@@ -4,8 +4,6 @@
 
 int main(int argc, char** argv) {
   palpate::end_with_an_error_on_shrunk_files();
-  return palpate::run_program("palpate-precompute", "try --dry-run, and fewer --jobs or a coarser mesh", [&] {
-    palpate::Team alone;
-    return palpate::run_commands(argc, argv, alone);
-  });
+  return palpate::run_program("palpate-precompute", "try --dry-run, and fewer --jobs or a coarser mesh",
+                              [&] { return palpate::run_commands(argc, argv); });
 }

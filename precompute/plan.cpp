@@ -88,8 +88,8 @@ double modes_seconds(const Plan& plan, std::int64_t modes) {
   return solves * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
 }
 
-void check_memory(const Plan& plan) {
-  const std::int64_t available = allotted_memory();
+void check_memory(const Plan& plan, int ranks) {
+  const std::int64_t available = allotted_memory() / ranks;
   const std::int64_t needed = plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes;
   if (available == 0 || needed <= available) return;  // 0: the kernel does not say
   const std::string overlays =

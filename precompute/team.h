@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/journal.h"
+#include "precompute/allotment.h"
 
 namespace palpate {
 
@@ -33,6 +34,9 @@ struct TileWork {
   std::function<bool()> interrupted;                   ///< no more tiles are begun
 };
 
+/// Who has a factor of their own: each rank of MPI, or those of a node together.
+enum class FactorOf : std::uint8_t { node, rank };
+
 /// The processes of one bake. All make the same calls in the same order.
 class Team {
  public:
@@ -44,8 +48,18 @@ class Team {
   /// Whether this process prints, writes what is no tile, and seals.
   [[nodiscard]] virtual bool leads() const { return true; }
 
-  /// How many processes there are.
+  /// Whether this process tells of its progress.
+  [[nodiscard]] virtual bool prints() const { return leads(); }
+  /// Whether this process has work; which of those it is; how many those are, and how many on this machine.
+  [[nodiscard]] virtual bool takes_part() const { return true; }
+  [[nodiscard]] virtual int rank() const { return 0; }
   [[nodiscard]] virtual int size() const { return 1; }
+  [[nodiscard]] virtual int size_here() const { return 1; }
+  /// Threads where none are asked for.
+  [[nodiscard]] virtual int default_jobs() const { return allotted_processors(); }
+
+  /// Forms the team, once, before all that follows.
+  virtual void form(FactorOf /*factor_of*/) {}
 
   /// Solves the leader's tiles with `jobs` threads of each process, in their order, and returns in all once
   /// all are done. False, in all, when one was interrupted.
@@ -56,6 +70,9 @@ class Team {
 
   /// The leader's text.
   virtual std::string share(std::string text) { return text; }
+
+  /// The texts of all processes, by rank, in the leader; nothing in others.
+  virtual std::vector<std::string> gather(const std::string& text) { return {text}; }
 
   /// Gives the leader, before the tile that is being solved counts as done, a line for its `listen`.
   virtual void tell(const std::string& line) { listener_(line); }
