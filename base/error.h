@@ -38,7 +38,7 @@ enum ExitCode : int {
   exit_input_error = 1,  ///< bad input, bad file, no memory, full disk; or what was written is incomplete
   exit_usage = 2,        ///< unknown, missing or wrong argument
   exit_differs = 3,  ///< `verify` found a difference or changed sources; a replay differs from its session
-  exit_interrupted = 130,  ///< Ctrl-C, SIGTERM or SIGHUP
+  exit_interrupted = 130,  ///< Ctrl-C, SIGTERM or SIGHUP; SIGUSR1 of a precomputation
 };
 
 }  // namespace palpate

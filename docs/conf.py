@@ -61,6 +61,7 @@ CHAPTERS = {
         "safety",
         "embedding",
         "python",
+        "cluster",
         "errors",
     ],
     "Reference": ["file-format", "reference/*"],

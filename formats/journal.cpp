@@ -42,9 +42,35 @@ std::vector<std::string_view> lines(std::string_view text) {
   return result;
 }
 
-std::string line_of(const JournalRange& range) {
-  return "columns " + std::to_string(range.matrix) + ' ' + std::to_string(range.first) + ' ' +
-         std::to_string(range.count) + ' ' + range.checksum + '\n';
+std::string text_of(const FileDescriptor& file) {
+  std::string text(static_cast<std::size_t>(file_size(file)), '\0');
+  read_exactly(file, std::as_writable_bytes(std::span(text)), 0);
+  return text;
+}
+
+std::optional<JournalFrame> read_frame(std::string_view line) {
+  JournalFrame frame;
+  const auto w = words(line);
+  if (w.size() < 4 || w[0] != "model" || !to_number(w[2], frame.file_bytes)) return {};
+  frame.key = w[1];
+  frame.checksum = w[3];
+  for (std::size_t i = 4; i < w.size(); ++i)
+    if (!to_number(w[i], frame.packed_at.emplace_back())) return {};
+  return frame;
+}
+
+std::optional<BakePart> read_part(std::string_view line) {
+  BakePart part;
+  const auto w = words(line);
+  if (w.size() < 5 || w.size() % 2 == 0 || w[0] != "part" || !to_number(w[1], part.number) ||
+      !to_number(w[2], part.parts) || part.number < 1 || part.number > part.parts)
+    return {};
+  for (std::size_t i = 3; i < w.size(); i += 2) {
+    PieceRange& pieces = part.pieces.emplace_back();
+    if (!to_number(w[i], pieces.first) || !to_number(w[i + 1], pieces.end) || pieces.end < pieces.first)
+      return {};
+  }
+  return part;
 }
 
 /// False when the file was deleted or replaced between opening and locking it.
@@ -96,43 +122,67 @@ Journal::Journal(const std::filesystem::path& path) {
   expect_journal(file_);
 }
 
-std::optional<JournalContents> Journal::read() const {
-  std::string text(static_cast<std::size_t>(file_size(file_)), '\0');
-  read_exactly(file_, std::as_writable_bytes(std::span(text)), 0);
-  const std::vector<std::string_view> all = lines(text);
-  if (all.size() < 2 || all[0] != first_line) return {};
-
-  JournalContents contents;
-  JournalFrame& frame = contents.frame;
-  const auto frame_words = words(all[1]);
-  if (frame_words.size() < 4 || frame_words[0] != "model" || !to_number(frame_words[2], frame.file_bytes))
-    return {};
-  frame.key = frame_words[1];
-  frame.checksum = frame_words[3];
-  for (std::size_t i = 4; i < frame_words.size(); ++i)
-    if (!to_number(frame_words[i], frame.packed_at.emplace_back())) return {};
-
-  for (std::size_t i = 2; i < all.size(); ++i) {
-    const auto w = words(all[i]);
-    JournalRange range;
-    if (w.size() != 5 || w[0] != "columns" || !to_number(w[1], range.matrix) ||
-        !to_number(w[2], range.first) || !to_number(w[3], range.count))
-      break;
-    range.checksum = w[4];
-    contents.ranges.push_back(std::move(range));
-  }
-  return contents;
+std::string line_of(const JournalRange& range) {
+  return "columns " + std::to_string(range.matrix) + ' ' + std::to_string(range.first) + ' ' +
+         std::to_string(range.count) + ' ' + range.checksum + '\n';
 }
 
-void Journal::write(const JournalContents& contents) {
+std::string text_of(const JournalContents& contents) {
   const JournalFrame& frame = contents.frame;
   std::string text = std::string(first_line) + "\nmodel " + frame.key + ' ' +
                      std::to_string(frame.file_bytes) + ' ' + frame.checksum;
   for (const std::int64_t at : frame.packed_at) text += ' ' + std::to_string(at);
   text += '\n';
+  if (frame.part) {
+    text += "part " + std::to_string(frame.part->number) + ' ' + std::to_string(frame.part->parts);
+    for (const PieceRange& pieces : frame.part->pieces)
+      text += ' ' + std::to_string(pieces.first) + ' ' + std::to_string(pieces.end);
+    text += '\n';
+  }
   for (const JournalRange& range : contents.ranges) text += line_of(range);
+  return text;
+}
+
+std::optional<JournalRange> read_range(std::string_view line) {
+  const auto w = words(line);
+  JournalRange range;
+  if (w.size() != 5 || w[0] != "columns" || !to_number(w[1], range.matrix) || !to_number(w[2], range.first) ||
+      !to_number(w[3], range.count))
+    return {};
+  range.checksum = w[4];
+  return range;
+}
+
+std::optional<JournalContents> read_journal(std::string_view text) {
+  const std::vector<std::string_view> all = lines(text);
+  if (all.size() < 2 || all[0] != first_line) return {};
+  std::optional<JournalFrame> frame = read_frame(all[1]);
+  if (!frame) return {};
+  std::size_t next = 2;
+  if (all.size() > next && all[next].starts_with("part ")) {
+    frame->part = read_part(all[next++]);
+    if (!frame->part || frame->part->pieces.size() != frame->packed_at.size()) return {};
+  }
+  JournalContents contents{*std::move(frame), {}};
+  for (; next < all.size(); ++next) {
+    std::optional<JournalRange> range = read_range(all[next]);
+    if (!range) break;
+    contents.ranges.push_back(*std::move(range));
+  }
+  return contents;
+}
+
+std::optional<JournalContents> peek_journal(const std::filesystem::path& path) {
+  return read_journal(text_of(open_file(path, OpenMode::read)));
+}
+
+std::optional<JournalContents> Journal::read() const {
+  return read_journal(text_of(file_));
+}
+
+void Journal::write(const JournalContents& contents) {
   empty();
-  append_text(file_, text);
+  append_text(file_, text_of(contents));
 }
 
 void Journal::empty() {

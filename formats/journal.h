@@ -5,11 +5,27 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/file_io.h"
 
 namespace palpate {
+
+/// Columns of a packed matrix, or leaves of near pairs: [first, end).
+struct PieceRange {
+  std::int64_t first = 0;
+  std::int64_t end = 0;
+  friend bool operator==(const PieceRange&, const PieceRange&) = default;
+};
+
+/// A part of a bake, with a file of its own: number `number` of `parts`, from 1.
+struct BakePart {
+  std::int64_t number = 1;
+  std::int64_t parts = 1;
+  std::vector<PieceRange> pieces;  ///< that it has of each matrix
+  friend bool operator==(const BakePart&, const BakePart&) = default;
+};
 
 /// The part of PATH.partial that is finished before the columns arrive.
 struct JournalFrame {
@@ -17,6 +33,7 @@ struct JournalFrame {
   std::int64_t file_bytes = 0;
   std::string checksum;                 ///< of all bytes but the packed matrices
   std::vector<std::int64_t> packed_at;  ///< first byte of each packed matrix
+  std::optional<BakePart> part;         ///< nothing of a whole model
 };
 
 /// Columns [first, first + count) of a packed matrix and the checksum of their bytes.
@@ -32,6 +49,19 @@ struct JournalContents {
   std::vector<JournalRange> ranges;
 };
 
+/// A range as a line of a journal, with its end.
+[[nodiscard]] std::string line_of(const JournalRange& range);
+/// A frame and ranges as the text of a journal.
+[[nodiscard]] std::string text_of(const JournalContents& contents);
+
+/// Reads a line without its end; nothing when it is no range.
+[[nodiscard]] std::optional<JournalRange> read_range(std::string_view line);
+/// Reads what `text_of` gave, of which a kill may have cut off the end; nothing when there is no complete
+/// frame. A line that was cut off ends the list.
+[[nodiscard]] std::optional<JournalContents> read_journal(std::string_view text);
+/// Reads a journal that another process may be writing. Throws Error where the file cannot be read.
+[[nodiscard]] std::optional<JournalContents> peek_journal(const std::filesystem::path& path);
+
 /// Throws Error where PATH.partial or PATH.progress, beside the model PATH, is something that no killed run
 /// of ours can have left: another's file, a link.
 void expect_own_journal(const std::filesystem::path& model);
@@ -42,8 +72,7 @@ class Journal {
   /// Opens or makes it. Throws Error when another process holds it, or it is another's file.
   explicit Journal(const std::filesystem::path& path);
 
-  /// What a killed run left; nothing when there is no complete frame. A line that was cut off by the kill
-  /// ends the list.
+  /// What a killed run left, as read_journal takes it.
   [[nodiscard]] std::optional<JournalContents> read() const;
 
   void write(const JournalContents& contents);  ///< in place of what it held

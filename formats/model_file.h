@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -15,6 +16,8 @@ namespace palpate {
 
 inline constexpr int format_major = 3;  ///< another major version is refused: "precompute it again"
 inline constexpr int format_minor = 4;  ///< newer minor versions are read, what they add is ignored
+
+struct BakePart;
 
 /// A packed matrix that is streamed to disk.
 enum class PackedMatrix : std::uint8_t {
@@ -40,6 +43,18 @@ class ModelWriter {
   /// file cannot be created or the disk cannot hold it (with the numbers).
   ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
               Leftovers leftovers = Leftovers::resume);
+
+  /// Writes a part: all that is written at once, and `part.pieces` of the matrices, to PATH itself, where
+  /// they stay with PATH.progress until `add_part` takes them up. Resumes as above, where the part is the
+  /// same. Only these pieces may be written, and `finish` is not called.
+  ModelWriter(std::filesystem::path path, const Model& model, Precision precision, Leftovers leftovers,
+              const BakePart& part);
+
+  /// Writes pieces of a model that the writer of another process began, with its `journal_text`, to the same
+  /// file; `report` is given the journal's line of each. Throws Error where the model is another one, or the
+  /// file that is there is not the one of that process.
+  ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+              const std::string& journal_text, std::function<void(const std::string& line)> report);
   ~ModelWriter();
   ModelWriter(const ModelWriter&) = delete;
   ModelWriter& operator=(const ModelWriter&) = delete;
@@ -63,12 +78,21 @@ class ModelWriter {
   /// Stores them. Thread-safe for different leaves.
   void write_near(Index leaf, std::span<const float> entries);
 
+  /// Takes over the pieces of a part of the same model, except those that are there. Throws Error where it is
+  /// not of this model, not finished, or damaged.
+  void add_part(const std::filesystem::path& path);
+
+  /// What the journal holds, for writers of other processes.
+  [[nodiscard]] std::string journal_text() const;
+  /// Journals a piece that another process wrote.
+  void note(const std::string& line);
+
   /// Adds the probes, and of a compressed model ranks, certificate, bases and couplings, seals and renames.
   /// All columns of all matrices, and all near pairs, must have been written.
   void finish(const std::vector<Probe>& probes,
               std::shared_ptr<const HierarchicalMatrix> compressed = nullptr);
 
-  /// Removes PATH.partial and PATH.progress.
+  /// Removes PATH.partial and PATH.progress, except where another process began them.
   void discard() noexcept;
 
  private:

@@ -141,19 +141,33 @@ struct ModelWriter::Impl {
     std::vector<std::int64_t> starts;  ///< [pieces + 1] first entry of each
     std::shared_ptr<const SmoothPart> smooth;
     std::vector<bool> done{};  ///< [pieces]
+    PieceRange own{};          ///< pieces that the file has
 
     [[nodiscard]] std::int64_t pieces() const { return std::ssize(starts) - 1; }
+    /// Entries of the file's pieces before a piece; of all of them.
+    [[nodiscard]] std::int64_t entry(std::int64_t piece) const {
+      return starts[static_cast<std::size_t>(piece)] - starts[static_cast<std::size_t>(own.first)];
+    }
+    [[nodiscard]] std::int64_t entries() const { return entry(own.end); }
     /// Bytes before a piece; of all of them.
     [[nodiscard]] std::int64_t byte(std::int64_t piece) const {
-      return starts[static_cast<std::size_t>(piece)] * static_cast<std::int64_t>(scalar.bytes);
+      return entry(piece) * static_cast<std::int64_t>(scalar.bytes);
     }
-    [[nodiscard]] std::int64_t bytes() const { return byte(pieces()); }
+    [[nodiscard]] std::int64_t bytes() const { return byte(own.end); }
+    [[nodiscard]] bool has_in_file(std::int64_t first, std::int64_t count) const {
+      return first >= own.first && count >= 0 && first <= own.end && count <= own.end - first;
+    }
   };
 
-  Impl(std::filesystem::path to, const Model& model, Precision precision, Leftovers leftovers);
+  Impl(std::filesystem::path to, const Model& model, Precision precision,
+       const std::optional<BakePart>& part);
+
+  void begin(const Model& model, Leftovers leftovers);
+  void join_in(const std::string& journal_text, std::function<void(const std::string&)> to_report);
 
   [[nodiscard]] JournalFrame examine(const Model& model);
   bool resume();
+  [[nodiscard]] std::vector<JournalRange> undamaged(const std::vector<JournalRange>& ranges);
   [[nodiscard]] bool is_ours(const JournalContents& left) const;
   void start(const Model& model);
   void write_body(const Model& model);
@@ -172,6 +186,9 @@ struct ModelWriter::Impl {
   [[nodiscard]] std::vector<Gap> gaps(const JournalFrame& of) const;
   [[nodiscard]] std::string streamed_checksum(std::size_t matrix) const;
   void mark_done(const JournalRange& range);
+  void record(const JournalRange& range);
+  void add_part(const std::filesystem::path& from);
+  void take_over(const FileDescriptor& file, std::int64_t origin, const JournalRange& range);
   void discard() noexcept;
 
   std::filesystem::path path, partial;
@@ -182,7 +199,8 @@ struct ModelWriter::Impl {
   std::int64_t order;
   std::vector<Streamed> matrices;
   JournalFrame frame;
-  Journal journal;
+  std::optional<Journal> journal;                  // nothing where another process has it
+  std::function<void(const std::string&)> report;  // to the process that has it
   FileDescriptor data;
   mutable std::mutex mutex;  // guards what is done and the journal
 };
@@ -215,21 +233,32 @@ std::vector<ModelWriter::Impl::Streamed> ModelWriter::Impl::streamed(const Model
   if (model.dynamics.method == DynamicsMethod::packed)
     matrices.push_back(
         packed_by_columns(inverse_path, "the inverse of K_bar", model.dynamics.inverse, precision, order));
-  for (Streamed& matrix : matrices) matrix.done.assign(matrix.starts.size() - 1, false);
+  for (Streamed& matrix : matrices) {
+    matrix.done.assign(matrix.starts.size() - 1, false);
+    matrix.own = {0, matrix.pieces()};
+  }
   return matrices;
 }
 
 ModelWriter::Impl::Impl(std::filesystem::path to, const Model& model, Precision precision,
-                        Leftovers leftovers)
+                        const std::optional<BakePart>& part)
     : path(std::move(to)),
-      partial(with_suffix(path, ".partial")),
+      partial(part ? path : with_suffix(path, ".partial")),
       header{precision},
       counts(Counts::of(model, path.string())),
       element(model.mesh.element),
       order(model.stored_dofs()),
-      matrices(streamed(model, precision)),
-      frame(examine(model)),
-      journal(with_suffix(path, ".progress")) {
+      matrices(streamed(model, precision)) {
+  if (part) {
+    for (std::size_t k = 0; k < matrices.size(); ++k) matrices[k].own = part->pieces.at(k);
+  }
+  frame = examine(model);
+  frame.part = part;
+}
+
+/// Resumes what is there, or starts.
+void ModelWriter::Impl::begin(const Model& model, Leftovers leftovers) {
+  journal.emplace(with_suffix(path, ".progress"));
   if (leftovers == Leftovers::resume && resume()) return;
   try {
     start(model);
@@ -261,9 +290,9 @@ JournalFrame ModelWriter::Impl::examine(const Model& model) {
 
 /// Takes up what a killed run left; false when that is not the same model or was altered.
 bool ModelWriter::Impl::resume() {
-  const std::optional<JournalContents> left = journal.read();
-  if (!left || left->frame.key != frame.key || left->frame.packed_at.size() != matrices.size() ||
-      !std::filesystem::exists(partial))
+  const std::optional<JournalContents> left = journal->read();
+  if (!left || left->frame.key != frame.key || left->frame.part != frame.part ||
+      left->frame.packed_at.size() != matrices.size() || !std::filesystem::exists(partial))
     return false;
   if (!is_ours(*left)) return false;
   data = open_file(partial, OpenMode::write);
@@ -276,20 +305,48 @@ bool ModelWriter::Impl::resume() {
     return false;
 
   frame = left->frame;
+  const std::vector<JournalRange> whole = undamaged(left->ranges);
+  for (const JournalRange& range : whole) mark_done(range);
+  journal->write({frame, whole});
+  return true;
+}
+
+/// Those whose bytes still have their checksums.
+std::vector<JournalRange> ModelWriter::Impl::undamaged(const std::vector<JournalRange>& ranges) {
   std::vector<JournalRange> whole;
-  for (const JournalRange& range : left->ranges) {
+  for (const JournalRange& range : ranges) {
     if (range.matrix >= std::ssize(matrices)) continue;
     const auto matrix = static_cast<std::size_t>(range.matrix);
-    const std::int64_t pieces = matrices[matrix].pieces();
-    if (range.first > pieces || range.count > pieces - range.first) continue;
+    if (!matrices[matrix].has_in_file(range.first, range.count)) continue;
     RunningChecksum stored;
     add_bytes(stored, data, place(matrix, range.first), place(matrix, range.first + range.count));
-    if (stored.digits() != range.checksum) continue;
-    mark_done(range);
-    whole.push_back(range);
+    if (stored.digits() == range.checksum) whole.push_back(range);
   }
-  journal.write({frame, whole});
-  return true;
+  return whole;
+}
+
+/// Writes to the file of another process.
+void ModelWriter::Impl::join_in(const std::string& journal_text,
+                                std::function<void(const std::string&)> to_report) {
+  const std::optional<JournalContents> begun = read_journal(journal_text);
+  if (!begun || begun->frame.key != frame.key || begun->frame.packed_at.size() != matrices.size())
+    throw Error("another rank has computed another model than this one", path.string(),
+                "Start the same build of palpate-precompute-mpi on all nodes, on one kind of processor, with "
+                "the same files");
+  const std::string unshared =
+      "Write to a folder that all nodes share, or bake in parts: palpate-precompute --part K/N";
+  std::error_code missing;
+  if (!std::filesystem::exists(partial, missing))
+    throw Error("is not there, where another rank has made it: the nodes do not share this folder",
+                partial.string(), unshared);
+  data = open_file(partial, OpenMode::write);
+  if (file_size(data) != begun->frame.file_bytes || !is_ours(*begun) ||
+      checksum_around(data, gaps(begun->frame)) != begun->frame.checksum)
+    throw Error("is not the file that another rank has made: the nodes do not share this folder",
+                partial.string(), unshared);
+  frame = begun->frame;
+  for (const JournalRange& range : begun->ranges) mark_done(range);
+  report = std::move(to_report);
 }
 
 /// Whether the HDF5 library can be given what a killed run left, and its packed matrices lie where the
@@ -298,6 +355,7 @@ bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
   try {
     const hdf5::Contents contents = hdf5::Contents::read(partial);
     for (std::size_t matrix = 0; matrix < matrices.size(); ++matrix) {
+      if (matrices[matrix].bytes() == 0) continue;
       const hdf5::Stored stored = contents.locate(matrices[matrix].path, matrices[matrix].scalar, 1);
       if (stored.offset != left.frame.packed_at[matrix] || stored.bytes != matrices[matrix].bytes())
         return false;
@@ -309,38 +367,40 @@ bool ModelWriter::Impl::is_ours(const JournalContents& left) const {
 }
 
 void ModelWriter::Impl::start(const Model& model) {
-  journal.empty();
+  journal->empty();
   data.close();
   check_free_space(partial, frame.file_bytes);
   make_anew(partial);
   write_body(model);
   data = open_file(partial, OpenMode::write);
-  for (const Gap& gap : gaps(frame)) reserve_space(data, gap.at, gap.bytes);
+  for (const Gap& gap : gaps(frame))
+    if (gap.bytes > 0) reserve_space(data, gap.at, gap.bytes);
   frame.file_bytes = file_size(data);
   frame.checksum = checksum_around(data, gaps(frame));
-  journal.write({frame, {}});
+  journal->write({frame, {}});
 }
 
 /// Everything but what `finish` brings.
 void ModelWriter::Impl::write_body(const Model& model) {
   const hdf5::Quiet quiet;
-  std::int64_t smallest = matrices.front().bytes();
-  for (const Streamed& matrix : matrices) smallest = std::min(smallest, matrix.bytes());
+  std::int64_t smallest = streamed_bytes();
+  for (const Streamed& matrix : matrices)
+    if (matrix.bytes() > 0) smallest = std::min(smallest, matrix.bytes());
   hdf5::File file = hdf5::File::create(partial, smallest);
   write_attributes(file, model, header);
   for_each_known_field(model, [&](const auto& field) { write_field(file, field, model, counts); });
   write_vtk_view(file);
   for (const Streamed& matrix : matrices) {
     frame.packed_at.push_back(
-        file.write(matrix.path, matrix.scalar, std::array{matrix.starts.back()}, nullptr));
+        matrix.bytes() == 0 ? 0
+                            : file.write(matrix.path, matrix.scalar, std::array{matrix.entries()}, nullptr));
   }
   file.close();
 }
 
 void ModelWriter::Impl::expect_piece(std::size_t matrix, std::int64_t first, std::int64_t count,
                                      std::int64_t entries) const {
-  if (matrix < matrices.size() && first >= 0 && count >= 0 && first <= matrices[matrix].pieces() &&
-      count <= matrices[matrix].pieces() - first) {
+  if (matrix < matrices.size() && matrices[matrix].has_in_file(first, count)) {
     const std::vector<std::int64_t>& starts = matrices[matrix].starts;
     if (entries == starts[static_cast<std::size_t>(first + count)] - starts[static_cast<std::size_t>(first)])
       return;
@@ -377,8 +437,22 @@ bool ModelWriter::Impl::has(std::size_t matrix, std::int64_t first, std::int64_t
 }
 
 void ModelWriter::Impl::mark_done(const JournalRange& range) {
-  const auto begin = matrices[static_cast<std::size_t>(range.matrix)].done.begin() + range.first;
+  if (range.matrix >= std::ssize(matrices)) return;
+  Streamed& matrix = matrices[static_cast<std::size_t>(range.matrix)];
+  if (!matrix.has_in_file(range.first, range.count)) return;
+  const auto begin = matrix.done.begin() + range.first;
   std::fill(begin, begin + range.count, true);
+}
+
+/// A piece is in the file.
+void ModelWriter::Impl::record(const JournalRange& range) {
+  const std::scoped_lock lock(mutex);
+  if (journal) {
+    journal->add(range);
+  } else {
+    report(line_of(range));
+  }
+  mark_done(range);
 }
 
 template <class T, class From>
@@ -404,10 +478,56 @@ void ModelWriter::Impl::store(std::size_t matrix, std::int64_t first, std::int64
     write_exactly(data, bytes_of(converted), at);
     at += static_cast<std::int64_t>(bytes_of(converted).size());
   }
-  const std::scoped_lock lock(mutex);
-  const JournalRange range{static_cast<std::int64_t>(matrix), first, count, stored.digits()};
-  journal.add(range);
-  mark_done(range);
+  record({static_cast<std::int64_t>(matrix), first, count, stored.digits()});
+}
+
+/// Copies the pieces that are not there.
+void ModelWriter::Impl::add_part(const std::filesystem::path& from) {
+  Journal held(with_suffix(from, ".progress"));
+  const std::optional<JournalContents> left = held.read();
+  const std::string again = "Make this part again, with --part and --discard";
+  if (!left || !left->frame.part || left->frame.part->pieces.size() != matrices.size())
+    throw Error("holds no part of this model", from.string(), again);
+  if (left->frame.key != frame.key) {
+    const std::string other = hdf5::Contents::read(from).text_attribute("/", "generator").value_or("");
+    const std::string ours = "palpate-precompute " PALPATE_VERSION;
+    if (other != ours) throw Error("was made by " + other + ", and this is " + ours, from.string(), again);
+    throw Error(
+        "is a part of another model, or was made on another kind of processor", from.string(),
+        "Give join the same model.toml, geometry and place of the output as the parts had, on the same "
+        "kind of processor");
+  }
+  const FileDescriptor file = open_file(from, OpenMode::read);
+  for (const JournalRange& range : left->ranges) {
+    if (range.matrix >= std::ssize(matrices)) continue;
+    const auto matrix = static_cast<std::size_t>(range.matrix);
+    const PieceRange& pieces = left->frame.part->pieces[matrix];
+    if (range.first < pieces.first || range.first + range.count > pieces.end ||
+        !matrices[matrix].has_in_file(range.first, range.count) || has(matrix, range.first, range.count))
+      continue;
+    take_over(file, left->frame.packed_at[matrix] - matrices[matrix].byte(pieces.first), range);
+  }
+}
+
+/// Copies a range from a file in which the matrix would begin at `origin`.
+void ModelWriter::Impl::take_over(const FileDescriptor& file, std::int64_t origin,
+                                  const JournalRange& range) {
+  const auto matrix = static_cast<std::size_t>(range.matrix);
+  RunningChecksum copied;
+  std::vector<std::byte> buffer(std::size_t{1} << 20);
+  const std::int64_t end = place(matrix, range.first + range.count);
+  for (std::int64_t at = place(matrix, range.first); at < end; at += std::ssize(buffer)) {
+    const auto bytes = std::span(buffer).first(
+        static_cast<std::size_t>(std::min<std::int64_t>(std::ssize(buffer), end - at)));
+    read_exactly(file, bytes, at - frame.packed_at[matrix] + origin);
+    copied.update(bytes);
+    write_exactly(data, bytes, at);
+  }
+  if (copied.digits() != range.checksum)
+    throw Error("has changed since it was made: its columns " + std::to_string(range.first) + " to " +
+                    std::to_string(range.first + range.count - 1) + " have another checksum",
+                file.path().string(), "Copy it again, or give its --part again");
+  record(range);
 }
 
 /// Window by window, so that the file does not fill the memory.
@@ -478,18 +598,33 @@ void ModelWriter::Impl::seal(const std::vector<Probe>& probes,
   file.write_attribute("/", "content_hash", content.digits());
   file.close();
   rename_durably(partial, path);
-  journal.remove();
+  journal->remove();
 }
 
 void ModelWriter::Impl::discard() noexcept {
+  if (!journal) return;
   std::error_code ignored;
   std::filesystem::remove(partial, ignored);
-  journal.remove();
+  journal->remove();
 }
 
 ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
                          Leftovers leftovers)
-    : impl_(std::make_unique<Impl>(std::move(path), model, precision, leftovers)) {}
+    : impl_(std::make_unique<Impl>(std::move(path), model, precision, std::nullopt)) {
+  impl_->begin(model, leftovers);
+}
+
+ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+                         Leftovers leftovers, const BakePart& part)
+    : impl_(std::make_unique<Impl>(std::move(path), model, precision, part)) {
+  impl_->begin(model, leftovers);
+}
+
+ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
+                         const std::string& journal_text, std::function<void(const std::string& line)> report)
+    : impl_(std::make_unique<Impl>(std::move(path), model, precision, std::nullopt)) {
+  impl_->join_in(journal_text, std::move(report));
+}
 
 ModelWriter::~ModelWriter() = default;
 
@@ -513,6 +648,20 @@ void ModelWriter::write_columns(std::int64_t first, std::int64_t count, std::spa
     discard();
     throw;
   }
+}
+
+void ModelWriter::add_part(const std::filesystem::path& path) {
+  impl_->add_part(path);
+}
+
+std::string ModelWriter::journal_text() const {
+  const std::optional<JournalContents> contents = impl_->journal->read();
+  return contents ? text_of(*contents) : "";
+}
+
+void ModelWriter::note(const std::string& line) {
+  const std::string_view range = line;
+  if (const auto read = read_range(range.substr(0, range.find('\n')))) impl_->record(*read);
 }
 
 bool ModelWriter::has_near(Index leaf) const {

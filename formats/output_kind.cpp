@@ -50,7 +50,7 @@ bool is_our_xml(std::string_view text, std::string_view before_there_was_a_mark)
 }
 
 bool is_our_report(std::string_view text) {
-  if (text.starts_with("{\n  \"generator\": \"palpate-runtime ")) return true;
+  if (text.starts_with("{\n  \"generator\": \"palpate-")) return true;
   return text.starts_with("{\n  \"file\": ") && contains(text, "\n  \"fast\": ") &&
          contains(text, "\n  \"tool\": ");
 }

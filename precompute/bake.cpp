@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <random>
 
@@ -14,7 +14,9 @@
 #include "base/parallel.h"
 #include "formats/model_file.h"
 #include "formats/outputs/output_paths.h"
+#include "formats/outputs/part_files.h"
 #include "meshes/quality.h"
+#include "precompute/columns.h"
 #include "precompute/compressed_greens.h"
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/factor.h"
@@ -76,10 +78,6 @@ constexpr const char* precision_stage = "choosing the precision";
 constexpr const char* inverse_factor_stage = "factorising K_bar";
 constexpr const char* write_stage = "writing the file";
 
-constexpr const char* column_stage(PackedMatrix matrix) {
-  return matrix == PackedMatrix::greens ? "Green's functions" : "inverse of K_bar";
-}
-
 struct Plans {
   Plan plan;
   std::optional<CompressionPlan> compression;
@@ -87,8 +85,17 @@ struct Plans {
   DynamicsPlan dynamics;
 };
 
-/// What follows the plan.
-std::vector<Stage> stages_of(const Plans& plans, int jobs) {
+/// What the stages that solve columns have in common.
+struct Shared {
+  int jobs;
+  Team& team;
+  Progress& progress;
+  TileCounts& tiles;
+  std::function<bool()> interrupted;
+};
+
+/// What follows the plan, by so many ranks.
+std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
   const auto& [plan, compression, overlays, dynamics] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
@@ -96,7 +103,7 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs) {
   if (dynamics.method == DynamicsMethod::modal)
     stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
   if (compression) {
-    const std::vector<Stage> more = compression_stages(*compression);
+    const std::vector<Stage> more = compression_stages(*compression, ranks);
     stages.insert(stages.end(), more.begin(), more.end());
     stages.push_back({write_stage, plan.write_seconds});
     return stages;
@@ -104,13 +111,32 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs) {
   const bool packed = dynamics.method == DynamicsMethod::packed;
   stages.push_back({precision_stage, plan.precision_seconds * (packed ? 2.0 : 1.0) +
                                          plan.factor_seconds * (packed ? 1.0 : 0.0)});
-  stages.push_back({column_stage(PackedMatrix::greens), plan.seconds});
+  stages.push_back({column_stage(PackedMatrix::greens), plan.seconds / ranks});
   if (packed) {
     stages.push_back({inverse_factor_stage, plan.factor_seconds});
-    stages.push_back({column_stage(PackedMatrix::inverse), plan.seconds});
+    stages.push_back({column_stage(PackedMatrix::inverse), plan.seconds / ranks});
   }
   stages.push_back({write_stage, plan.write_seconds});
   return stages;
+}
+
+/// What all ranks take together.
+std::string ranks_text(const Plans& plans, const std::vector<Tile>& tiles, int jobs, int ranks) {
+  const Plan& plan = plans.plan;
+  double seconds = 0.0;
+  for (const Stage& stage : stages_of(plans, jobs, ranks)) seconds += stage.seconds;
+  const auto memory =
+      static_cast<double>(plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes) * 1e-9;
+  const auto threads = std::int64_t{jobs} * ranks;
+  std::string text = fmt::format(
+      "{} ranks of {} job{}: {:.2f} GB of memory each, {:.1f} GB in all; about {} from the factor to the "
+      "file, "
+      "{:.1f} hours of a processor",
+      ranks, jobs, jobs == 1 ? "" : "s", memory, memory * ranks, duration_text(seconds),
+      seconds * static_cast<double>(threads) / 3600.0);
+  if (!plans.compression && std::ssize(tiles) < 2 * threads)
+    text += fmt::format("; {} blocks of columns for {} threads: fewer ranks would do", tiles.size(), threads);
+  return text;
 }
 
 /// What makes a large file smaller.
@@ -186,61 +212,6 @@ std::vector<Probe> make_probes(const Factor& factor, const std::vector<std::int6
   return probes;
 }
 
-/// How many columns an earlier, unfinished run has left, and what the others take.
-struct Kept {
-  std::int64_t columns = 0;
-  double flops = 0.0;  ///< of the columns that are still to be solved
-};
-
-Kept kept_columns(const GreensSolver& solver, const Plan& plan, const ModelWriter& writer,
-                  PackedMatrix matrix) {
-  Kept kept;
-  for (std::int64_t first = 0; first < plan.stored_dofs; first += plan.block_columns) {
-    const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
-    if (writer.has_columns(first, count, matrix)) {
-      kept.columns += count;
-    } else {
-      kept.flops += solver.flops(first, count);
-    }
-  }
-  return kept;
-}
-
-/// Computes all blocks of columns of a packed matrix that the file does not have yet, `jobs` at a time. False
-/// when interrupted.
-bool solve_columns(const GreensSolver& solver, const Plan& plan, int jobs, ModelWriter& writer,
-                   PackedMatrix matrix, Progress& progress, const InterruptGuard& interrupt) {
-  const std::string name = column_stage(matrix);
-  const std::int64_t blocks = (plan.stored_dofs + plan.block_columns - 1) / plan.block_columns;
-  const Kept kept = kept_columns(solver, plan, writer, matrix);
-  if (kept.columns > 0) {
-    progress.line(fmt::format("{}: {} of {} columns were kept from an earlier, unfinished run", name,
-                              kept.columns, plan.stored_dofs));
-    progress.expect(name, plan.seconds * kept.flops / plan.flops);
-  }
-  progress.begin(name);
-  double done_flops = 0.0;
-  std::mutex mutex;  // progress and its counter
-  struct Scratch {
-    GreensSolver::Workspace workspace;
-    std::vector<double> packed;
-  };
-  std::vector<Scratch> scratch(static_cast<std::size_t>(jobs));
-  parallel_for(blocks, jobs, [&](std::int64_t block, int worker) {
-    const std::int64_t first = block * plan.block_columns;
-    const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
-    if (interrupt.requested() || writer.has_columns(first, count, matrix)) return;
-    auto& [workspace, packed] = scratch[static_cast<std::size_t>(worker)];
-    solver.columns(first, count, workspace, packed);
-    writer.write_columns(first, count, packed, matrix);
-    const double flops = solver.flops(first, count);
-    const std::scoped_lock lock(mutex);
-    done_flops += flops;
-    progress.reach(done_flops / kept.flops);
-  });
-  return !interrupt.requested();
-}
-
 SparseMatrix stiffness_of_step(const ElasticBody& body, const Stiffness& stiffness,
                                const DynamicsOptions& options) {
   return effective_stiffness(stiffness.K, assemble_mass(body, stiffness, options.lumped), options.damping,
@@ -283,17 +254,18 @@ Precision decide_precision(const Description& description, const ElasticBody& bo
 /// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
 bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const DynamicsOptions& options,
                    const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
-                   const Plan& plan, int jobs, ModelWriter& writer, Progress& progress,
-                   const InterruptGuard& interrupt) {
+                   const Plan& plan, const PieceRange& columns, const Shared& run, ModelWriter& writer) {
   const SparseMatrix K_bar = stiffness_of_step(body, stiffness, options);
   Factor factor(K_bar, stiffness.node_start);
   const GreensSolver solver(factor, stored, stiffness.free_dofs, body.mesh.dimension());
   if (solver.stored_dofs() != stored_dofs) {
     throw std::logic_error("K_bar and K, of one pattern, have different elimination orders");
   }
-  progress.begin(inverse_factor_stage);
+  if (writer.has_columns(columns.first, columns.end - columns.first, PackedMatrix::inverse)) return true;
+  run.progress.begin(inverse_factor_stage);
   factor.factorize();
-  return solve_columns(solver, plan, jobs, writer, PackedMatrix::inverse, progress, interrupt);
+  return solve_columns(solver, plan, columns, run.jobs, run.team, writer, PackedMatrix::inverse, run.progress,
+                       run.tiles, run.interrupted);
 }
 
 OverlayPlan announce_overlays(const Description& description, const Model& model, Progress& progress) {
@@ -371,23 +343,49 @@ void add_dynamics(const Description& description, const DynamicsPlan& plan, cons
                         assemble_mass(body, stiffness, description.dynamics->lumped), factor, stored_dofs);
 }
 
-/// Computes the columns of the packed matrices and the probes of the first one. Nothing when interrupted.
-std::optional<std::vector<Probe>> solve_matrices(const Description& description, const ElasticBody& body,
-                                                 const Stiffness& stiffness, std::unique_ptr<Factor> factor,
-                                                 const GreensSolver& solver,
-                                                 const std::vector<std::uint8_t>& stored, const Plans& plans,
-                                                 int jobs, ModelWriter& writer, Progress& progress,
-                                                 const InterruptGuard& interrupt) {
+/// What is found once the file is begun.
+struct Solved {
+  std::vector<Probe> probes;
+  std::shared_ptr<const HierarchicalMatrix> compressed;
+};
+
+/// Computes the columns of the packed matrices, of a part or all, and the leader the probes of the first one.
+/// Nothing when interrupted.
+std::optional<Solved> solve_matrices(const Description& description, const ElasticBody& body,
+                                     const Stiffness& stiffness, std::unique_ptr<Factor> factor,
+                                     const GreensSolver& solver, const std::vector<std::uint8_t>& stored,
+                                     const Plans& plans, const std::optional<BakePart>& part,
+                                     const Shared& run, ModelWriter& writer) {
   const std::vector<std::int64_t> stored_dofs = solver.stored_dofs();
-  if (!solve_columns(solver, plans.plan, jobs, writer, PackedMatrix::greens, progress, interrupt)) return {};
-  std::vector<Probe> probes = make_probes(*factor, stored_dofs);
+  const PieceRange columns = part ? part->pieces.front() : PieceRange{0, plans.plan.stored_dofs};
+  if (!solve_columns(solver, plans.plan, columns, run.jobs, run.team, writer, PackedMatrix::greens,
+                     run.progress, run.tiles, run.interrupted))
+    return {};
+  Solved solved;
+  if (run.team.leads() && !part) solved.probes = make_probes(*factor, stored_dofs);
   if (plans.dynamics.method == DynamicsMethod::packed) {
     factor.reset();  // its memory is for that of K_bar
-    if (!solve_inverse(body, stiffness, *description.dynamics, stored, stored_dofs, plans.plan, jobs, writer,
-                       progress, interrupt))
+    if (!solve_inverse(body, stiffness, *description.dynamics, stored, stored_dofs, plans.plan, columns, run,
+                       writer))
       return {};
   }
-  return probes;
+  return solved;
+}
+
+/// Compresses the Green's functions: all ranks share the near pairs, of which a part has some, and the leader
+/// makes the rest. Nothing when interrupted.
+std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor& factor,
+                                       const std::optional<BakePart>& part, const Shared& run,
+                                       ModelWriter& writer) {
+  GreensCompressor compressor(plan, factor, run.jobs, run.progress, run.interrupted);
+  const PieceRange leaves = part ? part->pieces.front() : PieceRange{0, plan.frame.tree.leaves()};
+  if (!compressor.solve_near(leaves, run.team, writer, run.tiles)) return {};
+  Solved solved;
+  if (part || !run.team.leads()) return solved;
+  solved.compressed = compressor.compress(writer);
+  if (solved.compressed == nullptr) return {};
+  solved.probes = make_probes(factor, plan.stored.dofs);
+  return solved;
 }
 
 /// Condenses the overlays that the file is to keep. False when interrupted.
@@ -401,11 +399,11 @@ bool add_overlays(const Description& description, const OverlayPlan& overlays, i
   return !interrupt.requested();
 }
 
-std::string interruption_text(const std::filesystem::path& output) {
+std::string interruption_text(const BakeOptions& options) {
   return fmt::format(
-      "interrupted: the columns that are done are kept in {}.partial; the same command goes on from there, "
+      "interrupted: the columns that are done are kept in {}{}; the same command goes on from there, "
       "with --discard it begins anew",
-      output.string());
+      options.output.string(), options.part ? "" : ".partial");
 }
 
 void check_touchable(const Surface& surface, const Model& model, const Description& description) {
@@ -419,86 +417,209 @@ void check_touchable(const Surface& surface, const Model& model, const Descripti
 /// Where the model may be written; before any work.
 std::filesystem::path check_output(const Description& description, const BakeOptions& options) {
   OutputPaths paths(options.force);
+  if (!options.report.empty() && options.report != "-")
+    paths.add(options.report, OutputKind::report, "--report");
   paths.add_input(description.file, "the description");
   for (const auto& file : input_files(description)) paths.add_input(file, "the geometry");
+  for (const auto& part : options.parts) paths.add_input(part, "a part");
   return paths.add(options.output, OutputKind::model, "--output");
+}
+
+/// The options with the paths that are read and written, which are checked by the leader.
+BakeOptions with_paths(const Description& description, const BakeOptions& asked, Team& team) {
+  BakeOptions options = asked;
+  if (options.join) options.parts = find_parts(options.output, options.parts);
+  if (options.part) options.output = part_path(options.output, options.part->number, options.part->parts);
+  if (options.dry_run) return options;
+  const auto output = team.leads() ? check_output(description, options) : std::filesystem::path();
+  options.output = team.share(output.string());
+  return options;
+}
+
+/// The part that is asked for: of all matrices the same columns.
+std::optional<BakePart> planned_part(const BakeOptions& options, const Plans& plans,
+                                     const GreensSolver& solver) {
+  if (!options.part) return {};
+  const auto [number, parts] = *options.part;
+  const PieceRange pieces =
+      share_of(plans.compression ? near_tiles(plans.compression->frame) : column_tiles(solver, plans.plan),
+               number, parts);
+  const bool two = plans.dynamics.method == DynamicsMethod::packed;
+  return BakePart{number, parts, std::vector<PieceRange>(two ? 2 : 1, pieces)};
+}
+
+/// Begins the file, or goes on with it: a part's own, the leader's, or that which the leader has begun.
+std::unique_ptr<ModelWriter> open_writer(const BakeOptions& options, const std::optional<BakePart>& part,
+                                         const Model& model, Precision precision, Team& team) {
+  const Leftovers leftovers = options.discard ? Leftovers::discard : Leftovers::resume;
+  if (part) return std::make_unique<ModelWriter>(options.output, model, precision, leftovers, *part);
+  if (!team.leads())
+    return std::make_unique<ModelWriter>(options.output, model, precision, team.share(""),
+                                         [&team](const std::string& line) { team.tell(line); });
+  auto writer = std::make_unique<ModelWriter>(options.output, model, precision, leftovers);
+  for (const auto& path : options.parts) writer->add_part(path);
+  team.share(writer->journal_text());
+  team.listen([&to = *writer](const std::string& line) { to.note(line); });
+  return writer;
+}
+
+/// The stages of a bake, which share all of this.
+class Bake {
+ public:
+  Bake(const Description& description, const BakeOptions& options, Team& team, Progress& progress,
+       InterruptGuard& interrupt)
+      : description_(description),
+        options_(options),
+        team_(team),
+        progress_(progress),
+        interrupt_(interrupt) {}
+
+  BakeResult run() {
+    assemble();
+    if (options_.dry_run) return BakeResult::planned;
+    progress_.plan(stages_of(plans_, options_.jobs, team_.size()));
+    progress_.begin(factor_stage);
+    factor_->factorize();
+    interrupt_.note_from_now_on();
+    if (!describe()) {
+      progress_.line("interrupted: nothing was written");
+      return BakeResult::interrupted;
+    }
+    return solve_and_write();
+  }
+
+  [[nodiscard]] const Plan& plan() const { return plans_.plan; }
+  [[nodiscard]] const TileCounts& tiles() const { return tiles_; }
+
+ private:
+  void assemble();
+  bool describe();
+  BakeResult solve_and_write();
+  std::optional<Solved> solve(ModelWriter& writer);
+
+  const Description& description_;
+  const BakeOptions& options_;
+  Team& team_;
+  Progress& progress_;
+  InterruptGuard& interrupt_;
+
+  Model model_;
+  std::optional<ElasticBody> elastic_;
+  Stiffness stiffness_;
+  std::vector<Vec3> loads_, prescribed_;
+  std::string warning_;
+  std::vector<std::uint8_t> stored_;
+  std::unique_ptr<Factor> factor_;
+  std::optional<GreensSolver> solver_;
+  Plans plans_;
+  std::optional<BakePart> part_;
+  StoredNumbering stored_as_;
+  Precision precision_ = Precision::single_precision;
+  TileCounts tiles_;
+};
+
+/// Mesh, K and the plan.
+void Bake::assemble() {
+  MeshedBody body = mesh_body(description_, [&](const std::string& text) { progress_.begin(text); });
+  for (const std::string& note : body.notes) progress_.line("note: " + note);
+  warning_ = body.warning;
+  progress_.begin("assembling K");
+  loads_ = nodal_loads(description_, body);
+  prescribed_ = body.prescribed;
+  const Surface surface = body.surface;
+  model_ = describe_model(description_, options_, std::move(body));
+  elastic_.emplace(elastic_body(model_));
+  elastic_->prescribed = prescribed_;
+  stiffness_ = assemble_stiffness(*elastic_);
+  openblas_set_num_threads(1);  // blocks of columns are the parallel work: the bytes depend on no `jobs`
+  progress_.begin("ordering K");
+  factor_ = std::make_unique<Factor>(stiffness_.K, stiffness_.node_start);
+  stored_ = stored_dof_marks(model_.mesh, surface, stiffness_, description_.scope, description_.layers);
+  solver_.emplace(*factor_, stored_, stiffness_.free_dofs, model_.dimension());
+  check_touchable(surface, model_, description_);
+  plans_ = announce_plans(description_, options_, model_, stiffness_, *factor_, *solver_, progress_);
+  const int ranks = options_.ranks > 0 ? options_.ranks : team_.size();
+  if (ranks > 1)
+    progress_.line(ranks_text(plans_, column_tiles(*solver_, plans_.plan), options_.jobs, ranks));
+  if (!warning_.empty()) progress_.warn(warning_);
+  check_memory(plans_.plan, team_.size_here());
+  part_ = planned_part(options_, plans_, *solver_);
+}
+
+/// All of the model that is known before the columns. False when interrupted.
+bool Bake::describe() {
+  stored_as_ = plans_.compression ? plans_.compression->stored
+                                  : number_stored(*solver_, stiffness_, model_.dimension());
+  model_.stored_nodes = stored_as_.nodes;
+  model_.rest_force = loads_;
+  model_.rest_displacement = rest_displacement(*factor_, stiffness_, loads_, prescribed_, model_.dimension());
+  const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, options_.jobs,
+                                                           model_, progress_, interrupt_);
+  if (team_.any(!whole)) return false;
+  add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_,
+               progress_);
+  if (plans_.compression) {
+    model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
+  } else {
+    progress_.begin(precision_stage);
+    precision_ =
+        decide_precision(description_, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_, progress_);
+  }
+  return true;
+}
+
+std::optional<Solved> Bake::solve(ModelWriter& writer) {
+  const Shared run{options_.jobs, team_, progress_, tiles_, [&] { return interrupt_.requested(); }};
+  if (plans_.compression) return solve_compressed(*plans_.compression, *factor_, part_, run, writer);
+  return solve_matrices(description_, *elastic_, stiffness_, std::move(factor_), *solver_, stored_, plans_,
+                        part_, run, writer);
+}
+
+BakeResult Bake::solve_and_write() {
+  const std::unique_ptr<ModelWriter> writer = open_writer(options_, part_, model_, precision_, team_);
+  model_.overlay = {};  // written by now
+  model_.dynamics = {};
+  const std::optional<Solved> solved = solve(*writer);
+  if (!solved) {
+    progress_.line(interruption_text(options_));
+    return BakeResult::interrupted;
+  }
+  if (part_) {
+    progress_.line(fmt::format("part {} of {} written: {} and {}.progress", part_->number, part_->parts,
+                               options_.output.string(), options_.output.filename().string()));
+    return BakeResult::part_done;
+  }
+  if (!team_.leads()) return BakeResult::done;
+  progress_.begin(write_stage);
+  writer->finish(solved->probes, solved->compressed);
+  progress_.line(fmt::format("{} written", options_.output.string()));
+  if (!options_.keep_parts) remove_parts(options_.parts);
+  if (!warning_.empty()) progress_.warn(warning_);
+  return BakeResult::done;
 }
 
 }  // namespace
 
-BakeResult bake(const Description& description, const BakeOptions& asked) {
-  BakeOptions options = asked;
-  if (!options.dry_run) options.output = check_output(description, asked);
-  Progress progress;
-  MeshedBody body = mesh_body(description, [&](const std::string& text) { progress.begin(text); });
-  for (const std::string& note : body.notes) progress.line("note: " + note);
-  const std::string warning = body.warning;
+BakeResult bake(const Description& description, const BakeOptions& options) {
+  Team alone;
+  return bake(description, options, alone).result;
+}
 
-  progress.begin("assembling K");
-  const std::vector<Vec3> loads = nodal_loads(description, body);
-  const std::vector<Vec3> prescribed = body.prescribed;
-  const Surface surface = body.surface;
-  Model model = describe_model(description, options, std::move(body));
-  ElasticBody elastic = elastic_body(model);
-  elastic.prescribed = prescribed;
-  const Stiffness stiffness = assemble_stiffness(elastic);
-  openblas_set_num_threads(1);  // blocks of columns are the parallel work: the bytes depend on no `jobs`
-  progress.begin("ordering K");
-  auto factor = std::make_unique<Factor>(stiffness.K, stiffness.node_start);
-  const std::vector<std::uint8_t> stored =
-      stored_dof_marks(model.mesh, surface, stiffness, description.scope, description.layers);
-  const GreensSolver solver(*factor, stored, stiffness.free_dofs, model.dimension());
-  check_touchable(surface, model, description);
-  const Plans plans = announce_plans(description, options, model, stiffness, *factor, solver, progress);
-  if (!warning.empty()) progress.warn(warning);
-  check_memory(plans.plan);
-  if (options.dry_run) return BakeResult::planned;
-
-  progress.plan(stages_of(plans, options.jobs));
-  progress.begin(factor_stage);
-  factor->factorize();
-  const StoredNumbering stored_as =
-      plans.compression ? plans.compression->stored : number_stored(solver, stiffness, model.dimension());
-  model.stored_nodes = stored_as.nodes;
-  model.rest_force = loads;
-  model.rest_displacement = rest_displacement(*factor, stiffness, loads, prescribed, model.dimension());
-  const InterruptGuard interrupt;
-  if (description.overlay &&
-      !add_overlays(description, plans.overlays, options.jobs, model, progress, interrupt)) {
-    progress.line("interrupted: nothing was written");
-    return BakeResult::interrupted;
-  }
-  add_dynamics(description, plans.dynamics, elastic, stiffness, *factor, stored_as.dofs, model, progress);
-  Precision precision = Precision::single_precision;
-  if (plans.compression) {
-    model.compressed = std::make_shared<const HierarchicalMatrix>(plans.compression->frame);
-  } else {
-    progress.begin(precision_stage);
-    precision = decide_precision(description, elastic, stiffness, *factor, stored_as.dofs, model, progress);
-  }
-  ModelWriter writer(options.output, model, precision,
-                     options.discard ? Leftovers::discard : Leftovers::resume);
-  model.overlay = {};  // written by now
-  model.dynamics = {};
-  std::shared_ptr<const HierarchicalMatrix> compressed;
-  std::optional<std::vector<Probe>> probes;
-  if (plans.compression) {
-    compressed = compress_greens(*plans.compression, *factor, options.jobs, writer, progress,
-                                 [&] { return interrupt.requested(); });
-    if (compressed != nullptr) probes = make_probes(*factor, stored_as.dofs);
-  } else {
-    probes = solve_matrices(description, elastic, stiffness, std::move(factor), solver, stored, plans,
-                            options.jobs, writer, progress, interrupt);
-  }
-  if (!probes) {
-    progress.line(interruption_text(options.output));
-    return BakeResult::interrupted;
-  }
-  progress.begin(write_stage);
-  writer.finish(*probes, compressed);
-  progress.line(fmt::format("{} written", options.output.string()));
-  if (!warning.empty()) progress.warn(warning);
-  return BakeResult::done;
+BakeSummary bake(const Description& description, const BakeOptions& asked, Team& team) {
+  InterruptGuard interrupt;
+  const BakeOptions options = with_paths(description, asked, team);
+  Progress progress(team.prints());
+  Bake bake(description, options, team, progress, interrupt);
+  BakeSummary summary{.model = description.file.string(),
+                      .output = options.output,
+                      .part = options.part,
+                      .jobs = options.jobs};
+  summary.result = bake.run();
+  progress.end();
+  summary.plan = bake.plan();
+  summary.tiles = bake.tiles();
+  summary.stages = progress.stages();
+  return summary;
 }
 
 }  // namespace palpate

@@ -46,24 +46,6 @@ StoredNumbering reordered(const StoredNumbering& stored, const std::vector<Index
   return result;
 }
 
-/// Prints what a stage has done.
-class StageProgress {
- public:
-  StageProgress(Progress& progress, std::function<bool()> interrupted)
-      : progress_(progress), interrupted_(std::move(interrupted)) {}
-
-  bool reach(const char* stage, double share) {
-    if (stage != stage_) progress_.begin(stage_ = stage);
-    progress_.reach(share);
-    return !interrupted_();
-  }
-
- private:
-  Progress& progress_;
-  std::function<bool()> interrupted_;
-  const char* stage_ = nullptr;
-};
-
 std::vector<double> table_of(const std::vector<TouchErrors>& errors) {
   std::vector<double> table;
   for (const TouchErrors& e : errors) {
@@ -130,43 +112,94 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
   return plan;
 }
 
-std::vector<Stage> compression_stages(const CompressionPlan& plan) {
-  return {{near_stage, plan.near_seconds},
+std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks) {
+  return {{near_stage, plan.near_seconds / ranks},
           {sample_stage, plan.sample_seconds},
           {far_stage, plan.far_seconds},
           {touch_stage, plan.touch_seconds}};
 }
 
-std::shared_ptr<const HierarchicalMatrix> compress_greens(const CompressionPlan& plan, const Factor& factor,
-                                                          int jobs, ModelWriter& writer, Progress& progress,
-                                                          const std::function<bool()>& interrupted) {
-  StageProgress stages(progress, interrupted);
-  Compression compression(
-      factor, plan.stored.dofs, plan.frame.dimension, plan.clusters, jobs,
-      [&](CompressionStage stage, double share) { return stages.reach(name_of(stage), share); });
-  const NearStore store = {
-      [&](Index leaf, std::span<float> entries) {
-        if (!writer.has_near(leaf)) return false;
-        writer.read_near(leaf, entries);
-        return true;
-      },
-      [&](Index leaf, std::span<const float> entries) { writer.write_near(leaf, entries); }};
-  if (!compression.prepare(store)) return nullptr;
-  double cut = cut_of_tolerance * plan.frame.tolerance;
+std::vector<Tile> near_tiles(const HierarchicalMatrix& frame) {
+  std::vector<Tile> tiles;
+  for (Index leaf = 0; leaf < frame.tree.leaves(); ++leaf) {
+    const auto begin = static_cast<std::size_t>(frame.first_near_pair(leaf)),
+               end = static_cast<std::size_t>(frame.first_near_pair(leaf + 1));
+    tiles.push_back({leaf, 1, static_cast<double>(frame.near_at[end] - frame.near_at[begin])});
+  }
+  return tiles;
+}
+
+GreensCompressor::GreensCompressor(const CompressionPlan& plan, const Factor& factor, int jobs,
+                                   Progress& progress, std::function<bool()> interrupted)
+    : plan_(plan),
+      factor_(factor),
+      jobs_(jobs),
+      progress_(progress),
+      interrupted_(std::move(interrupted)),
+      compression_(factor, plan.stored.dofs, plan.frame.dimension, plan.clusters, jobs,
+                   [this](CompressionStage stage, double share) { return reach(name_of(stage), share); }) {}
+
+bool GreensCompressor::reach(const char* stage, double share) {
+  if (stage != stage_) progress_.begin(stage_ = stage);
+  progress_.reach(share);
+  return !interrupted_();
+}
+
+bool GreensCompressor::solve_near(const PieceRange& part, Team& team, ModelWriter& writer,
+                                  TileCounts& counts) {
+  std::vector<Tile> tiles;
+  std::int64_t kept = 0;
+  double cost = 0.0, whole = 0.0;
+  for (const Tile& tile : near_tiles(plan_.frame)) {
+    whole += tile.cost;
+    if (tile.first < part.first || tile.first >= part.end) continue;
+    if (writer.has_near(static_cast<Index>(tile.first))) {
+      ++kept;
+      ++counts.kept;
+    } else {
+      cost += tile.cost;
+      tiles.push_back(tile);
+    }
+  }
+  if (kept > 0)
+    progress_.line(fmt::format("{}: those of {} of {} leaves were kept from earlier runs", near_stage, kept,
+                               part.end - part.first));
+  if (cost < whole) progress_.expect(near_stage, plan_.near_seconds * cost / whole);
+  progress_.begin(stage_ = near_stage);
+  std::vector<std::vector<float>> scratch(static_cast<std::size_t>(jobs_));
+  double done = 0.0;
+  return team.work(tiles, jobs_,
+                   {[&](const Tile& tile, int worker) {
+                      std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
+                      compression_.solve_near(static_cast<Index>(tile.first), worker, entries);
+                      writer.write_near(static_cast<Index>(tile.first), entries);
+                    },
+                    [&](const Tile& tile) {
+                      done += tile.cost;
+                      ++counts.solved;
+                      progress_.reach(done / cost);
+                    },
+                    interrupted_});
+}
+
+std::shared_ptr<const HierarchicalMatrix> GreensCompressor::compress(ModelWriter& writer) {
+  if (!compression_.prepare([&](Index leaf, std::span<float> entries) { writer.read_near(leaf, entries); }))
+    return nullptr;
+  double cut = cut_of_tolerance * plan_.frame.tolerance;
   for (int attempt = 1;; ++attempt, cut *= finer) {
-    const std::shared_ptr<HierarchicalMatrix> matrix = compression.compress(cut);
+    const std::shared_ptr<HierarchicalMatrix> matrix = compression_.compress(cut);
     if (matrix == nullptr) return nullptr;
     std::vector<TouchErrors> errors =
-        certify(*matrix, factor, plan.stored.dofs, plan.places.points, plan.places.touchable, touches,
-                certificate_seed, jobs, [&](double share) { return stages.reach(touch_stage, share); });
-    if (interrupted()) return nullptr;
+        certify(*matrix, factor_, plan_.stored.dofs, plan_.places.points, plan_.places.touchable, touches,
+                certificate_seed, jobs_, [&](double share) { return reach(touch_stage, share); });
+    if (interrupted_()) return nullptr;
     const double worst = worst_of(errors);
-    if (worst <= accepted * plan.frame.tolerance) {
+    if (worst <= accepted * plan_.frame.tolerance) {
       loosen_bound(*matrix, errors);
-      matrix->tolerance = plan.frame.tolerance;
+      matrix->tolerance = plan_.frame.tolerance;
       matrix->certificate = table_of(errors);
-      progress.line(fmt::format("compressed to {:.1f} MB; force errors of random touches:\n{}",
-                                1e-6 * static_cast<double>(matrix->bytes()), certificate_text(*matrix)));
+      progress_.line(fmt::format("compressed to {:.1f} MB; force errors of random touches:\n{}",
+                                 1e-6 * static_cast<double>(matrix->bytes()), certificate_text(*matrix)));
       return matrix;
     }
     if (attempt == most_cuts) {
@@ -174,10 +207,10 @@ std::shared_ptr<const HierarchicalMatrix> compress_greens(const CompressionPlan&
       throw Error(
           fmt::format(
               "forces of random touches are off by up to {:.2g} of the largest, the tolerance is {:.2g}",
-              worst, plan.frame.tolerance),
+              worst, plan_.frame.tolerance),
           "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
     }
-    progress.line(
+    progress_.line(
         fmt::format("force errors up to {:.1e} at a cut of {:.1e}: again with more terms", worst, cut));
   }
 }

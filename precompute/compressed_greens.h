@@ -15,6 +15,7 @@
 #include "precompute/numerics/factor.h"
 #include "precompute/plan.h"
 #include "precompute/progress.h"
+#include "precompute/team.h"
 
 namespace palpate {
 
@@ -46,14 +47,38 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
                                  int jobs);
 
 /// The stages of `compress_greens`, with the seconds that they are expected to take.
-std::vector<Stage> compression_stages(const CompressionPlan& plan);
+std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks = 1);
 
-/// Makes the matrix with near pairs by way of the writer, and measures random touches; where their forces are
-/// off by more than the tolerance, again with more terms. Null when `interrupted`. Throws Error where the
-/// tolerance is out of reach.
-std::shared_ptr<const HierarchicalMatrix> compress_greens(const CompressionPlan& plan, const Factor& factor,
-                                                          int jobs, ModelWriter& writer, Progress& progress,
-                                                          const std::function<bool()>& interrupted);
+/// Leaves of near pairs, whose cost is the number of their entries.
+std::vector<Tile> near_tiles(const HierarchicalMatrix& frame);
+
+/// How the Green's functions of a plan are made.
+class GreensCompressor {
+ public:
+  /// All are kept by reference.
+  GreensCompressor(const CompressionPlan& plan, const Factor& factor, int jobs, Progress& progress,
+                   std::function<bool()> interrupted);
+
+  /// Solves for the near pairs of the leaves of `part` that the writer does not have yet, and writes them.
+  /// Adds to `counts`. False when interrupted.
+  bool solve_near(const PieceRange& part, Team& team, ModelWriter& writer, TileCounts& counts);
+
+  /// Makes the matrix with the near pairs of the writer, which has all, and measures random touches; where
+  /// their forces are off by more than the tolerance, again with more terms. Null when interrupted. Throws
+  /// Error where the tolerance is out of reach.
+  std::shared_ptr<const HierarchicalMatrix> compress(ModelWriter& writer);
+
+ private:
+  bool reach(const char* stage, double share);
+
+  const CompressionPlan& plan_;
+  const Factor& factor_;
+  int jobs_;
+  Progress& progress_;
+  std::function<bool()> interrupted_;
+  const char* stage_ = nullptr;  // under way
+  Compression compression_;
+};
 
 /// The certificate as a table, a line for each number of nodes.
 std::string certificate_text(const HierarchicalMatrix& matrix);

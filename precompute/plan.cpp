@@ -5,11 +5,10 @@
 
 #include <chrono>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "base/error.h"
-#include "base/memory.h"
+#include "precompute/allotment.h"
 
 namespace palpate {
 namespace {
@@ -50,7 +49,7 @@ std::int64_t choose_block_columns(std::int64_t free_dofs) {
 
 /// How many of `jobs` threads have a processor.
 int working(int jobs) {
-  return std::min(jobs, std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  return std::min(jobs, allotted_processors());
 }
 
 }  // namespace
@@ -89,8 +88,8 @@ double modes_seconds(const Plan& plan, std::int64_t modes) {
   return solves * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
 }
 
-void check_memory(const Plan& plan) {
-  const std::int64_t available = available_memory();
+void check_memory(const Plan& plan, int ranks) {
+  const std::int64_t available = allotted_memory() / ranks;
   const std::int64_t needed = plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes;
   if (available == 0 || needed <= available) return;  // 0: the kernel does not say
   const std::string overlays =

@@ -37,7 +37,8 @@ double overlay_seconds(std::int64_t bytes, int jobs);
 /// What Lanczos' method takes for so many modes [s].
 double modes_seconds(const Plan& plan, std::int64_t modes);
 
-/// Throws Error with the numbers when the plan needs more memory than is free.
-void check_memory(const Plan& plan);
+/// Throws Error with the numbers when the plan needs more memory than is free, for so many ranks on this
+/// machine.
+void check_memory(const Plan& plan, int ranks = 1);
 
 }  // namespace palpate

@@ -16,7 +16,7 @@ constexpr double share_between_lines = 0.1;    // ... and of what the stage took
 constexpr double seconds_between_rewrites = 1.0;
 
 /// Not by stdio, whose lock a child that is forked meanwhile would inherit.
-void print(std::string_view text) {
+void write_out(std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
     if (written <= 0) return;
@@ -48,7 +48,7 @@ std::string duration_text(double seconds) {
   return fmt::format("{} h {} min", minutes / 60, minutes % 60);
 }
 
-Progress::Progress() : terminal_(isatty(STDERR_FILENO) != 0) {
+Progress::Progress(bool prints) : prints_(prints), terminal_(isatty(STDERR_FILENO) != 0) {
   ticker_ = without_signals([this](const std::stop_token& stop) { tick(stop); });
 }
 
@@ -60,6 +60,10 @@ Progress::~Progress() {
 
 double Progress::now() const {
   return std::chrono::duration<double>(Clock::now() - start_).count();
+}
+
+void Progress::print(const std::string& text) const {
+  if (prints_) write_out(text);
 }
 
 void Progress::line(const std::string& text) {
@@ -99,6 +103,16 @@ void Progress::reach(double share) {
   time_left_.reach(share, now());
 }
 
+void Progress::end() {
+  const std::scoped_lock lock(mutex_);
+  end_stage();
+}
+
+std::vector<Stage> Progress::stages() {
+  const std::scoped_lock lock(mutex_);
+  return over_;
+}
+
 std::string Progress::stage_text() const {
   std::string text = stage_;
   if (share_ >= 0.0) text += fmt::format(": {} %", static_cast<int>(100.0 * share_));
@@ -127,6 +141,7 @@ void Progress::end_stage() {
   const bool said_share = share_ >= 0.0;
   if (line_open_ || said_share)
     write_line(said_share ? fmt::format("{}: {} %", stage_, static_cast<int>(100.0 * share_)) : stage_);
+  if (!stage_.empty()) over_.push_back({stage_, now() - begun_});
   stage_.clear();
   share_ = -1.0;
 }

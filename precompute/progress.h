@@ -21,7 +21,8 @@ std::string duration_text(double seconds);
 /// elsewhere in a line every five seconds, less often as it takes longer. Safe for several threads.
 class Progress {
  public:
-  Progress();
+  /// `prints`: false for one of several processes, another of which prints.
+  explicit Progress(bool prints = true);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -41,6 +42,12 @@ class Progress {
   /// A stage begins, and the one before it is over.
   void begin(const std::string& stage);
 
+  /// The last stage is over.
+  void end();
+
+  /// The stages that are over, with the seconds that they took.
+  [[nodiscard]] std::vector<Stage> stages();
+
   /// The share (0..1) of the stage that is done.
   void reach(double share);
 
@@ -48,6 +55,7 @@ class Progress {
   using Clock = std::chrono::steady_clock;
   [[nodiscard]] double now() const;  // seconds since construction
   [[nodiscard]] std::string stage_text() const;
+  void print(const std::string& text) const;
   void show(const std::string& text);  // of the stage under way
   void write_line(const std::string& text);
   void end_stage();
@@ -55,10 +63,12 @@ class Progress {
   void tick(const std::stop_token& stop);
 
   const Clock::time_point start_ = Clock::now();
+  const bool prints_;
   const bool terminal_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
   TimeLeft time_left_;
+  std::vector<Stage> over_;
   std::string stage_;       // under way, empty: none
   double share_ = -1.0;     // of it, -1: it does not say
   double begun_ = 0.0;      // when it began [s]

@@ -93,7 +93,8 @@ struct Compression::Impl {
         workspaces_(at(jobs)) {}
 
   [[nodiscard]] int jobs() const noexcept { return jobs_; }
-  bool solve_near(const NearStore& store);
+  void solve_near(Index leaf, int worker, std::vector<float>& entries);
+  bool gather_near(const FetchNear& fetch);
   bool sample();
   bool climb(double cut);
   [[nodiscard]] HierarchicalMatrix packed();
@@ -127,6 +128,11 @@ struct Compression::Impl {
     return std::span(matrix_.neighbour)
         .subspan(at(matrix_.near_from[i]), at(matrix_.near_from[i + 1] - matrix_.near_from[i]));
   }
+  /// Where the entries of the near pairs of a leaf [0, leaves) begin, and where they end.
+  [[nodiscard]] std::int64_t near_begin(Index leaf) const {
+    return matrix_.near_at[at(matrix_.first_near_pair(leaf))];
+  }
+  [[nodiscard]] std::int64_t near_end(Index leaf) const { return near_begin(leaf + 1); }
   /// Dofs of K of stored dofs.
   [[nodiscard]] Dofs dofs_of(const Dofs& stored) const {
     Dofs dofs;
@@ -169,20 +175,24 @@ struct Compression::Impl {
   bool stopped_ = false;
 };
 
-bool Compression::Impl::solve_near(const NearStore& store) {
+void Compression::Impl::solve_near(Index leaf, int worker, std::vector<float>& entries) {
+  entries.resize(at(near_end(leaf) - near_begin(leaf)));
+  solve_near_of(matrix_.tree.first_leaf() + leaf, entries, workspaces_[at(worker)]);
+}
+
+bool Compression::Impl::gather_near(const FetchNear& fetch) {
   near_ = floats(matrix_.near_at.back());
   const Index leaves = matrix_.tree.leaves();
   done_ = 0;
   parallel_for(leaves, jobs_, [&](std::int64_t i, int worker) {
     if (stopped()) return;
     const auto leaf = static_cast<Index>(i);
-    const std::int64_t first = matrix_.near_at[at(matrix_.first_near_pair(leaf))],
-                       end = matrix_.near_at[at(matrix_.first_near_pair(leaf + 1))];
-    const std::span<float> entries(near_.get() + first, at(end - first));
-    if (!store.fetch || !store.fetch(leaf, entries)) {
-      solve_near_of(matrix_.tree.first_leaf() + leaf, entries, workspaces_[at(worker)]);
-      if (store.keep) store.keep(leaf, entries);
+    const std::span<float> entries(near_.get() + near_begin(leaf), at(near_end(leaf) - near_begin(leaf)));
+    if (fetch) {
+      fetch(leaf, entries);
+      return;
     }
+    solve_near_of(matrix_.tree.first_leaf() + leaf, entries, workspaces_[at(worker)]);
     tick(CompressionStage::near, leaves);
   });
   matrix_.near = near_;
@@ -483,8 +493,12 @@ Compression::Compression(const Factor& factor, std::span<const std::int64_t> sto
 
 Compression::~Compression() = default;
 
-bool Compression::prepare(const NearStore& store) {
-  return impl_->solve_near(store) && impl_->sample();
+void Compression::solve_near(Index leaf, int worker, std::vector<float>& entries) {
+  impl_->solve_near(leaf, worker, entries);
+}
+
+bool Compression::prepare(const FetchNear& fetch) {
+  return impl_->gather_near(fetch) && impl_->sample();
 }
 
 std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "matrices/hierarchical.h"
 #include "precompute/compression/cluster_pairs.h"
@@ -21,12 +22,9 @@ enum class CompressionStage : std::uint8_t { near, samples, far };
 /// Told which share of a part is done; false stops.
 using CompressionProgress = std::function<bool(CompressionStage, double)>;
 
-/// Where near pairs are kept, leaf [0, leaves) by leaf of their columns: what an earlier run has solved need
-/// not be solved again. Called by several threads at once.
-struct NearStore {
-  std::function<bool(Index leaf, std::span<float> entries)> fetch;  ///< false: it has none
-  std::function<void(Index leaf, std::span<const float> entries)> keep;
-};
+/// Gives the entries of the near pairs in which leaf [0, leaves) is the column, as `solve_near` did. Called
+/// by several threads at once.
+using FetchNear = std::function<void(Index leaf, std::span<float> entries)>;
 
 /// Xi of the stored dofs as a HierarchicalMatrix.
 ///
@@ -36,7 +34,7 @@ struct NearStore {
 /// skeletons. What loads on the near do is taken off with the near pairs and, going up the tree, with the
 /// couplings of each level, so that the same random loads serve all levels (Boukaram and others, arXiv
 /// 2506.16759). Bases and couplings that are too fine so far are recompressed at last. The result depends on
-/// neither `jobs` nor what a store had.
+/// neither `jobs` nor who solved for the near pairs.
 class Compression {
  public:
   /// `stored_dofs` [d N] are dofs of K, d a node, in the order of `nodes`, -1 where held. All are kept by
@@ -47,8 +45,13 @@ class Compression {
   Compression(const Compression&) = delete;
   Compression& operator=(const Compression&) = delete;
 
-  /// Solves for near pairs and random loads. False when `progress` said stop.
-  bool prepare(const NearStore& store = {});
+  /// Solves for the near pairs in which leaf [0, leaves) is the column: pair after pair, resized. By thread
+  /// `worker` in [0, jobs); different leaves at once, before `prepare`.
+  void solve_near(Index leaf, int worker, std::vector<float>& entries);
+
+  /// Takes the near pairs from `fetch`, or solves for them, and for random loads. False when `progress` said
+  /// stop.
+  bool prepare(const FetchNear& fetch = {});
 
   /// The matrix, cut off where rows of L^-1 Xi L^-T, L the roots of the leaves, are moved by at most `cut` by
   /// random loads of +-1 on all that is far (see `recompressed`). Once prepared, for any number of cuts. Null

@@ -1,0 +1,79 @@
+#include "precompute/bake_report.h"
+
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "base/json_text.h"
+#include "base/write_file.h"
+
+namespace palpate {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const BakeSummary& bake) {
+  const Plan& plan = bake.plan;
+  Json json = {{"model", bake.model},
+               {"output", bake.output.string()},
+               {"result", name_of(bake.result)},
+               {"nodes", plan.nodes},
+               {"elements", plan.elements},
+               {"free_dofs", plan.free_dofs},
+               {"stored_dofs", plan.stored_dofs},
+               {"factor_entries", plan.factor_entries},
+               {"greens_bytes", plan.file_bytes},
+               {"expected_memory_bytes", plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes},
+               {"tiles_solved", bake.tiles.solved},
+               {"tiles_kept", bake.tiles.kept}};
+  if (bake.part) json["part"] = {bake.part->number, bake.part->parts};
+  json["stages"] = Json::array();
+  for (const Stage& stage : bake.stages)
+    json["stages"].push_back({{"name", stage.name}, {"seconds", stage.seconds}});
+  return json;
+}
+
+}  // namespace
+
+std::string json_text_of(const BakeSummary& bake) {
+  return json_text(json_of(bake));
+}
+
+std::string name_of(BakeResult result) {
+  switch (result) {
+    case BakeResult::done:
+      return "done";
+    case BakeResult::part_done:
+      return "part";
+    case BakeResult::planned:
+      return "planned";
+    case BakeResult::interrupted:
+      return "interrupted";
+  }
+  return "";
+}
+
+void write_report(const std::filesystem::path& file, const std::vector<std::string>& bakes,
+                  const RunFigures& run) {
+  Json json = {{"generator", "palpate-precompute " PALPATE_VERSION},
+               {"ranks", run.ranks},
+               {"jobs", run.jobs},
+               {"seconds", run.seconds},
+               {"peak_memory_bytes", run.peak_memory},
+               {"models", Json::array()}};
+  for (const std::string& bake : bakes) json["models"].push_back(Json::parse(bake));
+  const std::string text = json_text(json, 2);
+  if (file == "-") {
+    std::fputs(text.c_str(), stdout);
+  } else {
+    write_file(file, text);
+  }
+}
+
+std::int64_t peak_memory() {
+  rusage usage = {};
+  return ::getrusage(RUSAGE_SELF, &usage) == 0 ? std::int64_t{1024} * usage.ru_maxrss : 0;
+}
+
+}  // namespace palpate

@@ -1,0 +1,28 @@
+// Columns of the packed matrices, and which of them a part has.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "formats/model_file.h"
+#include "precompute/numerics/greens_solver.h"
+#include "precompute/plan.h"
+#include "precompute/progress.h"
+#include "precompute/team.h"
+
+namespace palpate {
+
+/// Name of the stage in which the columns of a matrix are solved.
+const char* column_stage(PackedMatrix matrix);
+
+/// Columns that are solved together, whoever solves them: the bytes depend on no number of jobs, parts or
+/// processes. Their cost is in flops.
+std::vector<Tile> column_tiles(const GreensSolver& solver, const Plan& plan);
+
+/// Computes the columns of a packed matrix, of `part` or all, that the file does not have yet, and adds to
+/// `counts`. False when interrupted.
+bool solve_columns(const GreensSolver& solver, const Plan& plan, const PieceRange& part, int jobs, Team& team,
+                   ModelWriter& writer, PackedMatrix matrix, Progress& progress, TileCounts& counts,
+                   const std::function<bool()>& interrupted);
+
+}  // namespace palpate

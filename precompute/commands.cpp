@@ -1,0 +1,284 @@
+#include "precompute/commands.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "base/command_line.h"
+#include "base/error.h"
+#include "base/program.h"
+#include "base/spelling.h"
+#include "formats/model_file.h"
+#include "precompute/bake.h"
+#include "precompute/bake_report.h"
+#include "precompute/compare.h"
+#include "precompute/description/not_a_description.h"
+#include "precompute/inspect.h"
+#include "precompute/verify.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t most_parts = 100'000;
+
+/// "3/16"; nothing when it is no part.
+std::optional<PartNumber> read_part_number(const std::string& text) {
+  PartNumber part;
+  const char* const end = text.data() + text.size();
+  const auto [slash, bad] = std::from_chars(text.data(), end, part.number);
+  if (bad != std::errc() || slash == end || *slash != '/') return {};
+  const auto [last, bad_too] = std::from_chars(slash + 1, end, part.parts);
+  if (bad_too != std::errc() || last != end || part.number < 1 || part.number > part.parts ||
+      part.parts > most_parts)
+    return {};
+  return part;
+}
+
+void add_report(CLI::App& command, BakeOptions& options) {
+  command
+      .add_option("--report", options.report,
+                  "write a report as JSON: sizes, seconds of the stages, memory; -: to standard output")
+      ->type_name("FILE");
+}
+
+void add_jobs(CLI::App& command, BakeOptions& options) {
+  options.jobs = 0;
+  command
+      .add_option("-j,--jobs", options.jobs, "number of threads; default: one per processor that it may use")
+      ->option_text("N")
+      ->check(CLI::Range(1, 1024));
+}
+
+}  // namespace
+
+void add_bake_options(CLI::App& app, BakeOptions& options) {
+  app.add_option("-o,--output", options.output,
+                 "file to write; default: NAME.palpate.hdf in the current folder")
+      ->type_name("FILE");
+  add_jobs(app, options);
+  app.add_flag("--dry-run", options.dry_run,
+               "print what it would need (degrees of freedom, bytes, time) and stop");
+  app.add_flag("--force", options.force, "overwrite the output even if it is not an earlier model");
+  app.add_flag(
+      "--discard", options.discard,
+      "start over; by default a run that was interrupted or killed resumes with the columns it has finished");
+  add_report(app, options);
+}
+
+BakeSummary bake_model(const std::string& model, BakeOptions options, Team& team) {
+  check_is_description(model);
+  const Description description = read_description(model);
+  if (options.output.empty()) options.output = description.name + ".palpate.hdf";
+  if (options.jobs == 0) options.jobs = team.default_jobs();
+  return bake(description, options, team);
+}
+
+std::string next_steps(const BakeSummary& bake) {
+  const std::string output = bake.output.string();
+  if (bake.result == BakeResult::part_done)
+    return "next, once all parts are there: palpate-precompute join " + bake.model + "\n";
+  if (bake.result != BakeResult::done) return "";
+  return "next: palpate-precompute verify " + output + "\n      palpate-runtime play " + output + " --view\n";
+}
+
+namespace {
+
+int run_bake(const std::string& model, const BakeOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  Team alone;
+  const BakeSummary summary = bake_model(model, options, alone);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (!options.report.empty())
+    write_report(options.report, {json_text_of(summary)}, {1, summary.jobs, seconds, peak_memory()});
+  std::fputs(next_steps(summary).c_str(), stderr);
+  return summary.result == BakeResult::interrupted ? exit_interrupted : exit_ok;
+}
+
+int run_verify(const std::string& file) {
+  const VerifyReport report = verify(load_model(file), file);
+  std::fputs(to_text(report).c_str(), stdout);
+  if (!report.passed()) return exit_differs;
+  std::fprintf(stderr, "next: palpate-runtime play %s --view\n", file.c_str());
+  return exit_ok;
+}
+
+int run_compare(const std::string& a, const std::string& b, const CompareOptions& options) {
+  const Comparison comparison = compare(load_model(a), load_model(b), options);
+  std::fputs(to_text(comparison).c_str(), stdout);
+  return exit_ok;
+}
+
+/// As they were written.
+struct Arguments {
+  std::string model, file, other_file, part;
+  BakeOptions bake;
+  CompareOptions compare;
+  HelpArguments help;
+};
+
+void add_bake(CLI::App& app, Arguments& arguments) {
+  app.add_option("MODEL.toml", arguments.model, "description of the body")->type_name("");
+  add_bake_options(app, arguments.bake);
+  app.add_option(
+         "--part", arguments.part,
+         "compute only the K-th of N shares of the columns, into FILE.part-K-of-N; 'join' makes one file "
+         "of all")
+      ->option_text("K/N")
+      ->check([](const std::string& text) {
+        return read_part_number(text) ? "" : "'" + text + "' is not K/N with 1 <= K <= N <= 100000";
+      });
+  app.footer(
+      "Examples:\n"
+      "  palpate-precompute meshes/models/cube/model.toml    writes cube.palpate.hdf\n"
+      "  palpate-precompute help verify                      more about a command\n"
+      "  palpate-runtime play cube.palpate.hdf --view        then: push it in a browser\n"
+      "Ctrl-C, SIGTERM or SIGUSR1 keeps finished columns in FILE.partial and .progress; the same command "
+      "resumes.\n"
+      "Exit status: 0 done, 1 bad input or not enough room, 2 wrong arguments, 3 not verified, 130 "
+      "interrupted.");
+}
+
+CLI::App* add_join(CLI::App& app, Arguments& arguments) {
+  BakeOptions& options = arguments.bake;
+  CLI::App* command = app.add_subcommand("join", "make one file of the parts that --part K/N has computed");
+  command->add_option("MODEL.toml", arguments.file, "description of the body, the same as that of the parts")
+      ->required()
+      ->type_name("");
+  command
+      ->add_option("PART", options.parts,
+                   "parts, or folders in which they are; default: the folder of the output")
+      ->type_name("");
+  command
+      ->add_option("-o,--output", options.output,
+                   "file to write; default: NAME.palpate.hdf in the current folder")
+      ->type_name("FILE");
+  add_jobs(*command, options);
+  command->add_flag("--force", options.force, "overwrite the output even if it is not an earlier model");
+  add_report(*command, options);
+  command->add_flag("--keep-parts", options.keep_parts, "leave the parts there once the file is written");
+  command->footer(
+      "The file has the bytes that one run without parts would have written. A run that was interrupted or "
+      "killed is resumed by the same command.\n"
+      "Examples:\n"
+      "  palpate-precompute meshes/models/cube/model.toml --part 1/2\n"
+      "  palpate-precompute meshes/models/cube/model.toml --part 2/2    on another machine\n"
+      "  palpate-precompute join meshes/models/cube/model.toml          writes cube.palpate.hdf");
+  return command;
+}
+
+CLI::App* add_inspect(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("inspect", "print what a file contains");
+  command->add_option("FILE", arguments.file, "precomputed model, NAME.palpate.hdf")
+      ->required()
+      ->type_name("");
+  command->footer(
+      "Prints materials, mesh and mesh quality, fixed and stored nodes, overlays, dynamics and source "
+      "files.\n"
+      "Example:\n"
+      "  palpate-precompute inspect cube.palpate.hdf");
+  return command;
+}
+
+CLI::App* add_verify(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand(
+      "verify",
+      "check a file: checksums, probes, sampled columns against K, and whether its sources have changed");
+  command->add_option("FILE", arguments.file, "precomputed model, NAME.palpate.hdf")
+      ->required()
+      ->type_name("");
+  command->footer(
+      "Prints one line per check, with the measured error and its bound. Exit status 3 if one fails.\n"
+      "Example:\n"
+      "  palpate-precompute verify cube.palpate.hdf && palpate-runtime play cube.palpate.hdf --view");
+  return command;
+}
+
+CLI::App* add_compare(CLI::App& app, Arguments& arguments) {
+  CompareOptions& options = arguments.compare;
+  CLI::App* command = app.add_subcommand(
+      "compare",
+      "press the same fingertip on two files of one body and print how force and displacement differ");
+  command->add_option("A", arguments.file, "precomputed model, NAME.palpate.hdf")->required()->type_name("");
+  command->add_option("B", arguments.other_file, "another model NAME.palpate.hdf, usually the finer one")
+      ->required()
+      ->type_name("");
+  command->add_option("--touches", options.touches, "number of places, spread over the surface; default: 20")
+      ->option_text("N")
+      ->check(CLI::Range(1, 10000));
+  command
+      ->add_option("--radius", options.radius,
+                   "radius of the fingertip [m]; 0: a single node; default: three mean edge lengths of the "
+                   "coarser file")
+      ->option_text("METRES")
+      ->check(CLI::NonNegativeNumber);
+  command->footer(
+      "Shows the effect of another mesh, element or precision: precompute the body twice, then compare.\n"
+      "Examples:\n"
+      "  palpate-precompute compare coarse.palpate.hdf fine.palpate.hdf\n"
+      "  palpate-precompute compare tet4.palpate.hdf tet10.palpate.hdf --touches 50 --radius 0.01");
+  return command;
+}
+
+/// What to do instead, where a usage error shows it.
+std::string usage_hint(const CLI::App& app, const std::string& first_word) {
+  const bool of_help = app.got_subcommand("help");
+  if (!app.get_subcommands().empty() && !of_help) {
+    return "See palpate-precompute " + app.get_subcommands().front()->get_name() + " --help";
+  }
+  if (of_help) return "See palpate-precompute --help";
+  const auto command = meant(first_word, {"join", "inspect", "verify", "compare", "help"});
+  if (command && !std::filesystem::exists(first_word))
+    return "Did you mean palpate-precompute " + *command + "? See palpate-precompute --help";
+  return "See palpate-precompute --help";
+}
+
+}  // namespace
+
+int run_commands(int argc, char** argv) {
+  CLI::App app{
+      "Meshes an elastic body, assembles its stiffness and stores the Green's functions from which "
+      "palpate-runtime computes forces.",
+      "palpate-precompute"};
+  app.formatter(std::make_shared<HelpFormatter>());
+  app.set_version_flag("--version", "palpate-precompute " PALPATE_VERSION);
+  app.require_subcommand(0, 1);
+  Arguments arguments;
+  add_bake(app, arguments);
+  const CLI::App* join_command = add_join(app, arguments);
+  const CLI::App* inspect_command = add_inspect(app, arguments);
+  const CLI::App* verify_command = add_verify(app, arguments);
+  const CLI::App* compare_command = add_compare(app, arguments);
+  const CLI::App* help_command = add_help_command(app, arguments.help);
+  try {
+    app.parse(argc, argv);
+    if (help_command->parsed()) {
+      std::fputs(help_page(app, arguments.help).c_str(), stdout);
+      return exit_ok;
+    }
+    if (app.get_subcommands().empty() && arguments.model.empty())
+      throw CLI::RequiredError(
+          "MODEL.toml, `join MODEL.toml`, `inspect FILE`, `verify FILE` or `compare A B`");
+    if (const auto command = meant(arguments.model, {"join", "inspect", "verify", "compare"});
+        command && !std::filesystem::exists(arguments.model))
+      throw CLI::ParseError("there is no command '" + arguments.model + "' and no such file",
+                            CLI::ExitCodes::ExtrasError);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return tell_usage(error.what(), usage_hint(app, argc > 1 ? argv[1] : ""));
+  }
+  if (inspect_command->parsed()) {
+    std::fputs(inspect(load_model(arguments.file)).c_str(), stdout);
+    return exit_ok;
+  }
+  if (compare_command->parsed()) return run_compare(arguments.file, arguments.other_file, arguments.compare);
+  if (verify_command->parsed()) return run_verify(arguments.file);
+  arguments.bake.part = read_part_number(arguments.part);
+  arguments.bake.join = join_command->parsed();
+  return run_bake(arguments.bake.join ? arguments.file : arguments.model, arguments.bake);
+}
+
+}  // namespace palpate

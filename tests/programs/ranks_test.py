@@ -1,0 +1,267 @@
+"""palpate-precompute-mpi with one to four ranks on this machine: the bytes of palpate-precompute, whatever happens to ranks."""
+
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import unittest
+
+from programs import BINARY, MODELS, PRECOMPUTE, ProgramTest, cube_toml, run
+
+RANKS = BINARY / "precompute" / "cluster" / "palpate-precompute-mpi"
+MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none"]
+
+
+class RanksTest(ProgramTest):
+    def command(self, ranks, *arguments):
+        return [*MPIRUN, "-n", str(ranks), str(RANKS), *map(str, arguments)]
+
+    def ranks(self, ranks, *arguments):
+        return run(*self.command(ranks, *arguments), cwd=self.folder)
+
+    def own_factors(self, ranks, *arguments):
+        """A run of ranks that don't share a factor, as those of several nodes; it must succeed."""
+        result = self.ranks(ranks, *arguments, "--factor", "rank", "--jobs", "1")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stderr
+
+    def straight(self, model):
+        output = self.folder / "straight.palpate.hdf"
+        result = run(PRECOMPUTE, model, "-o", output, cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return output.read_bytes()
+
+    def start(self, ranks, model, output, **options):
+        """A running job that has written some columns, beyond those that an earlier one left."""
+        journal = output.with_name(output.name + ".progress")
+        left = journal.read_text() if journal.exists() else ""
+        process = subprocess.Popen(self.command(ranks, model, "-o", output, "--factor", "rank", "--jobs", "1"), cwd=self.folder,
+                                   stderr=subprocess.PIPE, text=True, **options)
+        self.addCleanup(process.stderr.close)
+        self.wait_for(lambda: journal.exists() and journal.read_text() != left and "\ncolumns" in journal.read_text(), process)
+        return process
+
+    def pids(self, mpirun):
+        """The processes of a job's ranks."""
+        found = []
+        for entry in pathlib.Path("/proc").glob("[0-9]*"):
+            try:
+                words = (entry / "cmdline").read_bytes().split(b"\0")
+                parent = int((entry / "stat").read_text().rsplit(") ")[1].split()[1])
+            except (OSError, IndexError):
+                continue
+            if words[0] == os.fsencode(RANKS) and parent == mpirun.pid:
+                found.append(int(entry.name))
+        return sorted(found)
+
+
+class Bytes(RanksTest):
+    def check(self, model, *counts):
+        data = self.straight(model)
+        output = self.folder / "ranks.palpate.hdf"
+        for ranks in counts:
+            self.own_factors(ranks, model, "-o", output)
+            self.assertEqual(output.read_bytes(), data, f"{ranks} ranks")
+            output.unlink()
+        self.assertEqual(sorted(p.name for p in self.folder.glob("ranks*")), [])
+
+    def test_cube(self):
+        self.check(self.write("model.toml", cube_toml(8, precision="split")), 1, 2, 3, 4, 8)
+
+    def test_plate(self):
+        self.check(MODELS / "plate" / "model.toml", 2, 3)
+
+    def test_cantilever_with_the_inverse_of_dynamics(self):
+        self.check(MODELS / "cantilever" / "model.toml", 1, 2, 3, 4)
+
+    def test_compressed(self):
+        self.check(self.write("model.toml", cube_toml(12).replace('precision = "double"\n', 'compression = "h2"\n')), 2, 4)
+
+    def test_modes_and_overlays(self):
+        text = cube_toml(6, scope="layers").replace('"layers"', '"layers"\nlayers = 2')
+        self.check(self.write("model.toml", text + '[dynamics]\nmethod = "modal"\nmodes = 10\n[overlay]\n[[overlay.region]]\n'
+                              "sphere = {center = [0.5, 0.5, 1], radius = 0.3}\n"), 2)
+
+    def test_ranks_of_a_node_share_a_factor(self):
+        model = self.write("model.toml", cube_toml(8))
+        data = self.straight(model)
+        report = self.folder / "report.json"
+        result = self.ranks(3, model, "--report", report)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual((self.folder / "cube.palpate.hdf").read_bytes(), data)
+        self.assertEqual(json.loads(report.read_text())["ranks"], 1)
+
+    def test_one_machine_goes_on_with_what_ranks_left_and_the_reverse(self):
+        model = self.write("model.toml", cube_toml(16))
+        data = self.straight(model)
+        output = self.folder / "x.palpate.hdf"
+        job = self.start(2, model, output)
+        job.send_signal(signal.SIGUSR1)
+        job.wait()
+        self.assertFalse(output.exists())
+        journal = output.with_name(output.name + ".progress")
+        process = subprocess.Popen([PRECOMPUTE, model, "-o", output, "--jobs", "1"], cwd=self.folder, stderr=subprocess.DEVNULL)
+        left = journal.read_text().count("\ncolumns")
+        self.wait_for(lambda: journal.read_text().count("\ncolumns") > left, process)
+        process.terminate()
+        self.assertEqual(process.wait(), 130)
+        self.assertRegex(self.own_factors(3, model, "-o", output), r"[1-9]\d* of \d+ columns were kept")
+        self.assertEqual(output.read_bytes(), data)
+
+
+class Dying(RanksTest):
+    def test_a_rank_that_is_killed_costs_its_tiles(self):
+        model = self.write("model.toml", cube_toml(16))
+        data = self.straight(model)
+        output = self.folder / "x.palpate.hdf"
+        choose = random.Random(21)
+        for attempt in range(5):
+            job = self.start(3, model, output)
+            os.kill(choose.choice(self.pids(job)), signal.SIGKILL)
+            self.assertNotEqual(job.wait(timeout=100), 0)
+            self.assertRegex(job.stderr.read(), "exited on signal 9")
+            if output.exists():  # it was the last tile
+                break
+        self.own_factors(2, model, "-o", output)
+        self.assertEqual(output.read_bytes(), data)
+        self.assertEqual(list(self.folder.glob("x.palpate.hdf.*")), [])
+
+    def test_a_job_that_is_killed_at_any_moment(self):
+        model = self.write("model.toml", cube_toml(14))
+        data = self.straight(model)
+        output = self.folder / "x.palpate.hdf"
+        for attempt in range(6):
+            job = subprocess.Popen(self.command(2, model, "-o", output, "--factor", "rank", "--jobs", "1"), cwd=self.folder,
+                                   stderr=subprocess.DEVNULL, start_new_session=True)
+            try:
+                job.wait(timeout=0.4 + 0.3 * attempt)
+            except subprocess.TimeoutExpired:
+                for pid in self.pids(job):
+                    os.kill(pid, signal.SIGKILL)
+                job.kill()
+                job.wait()
+        self.own_factors(2, model, "-o", output)
+        self.assertEqual(output.read_bytes(), data)
+
+    def test_signals_keep_the_columns(self):
+        model = self.write("model.toml", cube_toml(16))
+        data = self.straight(model)
+        output = self.folder / "x.palpate.hdf"
+        for stop in (signal.SIGUSR1, signal.SIGTERM):
+            job = self.start(2, model, output)
+            for pid in self.pids(job):  # as srun does, to every rank
+                os.kill(pid, stop)
+            self.assertEqual(job.wait(timeout=100), 130)
+            self.assertIn("interrupted: the columns that are done are kept", job.stderr.read())
+        self.assertRegex(self.own_factors(2, model, "-o", output), r"[1-9]\d* of \d+ columns were kept")
+        self.assertEqual(output.read_bytes(), data)
+
+    def test_a_signal_to_one_rank_stops_all(self):
+        model = self.write("model.toml", cube_toml(16))
+        output = self.folder / "x.palpate.hdf"
+        job = self.start(3, model, output)
+        os.kill(self.pids(job)[-1], signal.SIGTERM)
+        self.assertEqual(job.wait(timeout=100), 130)
+        self.assertTrue(output.with_name("x.palpate.hdf.partial").exists())
+
+
+class Misfits(RanksTest):
+    def refused(self, result, *pieces):
+        """One error with its hint, among mpirun's own words."""
+        self.assertEqual(result.returncode, 1, result.stderr)
+        lines = [line for line in result.stderr.splitlines() if line.startswith(("error: ", "hint: "))]
+        self.assertEqual([line.split(":")[0] for line in lines], ["error", "hint"], result.stderr)
+        for piece in pieces:
+            self.assertIn(piece, "\n".join(lines))
+
+    def test_what_all_ranks_find_is_told_once(self):
+        self.refused(self.ranks(3, self.folder / "none.toml", "--factor", "rank"), "none.toml")
+        model = self.write("model.toml", cube_toml(2).replace("0.3", "0.7"))
+        self.refused(self.ranks(2, model, "--factor", "rank"), "model.toml")
+
+    def test_another_job_writes_the_same_output(self):
+        model = self.write("model.toml", cube_toml(16))
+        output = self.folder / "x.palpate.hdf"
+        job = self.start(2, model, output)
+        pids = self.pids(job)
+        for pid in pids:
+            os.kill(pid, signal.SIGSTOP)
+        self.refused(self.ranks(2, model, "-o", output, "--factor", "rank"), "another palpate-precompute is writing this file")
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
+        self.assertEqual(job.wait(), 0)
+
+    def test_a_folder_that_ranks_do_not_share(self):
+        model = self.write("model.toml", cube_toml(3))
+        for name in ("a", "b"):
+            (self.folder / name).mkdir()
+        arguments = [RANKS, model, "-o", "x.palpate.hdf", "--factor", "rank"]
+        two = [*MPIRUN, "-n", "1", "--wdir", self.folder / "a", *arguments, ":", "-n", "1", "--wdir", self.folder / "b", *arguments]
+        self.refused(run(*two, cwd=self.folder), "rank 1 on", "the nodes do not share this folder", "--part K/N")
+        (self.folder / "b" / "x.palpate.hdf.partial").write_bytes((self.folder / "a" / "x.palpate.hdf.partial").read_bytes()[:-1])
+        self.refused(run(*two, cwd=self.folder), "is not the file that another rank has made")
+
+    def test_ranks_with_different_models(self):
+        one, other = self.write("model.toml", cube_toml(3)), self.folder / "other"
+        other.mkdir()
+        (other / "model.toml").write_text(cube_toml(3).replace("0.3", "0.31"))
+        output = self.folder / "x.palpate.hdf"
+        rest = ["-o", output, "--factor", "rank"]
+        result = run(*MPIRUN, "-n", "1", RANKS, one, *rest, ":", "-n", "1", RANKS, other / "model.toml", *rest, cwd=self.folder)
+        self.refused(result, "rank 1 on", "another rank has computed another model")
+
+    def test_usage_is_told_once(self):
+        model = self.write("model.toml", cube_toml(2))
+        for arguments, piece in (((model, "--ranks", "3"), "--ranks goes with --dry-run"), ((), "MODEL.toml is required"),
+                                 ((model, model, "-o", "x"), "there are several"), ((model, "--factor", "some"), "--factor")):
+            result = self.ranks(2, *arguments)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertEqual(result.stderr.count("error: "), 1, result.stderr)
+            self.assertIn(piece, result.stderr)
+
+    def test_help_needs_no_ranks(self):
+        self.assertIn("--factor node|rank", run(RANKS, "--help").stdout)
+        self.assertIn("palpate-precompute-mpi 0", run(RANKS, "--version").stdout)
+
+
+class Plans(RanksTest):
+    def test_dry_run_says_what_all_ranks_take(self):
+        model = self.write("model.toml", cube_toml(6))
+        result = run(RANKS, model, "--dry-run", "--ranks", "16", "--jobs", "4", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"16 ranks of 4 jobs: 0\.\d\d GB of memory each, .* in all; about .* hours of a processor; "
+                         r"3 blocks of columns for 64 threads: fewer ranks would do")  # 507 of 192 each
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
+
+    def test_many_models(self):
+        models = []
+        for cells in (2, 9, 3, 4):
+            models.append(self.write(f"c{cells}.toml", cube_toml(cells, name=f"c{cells}")))
+        straight = {}
+        for model in models:
+            self.assertEqual(run(PRECOMPUTE, model, cwd=self.folder).returncode, 0)
+            file = self.folder / f"{model.stem}.palpate.hdf"
+            straight[model.stem] = file.read_bytes()
+            file.unlink()
+        report = self.folder / "night.json"
+        result = self.ranks(2, *models, "--factor", "rank", "--report", report)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for name, data in straight.items():
+            self.assertEqual((self.folder / f"{name}.palpate.hdf").read_bytes(), data, name)
+        bakes = json.loads(report.read_text())["models"]
+        self.assertEqual(sorted(pathlib.Path(bake["model"]).stem for bake in bakes), ["c2", "c3", "c4", "c9"])
+        self.assertTrue(all(bake["result"] == "done" for bake in bakes))
+
+    def test_a_model_that_fails_does_not_keep_the_others(self):
+        good, bad = self.write("good.toml", cube_toml(3, name="good")), self.write("bad.toml", cube_toml(3, name="bad"))
+        (self.folder / "bad.palpate.hdf").write_text("somebody's")
+        result = self.ranks(2, good, bad, "--factor", "rank")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn("is there already and is not a model of Palpate's", result.stderr)
+        self.assertTrue((self.folder / "good.palpate.hdf").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
