@@ -1,14 +1,10 @@
 #include "precompute/cluster/rank_commands.h"
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <memory>
-#include <numeric>
-#include <set>
 #include <string>
 #include <vector>
 

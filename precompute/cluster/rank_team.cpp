@@ -94,9 +94,9 @@ int size_of(MPI_Comm comm) {
 struct RankTeam::Impl {
   /// One call of `work`.
   struct Round {
-    explicit Round(const TileWork& work) : todo(work) {}
+    explicit Round(const TileWork& work) : tile_work(work) {}
 
-    const TileWork& todo;
+    const TileWork& tile_work;
     std::mutex mutex;  // of all that follows
     std::condition_variable ready;
     std::deque<Tile> stock;  // that threads of this rank take from; the leader's is that of all
@@ -185,7 +185,7 @@ void RankTeam::Impl::solve(Round& all, int worker) {
     all.stock.pop_front();
     lock.unlock();
     try {
-      all.todo.solve(tile, worker);
+      all.tile_work.solve(tile, worker);
     } catch (...) {
       lock.lock();
       if (!all.failure) all.failure = std::current_exception();
@@ -233,7 +233,7 @@ void RankTeam::Impl::lead_message(Round& all, const Message& message,
       break;
     case Kind::done:
       --out;
-      all.todo.done({head.first, head.count, head.cost});
+      all.tile_work.done({head.first, head.count, head.cost});
       break;
     case Kind::back:
       out -= head.count;
@@ -298,10 +298,10 @@ bool RankTeam::Impl::lead(Round& all, const std::function<void(const std::string
       if (all.failure) std::rethrow_exception(all.failure);
     }
     for (const Message& message : own)
-      all.todo.done({message.head.first, message.head.count, message.head.cost});
+      all.tile_work.done({message.head.first, message.head.count, message.head.cost});
     const bool all_joined = std::find(joined.begin(), joined.end(), false) == joined.end();
     if (ended && all_joined && out == 0 && own.empty() && idle) break;
-    if ((interrupted = interrupted || all.todo.interrupted()) && !all.halted) {
+    if ((interrupted = interrupted || all.tile_work.interrupted()) && !all.halted) {
       halt(all);
       for (int to = 1; to < size_of(team); ++to) send(to, {Kind::halt, epoch});
     }
@@ -348,7 +348,7 @@ bool RankTeam::Impl::follow(Round& all, int jobs) {
       send(0, {Kind::ask, epoch, need, more});
       asked += need;
     }
-    if (!told_stop && all.todo.interrupted()) {
+    if (!told_stop && all.tile_work.interrupted()) {
       told_stop = true;
       send(0, {Kind::stop, epoch});
     }

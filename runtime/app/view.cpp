@@ -25,7 +25,7 @@
 namespace palpate {
 namespace {
 
-/// A recording that the viewer's page leafs through.
+/// A recording that the viewer's page looks through.
 class SessionView : public ViewedRun {
  public:
   SessionView(const SessionPictures& pictures, ViewerPort port)
@@ -47,9 +47,9 @@ class SessionView : public ViewedRun {
     state_["frame"] = shown;
     server_.show_state(json_text(state_));
   }
-  std::optional<Leaf> leaf(std::int64_t frame) override {
+  std::optional<RecordedFrame> recorded_frame(std::int64_t frame) override {
     const std::lock_guard lock(mutex_);
-    return Leaf{nearest(frame), pictures_.picture(nearest(frame))};
+    return RecordedFrame{nearest(frame), pictures_.picture(nearest(frame))};
   }
   void point(const PointerPose&) override {}
   void lose_pointer() override {}
@@ -105,7 +105,7 @@ int view(const std::filesystem::path& recording, const ViewerOptions& options) {
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
-  const SessionPictures pictures(recording);  // a broken file is told whatever else uses the port
+  const SessionPictures pictures(recording);  // first: a broken file is told even where the port is taken
   const SessionView session(pictures, ViewerPort(options));
   fmt::print(stderr, "{}: {} pictures, {:.3f} s\nopen {} in a browser; Ctrl-C ends\n", recording.string(),
              pictures.frames(), pictures.time(pictures.frames() - 1), session.url());

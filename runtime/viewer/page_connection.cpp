@@ -213,7 +213,7 @@ void PageConnection::follow() {
   send_news();
 }
 
-std::optional<std::int64_t> PageConnection::leaf() const noexcept {
+std::optional<std::int64_t> PageConnection::own_frame() const noexcept {
   if (!alone_) return std::nullopt;
   return alone_->frame;
 }

@@ -39,7 +39,7 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   /// It sees what is shown to all.
   void follow();
   /// The frame that it sees alone.
-  [[nodiscard]] std::optional<std::int64_t> leaf() const noexcept;
+  [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept;
   /// It has shown the token, and there is room for it.
   [[nodiscard]] bool is_admitted() const noexcept { return is_admitted_; }
   /// It does not read.

@@ -147,7 +147,7 @@ void PageServer::show_all() {
 }
 
 PageRole PageServer::role(const PageConnection& page) const {
-  return {controller_ == &page, controller_ != nullptr, open_.size(), page.leaf()};
+  return {controller_ == &page, controller_ != nullptr, open_.size(), page.own_frame()};
 }
 
 void PageServer::join(PageConnection& page) {
@@ -189,10 +189,10 @@ void PageServer::hand_over(PageConnection& page, bool take) {
 }
 
 /// Who only watches a replay still looks at what it likes.
-void PageServer::leaf(PageConnection& page, std::int64_t frame) {
-  std::optional<Leaf> leaf = run_.leaf(frame);
-  if (leaf && broadcast_.picture()) {
-    page.look_alone({broadcast_.picture()->scene, nullptr, std::move(leaf->picture)}, leaf->frame);
+void PageServer::show_alone(PageConnection& page, std::int64_t frame) {
+  std::optional<RecordedFrame> recorded = run_.recorded_frame(frame);
+  if (recorded && broadcast_.picture()) {
+    page.look_alone({broadcast_.picture()->scene, nullptr, std::move(recorded->picture)}, recorded->frame);
   }
 }
 
@@ -201,16 +201,16 @@ void PageServer::obey(PageConnection& page, const PageWord& word) {
   if (std::holds_alternative<FollowWord>(word)) return page.follow();
   const char* name = name_of(word);
   const auto* seek = std::get_if<SeekWord>(&word);
-  const bool leafs = is_replay_ && seek != nullptr && controller_ != &page;
-  if (controller_ != &page && !leafs) {
+  const bool looks_alone = is_replay_ && seek != nullptr && controller_ != &page;
+  if (controller_ != &page && !looks_alone) {
     page.say(error_word(
         name, PageError(PageRefusal::control, "this page only watches", "",
                         controller_ == nullptr ? "take control first" : "another page has control")));
     return;
   }
   try {
-    if (leafs) {
-      leaf(page, seek->frame);
+    if (looks_alone) {
+      show_alone(page, seek->frame);
     } else {
       std::visit(Ask{run_}, word);
     }

@@ -70,7 +70,7 @@ class PageServer {
   void show_all();
   void hand_over(PageConnection& page, bool take);
   void release();
-  void leaf(PageConnection& page, std::int64_t frame);
+  void show_alone(PageConnection& page, std::int64_t frame);
 
   ViewedRun& run_;
   bool is_replay_;

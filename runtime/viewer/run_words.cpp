@@ -58,8 +58,8 @@ std::string StateWord::for_page(std::uint32_t scene, const PageRole& role, const
   state["you"] = role.is_controller ? "controller" : "watcher";
   state["controlled"] = role.controlled;
   state["watchers"] = role.pages;
-  state["alone"] = role.leaf.has_value();
-  if (role.leaf) state["frame"] = *role.leaf;
+  state["alone"] = role.own_frame.has_value();
+  if (role.own_frame) state["frame"] = *role.own_frame;
   const auto pointer = members_.find("pointer");
   state["pointer"] = role.is_controller && pointer != members_.end() && *pointer == true;
   if (!times.is_null()) state["times"] = times;

@@ -13,9 +13,9 @@ namespace palpate {
 /// What a page is to the run.
 struct PageRole {
   bool is_controller = false;
-  bool controlled = false;                ///< whether any page is
-  std::size_t pages = 0;                  ///< all that watch
-  std::optional<std::int64_t> leaf = {};  ///< the frame of a recording that it sees alone
+  bool controlled = false;                     ///< whether any page is
+  std::size_t pages = 0;                       ///< all that watch
+  std::optional<std::int64_t> own_frame = {};  ///< of a recording, where it sees another than all
 };
 
 /// The first message of all. `mode`: live, replay or file. `has_book`: the page's help can open the book.

@@ -46,7 +46,7 @@ class PageError : public Error {
 };
 
 /// A frame of a recording.
-struct Leaf {
+struct RecordedFrame {
   std::int64_t frame = 0;
   SurfacePicture picture;
 };
@@ -66,9 +66,9 @@ class ViewedRun {
   virtual void change(const SettingsChange& settings) = 0;
   virtual void record(bool on) = 0;
   virtual void seek(std::int64_t frame) = 0;  ///< in a replay
-  /// The nearest frame that a replay has, for a page that leafs for itself; all others see what they saw.
-  /// Nothing where there is no replay.
-  virtual std::optional<Leaf> leaf(std::int64_t frame) {
+  /// The nearest frame that a replay has, for a page that looks through it by itself; all others see what
+  /// they saw. Nothing where there is no replay.
+  virtual std::optional<RecordedFrame> recorded_frame(std::int64_t frame) {
     static_cast<void>(frame);
     return std::nullopt;
   }

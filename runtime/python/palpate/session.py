@@ -99,6 +99,7 @@ class Session:
         self._view = numpy.frombuffer(self._poses, POSE)  # the same memory
         self._result = CResult(ctypes.sizeof(CResult))
         self._names: dict[int, frozenset[str]] = {0: frozenset()}
+        self._status = 0
 
     def close(self) -> None:
         """Ends the session; what it gave stays."""
@@ -146,7 +147,7 @@ class Session:
     @property
     def status(self) -> frozenset[str]:
         """Names of the status bits of the last tick."""
-        bits = getattr(self, "_status", 0)
+        bits = self._status
         if bits not in self._names:
             names = (self._library.palpate_status_name(1 << k) for k in range(32) if bits >> k & 1)
             self._names[bits] = frozenset(name.decode() for name in names if name)

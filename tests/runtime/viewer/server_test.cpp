@@ -47,11 +47,11 @@ class Asked : public ViewedRun {
   }
   void record(bool on) override { note(on ? "record" : "record no more"); }
   void seek(std::int64_t frame) override { note("seek " + std::to_string(frame)); }
-  std::optional<Leaf> leaf(std::int64_t frame) override {
-    Leaf leaf{std::min<std::int64_t>(frame, 99), {}};
-    leaf.picture.frame.tick = 1000 + leaf.frame;
-    leaf.picture.frame.displacement.assign(displacements, static_cast<float>(leaf.frame));
-    return leaf;
+  std::optional<RecordedFrame> recorded_frame(std::int64_t frame) override {
+    RecordedFrame recorded{std::min<std::int64_t>(frame, 99), {}};
+    recorded.picture.frame.tick = 1000 + recorded.frame;
+    recorded.picture.frame.displacement.assign(displacements, static_cast<float>(recorded.frame));
+    return recorded;
   }
   std::size_t displacements = 0;
 
