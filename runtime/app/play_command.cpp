@@ -32,6 +32,7 @@ void add_settings(CLI::App& play, PlayArguments& arguments, SettingGroup group, 
 constexpr const char* input_group = "Input device";
 constexpr const char* viewer_group = "Viewer";
 constexpr const char* body_group = "The body";
+constexpr const char* live_group = "The live solver";
 constexpr const char* loop_group = "The loop";
 constexpr const char* output_group = "Output files";
 
@@ -202,6 +203,7 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
   add_viewer(*play, arguments);
   add_settings(*play, arguments, SettingGroup::tool, "The tool");
   add_body(*play, arguments);
+  add_settings(*play, arguments, SettingGroup::live, live_group);
   add_loop(*play, arguments);
   add_outputs(*play, arguments);
   add_settings(*play, arguments, SettingGroup::workspace, "Workspace of the device");

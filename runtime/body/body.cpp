@@ -11,6 +11,7 @@
 #include "matrices/hierarchical.h"
 #include "runtime/body/modal_newmark.h"
 #include "runtime/body/surface_numbering.h"
+#include "runtime/live/live_model.h"
 #include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
@@ -126,6 +127,11 @@ Body::Body(Model model, const GreensOptions& options, int refinement, ContactMod
     surface_friction_.push_back(model_.materials[material].friction);
   }
   measure_surface();
+}
+
+Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options)
+    : Body(std::move(model), options, 1, ContactModel::live) {
+  live_ = std::move(live);
 }
 
 /// Surface nodes that follow the same node of the body lie together in memory: the tick moves them together.

@@ -35,10 +35,10 @@ TangentPattern::TangentPattern(std::span<const Index> cells, int nodes_per_cell,
   zero_.reserve(static_cast<Eigen::Index>(total));
   for (std::size_t column = 0; column < rows.size(); ++column) {
     zero_.startVec(static_cast<Eigen::Index>(column));
-    diagonal_.push_back(static_cast<Index>(zero_.nonZeros()));  // the first of its column
     for (const Index row : rows[column]) zero_.insertBack(row, static_cast<Eigen::Index>(column)) = 0.0;
   }
   zero_.finalize();
+  diagonal_.assign(zero_.outerIndexPtr(), zero_.outerIndexPtr() + free_dofs);  // the first of its column
   places_.reserve(count * entries_);
   for (std::size_t cell = 0; cell < count; ++cell) {
     gather(cell);

@@ -34,7 +34,7 @@ class TangentSolver {
   bool solve(const Eigen::VectorXd& b, Eigen::VectorXd& x);
 
   /// Solves with the factor at hand, which by conjugate gradients may be of an older matrix.
-  [[nodiscard]] Eigen::VectorXd by_factor(const Eigen::VectorXd& b) const { return factor_.solve(b); }
+  [[nodiscard]] Eigen::MatrixXd by_factor(const Eigen::MatrixXd& b) const { return factor_.solve(b); }
 
   [[nodiscard]] std::int64_t factorisations() const noexcept { return factorisations_; }
   [[nodiscard]] std::int64_t iterations() const noexcept { return iterations_; }  ///< of conjugate gradients

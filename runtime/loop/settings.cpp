@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <concepts>
+#include <initializer_list>
 #include <limits>
 #include <vector>
 
@@ -55,6 +56,15 @@ std::string text_of(const Tool& tool) {
 }
 std::string text_of(ContactModel contact) {
   return contact == ContactModel::dynamic ? "dynamic" : "quasi-static";
+}
+std::string text_of(LiveLaw law) {
+  return name_of(law);
+}
+std::string text_of(Integrator integrator) {
+  return name_of(integrator);
+}
+std::string text_of(bool yes) {
+  return yes ? "yes" : "no";
 }
 std::string text_of(const OverlayOptions& overlay) {
   return fmt::format("r={},rings={}", overlay.refinement, overlay.rings);
@@ -112,6 +122,32 @@ void read_value(const Setting& setting, const std::string& text, ContactModel& c
   contact = text == "dynamic" ? ContactModel::dynamic : ContactModel::quasi_static;
   if (text != text_of(contact))
     refuse(setting.name, "'" + text + "' is neither quasi-static nor dynamic", "write one of them");
+}
+
+/// The one of some values that has this name.
+template <class Value>
+Value read_name(const Setting& setting, const std::string& text, std::initializer_list<Value> values) {
+  std::string names;
+  for (const Value value : values) {
+    if (text == text_of(value)) return value;
+    names += (names.empty() ? "" : ", ") + text_of(value);
+  }
+  refuse(setting.name, "'" + text + "' is none of " + names, "write one of them");
+}
+
+void read_value(const Setting& setting, const std::string& text, LiveLaw& law) {
+  law = read_name(setting, text,
+                  {LiveLaw::linear, LiveLaw::corotational, LiveLaw::corotational_qr, LiveLaw::neo_hookean,
+                   LiveLaw::mass_spring});
+}
+
+void read_value(const Setting& setting, const std::string& text, Integrator& integrator) {
+  integrator =
+      read_name(setting, text, {Integrator::implicit_euler, Integrator::midpoint, Integrator::newmark});
+}
+
+void read_value(const Setting& setting, const std::string& text, bool& yes) {
+  yes = read_name(setting, text, {true, false});
 }
 
 void read_value(const Setting&, const std::string& text, OverlayOptions& overlay) {
@@ -201,6 +237,58 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
         s.overlay_memory);
 }
 
+/// Visits the settings of the live solver.
+template <class SomeSettings, class Visitor>
+void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
+  auto& [solver, step, integrator, gravity, mass_damping, stiffness_damping, yield, creep, most_plastic, free,
+         floor, floor_friction] = live;
+  constexpr SettingGroup group = SettingGroup::live;
+  const bool is_told = live.solver.has_value();
+  visit(
+      Setting{
+          "solver", group, "linear|corotational|corotational-qr|neo-hookean|mass-spring", "",
+          "none: the file's Green's functions",
+          "solve the body anew in each step, beside the tick, for large deformation and bodies that move; "
+          "the tool meets the compliance of one step",
+          any_number, is_told},
+      solver);
+  visit(Setting{"live-step", group, "S", "s", "0.005", "time step of the solver, a whole number of ticks",
+                positive_number, is_told},
+        step);
+  visit(Setting{"integrator", group, "implicit-euler|midpoint|newmark", "", "implicit-euler",
+                "how the solver steps; implicit-euler damps fast motion, the others keep energy", any_number,
+                is_told},
+        integrator);
+  visit(Setting{"gravity", group, "X,Y,Z", "m/s^2", "0,0,0", "acceleration of gravity on a live body",
+                any_number, is_told},
+        gravity);
+  visit(Setting{"mass-damping", group, "A", "1/s", "1", "part of the damping that is A times the mass",
+                number_from_zero, is_told},
+        mass_damping);
+  visit(Setting{"stiffness-damping", group, "B", "s", "0.001",
+                "part of the damping that is B times the stiffness", number_from_zero, is_told},
+        stiffness_damping);
+  visit(Setting{"yield", group, "STRAIN", "", "inf",
+                "elastic strain (norm) above which a body keeps dents; inf: never", positive_or_infinite,
+                is_told},
+        yield);
+  visit(Setting{"creep", group, "RATE", "1/s", "10", "rate at which strain above the yield becomes plastic",
+                number_from_zero, is_told},
+        creep);
+  visit(Setting{"most-plastic", group, "STRAIN", "", "inf", "largest plastic strain (norm)",
+                positive_or_infinite, is_told},
+        most_plastic);
+  visit(Setting{"free", group, "yes|no", "", "no", "lets go of what the model holds: the body moves in space",
+                any_number, is_told},
+        free);
+  visit(Setting{"floor", group, "HEIGHT", "m", "none", "height of a floor along z, in the plane along y",
+                any_number, is_told && floor.has_value()},
+        floor);
+  visit(Setting{"floor-friction", group, "MU", "", "0.5", "Coulomb friction coefficient of the floor",
+                number_from_zero, is_told},
+        floor_friction);
+}
+
 /// Visits the settings of the loop, and of where the device is in the body's frame.
 template <class SomeSettings, class Visitor>
 void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
@@ -228,7 +316,7 @@ void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
 /// nothing compiles.
 template <class SomeSettings, class Visitor>
 void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
-  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_memory, rate,
+  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_memory, live, rate,
          motion_scale, force_scale, origin, axes, safety] = settings;
   for_each_tool_setting(tool, visit);
   visit(Setting{"reach", SettingGroup::tool, "METRES", "m", "the longest edge of the surface",
@@ -242,6 +330,7 @@ void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
                 contact_counts},
         max_contacts);
   for_each_body_setting(settings, visit);
+  for_each_live_setting(live, visit);
   for_each_frame_setting(settings, visit);
   visit(Setting{"safety", SettingGroup::safety, "NAME=VALUE,...", "",
                 "on for devices held by a hand, off for scripts",
@@ -311,7 +400,8 @@ BodyOptions Settings::body() const {
   return {.refinement = overlay ? overlay->refinement : 1,
           .contact = contact,
           .load_scale = load_scale,
-          .stiffness_scale = stiffness_scale};
+          .stiffness_scale = stiffness_scale,
+          .live = live};
 }
 
 Tool parse_shape(const std::string& text) {
