@@ -33,22 +33,6 @@ Mat3 strain_tensor(const std::array<double, 6>& strain) {
 
 }  // namespace
 
-const char* name_of(LiveLaw law) noexcept {
-  switch (law) {
-    case LiveLaw::linear:
-      return "linear";
-    case LiveLaw::corotational:
-      return "corotational";
-    case LiveLaw::corotational_qr:
-      return "corotational-qr";
-    case LiveLaw::neo_hookean:
-      return "neo-hookean";
-    case LiveLaw::mass_spring:
-      return "mass-spring";
-  }
-  return "";
-}
-
 LiveInput live_input(const Model& model) {
   return {.mesh = model.mesh,
           .analysis = model.analysis,

@@ -111,7 +111,4 @@ class LiveBody {
   TangentPattern pattern_;
 };
 
-/// The names that users give: linear, corotational, corotational-qr, neo-hookean, mass-spring.
-const char* name_of(LiveLaw law) noexcept;
-
 }  // namespace palpate

@@ -193,6 +193,22 @@ void make_positive(const LawConstants& c, PointTangent& C) noexcept {
 
 }  // namespace
 
+const char* name_of(LiveLaw law) noexcept {
+  switch (law) {
+    case LiveLaw::linear:
+      return "linear";
+    case LiveLaw::corotational:
+      return "corotational";
+    case LiveLaw::corotational_qr:
+      return "corotational-qr";
+    case LiveLaw::neo_hookean:
+      return "neo-hookean";
+    case LiveLaw::mass_spring:
+      return "mass-spring";
+  }
+  return "";
+}
+
 LawConstants law_constants(const Material& material, Analysis analysis) {
   const double E = material.youngs_modulus, nu = material.poissons_ratio;
   LawConstants c{.mu = E / (2.0 * (1.0 + nu)),

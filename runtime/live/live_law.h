@@ -18,6 +18,9 @@ enum class LiveLaw : std::uint8_t {
   mass_spring,  ///< springs along the elements' edges (springs.h)
 };
 
+/// The names that users give: linear, corotational, corotational-qr, neo-hookean, mass-spring.
+const char* name_of(LiveLaw law) noexcept;
+
 /// The elastic constants as the laws take them.
 struct LawConstants {
   double mu = 0.0;      ///< shear modulus [Pa]

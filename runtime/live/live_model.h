@@ -4,6 +4,7 @@
 #include "formats/model.h"
 #include "runtime/live/live_body.h"
 #include "runtime/live/live_settings.h"
+#include "runtime/live/live_stepper.h"
 
 namespace palpate {
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "runtime/live/live_stepper.h"
+
 namespace palpate {
 
 LiveOptions live_options(const LiveSettings& settings) {

@@ -1,13 +1,16 @@
 // What a person chooses of a body that is solved while it is touched.
 #pragma once
 
+#include <limits>
 #include <optional>
 
 #include "runtime/live/integrator.h"
-#include "runtime/live/live_body.h"
-#include "runtime/live/live_stepper.h"
+#include "runtime/live/live_law.h"
 
 namespace palpate {
+
+struct LiveOptions;
+struct StepperOptions;
 
 /// The live solver of a session. With default values a body moves as it was precomputed to: held where it is
 /// held, without weight.

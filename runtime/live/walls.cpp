@@ -15,7 +15,7 @@ Vec3 shortened(const Vec3& v, double by) noexcept {
 
 }  // namespace
 
-std::vector<Wall> room(const Vec3& low, const Vec3& high, double friction, bool has_lid) {
+std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, bool has_lid) {
   std::vector<Wall> walls;
   for (int axis = 0; axis < 3; ++axis) {
     walls.push_back({.normal = Vec3::Unit(axis), .offset = low[axis], .friction = friction});

@@ -17,7 +17,7 @@ struct Wall {
 };
 
 /// A floor and four walls around a box, open above; with a lid, closed.
-std::vector<Wall> room(const Vec3& low, const Vec3& high, double friction, bool has_lid = false);
+std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, bool has_lid = false);
 
 /// How a node meets a wall: its gap along a normal.
 struct WallGap {
