@@ -13,10 +13,13 @@
 #include <exception>
 #include <mutex>
 #include <optional>
+#include <sstream>
 #include <thread>
 
 #include "base/error.h"
 #include "precompute/allotment.h"
+#include "precompute/cluster/mumps_numbers.h"
+#include "precompute/cluster/rank_messages.h"
 
 namespace palpate {
 namespace {
@@ -54,39 +57,10 @@ struct Message {
   int from = 0;
 };
 
-/// Waits without a processor: MPI's own waiting would take one from the threads that solve.
-void wait(MPI_Request& request) {
-  auto pause = std::chrono::microseconds(20);
-  for (int done = 0;;) {
-    MPI_Test(&request, &done, MPI_STATUS_IGNORE);
-    if (done != 0) return;
-    std::this_thread::sleep_for(pause);
-    pause = std::min<std::chrono::microseconds>(2 * pause, std::chrono::milliseconds(5));
-  }
-}
-
 void barrier(MPI_Comm comm) {
   MPI_Request request = MPI_REQUEST_NULL;
   MPI_Ibarrier(comm, &request);
   wait(request);
-}
-
-void broadcast(void* data, int bytes, MPI_Comm comm) {
-  MPI_Request request = MPI_REQUEST_NULL;
-  MPI_Ibcast(data, bytes, MPI_BYTE, 0, comm, &request);
-  wait(request);
-}
-
-int rank_in(MPI_Comm comm) {
-  int rank = 0;
-  MPI_Comm_rank(comm, &rank);
-  return rank;
-}
-
-int size_of(MPI_Comm comm) {
-  int size = 0;
-  MPI_Comm_size(comm, &size);
-  return size;
 }
 
 }  // namespace
@@ -122,6 +96,8 @@ struct RankTeam::Impl {
   MPI_Comm node = MPI_COMM_NULL;
   MPI_Comm team = MPI_COMM_NULL;  // of this rank where it takes part
   bool by_node = false;
+  FactorOf factor_of = FactorOf::rank;
+  std::string lines;  // of a tile that is solved together, for the leader
   int default_jobs = 1;
   std::int32_t epoch = 0;
   std::deque<Message> early;  // of calls of `work` and `gather` that are to come
@@ -387,7 +363,8 @@ RankTeam::RankTeam() : impl_(std::make_unique<Impl>()) {
 RankTeam::~RankTeam() = default;
 
 void RankTeam::form(FactorOf factor_of) {
-  impl_->by_node = factor_of == FactorOf::node;
+  impl_->by_node = factor_of == FactorOf::node || factor_of == FactorOf::automatic;
+  impl_->factor_of = factor_of;
   impl_->form();
 }
 
@@ -441,7 +418,31 @@ bool RankTeam::work(const std::vector<Tile>& tiles, int jobs, const TileWork& wo
   }
 }
 
+Spreading RankTeam::spreading() const {
+  if (impl_->factor_of == FactorOf::all) return Spreading::always;
+  const bool may = impl_->factor_of == FactorOf::automatic && size() > 1 && has_mumps();
+  return may ? Spreading::where_needed : Spreading::never;
+}
+
+std::unique_ptr<SpreadNumbers> RankTeam::spread(const SparseMatrix& K, const Factor& analysed, int jobs) {
+  return make_mumps_numbers(impl_->team, K, analysed.permutation(), {.threads = jobs});
+}
+
+void RankTeam::hand_over_lines() {
+  const std::vector<std::string> all = gather(impl_->lines);
+  impl_->lines.clear();
+  for (const std::string& of_rank : all) {
+    std::istringstream lines(of_rank);
+    for (std::string line; std::getline(lines, line);) listener_(line);
+  }
+}
+
 void RankTeam::tell(const std::string& line) {
+  if (impl_->round == nullptr) {
+    impl_->lines += line;
+    if (line.empty() || line.back() != '\n') impl_->lines += '\n';
+    return;
+  }
   const std::scoped_lock lock(impl_->round->mutex);
   impl_->round->outbox.push_back({{Kind::told, impl_->epoch}, line, 0});
 }
@@ -456,9 +457,9 @@ bool RankTeam::any(bool here) {
 
 std::string RankTeam::share(std::string text) {
   std::int64_t bytes = std::ssize(text);
-  broadcast(&bytes, sizeof bytes, impl_->team);
+  broadcast(&bytes, 1, MPI_INT64_T, impl_->team);
   text.resize(static_cast<std::size_t>(bytes));
-  broadcast(text.data(), static_cast<int>(bytes), impl_->team);
+  broadcast(text.data(), static_cast<int>(bytes), MPI_BYTE, impl_->team);
   return text;
 }
 
