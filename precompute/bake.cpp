@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/interrupt.h"
 #include "base/parallel.h"
+#include "formats/begun_model.h"
 #include "formats/model_file.h"
 #include "formats/outputs/output_paths.h"
 #include "formats/outputs/part_files.h"
@@ -507,9 +508,11 @@ class Bake {
     progress_.plan(stages_of(plans_, options_.jobs, team_.size()));
     progress_.begin(factor_stage);
     factor_->factorize();
-    if (const SpreadNumbers* spread = factor_->spread_numbers(); spread != nullptr)
+    if (const SpreadNumbers* numbers = factor_->spread_numbers(); numbers != nullptr) {
+      spread_ = numbers->memory();
       progress_.line(fmt::format("factor over {} ranks: {}; {} % of work space beyond the estimate",
-                                 team_.size(), text_of(spread->memory(), true), spread->memory().room));
+                                 team_.size(), text_of(*spread_, true), spread_->room));
+    }
     interrupt_.note_from_now_on();
     if (!describe()) {
       progress_.line("interrupted: nothing was written");
@@ -520,11 +523,13 @@ class Bake {
 
   [[nodiscard]] const Plan& plan() const { return plans_.plan; }
   [[nodiscard]] const TileCounts& tiles() const { return tiles_; }
+  [[nodiscard]] const std::optional<SpreadMemory>& spread() const { return spread_; }
 
  private:
   void assemble();
   void spread_where_needed(int ranks);
   bool describe();
+  bool take_up();
   BakeResult solve_and_write();
   std::optional<Solved> solve(ModelWriter& writer);
 
@@ -547,6 +552,7 @@ class Bake {
   StoredNumbering stored_as_;
   Precision precision_ = Precision::single_precision;
   TileCounts tiles_;
+  std::optional<SpreadMemory> spread_;  // of a factor over several processes
 };
 
 /// Mesh, K and the plan.
@@ -584,14 +590,14 @@ void Bake::spread_where_needed(int ranks) {
   if (spreading == Spreading::never) return;
   if (spreading == Spreading::where_needed && !team_.any(needs_more_memory(plans_.plan, team_.size_here())))
     return;
-  SpreadMemory memory = expected_spread_memory(*factor_, ranks);
+  spread_ = expected_spread_memory(*factor_, ranks);
   if (ranks == team_.size() || !options_.dry_run) {
     factor_->spread(team_.spread(stiffness_.K, *factor_, options_.jobs));
-    memory = factor_->spread_numbers()->memory();
+    spread_ = factor_->spread_numbers()->memory();
   }
-  spread_plan(memory, stiffness_.K.nonZeros(), ranks, options_.jobs, plans_.plan);
+  spread_plan(*spread_, stiffness_.K.nonZeros(), ranks, options_.jobs, plans_.plan);
   progress_.line(fmt::format("factor over {} rank{} by MUMPS: about {}", ranks, ranks == 1 ? "" : "s",
-                             text_of(memory, false)));
+                             text_of(*spread_, false)));
 }
 
 /// All of the model that is known before the columns. False when interrupted.
@@ -601,18 +607,34 @@ bool Bake::describe() {
   model_.stored_nodes = stored_as_.nodes;
   model_.rest_force = loads_;
   model_.rest_displacement = rest_displacement(*factor_, stiffness_, loads_, prescribed_, model_.dimension());
+  if (plans_.compression)
+    model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
   const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, options_.jobs,
                                                            model_, progress_, interrupt_);
   if (team_.any(!whole)) return false;
+  if (take_up()) return true;
   add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_,
                progress_);
-  if (plans_.compression) {
-    model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
-  } else {
+  if (!plans_.compression) {
     progress_.begin(precision_stage);
     precision_ = decide_precision(description_, *elastic_, stiffness_, *factor_, stored_as_.dofs, team_,
                                   options_.jobs, model_, progress_);
   }
+  return true;
+}
+
+/// Whether an interrupted run has left what comes before the columns.
+bool Bake::take_up() {
+  if (options_.part || options_.join || options_.discard) return false;
+  std::optional<Precision> left;
+  if (team_.leads()) left = take_up_begun_model(options_.output, model_);
+  if (team_.share(left ? "left" : "").empty()) return false;
+  if (!team_.leads()) left = take_up_begun_model(options_.output, model_);
+  if (!left)
+    throw Error("is not the file that another rank has found: the nodes do not share this folder",
+                options_.output.string() + ".partial", "Write to a folder that all nodes share");
+  precision_ = *left;
+  progress_.line("what comes before the columns is kept from an earlier run");
   return true;
 }
 
@@ -666,6 +688,7 @@ BakeSummary bake(const Description& description, const BakeOptions& asked, Team&
   progress.end();
   summary.plan = bake.plan();
   summary.tiles = bake.tiles();
+  summary.spread = bake.spread();
   summary.stages = progress.stages();
   return summary;
 }

@@ -65,8 +65,8 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
   plan.file_bytes =
       packed_size(plan.stored_dofs) * bytes_per_scalar(precision.value_or(Precision::single_precision));
   plan.block_columns = choose_block_columns(plan.free_dofs);
-  plan.memory_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) +
-                      jobs * solver.workspace_bytes(plan.block_columns);
+  plan.factor_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
+  plan.memory_bytes = plan.factor_bytes + jobs * solver.workspace_bytes(plan.block_columns);
   for (std::int64_t first = 0; first < plan.stored_dofs; first += plan.block_columns) {
     plan.flops += solver.flops(first, std::min(plan.block_columns, plan.stored_dofs - first));
   }
@@ -104,10 +104,11 @@ void check_memory(const Plan& plan, int ranks) {
       fmt::format("{:.2f} GB of memory are needed, {:.2f} GB are free: {:.2f} GB for the factor ({} entries)"
                   "{}{} and the rest for blocks of {} columns",
                   static_cast<double>(needed) / 1e9, static_cast<double>(available) / 1e9,
-                  static_cast<double>(plan.factor_entries) * 8e-9, plan.factor_entries, overlays, dynamics,
+                  static_cast<double>(plan.factor_bytes) * 1e-9, plan.factor_entries, overlays, dynamics,
                   plan.block_columns),
       "memory",
       std::string("Use fewer --jobs, a larger mesh.edge_length or a stronger mesh.grading") +
+          ", or more nodes that share the factor (palpate-precompute-mpi)" +
           (overlays.empty() ? "" : ", or smaller regions in [overlay]") +
           (dynamics.empty() ? "" : ", or fewer modes in [dynamics]"));
 }

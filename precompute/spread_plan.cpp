@@ -16,7 +16,7 @@ constexpr double solve_efficiency = 0.5;   // of sweeps together against those o
 constexpr double factor_efficiency = 0.6;  // of factorising together
 constexpr double paths = 1.5;              // loads are swept to the root and back through all of the factor
 constexpr std::int64_t touched_columns = 90;  // of a place that the precision is chosen by
-constexpr std::int64_t touched_copies = 6;    // loads, residuals and solutions, of these in long double
+constexpr std::int64_t touched_copies = 3;    // loads, residuals and solutions, of these in long double
 
 }  // namespace
 
@@ -33,6 +33,7 @@ void spread_plan(const SpreadMemory& memory, std::int64_t entries, int ranks, in
   const std::int64_t K_bytes = entries * (scalar + static_cast<std::int64_t>(sizeof(std::int64_t)));
   const std::int64_t blocks = 2 * plan.block_columns * (plan.free_dofs + plan.stored_dofs) / ranks * scalar;
   const std::int64_t touches = touched_columns * touched_copies * plan.free_dofs * scalar;
+  plan.factor_bytes = memory.expected;
   plan.memory_bytes = memory.expected + K_bytes + std::max(blocks, touches);
   const double all = plan.flops;
   plan.flops = paths * 2.0 * static_cast<double>(plan.factor_entries) * static_cast<double>(plan.stored_dofs);

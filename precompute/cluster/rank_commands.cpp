@@ -87,11 +87,11 @@ int run_bakes(const Arguments& arguments, Team& team) {
   entries.insert(entries.end(), others.entries.begin(), others.entries.end());
   const std::vector<std::string> memory = team.gather(std::to_string(peak_memory()));
   if (team.leads() && !arguments.bake.report.empty()) {
-    std::int64_t peak = 0;
-    for (const std::string& of_rank : memory) peak = std::max<std::int64_t>(peak, std::stoll(of_rank));
+    std::vector<std::int64_t> peaks;
+    for (const std::string& of_rank : memory) peaks.push_back(std::stoll(of_rank));
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const int jobs = arguments.bake.jobs == 0 ? team.default_jobs() : arguments.bake.jobs;
-    write_report(arguments.bake.report, entries, {team.size(), jobs, seconds, peak});
+    write_report(arguments.bake.report, entries, {team.size(), jobs, seconds, peaks});
   }
   return std::stoi(all);
 }

@@ -1,4 +1,5 @@
-"""palpate-precompute-mpi with one to four ranks on this machine: the bytes of palpate-precompute, whatever happens to ranks."""
+"""palpate-precompute-mpi with one to four ranks on this machine: the bytes of palpate-precompute, whatever happens to ranks, and its numbers where they
+share a factor."""
 
 import json
 import os
@@ -8,10 +9,14 @@ import signal
 import subprocess
 import unittest
 
+import h5py
+import numpy
+
 from programs import BINARY, MODELS, PRECOMPUTE, ProgramTest, cube_toml, run
 
 RANKS = BINARY / "precompute" / "cluster" / "palpate-precompute-mpi"
-MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none"]
+MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1"]
+HAS_MUMPS = "dmumps" in run("ldd", RANKS).stdout
 
 
 class RanksTest(ProgramTest):
@@ -109,6 +114,98 @@ class Bytes(RanksTest):
         self.assertEqual(process.wait(), 130)
         self.assertRegex(self.own_factors(3, model, "-o", output), r"[1-9]\d* of \d+ columns were kept")
         self.assertEqual(output.read_bytes(), data)
+
+
+class Distributed(RanksTest):
+    """One factor over all ranks, by MUMPS: the numbers of palpate-precompute, whose own factor is CHOLMOD's."""
+
+    def setUp(self):
+        super().setUp()
+        if not HAS_MUMPS:
+            self.skipTest("this build has no MUMPS")
+
+    def bake(self, ranks, model, *arguments):
+        output = self.folder / "spread.palpate.hdf"
+        result = self.ranks(ranks, model, "-o", output, "--factor", "distributed", "--jobs", "1", *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return output
+
+    def check(self, model, *counts, matrices=("greens/packed",)):
+        self.straight(model)
+        for ranks in counts:
+            output = self.bake(ranks, model)
+            with h5py.File(self.folder / "straight.palpate.hdf") as one, h5py.File(output) as spread:
+                for name in matrices:
+                    entries = one[name][:]
+                    error = numpy.abs(spread[name][:] - entries).max() / numpy.abs(entries).max()
+                    self.assertLess(error, 1e-12, f"{name}, {ranks} ranks")
+                one_probes, probes = one["probes/displacements"][:], spread["probes/displacements"][:]
+                self.assertLess(numpy.abs(probes - one_probes).max() / numpy.abs(one_probes).max(), 1e-12)
+            output.unlink()
+            self.assertEqual(sorted(p.name for p in self.folder.glob("spread*")), [])
+
+    def test_cube(self):
+        self.check(self.write("model.toml", cube_toml(5)), 1, 2, 4)
+
+    def test_plate(self):
+        self.check(MODELS / "plate" / "model.toml", 2, 4)
+
+    def test_held_axes_have_no_columns(self):
+        text = cube_toml(3).replace("[storage]", '[[fixed]]\nhalf_space = {point = [1, 0, 0], normal = [1, 0, 0]}\naxes = "xy"\n[storage]')
+        self.check(self.write("model.toml", text), 3)
+
+    def test_the_inverse_of_dynamics(self):
+        text = cube_toml(3, scope="full") + '[dynamics]\nmethod = "packed"\n'
+        self.check(self.write("model.toml", text), 2, matrices=("greens/packed", "dynamics/inverse"))
+
+    def test_compressed_is_verified(self):
+        model = self.write("model.toml", cube_toml(4).replace('precision = "double"\n', 'compression = "h2"\n'))
+        result = run(PRECOMPUTE, "verify", self.bake(2, model))
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+
+    def test_goes_on_after_a_signal_and_the_reverse(self):
+        model = self.write("model.toml", cube_toml(9))
+        output = self.folder / "spread.palpate.hdf"
+        journal = output.with_name(output.name + ".progress")
+        job = subprocess.Popen(self.command(2, model, "-o", output, "--factor", "distributed", "--jobs", "1"), cwd=self.folder,
+                               stderr=subprocess.PIPE, text=True)
+        self.addCleanup(job.stderr.close)
+        self.wait_for(lambda: journal.exists() and "\ncolumns" in journal.read_text(), job)
+        os.kill(self.pids(job)[-1], signal.SIGTERM)
+        self.assertEqual(job.wait(timeout=200), 130)
+        self.assertIn("interrupted: the columns that are done are kept", job.stderr.read())
+        again = run(PRECOMPUTE, model, "-o", output, cwd=self.folder)
+        self.assertRegex(again.stderr, r"[1-9]\d* of \d+ columns were kept")
+        result = run(PRECOMPUTE, "verify", output)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+
+    def test_memory_of_ranks_is_planned_and_reported(self):
+        model = self.write("model.toml", cube_toml(5))
+        report = self.folder / "report.json"
+        self.bake(2, model, "--report", report)
+        numbers = json.loads(report.read_text())
+        self.assertEqual(len(numbers["rank_memory_bytes"]), 2)
+        factor = numbers["models"][0]["factor_over_ranks"]
+        self.assertLessEqual(factor["used_bytes"], factor["expected_bytes"])
+        self.assertGreater(factor["used_bytes_of_all"], factor["used_bytes"])
+        result = run(RANKS, model, "--dry-run", "--ranks", "4", "--factor", "distributed", cwd=self.folder)
+        self.assertRegex(result.stderr, r"factor over 4 ranks by MUMPS: about 0\.\d\d GB of memory in the rank with most, 0\.\d\d GB in all")
+
+    def test_a_body_that_is_not_held(self):
+        model = self.write("model.toml", cube_toml(3).replace("[[fixed]]\nhalf_space = { point = [0, 0, 0], normal = [0, 0, -1] }\n",
+                                                             "[[fixed]]\nnodes = [0]\n"))
+        result = self.ranks(2, model, "--factor", "distributed")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertEqual(result.stderr.count("error: "), 1, result.stderr)
+
+
+@unittest.skipIf(HAS_MUMPS, "this build has MUMPS")
+class WithoutMumps(RanksTest):
+    def test_it_says_so(self):
+        result = self.ranks(2, self.write("model.toml", cube_toml(2)), "--factor", "distributed")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertRegex(result.stderr, "error: --factor distributed: this build .* has no MUMPS")
+        self.assertEqual(result.stderr.count("error: "), 1, result.stderr)
 
 
 class Dying(RanksTest):
@@ -222,7 +319,7 @@ class Misfits(RanksTest):
             self.assertIn(piece, result.stderr)
 
     def test_help_needs_no_ranks(self):
-        self.assertIn("--factor node|rank", run(RANKS, "--help").stdout)
+        self.assertIn("--factor auto|node|rank|distributed", run(RANKS, "--help").stdout)
         self.assertIn("palpate-precompute-mpi 0", run(RANKS, "--version").stdout)
 
 
