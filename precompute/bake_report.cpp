@@ -24,6 +24,7 @@ Json json_of(const BakeSummary& bake) {
                {"free_dofs", plan.free_dofs},
                {"stored_dofs", plan.stored_dofs},
                {"factor_entries", plan.factor_entries},
+               {"block_columns", plan.block_columns},
                {"greens_bytes", plan.file_bytes},
                {"expected_memory_bytes", plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes},
                {"tiles_solved", bake.tiles.solved},

@@ -332,6 +332,15 @@ class Plans(RanksTest):
                          r"3 blocks of columns for 64 threads: fewer ranks would do")  # 507 of 192 each
         self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
 
+    def test_blocks_of_columns_depend_on_the_model_alone(self):
+        for cells, columns in ((6, 192), (30, 96)):  # the larger one has work for more threads than blocks of 192
+            model = self.write("model.toml", cube_toml(cells))
+            for ranks in (1, 64):
+                report = self.folder / "report.json"
+                result = run(RANKS, model, "--dry-run", "--ranks", ranks, "--jobs", ranks, "--report", report, cwd=self.folder)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertEqual(json.loads(report.read_text())["models"][0]["block_columns"], columns)
+
     def test_many_models(self):
         models = []
         for cells in (2, 9, 3, 4):
