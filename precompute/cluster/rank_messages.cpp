@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <thread>
+
+#include "precompute/cluster/rank_threads.h"
 
 namespace palpate {
 
@@ -11,12 +12,13 @@ void wait(MPI_Request& request) {
   for (int done = 0;;) {
     MPI_Test(&request, &done, MPI_STATUS_IGNORE);
     if (done != 0) return;
-    std::this_thread::sleep_for(pause);
+    pause_for(pause);
     pause = std::min<std::chrono::microseconds>(2 * pause, std::chrono::milliseconds(5));
   }
 }
 
 void broadcast(void* data, int count, MPI_Datatype type, MPI_Comm comm) {
+  if (size_of(comm) == 1) return;
   MPI_Request request = MPI_REQUEST_NULL;
   MPI_Ibcast(data, count, type, 0, comm, &request);
   wait(request);

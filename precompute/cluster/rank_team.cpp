@@ -7,24 +7,23 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <condition_variable>
 #include <cstring>
 #include <deque>
 #include <exception>
 #include <mutex>
 #include <optional>
 #include <sstream>
-#include <thread>
 
 #include "base/error.h"
 #include "precompute/allotment.h"
 #include "precompute/cluster/mumps_numbers.h"
 #include "precompute/cluster/rank_messages.h"
+#include "precompute/cluster/rank_threads.h"
 
 namespace palpate {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = RankClock;
 
 constexpr std::chrono::microseconds between_looks{500};  // for messages, while threads of the rank solve
 constexpr std::chrono::seconds between_signs{5};         // of life, from every rank
@@ -58,6 +57,7 @@ struct Message {
 };
 
 void barrier(MPI_Comm comm) {
+  if (size_of(comm) == 1) return;
   MPI_Request request = MPI_REQUEST_NULL;
   MPI_Ibarrier(comm, &request);
   wait(request);
@@ -71,8 +71,8 @@ struct RankTeam::Impl {
     explicit Round(const TileWork& work) : tile_work(work) {}
 
     const TileWork& tile_work;
-    std::mutex mutex;  // of all that follows
-    std::condition_variable ready;
+    RankMutex mutex;  // of all that follows
+    RankCondition ready;
     std::deque<Tile> stock;  // that threads of this rank take from; the leader's is that of all
     std::deque<Message> outbox;
     int waiting = 0;  // threads
@@ -284,7 +284,7 @@ bool RankTeam::Impl::lead(Round& all, const std::function<void(const std::string
     answer_asks(all);
     show_signs_of_life();
     expect_signs_of_life();
-    if (idle) std::this_thread::sleep_for(between_looks);
+    if (idle) pause_for(between_looks);
   }
   for (int to = 1; to < size_of(team); ++to) send(to, {Kind::end, epoch, interrupted ? 0 : 1});
   return !interrupted;
@@ -330,7 +330,7 @@ bool RankTeam::Impl::follow(Round& all, int jobs) {
     }
     show_signs_of_life();
     expect_signs_of_life();
-    if (idle) std::this_thread::sleep_for(between_looks);
+    if (idle) pause_for(between_looks);
   }
 }
 
@@ -398,7 +398,7 @@ bool RankTeam::work(const std::vector<Tile>& tiles, int jobs, const TileWork& wo
   impl_->heard.assign(impl_->heard.size(), never);
   if (leads()) round.stock.assign(tiles.begin(), tiles.end());
   impl_->round = &round;
-  std::vector<std::jthread> threads;
+  std::vector<RankThread> threads;
   const auto close = [&] {
     const std::scoped_lock lock(round.mutex);
     round.closed = true;
@@ -474,7 +474,7 @@ std::vector<std::string> RankTeam::gather(const std::string& text) {
   for (std::size_t missing = texts.size() - 1; missing > 0;) {
     const auto message = impl_->receive();
     if (!message) {
-      std::this_thread::sleep_for(between_looks);
+      pause_for(between_looks);
     } else if (message->head.kind == Kind::told && message->head.epoch == impl_->epoch) {
       texts[static_cast<std::size_t>(message->from)] = message->text;
       --missing;
