@@ -53,7 +53,7 @@ std::int64_t choose_block_columns(std::int64_t free_dofs, double flops) {
                                   flops < work_for_many ? max_block_columns : block_columns_for_many);
 }
 
-/// Of all columns, in blocks of so many.
+/// Flops of all columns, in blocks of so many.
 double column_flops(const GreensSolver& solver, std::int64_t block) {
   double flops = 0.0;
   for (std::int64_t first = 0; first < solver.order(); first += block)
