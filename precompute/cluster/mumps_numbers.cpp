@@ -89,6 +89,7 @@ class MumpsNumbers : public SpreadNumbers {
   };
 
   void run(Job job);
+  void expect_version() const;
   [[nodiscard]] MUMPS_INT& control(int number) { return mumps_.icntl[number - 1]; }
   void give_entries();
   Announcement announce(Call call, std::int64_t columns, std::int64_t rows);
@@ -145,10 +146,7 @@ MumpsNumbers::MumpsNumbers(MPI_Comm ranks, const SparseMatrix& K, std::span<cons
   mumps_.sym = 1;  // positive definite
   mumps_.par = 1;  // rank 0 works too
   run(Job::begin);
-  if (std::string(mumps_.version_number) != MUMPS_VERSION)
-    throw Error(fmt::format("MUMPS {} is here, and this program was built for {}", mumps_.version_number,
-                            MUMPS_VERSION),
-                "--factor distributed", "Build it again on this machine");
+  expect_version();
   for (const int stream : {1, 2, 3}) control(stream) = -1;
   control(4) = 0;   // no text
   control(7) = 1;   // ordered by perm_in
@@ -170,6 +168,14 @@ MumpsNumbers::MumpsNumbers(MPI_Comm ranks, const SparseMatrix& K, std::span<cons
   memory_.expected = mumps_.infog[15] * megabyte;
   memory_.expected_all = mumps_.infog[16] * megabyte;
   memory_.room = options.room;
+}
+
+/// Throws Error where the library is another one than the header was of.
+void MumpsNumbers::expect_version() const {
+  const std::string here = mumps_.version_number, built_for = MUMPS_VERSION;
+  if (here == built_for) return;
+  throw Error(fmt::format("MUMPS {} is here, and this program was built for {}", here, built_for),
+              "--factor distributed", "Build it again on this machine");
 }
 
 MumpsNumbers::~MumpsNumbers() {
@@ -302,10 +308,11 @@ SolutionRows MumpsNumbers::share_out(const SolutionRows& found, std::int64_t col
     take_at[r] = take_at[r - 1] + taken[r - 1];
   }
   SolutionRows all;
-  all.places.resize(static_cast<std::size_t>(first_row.back() + rows.back()));
+  all.places.resize(static_cast<std::size_t>(first_row.back()) + static_cast<std::size_t>(rows.back()));
   MPI_Allgatherv(found.places.data(), own, MPI_INT, all.places.data(), rows.data(), first_row.data(), MPI_INT,
                  ranks_);
-  std::vector<double> pieces(static_cast<std::size_t>(take_at.back() + taken.back()));
+  std::vector<double> pieces(static_cast<std::size_t>(take_at.back()) +
+                             static_cast<std::size_t>(taken.back()));
   MPI_Alltoallv(found.values.data(), sent.data(), send_at.data(), MPI_DOUBLE, pieces.data(), taken.data(),
                 take_at.data(), MPI_DOUBLE, ranks_);
   all.values.resize(pieces.size());
