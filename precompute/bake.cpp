@@ -285,7 +285,7 @@ OverlayPlan announce_overlays(const Description& description, const Model& model
 
 DynamicsPlan announce_dynamics(const Description& description, const Plan& plan, const Stiffness& stiffness,
                                Progress& progress) {
-  const DynamicsPlan dynamics =
+  DynamicsPlan dynamics =
       plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
                     description.precision.value_or(Precision::single_precision));
   const std::string method =

@@ -3,10 +3,24 @@
 
 #include <mpi.h>
 
+#include <algorithm>
+#include <chrono>
+
+#include "precompute/cluster/rank_threads.h"
+
 namespace palpate {
 
 /// Waits without a processor: MPI's own waiting would take one from the threads that solve.
-void wait(MPI_Request& request);
+inline void wait(MPI_Request& request) {
+  auto pause = std::chrono::microseconds(20);
+  for (int done = 0;;) {
+    MPI_Test(&request, &done, MPI_STATUS_IGNORE);
+    if (done != 0) break;
+    pause_for(pause);
+    pause = std::min<std::chrono::microseconds>(2 * pause, std::chrono::milliseconds(5));
+  }
+  MPI_Wait(&request, MPI_STATUS_IGNORE);  // it is done: this tells tools that follow requests
+}
 
 /// From rank 0 to all.
 void broadcast(void* data, int count, MPI_Datatype type, MPI_Comm comm);

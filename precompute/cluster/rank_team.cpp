@@ -86,6 +86,7 @@ struct RankTeam::Impl {
   void solve(Round& round, int worker);
   void halt(Round& round);
   bool lead(Round& round, const std::function<void(const std::string&)>& listener, int jobs);
+  void take(Round& round, const Tile& tile);
   bool follow(Round& round, int jobs);
   void answer_asks(Round& round);
   void show_signs_of_life();
@@ -290,6 +291,17 @@ bool RankTeam::Impl::lead(Round& all, const std::function<void(const std::string
   return !interrupted;
 }
 
+/// Puts a tile into the stock, or gives it back.
+void RankTeam::Impl::take(Round& all, const Tile& tile) {
+  const std::scoped_lock lock(all.mutex);
+  if (all.halted) {
+    all.outbox.push_back({{Kind::back, epoch, 0, 1}, "", 0});
+  } else {
+    all.stock.push_back(tile);
+    all.ready.notify_one();
+  }
+}
+
 bool RankTeam::Impl::follow(Round& all, int jobs) {
   std::int64_t asked = 0;  // tiles that were asked for and did not come
   bool told_stop = false;
@@ -300,14 +312,9 @@ bool RankTeam::Impl::follow(Round& all, int jobs) {
       const Head& head = message->head;
       if (head.kind == Kind::end && head.epoch == epoch) return head.first != 0;
       if (head.kind == Kind::halt) halt(all);
-      if (head.kind != Kind::give) continue;
-      const std::scoped_lock lock(all.mutex);
-      asked = std::max<std::int64_t>(asked - 1, 0);
-      if (all.halted) {
-        all.outbox.push_back({{Kind::back, epoch, 0, 1}, "", 0});
-      } else {
-        all.stock.push_back({head.first, head.count, head.cost});
-        all.ready.notify_one();
+      if (head.kind == Kind::give) {
+        asked = std::max<std::int64_t>(asked - 1, 0);
+        take(all, {head.first, head.count, head.cost});
       }
     }
     std::deque<Message> own;
