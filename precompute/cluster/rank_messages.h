@@ -15,11 +15,10 @@ inline void wait(MPI_Request& request) {
   auto pause = std::chrono::microseconds(20);
   for (int done = 0;;) {
     MPI_Test(&request, &done, MPI_STATUS_IGNORE);
-    if (done != 0) break;
+    if (done != 0) return;
     pause_for(pause);
     pause = std::min<std::chrono::microseconds>(2 * pause, std::chrono::milliseconds(5));
   }
-  MPI_Wait(&request, MPI_STATUS_IGNORE);  // it is done: this tells tools that follow requests
 }
 
 /// From rank 0 to all.

@@ -76,7 +76,7 @@ struct RankTeam::Impl {
     std::deque<Tile> stock;  // that threads of this rank take from; the leader's is that of all
     std::deque<Message> outbox;
     int waiting = 0;  // threads
-    bool closed = false, halted = false;
+    bool closed = false, halted = false, told_stop = false;
     std::exception_ptr failure;
   };
 
@@ -88,6 +88,7 @@ struct RankTeam::Impl {
   bool lead(Round& round, const std::function<void(const std::string&)>& listener, int jobs);
   void take(Round& round, const Tile& tile);
   bool follow(Round& round, int jobs);
+  void tell_stop(Round& round);
   void answer_asks(Round& round);
   void show_signs_of_life();
   void expect_signs_of_life();
@@ -304,7 +305,6 @@ void RankTeam::Impl::take(Round& all, const Tile& tile) {
 
 bool RankTeam::Impl::follow(Round& all, int jobs) {
   std::int64_t asked = 0;  // tiles that were asked for and did not come
-  bool told_stop = false;
   while (true) {
     bool idle = true;
     while (const auto message = receive()) {
@@ -331,14 +331,18 @@ bool RankTeam::Impl::follow(Round& all, int jobs) {
       send(0, {Kind::ask, epoch, need, more});
       asked += need;
     }
-    if (!told_stop && all.tile_work.interrupted()) {
-      told_stop = true;
-      send(0, {Kind::stop, epoch});
-    }
+    tell_stop(all);
     show_signs_of_life();
     expect_signs_of_life();
     if (idle) pause_for(between_looks);
   }
+}
+
+/// Says once that this rank was interrupted.
+void RankTeam::Impl::tell_stop(Round& all) {
+  if (all.told_stop || !all.tile_work.interrupted()) return;
+  all.told_stop = true;
+  send(0, {Kind::stop, epoch});
 }
 
 void RankTeam::Impl::form() {
