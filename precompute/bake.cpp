@@ -630,10 +630,11 @@ bool Bake::take_up() {
   if (team_.leads()) left = take_up_begun_model(options_.output, model_);
   if (team_.share(left ? "left" : "").empty()) return false;
   if (!team_.leads()) left = take_up_begun_model(options_.output, model_);
-  if (!left)
+  if (!left) {
     throw Error("is not the file that another rank has found: the nodes do not share this folder",
                 options_.output.string() + ".partial",
                 "Write to a folder that all nodes share, or bake in parts: palpate-precompute --part K/N");
+  }
   precision_ = *left;
   progress_.line("what comes before the columns is kept from an earlier run");
   return true;
