@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/file_io.h"
+#include "formats/begun_model.h"
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
 #include "formats/dynamics_fields.h"
@@ -606,6 +607,31 @@ void ModelWriter::Impl::discard() noexcept {
   std::error_code ignored;
   std::filesystem::remove(partial, ignored);
   journal->remove();
+}
+
+std::optional<Precision> take_up_begun_model(const std::filesystem::path& path, Model& model) {
+  const std::optional<JournalContents> journal = std::filesystem::exists(with_suffix(path, ".progress"))
+                                                     ? peek_journal(with_suffix(path, ".progress"))
+                                                     : std::nullopt;
+  if (!journal) return {};
+  const std::optional<BegunModel> begun = read_begun_model(with_suffix(path, ".partial"));
+  if (!begun) return {};
+  Model candidate = model;
+  candidate.rest_displacement = begun->model.rest_displacement;
+  candidate.dynamics = begun->model.dynamics;
+  candidate.greens = begun->model.greens;
+  candidate.force_errors = begun->model.force_errors;
+  try {
+    if (ModelWriter::key_of(path, candidate, begun->precision) != journal->frame.key) return {};
+  } catch (const Error&) {
+    return {};  // it is of another model
+  }
+  model = std::move(candidate);
+  return begun->precision;
+}
+
+std::string ModelWriter::key_of(const std::filesystem::path& path, const Model& model, Precision precision) {
+  return Impl(path, model, precision, std::nullopt).frame.key;
 }
 
 ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,
