@@ -616,18 +616,21 @@ std::optional<Precision> take_up_begun_model(const std::filesystem::path& path, 
   if (!journal) return {};
   const std::optional<BegunModel> begun = read_begun_model(with_suffix(path, ".partial"));
   if (!begun) return {};
-  Model candidate = model;
-  candidate.rest_displacement = begun->model.rest_displacement;
-  candidate.dynamics = begun->model.dynamics;
-  candidate.greens = begun->model.greens;
-  candidate.force_errors = begun->model.force_errors;
+  const auto take_from = [&](const Model& other) {
+    model.rest_displacement = other.rest_displacement;
+    model.dynamics = other.dynamics;
+    model.greens = other.greens;
+    model.force_errors = other.force_errors;
+  };
+  const Model before = model;  // its mesh stays where it is: others refer to it
+  take_from(begun->model);
   try {
-    if (ModelWriter::key_of(path, candidate, begun->precision) != journal->frame.key) return {};
+    if (ModelWriter::key_of(path, model, begun->precision) == journal->frame.key) return begun->precision;
   } catch (const Error&) {
-    return {};  // it is of another model
+    // It is of another model.
   }
-  model = std::move(candidate);
-  return begun->precision;
+  take_from(before);
+  return {};
 }
 
 std::string ModelWriter::key_of(const std::filesystem::path& path, const Model& model, Precision precision) {
