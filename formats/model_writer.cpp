@@ -614,20 +614,21 @@ std::optional<Precision> take_up_begun_model(const std::filesystem::path& path, 
                                                      ? peek_journal(with_suffix(path, ".progress"))
                                                      : std::nullopt;
   if (!journal) return {};
-  const std::optional<BegunModel> begun = read_begun_model(with_suffix(path, ".partial"));
+  std::optional<BegunModel> begun = read_begun_model(with_suffix(path, ".partial"));
   if (!begun) return {};
-  Model candidate = model;
-  candidate.rest_displacement = begun->model.rest_displacement;
-  candidate.dynamics = begun->model.dynamics;
-  candidate.greens = begun->model.greens;
-  candidate.force_errors = begun->model.force_errors;
+  const auto exchange = [&] {  // by field: others refer to the mesh and the rest of the model
+    std::swap(model.rest_displacement, begun->model.rest_displacement);
+    std::swap(model.dynamics, begun->model.dynamics);
+    std::swap(model.greens, begun->model.greens);
+    std::swap(model.force_errors, begun->model.force_errors);
+  };
+  exchange();
   try {
-    if (ModelWriter::key_of(path, candidate, begun->precision) != journal->frame.key) return {};
-  } catch (const Error&) {
-    return {};  // it is of another model
+    if (ModelWriter::key_of(path, model, begun->precision) == journal->frame.key) return begun->precision;
+  } catch (const Error&) {  // it is of another model
   }
-  model = std::move(candidate);
-  return begun->precision;
+  exchange();
+  return {};
 }
 
 std::string ModelWriter::key_of(const std::filesystem::path& path, const Model& model, Precision precision) {
