@@ -614,22 +614,20 @@ std::optional<Precision> take_up_begun_model(const std::filesystem::path& path, 
                                                      ? peek_journal(with_suffix(path, ".progress"))
                                                      : std::nullopt;
   if (!journal) return {};
-  const std::optional<BegunModel> begun = read_begun_model(with_suffix(path, ".partial"));
+  std::optional<BegunModel> begun = read_begun_model(with_suffix(path, ".partial"));
   if (!begun) return {};
-  const auto take_from = [&](const Model& other) {
-    model.rest_displacement = other.rest_displacement;
-    model.dynamics = other.dynamics;
-    model.greens = other.greens;
-    model.force_errors = other.force_errors;
+  const auto exchange = [&] {  // by field: others refer to the mesh and the rest of the model
+    std::swap(model.rest_displacement, begun->model.rest_displacement);
+    std::swap(model.dynamics, begun->model.dynamics);
+    std::swap(model.greens, begun->model.greens);
+    std::swap(model.force_errors, begun->model.force_errors);
   };
-  const Model before = model;  // its mesh stays where it is: others refer to it
-  take_from(begun->model);
+  exchange();
   try {
     if (ModelWriter::key_of(path, model, begun->precision) == journal->frame.key) return begun->precision;
-  } catch (const Error&) {
-    // It is of another model.
+  } catch (const Error&) {  // it is of another model
   }
-  take_from(before);
+  exchange();
   return {};
 }
 
