@@ -230,8 +230,9 @@ class Faults : public testing::TestWithParam<Case> {};
 TEST_P(Faults, StayWithinTheClamps) {
   const Case& fault = GetParam();
   Felt felt;
-  // A machine that is itself away for longer than a device may be silent shows that, and not this fault. It may
-  // be away from the loop, or from the threads that read and write: then a fault is latched that is not planted.
+  // A machine that is itself away for longer than a device may be silent shows that, and not this fault. It
+  // may be away from the loop, or from the threads that read and write: then a fault is latched that is not
+  // planted.
   constexpr std::int64_t away = 10'000'000;  // ns
   for (int attempt = 0; attempt < 60; ++attempt) {
     felt = press(fault);
