@@ -11,6 +11,8 @@
 #include <cstdio>
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,8 +20,10 @@
 #include "base/error.h"
 #include "precompute/compression/certificate.h"
 #include "precompute/compression/compression.h"
+#include "precompute/compression/recompression.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
+#include "tests/support/column_compression.h"
 #include "tests/support/study.h"
 
 namespace palpate {
@@ -30,6 +34,9 @@ struct Options {
   ClusterOptions clusters;
   std::vector<double> cut = {1e-2};
   std::int64_t touches = 100;
+  double share = 0.2;
+  Index tile = 2;
+  bool columns = false;
   int jobs = static_cast<int>(std::thread::hardware_concurrency());
 };
 
@@ -40,6 +47,9 @@ Options read(int count, char** words) {
       {"--eta", [&](const std::string& text) { options.clusters.eta = std::stod(text); }},
       {"--cut", [&](const std::string& text) { options.cut = test::numbers(text); }},
       {"--touches", [&](const std::string& text) { options.touches = std::stoll(text); }},
+      {"--share", [&](const std::string& text) { options.share = std::stod(text); }},
+      {"--tile", [&](const std::string& text) { options.tile = std::stoi(text); }},
+      {"--from", [&](const std::string& text) { options.columns = text == "columns"; }},
       {"--jobs", [&](const std::string& text) { options.jobs = std::stoi(text); }},
   };
   options.model = words[1];
@@ -50,9 +60,13 @@ Options read(int count, char** words) {
 /// Seconds since it was asked last.
 double lap() {
   static auto last = std::chrono::steady_clock::now();
+  static std::clock_t last_cpu = 0;
   const auto now = std::chrono::steady_clock::now();
   const double seconds = std::chrono::duration<double>(now - last).count();
+  const std::clock_t cpu = std::clock();
+  fmt::print("[cpu {:.1f} s] ", double(cpu - last_cpu) / CLOCKS_PER_SEC);
   last = now;
+  last_cpu = cpu;
   return seconds;
 }
 
@@ -105,13 +119,26 @@ void run(const Options& options) {
   fmt::print("stored nodes: {}, {} levels, {} near and {} far pairs, {:.1f} s\n", points.size(),
              clusters.tree.levels, clusters.near_pair.size(), clusters.far_pair.size(), lap());
 
-  Compression compression(factor, stored_dofs, d, clusters, options.jobs,
-                          [](CompressionStage, double) { return true; });
-  compression.prepare();
-  fmt::print("near pairs and random loads: {:.1f} s\n", lap());
+  std::optional<Compression> compression;
+  std::optional<HierarchicalMatrix> finer;
+  if (options.columns) {
+    test::ColumnCompression columns(factor, stored_dofs, d, clusters, options.jobs, options.tile);
+    fmt::print("columns: {:.3g} Tflop\n", 1e-12 * columns.flops());
+    std::fflush(stdout);
+    finer = columns.compress(options.share * options.cut.front());
+    const test::ColumnTimes& t = columns.times();
+    fmt::print("columns: roots {:.1f}, solves {:.1f}, tiles {:.1f}, joining {:.1f} s of processor time\n", t.roots, t.solves, t.tiles, t.joining);
+    fmt::print("columns: {:.1f} s\n", lap());
+  } else {
+    compression.emplace(factor, stored_dofs, d, clusters, options.jobs,
+                        [](CompressionStage, double) { return true; });
+    compression->prepare();
+    fmt::print("near pairs and random loads: {:.1f} s\n", lap());
+  }
   std::fflush(stdout);
   for (const double cut : options.cut) {
-    const auto matrix = compression.compress(cut);
+    const auto matrix = finer ? std::make_shared<HierarchicalMatrix>(recompressed(*finer, cut, options.jobs))
+                              : compression->compress(cut);
     fmt::print("cut {:g}: {:.1f} s\n", cut, lap());
     const auto gigabytes = [](std::int64_t floats) { return 4e-9 * double(floats); };
     const double dense = 4e-9 * 0.5 * double(matrix->order()) * double(matrix->order());
