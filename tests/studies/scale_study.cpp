@@ -127,8 +127,8 @@ void run(const Options& options) {
     std::fflush(stdout);
     finer = columns.compress(options.share * options.cut.front());
     const test::ColumnTimes& t = columns.times();
-    fmt::print("columns: roots {:.1f}, solves {:.1f}, tiles {:.1f}, joining {:.1f} s of processor time\n", t.roots, t.solves, t.tiles, t.joining);
-    fmt::print("columns: {:.1f} s\n", lap());
+    fmt::print("columns: solves {:.1f}, tiles {:.1f}, joining {:.1f} s of processor time\n", t.solves, t.tiles, t.joining);
+    fmt::print("columns: {:.1f} s, {:.3f} GB kept\n", lap(), 1e-9 * double(columns.kept_bytes()));
   } else {
     compression.emplace(factor, stored_dofs, d, clusters, options.jobs,
                         [](CompressionStage, double) { return true; });

@@ -70,6 +70,7 @@ ColumnCompression::ColumnCompression(const Factor& factor, std::span<const std::
       rows_(matrix_.far_pair.size()),
       covariance_(needed_.size()),
       basis_(needed_.size()),
+      compliance_(needed_.size()),
       change_(needed_.size()),
       place_(needed_.size() + 1) {
   matrix_.near = near_;
@@ -115,22 +116,6 @@ double ColumnCompression::flops() const {
   return total;
 }
 
-std::int64_t ColumnCompression::kept_bytes() const {
-  std::int64_t floats = 0;
-  for (const FloatRows& rows : rows_) floats += rows.size();
-  return floats * static_cast<std::int64_t>(sizeof(float));
-}
-
-void ColumnCompression::solve_root(Index leaf, SelectedSolver::Workspace& workspace) {
-  const Index c = matrix_.tree.first_leaf() + leaf;
-  const auto own = stored_dofs_.subspan(at(first_dof(c)), at(dofs(c)));
-  Rows block(dofs(c), dofs(c));
-  solver_.solve(own, own, workspace, {block.data(), at(block.size())});
-  Eigen::Map<FloatRows>(near_.get() + matrix_.near_at[at(matrix_.first_near_pair(leaf))], dofs(c), dofs(c)) =
-      block.cast<float>();
-  root_[at(leaf)] = root_of_leaf(matrix_, leaf);
-}
-
 void ColumnCompression::solve_tile(Index tile, Desk& desk) {
   const auto rows = later_dofs(tile * tile_leaves_);
   const std::int64_t end = tile + 1 < tiles() ? std::ssize(later_dofs((tile + 1) * tile_leaves_)) : 0;
@@ -151,20 +136,11 @@ void ColumnCompression::keep_near(Index tile, const Desk& desk) {
       Eigen::Map<FloatRows>(near_.get() + matrix_.near_at[at(p)], dofs(row), dofs(c)) =
           of_row.middleCols(first_dof(c) - first_dof(first), dofs(c)).cast<float>();
     }
-  }
-}
-
-/// L^-1 on all rows, leaf after leaf.
-void ColumnCompression::weigh_rows(Index tile, Desk& desk) const {
-  const Index first = tile * tile_leaves_;
-  const std::int64_t width = std::ssize(desk.tile) / std::ssize(later_dofs(first));
-  double* rows = desk.tile.data();
-  for (Index leaf = first; leaf < matrix_.tree.leaves(); ++leaf) {
-    const Rows& L = root_[at(leaf)];
-    cblas_dtrsm(CblasRowMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit,
-                static_cast<blasint>(L.rows()), static_cast<blasint>(width), 1.0, L.data(),
-                static_cast<blasint>(L.rows()), rows, static_cast<blasint>(width));
-    rows += L.rows() * width;
+    root_[at(leaf)] = root_of_leaf(matrix_, leaf);
+    const Eigen::Map<const FloatRows> own(
+        near_.get() + matrix_.near_at[at(matrix_.first_near_pair(leaf))], dofs(c), dofs(c));
+    const std::int64_t free = (own.diagonal().array() > 0.0F).count();
+    compliance_[at(c)] = double(own.trace()) / double(std::max<std::int64_t>(free, 1));
   }
 }
 
@@ -186,7 +162,8 @@ ColumnCompression::Front ColumnCompression::compress_leaf(Index leaf, Index firs
     cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, static_cast<blasint>(n),
                 static_cast<blasint>(dofs(row)), 1.0, of(row), static_cast<blasint>(width), 1.0, gram.data(),
                 static_cast<blasint>(n));
-  column_basis_[at(c)] = leading(gram.selfadjointView<Eigen::Lower>(), cut * cut * double(n));
+  column_basis_[at(c)] =
+      leading(gram.selfadjointView<Eigen::Lower>(), cut * cut * double(n) * compliance_[at(c)]);
   const Rows V = column_basis_[at(c)];
   Front front;
   for (const auto& [row, pair] : pairs) {
@@ -214,8 +191,9 @@ ColumnCompression::Front ColumnCompression::joined(Index parent, Front a, Front 
     const Rows rows = both(i);
     gram.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
   }
-  column_basis_[at(parent)] =
-      leading(gram.selfadjointView<Eigen::Lower>(), cut * cut * double(dofs(parent)));
+  compliance_[at(parent)] = 0.5 * (compliance_[at(2 * parent + 1)] + compliance_[at(2 * parent + 2)]);
+  column_basis_[at(parent)] = leading(gram.selfadjointView<Eigen::Lower>(),
+                                      cut * cut * double(dofs(parent)) * compliance_[at(parent)]);
   Front front;
   for (std::size_t i = 0; i < a.rows.size(); ++i) {
     front.rows.push_back((both(i) * column_basis_[at(parent)]).cast<float>());
@@ -252,6 +230,22 @@ void ColumnCompression::hand_up(Index c, Front front, double cut) {
                         : joined(parent, std::move(other), std::move(front), cut);
     c = parent;
   }
+}
+
+/// L^-1 on the rows of all far pairs.
+void ColumnCompression::weigh_rows() {
+  parallel_for(std::ssize(rows_), jobs_, [&](std::int64_t pair, int) {
+    const Index row = matrix_.far_pair[at(pair)][0];
+    const int down = matrix_.tree.levels - ClusterTree::level(row);
+    const Index first = ((row + 1) << down) - 1, end = first + (Index{1} << down);
+    for (Index c = first; c < end; ++c) {
+      auto of_leaf = rows_[at(pair)].middleRows(first_dof(c) - first_dof(first), dofs(c));
+      of_leaf = root_[at(c - matrix_.tree.first_leaf())]
+                    .triangularView<Eigen::Lower>()
+                    .solve(of_leaf.cast<double>())
+                    .cast<float>();
+    }
+  });
 }
 
 /// Top down: of the cluster's own later rows, and of those of the clusters above it.
@@ -373,11 +367,6 @@ HierarchicalMatrix ColumnCompression::packed() {
 
 HierarchicalMatrix ColumnCompression::compress(double cut) {
   std::vector<Desk> desks(at(jobs_));
-  parallel_for(matrix_.tree.leaves(), jobs_, [&](std::int64_t leaf, int worker) {
-    Desk& desk = desks[at(worker)];
-    const Stopwatch watch(desk.times.roots);
-    solve_root(static_cast<Index>(leaf), desk.workspace);
-  });
   parallel_for(tiles(), jobs_, [&](std::int64_t i, int worker) {
     Desk& desk = desks[at(worker)];
     const auto tile = static_cast<Index>(i);
@@ -387,19 +376,19 @@ HierarchicalMatrix ColumnCompression::compress(double cut) {
     }
     const Stopwatch watch(desk.times.tiles);
     keep_near(tile, desk);
-    weigh_rows(tile, desk);
     for (Index leaf = tile * tile_leaves_; leaf < (tile + 1) * tile_leaves_; ++leaf) {
       const Index c = matrix_.tree.first_leaf() + leaf;
       if (needed_[at(c)]) hand_up(c, compress_leaf(leaf, tile * tile_leaves_, desk, cut), cut);
     }
   });
   for (const Desk& desk : desks) {
-    times_.roots += desk.times.roots;
     times_.solves += desk.times.solves;
     times_.tiles += desk.times.tiles;
   }
   desks.clear();
+  for (const FloatRows& rows : rows_) kept_bytes_ += rows.size() * std::int64_t{sizeof(float)};
   const double start = seconds(CLOCK_PROCESS_CPUTIME_ID);
+  weigh_rows();
   find_column_covariances();
   for (int level = matrix_.tree.levels; level > 0; --level) join_level(level, cut);
   HierarchicalMatrix matrix = packed();

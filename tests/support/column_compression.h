@@ -15,7 +15,6 @@ namespace palpate::test {
 
 /// Processor time of all threads in the parts of a compression from columns [s].
 struct ColumnTimes {
-  double roots = 0.0;    ///< solves for the leaves' own blocks, which weigh what is compressed
   double solves = 0.0;   ///< of all columns of the lower triangle
   double tiles = 0.0;    ///< compression of columns as they come
   double joining = 0.0;  ///< one basis for the rows and the columns of a cluster
@@ -39,14 +38,11 @@ class ColumnCompression {
   /// loads of +-1 on all that is far, in the root mean square over its cluster. To be called once.
   HierarchicalMatrix compress(double cut);
 
-  /// What `compress` would take, without `joining`, from so many of its tiles.
-  ColumnTimes estimate(double cut, Index tiles);
-
   [[nodiscard]] const ColumnTimes& times() const noexcept { return times_; }
   /// Multiplications and additions of the solves.
   [[nodiscard]] double flops() const;
   /// Bytes of the rows of the far pairs in the bases of their columns.
-  [[nodiscard]] std::int64_t kept_bytes() const;
+  [[nodiscard]] std::int64_t kept_bytes() const noexcept { return kept_bytes_; }
 
  private:
   using Matrix = Eigen::MatrixXd;
@@ -72,14 +68,13 @@ class ColumnCompression {
   [[nodiscard]] std::vector<HierarchicalMatrix::Pair> later_pairs(Index c) const;
   [[nodiscard]] std::span<const std::int64_t> later_dofs(Index leaf) const;
   [[nodiscard]] Index tiles() const { return matrix_.tree.leaves() / tile_leaves_; }
-  void solve_root(Index leaf, SelectedSolver::Workspace& workspace);
   void solve_tile(Index tile, Desk& desk);
   void keep_near(Index tile, const Desk& desk);
-  void weigh_rows(Index tile, Desk& desk) const;
   Front compress_leaf(Index leaf, Index first_leaf, Desk& desk, double cut);
   Front joined(Index parent, Front a, Front b, double cut);
   void hand_up(Index c, Front front, double cut);
   void keep_own_pairs(Index c, Front& front);
+  void weigh_rows();
   void find_column_covariances();
   void join_level(int level, double cut);
   void find_basis(Index c, double cut);
@@ -101,9 +96,11 @@ class ColumnCompression {
   std::vector<FloatRows> rows_;       // [far pairs] in the basis of the columns, then in both
   std::vector<Matrix> covariance_;    // [clusters] of later rows in the basis of the columns
   std::vector<Matrix> basis_;         // [clusters] as column_basis_, of rows and columns
+  std::vector<double> compliance_;    // [clusters] mean of the diagonal of Xi [m/N]
   std::vector<Matrix> change_;        // [clusters] basis_^T column_basis_
   std::vector<std::int64_t> place_;   // [clusters] where its rows are among those of its level
   ColumnTimes times_;
+  std::int64_t kept_bytes_ = 0;
 };
 
 }  // namespace palpate::test
