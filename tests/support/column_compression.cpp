@@ -102,56 +102,58 @@ std::vector<HierarchicalMatrix::Pair> ColumnCompression::later_pairs(Index c) co
   return pairs;
 }
 
-std::span<const std::int64_t> ColumnCompression::later_dofs(Index leaf) const {
-  return stored_dofs_.subspan(at(first_dof(matrix_.tree.first_leaf() + leaf)));
+/// Dofs of K of the leaves of a tile and of all later ones.
+std::span<const std::int64_t> ColumnCompression::tile_rows(Index tile) const {
+  return stored_dofs_.subspan(at(first_dof(first_of(tile))));
+}
+
+std::span<const std::int64_t> ColumnCompression::tile_columns(Index tile) const {
+  const std::int64_t end = tile + 1 < tiles() ? first_dof(first_of(tile + 1)) : std::ssize(stored_dofs_);
+  return tile_rows(tile).first(at(end - first_dof(first_of(tile))));
+}
+
+double ColumnCompression::flops_of(Index tile) const {
+  return solver_.flops(tile_rows(tile), tile_columns(tile));
 }
 
 double ColumnCompression::flops() const {
   double total = 0.0;
-  for (Index tile = 0; tile < tiles(); ++tile) {
-    const auto rows = later_dofs(tile * tile_leaves_);
-    const std::int64_t end = tile + 1 < tiles() ? std::ssize(later_dofs((tile + 1) * tile_leaves_)) : 0;
-    total += solver_.flops(rows, rows.first(at(std::ssize(rows) - end)));
-  }
+  for (Index tile = 0; tile < tiles(); ++tile) total += flops_of(tile);
   return total;
 }
 
 void ColumnCompression::solve_tile(Index tile, Desk& desk) {
-  const auto rows = later_dofs(tile * tile_leaves_);
-  const std::int64_t end = tile + 1 < tiles() ? std::ssize(later_dofs((tile + 1) * tile_leaves_)) : 0;
-  const auto columns = rows.first(at(std::ssize(rows) - end));
+  const auto rows = tile_rows(tile), columns = tile_columns(tile);
   desk.tile.resize(rows.size() * columns.size());
   solver_.solve(rows, columns, desk.workspace, desk.tile);
 }
 
 void ColumnCompression::keep_near(Index tile, const Desk& desk) {
-  const Index first = matrix_.tree.first_leaf() + tile * tile_leaves_;
-  const std::int64_t width = std::ssize(desk.tile) / std::ssize(later_dofs(tile * tile_leaves_));
+  const Index first = first_of(tile);
+  const std::int64_t width = std::ssize(tile_columns(tile));
   for (Index c = first; c < first + tile_leaves_; ++c) {
     const Index leaf = c - matrix_.tree.first_leaf();
     for (std::int64_t p = matrix_.first_near_pair(leaf); p < matrix_.first_near_pair(leaf + 1); ++p) {
       const Index row = matrix_.near_pair[at(p)][0];
-      const Eigen::Map<const Rows> of_row(
-          desk.tile.data() + (first_dof(row) - first_dof(first)) * width, dofs(row), width);
+      const Eigen::Map<const Rows> of_row(desk.tile.data() + (first_dof(row) - first_dof(first)) * width,
+                                          dofs(row), width);
       Eigen::Map<FloatRows>(near_.get() + matrix_.near_at[at(p)], dofs(row), dofs(c)) =
           of_row.middleCols(first_dof(c) - first_dof(first), dofs(c)).cast<float>();
     }
     root_[at(leaf)] = root_of_leaf(matrix_, leaf);
-    const Eigen::Map<const FloatRows> own(
-        near_.get() + matrix_.near_at[at(matrix_.first_near_pair(leaf))], dofs(c), dofs(c));
+    const Eigen::Map<const FloatRows> own(near_.get() + matrix_.near_at[at(matrix_.first_near_pair(leaf))],
+                                          dofs(c), dofs(c));
     const std::int64_t free = (own.diagonal().array() > 0.0F).count();
     compliance_[at(c)] = double(own.trace()) / double(std::max<std::int64_t>(free, 1));
   }
 }
 
-/// The columns of one leaf of a tile that begins with `first_leaf`.
-ColumnCompression::Front ColumnCompression::compress_leaf(Index leaf, Index first_leaf, Desk& desk,
-                                                          double cut) {
-  const Index c = matrix_.tree.first_leaf() + leaf;
-  const std::int64_t first = first_dof(matrix_.tree.first_leaf() + first_leaf), n = dofs(c);
-  const std::int64_t height = std::ssize(later_dofs(first_leaf)), width = std::ssize(desk.tile) / height;
+/// The columns of a leaf c of the tile.
+ColumnCompression::Front ColumnCompression::compress_leaf(Index c, Index tile, Desk& desk, double cut) {
+  const std::int64_t first = first_dof(first_of(tile)), n = dofs(c);
+  const std::int64_t height = std::ssize(tile_rows(tile)), width = std::ssize(tile_columns(tile));
   double* const corner = desk.tile.data() + (first_dof(c) - first);
-  const Rows& L = root_[at(leaf)];
+  const Rows& L = root_[at(c - matrix_.tree.first_leaf())];
   cblas_dtrsm(CblasRowMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, static_cast<blasint>(height),
               static_cast<blasint>(n), 1.0, L.data(), static_cast<blasint>(n), corner,
               static_cast<blasint>(width));
@@ -180,7 +182,8 @@ ColumnCompression::Front ColumnCompression::compress_leaf(Index leaf, Index firs
 
 /// Both siblings in a basis of their parent.
 ColumnCompression::Front ColumnCompression::joined(Index parent, Front a, Front b, double cut) {
-  const Eigen::Index m = column_basis_[at(2 * parent + 1)].cols(), k = column_basis_[at(2 * parent + 2)].cols();
+  const Eigen::Index m = column_basis_[at(2 * parent + 1)].cols(),
+                     k = column_basis_[at(2 * parent + 2)].cols();
   const auto both = [&](std::size_t i) {
     Rows rows(a.rows[i].rows(), m + k);
     rows << a.rows[i].cast<double>(), b.rows[i].cast<double>();
@@ -212,10 +215,9 @@ void ColumnCompression::keep_own_pairs(Index c, Front& front) {
 
 /// Goes up the tree for as long as siblings wait.
 void ColumnCompression::hand_up(Index c, Front front, double cut) {
-  while (true) {
+  while (needed_[at(c)]) {
     keep_own_pairs(c, front);
     const Index parent = ClusterTree::parent(c), sibling = c % 2 == 1 ? c + 1 : c - 1;
-    if (!needed_[at(parent)]) return;
     Front other;
     {
       const std::scoped_lock lock(mutex_);
@@ -271,7 +273,8 @@ void ColumnCompression::find_column_covariances() {
 Matrix ColumnCompression::part_in_rows(Index pair, Index c) const {
   Index first = matrix_.far_pair[at(pair)][0];
   for (int level = ClusterTree::level(first); level < ClusterTree::level(c); ++level) first = 2 * first + 1;
-  return rows_[at(pair)].middleRows(place_[at(c)] - place_[at(first)], place_[at(c + 1)] - place_[at(c)])
+  return rows_[at(pair)]
+      .middleRows(place_[at(c)] - place_[at(first)], place_[at(c + 1)] - place_[at(c)])
       .cast<double>();
 }
 
@@ -320,9 +323,8 @@ void ColumnCompression::join_level(int level, double cut) {
   const Index first = tree.first_of_level(level), end = first + (Index{1} << level);
   place_[at(first)] = 0;
   for (Index c = first; c < end; ++c) {
-    const std::int64_t rows = level == tree.levels
-                                  ? dofs(c)
-                                  : basis_[at(2 * c + 1)].cols() + basis_[at(2 * c + 2)].cols();
+    const std::int64_t rows =
+        level == tree.levels ? dofs(c) : basis_[at(2 * c + 1)].cols() + basis_[at(2 * c + 2)].cols();
     place_[at(c + 1)] = place_[at(c)] + rows;
   }
   parallel_for(end - first, jobs_, [&](std::int64_t i, int) {
@@ -347,8 +349,10 @@ HierarchicalMatrix ColumnCompression::packed() {
     if (basis_[at(c)].cols() == 0) continue;
     if (c >= tree.first_leaf()) {
       const std::int64_t leaf = c - tree.first_leaf();
-      put(root_[at(leaf)].triangularView<Eigen::Lower>() * basis_[at(c)],
-          basis.get() + matrix.basis_at[at(leaf)]);
+      Matrix V = root_[at(leaf)].triangularView<Eigen::Lower>() * basis_[at(c)];
+      for (Eigen::Index i = 0; i < V.rows(); ++i)
+        if (stored_dofs_[at(first_dof(c) + i)] < 0) V.row(i).setZero();  // held: but for rounding it is zero
+      put(V, basis.get() + matrix.basis_at[at(leaf)]);
     } else {
       put(basis_[at(c)].topRows(matrix.rank[at(2 * c + 1)]),
           transfer.get() + matrix.transfer_at[at(2 * c + 1)]);
@@ -365,26 +369,30 @@ HierarchicalMatrix ColumnCompression::packed() {
   return matrix;
 }
 
+/// Solves for a tile and compresses its leaves: their fronts.
+std::vector<ColumnCompression::Front> ColumnCompression::work_on(Index tile, Desk& desk, double cut) {
+  {
+    const Stopwatch watch(desk.times.solves);
+    solve_tile(tile, desk);
+  }
+  const Stopwatch watch(desk.times.leaves);
+  keep_near(tile, desk);
+  std::vector<Front> fronts;
+  for (Index c = first_of(tile); c < first_of(tile + 1); ++c)
+    fronts.push_back(compress_leaf(c, tile, desk, cut));
+  return fronts;
+}
+
 HierarchicalMatrix ColumnCompression::compress(double cut) {
   std::vector<Desk> desks(at(jobs_));
-  parallel_for(tiles(), jobs_, [&](std::int64_t i, int worker) {
+  parallel_for(tiles(), jobs_, [&](std::int64_t tile, int worker) {
     Desk& desk = desks[at(worker)];
-    const auto tile = static_cast<Index>(i);
-    {
-      const Stopwatch watch(desk.times.solves);
-      solve_tile(tile, desk);
-    }
-    const Stopwatch watch(desk.times.tiles);
-    keep_near(tile, desk);
-    for (Index leaf = tile * tile_leaves_; leaf < (tile + 1) * tile_leaves_; ++leaf) {
-      const Index c = matrix_.tree.first_leaf() + leaf;
-      if (needed_[at(c)]) hand_up(c, compress_leaf(leaf, tile * tile_leaves_, desk, cut), cut);
-    }
+    std::vector<Front> fronts = work_on(static_cast<Index>(tile), desk, cut);
+    const Stopwatch watch(desk.times.joining);
+    Index c = first_of(static_cast<Index>(tile));
+    for (Front& front : fronts) hand_up(c++, std::move(front), cut);
   });
-  for (const Desk& desk : desks) {
-    times_.solves += desk.times.solves;
-    times_.tiles += desk.times.tiles;
-  }
+  for (const Desk& desk : desks) times_ += desk.times;
   desks.clear();
   for (const FloatRows& rows : rows_) kept_bytes_ += rows.size() * std::int64_t{sizeof(float)};
   const double start = seconds(CLOCK_PROCESS_CPUTIME_ID);
@@ -392,8 +400,26 @@ HierarchicalMatrix ColumnCompression::compress(double cut) {
   find_column_covariances();
   for (int level = matrix_.tree.levels; level > 0; --level) join_level(level, cut);
   HierarchicalMatrix matrix = packed();
-  times_.joining = seconds(CLOCK_PROCESS_CPUTIME_ID) - start;
+  times_.joining += seconds(CLOCK_PROCESS_CPUTIME_ID) - start;
   return matrix;
+}
+
+ColumnTimes ColumnCompression::estimate(double cut, Index count) {
+  std::vector<Desk> desks(at(jobs_));
+  double flops = 0.0, entries = 0.0, all_flops = 0.0, all_entries = 0.0;
+  for (Index tile = 0; tile < tiles(); ++tile) {
+    all_flops += flops_of(tile);
+    all_entries += double(tile_rows(tile).size()) * double(tile_columns(tile).size());
+  }
+  const auto chosen = [&](std::int64_t k) { return static_cast<Index>((2 * k + 1) * tiles() / (2 * count)); };
+  for (Index k = 0; k < count; ++k) {
+    flops += flops_of(chosen(k));
+    entries += double(tile_rows(chosen(k)).size()) * double(tile_columns(chosen(k)).size());
+  }
+  parallel_for(count, jobs_, [&](std::int64_t k, int worker) { work_on(chosen(k), desks[at(worker)], cut); });
+  ColumnTimes sum;
+  for (const Desk& desk : desks) sum += desk.times;
+  return {sum.solves * all_flops / flops, sum.leaves * all_entries / entries, 0.0};
 }
 
 }  // namespace palpate::test
