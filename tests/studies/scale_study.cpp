@@ -94,12 +94,14 @@ void number_stored_nodes(const std::vector<std::uint8_t>& stored, const ClusterO
       in_mesh_order.push_back(node);
   }
   std::vector<Vec3> points;
+  points.reserve(in_mesh_order.size());
   for (const Index node : in_mesh_order) points.push_back(problem.model.mesh.nodes[std::size_t(node)]);
   problem.clusters = cluster_nodes(points, options);
   for (const Index k : problem.clusters.order) {
     nodes.push_back(in_mesh_order[std::size_t(k)]);
     for (int axis = 0; axis < d; ++axis)
-      problem.stored_dofs.push_back(problem.stiffness.free_of_dof[std::size_t(d * nodes.back() + axis)]);
+      problem.stored_dofs.push_back(
+          problem.stiffness.free_of_dof[std::size_t(std::int64_t{d} * nodes.back() + axis)]);
   }
   problem.places = touchable_points(problem.model, nodes);
 }
@@ -149,13 +151,14 @@ void report(const HierarchicalMatrix& matrix, const Options& options, const Prob
   const auto errors =
       certify(matrix, *problem.factor, problem.stored_dofs, problem.places.points, problem.places.touchable,
               options.touches, 100000, options.jobs, [](double) { return true; });
-  for (const TouchErrors& e : errors)
+  for (const TouchErrors& e : errors) {
     fmt::print(
         "  touches of {} nodes: median {:.2e}, 99 % {:.2e}, worst {:.2e}; {} bounds, force off by {:.3f} "
         "(median) to {:.2f} of them\n",
         e.nodes, e.quantile(0.5), e.quantile(0.99), e.quantile(1.0), e.bound_shares.size(),
         e.bound_shares.empty() ? 0.0 : e.bound_shares[e.bound_shares.size() / 2],
         e.bound_shares.empty() ? 0.0 : e.bound_shares.back());
+  }
   fmt::print("  touches: {}\n", lap());
   std::fflush(stdout);
 }
