@@ -78,8 +78,8 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
   plan.factor_entries = factor.entries();
   plan.file_bytes =
       packed_size(plan.stored_dofs) * bytes_per_scalar(precision.value_or(Precision::single_precision));
-  plan.flops = column_flops(solver, max_block_columns);
-  plan.block_columns = choose_block_columns(plan.free_dofs, plan.flops);
+  plan.block_columns = choose_block_columns(plan.free_dofs, column_flops(solver, max_block_columns));
+  plan.flops = column_flops(solver, plan.block_columns);
   plan.factor_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   plan.memory_bytes = plan.factor_bytes + jobs * solver.workspace_bytes(plan.block_columns);
   const double rate = measured_flops_per_second();

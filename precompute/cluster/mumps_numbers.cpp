@@ -382,9 +382,9 @@ void MumpsNumbers::multiply(std::span<const std::int64_t> from, std::int64_t col
     }
     loads.end_column();
   }
-  const SolutionRows rows = share_out(solve_sparse(std::move(loads), columns, places(to)), columns, true);
-  std::fill(u.begin(), u.end(), 0.0);
   const std::vector<int> place_of = places(to);
+  const SolutionRows rows = share_out(solve_sparse(std::move(loads), columns, place_of), columns, true);
+  std::fill(u.begin(), u.end(), 0.0);
   std::vector<std::size_t> row_at(to.size(), 0);
   for (std::size_t k = 0; k < rows.places.size(); ++k) row_at[static_cast<std::size_t>(rows.places[k])] = k;
   for (std::size_t k = 0; k < to.size(); ++k) {

@@ -27,7 +27,7 @@
 #include "precompute/compression/recompression.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
-#include "tests/support/column_compression.h"
+#include "tests/support/compression/column_compression.h"
 #include "tests/support/study.h"
 
 namespace palpate {

@@ -1,7 +1,6 @@
 // Compression from all columns, which studies compare with the product's, against the dense inverse of K.
-#include "tests/support/column_compression.h"
+#include "tests/support/compression/column_compression.h"
 
-#include <cblas.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -11,13 +10,10 @@
 #include <random>
 
 #include "meshes/generate.h"
-#include "meshes/surface.h"
 #include "precompute/compression/compression.h"
 #include "precompute/compression/recompression.h"
-#include "precompute/numerics/scope.h"
-#include "tests/support/clustered_body.h"
-#include "tests/support/hierarchical_sample.h"
-#include "tests/support/precompute_case.h"
+#include "tests/support/compression/hierarchical_sample.h"
+#include "tests/support/compression/inverted_body.h"
 
 namespace palpate::column_compression_test {
 namespace {
@@ -29,41 +25,22 @@ bool at_left(const Vec3& x) {
   return x.x() < 1e-9;
 }
 
-/// A bar on rollers, factorised, with its stored nodes in clusters, and Xi of them by the dense inverse of K.
-/// Some of their dofs are held.
-class Bar {
+/// A bar on rollers, some of whose stored dofs are held, and what compresses its Green's functions.
+class Bar : public test::InvertedBody {
  public:
   Bar()
-      : elastic_(test::ElasticCase(
-                     generate(BoxShape{Vec3::Zero(), Vec3(0.2, 0.06, 0.05), {16, 5, 4}}, ElementType::tet4),
-                     Material{1.0e4, 0.45, 1000.0})
-                     .hold(at_bottom, 4)
-                     .hold(at_left, 3)),
-        stiffness_(assemble_stiffness(elastic_.body())),
-        factor_(stiffness_.K, stiffness_.node_start),
-        stored_(
-            elastic_.mesh, stiffness_,
-            stored_dof_marks(elastic_.mesh, extract_surface(elastic_.mesh), stiffness_, Scope::surface, 0),
-            {.leaf = 12}) {
-    openblas_set_num_threads(1);
-    factor_.factorize();
-    const Eigen::MatrixXd K = Eigen::MatrixXd(stiffness_.K).selfadjointView<Eigen::Lower>();
-    const Eigen::MatrixXd inverse = K.llt().solve(Eigen::MatrixXd::Identity(K.rows(), K.cols()));
-    const auto n = std::ssize(stored_.dofs);
-    Xi_ = Eigen::MatrixXd::Zero(n, n);
-    for (Eigen::Index i = 0; i < n; ++i)
-      for (Eigen::Index j = 0; j < n; ++j)
-        if (dof(i) >= 0 && dof(j) >= 0) Xi_(i, j) = inverse(dof(i), dof(j));
-  }
+      : InvertedBody(test::ElasticCase(generate(BoxShape{Vec3::Zero(), Vec3(0.2, 0.06, 0.05), {16, 5, 4}},
+                                                ElementType::tet4),
+                                       Material{1.0e4, 0.45, 1000.0})
+                         .hold(at_bottom, 4)
+                         .hold(at_left, 3)) {}
 
-  [[nodiscard]] const Eigen::MatrixXd& Xi() const { return Xi_; }
-  [[nodiscard]] const test::ClusteredBody& stored() const { return stored_; }
   [[nodiscard]] test::ColumnCompression compression(int jobs = 1, Index tile = 4) const {
-    return {factor_, stored_.dofs, 3, stored_.clusters, jobs, tile};
+    return {factor(), stored().dofs, 3, stored().clusters, jobs, tile};
   }
 
   [[nodiscard]] HierarchicalMatrix sketched(double cut) const {
-    Compression compression(factor_, stored_.dofs, 3, stored_.clusters, 1,
+    Compression compression(factor(), stored().dofs, 3, stored().clusters, 1,
                             [](CompressionStage, double) { return true; });
     compression.prepare();
     return *compression.compress(cut);
@@ -71,10 +48,10 @@ class Bar {
 
   /// The largest error of a force of touches of 5 to 40 nodes, over the touch's largest.
   [[nodiscard]] double force_error(const HierarchicalMatrix& matrix) const {
-    const Eigen::MatrixXd stored = test::written_out(matrix);
+    const Eigen::MatrixXd compressed = test::written_out(matrix);
     std::mt19937 random(7);
     std::uniform_real_distribution<double> entry(-1.0, 1.0);
-    std::vector<Index> nodes = stored_.touchable;
+    std::vector<Index> nodes = stored().touchable;
     double worst = 0.0;
     for (int touch = 0; touch < 40; ++touch) {
       std::shuffle(nodes.begin(), nodes.end(), random);
@@ -82,21 +59,12 @@ class Bar {
       for (int k = 0; k < (touch % 2 == 0 ? 5 : 40); ++k)
         for (int axis = 0; axis < 3; ++axis) dofs.push_back(3 * nodes[std::size_t(k)] + axis);
       const Eigen::VectorXd u = Eigen::VectorXd::NullaryExpr(std::ssize(dofs), [&] { return entry(random); });
-      const Eigen::MatrixXd exact = Xi_(dofs, dofs), C = stored(dofs, dofs);
+      const Eigen::MatrixXd exact = Xi()(dofs, dofs), C = compressed(dofs, dofs);
       const Eigen::VectorXd f_0 = exact.llt().solve(u), f = C.llt().solve(u);
       worst = std::max(worst, (f - f_0).lpNorm<Eigen::Infinity>() / f_0.lpNorm<Eigen::Infinity>());
     }
     return worst;
   }
-
- private:
-  [[nodiscard]] std::int64_t dof(Eigen::Index i) const { return stored_.dofs[static_cast<std::size_t>(i)]; }
-
-  test::ElasticCase elastic_;
-  Stiffness stiffness_;
-  Factor factor_;
-  test::ClusteredBody stored_;
-  Eigen::MatrixXd Xi_;
 };
 
 const Bar& bar() {

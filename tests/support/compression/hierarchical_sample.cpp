@@ -1,4 +1,4 @@
-#include "tests/support/hierarchical_sample.h"
+#include "tests/support/compression/hierarchical_sample.h"
 
 #include <algorithm>
 #include <cmath>

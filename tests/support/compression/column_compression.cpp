@@ -1,4 +1,4 @@
-#include "tests/support/column_compression.h"
+#include "tests/support/compression/column_compression.h"
 
 #include <cblas.h>
 
