@@ -1,5 +1,6 @@
 // The body as it is drawn: its surface, edges, held nodes and the overlay's outline.
 import {
+  Box3,
   BufferAttribute,
   BufferGeometry,
   DynamicDrawUsage,
@@ -38,6 +39,8 @@ export class Body {
   /** Seen is rest + scale * u. */
   scale = 1;
   field: Field = 'none';
+  /** Around what is seen. */
+  readonly box = new Box3();
   /** What is seen now, with all that a pointer may touch. */
   surface: Surface = { position: [], normal: [], triangle: [] };
   /** In the plane: the boundary, the body on its left, of the surface's vertices. */
@@ -113,8 +116,13 @@ export class Body {
   /** A section shows the inside of what is left. */
   is_cut = false;
 
-  set_pixel(pixel: number): void {
+  /** Before a picture: pixels of the drawing for one of the page, and what throws a shade, as Light has it. */
+  prepare(pixel: number, tool: number): void {
     this.material_.set({ pixel });
+    for (const material of [this.material_, this.interior_.mesh.material]) {
+      material.set_cut(this.is_cut);
+      material.set_tool(tool);
+    }
     this.held_.material.size = 3 * pixel;
   }
 
@@ -130,7 +138,7 @@ export class Body {
     this.patch_ = null;
     this.frame_ = null;
     this.interior_.take(scene);
-    this.material_.set({ is_flat: scene.dimension === 2 ? 1 : 0 });
+    this.material_.set_flat(scene.dimension === 2);
     this.rebuild();
   }
 
@@ -180,10 +188,14 @@ export class Body {
     const position = this.attribute('position');
     const place = position.array as Float32Array;
     const { node, rest } = topology;
+    const { scale, u_: u } = this;
     for (let v = 0; v < node.length; ++v) {
-      const i = node[v]!;
-      for (let k = 0; k < 3; ++k) place[3 * v + k] = rest[3 * i + k]! + this.scale * this.u_[3 * i + k]!;
+      const i = 3 * node[v]!;
+      place[3 * v] = rest[i]! + scale * u[i]!;
+      place[3 * v + 1] = rest[i + 1]! + scale * u[i + 1]!;
+      place[3 * v + 2] = rest[i + 2]! + scale * u[i + 2]!;
     }
+    this.box.setFromArray(place);
     const normal = this.attribute('normal');
     vertex_normals(place, topology.triangle, normal.array as Float32Array);
     position.needsUpdate = normal.needsUpdate = true;
@@ -193,11 +205,8 @@ export class Body {
   /** Colours by the numbers from `low` to `high`. */
   show_range(low: number, high: number, colouring: Colouring): void {
     const traits = field_traits[this.field];
-    this.material_.set({
-      colouring: this.field === 'material' ? 2 : traits.has_range ? 1 : 0,
-      is_log: colouring.is_log && !traits.is_signed ? 1 : 0,
-      lines: colouring.isolines,
-    });
+    this.material_.set_colouring(this.field === 'material' ? 2 : traits.has_range ? 1 : 0, colouring.isolines);
+    this.material_.set({ is_log: colouring.is_log && !traits.is_signed ? 1 : 0 });
     this.colour_edges();
     this.material_.set_map(traits.is_signed ? 'diverging' : colouring.map);
     this.material_.set_range(high > 0 ? low : -Number(traits.is_signed), high > 0 ? high : 1); // where all is 0, 0 has its colour too

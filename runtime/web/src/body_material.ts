@@ -43,7 +43,7 @@ uniform sampler2D colour_map, materials;
 uniform vec2 range;
 uniform vec4 cut;
 uniform vec3 tissue, tint;
-uniform float colouring, is_log, lines, shows_held, is_flat, veil, pixel;
+uniform float is_log, lines, shows_held, pixel;
 ${light_glsl}
 
 float share_of(float value) {
@@ -52,22 +52,30 @@ float share_of(float value) {
 }
 
 vec3 own_colour() {
-  if (colouring < 0.5) return tissue;
-  if (colouring > 1.5) return texture2D(materials, vec2((floor(v_shown.w + 0.5) + 0.5) / 256.0, 0.5)).rgb;
+#if COLOURING == 0
+  return tissue;
+#elif COLOURING == 2
+  return texture2D(materials, vec2((floor(v_shown.w + 0.5) + 0.5) / 256.0, 0.5)).rgb;
+#else
   if (v_shown.y < 0.999) return tint * 0.8;
   float share = clamp(share_of(v_shown.x), 0.0, 1.0);
   vec3 colour = texture2D(colour_map, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
-  if (lines > 0.5) {
+#ifdef LINES
+  {
     float place = share * lines;
     float width = fwidth(place);
     float apart = abs(fract(place - 0.5) - 0.5);
     if (width < 0.5) colour *= mix(0.42, 1.0, smoothstep(0.6 * width, 1.4 * width, place < 0.3 ? 1.0 : apart));
   }
+#endif
   return colour;
+#endif
 }
 
 void main() {
+#ifdef CUT
   if (dot(cut.xyz, v_world) > cut.w) discard;
+#endif
   vec3 colour = own_colour();
   float held = shows_held * step(0.999, v_shown.z);
   if (held > 0.5) {
@@ -75,26 +83,29 @@ void main() {
     colour = mix(colour, mix(vec3(dot(colour, vec3(0.3, 0.6, 0.1))), vec3(0.02, 0.025, 0.03), 0.55), 0.35 + 0.5 * stripe);
   }
   float alpha = 1.0;
-  if (is_flat < 0.5) {
-    vec3 eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-v_place);
-    vec3 normal = normalize(v_normal);
-    if (!gl_FrontFacing) normal = -normal;
-    vec2 open = texture2D(open_map, gl_FragCoord.xy / picture_size).rg;
-    float near_tool = tool_open(v_place, normal);
-    float sky = open.r * (0.2 + 0.8 * near_tool);
-    float key = open.g * tool_shade(v_place, key_way) * mix(0.4, 1.0, open.r) * mix(0.45, 1.0, near_tool);
-    Lit lit = light_at(v_place, normal, eye, sky, key);
-    if (colouring < 0.5) {
-      float thin = 1.0 - abs(dot(normal, key_way));
-      vec3 glow = vec3(0.10, 0.02, 0.012) * thin * key;
-      colour = colour * lit.diffuse + glow + vec3(1.0, 0.97, 0.93) * (0.75 * lit.shine + 0.16 * lit.gloss) * (1.0 - 0.8 * held);
-    } else {
-      float bright = dot(lit.diffuse, vec3(0.2126, 0.7152, 0.0722));
-      colour = colour * mix(0.35, 1.0, min(1.0, bright)) * mix(1.0, bright, 0.45) + vec3(0.10 * lit.shine + 0.05 * lit.gloss);
-    }
-    if (!gl_FrontFacing) colour *= 0.55;
-    if (veil > 0.0) alpha = mix(0.16, 0.85, pow(1.0 - abs(dot(normal, eye)), 2.0));
-  }
+#ifndef FLAT
+  vec3 eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-v_place);
+  vec3 normal = normalize(v_normal);
+  if (!gl_FrontFacing) normal = -normal;
+  vec2 open = texture2D(open_map, gl_FragCoord.xy / picture_size).rg;
+  float near_tool = tool_open(v_place, normal);
+  float sky = open.r * (0.2 + 0.8 * near_tool);
+  float key = open.g * tool_shade(v_place, key_way) * mix(0.4, 1.0, open.r) * mix(0.45, 1.0, near_tool);
+  Lit lit = light_at(v_place, normal, eye, sky, key);
+#if COLOURING == 0
+  float thin = 1.0 - abs(dot(normal, key_way));
+  vec3 glow = vec3(0.10, 0.02, 0.012) * thin * key;
+  colour = colour * lit.diffuse + glow + vec3(1.0, 0.97, 0.93) * (0.75 * lit.shine + 0.16 * lit.gloss) * (1.0 - 0.8 * held);
+#else
+  float bright = dot(lit.diffuse, vec3(0.2126, 0.7152, 0.0722));
+  colour = colour * mix(0.35, 1.0, min(1.0, bright)) * mix(1.0, bright, 0.45) + vec3(0.10 * lit.shine + 0.05 * lit.gloss);
+#endif
+  if (!gl_FrontFacing) colour *= 0.55;
+#ifdef VEIL
+  float away = 1.0 - abs(dot(normal, eye));
+  alpha = mix(0.16, 0.85, away * away);
+#endif
+#endif
   gl_FragColor = vec4(colour, alpha);
   #include <colorspace_fragment>
 }`;
@@ -116,14 +127,12 @@ export class BodyMaterial extends ShaderMaterial {
         range: { value: new Vector2(0, 1) },
         tissue: { value: new Color(tissue) },
         tint: { value: new Color(`rgb(${tint.join()})`) },
-        colouring: { value: 0 }, // 0: plain, 1: numbers, 2: materials
         is_log: { value: 0 },
         lines: { value: 0 },
         shows_held: { value: 1 },
-        is_flat: { value: 0 },
-        veil: { value: 0 },
         pixel: { value: 1 }, // pixels of the drawing for one of the page
       },
+      defines: { TOOL: 0, COLOURING: 0 },
       polygonOffset: true,
       polygonOffsetFactor: 1,
       polygonOffsetUnits: 2,
@@ -131,8 +140,38 @@ export class BodyMaterial extends ShaderMaterial {
     this.set_map('viridis');
   }
 
-  set(values: Partial<Record<'colouring' | 'is_log' | 'lines' | 'shows_held' | 'is_flat' | 'pixel', number>>): void {
+  set(values: Partial<Record<'is_log' | 'shows_held' | 'pixel', number>>): void {
     for (const [name, value] of Object.entries(values)) this.uniforms[name]!.value = value;
+  }
+
+  /** 0: plain, 1: numbers, 2: materials; so many isolines, 0 for none. */
+  set_colouring(colouring: 0 | 1 | 2, lines: number): void {
+    this.uniforms.lines!.value = lines;
+    this.define('COLOURING', colouring);
+    this.define('LINES', lines > 0);
+  }
+
+  /** A body in the plane has no light and shade. */
+  set_flat(on: boolean): void {
+    this.define('FLAT', on);
+  }
+
+  /** Whether a section cuts it. */
+  set_cut(on: boolean): void {
+    this.define('CUT', on);
+  }
+
+  /** Another code where another tool throws its shade. */
+  set_tool(tool: number): void {
+    this.define('TOOL', tool);
+  }
+
+  private define(name: string, value: number | boolean): void {
+    const wanted = value === false ? undefined : value;
+    if (this.defines[name] === wanted) return;
+    if (wanted === undefined) delete this.defines[name];
+    else this.defines[name] = wanted;
+    this.needsUpdate = true;
   }
 
   set_range(low: number, high: number): void {
@@ -157,6 +196,6 @@ export class BodyMaterial extends ShaderMaterial {
     this.side = side;
     this.transparent = veil;
     this.depthWrite = !veil;
-    this.uniforms.veil!.value = veil ? 1 : 0;
+    this.define('VEIL', veil);
   }
 }

@@ -43,7 +43,7 @@ export class Interior {
 
   constructor(light: Light, cut: { value: Vector4 }) {
     this.mesh = new Mesh(new BufferGeometry(), new BodyMaterial(light, cut));
-    this.mesh.material.set({ colouring: 2 });
+    this.mesh.material.set_colouring(2, 0);
     this.mesh.material.set_see_through(false, true);
     this.mesh.visible = false;
   }

@@ -21,12 +21,16 @@ export class Light {
     is_light: { value: 0 },
   };
 
+  /** What throws a shade, TOOL in the code below: a code for all cases would compute them all. */
+  tool: 0 | 1 | 2 | 3 = 0; // none, ball, capsule, disc
+
   /** Where no shade of the body was drawn. */
   without_shade(): void {
     this.uniforms.open_map.value = open;
   }
 }
 
+/** Where `TOOL` is defined. */
 export const light_glsl = /* glsl */ `
 uniform sampler2D open_map, shape_map;
 uniform vec2 picture_size, depth_range;
@@ -47,41 +51,48 @@ float disc_shade(vec3 place, vec3 way) {
 
 /** What the tool leaves of the key lamp: soft, the softer the farther it is. */
 float tool_shade(vec3 place, vec3 way) {
-  if (tool_radius <= 0.0) return 1.0;
-  if (tool_disc.w > 0.0) return disc_shade(place, way);
+#if TOOL == 0
+  return 1.0;
+#elif TOOL == 3
+  return disc_shade(place, way);
+#else
+  vec3 centre = tool_a;
+#if TOOL == 2
   vec3 axis = tool_b - tool_a;
   vec3 from = place - tool_a;
   float across = dot(axis, axis) - dot(way, axis) * dot(way, axis);
-  float s = across > 1e-12 ? clamp((dot(from, axis) - dot(from, way) * dot(way, axis)) / across, 0.0, 1.0) : 0.0;
-  vec3 centre = tool_a + s * axis;
+  centre += (across > 1e-12 ? clamp((dot(from, axis) - dot(from, way) * dot(way, axis)) / across, 0.0, 1.0) : 0.0) * axis;
+#endif
   float t = dot(centre - place, way);
   float soft = 0.04 * tool_radius + 0.4 * max(t, 0.0);
   float apart = length(centre - place - max(t, 0.0) * way) - tool_radius;
   return mix(1.0, smoothstep(-soft, soft, apart), smoothstep(-0.2, 0.3, t / tool_radius));
+#endif
 }
 
 /** How much of the sky the tool leaves open. */
 float tool_open(vec3 place, vec3 normal) {
-  if (tool_radius <= 0.0) return 1.0;
-  vec3 nearest;
+#if TOOL == 0
+  return 1.0;
+#else
+  vec3 nearest = tool_a;
   float size = tool_radius;
-  if (tool_disc.w > 0.0) {
-    vec3 from = place - tool_a;
-    vec3 flat_way = from - dot(from, tool_disc.xyz) * tool_disc.xyz;
-    float r = length(flat_way);
-    nearest = tool_a + flat_way * min(1.0, 0.55 * tool_disc.w / max(r, 1e-9));
-    size = max(tool_radius, 0.45 * tool_disc.w);
-  } else {
-    vec3 axis = tool_b - tool_a;
-    float length2 = dot(axis, axis);
-    nearest = tool_a + axis * (length2 > 0.0 ? clamp(dot(place - tool_a, axis) / length2, 0.0, 1.0) : 0.0);
-  }
+#if TOOL == 3
+  vec3 from = place - tool_a;
+  vec3 flat_way = from - dot(from, tool_disc.xyz) * tool_disc.xyz;
+  nearest += flat_way * min(1.0, 0.55 * tool_disc.w / max(length(flat_way), 1e-9));
+  size = max(tool_radius, 0.45 * tool_disc.w);
+#elif TOOL == 2
+  vec3 axis = tool_b - tool_a;
+  nearest += axis * clamp(dot(place - tool_a, axis) / dot(axis, axis), 0.0, 1.0);
+#endif
   vec3 way = nearest - place;
   float l = max(length(way), 1e-9);
   float h = max(l / size, 1.0);
   float facing = dot(normal, way) / l;
   float crease = 0.75 * exp(-max(0.0, l - tool_radius) / (0.42 * size)) * smoothstep(-0.9, -0.1, facing);
   return (1.0 - clamp(facing, 0.0, 1.0) / (h * h)) * (1.0 - crease);
+#endif
 }
 
 struct Lit { vec3 diffuse; float shine; float gloss; float open; };
@@ -97,11 +108,15 @@ Lit light_at(vec3 place, vec3 normal, vec3 eye, float open_sky, float key_share)
   float near_half = max(0.0, dot(normal, half_way));
   vec3 seen = reflect(-eye, normal);
   float window = smoothstep(0.86, 0.985, dot(seen, normalize(vec3(-0.35, 0.8, 0.45))));
-  float rim = pow(1.0 - max(0.0, dot(normal, eye)), 4.0);
+  float rim = 1.0 - max(0.0, dot(normal, eye));
+  rim *= rim;
+  rim *= rim;
+  float near_half2 = near_half * near_half, near_half4 = near_half2 * near_half2, near_half8 = near_half4 * near_half4;
+  float near_half16 = near_half8 * near_half8, near_half32 = near_half16 * near_half16;
   Lit lit;
   lit.diffuse = diffuse;
-  lit.shine = pow(near_half, 90.0) * key_share + 0.11 * window * open_sky * (0.4 + 0.6 * key_share);
-  lit.gloss = 0.12 * pow(near_half, 12.0) * key_share + rim * (0.25 + 0.75 * max(0.0, normal.y)) * open_sky;
+  lit.shine = near_half32 * near_half32 * near_half16 * near_half8 * near_half2 * key_share + 0.11 * window * open_sky * (0.4 + 0.6 * key_share);
+  lit.gloss = 0.12 * near_half8 * near_half4 * key_share + rim * (0.25 + 0.75 * max(0.0, normal.y)) * open_sky;
   lit.open = open_sky;
   return lit;
 }

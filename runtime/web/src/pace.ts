@@ -18,7 +18,7 @@ export class Pace {
   private quick_ = 0;
   private skipped_ = 2; // pictures that do not count: what came before is in their time
 
-  /** A picture came `wait` [ms] after it was wanted and the one before was done. */
+  /** A picture came `wait` [ms] after it was wanted and the one before was begun, or without a pause between them. */
   note(wait: number): void {
     if (this.skipped_ > 0) {
       --this.skipped_;

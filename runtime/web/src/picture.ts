@@ -151,8 +151,9 @@ export class Picture {
       this.section_.set_regions(this.body.regions());
     }
     this.body.show_edges(drawn.edges || this.body.scene?.dimension === 2);
-    this.body.set_pixel(this.view.canvas.width / Math.max(1, this.view.canvas.clientWidth));
     this.place_tool(drawn);
+    this.body.prepare(this.view.canvas.width / Math.max(1, this.view.canvas.clientWidth), this.view.light.tool);
+    this.view.body_box = this.body.box;
     this.colour(drawn);
   }
 

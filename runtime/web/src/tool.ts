@@ -66,7 +66,7 @@ export class ToolView {
   constructor(private readonly light_: Light) {
     const uniforms = { ...light_.uniforms, clear: { value: 0 }, size: { value: 1 }, body_colour: { value: new Color(tissue) } };
     const geometry = new SphereGeometry(1);
-    this.tool_ = new Mesh(geometry, new ShaderMaterial({ vertexShader: vertex, fragmentShader: steel, uniforms, transparent: true }));
+    this.tool_ = new Mesh(geometry, new ShaderMaterial({ vertexShader: vertex, fragmentShader: steel, uniforms, transparent: true, defines: { TOOL: 0 } }));
     this.ghost_ = new Mesh(geometry, new ShaderMaterial({ vertexShader: vertex, fragmentShader: rim, transparent: true, depthTest: false, depthWrite: false }));
     this.tool_.renderOrder = 2;
     this.ghost_.renderOrder = 3;
@@ -116,6 +116,7 @@ export class ToolView {
   cast(camera: Camera): void {
     const { tool_a, tool_b, tool_disc, tool_radius } = this.light_.uniforms;
     tool_radius.value = this.group.visible ? this.shape_.radius || this.radius : 0;
+    this.light_.tool = !this.group.visible ? 0 : this.shape_.disc_radius > 0 ? 3 : this.shape_.length > 0 ? 2 : 1;
     const axis = (this.dimension_ === 3 ? new Vector3(0, 0, 1) : new Vector3(0, 1, 0)).applyQuaternion(this.tool_.quaternion);
     const to_eye = camera.matrixWorldInverse;
     tool_a.value.copy(this.tool_.position).applyMatrix4(to_eye);

@@ -1,9 +1,9 @@
 // The picture: what is drawn, when, and how finely.
-import { Box3, GridHelper, Group, Scene, Vector3, WebGLRenderer } from 'three';
+import { Box3, GridHelper, Group, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
 import { Eye, type Margins } from './eye';
 import { Light } from './light';
 import { Pace } from './pace';
-import { Shade } from './shade';
+import { Shade, type Around } from './shade';
 import type { Section } from './section';
 import type { Scene as SceneMessage } from './wire';
 
@@ -33,6 +33,9 @@ export class View {
   margins: () => Margins = () => ({ top: 60, bottom: 66, left: 24, right: 84 });
   readonly drawing: Drawing = { pictures: 0, share: 1, rests: false };
 
+  /** Around the body as it is now. */
+  body_box = new Box3();
+
   /** Every picture is drawn whole, as for a video. */
   is_whole = false;
 
@@ -43,7 +46,9 @@ export class View {
   private readonly still_ = new Group();
   private is_wanted_ = false;
   private wanted_at_ = 0;
-  private drawn_at_ = 0;
+  private begun_at_ = 0; // [ms], when the last one was begun
+  private done_at_ = 0; // and when the page was free again: a browser without a graphics card waits for each picture after it was drawn
+  private readonly handed_over_ = new MessageChannel();
   private rest_timer_ = 0;
   private size_ = '';
 
@@ -64,6 +69,7 @@ export class View {
     this.eye = new Eye(this.canvas, () => this.margins());
     this.eye.changed = () => this.draw();
     new ResizeObserver(() => this.resize()).observe(element);
+    this.handed_over_.port1.onmessage = () => (this.done_at_ = performance.now());
     this.resize();
   }
 
@@ -76,11 +82,14 @@ export class View {
     if (this.is_wanted_) return;
     this.is_wanted_ = true;
     this.wanted_at_ = performance.now();
-    requestAnimationFrame((now) => {
+    requestAnimationFrame(() => {
       this.is_wanted_ = false;
-      this.pace_.note(now - Math.max(this.drawn_at_, this.wanted_at_));
-      this.drawn_at_ = performance.now();
+      const begun = performance.now();
+      const is_done = this.done_at_ >= this.begun_at_;
+      this.pace_.note(is_done ? this.done_at_ - this.begun_at_ + begun - Math.max(this.done_at_, this.wanted_at_) : begun - this.begun_at_);
+      this.begun_at_ = begun;
       this.picture(this.is_whole ? Math.min(smooth, this.pace_.most) : this.pace_.share, this.is_whole);
+      this.handed_over_.port2.postMessage(0);
       clearTimeout(this.rest_timer_);
       this.rest_timer_ = window.setTimeout(() => this.rest(), rest_after);
     });
@@ -144,6 +153,24 @@ export class View {
     this.pace_.least = Math.min(0.4, Math.sqrt(least_drawn / (width * height)) / screen);
   }
 
+  /** Where the body is in the picture. */
+  private around(): Around {
+    const { camera } = this.eye;
+    const { min, max } = this.body_box;
+    const low = new Vector2(1, 1);
+    const high = new Vector2(-1, -1);
+    for (let k = 0; k < 8; ++k) {
+      const corner = new Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z).applyMatrix4(camera.matrixWorldInverse);
+      if (corner.z > -camera.near) return { left: 0, below: 0, width: 1, height: 1 }; // beside who looks
+      corner.applyMatrix4(camera.projectionMatrix);
+      low.min(new Vector2(corner.x, corner.y));
+      high.max(new Vector2(corner.x, corner.y));
+    }
+    low.clampScalar(-1, 1);
+    high.clampScalar(-1, 1);
+    return { left: 0.5 + 0.5 * low.x, below: 0.5 + 0.5 * low.y, width: 0.5 * (high.x - low.x), height: 0.5 * (high.y - low.y) };
+  }
+
   private screen_pixels(): number {
     return Math.min(most_pixels, window.devicePixelRatio);
   }
@@ -181,7 +208,10 @@ export class View {
     depth_range.value.set(-middle.z - 1.5 * radius, 3 * radius);
     this.section_.prepare(ratio);
     if (this.eye.is_flat) this.light.without_shade();
-    else this.shade_.draw(renderer, this.scene, camera, canvas.width, canvas.height, shade_reach * radius, is_fine);
+    else {
+      this.shade_.set_cut(this.section_.is_on);
+      this.shade_.draw(renderer, this.scene, camera, [canvas.width, canvas.height], this.around(), shade_reach * radius, is_fine);
+    }
     renderer.clear();
     renderer.render(this.scene, camera);
   }
