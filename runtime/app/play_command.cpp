@@ -172,6 +172,10 @@ void read_view(PlayArguments& arguments, PlayOptions& options) {
   for (const auto& [name, value] : arguments.settings) {
     if (is_mouse && find_setting(name)->group == SettingGroup::workspace)
       throw CLI::ValidationError("--" + name, "the pointer is in the body's frame already");
+    const bool is_replay = options.device.kind == DeviceChoice::Kind::replay;  // it may have a solver
+    if (find_setting(name)->group == SettingGroup::live && !arguments.settings.contains("solver") &&
+        !is_replay)
+      throw CLI::ValidationError("--" + name, "it is for --solver, which is not given");
   }
 }
 
@@ -222,6 +226,8 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
       "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool sphere:0.005 --record "
       "touch.h5\n"
       "  palpate-runtime play liver.palpate.hdf --device replay:touch.h5\n"
+      "  palpate-runtime play block.palpate.hdf --view --solver corotational --free yes \\\n"
+      "      --gravity 0,0,-9.81 --floor -0.05 --yield 0.05\n"
       "  palpate-runtime play liver.palpate.hdf --device hid --profile polhem_v1 --tool sphere:0.008 "
       "\\\n      --safety max_force=2\n"
       "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool capsule:0.008,0.03 "

@@ -2,9 +2,26 @@
 
 #include <cmath>
 
+#include "base/error.h"
 #include "runtime/live/live_stepper.h"
 
 namespace palpate {
+namespace {
+
+/// The corners of a box, which in the plane reaches all along z.
+AxisBox whole(AxisBox box, int dimension, const char* option) {
+  if (dimension == 2) {
+    box.low.z() = -1.0;
+    box.high.z() = 1.0;
+  }
+  if (!((box.high - box.low).minCoeff() > 0.0)) {
+    throw Error("the box has no size", option,
+                "give its lowest corner, then its highest, e.g. 0,0,0,0.2,0.2,0.1");
+  }
+  return box;
+}
+
+}  // namespace
 
 LiveOptions live_options(const LiveSettings& settings) {
   LiveOptions options{.law = settings.solver.value(),
@@ -19,9 +36,17 @@ StepperOptions stepper_options(const LiveSettings& settings, int dimension) {
   StepperOptions options{.time_step = settings.step,
                          .scheme = {.integrator = settings.integrator, .tolerance = 1e-5}};
   if (settings.floor) {
-    options.walls.push_back({.normal = Vec3::Unit(dimension - 1),
-                             .offset = *settings.floor,
-                             .friction = settings.floor_friction});
+    options.walls.push_back(
+        {.normal = Vec3::Unit(dimension - 1), .offset = *settings.floor, .friction = settings.wall_friction});
+  }
+  if (settings.room) {
+    const AxisBox room = whole(*settings.room, dimension, "--room");
+    const std::vector<Wall> walls = room_walls(room.low, room.high, settings.wall_friction, dimension);
+    options.walls.insert(options.walls.end(), walls.begin(), walls.end());
+  }
+  if (settings.obstacle) {
+    const AxisBox box = whole(*settings.obstacle, dimension, "--obstacle");
+    options.walls.push_back({.friction = settings.wall_friction, .box = {{box.low, box.high}}});
   }
   return options;
 }

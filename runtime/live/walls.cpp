@@ -15,11 +15,12 @@ Vec3 shortened(const Vec3& v, double by) noexcept {
 
 }  // namespace
 
-std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, bool has_lid) {
+std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, int dimension,
+                             bool has_lid) {
   std::vector<Wall> walls;
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < dimension; ++axis) {
     walls.push_back({.normal = Vec3::Unit(axis), .offset = low[axis], .friction = friction});
-    if (axis < 2 || has_lid)
+    if (axis < dimension - 1 || has_lid)
       walls.push_back({.normal = -Vec3::Unit(axis), .offset = -high[axis], .friction = friction});
   }
   return walls;

@@ -16,8 +16,9 @@ struct Wall {
   std::optional<std::pair<Vec3, Vec3>> box{};  ///< in place of the plane: its lowest and highest corner [m]
 };
 
-/// A floor and four walls around a box, open above; with a lid, closed.
-std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, bool has_lid = false);
+/// A floor and walls around a box, open above; with a lid, closed. In the plane y is up, else z.
+std::vector<Wall> room_walls(const Vec3& low, const Vec3& high, double friction, int dimension = 3,
+                             bool has_lid = false);
 
 /// How a node meets a wall: its gap along a normal.
 struct WallGap {

@@ -72,6 +72,9 @@ std::string text_of(const OverlayOptions& overlay) {
 std::string text_of(const Vec3& place) {
   return fmt::format("{},{},{}", place.x(), place.y(), place.z());
 }
+std::string text_of(const AxisBox& box) {
+  return text_of(box.low) + "," + text_of(box.high);
+}
 std::string text_of(const SafetyOptions& options) {
   std::string text;
   for_each_safety_field(options, [&](const SafetyField& field, const auto& value) {
@@ -161,6 +164,18 @@ void read_value(const Setting& setting, const std::string& text, Vec3& place) {
   place = {(*numbers)[0], (*numbers)[1], numbers->size() == 3 ? (*numbers)[2] : 0.0};
 }
 
+void read_value(const Setting& setting, const std::string& text, AxisBox& box) {
+  std::size_t middle = 0;
+  for (int commas = 0; commas < 3 && middle != std::string::npos; ++commas)
+    middle = text.find(',', commas == 0 ? 0 : middle + 1);
+  const auto low = parse_vector(text.substr(0, middle)),
+             high = middle == std::string::npos ? std::nullopt : parse_vector(text.substr(middle + 1));
+  if (!low || !high || low->size() != 3 || high->size() != 3)
+    refuse(setting.name, "'" + text + "' is not two corners X,Y,Z,X,Y,Z",
+           "write for instance 0,0,0,0.2,0.2,0.1");
+  box = {{(*low)[0], (*low)[1], (*low)[2]}, {(*high)[0], (*high)[1], (*high)[2]}};
+}
+
 void read_value(const Setting&, const std::string& text, std::string& axes) {
   static_cast<void>(parse_axes(text));
   axes = text;
@@ -241,7 +256,7 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
 template <class SomeSettings, class Visitor>
 void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
   auto& [solver, step, integrator, gravity, mass_damping, stiffness_damping, yield, creep, most_plastic, free,
-         floor, floor_friction] = live;
+         floor, room, obstacle, wall_friction] = live;
   constexpr SettingGroup group = SettingGroup::live;
   const bool is_told = live.solver.has_value();
   visit(
@@ -284,9 +299,18 @@ void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
   visit(Setting{"floor", group, "HEIGHT", "m", "none", "height of a floor along z, in the plane along y",
                 any_number, is_told && floor.has_value()},
         floor);
-  visit(Setting{"floor-friction", group, "MU", "", "0.5", "Coulomb friction coefficient of the floor",
-                number_from_zero, is_told},
-        floor_friction);
+  visit(Setting{"room", group, "X,Y,Z,X,Y,Z", "m", "none",
+                "walls and a floor around the body: the lowest and the highest corner of the room, which is "
+                "open above",
+                any_number, is_told && room.has_value()},
+        room);
+  visit(Setting{"obstacle", group, "X,Y,Z,X,Y,Z", "m", "none",
+                "a box that the body stays out of: its lowest and its highest corner", any_number,
+                is_told && obstacle.has_value()},
+        obstacle);
+  visit(Setting{"wall-friction", group, "MU", "", "0.5",
+                "Coulomb friction coefficient of floor, room and obstacle", number_from_zero, is_told},
+        wall_friction);
 }
 
 /// Visits the settings of the loop, and of where the device is in the body's frame.

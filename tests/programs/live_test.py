@@ -92,6 +92,46 @@ class Live(ProgramTest):
         self.assertLess(time[5], 0.09)
         self.assertAlmostEqual(u[5, :, 2].mean(), -0.5 * 9.81 * (time[5] + 0.0025) ** 2, delta=0.001)  # implicit Euler is half a step ahead
 
+    def test_a_file_without_greens_functions_is_enough(self):
+        whole = self.bake(BLOCK)
+        file = self.bake(BLOCK.replace('precision = "double"', 'scope = "none"').replace('"block"', '"bare"'))
+        with h5py.File(self.folder / file) as stored:
+            self.assertNotIn("greens", stored)
+            self.assertEqual(stored["dofs/stored_nodes"].shape, (0,))
+        for solver in ("corotational", "neo-hookean", "mass-spring"):
+            self.assertEqual(self.force(file, 0.003, "--solver", solver)[0], self.force(whole, 0.003, "--solver", solver)[0], solver)
+        for program, command in ((PRECOMPUTE, "inspect"), (PRECOMPUTE, "verify")):
+            result = run(program, command, file, cwd=self.folder)
+            self.assertEqual(result.returncode, 0, result.stderr)
+        path = self.write("touch.csv", press(0.001))
+        result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", cwd=self.folder)
+        self.assertNotEqual(result.returncode, 0)
+        self.assertIn("no Green's functions", result.stderr)
+        self.assertIn("--solver corotational", result.stderr)
+
+    def test_a_body_that_nothing_holds_needs_no_fixed_region(self):
+        free = "\n".join(line for line in BLOCK.splitlines() if "fixed" not in line and "half_space" not in line)
+        file = self.bake(free.replace('precision = "double"', 'scope = "none"'))
+        away = "t,x,y,z\n0,0.02,0.02,0.5\n1,0.02,0.02,0.5\n"
+        self.play(file, away, "--record", "fall.h5", "--solver", "corotational", "--gravity", "2,0,-9.81", "--room", "-0.1,-0.1,-0.05,0.15,0.15,0.2",
+                  "--obstacle", "0.06,-0.1,-0.06,0.1,0.15,0.0", "--wall-friction", "0")
+        with h5py.File(self.folder / "fall.h5") as recording:
+            last = (recording["surface/nodes"][:] + recording["frames/displacement"][-1])
+        self.assertAlmostEqual(last[:, 2].min(), -0.05, delta=1e-3)
+        self.assertGreater(last[:, 0].min(), 0.01)  # it has slid
+        self.assertLess(last[:, 0].max(), 0.061)    # against the obstacle
+
+    def test_plasticity_keeps_a_dent(self):
+        file = self.bake(BLOCK)
+        script = "t,x,y,z\n0,0.02,0.02,0.037\n0.4,0.02,0.02,0.026\n0.8,0.02,0.02,0.026\n1.2,0.02,0.02,0.05\n2.4,0.02,0.02,0.05\n"
+        for options, least, most in (((), 0, 1e-4), (("--yield", "0.05", "--creep", "20"), 1e-3, 1e-2)):
+            report, _ = self.play(file, script, "--record", "dent.h5", "--solver", "corotational", *options)
+            with h5py.File(self.folder / "dent.h5") as recording:
+                dent = -recording["frames/displacement"][-1][:, 2].min()
+            (self.folder / "dent.h5").unlink()
+            self.assertTrue(least <= dent <= most, (options, dent))
+            self.assertEqual(report["live"]["plastic_work_J"] > 0, bool(options))
+
     def test_what_does_not_fit_is_refused(self):
         file = self.bake(BLOCK)
         path = self.write("touch.csv", press(0.001))
@@ -99,7 +139,13 @@ class Live(ProgramTest):
                                  (("--solver", "corotational", "--overlay", "r=2,rings=1"), "--overlay"),
                                  (("--solver", "corotational", "--contact", "dynamic"), "--contact"),
                                  (("--solver", "neo-hookean", "--yield", "0.1"), "does not flow"),
-                                 (("--solver", "rubber"), "none of linear, corotational")):
+                                 (("--solver", "rubber"), "none of linear, corotational"),
+                                 (("--gravity", "0,0,-9.81"), "--solver, which is not given"),
+                                 (("--solver", "linear", "--room", "0,0,0"), "not two corners"),
+                                 (("--solver", "linear", "--obstacle", "1,1,1,0,2,2"), "no size"),
+                                 (("--solver", "linear", "--integrator", "verlet"), "none of implicit-euler"),
+                                 (("--solver", "linear", "--creep", "-1"), "not a number that is"),
+                                 (("--solver", "linear", "--live-step", "0"), "not a number that is")):
             result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", *arguments, cwd=self.folder)
             self.assertNotEqual(result.returncode, 0, arguments)
             self.assertIn(words, result.stderr, arguments)
