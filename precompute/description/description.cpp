@@ -1,5 +1,7 @@
 #include "precompute/description/description.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "base/error.h"

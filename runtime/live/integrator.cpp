@@ -31,6 +31,9 @@ const char* name_of(Integrator integrator) noexcept {
 
 double longest_stable_step(Integrator integrator, double omega, double zeta) {
   if (is_implicit(integrator) || !(omega > 0.0)) return std::numeric_limits<double>::infinity();
+  // |1 - zeta h +- i sqrt(1 - zeta^2) h| <= 1, and of real roots the larger one.
+  if (integrator == Integrator::explicit_euler)
+    return 2.0 / omega * (zeta <= 1.0 ? zeta : 1.0 / (zeta + std::sqrt(zeta * zeta - 1.0)));
   // The first step, of growing ones, that is not stable; then between it and the last that is.
   double stable = 0.0, unstable = 0.01;
   while (unstable < 10.0 && is_stable(integrator, unstable, zeta)) {

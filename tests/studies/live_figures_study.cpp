@@ -74,7 +74,7 @@ Eigen::Vector2d pulled(const Mesh& mesh, double nu, LiveLaw law, int axis) {
 /// A cantilever that sinks under its weight: [d N] positions.
 VectorXd sagging(LiveLaw law, double nu, LiveBody& body) {
   LiveInput input = live_input_of(generate(BoxShape{Vec3::Zero(), Vec3(0.08, 0.02, 0.02), {16, 4, 4}}),
-                                  {.youngs_modulus = 4 * E0, .poissons_ratio = nu, .density = 1000.0});
+                                  {.youngs_modulus = 30 * E0, .poissons_ratio = nu, .density = 1000.0});
   hold(
       input, [](const Vec3& x) { return x.x() < 1e-9; }, 7);
   body = LiveBody(std::move(input), {.law = law, .gravity = Vec3(0, 0, -9.81)});
@@ -111,7 +111,7 @@ void compare_springs(const std::string& folder) {
                                            {"4 × 4 × 4", 4, 0.0},
                                            {"8 × 8 × 8", 8, 0.0},
                                            {"8 × 8 × 8, nodes shaken by 25 %", 8, 0.25}}) {
-    for (const double nu : {0.0, 0.25, 0.45}) {
+    for (const double nu : {0.0, 0.45}) {
       const Mesh mesh = cube(cells, shake);
       const Eigen::Vector2d elements = pulled(mesh, nu, LiveLaw::corotational, 0),
                             along_x = pulled(mesh, nu, LiveLaw::mass_spring, 0),
@@ -200,7 +200,7 @@ void map_of_limits(const std::string& folder) {
   lines << "integrator,E,limit\n";
   fmt::print(
       "| integrator | longest stable step at E = 1 kPa [ms] | 10 kPa | 100 kPa | 1 MPa | steps above the "
-      "limit that stayed small, below that grew |\n|---|---|---|---|---|---|\n");
+      "limit that did not grow, below it that grew |\n|---|---|---|---|---|---|\n");
   for (const Integrator integrator : {Integrator::explicit_euler, Integrator::semi_implicit_euler,
                                       Integrator::verlet, Integrator::rk2, Integrator::rk4}) {
     std::string cells;

@@ -3,10 +3,12 @@
 //   live_study FOLDER
 //
 // Writes to FOLDER, for each case, NAME.inp for CalculiX and NAME.csv with our figures: a row a level and
-// law. scripts/studies/live-truth runs it and CalculiX.
+// law; and for tet10 curves/NAME.csv, with levels in small steps and without CalculiX.
+// scripts/studies/live-truth runs it and CalculiX.
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
 
@@ -78,6 +80,30 @@ void write_case(const LargeCase& large, const std::string& folder) {
   }
 }
 
+/// Figures of a case by each law.
+void write_figures(const LargeCase& large, const std::string& file) {
+  std::ofstream out(file);
+  out << "law,level,figure\n";
+  for (const LiveLaw law : {LiveLaw::neo_hookean, LiveLaw::corotational, LiveLaw::linear}) {
+    const std::vector<double> figures = solve_large(large, law);
+    for (std::size_t k = 0; k < figures.size(); ++k)
+      out << fmt::format("{},{},{:.10g}\n", name_of(law), large.levels[k], figures[k]);
+  }
+}
+
+/// The case in small steps.
+LargeCase in_small_steps(LargeCase large) {
+  large.parts = 4;
+  if (large.name.starts_with("bending")) {
+    large.levels = {1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 85, 90};
+  } else if (large.name.starts_with("bar")) {
+    large.levels = {1.02, 1.04, 1.06, 1.08, 1.1, 1.15, 1.2, 1.3, 1.4, 1.5};
+  } else {
+    large.levels = {0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25, 0.275, 0.3};
+  }
+  return large;
+}
+
 }  // namespace
 }  // namespace palpate::test
 
@@ -88,14 +114,11 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::string folder = argv[1];
+  std::filesystem::create_directory(folder + "/curves");
   for (const test::LargeCase& large : test::large_cases()) {
     test::write_case(large, folder);
-    std::ofstream out(folder + "/" + large.name + ".csv");
-    out << "law,level,figure\n";
-    for (const LiveLaw law : {LiveLaw::neo_hookean, LiveLaw::corotational, LiveLaw::linear}) {
-      const std::vector<double> figures = test::solve_large(large, law);
-      for (std::size_t k = 0; k < figures.size(); ++k)
-        out << fmt::format("{},{},{:.10g}\n", name_of(law), large.levels[k], figures[k]);
-    }
+    test::write_figures(large, folder + "/" + large.name + ".csv");
+    if (large.input.mesh.element == ElementType::tet10)
+      test::write_figures(test::in_small_steps(large), folder + "/curves/" + large.name + ".csv");
   }
 }

@@ -19,6 +19,7 @@ struct LargeCase {
   std::vector<Index> moved{};   ///< nodes
   std::uint8_t moved_axes = 7;  ///< along which they are
   std::vector<double> levels;   ///< of the motion: stretches, angles [degrees], shares of the thickness
+  int parts = 8;                ///< in which each level is reached from the one before
   std::function<Vec3(const Vec3&, double)> place{};  ///< where a moved node goes at a level [m]
   /// The figure by forces on the moved nodes and where these are: a force [N] or a moment [N m].
   std::function<double(const std::vector<Vec3>& x, const std::vector<Vec3>& force, double level)> figure{};
@@ -108,9 +109,13 @@ inline LargeCase indentation_case(ElementType type) {
 }
 
 inline std::vector<LargeCase> large_cases() {
-  return {bar_case(ElementType::tet4),         bar_case(ElementType::tet10),
-          bending_case(ElementType::tet4),     bending_case(ElementType::tet10),
-          indentation_case(ElementType::tet4), indentation_case(ElementType::tet10)};
+  std::vector<LargeCase> cases = {bar_case(ElementType::tet4),         bar_case(ElementType::tet10),
+                                  bending_case(ElementType::tet4),     bending_case(ElementType::tet10),
+                                  indentation_case(ElementType::tet4), indentation_case(ElementType::tet10)};
+  for (LargeCase& large : cases) {
+    if (large.input.mesh.element == ElementType::tet10) large.parts = 24;
+  }
+  return cases;
 }
 
 /// The figures of all levels by a law. Each level is reached in parts.
@@ -125,9 +130,8 @@ inline std::vector<double> solve_large(const LargeCase& large, LiveLaw law) {
       x = body.start();
       reached = 1.0;
     }
-    const int parts = body.mesh().element == ElementType::tet10 ? 24 : 8;
-    for (int part = 1; part <= parts; ++part) {
-      const double at = reached + (level - reached) * part / parts;
+    for (int part = 1; part <= large.parts; ++part) {
+      const double at = reached + (level - reached) * part / large.parts;
       for (const Index node : large.moved) {
         const Vec3 to = large.place(large.input.mesh.nodes[static_cast<std::size_t>(node)], at);
         for (int axis = 0; axis < 3; ++axis) {

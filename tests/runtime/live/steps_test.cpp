@@ -201,6 +201,8 @@ TEST(Limit, IsThatOfTheHighestMode) {
   EXPECT_NEAR(longest_stable_step(Integrator::rk4, 1.0, 0.0), std::sqrt(8.0), 1e-6);
   EXPECT_NEAR(longest_stable_step(Integrator::explicit_euler, 1.0, 0.1), 0.2, 1e-6);
   EXPECT_EQ(longest_stable_step(Integrator::explicit_euler, 1.0, 0.0), 0.0);
+  EXPECT_NEAR(longest_stable_step(Integrator::explicit_euler, 2.0, 1e-4), 1e-4, 1e-15);
+  EXPECT_NEAR(longest_stable_step(Integrator::explicit_euler, 1.0, 1.25), 1.0, 1e-12);  // roots 0.5 and 2
   EXPECT_NEAR(longest_stable_step(Integrator::semi_implicit_euler, 1.0, 0.3), 2.0 * (std::sqrt(1.09) - 0.3),
               1e-6);
   EXPECT_TRUE(std::isinf(longest_stable_step(Integrator::newmark, 1.0, 0.0)));
