@@ -145,7 +145,7 @@ std::string throw_once(const LiveBody& body, unsigned seed) {
 // Set PALPATE_THROWS=10000 for the whole study.
 TEST(Walls, RandomThrowsEndAtRestWithinThem) {
   const char* wanted = std::getenv("PALPATE_THROWS");
-  const int throws = wanted != nullptr ? std::atoi(wanted) : 40;
+  const int throws = wanted != nullptr ? std::atoi(wanted) : 300;
   const Material material{.youngs_modulus = 2e4, .poissons_ratio = 0.35, .density = 1000.0};
   const LiveBody body(
       test::live_input_of(generate(BoxShape{Vec3::Zero(), Vec3(0.02, 0.02, 0.01), {2, 2, 1}}), material),
