@@ -12,9 +12,9 @@ const char* column_stage(PackedMatrix matrix) {
 
 std::vector<Tile> column_tiles(const GreensSolver& solver, const Plan& plan) {
   std::vector<Tile> tiles;
-  for (std::int64_t first = 0; first < plan.stored_dofs; first += plan.block_columns) {
-    const std::int64_t count = std::min(plan.block_columns, plan.stored_dofs - first);
-    tiles.push_back({first, count, solver.flops(first, count)});
+  for (const PieceRange& block : column_blocks(plan)) {
+    const std::int64_t count = block.end - block.first;
+    tiles.push_back({block.first, count, solver.flops(block.first, count)});
   }
   return tiles;
 }

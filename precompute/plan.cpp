@@ -3,6 +3,7 @@
 #include <cblas.h>
 #include <fmt/format.h>
 
+#include <array>
 #include <chrono>
 #include <string>
 #include <vector>
@@ -14,10 +15,14 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t max_block_columns = 192;
-// Where there is work for many threads, blocks are narrower, so that 2 048 threads find enough of them: of
-// 300 000 columns they then are busy for 90 % of the time in place of 45 %. It costs 3 % (48 columns 13 %).
-constexpr std::int64_t block_columns_for_many = 96;
-constexpr double work_for_many = 1e12;  // multiplications and additions of all columns
+// Where there is work for many threads, blocks are narrower, so that 2 048 threads find enough of them, and
+// of several widths, so that the threads of a node do not all write at once; narrow ones at the end let all
+// threads end together. Of 300 000 columns 2 048 threads then are busy for 93 % of the time: with 96 columns
+// everywhere for 74 %, with 192 for 45 % (scripts/studies/cluster).
+constexpr std::array<std::int64_t, 4> widths_for_many = {84, 72, 60, 48};
+constexpr std::int64_t last_width_for_many = 24;
+constexpr double last_part_for_many = 0.2;  // of all columns
+constexpr double work_for_many = 1e12;      // multiplications and additions of all columns
 constexpr std::int64_t max_block_bytes = 512LL << 20;
 constexpr double sweep_efficiency =
     0.4;  // of the sweeps against products alone: gathers and small supernodes (measured)
@@ -47,17 +52,21 @@ double measured_flops_per_second() {
 
 /// Columns a block: as wide as pays, but one block's right-hand sides stay below max_block_bytes. It depends
 /// on the model alone: products of other widths may differ in their last digits.
-std::int64_t choose_block_columns(std::int64_t free_dofs, double flops) {
+std::int64_t widest_block(std::int64_t free_dofs) {
   const std::int64_t fits = max_block_bytes / (free_dofs * static_cast<std::int64_t>(sizeof(double)));
-  return std::clamp<std::int64_t>(fits / 24 * 24, 24,
-                                  flops < work_for_many ? max_block_columns : block_columns_for_many);
+  return std::clamp<std::int64_t>(fits / 24 * 24, 24, max_block_columns);
 }
 
-/// Flops of all columns, in blocks of so many.
-double column_flops(const GreensSolver& solver, std::int64_t block) {
+/// Columns of block number k where blocks are for many threads, the first of them being `first` of all.
+std::int64_t width_for_many(std::size_t k, std::int64_t first, std::int64_t all) {
+  const bool last = static_cast<double>(all - first) <= last_part_for_many * static_cast<double>(all);
+  return last ? last_width_for_many : widths_for_many[k % widths_for_many.size()];
+}
+
+double column_flops(const GreensSolver& solver, const Plan& plan) {
   double flops = 0.0;
-  for (std::int64_t first = 0; first < solver.order(); first += block)
-    flops += solver.flops(first, std::min(block, solver.order() - first));
+  for (const PieceRange& block : column_blocks(plan))
+    flops += solver.flops(block.first, block.end - block.first);
   return flops;
 }
 
@@ -67,6 +76,18 @@ int working(int jobs) {
 }
 
 }  // namespace
+
+std::vector<PieceRange> column_blocks(const Plan& plan) {
+  std::vector<PieceRange> blocks;
+  const std::int64_t all = plan.stored_dofs;
+  for (std::int64_t first = 0; first < all;) {
+    const std::int64_t width = plan.for_many ? width_for_many(blocks.size(), first, all) : plan.block_columns;
+    const std::int64_t end = std::min(first + std::min(width, plan.block_columns), all);
+    blocks.push_back({first, end});
+    first = end;
+  }
+  return blocks;
+}
 
 Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver,
                std::optional<Precision> precision, int jobs) {
@@ -78,8 +99,13 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
   plan.factor_entries = factor.entries();
   plan.file_bytes =
       packed_size(plan.stored_dofs) * bytes_per_scalar(precision.value_or(Precision::single_precision));
-  plan.block_columns = choose_block_columns(plan.free_dofs, column_flops(solver, max_block_columns));
-  plan.flops = column_flops(solver, plan.block_columns);
+  plan.block_columns = widest_block(plan.free_dofs);
+  plan.flops = column_flops(solver, plan);
+  plan.for_many = plan.flops >= work_for_many;
+  if (plan.for_many) {
+    plan.block_columns = std::min(plan.block_columns, widths_for_many.front());
+    plan.flops = column_flops(solver, plan);
+  }
   plan.factor_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   plan.memory_bytes = plan.factor_bytes + jobs * solver.workspace_bytes(plan.block_columns);
   const double rate = measured_flops_per_second();

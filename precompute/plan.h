@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
+#include "formats/journal.h"
 #include "formats/packed.h"
 #include "precompute/numerics/greens_solver.h"
 
@@ -21,13 +23,18 @@ struct Plan {
   std::int64_t memory_bytes = 0;    ///< largest demand: factor and workspaces of all jobs
   std::int64_t overlay_bytes = 0;   ///< of memory, for overlays until they are written
   std::int64_t dynamics_bytes = 0;  ///< of memory, for mass, damping, K_bar and modes
-  std::int64_t block_columns = 0;   ///< right-hand sides solved at a time; the same for any number of jobs
+  std::int64_t block_columns = 0;   ///< right-hand sides solved at a time, at most
+  bool for_many = false;            ///< blocks are cut for many threads
   double flops = 0.0;               ///< of the column solves
   double seconds = 0.0;             ///< estimate of the column solves with all jobs, from a measured rate
   double factor_seconds = 0.0;      ///< of the factorisation, which one thread does
   double precision_seconds = 0.0;   ///< of the touches from which the precision is chosen
   double write_seconds = 0.0;       ///< of checksums and probes once the columns are there
 };
+
+/// The columns that are solved together, in the order in which they are begun: by the model alone, whoever
+/// solves them.
+std::vector<PieceRange> column_blocks(const Plan& plan);
 
 Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solver,
                std::optional<Precision> precision, int jobs);

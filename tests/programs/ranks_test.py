@@ -387,7 +387,7 @@ class Plans(RanksTest):
         self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
 
     def test_blocks_of_columns_depend_on_the_model_alone(self):
-        for cells, columns in ((6, 192), (30, 96)):  # the larger one has work for more threads than blocks of 192
+        for cells, columns in ((6, 192), (30, 84)):  # the larger one has work for more threads than blocks of 192
             model = self.write("model.toml", cube_toml(cells))
             for ranks in (1, 64):
                 report = self.folder / "report.json"

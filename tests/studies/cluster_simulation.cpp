@@ -26,7 +26,7 @@ constexpr double host_speed = 1e9;  // of the platform [flop/s]: a second is so 
 struct Figures {
   std::map<std::string, double> seconds;  ///< and other numbers by name
   std::vector<Tile> tiles;                ///< with seconds as their cost
-  std::vector<double> bytes;              ///< of each tile
+  std::map<std::int64_t, double> bytes;   ///< by each tile's first column
 };
 
 /// Lines "name number" and "tile first count seconds bytes".
@@ -42,7 +42,7 @@ Figures read_figures(const std::string& file) {
       double bytes = 0.0;
       words >> tile.first >> tile.count >> tile.cost >> bytes;
       figures.tiles.push_back(tile);
-      figures.bytes.push_back(bytes);
+      figures.bytes[tile.first] = bytes;
     } else {
       words >> figures.seconds[name];
     }
@@ -67,8 +67,7 @@ void run(const Figures& figures, int threads) {
   TileWork work;
   work.solve = [&](const Tile& tile, int) {
     compute(tile.cost);
-    const auto k = static_cast<std::size_t>(tile.first / figures.tiles.front().count);
-    s4u::Comm::sendto(here, storage, static_cast<std::uint64_t>(figures.bytes[k]));
+    s4u::Comm::sendto(here, storage, static_cast<std::uint64_t>(figures.bytes.at(tile.first)));
     team.tell("columns");
   };
   work.done = [&](const Tile& tile) { worked += tile.cost; };
@@ -77,7 +76,7 @@ void run(const Figures& figures, int threads) {
   if (team.leads()) {
     const double solved = s4u::Engine::get_clock();
     double file = 0.0;
-    for (const double bytes : figures.bytes) file += bytes;
+    for (const auto& [first, bytes] : figures.bytes) file += bytes;
     s4u::Comm::sendto(storage, here, static_cast<std::uint64_t>(file));  // read for its checksum
     std::printf("figures %g %g %g %g\n", begun, solved - begun, s4u::Engine::get_clock() - solved, worked);
     std::fflush(stdout);

@@ -2,15 +2,18 @@
 //
 //   tile_study MODEL.toml [--samples N]
 //
-// Meshes the model, factorises K, and solves and writes N of its blocks of columns, by one thread. Prints its
-// processor's seconds, those of the other blocks by their flops: "before", "factor", "tile FIRST COUNT
-// SECONDS BYTES".
+// Meshes the model, factorises K, and solves and writes N of its blocks of columns of each width, by one
+// thread. Prints its processor's seconds, those of the other blocks by the flops of as wide ones: "before",
+// "factor", "tile FIRST COUNT SECONDS BYTES".
 #include <cblas.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <iterator>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -41,6 +44,29 @@ void write_block(const std::vector<double>& packed, std::FILE* file) {
   std::fwrite(values.data(), sizeof(float), values.size(), file);
 }
 
+/// Seconds per flop of blocks that are `count` columns wide, from `samples` of them.
+double measured_rate(const GreensSolver& solver, const std::vector<Tile>& tiles, std::int64_t count,
+                     std::int64_t samples, std::FILE* out) {
+  std::vector<Tile> as_wide;
+  std::copy_if(tiles.begin(), tiles.end(), std::back_inserter(as_wide),
+               [&](const Tile& tile) { return tile.count == count; });
+  samples = std::min(samples, std::ssize(as_wide));
+  GreensSolver::Workspace workspace;
+  std::vector<double> packed;
+  double spent = 0.0, flops = 0.0;
+  for (std::int64_t k = -1; k < samples; ++k) {
+    const auto at = static_cast<std::size_t>((2 * std::max<std::int64_t>(k, 0) + 1) * std::ssize(as_wide) /
+                                             (2 * samples));
+    const double start = processor_seconds();
+    solver.columns(as_wide[at].first, count, workspace, packed);
+    write_block(packed, out);
+    if (k < 0) continue;  // fills the workspace
+    spent += processor_seconds() - start;
+    flops += as_wide[at].cost;
+  }
+  return spent / flops;
+}
+
 void run(const std::string& file, std::int64_t samples) {
   const Description description = read_description(file);
   MeshedBody body = mesh_body(description, [](const std::string&) {});
@@ -62,20 +88,10 @@ void run(const std::string& file, std::int64_t samples) {
   const double factorised = processor_seconds();
   const Plan plan = make_plan(body.mesh, factor, solver, Precision::single_precision, 1);
   const std::vector<Tile> tiles = column_tiles(solver, plan);
-  GreensSolver::Workspace workspace;
-  std::vector<double> packed;
-  double spent = 0.0, flops = 0.0;
+  std::map<std::int64_t, double> rate;  // by width
   std::FILE* const out = std::tmpfile();
-  for (std::int64_t k = -1; k < samples; ++k) {
-    const auto at =
-        static_cast<std::size_t>((2 * std::max<std::int64_t>(k, 0) + 1) * std::ssize(tiles) / (2 * samples));
-    const double start = processor_seconds();
-    solver.columns(tiles[at].first, tiles[at].count, workspace, packed);
-    write_block(packed, out);
-    if (k < 0) continue;  // fills the workspace
-    spent += processor_seconds() - start;
-    flops += tiles[at].cost;
-  }
+  for (const Tile& tile : tiles)
+    if (!rate.contains(tile.count)) rate[tile.count] = measured_rate(solver, tiles, tile.count, samples, out);
   std::fclose(out);
   fmt::print("nodes {}\nstored_dofs {}\nfactor_entries {}\n", plan.nodes, plan.stored_dofs,
              plan.factor_entries);
@@ -83,7 +99,7 @@ void run(const std::string& file, std::int64_t samples) {
   for (const Tile& tile : tiles) {
     const std::int64_t entries =
         tile.count * (plan.stored_dofs - tile.first) - tile.count * (tile.count - 1) / 2;
-    fmt::print("tile {} {} {:.6f} {}\n", tile.first, tile.count, tile.cost * spent / flops,
+    fmt::print("tile {} {} {:.6f} {}\n", tile.first, tile.count, tile.cost * rate.at(tile.count),
                entries * static_cast<std::int64_t>(sizeof(float)));
   }
 }
@@ -94,7 +110,7 @@ void run(const std::string& file, std::int64_t samples) {
 int main(int argc, char** argv) {
   return palpate::run_program("tile_study", "", [&] {
     if (argc != 2 && argc != 4) return 2;
-    palpate::run(argv[1], argc == 4 ? std::stoll(argv[3]) : 8);
+    palpate::run(argv[1], argc == 4 ? std::stoll(argv[3]) : 4);
     return 0;
   });
 }
