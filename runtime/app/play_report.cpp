@@ -208,6 +208,11 @@ void print_live(const Body& body, const LiveTelling& live) {
       "the tool met the compliance of {:.3g} s ago; against the solver it was off by {:.2g} m and {:.2g} N "
       "at most, of forces up to {:.3g} N\n",
       live.compliance_age, live.largest_error, live.largest_force_error, live.largest_force);
+  if (counts.stopped > 0)
+    print_warning(
+        fmt::format("in {} steps the solver found no solution however short they were, and stopped the body "
+                    "where it was: give it a shorter --live-step, more damping or less load",
+                    counts.stopped));
 }
 
 Json json_live(const Body& body, const LiveTelling& live) {

@@ -1,5 +1,7 @@
 #include "runtime/live/live_model.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -14,6 +16,24 @@ namespace palpate {
 namespace {
 
 constexpr Index columns_at_once = 64;
+
+/// Throws Error where nodes that can move begin in a wall.
+void check_start(const LiveBody& body, const std::vector<Wall>& walls) {
+  const int d = body.dimension();
+  const double least = -1e-9 * (body.rest().maxCoeff() - body.rest().minCoeff());
+  for (Index node = 0; node < std::ssize(body.mesh().nodes); ++node) {
+    if (body.free_of_dof()[static_cast<std::size_t>(d * node)] < 0) continue;
+    const Vec3 at = node_part(body.start(), d, node);
+    for (const Wall& wall : walls) {
+      const std::optional<WallGap> gap = gap_to(wall, at, at);
+      if (!gap || gap->gap >= least) continue;
+      throw Error(
+          fmt::format("the body begins in {}: its node at ({:.4g}, {:.4g}, {:.4g}) m is {:.3g} m deep",
+                      wall.box ? "the obstacle" : "a wall", at.x(), at.y(), at.z(), -gap->gap),
+          wall.box ? "--obstacle" : "--floor and --room", "move it out of the body's way");
+    }
+  }
+}
 
 /// Where the body rests: in balance, where that is found.
 Eigen::VectorXd rest_of(const LiveBody& body) {
@@ -72,7 +92,10 @@ LiveParts make_live_parts(const Model& model, const LiveSettings& settings) {
     input.fixed.clear();
     input.held_displacement.clear();
   }
-  return {LiveBody(std::move(input), live_options(settings)), stepper_options(settings, model.dimension())};
+  LiveParts parts{LiveBody(std::move(input), live_options(settings)),
+                  stepper_options(settings, model.dimension())};
+  check_start(parts.body, parts.stepper.walls);
+  return parts;
 }
 
 Model live_model(Model model, const LiveParts& live, const LiveSettings& settings) {

@@ -1,5 +1,7 @@
 #include "runtime/live/live_settings.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "base/error.h"
@@ -7,6 +9,8 @@
 
 namespace palpate {
 namespace {
+
+constexpr double most_gravity = 1000.0;  // [m/s^2]
 
 /// The corners of a box, which in the plane reaches all along z.
 AxisBox whole(AxisBox box, int dimension, const char* option) {
@@ -24,6 +28,10 @@ AxisBox whole(AxisBox box, int dimension, const char* option) {
 }  // namespace
 
 LiveOptions live_options(const LiveSettings& settings) {
+  if (!(settings.gravity.norm() <= most_gravity)) {
+    throw Error(fmt::format("the body would fall by {:.3g} m/s^2", settings.gravity.norm()), "--gravity",
+                fmt::format("give at most {} m/s^2; the earth has 9.81", most_gravity));
+  }
   LiveOptions options{.law = settings.solver.value(),
                       .damping = {.mass = settings.mass_damping, .stiffness = settings.stiffness_damping},
                       .gravity = settings.gravity};

@@ -19,6 +19,8 @@ namespace {
 /// The compliance between the nodes of so many contacts fits into a gigabyte.
 constexpr NumberRange contact_counts{1.0, 1000.0, true, true, "from 1 to 1000"};
 
+constexpr NumberRange live_steps{0.0, 0.1, false, true, "greater than 0 and at most 0.1"};
+
 constexpr NumberRange megabytes{1.0, 1e9, true, true, "of megabytes, from 1 on"};
 constexpr NumberRange positive_or_infinite{0.0, std::numeric_limits<double>::infinity(), false, true,
                                            "greater than 0, or inf"};
@@ -268,7 +270,7 @@ void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
           any_number, is_told},
       solver);
   visit(Setting{"live-step", group, "S", "s", "0.005", "time step of the solver, a whole number of ticks",
-                positive_number, is_told},
+                live_steps, is_told},
         step);
   visit(Setting{"integrator", group, "implicit-euler|midpoint|newmark", "", "implicit-euler",
                 "how the solver steps; implicit-euler damps fast motion, the others keep energy", any_number,
