@@ -145,7 +145,7 @@ class Live(ProgramTest):
                                  (("--solver", "linear", "--room", "0,0,0"), "not two corners"),
                                  (("--solver", "linear", "--obstacle", "1,1,1,0,2,2"), "no size"),
                                  (("--solver", "linear", "--obstacle", "-0.01,-0.01,0.015,0.015,0.015,0.1"), "begins in the obstacle"),
-                                 (("--solver", "linear", "--floor", "0.01"), "begins in a wall"),
+                                 (("--solver", "linear", "--floor", "0.015"), "begins in a wall"),
                                  (("--solver", "linear", "--gravity", "0,0,-1e6"), "at most 1000"),
                                  (("--solver", "linear", "--live-step", "1"), "at most 0.1"),
                                  (("--solver", "linear", "--integrator", "verlet"), "none of implicit-euler"),
