@@ -112,6 +112,9 @@ TEST(ModelFile, WithoutGreensFunctionsHoldsTheRest) {
   const Folder folder;
   Model written = sample_model();
   written.scope = Scope::none;
+  Model storing = written;
+  storing.overlay = {};
+  EXPECT_THROW(ModelWriter(folder / "a.palpate.hdf", storing, Precision::single_precision), Error);
   written.stored_nodes.clear();
   written.probes.clear();
   EXPECT_THROW(ModelWriter(folder / "a.palpate.hdf", written, Precision::single_precision),
