@@ -89,7 +89,7 @@ class Viewer : public testing::Test {
   std::shared_ptr<const Scene> scene_ = std::make_shared<const Scene>(make_scene(body_, 1));
 
   [[nodiscard]] std::unique_ptr<ViewerServer> serve(const ViewerOptions& options, bool is_replay = false) {
-    return std::make_unique<ViewerServer>(ViewerPort(options), run_, is_replay);
+    return std::make_unique<ViewerServer>(ViewerPort(options), std::vector<RunToShow>{{run_, is_replay}});
   }
   [[nodiscard]] test::Served served() const { return test::Served(server_->url()); }
   [[nodiscard]] std::uint16_t port() const { return served().port; }
