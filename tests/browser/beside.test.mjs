@@ -90,7 +90,7 @@ test('a recording stands beside a body that is touched', async (t) => {
   assert.ok((await settled(live)).force[2] < 0);
   await page.mouse.up();
   assert.ok(Math.abs((await told(recording, 'lastFrame')).force[2]) === 0, 'it is not pressed');
-  const [download] = await Promise.all([page.waitForEvent('download'), part(live, 'save-stl').click()]);
+  const [download] = await Promise.all([page.waitForEvent('download'), part(live, 'save-stl').evaluate((button) => button.click())]);
   assert.match(download.suggestedFilename(), /\.stl$/);
   assert.deepEqual(page.complaints, []);
 });

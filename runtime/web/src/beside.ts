@@ -15,7 +15,7 @@ const mark = 'palpate beside';
 
 interface Letter {
   mark: typeof mark;
-  shared: Shared | null; // null: the page is there, and wants to know what the other one has
+  shared: Shared | null; // null: the page is there and asks what the other one has, or that was all of it
 }
 
 function letter_of(event: MessageEvent<unknown>): Letter | null {
@@ -36,12 +36,19 @@ function has_neighbour(): boolean {
 export class Neighbour {
   readonly is_there = has_neighbour();
   private readonly known_ = new Map<string, string>(); // what both have
+  private has_begun_ = false; // until then the other one's is what counts
 
-  constructor(hear: (shared: Shared) => void) {
+  /** `begun`: the other one's was all heard. */
+  constructor(hear: (shared: Shared) => void, begun: () => void) {
     if (!this.is_there) return;
     window.addEventListener('message', (event: MessageEvent<unknown>) => {
       const letter = letter_of(event);
-      if (event.source !== window.parent || !letter?.shared) return;
+      if (event.source !== window.parent || !letter) return;
+      if (!letter.shared) {
+        this.has_begun_ = true;
+        begun();
+        return;
+      }
       this.known_.set(letter.shared.about, JSON.stringify(letter.shared));
       hear(letter.shared);
     });
@@ -55,7 +62,7 @@ export class Neighbour {
   /** Only what the other one does not have. */
   say(shared: Shared): void {
     const text = JSON.stringify(shared);
-    if (!this.is_there || this.known_.get(shared.about) === text) return;
+    if (!this.has_begun_ || this.known_.get(shared.about) === text) return;
     this.known_.set(shared.about, text);
     this.post(shared);
   }
@@ -70,7 +77,7 @@ export class Neighbour {
   }
 }
 
-/** The page that has both in it, and carries what one says to the other. The first one leads where both begin. */
+/** The page that has both in it, and carries what one says to the other. Which is there first leads the other one. */
 export class Beside {
   private readonly panes_: HTMLIFrameElement[];
   private readonly said_ = new Map<string, Shared>(); // last of each
@@ -93,12 +100,12 @@ export class Beside {
         this.said_.set(letter.shared.about, letter.shared);
         this.carry(1 - from, letter.shared);
       } else {
-        for (const shared of this.said_.values()) this.carry(from, shared);
+        for (const shared of [...this.said_.values(), null]) this.carry(from, shared);
       }
     });
   }
 
-  private carry(to: number, shared: Shared): void {
+  private carry(to: number, shared: Shared | null): void {
     this.panes_[to]?.contentWindow?.postMessage({ mark, shared } satisfies Letter, location.origin);
   }
 }

@@ -63,7 +63,13 @@ class Page implements Listener {
   private readonly drawing_: ViewControls;
   private readonly hand_: Hand;
   private readonly source_: Source;
-  private readonly neighbour_ = new Neighbour((shared) => this.take_shared(shared));
+  private readonly neighbour_ = new Neighbour(
+    (shared) => this.take_shared(shared),
+    () => {
+      this.share_look();
+      this.share_picture();
+    },
+  );
 
   constructor() {
     const { view } = this.picture_;
@@ -174,6 +180,7 @@ class Page implements Listener {
     document.body.classList.toggle('live', mode === 'live');
     document.body.classList.toggle('served', mode !== 'file');
     document.body.classList.toggle('pane', this.neighbour_.is_there);
+    if (this.neighbour_.is_there && window.innerHeight <= 480 && !document.body.classList.contains('folded')) this.toggle_panel();
   }
 
   private take_state(state: State): void {
@@ -423,7 +430,6 @@ class Page implements Listener {
       this.picture_.face_section();
     }
     this.neighbour_.begin();
-    this.share_look();
   }
 
   private get kept(): Kept {
