@@ -59,6 +59,10 @@ class ModelWriter {
   ModelWriter(const ModelWriter&) = delete;
   ModelWriter& operator=(const ModelWriter&) = delete;
 
+  /// The key of a model in its journal. Throws Error where a reader would refuse it.
+  [[nodiscard]] static std::string key_of(const std::filesystem::path& path, const Model& model,
+                                          Precision precision);
+
   /// Whether columns [first, first + count) were written, by this run or an earlier one.
   [[nodiscard]] bool has_columns(std::int64_t first, std::int64_t count,
                                  PackedMatrix matrix = PackedMatrix::greens) const;

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/file_io.h"
 #include "base/memory.h"
+#include "formats/begun_model.h"
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
 #include "formats/dynamics_fields.h"
@@ -56,8 +57,10 @@ class Reader {
       : file_(file), options_(options), where_(file.path().string()), counts_(where_) {}
 
   Model read();
+  BegunModel read_begun();
 
  private:
+  void read_known();
   template <class T>
   void read_attribute(const Attribute<T>& attribute);
   template <class T>
@@ -84,19 +87,8 @@ class Reader {
 
 Model Reader::read() {
   const std::vector<std::int64_t> version = read_version(file_);
-  for_each_attribute([this](const auto& attribute) { read_attribute(attribute); });
-  for_each_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
-  if (file_.has(overlay_group)) {
-    for_each_overlay_field([this](const auto& field) { read_field(field); });
-    if (model_.overlay.refinement == 0) refuse(where_, "/overlay/refinement is 0");
-  }
-  if (file_.has(dynamics_group))
-    for_each_dynamics_field(model_, [this](const auto& field) { read_field(field); });
-  if (header_.precision == Precision::split_precision)
-    for_each_smooth_field(model_, [this](const auto& field) { read_field(field); });
-  if (file_.has(greens_errors_path)) visit_greens_errors([this](const auto& field) { read_field(field); });
-  if (model_.dynamics.method == DynamicsMethod::packed && file_.has(inverse_errors_path))
-    visit_inverse_errors([this](const auto& field) { read_field(field); });
+  read_known();
+  for_each_probe_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
   check_model(model_, where_);
   check_precision(model_, header_.precision, where_);
   if (file_.has(tree_path)) {
@@ -108,6 +100,29 @@ Model Reader::read() {
     model_.dynamics.inverse = read_packed(inverse_path, model_.dynamics.inverse.smooth());
   check_content(version);
   return std::move(model_);
+}
+
+BegunModel Reader::read_begun() {
+  read_version(file_);
+  read_known();
+  return {std::move(model_), header_.precision};
+}
+
+/// What is known before the Green's functions.
+void Reader::read_known() {
+  for_each_attribute([this](const auto& attribute) { read_attribute(attribute); });
+  for_each_body_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
+  if (file_.has(overlay_group)) {
+    for_each_overlay_field([this](const auto& field) { read_field(field); });
+    if (model_.overlay.refinement == 0) refuse(where_, "/overlay/refinement is 0");
+  }
+  if (file_.has(dynamics_group))
+    for_each_dynamics_field(model_, [this](const auto& field) { read_field(field); });
+  if (header_.precision == Precision::split_precision)
+    for_each_smooth_field(model_, [this](const auto& field) { read_field(field); });
+  if (file_.has(greens_errors_path)) visit_greens_errors([this](const auto& field) { read_field(field); });
+  if (model_.dynamics.method == DynamicsMethod::packed && file_.has(inverse_errors_path))
+    visit_inverse_errors([this](const auto& field) { read_field(field); });
 }
 
 template <class T>
@@ -275,6 +290,16 @@ void Reader::check_content(const std::vector<std::int64_t>& version) {
 }
 
 }  // namespace
+
+std::optional<BegunModel> read_begun_model(const std::filesystem::path& partial) {
+  std::error_code missing;
+  if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(partial, missing))) return {};
+  try {
+    return Reader(hdf5::Contents::read(partial), {}).read_begun();
+  } catch (const Error&) {
+    return {};  // it is begun anew
+  }
+}
 
 Model load_model(const std::filesystem::path& path, const LoadOptions& options) {
   FileDescriptor bytes = open_file(path, OpenMode::read);

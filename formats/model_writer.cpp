@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/file_io.h"
+#include "formats/begun_model.h"
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
 #include "formats/dynamics_fields.h"
@@ -606,6 +607,32 @@ void ModelWriter::Impl::discard() noexcept {
   std::error_code ignored;
   std::filesystem::remove(partial, ignored);
   journal->remove();
+}
+
+std::optional<Precision> take_up_begun_model(const std::filesystem::path& path, Model& model) {
+  const std::optional<JournalContents> journal = std::filesystem::exists(with_suffix(path, ".progress"))
+                                                     ? peek_journal(with_suffix(path, ".progress"))
+                                                     : std::nullopt;
+  if (!journal) return {};
+  std::optional<BegunModel> begun = read_begun_model(with_suffix(path, ".partial"));
+  if (!begun) return {};
+  const auto exchange = [&] {  // by field: others refer to the mesh and the rest of the model
+    std::swap(model.rest_displacement, begun->model.rest_displacement);
+    std::swap(model.dynamics, begun->model.dynamics);
+    std::swap(model.greens, begun->model.greens);
+    std::swap(model.force_errors, begun->model.force_errors);
+  };
+  exchange();
+  try {
+    if (ModelWriter::key_of(path, model, begun->precision) == journal->frame.key) return begun->precision;
+  } catch (const Error&) {  // it is of another model
+  }
+  exchange();
+  return {};
+}
+
+std::string ModelWriter::key_of(const std::filesystem::path& path, const Model& model, Precision precision) {
+  return Impl(path, model, precision, std::nullopt).frame.key;
 }
 
 ModelWriter::ModelWriter(std::filesystem::path path, const Model& model, Precision precision,

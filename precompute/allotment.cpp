@@ -97,6 +97,16 @@ std::int64_t allotted_memory(const std::string& root) {
         free += number(stat, k + 1).value_or(0.0);
     memory = std::min(memory, std::max(free, 1.0));
   });
+  // What Slurm has set aside, where it does not limit it by control groups [MB].
+  const auto of_slurm = [](const char* name) {
+    const char* const text = std::getenv(name);
+    return text == nullptr ? std::nullopt : number({text}, 0);
+  };
+  constexpr double megabyte = 1 << 20;
+  if (const auto given = of_slurm("SLURM_MEM_PER_NODE"); given && *given > 0.0)
+    memory = std::min(memory, *given * megabyte);
+  const auto each = of_slurm("SLURM_MEM_PER_CPU"), processors = of_slurm("SLURM_CPUS_ON_NODE");
+  if (each && processors && *each > 0.0) memory = std::min(memory, *each * *processors * megabyte);
   return static_cast<std::int64_t>(memory);
 }
 

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/interrupt.h"
 #include "base/parallel.h"
+#include "formats/begun_model.h"
 #include "formats/model_file.h"
 #include "formats/outputs/output_paths.h"
 #include "formats/outputs/part_files.h"
@@ -28,6 +29,7 @@
 #include "precompute/numerics/scope.h"
 #include "precompute/plan.h"
 #include "precompute/progress.h"
+#include "precompute/spread_plan.h"
 
 namespace palpate {
 namespace {
@@ -222,12 +224,14 @@ SparseMatrix stiffness_of_step(const ElasticBody& body, const Stiffness& stiffne
 /// model.
 Precision decide_precision(const Description& description, const ElasticBody& body,
                            const Stiffness& stiffness, const Factor& factor,
-                           const std::vector<std::int64_t>& stored_dofs, Model& model, Progress& progress) {
+                           const std::vector<std::int64_t>& stored_dofs, Team& team, int jobs, Model& model,
+                           Progress& progress) {
   std::vector<PrecisionStudy> studies;
   studies.emplace_back(model, factor, stiffness.K, stored_dofs);
   if (model.dynamics.method == DynamicsMethod::packed) {
     const SparseMatrix K_bar = stiffness_of_step(body, stiffness, *description.dynamics);
     Factor factor_bar(K_bar, stiffness.node_start);
+    spread_likewise(factor, K_bar, team, jobs, factor_bar);
     factor_bar.factorize();
     studies.emplace_back(model, factor_bar, K_bar, stored_dofs);
   }
@@ -254,7 +258,8 @@ Precision decide_precision(const Description& description, const ElasticBody& bo
 /// Factorises K_bar and computes the columns of its inverse, numbered as those of Xi. False when interrupted.
 bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const DynamicsOptions& options,
                    const std::vector<std::uint8_t>& stored, const std::vector<std::int64_t>& stored_dofs,
-                   const Plan& plan, const PieceRange& columns, const Shared& run, ModelWriter& writer) {
+                   const Plan& plan, const PieceRange& columns, bool spread, const Shared& run,
+                   ModelWriter& writer) {
   const SparseMatrix K_bar = stiffness_of_step(body, stiffness, options);
   Factor factor(K_bar, stiffness.node_start);
   const GreensSolver solver(factor, stored, stiffness.free_dofs, body.mesh.dimension());
@@ -263,6 +268,7 @@ bool solve_inverse(const ElasticBody& body, const Stiffness& stiffness, const Dy
   }
   if (writer.has_columns(columns.first, columns.end - columns.first, PackedMatrix::inverse)) return true;
   run.progress.begin(inverse_factor_stage);
+  if (spread) factor.spread(run.team.spread(K_bar, factor, run.jobs));
   factor.factorize();
   return solve_columns(solver, plan, columns, run.jobs, run.team, writer, PackedMatrix::inverse, run.progress,
                        run.tiles, run.interrupted);
@@ -279,7 +285,7 @@ OverlayPlan announce_overlays(const Description& description, const Model& model
 
 DynamicsPlan announce_dynamics(const Description& description, const Plan& plan, const Stiffness& stiffness,
                                Progress& progress) {
-  const DynamicsPlan dynamics =
+  DynamicsPlan dynamics =
       plan_dynamics(*description.dynamics, description.scope, plan.stored_dofs, stiffness.K,
                     description.precision.value_or(Precision::single_precision));
   const std::string method =
@@ -362,13 +368,33 @@ std::optional<Solved> solve_matrices(const Description& description, const Elast
                      run.progress, run.tiles, run.interrupted))
     return {};
   Solved solved;
-  if (run.team.leads() && !part) solved.probes = make_probes(*factor, stored_dofs);
+  const bool spread = factor->spread_numbers() != nullptr;
+  if ((run.team.leads() || spread) && !part) solved.probes = make_probes(*factor, stored_dofs);
   if (plans.dynamics.method == DynamicsMethod::packed) {
     factor.reset();  // its memory is for that of K_bar
-    if (!solve_inverse(body, stiffness, *description.dynamics, stored, stored_dofs, plans.plan, columns, run,
-                       writer))
+    if (!solve_inverse(body, stiffness, *description.dynamics, stored, stored_dofs, plans.plan, columns,
+                       spread, run, writer))
       return {};
   }
+  return solved;
+}
+
+/// Compresses the Green's functions in the leader, which the others help to solve. Nothing when interrupted.
+std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const Factor& factor,
+                                             SpreadNumbers& spread, const Shared& run, ModelWriter& writer) {
+  Solved solved;
+  if (!run.team.leads()) {
+    spread.serve();
+    return solved;
+  }
+  constexpr int one_thread = 1;  // only one solves with all ranks
+  Team alone;
+  GreensCompressor compressor(plan, factor, one_thread, run.progress, run.interrupted);
+  if (compressor.solve_near({0, plan.frame.tree.leaves()}, alone, writer, run.tiles))
+    solved.compressed = compressor.compress(writer);
+  if (solved.compressed != nullptr) solved.probes = make_probes(factor, plan.stored.dofs);
+  spread.release();
+  if (solved.compressed == nullptr) return {};
   return solved;
 }
 
@@ -377,6 +403,8 @@ std::optional<Solved> solve_matrices(const Description& description, const Elast
 std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor& factor,
                                        const std::optional<BakePart>& part, const Shared& run,
                                        ModelWriter& writer) {
+  if (SpreadNumbers* spread = factor.spread_numbers(); spread != nullptr)
+    return solve_compressed_alone(plan, factor, *spread, run, writer);
   GreensCompressor compressor(plan, factor, run.jobs, run.progress, run.interrupted);
   const PieceRange leaves = part ? part->pieces.front() : PieceRange{0, plan.frame.tree.leaves()};
   if (!compressor.solve_near(leaves, run.team, writer, run.tiles)) return {};
@@ -480,6 +508,11 @@ class Bake {
     progress_.plan(stages_of(plans_, options_.jobs, team_.size()));
     progress_.begin(factor_stage);
     factor_->factorize();
+    if (const SpreadNumbers* numbers = factor_->spread_numbers(); numbers != nullptr) {
+      spread_ = numbers->memory();
+      progress_.line(fmt::format("factor over {} ranks: {}; {} % of work space beyond the estimate",
+                                 team_.size(), text_of(*spread_, true), spread_->room));
+    }
     interrupt_.note_from_now_on();
     if (!describe()) {
       progress_.line("interrupted: nothing was written");
@@ -490,10 +523,13 @@ class Bake {
 
   [[nodiscard]] const Plan& plan() const { return plans_.plan; }
   [[nodiscard]] const TileCounts& tiles() const { return tiles_; }
+  [[nodiscard]] const std::optional<SpreadMemory>& spread() const { return spread_; }
 
  private:
   void assemble();
+  void spread_where_needed(int ranks);
   bool describe();
+  bool take_up();
   BakeResult solve_and_write();
   std::optional<Solved> solve(ModelWriter& writer);
 
@@ -516,6 +552,7 @@ class Bake {
   StoredNumbering stored_as_;
   Precision precision_ = Precision::single_precision;
   TileCounts tiles_;
+  std::optional<SpreadMemory> spread_;  // of a factor over several processes
 };
 
 /// Mesh, K and the plan.
@@ -539,11 +576,28 @@ void Bake::assemble() {
   check_touchable(surface, model_, description_);
   plans_ = announce_plans(description_, options_, model_, stiffness_, *factor_, *solver_, progress_);
   const int ranks = options_.ranks > 0 ? options_.ranks : team_.size();
+  spread_where_needed(ranks);
   if (ranks > 1)
     progress_.line(ranks_text(plans_, column_tiles(*solver_, plans_.plan), options_.jobs, ranks));
   if (!warning_.empty()) progress_.warn(warning_);
   check_memory(plans_.plan, team_.size_here());
   part_ = planned_part(options_, plans_, *solver_);
+}
+
+/// Hands the factor to all processes where that is asked for, or where one of them cannot hold it.
+void Bake::spread_where_needed(int ranks) {
+  const Spreading spreading = team_.spreading();
+  if (spreading == Spreading::never) return;
+  if (spreading == Spreading::where_needed && !team_.any(needs_more_memory(plans_.plan, team_.size_here())))
+    return;
+  spread_ = expected_spread_memory(*factor_, ranks);
+  if (ranks == team_.size() || !options_.dry_run) {
+    factor_->spread(team_.spread(stiffness_.K, *factor_, options_.jobs));
+    spread_ = factor_->spread_numbers()->memory();
+  }
+  spread_plan(*spread_, stiffness_.K.nonZeros(), ranks, options_.jobs, plans_.plan);
+  progress_.line(fmt::format("factor over {} rank{} by MUMPS: about {}", ranks, ranks == 1 ? "" : "s",
+                             text_of(*spread_, false)));
 }
 
 /// All of the model that is known before the columns. False when interrupted.
@@ -553,18 +607,36 @@ bool Bake::describe() {
   model_.stored_nodes = stored_as_.nodes;
   model_.rest_force = loads_;
   model_.rest_displacement = rest_displacement(*factor_, stiffness_, loads_, prescribed_, model_.dimension());
+  if (plans_.compression)
+    model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
   const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, options_.jobs,
                                                            model_, progress_, interrupt_);
   if (team_.any(!whole)) return false;
+  if (take_up()) return true;
   add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_,
                progress_);
-  if (plans_.compression) {
-    model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
-  } else {
+  if (!plans_.compression) {
     progress_.begin(precision_stage);
-    precision_ =
-        decide_precision(description_, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_, progress_);
+    precision_ = decide_precision(description_, *elastic_, stiffness_, *factor_, stored_as_.dofs, team_,
+                                  options_.jobs, model_, progress_);
   }
+  return true;
+}
+
+/// Whether an interrupted run has left what comes before the columns.
+bool Bake::take_up() {
+  if (options_.part || options_.join || options_.discard) return false;
+  std::optional<Precision> left;
+  if (team_.leads()) left = take_up_begun_model(options_.output, model_);
+  if (team_.share(left ? "left" : "").empty()) return false;
+  if (!team_.leads()) left = take_up_begun_model(options_.output, model_);
+  if (!left) {
+    throw Error("is not the file that another rank has found: the nodes do not share this folder",
+                options_.output.string() + ".partial",
+                "Write to a folder that all nodes share, or bake in parts: palpate-precompute --part K/N");
+  }
+  precision_ = *left;
+  progress_.line("what comes before the columns is kept from an earlier run");
   return true;
 }
 
@@ -618,6 +690,7 @@ BakeSummary bake(const Description& description, const BakeOptions& asked, Team&
   progress.end();
   summary.plan = bake.plan();
   summary.tiles = bake.tiles();
+  summary.spread = bake.spread();
   summary.stages = progress.stages();
   return summary;
 }

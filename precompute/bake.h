@@ -51,8 +51,9 @@ struct BakeSummary {
   BakeResult result = BakeResult::planned;
   int jobs = 1;
   Plan plan{};
-  TileCounts tiles{};           ///< of all processes
-  std::vector<Stage> stages{};  ///< with the seconds that they took
+  TileCounts tiles{};                    ///< of all processes
+  std::optional<SpreadMemory> spread{};  ///< of a factor over several processes
+  std::vector<Stage> stages{};           ///< with the seconds that they took
 };
 
 /// Runs it with other processes, which call this too: each computes what comes before the columns, all share

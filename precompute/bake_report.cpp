@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -23,10 +24,18 @@ Json json_of(const BakeSummary& bake) {
                {"free_dofs", plan.free_dofs},
                {"stored_dofs", plan.stored_dofs},
                {"factor_entries", plan.factor_entries},
+               {"block_columns", plan.block_columns},
                {"greens_bytes", plan.file_bytes},
                {"expected_memory_bytes", plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes},
                {"tiles_solved", bake.tiles.solved},
                {"tiles_kept", bake.tiles.kept}};
+  if (bake.spread) {
+    json["factor_over_ranks"] = {{"expected_bytes", bake.spread->expected},
+                                 {"expected_bytes_of_all", bake.spread->expected_all},
+                                 {"used_bytes", bake.spread->used},
+                                 {"used_bytes_of_all", bake.spread->used_all},
+                                 {"work_space_percent", bake.spread->room}};
+  }
   if (bake.part) json["part"] = {bake.part->number, bake.part->parts};
   json["stages"] = Json::array();
   for (const Stage& stage : bake.stages)
@@ -60,7 +69,8 @@ void write_report(const std::filesystem::path& file, const std::vector<std::stri
                {"ranks", run.ranks},
                {"jobs", run.jobs},
                {"seconds", run.seconds},
-               {"peak_memory_bytes", run.peak_memory},
+               {"peak_memory_bytes", *std::max_element(run.peak_memory.begin(), run.peak_memory.end())},
+               {"rank_memory_bytes", run.peak_memory},
                {"models", Json::array()}};
   for (const std::string& bake : bakes) json["models"].push_back(Json::parse(bake));
   const std::string text = json_text(json, 2);

@@ -12,9 +12,9 @@ namespace palpate {
 /// How a run as a whole was done.
 struct RunFigures {
   int ranks = 1;
-  int jobs = 1;                  ///< threads of a rank
-  double seconds = 0.0;          ///< of wall time
-  std::int64_t peak_memory = 0;  ///< of the rank that had most [byte]
+  int jobs = 1;                             ///< threads of a rank
+  double seconds = 0.0;                     ///< of wall time
+  std::vector<std::int64_t> peak_memory{};  ///< of each rank [byte]
 };
 
 /// "done", "part", "planned" or "interrupted".

@@ -46,19 +46,27 @@ bool solve_columns(const GreensSolver& solver, const Plan& plan, const PieceRang
     std::vector<double> packed;
   };
   std::vector<Scratch> scratch(static_cast<std::size_t>(jobs));
+  SpreadNumbers* const spread = solver.factor().spread_numbers();
+  const std::vector<std::int64_t> dofs =
+      spread == nullptr ? std::vector<std::int64_t>() : solver.stored_dofs();
   double done = 0.0;
-  return team.work(tiles, jobs,
-                   {[&](const Tile& tile, int worker) {
-                      auto& [workspace, packed] = scratch[static_cast<std::size_t>(worker)];
-                      solver.columns(tile.first, tile.count, workspace, packed);
-                      writer.write_columns(tile.first, tile.count, packed, matrix);
-                    },
-                    [&](const Tile& tile) {
-                      done += tile.cost;
-                      ++counts.solved;
-                      progress.reach(done / cost);
-                    },
-                    interrupted});
+  const TileWork work = {[&](const Tile& tile, int worker) {
+                           auto& [workspace, packed] = scratch[static_cast<std::size_t>(worker)];
+                           ColumnShare own{tile.first, tile.count};
+                           if (spread == nullptr) {
+                             solver.columns(tile.first, tile.count, workspace, packed);
+                           } else {
+                             own = spread->columns(dofs, tile.first, tile.count, packed);
+                           }
+                           if (own.count > 0) writer.write_columns(own.first, own.count, packed, matrix);
+                         },
+                         [&](const Tile& tile) {
+                           done += tile.cost;
+                           ++counts.solved;
+                           progress.reach(done / cost);
+                         },
+                         interrupted};
+  return spread == nullptr ? team.work(tiles, jobs, work) : team.work_together(tiles, work);
 }
 
 }  // namespace palpate

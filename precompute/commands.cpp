@@ -93,7 +93,7 @@ int run_bake(const std::string& model, const BakeOptions& options) {
   const BakeSummary summary = bake_model(model, options, alone);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!options.report.empty())
-    write_report(options.report, {json_text_of(summary)}, {1, summary.jobs, seconds, peak_memory()});
+    write_report(options.report, {json_text_of(summary)}, {1, summary.jobs, seconds, {peak_memory()}});
   std::fputs(next_steps(summary).c_str(), stderr);
   return summary.result == BakeResult::interrupted ? exit_interrupted : exit_ok;
 }

@@ -17,6 +17,7 @@ struct Plan {
   std::int64_t stored_dofs = 0;     ///< order n of the stored block of Xi
   std::int64_t factor_entries = 0;  ///< stored entries of L
   std::int64_t file_bytes = 0;      ///< of the packed matrix, the bulk of the file
+  std::int64_t factor_bytes = 0;    ///< of memory, of this process's part of it where it is spread
   std::int64_t memory_bytes = 0;    ///< largest demand: factor and workspaces of all jobs
   std::int64_t overlay_bytes = 0;   ///< of memory, for overlays until they are written
   std::int64_t dynamics_bytes = 0;  ///< of memory, for mass, damping, K_bar and modes

@@ -1,6 +1,7 @@
 #include "precompute/team.h"
 
 #include <mutex>
+#include <stdexcept>
 
 #include "base/parallel.h"
 
@@ -40,6 +41,21 @@ bool Team::work(const std::vector<Tile>& tiles, int jobs, const TileWork& work) 
     work.done(tile);
   });
   return !work.interrupted();
+}
+
+bool Team::work_together(const std::vector<Tile>& tiles, const TileWork& work) {
+  for (const Tile& tile : tiles) {
+    if (any(work.interrupted())) return false;
+    work.solve(tile, 0);
+    hand_over_lines();
+    if (leads()) work.done(tile);
+  }
+  return !any(work.interrupted());
+}
+
+std::unique_ptr<SpreadNumbers> Team::spread(const SparseMatrix& /*K*/, const Factor& /*analysed*/,
+                                            int /*jobs*/) {
+  throw std::logic_error("one process has nobody to spread a factor over");
 }
 
 }  // namespace palpate

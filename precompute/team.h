@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "formats/journal.h"
 #include "precompute/allotment.h"
+#include "precompute/numerics/factor.h"
 
 namespace palpate {
 
@@ -34,8 +36,12 @@ struct TileWork {
   std::function<bool()> interrupted;                   ///< no more tiles are begun
 };
 
-/// Who has a factor of their own: each rank of MPI, or those of a node together.
-enum class FactorOf : std::uint8_t { node, rank };
+/// Who has a factor of their own: the ranks of a node together, each rank of MPI, or all ranks together.
+/// Automatic is by node, and together the nodes where one cannot hold it.
+enum class FactorOf : std::uint8_t { automatic, node, rank, all };
+
+/// Whether the numbers of a factor are spread over the processes.
+enum class Spreading : std::uint8_t { never, where_needed, always };
 
 /// The processes of one bake. All make the same calls in the same order.
 class Team {
@@ -65,6 +71,17 @@ class Team {
   /// all are done. False, in all, when one was interrupted.
   virtual bool work(const std::vector<Tile>& tiles, int jobs, const TileWork& work);
 
+  /// Solves tiles one after the other, all processes each of them together, and returns in all. False, in
+  /// all, when one was interrupted. Only the main thread of each process works.
+  bool work_together(const std::vector<Tile>& tiles, const TileWork& work);
+
+  [[nodiscard]] virtual Spreading spreading() const { return Spreading::never; }
+
+  /// The numbers of a factor of K, which is analysed, over the processes. `jobs`: threads of each. Throws
+  /// Error.
+  [[nodiscard]] virtual std::unique_ptr<SpreadNumbers> spread(const SparseMatrix& K, const Factor& analysed,
+                                                              int jobs);
+
   /// Whether any process says so.
   virtual bool any(bool here) { return here; }
 
@@ -79,6 +96,9 @@ class Team {
   void listen(std::function<void(const std::string&)> listener) { listener_ = std::move(listener); }
 
  protected:
+  /// Gives the leader the lines of the tile that was solved together.
+  virtual void hand_over_lines() {}
+
   std::function<void(const std::string&)> listener_ = [](const std::string&) {};
 };
 

@@ -20,7 +20,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> models;
-  std::string factor_of = "node";
+  std::string factor_of = "auto";
   BakeOptions bake;
   HelpArguments help;
 };
@@ -32,9 +32,10 @@ void add_options(CLI::App& app, Arguments& arguments) {
   add_bake_options(app, arguments.bake);
   app.add_option("--factor", arguments.factor_of,
                  "who has a factor of K: the ranks of a node together, the first of which works with the "
-                 "processors of all, or each rank; default: node")
-      ->option_text("node|rank")
-      ->check(CLI::IsMember({"node", "rank"}));
+                 "processors of all (node); each rank; or all ranks together, by MUMPS (distributed). auto: "
+                 "node, and the nodes together where one cannot hold it; default: auto")
+      ->option_text("auto|node|rank|distributed")
+      ->check(CLI::IsMember({"auto", "node", "rank", "distributed"}));
   app.add_option("--ranks", arguments.bake.ranks, "with --dry-run: plan for so many ranks that have a factor")
       ->option_text("N")
       ->check(CLI::Range(1, 100'000));
@@ -47,6 +48,12 @@ void add_options(CLI::App& app, Arguments& arguments) {
       "or\n"
       "SIGUSR1 keeps finished columns; the same command, or palpate-precompute, resumes.\n"
       "Exit status: 0 done, 1 bad input or not enough room, 2 wrong arguments, 130 interrupted.");
+}
+
+FactorOf factor_of(const std::string& name) {
+  if (name == "node") return FactorOf::node;
+  if (name == "rank") return FactorOf::rank;
+  return name == "distributed" ? FactorOf::all : FactorOf::automatic;
 }
 
 /// Throws CLI::ParseError.
@@ -80,11 +87,11 @@ int run_bakes(const Arguments& arguments, Team& team) {
   entries.insert(entries.end(), others.entries.begin(), others.entries.end());
   const std::vector<std::string> memory = team.gather(std::to_string(peak_memory()));
   if (team.leads() && !arguments.bake.report.empty()) {
-    std::int64_t peak = 0;
-    for (const std::string& of_rank : memory) peak = std::max<std::int64_t>(peak, std::stoll(of_rank));
+    std::vector<std::int64_t> peaks;
+    for (const std::string& of_rank : memory) peaks.push_back(std::stoll(of_rank));
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const int jobs = arguments.bake.jobs == 0 ? team.default_jobs() : arguments.bake.jobs;
-    write_report(arguments.bake.report, entries, {team.size(), jobs, seconds, peak});
+    write_report(arguments.bake.report, entries, {team.size(), jobs, seconds, peaks});
   }
   return std::stoi(all);
 }
@@ -114,7 +121,7 @@ int run_rank_commands(int argc, char** argv, Team& team) {
     if (error.get_exit_code() == 0) return app.exit(error);
     return tell_usage(error.what(), "See palpate-precompute-mpi --help");
   }
-  team.form(arguments.factor_of == "node" ? FactorOf::node : FactorOf::rank);
+  team.form(factor_of(arguments.factor_of));
   return team.takes_part() ? run_bakes(arguments, team) : exit_ok;
 }
 

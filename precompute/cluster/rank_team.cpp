@@ -7,21 +7,23 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <condition_variable>
 #include <cstring>
 #include <deque>
 #include <exception>
 #include <mutex>
 #include <optional>
-#include <thread>
+#include <sstream>
 
 #include "base/error.h"
 #include "precompute/allotment.h"
+#include "precompute/cluster/mumps_numbers.h"
+#include "precompute/cluster/rank_messages.h"
+#include "precompute/cluster/rank_threads.h"
 
 namespace palpate {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = RankClock;
 
 constexpr std::chrono::microseconds between_looks{500};  // for messages, while threads of the rank solve
 constexpr std::chrono::seconds between_signs{5};         // of life, from every rank
@@ -54,39 +56,11 @@ struct Message {
   int from = 0;
 };
 
-/// Waits without a processor: MPI's own waiting would take one from the threads that solve.
-void wait(MPI_Request& request) {
-  auto pause = std::chrono::microseconds(20);
-  for (int done = 0;;) {
-    MPI_Test(&request, &done, MPI_STATUS_IGNORE);
-    if (done != 0) return;
-    std::this_thread::sleep_for(pause);
-    pause = std::min<std::chrono::microseconds>(2 * pause, std::chrono::milliseconds(5));
-  }
-}
-
 void barrier(MPI_Comm comm) {
+  if (size_of(comm) == 1) return;
   MPI_Request request = MPI_REQUEST_NULL;
   MPI_Ibarrier(comm, &request);
   wait(request);
-}
-
-void broadcast(void* data, int bytes, MPI_Comm comm) {
-  MPI_Request request = MPI_REQUEST_NULL;
-  MPI_Ibcast(data, bytes, MPI_BYTE, 0, comm, &request);
-  wait(request);
-}
-
-int rank_in(MPI_Comm comm) {
-  int rank = 0;
-  MPI_Comm_rank(comm, &rank);
-  return rank;
-}
-
-int size_of(MPI_Comm comm) {
-  int size = 0;
-  MPI_Comm_size(comm, &size);
-  return size;
 }
 
 }  // namespace
@@ -97,12 +71,12 @@ struct RankTeam::Impl {
     explicit Round(const TileWork& work) : tile_work(work) {}
 
     const TileWork& tile_work;
-    std::mutex mutex;  // of all that follows
-    std::condition_variable ready;
+    RankMutex mutex;  // of all that follows
+    RankCondition ready;
     std::deque<Tile> stock;  // that threads of this rank take from; the leader's is that of all
     std::deque<Message> outbox;
     int waiting = 0;  // threads
-    bool closed = false, halted = false;
+    bool closed = false, halted = false, told_stop = false;
     std::exception_ptr failure;
   };
 
@@ -112,7 +86,9 @@ struct RankTeam::Impl {
   void solve(Round& round, int worker);
   void halt(Round& round);
   bool lead(Round& round, const std::function<void(const std::string&)>& listener, int jobs);
+  void take(Round& round, const Tile& tile);
   bool follow(Round& round, int jobs);
+  void tell_stop(Round& round);
   void answer_asks(Round& round);
   void show_signs_of_life();
   void expect_signs_of_life();
@@ -122,6 +98,8 @@ struct RankTeam::Impl {
   MPI_Comm node = MPI_COMM_NULL;
   MPI_Comm team = MPI_COMM_NULL;  // of this rank where it takes part
   bool by_node = false;
+  FactorOf factor_of = FactorOf::rank;
+  std::string lines;  // of a tile that is solved together, for the leader
   int default_jobs = 1;
   std::int32_t epoch = 0;
   std::deque<Message> early;  // of calls of `work` and `gather` that are to come
@@ -308,15 +286,25 @@ bool RankTeam::Impl::lead(Round& all, const std::function<void(const std::string
     answer_asks(all);
     show_signs_of_life();
     expect_signs_of_life();
-    if (idle) std::this_thread::sleep_for(between_looks);
+    if (idle) pause_for(between_looks);
   }
   for (int to = 1; to < size_of(team); ++to) send(to, {Kind::end, epoch, interrupted ? 0 : 1});
   return !interrupted;
 }
 
+/// Puts a tile into the stock, or gives it back.
+void RankTeam::Impl::take(Round& all, const Tile& tile) {
+  const std::scoped_lock lock(all.mutex);
+  if (all.halted) {
+    all.outbox.push_back({{Kind::back, epoch, 0, 1}, "", 0});
+  } else {
+    all.stock.push_back(tile);
+    all.ready.notify_one();
+  }
+}
+
 bool RankTeam::Impl::follow(Round& all, int jobs) {
   std::int64_t asked = 0;  // tiles that were asked for and did not come
-  bool told_stop = false;
   while (true) {
     bool idle = true;
     while (const auto message = receive()) {
@@ -324,14 +312,9 @@ bool RankTeam::Impl::follow(Round& all, int jobs) {
       const Head& head = message->head;
       if (head.kind == Kind::end && head.epoch == epoch) return head.first != 0;
       if (head.kind == Kind::halt) halt(all);
-      if (head.kind != Kind::give) continue;
-      const std::scoped_lock lock(all.mutex);
-      asked = std::max<std::int64_t>(asked - 1, 0);
-      if (all.halted) {
-        all.outbox.push_back({{Kind::back, epoch, 0, 1}, "", 0});
-      } else {
-        all.stock.push_back({head.first, head.count, head.cost});
-        all.ready.notify_one();
+      if (head.kind == Kind::give) {
+        asked = std::max<std::int64_t>(asked - 1, 0);
+        take(all, {head.first, head.count, head.cost});
       }
     }
     std::deque<Message> own;
@@ -348,14 +331,18 @@ bool RankTeam::Impl::follow(Round& all, int jobs) {
       send(0, {Kind::ask, epoch, need, more});
       asked += need;
     }
-    if (!told_stop && all.tile_work.interrupted()) {
-      told_stop = true;
-      send(0, {Kind::stop, epoch});
-    }
+    tell_stop(all);
     show_signs_of_life();
     expect_signs_of_life();
-    if (idle) std::this_thread::sleep_for(between_looks);
+    if (idle) pause_for(between_looks);
   }
+}
+
+/// Says once that this rank was interrupted.
+void RankTeam::Impl::tell_stop(Round& all) {
+  if (all.told_stop || !all.tile_work.interrupted()) return;
+  all.told_stop = true;
+  send(0, {Kind::stop, epoch});
 }
 
 void RankTeam::Impl::form() {
@@ -387,7 +374,8 @@ RankTeam::RankTeam() : impl_(std::make_unique<Impl>()) {
 RankTeam::~RankTeam() = default;
 
 void RankTeam::form(FactorOf factor_of) {
-  impl_->by_node = factor_of == FactorOf::node;
+  impl_->by_node = factor_of == FactorOf::node || factor_of == FactorOf::automatic;
+  impl_->factor_of = factor_of;
   impl_->form();
 }
 
@@ -421,7 +409,7 @@ bool RankTeam::work(const std::vector<Tile>& tiles, int jobs, const TileWork& wo
   impl_->heard.assign(impl_->heard.size(), never);
   if (leads()) round.stock.assign(tiles.begin(), tiles.end());
   impl_->round = &round;
-  std::vector<std::jthread> threads;
+  std::vector<RankThread> threads;
   const auto close = [&] {
     const std::scoped_lock lock(round.mutex);
     round.closed = true;
@@ -441,7 +429,31 @@ bool RankTeam::work(const std::vector<Tile>& tiles, int jobs, const TileWork& wo
   }
 }
 
+Spreading RankTeam::spreading() const {
+  if (impl_->factor_of == FactorOf::all) return Spreading::always;
+  const bool may = impl_->factor_of == FactorOf::automatic && size() > 1 && has_mumps();
+  return may ? Spreading::where_needed : Spreading::never;
+}
+
+std::unique_ptr<SpreadNumbers> RankTeam::spread(const SparseMatrix& K, const Factor& analysed, int jobs) {
+  return make_mumps_numbers(impl_->team, K, analysed.permutation(), {.threads = jobs});
+}
+
+void RankTeam::hand_over_lines() {
+  const std::vector<std::string> all = gather(impl_->lines);
+  impl_->lines.clear();
+  for (const std::string& of_rank : all) {
+    std::istringstream lines(of_rank);
+    for (std::string line; std::getline(lines, line);) listener_(line);
+  }
+}
+
 void RankTeam::tell(const std::string& line) {
+  if (impl_->round == nullptr) {
+    impl_->lines += line;
+    if (line.empty() || line.back() != '\n') impl_->lines += '\n';
+    return;
+  }
   const std::scoped_lock lock(impl_->round->mutex);
   impl_->round->outbox.push_back({{Kind::told, impl_->epoch}, line, 0});
 }
@@ -456,9 +468,9 @@ bool RankTeam::any(bool here) {
 
 std::string RankTeam::share(std::string text) {
   std::int64_t bytes = std::ssize(text);
-  broadcast(&bytes, sizeof bytes, impl_->team);
+  broadcast(&bytes, 1, MPI_INT64_T, impl_->team);
   text.resize(static_cast<std::size_t>(bytes));
-  broadcast(text.data(), static_cast<int>(bytes), impl_->team);
+  broadcast(text.data(), static_cast<int>(bytes), MPI_BYTE, impl_->team);
   return text;
 }
 
@@ -473,7 +485,7 @@ std::vector<std::string> RankTeam::gather(const std::string& text) {
   for (std::size_t missing = texts.size() - 1; missing > 0;) {
     const auto message = impl_->receive();
     if (!message) {
-      std::this_thread::sleep_for(between_looks);
+      pause_for(between_looks);
     } else if (message->head.kind == Kind::told && message->head.epoch == impl_->epoch) {
       texts[static_cast<std::size_t>(message->from)] = message->text;
       --missing;

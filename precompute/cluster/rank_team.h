@@ -19,8 +19,8 @@ class RankTeam : public Team {
   RankTeam();
   ~RankTeam() override;
 
-  /// Forms the team: of all ranks, or, where those of a node share a factor, of the first of each node, which
-  /// takes over the processors of the others. Those only wait.
+  /// Forms the team: of all ranks, or, where those of a node have one factor, of the first of each node,
+  /// which takes over the processors of the others. Those only wait.
   void form(FactorOf factor_of) override;
 
   [[nodiscard]] bool takes_part() const override;
@@ -30,6 +30,10 @@ class RankTeam : public Team {
   [[nodiscard]] int size_here() const override;
   [[nodiscard]] int default_jobs() const override;
 
+  [[nodiscard]] Spreading spreading() const override;
+  [[nodiscard]] std::unique_ptr<SpreadNumbers> spread(const SparseMatrix& K, const Factor& analysed,
+                                                      int jobs) override;
+
   bool work(const std::vector<Tile>& tiles, int jobs, const TileWork& work) override;
   bool any(bool here) override;
   std::string share(std::string text) override;
@@ -38,6 +42,9 @@ class RankTeam : public Team {
 
   /// Waits for all ranks, those that did not take part too.
   void end();
+
+ protected:
+  void hand_over_lines() override;
 
  private:
   struct Impl;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "precompute/numerics/spread_numbers.h"
+
 namespace palpate {
 
 SelectedSolver::SelectedSolver(const Factor& factor)
@@ -22,6 +24,11 @@ void SelectedSolver::solve(std::span<const std::int64_t> rows, std::span<const s
   std::fill(block.begin(), block.end(), 0.0);
   if (columns.empty() || rows.empty()) return;
   const auto width = static_cast<std::int64_t>(columns.size());
+  if (SpreadNumbers* spread = sweeps_.factor().spread_numbers(); spread != nullptr) {
+    std::vector<double> ones(columns.size() * columns.size(), 0.0);
+    for (std::size_t c = 0; c < columns.size(); ++c) ones[c * columns.size() + c] = 1.0;
+    return spread->multiply(columns, width, ones, rows, block);
+  }
   SupernodalSweeps::Workspace& sweep = workspace.sweep;
   sweeps_.prepare(sweep, width);
   mark(columns, sweep.on_path);
@@ -56,6 +63,8 @@ void SelectedSolver::sweep(std::int64_t width, Workspace& workspace) const {
 
 void SelectedSolver::multiply(std::span<const std::int64_t> dofs, std::int64_t columns,
                               std::span<const double> f, Workspace& workspace, std::span<double> u) const {
+  if (SpreadNumbers* spread = sweeps_.factor().spread_numbers(); spread != nullptr)
+    return spread->multiply(dofs, columns, f, dofs, u);
   sweeps_.prepare(workspace.sweep, columns);
   mark(dofs, workspace.sweep.on_path);
   workspace.wanted = workspace.sweep.on_path;

@@ -88,6 +88,7 @@ Factor::~Factor() {
 }
 
 void Factor::factorize() {
+  if (spread_) return spread_->factorize();
   cholmod_sparse K_view = view(K_, CHOLMOD_REAL);
   cholmod_l_factorize(&K_view, factor_, &common_);
   if (common_.status == CHOLMOD_NOT_POSDEF) {
@@ -99,6 +100,7 @@ void Factor::factorize() {
 }
 
 std::vector<double> Factor::solve(std::span<const double> b, std::int64_t columns) const {
+  if (spread_) return spread_->solve(b, columns);
   cholmod_dense rhs{};
   rhs.nrow = static_cast<std::size_t>(order());
   rhs.ncol = static_cast<std::size_t>(columns);

@@ -9,11 +9,14 @@
 #include <vector>
 
 #include "precompute/numerics/assembly.h"
+#include "precompute/numerics/spread_numbers.h"
 
 namespace palpate {
 
 /// P K P^T = L L^T, supernodal, ordered by METIS on the graph of the nodes, so that the dofs of a node stay
 /// together. The constructor analyses (no numbers yet: enough to plan and to estimate), `factorize` computes.
+/// Where one process cannot hold the numbers, `spread` hands them to several, which then factorise and solve
+/// together.
 class Factor {
  public:
   /// K: lower triangle with complete blocks of nodes, as assemble_stiffness leaves it; node a has the dofs
@@ -23,10 +26,15 @@ class Factor {
   Factor(const Factor&) = delete;
   Factor& operator=(const Factor&) = delete;
 
+  /// Leaves the numbers, which are not computed yet, to several processes.
+  void spread(std::unique_ptr<SpreadNumbers> numbers) { spread_ = std::move(numbers); }
+  [[nodiscard]] SpreadNumbers* spread_numbers() const noexcept { return spread_.get(); }  ///< or null
+
   /// Numeric factorisation. Throws Error when K is not positive definite or memory is short.
   void factorize();
 
-  /// x = K^-1 b for `columns` right-hand sides, column-major [n, columns], by plain cholmod_solve.
+  /// x = K^-1 b for `columns` right-hand sides, column-major [n, columns], by plain cholmod_solve or
+  /// the processes that have the numbers.
   [[nodiscard]] std::vector<double> solve(std::span<const double> b, std::int64_t columns = 1) const;
 
   [[nodiscard]] std::int64_t order() const noexcept { return K_.rows(); }  ///< n
@@ -41,6 +49,7 @@ class Factor {
   const SparseMatrix& K_;
   mutable cholmod_common common_{};  // CHOLMOD takes its settings and workspace by pointer even to solve
   cholmod_factor* factor_ = nullptr;
+  std::unique_ptr<SpreadNumbers> spread_;
 };
 
 }  // namespace palpate

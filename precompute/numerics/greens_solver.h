@@ -31,6 +31,8 @@ class GreensSolver {
   GreensSolver(const Factor& factor, const std::vector<std::uint8_t>& stored,
                std::span<const std::int64_t> mesh_dofs, int d);
 
+  [[nodiscard]] const Factor& factor() const noexcept { return sweeps_.factor(); }
+
   /// Number of stored dofs, held ones of stored nodes among them.
   [[nodiscard]] std::int64_t order() const noexcept { return static_cast<std::int64_t>(place_.size()); }
 

@@ -36,7 +36,7 @@
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
 #include "runtime/body/greens.h"
-#include "tests/support/clustered_body.h"
+#include "tests/support/compression/clustered_body.h"
 #include "tests/support/precompute_case.h"
 
 namespace palpate {

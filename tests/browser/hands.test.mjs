@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { close, folder, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
+import { close, film_times, folder, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
 import { choose, open_cube, part, recorded, settled, top } from './steps.mjs';
 
 after(close);
@@ -230,11 +230,12 @@ test('a recording is filmed, its playhead is where the picture is, and watchers 
   await until(page, () => document.querySelector('[data-testid="replay-time"]').innerText.startsWith(`0:0${window.palpate.time.toFixed(2)}`));
   assert.match(shown, / \/ 0:01\.50$/);
   await watcher.context().close();
-  await part(page, 'replay-speed').selectOption('2');
+  await part(page, 'replay-speed').selectOption('0.25'); // 6 s: a busy machine draws few pictures a second
   const [download] = await Promise.all([page.waitForEvent('download'), part(page, 'save-video').click()]);
   const video = await readFile(await download.path());
-  assert.deepEqual([...video.subarray(0, 4)], [0x1a, 0x45, 0xdf, 0xa3], 'it is Matroska, as WebM is');
-  assert.ok(video.length > 5000, `${video.length} bytes`);
+  const times = film_times(video);
+  assert.ok(times.length >= 4, `pictures at ${times} ms`);
+  assert.ok(times.at(-1) > 1000, `pictures at ${times} ms`); // a busy machine loses the last ones
   assert.deepEqual(page.complaints, []);
 });
 
@@ -245,7 +246,7 @@ test('an exported page has the looks of the live one', async (t) => {
   const page = await ready(await visit(t, `file://${html}`, { ...small, colorScheme: 'light' }));
   assert.ok((await readFile(html)).length > 700_000);
   assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), 'light');
-  assert.ok(await part(page, 'depth-number').isHidden(), 'recordings have no depth');
+  await part(page, 'depth-number').waitFor({ state: 'hidden' }); // recordings have no depth, once they are read
   const { frames } = await told(page, 'state');
   await scrub_to(page, Math.floor(frames / 2));
   await until(page, () => window.palpate.lastFrame.force[2] < 0);

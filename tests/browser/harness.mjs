@@ -152,3 +152,26 @@ export async function project(page, point) {
 export function near(value, wanted, share, what) {
   assert.ok(Math.abs(value - wanted) <= share * Math.abs(wanted), `${what}: ${value}, wanted ${wanted} within ${share}`);
 }
+
+/** When each picture of a WebM file is shown [ms]: the blocks of its clusters (Matroska, RFC 9559). */
+export function film_times(file) {
+  const number = (at, length, first = file[at]) => file.subarray(at + 1, at + length).reduce((sum, byte) => 256 * sum + byte, first);
+  const length_at = (at) => Math.clz32(file[at]) - 23;
+  const parents = [0x18538067, 0x1f43b675, 0xa0]; // segment, cluster, group of blocks
+  const blocks = [0xa3, 0xa1];
+  const time = 0xe7;
+  const times = [];
+  let began = 0;
+  for (let at = 0; at < file.length; ) {
+    const id = number(at, length_at(at));
+    at += length_at(at);
+    const width = length_at(at);
+    const size = number(at, width, file[at] & (0xff >> width));
+    at += width;
+    if (parents.includes(id)) continue; // what is in it comes next
+    if (id === time) began = number(at - 1, size + 1, 0);
+    if (blocks.includes(id)) times.push(began + file.readInt16BE(at + 1));
+    at += size;
+  }
+  return times;
+}

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/hierarchical_sample.h"
+#include "tests/support/compression/hierarchical_sample.h"
 
 namespace palpate::error_bound_test {
 namespace {

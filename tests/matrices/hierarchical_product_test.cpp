@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/hierarchical_sample.h"
+#include "tests/support/compression/hierarchical_sample.h"
 
 namespace palpate::hierarchical_product_test {
 namespace {

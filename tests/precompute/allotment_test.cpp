@@ -5,9 +5,11 @@
 #include <sched.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <thread>
 
 #include "base/memory.h"
@@ -19,12 +21,14 @@ namespace {
 class Allotment : public testing::Test {
  protected:
   void SetUp() override {
-    const char* const slurm = std::getenv("SLURM_CPUS_PER_TASK");
-    if (slurm != nullptr) before_ = slurm;
-    ::unsetenv("SLURM_CPUS_PER_TASK");
+    for (const char* name : names) {
+      if (const char* const slurm = std::getenv(name)) before_[name] = slurm;
+      ::unsetenv(name);
+    }
   }
   void TearDown() override {
-    if (!before_.empty()) ::setenv("SLURM_CPUS_PER_TASK", before_.c_str(), 1);
+    for (const char* name : names) ::unsetenv(name);
+    for (const auto& [name, value] : before_) ::setenv(name.c_str(), value.c_str(), 1);
     std::filesystem::remove_all(root_);
   }
   void put(const std::string& file, const std::string& text) const {
@@ -37,7 +41,9 @@ class Allotment : public testing::Test {
 
   std::filesystem::path root_ =
       std::filesystem::temp_directory_path() / ("palpate_allotment_" + std::to_string(::getpid()));
-  std::string before_;
+  static constexpr std::array names = {"SLURM_CPUS_PER_TASK", "SLURM_MEM_PER_NODE", "SLURM_MEM_PER_CPU",
+                                       "SLURM_CPUS_ON_NODE"};
+  std::map<std::string, std::string> before_;
 };
 
 TEST_F(Allotment, WithoutLimitsIsTheAffinity) {
@@ -75,7 +81,16 @@ TEST_F(Allotment, QuotaOfTheFirstVersionOfGroups) {
 TEST_F(Allotment, SlurmsCpusOfATask) {
   ::setenv("SLURM_CPUS_PER_TASK", "1", 1);
   EXPECT_EQ(processors(), 1);
-  ::unsetenv("SLURM_CPUS_PER_TASK");
+}
+
+TEST_F(Allotment, SlurmsMemoryOfANodeOrOfItsCpus) {
+  ::setenv("SLURM_MEM_PER_NODE", "3", 1);
+  EXPECT_EQ(memory(), 3 << 20);
+  ::setenv("SLURM_MEM_PER_NODE", "0", 1);  // all that there is
+  EXPECT_GT(memory(), 3 << 20);
+  ::setenv("SLURM_MEM_PER_CPU", "2", 1);
+  ::setenv("SLURM_CPUS_ON_NODE", "4", 1);
+  EXPECT_EQ(memory(), 8 << 20);
 }
 
 TEST_F(Allotment, MemoryOfAGroupCountsItsCacheAsFree) {

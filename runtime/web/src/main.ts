@@ -476,12 +476,13 @@ class Page implements Listener {
       this.replay_.halt();
       return;
     }
-    this.replay_.play_once(() => {
-      this.saving_.stop();
-      this.picture_.view.is_whole = false;
-    });
     this.picture_.view.is_whole = true;
-    this.saving_.film(this.state_?.model?.name ?? 'Palpate');
+    this.saving_.film(this.state_?.model?.name ?? 'Palpate', () =>
+      this.replay_.play_once(() => {
+        this.saving_.stop();
+        this.picture_.view.is_whole = false;
+      }),
+    );
   }
 
   /** Sees again what the page that steers shows. */

@@ -8,6 +8,7 @@ import { css_colour } from './theme';
 const on_paper: Inks = { ground: '#ffffff', lit: '#ffffff', ink: '#17202b', dim: '#4c5a6b', axes: { x: '#c02531', y: '#1f7a33', z: '#1f5fc4' } };
 const video_rate = 30; // pictures a second
 const video_bits = 8_000_000; // a second
+const last_held = 500; // [ms]
 
 function inks_of(ground: Ground): Inks {
   if (ground === 'white') return on_paper;
@@ -48,9 +49,10 @@ export class Saving {
     }
   }
 
-  /** Films all that is drawn from now on, until `stop`. */
-  film(name: string): void {
-    const kind = ['video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm'].find((one) => globalThis.MediaRecorder?.isTypeSupported(one));
+  /** Films all that is drawn once it has `begun`, until `stop`. */
+  film(name: string, begun: () => void): void {
+    // VP8 first: a browser without a graphics card keeps more pictures of it.
+    const kind = ['video/webm;codecs=vp8', 'video/webm;codecs=vp9', 'video/webm'].find((one) => globalThis.MediaRecorder?.isTypeSupported(one));
     if (!kind) {
       toast('This browser cannot record videos', 'Firefox and Chromium can');
       return;
@@ -60,13 +62,17 @@ export class Saving {
     const parts: Blob[] = [];
     recorder.ondataavailable = ({ data }) => parts.push(data);
     recorder.onstop = () => save(new Blob(parts, { type: 'video/webm' }), `${name}.webm`);
+    recorder.onstart = begun;
     recorder.start(1000);
     this.recorder_ = recorder;
     button('save-video').setAttribute('aria-pressed', 'true');
   }
 
+  /** Holds the last picture for a moment, as what is drawn just before the end is not in the file. */
   stop(): void {
-    this.recorder_?.stop();
+    const recorder = this.recorder_;
+    this.drawn();
+    setTimeout(() => recorder?.stop(), last_held);
     this.recorder_ = null;
     button('save-video').setAttribute('aria-pressed', 'false');
   }

@@ -1,7 +1,6 @@
 // Compressed Green's functions, written out, against the dense inverse of K; and what is certified of them.
 #include "precompute/compression/compression.h"
 
-#include <cblas.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -13,14 +12,11 @@
 
 #include "base/error.h"
 #include "meshes/generate.h"
-#include "meshes/surface.h"
 #include "precompute/compression/certificate.h"
 #include "precompute/compression/recompression.h"
-#include "precompute/numerics/scope.h"
 #include "precompute/numerics/touches.h"
-#include "tests/support/clustered_body.h"
-#include "tests/support/hierarchical_sample.h"
-#include "tests/support/precompute_case.h"
+#include "tests/support/compression/hierarchical_sample.h"
+#include "tests/support/compression/inverted_body.h"
 
 namespace palpate::compression_test {
 namespace {
@@ -45,53 +41,20 @@ bool go_on(CompressionStage, double) {
   return true;
 }
 
-/// A factorised body with its stored nodes in clusters, and Xi of them by the dense inverse of K.
-class Body {
+/// A body, and what compresses its Green's functions and certifies them.
+class Body : public test::InvertedBody {
  public:
-  explicit Body(test::ElasticCase of, const ClusterOptions& options = {.leaf = 12},
-                Scope scope = Scope::surface)
-      : elastic_(std::move(of)),
-        stiffness_(assemble_stiffness(elastic_.body())),
-        factor_(stiffness_.K, stiffness_.node_start),
-        stored_(elastic_.mesh, stiffness_,
-                stored_dof_marks(elastic_.mesh, extract_surface(elastic_.mesh), stiffness_, scope, 0),
-                options) {
-    openblas_set_num_threads(1);  // as a bake does
-    factor_.factorize();
-    const Eigen::MatrixXd K = Eigen::MatrixXd(stiffness_.K).selfadjointView<Eigen::Lower>();
-    const Eigen::MatrixXd inverse = K.llt().solve(Eigen::MatrixXd::Identity(K.rows(), K.cols()));
-    const auto n = std::ssize(stored_.dofs);
-    Xi_ = Eigen::MatrixXd::Zero(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        const std::int64_t row = dof(i), column = dof(j);
-        if (row >= 0 && column >= 0) Xi_(i, j) = inverse(row, column);
-      }
-    }
-  }
+  using InvertedBody::InvertedBody;
 
-  [[nodiscard]] int dimension() const { return elastic_.mesh.dimension(); }
-  [[nodiscard]] const Factor& factor() const { return factor_; }
-  [[nodiscard]] const test::ClusteredBody& stored() const { return stored_; }
-  [[nodiscard]] const Eigen::MatrixXd& Xi() const { return Xi_; }
   [[nodiscard]] HierarchicalMatrix compressed(const CompressionOptions& options) const {
-    return compress(factor_, stored_.dofs, dimension(), stored_.clusters, options, go_on).value();
+    return compress(factor(), stored().dofs, dimension(), stored().clusters, options, go_on).value();
   }
   [[nodiscard]] std::vector<TouchErrors> certified(const HierarchicalMatrix& matrix,
                                                    std::span<const Index> touchable, std::int64_t touches,
                                                    int jobs = 1) const {
-    return certify(matrix, factor_, stored_.dofs, stored_.points, touchable, touches, 0, jobs,
+    return certify(matrix, factor(), stored().dofs, stored().points, touchable, touches, 0, jobs,
                    [](double) { return true; });
   }
-
- private:
-  [[nodiscard]] std::int64_t dof(Eigen::Index i) const { return stored_.dofs[static_cast<std::size_t>(i)]; }
-
-  test::ElasticCase elastic_;
-  Stiffness stiffness_;
-  Factor factor_;
-  test::ClusteredBody stored_;
-  Eigen::MatrixXd Xi_;
 };
 
 bool at_bottom(const Vec3& x) {

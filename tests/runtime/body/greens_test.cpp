@@ -6,7 +6,7 @@
 #include <random>
 
 #include "base/error.h"
-#include "tests/support/hierarchical_sample.h"
+#include "tests/support/compression/hierarchical_sample.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::greens_test {

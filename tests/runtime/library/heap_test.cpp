@@ -25,7 +25,7 @@
 #include "runtime/body/prescribed_nodes.h"
 #include "runtime/library/palpate.h"
 #include "runtime/tick/step.h"
-#include "tests/support/hierarchical_sample.h"
+#include "tests/support/compression/hierarchical_sample.h"
 #include "tests/support/runtime_model.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

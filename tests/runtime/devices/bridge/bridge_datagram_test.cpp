@@ -11,7 +11,7 @@
 #include "runtime/devices/bridge/bridge_key.h"
 #include "runtime/devices/bridge/bridge_order.h"
 #include "runtime/devices/bridge/bridge_wire.h"
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate::bridge_datagram_test {
 namespace {

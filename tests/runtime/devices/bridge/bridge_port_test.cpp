@@ -28,7 +28,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate::bridge_port_test {
 namespace {

@@ -14,7 +14,7 @@
 #include "runtime/safety/monotonic_clock.h"
 #include "runtime/safety/silence_watch.h"
 #include "runtime/safety/speed_limit.h"
-#include "tests/support/fake_hidapi.h"
+#include "tests/support/devices/fake_hidapi.h"
 
 namespace palpate::fake_hid_test {
 namespace {

@@ -14,7 +14,7 @@
 #include <iterator>
 #include <thread>
 
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate::guardian_test {
 namespace {

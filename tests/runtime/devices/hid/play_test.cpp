@@ -24,7 +24,7 @@
 #include "runtime/safety/device.h"
 #include "runtime/safety/fault.h"
 #include "runtime/safety/safety.h"
-#include "tests/support/devices_emulated_bus.h"
+#include "tests/support/devices/emulated_bus.h"
 
 namespace palpate::play_test {
 namespace {

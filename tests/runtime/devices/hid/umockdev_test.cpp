@@ -16,7 +16,7 @@
 
 #include "base/error.h"
 #include "runtime/devices/hid/hid_port.h"
-#include "tests/support/devices_emulated_bus.h"
+#include "tests/support/devices/emulated_bus.h"
 
 namespace palpate::umockdev_test {
 namespace {

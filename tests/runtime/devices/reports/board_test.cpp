@@ -7,7 +7,7 @@
 #include <random>
 
 #include "runtime/devices/reports/palpate_board.h"
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate::board_test {
 namespace {

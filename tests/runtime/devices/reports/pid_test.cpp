@@ -11,7 +11,7 @@
 #include "runtime/devices/reports/pid_layout.h"
 #include "runtime/devices/reports/pid_reports.h"
 #include "runtime/devices/reports/pid_sequence.h"
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate::pid_test {
 namespace {

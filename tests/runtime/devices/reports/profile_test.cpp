@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "runtime/devices/reports/device_profile.h"
 #include "runtime/devices/reports/palpate_board.h"
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate::profile_test {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "runtime/devices/reports/device_profile.h"
 #include "runtime/devices/reports/space_mouse.h"
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate::spacemouse_test {
 namespace {

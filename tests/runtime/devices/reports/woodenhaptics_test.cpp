@@ -9,7 +9,7 @@
 #include "runtime/devices/reports/device_profile.h"
 #include "runtime/devices/reports/woodenhaptics_arm.h"
 #include "runtime/devices/reports/woodenhaptics_report.h"
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate::woodenhaptics_test {
 namespace {

@@ -26,6 +26,7 @@ struct ClusteredBody {
       if (stored[k] != 0 && (nodes.empty() || nodes.back() != node)) nodes.push_back(node);
     }
     std::vector<Vec3> in_mesh_order;
+    in_mesh_order.reserve(nodes.size());
     for (const Index node : nodes) in_mesh_order.push_back(mesh.nodes[static_cast<std::size_t>(node)]);
     clusters = cluster_nodes(in_mesh_order, options);
     for (const Index k : clusters.order) {

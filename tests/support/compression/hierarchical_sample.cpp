@@ -1,4 +1,4 @@
-#include "tests/support/hierarchical_sample.h"
+#include "tests/support/compression/hierarchical_sample.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@ namespace {
 
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-std::size_t at(std::int64_t i) {
+std::size_t place(std::int64_t i) {
   return static_cast<std::size_t>(i);
 }
 
@@ -30,7 +30,7 @@ void choose_pairs(HierarchicalMatrix& matrix, Index a, Index b, std::mt19937_64&
 
 /// Numbers that neither grow nor fade in sums of `terms` products.
 std::shared_ptr<const float[]> random_entries(std::int64_t count, Index terms, std::mt19937_64& random) {
-  const std::shared_ptr<float[]> entries(new float[at(std::max<std::int64_t>(count, 1))]);
+  const std::shared_ptr<float[]> entries(new float[place(std::max<std::int64_t>(count, 1))]);
   const double size = 1.0 / std::sqrt(std::max(1.0, static_cast<double>(terms)));
   for (std::int64_t k = 0; k < count; ++k) entries[k] = static_cast<float>(size * random_number(random));
   return entries;
@@ -48,18 +48,18 @@ void mirror_diagonal(const HierarchicalMatrix& matrix, float* near) {
 }
 
 Eigen::MatrixXd V_of(const HierarchicalMatrix& matrix, Index cluster) {
-  const Index rank = matrix.rank[at(cluster)];
+  const Index rank = matrix.rank[place(cluster)];
   const Eigen::Index dofs = matrix.dimension * (matrix.tree.end(cluster) - matrix.tree.begin(cluster));
   if (cluster >= matrix.tree.first_leaf()) {
-    const float* V = matrix.basis.get() + matrix.basis_at[at(cluster - matrix.tree.first_leaf())];
+    const float* V = matrix.basis.get() + matrix.basis_at[place(cluster - matrix.tree.first_leaf())];
     return Eigen::Map<const FloatRows>(V, dofs, rank).cast<double>();
   }
   Eigen::MatrixXd V(dofs, rank);
   Eigen::Index row = 0;
   for (const Index child : {2 * cluster + 1, 2 * cluster + 2}) {
     const Eigen::MatrixXd below = V_of(matrix, child);
-    const Eigen::Map<const FloatRows> E(matrix.transfer.get() + matrix.transfer_at[at(child)],
-                                        matrix.rank[at(child)], rank);
+    const Eigen::Map<const FloatRows> E(matrix.transfer.get() + matrix.transfer_at[place(child)],
+                                        matrix.rank[place(child)], rank);
     V.middleRows(row, below.rows()) = below * E.cast<double>();
     row += below.rows();
   }
@@ -84,13 +84,13 @@ HierarchicalMatrix random_hierarchical(const HierarchicalKind& kind, unsigned se
   };
   std::sort(matrix.near_pair.begin(), matrix.near_pair.end(), by_column);
   std::sort(matrix.far_pair.begin(), matrix.far_pair.end(), by_column);
-  std::vector<bool> needed(at(matrix.tree.clusters()), false);
-  for (const auto& [row, column] : matrix.far_pair) needed[at(row)] = needed[at(column)] = true;
+  std::vector<bool> needed(place(matrix.tree.clusters()), false);
+  for (const auto& [row, column] : matrix.far_pair) needed[place(row)] = needed[place(column)] = true;
   for (Index c = 1; c < matrix.tree.clusters(); ++c)
-    if (needed[at(ClusterTree::parent(c))]) needed[at(c)] = true;
+    if (needed[place(ClusterTree::parent(c))]) needed[place(c)] = true;
   for (Index c = 0; c < matrix.tree.clusters(); ++c) {
     const auto rank = static_cast<Index>(random() % static_cast<std::uint64_t>(kind.largest_rank + 1));
-    matrix.rank.push_back(needed[at(c)] ? rank : 0);
+    matrix.rank.push_back(needed[place(c)] ? rank : 0);
   }
   matrix.index();
   matrix.basis = random_entries(matrix.basis_at.back(), kind.largest_rank, random);
@@ -114,8 +114,8 @@ Eigen::MatrixXd written_out(const HierarchicalMatrix& matrix) {
   };
   for (std::size_t p = 0; p < matrix.far_pair.size(); ++p) {
     const auto [row, column] = matrix.far_pair[p];
-    const Eigen::Map<const FloatRows> S(matrix.coupling.get() + matrix.coupling_at[p], matrix.rank[at(row)],
-                                        matrix.rank[at(column)]);
+    const Eigen::Map<const FloatRows> S(matrix.coupling.get() + matrix.coupling_at[p],
+                                        matrix.rank[place(row)], matrix.rank[place(column)]);
     put(row, column, V_of(matrix, row) * S.cast<double>() * V_of(matrix, column).transpose());
   }
   for (std::size_t p = 0; p < matrix.near_pair.size(); ++p) {

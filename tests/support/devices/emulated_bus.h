@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/devices_firmware.h"
+#include "tests/support/devices/firmware.h"
 
 namespace palpate {
 

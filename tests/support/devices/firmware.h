@@ -17,7 +17,7 @@
 #include "runtime/devices/reports/device_profile.h"
 #include "runtime/devices/reports/palpate_board.h"
 #include "runtime/devices/reports/pid_layout.h"
-#include "tests/support/devices_bytes.h"
+#include "tests/support/devices/bytes.h"
 
 namespace palpate {
 

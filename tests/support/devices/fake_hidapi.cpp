@@ -1,4 +1,4 @@
-#include "tests/support/fake_hidapi.h"
+#include "tests/support/devices/fake_hidapi.h"
 
 #include <hidapi.h>
 #include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp

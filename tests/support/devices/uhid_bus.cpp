@@ -14,7 +14,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "tests/support/devices_emulated_bus.h"
+#include "tests/support/devices/emulated_bus.h"
 
 namespace palpate {
 namespace {

@@ -15,7 +15,7 @@
 #include <memory>
 #include <string>
 
-#include "tests/support/devices_firmware.h"
+#include "tests/support/devices/firmware.h"
 
 namespace palpate {
 

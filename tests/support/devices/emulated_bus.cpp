@@ -1,4 +1,4 @@
-#include "tests/support/devices_emulated_bus.h"
+#include "tests/support/devices/emulated_bus.h"
 
 #include <fcntl.h>
 #include <fmt/core.h>

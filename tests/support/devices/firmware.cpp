@@ -1,4 +1,4 @@
-#include "tests/support/devices_firmware.h"
+#include "tests/support/devices/firmware.h"
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -1,0 +1,63 @@
+#include "precompute/spread_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/allotment.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t scalar = sizeof(double);
+// Of MUMPS with 30 % of work space, against the factor (measured on 1 to 8 ranks): fronts and contributions,
+// buffers for each doubling of the ranks, and what the rank with most has against the mean.
+constexpr double one_rank = 1.45, each_doubling = 0.3, uneven = 1.15;
+constexpr double solve_efficiency = 0.5;   // of sweeps together against those of a process alone
+constexpr double factor_efficiency = 0.6;  // of factorising together
+constexpr double paths = 1.5;              // loads are swept to the root and back through all of the factor
+constexpr std::int64_t touched_columns = 90;  // of a place that the precision is chosen by
+constexpr std::int64_t touched_copies = 3;    // loads, residuals and solutions, of these in long double
+
+}  // namespace
+
+SpreadMemory expected_spread_memory(const Factor& factor, int ranks) {
+  SpreadMemory memory;
+  const double all =
+      static_cast<double>(factor.entries() * scalar) * (one_rank + each_doubling * std::log2(ranks));
+  memory.expected_all = static_cast<std::int64_t>(all);
+  memory.expected = static_cast<std::int64_t>(ranks > 1 ? uneven * all / ranks : all);
+  return memory;
+}
+
+void spread_plan(const SpreadMemory& memory, std::int64_t entries, int ranks, int jobs, Plan& plan) {
+  const std::int64_t K_bytes = entries * (scalar + static_cast<std::int64_t>(sizeof(std::int64_t)));
+  const std::int64_t blocks = 2 * plan.block_columns * (plan.free_dofs + plan.stored_dofs) / ranks * scalar;
+  const std::int64_t touches = touched_columns * touched_copies * plan.free_dofs * scalar;
+  plan.factor_bytes = memory.expected;
+  plan.memory_bytes = memory.expected + K_bytes + std::max(blocks, touches);
+  const double all = plan.flops;
+  plan.flops = paths * 2.0 * static_cast<double>(plan.factor_entries) * static_cast<double>(plan.stored_dofs);
+  plan.seconds *= plan.flops / std::max(all, 1.0) / solve_efficiency;  // of one process
+  plan.factor_seconds /= factor_efficiency * ranks * jobs;
+  plan.precision_seconds /= solve_efficiency * ranks;
+}
+
+std::string text_of(const SpreadMemory& memory, bool used) {
+  const std::int64_t most = used ? memory.used : memory.expected,
+                     all = used ? memory.used_all : memory.expected_all;
+  return fmt::format("{:.2f} GB of memory in the rank with most, {:.2f} GB in all",
+                     static_cast<double>(most) * 1e-9, static_cast<double>(all) * 1e-9);
+}
+
+bool needs_more_memory(const Plan& plan, int ranks_here) {
+  const std::int64_t available = allotted_memory() / ranks_here;
+  return available > 0 && plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes > available;
+}
+
+void spread_likewise(const Factor& first, const SparseMatrix& K, Team& team, int jobs, Factor& factor) {
+  if (first.spread_numbers() != nullptr) factor.spread(team.spread(K, factor, jobs));
+}
+
+}  // namespace palpate
