@@ -48,7 +48,7 @@ Response guarded(Response response) {
   return response;
 }
 
-/// Of a request for the second of two runs, as the first one's would be.
+/// Path of a request; the second run's without what is before it, as the first one's would be.
 std::string_view path_in_run(const Request& request, const ServedAddress& served) {
   const std::string_view path = target_of(request).path;
   return run_of(request, served) == 0 ? path : path.substr(second_run.size() - 1);

@@ -4,6 +4,7 @@ import { createServer } from 'node:http';
 import path from 'node:path';
 import { after, test } from 'node:test';
 import { close, folder, open, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
+import { barriers, faults_of_layout, layouts } from './looks.mjs';
 import { choose, part, recorded, settled, top } from './steps.mjs';
 
 after(close);
@@ -93,6 +94,36 @@ test('a recording stands beside a body that is touched', async (t) => {
   const [download] = await Promise.all([page.waitForEvent('download'), part(live, 'save-stl').evaluate((button) => button.click())]);
   assert.match(download.suggestedFilename(), /\.stl$/);
   assert.deepEqual(page.complaints, []);
+});
+
+test('no text is cut off or covered, and every target is large enough, at five sizes', async (t) => {
+  const at = await folder(t);
+  const session = await recorded(t, at, 0.1);
+  const served = await serve(t, ['play', path.join(at, 'model.palpate.hdf'), '--view', '--view-address', '127.0.0.1:0', '--tool', 'sphere:0.1', '--beside', session], at);
+  for (const [width, height, hasTouch] of layouts) {
+    const page = await visit(t, served.url, { viewport: { width, height }, hasTouch, isMobile: hasTouch });
+    const both = await panes(page);
+    await until(both[0], () => window.palpate.state.you === 'controller');
+    await part(both[0], 'field').selectOption('von-mises');
+    await until(both[1], () => document.querySelector('[data-testid="field"]').value === 'von-mises');
+    await scrub_to(both[1], 30); // it is pressed, so that there is something to colour
+    await until(both[1], () => document.querySelectorAll('[data-testid="colour-ticks"] span').length > 0);
+    for (const [k, pane] of both.entries()) {
+      const check = async (what) => assert.deepEqual(await faults_of_layout(pane, hasTouch ? 44 : 24), [], `${width} × ${height}, ${k === 0 ? 'live' : 'recorded'}${what}`);
+      await check('');
+      await part(pane, 'view-menu').click();
+      await check(', with the card of the view');
+      await part(pane, 'view-menu').click();
+      const { height: seen } = await part(pane, 'view').boundingBox();
+      assert.ok(seen > 0.4 * Math.min(height, (height / width) * 640) / (height > width ? 2 : 1), `${width} × ${height}: the picture is ${seen} px high`);
+    }
+    if (width === 1280) {
+      assert.deepEqual(await barriers(page), []);
+      for (const pane of both) assert.deepEqual(await barriers(pane), []);
+    }
+    assert.deepEqual(page.complaints, []);
+    await page.context().close();
+  }
 });
 
 test('pages of other addresses cannot have it in them', async (t) => {

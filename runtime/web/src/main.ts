@@ -363,8 +363,6 @@ class Page implements Listener {
     (on ? part('help-text') : button('help')).focus();
   }
 
-  // --- how it is looked at ---
-
   // --- beside another page ---
 
   private share_look(): void {
@@ -403,6 +401,8 @@ class Page implements Listener {
       this.replay_.follow_time(shared.time);
     }
   }
+
+  // --- how it is looked at ---
 
   private choose_theme(theme: Theme): void {
     const known = themes.includes(theme) ? theme : 'auto';
