@@ -8,7 +8,7 @@ import type { Vec3 } from './words';
 export type Shared =
   | { about: 'look'; look: KeptLook; theme: string }
   | { about: 'eye'; place: Place | null; towards: Vec3 } // no place: all of the body, from there
-  | { about: 'range'; field: Field; typed: number | null; largest: number }
+  | { about: 'range'; field: Field; typed: number | null; largest: number } // each has its own
   | { about: 'time'; time: number }; // [s], of recordings
 
 const mark = 'palpate beside';
@@ -35,7 +35,7 @@ function has_neighbour(): boolean {
 /** The page of one of two runs, as it talks to the other one. Alone it says and hears nothing. */
 export class Neighbour {
   readonly is_there = has_neighbour();
-  private readonly known_ = new Map<string, string>(); // what both have
+  private readonly known_ = new Map<string, string>(); // what both have, and the range that was said
   private has_begun_ = false; // until then the other one's is what counts
 
   /** `begun`: the other one's was all heard. */
@@ -49,7 +49,7 @@ export class Neighbour {
         begun();
         return;
       }
-      this.known_.set(letter.shared.about, JSON.stringify(letter.shared));
+      if (letter.shared.about !== 'range') this.known_.set(letter.shared.about, JSON.stringify(letter.shared));
       hear(letter.shared);
     });
   }
@@ -80,7 +80,7 @@ export class Neighbour {
 /** The page that has both in it, and carries what one says to the other. Which is there first leads the other one. */
 export class Beside {
   private readonly panes_: HTMLIFrameElement[];
-  private readonly said_ = new Map<string, Shared>(); // last of each
+  private readonly said_ = new Map<string, Shared>(); // last of each, and of both for ranges
 
   constructor() {
     document.body.className = 'beside';
@@ -97,10 +97,11 @@ export class Beside {
       const from = this.panes_.findIndex((pane) => pane.contentWindow === event.source);
       if (!letter || from < 0) return;
       if (letter.shared) {
-        this.said_.set(letter.shared.about, letter.shared);
+        this.said_.set(letter.shared.about === 'range' ? `range of ${from}` : letter.shared.about, letter.shared);
         this.carry(1 - from, letter.shared);
       } else {
-        for (const shared of [...this.said_.values(), null]) this.carry(from, shared);
+        for (const [what, shared] of this.said_) if (what !== `range of ${from}`) this.carry(from, shared);
+        this.carry(from, null);
       }
     });
   }

@@ -661,6 +661,7 @@ TEST_F(Viewer, TwoRunsHavePagesOfTheirOwn) {
   EXPECT_EQ(test::ask(served(), {.target = "/2/", .query = ""}).result_int(), 403U);
 
   for (const std::size_t run : {0U, 1U}) {
+    server_->show_state("{}", run);
     server_->show_scene(scene_, run);
     server_->show_picture(picture(run == 0 ? 11 : 22), nullptr, run);
   }
