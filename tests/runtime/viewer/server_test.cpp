@@ -682,6 +682,7 @@ TEST_F(Viewer, TwoRunsHavePagesOfTheirOwn) {
   run_.wait_for("step");
   EXPECT_EQ(run_.words(), std::vector<std::string>{"step"});
   EXPECT_EQ(second.words(), std::vector<std::string>{"seek 9"});
+  server_.reset();  // before the second run
 }
 
 TEST_F(Viewer, WatchersOfARunDoNotLeaf) {
