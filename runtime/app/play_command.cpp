@@ -57,6 +57,9 @@ void add_viewer(CLI::App& play, PlayArguments& arguments) {
                   "address at which --view serves the page; default: 127.0.0.1:8017; port 0: any free one")
       ->type_name("[ADDRESS:]PORT")
       ->group(viewer_group);
+  play.add_option("--beside", arguments.beside, "with --view: a recording that is shown beside the body")
+      ->type_name("SESSION.h5")
+      ->group(viewer_group);
 }
 
 void add_body(CLI::App& play, PlayArguments& arguments) {
@@ -158,6 +161,9 @@ void read_view(PlayArguments& arguments, PlayOptions& options) {
   if (arguments.view) options.view = read_view_address(arguments.view_address.value_or("8017"));
   if (arguments.view_address && !arguments.view)
     throw CLI::ValidationError("--view-address", "it is for --view, which is not given");
+  if (!arguments.beside.empty() && !arguments.view)
+    throw CLI::ValidationError("--beside", "it is for --view, which is not given");
+  options.beside = arguments.beside;
   if (arguments.device.empty() && !arguments.view) {
     throw CLI::RequiredError(
         "--device (what moves the tool), or --view (to move it with the pointer in a browser),");
