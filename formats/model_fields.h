@@ -192,6 +192,7 @@ template <class Visitor>
 void for_each_body_field(ElementType element, Visitor&& visit) {
   using Bytes = std::vector<std::uint8_t>;
   using Int32s = std::vector<std::int32_t>;
+  using Int64s = std::vector<std::int64_t>;
   using Doubles = std::vector<double>;
   const ElementTraits& kind = traits(element);
   const Extent nodes = {Count::nodes}, elements = {Count::elements}, materials = {Count::materials},
