@@ -5,6 +5,7 @@
 
 #include "runtime/background/live_motion.h"
 #include "runtime/background/packed_motion.h"
+#include "runtime/tick/surface_motion.h"
 
 namespace palpate {
 namespace {
@@ -45,7 +46,8 @@ void MotionSource::receive(State& state, std::int64_t step) noexcept {
 void MotionSource::receive(State& state) noexcept {
   if (!state.surface.motion.active()) return;
   if (!in_background_ && state.surface.motion.job().step != done_) do_job(state.surface.motion.job());
-  state.surface.motion.receive(samples_.read());
+  const MotionSample& sample = samples_.read();
+  if (state.surface.motion.receive(sample)) change_compliance(body_, state.surface, sample.compliance);
 }
 
 void MotionSource::post(const State& state) noexcept {
@@ -81,6 +83,8 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
   sample.step = job.step;
   sample.let_go = job.let_go;
   stepper_->do_job(job, job.let_go != let_go_done_, sample.u);
+  sample.compliance = stepper_->compliance();
+  sample.is_near_limit = stepper_->is_near_limit();
   let_go_done_ = job.let_go;
   samples_.publish();
   ++steps_;
