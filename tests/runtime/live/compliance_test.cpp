@@ -235,5 +235,28 @@ TEST_P(LiveComplianceOf, ATickChangesWithoutAJump) {
   EXPECT_GT(force, 0.0);
 }
 
+// The steps of a session that came late, and one that was never made.
+TEST(LiveReplay, DoesTheStepsThatThereWere) {
+  const Body body = test::live_bar(2, {.solver = LiveLaw::corotational});
+  const auto play = [&](bool skips) {
+    State state(body, {.tools = {Tool{.radius = 0.006, .reach = 0.01}}});
+    MotionSource source(body, state, {.in_background = false});
+    double forces = 0.0;
+    for (int k = 0; k < 100; ++k) {
+      const std::int64_t made = std::max(0, k / 5 - 2), step = skips && made == 5 ? 4 : made;
+      source.receive(state, step);
+      EXPECT_EQ(state.surface.motion.sample_step(), step);
+      palpate::step(body, state, {.position = Vec3(0.06, 0.0265 - 0.0001 * k, 0.0)});
+      source.post(state);
+      forces += state.tools[0].wrench.force.norm();
+    }
+    EXPECT_EQ(source.steps(), skips ? 16 : 17);
+    EXPECT_GT(forces, 0.0);
+    return forces;
+  };
+  EXPECT_EQ(play(false), play(false));
+  EXPECT_NE(play(false), play(true));
+}
+
 }  // namespace
 }  // namespace palpate::live_compliance_test
