@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -403,7 +404,8 @@ TEST(LiveTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
   for (int k = 0; k < 3000; ++k) {
     ToolPose pose;
     pose.position = Vec3(0.07, 0.027 - 2e-5 * std::min(k, 3000 - k), 0.01);
-    while (state.surface.motion.job().step > source.steps()) std::this_thread::yield();
+    while (state.surface.motion.job().step > source.steps())
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
 #if PALPATE_OWN_MALLOC
     counting = true;
 #endif
