@@ -54,6 +54,7 @@ CHAPTERS = {
         "elements",
         "overlays",
         "dynamics",
+        "live",
         "probe",
         "viewer",
         "recordings",
@@ -78,7 +79,7 @@ CHAPTERS = {
         "contributing",
     ],
 }
-MEASUREMENTS = ["precompute", "size", "accuracy", "overlays", "contact", "hands", "dynamics", "devices", "viewer", "viewer-looks"]
+MEASUREMENTS = ["precompute", "size", "accuracy", "overlays", "contact", "hands", "dynamics", "live", "devices", "viewer", "viewer-looks"]
 
 
 def toctree(folder, pages, caption=""):

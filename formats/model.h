@@ -23,6 +23,7 @@ enum class Scope : std::uint8_t {
   surface,  ///< free nodes on the surface
   layers,   ///< those and the free interior nodes within `layers` elements of the surface
   full,     ///< all free nodes
+  none,     ///< nothing: the body is for solvers that need no Green's functions
 };
 
 /// One file that the model was made from, so that a stale model can be noticed.

@@ -102,6 +102,15 @@ void check_stored_nodes(const Model& model, const std::string& where) {
   }
 }
 
+/// Without Green's functions there is nothing that rests on them.
+void check_nothing_stored(const Model& model, const std::string& where) {
+  if (!model.stored_nodes.empty())
+    refuse(where, "/dofs/stored_nodes has " + std::to_string(model.stored_nodes.size()) +
+                      " entries, but the scope is none");
+  if (model.overlay.refinement != 0 || model.dynamics.method != DynamicsMethod::none)
+    refuse(where, "the scope is none, but there are overlays or dynamics");
+}
+
 void check_range(const char* path, int value, int low, int high, const std::string& where) {
   if (value < low || value > high)
     refuse(where, std::string(path) + " is " + std::to_string(value) + ", only " + std::to_string(low) +
@@ -144,6 +153,7 @@ Counts::Counts(std::string where) : where_(std::move(where)) {
 
 Counts Counts::of(const Model& model, std::string where) {
   Counts counts(std::move(where));
+  if (model.scope == Scope::none) counts.allow_none_stored();
   const auto set = [&counts](Count count, std::size_t value, const char* path) {
     counts.set(count, static_cast<std::int64_t>(value), path);
   };
@@ -167,9 +177,10 @@ Counts Counts::of(const Model& model, std::string where) {
 }
 
 void Counts::set(Count count, std::int64_t value, const char* told_by) {
-  if (value < smallest(count))
+  const std::int64_t least = count == Count::stored_nodes ? least_stored_ : smallest(count);
+  if (value < least)
     refuse(where_, std::string(told_by) + " has " + std::to_string(value) + " entries, at least " +
-                       std::to_string(smallest(count)) + " are needed");
+                       std::to_string(least) + " are needed");
   if (counts_index_numbers(count) && value > std::numeric_limits<Index>::max() / 8)
     refuse(where_,
            std::string(told_by) + " has " + std::to_string(value) + " entries, more than can be numbered");
@@ -219,6 +230,7 @@ void check_model(const Model& model, const std::string& where) {
   check_elements(model.mesh, where);
   check_surface(model, where);
   check_stored_nodes(model, where);
+  if (model.scope == Scope::none) check_nothing_stored(model, where);
   if (model.overlay.refinement != 0) check_overlay(model, where);
   if (model.dynamics.method != DynamicsMethod::none) check_dynamics(model, where);
 }

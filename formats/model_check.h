@@ -24,6 +24,9 @@ class Counts {
 
   void set(Count count, std::int64_t value, const char* told_by);
 
+  /// A model of scope none stores no node.
+  void allow_none_stored() noexcept { least_stored_ = 0; }
+
   /// The size that a dimension must have.
   [[nodiscard]] std::int64_t size(const Extent& extent) const;
 
@@ -38,6 +41,7 @@ class Counts {
 
  private:
   std::string where_;
+  std::int64_t least_stored_ = 1;
   std::array<std::int64_t, number_of_counts> values_;
   std::array<const char*, number_of_counts> told_by_ = {};
 };
@@ -67,8 +71,8 @@ void check_values(const Field<T>& field, const std::vector<T>& values, const Cou
 
 /// Proves what involves several fields: an analysis that fits the elements, valid materials and thickness, a
 /// plane body in z = 0, elements that are nowhere inverted, surface simplices with distinct corners, stored
-/// nodes that are free along some axis and named once, patches
-/// in their order round stored nodes of the surface. Sizes are right and values in their ranges already.
+/// nodes that are free along some axis and named once, none with scope none, patches in their order round
+/// stored nodes of the surface. Sizes are right and values in their ranges already.
 /// Throws Error (where = `where`) naming the field.
 void check_model(const Model& model, const std::string& where);
 

@@ -13,7 +13,7 @@ namespace palpate {
 namespace {
 
 constexpr std::array analyses = {"solid", "plane_stress", "plane_strain"};
-constexpr std::array scopes = {"surface", "layers", "full"};
+constexpr std::array scopes = {"surface", "layers", "full", "none"};
 // A reader that does not know the second refuses it, and does not take R for Xi.
 constexpr std::array precisions = {"float32", "float32+smooth", "float64"};
 
@@ -109,9 +109,9 @@ Analysis analysis_from(const std::string& text) {
 }
 
 Scope scope_from(const std::string& text) {
-  for (const Scope scope : {Scope::surface, Scope::layers, Scope::full})
+  for (const Scope scope : {Scope::surface, Scope::layers, Scope::full, Scope::none})
     if (text == text_of(scope)) return scope;
-  throw Unreadable{"is '" + text + "', not surface, layers or full"};
+  throw Unreadable{"is '" + text + "', not surface, layers, full or none"};
 }
 
 Precision precision_from(const std::string& text) {

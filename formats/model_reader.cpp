@@ -91,7 +91,9 @@ Model Reader::read() {
   for_each_probe_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
   check_model(model_, where_);
   check_precision(model_, header_.precision, where_);
-  if (file_.has(tree_path)) {
+  if (model_.scope == Scope::none) {
+    model_.greens = {};
+  } else if (file_.has(tree_path)) {
     read_compressed();
   } else {
     model_.greens = read_packed(greens_path, model_.greens.smooth());
@@ -111,14 +113,17 @@ BegunModel Reader::read_begun() {
 /// What is known before the Green's functions.
 void Reader::read_known() {
   for_each_attribute([this](const auto& attribute) { read_attribute(attribute); });
+  if (model_.scope == Scope::none) counts_.allow_none_stored();
   for_each_body_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
+  if (model_.scope == Scope::none && (file_.has(overlay_group) || file_.has(dynamics_group)))
+    refuse(where_, "the scope is none, but there are overlays or dynamics");
   if (file_.has(overlay_group)) {
     for_each_overlay_field([this](const auto& field) { read_field(field); });
     if (model_.overlay.refinement == 0) refuse(where_, "/overlay/refinement is 0");
   }
   if (file_.has(dynamics_group))
     for_each_dynamics_field(model_, [this](const auto& field) { read_field(field); });
-  if (header_.precision == Precision::split_precision)
+  if (header_.precision == Precision::split_precision && model_.scope != Scope::none)
     for_each_smooth_field(model_, [this](const auto& field) { read_field(field); });
   if (file_.has(greens_errors_path)) visit_greens_errors([this](const auto& field) { read_field(field); });
   if (model_.dynamics.method == DynamicsMethod::packed && file_.has(inverse_errors_path))

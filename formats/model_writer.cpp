@@ -221,6 +221,7 @@ ModelWriter::Impl::Streamed ModelWriter::Impl::packed_by_columns(const char* pat
 std::vector<ModelWriter::Impl::Streamed> ModelWriter::Impl::streamed(const Model& model,
                                                                      Precision precision) {
   std::vector<Streamed> matrices;
+  if (model.scope == Scope::none) return matrices;
   const std::int64_t order = model.stored_dofs();
   if (const HierarchicalMatrix* compressed = model.compressed.get(); compressed != nullptr) {
     Streamed near{near_path, "the near pairs", hdf5::element_type<float>(), {}, nullptr};

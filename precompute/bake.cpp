@@ -503,6 +503,7 @@ class Bake {
         interrupt_(interrupt) {}
 
   BakeResult run() {
+    if (description_.scope == Scope::none) return write_without_greens();
     assemble();
     if (options_.dry_run) return BakeResult::planned;
     progress_.plan(stages_of(plans_, options_.jobs, team_.size()));
@@ -526,6 +527,8 @@ class Bake {
   [[nodiscard]] const std::optional<SpreadMemory>& spread() const { return spread_; }
 
  private:
+  BakeResult write_without_greens();
+  MeshedBody mesh();
   void assemble();
   void spread_where_needed(int ranks);
   bool describe();
@@ -555,11 +558,40 @@ class Bake {
   std::optional<SpreadMemory> spread_;  // of a factor over several processes
 };
 
-/// Mesh, K and the plan.
-void Bake::assemble() {
+MeshedBody Bake::mesh() {
   MeshedBody body = mesh_body(description_, [&](const std::string& text) { progress_.begin(text); });
   for (const std::string& note : body.notes) progress_.line("note: " + note);
   warning_ = body.warning;
+  return body;
+}
+
+/// Mesh, materials and loads, for solvers that need no Green's functions. Nothing is solved: the rest state
+/// is where held nodes are.
+BakeResult Bake::write_without_greens() {
+  if (options_.part || options_.join) {
+    throw Error("scope \"none\" has no columns to share between parts", description_.file.string(),
+                "leave out --part and --join, or set another scope in [storage]");
+  }
+  MeshedBody body = mesh();
+  const std::vector<Vec3> loads = nodal_loads(description_, body);
+  const std::vector<Vec3> prescribed = body.prescribed;
+  model_ = describe_model(description_, options_, std::move(body));
+  model_.rest_force = loads;
+  if (!prescribed.empty()) model_.rest_displacement = prescribed;
+  progress_.line(fmt::format("{} nodes, {} elements ({}); no Green's functions", model_.mesh.nodes.size(),
+                             model_.mesh.elements(), traits(model_.mesh.element).name));
+  if (options_.dry_run) return BakeResult::planned;
+  if (!team_.leads()) return BakeResult::done;
+  progress_.begin(write_stage);
+  ModelWriter(options_.output, model_, precision_, Leftovers::discard).finish({}, nullptr);
+  progress_.line(fmt::format("{} written", options_.output.string()));
+  if (!warning_.empty()) progress_.warn(warning_);
+  return BakeResult::done;
+}
+
+/// Mesh, K and the plan.
+void Bake::assemble() {
+  MeshedBody body = mesh();
   progress_.begin("assembling K");
   loads_ = nodal_loads(description_, body);
   prescribed_ = body.prescribed;

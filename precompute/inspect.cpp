@@ -22,6 +22,8 @@ std::string scope_text(const Model& model) {
       return fmt::format("surface + {} layer{}", model.layers, model.layers == 1 ? "" : "s");
     case Scope::full:
       return "full";
+    case Scope::none:
+      return "none";
   }
   return "unknown";
 }
@@ -179,7 +181,9 @@ std::string inspect(const Model& model) {
   text += fmt::format("  analysis          {}\n", analysis_text(model));
   text += materials_text(model);
   text += rest_text(model);
-  if (model.compressed != nullptr) {
+  if (model.scope == Scope::none) {
+    text += "  Green's functions none: for solvers that need none\n";
+  } else if (model.compressed != nullptr) {
     text += compressed_text(model);
   } else {
     text += fmt::format(

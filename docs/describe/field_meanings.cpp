@@ -20,7 +20,9 @@ constexpr FieldMeaning model_attributes[] = {
     {"element", "kind of all elements: `tri3`, `quad4` (in the plane), `tet4`, `tet10` or `hex8` (in space)"},
     {"dimension", "*d*: 2 or 3, as the elements have it; a node has as many dofs"},
     {"analysis", "`solid` in space, `plane_stress` or `plane_strain` in the plane"},
-    {"scope", "`surface`, `layers` or `full`: which nodes are stored"},
+    {"scope",
+     "`surface`, `layers`, `full` or `none`: which nodes are stored. With `none` there are no Green's "
+     "functions and no probes; readers of versions before 3.5 refuse such a file"},
     {"layers", "element layers below the surface that are stored; 0 unless `scope` is `layers`"},
     {"content_hash", "one hash of everything, see [checksums](../file-format.md#checksums)"}};
 

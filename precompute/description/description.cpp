@@ -1,5 +1,7 @@
 #include "precompute/description/description.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "base/error.h"
@@ -41,11 +43,25 @@ double read_thickness(const TomlTable& root, Analysis analysis) {
 Scope read_scope(const TomlTable& storage, int dimension) {
   const std::string usual = dimension == 2 && !storage.has("layers") ? "full" : "layers";
   const std::string scope =
-      storage.has("scope") ? storage.choice("scope", {"surface", "layers", "full"}) : usual;
-  if (scope == "surface") {
-    return Scope::surface;
-  }
+      storage.has("scope") ? storage.choice("scope", {"surface", "layers", "full", "none"}) : usual;
+  if (scope == "surface") return Scope::surface;
+  if (scope == "none") return Scope::none;
   return scope == "layers" ? Scope::layers : Scope::full;
+}
+
+/// Without Green's functions there is nothing for these to be about.
+void check_without_greens(const TomlTable& root, const TomlTable& storage) {
+  for (const char* key : {"precision", "compression", "tolerance"}) {
+    if (storage.has(key))
+      storage.fail(key,
+                   fmt::format("[storage] {} is about Green's functions, and scope \"none\" keeps none", key),
+                   fmt::format("remove {}, or set another scope", key));
+  }
+  for (const char* key : {"overlay", "dynamics"}) {
+    if (root.has(key))
+      root.fail(key, fmt::format("[{}] needs Green's functions, and scope \"none\" keeps none", key),
+                fmt::format("remove [{}], or set another scope in [storage]", key));
+  }
 }
 
 constexpr double least_tolerance = 1e-4;  // of compression: below it packed storage is no larger
@@ -147,9 +163,10 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   const int dimension = result.analysis == Analysis::solid ? 3 : 2;
   result.materials = read_materials(root, dimension);
   keep_regions(result.geometry, result.materials);
-  result.fixed = read_fixed(root, dimension);
-  result.loads = read_loads(root, dimension);
   result.scope = read_scope(storage, dimension);
+  if (result.scope == Scope::none) check_without_greens(root, storage);
+  if (root.has("fixed") || result.scope != Scope::none) result.fixed = read_fixed(root, dimension);
+  result.loads = read_loads(root, dimension);
   result.layers = read_layers(storage, result.scope);
   result.precision = read_precision(storage);
   result.form = read_form(storage);

@@ -179,7 +179,8 @@ KeyTable storage() {
       "[storage]",
       {{"scope", "", "`\"layers\"`; in the plane `\"full\"`",
         "nodes whose Green's functions are kept: `\"surface\"`, `\"layers\"` (the surface and what is close "
-        "below) or `\"full\"`"},
+        "below) or `\"full\"`; `\"none\"`: no Green's functions, for `play --solver`, where `[[fixed]]` "
+        "may be missing"},
        {"layers", "", shown(Description{}.layers), "scope `\"layers\"`: how many elements deep"},
        {"precision", "", "`\"auto\"`", "`\"auto\"`, `\"single\"`, `\"split\"` or `\"double\"`"},
        {"compression", "", "`\"auto\"`",

@@ -180,7 +180,7 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   FixedNodes held = hold_nodes(body.mesh, description.fixed, toml);
   body.fixed = std::move(held.axes);
   body.prescribed = std::move(held.displacement);
-  check_held(body.mesh, body.fixed, toml);
+  if (description.scope != Scope::none) check_held(body.mesh, body.fixed, toml);
   body.warning = scale_warning(body.mesh, description.scale);
   return body;
 }

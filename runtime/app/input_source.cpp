@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "base/error.h"
-#include "runtime/app/open_device.h"
 #include "runtime/app/script_device.h"
+#include "runtime/devices/bridge/bridge_port.h"
+#include "runtime/devices/hid/hid_choice.h"
+#include "runtime/devices/hid/hid_port.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/replay_device.h"
 #include "runtime/safety/safety.h"
@@ -74,6 +76,19 @@ Settings settle_mouse(Settings settings, const Body& body) {
   if (std::isinf(settings.tool.coupling_stiffness))
     settings.tool.coupling_stiffness = stiffer_than_surface * surface_stiffness(body);
   return settings;
+}
+
+/// The port of `hid` or `bridge`; not open yet. Throws Error that says what there is and how to choose, when
+/// it is not clear which device is meant or it cannot be had.
+std::unique_ptr<DevicePort> make_port(const DeviceChoice& choice, const SafetyOptions& safety,
+                                      Guardian* guardian) {
+  if (choice.kind == DeviceChoice::Kind::bridge) {
+    return std::make_unique<BridgePort>(BridgeOptions{
+        .listen = parse_bridge_address(choice.text), .max_force = safety.max_force, .stale = safety.stale});
+  }
+  std::vector<NamedProfile> profiles = known_profiles();
+  if (!choice.profile.empty()) profiles = {find_profile(choice.profile)};
+  return std::make_unique<HidPort>(choose_hid_device(attached_devices(), profiles, choice.target), guardian);
 }
 
 }  // namespace

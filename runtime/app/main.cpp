@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -37,6 +38,7 @@ struct Arguments {
   PlayArguments play;
   DevicesOptions devices;
   ExportOptions exported;
+  std::vector<std::filesystem::path> recordings;
   std::string view_address = "127.0.0.1:8017";
   HelpArguments help;
 };
@@ -117,15 +119,19 @@ CLI::App* add_session(CLI::App& app, Arguments& arguments) {
 }
 
 CLI::App* add_view(CLI::App& app, Arguments& arguments) {
-  CLI::App* view = app.add_subcommand("view", "show a recording in a browser");
-  view->add_option("SESSION.h5", arguments.file, "recording")->required()->type_name("");
+  CLI::App* view = app.add_subcommand("view", "show a recording in a browser, or two side by side");
+  view->add_option("SESSION.h5", arguments.recordings, "recording; two are shown side by side")
+      ->required()
+      ->expected(1, 2)
+      ->type_name("");
   view->add_option("--view-address", arguments.view_address, "address at which the page is served")
       ->type_name("[ADDRESS:]PORT")
       ->capture_default_str();
   view->footer(
       "To touch a model itself: palpate-runtime play FILE --view\n"
       "Example:\n"
-      "  palpate-runtime view touch.h5");
+      "  palpate-runtime view touch.h5\n"
+      "  palpate-runtime view coarse.h5 fine.h5");
   return view;
 }
 
@@ -248,7 +254,7 @@ int run(int argc, char** argv) {
     }
     if (devices_command->parsed()) return devices(arguments.devices);
     if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.force);
-    if (view_command->parsed()) return view(arguments.file, read_view_address(arguments.view_address));
+    if (view_command->parsed()) return view(arguments.recordings, read_view_address(arguments.view_address));
     if (export_command->parsed()) return export_html(arguments.exported);
     if (play_command->parsed()) return play_and_name_next(read_play(arguments.play));
     return probe(

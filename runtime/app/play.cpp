@@ -12,6 +12,7 @@
 #include "runtime/app/fitting_tool.h"
 #include "runtime/app/input_source.h"
 #include "runtime/app/play_session.h"
+#include "runtime/app/session_view.h"
 #include "runtime/app/viewed_play.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/monitor.h"
@@ -49,6 +50,10 @@ OutputPaths check_outputs(PlayOptions& options) {
     paths.add_input(options.device.target, "the session that is replayed");
     paths.add_input(parts_folder(options.device.target), "the replayed session's parts");
   }
+  if (!options.beside.empty()) {
+    paths.add_input(options.beside, "the recording beside it");
+    paths.add_input(parts_folder(options.beside), "the parts of the recording beside it");
+  }
   if (!options.record.empty()) options.record = add_recording(paths, options.record, "--record");
   const auto add = [&paths](std::filesystem::path& file, OutputKind kind, const char* option) {
     if (!file.empty()) file = paths.add(file, kind, option);
@@ -74,6 +79,8 @@ int play(PlayOptions options) {
   stop_on_signals();
   block_acknowledging_signal();
   if (options.processor) leave_to_the_loop(*options.processor);
+  std::optional<SessionView> beside;  // first: a broken file is told even where the port is taken
+  if (!options.beside.empty()) beside.emplace(options.beside);
   std::optional<ViewerPort> port;
   if (options.view) port.emplace(*options.view);
   InputSource input = make_input_source(options, guardian ? &*guardian : nullptr);
@@ -84,7 +91,7 @@ int play(PlayOptions options) {
   if (input.link != nullptr)
     wait_for(*input.link, options.device.kind == DeviceChoice::Kind::bridge, stop_asked);
   if (port) {
-    ViewedPlay viewed(options, input, std::move(body), std::move(*port));
+    ViewedPlay viewed(options, input, std::move(body), std::move(*port), beside ? &*beside : nullptr);
     const LoopReport report = viewed.run(stop_asked);
     return exit_code(report, viewed.recording_failed());
   }

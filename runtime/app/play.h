@@ -43,6 +43,7 @@ struct PlayOptions {
   std::optional<int> processor;    ///< that the loop is to have for itself
   bool fast = false;
   std::optional<ViewerOptions> view;  ///< where it is shown in a browser
+  std::filesystem::path beside;       ///< recording that the browser shows beside it; empty: none
   std::filesystem::path record;       ///< empty: nothing is recorded
   double record_frames = 60.0;        ///< of the surface a second; 0: none
   std::filesystem::path report;       ///< JSON; "-": on the standard output; empty: none

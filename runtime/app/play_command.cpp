@@ -32,6 +32,7 @@ void add_settings(CLI::App& play, PlayArguments& arguments, SettingGroup group, 
 constexpr const char* input_group = "Input device";
 constexpr const char* viewer_group = "Viewer";
 constexpr const char* body_group = "The body";
+constexpr const char* live_group = "The live solver";
 constexpr const char* loop_group = "The loop";
 constexpr const char* output_group = "Output files";
 
@@ -55,6 +56,9 @@ void add_viewer(CLI::App& play, PlayArguments& arguments) {
   play.add_option("--view-address", arguments.view_address,
                   "address at which --view serves the page; default: 127.0.0.1:8017; port 0: any free one")
       ->type_name("[ADDRESS:]PORT")
+      ->group(viewer_group);
+  play.add_option("--beside", arguments.beside, "with --view: a recording that is shown beside the body")
+      ->type_name("SESSION.h5")
       ->group(viewer_group);
 }
 
@@ -157,6 +161,9 @@ void read_view(PlayArguments& arguments, PlayOptions& options) {
   if (arguments.view) options.view = read_view_address(arguments.view_address.value_or("8017"));
   if (arguments.view_address && !arguments.view)
     throw CLI::ValidationError("--view-address", "it is for --view, which is not given");
+  if (!arguments.beside.empty() && !arguments.view)
+    throw CLI::ValidationError("--beside", "it is for --view, which is not given");
+  options.beside = arguments.beside;
   if (arguments.device.empty() && !arguments.view) {
     throw CLI::RequiredError(
         "--device (what moves the tool), or --view (to move it with the pointer in a browser),");
@@ -171,6 +178,10 @@ void read_view(PlayArguments& arguments, PlayOptions& options) {
   for (const auto& [name, value] : arguments.settings) {
     if (is_mouse && find_setting(name)->group == SettingGroup::workspace)
       throw CLI::ValidationError("--" + name, "the pointer is in the body's frame already");
+    const bool is_replay = options.device.kind == DeviceChoice::Kind::replay;  // it may have a solver
+    if (find_setting(name)->group == SettingGroup::live && !arguments.settings.contains("solver") &&
+        !is_replay)
+      throw CLI::ValidationError("--" + name, "it is for --solver, which is not given");
   }
 }
 
@@ -202,6 +213,7 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
   add_viewer(*play, arguments);
   add_settings(*play, arguments, SettingGroup::tool, "The tool");
   add_body(*play, arguments);
+  add_settings(*play, arguments, SettingGroup::live, live_group);
   add_loop(*play, arguments);
   add_outputs(*play, arguments);
   add_settings(*play, arguments, SettingGroup::workspace, "Workspace of the device");
@@ -220,6 +232,8 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
       "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool sphere:0.005 --record "
       "touch.h5\n"
       "  palpate-runtime play liver.palpate.hdf --device replay:touch.h5\n"
+      "  palpate-runtime play block.palpate.hdf --view --solver corotational --free yes \\\n"
+      "      --gravity 0,0,-9.81 --floor -0.05 --yield 0.05\n"
       "  palpate-runtime play liver.palpate.hdf --device hid --profile polhem_v1 --tool sphere:0.008 "
       "\\\n      --safety max_force=2\n"
       "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool capsule:0.008,0.03 "

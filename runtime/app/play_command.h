@@ -21,6 +21,7 @@ struct PlayArguments {
   bool fast = false;
   bool view = false;
   std::optional<std::string> view_address;
+  std::string beside;
   std::string record;
   std::optional<std::string> record_frames;
   std::string report;

@@ -10,6 +10,8 @@
 
 #include "base/json_text.h"
 #include "runtime/app/best_effort_report.h"
+#include "runtime/background/live_motion.h"
+#include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
 
 namespace palpate {
@@ -189,9 +191,52 @@ std::string_view name_of(DynamicsMethod method) {
   return method == DynamicsMethod::packed ? "packed" : "modal";
 }
 
+const LiveMotion* live_motion(const PlayedRun& run) {
+  return run.motion != nullptr ? dynamic_cast<const LiveMotion*>(&run.motion->stepper()) : nullptr;
+}
+
+void print_live(const Body& body, const LiveTelling& live) {
+  const LiveCounts& counts = live.counts;
+  fmt::print(
+      stderr,
+      "solver: {}, {} steps by {}; {} were cut as they diverged, {} could not be made, {} had inverted "
+      "elements (at most {})\n",
+      name_of(body.live()->body.options().law), counts.steps, name_of(body.live()->stepper.scheme.integrator),
+      counts.halved, counts.stopped, counts.inverted, counts.most_inverted);
+  fmt::print(
+      stderr,
+      "the tool met the compliance of {:.3g} s ago; against the solver it was off by {:.2g} m and {:.2g} N "
+      "at most, of forces up to {:.3g} N\n",
+      live.compliance_age, live.largest_error, live.largest_force_error, live.largest_force);
+  if (counts.stopped > 0)
+    print_warning(
+        fmt::format("in {} steps the solver found no solution however short they were, and stopped the body "
+                    "where it was: give it a shorter --live-step, more damping or less load",
+                    counts.stopped));
+}
+
+Json json_live(const Body& body, const LiveTelling& live) {
+  const LiveCounts& counts = live.counts;
+  return {{"solver", name_of(body.live()->body.options().law)},
+          {"integrator", name_of(body.live()->stepper.scheme.integrator)},
+          {"step_s", body.live()->stepper.time_step},
+          {"steps", counts.steps},
+          {"steps_cut", counts.halved},
+          {"steps_stopped", counts.stopped},
+          {"steps_with_inverted_elements", counts.inverted},
+          {"most_inverted", counts.most_inverted},
+          {"plastic_work_J", counts.plastic_work},
+          {"compliance_age_s", live.compliance_age},
+          {"largest_error_m", live.largest_error},
+          {"last_error_m", live.last_error},
+          {"largest_force_error_N", live.largest_force_error},
+          {"last_force_error_N", live.last_force_error},
+          {"largest_force_N", live.largest_force}};
+}
+
 Json json_dynamics(const Body& body, const MotionSource* motion) {
-  Json json = {{"method", name_of(body.model().dynamics.method)},
-               {"contact", body.contact_model() == ContactModel::dynamic ? "dynamic" : "quasi-static"}};
+  Json json = {{"method", body.live() != nullptr ? "live" : name_of(body.model().dynamics.method)},
+               {"contact", body.contact_model() == ContactModel::quasi_static ? "quasi-static" : "dynamic"}};
   if (motion != nullptr) {
     json["steps"] = motion->steps();
     json["longest_step_s"] = motion->longest_step();
@@ -263,6 +308,7 @@ void print_report(const PlayedRun& run) {
     fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
                1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
   }
+  if (const LiveMotion* live = live_motion(run)) print_live(run.body, live->telling());
   if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
   if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
 }
@@ -302,6 +348,7 @@ std::string json_report(const PlayedRun& run) {
   if (run.options.device.kind == DeviceChoice::Kind::replay) json["replay"] = json_replay(report.replay);
   if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay.value());
   json["dynamics"] = json_dynamics(run.body, run.motion);
+  if (const LiveMotion* live = live_motion(run)) json["live"] = json_live(run.body, live->telling());
   if (!run.options.record.empty()) {
     json["recording"] = run.options.record.string();
     json["recording_failed"] = run.recording_failure ? Json(in_one_line(*run.recording_failure)) : Json();

@@ -45,7 +45,8 @@ TickNote note_of(const TickRecord& tick, std::int64_t rate) {
 
 }  // namespace
 
-SessionPictures::SessionPictures(const std::filesystem::path& path) : file_(path) {
+SessionPictures::SessionPictures(const std::filesystem::path& path)
+    : file_(path), name_(path.filename().string()) {
   check_session(recording(), path);
   if (frames() == 0 || recording().frames.surface.nodes.empty()) {
     throw Error("has no pictures of the surface", path.string(),
@@ -109,7 +110,8 @@ nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
   state.locked = "this is a recording";
   state.settings = split_settings(recording().info.options);
   json told = to_json(state);
-  told.update({{"frames", times.size()},
+  told.update({{"session", name_},
+               {"frames", times.size()},
                {"frame", 0},
                {"duration", times.empty() ? 0.0 : times.back()},
                {"times", times}});

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 #include "formats/recording.h"
@@ -47,6 +48,7 @@ class SessionPictures {
   [[nodiscard]] const Recording& recording() const noexcept { return file_.recording(); }
 
   RecordingFile file_;
+  std::string name_;  // of the file
 };
 
 }  // namespace palpate

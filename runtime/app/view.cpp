@@ -3,8 +3,7 @@
 #include <fmt/core.h>
 #include <signal.h>
 
-#include <algorithm>
-#include <mutex>
+#include <deque>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -15,66 +14,15 @@
 #include "formats/outputs/output_paths.h"
 #include "formats/recording_parts.h"
 #include "runtime/app/session_pictures.h"
+#include "runtime/app/session_view.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
-#include "runtime/viewer/viewed_run.h"
 #include "runtime/viewer/viewer_server.h"
 #include "runtime/viewer/wire.h"
 #include "runtime/web/page.h"
 
 namespace palpate {
 namespace {
-
-/// A recording that the viewer's page looks through.
-class SessionView : public ViewedRun {
- public:
-  SessionView(const SessionPictures& pictures, ViewerPort port)
-      : pictures_(pictures), state_(pictures.state(pictures.times())), server_(std::move(port), *this, true) {
-    const std::lock_guard lock(mutex_);  // a page may seek already
-    server_.show_scene(std::make_shared<const Scene>(pictures.scene()));
-    server_.show_state(json_text(state_));
-    state_.erase("times");  // which the server keeps
-    for (const TickRun& run : pictures.ticks()) server_.show_ticks(run.notes, run.stride);
-    server_.show_picture(pictures.picture(0));
-  }
-
-  [[nodiscard]] const std::string& url() const noexcept { return server_.url(); }
-
-  void seek(std::int64_t frame) override {
-    const std::lock_guard lock(mutex_);
-    const std::int64_t shown = nearest(frame);
-    server_.show_picture(pictures_.picture(shown));
-    state_["frame"] = shown;
-    server_.show_state(json_text(state_));
-  }
-  std::optional<RecordedFrame> recorded_frame(std::int64_t frame) override {
-    const std::lock_guard lock(mutex_);
-    return RecordedFrame{nearest(frame), pictures_.picture(nearest(frame))};
-  }
-  void point(const PointerPose&) override {}
-  void lose_pointer() override {}
-  void pause(bool) override { refuse(); }
-  void step_once() override { refuse(); }
-  void reset() override { refuse(); }
-  void acknowledge() override { refuse(); }
-  void change(const SettingsChange&) override { refuse(); }
-  void record(bool) override { refuse(); }
-
- private:
-  [[noreturn]] static void refuse() {
-    throw Error("cannot be done with a recording", "palpate-runtime view",
-                "touch the body itself: palpate-runtime play MODEL.palpate.hdf --view");
-  }
-
-  [[nodiscard]] std::int64_t nearest(std::int64_t frame) const {
-    return std::clamp<std::int64_t>(frame, 0, pictures_.frames() - 1);
-  }
-
-  const SessionPictures& pictures_;
-  std::mutex mutex_;
-  nlohmann::json state_;
-  ViewerServer server_;
-};
 
 /// One in so many of a page's pictures is whole; from it the page makes those after it that it jumps to.
 constexpr std::size_t pictures_per_whole = 30;
@@ -100,15 +48,23 @@ std::vector<std::int64_t> choose(const SessionPictures& pictures, const ExportOp
 
 }  // namespace
 
-int view(const std::filesystem::path& recording, const ViewerOptions& options) {
+int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptions& options) {
   sigset_t ends;  // blocked before the server's thread begins, which inherits that
   sigemptyset(&ends);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
-  const SessionPictures pictures(recording);  // first: a broken file is told even where the port is taken
-  const SessionView session(pictures, ViewerPort(options));
-  fmt::print(stderr, "{}: {} pictures, {:.3f} s\nopen {} in a browser; Ctrl-C ends\n", recording.string(),
-             pictures.frames(), pictures.time(pictures.frames() - 1), session.url());
+  std::deque<SessionView> sessions;  // first: a broken file is told even where the port is taken
+  std::vector<RunToShow> runs;
+  for (const std::filesystem::path& recording : recordings)
+    runs.push_back({sessions.emplace_back(recording), true});
+  ViewerServer server(ViewerPort(options), runs);
+  for (std::size_t k = 0; k < sessions.size(); ++k) {
+    sessions[k].show(server, k);
+    const SessionPictures& pictures = sessions[k].pictures();
+    fmt::print(stderr, "{}: {} pictures, {:.3f} s\n", recordings[k].string(), pictures.frames(),
+               pictures.time(pictures.frames() - 1));
+  }
+  fmt::print(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
   int signal = 0;
   sigwait(&ends, &signal);
   return exit_ok;

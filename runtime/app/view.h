@@ -4,13 +4,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
 
-/// Serves a recording until SIGINT or SIGTERM. Returns the exit code; throws Error.
-int view(const std::filesystem::path& recording, const ViewerOptions& options);
+/// Serves a recording, or two side by side, until SIGINT or SIGTERM. Returns the exit code; throws Error.
+int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptions& options);
 
 /// What of a recording goes into a page.
 struct ExportOptions {

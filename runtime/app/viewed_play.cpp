@@ -8,6 +8,7 @@
 #include <ctime>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "base/json_text.h"
@@ -48,7 +49,7 @@ bool is_of_the_run(const Setting& setting) {
 }  // namespace
 
 ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body,
-                       ViewerPort port)
+                       ViewerPort port, SessionView* beside)
     : options_(std::move(options)),
       input_(input),
       body_(std::move(body)),
@@ -57,6 +58,7 @@ ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<
       most_rings_(overlay_rings(*body_)),
       size_(body_->bounds().diagonal().norm()),
       port_(std::move(port)),
+      beside_(beside),
       requested_{.text = options_.settings_text, .settings = options_.settings, .record = options_.record} {
   if (options_.device.kind == DeviceChoice::Kind::mouse) add_mouse(input_, options_, *body_);
   state_.device = options_.device.text;
@@ -67,8 +69,11 @@ ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<
 }
 
 LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
-  ViewerServer server(std::move(port_), *this);
+  std::vector<RunToShow> runs = {{*this, false}};
+  if (beside_ != nullptr) runs.push_back({*beside_, true});
+  ViewerServer server(std::move(port_), runs);
   server_ = &server;
+  if (beside_ != nullptr) beside_->show(server, 1);
   show_body();
   const std::jthread teller([this](const std::stop_token& over) { tell_states(over); });
 

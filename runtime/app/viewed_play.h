@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "runtime/app/play_session.h"
 #include "runtime/app/run_state.h"
+#include "runtime/app/session_view.h"
 #include "runtime/viewer/viewed_run.h"
 #include "runtime/viewer/viewer_server.h"
 
@@ -24,8 +25,10 @@ namespace palpate {
 /// will do. A request that cannot be met is told to the page, and the session before begins again.
 class ViewedPlay : public ViewedRun {
  public:
-  /// `input` as make_input_source left it, `body` as the options ask for it; `port`: where it is shown.
-  ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body, ViewerPort port);
+  /// `input` as make_input_source left it, `body` as the options ask for it; `port`: where it is shown;
+  /// `beside`: a recording that is shown beside it and lives as long, null for none.
+  ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body, ViewerPort port,
+             SessionView* beside = nullptr);
 
   /// Serves the pages, says where once the first session could begin, and goes on until `stop` or the end of
   /// a duration that the options give. Tells of the last session, whose report it returns. Throws Error. To
@@ -83,6 +86,7 @@ class ViewedPlay : public ViewedRun {
   int most_rings_;  // that overlays of it may have
   double size_;     // of the body [m]
   ViewerPort port_;
+  SessionView* beside_;
   ViewerServer* server_ = nullptr;
   LoopControl control_;
   bool recording_failed_ = false;

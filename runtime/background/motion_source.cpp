@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <chrono>
 
+#include "runtime/background/live_motion.h"
+#include "runtime/background/packed_motion.h"
+
 namespace palpate {
 namespace {
 
@@ -14,18 +17,19 @@ int processors_beside_the_tick() {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()) - 1);
 }
 
+std::unique_ptr<MotionStepper> make_stepper(const Body& body, int jobs) {
+  if (body.live() != nullptr) return std::make_unique<LiveMotion>(body);
+  return std::make_unique<PackedMotion>(body, jobs);
+}
+
 }  // namespace
 
 MotionSource::MotionSource(const Body& body, const State& state, const MotionSourceOptions& options)
     : body_(body),
-      newmark_(body.model().dynamics, options.jobs > 0 ? options.jobs : processors_beside_the_tick()),
+      stepper_(make_stepper(body, options.jobs > 0 ? options.jobs : processors_beside_the_tick())),
       in_background_(options.in_background),
       jobs_(state.surface.motion.job()),
-      samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.greens().order()))}),
-      f_(body.greens().order()),
-      u_(f_.size()),
-      v_(f_.size()) {
-  newmark_.predict();  // reads the matrix once
+      samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.greens().order()))}) {
   if (in_background_) worker_ = std::thread([this] { work(); });
 }
 
@@ -66,48 +70,22 @@ void MotionSource::work() noexcept {
   }
 }
 
-/// Ends the step that was predicted last and predicts the next one.
 void MotionSource::do_job(const MotionJob& job) noexcept {
   const auto begin = std::chrono::steady_clock::now();
   if (job.step < done_) {  // the state was set back
-    newmark_.rest();
+    stepper_->rest();
     let_go_done_ = 0;
   }
   done_ = job.step;
-  if (job.load.empty()) {
-    newmark_.advance();
-  } else {
-    body_.greens().displacement(job.load.nodes(), job.load.forces(), u_);
-    touched_.clear();
-    for (const Index node : job.load.nodes()) {
-      for (std::int64_t axis = 0; axis < body_.dimension(); ++axis)
-        touched_.push_back(std::int64_t{body_.dimension()} * node + axis);
-    }
-    newmark_.advance(u_, touched_);
-  }
-  if (job.left < 1.0) newmark_.damp(job.left);
-  if (job.let_go != let_go_done_) let_go(job.release);
-  let_go_done_ = job.let_go;
-  newmark_.predict();
   MotionSample& sample = samples_.next();
   sample.step = job.step;
   sample.let_go = job.let_go;
-  std::copy(newmark_.predicted().begin(), newmark_.predicted().end(), sample.u.begin());
+  stepper_->do_job(job, job.let_go != let_go_done_, sample.u);
+  let_go_done_ = job.let_go;
   samples_.publish();
   ++steps_;
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
   longest_ = std::max(longest_.load(), taken.count());
-}
-
-void MotionSource::let_go(const LetGo& release) noexcept {
-  std::fill(f_.begin(), f_.end(), 0.0);
-  const auto d = static_cast<std::size_t>(body_.dimension());
-  const std::span<const double> forces = release.force.forces();
-  for (std::size_t k = 0; k < forces.size(); ++k)
-    f_[d * static_cast<std::size_t>(release.force.nodes()[k / d]) + k % d] += forces[k];
-  body_.greens().displacement(release.force.nodes(), release.force.forces(), u_);
-  body_.greens().displacement(release.rate.nodes(), release.rate.forces(), v_);
-  newmark_.let_go(f_, u_, v_);
 }
 
 }  // namespace palpate

@@ -1,13 +1,14 @@
-// Steps the packed dynamics beside the tick.
+// Steps packed dynamics or a live body beside the tick.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <thread>
 #include <vector>
 
 #include "base/latest.h"
-#include "runtime/body/packed_newmark.h"
+#include "runtime/background/motion_stepper.h"
 #include "runtime/tick/state.h"
 
 namespace palpate {
@@ -17,13 +18,13 @@ struct MotionSourceOptions {
   int jobs = 0;               ///< threads that multiply; 0: one for each processor but one
 };
 
-/// Does the jobs of a state's FreeMotion for a body of packed dynamics: after each tick `post`, before the
-/// next one `receive`. In the background neither waits: a step that is not there in time comes later, and the
-/// body's time stands still meanwhile.
+/// Does the jobs of a state's FreeMotion for a live body or one of packed dynamics: after each tick `post`,
+/// before the next one `receive`. In the background neither waits: a step that is not there in time comes
+/// later, and the body's time stands still meanwhile.
 class MotionSource {
  public:
   /// `body` must live as long; `state` is one that the loop will use, or a copy. Throws Error unless the
-  /// body's dynamics are packed.
+  /// body is live or its dynamics are packed.
   MotionSource(const Body& body, const State& state, const MotionSourceOptions& options);
   ~MotionSource();
   MotionSource(const MotionSource&) = delete;
@@ -36,21 +37,19 @@ class MotionSource {
 
   [[nodiscard]] std::int64_t steps() const noexcept { return steps_; }     ///< done so far
   [[nodiscard]] double longest_step() const noexcept { return longest_; }  ///< [s]
+  [[nodiscard]] const MotionStepper& stepper() const noexcept { return *stepper_; }
 
  private:
   void work() noexcept;
   void do_job(const MotionJob& job) noexcept;
-  void let_go(const LetGo& release) noexcept;
 
   const Body& body_;
-  PackedNewmark newmark_;
+  std::unique_ptr<MotionStepper> stepper_;
   bool in_background_;
   Latest<MotionJob> jobs_;
   Latest<MotionSample> samples_;
-  std::int64_t done_ = 0;          // the last job
-  std::int64_t let_go_done_ = 0;   // of the body
-  std::vector<double> f_, u_, v_;  // [n] scratch
-  std::vector<std::int64_t> touched_;
+  std::int64_t done_ = 0;         // the last job
+  std::int64_t let_go_done_ = 0;  // of the body
   std::atomic<std::int64_t> steps_ = 0;
   std::atomic<double> longest_ = 0.0;
   std::atomic<bool> stop_ = false;

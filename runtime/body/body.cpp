@@ -11,6 +11,7 @@
 #include "matrices/hierarchical.h"
 #include "runtime/body/modal_newmark.h"
 #include "runtime/body/surface_numbering.h"
+#include "runtime/live/live_model.h"
 #include "runtime/solve/tick_tuning.h"
 
 namespace palpate {
@@ -66,6 +67,11 @@ FineSurface surface_as_it_is(const Model& model) {
 
 /// Those that contact is to meet; of dynamic contact with modes still without them.
 Greens take_greens(Model& model, const GreensOptions& options, ContactModel contact) {
+  if (model.scope == Scope::none) {
+    throw Error("the file has no Green's functions: its scope is none", model.name,
+                "play it with --solver, e.g. --solver corotational, or set another scope in [storage] and "
+                "precompute it again");
+  }
   check_sizes(model);
   PackedGreens greens = std::exchange(model.greens, {});
   const std::shared_ptr<const HierarchicalMatrix> compressed = std::exchange(model.compressed, nullptr);
@@ -126,6 +132,11 @@ Body::Body(Model model, const GreensOptions& options, int refinement, ContactMod
     surface_friction_.push_back(model_.materials[material].friction);
   }
   measure_surface();
+}
+
+Body::Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options)
+    : Body(std::move(model), options, 1, ContactModel::live) {
+  live_ = std::move(live);
 }
 
 /// Surface nodes that follow the same node of the body lie together in memory: the tick moves them together.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -14,10 +15,13 @@
 
 namespace palpate {
 
+struct LiveParts;
+
 /// What a contact force meets.
 enum class ContactModel : std::uint8_t {
   quasi_static,  ///< the body's stiffness: Xi
   dynamic,       ///< its inertia and viscosity too: K_bar^-1 of one time step (theory.md section 5)
+  live,          ///< a live body's: the compliance of one of its steps, of several ticks
 };
 
 /// The free surface node that is nearest to a point.
@@ -44,12 +48,16 @@ class Body {
   /// sizes of the model's parts do not fit together, or for dynamic contact with a model without dynamics.
   explicit Body(Model model, const GreensOptions& options = {}, int refinement = 1,
                 ContactModel contact = ContactModel::quasi_static);
+  /// A body that is solved while it is touched, by `live_model` of the same parts.
+  Body(Model model, std::shared_ptr<const LiveParts> live, const GreensOptions& options = {});
 
   /// Everything baked, except `greens`, which greens() has taken over.
   [[nodiscard]] const Model& model() const noexcept { return model_; }
   /// Green's functions of the static body; with dynamic contact K_bar^-1.
   [[nodiscard]] const Greens& greens() const noexcept { return greens_; }
   [[nodiscard]] ContactModel contact_model() const noexcept { return contact_model_; }
+  /// The solver beside the tick, null for a body that its Green's functions tell all of.
+  [[nodiscard]] const LiveParts* live() const noexcept { return live_.get(); }
   /// Null unless the dynamics are modal.
   [[nodiscard]] const Modes* modes() const noexcept { return modes_.get(); }
 
@@ -144,6 +152,7 @@ class Body {
   ContactModel contact_model_;
   Greens greens_;
   std::shared_ptr<const Modes> modes_;
+  std::shared_ptr<const LiveParts> live_;
   int refinement_;
   FineSurface fine_;
   std::vector<Index> stored_of_mesh_;  // [N]

@@ -20,7 +20,12 @@ std::int64_t count_ticks(const Body& body, double tick) {
   const double step = model.dynamics.newmark.time_step;
   const double ticks = std::round(step / tick);
   const bool dynamic = body.contact_model() == ContactModel::dynamic;
-  if (ticks < 1.0 || std::abs(ticks * tick - step) > 1e-9 * step || (dynamic && ticks > 1.0)) {
+  const bool fits = ticks >= 1.0 && std::abs(ticks * tick - step) <= 1e-9 * step;
+  if (body.live() != nullptr && !fits) {
+    throw Error(fmt::format("the solver's step of {} s is not a whole number of ticks of {} s", step, tick),
+                "--live-step", fmt::format("give {}", std::max(1.0, ticks) * tick));
+  }
+  if (!fits || (dynamic && ticks > 1.0)) {
     throw Error(fmt::format("the file's time step of {} s is not {} of {} s", step,
                             dynamic ? "that of dynamic contact, one tick" : "a whole number of ticks", tick),
                 model.name,
@@ -73,7 +78,8 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
       tick_(tick),
       ticks_per_step_(count_ticks(body, tick)),
       decay_(std::exp(-tick * static_cast<double>(ticks_per_step_) / tuning.body.settling)),
-      dynamic_contact_(body.contact_model() == ContactModel::dynamic),
+      dynamic_contact_(body.contact_model() != ContactModel::quasi_static),
+      active_(body.contact_model() == ContactModel::live),
       phase_(ticks_per_step_),
       pending_(make_let_go(dimension_, room(body, most_loads))),
       job_{.release = make_let_go(dimension_, room(body, most_loads)),

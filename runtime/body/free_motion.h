@@ -105,7 +105,7 @@ class FreeMotion {
   std::int64_t ticks_per_step_ = 1;
   double decay_;  // what quasi-static contact leaves of the motion in a step
   bool dynamic_contact_;
-  bool active_ = false;
+  bool active_;
   std::int64_t ticks_ = 0;
   std::int64_t phase_ = 1;        // of the present step's ticks, the last one ends it
   std::vector<NodalLoad> loads_;  // [history] of the last ticks, in turn

@@ -12,6 +12,7 @@
 #include "base/regular_file.h"
 #include "formats/model_file.h"
 #include "runtime/body/scaled_model.h"
+#include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
 
 namespace palpate {
@@ -49,6 +50,19 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
     print_warning(file.string() + ": " + warning);
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
+  if (options.live.solver) {
+    if (options.refinement > 1) {
+      throw Error("overlays refine Green's functions, and a live solver has none", "--overlay",
+                  "leave out --overlay or --solver");
+    }
+    if (options.contact == ContactModel::dynamic) {
+      throw Error("a live solver meets the tool with the body's inertia by itself", "--contact",
+                  "leave out --contact or --solver");
+    }
+    auto live = std::make_shared<const LiveParts>(make_live_parts(model, options.live));
+    model = live_model(std::move(model), *live, options.live);
+    return {std::move(model), std::move(live)};
+  }
   return Body(std::move(model), {}, options.refinement, options.contact);
 }
 

@@ -6,6 +6,7 @@
 
 #include "formats/outputs/output_paths.h"
 #include "runtime/body/body.h"
+#include "runtime/live/live_settings.h"
 
 namespace palpate {
 
@@ -15,6 +16,7 @@ struct BodyOptions {
   ContactModel contact = ContactModel::quasi_static;
   double load_scale = 1.0;  ///< see scale_loads
   double stiffness_scale = 1.0;
+  LiveSettings live{};
 
   bool operator==(const BodyOptions&) const = default;
 };

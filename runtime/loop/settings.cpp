@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <concepts>
+#include <initializer_list>
 #include <limits>
 #include <vector>
 
@@ -17,6 +18,8 @@ namespace {
 
 /// The compliance between the nodes of so many contacts fits into a gigabyte.
 constexpr NumberRange contact_counts{1.0, 1000.0, true, true, "from 1 to 1000"};
+
+constexpr NumberRange live_steps{0.0, 0.1, false, true, "greater than 0 and at most 0.1"};
 
 constexpr NumberRange megabytes{1.0, 1e9, true, true, "of megabytes, from 1 on"};
 constexpr NumberRange positive_or_infinite{0.0, std::numeric_limits<double>::infinity(), false, true,
@@ -56,11 +59,23 @@ std::string text_of(const Tool& tool) {
 std::string text_of(ContactModel contact) {
   return contact == ContactModel::dynamic ? "dynamic" : "quasi-static";
 }
+std::string text_of(LiveLaw law) {
+  return name_of(law);
+}
+std::string text_of(Integrator integrator) {
+  return name_of(integrator);
+}
+std::string text_of(bool yes) {
+  return yes ? "yes" : "no";
+}
 std::string text_of(const OverlayOptions& overlay) {
   return fmt::format("r={},rings={}", overlay.refinement, overlay.rings);
 }
 std::string text_of(const Vec3& place) {
   return fmt::format("{},{},{}", place.x(), place.y(), place.z());
+}
+std::string text_of(const AxisBox& box) {
+  return text_of(box.low) + "," + text_of(box.high);
 }
 std::string text_of(const SafetyOptions& options) {
   std::string text;
@@ -114,6 +129,32 @@ void read_value(const Setting& setting, const std::string& text, ContactModel& c
     refuse(setting.name, "'" + text + "' is neither quasi-static nor dynamic", "write one of them");
 }
 
+/// The one of some values that has this name.
+template <class Value>
+Value read_name(const Setting& setting, const std::string& text, std::initializer_list<Value> values) {
+  std::string names;
+  for (const Value value : values) {
+    if (text == text_of(value)) return value;
+    names += (names.empty() ? "" : ", ") + text_of(value);
+  }
+  refuse(setting.name, "'" + text + "' is none of " + names, "write one of them");
+}
+
+void read_value(const Setting& setting, const std::string& text, LiveLaw& law) {
+  law = read_name(setting, text,
+                  {LiveLaw::linear, LiveLaw::corotational, LiveLaw::corotational_qr, LiveLaw::neo_hookean,
+                   LiveLaw::mass_spring});
+}
+
+void read_value(const Setting& setting, const std::string& text, Integrator& integrator) {
+  integrator =
+      read_name(setting, text, {Integrator::implicit_euler, Integrator::midpoint, Integrator::newmark});
+}
+
+void read_value(const Setting& setting, const std::string& text, bool& yes) {
+  yes = read_name(setting, text, {true, false});
+}
+
 void read_value(const Setting&, const std::string& text, OverlayOptions& overlay) {
   overlay = parse_overlay(text, "--overlay");
 }
@@ -123,6 +164,18 @@ void read_value(const Setting& setting, const std::string& text, Vec3& place) {
   if (!numbers)
     refuse(setting.name, "'" + text + "' is not finite numbers X,Y,Z", "write for instance 0,0,0.1");
   place = {(*numbers)[0], (*numbers)[1], numbers->size() == 3 ? (*numbers)[2] : 0.0};
+}
+
+void read_value(const Setting& setting, const std::string& text, AxisBox& box) {
+  std::size_t middle = 0;
+  for (int commas = 0; commas < 3 && middle != std::string::npos; ++commas)
+    middle = text.find(',', commas == 0 ? 0 : middle + 1);
+  const auto low = parse_vector(text.substr(0, middle)),
+             high = middle == std::string::npos ? std::nullopt : parse_vector(text.substr(middle + 1));
+  if (!low || !high || low->size() != 3 || high->size() != 3)
+    refuse(setting.name, "'" + text + "' is not two corners X,Y,Z,X,Y,Z",
+           "write for instance 0,0,0,0.2,0.2,0.1");
+  box = {{(*low)[0], (*low)[1], (*low)[2]}, {(*high)[0], (*high)[1], (*high)[2]}};
 }
 
 void read_value(const Setting&, const std::string& text, std::string& axes) {
@@ -201,6 +254,67 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
         s.overlay_memory);
 }
 
+/// Visits the settings of the live solver.
+template <class SomeSettings, class Visitor>
+void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
+  auto& [solver, step, integrator, gravity, mass_damping, stiffness_damping, yield, creep, most_plastic, free,
+         floor, room, obstacle, wall_friction] = live;
+  constexpr SettingGroup group = SettingGroup::live;
+  const bool is_told = live.solver.has_value();
+  visit(
+      Setting{
+          "solver", group, "linear|corotational|corotational-qr|neo-hookean|mass-spring", "",
+          "none: the file's Green's functions",
+          "solve the body anew in each step, beside the tick, for large deformation and bodies that move; "
+          "the tool meets the compliance of one step",
+          any_number, is_told},
+      solver);
+  visit(Setting{"live-step", group, "S", "s", "0.005", "time step of the solver, a whole number of ticks",
+                live_steps, is_told},
+        step);
+  visit(Setting{"integrator", group, "implicit-euler|midpoint|newmark", "", "implicit-euler",
+                "how the solver steps; implicit-euler damps fast motion, the others keep energy", any_number,
+                is_told},
+        integrator);
+  visit(Setting{"gravity", group, "X,Y,Z", "m/s^2", "0,0,0", "acceleration of gravity on a live body",
+                any_number, is_told},
+        gravity);
+  visit(Setting{"mass-damping", group, "A", "1/s", "1", "part of the damping that is A times the mass",
+                number_from_zero, is_told},
+        mass_damping);
+  visit(Setting{"stiffness-damping", group, "B", "s", "0.001",
+                "part of the damping that is B times the stiffness", number_from_zero, is_told},
+        stiffness_damping);
+  visit(Setting{"yield", group, "STRAIN", "", "inf",
+                "elastic strain (norm) above which a body keeps dents; inf: never", positive_or_infinite,
+                is_told},
+        yield);
+  visit(Setting{"creep", group, "RATE", "1/s", "10", "rate at which strain above the yield becomes plastic",
+                number_from_zero, is_told},
+        creep);
+  visit(Setting{"most-plastic", group, "STRAIN", "", "inf", "largest plastic strain (norm)",
+                positive_or_infinite, is_told},
+        most_plastic);
+  visit(Setting{"free", group, "yes|no", "", "no", "lets go of what the model holds: the body moves in space",
+                any_number, is_told},
+        free);
+  visit(Setting{"floor", group, "HEIGHT", "m", "none", "height of a floor along z, in the plane along y",
+                any_number, is_told && floor.has_value()},
+        floor);
+  visit(Setting{"room", group, "X,Y,Z,X,Y,Z", "m", "none",
+                "walls and a floor around the body: the lowest and the highest corner of the room, which is "
+                "open above",
+                any_number, is_told && room.has_value()},
+        room);
+  visit(Setting{"obstacle", group, "X,Y,Z,X,Y,Z", "m", "none",
+                "a box that the body stays out of: its lowest and its highest corner", any_number,
+                is_told && obstacle.has_value()},
+        obstacle);
+  visit(Setting{"wall-friction", group, "MU", "", "0.5",
+                "Coulomb friction coefficient of floor, room and obstacle", number_from_zero, is_told},
+        wall_friction);
+}
+
 /// Visits the settings of the loop, and of where the device is in the body's frame.
 template <class SomeSettings, class Visitor>
 void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
@@ -228,7 +342,7 @@ void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
 /// nothing compiles.
 template <class SomeSettings, class Visitor>
 void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
-  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_memory, rate,
+  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_memory, live, rate,
          motion_scale, force_scale, origin, axes, safety] = settings;
   for_each_tool_setting(tool, visit);
   visit(Setting{"reach", SettingGroup::tool, "METRES", "m", "the longest edge of the surface",
@@ -242,6 +356,7 @@ void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
                 contact_counts},
         max_contacts);
   for_each_body_setting(settings, visit);
+  for_each_live_setting(live, visit);
   for_each_frame_setting(settings, visit);
   visit(Setting{"safety", SettingGroup::safety, "NAME=VALUE,...", "",
                 "on for devices held by a hand, off for scripts",
@@ -311,7 +426,8 @@ BodyOptions Settings::body() const {
   return {.refinement = overlay ? overlay->refinement : 1,
           .contact = contact,
           .load_scale = load_scale,
-          .stiffness_scale = stiffness_scale};
+          .stiffness_scale = stiffness_scale,
+          .live = live};
 }
 
 Tool parse_shape(const std::string& text) {

@@ -11,6 +11,7 @@
 #include "base/number_range.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/body/body.h"
+#include "runtime/live/live_settings.h"
 #include "runtime/loop/loading.h"
 #include "runtime/safety/safety_options.h"
 #include "runtime/safety/workspace.h"
@@ -31,6 +32,7 @@ struct Settings {
   double stiffness_scale = 1.0;                              ///< of all Young's moduli
   std::optional<OverlayOptions> overlay;                     ///< none: the body's own mesh
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
+  LiveSettings live;                                         ///< a solver in place of Green's functions
   std::int64_t rate = 1000;                                  ///< ticks a second
   double motion_scale = 1.0;                                 ///< as in WorkspaceOptions
   double force_scale = 1.0;
@@ -43,7 +45,7 @@ struct Settings {
 };
 
 /// What a setting is of: its place in the help. The loop's and the workspace's stay as they are in a run.
-enum class SettingGroup : std::uint8_t { tool, body, loop, workspace, safety };
+enum class SettingGroup : std::uint8_t { tool, body, live, loop, workspace, safety };
 
 /// A setting as options, recordings, pages and the documentation have it.
 struct Setting {

@@ -20,6 +20,8 @@ namespace http = beast::http;
 
 constexpr unsigned http_version = 11;  // 1.1
 constexpr std::string_view book_path = "/book/";
+constexpr std::string_view second_run = "/2/";
+constexpr std::string_view both_runs = "/beside";
 
 std::string_view view(beast::string_view text) {
   return {text.data(), text.size()};
@@ -46,15 +48,22 @@ Response guarded(Response response) {
   return response;
 }
 
-Response page(std::string_view host) {
+/// Path of a request; the second run's without what is before it, as the first one's would be.
+std::string_view path_in_run(const Request& request, const ServedAddress& served) {
+  const std::string_view path = target_of(request).path;
+  return run_of(request, served) == 0 ? path : path.substr(second_run.size() - 1);
+}
+
+/// `framed`: pages of this server may have it in them; `frames`: it has others of this server in it.
+Response page(std::string_view host, bool framed, bool frames) {
   Response response(http::status::ok, http_version);
   response.set(http::field::content_type, "text/html; charset=utf-8");
   response.set("Content-Security-Policy",
                fmt::format("default-src 'none'; script-src 'unsafe-inline' blob:; worker-src blob:; "
                            "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; "
                            "connect-src 'self' ws://{} blob: data:; base-uri 'none'; form-action 'none'; "
-                           "frame-ancestors 'none'",
-                           host));
+                           "frame-src {}; frame-ancestors {}",
+                           host, frames ? "'self'" : "'none'", framed ? "'self'" : "'none'"));
   response.body() = viewer_page();
   return response;
 }
@@ -80,8 +89,12 @@ bool wants_book(const Request& request) {
   return target_of(request).path.starts_with(book_path);
 }
 
-bool wants_socket(const Request& request) {
-  return target_of(request).path == "/socket" && beast::websocket::is_upgrade(request);
+std::size_t run_of(const Request& request, const ServedAddress& served) {
+  return served.runs > 1 && target_of(request).path.starts_with(second_run) ? 1 : 0;
+}
+
+bool wants_socket(const Request& request, const ServedAddress& served) {
+  return path_in_run(request, served) == "/socket" && beast::websocket::is_upgrade(request);
 }
 
 std::optional<Response> refusal(const Request& request, const ServedAddress& served) {
@@ -99,7 +112,7 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
   if (!wants_book(request) && !is_same_token(target_of(request).token, served.token))
     return guarded(
         plain(http::status::forbidden, "Open the whole address that the runtime printed, with its token."));
-  if (wants_socket(request)) {
+  if (wants_socket(request, served)) {
     const auto offered = request.find(http::field::sec_websocket_protocol);
     if (offered != request.end() && !http::token_list(offered->value()).exists(subprotocol))
       return guarded(plain(http::status::bad_request, "The socket speaks palpate.2 only."));
@@ -125,9 +138,13 @@ Response book_answer(const Request& request, const std::filesystem::path& book) 
   return guarded(std::move(response));
 }
 
-Response answer(const Request& request, const std::optional<DrawnPicture>& shown) {
-  const std::string_view path = target_of(request).path;
-  if (path == "/") return guarded(page(view(request[http::field::host])));
+Response answer(const Request& request, const ServedAddress& served,
+                const std::optional<DrawnPicture>& shown) {
+  const std::string_view path = path_in_run(request, served);
+  const std::string_view host = view(request[http::field::host]);
+  const bool has_two = served.runs > 1;
+  if (path == "/") return guarded(page(host, has_two, false));
+  if (has_two && target_of(request).path == both_runs) return guarded(page(host, false, true));
   const bool is_stl = path == "/surface.stl";
   if (!is_stl && path != "/surface.vtu")
     return guarded(plain(http::status::not_found, "There is no such page."));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/beast/http.hpp>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -23,8 +24,11 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
 /// What is said to a request that may be answered, but there are too many of them.
 Response full_house();
 
+/// Which of the runs it is about: the second one's addresses begin with /2/, all others are the first one's.
+std::size_t run_of(const Request& request, const ServedAddress& served);
+
 /// Whether it wants to go on as a WebSocket.
-bool wants_socket(const Request& request);
+bool wants_socket(const Request& request, const ServedAddress& served);
 
 /// Whether it asks for the book, which is the same for everybody and needs no token.
 bool wants_book(const Request& request);
@@ -32,7 +36,9 @@ bool wants_book(const Request& request);
 /// A file of the book, or that it is not there.
 Response book_answer(const Request& request, const std::filesystem::path& book);
 
-/// To all other requests that are not refused: the page, the surface as it is seen, or that it is not there.
-Response answer(const Request& request, const std::optional<DrawnPicture>& shown);
+/// To all other requests that are not refused: the page, the surface as it is seen in the run that it asks
+/// for, or that it is not there.
+Response answer(const Request& request, const ServedAddress& served,
+                const std::optional<DrawnPicture>& shown);
 
 }  // namespace palpate

@@ -53,10 +53,11 @@ void PageConnection::answer_request() {
   if (wants_book(request)) return respond(book_answer(request, server_.served().book));
   if (!server_.has_room()) return respond(full_house());
   is_admitted_ = true;
-  if (wants_socket(request)) {
+  run_ = &server_.run(run_of(request, server_.served()));
+  if (wants_socket(request, server_.served())) {
     open_socket();
   } else {
-    respond(answer(request, server_.broadcast().picture()));
+    respond(answer(request, server_.served(), run_->broadcast().picture()));
   }
 }
 
@@ -97,8 +98,8 @@ void PageConnection::open_socket() {
   socket_->async_accept(request, [self = shared_from_this()](const ErrorCode& problem) {
     if (problem) return self->server_.leave(*self);
     self->is_open_ = true;
-    self->ticks_ = self->server_.is_replay() ? 0 : self->server_.broadcast().ticks().end();
-    self->server_.join(*self);
+    self->ticks_ = self->run_->is_replay() ? 0 : self->run_->broadcast().ticks().end();
+    self->run_->join(*self);
     self->read();
   });
 }
@@ -119,7 +120,7 @@ void PageConnection::receive(const ErrorCode& problem) {
       parse_page_word({static_cast<const char*>(bytes.data()), bytes.size()}, reason);
   if (!word) return close(websocket::close_code::bad_payload, reason);
   buffer_.consume(bytes.size());
-  server_.obey(*this, *word);
+  run_->obey(*this, *word);
   if (is_open_) read();
 }
 
@@ -167,7 +168,7 @@ void PageConnection::send_news() {
 }
 
 Message PageConnection::next_message() {
-  Broadcast& shown = server_.broadcast();
+  Broadcast& shown = run_->broadcast();
   if (!said_.empty()) {
     Message message = text_message(std::move(said_.front()));
     said_bytes_ -= message.bytes->size();
@@ -178,7 +179,7 @@ Message PageConnection::next_message() {
     const bool is_first = states_ == 0;
     states_ = shown.states();
     is_role_sent_ = true;
-    return shown.state_message(server_.role(*this), is_first);
+    return shown.state_message(run_->role(*this), is_first);
   }
   if (scenes_ != shown.scenes()) {
     scenes_ = shown.scenes();
@@ -240,7 +241,7 @@ void PageConnection::note_picture(const Message& message) {
 
 Message PageConnection::next_picture() {
   if (alone_) return own_picture();
-  Broadcast& shown = server_.broadcast();
+  Broadcast& shown = run_->broadcast();
   const ScenePatch* patch = shown.picture()->patch.get();
   const std::uint32_t number = patch == nullptr ? 0 : patch->number;
   if (std::exchange(patch_, number) != number && number != 0) return shown.patch_message();

@@ -19,6 +19,7 @@
 namespace palpate {
 
 class PageServer;
+class ShownRun;
 
 /// One request, and where that asks for it a socket from then on: a page. For the server's thread.
 class PageConnection : public std::enable_shared_from_this<PageConnection> {
@@ -42,6 +43,8 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept;
   /// It has shown the token, and there is room for it.
   [[nodiscard]] bool is_admitted() const noexcept { return is_admitted_; }
+  /// The run that it asks for; null before it has shown the token.
+  [[nodiscard]] ShownRun* run() const noexcept { return run_; }
   /// It does not read.
   [[nodiscard]] bool is_stalled() const;
 
@@ -63,6 +66,7 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   boost::beast::tcp_stream stream_;
   std::optional<boost::beast::websocket::stream<boost::beast::tcp_stream>> socket_;
   PageServer& server_;
+  ShownRun* run_ = nullptr;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
   std::optional<Response> response_;

@@ -30,7 +30,7 @@ ViewerPort::ViewerPort(const ViewerOptions& options) {
     throw Error("'" + options.address + "' is not an IP address", "viewer",
                 "give one of this machine, such as 127.0.0.1, or 0.0.0.0 for all of them");
   }
-  served_ = {.address = options.address, .port = 0, .token = random_token(), .book = options.book};
+  served_ = {.address = options.address, .port = 0, .token = random_token(), .book = options.book, .runs = 1};
   const tcp::endpoint wanted(address, options.port);
   asio::io_context context;
   tcp::acceptor acceptor(context);
@@ -55,8 +55,9 @@ ViewerPort::~ViewerPort() {
 ViewerPort::ViewerPort(ViewerPort&& other) noexcept
     : served_(std::move(other.served_)), socket_(other.release()) {}
 
-std::string ViewerPort::url() const {
-  return fmt::format("http://{}:{}/?token={}", seen_from_here(served_.address), served_.port, served_.token);
+std::string ViewerPort::url(const std::string& page) const {
+  return fmt::format("http://{}:{}/{}?token={}", seen_from_here(served_.address), served_.port, page,
+                     served_.token);
 }
 
 int ViewerPort::release() noexcept {

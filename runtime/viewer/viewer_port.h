@@ -1,6 +1,7 @@
 // Where a viewer is served.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -22,6 +23,7 @@ struct ServedAddress {
   std::uint16_t port = 0;
   std::string token;           ///< 128 random bits as hexadecimal digits
   std::filesystem::path book;  ///< empty: there is none
+  std::size_t runs = 1;        ///< that are shown, one or two
 };
 
 /// An address that is taken, so that what comes next cannot fail for it: who connects waits until a
@@ -36,8 +38,8 @@ class ViewerPort {
   ViewerPort& operator=(const ViewerPort&) = delete;
 
   [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
-  /// What to open in a browser of this machine: http://127.0.0.1:8017/?token=...
-  [[nodiscard]] std::string url() const;
+  /// What to open in a browser of this machine: http://127.0.0.1:8017/PAGE?token=...
+  [[nodiscard]] std::string url(const std::string& page = "") const;
   /// The listening socket, which is the caller's from now on.
   [[nodiscard]] int release() noexcept;
 

@@ -105,7 +105,7 @@ let browser = null;
 export async function open() {
   browser ??= await chromium.launch({
     executablePath: process.env.PALPATE_CHROMIUM ?? '/usr/bin/chromium',
-    args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
+    args: ['--no-sandbox', '--enable-unsafe-swiftshader'], // as it draws by itself without a graphics card: told that it has one, it would emulate all of that
   });
   return browser;
 }

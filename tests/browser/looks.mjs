@@ -5,6 +5,15 @@ import path from 'node:path';
 
 const axe = readFileSync(createRequire(path.join(process.env.PALPATE_BROWSER_MODULES, 'package.json')).resolve('axe-core/axe.min.js'), 'utf8');
 
+/// Windows that the page is looked at in: width, height, and whether by touch.
+export const layouts = [
+  [360, 640, true],
+  [640, 360, true],
+  [900, 600, false],
+  [1280, 800, false],
+  [3840, 2160, false],
+];
+
 /// Hides all that stands over the picture.
 export async function bare(page) {
   await page.addStyleTag({ content: '.stage > :not(canvas) { opacity: 0 !important; }' });

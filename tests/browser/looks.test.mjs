@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import path from 'node:path';
 import { after, test } from 'node:test';
 import { bake, close, folder, project, ready, run, runtime, serve, until, visit } from './harness.mjs';
-import { bare, barriers, contrast, difference, faults_of_layout, keep_ground, keep_pixels, rest } from './looks.mjs';
+import { bare, barriers, contrast, difference, faults_of_layout, keep_ground, keep_pixels, layouts, rest } from './looks.mjs';
 import { choose, part, recorded, settled } from './steps.mjs';
 
 after(close);
@@ -151,14 +151,6 @@ test('a stiffer ball within is seen: by material, cut open, and through the surf
   const through = await blue('through');
   assert.ok(cut > 1000 && through > 1000 && closed < 0.1 * Math.min(cut, through), `blue pixels: closed ${closed}, cut ${cut}, through ${through}`);
 });
-
-const layouts = [
-  [360, 640, true],
-  [640, 360, true],
-  [900, 600, false],
-  [1280, 800, false],
-  [3840, 2160, false],
-];
 
 test('no text is cut off or covered, and every target is large enough, at five sizes', async (t) => {
   const { at, page: mouse, served } = await open_block(t);

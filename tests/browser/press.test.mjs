@@ -208,7 +208,7 @@ test('a press with room for all its contacts is no best effort', async (t) => {
 });
 
 test('the picture is the stored one', async (t) => {
-  const { page } = await open_cube(t, { args: ['--tool', 'sphere:0.15', '--coupling', '100'] });
+  const { page } = await open_cube(t, { args: ['--tool', 'sphere:0.15', '--coupling', '100'], viewport: { width: 1280, height: 800 } });
   await part(page, 'field').selectOption('von-mises');
   await choose(page, 'press', 0.1);
   const { x, y } = await project(page, top);

@@ -7,11 +7,11 @@ import { bake, cube, folder, ready, run, runtime, serve, told, until, visit } fr
 export const top = [0.5, 0.5, 1]; // a node of the cube, which its 6 cells an edge have there
 
 /// The cube with a page, in a folder of its own: { at, file, page, served }.
-export async function open_cube(t, { cells = 6, args = ['--tool', 'point'], toml = '' } = {}) {
+export async function open_cube(t, { cells = 6, args = ['--tool', 'point'], toml = '', viewport = { width: 1010, height: 640 } } = {}) {
   const at = await folder(t);
   const file = await bake(at, cube(cells, toml));
   const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', ...args], at);
-  const page = await ready(await visit(t, served.url));
+  const page = await ready(await visit(t, served.url, { viewport }));
   return { at, file, served, page };
 }
 

@@ -413,6 +413,7 @@ const Edit edits[] = {
     {"OtherScalar",
      [](const Path& p) { set_text(p, "scalar", "float16"); },
      {"attribute scalar is 'float16'"}},
+    {"ScopeNone", [](const Path& p) { set_text(p, "scope", "none"); }, {"the scope is none"}},
     {"OtherScope", [](const Path& p) { set_text(p, "scope", "all"); }, {"attribute scope is 'all'"}},
     {"NegativeLayers", [](const Path& p) { set_integers(p, "layers", {-1}); }, {"attribute layers is -1"}},
     {"ManyLayers",

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <thread>
 
+#include "base/error.h"
 #include "formats/checksum.h"
 #include "formats/hdf5_contents.h"
 #include "tests/support/formats_sample.h"
@@ -106,6 +107,26 @@ INSTANTIATE_TEST_SUITE_P(ModelFile, EveryElement, testing::ValuesIn(body_element
 
 INSTANTIATE_TEST_SUITE_P(ModelFile, BothPrecisions,
                          Values(Precision::single_precision, Precision::double_precision));
+
+TEST(ModelFile, WithoutGreensFunctionsHoldsTheRest) {
+  const Folder folder;
+  Model written = sample_model();
+  written.scope = Scope::none;
+  Model storing = written;
+  storing.overlay = {};
+  EXPECT_THROW(ModelWriter(folder / "a.palpate.hdf", storing, Precision::single_precision), Error);
+  written.stored_nodes.clear();
+  written.probes.clear();
+  EXPECT_THROW(ModelWriter(folder / "a.palpate.hdf", written, Precision::single_precision),
+               Error);  // overlays
+  written.overlay = {};
+  ModelWriter(folder / "a.palpate.hdf", written, Precision::single_precision).finish({});
+  const Model read = load_model(folder / "a.palpate.hdf");
+  EXPECT_EQ(read.scope, Scope::none);
+  EXPECT_EQ(difference(written, read), "");
+  EXPECT_FALSE(hdf5::Contents::read(folder / "a.palpate.hdf").has("/greens/packed"));
+  EXPECT_EQ(files_in(folder), Names{"a.palpate.hdf"});
+}
 
 TEST(ModelFile, GreensFunctionsStartOnAPage) {
   const Folder folder;

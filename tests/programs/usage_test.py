@@ -128,7 +128,7 @@ class Usage(ProgramTest):
     def test_options_of_play_stand_in_groups_in_the_order_of_use(self):
         page = run(RUNTIME, "play", "--help").stdout
         headings = re.findall(r"^([A-Z][^\n]*):$", page, re.MULTILINE)
-        self.assertEqual(headings, ["Arguments", "Input device", "Viewer", "The tool", "The body", "The loop", "Output files",
+        self.assertEqual(headings, ["Arguments", "Input device", "Viewer", "The tool", "The body", "The live solver", "The loop", "Output files",
                                     "Workspace of the device", "Safety", "Examples"])
         groups = dict(re.findall(r"^([A-Z][^\n]*):\n(.*?)(?=^[A-Z][^\n]*:$|\Z)", page, re.MULTILINE | re.DOTALL))
         for option, heading in (("--device", "Input device"), ("--view", "Viewer"), ("--tool", "The tool"),

@@ -137,11 +137,21 @@ class PlayView(ViewTest):
         self.assert_asks_for_token(*self.PLAY)
         self.assert_wrong_addresses(*self.PLAY)
 
+    def test_a_recording_beside_it(self):
+        self.record()
+        with self.started(*self.PLAY, "--view-address", "0", "--beside", "touch.h5") as (process, url):
+            for page in ("beside", "", "2/"):
+                self.assertEqual(status_of(url.replace("/beside?", f"/{page}?")), 200)
+            self.assertEqual(self.end(process, signal.SIGTERM)[0], 130)
+        over_itself = run(RUNTIME, *self.PLAY, "--view-address", "0", "--beside", "touch.h5", "--record", "touch.h5", cwd=self.folder)
+        self.assert_refused(over_itself, "the recording beside it")
+
     def test_wrong_arguments(self):
         self.assert_usage("what is shown keeps the clock", *self.PLAY, "--fast")
         self.assert_usage("what is shown keeps the clock", *self.PLAY, "--fast", "--device", "script:touch.csv")
         self.assert_usage("it is for --view, which is not given", "play", CUBE, "--device", "script:touch.csv", "--view-address", "0")
         self.assert_usage("or --view (to move it with the pointer", "play", CUBE)
+        self.assert_usage("it is for --view, which is not given", "play", CUBE, "--device", "script:touch.csv", "--beside", "touch.h5")
         self.assert_usage("give --view too", "play", CUBE, "--device", "mouse")
         self.assert_usage("the pointer is in the body's frame already", *self.PLAY, "--motion-scale", "2")
         self.assert_usage("profiles are for --device hid", *self.PLAY, "--profile", "polhem_v1")
@@ -155,6 +165,14 @@ class View(ViewTest):
                 self.assertEqual(status_of(url), 200)
                 self.assertEqual(status_of(url.replace("/?", "/surface.vtu?")), 200)
                 self.assertEqual(self.end(process, number), (0, ""))
+
+    def test_shows_two_side_by_side(self):
+        self.record()
+        with self.started("view", "touch.h5", "touch.h5", "--view-address", "0") as (process, url):
+            self.assertIn("/beside?token=", url)
+            for page in ("beside", "", "2/", "2/surface.vtu"):
+                self.assertEqual(status_of(url.replace("/beside?", f"/{page}?")), 200)
+            self.assertEqual(self.end(process, signal.SIGINT), (0, ""))
 
     def test_address(self):
         self.record()

@@ -144,6 +144,12 @@ export class Eye {
     const centre = new Vector3(...target).multiplyScalar(this.radius).add(this.box_.getCenter(new Vector3()));
     this.go(towards, centre, away * this.radius);
   }
+  /** The whole body, from there. */
+  fit_from(towards: Vec3): void {
+    if (!this.is_flat) this.towards_ = towards;
+    this.fit();
+  }
+
   get is_fitted(): boolean {
     return this.is_fitted_;
   }

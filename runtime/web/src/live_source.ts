@@ -76,5 +76,5 @@ export class LiveSource implements Source {
 
 /** The socket beside this page, with the token that is in its address. */
 export function socket_url(page: Location): string {
-  return `${page.protocol === 'https:' ? 'wss' : 'ws'}://${page.host}/socket${page.search}`;
+  return new URL(`socket${page.search}`, page.href).href.replace(/^http/, 'ws').replace(/#.*/, '');
 }

@@ -1,5 +1,6 @@
 // The viewer's page: what comes from the run is shown, what the person does is said to it.
 import './style.css';
+import { Beside, Neighbour, type Shared } from './beside';
 import { of_frame, RecentEfforts, sentence } from './best_effort';
 import { button, input, part, select, show_value, toast, write } from './dom';
 import { FileSource, stored_session } from './file_source';
@@ -26,7 +27,8 @@ import { floats_of_contact, type Frame, type Picture as Message } from './wire';
 import type { Mode, Said, State, Word } from './words';
 
 const live_samples = 60_000; // more than ten seconds at the highest rate
-const plot_wait = 50; // [ms] between drawings of the plots
+const plot_wait = 100; // [ms] between drawings of the plots
+const playhead_wait = 40; // and in a recording, where they show what the picture is of
 const numbers_wait = 100;
 const timing_wait = 500;
 const keep_wait = 500; // [ms] before how a model is looked at is kept
@@ -61,6 +63,13 @@ class Page implements Listener {
   private readonly drawing_: ViewControls;
   private readonly hand_: Hand;
   private readonly source_: Source;
+  private readonly neighbour_ = new Neighbour(
+    (shared) => this.take_shared(shared),
+    () => {
+      this.share_look();
+      this.share_picture();
+    },
+  );
 
   constructor() {
     const { view } = this.picture_;
@@ -79,6 +88,7 @@ class Page implements Listener {
     this.drawing_ = new ViewControls((drawn) => {
       this.picture_.take(drawn);
       this.want_keep();
+      this.share_look();
     });
     this.hand_ = new Hand(
       view,
@@ -98,12 +108,14 @@ class Page implements Listener {
     view.after_drawing = () => {
       marked();
       this.saving_.drawn();
+      this.share_picture();
       if (this.mode_ !== 'live') this.want_plots(); // the playhead is where the picture is
     };
     view.margins = () => this.margins();
     const watch = new ResizeObserver(() => view.eye.resize());
     for (const id of ['hand', 'replay']) watch.observe(part(id));
     view.eye.taken = () => this.want_keep();
+    this.replay_.sought = (time) => this.neighbour_.say({ about: 'time', time });
     this.listen();
     this.listen_keys();
     this.choose_theme(kept_theme() as Theme);
@@ -167,6 +179,8 @@ class Page implements Listener {
     this.mode_ = mode;
     document.body.classList.toggle('live', mode === 'live');
     document.body.classList.toggle('served', mode !== 'file');
+    document.body.classList.toggle('pane', this.neighbour_.is_there);
+    if (this.neighbour_.is_there && window.innerHeight <= 480 && !document.body.classList.contains('folded')) this.toggle_panel();
   }
 
   private take_state(state: State): void {
@@ -349,6 +363,45 @@ class Page implements Listener {
     (on ? part('help-text') : button('help')).focus();
   }
 
+  // --- beside another page ---
+
+  private share_look(): void {
+    if (this.kept_for_ !== '') this.neighbour_.say({ about: 'look', look: this.drawing_.kept, theme: this.theme_.choice });
+  }
+
+  /** What a picture has that the one beside it is to have too. */
+  private share_picture(): void {
+    if (!this.neighbour_.is_there || this.kept_for_ === '') return;
+    this.neighbour_.say(this.shared_eye());
+    const { own_range: largest, body } = this.picture_;
+    this.neighbour_.say({ about: 'range', field: body.field, typed: this.drawing_.typed_range, largest });
+  }
+
+  private shared_eye(): Shared {
+    const { eye } = this.picture_.view;
+    const place = eye.place;
+    return { about: 'eye', place: eye.is_fitted ? null : place, towards: place.towards };
+  }
+
+  private take_shared(shared: Shared): void {
+    const { eye } = this.picture_.view;
+    if (shared.about === 'look') {
+      this.drawing_.kept = shared.look;
+      if (shared.theme !== this.theme_.choice) this.choose_theme(shared.theme as Theme);
+      this.neighbour_.note({ about: 'look', look: this.drawing_.kept, theme: this.theme_.choice });
+    } else if (shared.about === 'eye') {
+      if (shared.place) eye.place = shared.place;
+      else eye.fit_from(shared.towards);
+      this.neighbour_.note(this.shared_eye());
+    } else if (shared.about === 'range') {
+      this.picture_.range_beside = shared;
+      if (shared.field === this.picture_.body.field) this.drawing_.typed_range = shared.typed;
+      this.picture_.view.draw();
+    } else {
+      this.replay_.follow_time(shared.time);
+    }
+  }
+
   // --- how it is looked at ---
 
   private choose_theme(theme: Theme): void {
@@ -357,6 +410,7 @@ class Page implements Listener {
     this.theme_.choose(known);
     keep_theme(known);
     this.show_theme();
+    this.share_look();
   }
 
   private show_theme(): void {
@@ -370,10 +424,12 @@ class Page implements Listener {
     if (this.kept_for_ === model || this.picture_.body.scene === null) return;
     const kept = (this.kept_for_ === '' ? of_hash(location.hash) : null) ?? kept_of(model);
     this.kept_for_ = model;
-    if (!kept) return;
-    this.drawing_.kept = kept.look;
-    if (kept.place) this.picture_.view.eye.place = kept.place;
-    this.picture_.face_section();
+    if (kept) {
+      this.drawing_.kept = kept.look;
+      if (kept.place) this.picture_.view.eye.place = kept.place;
+      this.picture_.face_section();
+    }
+    this.neighbour_.begin();
   }
 
   private get kept(): Kept {
@@ -446,7 +502,7 @@ class Page implements Listener {
         this.plots_.cursor = this.mode_ === 'live' ? null : (this.picture_.frame?.time ?? null);
         this.plots_.draw(this.history_, this.state_?.rate ?? 1000, this.mode_ !== 'live');
       });
-    }, plot_wait);
+    }, this.mode_ === 'live' ? plot_wait : playhead_wait);
   }
 
   private felt(): Felt {
@@ -549,4 +605,5 @@ class Page implements Listener {
   }
 }
 
-new Page();
+if (/\/beside$/.test(location.pathname)) new Beside();
+else new Page();

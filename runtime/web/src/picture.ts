@@ -3,7 +3,7 @@ import { Vector3 } from 'three';
 import { Arrows } from './arrows';
 import { Body, type Colouring } from './body';
 import { ColourBar } from './colour_bar';
-import { field_traits, log_span, Range } from './colours';
+import { field_traits, log_span, Range, type Field } from './colours';
 import { part, rem } from './dom';
 import { Marks } from './marks';
 import { Section, type SectionAxis } from './section';
@@ -181,7 +181,8 @@ export class Picture {
   private colour(drawn: Drawn): void {
     const { shown } = this.body;
     const is_log = drawn.log && !field_traits[drawn.field].is_signed;
-    const automatic = this.range_.follow(is_log || drawn.largest ? shown.largest : shown.usual, performance.now() / 1000);
+    this.own_range = this.range_.follow(is_log || drawn.largest ? shown.largest : shown.usual, performance.now() / 1000);
+    const automatic = Math.max(this.own_range, this.range_beside.field === drawn.field ? this.range_beside.largest : 0);
     const high = drawn.range ?? automatic;
     const low = field_traits[drawn.field].is_signed ? -high : is_log ? high / log_span : 0;
     const colouring: Colouring = { map: drawn.map, is_log, isolines: drawn.isolines ? 12 : 0 };
@@ -191,4 +192,8 @@ export class Picture {
   }
   /** The largest number of the range as it comes by itself. */
   automatic_range = 0;
+  /** The same without what is shown beside. */
+  own_range = 0;
+  /** Of what is shown beside, which has the same colours. */
+  range_beside: { field: Field | null; largest: number } = { field: null, largest: 0 };
 }

@@ -32,6 +32,9 @@ export class ReplayBar {
     });
   }
 
+  /** A frame at this time [s] was sought, by who looks. */
+  sought: (time: number) => void = () => undefined;
+
   private get can_move(): boolean {
     return this.may_seek_ && this.times_.length > 0;
   }
@@ -105,6 +108,18 @@ export class ReplayBar {
   }
 
   private ask(frame: number): void {
+    this.asked_ = frame;
+    this.seek_(frame);
+    this.write();
+    this.sought(this.times_[frame] ?? 0);
+  }
+
+  /** As another page, which plays or seeks: not told again. */
+  follow_time(time: number): void {
+    if (!this.can_move) return;
+    this.stop();
+    const frame = frame_at(this.times_, time + 1e-9);
+    this.time_ = this.times_[frame] ?? 0;
     this.asked_ = frame;
     this.seek_(frame);
     this.write();

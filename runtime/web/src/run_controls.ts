@@ -69,7 +69,7 @@ export class RunControls {
   show(state: State, mode: Mode, is_connected: boolean): void {
     this.state_ = state;
     const steers = mode === 'live' && state.you === 'controller' && is_connected;
-    write(part('model'), state.model.name);
+    write(part('model'), state.session ? `${state.model.name}: ${state.session}` : state.model.name);
     document.title = `${state.model.name} – Palpate`;
     part('role').hidden = mode === 'file';
     write(part('role'), role_of(state, mode, is_connected));

@@ -170,6 +170,17 @@ export class ViewControls {
     this.changed_(drawn);
   }
 
+  /** As it was typed; null: as it comes. */
+  get typed_range(): number | null {
+    return this.range_;
+  }
+  set typed_range(range: number | null) {
+    if (range === this.range_) return;
+    this.range_ = range;
+    input('range').value = range === null ? '' : short_number(range / this.factor_[0]);
+    this.tell();
+  }
+
   private take_range(): void {
     const text = input('range').value.trim();
     const typed = Number(text.replace(',', '.'));

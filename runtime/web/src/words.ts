@@ -54,6 +54,7 @@ export interface State {
   misses: number;
   settings: Record<string, string>;
   defaults: { radius: number; reach: number; friction: number; depth: number };
+  session?: string; // name of a recording's file
   frames?: number;
   frame?: number;
   alone?: boolean; // of a replay it sees another frame than the page that steers

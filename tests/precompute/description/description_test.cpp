@@ -229,6 +229,27 @@ lowest = {axis = "z", percent = 25}
   EXPECT_EQ(std::get<SelectLowest>(d.overlay->regions[1]).fraction, 0.25);
 }
 
+TEST(Description, WithoutGreensFunctionsNeedsNothingFixed) {
+  const TempFolder folder;
+  const std::string head = "name = \"a\"\n" + box + material;
+  const Description bare = read(folder, head + "[storage]\nscope = \"none\"\n");
+  EXPECT_EQ(bare.scope, Scope::none);
+  EXPECT_TRUE(bare.fixed.empty());
+  EXPECT_EQ(read(folder, head + fixed + "[storage]\nscope = \"none\"\n").fixed.size(), 1U);
+  for (const auto& [more, words] :
+       {std::pair("precision = \"double\"\n", "precision is about Green's functions"),
+        std::pair("compression = \"h2\"\n", "compression is about"), std::pair("layers = 2\n", "layers"),
+        std::pair("[dynamics]\n", "[dynamics] needs Green's functions"),
+        std::pair("[overlay]\nrings = 1\n[[overlay.region]]\ntag = 2\n", "[overlay] needs")}) {
+    try {
+      read(folder, head + "[storage]\nscope = \"none\"\n" + more);
+      ADD_FAILURE() << more;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST(Description, ReadsDynamics) {
   const TempFolder folder;
   const std::string head = "name = \"a\"\n" + box + material + fixed + "[storage]\nscope = \"full\"\n";

@@ -11,21 +11,46 @@ namespace palpate {
 namespace {
 
 /// A value for each setting that is not its default, as it is written.
-const SettingsText others = {
-    {"tool", "capsule:0.25,0.5"}, {"friction", "0.3"},      {"coupling", "250"},
-    {"coupling-torsion", "0.75"}, {"max-force", "7.5"},     {"hand-over", "inf"},
-    {"reach", "0.125"},           {"max-contacts", "7"},    {"contact", "dynamic"},
-    {"load-scale", "0"},          {"stiffness-scale", "2"}, {"overlay", "r=16,rings=16"},
-    {"overlay-memory", "64"},     {"rate", "5000"},         {"motion-scale", "0.5"},
-    {"force-scale", "4"},         {"origin", "1,2,3"},      {"axes", "x,-z,y"},
-    {"safety", "max_force=2"}};
+const SettingsText others = {{"tool", "capsule:0.25,0.5"},
+                             {"friction", "0.3"},
+                             {"coupling", "250"},
+                             {"coupling-torsion", "0.75"},
+                             {"max-force", "7.5"},
+                             {"hand-over", "inf"},
+                             {"reach", "0.125"},
+                             {"max-contacts", "7"},
+                             {"contact", "dynamic"},
+                             {"load-scale", "0"},
+                             {"stiffness-scale", "2"},
+                             {"overlay", "r=16,rings=16"},
+                             {"overlay-memory", "64"},
+                             {"rate", "5000"},
+                             {"motion-scale", "0.5"},
+                             {"force-scale", "4"},
+                             {"origin", "1,2,3"},
+                             {"axes", "x,-z,y"},
+                             {"safety", "max_force=2"},
+                             {"solver", "neo-hookean"},
+                             {"live-step", "0.002"},
+                             {"integrator", "midpoint"},
+                             {"gravity", "0,0,-9.81"},
+                             {"mass-damping", "0"},
+                             {"stiffness-damping", "0.5"},
+                             {"yield", "0.1"},
+                             {"creep", "3"},
+                             {"most-plastic", "0.4"},
+                             {"free", "yes"},
+                             {"floor", "-0.1"},
+                             {"room", "0,0,0,1,1,2"},
+                             {"obstacle", "0,0,0,1,2,1"},
+                             {"wall-friction", "0.25"}};
 
 TEST(SettingsTable, HasEachMember) {
-  const auto& [tool, reach, contacts, contact, load, stiffness, overlay, memory, rate, motion, force, origin,
-               axes, safety] = Settings{};
+  const auto& [tool, reach, contacts, contact, load, stiffness, overlay, memory, live, rate, motion, force,
+               origin, axes, safety] = Settings{};
   const Settings all = read_settings(others);
-  const auto& [tool2, reach2, contacts2, contact2, load2, stiffness2, overlay2, memory2, rate2, motion2,
-               force2, origin2, axes2, safety2] = all;
+  const auto& [tool2, reach2, contacts2, contact2, load2, stiffness2, overlay2, memory2, live2, rate2,
+               motion2, force2, origin2, axes2, safety2] = all;
   EXPECT_NE(reach, reach2);
   EXPECT_NE(contacts, contacts2);
   EXPECT_NE(contact, contact2);
@@ -33,6 +58,24 @@ TEST(SettingsTable, HasEachMember) {
   EXPECT_NE(stiffness, stiffness2);
   EXPECT_NE(overlay.has_value(), overlay2.has_value());
   EXPECT_NE(memory, memory2);
+  const auto& [solver, step, integrator, gravity, by_mass, by_stiffness, yield, creep, most_plastic, free,
+               floor, room, obstacle, wall_friction] = live;
+  const auto& [solver2, step2, integrator2, gravity2, by_mass2, by_stiffness2, yield2, creep2, most_plastic2,
+               free2, floor2, room2, obstacle2, wall_friction2] = live2;
+  EXPECT_NE(solver, solver2);
+  EXPECT_NE(step, step2);
+  EXPECT_NE(integrator, integrator2);
+  EXPECT_NE(gravity, gravity2);
+  EXPECT_NE(by_mass, by_mass2);
+  EXPECT_NE(by_stiffness, by_stiffness2);
+  EXPECT_NE(yield, yield2);
+  EXPECT_NE(creep, creep2);
+  EXPECT_NE(most_plastic, most_plastic2);
+  EXPECT_NE(free, free2);
+  EXPECT_NE(floor, floor2);
+  EXPECT_NE(room, room2);
+  EXPECT_NE(obstacle, obstacle2);
+  EXPECT_NE(wall_friction, wall_friction2);
   EXPECT_NE(rate, rate2);
   EXPECT_NE(motion, motion2);
   EXPECT_NE(force, force2);
@@ -101,10 +144,12 @@ TEST(SettingsTable, HasTheDefaults) {
       in_words.insert(setting.name);
     }
   }
-  EXPECT_EQ(in_words, (std::set<std::string>{"tool", "friction", "coupling", "coupling-torsion", "max-force",
-                                             "reach", "overlay", "origin", "safety"}));
+  EXPECT_EQ(in_words,
+            (std::set<std::string>{"tool", "friction", "coupling", "coupling-torsion", "max-force", "reach",
+                                   "overlay", "origin", "safety", "solver", "floor", "room", "obstacle"}));
   Settings read = read_settings(defaults), made;
-  read.overlay = made.overlay = OverlayOptions{};  // else its memory is not told
+  read.live.solver = made.live.solver = LiveLaw::corotational;  // else the others of it are not told
+  read.overlay = made.overlay = OverlayOptions{};               // else its memory is not told
   EXPECT_EQ(to_text(read), to_text(made));
 }
 

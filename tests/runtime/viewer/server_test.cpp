@@ -89,7 +89,7 @@ class Viewer : public testing::Test {
   std::shared_ptr<const Scene> scene_ = std::make_shared<const Scene>(make_scene(body_, 1));
 
   [[nodiscard]] std::unique_ptr<ViewerServer> serve(const ViewerOptions& options, bool is_replay = false) {
-    return std::make_unique<ViewerServer>(ViewerPort(options), run_, is_replay);
+    return std::make_unique<ViewerServer>(ViewerPort(options), std::vector<RunToShow>{{run_, is_replay}});
   }
   [[nodiscard]] test::Served served() const { return test::Served(server_->url()); }
   [[nodiscard]] std::uint16_t port() const { return served().port; }
@@ -639,6 +639,50 @@ TEST_F(Viewer, WatchersOfAReplayLeafForThemselves) {
   steers.say(R"({"type":"seek","frame":9})");
   run_.wait_for("seek 9");
   EXPECT_EQ(run_.words(), std::vector<std::string>{"seek 9"});
+}
+
+TEST_F(Viewer, TwoRunsHavePagesOfTheirOwn) {
+  for (const char* target : {"/2/", "/beside"})
+    EXPECT_EQ(test::ask(served(), {.target = target}).result_int(), 404U) << target << ": there is one run";
+  Asked second;
+  server_ = std::make_unique<ViewerServer>(ViewerPort({.port = 0}),
+                                           std::vector<RunToShow>{{run_, false}, {second, true}});
+  EXPECT_TRUE(server_->url().ends_with("/beside" + served().query));
+  const auto policy = [&](const char* target) {
+    const test::Answer page = test::ask(served(), {.target = target});
+    EXPECT_EQ(page.result_int(), 200U) << target;
+    return std::string(page["Content-Security-Policy"]);
+  };
+  for (const char* target : {"/", "/2/"})
+    EXPECT_TRUE(policy(target).ends_with("frame-src 'none'; frame-ancestors 'self'")) << target;
+  EXPECT_TRUE(policy("/beside").ends_with("frame-src 'self'; frame-ancestors 'none'"));
+  for (const char* target : {"/2", "/2/beside", "/2/2/", "/3/"})
+    EXPECT_EQ(test::ask(served(), {.target = target}).result_int(), 404U) << target;
+  EXPECT_EQ(test::ask(served(), {.target = "/2/", .query = ""}).result_int(), 403U);
+
+  for (const std::size_t run : {0U, 1U}) {
+    server_->show_state("{}", run);
+    server_->show_scene(scene_, run);
+    server_->show_picture(picture(run == 0 ? 11 : 22), nullptr, run);
+  }
+  Client one = client();
+  Client other = client({.target = "/2/socket"});
+  EXPECT_EQ(one.receive("hello").at("mode"), "live");
+  EXPECT_EQ(other.receive("hello").at("mode"), "replay");
+  EXPECT_EQ(one.receive("state", is_controller).at("watchers"), 1);
+  EXPECT_EQ(other.receive("state", is_controller).at("watchers"), 1) << "each run has a controller";
+  hear_frame(one, 11);
+  hear_frame(other, 22);
+  const std::string saved =
+      std::string(test::ask(served(), {.target = "/2/surface.stl"})[http::field::content_disposition]);
+  EXPECT_EQ(saved, "attachment; filename=\"surface-tick-22.stl\"");
+  other.say(R"({"type":"seek","frame":9})");
+  second.wait_for("seek 9");
+  one.say(step);
+  run_.wait_for("step");
+  EXPECT_EQ(run_.words(), std::vector<std::string>{"step"});
+  EXPECT_EQ(second.words(), std::vector<std::string>{"seek 9"});
+  server_.reset();  // before the second run
 }
 
 TEST_F(Viewer, WatchersOfARunDoNotLeaf) {

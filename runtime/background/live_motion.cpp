@@ -1,0 +1,114 @@
+#include "runtime/background/live_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/live/live_model.h"
+#include "runtime/solve/node_vectors.h"
+
+namespace palpate {
+namespace {
+
+/// At rest as the tick has the body: under its loads.
+LiveState start_of(const Body& body, const LiveBody& live) {
+  LiveState state(live);
+  const Model& model = body.model();
+  for (std::size_t node = 0; node < model.mesh.nodes.size(); ++node) {
+    state.x.segment(Eigen::Index{live.dimension()} * static_cast<Eigen::Index>(node), live.dimension()) =
+        (model.mesh.nodes[node] + model.rest_displacement[node]).head(live.dimension());
+  }
+  return state;
+}
+
+}  // namespace
+
+LiveMotion::LiveMotion(const Body& body)
+    : body_(body),
+      live_(body.live()->body),
+      stepper_(live_, body.live()->stepper),
+      state_(start_of(body, live_)),
+      predicted_(state_),
+      push_(Eigen::VectorXd::Zero(live_.dofs())),
+      by_load_(static_cast<std::size_t>(body.greens().order())),
+      by_last_load_(by_load_.size()) {
+  predict();
+}
+
+/// The step to come, under the forces of the last one.
+void LiveMotion::predict() noexcept {
+  predicted_ = state_;
+  predicted_report_ = stepper_.step(predicted_, push_);
+}
+
+void LiveMotion::rest() noexcept {
+  state_ = start_of(body_, live_);
+  push_.setZero();
+  std::fill(by_last_load_.begin(), by_last_load_.end(), 0.0);
+  predict();
+  const std::lock_guard lock(mutex_);
+  telling_ = {};
+}
+
+LiveTelling LiveMotion::telling() const {
+  const std::lock_guard lock(mutex_);
+  return telling_;
+}
+
+void LiveMotion::put_on(const NodalLoad& load, Eigen::VectorXd& push) const noexcept {
+  const int d = live_.dimension();
+  push.setZero();
+  for (std::size_t k = 0; k < load.nodes().size(); ++k) {
+    const Vec3 f = vector_at(load.forces(), d, static_cast<Index>(k));
+    push.segment(Eigen::Index{d} * body_.mesh_node(load.nodes()[k]), d) += f.head(d);
+  }
+}
+
+void LiveMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcept {
+  const int d = live_.dimension();
+  Eigen::VectorXd push(live_.dofs());
+  put_on(job.load, push);
+  std::fill(by_load_.begin(), by_load_.end(), 0.0);
+  if (!job.load.empty()) body_.greens().displacement(job.load.nodes(), job.load.forces(), by_load_);
+  LiveReport report = predicted_report_;
+  if (push == push_) {
+    state_ = predicted_;
+  } else {
+    report = stepper_.step(state_, push);
+  }
+  compare(job, report);
+  push_ = push;
+  predict();
+  std::swap(by_load_, by_last_load_);
+  for (Index stored = 0; stored < body_.greens().nodes(); ++stored) {
+    const Vec3 moved = node_part(predicted_.x, d, body_.mesh_node(stored)) - body_.rest_position(stored);
+    set_vector(u, d, stored, moved - vector_at(by_last_load_, d, stored));
+  }
+}
+
+/// Where the tick had the loaded nodes, against where they are.
+void LiveMotion::compare(const MotionJob& job, const LiveReport& report) noexcept {
+  const int d = live_.dimension();
+  double along = 0.0, by_compliance = 0.0, largest = 0.0;
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t k = 0; k < job.load.nodes().size(); ++k) {
+    const Index stored = job.load.nodes()[k], node = body_.mesh_node(stored);
+    const Vec3 expected = node_part(predicted_.x, d, node) + vector_at(by_load_, d, stored) -
+                          vector_at(by_last_load_, d, stored);
+    const Vec3 off = node_part(state_.x, d, node) - expected,
+               f = vector_at(job.load.forces(), d, static_cast<Index>(k));
+    largest = std::max(largest, off.norm());
+    along += f.dot(off);
+    by_compliance += f.dot(vector_at(by_load_, d, stored));
+    sum += f;
+  }
+  const std::lock_guard lock(mutex_);
+  telling_.counts.add(report);
+  telling_.compliance_age = state_.time;
+  telling_.last_error = largest;
+  telling_.last_force_error = by_compliance > 0.0 ? sum.norm() * std::abs(along) / by_compliance : 0.0;
+  telling_.largest_error = std::max(telling_.largest_error, largest);
+  telling_.largest_force_error = std::max(telling_.largest_force_error, telling_.last_force_error);
+  telling_.largest_force = std::max(telling_.largest_force, sum.norm());
+}
+
+}  // namespace palpate

@@ -1,0 +1,58 @@
+// A live body as a motion stepper.
+#pragma once
+
+#include <Eigen/Core>
+#include <mutex>
+#include <vector>
+
+#include "runtime/background/motion_stepper.h"
+#include "runtime/live/live_stepper.h"
+
+namespace palpate {
+
+/// What is told of a live body: how its steps went, and how far the tick's local model of it was off.
+struct LiveTelling {
+  LiveCounts counts;
+  double compliance_age = 0.0;  ///< time of the body since the compliance that ticks use was factored [s]
+  /// How far loaded nodes were at the end of a step from where the compliance had them, at most [m]; and of
+  /// the last.
+  double largest_error = 0.0;
+  double last_error = 0.0;
+  /// What that makes of the tool's force, along the force: F (f . du) / (f . W f), at most; and of the last
+  /// [N].
+  double largest_force_error = 0.0;
+  double last_force_error = 0.0;
+  double largest_force = 0.0;  ///< sum of the forces on the body at the end of a step [N]
+};
+
+/// Steps a live body. The tick meets x = x_p + W (f - f_p): x_p is the step with the forces f_p of the last
+/// one held, W the compliance in the body's Greens. The forces f that the tick ends with do the step anew,
+/// without W; how far the two are apart is the error of the local model.
+class LiveMotion final : public MotionStepper {
+ public:
+  /// `body` must have a live one, and live as long.
+  explicit LiveMotion(const Body& body);
+
+  void rest() noexcept override;
+  void do_job(const MotionJob& job, bool lets_go, std::span<double> u) noexcept override;
+
+  [[nodiscard]] LiveTelling telling() const;  ///< from any thread
+
+ private:
+  void put_on(const NodalLoad& load, Eigen::VectorXd& push) const noexcept;
+  void predict() noexcept;
+  void compare(const MotionJob& job, const LiveReport& report) noexcept;
+
+  const Body& body_;
+  const LiveBody& live_;
+  LiveStepper stepper_;
+  LiveReport predicted_report_;
+  LiveState state_, predicted_;       // now; at the end of the step that is predicted
+  Eigen::VectorXd push_;              // [d N] forces with which it was predicted
+  std::vector<double> by_load_;       // [n] W f of the last job
+  std::vector<double> by_last_load_;  // [n] W f_p
+  mutable std::mutex mutex_;          // of `telling_`
+  LiveTelling telling_;
+};
+
+}  // namespace palpate

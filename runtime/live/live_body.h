@@ -1,0 +1,114 @@
+// What is constant of a body that is solved while it moves.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "formats/newmark.h"
+#include "meshes/material.h"
+#include "meshes/mesh.h"
+#include "runtime/live/live_law.h"
+#include "runtime/live/springs.h"
+#include "runtime/live/tangent_pattern.h"
+
+namespace palpate {
+
+struct Model;
+
+/// When a body keeps a dent (Parker & O'Brien 2009; theory.md section 7). Strains are Frobenius norms in the
+/// rotated frame.
+struct Plasticity {
+  double yield = std::numeric_limits<double>::infinity();  ///< elastic strain above which it flows [-]
+  double creep = 0.0;  ///< rate at which what is above the yield turns plastic [1/s]
+  double maximum = std::numeric_limits<double>::infinity();  ///< most plastic strain [-]
+
+  [[nodiscard]] bool flows() const noexcept {
+    return creep > 0.0 && yield < std::numeric_limits<double>::infinity();
+  }
+};
+
+/// A body before it is made ready. N nodes, d dofs each.
+struct LiveInput {
+  Mesh mesh;
+  Analysis analysis = Analysis::solid;
+  double thickness = 1.0;  ///< in the plane [m]; 1 in space
+  std::vector<Material> materials;
+  std::vector<Index> material_of_element{};  ///< [E]
+  std::vector<std::uint8_t> fixed{};         ///< [N] bit `axis` is set where the node is held; empty: nowhere
+  std::vector<Vec3> held_displacement{};     ///< [N] of nodes that are held, along those axes [m]; empty: 0
+  std::vector<Vec3> load{};                  ///< [N] force that acts all the time [N]; empty: none
+};
+
+/// The body of a baked file: mesh, materials, held nodes and loads. Needs no Green's functions.
+LiveInput live_input(const Model& model);
+
+struct LiveOptions {
+  LiveLaw law = LiveLaw::corotational;
+  Plasticity plasticity{};      ///< of linear and corotational laws
+  Rayleigh damping{};           ///< C_d = mass M + stiffness K, K the tangent of the step
+  Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
+};
+
+/// A body ready to be stepped: quadrature points, masses, and the pattern of its tangent. Const once made;
+/// shared by threads. Positions, velocities and forces are [d N], dof d node + axis.
+class LiveBody {
+ public:
+  /// Throws Error for springs on other elements than tri3 and tet4, for initial strain where a law has no
+  /// place for it, for plasticity of a law that does not flow, and for numbers out of their range.
+  LiveBody(LiveInput input, const LiveOptions& options);
+
+  [[nodiscard]] const Mesh& mesh() const noexcept { return input_.mesh; }
+  [[nodiscard]] const LiveOptions& options() const noexcept { return options_; }
+  [[nodiscard]] int dimension() const noexcept { return input_.mesh.dimension(); }  ///< d
+  [[nodiscard]] Eigen::Index dofs() const noexcept { return rest_.size(); }         ///< d N
+  [[nodiscard]] Index free_dofs() const noexcept { return static_cast<Index>(dof_of_free_.size()); }
+  /// [d N] number among the free dofs, -1 where held.
+  [[nodiscard]] std::span<const Index> free_of_dof() const noexcept { return free_of_dof_; }
+  [[nodiscard]] std::span<const Index> dof_of_free() const noexcept { return dof_of_free_; }  ///< [n]
+
+  [[nodiscard]] const Eigen::VectorXd& rest() const noexcept { return rest_; }  ///< positions in the mesh [m]
+  /// Where held dofs stay; of others as in the mesh [m].
+  [[nodiscard]] const Eigen::VectorXd& start() const noexcept { return start_; }
+  [[nodiscard]] const Eigen::VectorXd& mass() const noexcept { return mass_; }  ///< lumped [kg]
+  [[nodiscard]] const Eigen::VectorXd& load() const noexcept { return load_; }  ///< with weight [N]
+
+  // Quadrature points: element e has points() of them, from points() * e on.
+  [[nodiscard]] int points() const noexcept { return points_; }  ///< an element
+  [[nodiscard]] Index all_points() const noexcept { return static_cast<Index>(weight_.size()); }
+  [[nodiscard]] double weight(Index point) const noexcept { return weight_[point]; }  ///< volume [m^3]
+  /// [3 x nodes an element] gradients of the shape functions, a column a node; in the plane z is 0 [1/m].
+  [[nodiscard]] Eigen::Map<const Eigen::Matrix3Xd> gradients(Index point) const noexcept {
+    const auto nodes = static_cast<std::size_t>(nodes_per_element_);
+    return {gradient_.data() + 3 * nodes * static_cast<std::size_t>(point), 3, nodes_per_element_};
+  }
+  [[nodiscard]] const LawConstants& constants(Index element) const noexcept {
+    return constants_[input_.material_of_element[element]];
+  }
+  [[nodiscard]] const Mat3& initial_strain(Index element) const noexcept {
+    return initial_strain_[input_.material_of_element[element]];
+  }
+  [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }  ///< of mass_spring
+  [[nodiscard]] const TangentPattern& pattern() const noexcept { return pattern_; }
+
+ private:
+  void check() const;
+  void number_dofs();
+  void find_points();
+  void find_loads();
+
+  LiveInput input_;
+  LiveOptions options_;
+  int points_ = 0;
+  int nodes_per_element_ = 0;
+  std::vector<Index> free_of_dof_, dof_of_free_;
+  Eigen::VectorXd rest_, start_, mass_, load_;
+  std::vector<double> weight_, gradient_;
+  std::vector<LawConstants> constants_;  // [materials]
+  std::vector<Mat3> initial_strain_;     // [materials]
+  std::vector<Spring> springs_;
+  TangentPattern pattern_;
+};
+
+}  // namespace palpate

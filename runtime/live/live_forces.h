@@ -1,0 +1,30 @@
+// Internal forces of a live body, their energy and their tangent.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "runtime/live/live_body.h"
+
+namespace palpate {
+
+/// What a pass over the elements finds.
+struct ForceSums {
+  double energy = 0.0;  ///< of all elements [J]
+  Index inverted = 0;   ///< quadrature points whose volume is zero or less: they are survived
+};
+
+/// The deformation gradient at a quadrature point, in the plane with F_33 = 1. `x` [d N] positions [m].
+Mat3 deformation_gradient(const LiveBody& body, const Eigen::VectorXd& x, Index point) noexcept;
+
+/// f [d N] = -dE/dx, the forces of the elements or springs on their nodes, held ones too [N]. `plastic`
+/// strain of each quadrature point, or empty for none.
+ForceSums internal_forces(const LiveBody& body, const Eigen::VectorXd& x, std::span<const Mat3> plastic,
+                          Eigen::VectorXd& f);
+
+/// Fills `K`, of the body's pattern, with -df/dx of the free dofs (lower triangle) [N/m].
+void assemble_tangent(const LiveBody& body, const Eigen::VectorXd& x, std::span<const Mat3> plastic,
+                      TangentKind kind, LiveMatrix& K);
+
+}  // namespace palpate

@@ -1,0 +1,186 @@
+#include "runtime/live/live_stepper.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+
+namespace palpate {
+namespace {
+
+constexpr int most_depth = 8;          // of halving
+constexpr int rounds_at_rest = 300;    // of the power iteration
+constexpr int rounds_between = 4;      // at each look
+constexpr std::int64_t look_each = 4;  // steps
+constexpr double near_share = 0.9;     // of the limit
+
+double limit_at(const LiveBody& body, const StepperOptions& options, LargestFrequency& frequency) {
+  if (is_implicit(options.scheme.integrator)) return std::numeric_limits<double>::infinity();
+  return longest_step_at(body, options.scheme.integrator,
+                         frequency.estimate(body.start(), {}, rounds_at_rest));
+}
+
+}  // namespace
+
+LiveStepper::LiveStepper(const LiveBody& body, const StepperOptions& options)
+    : body_(body),
+      options_(options),
+      implicit_(body, options.scheme, options.walls),
+      frequency_(body),
+      limit_at_rest_(limit_at(body, options, frequency_)),
+      limit_(limit_at_rest_),
+      none_(Eigen::VectorXd::Zero(body.dofs())) {
+  const char* name = name_of(options.scheme.integrator);
+  if (!(options.time_step > 0.0) || !std::isfinite(options.time_step))
+    throw Error(fmt::format("the time step is {} s", options.time_step), "live body",
+                "give a positive time, e.g. 0.001");
+  if (options.time_step <= limit_at_rest_) return;
+  if (limit_at_rest_ == 0.0) {
+    throw Error(fmt::format("{} grows in steps of any length on a body without damping", name), "live body",
+                "take semi-implicit-euler, verlet, rk4 or an implicit integrator, or give the body damping");
+  }
+  throw Error(fmt::format("steps of {:.4g} s by {} are unstable: the longest stable one is {:.4g} s",
+                          options.time_step, name, limit_at_rest_),
+              "live body", "take shorter steps, a softer or coarser body, or an implicit integrator");
+}
+
+void LiveCounts::add(const LiveReport& report) noexcept {
+  ++steps;
+  if (report.parts > 1) ++halved;
+  if (!report.whole) ++stopped;
+  if (report.inverted > 0) ++inverted;
+  most_inverted = std::max(most_inverted, report.inverted);
+  if (report.is_near) ++near_limit;
+  plastic_work += report.flow.work;
+}
+
+LiveReport LiveStepper::step(LiveState& state, const Eigen::VectorXd& push) {
+  LiveReport report;
+  report.parts = 0;
+  const double end = state.time + options_.time_step;
+  if (!is_implicit(options_.scheme.integrator)) watch_limit(state, report);
+  report.limit = limit_;
+  if (options_.scheme.integrator == Integrator::newmark && !state.has_acceleration)
+    find_acceleration(state, push.size() > 0 ? push : none_);
+  // A body that has become stiffer takes shorter steps.
+  const double parts = std::min(std::ceil(options_.time_step / limit_), 64.0);
+  const double h = options_.time_step / std::max(parts, 1.0);
+  for (int k = 0; k < std::max(static_cast<int>(parts), 1) && report.whole; ++k)
+    report.whole = advance(state, h, push.size() > 0 ? push : none_, 0, report);
+  state.time = end;
+  if (!state.plastic.empty()) {
+    report.flow = flow(body_, state.x, options_.time_step, state.plastic);
+  }
+  counts_.add(report);
+  return report;
+}
+
+/// M a = f - C_d v of the free dofs.
+void LiveStepper::find_acceleration(LiveState& state, const Eigen::VectorXd& push) {
+  internal_forces(body_, state.x, state.plastic, forces_);
+  forces_ += body_.load() + push;
+  add_damping_forces(body_, state.x, state.v, state.plastic, forces_);
+  for (const Index dof : body_.dof_of_free()) state.a[dof] = forces_[dof] / body_.mass()[dof];
+  state.has_acceleration = true;
+}
+
+void LiveStepper::watch_limit(const LiveState& state, LiveReport& report) {
+  if (counts_.steps % look_each == 0) {
+    const double omega = frequency_.estimate(state.x, state.plastic, rounds_between);
+    limit_ = longest_step_at(body_, options_.scheme.integrator, omega);
+  }
+  report.is_near = options_.time_step > near_share * limit_;
+}
+
+/// One step of h, or two halves of it. False when the shortest ones diverge too: the body then stands still.
+bool LiveStepper::advance(LiveState& state, double h, const Eigen::VectorXd& push, int depth,
+                          LiveReport& report) {
+  const LiveState before = state;
+  if (advance_once(state, h, push, report)) {
+    ++report.parts;
+    return true;
+  }
+  state = before;
+  if (depth < most_depth) {
+    return advance(state, 0.5 * h, push, depth + 1, report) &&
+           advance(state, 0.5 * h, push, depth + 1, report);
+  }
+  state.v.setZero();
+  state.a.setZero();
+  ++report.parts;
+  return false;
+}
+
+bool LiveStepper::advance_once(LiveState& state, double h, const Eigen::VectorXd& push, LiveReport& report) {
+  bool whole = true;
+  if (is_implicit(options_.scheme.integrator)) {
+    const ImplicitReport implicit = implicit_.advance(state, h, push);
+    report.newton += implicit.newton;
+    report.contacts = implicit_.contacts().closed();
+    report.inverted = std::max(report.inverted, implicit.inverted);
+    whole = implicit.converged;
+  } else {
+    whole = advance_explicitly(state, h, push, report);
+  }
+  if (!whole || !state.x.allFinite() || !state.v.allFinite()) return false;
+  return true;
+}
+
+bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::VectorXd& push,
+                                     LiveReport& report) {
+  const int d = body_.dimension();
+  const Eigen::VectorXd from = state.x;
+  double energy_before = -1.0, energy = 0.0;
+  const auto accelerate = [&](const Eigen::VectorXd& x, const Eigen::VectorXd& v) {
+    const ForceSums sums = internal_forces(body_, x, state.plastic, forces_);
+    energy = sums.energy;
+    report.inverted = std::max(report.inverted, sums.inverted);
+    if (energy_before < 0.0) energy_before = energy;
+    forces_ += body_.load() + push;
+    add_damping_forces(body_, x, v, state.plastic, forces_);
+    Eigen::VectorXd a = forces_.cwiseQuotient(body_.mass());
+    for (Eigen::Index dof = 0; dof < a.size(); ++dof) {
+      if (body_.free_of_dof()[static_cast<std::size_t>(dof)] < 0) a[dof] = 0.0;
+    }
+    return a;
+  };
+  const auto kinetic = [&] { return 0.5 * state.v.dot(body_.mass().cwiseProduct(state.v)); };
+  const double kinetic_before = kinetic();
+  step_explicitly(options_.scheme.integrator, h, accelerate, state.x, state.v);
+  // No stable step makes energy of this size by itself.
+  const double work =
+      (body_.load() + push).cwiseAbs().dot((state.x - from).cwiseAbs() + h * state.v.cwiseAbs());
+  const double most = 4.0 * (kinetic_before + energy_before + work);
+  if (!(kinetic() <= most + 1e-30)) return false;
+  report.contacts = 0;
+  if (options_.walls.empty()) {
+    return true;
+  }
+  for (Index node = 0; node < std::ssize(body_.mesh().nodes); ++node) {
+    if (body_.free_of_dof()[static_cast<std::size_t>(d * node)] < 0) continue;
+    Vec3 x = node_part(state.x, d, node), v = node_part(state.v, d, node);
+    if (!stop_at_walls(options_.walls, node_part(from, d, node), h, x, v)) continue;
+    ++report.contacts;
+    state.x.segment(Eigen::Index{d} * node, d) = x.head(d);
+    state.v.segment(Eigen::Index{d} * node, d) = v.head(d);
+  }
+  return true;
+}
+
+void add_damping_forces(const LiveBody& body, const Eigen::VectorXd& x, const Eigen::VectorXd& v,
+                        std::span<const Mat3> plastic, Eigen::VectorXd& f) {
+  const Rayleigh& damping = body.options().damping;
+  if (damping.mass > 0.0) f -= damping.mass * body.mass().cwiseProduct(v);
+  if (damping.stiffness == 0.0) return;
+  LiveMatrix K;
+  assemble_tangent(body, x, plastic, TangentKind::positive, K);
+  Eigen::VectorXd free(body.free_dofs());
+  for (Index k = 0; k < body.free_dofs(); ++k) free[k] = v[body.dof_of_free()[k]];
+  const Eigen::VectorXd resisting = K.selfadjointView<Eigen::Lower>() * free;
+  for (Index k = 0; k < body.free_dofs(); ++k) f[body.dof_of_free()[k]] -= damping.stiffness * resisting[k];
+}
+
+}  // namespace palpate

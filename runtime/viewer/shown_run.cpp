@@ -1,0 +1,127 @@
+#include "runtime/viewer/shown_run.h"
+
+#include <optional>
+#include <variant>
+
+#include "base/error.h"
+#include "runtime/viewer/page_connection.h"
+
+namespace palpate {
+namespace {
+
+/// What a word asks of the run.
+struct Ask {
+  ViewedRun& run;
+  void operator()(const PointWord& word) const { run.point(word.wanted); }
+  void operator()(const PauseWord& word) const { run.pause(word.paused); }
+  void operator()(const StepWord&) const { run.step_once(); }
+  void operator()(const ResetWord&) const { run.reset(); }
+  void operator()(const AcknowledgeWord&) const { run.acknowledge(); }
+  void operator()(const ChangeWord& word) const { run.change(word.settings); }
+  void operator()(const RecordWord& word) const { run.record(word.on); }
+  void operator()(const ControlWord&) const {}  // is between pages
+  void operator()(const SeekWord& word) const { run.seek(word.frame); }
+  void operator()(const FollowWord&) const {}  // is the page's own
+};
+
+}  // namespace
+
+void ShownRun::take_mail() {
+  Mail mail = mailbox_.take();
+  if (mail.scene) broadcast_.set_scene(std::move(mail.scene));
+  if (!mail.times.is_null()) broadcast_.set_times(std::move(mail.times));
+  if (mail.state) broadcast_.set_state(std::move(*mail.state));
+  if (mail.picture) broadcast_.set_picture(std::move(*mail.picture));
+  for (const Mail::Ticks& ticks : mail.ticks) broadcast_.add_ticks(ticks.notes, ticks.stride, is_replay_);
+  show_all();
+}
+
+void ShownRun::repeat_state() {
+  broadcast_.repeat_state();
+  show_all();
+}
+
+void ShownRun::show_state_anew() {
+  broadcast_.touch_state();
+  show_all();
+}
+
+void ShownRun::show_all() {
+  const std::set<PageConnection*> pages = open_;
+  for (PageConnection* page : pages) page->send_news();
+}
+
+PageRole ShownRun::role(const PageConnection& page) const {
+  return {controller_ == &page, controller_ != nullptr, open_.size(), page.own_frame()};
+}
+
+void ShownRun::join(PageConnection& page) {
+  open_.insert(&page);
+  if (open_.size() == 1) controller_ = &page;
+  broadcast_.touch_state();
+  page.say(hello_word(is_replay_ ? "replay" : "live", ++joined_, has_book_));
+  show_all();
+}
+
+void ShownRun::leave(PageConnection& page) {
+  if (open_.erase(&page) == 0) return;
+  if (controller_ == &page) {
+    release();
+  } else {
+    show_state_anew();
+  }
+}
+
+void ShownRun::release() {
+  controller_ = nullptr;
+  run_.lose_pointer();
+  show_state_anew();
+}
+
+void ShownRun::hand_over(PageConnection& page, bool take) {
+  if (!take) {
+    if (controller_ == &page) release();
+  } else if (controller_ == nullptr) {
+    controller_ = &page;
+    page.follow();
+    show_state_anew();
+  } else if (controller_ != &page) {
+    page.say(error_word("control", PageError(PageRefusal::control, "another page has control", "",
+                                             "ask for it when that page has given it up")));
+  }
+}
+
+/// Who only watches a replay still looks at what it likes.
+void ShownRun::show_alone(PageConnection& page, std::int64_t frame) {
+  std::optional<RecordedFrame> recorded = run_.recorded_frame(frame);
+  if (recorded && broadcast_.picture()) {
+    page.look_alone({broadcast_.picture()->scene, nullptr, std::move(recorded->picture)}, recorded->frame);
+  }
+}
+
+void ShownRun::obey(PageConnection& page, const PageWord& word) {
+  if (const auto* control = std::get_if<ControlWord>(&word)) return hand_over(page, control->take);
+  if (std::holds_alternative<FollowWord>(word)) return page.follow();
+  const char* name = name_of(word);
+  const auto* seek = std::get_if<SeekWord>(&word);
+  const bool looks_alone = is_replay_ && seek != nullptr && controller_ != &page;
+  if (controller_ != &page && !looks_alone) {
+    page.say(error_word(
+        name, PageError(PageRefusal::control, "this page only watches", "",
+                        controller_ == nullptr ? "take control first" : "another page has control")));
+    return;
+  }
+  try {
+    if (looks_alone) {
+      show_alone(page, seek->frame);
+    } else {
+      std::visit(Ask{run_}, word);
+    }
+  } catch (const Error& error) {
+    page.say(error_word(name, error));
+  } catch (const std::exception& error) {  // no memory, say: the run goes on
+    page.say(error_word(name, Error(error.what(), "", "")));
+  }
+}
+
+}  // namespace palpate
