@@ -63,6 +63,7 @@ CHAPTERS = {
         "embedding",
         "python",
         "cluster",
+        "packages",
         "errors",
     ],
     "Reference": ["file-format", "reference/*"],
