@@ -65,6 +65,17 @@ std::vector<std::string_view> alternatives(std::string_view value) {
   return parts;
 }
 
+/// Endings of files that a meaning lists: ".stl" and ".off" of "a surface (.stl, .off)".
+std::vector<std::string> endings_in(const std::string& meaning) {
+  std::vector<std::string> endings;
+  for (std::size_t at = meaning.find('.'); at != std::string::npos; at = meaning.find('.', at + 1)) {
+    if (at == 0 || (meaning[at - 1] != '(' && meaning[at - 1] != ' ')) continue;
+    const std::size_t end = meaning.find_first_of(" ,;)", at);
+    endings.push_back(meaning.substr(at, end - at));
+  }
+  return endings;
+}
+
 }  // namespace
 
 CommandText command_tree(const CLI::App& app) {
@@ -92,12 +103,18 @@ std::vector<ValueChoice> value_choices(std::string_view value) {
 
 std::vector<ValueChoice> positional_choices(const ArgumentText& argument) {
   const std::string name = argument.names.front();
-  if (name.find('.') != std::string::npos) return {{.word = "", .file_pattern = pattern_of(name)}};
+  std::vector<ValueChoice> choices;
   const std::string file = "NAME.palpate";
   const std::size_t at = argument.meaning.find(file);
-  if (at == std::string::npos) return {};
-  const std::size_t end = argument.meaning.find_first_of(" ,;", at);
-  return {{.word = "", .file_pattern = pattern_of(argument.meaning.substr(at, end - at))}};
+  if (name.find('.') != std::string::npos) {
+    choices.push_back({.word = "", .file_pattern = pattern_of(name)});
+  } else if (at != std::string::npos) {
+    const std::size_t end = argument.meaning.find_first_of(" ,;", at);
+    choices.push_back({.word = "", .file_pattern = pattern_of(argument.meaning.substr(at, end - at))});
+  }
+  for (const std::string& ending : endings_in(argument.meaning))
+    choices.push_back({.word = "", .file_pattern = "*" + ending});
+  return choices;
 }
 
 }  // namespace palpate

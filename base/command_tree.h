@@ -43,7 +43,8 @@ struct ValueChoice {
 /// "FILE".
 [[nodiscard]] std::vector<ValueChoice> value_choices(std::string_view value);
 
-/// Choices of a positional argument, from its name or from the file that its meaning names.
+/// Choices of a positional argument, from its name or from the file and the endings of files that its meaning
+/// names: "NAME.palpate.hdf", "(.stl, .off)".
 [[nodiscard]] std::vector<ValueChoice> positional_choices(const ArgumentText& argument);
 
 }  // namespace palpate

@@ -72,7 +72,9 @@ NAME_choices() {
       rest=${word#"$head"}
       compopt -o filenames 2>/dev/null
       while IFS= read -r file; do
-        if [[ -d $file || $file == ${choice#"$head"} ]]; then COMPREPLY+=("$head$file"); fi
+        if [[ -d $file || $file == ${choice#"$head"} ]]; then
+          [[ " ${COMPREPLY[*]} " == *" $head$file "* ]] || COMPREPLY+=("$head$file")
+        fi
       done < <(compgen -f -- "$rest")
     elif [[ $head == "$word"* ]]; then
       COMPREPLY+=("$head")

@@ -114,6 +114,12 @@ std::string command_section(const std::string& program, const CommandText& comma
          "\n" + entries(command.positionals) + entries(command.options) + footer(command.footer);
 }
 
+/// Text below a heading, which begins a paragraph itself.
+std::string behind_heading(const std::string& text) {
+  const std::string paragraph = ".PP\n";
+  return text.starts_with(paragraph) ? text.substr(paragraph.size()) : text;
+}
+
 }  // namespace
 
 std::string man_page(const CommandText& program, const std::string& version,
@@ -129,7 +135,8 @@ std::string man_page(const CommandText& program, const std::string& version,
     text += ".br\n" + synopsis(program.name, command) + "\n";
   text += ".SH DESCRIPTION\n" + plain(program.meaning) + "\n";
   if (!program.positionals.empty()) text += entries(program.positionals);
-  text += footer(program.footer) + ".SH OPTIONS\n" + entries(program.options) + ".SH COMMANDS\n";
+  text +=
+      footer(program.footer) + ".SH OPTIONS\n" + behind_heading(entries(program.options)) + ".SH COMMANDS\n";
   for (const CommandText& command : program.commands) text += command_section(program.name, command);
   text += ".SH SEE ALSO\n";
   for (const std::string& page : see_also)

@@ -50,6 +50,7 @@ CHAPTERS = {
         "tutorials/read-in-python",
     ],
     "Guide": [
+        "surfaces",
         "model-toml",
         "elements",
         "overlays",

@@ -146,17 +146,16 @@ void for_each_attribute(Visitor&& visit) {
                            }});
 }
 
-/// Datasets that are known before the Green's functions, of a body made of `element`; a field's counts and
-/// limits are set by those above it.
+/// Datasets of the mesh of a body made of `element`.
 template <class Visitor>
-void for_each_body_field(ElementType element, Visitor&& visit) {
+void for_each_mesh_field(ElementType element, Visitor&& visit) {
   using Bytes = std::vector<std::uint8_t>;
   using Int32s = std::vector<std::int32_t>;
   using Int64s = std::vector<std::int64_t>;
   using Doubles = std::vector<double>;
   const ElementTraits& kind = traits(element);
-  const Extent nodes = {Count::nodes}, elements = {Count::elements}, materials = {Count::materials},
-               three = {Count::one, 3, 0}, d = {Count::one, kind.dimension, 0};
+  const Extent nodes = {Count::nodes}, elements = {Count::elements}, three = {Count::one, 3, 0},
+               d = {Count::one, kind.dimension, 0};
 
   visit(Field<double>{"/mesh/nodes",
                       {nodes, three},
@@ -185,6 +184,21 @@ void for_each_body_field(ElementType element, Visitor&& visit) {
                             [](const Model& m) { return m.surface; },
                             [](Model& m, const Int32s& v) { m.surface = v; },
                             nodes});
+}
+
+/// Datasets that are known before the Green's functions, of a body made of `element`; a field's counts and
+/// limits are set by those above it.
+template <class Visitor>
+void for_each_body_field(ElementType element, Visitor&& visit) {
+  using Bytes = std::vector<std::uint8_t>;
+  using Int32s = std::vector<std::int32_t>;
+  using Int64s = std::vector<std::int64_t>;
+  using Doubles = std::vector<double>;
+  const ElementTraits& kind = traits(element);
+  const Extent nodes = {Count::nodes}, elements = {Count::elements}, materials = {Count::materials},
+               three = {Count::one, 3, 0};
+
+  for_each_mesh_field(element, visit);
   visit(Field<std::uint8_t>{"/dofs/fixed",
                             {nodes},
                             [](const Model& m) { return m.fixed; },

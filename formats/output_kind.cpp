@@ -85,6 +85,8 @@ std::string_view name_of(OutputKind kind) noexcept {
       return "page";
     case OutputKind::faces:
       return "list of triangles";
+    case OutputKind::surface:
+      return "repaired surface";
   }
   return "";
 }
@@ -121,6 +123,8 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
               contains(text, "<title>Palpate</title>"));
     case OutputKind::faces:
       return is_loose_triangles(*bytes);
+    case OutputKind::surface:
+      return text.starts_with("OFF\n# repaired by palpate-precompute\n");
   }
   return false;
 }

@@ -17,6 +17,7 @@ enum class OutputKind : std::uint8_t {
   grid,       ///< for ParaView, .vtu
   page,       ///< a recording as HTML
   faces,      ///< triangles that are wrong, .off
+  surface,    ///< that was repaired, .off
 };
 
 /// "table of contact points"

@@ -10,6 +10,7 @@
 
 #include "base/command_line.h"
 #include "base/error.h"
+#include "base/printable.h"
 #include "base/program.h"
 #include "base/spelling.h"
 #include "formats/model_file.h"
@@ -17,6 +18,7 @@
 #include "precompute/bake_report.h"
 #include "precompute/compare.h"
 #include "precompute/description/not_a_description.h"
+#include "precompute/draft_command.h"
 #include "precompute/inspect.h"
 #include "precompute/verify.h"
 
@@ -87,10 +89,37 @@ std::string next_steps(const BakeSummary& bake) {
 
 namespace {
 
-int run_bake(const std::string& model, const BakeOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
+/// Whether the output is what the bake of this description would make, by its text and its source files.
+bool is_done(const Description& description, const std::filesystem::path& output) {
+  if (!std::filesystem::exists(output)) return false;
+  try {
+    const Model model = load_model(output);
+    return model.model_toml == description.text && stale_sources(model, output).empty();
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+/// Bakes it, unless that is not wanted where nothing has changed.
+BakeSummary bake_or_keep(const std::string& model, const BakeOptions& options, bool unless_done) {
+  if (unless_done) {
+    check_is_description(model);
+    const Description description = read_description(model);
+    const std::filesystem::path output =
+        options.output.empty() ? std::filesystem::path(description.name + ".palpate.hdf") : options.output;
+    if (is_done(description, output)) {
+      std::fprintf(stderr, "%s is there, and nothing that it was made from has changed\n",
+                   printable(output.string()).c_str());
+      return {.model = model, .output = output, .result = BakeResult::done};
+    }
+  }
   Team alone;
-  const BakeSummary summary = bake_model(model, options, alone);
+  return bake_model(model, options, alone);
+}
+
+int run_bake(const std::string& model, const BakeOptions& options, bool unless_done) {
+  const auto start = std::chrono::steady_clock::now();
+  const BakeSummary summary = bake_or_keep(model, options, unless_done);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!options.report.empty())
     write_report(options.report, {json_text_of(summary)}, {1, summary.jobs, seconds, {peak_memory()}});
@@ -116,13 +145,20 @@ int run_compare(const std::string& a, const std::string& b, const CompareOptions
 struct Arguments {
   std::string model, file, other_file, part;
   BakeOptions bake;
+  bool unless_done = false;
+  DraftArguments draft;
   CompareOptions compare;
   HelpArguments help;
 };
 
 void add_bake(CLI::App& app, Arguments& arguments) {
-  app.add_option("MODEL.toml", arguments.model, "description of the body")->type_name("");
+  app.add_option("MODEL.toml", arguments.model,
+                 "description of the body; or a surface (.stl, .obj, .ply, .off) or a labelled image (.inr, "
+                 ".inr.gz), of which the description NAME.model.toml is written beside it first")
+      ->type_name("");
   add_bake_options(app, arguments.bake);
+  app.add_flag("--unless-done", arguments.unless_done,
+               "do nothing where the output is there and nothing that it was made from has changed");
   app.add_option(
          "--part", arguments.part,
          "compute only the K-th of N shares of the columns, into FILE.part-K-of-N; 'join' makes one file "
@@ -131,9 +167,11 @@ void add_bake(CLI::App& app, Arguments& arguments) {
       ->check([](const std::string& text) {
         return read_part_number(text) ? "" : "'" + text + "' is not K/N with 1 <= K <= N <= 100000";
       });
+  add_draft_options(app, arguments.draft);
   app.footer(
       "Examples:\n"
       "  palpate-precompute meshes/models/cube/model.toml    writes cube.palpate.hdf\n"
+      "  palpate-precompute organ.stl                        writes organ.model.toml and organ.palpate.hdf\n"
       "  palpate-precompute help verify                      more about a command\n"
       "  palpate-runtime play cube.palpate.hdf --view        then: push it in a browser\n"
       "Ctrl-C, SIGTERM or SIGUSR1 keeps finished columns in FILE.partial and .progress; the same command "
@@ -230,7 +268,7 @@ std::string usage_hint(const CLI::App& app, const std::string& first_word) {
     return "See palpate-precompute " + app.get_subcommands().front()->get_name() + " --help";
   }
   if (of_help) return "See palpate-precompute --help";
-  const auto command = meant(first_word, {"join", "inspect", "verify", "compare", "help"});
+  const auto command = meant(first_word, {"new", "join", "inspect", "verify", "compare", "help"});
   if (command && !std::filesystem::exists(first_word))
     return "Did you mean palpate-precompute " + *command + "? See palpate-precompute --help";
   return "See palpate-precompute --help";
@@ -248,6 +286,7 @@ int run_commands(int argc, char** argv) {
   app.require_subcommand(0, 1);
   Arguments arguments;
   add_bake(app, arguments);
+  const CLI::App* new_command = add_new(app, arguments.file, arguments.draft);
   const CLI::App* join_command = add_join(app, arguments);
   const CLI::App* inspect_command = add_inspect(app, arguments);
   const CLI::App* verify_command = add_verify(app, arguments);
@@ -261,11 +300,12 @@ int run_commands(int argc, char** argv) {
     }
     if (app.get_subcommands().empty() && arguments.model.empty())
       throw CLI::RequiredError(
-          "MODEL.toml, `join MODEL.toml`, `inspect FILE`, `verify FILE` or `compare A B`");
-    if (const auto command = meant(arguments.model, {"join", "inspect", "verify", "compare"});
+          "MODEL.toml, `new`, `join MODEL.toml`, `inspect FILE`, `verify FILE` or `compare A B`");
+    if (const auto command = meant(arguments.model, {"new", "join", "inspect", "verify", "compare"});
         command && !std::filesystem::exists(arguments.model))
       throw CLI::ParseError("there is no command '" + arguments.model + "' and no such file",
                             CLI::ExitCodes::ExtrasError);
+    if (app.get_subcommands().empty()) check_draft_options(arguments.model, arguments.draft);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     return tell_usage(error.what(), usage_hint(app, argc > 1 ? argv[1] : ""));
@@ -276,9 +316,11 @@ int run_commands(int argc, char** argv) {
   }
   if (compare_command->parsed()) return run_compare(arguments.file, arguments.other_file, arguments.compare);
   if (verify_command->parsed()) return run_verify(arguments.file);
+  if (new_command->parsed()) return run_new(arguments.file, arguments.draft);
   arguments.bake.part = read_part_number(arguments.part);
   arguments.bake.join = join_command->parsed();
-  return run_bake(arguments.bake.join ? arguments.file : arguments.model, arguments.bake);
+  return run_bake(arguments.bake.join ? arguments.file : described(arguments.model, arguments.draft),
+                  arguments.bake, arguments.unless_done);
 }
 
 }  // namespace palpate

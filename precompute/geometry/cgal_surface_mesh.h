@@ -5,7 +5,7 @@
 
 #include "meshes/mesh.h"
 #include "precompute/description/description.h"
-#include "precompute/geometry/surface_input.h"
+#include "precompute/surfaces/surface_input.h"
 
 namespace palpate {
 

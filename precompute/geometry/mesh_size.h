@@ -5,8 +5,8 @@
 
 #include "base/child_process.h"
 #include "precompute/description/description.h"
-#include "precompute/geometry/surface_input.h"
 #include "precompute/geometry/voxel_body.h"
+#include "precompute/surfaces/surface_input.h"
 
 namespace palpate {
 

@@ -8,7 +8,7 @@
 #include "precompute/description/description.h"
 #include "precompute/geometry/mesh_parts.h"
 #include "precompute/geometry/mesh_size.h"
-#include "precompute/geometry/surface_input.h"
+#include "precompute/surfaces/surface_input.h"
 
 namespace palpate {
 

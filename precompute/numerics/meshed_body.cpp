@@ -12,9 +12,9 @@
 #include "precompute/geometry/material_parts.h"
 #include "precompute/geometry/picture.h"
 #include "precompute/geometry/plane_mesh.h"
-#include "precompute/geometry/surface_input.h"
 #include "precompute/geometry/tetgen_mesh.h"
 #include "precompute/numerics/fixed_nodes.h"
+#include "precompute/surfaces/surface_input.h"
 
 namespace palpate {
 namespace {

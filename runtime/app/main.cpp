@@ -19,6 +19,7 @@
 #include "runtime/app/session.h"
 #include "runtime/app/view.h"
 #include "runtime/loop/numbers.h"
+#include "runtime/push/push_command.h"
 
 namespace {
 
@@ -36,6 +37,7 @@ struct Arguments {
   std::optional<std::string> overlay;
   std::string field;
   PlayArguments play;
+  PushArguments push;
   DevicesOptions devices;
   ExportOptions exported;
   std::vector<std::filesystem::path> recordings;
@@ -197,7 +199,7 @@ std::vector<ProbePlace> read_places(const CLI::App& probe, const Arguments& argu
   return places;
 }
 
-constexpr std::string_view commands = "play, view, probe, session, export or devices";
+constexpr std::string_view commands = "push, play, view, probe, session, export or devices";
 
 /// Where the first word is no command, a hint of what was meant by it; else nothing.
 std::string meant_by(const CLI::App& app, const std::string& word) {
@@ -208,7 +210,10 @@ std::string meant_by(const CLI::App& app, const std::string& word) {
     return "palpate-runtime play " + word + " --view shows it and lets you push it. " + see;
   if (word.ends_with(".toml"))
     return "palpate-precompute " + word + " makes the file that is played with. " + see;
-  const auto command = meant(word, {"probe", "play", "view", "export", "session", "devices", "help"});
+  for (const char* const ending : {".stl", ".obj", ".ply", ".off", ".inr", ".inr.gz"})
+    if (word.ends_with(ending))
+      return "palpate-runtime push " + word + " makes a body of it that you can push. " + see;
+  const auto command = meant(word, {"push", "probe", "play", "view", "export", "session", "devices", "help"});
   return command ? "Did you mean palpate-runtime " + *command + "? " + see
                  : fmt::format("Commands are {}. {}", commands, see);
 }
@@ -222,6 +227,22 @@ int play_and_name_next(const PlayOptions& options) {
   return status;
 }
 
+/// Bakes what is not baked yet and plays it with a viewer. Wrong arguments are told before a minute's work.
+int push(const PushArguments& arguments) {
+  PlayArguments play_arguments;
+  play_arguments.file = arguments.file;
+  play_arguments.view = true;
+  play_arguments.view_address = arguments.view_address;
+  play_arguments.duration = arguments.duration;
+  PlayOptions options = read_play(play_arguments);
+  if (!is_baked(arguments)) {
+    const Baked baked = bake_first(arguments);
+    if (baked.status != exit_ok) return baked.status;
+    options.file = baked.file;
+  }
+  return play(options);
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Lets a tool touch a precomputed elastic body and computes the finite-element forces.",
                "palpate-runtime");
@@ -230,10 +251,12 @@ int run(int argc, char** argv) {
   app.require_subcommand(0, 1);
   app.footer(
       "Examples:\n"
-      "  palpate-runtime play cube.palpate.hdf --view    push it in a browser\n"
+      "  palpate-runtime push organ.stl                  make a body of a surface and push it in a browser\n"
+      "  palpate-runtime play cube.palpate.hdf --view    push a precomputed one\n"
       "  palpate-runtime help play                       more about a command\n"
       "Exit status: 0 done, 1 bad input or file, 2 wrong arguments, 3 a replay differed, 130 interrupted.");
   Arguments arguments;
+  const CLI::App* push_command = add_push(app, arguments.push);
   const CLI::App* play_command = add_play(app, arguments.play);
   const CLI::App* view_command = add_view(app, arguments);
   const CLI::App* probe_command = add_probe(app, arguments);
@@ -256,6 +279,7 @@ int run(int argc, char** argv) {
     if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.force);
     if (view_command->parsed()) return view(arguments.recordings, read_view_address(arguments.view_address));
     if (export_command->parsed()) return export_html(arguments.exported);
+    if (push_command->parsed()) return push(arguments.push);
     if (play_command->parsed()) return play_and_name_next(read_play(arguments.play));
     return probe(
         {.file = arguments.file,

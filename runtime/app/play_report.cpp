@@ -205,9 +205,17 @@ void print_live(const Body& body, const LiveTelling& live) {
       counts.halved, counts.stopped, counts.inverted, counts.most_inverted);
   fmt::print(
       stderr,
-      "the tool met the compliance of {:.3g} s ago; against the solver it was off by {:.2g} m and {:.2g} N "
-      "at most, of forces up to {:.3g} N\n",
-      live.compliance_age, live.largest_error, live.largest_force_error, live.largest_force);
+      "the tool met the compliance of {:.3g} s ago, renewed {} times and turned {} times; against the solver "
+      "it was off by {:.2g} m and {:.2g} N at most, of forces up to {:.3g} N\n",
+      live.compliance_age, live.renewals, live.turns, live.largest_error, live.largest_force_error,
+      live.largest_force);
+  if (counts.near_limit > 0)
+    print_warning(fmt::format(
+        "the body stiffened: {} explicit steps of {:.3g} s were longer than nine tenths of the longest "
+        "stable "
+        "one, which was {:.3g} s at least, or were cut to it; give it a shorter --live-step or an implicit "
+        "--integrator",
+        counts.near_limit, body.live()->stepper.time_step, live.step_limit));
   if (counts.stopped > 0)
     print_warning(
         fmt::format("in {} steps the solver found no solution however short they were, and stopped the body "
@@ -226,7 +234,11 @@ Json json_live(const Body& body, const LiveTelling& live) {
           {"steps_with_inverted_elements", counts.inverted},
           {"most_inverted", counts.most_inverted},
           {"plastic_work_J", counts.plastic_work},
+          {"longest_stable_step_s", std::isfinite(live.step_limit) ? Json(live.step_limit) : Json(nullptr)},
+          {"steps_near_limit", counts.near_limit},
           {"compliance_age_s", live.compliance_age},
+          {"compliance_renewals", live.renewals},
+          {"compliance_turns", live.turns},
           {"largest_error_m", live.largest_error},
           {"last_error_m", live.last_error},
           {"largest_force_error_N", live.largest_force_error},

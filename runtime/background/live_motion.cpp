@@ -7,26 +7,13 @@
 #include "runtime/solve/node_vectors.h"
 
 namespace palpate {
-namespace {
 
-/// At rest as the tick has the body: under its loads.
-LiveState start_of(const Body& body, const LiveBody& live) {
-  LiveState state(live);
-  const Model& model = body.model();
-  for (std::size_t node = 0; node < model.mesh.nodes.size(); ++node) {
-    state.x.segment(Eigen::Index{live.dimension()} * static_cast<Eigen::Index>(node), live.dimension()) =
-        (model.mesh.nodes[node] + model.rest_displacement[node]).head(live.dimension());
-  }
-  return state;
-}
-
-}  // namespace
-
-LiveMotion::LiveMotion(const Body& body)
+LiveMotion::LiveMotion(const Body& body, bool renews_compliance)
     : body_(body),
       live_(body.live()->body),
       stepper_(live_, body.live()->stepper),
-      state_(start_of(body, live_)),
+      compliance_(body, renews_compliance),
+      state_(state_at_rest(body)),
       predicted_(state_),
       push_(Eigen::VectorXd::Zero(live_.dofs())),
       by_load_(static_cast<std::size_t>(body.greens().order())),
@@ -41,8 +28,9 @@ void LiveMotion::predict() noexcept {
 }
 
 void LiveMotion::rest() noexcept {
-  state_ = start_of(body_, live_);
+  state_ = state_at_rest(body_);
   push_.setZero();
+  compliance_.rest();
   std::fill(by_last_load_.begin(), by_last_load_.end(), 0.0);
   predict();
   const std::lock_guard lock(mutex_);
@@ -67,17 +55,17 @@ void LiveMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcep
   const int d = live_.dimension();
   Eigen::VectorXd push(live_.dofs());
   put_on(job.load, push);
-  std::fill(by_load_.begin(), by_load_.end(), 0.0);
-  if (!job.load.empty()) body_.greens().displacement(job.load.nodes(), job.load.forces(), by_load_);
+  displace(job.load, by_load_);
   LiveReport report = predicted_report_;
   if (push == push_) {
     state_ = predicted_;
   } else {
     report = stepper_.step(state_, push);
   }
-  compare(job, report);
+  const double error = compare(job, report);
   push_ = push;
   predict();
+  if (compliance_.follow(state_, error)) displace(job.load, by_load_);
   std::swap(by_load_, by_last_load_);
   for (Index stored = 0; stored < body_.greens().nodes(); ++stored) {
     const Vec3 moved = node_part(predicted_.x, d, body_.mesh_node(stored)) - body_.rest_position(stored);
@@ -85,8 +73,14 @@ void LiveMotion::do_job(const MotionJob& job, bool, std::span<double> u) noexcep
   }
 }
 
-/// Where the tick had the loaded nodes, against where they are.
-void LiveMotion::compare(const MotionJob& job, const LiveReport& report) noexcept {
+/// u [n] = W f.
+void LiveMotion::displace(const NodalLoad& load, std::vector<double>& u) const noexcept {
+  std::fill(u.begin(), u.end(), 0.0);
+  if (!load.empty()) compliance_.now().displacement(load.nodes(), load.forces(), u);
+}
+
+/// Where the tick had the loaded nodes, against where they are. By how much the force is off, of it.
+double LiveMotion::compare(const MotionJob& job, const LiveReport& report) noexcept {
   const int d = live_.dimension();
   double along = 0.0, by_compliance = 0.0, largest = 0.0;
   Vec3 sum = Vec3::Zero();
@@ -103,12 +97,16 @@ void LiveMotion::compare(const MotionJob& job, const LiveReport& report) noexcep
   }
   const std::lock_guard lock(mutex_);
   telling_.counts.add(report);
-  telling_.compliance_age = state_.time;
+  telling_.step_limit = std::min(telling_.step_limit, report.limit);
+  telling_.compliance_age = state_.time - compliance_.factored();
+  telling_.renewals = compliance_.renewals();
+  telling_.turns = compliance_.turns();
   telling_.last_error = largest;
   telling_.last_force_error = by_compliance > 0.0 ? sum.norm() * std::abs(along) / by_compliance : 0.0;
   telling_.largest_error = std::max(telling_.largest_error, largest);
   telling_.largest_force_error = std::max(telling_.largest_force_error, telling_.last_force_error);
   telling_.largest_force = std::max(telling_.largest_force, sum.norm());
+  return sum.norm() > 0.0 ? telling_.last_force_error / sum.norm() : 0.0;
 }
 
 }  // namespace palpate

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <mutex>
 #include <vector>
 
+#include "runtime/background/live_compliance.h"
 #include "runtime/background/motion_stepper.h"
 #include "runtime/live/live_stepper.h"
 
@@ -14,6 +16,8 @@ namespace palpate {
 struct LiveTelling {
   LiveCounts counts;
   double compliance_age = 0.0;  ///< time of the body since the compliance that ticks use was factored [s]
+  std::int64_t renewals = 0;    ///< times that it was factored anew
+  std::int64_t turns = 0;       ///< times that it was turned with the body
   /// How far loaded nodes were at the end of a step from where the compliance had them, at most [m]; and of
   /// the last.
   double largest_error = 0.0;
@@ -22,30 +26,41 @@ struct LiveTelling {
   /// [N].
   double largest_force_error = 0.0;
   double last_force_error = 0.0;
+  /// The shortest of the longest stable steps on the way, of explicit integrators [s]; else infinity.
+  double step_limit = std::numeric_limits<double>::infinity();
   double largest_force = 0.0;  ///< sum of the forces on the body at the end of a step [N]
 };
 
 /// Steps a live body. The tick meets x = x_p + W (f - f_p): x_p is the step with the forces f_p of the last
-/// one held, W the compliance in the body's Greens. The forces f that the tick ends with do the step anew,
-/// without W; how far the two are apart is the error of the local model.
+/// one held, W the compliance of one step, which is renewed as the body changes (LiveCompliance). The forces
+/// f that the tick ends with do the step anew, without W; how far the two are apart is the error of the local
+/// model.
 class LiveMotion final : public MotionStepper {
  public:
   /// `body` must have a live one, and live as long.
-  explicit LiveMotion(const Body& body);
+  explicit LiveMotion(const Body& body, bool renews_compliance = true);
 
   void rest() noexcept override;
   void do_job(const MotionJob& job, bool lets_go, std::span<double> u) noexcept override;
+
+  [[nodiscard]] std::shared_ptr<const Greens> compliance() const noexcept override {
+    return compliance_.renewed();
+  }
+  [[nodiscard]] bool is_near_limit() const noexcept override { return predicted_report_.is_near; }
+  [[nodiscard]] const LiveState& state() const noexcept { return state_; }
 
   [[nodiscard]] LiveTelling telling() const;  ///< from any thread
 
  private:
   void put_on(const NodalLoad& load, Eigen::VectorXd& push) const noexcept;
   void predict() noexcept;
-  void compare(const MotionJob& job, const LiveReport& report) noexcept;
+  void displace(const NodalLoad& load, std::vector<double>& u) const noexcept;
+  double compare(const MotionJob& job, const LiveReport& report) noexcept;
 
   const Body& body_;
   const LiveBody& live_;
   LiveStepper stepper_;
+  LiveCompliance compliance_;
   LiveReport predicted_report_;
   LiveState state_, predicted_;       // now; at the end of the step that is predicted
   Eigen::VectorXd push_;              // [d N] forces with which it was predicted

@@ -5,12 +5,14 @@
 
 #include "runtime/background/live_motion.h"
 #include "runtime/background/packed_motion.h"
+#include "runtime/tick/surface_motion.h"
 
 namespace palpate {
 namespace {
 
 constexpr auto pause = std::chrono::microseconds(50);
 constexpr auto long_pause = std::chrono::milliseconds(1);  // while nothing moves
+constexpr std::size_t most_posted = 64;                    // jobs that a replay may be behind by
 constexpr int patience = 2000;                             // pauses until then
 
 int processors_beside_the_tick() {
@@ -39,17 +41,35 @@ MotionSource::~MotionSource() {
 }
 
 void MotionSource::receive(State& state, std::int64_t step) noexcept {
-  if (state.surface.motion.sample_step() < step) receive(state);
+  if (state.surface.motion.sample_step() >= step) return;
+  const auto job =
+      std::find_if(posted_.begin(), posted_.end(), [&](const MotionJob& at) { return at.step == step; });
+  if (job == posted_.end()) return receive(state);
+  do_job(*job);
+  take(state);
 }
 
 void MotionSource::receive(State& state) noexcept {
   if (!state.surface.motion.active()) return;
   if (!in_background_ && state.surface.motion.job().step != done_) do_job(state.surface.motion.job());
-  state.surface.motion.receive(samples_.read());
+  take(state);
+}
+
+void MotionSource::take(State& state) noexcept {
+  const MotionSample& sample = samples_.read();
+  if (state.surface.motion.receive(sample)) change_compliance(body_, state.surface, sample.compliance);
 }
 
 void MotionSource::post(const State& state) noexcept {
-  if (!in_background_ || !state.surface.motion.active()) return;
+  if (!state.surface.motion.active()) return;
+  if (!in_background_) {
+    const MotionJob& job = state.surface.motion.job();
+    if (!posted_.empty() && job.step == posted_.back().step) return;
+    if (!posted_.empty() && job.step < posted_.back().step) posted_.clear();  // the state was set back
+    if (posted_.size() == most_posted) posted_.pop_front();
+    posted_.push_back(job);
+    return;
+  }
   jobs_.next() = state.surface.motion.job();
   jobs_.publish();
 }
@@ -81,6 +101,8 @@ void MotionSource::do_job(const MotionJob& job) noexcept {
   sample.step = job.step;
   sample.let_go = job.let_go;
   stepper_->do_job(job, job.let_go != let_go_done_, sample.u);
+  sample.compliance = stepper_->compliance();
+  sample.is_near_limit = stepper_->is_near_limit();
   let_go_done_ = job.let_go;
   samples_.publish();
   ++steps_;

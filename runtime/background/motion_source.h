@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -31,7 +32,7 @@ class MotionSource {
   MotionSource& operator=(const MotionSource&) = delete;
 
   void receive(State& state) noexcept;
-  /// For a replay of a tick that had the samples up to `step`; not in the background.
+  /// For a replay of a tick whose last sample was of `step`, of jobs up to 64 ago; not in the background.
   void receive(State& state, std::int64_t step) noexcept;
   void post(const State& state) noexcept;
 
@@ -41,6 +42,7 @@ class MotionSource {
 
  private:
   void work() noexcept;
+  void take(State& state) noexcept;
   void do_job(const MotionJob& job) noexcept;
 
   const Body& body_;
@@ -48,6 +50,7 @@ class MotionSource {
   bool in_background_;
   Latest<MotionJob> jobs_;
   Latest<MotionSample> samples_;
+  std::deque<MotionJob> posted_;  // the last ones; not in the background
   std::int64_t done_ = 0;         // the last job
   std::int64_t let_go_done_ = 0;  // of the body
   std::atomic<std::int64_t> steps_ = 0;

@@ -1,6 +1,7 @@
 // How the motion of all dofs is stepped beside the tick.
 #pragma once
 
+#include <memory>
 #include <span>
 
 #include "runtime/body/free_motion.h"
@@ -20,6 +21,10 @@ class MotionStepper {
   /// Does a job, `lets_go` with its release; fills u [n] of the stored dofs at the end of the step after, as
   /// it would be without contact forces [m].
   virtual void do_job(const MotionJob& job, bool lets_go, std::span<double> u) noexcept = 0;
+  /// Whether the last step was explicit, and close to the longest stable one.
+  [[nodiscard]] virtual bool is_near_limit() const noexcept { return false; }
+  /// What contact forces act by on top of that u; null: the body's Green's functions.
+  [[nodiscard]] virtual std::shared_ptr<const Greens> compliance() const noexcept { return nullptr; }
 };
 
 }  // namespace palpate

@@ -262,8 +262,8 @@ void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<dou
   add(displacement, -1.0, dynamic_contact_ ? held_ : pending_held_);
 }
 
-void FreeMotion::receive(const MotionSample& sample) noexcept {
-  if (sample.step <= sample_step_ || sample.step > job_.step) return;
+bool FreeMotion::receive(const MotionSample& sample) noexcept {
+  if (sample.step <= sample_step_ || sample.step > job_.step) return false;
   const bool has_held = held_in_flight_ && sample.let_go == job_.let_go;
   for (std::size_t i = 0; i < u_.size(); ++i) {
     u_before_[i] += share_ * (u_[i] - u_before_[i]);
@@ -275,8 +275,19 @@ void FreeMotion::receive(const MotionSample& sample) noexcept {
     held_in_flight_ = false;
   }
   sample_step_ = sample.step;
+  is_near_limit_ = sample.is_near_limit;
   sample_phase_ = phase_ % ticks_per_step_;
   share_ = 0.0;
+  return true;
+}
+
+void FreeMotion::take_over(const Body& body, std::span<const double> u, double sign) noexcept {
+  add(u, sign, u_before_);
+  for (std::size_t node = 0; node < value_.size(); ++node) {
+    const SurfaceParts parts = body.surface_parts(static_cast<Index>(node));
+    for (std::size_t k = 0; k < parts.stored.size(); ++k)
+      value_[node] += sign * parts.weights[k] * vector_at(u, dimension_, parts.stored[k]);
+  }
 }
 
 }  // namespace palpate

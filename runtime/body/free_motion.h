@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -34,6 +35,9 @@ struct MotionSample {
   std::int64_t step = 0;    ///< of the job that it answers
   std::int64_t let_go = 0;  ///< how many are in it
   std::vector<double> u;    ///< [n] without contact forces at the end of the step after [m]
+  /// What contact forces act by from then on, for a live body; null: the body's Green's functions.
+  std::shared_ptr<const Greens> compliance{};
+  bool is_near_limit = false;  ///< a live body's explicit step is close to the longest stable one
 };
 
 /// A moment of free motion, for the eye: the modes times q plus u.
@@ -88,8 +92,14 @@ class FreeMotion {
 
   /// For MotionSource: what is to be done next; the sample that it made.
   [[nodiscard]] const MotionJob& job() const noexcept { return job_; }
-  void receive(const MotionSample& sample) noexcept;
+  /// False where it is old.
+  bool receive(const MotionSample& sample) noexcept;
+  /// The part of the motion that contact forces make is another by -u [n] from now on, as their compliance
+  /// is: u comes to the motion beside them until the next sample. After `receive`.
+  void take_over(const Body& body, std::span<const double> u, double sign) noexcept;
   [[nodiscard]] std::int64_t sample_step() const noexcept { return sample_step_; }  ///< of the last
+  /// Whether the last sample is of an explicit step that is close to the longest stable one.
+  [[nodiscard]] bool is_near_limit() const noexcept { return is_near_limit_; }
   /// Whether the packed dynamics are behind their time, after begin_tick: what is seen waits for them.
   [[nodiscard]] bool is_late() const noexcept { return ends_step() && job_.step > sample_step_; }
 
@@ -127,6 +137,7 @@ class FreeMotion {
   // Packed.
   MotionJob job_;
   std::int64_t sample_step_ = 0;
+  bool is_near_limit_ = false;
   bool held_in_flight_ = false;       // held_ until a sample has it
   std::int64_t sample_phase_ = 0;     // phase in which the sample came
   std::vector<double> u_before_, u_;  // [n] samples between which the tick is

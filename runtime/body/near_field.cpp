@@ -200,17 +200,17 @@ void NearField::respond(const Body& body, Index place) noexcept {
   }
 }
 
-/// C between a node and those before it and itself.
-void NearField::connect(const Body& body, Index place) noexcept {
+/// C between a node and the first `count`, which are those before it and itself; for a group it may be more.
+void NearField::connect(const Body& body, Index place, Index count) noexcept {
   if (patch_place(place) >= 0) {
     connect_within_patch(place);
   } else if (is_group(place)) {
-    connect_by_members(place);
+    connect_by_members(place, count);
   } else {
     connect_beside_patch(body, place);
   }
   const std::ptrdiff_t d = dimension_;
-  const std::ptrdiff_t width = d * (place + 1);
+  const std::ptrdiff_t width = d * count;
   for (std::ptrdiff_t axis = 0; axis < d; ++axis)
     std::copy_n(blocks_.data() + axis * width, width, C_.data() + (d * place + axis) * stride_);
   // The node's columns go into each row at once: a row is a place in memory of its own.
@@ -222,9 +222,9 @@ void NearField::connect(const Body& body, Index place) noexcept {
 }
 
 /// From the members' rows: A^T C A of their maps A.
-void NearField::connect_by_members(Index place) noexcept {
+void NearField::connect_by_members(Index place, Index count) noexcept {
   const std::ptrdiff_t d = dimension_;
-  const std::ptrdiff_t width = d * (place + 1);
+  const std::ptrdiff_t width = d * count, after = d * (place + 1);
   std::fill_n(blocks_.data(), d * width, 0.0);
   const auto for_each_entry = [&](auto&& visit) {
     for_each_member(place, [&](Index member, double, const Eigen::Matrix3d& map) {
@@ -234,7 +234,10 @@ void NearField::connect_by_members(Index place) noexcept {
     });
   };
   for_each_entry([&](std::ptrdiff_t dof, std::ptrdiff_t i, double factor) {
-    palpate::add(C_.data() + dof * stride_, factor, blocks_.data() + i * width, d * place);
+    const double* row = C_.data() + dof * stride_;
+    double* block = blocks_.data() + i * width;
+    palpate::add(row, factor, block, d * place);
+    palpate::add(row + after, factor, block + after, width - after);
   });
   for_each_entry([&](std::ptrdiff_t dof, std::ptrdiff_t j, double factor) {
     for (std::ptrdiff_t i = 0; i < d; ++i)
@@ -276,8 +279,8 @@ void NearField::connect_beside_patch(const Body& body, Index place) noexcept {
   const std::ptrdiff_t width = std::ptrdiff_t{d} * base_count_;
   std::fill_n(by_base_.data(), d * width, 0.0);
   for (Index k = 0; k < part_count_[at(place)]; ++k) {
-    body.greens().gather(base_[at(bases_of_[at(parts_ * place + k)])], {base_.data(), at(base_count_)},
-                         {gathered_.data(), static_cast<std::size_t>(d * width)});
+    load_.greens(body).gather(base_[at(bases_of_[at(parts_ * place + k)])], {base_.data(), at(base_count_)},
+                              {gathered_.data(), static_cast<std::size_t>(d * width)});
     palpate::add(gathered_.data(), part_weight_[at(parts_ * place + k)], by_base_.data(), d * width);
   }
   double* block = blocks_.data();
@@ -386,6 +389,25 @@ bool NearField::change_patch(const Body& body, std::shared_ptr<const Patch> patc
     connect(body, place);
   }
   return true;
+}
+
+void NearField::change_compliance(const Body& body, std::shared_ptr<const Greens> compliance) noexcept {
+  ++revision_;
+  load_.compliance = std::move(compliance);
+  bool has_groups = false;
+  for (Index place = 0; place < count_; ++place) has_groups = has_groups || is_group(place);
+  for (Index place = count_; place-- > 0 && !has_groups;) {
+    if (wanted_[at(place)] != tick_ && !is_loaded(place)) forget(place);
+  }
+  for (Index place = 0; place < count_; ++place) {
+    if (!is_group(place)) connect(body, place);
+  }
+  for (Index place = 0; place < count_; ++place) {  // from the rows of their members, which may come later
+    if (is_group(place)) connect(body, place, count_);
+  }
+  for (std::size_t dof = 0; dof < at(dimension_ * count_); ++dof) begun_[dof] -= displacement_[dof];
+  displace();
+  for (std::size_t dof = 0; dof < at(dimension_ * count_); ++dof) begun_[dof] += displacement_[dof];
 }
 
 void NearField::unload() noexcept {

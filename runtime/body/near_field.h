@@ -78,6 +78,10 @@ class NearField {
   /// in this tick are forgotten. False, and nothing happens, when the patch is larger than there is room for,
   /// or groups are wanted.
   bool change_patch(const Body& body, std::shared_ptr<const Patch> patch) noexcept;
+  /// Gathers all of C anew from another compliance, null for the body's Green's functions. Forces stay as
+  /// they are, their displacement does not. Nodes that were not wanted in this tick are forgotten where there
+  /// are no groups.
+  void change_compliance(const Body& body, std::shared_ptr<const Greens> compliance) noexcept;
   /// How often all of C was gathered anew. As long as it is the same, so is what C has between two nodes that
   /// stay.
   [[nodiscard]] std::int64_t revision() const noexcept { return revision_; }
@@ -116,8 +120,9 @@ class NearField {
   void follow(const Body& body, Index place, Index surface_node) noexcept;
   void leave(Index place) noexcept;
   void move(Index from, Index to) noexcept;
-  void connect(const Body& body, Index place) noexcept;
-  void connect_by_members(Index place) noexcept;
+  void connect(const Body& body, Index place) noexcept { connect(body, place, place + 1); }
+  void connect(const Body& body, Index place, Index count) noexcept;
+  void connect_by_members(Index place, Index count) noexcept;
   void connect_to_group(Index group, const double* by, double* block) const noexcept;
   void connect_within_patch(Index place) noexcept;
   void connect_beside_patch(const Body& body, Index place) noexcept;

@@ -23,6 +23,10 @@ SurfaceLoad::SurfaceLoad(int d, Index near_nodes, Index stored_nodes, Index patc
       patch_force(dofs(d, static_cast<Index>(patch_place.size()))),
       beside(dofs(d, patch_nodes)) {}
 
+const Greens& SurfaceLoad::greens(const Body& body) const noexcept {
+  return compliance != nullptr ? *compliance : body.greens();
+}
+
 void SurfaceLoad::clear() noexcept {
   count = 0;
   patch_count = 0;
@@ -67,7 +71,7 @@ void surface_displacement(const Body& body, const SurfaceLoad& load, std::span<d
       sum += parts.weights[k] * of_stored(parts.stored[k]);
     return sum;
   };
-  body.greens().displacement(load.nodes(), load.forces(), stored);
+  load.greens(body).displacement(load.nodes(), load.forces(), stored);
   if (moves) add_motion(body, *motion, stored);
   for (std::size_t node = 0; node < u.size(); ++node) {
     u[node] =

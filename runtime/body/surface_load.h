@@ -5,9 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "runtime/body/greens.h"
 #include "runtime/body/patch.h"
 
 namespace palpate {
+
+class Body;
 
 /// The forces of a tick. Taking one over another of the same body and room allocates nothing.
 struct SurfaceLoad {
@@ -28,12 +31,16 @@ struct SurfaceLoad {
     return {force.data(), static_cast<std::size_t>(dimension * count)};
   }
 
+  /// What the forces act by: `compliance` or the body's Green's functions.
+  [[nodiscard]] const Greens& greens(const Body& body) const noexcept;
+
   int dimension;  ///< d
   Index count = 0;
   std::vector<Index> node;
   std::vector<double> force;
-  std::shared_ptr<const Patch> patch;  ///< null: no overlay
-  Index patch_count = 0;               ///< forces on surface nodes of the patch
+  std::shared_ptr<const Patch> patch;        ///< null: no overlay
+  std::shared_ptr<const Greens> compliance;  ///< of a live body that has changed; null: the body's
+  Index patch_count = 0;                     ///< forces on surface nodes of the patch
   std::vector<Index> patch_place;
   std::vector<double> patch_force;
   std::vector<double> beside;  ///< [d g] displacement of Q by the forces beside the patch, without it [m]

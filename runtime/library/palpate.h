@@ -80,7 +80,8 @@ enum palpate_status {
   PALPATE_HANDING_OVER = 1 << 10,     /* a force is on its way to the contact's, so as not to kick */
   PALPATE_OLDER_PATCH = 1 << 11,      /* the overlay for this place was not there yet */
   PALPATE_LATE_MOTION = 1 << 12,      /* the body's free motion was not there in time */
-  PALPATE_RIGID_CONTACT = 1 << 13     /* a tool presses on what cannot move: only its coupling gives way */
+  PALPATE_RIGID_CONTACT = 1 << 13,    /* a tool presses on what cannot move: only its coupling gives way */
+  PALPATE_NEAR_STEP_LIMIT = 1 << 14   /* a live body's explicit step is close to the longest stable one */
 };
 
 /* "capacity_full" and so on; NULL for what is not one bit of these. Real-time safe. */

@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <memory>
 #include <string>
 #include <utility>
 
 #include "base/error.h"
 #include "runtime/live/balance.h"
-#include "runtime/live/implicit_step.h"
-#include "runtime/live/live_forces.h"
+#include "runtime/live/step_compliance.h"
+#include "runtime/live/wall_contacts.h"
 
 namespace palpate {
 namespace {
@@ -42,50 +41,25 @@ Eigen::VectorXd rest_of(const LiveBody& body) {
   return find_balance(body, body.load(), {}, x, {.tolerance = 1e-8}).converged ? x : body.start();
 }
 
-/// [n] free dof of each stored dof, -1 where it is held.
-std::vector<Index> free_of_stored(const LiveBody& body, const std::vector<Index>& stored_nodes) {
-  const int d = body.dimension();
-  std::vector<Index> free;
-  for (const Index node : stored_nodes) {
-    for (int axis = 0; axis < d; ++axis)
-      free.push_back(body.free_of_dof()[static_cast<std::size_t>(d * node + axis)]);
-  }
-  return free;
-}
-
-/// The blocks of a matrix's inverse, times `scale`, that belong to the stored dofs.
-PackedGreens packed_inverse(const LiveMatrix& A, const std::vector<Index>& free, double scale) {
-  TangentSolver solver({});
-  if (!solver.set(A)) {
+/// The compliance of a step at x.
+PackedGreens compliance_at(const LiveParts& live, const Eigen::VectorXd& x, const std::vector<Index>& nodes) {
+  StepCompliance compliance(live.body, live.stepper, nodes);
+  if (!compliance.begin(x, {})) {
     throw Error("the body's stiffness at rest is not positive definite", "live body",
                 "its loads may be too large for it: try --load-scale");
   }
-  const auto order = std::ssize(free);
-  const std::shared_ptr<double[]> packed(new double[static_cast<std::size_t>(packed_size(order))]);
-  for (Eigen::Index first = 0; first < order; first += columns_at_once) {
-    const Eigen::Index count = std::min<Eigen::Index>(columns_at_once, order - first);
-    Eigen::MatrixXd E = Eigen::MatrixXd::Zero(A.rows(), count);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      if (const Index dof = free[static_cast<std::size_t>(first + k)]; dof >= 0) E(dof, k) = scale;
-    }
-    const Eigen::MatrixXd columns = solver.by_factor(E);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      for (Eigen::Index row = first + k; row < order; ++row) {
-        const Index dof = free[static_cast<std::size_t>(row)];
-        packed[packed_index(row, first + k, order)] = dof >= 0 ? columns(dof, k) : 0.0;
-      }
-    }
+  while (!compliance.go_on(columns_at_once)) {
   }
-  return {packed, order, Precision::double_precision};
+  return compliance.take();
 }
 
 }  // namespace
 
 LiveParts make_live_parts(const Model& model, const LiveSettings& settings) {
-  if (!is_implicit(settings.integrator)) {
-    throw Error(
-        std::string(name_of(settings.integrator)) + " is explicit, and a tool needs an implicit integrator",
-        "--integrator", "take implicit-euler, midpoint or newmark");
+  if (!answers_within_step(settings.integrator)) {
+    throw Error(std::string("by ") + name_of(settings.integrator) +
+                    " a step ends where it does whatever the forces in it: a tool would not be felt",
+                "--integrator", "take semi-implicit-euler or another one");
   }
   LiveInput input = live_input(model);
   if (settings.free) {
@@ -95,6 +69,7 @@ LiveParts make_live_parts(const Model& model, const LiveSettings& settings) {
   LiveParts parts{LiveBody(std::move(input), live_options(settings)),
                   stepper_options(settings, model.dimension())};
   check_start(parts.body, parts.stepper.walls);
+  if (!is_implicit(settings.integrator)) LiveStepper(parts.body, parts.stepper);  // refuses what is unstable
   return parts;
 }
 
@@ -125,15 +100,7 @@ Model live_model(Model model, const LiveParts& live, const LiveSettings& setting
   for (std::size_t node = 0; node < model.rest_displacement.size(); ++node)
     model.rest_displacement[node] =
         node_part(x, d, static_cast<Index>(node)) - node_part(body.rest(), d, static_cast<Index>(node));
-  const StepFactors factors = step_factors(live.stepper.scheme.integrator, live.stepper.time_step);
-  LiveMatrix A;
-  assemble_tangent(body, x, {}, TangentKind::positive, A);
-  for (Eigen::Index k = 0; k < A.nonZeros(); ++k)
-    A.valuePtr()[k] *= 1.0 + factors.t * body.options().damping.stiffness;
-  for (Index free = 0; free < body.free_dofs(); ++free)
-    A.valuePtr()[body.pattern().diagonal()[free]] +=
-        (factors.s + factors.t * body.options().damping.mass) * body.mass()[body.dof_of_free()[free]];
-  model.greens = packed_inverse(A, free_of_stored(body, model.stored_nodes), factors.ahead);
+  model.greens = compliance_at(live, x, model.stored_nodes);
   return model;
 }
 

@@ -41,8 +41,10 @@ LiveOptions live_options(const LiveSettings& settings) {
 }
 
 StepperOptions stepper_options(const LiveSettings& settings, int dimension) {
-  StepperOptions options{.time_step = settings.step,
-                         .scheme = {.integrator = settings.integrator, .tolerance = 1e-5}};
+  StepperOptions options{
+      .time_step = settings.step,
+      .scheme = {
+          .integrator = settings.integrator, .solver = {.kind = settings.step_solver}, .tolerance = 1e-5}};
   if (settings.floor) {
     options.walls.push_back(
         {.normal = Vec3::Unit(dimension - 1), .offset = *settings.floor, .friction = settings.wall_friction});

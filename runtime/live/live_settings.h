@@ -6,6 +6,7 @@
 
 #include "runtime/live/integrator.h"
 #include "runtime/live/live_law.h"
+#include "runtime/live/solver_kind.h"
 
 namespace palpate {
 
@@ -25,7 +26,8 @@ struct AxisBox {
 struct LiveSettings {
   std::optional<LiveLaw> solver;                           ///< none: Green's functions
   double step = 0.005;                                     ///< of the solver; a whole number of ticks [s]
-  Integrator integrator = Integrator::implicit_euler;      ///< an implicit one
+  Integrator integrator = Integrator::implicit_euler;      ///< not explicit Euler
+  SolverKind step_solver = SolverKind::factor;             ///< of the equations of an implicit step
   Vec3 gravity = Vec3::Zero();                             ///< [m/s^2]
   double mass_damping = 1.0;                               ///< [1/s]
   double stiffness_damping = 0.001;                        ///< [s]
@@ -33,7 +35,7 @@ struct LiveSettings {
   double creep = 10.0;                                     ///< as in Plasticity [1/s]
   double most_plastic = std::numeric_limits<double>::infinity();  ///< as in Plasticity
   bool free = false;                                              ///< nothing is held
-  std::optional<double> floor;        ///< height along z, in the plane y; none: there is none [m]
+  std::optional<double> floor{};      ///< height along z, in the plane y; none: there is none [m]
   std::optional<AxisBox> room{};      ///< the body stays in it: walls and a floor, no lid
   std::optional<AxisBox> obstacle{};  ///< the body stays out of it
   double wall_friction = 0.5;         ///< Coulomb's coefficient of all walls

@@ -3,17 +3,12 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCholesky>
-#include <cstdint>
 #include <optional>
 
+#include "runtime/live/solver_kind.h"
 #include "runtime/live/tangent_pattern.h"
 
 namespace palpate {
-
-enum class SolverKind : std::uint8_t {
-  factor,              ///< LDL^T of each matrix, the order of elimination found once
-  conjugate_gradient,  ///< conjugate gradients, preconditioned by the factor of an older matrix
-};
 
 struct TangentSolverOptions {
   SolverKind kind = SolverKind::factor;

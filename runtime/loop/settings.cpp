@@ -65,6 +65,9 @@ std::string text_of(LiveLaw law) {
 std::string text_of(Integrator integrator) {
   return name_of(integrator);
 }
+std::string text_of(SolverKind kind) {
+  return name_of(kind);
+}
 std::string text_of(bool yes) {
   return yes ? "yes" : "no";
 }
@@ -148,7 +151,13 @@ void read_value(const Setting& setting, const std::string& text, LiveLaw& law) {
 
 void read_value(const Setting& setting, const std::string& text, Integrator& integrator) {
   integrator =
-      read_name(setting, text, {Integrator::implicit_euler, Integrator::midpoint, Integrator::newmark});
+      read_name(setting, text,
+                {Integrator::implicit_euler, Integrator::midpoint, Integrator::newmark,
+                 Integrator::semi_implicit_euler, Integrator::verlet, Integrator::rk2, Integrator::rk4});
+}
+
+void read_value(const Setting& setting, const std::string& text, SolverKind& kind) {
+  kind = read_name(setting, text, {SolverKind::factor, SolverKind::conjugate_gradient});
 }
 
 void read_value(const Setting& setting, const std::string& text, bool& yes) {
@@ -257,8 +266,8 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
 /// Visits the settings of the live solver.
 template <class SomeSettings, class Visitor>
 void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
-  auto& [solver, step, integrator, gravity, mass_damping, stiffness_damping, yield, creep, most_plastic, free,
-         floor, room, obstacle, wall_friction] = live;
+  auto& [solver, step, integrator, step_solver, gravity, mass_damping, stiffness_damping, yield, creep,
+         most_plastic, free, floor, room, obstacle, wall_friction] = live;
   constexpr SettingGroup group = SettingGroup::live;
   const bool is_told = live.solver.has_value();
   visit(
@@ -272,10 +281,18 @@ void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
   visit(Setting{"live-step", group, "S", "s", "0.005", "time step of the solver, a whole number of ticks",
                 live_steps, is_told},
         step);
-  visit(Setting{"integrator", group, "implicit-euler|midpoint|newmark", "", "implicit-euler",
-                "how the solver steps; implicit-euler damps fast motion, the others keep energy", any_number,
-                is_told},
-        integrator);
+  visit(
+      Setting{"integrator", group, "implicit-euler|midpoint|newmark|semi-implicit-euler|verlet|rk2|rk4", "",
+              "implicit-euler",
+              "how the solver steps; implicit-euler damps fast motion, midpoint and newmark keep energy; the "
+              "others are explicit: steps cost little, and are refused where they are longer than is stable",
+              any_number, is_told},
+      integrator);
+  visit(Setting{"step-solver", group, "factor|cg", "", "factor",
+                "how an implicit step is solved: by a factor, or by conjugate gradients, which is faster for "
+                "large bodies",
+                any_number, is_told},
+        step_solver);
   visit(Setting{"gravity", group, "X,Y,Z", "m/s^2", "0,0,0", "acceleration of gravity on a live body",
                 any_number, is_told},
         gravity);

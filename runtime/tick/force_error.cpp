@@ -60,7 +60,7 @@ double along(const Vec3& n, std::span<const double> block, std::ptrdiff_t stride
 double closing_force(const Body& body, const State& state, const LeftOut& place, double depth) noexcept {
   const Index node = stored_node(body, place.node);
   std::array<double, 9> block{};
-  body.greens().gather(node, {&node, 1}, block);
+  state.surface.near.load().greens(body).gather(node, {&node, 1}, block);
   const int d = body.dimension();
   const double give =
       along(place.normal, block, d, d, place.normal) + 1.0 / state.tools[place.tool].tool.coupling_stiffness;
@@ -122,7 +122,8 @@ double missing_of_left_out(const Body& body, const State& state, Scratch& scratc
   const std::size_t row = static_cast<std::size_t>(deepest);
   const std::ptrdiff_t width = d * static_cast<std::ptrdiff_t>(count);
   const std::span<double> blocks(scratch.left_out_blocks.data(), static_cast<std::size_t>(d * width));
-  body.greens().gather(scratch.left_out_nodes[row], std::span(scratch.left_out_nodes).first(count), blocks);
+  state.surface.near.load().greens(body).gather(scratch.left_out_nodes[row],
+                                                std::span(scratch.left_out_nodes).first(count), blocks);
   const double coupling = 1.0 / state.tools[tool].tool.coupling_stiffness;
   Vec3 sum = Vec3::Zero();
   double given_way = 0.0;

@@ -123,7 +123,8 @@ StepStatus step(const Body& body, State& state, const ToolPose& pose) noexcept {
 }
 
 void surface_displacement(const Body& body, const State& state, std::span<double> u) noexcept {
-  body.greens().displacement(state.surface.near.load().nodes(), state.surface.near.load().forces(), u);
+  const SurfaceLoad& load = state.surface.near.load();
+  load.greens(body).displacement(load.nodes(), load.forces(), u);
   if (!state.surface.motion.active()) return;
   const int d = body.dimension();
   for (Index node = 0; node < body.greens().nodes(); ++node)

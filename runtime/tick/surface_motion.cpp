@@ -39,7 +39,7 @@ void displace_ranges(const Body& body, const SurfaceState& surface, Scratch& scr
   std::size_t nodes = 0;
   for (const NodeRange& range : ranges) nodes += static_cast<std::size_t>(range.end - range.first);
   const SurfaceLoad& load = surface.near.load();
-  body.greens().displacement(
+  load.greens(body).displacement(
       load.nodes(), load.forces(), ranges,
       std::span(scratch.far_displacement).first(static_cast<std::size_t>(body.dimension()) * nodes));
 }
@@ -132,6 +132,18 @@ void renew_all_in_turn(const Body& body, SurfaceState& surface, Scratch& scratch
 
 }  // namespace
 
+void change_compliance(const Body& body, SurfaceState& surface,
+                       const std::shared_ptr<const Greens>& compliance) noexcept {
+  const SurfaceLoad& load = surface.near.load();
+  if (load.compliance == compliance) return;
+  std::vector<double>& u = surface.stored_displacement;
+  load.greens(body).displacement(load.nodes(), load.forces(), u);
+  surface.motion.take_over(body, u, 1.0);
+  surface.near.change_compliance(body, compliance);
+  load.greens(body).displacement(load.nodes(), load.forces(), u);
+  surface.motion.take_over(body, u, -1.0);
+}
+
 void move_near_surface(const Body& body, SurfaceState& surface) noexcept {
   for (Index place = 0; place < surface.near.count(); ++place) {
     const Index node = surface.near.node(place);
@@ -146,6 +158,7 @@ void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexce
   surface.motion.begin_tick(body);
   if (!surface.motion.active()) return;
   if (surface.motion.is_late()) state.status |= StepStatus::late_motion;
+  if (surface.motion.is_near_limit()) state.status |= StepStatus::near_step_limit;
   move_near_surface(body, surface);
   const auto d = static_cast<std::size_t>(body.dimension());
   for (const ToolState& tool : state.tools) {

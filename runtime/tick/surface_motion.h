@@ -2,14 +2,21 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "runtime/tick/state.h"
 
 namespace palpate {
 
 /// Moves the surface to where the body's free motion has it in this tick: all near nodes, and as many around
-/// the tools as may have come near since they were looked at. Sets StepStatus::late_motion.
+/// the tools as may have come near since they were looked at. Sets StepStatus::late_motion and
+/// near_step_limit.
 void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexcept;
+
+/// Lets contact forces act by another compliance, null for the body's Green's functions: where they have the
+/// surface now it stays. After FreeMotion::receive, between ticks.
+void change_compliance(const Body& body, SurfaceState& surface,
+                       const std::shared_ptr<const Greens>& compliance) noexcept;
 
 /// Moves the near surface nodes to where free motion and contact forces have them.
 void move_near_surface(const Body& body, SurfaceState& surface) noexcept;

@@ -72,6 +72,45 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   assert.deepEqual(page.complaints, []);
 });
 
+test('a live body has settings of its own, which are taken and refused with a reason', async (t) => {
+  const at = await folder(t);
+  const soft = cube(3).replace('youngs_modulus = 1.0', 'youngs_modulus = 1e6\ndensity = 1000').replace(/\[\[fixed\]\][^]*$/, '[storage]\nscope = "none"\n');
+  const file = await bake(at, soft);
+  const options = ['--solver', 'corotational', '--gravity', '0,0,-9.81', '--floor', '-0.2'];
+  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', '--tool', 'sphere:0.1', ...options], at);
+  const page = await ready(await visit(t, served.url, { viewport: { width: 1010, height: 900 } }));
+  await part(page, 'live-settings').waitFor();
+  assert.equal(await part(page, 'overlay').isVisible(), false);
+  assert.equal(await part(page, 'contact').isDisabled(), true);
+  assert.equal(await part(page, 'solver').inputValue(), 'corotational');
+  assert.equal(await part(page, 'gravity').inputValue(), '0,0,-9.81');
+  assert.equal(await part(page, 'yield').inputValue(), 'inf');
+  const taken = async (name, value) => {
+    await until(page, ([key, now]) => window.palpate.state.settings[key] === now && !window.palpate.state.busy, [name, value]);
+    await until(page, () => window.palpate.ready);
+  };
+  for (const [name, value] of Object.entries({ yield: '0.05', creep: '20', 'most-plastic': '0.5', 'live-step': '0.01', 'mass-damping': '2', 'stiffness-damping': '0.01', 'wall-friction': '0.25', gravity: '0,0,-5' })) {
+    await part(page, name).fill(value);
+    await part(page, name).press('Enter');
+    await taken(name, value);
+  }
+  await part(page, 'step-solver').selectOption('cg');
+  await taken('step-solver', 'cg');
+  await part(page, 'integrator').selectOption('midpoint');
+  await taken('integrator', 'midpoint');
+  await part(page, 'live-step').fill('1');
+  await part(page, 'live-step').press('Enter');
+  await page.getByText(/at most 0.1/).first().waitFor();
+  await part(page, 'live-step').fill('0.05');
+  await part(page, 'live-step').press('Enter');
+  await taken('live-step', '0.05');
+  await part(page, 'integrator').selectOption('verlet');
+  await page.getByText(/the longest stable one is/).first().waitFor();
+  await until(page, () => window.palpate.state.settings.integrator === 'midpoint' && !window.palpate.state.busy);
+  const cubes = await open_cube(t);
+  assert.equal(await part(cubes.page, 'live-settings').isVisible(), false);
+});
+
 test('a recording begins and ends with the button, and is whole', async (t) => {
   const { page, at } = await open_cube(t);
   await part(page, 'record').click();

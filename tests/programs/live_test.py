@@ -64,12 +64,41 @@ class Live(ProgramTest):
         self.assertLess(of_linear["live"]["largest_force_error_N"], 1e-6 * linear)  # W is right all the time
         self.assertGreater(of_stiffer["live"]["largest_force_error_N"], 0)
         self.assertLess(of_stiffer["live"]["last_force_error_N"], 1e-3 * stiffer)  # at rest the solver has it
-        self.assertGreater(of_stiffer["live"]["compliance_age_s"], 0.9)
+        self.assertGreater(of_linear["live"]["compliance_age_s"], 0.9)
+        self.assertEqual(of_linear["live"]["compliance_renewals"], 0)
+        self.assertLess(of_stiffer["live"]["compliance_age_s"], 0.9)
+        self.assertGreater(of_stiffer["live"]["compliance_renewals"], 0)
+
+    def test_explicit_integrators_and_conjugate_gradients_press_alike(self):
+        file = self.bake(BLOCK)
+        reference, _ = self.force(file, 0.004, "--solver", "corotational", "--live-step", "0.001", "--mass-damping", "20")
+        for options in (("--step-solver", "cg"), ("--integrator", "semi-implicit-euler"), ("--integrator", "verlet"), ("--integrator", "rk4")):
+            force, report = self.force(file, 0.004, "--solver", "corotational", "--live-step", "0.001", "--mass-damping", "20", "--stiffness-damping", "0", *options)
+            self.assertAlmostEqual(force / reference, 1, delta=0.01, msg=options)
+            self.assertEqual(report["live"]["steps_stopped"], 0)
+            explicit = "--integrator" in options
+            self.assertEqual(report["live"]["longest_stable_step_s"] is not None, explicit)
+
+    def test_a_step_near_the_limit_is_told(self):
+        file = self.bake(BLOCK)
+        options = ("--solver", "neo-hookean", "--integrator", "verlet", "--stiffness-damping", "0", "--mass-damping", "20")
+        path = self.write("touch.csv", press(0.001))
+        refused = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", *options, "--live-step", "0.05", cwd=self.folder)
+        limit = float(refused.stderr.split("the longest stable one is ")[1].split()[0])
+        stiffer = (0.95 * limit / 0.001) ** 2  # the limit falls with the root of the stiffness: 1 ms is 95 % of it
+        report, told = self.play(file, press(0.001), *options, "--live-step", "0.001", "--stiffness-scale", str(stiffer))
+        self.assertGreater(report["live"]["steps_near_limit"], 0)
+        self.assertGreater(report["status_ticks"]["near_step_limit"], 0)
+        self.assertIn("the body stiffened", told)
+        far, told = self.play(file, press(0.001), *options, "--live-step", "0.001")
+        self.assertEqual(far["status_ticks"]["near_step_limit"], 0)
+        self.assertNotIn("the body stiffened", told)
 
     def test_equal_runs_are_equal_and_replay_to_the_bit(self):
         file = self.bake(BLOCK)
         options = ("--solver", "corotational", "--yield", "0.05", "--creep", "20", "--gravity", "0,0,-9.81")
-        self.play(file, press(0.006), "--record", "a.h5", *options)
+        report, _ = self.play(file, press(0.006), "--record", "a.h5", *options)
+        self.assertGreater(report["live"]["compliance_renewals"], 0)
         self.play(file, press(0.006), "--record", "b.h5", *options)
         with h5py.File(self.folder / "a.h5") as a, h5py.File(self.folder / "b.h5") as b:
             numpy.testing.assert_array_equal(a["ticks/force"][:], b["ticks/force"][:])
@@ -148,7 +177,8 @@ class Live(ProgramTest):
                                  (("--solver", "linear", "--floor", "0.015"), "begins in a wall"),
                                  (("--solver", "linear", "--gravity", "0,0,-1e6"), "at most 1000"),
                                  (("--solver", "linear", "--live-step", "1"), "at most 0.1"),
-                                 (("--solver", "linear", "--integrator", "verlet"), "none of implicit-euler"),
+                                 (("--solver", "linear", "--integrator", "explicit-euler"), "none of implicit-euler"),
+                                 (("--solver", "linear", "--integrator", "verlet", "--live-step", "0.05"), "the longest stable one is"),
                                  (("--solver", "linear", "--creep", "-1"), "not a number that is"),
                                  (("--solver", "linear", "--live-step", "0"), "not a number that is")):
             result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", *arguments, cwd=self.folder)

@@ -87,7 +87,7 @@ class Completion(ProgramTest):
 
     def setUp(self):
         super().setUp()
-        for name in ("touch.csv", "notes.txt", "model.toml", "cube.palpate.hdf", "touch.h5", "deep/other.csv", "a file.csv"):
+        for name in ("touch.csv", "notes.txt", "model.toml", "cube.palpate.hdf", "touch.h5", "organ.stl", "deep/other.csv", "a file.csv"):
             file = self.folder / name
             file.parent.mkdir(exist_ok=True)
             file.touch()
@@ -120,7 +120,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}" """
 
     def test_bash_offers_commands_files_and_values(self):
         for line, wanted in (
-                ("palpate-runtime pl", ["play"]), ("palpate-runtime ", ["devices", "export", "help", "play", "probe", "session", "view"]),
+                ("palpate-runtime pl", ["play"]), ("palpate-runtime ", ["devices", "export", "help", "play", "probe", "push", "session", "view"]),
                 ("palpate-runtime help s", ["session"]), ("palpate-runtime play ", ["cube.palpate.hdf", "deep"]),
                 ("palpate-runtime play --contact ", ["dynamic", "quasi-static"]), ("palpate-runtime play --contact=d", ["dynamic"]),
                 ("palpate-runtime play --tool ", ["capsule:", "disc:", "point", "sphere:"]), ("palpate-runtime play --tool=s", ["sphere:"]),
@@ -128,7 +128,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}" """
                 ("palpate-runtime play --device=script:t", ["touch.csv"]), ("palpate-runtime play --device replay:", ["deep", "touch.h5"]),
                 ("palpate-runtime play --device script:deep/", ["deep/other.csv"]), ("palpate-runtime play --device script:a", ["a file.csv"]),
                 ("palpate-runtime play --rate ", []), ("palpate-runtime play cube.palpate.hdf --vi", ["--view", "--view-address"]),
-                ("palpate-runtime export t", ["touch.h5"]), ("palpate-precompute m", ["model.toml"]), ("palpate-precompute ver", ["verify"]),
+                ("palpate-runtime export t", ["touch.h5"]), ("palpate-precompute m", ["model.toml"]), ("palpate-precompute o", ["organ.stl"]), ("palpate-runtime push ", ["cube.palpate.hdf", "deep", "model.toml", "organ.stl"]), ("palpate-precompute ver", ["verify"]),
                 ("palpate-precompute verify c", ["cube.palpate.hdf"]), ("palpate-precompute compare cube.palpate.hdf c", ["cube.palpate.hdf"]),
                 ("palpate-precompute model.toml -o n", ["notes.txt"])):
             with self.subTest(line=line):

@@ -152,14 +152,21 @@ class NotADescription(ProgramTest):
         return re.sub("(?m)^    ", "", text)
 
     def test_geometry_gets_a_model_toml_that_works(self):
-        for name, content, what in (("cube.off", OFF.encode(), "a surface"), ("Two Tets.mesh", MEDIT.encode(), "a volume mesh"),
-                                    ("sheet.png", png(40, 20), "a picture"), ("ball.inr", inr(40), "an image"),
-                                    ("ball2.inr.gz", gzip.compress(inr(40)), "an image")):
+        for name, content, what in (("Two Tets.mesh", MEDIT.encode(), "a volume mesh"), ("sheet.png", png(40, 20), "a picture")):
             with self.subTest(name=name):
                 (self.folder / name).write_bytes(content)
                 model = self.write("model.toml", self.starter(run(PRECOMPUTE, name, cwd=self.folder), name, what))
                 result = run(PRECOMPUTE, model, cwd=self.folder)
                 self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertTrue((self.folder / (name.split(".")[0] + ".palpate.hdf")).exists())
+
+    def test_surfaces_and_images_get_one_by_themselves(self):
+        for name, content in (("cube.off", OFF.encode()), ("ball.inr", inr(40)), ("ball2.inr.gz", gzip.compress(inr(40)))):
+            with self.subTest(name=name):
+                (self.folder / name).write_bytes(content)
+                result = run(PRECOMPUTE, name, "--surface-nodes", "300", cwd=self.folder)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertTrue((self.folder / (name.split(".")[0] + ".model.toml")).exists())
                 self.assertTrue((self.folder / (name.split(".")[0] + ".palpate.hdf")).exists())
 
     def test_files_of_ours_and_folders(self):

@@ -15,7 +15,7 @@
 
 #include "base/error.h"
 #include "meshes/mesh.h"
-#include "precompute/geometry/surface_input.h"
+#include "precompute/surfaces/surface_input.h"
 
 namespace palpate::testing {
 

@@ -8,6 +8,7 @@ import { format_si, format_time, short_number } from './format';
 import { History } from './history';
 import { as_hash, keep, keep_theme, kept_of, kept_theme, of_hash, type Kept } from './kept';
 import { on_keys } from './keyboard';
+import { near_limit } from './live_controls';
 import { LiveSource, socket_url } from './live_source';
 import { show_felt, show_timing, type Felt } from './numbers';
 import { Picture } from './picture';
@@ -527,6 +528,9 @@ class Page implements Listener {
     show_felt(this.felt());
     const bound = this.picture_.frame?.greens_error ?? 0;
     write(part('greens-error'), bound > 0 ? `± ${format_si(bound, 'N', 2)}` : '');
+    const near = near_limit(this.picture_.frame);
+    write(part('near-limit'), near);
+    part('near-limit').hidden = near === '';
     const text = this.best_effort();
     write(part('best-effort'), text);
     part('best-effort').hidden = text === '';

@@ -1,6 +1,7 @@
 // The run and its settings: what the runtime has is shown, what the person wants is asked for.
 import { button, input, part, select, show_value, write } from './dom';
 import { format_number } from './format';
+import { LiveControls } from './live_controls';
 import { parse_tool, tool_text } from './pose';
 import { sentences } from './problem';
 import type { Mode, State, Word } from './words';
@@ -28,6 +29,7 @@ function role_of(state: State, mode: Mode, is_connected: boolean): string {
 
 export class RunControls {
   private state_: State | null = null;
+  private readonly live_ = new LiveControls((name, value) => this.change(name, value));
 
   constructor(private readonly send_: (word: Word) => void) {
     const on = (id: string, word: () => Word) => button(id).addEventListener('click', () => send_(word()));
@@ -139,6 +141,7 @@ export class RunControls {
     const overlay = /^(?:r=(\d+))?,?(?:rings=(\d+))?/.exec(settings.overlay ?? '');
     if (overlay?.[1]) show_value(input('overlay-r'), overlay[1]);
     if (overlay?.[2]) show_value(input('overlay-rings'), overlay[2]);
+    this.live_.show(state);
     show_value(input('stiffness-scale'), settings['stiffness-scale'] ?? '1');
     show_value(input('load-scale'), settings['load-scale'] ?? '1');
     input('load-scale').disabled = !model.loads;

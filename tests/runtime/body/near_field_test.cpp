@@ -249,6 +249,20 @@ TEST_P(NearFieldTest, AGroupMovesAndIsLoadedThroughItsMembers) {
   body_.greens().displacement(near.load().nodes(), near.load().forces(), whole);
   EXPECT_LT((Eigen::Map<const Eigen::VectorXd>(whole.data(), Xi.rows()) - u).norm(), 1e-13 * u.norm());
 
+  // Another compliance, as live bodies have them.
+  const Eigen::MatrixXd own = Xi;
+  Xi = test::random_definite(Xi.rows(), 5);
+  const Index places = near.count();
+  near.change_compliance(body_,
+                         std::make_shared<const Greens>(test::pack(Xi, Precision::double_precision), d));
+  EXPECT_EQ(near.count(), places);
+  expect_exact();
+  const Eigen::VectorXd by_other = Xi * f;
+  for (Index place = 0; place < near.count(); ++place) {
+    EXPECT_LT((near.displacement(place).head(d) - of_place(place).transpose() * by_other).norm(),
+              1e-13 * by_other.norm());
+  }
+
   // Others go, and the last places move.
   near.unload();
   near.displace();
@@ -259,6 +273,9 @@ TEST_P(NearFieldTest, AGroupMovesAndIsLoadedThroughItsMembers) {
   }
   EXPECT_LT(near.place_of(body_.aggregate_node(a.number)), 0);
   near.want(body_, others[4]);
+  expect_exact();
+  Xi = own;
+  near.change_compliance(body_, nullptr);
   expect_exact();
 }
 

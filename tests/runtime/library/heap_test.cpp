@@ -15,6 +15,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <thread>
 #include <tuple>
 #include <vector>
 
@@ -26,6 +27,7 @@
 #include "runtime/library/palpate.h"
 #include "runtime/tick/step.h"
 #include "tests/support/compression/hierarchical_sample.h"
+#include "tests/support/live_session.h"
 #include "tests/support/runtime_model.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -385,6 +387,41 @@ TEST_P(MovingTick, MakesNoSystemCall) {
     return state_.surface.motion.active();
   });
 #endif
+}
+
+// Beside the thread that steps a live body and renews its compliance, as the tool bends it.
+TEST(LiveTick, MakesNoHeapCallWhereTheComplianceIsRenewed) {
+  const Body body = test::live_bar(3, {.solver = LiveLaw::corotational});
+  State state(body, {.tools = {Tool{.radius = 0.006, .reach = 0.01}}});
+  MotionSource source(body, state, {.in_background = true});
+  SurfaceFrames frames(body, state, {.ticks_per_frame = 5}, [](const SurfacePicture&) {});
+  const Greens* last = nullptr;
+  int changes = 0;
+#if PALPATE_OWN_MALLOC
+  heap_calls = 0;
+#endif
+  for (int k = 0; k < 3000; ++k) {
+    ToolPose pose;
+    pose.position = Vec3(0.07, 0.027 - 2e-5 * std::min(k, 3000 - k), 0.01);
+    while (state.surface.motion.job().step > source.steps()) std::this_thread::yield();
+#if PALPATE_OWN_MALLOC
+    counting = true;
+#endif
+    source.receive(state);
+    step(body, state, pose);
+    source.post(state);
+    frames.post(state, k, 0.001 * k);
+#if PALPATE_OWN_MALLOC
+    counting = false;
+#endif
+    const Greens* now = state.surface.near.load().compliance.get();
+    changes += now != last ? 1 : 0;
+    last = now;
+  }
+#if PALPATE_OWN_MALLOC
+  EXPECT_EQ(heap_calls, 0);
+#endif
+  EXPECT_GT(changes, 2);
 }
 
 /// Rows and displacements of compressed Green's functions, more at once than is kept of them.

@@ -33,6 +33,7 @@ const SettingsText others = {{"tool", "capsule:0.25,0.5"},
                              {"solver", "neo-hookean"},
                              {"live-step", "0.002"},
                              {"integrator", "midpoint"},
+                             {"step-solver", "cg"},
                              {"gravity", "0,0,-9.81"},
                              {"mass-damping", "0"},
                              {"stiffness-damping", "0.5"},
@@ -58,13 +59,14 @@ TEST(SettingsTable, HasEachMember) {
   EXPECT_NE(stiffness, stiffness2);
   EXPECT_NE(overlay.has_value(), overlay2.has_value());
   EXPECT_NE(memory, memory2);
-  const auto& [solver, step, integrator, gravity, by_mass, by_stiffness, yield, creep, most_plastic, free,
-               floor, room, obstacle, wall_friction] = live;
-  const auto& [solver2, step2, integrator2, gravity2, by_mass2, by_stiffness2, yield2, creep2, most_plastic2,
-               free2, floor2, room2, obstacle2, wall_friction2] = live2;
+  const auto& [solver, step, integrator, step_solver, gravity, by_mass, by_stiffness, yield, creep,
+               most_plastic, free, floor, room, obstacle, wall_friction] = live;
+  const auto& [solver2, step2, integrator2, step_solver2, gravity2, by_mass2, by_stiffness2, yield2, creep2,
+               most_plastic2, free2, floor2, room2, obstacle2, wall_friction2] = live2;
   EXPECT_NE(solver, solver2);
   EXPECT_NE(step, step2);
   EXPECT_NE(integrator, integrator2);
+  EXPECT_NE(step_solver, step_solver2);
   EXPECT_NE(gravity, gravity2);
   EXPECT_NE(by_mass, by_mass2);
   EXPECT_NE(by_stiffness, by_stiffness2);

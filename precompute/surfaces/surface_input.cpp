@@ -1,17 +1,14 @@
-#include "precompute/geometry/surface_input.h"
+#include "precompute/surfaces/surface_input.h"
 
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
 #include <CGAL/AABB_triangle_primitive.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/IO/polygon_soup_io.h>
 #include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/detect_features.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polygon_mesh_processing/remesh.h>
-#include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Polygon_mesh_processing/shape_predicates.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_faces.h>
@@ -32,80 +29,30 @@
 #include "base/regular_file.h"
 #include "base/write_file.h"
 #include "formats/outputs/output_paths.h"
+#include "precompute/surfaces/polygon_soup.h"
+#include "precompute/surfaces/surface_bytes.h"
+#include "precompute/surfaces/surface_mend.h"
 
 namespace palpate {
 namespace {
 
 namespace PMP = CGAL::Polygon_mesh_processing;
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Point = Kernel::Point_3;
+using Kernel = PolygonSoup::Kernel;
+using Point = PolygonSoup::Point;
+using Polygon = PolygonSoup::Polygon;
 using SurfaceMesh = CGAL::Surface_mesh<Point>;
 using Face = SurfaceMesh::Face_index;
-using Polygon = std::vector<std::size_t>;
 
 constexpr double sharp_edge_degrees = 60.0;
 constexpr int remesh_iterations = 5;
-constexpr double largest_coordinate = 1e30;
 constexpr double remesh_time = 1e-3;    // [s] for a triangle, meant to be far too much
 constexpr double remesh_memory = 4e3;   // [byte] for a triangle, likewise
 constexpr double most_triangles = 2e7;  // after remeshing; a body's boundary has some 1e5 at most
 
-/// Polygons that share points by number, as a file gives them.
-struct Soup {
-  std::vector<Point> points;
-  std::vector<Polygon> polygons;
-};
-
-std::string shown(const Point& p) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << "(" << p.x() << ", " << p.y() << ", " << p.z() << ")";
-  return text.str();
-}
-
-/// What CGAL's readers leave to others.
-void check_soup(const Soup& soup, const std::string& where) {
-  for (const Point& p : soup.points) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!(std::abs(p[axis]) <= largest_coordinate)) {
-        throw Error("a coordinate is not a finite number or beyond all measure: " + shown(p), where,
-                    "export the surface again");
-      }
-    }
-  }
-  for (std::size_t i = 0; i < soup.polygons.size(); ++i) {
-    for (const std::size_t corner : soup.polygons[i]) {
-      if (corner >= soup.points.size()) {
-        throw Error("polygon " + std::to_string(i + 1) + " of " + std::to_string(soup.polygons.size()) +
-                        " has a corner that is none of the file's " + std::to_string(soup.points.size()) +
-                        " points",
-                    where, "the file is damaged: export the surface again");
-      }
-    }
-  }
-}
-
-Soup read_soup(const std::filesystem::path& file, const std::string& where) {
-  Soup soup;
-  bool read = false;
-  try {
-    read = CGAL::IO::read_polygon_soup(file.string(), soup.points, soup.polygons,
-                                       CGAL::parameters::verbose(false));
-  } catch (const std::exception&) {
-    read = false;
-  }
-  if (!read || soup.polygons.empty()) {
-    throw Error("cannot read a surface from this file", where,
-                "it must be a complete .off, .obj, .stl or .ply with triangles or polygons");
-  }
-  check_soup(soup, where);
-  return soup;
-}
-
 using Edge = std::pair<std::size_t, std::size_t>;
 
 /// How many polygons meet in each edge.
-std::map<Edge, int> count_edges(const Soup& soup) {
+std::map<Edge, int> count_edges(const PolygonSoup& soup) {
   std::map<Edge, int> count;
   for (const Polygon& polygon : soup.polygons) {
     for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -135,7 +82,7 @@ std::size_t count_holes(const std::vector<Edge>& open_edges, std::size_t points)
   return holes.size();
 }
 
-void check_edges(const Soup& soup, const std::string& where) {
+void check_edges(const PolygonSoup& soup, const std::string& where) {
   std::vector<Edge> open_edges;
   for (const auto& [edge, count] : count_edges(soup)) {
     const std::string place =
@@ -159,21 +106,8 @@ void check_edges(const Soup& soup, const std::string& where) {
               where, "close the holes in a mesh editor (\"fill holes\")");
 }
 
-/// Merges points at the same place and drops what collapses to less than a triangle.
-void weld(Soup& soup) {
-  PMP::merge_duplicate_points_in_polygon_soup(soup.points, soup.polygons);
-  for (Polygon& polygon : soup.polygons) {
-    polygon.erase(std::unique(polygon.begin(), polygon.end()), polygon.end());
-    while (polygon.size() > 1 && polygon.front() == polygon.back()) {
-      polygon.pop_back();
-    }
-  }
-  std::erase_if(soup.polygons, [](const Polygon& polygon) { return polygon.size() < 3; });
-  PMP::remove_isolated_points_in_polygon_soup(soup.points, soup.polygons);
-}
-
 /// Orients all polygons alike.
-SurfaceMesh connect(Soup& soup, const std::string& where, std::vector<std::string>& notes) {
+SurfaceMesh connect(PolygonSoup& soup, const std::string& where, std::vector<std::string>& notes) {
   const std::size_t points = soup.points.size();
   const std::vector<Polygon> as_given = soup.polygons;
   PMP::orient_polygon_soup(soup.points, soup.polygons);
@@ -311,25 +245,6 @@ void remesh(SurfaceMesh& mesh, double edge_length) {
   mesh.collect_garbage();
 }
 
-TriangleSurface export_surface(const SurfaceMesh& mesh) {
-  TriangleSurface surface;
-  surface.nodes.reserve(mesh.number_of_vertices());
-  for (const auto vertex : mesh.vertices()) {
-    const Point& p = mesh.point(vertex);
-    surface.nodes.emplace_back(p.x(), p.y(), p.z());
-  }
-  surface.triangles.reserve(mesh.number_of_faces());
-  for (const Face face : mesh.faces()) {
-    Triangle triangle{};
-    std::size_t corner = 0;
-    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face))) {
-      triangle[corner++] = static_cast<Index>(static_cast<std::size_t>(vertex));
-    }
-    surface.triangles.push_back(triangle);
-  }
-  return surface;
-}
-
 /// What a child sends.
 struct Answer {
   TriangleSurface surface;
@@ -348,8 +263,7 @@ std::string take_text(std::span<const std::byte>& bytes) {
 
 Bytes pack(const Answer& answer) {
   Bytes bytes;
-  append_array(bytes, std::span(answer.surface.nodes));
-  append_array(bytes, std::span(answer.surface.triangles));
+  append_surface(bytes, answer.surface);
   append_text(bytes, answer.crossings.problem);
   append_array(bytes, std::span(answer.crossings.triangles));
   for (const std::string& note : answer.notes) {
@@ -360,8 +274,7 @@ Bytes pack(const Answer& answer) {
 
 Answer unpack(std::span<const std::byte> bytes) {
   Answer answer;
-  answer.surface.nodes = take_array<Vec3>(bytes);
-  answer.surface.triangles = take_array<Triangle>(bytes);
+  answer.surface = take_surface(bytes);
   answer.crossings.problem = take_text(bytes);
   answer.crossings.triangles = take_array<Corners>(bytes);
   while (!bytes.empty()) {
@@ -373,7 +286,7 @@ Answer unpack(std::span<const std::byte> bytes) {
 /// The surface of a file, whole and turned outwards; it may still intersect itself.
 SurfaceMesh read_mesh(const std::filesystem::path& file, const std::string& where,
                       std::vector<std::string>& notes) {
-  Soup soup = read_soup(file, where);
+  PolygonSoup soup = read_polygon_soup(file, where);
   weld(soup);
   check_edges(soup, where);
   SurfaceMesh mesh = connect(soup, where, notes);
@@ -413,7 +326,7 @@ TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std:
                                 "repair the surface in a mesh editor, or export it again",
                                 [](SurfaceMesh& mesh, Answer& into) {
                                   into.crossings = find_self_intersections(mesh);
-                                  into.surface = export_surface(mesh);
+                                  into.surface = surface_of(mesh);
                                 });
   if (!answer.crossings.problem.empty()) {
     const std::filesystem::path bad_faces = write_bad_faces(answer.crossings.triangles, file.stem().string());
@@ -447,7 +360,7 @@ Remeshing remesh_surface(const std::filesystem::path& file, const TriangleSurfac
                         return;
                       }
                       into.crossings = find_self_intersections(mesh);
-                      into.surface = export_surface(mesh);
+                      into.surface = surface_of(mesh);
                     });
   return {std::move(answer.surface), std::move(answer.crossings.problem)};
 }

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "precompute/geometry/surface_input.h"
+#include "precompute/surfaces/surface_input.h"
 #include "tests/support/geometry_shapes.h"
 
 namespace palpate::surface_test {

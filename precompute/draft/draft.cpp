@@ -1,0 +1,171 @@
+#include "precompute/draft/draft.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <string_view>
+
+#include "base/error.h"
+#include "base/printable.h"
+#include "base/write_file.h"
+#include "formats/outputs/output_paths.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::string_view repaired_mark = "# repaired by palpate-precompute\n";  // OutputKind::surface
+constexpr std::array<double, 3> wrap_offsets = {usual_wrap_offset, 0.15, 0.3};    // of the edge
+
+/// In quotes, as TOML writes it.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + '"';
+}
+
+double edge_length(const Shape& shape, const UnitGuess& unit, const DraftOptions& options) {
+  return edge_for_nodes(shape.area, options.shape.nodes) * unit.unit.metres;
+}
+
+UnitGuess unit_of(const Shape& shape, const DraftOptions& options) {
+  if (options.unit) return {*options.unit, "it was given"};
+  return guess_unit(shape.size.maxCoeff());
+}
+
+/// A description that is there is a person's: it is used, not written over.
+void use_existing(const std::filesystem::path& file, const std::filesystem::path& description,
+                  bool has_options, const Tell& tell) {
+  if (has_options)
+    throw Error("is there already, and these options are for a new one", description.string(),
+                "give --renew to write it anew, or change it in an editor and give it to palpate-precompute");
+  tell(printable(description.string()) + " is there and is used as it is (--renew writes it anew)");
+  std::error_code failed;
+  const auto shape_time = std::filesystem::last_write_time(file, failed);
+  if (!failed && shape_time > std::filesystem::last_write_time(description, failed) && !failed)
+    tell("note: " + printable(file.string()) + " is newer: --renew takes it into account");
+}
+
+/// Writes the surface that a shape has been repaired to beside it, where it was.
+std::filesystem::path write_repaired(const std::filesystem::path& file, const Shape& shape) {
+  if (shape.repaired.triangles.empty()) return file;
+  OutputPaths outputs(false);
+  outputs.add_input(file, "the surface");
+  const std::filesystem::path path = outputs.add(file.parent_path() / (shape_name(file) + ".repaired.off"),
+                                                 OutputKind::surface, "the repaired surface");
+  std::string text = off_text(shape.repaired);
+  text.insert(text.find('\n') + 1, std::string(repaired_mark));
+  write_file(path, text);
+  return path;
+}
+
+/// Some surfaces intersect themselves once they have the edge length of the mesh, where they are thinner than
+/// that. These are wrapped, ever more thickly, until they do not; the last wrapping is taken as it is.
+std::filesystem::path make_meshable(const std::filesystem::path& file, double edge, Shape& shape) {
+  std::filesystem::path path = write_repaired(file, shape);
+  std::vector<std::string> notes;
+  const TriangleSurface surface = read_surface(path, notes);
+  std::string problem = remesh_surface(path, surface, edge).problem;
+  if (problem.empty()) return path;
+  const std::string why = "with the edge length of the mesh it " + problem.substr(0, problem.find(':'));
+  for (const double offset : wrap_offsets) {
+    shape.repaired = wrapped_surface(surface, edge, offset, file.string());
+    path = write_repaired(file, shape);
+    problem = remesh_surface(path, shape.repaired, edge).problem;
+    if (!problem.empty() && offset != wrap_offsets.back()) continue;
+    shape.remesh = problem.empty();
+    shape.repairs.push_back(fmt::format("as {}, it was wrapped: a new surface lies around it at {:.3g} units",
+                                        why, offset * edge));
+    break;
+  }
+  return path;
+}
+
+void tell_decisions(const Shape& shape, const UnitGuess& unit, const DraftOptions& options,
+                    const Tell& tell) {
+  tell(fmt::format("unit: {}, as {}; another one: --unit {}", unit.unit.name, unit.why, unit_choices));
+  const double edge = edge_length(shape, unit, options);
+  tell(fmt::format("edge length: {}, for about {} surface nodes", length_text(edge), options.shape.nodes));
+  tell(fmt::format("tissue: E = {} Pa, nu = {}; held: the lowest {} % along {}",
+                   options.values.youngs_modulus, options.values.poissons_ratio, options.values.percent,
+                   options.values.down));
+}
+
+}  // namespace
+
+std::filesystem::path draft_file(const std::filesystem::path& shape) {
+  return shape.parent_path() / (shape_name(shape) + ".model.toml");
+}
+
+std::string draft_text(const std::filesystem::path& file, const std::string& repaired, const Shape& shape,
+                       const UnitGuess& unit, const DraftOptions& options) {
+  const DraftValues& values = options.values;
+  const std::string name = file.filename().string();
+  const bool is_surface = shape.kind == ShapeKind::surface;
+  std::string text = fmt::format(
+      "# Drafted by palpate-precompute from {}. It is yours: change what is wrong, then run\n"
+      "#   palpate-precompute {}\n"
+      "name = {}\n\n[geometry]\n",
+      printable(name), printable(draft_file(file).filename().string()),
+      quoted(values.name.empty() ? shape_name(file) : values.name));
+  text +=
+      fmt::format("{} = {}\n", is_surface ? "surface" : "image", quoted(repaired.empty() ? name : repaired));
+  for (const std::string& repair : shape.repairs) text += "# repaired: " + repair + "\n";
+  text += fmt::format("scale = {}  # metres per unit of the file ({}): {}\n", unit.unit.metres,
+                      unit.unit.name, unit.why);
+  text += fmt::format(
+      "\n[mesh]\nedge_length = {:.3g}  # metres: about {} surface nodes; half of it makes four times as "
+      "many\n",
+      edge_length(shape, unit, options), options.shape.nodes);
+  if (is_surface)
+    text += shape.remesh ? "remesh = true\n"
+                         : "remesh = false  # the triangles of the surface are of that size\n";
+  text += fmt::format(
+      "\n[material]\nyoungs_modulus = {}  # pascals: soft tissue, about that of healthy liver\n"
+      "poissons_ratio = {}  # below 0.5; from 0.47 on add element = \"tet10\" to [mesh]\n"
+      "density = {}  # kg/m^3\nfriction = {}  # between the surface and a tool: wet tissue\n",
+      values.youngs_modulus, values.poissons_ratio, values.density, values.friction);
+  text += fmt::format(
+      "\n[[fixed]]  # what is held: as if the body lay on a table\nlowest = {{axis = \"{}\", percent = "
+      "{}}}\n",
+      values.down, values.percent);
+  text +=
+      "\n[storage]\nscope = \"surface\"  # \"layers\" keeps what is below too, for overlays "
+      "(docs/overlays.md)\n";
+  return text;
+}
+
+std::filesystem::path draft(const std::filesystem::path& file, const DraftOptions& options, bool has_options,
+                            const Tell& tell) {
+  const std::filesystem::path description = draft_file(file);
+  const bool is_there = std::filesystem::exists(description);
+  if (is_there && !options.renew) {
+    use_existing(file, description, has_options, tell);
+    return description;
+  }
+  expect_writable_folder(description);
+  Shape shape = read_shape(file, options.shape);
+  for (const std::string& repair : shape.repairs) tell("repaired: " + repair);
+  const UnitGuess unit = unit_of(shape, options);
+  tell_decisions(shape, unit, options, tell);
+  std::string repaired;
+  if (shape.kind == ShapeKind::surface) {
+    const std::size_t told = shape.repairs.size();
+    const double edge = edge_for_nodes(shape.area, options.shape.nodes);
+    const std::filesystem::path surface = options.shape.strict ? file : make_meshable(file, edge, shape);
+    for (std::size_t i = told; i < shape.repairs.size(); ++i) tell("repaired: " + shape.repairs[i]);
+    if (surface != file) {
+      repaired = surface.filename().string();
+      tell("wrote " + printable(surface.string()) + ", the surface as it was repaired");
+    }
+  }
+  write_file(description, draft_text(file, repaired, shape, unit, options));
+  tell(fmt::format("wrote {}{}: change it and run palpate-precompute {}", printable(description.string()),
+                   is_there ? " anew" : "", printable(description.string())));
+  return description;
+}
+
+}  // namespace palpate

@@ -1,0 +1,53 @@
+// A model.toml for a surface or an image.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "precompute/draft/length_unit.h"
+#include "precompute/draft/shape.h"
+
+namespace palpate {
+
+/// What a drafted model.toml says besides the shape. Defaults are those of soft tissue: E and nu of healthy
+/// liver, rounded (Roulot et al., J. Hepatology 48, 2008: 5.5 +- 1.6 kPa), density and friction as the liver
+/// of meshes/models.
+struct DraftValues {
+  std::string name;              ///< empty: that of the file
+  double youngs_modulus = 5e3;   ///< [Pa]
+  double poissons_ratio = 0.45;  ///< [-]
+  double density = 1060.0;       ///< [kg/m^3]
+  double friction = 0.2;         ///< [-]
+  char down = 'z';               ///< axis along which the lowest nodes are held
+  double percent = 10.0;         ///< of the extent along it that is held
+};
+
+/// How a draft is made.
+struct DraftOptions {
+  ShapeOptions shape{};
+  std::optional<LengthUnit> unit{};  ///< empty: guessed
+  bool renew = false;                ///< a description that is there is written anew
+  DraftValues values{};
+};
+
+/// Takes a line for a person.
+using Tell = std::function<void(const std::string&)>;
+
+/// The description that belongs to a surface or an image: "organ.model.toml" beside "organ.stl".
+std::filesystem::path draft_file(const std::filesystem::path& shape);
+
+/// The text of a description of a shape in `file` (where repaired, in `repaired`, a name in the same folder).
+/// `unit` is what its unit is and why.
+std::string draft_text(const std::filesystem::path& file, const std::string& repaired, const Shape& shape,
+                       const UnitGuess& unit, const DraftOptions& options);
+
+/// Writes the description of a surface or an image beside it, and a surface that was repaired as
+/// NAME.repaired.off, and returns the description's file. A description that is there already is used as it
+/// is; each decision is told. Throws Error for a file that cannot be used, for options that would change a
+/// description that is there, unless `renew`, and where it cannot be written.
+std::filesystem::path draft(const std::filesystem::path& file, const DraftOptions& options, bool has_options,
+                            const Tell& tell);
+
+}  // namespace palpate

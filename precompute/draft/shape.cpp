@@ -1,0 +1,107 @@
+#include "precompute/draft/shape.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include "base/error.h"
+#include "precompute/geometry/labelled_image.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, ShapeKind>, 6> endings = {{{".stl", ShapeKind::surface},
+                                                                            {".obj", ShapeKind::surface},
+                                                                            {".ply", ShapeKind::surface},
+                                                                            {".off", ShapeKind::surface},
+                                                                            {".inr", ShapeKind::image},
+                                                                            {".inr.gz", ShapeKind::image}}};
+constexpr double staircase = 1.5;
+
+/// The ending in small letters that a name has, or null.
+const std::pair<std::string_view, ShapeKind>* ending_of(const std::filesystem::path& file) {
+  std::string name = file.filename().string();
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+  const auto* const found =
+      std::ranges::find_if(endings, [&](const auto& ending) { return name.ends_with(ending.first); });
+  return found == endings.end() ? nullptr : found;
+}
+
+void measure(const TriangleSurface& surface, Shape& shape) {
+  Vec3 low = surface.nodes.front(), high = low;
+  for (const Vec3& x : surface.nodes) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  shape.size = high - low;
+  shape.area = area(surface);
+}
+
+Shape read_whole_surface(const std::filesystem::path& file) {
+  std::vector<std::string> notes;
+  Shape shape;
+  measure(read_surface(file, notes), shape);
+  if (!notes.empty())
+    throw Error("the surface needs a repair: " + notes.front(), file.string(),
+                "leave out --strict to have it repaired, or repair it in a mesh editor");
+  return shape;
+}
+
+Shape read_repaired_surface(const std::filesystem::path& file, const ShapeOptions& options) {
+  RepairedSurface repaired = repair_surface(file, options.parts, options.nodes);
+  Shape shape;
+  measure(repaired.surface, shape);
+  shape.repairs = std::move(repaired.repairs);
+  if (!shape.repairs.empty()) shape.repaired = std::move(repaired.surface);
+  return shape;
+}
+
+/// Sides of voxels between body and not-body.
+double boundary_area(const VoxelBody& body) {
+  const std::array<std::size_t, 3> step = {body.at(1, 0, 0), body.at(0, 1, 0), body.at(0, 0, 1)};
+  double sum = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::size_t sides = 0;
+    for (std::size_t v = step.at(axis); v < body.inside.size(); ++v)
+      sides += body.inside[v] != body.inside[v - step.at(axis)] ? 1 : 0;
+    sum += static_cast<double>(sides) * body.spacing.prod() / body.spacing[static_cast<int>(axis)];
+  }
+  return sum / staircase;
+}
+
+Shape read_image(const std::filesystem::path& file) {
+  Shape shape;
+  shape.kind = ShapeKind::image;
+  const VoxelBody body =
+      read_labelled_image({file, {}, false}, std::numeric_limits<double>::max(), shape.repairs);
+  for (int axis = 0; axis < 3; ++axis)  // less the empty rim of two voxels on each side
+    shape.size[axis] = body.spacing[axis] * (body.size.at(static_cast<std::size_t>(axis)) - 4);
+  shape.area = boundary_area(body);
+  shape.repairs.clear();  // the bake tells them
+  return shape;
+}
+
+}  // namespace
+
+std::optional<ShapeKind> shape_kind(const std::filesystem::path& file) {
+  const auto* const ending = ending_of(file);
+  return ending == nullptr ? std::nullopt : std::optional(ending->second);
+}
+
+std::string shape_name(const std::filesystem::path& file) {
+  const std::string name = file.filename().string();
+  const auto* const ending = ending_of(file);
+  return ending == nullptr ? file.stem().string() : name.substr(0, name.size() - ending->first.size());
+}
+
+Shape read_shape(const std::filesystem::path& file, const ShapeOptions& options) {
+  if (shape_kind(file) == ShapeKind::image) return read_image(file);
+  return options.strict ? read_whole_surface(file) : read_repaired_surface(file, options);
+}
+
+}  // namespace palpate

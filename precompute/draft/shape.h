@@ -1,0 +1,45 @@
+// A surface or an image that a person has, and what it takes to use it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "precompute/surfaces/surface_repair.h"
+
+namespace palpate {
+
+/// What a file describes a body by.
+enum class ShapeKind : std::uint8_t { surface, image };
+
+/// Surface or image by the file's name; nothing for every other file.
+std::optional<ShapeKind> shape_kind(const std::filesystem::path& file);
+
+/// The file's name without folder and ending: "organ" of "in/organ.inr.gz".
+std::string shape_name(const std::filesystem::path& file);
+
+/// A shape as it was found.
+struct Shape {
+  ShapeKind kind = ShapeKind::surface;
+  std::vector<std::string> repairs;  ///< surfaces: what was repaired, a sentence each
+  TriangleSurface repaired;          ///< the surface then; empty where the file is whole
+  Vec3 size = Vec3::Zero();          ///< of the box around it [file units]
+  double area = 0.0;                 ///< of the boundary [file units^2]
+  bool remesh = true;                ///< surfaces: the edge length is to be that of the boundary too
+};
+
+/// How a shape is taken.
+struct ShapeOptions {
+  SurfaceParts parts = SurfaceParts::largest;
+  bool strict = false;  ///< repair nothing
+  int nodes = 4000;     ///< on the surface of the mesh that is to come
+};
+
+/// Reads a surface and repairs it, or measures an image: its boundary is that of the voxels that are not 0,
+/// whose staircase is taken for 3/2 of the smooth area, the mean over all directions of |n_x| + |n_y| +
+/// |n_z|. Throws Error for files that cannot be used; strict, also for surfaces that would need a repair.
+Shape read_shape(const std::filesystem::path& file, const ShapeOptions& options);
+
+}  // namespace palpate

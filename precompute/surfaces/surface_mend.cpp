@@ -1,0 +1,91 @@
+#include "precompute/surfaces/surface_mend.h"
+
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
+#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/repair_self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/shape_predicates.h>
+#include <CGAL/alpha_wrap_3.h>
+
+#include <algorithm>
+
+namespace palpate {
+namespace {
+
+namespace PMP = CGAL::Polygon_mesh_processing;
+using SurfaceMesh = CGAL::Surface_mesh<PolygonSoup::Point>;
+
+PolygonSoup soup_of(const TriangleSurface& surface) {
+  PolygonSoup soup;
+  for (const Vec3& x : surface.nodes) soup.points.emplace_back(x[0], x[1], x[2]);
+  for (const Triangle& t : surface.triangles) {
+    auto& polygon = soup.polygons.emplace_back();
+    for (const Index node : t) polygon.push_back(static_cast<std::size_t>(node));
+  }
+  return soup;
+}
+
+SurfaceMesh mesh_of(const PolygonSoup& soup) {
+  SurfaceMesh mesh;
+  PMP::polygon_soup_to_polygon_mesh(soup.points, soup.polygons, mesh);
+  return mesh;
+}
+
+}  // namespace
+
+TriangleSurface surface_of(const SurfaceMesh& mesh) {
+  TriangleSurface surface;
+  surface.nodes.reserve(mesh.number_of_vertices());
+  for (const auto vertex : mesh.vertices()) {
+    const PolygonSoup::Point& p = mesh.point(vertex);
+    surface.nodes.emplace_back(p.x(), p.y(), p.z());
+  }
+  surface.triangles.reserve(mesh.number_of_faces());
+  for (const auto face : mesh.faces()) {
+    Triangle triangle{};
+    std::size_t corner = 0;
+    for (const auto vertex : mesh.vertices_around_face(mesh.halfedge(face)))
+      triangle[corner++] = static_cast<Index>(static_cast<std::size_t>(vertex));
+    surface.triangles.push_back(triangle);
+  }
+  return surface;
+}
+
+std::string problem_of(const TriangleSurface& surface) {
+  PolygonSoup soup = soup_of(surface);
+  if (weld(soup) != 0) return "has triangles without area";
+  const std::size_t points = soup.points.size();
+  if (!PMP::orient_polygon_soup(soup.points, soup.polygons) || soup.points.size() != points)
+    return "is not manifold";
+  SurfaceMesh mesh = mesh_of(soup);
+  if (!CGAL::is_closed(mesh)) return "is open";
+  if (std::ranges::any_of(mesh.faces(),
+                          [&](auto face) { return PMP::is_degenerate_triangle_face(face, mesh); }))
+    return "has triangles without area";
+  auto part = mesh.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:part").first;
+  const std::size_t parts = PMP::connected_components(mesh, part);
+  if (parts != 1) return "has " + std::to_string(parts) + " parts";
+  std::vector<std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>> pairs;
+  PMP::self_intersections(mesh, std::back_inserter(pairs));
+  if (pairs.empty()) return "";
+  return "intersects itself in " + std::to_string(pairs.size()) +
+         (pairs.size() == 1 ? " pair of triangles" : " pairs of triangles");
+}
+
+TriangleSurface without_self_intersections(const TriangleSurface& surface) {
+  SurfaceMesh mesh = mesh_of(soup_of(surface));
+  PMP::experimental::remove_self_intersections(mesh, CGAL::parameters::preserve_genus(false));
+  mesh.collect_garbage();
+  return surface_of(mesh);
+}
+
+TriangleSurface wrap_surface(const TriangleSurface& surface, double alpha, double offset) {
+  const PolygonSoup soup = soup_of(surface);
+  SurfaceMesh wrap;
+  CGAL::alpha_wrap_3(soup.points, soup.polygons, alpha, offset, wrap);
+  wrap.collect_garbage();
+  return surface_of(wrap);
+}
+
+}  // namespace palpate

@@ -1,0 +1,165 @@
+// A model.toml for a surface or an image.
+#include "precompute/draft/draft.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <sstream>
+
+#include "precompute/description/description.h"
+#include "precompute/draft/questions.h"
+#include "tests/support/geometry_shapes.h"
+
+namespace palpate::draft_test {
+namespace {
+
+using testing::ball;
+using testing::cube;
+using testing::error_of;
+using testing::expect_mentions;
+using testing::off;
+using testing::TempFolder;
+
+TEST(LengthUnit, IsGuessedByTheSize) {
+  const std::vector<std::pair<double, std::string>> cases = {
+      {150.0, "mm"}, {20.0, "mm"}, {1900.0, "mm"}, {0.15, "m"}, {0.5, "m"}, {15.0, "cm"}, {2.0, "cm"}};
+  for (const auto& [longest, name] : cases) EXPECT_EQ(guess_unit(longest).unit.name, name) << longest;
+  for (const double longest : {1.0, 1.7, 5e4, 3e-3, 1e-9}) {
+    const double metres = longest * guess_unit(longest).unit.metres;
+    EXPECT_GE(metres, 0.1 * (1 - 1e-12)) << longest;
+    EXPECT_LE(metres, 1.0) << longest;
+  }
+  expect_mentions(guess_unit(150.0).why, {"150", "15 cm in mm"});
+}
+
+TEST(LengthUnit, IsReadByNameOrInMetres) {
+  EXPECT_EQ(read_unit("in")->metres, 0.0254);
+  EXPECT_EQ(read_unit("0.1")->metres, 0.1);
+  for (const char* const wrong : {"", "miles", "-1", "0", "1x", "inf", "nan"})
+    EXPECT_FALSE(read_unit(wrong)) << wrong;
+}
+
+class DraftTest : public ::testing::Test {
+ protected:
+  /// A ball with a hole, of radius 60, with corners of so many refinements.
+  std::filesystem::path open_ball(const std::string& name) {
+    TriangleSurface surface = ball(3);
+    for (Vec3& x : surface.nodes) x *= 60.0;
+    surface.triangles.resize(surface.triangles.size() - 4);
+    return folder_.write(name, off(surface));
+  }
+
+  Tell tell() {
+    return [this](const std::string& line) { told_ += line + "\n"; };
+  }
+
+  static std::string text_of(const std::filesystem::path& file) {
+    std::ostringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+  }
+
+  TempFolder folder_;
+  std::string told_;
+};
+
+TEST_F(DraftTest, SaysWhatItDecided) {
+  DraftOptions options;
+  options.shape.nodes = 1000;
+  const std::filesystem::path file = draft(open_ball("organ.off"), options, false, tell());
+  EXPECT_EQ(file, folder_.path() / "organ.model.toml");
+  expect_mentions(told_, {"repaired: a hole was filled", "unit: mm", "12 cm", "1000 surface nodes",
+                          "E = 5000 Pa", "organ.repaired.off", "organ.model.toml"});
+  const Description description = read_description(file);
+  EXPECT_EQ(description.name, "organ");
+  EXPECT_EQ(std::get<SurfaceGeometry>(description.geometry).file, folder_.path() / "organ.repaired.off");
+  EXPECT_EQ(description.scale, 0.001);
+  EXPECT_TRUE(description.mesh.remesh);
+  // Equilateral triangles, two per node, on 4 pi 0.06^2 m^2.
+  const double edge = std::sqrt(4.0 * std::numbers::pi * 0.0036 / 1000.0 * 2.0 / std::sqrt(3.0));
+  EXPECT_NEAR(*description.mesh.edge_length, edge, 0.02 * edge);
+  EXPECT_EQ(description.materials.front().material.youngs_modulus, 5e3);
+  EXPECT_EQ(description.materials.front().material.poissons_ratio, 0.45);
+  EXPECT_EQ(description.fixed.size(), 1U);
+}
+
+TEST_F(DraftTest, WholeSurfaceIsUsedItself) {
+  const std::filesystem::path file =
+      draft(folder_.write("box.off", off(cube(100.0))), {.shape = {.nodes = 300}}, false, tell());
+  EXPECT_EQ(std::get<SurfaceGeometry>(read_description(file).geometry).file, folder_.path() / "box.off");
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "box.repaired.off"));
+}
+
+TEST_F(DraftTest, DescriptionThatIsThereIsAPersons) {
+  const std::filesystem::path surface = folder_.write("box.off", off(cube(100.0)));
+  DraftOptions options = {.shape = {.nodes = 300}};
+  const std::filesystem::path file = draft(surface, options, false, tell());
+  std::ofstream(file, std::ios::app) << "# mine\n";
+  told_.clear();
+  EXPECT_EQ(draft(surface, options, false, tell()), file);
+  expect_mentions(told_, {"is there and is used as it is", "--renew"});
+  expect_mentions(text_of(file), {"# mine"});
+  options.unit = read_unit("cm");
+  expect_mentions(error_of([&] { draft(surface, options, true, tell()); }),
+                  {"box.model.toml", "is there already", "--renew"});
+  options.renew = true;
+  draft(surface, options, true, tell());
+  expect_mentions(told_, {"anew"});
+  EXPECT_EQ(text_of(file).find("# mine"), std::string::npos);
+  EXPECT_EQ(read_description(file).scale, 0.01);
+}
+
+TEST_F(DraftTest, StrictRefusesWhatNeedsARepair) {
+  const DraftOptions strict = {.shape = {.strict = true, .nodes = 300}};
+  const std::filesystem::path open = open_ball("open.off");
+  expect_mentions(error_of([&] { draft(open, strict, true, tell()); }), {"open.off", "is open"});
+  TriangleSurface flipped = cube(100.0);
+  std::swap(flipped.triangles[3][0], flipped.triangles[3][1]);
+  const std::filesystem::path file = folder_.write("flipped.off", off(flipped));
+  expect_mentions(error_of([&] { draft(file, strict, true, tell()); }),
+                  {"flipped.off", "needs a repair", "turned"});
+  EXPECT_FALSE(std::filesystem::exists(draft_file(file)));
+  draft(folder_.write("whole.off", off(cube(100.0))), strict, true, tell());
+}
+
+TEST_F(DraftTest, NamesAreWrittenAsTomlWantsThem) {
+  const std::filesystem::path file = draft(folder_.write("an \"organ\" of\\mine.off", off(cube(100.0))),
+                                           {.shape = {.nodes = 300}}, false, tell());
+  EXPECT_EQ(read_description(file).name, "an \"organ\" of\\mine");
+}
+
+TEST_F(DraftTest, QuestionsAreAnsweredThroughAPipe) {
+  const std::filesystem::path surface = open_ball("organ.off");
+  std::istringstream answers(surface.string() + "\nliver\nmm\n8e3\n\ny\n25\n300\n");
+  std::ostringstream questions;
+  const std::filesystem::path file = draft_by_questions({}, {}, {answers, questions, false});
+  const Description description = read_description(file);
+  EXPECT_EQ(description.name, "liver");
+  EXPECT_EQ(description.materials.front().material.youngs_modulus, 8e3);
+  EXPECT_EQ(description.materials.front().material.poissons_ratio, 0.45);
+  expect_mentions(text_of(file), {"lowest = {axis = \"y\", percent = 25}"});
+  expect_mentions(questions.str(), {"Poisson's ratio", "[0.45]", "repaired: a hole was filled"});
+}
+
+TEST_F(DraftTest, WrongAnswersAreAskedForAgainOnATerminal) {
+  const std::string file = folder_.write("box.off", off(cube(100.0))).string();
+  std::istringstream answers("nothing.txt\nmissing.off\n" + file + "\n\nmiles\ncm\nsoft\n1e4\n\n\n\n300\n");
+  std::ostringstream questions;
+  draft_by_questions({}, {}, {answers, questions, true});
+  expect_mentions(questions.str(), {"'nothing.txt' is no surface", "there is no file 'missing.off'",
+                                    "'miles' is no unit", "'soft' is not a number"});
+  EXPECT_EQ(read_description(folder_.path() / "box.model.toml").scale, 0.01);
+  std::istringstream wrong("liver\nmiles\n");
+  expect_mentions(error_of([&] {
+                    draft_by_questions(file, {.renew = true}, {wrong, questions, false});
+                  }),
+                  {"'miles' is no unit", "correct this answer"});
+  std::istringstream few("liver\n");
+  expect_mentions(error_of([&] {
+                    draft_by_questions(file, {.renew = true}, {few, questions, false});
+                  }),
+                  {"the answers ended", "Unit of the file"});
+}
+
+}  // namespace
+}  // namespace palpate::draft_test

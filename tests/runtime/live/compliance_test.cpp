@@ -1,0 +1,262 @@
+// The compliance by which a tool meets a live body, renewed as the body turns and deforms.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+#include "runtime/background/live_motion.h"
+#include "runtime/background/motion_source.h"
+#include "runtime/tick/step.h"
+#include "runtime/tick/surface_motion.h"
+#include "tests/support/live_session.h"
+
+namespace palpate::live_compliance_test {
+namespace {
+
+using Eigen::VectorXd;
+
+constexpr double quarter = 0.5 * std::numbers::pi;
+
+/// What a step's end moves by with a force in it, of the largest part: by W against two steps of the solver.
+double error_of(const Greens& W, const Body& body, const LiveState& state) {
+  const LiveBody& live = body.live()->body;
+  const int d = live.dimension();
+  double largest = 0.0, off = 0.0;
+  std::vector<double> u(static_cast<std::size_t>(W.order()));
+  for (Index stored = 0; stored < W.nodes(); stored += 3) {
+    std::vector<double> f = {1e-7, 2e-7, -1e-7};
+    f.resize(static_cast<std::size_t>(d));
+    W.displacement({&stored, 1}, f, u);
+    LiveState without = state, with = state;
+    VectorXd push = VectorXd::Zero(live.dofs());
+    LiveStepper(live, body.live()->stepper).step(without, push);
+    for (int axis = 0; axis < d; ++axis)
+      push[d * body.mesh_node(stored) + axis] = f[static_cast<std::size_t>(axis)];
+    LiveStepper(live, body.live()->stepper).step(with, push);
+    for (Index other = 0; other < W.nodes(); ++other) {
+      const Eigen::Index dof = Eigen::Index{d} * body.mesh_node(other);
+      for (int axis = 0; axis < d; ++axis) {
+        const double moved = with.x[dof + axis] - without.x[dof + axis];
+        largest = std::max(largest, std::abs(moved));
+        off = std::max(off, std::abs(moved - u[static_cast<std::size_t>(d * other + axis)]));
+      }
+    }
+  }
+  return off / largest;
+}
+
+class LiveComplianceOf : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Dimension, LiveComplianceOf, testing::Values(2, 3));
+
+TEST_P(LiveComplianceOf, ABodyThatTurnedIsRightAgain) {
+  const Body body = test::live_bar(GetParam(), {.solver = LiveLaw::corotational, .free = true});
+  LiveState state(body.live()->body);
+  const double at_rest = error_of(body.greens(), body, state);
+  EXPECT_LT(at_rest, 1e-5);
+  const Mat3 R = Eigen::AngleAxisd(quarter, Vec3::UnitZ()).toRotationMatrix();
+  throw_body(body.live()->body, R, Vec3(0.1, 0, 0), Vec3::Zero(), Vec3::Zero(), state);
+  EXPECT_GT(error_of(body.greens(), body, state), 0.1);
+  LiveCompliance compliance(body, true);
+  for (int k = 0; k < 200 && compliance.renewals() == 0; ++k) compliance.follow(state, 0.0);
+  EXPECT_EQ(compliance.renewals(), 1);
+  EXPECT_LT(error_of(compliance.now(), body, state), 1e-5);
+}
+
+TEST_P(LiveComplianceOf, ABodyThatGoesOnTurningIsTakenWithIt) {
+  const Body body = test::live_bar(GetParam(), {.solver = LiveLaw::corotational, .free = true});
+  LiveCompliance compliance(body, true), old(body, false);
+  LiveState state(body.live()->body);
+  const Vec3 axis = GetParam() == 2 ? Vec3(0, 0, 1) : Vec3(Vec3(1, 2, 2) / 3.0);
+  for (int k = 0; k < 300; ++k) {
+    LiveState now(body.live()->body);
+    throw_body(body.live()->body, Eigen::AngleAxisd(0.02 * k, axis).toRotationMatrix(), Vec3::Zero(),
+               Vec3::Zero(), Vec3::Zero(), now);
+    now.time = 0.005 * k;
+    compliance.follow(now, 0.0);
+    old.follow(now, 0.0);
+    state = now;
+  }
+  EXPECT_EQ(compliance.renewals(), 1);
+  EXPECT_GT(compliance.turns(), 50);
+  EXPECT_EQ(old.renewals() + old.turns(), 0);
+  EXPECT_GT(error_of(old.now(), body, state), 0.1);
+  EXPECT_LT(error_of(compliance.now(), body, state), 0.05);
+  compliance.rest();
+  EXPECT_EQ(compliance.renewed(), nullptr);
+}
+
+/// A bar that forces turn and push, without a tick.
+class DrivenBar {
+ public:
+  DrivenBar(const Body& body, bool renews)
+      : body_(body),
+        live_(body.live()->body),
+        motion_(body, renews),
+        u_(static_cast<std::size_t>(body.greens().order())) {}
+
+  /// How far the ends have turned [rad].
+  [[nodiscard]] double angle() const {
+    const Vec3 along = middle_of(0.08) - middle_of(0.0);
+    return std::atan2(along.y(), along.x());
+  }
+  /// Forces at the ends that take it to an angle, as a spring and a damper would.
+  void turn_to(double angle) {
+    for (int k = 0; k < 400; ++k) {
+      const double now = this->angle(), speed = (now - last_angle_) / 0.005;
+      last_angle_ = now;
+      const double inertia = live_.mass().sum() / 2.0 * 0.08 * 0.08 / 12.0;
+      const double force = inertia * (400.0 * (angle - now) - 40.0 * speed) / 0.08;
+      const Vec3 across = force * Vec3(-std::sin(now), std::cos(now), 0.0);
+      job_.load.clear();
+      put(across, 0.08);
+      put(-across, 0.0);
+      do_job();
+    }
+  }
+  /// Pushes ever harder on the middle of its long side, along the body's y; the largest error in the force,
+  /// of it.
+  double push() {
+    double largest = 0.0;
+    const Vec3 inwards(std::sin(angle()), -std::cos(angle()), 0.0);
+    const Index node = body_.nearest_surface_node(Vec3(0.04, 0.02, 0.0)).node;
+    for (int k = 1; k <= 10; ++k) {
+      const Vec3 f = 0.02 * k * inwards;
+      job_.load.clear();
+      job_.load.add({&node, 1}, {f.data(), 2}, 1.0);
+      do_job();
+      if (k > 1) largest = std::max(largest, motion_.telling().last_force_error / (0.02 * k));
+    }
+    return largest;
+  }
+  [[nodiscard]] LiveTelling telling() const { return motion_.telling(); }
+
+ private:
+  [[nodiscard]] Vec3 middle_of(double end) const {
+    Vec3 sum = Vec3::Zero();
+    int count = 0;
+    for (Index node = 0; node < std::ssize(live_.mesh().nodes); ++node) {
+      if (std::abs(live_.mesh().nodes[static_cast<std::size_t>(node)].x() - end) > 1e-9) continue;
+      sum += node_part(motion_.state().x, 2, node);
+      ++count;
+    }
+    return sum / count;
+  }
+  void put(const Vec3& force, double end) {
+    std::vector<Index> nodes;
+    for (Index stored = 0; stored < body_.greens().nodes(); ++stored) {
+      if (std::abs(body_.rest_position(stored).x() - end) < 1e-9) nodes.push_back(stored);
+    }
+    for (const Index node : nodes) {
+      const Vec3 f = force / static_cast<double>(nodes.size());
+      job_.load.add({&node, 1}, {f.data(), 2}, 1.0);
+    }
+  }
+  void do_job() {
+    ++job_.step;
+    motion_.do_job(job_, false, u_);
+  }
+
+  const Body& body_;
+  const LiveBody& live_;
+  LiveMotion motion_;
+  MotionJob job_{.release = {NodalLoad(2, 0), NodalLoad(2, 0)}, .load = NodalLoad(2, 100)};
+  std::vector<double> u_;
+  double last_angle_ = 0.0;
+};
+
+TEST(LiveCompliance, MeetsABodyThatTurnedByARightAngleAsAtRest) {
+  const Body body = test::live_bar(2, {.solver = LiveLaw::corotational, .mass_damping = 0.0, .free = true});
+  DrivenBar resting(body, false), never(body, false), renewed(body, true);
+  const double at_rest = resting.push();
+  for (DrivenBar* bar : {&never, &renewed}) {
+    bar->turn_to(quarter);
+    EXPECT_NEAR(bar->angle(), quarter, 0.01);
+  }
+  const double before = never.push(), after = renewed.push();
+  RecordProperty("error_at_rest", std::to_string(at_rest));
+  RecordProperty("error_without_renewal", std::to_string(before));
+  RecordProperty("error_with_renewal", std::to_string(after));
+  std::printf("share of the force: at rest %.4f, turned without renewal %.4f, with %.4f\n", at_rest, before,
+              after);
+  EXPECT_GT(before, 10.0 * at_rest);
+  EXPECT_LT(after, 1.5 * at_rest);
+  EXPECT_EQ(never.telling().renewals, 0);
+  EXPECT_GT(renewed.telling().renewals, 0);
+  EXPECT_LT(renewed.telling().compliance_age, never.telling().compliance_age);
+}
+
+// Two calls of the same tick, a change of the compliance between them: what is touched stays where it is.
+TEST_P(LiveComplianceOf, ATickChangesWithoutAJump) {
+  const Body body = test::live_bar(GetParam(), {.solver = LiveLaw::corotational});
+  State state(body, {.tools = {Tool{.radius = 0.006, .reach = 0.01}}});
+  MotionSource source(body, state, {.in_background = false});
+  const Index greens = static_cast<Index>(body.greens().order());
+  std::vector<double> before(static_cast<std::size_t>(greens)), after(before.size());
+  std::shared_ptr<const Greens> other;
+  {
+    LiveCompliance compliance(body, true);
+    LiveState bent(body.live()->body);
+    for (Eigen::Index dof = 0; dof < bent.x.size(); dof += GetParam())
+      bent.x[dof + 1] += 5.0 * std::pow(bent.x[dof], 2);
+    for (int k = 0; k < 100; ++k) compliance.follow(bent, 0.0);
+    other = compliance.renewed();
+  }
+  ASSERT_NE(other, nullptr);
+  ToolPose pose;
+  double force = 0.0;
+  for (int k = 0; k < 60; ++k) {
+    pose.position = Vec3(0.06, 0.0265 - 0.0001 * k, GetParam() == 3 ? 0.01 : 0.0);
+    const std::int64_t last = state.surface.motion.sample_step();
+    source.receive(state);
+    const bool changes = k == 55;
+    if (changes) {
+      ASSERT_GT(state.surface.motion.sample_step(), last);
+      surface_displacement(body, state, before);
+      change_compliance(body, state.surface, other);
+      surface_displacement(body, state, after);
+      double largest = 0.0, jump = 0.0;
+      for (std::size_t dof = 0; dof < before.size(); ++dof) {
+        largest = std::max(largest, std::abs(before[dof]));
+        jump = std::max(jump, std::abs(after[dof] - before[dof]));
+      }
+      EXPECT_GT(largest, 1e-3);
+      EXPECT_LT(jump, 1e-12 * largest);
+      EXPECT_EQ(state.surface.near.load().compliance, other);
+    }
+    step(body, state, pose);
+    source.post(state);
+    const double now = state.tools[0].wrench.force.norm();
+    if (changes) {
+      EXPECT_NEAR(now, force, 0.1 * force);
+    }
+    force = now;
+  }
+  EXPECT_GT(force, 0.0);
+}
+
+// The steps of a session that came late, and one that was never made.
+TEST(LiveReplay, DoesTheStepsThatThereWere) {
+  const Body body = test::live_bar(2, {.solver = LiveLaw::corotational});
+  const auto play = [&](bool skips) {
+    State state(body, {.tools = {Tool{.radius = 0.006, .reach = 0.01}}});
+    MotionSource source(body, state, {.in_background = false});
+    double forces = 0.0;
+    for (int k = 0; k < 100; ++k) {
+      const std::int64_t made = std::max(0, k / 5 - 2), step = skips && made == 5 ? 4 : made;
+      source.receive(state, step);
+      EXPECT_EQ(state.surface.motion.sample_step(), step);
+      palpate::step(body, state, {.position = Vec3(0.06, 0.0265 - 0.0001 * k, 0.0)});
+      source.post(state);
+      forces += state.tools[0].wrench.force.norm();
+    }
+    EXPECT_EQ(source.steps(), skips ? 16 : 17);
+    EXPECT_GT(forces, 0.0);
+    return forces;
+  };
+  EXPECT_EQ(play(false), play(false));
+  EXPECT_NE(play(false), play(true));
+}
+
+}  // namespace
+}  // namespace palpate::live_compliance_test
