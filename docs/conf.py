@@ -64,6 +64,7 @@ CHAPTERS = {
         "embedding",
         "python",
         "cluster",
+        "packages",
         "errors",
     ],
     "Reference": ["file-format", "reference/*"],
