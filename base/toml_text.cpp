@@ -1,5 +1,7 @@
 #include "base/toml_text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <vector>
 
@@ -158,6 +160,20 @@ toml::table parse_toml(std::string_view text, const std::string& file) {
                 file + ":" + std::to_string(at.line) + ":" + std::to_string(at.column),
                 "see https://toml.io for the syntax");
   }
+}
+
+std::string toml_string(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (code < 0x20 || code == 0x7F) {
+      result += fmt::format("\\u{:04X}", code);
+      continue;
+    }
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + '"';
 }
 
 }  // namespace palpate

@@ -14,4 +14,7 @@ namespace palpate {
 /// dots in keys.
 toml::table parse_toml(std::string_view text, const std::string& file);
 
+/// A text as a basic string of TOML: in quotes, with control characters, quotes and backslashes escaped.
+std::string toml_string(std::string_view text);
+
 }  // namespace palpate

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/toml_text.h"
 
 namespace palpate {
 namespace {
@@ -30,22 +31,12 @@ constexpr std::array<Kind, 13> geometry_endings = {{{".off", "surface", "a surfa
                                                     {".png", "picture", "a picture"},
                                                     {".pbm", "picture", "a picture"}}};
 
-/// In quotes, as TOML writes it.
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c;
-  }
-  return result + '"';
-}
-
 std::string first_description(const std::filesystem::path& file, const Kind& kind) {
   const std::string name = file.filename().string();
   const bool plane = kind.key == "picture";
-  std::string text = "    name = " + quoted(name.substr(0, name.size() - kind.ending.size())) + "\n";
+  std::string text = "    name = " + toml_string(name.substr(0, name.size() - kind.ending.size())) + "\n";
   if (plane) text += "    plane = \"stress\"\n    thickness = 0.001    # metres\n";
-  text += "    [geometry]\n    " + std::string(kind.key) + " = " + quoted(name) + "\n";
+  text += "    [geometry]\n    " + std::string(kind.key) + " = " + toml_string(name) + "\n";
   text += plane ? "    scale = 0.001    # metres a pixel\n"
                 : "    scale = 0.001    # metres per unit of the file: 0.001 for millimetres, 1 for metres\n";
   if (plane || kind.key == "image")

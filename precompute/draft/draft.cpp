@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "base/toml_text.h"
 #include "base/write_file.h"
 #include "formats/outputs/output_paths.h"
 
@@ -16,16 +17,6 @@ namespace {
 
 constexpr std::string_view repaired_mark = "# repaired by palpate-precompute\n";  // OutputKind::surface
 constexpr std::array<double, 3> wrap_offsets = {usual_wrap_offset, 0.15, 0.3};    // of the edge
-
-/// In quotes, as TOML writes it.
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c;
-  }
-  return result + '"';
-}
 
 double edge_length(const Shape& shape, const UnitGuess& unit, const DraftOptions& options) {
   return edge_for_nodes(shape.area, options.shape.nodes) * unit.unit.metres;
@@ -110,9 +101,9 @@ std::string draft_text(const std::filesystem::path& file, const std::string& rep
       "#   palpate-precompute {}\n"
       "name = {}\n\n[geometry]\n",
       printable(name), printable(draft_file(file).filename().string()),
-      quoted(values.name.empty() ? shape_name(file) : values.name));
-  text +=
-      fmt::format("{} = {}\n", is_surface ? "surface" : "image", quoted(repaired.empty() ? name : repaired));
+      toml_string(values.name.empty() ? shape_name(file) : values.name));
+  text += fmt::format("{} = {}\n", is_surface ? "surface" : "image",
+                      toml_string(repaired.empty() ? name : repaired));
   for (const std::string& repair : shape.repairs) text += "# repaired: " + repair + "\n";
   text += fmt::format("scale = {}  # metres per unit of the file ({}): {}\n", unit.unit.metres,
                       unit.unit.name, unit.why);

@@ -75,6 +75,11 @@ TEST(TomlText, WhatLooksDeepButIsNotIsRead) {
   EXPECT_EQ(table["m"]["n.o"]["p"].value<std::string>(), brackets);
 }
 
+TEST(TomlText, StringsAreReadAsTheyWere) {
+  const std::string text = "a \"quoted\" \\ path\nof two lines\t\x7F ü";
+  EXPECT_EQ(parse_toml("name = " + toml_string(text), "model.toml")["name"].value<std::string>(), text);
+}
+
 TEST(TomlText, SyntaxErrorsSayLineAndColumnInShort) {
   const Error error = refusal("a = 1\nb = ?\n");
   EXPECT_EQ(error.where(), "model.toml:2:5");
