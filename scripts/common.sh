@@ -41,11 +41,13 @@ install_packages() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing
 }
 
-# build PRESET [TARGET ...]
+# build PRESET [TARGET ...]: what was compiled before, here or in another clone, comes from a compiler cache.
 build() {
   local preset=$1
   shift
   say "building ($preset)"
+  export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
+  export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=true CCACHE_SLOPPINESS=pch_defines,time_macros
   cmake --preset "$preset" >/dev/null
   cmake --build "$root/build/$preset" --parallel "$jobs" ${1:+--target "$@"}
 }

@@ -37,6 +37,7 @@
 #include "precompute/numerics/scope.h"
 #include "runtime/body/greens.h"
 #include "tests/support/compression/clustered_body.h"
+#include "tests/support/folders.h"
 #include "tests/support/precompute_case.h"
 
 namespace palpate {
@@ -320,7 +321,7 @@ void register_body(const std::string& name, Forms made) {
 int main(int argc, char** argv) {
   openblas_set_num_threads(1);
   benchmark::Initialize(&argc, argv);
-  const std::filesystem::path liver = PALPATE_SOURCE_DIR "/meshes/models/liver";
+  const std::filesystem::path liver = palpate::test::source_file("meshes/models/liver");
   const char* file = std::getenv("PALPATE_BENCH_MODEL");
   if (file != nullptr && std::string(file).ends_with(".palpate.hdf")) {
     palpate::register_new_nodes(file);

@@ -40,6 +40,7 @@
 #include "precompute/bake.h"
 #include "runtime/body/patch_maker.h"
 #include "runtime/tick/step.h"
+#include "tests/support/folders.h"
 #include "tests/support/partitioned_inverse.h"
 
 namespace palpate {
@@ -312,8 +313,7 @@ void register_bodies(const std::filesystem::path& folder) {
     register_body({.name = "model", .file = file, .radius = 0.005, .depth = 0.002}, {2, 3, 4});
     return;
   }
-  const std::filesystem::path model =
-      std::filesystem::path(PALPATE_SOURCE_DIR) / "meshes/models/plate/model.toml";
+  const std::filesystem::path model = palpate::test::source_file("meshes/models/plate/model.toml");
   const Touched plate{
       .name = "plate", .file = bake_body(model, folder / "plate.palpate.hdf"), .radius = 0.1, .depth = 0.02};
   const auto body = std::make_shared<const Body>(load_model(plate.file));

@@ -20,6 +20,7 @@
 #include "precompute/numerics/greens_solver.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/scope.h"
+#include "tests/support/folders.h"
 
 namespace palpate {
 namespace {
@@ -27,7 +28,7 @@ namespace {
 constexpr std::int64_t block_columns = 192;
 
 std::filesystem::path model_toml(const std::string& name) {
-  return std::filesystem::path(PALPATE_SOURCE_DIR) / "meshes" / "models" / name / "model.toml";
+  return palpate::test::source_file("meshes/models/" + name + "/model.toml");
 }
 
 template <class F>

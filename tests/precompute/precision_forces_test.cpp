@@ -18,6 +18,7 @@
 #include "precompute/numerics/assembly.h"
 #include "precompute/verify.h"
 #include "tests/support/baked_body.h"
+#include "tests/support/folders.h"
 
 namespace palpate::precision_forces_test {
 namespace {
@@ -233,12 +234,12 @@ TEST_F(PrecisionForces, AKilledRunIsContinuedInSplitPrecision) {
   const std::string whole = bytes();
   std::filesystem::remove(file_);
   const std::string progress = file_.string() + ".progress", toml = (folder_ / "model.toml").string();
+  const std::string program = palpate::test::built_file("precompute/palpate-precompute");
   const pid_t child = ::fork();
   if (child == 0) {
     const int null = ::open("/dev/null", O_WRONLY);
     ::dup2(null, STDERR_FILENO);
-    const char* program = PALPATE_BINARY_DIR "/precompute/palpate-precompute";
-    ::execl(program, program, toml.c_str(), "-j", "1", "-o", file_.c_str(), nullptr);
+    ::execl(program.c_str(), program.c_str(), toml.c_str(), "-j", "1", "-o", file_.c_str(), nullptr);
     ::_exit(127);
   }
   const auto columns_done = [&] {

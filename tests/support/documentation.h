@@ -6,12 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/folders.h"
+
 namespace palpate::test {
 
 /// What stands in the fenced blocks of a language on a page: ```toml ... ```
-inline std::vector<std::string> fenced_blocks(const std::filesystem::path& page,
-                                              const std::string& language) {
-  std::ifstream lines(std::filesystem::path(PALPATE_SOURCE_DIR) / page);
+inline std::vector<std::string> fenced_blocks(const std::string& page, const std::string& language) {
+  std::ifstream lines(source_file(page));
   std::vector<std::string> blocks;
   bool inside = false;
   for (std::string line; std::getline(lines, line);) {

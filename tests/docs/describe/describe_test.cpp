@@ -17,6 +17,7 @@
 #include "runtime/safety/fault.h"
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/status.h"
+#include "tests/support/folders.h"
 
 namespace palpate {
 namespace {
@@ -39,7 +40,7 @@ std::ptrdiff_t rows_of(const std::string& page, const std::string& first_cell) {
 TEST(Reference, PagesInTheSourceTreeAreWhatTheCodeSays) {
   for (const Page& page : reference_pages()) {
     const std::string file = "docs/reference/" + page.name + ".md";
-    EXPECT_TRUE(text_of(std::filesystem::path(PALPATE_SOURCE_DIR) / file) == page.text)
+    EXPECT_TRUE(text_of(palpate::test::source_file(file)) == page.text)
         << file
         << " is not of these sources: run build/release/docs/describe/palpate-describe docs/reference";
   }
@@ -107,8 +108,7 @@ TEST(Reference, HasARowForEachStatusFaultAndPhase) {
 
 TEST(Reference, HasARowForEachTunedNumber) {
   const std::string page = tuning_page().text;
-  const std::string header =
-      text_of(std::filesystem::path(PALPATE_SOURCE_DIR) / "runtime/solve/tick_tuning.h");
+  const std::string header = text_of(palpate::test::source_file("runtime/solve/tick_tuning.h"));
   const std::regex member("\n  [^/\n]* = [^\n]*;"), row("\n\\| `[a-z_]+` \\|");
   const auto count = [](const std::string& text, const std::regex& what) {
     return std::distance(std::sregex_iterator(text.begin(), text.end(), what), {});

@@ -6,6 +6,7 @@
 #include "meshes/element.h"
 #include "precompute/numerics/meshed_body.h"
 #include "tests/support/documentation.h"
+#include "tests/support/folders.h"
 #include "tests/support/geometry_shapes.h"
 
 namespace palpate::body_test {
@@ -16,7 +17,7 @@ using testing::expect_mentions;
 using testing::TempFolder;
 using Elements = std::vector<Index>;
 
-const std::filesystem::path models = std::filesystem::path(PALPATE_SOURCE_DIR) / "meshes" / "models";
+const std::filesystem::path models = palpate::test::source_file("meshes/models");
 
 void ignore(const std::string& /*text*/) {}
 

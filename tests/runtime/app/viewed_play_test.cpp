@@ -27,12 +27,13 @@
 #include "runtime/body/patch_maker.h"
 #include "runtime/loop/device_link.h"
 #include "runtime/loop/loading.h"
+#include "tests/support/folders.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::viewed_play_test {
 namespace {
 
-const std::filesystem::path cube = PALPATE_SOURCE_DIR "/tests/golden/cube2/cube2.palpate.hdf";
+const std::filesystem::path cube = palpate::test::source_file("tests/golden/cube2/cube2.palpate.hdf");
 
 /// The options of `play FILE --view` with a ball.
 PlayOptions options_of(const std::filesystem::path& file) {

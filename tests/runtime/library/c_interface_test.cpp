@@ -23,6 +23,7 @@
 #include "runtime/solve/node_vectors.h"
 #include "runtime/tick/status.h"
 #include "runtime/tick/step.h"
+#include "tests/support/folders.h"
 
 namespace palpate::c_interface_test {
 namespace {
@@ -35,7 +36,7 @@ struct Ended {
 using Session = std::unique_ptr<palpate_session, Ended>;
 
 std::string golden(const std::string& name) {
-  return PALPATE_SOURCE_DIR "/tests/golden/" + name + "/" + name + ".palpate.hdf";
+  return palpate::test::source_file("tests/golden/" + name + "/" + name + ".palpate.hdf");
 }
 
 palpate_tool sphere(double radius) {

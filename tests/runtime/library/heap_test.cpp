@@ -28,6 +28,7 @@
 #include "runtime/library/palpate.h"
 #include "runtime/tick/step.h"
 #include "tests/support/compression/hierarchical_sample.h"
+#include "tests/support/folders.h"
 #include "tests/support/live_session.h"
 #include "tests/support/runtime_model.h"
 
@@ -479,8 +480,8 @@ TEST(OwnLoop, MakesNoHeapCall) {
   palpate_tool tool = PALPATE_TOOL_INIT;
   tool.radius = 0.2;
   tool.friction = 0.3;
-  const char* file = PALPATE_SOURCE_DIR "/tests/golden/cube2/cube2.palpate.hdf";
-  palpate_session* session = palpate_create(file, &tool, 1, 8, nullptr, 0);
+  const std::string file = palpate::test::source_file("tests/golden/cube2/cube2.palpate.hdf");
+  palpate_session* session = palpate_create(file.c_str(), &tool, 1, 8, nullptr, 0);
   ASSERT_NE(session, nullptr);
   palpate_counts counts = PALPATE_COUNTS_INIT;
   palpate_surface_counts(session, &counts);

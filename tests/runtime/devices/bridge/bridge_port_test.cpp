@@ -29,6 +29,7 @@
 
 #include "base/error.h"
 #include "tests/support/devices/bytes.h"
+#include "tests/support/folders.h"
 
 namespace palpate::bridge_port_test {
 namespace {
@@ -619,7 +620,7 @@ TEST_F(BridgePortTest, OneThreadReadsAnotherWrites) {
 class Example {
  public:
   explicit Example(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), PALPATE_BINARY_DIR "/runtime/palpate-bridge-example");
+    arguments.insert(arguments.begin(), palpate::test::built_file("runtime/palpate-bridge-example"));
     std::vector<char*> pointers;
     pointers.reserve(arguments.size() + 1);
     for (std::string& argument : arguments) pointers.push_back(argument.data());

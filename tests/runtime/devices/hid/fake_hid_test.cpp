@@ -15,6 +15,7 @@
 #include "runtime/safety/silence_watch.h"
 #include "runtime/safety/speed_limit.h"
 #include "tests/support/devices/fake_hidapi.h"
+#include "tests/support/folders.h"
 
 namespace palpate::fake_hid_test {
 namespace {
@@ -617,12 +618,14 @@ TEST(HidChoice, BuiltInProfilesAreTheFiles) {
   ASSERT_EQ(profiles.size(), 6U);
   for (const NamedProfile& profile : profiles) {
     EXPECT_EQ(profile.profile.name,
-              read_device_profile(PALPATE_SOURCE_DIR "/runtime/devices/hid/profiles/" + profile.key + ".toml")
+              read_device_profile(
+                  palpate::test::source_file("runtime/devices/hid/profiles/" + profile.key + ".toml"))
                   .name);
   }
   EXPECT_TRUE(says(message([] { static_cast<void>(find_profile("no such")); }), "aluhaptics, palpate_board"));
-  EXPECT_EQ(find_profile(PALPATE_SOURCE_DIR "/runtime/devices/hid/profiles/polhem_v1.toml").profile.name,
-            "Polhem v1");
+  EXPECT_EQ(
+      find_profile(palpate::test::source_file("runtime/devices/hid/profiles/polhem_v1.toml")).profile.name,
+      "Polhem v1");
 }
 
 TEST(HidChoice, NothingIsAttached) {

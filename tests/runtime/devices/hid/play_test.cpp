@@ -25,6 +25,7 @@
 #include "runtime/safety/fault.h"
 #include "runtime/safety/safety.h"
 #include "tests/support/devices/emulated_bus.h"
+#include "tests/support/folders.h"
 
 namespace palpate::play_test {
 namespace {
@@ -180,8 +181,9 @@ class PlayedDevice : public ::testing::Test {
     ASSERT_NE(mkdtemp(name.data()), nullptr);
     folder = name;
     std::ofstream(folder / "cube.toml") << small_cube;
-    Program bake({PALPATE_BINARY_DIR "/precompute/palpate-precompute", "cube.toml", "-o", "cube.palpate.hdf"},
-                 folder);
+    Program bake(
+        {palpate::test::built_file("precompute/palpate-precompute"), "cube.toml", "-o", "cube.palpate.hdf"},
+        folder);
     ASSERT_EQ(bake.wait(), 0) << bake.messages();
   }
   static void TearDownTestSuite() { fs::remove_all(folder); }
@@ -196,7 +198,7 @@ class PlayedDevice : public ::testing::Test {
   /// palpate-runtime with the only device.
   [[nodiscard]] static std::unique_ptr<Program> play(std::vector<std::string> arguments,
                                                      const std::string& safety = patient) {
-    const std::string program = PALPATE_BINARY_DIR "/runtime/palpate-runtime";
+    const std::string program = palpate::test::built_file("runtime/palpate-runtime");
     std::vector<std::string> line = {program, "play",     "cube.palpate.hdf", "--device",
                                      "hid",   "--tool",   "sphere:0.01",      "--safety",
                                      safety,  "--record", "session.h5",       "--record-frames",

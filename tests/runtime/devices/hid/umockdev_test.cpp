@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "runtime/devices/hid/hid_port.h"
 #include "tests/support/devices/emulated_bus.h"
+#include "tests/support/folders.h"
 
 namespace palpate::umockdev_test {
 namespace {
@@ -111,7 +112,8 @@ TEST_F(EmulatedHid, NothingIsAttached) {
   const EmulatedBus bus;
   EXPECT_TRUE(attached_devices().empty());
   EXPECT_TRUE(says(message([] { static_cast<void>(choose("")); }), "no HID device is attached"));
-  EXPECT_TRUE(says(output_of(PALPATE_BINARY_DIR "/runtime/palpate-runtime devices"), "No HID device"));
+  EXPECT_TRUE(
+      says(output_of(palpate::test::built_file("runtime/palpate-runtime") + " devices"), "No HID device"));
 }
 
 TEST_F(EmulatedHid, WhatIsAttachedIsSeenWithItsProfiles) {
@@ -149,7 +151,7 @@ TEST_F(EmulatedHid, WhatIsAttachedIsSeenWithItsProfiles) {
   EXPECT_EQ(choose("/dev/hidraw0", "polhem_v1").profile.name, "Polhem v1");
   EXPECT_EQ(choose("045e:001b").profile.name, "Force-feedback joystick (USB PID)");
 
-  const std::string program = PALPATE_BINARY_DIR "/runtime/palpate-runtime devices";
+  const std::string program = palpate::test::built_file("runtime/palpate-runtime") + " devices";
   const std::string text = output_of(program);
   EXPECT_TRUE(says(text, "CAFE:4001 Board (/dev/hidraw1)\n"));
   EXPECT_TRUE(says(text, "  serial   B 7\n"));
@@ -170,7 +172,8 @@ TEST_F(EmulatedHid, UnknownDevices) {
   const std::string text = message([] { static_cast<void>(choose("")); });
   EXPECT_TRUE(says(text, "no profile fits this device"));
   EXPECT_TRUE(says(text, "output report 2: 47 x 8 bit"));
-  EXPECT_TRUE(says(output_of(PALPATE_BINARY_DIR "/runtime/palpate-runtime devices"), "none fits"));
+  EXPECT_TRUE(
+      says(output_of(palpate::test::built_file("runtime/palpate-runtime") + " devices"), "none fits"));
 }
 
 TEST_F(EmulatedHid, ANodeThatIsNotThere) {

@@ -10,11 +10,12 @@
 #include "runtime/devices/reports/device_profile.h"
 #include "runtime/devices/reports/palpate_board.h"
 #include "tests/support/devices/bytes.h"
+#include "tests/support/folders.h"
 
 namespace palpate::profile_test {
 namespace {
 
-const std::string folder = PALPATE_SOURCE_DIR "/runtime/devices/hid/profiles/";
+const std::string folder = palpate::test::source_file("runtime/devices/hid/profiles/");
 
 DeviceProfile shipped(const std::string& name) {
   return read_device_profile(folder + name + ".toml");

@@ -7,6 +7,7 @@
 #include "runtime/devices/reports/device_profile.h"
 #include "runtime/devices/reports/space_mouse.h"
 #include "tests/support/devices/bytes.h"
+#include "tests/support/folders.h"
 
 namespace palpate::spacemouse_test {
 namespace {
@@ -15,7 +16,7 @@ using Triple = std::array<std::int16_t, 3>;
 
 SpaceMouseConstants constants() {
   const auto profile =
-      read_device_profile(PALPATE_SOURCE_DIR "/runtime/devices/hid/profiles/spacemouse.toml");
+      read_device_profile(palpate::test::source_file("runtime/devices/hid/profiles/spacemouse.toml"));
   return std::get<SpaceMouseConstants>(profile.kind);
 }
 

@@ -10,6 +10,7 @@
 #include "runtime/devices/reports/woodenhaptics_arm.h"
 #include "runtime/devices/reports/woodenhaptics_report.h"
 #include "tests/support/devices/bytes.h"
+#include "tests/support/folders.h"
 
 namespace palpate::woodenhaptics_test {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 constexpr double quarter = std::numbers::pi / 2.0;
 
 DeviceProfile profile(const std::string& name) {
-  return read_device_profile(PALPATE_SOURCE_DIR "/runtime/devices/hid/profiles/" + name + ".toml");
+  return read_device_profile(palpate::test::source_file("runtime/devices/hid/profiles/" + name + ".toml"));
 }
 
 ArmConstants arm_of(const std::string& name) {
