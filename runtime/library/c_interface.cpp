@@ -1,6 +1,7 @@
 // The C functions of palpate.h over the C++ step.
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "formats/model_file.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/background/patch_source.h"
+#include "runtime/background/surface_frames.h"
 #include "runtime/body/body.h"
 #include "runtime/library/palpate.h"
 #include "runtime/library/sized_struct.h"
@@ -149,6 +151,21 @@ palpate_overlay read_overlay(const palpate_overlay* given) {
   return overlay;
 }
 
+std::int64_t read_stress_ticks(std::int64_t ticks) {
+  if (ticks >= 0) return ticks;
+  throw Error("stress was asked for each " + std::to_string(ticks) + " ticks", "palpate_create_with_options",
+              "ask for 1 or more, or for 0 to have none");
+}
+
+/// Whether a tool can become another between two ticks: its shape stays, and all else makes sense.
+bool can_become(const Tool& tool, const Tool& next) noexcept {
+  const auto is_bound = [](double value) { return value > 0.0; };  // infinite for none
+  const auto is_size = [](double value) { return std::isfinite(value) && value >= 0.0; };
+  return tool.radius == next.radius && tool.length == next.length && tool.disc_radius == next.disc_radius &&
+         is_bound(next.coupling_stiffness) && is_bound(next.coupling_torsion) && is_bound(next.max_force) &&
+         is_bound(next.hand_over) && is_size(next.reach) && is_size(next.friction.value_or(0.0));
+}
+
 StateOptions with_room(StateOptions options, const Body& body, const palpate_overlay& overlay) {
   if (overlay.refinement > 1) options.patch_nodes = patch_room(body, overlay.rings, options.tools.size());
   return options;
@@ -165,9 +182,15 @@ struct Shown {
   MotionSnapshot motion;
 };
 
+/// Stress and pressure at the surface nodes.
+struct FoundStress {
+  std::int64_t tick = -1;
+  std::vector<float> von_mises, pressure;  // [S] [Pa]
+};
+
 struct palpate_session {
   palpate_session(Model model, const StateOptions& options, const palpate_overlay& overlay,
-                  ContactModel contact)
+                  ContactModel contact, std::int64_t stress_ticks)
       : body(std::move(model), {}, overlay.refinement, contact),
         untouched(body, with_room(options, body, overlay)),
         state(untouched),
@@ -180,6 +203,14 @@ struct palpate_session {
       overlays.emplace(body, state, PatchSourceOptions{.rings = overlay.rings, .memory = overlay.memory});
     if (body.model().dynamics.method == DynamicsMethod::packed)
       motion.emplace(body, state, MotionSourceOptions{});
+    if (stress_ticks > 0) {
+      frames.emplace(body, state, SurfaceFramesOptions{.ticks_per_frame = stress_ticks},
+                     [this](SurfacePicture picture) {
+                       stress.next() = {picture.frame.tick, std::move(picture.frame.von_mises),
+                                        std::move(picture.frame.pressure)};
+                       stress.publish();
+                     });
+    }
   }
 
   /// Hands what the last tick did over to the thread that draws.
@@ -199,6 +230,9 @@ struct palpate_session {
   std::vector<Vec3> displacement;
   std::optional<PatchSource> overlays;
   std::optional<MotionSource> motion;
+  std::int64_t ticks = 0;
+  Latest<FoundStress> stress{FoundStress{}};
+  std::optional<SurfaceFrames> frames;  // last: its thread hands stress over
 };
 
 extern "C" {
@@ -231,7 +265,9 @@ palpate_session* palpate_create_with_options(const char* file, const palpate_too
     state.tick = wanted.tick;
     const ContactModel contact =
         wanted.dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
-    return std::make_unique<palpate_session>(load_model(file), state, overlay, contact).release();
+    const std::int64_t stress_ticks = read_stress_ticks(wanted.stress_ticks);
+    return std::make_unique<palpate_session>(load_model(file), state, overlay, contact, stress_ticks)
+        .release();
   } catch (...) {
     try {
       const Error told =
@@ -259,6 +295,8 @@ uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexc
   const StepStatus status = step(session->body, session->state, session->poses);
   if (session->motion) session->motion->post(session->state);
   session->publish();
+  if (session->frames) session->frames->post(session->state, session->ticks, 0.0);
+  ++session->ticks;
   return static_cast<uint32_t>(status);
 }
 
@@ -267,6 +305,17 @@ int palpate_get(const palpate_session* session, int tool, palpate_result* result
   const bool exists = tool >= 0 && static_cast<std::size_t>(tool) < session->state.tools.size();
   if (exists) felt = to_result(session->state.tools[static_cast<std::size_t>(tool)]);
   return write_struct(felt, result) && exists ? 0 : -1;
+}
+
+int palpate_set_tool(palpate_session* session, int number, const palpate_tool* tool) noexcept {
+  if (number < 0 || static_cast<std::size_t>(number) >= session->state.tools.size()) return -1;
+  const auto given = read_struct(tool, 0, default_tool);
+  if (!given) return -1;
+  Tool& now = session->state.tools[static_cast<std::size_t>(number)].tool;
+  const Tool next = to_tool(*given);
+  if (!can_become(now, next)) return -1;
+  now = next;
+  return 0;
 }
 
 void palpate_reset(palpate_session* session) noexcept {
@@ -301,6 +350,15 @@ void palpate_surface_displacement(palpate_session* session, double* xyz) noexcep
     copy(u, xyz);
     xyz += 3;
   }
+}
+
+int64_t palpate_surface_stress(palpate_session* session, float* von_mises, float* pressure) noexcept {
+  const FoundStress& found = session->stress.read();
+  if (found.tick < 0) return -1;
+  const auto nodes = static_cast<std::ptrdiff_t>(session->displacement.size());
+  if (von_mises != nullptr) std::copy_n(found.von_mises.begin(), nodes, von_mises);
+  if (pressure != nullptr) std::copy_n(found.pressure.begin(), nodes, pressure);
+  return found.tick;
 }
 
 }  // extern "C"

@@ -4,9 +4,10 @@
  * in the plane, z of what you give is ignored and z of what you get is 0 (of a torque, only z is not).
  *
  * Nothing here throws, and nothing prints. Sessions are independent of each other. Of one session, one thread
- * at a time may use the functions of the loop, palpate_step, palpate_get and palpate_reset; while it does,
- * one other thread at a time may use those of the surface. "Real-time safe" below means: no memory is taken,
- * no lock, no system call, and the time is bounded. A session must not be NULL but where that is said.
+ * at a time may use the functions of the loop, palpate_step, palpate_get, palpate_set_tool and palpate_reset;
+ * while it does, one other thread at a time may use those of the surface. "Real-time safe" below means: no
+ * memory is taken, no lock, no system call, and the time is bounded. A session must not be NULL but where
+ * that is said.
  *
  * Each struct begins with its size, so that later versions can add members at its end: begin yours with its
  * PALPATE_..._INIT, which sets the size and the defaults, then change what is to differ. A program that was
@@ -117,16 +118,18 @@ typedef struct palpate_overlay {
 typedef struct palpate_options {
   size_t size; /* sizeof(palpate_options) */
   const palpate_overlay*
-      overlay;         /* NULL: none. A thread of the session builds overlays ahead of the tools, at
-                        * the priority of the thread that calls this; palpate_step never waits */
-  int dynamic_contact; /* not 0: the tools meet the body's inertia and viscosity too. The file must have
-                        * dynamics, with a time step of one tick */
-  double tick;         /* time from one palpate_step to the next, for bodies that swing [s] */
+      overlay;          /* NULL: none. A thread of the session builds overlays ahead of the tools, at
+                         * the priority of the thread that calls this; palpate_step never waits */
+  int dynamic_contact;  /* not 0: the tools meet the body's inertia and viscosity too. The file must have
+                         * dynamics, with a time step of one tick */
+  double tick;          /* time from one palpate_step to the next, for bodies that swing [s] */
+  int64_t stress_ticks; /* a thread of the session finds stress and pressure on the surface each so many
+                         * ticks, for palpate_surface_stress; 0: never */
 } palpate_options;
 
-/* No overlay, quasi-static contact, 0.001 s. */
+/* No overlay, quasi-static contact, 0.001 s, no stress. */
 #define PALPATE_OPTIONS_INIT \
-  { sizeof(palpate_options), NULL, 0, 0.001 }
+  { sizeof(palpate_options), NULL, 0, 0.001, 0 }
 
 /* palpate_create with options. A body whose file has packed dynamics is swung by threads of the session. */
 palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
@@ -174,6 +177,12 @@ typedef struct palpate_result {
  * zero, or the size is refused, and nothing is written. Real-time safe. */
 int palpate_get(const palpate_session* session, int tool, palpate_result* result) PALPATE_NOEXCEPT;
 
+/* What a tool is from the next tick on: its coupling, largest force, friction, reach and hand-over. Its shape
+ * (radius, length, disc_radius) stays that of palpate_create: a surface cannot be pushed aside within a tick.
+ * Returns 0; -1, and nothing changes, where the number is none, the shape is another, a value makes no sense,
+ * or the size is refused. Real-time safe; a function of the loop. */
+int palpate_set_tool(palpate_session* session, int number, const palpate_tool* tool) PALPATE_NOEXCEPT;
+
 /* To the state after palpate_create: a body that nobody has touched. Takes no memory, but too long for a
  * tick. */
 void palpate_reset(palpate_session* session) PALPATE_NOEXCEPT;
@@ -204,6 +213,12 @@ void palpate_surface_simplices(const palpate_session* session, int32_t* corners)
  * exactly zero where the body is fixed. Never makes the loop wait, but takes some microseconds a contact
  * and thousand nodes, too long for a tick: call it where you draw. */
 void palpate_surface_displacement(palpate_session* session, double* xyz) PALPATE_NOEXCEPT;
+
+/* Von Mises stress and contact pressure at the surface nodes, `nodes` numbers each [Pa], as they were found
+ * last; stress is not a number where it is not known (all around is held). Either may be NULL. Returns the
+ * tick that they belong to, counted from 0 since palpate_create; -1, and nothing is written, where there are
+ * none yet or options.stress_ticks is 0. With an overlay, on the body's nodes as it is under it. */
+int64_t palpate_surface_stress(palpate_session* session, float* von_mises, float* pressure) PALPATE_NOEXCEPT;
 
 #ifdef __cplusplus
 }

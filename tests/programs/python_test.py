@@ -3,10 +3,10 @@
 import ctypes
 import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 import threading
+import time
 import unittest
 
 import h5py
@@ -24,31 +24,6 @@ from palpate import library  # noqa: E402
 HAS_SANITIZERS = "PALPATE_SANITIZE:STRING=\n" not in (BINARY / "CMakeCache.txt").read_text()
 STRUCTS = {"palpate_tool": library.CTool, "palpate_pose": library.CPose, "palpate_overlay": library.COverlay,
            "palpate_options": library.COptions, "palpate_result": library.CResult, "palpate_counts": library.CCounts}
-CLIENT = r"""
-#include <palpate.h>
-#include <stdio.h>
-int main(int count, char** words) {
-  char error[512];
-  double x, y, z;
-  palpate_tool tool = PALPATE_TOOL_INIT;
-  palpate_pose pose = PALPATE_POSE_INIT;
-  palpate_result felt = PALPATE_RESULT_INIT;
-  tool.radius = 0.1;
-  tool.friction = 0.3;
-  palpate_session* session = palpate_create(words[count - 1], &tool, 1, 32, error, sizeof error);
-  if (session == NULL) return 1;
-  while (scanf("%la %la %la", &x, &y, &z) == 3) {
-    pose.position[0] = x;
-    pose.position[1] = y;
-    pose.position[2] = z;
-    palpate_step(session, &pose);
-    palpate_get(session, 0, &felt);
-    printf("%a %a %a\n", felt.force[0], felt.force[1], felt.force[2]);
-  }
-  palpate_destroy(session);
-  return 0;
-}
-"""
 
 
 def compiled(folder, source):
@@ -97,19 +72,42 @@ class Structs(PythonTest):
 
 
 class Forces(PythonTest):
-    def test_equal_those_of_a_c_client_to_the_last_bit(self):
+    def test_are_the_same_after_a_reset(self):
         positions = rubbed()
-        client = compiled(self.folder, CLIENT)
-        words = "\n".join(" ".join(float(x).hex() for x in row) for row in positions)
-        done = subprocess.run([client, self.cube], input=words, text=True, capture_output=True, check=True, timeout=60)
-        of_c = numpy.array([[float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()])
         with palpate.Session(self.cube, palpate.Tool(radius=0.1, friction=0.3)) as session:
-            of_python = session.play(positions)
-            self.assertGreater(of_python[-1, 2], 0.001)  # it is pressed
-            self.assertLess(of_python[-1, 0], -1e-4)  # and rubs
-            self.assertTrue(numpy.array_equal(of_c, of_python))
+            forces = session.play(positions)
+            self.assertGreater(forces[-1, 2], 0.001)  # it is pressed
+            self.assertLess(forces[-1, 0], -1e-4)  # and rubs
             session.reset()
-            self.assertTrue(numpy.array_equal(session.play(positions), of_python))
+            self.assertTrue(numpy.array_equal(session.play(positions), forces))
+
+    def test_follow_a_tool_that_is_changed(self):
+        slippery, rough = palpate.Tool(radius=0.1, friction=0.0), palpate.Tool(radius=0.1, friction=0.3)
+        with palpate.Session(self.cube, rough) as one, palpate.Session(self.cube, slippery) as other:
+            other.set_tool(0, rough)
+            self.assertEqual(other.tools, [rough])
+            self.assertTrue(numpy.array_equal(one.play(rubbed()), other.play(rubbed())))
+            with self.assertRaisesRegex(palpate.Error, "keep radius"):
+                other.set_tool(0, palpate.Tool(radius=0.2))
+            with self.assertRaises(IndexError):
+                other.set_tool(1, rough)
+
+    def test_press_on_the_surface(self):
+        with palpate.Session(self.cube, palpate.Tool(radius=0.1), stress_ticks=1) as session:
+            tick, von_mises, pressure = session.stress()
+            self.assertEqual(tick, -1)
+            self.assertTrue(numpy.isnan(von_mises).all() and numpy.isnan(pressure).all())
+            positions = rubbed()
+            session.play(positions)
+            for _ in range(6000):
+                tick, von_mises, pressure = session.stress()
+                if tick == len(positions) - 1:
+                    break
+                time.sleep(0.01)
+            self.assertEqual(tick, len(positions) - 1)
+            pressed = session.rest[int(numpy.argmax(pressure))]
+            self.assertLess(abs(pressed - [0.6, 0.5, 1]).max(), 0.2)
+            self.assertGreater(numpy.nanmax(von_mises), 0)
 
     def test_probe_is_the_inverse_of_the_greens_block(self):
         with palpate.Body(self.cube) as body:

@@ -6,7 +6,7 @@ import ctypes
 import os
 import pathlib
 import shutil
-from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_int32, c_size_t, c_uint32, c_void_p
+from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_float, c_int32, c_int64, c_size_t, c_uint32, c_void_p
 
 
 class Error(Exception):
@@ -41,7 +41,8 @@ class COverlay(Structure):
 
 
 class COptions(Structure):
-    _fields_ = [("size", c_size_t), ("overlay", POINTER(COverlay)), ("dynamic_contact", c_int), ("tick", c_double)]
+    _fields_ = [("size", c_size_t), ("overlay", POINTER(COverlay)), ("dynamic_contact", c_int), ("tick", c_double),
+                ("stress_ticks", c_int64)]
 
 
 class CResult(Structure):
@@ -61,11 +62,13 @@ FUNCTIONS = {
     "palpate_destroy": (None, [c_void_p]),
     "palpate_step": (c_uint32, [c_void_p, POINTER(CPose)]),
     "palpate_get": (c_int, [c_void_p, c_int, POINTER(CResult)]),
+    "palpate_set_tool": (c_int, [c_void_p, c_int, POINTER(CTool)]),
     "palpate_reset": (None, [c_void_p]),
     "palpate_surface_counts": (c_int, [c_void_p, POINTER(CCounts)]),
     "palpate_surface_rest": (None, [c_void_p, POINTER(c_double)]),
     "palpate_surface_simplices": (None, [c_void_p, POINTER(c_int32)]),
     "palpate_surface_displacement": (None, [c_void_p, POINTER(c_double)]),
+    "palpate_surface_stress": (c_int64, [c_void_p, POINTER(c_float), POINTER(c_float)]),
 }
 
 

@@ -14,6 +14,7 @@ import numpy
 from .library import CCounts, COptions, COverlay, CPose, CResult, CTool, Error, load
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
+FLOATS = ctypes.POINTER(ctypes.c_float)
 POSE = numpy.dtype(CPose)
 
 
@@ -72,22 +73,28 @@ def felt_of(result: CResult, status: frozenset[str]) -> Felt:
     return Felt(**members, status=status)
 
 
+def c_tool(tool: Tool) -> CTool:
+    return CTool(ctypes.sizeof(CTool), *dataclasses.astuple(tool))
+
+
 class Session:
     """One body and the tools that touch it. One thread steps; one other may draw at the same time.
 
     `file`: NAME.palpate.hdf; `tools`: one or several; `max_contacts`: room for contact points of all tools, 1 to 256;
     `overlay`: a finer mesh under the tools; `dynamic_contact`: the tools meet the body's inertia too (the file needs
-    dynamics with a time step of one tick); `tick`: time from one step to the next [s]. Throws Error."""
+    dynamics with a time step of one tick); `tick`: time from one step to the next [s]; `stress_ticks`: a thread finds
+    stress and pressure each so many ticks, for `stress`, 0 never. Throws Error."""
 
     def __init__(self, file: str | os.PathLike[str], tools: Tool | Sequence[Tool], *, max_contacts: int = 32,
-                 overlay: Overlay | None = None, dynamic_contact: bool = False, tick: float = 0.001):
+                 overlay: Overlay | None = None, dynamic_contact: bool = False, tick: float = 0.001,
+                 stress_ticks: int = 0):
         self.tools = [tools] if isinstance(tools, Tool) else list(tools)
         self.tick = tick
         self._library = load()
         self._session = None
-        c_tools = (CTool * len(self.tools))(*[(ctypes.sizeof(CTool), *dataclasses.astuple(tool)) for tool in self.tools])
+        c_tools = (CTool * len(self.tools))(*[c_tool(tool) for tool in self.tools])
         c_overlay = None if overlay is None else ctypes.pointer(COverlay(ctypes.sizeof(COverlay), *dataclasses.astuple(overlay)))
-        options = COptions(ctypes.sizeof(COptions), c_overlay, dynamic_contact, tick)
+        options = COptions(ctypes.sizeof(COptions), c_overlay, dynamic_contact, tick, stress_ticks)
         error = ctypes.create_string_buffer(4096)
         self._session = self._library.palpate_create_with_options(
             os.fsencode(file), c_tools, len(self.tools), max_contacts, ctypes.byref(options), error, len(error))
@@ -144,6 +151,16 @@ class Session:
             raise IndexError(f"tool {tool} of {len(self.tools)}")
         return felt_of(self._result, self.status)
 
+    def set_tool(self, number: int, tool: Tool) -> None:
+        """What a tool is from the next tick on; its shape stays. Throws Error where the shape is another, or a value makes no
+        sense, and IndexError where there is no such tool."""
+        if not 0 <= number < len(self.tools):
+            raise IndexError(f"tool {number} of {len(self.tools)}")
+        if self._library.palpate_set_tool(self._open(), number, ctypes.byref(c_tool(tool))) != 0:
+            raise Error(f"tool {number} cannot become {tool}",
+                        "keep radius, length and disc_radius; springs, largest force and hand-over are positive")
+        self.tools[number] = tool
+
     @property
     def status(self) -> frozenset[str]:
         """Names of the status bits of the last tick."""
@@ -185,6 +202,13 @@ class Session:
         u = numpy.empty((self._counts().nodes, 3))
         self._library.palpate_surface_displacement(self._open(), u.ctypes.data_as(DOUBLES))
         return u
+
+    def stress(self) -> tuple[int, numpy.ndarray, numpy.ndarray]:
+        """Tick, von Mises stress and contact pressure of the surface nodes [S] [Pa] as they were found last; the tick is -1,
+        and all is NaN, where there are none yet. Stress is NaN where it is not known."""
+        found = [numpy.full(self._counts().nodes, numpy.nan, numpy.float32) for _ in range(2)]
+        tick = self._library.palpate_surface_stress(self._open(), *[values.ctypes.data_as(FLOATS) for values in found])
+        return tick, found[0], found[1]
 
     def _counts(self) -> CCounts:
         counts = CCounts(ctypes.sizeof(CCounts))

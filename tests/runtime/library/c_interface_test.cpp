@@ -19,6 +19,7 @@
 
 #include "formats/model_file.h"
 #include "runtime/background/patch_source.h"
+#include "runtime/background/surface_frames.h"
 #include "runtime/library/palpate.h"
 #include "runtime/solve/node_vectors.h"
 #include "runtime/tick/status.h"
@@ -454,6 +455,106 @@ TEST(CInterfaceSizes, InitsAreTheDefaultsOfCpp) {
   EXPECT_EQ(options.tick, StateOptions{}.tick);
   const palpate_overlay overlay = PALPATE_OVERLAY_INIT;
   EXPECT_EQ(overlay.memory, PatchSourceOptions{}.memory);
+}
+
+palpate_pose place(double x, double y, double z) {
+  return {sizeof(palpate_pose), {x, y, z}, {1.0, 0.0, 0.0, 0.0}, 0};
+}
+
+/// Presses on the cube, then slides.
+palpate_pose rubbing(int tick) {
+  return place(0.4 + 0.001 * std::clamp(tick - 100, 0, 150), 0.5, 1.2 - 0.001 * std::min(tick, 130));
+}
+
+TEST(CInterfaceTool, BecomesWhatIsToldFromTheNextTickOn) {
+  palpate_tool rubs = sphere(0.1);
+  rubs.friction = 0.5;
+  rubs.coupling_stiffness = 300.0;
+  const Session created = open("cube2", {rubs}), changed = open("cube2", {sphere(0.1)});
+  ASSERT_EQ(palpate_set_tool(changed.get(), 0, &rubs), 0);
+  for (int tick = 0; tick < 250; ++tick) {
+    const palpate_pose pose = rubbing(tick);
+    palpate_step(created.get(), &pose);
+    palpate_step(changed.get(), &pose);
+    ASSERT_EQ(vector(result_of(changed.get(), 0).force), vector(result_of(created.get(), 0).force)) << tick;
+  }
+  const palpate_result felt = result_of(created.get(), 0);
+  EXPECT_LT(felt.force[0], -0.1 * felt.force[2]);  // it rubs
+  rubs.friction = 0.0;
+  ASSERT_EQ(palpate_set_tool(created.get(), 0, &rubs), 0);
+  const palpate_pose still = rubbing(249);
+  for (int tick = 0; tick < 500; ++tick) palpate_step(created.get(), &still);
+  EXPECT_GT(result_of(created.get(), 0).force[0], 0.5 * felt.force[0]);  // no longer
+}
+
+TEST(CInterfaceTool, StaysWhereItCannotBecomeWhatIsTold) {
+  const palpate_tool good = sphere(0.1);
+  const Session session = open("cube2", {good}), untouched = open("cube2", {good});
+  std::vector<palpate_tool> refused(9, good);
+  refused[0].radius = 0.2;
+  refused[1].length = 0.1;
+  refused[2].disc_radius = 0.3;
+  refused[3].coupling_stiffness = 0.0;
+  refused[4].coupling_torsion = nan;
+  refused[5].max_force = -1.0;
+  refused[6].hand_over = 0.0;
+  refused[7].reach = HUGE_VAL;
+  refused[8].size = 0;
+  for (const palpate_tool& tool : refused)
+    EXPECT_EQ(palpate_set_tool(session.get(), 0, &tool), -1) << &tool - refused.data();
+  EXPECT_EQ(palpate_set_tool(session.get(), 1, &good), -1);
+  EXPECT_EQ(palpate_set_tool(session.get(), -1, &good), -1);
+  for (int tick = 0; tick < 200; ++tick) {
+    const palpate_pose pose = rubbing(tick);
+    palpate_step(session.get(), &pose);
+    palpate_step(untouched.get(), &pose);
+  }
+  EXPECT_EQ(vector(result_of(session.get(), 0).force), vector(result_of(untouched.get(), 0).force));
+}
+
+/// Stress and pressure are those of a frame that is computed beside the same ticks.
+TEST(CInterfaceStress, IsThatOfTheSurfacesFrames) {
+  constexpr int ticks = 150;
+  const palpate_tool tool = sphere(0.1);
+  palpate_options options = PALPATE_OPTIONS_INIT;
+  options.stress_ticks = 10;
+  std::string why;
+  const Session session(create(&tool, 1, &options, why));
+  ASSERT_NE(session, nullptr) << why;
+  const Body body(load_model(golden("cube2")));
+  State state(body, {.tools = {Tool{.radius = 0.1}}, .max_contacts = 24});
+  SurfaceFrame expected;
+  SurfaceFrames frames(body, state, {.ticks_per_frame = 10, .in_background = false},
+                       [&](SurfacePicture picture) { expected = std::move(picture.frame); });
+  std::vector<float> von_mises(body.surface_rest_positions().size(), -1.0F), pressure = von_mises;
+  EXPECT_EQ(palpate_surface_stress(session.get(), von_mises.data(), pressure.data()), -1);
+  EXPECT_EQ(von_mises[0], -1.0F);
+  for (int tick = 0; tick < ticks; ++tick) {
+    const palpate_pose pose = rubbing(tick);
+    palpate_step(session.get(), &pose);
+    step(body, state, cpp_pose(pose));
+    frames.post(state, tick, 0.0);
+  }
+  ASSERT_EQ(expected.tick, 140);
+  std::int64_t found = -1;
+  for (int wait = 0; wait < 60000 && found != expected.tick; ++wait) {
+    found = palpate_surface_stress(session.get(), von_mises.data(), pressure.data());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ASSERT_EQ(found, expected.tick);
+  EXPECT_EQ(pressure, expected.pressure);
+  EXPECT_GT(*std::max_element(pressure.begin(), pressure.end()), 0.0F);
+  for (std::size_t node = 0; node < von_mises.size(); ++node) {
+    EXPECT_TRUE(von_mises[node] == expected.von_mises[node] ||
+                (std::isnan(von_mises[node]) && std::isnan(expected.von_mises[node])))
+        << node;
+  }
+  EXPECT_EQ(palpate_surface_stress(session.get(), nullptr, nullptr), expected.tick);
+  const Session without = open("cube2", {tool});
+  EXPECT_EQ(palpate_surface_stress(without.get(), von_mises.data(), nullptr), -1);
+  options.stress_ticks = -1;
+  EXPECT_EQ(create(&tool, 1, &options, why), nullptr);
+  EXPECT_NE(why.find("each -1 ticks"), std::string::npos) << why;
 }
 
 /// The wider the flat tool, the more it has to push away.

@@ -497,6 +497,8 @@ TEST(OwnLoop, MakesNoHeapCall) {
                               tick % 300 > 250 ? 1 : 0};
       palpate_step(session, &pose);
       palpate_get(session, 0, &result);
+      tool.friction = 0.3 + 1e-4 * tick;
+      EXPECT_EQ(palpate_set_tool(session, 0, &tool), 0);
       palpate_surface_displacement(session, xyz.data());
       if (result.contacts > 0) ++touching;
       if (tick == 500) palpate_reset(session);

@@ -1,0 +1,172 @@
+// Palpate in your own loop, in C++17: palpate.h, which says what all of it means, with owners and exceptions.
+// Header only. Link libpalpate as for C.
+#ifndef PALPATE_HPP
+#define PALPATE_HPP
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "palpate.h"
+
+namespace palpate {
+
+/// What could not be done (`what`), and what to do about it (`hint`).
+class Error : public std::runtime_error {
+ public:
+  /// By what palpate_create says: lines "error: ..." and "hint: ...".
+  explicit Error(std::string_view told)
+      : std::runtime_error(part(told, "error: ")), hint_(part(told, "hint: ")) {}
+  [[nodiscard]] const std::string& hint() const noexcept { return hint_; }
+
+ private:
+  static std::string part(std::string_view told, std::string_view name) {
+    const std::size_t begin = told.find(name);
+    if (begin == std::string_view::npos) return {};
+    told.remove_prefix(begin + name.size());
+    return std::string(told.substr(0, told.find('\n')));
+  }
+
+  std::string hint_;
+};
+
+/// Names of the status bits of a tick.
+inline std::vector<std::string> status_names(std::uint32_t status) {
+  std::vector<std::string> names;
+  for (std::uint32_t bit = 1; bit != 0; bit <<= 1) {
+    const char* name = (status & bit) != 0 ? palpate_status_name(bit) : nullptr;
+    if (name != nullptr) names.emplace_back(name);
+  }
+  return names;
+}
+
+/// A tool with palpate.h's defaults: a point.
+inline palpate_tool make_tool(double radius = 0.0) {
+  palpate_tool tool = PALPATE_TOOL_INIT;
+  tool.radius = radius;
+  return tool;
+}
+
+/// A pose at a place [m], not turned.
+inline palpate_pose make_pose(double x, double y, double z, bool grab = false) {
+  palpate_pose pose = PALPATE_POSE_INIT;
+  pose.position[0] = x;
+  pose.position[1] = y;
+  pose.position[2] = z;
+  pose.grab = grab ? 1 : 0;
+  return pose;
+}
+
+inline palpate_options make_options() {
+  return PALPATE_OPTIONS_INIT;
+}
+
+/// Stress and pressure at the surface nodes, as they were found last.
+struct SurfaceStress {
+  std::int64_t tick = -1;        ///< that they belong to, from 0; -1: none yet
+  std::vector<float> von_mises;  ///< [nodes] [Pa]; not a number where it is not known
+  std::vector<float> pressure;   ///< [nodes] [Pa]
+};
+
+/// One body and the tools that touch it. Threads as in palpate.h: one steps, one other may draw.
+class Session {
+ public:
+  /// Loads a baked file. Throws Error.
+  Session(const std::string& file, const std::vector<palpate_tool>& tools, int max_contacts = 32,
+          const palpate_options& options = make_options())
+      : tools_(tools.size()) {
+    std::string error(4096, '\0');
+    session_.reset(palpate_create_with_options(file.c_str(), tools.data(), static_cast<int>(tools.size()),
+                                               max_contacts, &options, error.data(), error.size()));
+    if (session_ == nullptr) throw Error(error.c_str());
+  }
+  Session(const std::string& file, const palpate_tool& tool, int max_contacts = 32,
+          const palpate_options& options = make_options())
+      : Session(file, std::vector<palpate_tool>{tool}, max_contacts, options) {}
+
+  [[nodiscard]] std::size_t tools() const noexcept { return tools_; }
+
+  /// One tick of a session with one tool. Status bits; of a session with more, nothing happens but
+  /// PALPATE_POSE_NOT_FINITE. Real-time safe.
+  std::uint32_t step(const palpate_pose& pose) noexcept { return step(&pose, 1); }
+  /// One tick, a pose for each tool. Status bits; where the number is another, nothing happens but
+  /// PALPATE_POSE_NOT_FINITE. Real-time safe.
+  std::uint32_t step(const std::vector<palpate_pose>& poses) noexcept {
+    return step(poses.data(), poses.size());
+  }
+
+  /// What a tool feels since the last tick; all zero where there is no such tool. Real-time safe.
+  [[nodiscard]] palpate_result felt(int tool = 0) const noexcept {
+    palpate_result result = PALPATE_RESULT_INIT;
+    palpate_get(session_.get(), tool, &result);
+    return result;
+  }
+
+  /// What a tool is from the next tick on; false where it cannot become that. Real-time safe.
+  bool set_tool(int number, const palpate_tool& tool) noexcept {
+    return palpate_set_tool(session_.get(), number, &tool) == 0;
+  }
+
+  void reset() noexcept { palpate_reset(session_.get()); }
+
+  /// Positions of the surface nodes at rest [3 nodes] [m].
+  [[nodiscard]] std::vector<double> rest() const {
+    std::vector<double> xyz(3 * nodes());
+    palpate_surface_rest(session_.get(), xyz.data());
+    return xyz;
+  }
+
+  /// Nodes of the triangles (in the plane: lines) [corners x simplices].
+  [[nodiscard]] std::vector<std::int32_t> simplices() const {
+    const palpate_counts all = counts();
+    std::vector<std::int32_t> corners(static_cast<std::size_t>(all.corners) *
+                                      static_cast<std::size_t>(all.simplices));
+    palpate_surface_simplices(session_.get(), corners.data());
+    return corners;
+  }
+
+  /// Displacement of the surface nodes in the last tick [3 nodes] [m].
+  [[nodiscard]] std::vector<double> displacement() {
+    std::vector<double> xyz(3 * nodes());
+    palpate_surface_displacement(session_.get(), xyz.data());
+    return xyz;
+  }
+
+  /// As options.stress_ticks has it found.
+  [[nodiscard]] SurfaceStress stress() {
+    SurfaceStress found{-1, std::vector<float>(nodes()), std::vector<float>(nodes())};
+    found.tick = palpate_surface_stress(session_.get(), found.von_mises.data(), found.pressure.data());
+    return found;
+  }
+
+  [[nodiscard]] palpate_counts counts() const noexcept {
+    palpate_counts all = PALPATE_COUNTS_INIT;
+    palpate_surface_counts(session_.get(), &all);
+    return all;
+  }
+
+  /// For the functions of palpate.h.
+  [[nodiscard]] palpate_session* get() noexcept { return session_.get(); }
+
+ private:
+  struct End {
+    void operator()(palpate_session* session) const noexcept { palpate_destroy(session); }
+  };
+
+  std::uint32_t step(const palpate_pose* poses, std::size_t count) noexcept {
+    return palpate_step(session_.get(), count == tools_ ? poses : nullptr);
+  }
+
+  [[nodiscard]] std::size_t nodes() const noexcept { return static_cast<std::size_t>(counts().nodes); }
+
+  std::size_t tools_;
+  std::unique_ptr<palpate_session, End> session_;
+};
+
+}  // namespace palpate
+#endif
