@@ -20,4 +20,7 @@ std::string_view nearest(std::string_view word, const std::vector<std::string_vi
 /// The shortest text that reads back as the same number, whatever the locale.
 std::string shown(double value);
 
+/// A text as an attribute of XML in double quotes, or what stands between elements.
+std::string xml_escaped(std::string_view text);
+
 }  // namespace palpate

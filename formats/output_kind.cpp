@@ -83,6 +83,12 @@ std::string_view name_of(OutputKind kind) noexcept {
       return "grid for ParaView";
     case OutputKind::page:
       return "page";
+    case OutputKind::scene:
+      return "glTF scene";
+    case OutputKind::series:
+      return "collection for ParaView";
+    case OutputKind::ticks:
+      return "table of ticks";
     case OutputKind::faces:
       return "list of triangles";
     case OutputKind::surface:
@@ -121,6 +127,12 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
       return text.starts_with("<!doctype html>") &&
              (contains(text, "<meta name=\"generator\" content=\"palpate-runtime ") ||
               contains(text, "<title>Palpate</title>"));
+    case OutputKind::scene:
+      return text.starts_with("glTF") && contains(text, "\"generator\":\"Palpate ");
+    case OutputKind::series:
+      return is_our_xml(text, "<!-- palpate ");
+    case OutputKind::ticks:
+      return text.starts_with("time,device_x,device_y,device_z,");
     case OutputKind::faces:
       return is_loose_triangles(*bytes);
     case OutputKind::surface:

@@ -16,6 +16,9 @@ enum class OutputKind : std::uint8_t {
   field,      ///< table of displacements, CSV
   grid,       ///< for ParaView, .vtu
   page,       ///< a recording as HTML
+  scene,      ///< a recording as glTF, .glb
+  series,     ///< a recording as a collection for ParaView, .pvd
+  ticks,      ///< table of a recording's ticks, CSV
   faces,      ///< triangles that are wrong, .off
   surface,    ///< that was repaired, .off
 };

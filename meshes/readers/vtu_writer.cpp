@@ -4,6 +4,7 @@
 
 #include <bit>
 
+#include "base/words.h"
 #include "base/write_file.h"
 
 namespace palpate {
@@ -39,26 +40,6 @@ class Document {
   std::string raw_;
 };
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
-}
-
 void add_cells(Document& document, ElementType element, std::span<const Index> connectivity) {
   const auto width = static_cast<std::size_t>(traits(element).nodes), cells = connectivity.size() / width;
   std::vector<std::int64_t> offsets(cells);
@@ -83,7 +64,7 @@ Document make_document(std::span<const Vec3> nodes, ElementType element, std::sp
                            connectivity.size() / static_cast<std::size_t>(traits(element).nodes)));
   document.add("<PointData>\n");
   for (const NodalField& field : fields) {
-    document.add_array<double>("Float64", escaped(field.name), field.components, field.values);
+    document.add_array<double>("Float64", xml_escaped(field.name), field.components, field.values);
   }
   document.add("</PointData>\n<Points>\n");
   document.add_array<double>("Float64", "Points", 3,

@@ -14,6 +14,7 @@
 #include "base/program.h"
 #include "base/spelling.h"
 #include "runtime/app/devices_command.h"
+#include "runtime/app/export.h"
 #include "runtime/app/play_command.h"
 #include "runtime/app/probe.h"
 #include "runtime/app/session.h"
@@ -143,26 +144,37 @@ std::string check_number(const std::string& text) {
 }
 
 CLI::App* add_export(CLI::App& app, ExportOptions& options) {
-  CLI::App* exported =
-      app.add_subcommand("export", "write a recording as one web page that needs no program");
+  CLI::App* exported = app.add_subcommand(
+      "export", "write a recording as a web page, a glTF scene, for ParaView or as a table");
   exported->add_option("SESSION.h5", options.recording, "recording")->required()->type_name("");
-  exported->add_option("--html", options.html, "file to write")->required()->type_name("OUT.html");
+  CLI::Option_group* outputs = exported->add_option_group("outputs", "one of them at least");
+  outputs->add_option("--html", options.html, "one web page that needs no program")->type_name("OUT.html");
+  outputs
+      ->add_option("--gltf", options.gltf, "surface and tool as an animation, for Blender and game engines")
+      ->type_name("OUT.glb");
+  outputs
+      ->add_option("--vtu", options.vtu,
+                   "a collection for ParaView; its pictures go into the folder OUT.frames")
+      ->type_name("OUT.pvd");
+  outputs->add_option("--csv", options.csv, "the ticks as a table")->type_name("OUT.csv");
+  outputs->require_option(1, 4);
   exported->add_flag("--force", options.force, force_help);
   exported->add_option("--fps", options.fps, "most pictures per second; default: 30")
       ->option_text("N")
       ->check(CLI::PositiveNumber)
       ->check(check_number);
-  exported->add_option("--from", options.from, "time at which the page starts [s]")
+  exported->add_option("--from", options.from, "time at which it starts [s]")
       ->option_text("S")
       ->check(CLI::NonNegativeNumber)
       ->check(check_number);
-  exported->add_option("--to", options.to, "time at which the page ends [s]")
+  exported->add_option("--to", options.to, "time at which it ends [s]")
       ->option_text("S")
       ->check(CLI::NonNegativeNumber)
       ->check(check_number);
   exported->footer(
       "Example:\n"
-      "  palpate-runtime export touch.h5 --html touch.html");
+      "  palpate-runtime export touch.h5 --html touch.html\n"
+      "  palpate-runtime export touch.h5 --gltf touch.glb --fps 10");
   return exported;
 }
 
@@ -278,7 +290,7 @@ int run(int argc, char** argv) {
     if (devices_command->parsed()) return devices(arguments.devices);
     if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.force);
     if (view_command->parsed()) return view(arguments.recordings, read_view_address(arguments.view_address));
-    if (export_command->parsed()) return export_html(arguments.exported);
+    if (export_command->parsed()) return export_session(arguments.exported);
     if (push_command->parsed()) return push(arguments.push);
     if (play_command->parsed()) return play_and_name_next(read_play(arguments.play));
     return probe(

@@ -82,16 +82,24 @@ SurfacePicture SessionPictures::picture(std::int64_t frame) const {
   return picture;
 }
 
+std::string SessionPictures::name() const {
+  std::string name = std::filesystem::path(recording().info.model_path).filename().string();
+  if (const std::size_t suffix = name.find(".palpate.hdf"); suffix != std::string::npos) name.resize(suffix);
+  return name;
+}
+
+Tool SessionPictures::tool() const {
+  return read_settings(split_settings(recording().info.options)).tool;
+}
+
 nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
   using nlohmann::json;
   const RecordedSurface& surface = recording().frames.surface;
   Eigen::AlignedBox3d bounds;
   for (const Vec3& node : surface.nodes) bounds.extend(node);
   const auto point = [](const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); };
-  std::string name = std::filesystem::path(recording().info.model_path).filename().string();
-  if (const std::size_t suffix = name.find(".palpate.hdf"); suffix != std::string::npos) name.resize(suffix);
   RunState state;
-  state.model = {{"name", name},
+  state.model = {{"name", name()},
                  {"file", recording().info.model_path},
                  {"dimension", surface.corners},
                  {"nodes", nullptr},

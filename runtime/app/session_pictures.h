@@ -33,6 +33,9 @@ class SessionPictures {
   [[nodiscard]] double time(std::int64_t frame) const {  ///< [s]
     return recording().frames.time[static_cast<std::size_t>(frame)];
   }
+  [[nodiscard]] const RecordedSurface& surface() const noexcept { return recording().frames.surface; }
+  [[nodiscard]] std::string name() const;  ///< of the model
+  [[nodiscard]] Tool tool() const;         ///< that touched it at the start
   /// The picture of frame 0 .. frames() - 1, with the tool as it was in its tick. Throws Error when it cannot
   /// be read.
   [[nodiscard]] SurfacePicture picture(std::int64_t frame) const;

@@ -1,0 +1,218 @@
+#include "runtime/exports/gltf.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "runtime/exports/tool_mesh.h"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+// Numbers of the specification (Khronos, glTF 2.0).
+constexpr int float_component = 5126, index_component = 5125;
+constexpr int vertex_buffer = 34962, index_buffer = 34963;
+constexpr int lines = 1, triangles = 4;
+
+constexpr std::size_t glb_header = 12;  // [bytes]
+
+constexpr double point_share = 0.01;  // [size of the body] what a tool without a radius is drawn with
+const double half = std::sqrt(0.5);
+const json z_becomes_y = json::array({-half, 0.0, 0.0, half});
+
+using Floats = std::vector<float>;
+
+/// The binary part, and the views and accessors that say what lies where.
+class Buffer {
+ public:
+  /// The number of the accessor of some floats, `width` to an element. `target`: of the view, 0 for none.
+  int add(const Floats& numbers, int width, int target) {
+    constexpr const char* types[] = {"SCALAR", "", "VEC3", "VEC4"};
+    json accessor = {{"componentType", float_component},
+                     {"count", numbers.size() / static_cast<std::size_t>(width)},
+                     {"type", types[width - 1]}};
+    if (width == 3 || target == 0) {  // asked for of positions and of times
+      Floats least(numbers.begin(), numbers.begin() + width), most = least;
+      for (std::size_t k = 0; k < numbers.size(); ++k) {
+        const std::size_t axis = k % static_cast<std::size_t>(width);
+        least[axis] = std::min(least[axis], numbers[k]);
+        most[axis] = std::max(most[axis], numbers[k]);
+      }
+      accessor["min"] = least;
+      accessor["max"] = most;
+    }
+    return add(accessor, numbers.data(), sizeof(float) * numbers.size(), target);
+  }
+
+  int add(const std::vector<std::uint32_t>& corners) {
+    return add({{"componentType", index_component}, {"count", corners.size()}, {"type", "SCALAR"}},
+               corners.data(), sizeof(std::uint32_t) * corners.size(), index_buffer);
+  }
+
+  json views = json::array(), accessors = json::array();
+  std::string bytes;
+
+ private:
+  int add(json accessor, const void* data, std::size_t size, int target) {
+    json view = {{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", size}};
+    if (target != 0) view["target"] = target;
+    bytes.append(static_cast<const char*>(data), size);
+    accessor["bufferView"] = views.size();
+    views.push_back(view);
+    accessors.push_back(accessor);
+    return static_cast<int>(accessors.size()) - 1;
+  }
+};
+
+Floats floats_of(const std::vector<Vec3>& vectors) {
+  Floats numbers;
+  for (const Vec3& v : vectors) {
+    for (const double x : v) numbers.push_back(static_cast<float>(x));
+  }
+  return numbers;
+}
+
+std::vector<Vec3> displaced(const RecordedSurface& surface, const SurfaceFrame& frame) {
+  std::vector<Vec3> places = surface.nodes;
+  for (std::size_t node = 0; node < places.size(); ++node)
+    places[node] += Eigen::Map<const Eigen::Vector3f>(&frame.displacement[3 * node]).cast<double>();
+  return places;
+}
+
+/// Of the nodes: means of those of the triangles around, by area.
+std::vector<Vec3> normals_of(const RecordedSurface& surface, const std::vector<Vec3>& places) {
+  std::vector<Vec3> normals(places.size(), Vec3::Zero());
+  for (std::size_t t = 0; t < surface.simplices.size(); t += 3) {
+    const auto corner = [&](std::size_t k) { return static_cast<std::size_t>(surface.simplices[t + k]); };
+    const Vec3 twice = (places[corner(1)] - places[corner(0)]).cross(places[corner(2)] - places[corner(0)]);
+    for (std::size_t k = 0; k < 3; ++k) normals[corner(k)] += twice;
+  }
+  for (Vec3& normal : normals) {
+    const double length = normal.norm();
+    normal = length > 0.0 ? Vec3(normal / length) : Vec3::UnitZ();
+  }
+  return normals;
+}
+
+Floats change(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
+  std::vector<Vec3> differences(from.size());
+  for (std::size_t k = 0; k < from.size(); ++k) differences[k] = to[k] - from[k];
+  return floats_of(differences);
+}
+
+json material(const char* name, const std::array<double, 4>& color, double roughness) {
+  return {{"name", name},
+          {"doubleSided", true},
+          {"pbrMetallicRoughness",
+           {{"baseColorFactor", color}, {"metallicFactor", 0.0}, {"roughnessFactor", roughness}}}};
+}
+
+std::vector<std::uint32_t> corners_of(const std::vector<Index>& simplices) {
+  return {simplices.begin(), simplices.end()};
+}
+
+/// The surface at rest without loads; its targets are the pictures.
+json surface_mesh(const RecordedSurface& surface, std::span<const SurfacePicture> pictures, Buffer& buffer) {
+  const bool is_solid = surface.corners == 3;
+  const std::vector<Vec3> normals = is_solid ? normals_of(surface, surface.nodes) : std::vector<Vec3>{};
+  json primitive = {{"attributes", {{"POSITION", buffer.add(floats_of(surface.nodes), 3, vertex_buffer)}}},
+                    {"mode", is_solid ? triangles : lines},
+                    {"material", 0}};
+  if (is_solid) primitive["attributes"]["NORMAL"] = buffer.add(floats_of(normals), 3, vertex_buffer);
+  primitive["indices"] = buffer.add(corners_of(surface.simplices));
+  for (const SurfacePicture& picture : pictures) {
+    const std::vector<Vec3> places = displaced(surface, picture.frame);
+    json target = {{"POSITION", buffer.add(picture.frame.displacement, 3, vertex_buffer)}};
+    if (is_solid)
+      target["NORMAL"] = buffer.add(change(normals, normals_of(surface, places)), 3, vertex_buffer);
+    primitive["targets"].push_back(target);
+  }
+  Floats weights(pictures.size(), 0.0F);
+  weights.front() = 1.0F;
+  return {{"name", "surface"}, {"primitives", json::array({primitive})}, {"weights", weights}};
+}
+
+json mesh_of_tool(const ToolMesh& mesh, Buffer& buffer) {
+  const json primitive = {{"attributes",
+                           {{"POSITION", buffer.add(floats_of(mesh.positions), 3, vertex_buffer)},
+                            {"NORMAL", buffer.add(floats_of(mesh.normals), 3, vertex_buffer)}}},
+                          {"indices", buffer.add(corners_of(mesh.triangles))},
+                          {"material", 1}};
+  return {{"name", "tool"}, {"primitives", json::array({primitive})}};
+}
+
+/// In each picture its own target, and the tool where it was.
+json animation(std::span<const SurfacePicture> pictures, int surface_node, int tool_node, Buffer& buffer) {
+  Floats times, weights, places, turns;
+  const double begin = pictures.front().frame.time;
+  for (std::size_t k = 0; k < pictures.size(); ++k) {
+    times.push_back(static_cast<float>(pictures[k].frame.time - begin));
+    weights.resize(weights.size() + pictures.size(), 0.0F);
+    weights[k * pictures.size() + k] = 1.0F;
+    const ToolPose& tool = pictures[k].tool;
+    for (const double x : tool.position) places.push_back(static_cast<float>(x));
+    for (const double x : tool.orientation.coeffs()) turns.push_back(static_cast<float>(x));  // x, y, z, w
+  }
+  const int input = buffer.add(times, 1, 0);
+  json samplers = json::array(), channels = json::array();
+  const auto move = [&](int node, const char* path, int output) {
+    channels.push_back({{"sampler", samplers.size()}, {"target", {{"node", node}, {"path", path}}}});
+    samplers.push_back({{"input", input}, {"output", output}, {"interpolation", "LINEAR"}});
+  };
+  move(surface_node, "weights", buffer.add(weights, 1, 0));
+  move(tool_node, "translation", buffer.add(places, 3, 0));
+  move(tool_node, "rotation", buffer.add(turns, 4, 0));
+  return {{"name", "session"}, {"samplers", samplers}, {"channels", channels}};
+}
+
+void append(std::string& bytes, std::uint32_t number) {
+  for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(number >> shift & 0xFFU);
+}
+
+void append_chunk(std::string& bytes, const char* kind, std::string chunk, char filling) {
+  chunk.resize((chunk.size() + 3) / 4 * 4, filling);
+  append(bytes, static_cast<std::uint32_t>(chunk.size()));
+  bytes.append(kind, 4);
+  bytes += chunk;
+}
+
+}  // namespace
+
+std::string glb_of(const std::string& name, const RecordedSurface& surface, const Tool& tool,
+                   std::span<const SurfacePicture> pictures) {
+  Eigen::AlignedBox3d bounds;
+  for (const Vec3& node : surface.nodes) bounds.extend(node);
+  Buffer buffer;
+  json scene;
+  scene["asset"] = {{"version", "2.0"}, {"generator", "Palpate " PALPATE_VERSION}};
+  scene["scene"] = 0;
+  scene["scenes"] = json::array({{{"name", name}, {"nodes", json::array({0})}}});
+  scene["nodes"] =
+      json::array({{{"name", name}, {"rotation", z_becomes_y}, {"children", json::array({1, 2})}},
+                   {{"name", "surface"}, {"mesh", 0}},
+                   {{"name", "tool"}, {"mesh", 1}}});
+  scene["materials"] = json::array(
+      {material("body", {0.62, 0.24, 0.2, 1.0}, 0.45), material("tool", {0.75, 0.77, 0.8, 1.0}, 0.3)});
+  const ToolMesh seen_tool = tool_mesh(tool, point_share * bounds.diagonal().norm());
+  scene["meshes"] = json::array({surface_mesh(surface, pictures, buffer), mesh_of_tool(seen_tool, buffer)});
+  scene["animations"] = json::array({animation(pictures, 1, 2, buffer)});
+  scene["bufferViews"] = buffer.views;
+  scene["accessors"] = buffer.accessors;
+  scene["buffers"] = json::array({{{"byteLength", buffer.bytes.size()}}});
+
+  std::string chunks;
+  append_chunk(chunks, "JSON", scene.dump(), ' ');
+  append_chunk(chunks, "BIN\0", std::move(buffer.bytes), '\0');
+  std::string file = "glTF";
+  append(file, 2);
+  append(file, static_cast<std::uint32_t>(glb_header + chunks.size()));
+  return file + chunks;
+}
+
+}  // namespace palpate
