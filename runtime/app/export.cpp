@@ -19,6 +19,7 @@
 #include "runtime/exports/gltf.h"
 #include "runtime/exports/ticks_table.h"
 #include "runtime/exports/vtu_series.h"
+#include "runtime/loop/session_check.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/wire.h"
@@ -134,7 +135,7 @@ std::size_t write_series(const std::filesystem::path& pvd, const RecordedSurface
 
 /// The ticks from options.from to options.to.
 void write_ticks(const ExportOptions& options, const std::filesystem::path& csv) {
-  const Recording recording = read_recording(options.recording);
+  const Recording recording = read_session(options.recording);
   std::vector<TickRecord> ticks;
   for (const TickRecord& tick : recording.ticks) {
     if (tick.time >= options.from && (!options.to || tick.time <= *options.to)) ticks.push_back(tick);

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "base/error.h"
-#include "runtime/app/session_check.h"
 #include "runtime/loop/loop.h"
 #include "runtime/loop/numbers.h"
+#include "runtime/loop/session_check.h"
 
 namespace palpate {
 namespace {

@@ -11,10 +11,10 @@
 #include "base/error.h"
 #include "base/write_file.h"
 #include "runtime/app/play_report.h"
-#include "runtime/app/session_check.h"
 #include "runtime/loop/last_tick.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/real_time.h"
+#include "runtime/loop/session_check.h"
 
 namespace palpate {
 namespace {

@@ -12,8 +12,8 @@
 #include "base/printable.h"
 #include "base/write_file.h"
 #include "runtime/app/best_effort_report.h"
-#include "runtime/app/session_check.h"
 #include "runtime/loop/output.h"
+#include "runtime/loop/session_check.h"
 #include "runtime/loop/session_xdmf.h"
 
 namespace palpate {

@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "runtime/app/run_state.h"
-#include "runtime/app/session_check.h"
+#include "runtime/loop/session_check.h"
 #include "runtime/loop/settings.h"
 
 namespace palpate {

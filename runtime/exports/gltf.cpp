@@ -85,7 +85,7 @@ std::vector<Vec3> displaced(const RecordedSurface& surface, const SurfaceFrame& 
   return places;
 }
 
-/// Of the nodes: means of those of the triangles around, by area.
+/// Normals of the nodes: means of those of the triangles around, by area.
 std::vector<Vec3> normals_of(const RecordedSurface& surface, const std::vector<Vec3>& places) {
   std::vector<Vec3> normals(places.size(), Vec3::Zero());
   for (std::size_t t = 0; t < surface.simplices.size(); t += 3) {

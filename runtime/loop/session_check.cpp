@@ -1,4 +1,4 @@
-#include "runtime/app/session_check.h"
+#include "runtime/loop/session_check.h"
 
 #include <fmt/core.h>
 
