@@ -30,6 +30,7 @@
 #include "precompute/plan.h"
 #include "precompute/progress.h"
 #include "precompute/spread_plan.h"
+#include "precompute/team_sharing.h"
 
 namespace palpate {
 namespace {
@@ -389,8 +390,8 @@ std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const 
   }
   constexpr int one_thread = 1;  // only one solves with all ranks
   Team alone;
-  GreensCompressor compressor(plan, factor, one_thread, run.progress, run.interrupted);
-  if (compressor.solve_near({0, plan.frame.tree.leaves()}, alone, writer, run.tiles))
+  GreensCompressor compressor(plan, factor, alone, one_thread, run.progress, run.interrupted);
+  if (compressor.solve_near({0, plan.frame.tree.leaves()}, writer, run.tiles))
     solved.compressed = compressor.compress(writer);
   if (solved.compressed != nullptr) solved.probes = make_probes(factor, plan.stored.dofs);
   spread.release();
@@ -398,32 +399,33 @@ std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const 
   return solved;
 }
 
-/// Compresses the Green's functions: all ranks share the near pairs, of which a part has some, and the leader
-/// makes the rest. Nothing when interrupted.
+/// Compresses the Green's functions; a part has some of the near pairs. Nothing when interrupted.
 std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor& factor,
                                        const std::optional<BakePart>& part, const Shared& run,
                                        ModelWriter& writer) {
   if (SpreadNumbers* spread = factor.spread_numbers(); spread != nullptr)
     return solve_compressed_alone(plan, factor, *spread, run, writer);
-  GreensCompressor compressor(plan, factor, run.jobs, run.progress, run.interrupted);
+  GreensCompressor compressor(plan, factor, run.team, run.jobs, run.progress, run.interrupted);
   const PieceRange leaves = part ? part->pieces.front() : PieceRange{0, plan.frame.tree.leaves()};
-  if (!compressor.solve_near(leaves, run.team, writer, run.tiles)) return {};
+  if (!compressor.solve_near(leaves, writer, run.tiles)) return {};
   Solved solved;
-  if (part || !run.team.leads()) return solved;
+  if (part) return solved;
   solved.compressed = compressor.compress(writer);
   if (solved.compressed == nullptr) return {};
-  solved.probes = make_probes(factor, plan.stored.dofs);
+  if (run.team.leads()) solved.probes = make_probes(factor, plan.stored.dofs);
   return solved;
 }
 
 /// Condenses the overlays that the file is to keep. False when interrupted.
-bool add_overlays(const Description& description, const OverlayPlan& overlays, int jobs, Model& model,
-                  Progress& progress, const InterruptGuard& interrupt) {
+bool add_overlays(const Description& description, const OverlayPlan& overlays, Team& team, int jobs,
+                  Model& model, Progress& progress, const InterruptGuard& interrupt) {
   progress.begin(overlay_stage);
-  model.overlay = condense_overlays(model, *description.overlay, overlays.centres, jobs, [&](double share) {
-    progress.reach(share);
-    return !interrupt.requested();
-  });
+  TeamSharing sharing(team, jobs, [&] { return interrupt.requested(); });
+  model.overlay =
+      condense_overlays(model, *description.overlay, overlays.centres, sharing, [&](double share) {
+        progress.reach(share);
+        return true;
+      });
   return !interrupt.requested();
 }
 
@@ -641,8 +643,8 @@ bool Bake::describe() {
   model_.rest_displacement = rest_displacement(*factor_, stiffness_, loads_, prescribed_, model_.dimension());
   if (plans_.compression)
     model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
-  const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, options_.jobs,
-                                                           model_, progress_, interrupt_);
+  const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, team_,
+                                                           options_.jobs, model_, progress_, interrupt_);
   if (team_.any(!whole)) return false;
   if (take_up()) return true;
   add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_,

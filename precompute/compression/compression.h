@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "base/sharing.h"
 #include "matrices/hierarchical.h"
 #include "precompute/compression/cluster_pairs.h"
 #include "precompute/numerics/factor.h"
@@ -40,7 +41,7 @@ class Compression {
   /// `stored_dofs` [d N] are dofs of K, d a node, in the order of `nodes`, -1 where held. All are kept by
   /// reference.
   Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
-              const ClusteredNodes& nodes, int jobs, CompressionProgress progress);
+              const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress);
   ~Compression();
   Compression(const Compression&) = delete;
   Compression& operator=(const Compression&) = delete;

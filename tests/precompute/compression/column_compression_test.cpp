@@ -40,7 +40,8 @@ class Bar : public test::InvertedBody {
   }
 
   [[nodiscard]] HierarchicalMatrix sketched(double cut) const {
-    Compression compression(factor(), stored().dofs, 3, stored().clusters, 1,
+    ThreadSharing one(1);
+    Compression compression(factor(), stored().dofs, 3, stored().clusters, one,
                             [](CompressionStage, double) { return true; });
     compression.prepare();
     return *compression.compress(cut);
