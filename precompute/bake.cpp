@@ -399,6 +399,14 @@ std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const 
   return solved;
 }
 
+/// From here on every process sees what all have written, on whatever machine.
+void see_all(Team& team, ModelWriter& writer) {
+  if (team.size() == 1) return;
+  writer.flush();
+  team.any(false);  // all have
+  writer.look_again();
+}
+
 /// Compresses the Green's functions; a part has some of the near pairs. Nothing when interrupted.
 std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor& factor,
                                        const std::optional<BakePart>& part, const Shared& run,
@@ -410,6 +418,7 @@ std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor
   if (!compressor.solve_near(leaves, writer, run.tiles)) return {};
   Solved solved;
   if (part) return solved;
+  see_all(run.team, writer);
   solved.compressed = compressor.compress(writer);
   if (solved.compressed == nullptr) return {};
   if (run.team.leads()) solved.probes = make_probes(factor, plan.stored.dofs);
@@ -695,6 +704,7 @@ BakeResult Bake::solve_and_write() {
                                options_.output.string(), options_.output.filename().string()));
     return BakeResult::part_done;
   }
+  see_all(team_, *writer);
   if (!team_.leads()) return BakeResult::done;
   progress_.begin(write_stage);
   writer->finish(solved->probes, solved->compressed);

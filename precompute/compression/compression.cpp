@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -99,7 +100,7 @@ struct Compression::Impl {
   bool sample();
   bool climb(double cut);
   [[nodiscard]] HierarchicalMatrix packed();
-  void check(HierarchicalMatrix& matrix);
+  bool check(HierarchicalMatrix& matrix);
 
  private:
   /// What is known of a cluster while its level is worked on.
@@ -499,17 +500,23 @@ HierarchicalMatrix Compression::Impl::packed() {
 
 /// Skeletons have errors of their own: what loads that chose nothing tell beyond what pair_error has is
 /// shared out in proportion to the pairs. Their bases are orthonormal, but for L.
-void Compression::Impl::check(HierarchicalMatrix& matrix) {
+bool Compression::Impl::check(HierarchicalMatrix& matrix) {
   std::vector<Index> nodes(at(matrix.tree.nodes));
   std::iota(nodes.begin(), nodes.end(), 0);
   const NodeRange all{0, matrix.tree.nodes};
-  Rows missing(matrix.order(), checks);
-  parallel_for(checks, jobs_, [&](std::int64_t k, int) {
+  std::vector<Eigen::VectorXd> displaced(checks);
+  SharedItems loads;
+  loads.count = checks;
+  loads.work = [&](std::int64_t k, int) {
     const Eigen::VectorXd f = load_.col(samples + k);
-    Eigen::VectorXd u(f.size());
+    Eigen::VectorXd& u = displaced[at(k)];
+    u.resize(f.size());
     displace(matrix, nodes, {f.data(), at(f.size())}, {&all, 1}, {u.data(), at(u.size())});
-    missing.col(k) = response_.col(samples + k) - u;
-  });
+  };
+  loads.carry = [&](std::int64_t k, Parcel& results) { results.carry(displaced[at(k)]); };
+  if (!sharing_.for_each(loads)) return false;
+  Rows missing(matrix.order(), checks);
+  for (Index k = 0; k < checks; ++k) missing.col(k) = response_.col(samples + k) - displaced[at(k)];
   std::vector<double> squared(at(matrix.tree.leaves()));
   parallel_for(matrix.tree.leaves(), jobs_, [&](std::int64_t leaf, int) {
     const Index c = matrix.tree.first_leaf() + static_cast<Index>(leaf);
@@ -530,6 +537,7 @@ void Compression::Impl::check(HierarchicalMatrix& matrix) {
   const double share = whole > 0.0 ? std::max(0.5 * measured - known, 0.0) / whole : 0.0;
   for (std::size_t p = 0; p < of_pair.size(); ++p)
     matrix.pair_error[p] = std::hypot(matrix.pair_error[p], std::sqrt(share * of_pair[p]));
+  return true;
 }
 
 Compression::Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
@@ -548,10 +556,10 @@ bool Compression::prepare(const FetchNear& fetch) {
 
 std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {
   if (!impl_->climb(skeleton_share * cut)) return nullptr;
-  auto matrix =
-      std::make_shared<HierarchicalMatrix>(recompressed(impl_->packed(), cut, impl_->sharing().jobs()));
-  impl_->check(*matrix);
-  return matrix;
+  std::optional<HierarchicalMatrix> recompressed_matrix =
+      recompressed(impl_->packed(), cut, impl_->sharing());
+  if (!recompressed_matrix || !impl_->check(*recompressed_matrix)) return nullptr;
+  return std::make_shared<HierarchicalMatrix>(*std::move(recompressed_matrix));
 }
 
 HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension) {

@@ -198,8 +198,9 @@ void from_columns(const Options& options, const Problem& problem) {
   fmt::print("all columns: {}; {:.3f} GB kept\n", lap(), 1e-9 * double(columns->kept_bytes()));
   columns.reset();
   std::fflush(stdout);
+  ThreadSharing threads(options.jobs);
   for (const double coarser : options.cut) {
-    const HierarchicalMatrix matrix = recompressed(finer, coarser, options.jobs);
+    const HierarchicalMatrix matrix = recompressed(finer, coarser, threads).value();
     fmt::print("cut {:g}: {}\n", coarser, lap());
     report(matrix, options, problem);
   }
