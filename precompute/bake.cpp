@@ -102,7 +102,7 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
   const auto& [plan, compression, overlays, dynamics] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
-    stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs)});
+    stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs) / ranks});
   if (dynamics.method == DynamicsMethod::modal)
     stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
   if (compression) {
@@ -686,8 +686,10 @@ bool Bake::take_up() {
 std::optional<Solved> Bake::solve(ModelWriter& writer) {
   const Shared run{options_.jobs, team_, progress_, tiles_, [&] { return interrupt_.requested(); }};
   if (plans_.compression) return solve_compressed(*plans_.compression, *factor_, part_, run, writer);
-  return solve_matrices(description_, *elastic_, stiffness_, std::move(factor_), *solver_, stored_, plans_,
-                        part_, run, writer);
+  std::optional<Solved> solved = solve_matrices(description_, *elastic_, stiffness_, std::move(factor_),
+                                                *solver_, stored_, plans_, part_, run, writer);
+  if (solved) see_all(team_, writer);
+  return solved;
 }
 
 BakeResult Bake::solve_and_write() {
@@ -704,7 +706,6 @@ BakeResult Bake::solve_and_write() {
                                options_.output.string(), options_.output.filename().string()));
     return BakeResult::part_done;
   }
-  see_all(team_, *writer);
   if (!team_.leads()) return BakeResult::done;
   progress_.begin(write_stage);
   writer->finish(solved->probes, solved->compressed);

@@ -114,9 +114,9 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
 
 std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks) {
   return {{near_stage, plan.near_seconds / ranks},
-          {sample_stage, plan.sample_seconds},
-          {far_stage, plan.far_seconds},
-          {touch_stage, plan.touch_seconds}};
+          {sample_stage, plan.sample_seconds / ranks},
+          {far_stage, plan.far_seconds / ranks},
+          {touch_stage, plan.touch_seconds / ranks}};
 }
 
 std::vector<Tile> near_tiles(const HierarchicalMatrix& frame) {

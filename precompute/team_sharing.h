@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "base/sharing.h"
+#include "precompute/numerics/sharing.h"
 #include "precompute/team.h"
 
 namespace palpate {

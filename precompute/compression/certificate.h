@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "base/sharing.h"
 #include "formats/model.h"
 #include "matrices/hierarchical.h"
 #include "meshes/mesh.h"
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 

@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "base/sharing.h"
 #include "matrices/hierarchical.h"
 #include "precompute/compression/cluster_pairs.h"
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 

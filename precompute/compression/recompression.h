@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "base/sharing.h"
 #include "matrices/hierarchical.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 

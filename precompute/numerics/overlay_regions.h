@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "base/sharing.h"
 #include "formats/model.h"
 #include "precompute/description/description.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 

@@ -6,7 +6,7 @@
 #include <mutex>
 
 #include "base/parallel.h"
-#include "base/parcel.h"
+#include "precompute/numerics/parcel.h"
 
 namespace palpate {
 

@@ -1,5 +1,5 @@
 // Results as bytes, and work that threads share.
-#include "base/sharing.h"
+#include "precompute/numerics/sharing.h"
 
 #include <gtest/gtest.h>
 
