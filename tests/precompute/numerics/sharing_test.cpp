@@ -22,7 +22,7 @@ TEST(Parcel, GivesWhatItTook) {
   taking.carry(some);
   taking.carry(matrix);
   taking.carry(empty);
-  taking.carry(std::span(fixed));
+  taking.carry(std::span<float>(fixed));
 
   int number_there = 0;
   std::vector<double> none_there = {1.0}, some_there;
@@ -35,7 +35,7 @@ TEST(Parcel, GivesWhatItTook) {
   giving.carry(matrix_there);
   EXPECT_FALSE(giving.empty());
   giving.carry(empty_there);
-  giving.carry(std::span(fixed_there));
+  giving.carry(std::span<float>(fixed_there));
   EXPECT_TRUE(giving.empty());
   EXPECT_EQ(number_there, number);
   EXPECT_EQ(none_there, none);
