@@ -29,7 +29,7 @@ constexpr Index samples = random_loads;
 constexpr std::size_t columns_at_once = 200;  // of couplings, solved together
 constexpr Index leaves_estimated = 64;        // whose flops are counted for an estimate
 constexpr std::int64_t loads_at_once = 32;    // solved together
-constexpr double front_share = 0.3;           // of the time of far pairs (measured)
+constexpr double front_share = 0.3;           // of the time of far pairs, a guess
 constexpr Index checks = 32;                  // more loads, that tell how far off the pairs are
 
 std::size_t at(std::int64_t i) {
