@@ -278,10 +278,10 @@ class Dying(RanksTest):
         self.assertEqual(list(self.folder.glob("x.palpate.hdf.*")), [])
 
     def test_a_rank_that_is_killed_among_far_pairs(self):
-        self.check_killed_in("far pairs", self.write("model.toml", compressed_toml(12)))
+        self.check_killed_in("far pairs, ", self.write("model.toml", compressed_toml(10)))
 
     def test_a_rank_that_is_killed_among_overlays(self):
-        self.check_killed_in("overlays  ", self.write("model.toml", overlays_toml(8, 0.4)))
+        self.check_killed_in("overlays, ", self.write("model.toml", overlays_toml(8, 0.4)))
 
     def test_a_job_that_is_killed_at_any_moment(self):
         model = self.write("model.toml", cube_toml(14))
