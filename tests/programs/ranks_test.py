@@ -278,7 +278,7 @@ class Dying(RanksTest):
         self.assertEqual(list(self.folder.glob("x.palpate.hdf.*")), [])
 
     def test_a_rank_that_is_killed_among_far_pairs(self):
-        self.check_killed_in("far pairs, ", self.write("model.toml", compressed_toml(10)))
+        self.check_killed_in("far pairs, ", self.write("model.toml", compressed_toml(12)))
 
     def test_a_rank_that_is_killed_among_overlays(self):
         self.check_killed_in("overlays, ", self.write("model.toml", overlays_toml(8, 0.4)))
