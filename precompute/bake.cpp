@@ -399,12 +399,13 @@ std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const 
   return solved;
 }
 
-/// From here on every process sees what all have written, on whatever machine.
-void see_all(Team& team, ModelWriter& writer) {
+/// From here on a process that `reads` sees what all have written, on whatever machine. Those that do not
+/// read may find the file sealed already, under its own name.
+void see_all(Team& team, ModelWriter& writer, bool reads) {
   if (team.size() == 1) return;
   writer.flush();
   team.any(false);  // all have
-  writer.look_again();
+  if (reads) writer.look_again();
 }
 
 /// Compresses the Green's functions; a part has some of the near pairs. Nothing when interrupted.
@@ -418,7 +419,7 @@ std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor
   if (!compressor.solve_near(leaves, writer, run.tiles)) return {};
   Solved solved;
   if (part) return solved;
-  see_all(run.team, writer);
+  see_all(run.team, writer, true);
   solved.compressed = compressor.compress(writer);
   if (solved.compressed == nullptr) return {};
   if (run.team.leads()) solved.probes = make_probes(factor, plan.stored.dofs);
@@ -688,7 +689,7 @@ std::optional<Solved> Bake::solve(ModelWriter& writer) {
   if (plans_.compression) return solve_compressed(*plans_.compression, *factor_, part_, run, writer);
   std::optional<Solved> solved = solve_matrices(description_, *elastic_, stiffness_, std::move(factor_),
                                                 *solver_, stored_, plans_, part_, run, writer);
-  if (solved) see_all(team_, writer);
+  if (solved) see_all(team_, writer, team_.leads());
   return solved;
 }
 
