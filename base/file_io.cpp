@@ -240,11 +240,12 @@ void rename_file(const std::filesystem::path& from, const std::filesystem::path&
   if (std::rename(from.c_str(), to.c_str()) != 0) fail("rename " + from.string(), to, errno);
 }
 
+void flush(const FileDescriptor& file) {
+  if (::fsync(file.get()) != 0) fail("write the file to the disk", file.path(), errno);
+}
+
 void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to) {
-  {
-    const FileDescriptor file = open_file(from, OpenMode::write);
-    if (::fsync(file.get()) != 0) fail("write the file to the disk", from, errno);
-  }
+  flush(open_file(from, OpenMode::write));
   rename_file(from, to);
   const int folder = ::open(folder_of(to).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder < 0) return;  // the file is complete; only the rename's place on the disk is left to the system

@@ -91,6 +91,10 @@ void make_anew(const std::filesystem::path& temporary);
 /// Renames. Throws Error with the system's reason.
 void rename_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
+/// Flushes what was written to the disk, on a file system of several machines to where all see it. Throws
+/// Error.
+void flush(const FileDescriptor& file);
+
 /// Flushes `from` to the disk, then renames it. Throws Error.
 void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to);
 

@@ -86,6 +86,11 @@ class ModelWriter {
   /// not of this model, not finished, or damaged.
   void add_part(const std::filesystem::path& path);
 
+  /// Hands what was written over to the file system, so that other machines see it (NFS keeps it until then).
+  void flush();
+  /// Sees what other machines have handed over since the file was opened.
+  void look_again();
+
   /// What the journal holds, for writers of other processes.
   [[nodiscard]] std::string journal_text() const;
   /// Journals a piece that another process wrote.

@@ -682,6 +682,14 @@ void ModelWriter::add_part(const std::filesystem::path& path) {
   impl_->add_part(path);
 }
 
+void ModelWriter::flush() {
+  palpate::flush(impl_->data);
+}
+
+void ModelWriter::look_again() {
+  impl_->data = open_file(impl_->partial, OpenMode::write);
+}
+
 std::string ModelWriter::journal_text() const {
   const std::optional<JournalContents> contents = impl_->journal->read();
   return contents ? text_of(*contents) : "";

@@ -30,6 +30,7 @@
 #include "precompute/plan.h"
 #include "precompute/progress.h"
 #include "precompute/spread_plan.h"
+#include "precompute/team_sharing.h"
 
 namespace palpate {
 namespace {
@@ -101,7 +102,7 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
   const auto& [plan, compression, overlays, dynamics] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
-    stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs)});
+    stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs) / ranks});
   if (dynamics.method == DynamicsMethod::modal)
     stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
   if (compression) {
@@ -389,8 +390,8 @@ std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const 
   }
   constexpr int one_thread = 1;  // only one solves with all ranks
   Team alone;
-  GreensCompressor compressor(plan, factor, one_thread, run.progress, run.interrupted);
-  if (compressor.solve_near({0, plan.frame.tree.leaves()}, alone, writer, run.tiles))
+  GreensCompressor compressor(plan, factor, alone, one_thread, run.progress, run.interrupted);
+  if (compressor.solve_near({0, plan.frame.tree.leaves()}, writer, run.tiles))
     solved.compressed = compressor.compress(writer);
   if (solved.compressed != nullptr) solved.probes = make_probes(factor, plan.stored.dofs);
   spread.release();
@@ -398,32 +399,43 @@ std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const 
   return solved;
 }
 
-/// Compresses the Green's functions: all ranks share the near pairs, of which a part has some, and the leader
-/// makes the rest. Nothing when interrupted.
+/// From here on a process that `reads` sees what all have written, on whatever machine. Those that do not
+/// read may find the file sealed already, under its own name.
+void see_all(Team& team, ModelWriter& writer, bool reads) {
+  if (team.size() == 1) return;
+  writer.flush();
+  team.any(false);  // all have
+  if (reads) writer.look_again();
+}
+
+/// Compresses the Green's functions; a part has some of the near pairs. Nothing when interrupted.
 std::optional<Solved> solve_compressed(const CompressionPlan& plan, const Factor& factor,
                                        const std::optional<BakePart>& part, const Shared& run,
                                        ModelWriter& writer) {
   if (SpreadNumbers* spread = factor.spread_numbers(); spread != nullptr)
     return solve_compressed_alone(plan, factor, *spread, run, writer);
-  GreensCompressor compressor(plan, factor, run.jobs, run.progress, run.interrupted);
+  GreensCompressor compressor(plan, factor, run.team, run.jobs, run.progress, run.interrupted);
   const PieceRange leaves = part ? part->pieces.front() : PieceRange{0, plan.frame.tree.leaves()};
-  if (!compressor.solve_near(leaves, run.team, writer, run.tiles)) return {};
+  if (!compressor.solve_near(leaves, writer, run.tiles)) return {};
   Solved solved;
-  if (part || !run.team.leads()) return solved;
+  if (part) return solved;
+  see_all(run.team, writer, true);
   solved.compressed = compressor.compress(writer);
   if (solved.compressed == nullptr) return {};
-  solved.probes = make_probes(factor, plan.stored.dofs);
+  if (run.team.leads()) solved.probes = make_probes(factor, plan.stored.dofs);
   return solved;
 }
 
 /// Condenses the overlays that the file is to keep. False when interrupted.
-bool add_overlays(const Description& description, const OverlayPlan& overlays, int jobs, Model& model,
-                  Progress& progress, const InterruptGuard& interrupt) {
+bool add_overlays(const Description& description, const OverlayPlan& overlays, Team& team, int jobs,
+                  Model& model, Progress& progress, const InterruptGuard& interrupt) {
   progress.begin(overlay_stage);
-  model.overlay = condense_overlays(model, *description.overlay, overlays.centres, jobs, [&](double share) {
-    progress.reach(share);
-    return !interrupt.requested();
-  });
+  TeamSharing sharing(team, jobs, [&] { return interrupt.requested(); });
+  model.overlay =
+      condense_overlays(model, *description.overlay, overlays.centres, sharing, [&](double share) {
+        progress.reach(share);
+        return true;
+      });
   return !interrupt.requested();
 }
 
@@ -641,8 +653,8 @@ bool Bake::describe() {
   model_.rest_displacement = rest_displacement(*factor_, stiffness_, loads_, prescribed_, model_.dimension());
   if (plans_.compression)
     model_.compressed = std::make_shared<const HierarchicalMatrix>(plans_.compression->frame);
-  const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, options_.jobs,
-                                                           model_, progress_, interrupt_);
+  const bool whole = !description_.overlay || add_overlays(description_, plans_.overlays, team_,
+                                                           options_.jobs, model_, progress_, interrupt_);
   if (team_.any(!whole)) return false;
   if (take_up()) return true;
   add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_,
@@ -675,8 +687,10 @@ bool Bake::take_up() {
 std::optional<Solved> Bake::solve(ModelWriter& writer) {
   const Shared run{options_.jobs, team_, progress_, tiles_, [&] { return interrupt_.requested(); }};
   if (plans_.compression) return solve_compressed(*plans_.compression, *factor_, part_, run, writer);
-  return solve_matrices(description_, *elastic_, stiffness_, std::move(factor_), *solver_, stored_, plans_,
-                        part_, run, writer);
+  std::optional<Solved> solved = solve_matrices(description_, *elastic_, stiffness_, std::move(factor_),
+                                                *solver_, stored_, plans_, part_, run, writer);
+  if (solved) see_all(team_, writer, team_.leads());
+  return solved;
 }
 
 BakeResult Bake::solve_and_write() {

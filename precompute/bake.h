@@ -56,8 +56,8 @@ struct BakeSummary {
   std::vector<Stage> stages{};           ///< with the seconds that they took
 };
 
-/// Runs it with other processes, which call this too: each computes what comes before the columns, all share
-/// these, and the leader alone prints and writes the rest.
+/// Runs it with other processes, which call this too: they share columns, compression and overlays, each
+/// computes what else comes before the columns, and the leader alone prints and writes the rest.
 BakeSummary bake(const Description& description, const BakeOptions& options, Team& team);
 
 }  // namespace palpate

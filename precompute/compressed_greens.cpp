@@ -114,9 +114,9 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
 
 std::vector<Stage> compression_stages(const CompressionPlan& plan, int ranks) {
   return {{near_stage, plan.near_seconds / ranks},
-          {sample_stage, plan.sample_seconds},
-          {far_stage, plan.far_seconds},
-          {touch_stage, plan.touch_seconds}};
+          {sample_stage, plan.sample_seconds / ranks},
+          {far_stage, plan.far_seconds / ranks},
+          {touch_stage, plan.touch_seconds / ranks}};
 }
 
 std::vector<Tile> near_tiles(const HierarchicalMatrix& frame) {
@@ -129,14 +129,15 @@ std::vector<Tile> near_tiles(const HierarchicalMatrix& frame) {
   return tiles;
 }
 
-GreensCompressor::GreensCompressor(const CompressionPlan& plan, const Factor& factor, int jobs,
+GreensCompressor::GreensCompressor(const CompressionPlan& plan, const Factor& factor, Team& team, int jobs,
                                    Progress& progress, std::function<bool()> interrupted)
     : plan_(plan),
       factor_(factor),
-      jobs_(jobs),
+      team_(team),
       progress_(progress),
       interrupted_(std::move(interrupted)),
-      compression_(factor, plan.stored.dofs, plan.frame.dimension, plan.clusters, jobs,
+      sharing_(team, jobs, interrupted_),
+      compression_(factor, plan.stored.dofs, plan.frame.dimension, plan.clusters, sharing_,
                    [this](CompressionStage stage, double share) { return reach(name_of(stage), share); }) {}
 
 bool GreensCompressor::reach(const char* stage, double share) {
@@ -145,8 +146,7 @@ bool GreensCompressor::reach(const char* stage, double share) {
   return !interrupted_();
 }
 
-bool GreensCompressor::solve_near(const PieceRange& part, Team& team, ModelWriter& writer,
-                                  TileCounts& counts) {
+bool GreensCompressor::solve_near(const PieceRange& part, ModelWriter& writer, TileCounts& counts) {
   std::vector<Tile> tiles;
   std::int64_t kept = 0;
   double cost = 0.0, whole = 0.0;
@@ -166,20 +166,20 @@ bool GreensCompressor::solve_near(const PieceRange& part, Team& team, ModelWrite
                                part.end - part.first));
   if (cost < whole) progress_.expect(near_stage, plan_.near_seconds * cost / whole);
   progress_.begin(stage_ = near_stage);
-  std::vector<std::vector<float>> scratch(static_cast<std::size_t>(jobs_));
+  std::vector<std::vector<float>> scratch(static_cast<std::size_t>(sharing_.jobs()));
   double done = 0.0;
-  return team.work(tiles, jobs_,
-                   {[&](const Tile& tile, int worker) {
-                      std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
-                      compression_.solve_near(static_cast<Index>(tile.first), worker, entries);
-                      writer.write_near(static_cast<Index>(tile.first), entries);
-                    },
-                    [&](const Tile& tile) {
-                      done += tile.cost;
-                      ++counts.solved;
-                      progress_.reach(done / cost);
-                    },
-                    interrupted_});
+  return team_.work(tiles, sharing_.jobs(),
+                    {[&](const Tile& tile, int worker) {
+                       std::vector<float>& entries = scratch[static_cast<std::size_t>(worker)];
+                       compression_.solve_near(static_cast<Index>(tile.first), worker, entries);
+                       writer.write_near(static_cast<Index>(tile.first), entries);
+                     },
+                     [&](const Tile& tile) {
+                       done += tile.cost;
+                       ++counts.solved;
+                       progress_.reach(done / cost);
+                     },
+                     interrupted_});
 }
 
 std::shared_ptr<const HierarchicalMatrix> GreensCompressor::compress(ModelWriter& writer) {
@@ -191,8 +191,8 @@ std::shared_ptr<const HierarchicalMatrix> GreensCompressor::compress(ModelWriter
     if (matrix == nullptr) return nullptr;
     std::vector<TouchErrors> errors =
         certify(*matrix, factor_, plan_.stored.dofs, plan_.places.points, plan_.places.touchable, touches,
-                certificate_seed, jobs_, [&](double share) { return reach(touch_stage, share); });
-    if (interrupted_()) return nullptr;
+                certificate_seed, sharing_, [&](double share) { return reach(touch_stage, share); });
+    if (team_.any(interrupted_())) return nullptr;
     const double worst = worst_of(errors);
     if (worst <= accepted * plan_.frame.tolerance) {
       loosen_bound(*matrix, errors);

@@ -16,6 +16,7 @@
 #include "precompute/plan.h"
 #include "precompute/progress.h"
 #include "precompute/team.h"
+#include "precompute/team_sharing.h"
 
 namespace palpate {
 
@@ -56,16 +57,16 @@ std::vector<Tile> near_tiles(const HierarchicalMatrix& frame);
 class GreensCompressor {
  public:
   /// All are kept by reference.
-  GreensCompressor(const CompressionPlan& plan, const Factor& factor, int jobs, Progress& progress,
-                   std::function<bool()> interrupted);
+  GreensCompressor(const CompressionPlan& plan, const Factor& factor, Team& team, int jobs,
+                   Progress& progress, std::function<bool()> interrupted);
 
   /// Solves for the near pairs of the leaves of `part` that the writer does not have yet, and writes them.
   /// Adds to `counts`. False when interrupted.
-  bool solve_near(const PieceRange& part, Team& team, ModelWriter& writer, TileCounts& counts);
+  bool solve_near(const PieceRange& part, ModelWriter& writer, TileCounts& counts);
 
-  /// Makes the matrix with the near pairs of the writer, which has all, and measures random touches; where
-  /// their forces are off by more than the tolerance, again with more terms. Null when interrupted. Throws
-  /// Error where the tolerance is out of reach.
+  /// Makes the matrix, in all processes, with the near pairs of the file, which has all, and measures random
+  /// touches; where their forces are off by more than the tolerance, again with more terms. Null when
+  /// interrupted. Throws Error where the tolerance is out of reach.
   std::shared_ptr<const HierarchicalMatrix> compress(ModelWriter& writer);
 
  private:
@@ -73,9 +74,10 @@ class GreensCompressor {
 
   const CompressionPlan& plan_;
   const Factor& factor_;
-  int jobs_;
+  Team& team_;
   Progress& progress_;
   std::function<bool()> interrupted_;
+  TeamSharing sharing_;
   const char* stage_ = nullptr;  // under way
   Compression compression_;
 };

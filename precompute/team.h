@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/journal.h"
@@ -87,6 +88,10 @@ class Team {
 
   /// The leader's text.
   virtual std::string share(std::string text) { return text; }
+
+  /// Gives `take` the bytes of each other process, one after the other.
+  virtual void exchange(const std::string& /*bytes*/, const std::function<void(std::string_view)>& /*take*/) {
+  }
 
   /// The texts of all processes, by rank, in the leader; nothing in others.
   virtual std::vector<std::string> gather(const std::string& text) { return {text}; }

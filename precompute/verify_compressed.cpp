@@ -77,10 +77,10 @@ std::vector<Check> check_columns(const Model& model, const Factor& factor,
 
 Check check_touches(const Model& model, const Factor& factor, std::span<const std::int64_t> stored_dofs) {
   const auto [points, touchable] = touchable_points(model, model.stored_nodes);
-  const int jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  ThreadSharing threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   Check check{"touches", 0.0, model.compressed->tolerance};
   for (const TouchErrors& errors : certify(*model.compressed, factor, stored_dofs, points, touchable, touches,
-                                           seed, jobs, [](double) { return true; }))
+                                           seed, threads, [](double) { return true; }))
     check.error = std::max(check.error, errors.quantile(1.0));
   return check;
 }

@@ -29,6 +29,7 @@ constexpr std::chrono::microseconds between_looks{500};  // for messages, while 
 constexpr std::chrono::seconds between_signs{5};         // of life, from every rank
 constexpr std::chrono::seconds longest_silence{60};      // since the first message of a call of `work`
 constexpr Clock::time_point never{};
+constexpr int page = 4096;         // bytes that are exchanged together
 constexpr std::int64_t ahead = 4;  // a rank takes tiles ahead while each thread of all has more than so many
 
 enum class Kind : std::int32_t {
@@ -472,6 +473,39 @@ std::string RankTeam::share(std::string text) {
   text.resize(static_cast<std::size_t>(bytes));
   broadcast(text.data(), static_cast<int>(bytes), MPI_BYTE, impl_->team);
   return text;
+}
+
+/// MPI counts in ints, so pages are exchanged.
+void RankTeam::exchange(const std::string& bytes, const std::function<void(std::string_view)>& take) {
+  const MPI_Comm team = impl_->team;
+  const auto ranks = static_cast<std::size_t>(size());
+  std::vector<std::int64_t> sizes(ranks);
+  const std::int64_t own = std::ssize(bytes);
+  MPI_Request request = MPI_REQUEST_NULL;
+  MPI_Iallgather(&own, 1, MPI_INT64_T, sizes.data(), 1, MPI_INT64_T, team, &request);
+  wait(request);
+
+  std::vector<int> counts(ranks), starts(ranks);
+  int all = 0;
+  for (std::size_t k = 0; k < ranks; ++k) {
+    counts[k] = static_cast<int>((sizes[k] + page - 1) / page);
+    starts[k] = all;
+    all += counts[k];
+  }
+  MPI_Datatype pages = MPI_DATATYPE_NULL;
+  MPI_Type_contiguous(page, MPI_BYTE, &pages);
+  MPI_Type_commit(&pages);
+  std::vector<char> received(static_cast<std::size_t>(all) * page);
+  const auto place = [&](std::size_t k) {
+    return received.data() + static_cast<std::size_t>(starts[k]) * page;
+  };
+  std::copy(bytes.begin(), bytes.end(), place(static_cast<std::size_t>(rank())));
+  MPI_Iallgatherv(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, received.data(), counts.data(), starts.data(), pages,
+                  team, &request);
+  wait(request);
+  MPI_Type_free(&pages);
+  for (std::size_t k = 0; k < ranks; ++k)
+    if (k != static_cast<std::size_t>(rank())) take({place(k), static_cast<std::size_t>(sizes[k])});
 }
 
 std::vector<std::string> RankTeam::gather(const std::string& text) {

@@ -37,6 +37,7 @@ class RankTeam : public Team {
   bool work(const std::vector<Tile>& tiles, int jobs, const TileWork& work) override;
   bool any(bool here) override;
   std::string share(std::string text) override;
+  void exchange(const std::string& bytes, const std::function<void(std::string_view)>& take) override;
   std::vector<std::string> gather(const std::string& text) override;
   void tell(const std::string& line) override;
 

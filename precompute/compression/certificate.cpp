@@ -2,11 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <mutex>
 #include <numeric>
 #include <random>
 
-#include "base/parallel.h"
 #include "matrices/error_bound.h"
 #include "matrices/hierarchical_product.h"
 #include "precompute/compression/selected_solver.h"
@@ -80,21 +78,19 @@ TouchablePoints touchable_points(const Model& model, std::span<const Index> stor
 std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
                                  std::span<const Index> touchable, std::int64_t touches, std::uint64_t seed,
-                                 int jobs, const std::function<bool(double)>& progress) {
+                                 Sharing& sharing, const std::function<bool(double)>& progress) {
   const SelectedSolver solver(factor);
-  std::vector<SelectedSolver::Workspace> workspaces(static_cast<std::size_t>(jobs));
+  std::vector<SelectedSolver::Workspace> workspaces(static_cast<std::size_t>(sharing.jobs()));
   std::vector<TouchErrors> result;
   for (const Index nodes : certified_nodes) result.push_back({nodes, {}});
-  std::mutex mutex;
-  std::int64_t done = 0;
-  bool stopped = false;
-  const std::int64_t all = touchable.empty() ? 0 : touches * std::ssize(result);
-  parallel_for(all, jobs, [&](std::int64_t item, int worker) {
-    {
-      const std::scoped_lock lock(mutex);
-      if (stopped) return;
-    }
-    TouchErrors& of_count = result[static_cast<std::size_t>(item % std::ssize(result))];
+  struct Measured {
+    double error = -1.0, bound_share = 0.0;  // -1: not yet
+  };
+  SharedItems items;
+  items.count = touchable.empty() ? 0 : touches * std::ssize(result);
+  std::vector<Measured> measured(static_cast<std::size_t>(items.count));
+  items.work = [&](std::int64_t item, int worker) {
+    const TouchErrors& of_count = result[static_cast<std::size_t>(item % std::ssize(result))];
     std::mt19937_64 random(seed + static_cast<std::uint64_t>(item));
     const std::vector<Index> nodes =
         touched_nodes(item / std::ssize(result), points, touchable, of_count.nodes, random);
@@ -115,13 +111,21 @@ std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor&
                     {C.data() + std::int64_t{d} * static_cast<std::int64_t>(k) * C.cols(),
                      static_cast<std::size_t>(d * C.cols())});
     const Eigen::MatrixXd u = touch_displacements(arms, d, random);
-    const double error = touch_error(exact.cast<long double>(), C, u, d);
-    const double share = bound_share(matrix, nodes, exact, C, u);
-    const std::scoped_lock lock(mutex);
-    of_count.errors.push_back(error);
-    if (share > 0.0) of_count.bound_shares.push_back(share);
-    if (!progress(static_cast<double>(++done) / static_cast<double>(all))) stopped = true;
-  });
+    measured[static_cast<std::size_t>(item)] = {touch_error(exact.cast<long double>(), C, u, d),
+                                                bound_share(matrix, nodes, exact, C, u)};
+  };
+  items.carry = [&](std::int64_t item, Parcel& results) {
+    results.carry(measured[static_cast<std::size_t>(item)].error);
+    results.carry(measured[static_cast<std::size_t>(item)].bound_share);
+  };
+  items.done = progress;
+  sharing.for_each(items);
+  for (std::size_t item = 0; item < measured.size(); ++item) {
+    if (measured[item].error < 0.0) continue;
+    TouchErrors& of_count = result[item % result.size()];
+    of_count.errors.push_back(measured[item].error);
+    if (measured[item].bound_share > 0.0) of_count.bound_shares.push_back(measured[item].bound_share);
+  }
   for (TouchErrors& of_count : result) {
     std::sort(of_count.errors.begin(), of_count.errors.end());
     std::sort(of_count.bound_shares.begin(), of_count.bound_shares.end());

@@ -11,6 +11,7 @@
 #include "matrices/hierarchical.h"
 #include "meshes/mesh.h"
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 
@@ -50,6 +51,6 @@ TouchablePoints touchable_points(const Model& model, std::span<const Index> stor
 std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor& factor,
                                  std::span<const std::int64_t> stored_dofs, std::span<const Vec3> points,
                                  std::span<const Index> touchable, std::int64_t touches, std::uint64_t seed,
-                                 int jobs, const std::function<bool(double)>& progress);
+                                 Sharing& sharing, const std::function<bool(double)>& progress);
 
 }  // namespace palpate

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <mutex>
 #include <numeric>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -29,6 +29,7 @@ constexpr Index samples = random_loads;
 constexpr std::size_t columns_at_once = 200;  // of couplings, solved together
 constexpr Index leaves_estimated = 64;        // whose flops are counted for an estimate
 constexpr std::int64_t loads_at_once = 32;    // solved together
+constexpr double front_share = 0.3;           // of the time of far pairs, a guess
 constexpr Index checks = 32;                  // more loads, that tell how far off the pairs are
 
 std::size_t at(std::int64_t i) {
@@ -84,21 +85,22 @@ std::shared_ptr<float[]> floats(std::int64_t count) {
 struct Compression::Impl {
  public:
   Impl(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
-       const ClusteredNodes& nodes, int jobs, CompressionProgress progress)
+       const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress)
       : solver_(factor),
         stored_dofs_(stored_dofs),
-        jobs_(jobs),
+        sharing_(sharing),
+        jobs_(sharing.jobs()),
         progress_(std::move(progress)),
         matrix_(compression_frame(nodes, dimension)),
-        workspaces_(at(jobs)) {}
+        workspaces_(at(jobs_)) {}
 
-  [[nodiscard]] int jobs() const noexcept { return jobs_; }
+  [[nodiscard]] Sharing& sharing() const noexcept { return sharing_; }
   void solve_near(Index leaf, int worker, std::vector<float>& entries);
   bool gather_near(const FetchNear& fetch);
   bool sample();
   bool climb(double cut);
   [[nodiscard]] HierarchicalMatrix packed();
-  void check(HierarchicalMatrix& matrix);
+  bool check(HierarchicalMatrix& matrix);
 
  private:
   /// What is known of a cluster while its level is worked on.
@@ -140,15 +142,9 @@ struct Compression::Impl {
     return dofs;
   }
 
-  /// One of `count` items of a stage is done.
-  void tick(CompressionStage stage, std::int64_t count) {
-    const std::scoped_lock lock(mutex_);
-    ++done_;
-    if (!progress_(stage, static_cast<double>(done_) / static_cast<double>(count))) stopped_ = true;
-  }
-  [[nodiscard]] bool stopped() {
-    const std::scoped_lock lock(mutex_);
-    return stopped_;
+  /// What is told of items that are a stage from one share of it to another.
+  [[nodiscard]] std::function<bool(double)> told(CompressionStage stage, double from = 0.0, double to = 1.0) {
+    return [=, this](double share) { return progress_(stage, std::lerp(from, to, share)); };
   }
 
   void solve_near_of(Index leaf, std::span<float> entries, SelectedSolver::Workspace& workspace);
@@ -156,23 +152,25 @@ struct Compression::Impl {
   Front joined_front(Index c);
   void thin_out(Index c, double cut, Front& front) const;
   [[nodiscard]] std::vector<Index> groups_of(Index first, Index clusters) const;
+  [[nodiscard]] std::vector<Index> needed_of_level(int level) const;
+  bool make_fronts(int level, double cut, const std::function<bool(double)>& done);
+  bool make_couplings(int level, const std::function<bool(double)>& done);
   void couple(Index first, Index end, SelectedSolver::Workspace& workspace);
   void take_off(Index c);
 
   SelectedSolver solver_;
   std::span<const std::int64_t> stored_dofs_;
-  int jobs_;
+  Sharing& sharing_;
+  int jobs_;  // threads of this process
   CompressionProgress progress_;
   HierarchicalMatrix matrix_;
   std::shared_ptr<float[]> near_;
   Eigen::VectorXd root_;             // [order] of D, 0 where held
   Rows response_, load_;             // [order x (samples + checks)]
+  std::vector<bool> needed_;         // [clusters]
   std::vector<Front> fronts_;        // [clusters]
   std::vector<FloatRows> coupling_;  // [far pairs]
   std::vector<SelectedSolver::Workspace> workspaces_;
-  std::mutex mutex_;  // of what follows
-  std::int64_t done_ = 0;
-  bool stopped_ = false;
 };
 
 void Compression::Impl::solve_near(Index leaf, int worker, std::vector<float>& entries) {
@@ -182,23 +180,27 @@ void Compression::Impl::solve_near(Index leaf, int worker, std::vector<float>& e
 
 bool Compression::Impl::gather_near(const FetchNear& fetch) {
   near_ = floats(matrix_.near_at.back());
-  const Index leaves = matrix_.tree.leaves();
-  done_ = 0;
-  parallel_for(leaves, jobs_, [&](std::int64_t i, int worker) {
-    if (stopped()) return;
-    const auto leaf = static_cast<Index>(i);
-    const std::span<float> entries(near_.get() + near_begin(leaf), at(near_end(leaf) - near_begin(leaf)));
+  const auto entries_of = [&](std::int64_t leaf) {
+    const std::int64_t begin = near_begin(static_cast<Index>(leaf)), end = near_end(static_cast<Index>(leaf));
+    return std::span(near_.get() + begin, at(end - begin));
+  };
+  SharedItems leaves;
+  leaves.count = matrix_.tree.leaves();
+  leaves.work = [&](std::int64_t leaf, int worker) {
     if (fetch) {
-      fetch(leaf, entries);
-      return;
+      fetch(static_cast<Index>(leaf), entries_of(leaf));
+    } else {
+      solve_near_of(matrix_.tree.first_leaf() + static_cast<Index>(leaf), entries_of(leaf),
+                    workspaces_[at(worker)]);
     }
-    solve_near_of(matrix_.tree.first_leaf() + leaf, entries, workspaces_[at(worker)]);
-    tick(CompressionStage::near, leaves);
-  });
+  };
+  leaves.carry = [&](std::int64_t leaf, Parcel& results) { results.carry(entries_of(leaf)); };
+  if (!fetch) leaves.done = told(CompressionStage::near);
+  if (!sharing_.for_each(leaves)) return false;
   matrix_.near = near_;
   const std::vector<double> root = root_of_diagonal(matrix_);
   root_ = Eigen::Map<const Eigen::VectorXd>(root.data(), std::ssize(root));
-  return !stopped_;
+  return true;
 }
 
 /// The pairs in which the leaf is the column.
@@ -233,19 +235,25 @@ bool Compression::Impl::sample() {
     const Eigen::MatrixXd L = root_of_leaf(matrix_, static_cast<Index>(leaf));
     L.transpose().triangularView<Eigen::Upper>().solveInPlace(of_leaf);
   });
-  done_ = 0;
-  const std::int64_t blocks = m / loads_at_once;
-  parallel_for(blocks, jobs_, [&](std::int64_t block, int worker) {
-    if (stopped()) return;
-    const std::int64_t first = block * loads_at_once;
-    const Rows f = load_.middleCols(first, loads_at_once);
+  const auto of_block = [&](std::int64_t block) {
+    return response_.middleCols(block * loads_at_once, loads_at_once);
+  };
+  SharedItems blocks;
+  blocks.count = m / loads_at_once;
+  blocks.work = [&](std::int64_t block, int worker) {
+    const Rows f = load_.middleCols(block * loads_at_once, loads_at_once);
     Rows u(n, loads_at_once);
     solver_.multiply(stored_dofs_, loads_at_once, {f.data(), at(f.size())}, workspaces_[at(worker)],
                      {u.data(), at(u.size())});
-    response_.middleCols(first, loads_at_once) = u;
-    tick(CompressionStage::samples, blocks);
-  });
-  return !stopped_;
+    of_block(block) = u;
+  };
+  blocks.carry = [&](std::int64_t block, Parcel& results) {
+    Rows u = of_block(block);
+    results.carry(u);
+    of_block(block) = u;
+  };
+  blocks.done = told(CompressionStage::samples);
+  return sharing_.for_each(blocks);
 }
 
 /// All dofs of a leaf, loads on its neighbours taken off.
@@ -275,8 +283,10 @@ Compression::Impl::Front Compression::Impl::leaf_front(Index leaf) const {
   return front;
 }
 
-/// The skeletons of both children.
+/// The skeletons of both children, loads on their partners taken off.
 Compression::Impl::Front Compression::Impl::joined_front(Index c) {
+  take_off(2 * c + 1);
+  take_off(2 * c + 2);
   Front front;
   const Front &a = fronts_[at(2 * c + 1)], &b = fronts_[at(2 * c + 2)];
   front.skeleton = a.skeleton;
@@ -319,6 +329,15 @@ void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
   const Eigen::MatrixXd W = front.W * chosen.follow;
   thin.W = W.householderQr().matrixQR().topRows(std::min(W.rows(), W.cols())).triangularView<Eigen::Upper>();
   front = std::move(thin);
+}
+
+/// Clusters of a level that have far pairs, or are inside of one that has.
+std::vector<Index> Compression::Impl::needed_of_level(int level) const {
+  std::vector<Index> clusters;
+  const Index first = matrix_.tree.first_of_level(level);
+  for (Index c = first; c < first + (Index{1} << level); ++c)
+    if (needed_[at(c)]) clusters.push_back(c);
+  return clusters;
 }
 
 /// Where groups of clusters of a level begin that are solved together, and where the last one ends.
@@ -378,41 +397,68 @@ void Compression::Impl::take_off(Index c) {
     front.response.row(i) -= by_partners.row(i) / root_[front.skeleton[at(i)]];
 }
 
+/// The fronts of the clusters of a level, which are needed.
+bool Compression::Impl::make_fronts(int level, double cut, const std::function<bool(double)>& done) {
+  const std::vector<Index> clusters = needed_of_level(level);
+  SharedItems fronts;
+  fronts.count = std::ssize(clusters);
+  fronts.work = [&](std::int64_t item, int) {
+    const Index c = clusters[at(item)];
+    Front front = level == matrix_.tree.levels ? leaf_front(c) : joined_front(c);
+    thin_out(c, cut, front);
+    fronts_[at(c)] = std::move(front);
+  };
+  fronts.carry = [&](std::int64_t item, Parcel& results) {
+    Front& front = fronts_[at(clusters[at(item)])];
+    results.carry(front.skeleton);
+    for (Rows* rows : {&front.response, &front.load}) results.carry(*rows);
+    for (Eigen::MatrixXd* matrix : {&front.W, &front.V}) results.carry(*matrix);
+  };
+  fronts.done = done;
+  return sharing_.for_each(fronts);
+}
+
+/// The couplings of the far pairs of a level.
+bool Compression::Impl::make_couplings(int level, const std::function<bool(double)>& done) {
+  const std::vector<Index> starts = groups_of(matrix_.tree.first_of_level(level), Index{1} << level);
+  SharedItems groups;
+  groups.count = std::ssize(starts) - 1;
+  groups.work = [&](std::int64_t group, int worker) {
+    couple(starts[at(group)], starts[at(group + 1)], workspaces_[at(worker)]);
+  };
+  groups.carry = [&](std::int64_t group, Parcel& results) {
+    for (Index c = starts[at(group)]; c < starts[at(group + 1)]; ++c)
+      for (const auto& [row, pair] : partners(c))
+        if (row > c) results.carry(coupling_[at(pair)]);
+  };
+  groups.done = done;
+  return sharing_.for_each(groups);
+}
+
 bool Compression::Impl::climb(double cut) {
   const ClusterTree& tree = matrix_.tree;
   fronts_.assign(at(tree.clusters()), {});
   coupling_.assign(matrix_.far_pair.size(), {});
-  std::vector<bool> needed(at(tree.clusters()), false);
+  needed_.assign(at(tree.clusters()), false);
   std::int64_t count = 0;
   for (Index c = 1; c < tree.clusters(); ++c) {
-    needed[at(c)] = needed[at(ClusterTree::parent(c))] || !partners(c).empty();
-    count += needed[at(c)] ? 1 : 0;
+    needed_[at(c)] = needed_[at(ClusterTree::parent(c))] || !partners(c).empty();
+    count += needed_[at(c)] ? 1 : 0;
   }
-  done_ = 0;
+  std::int64_t begun = 0;  // clusters
   for (int level = tree.levels; level > 0; --level) {
-    const Index first = tree.first_of_level(level), clusters = Index{1} << level;
-    const auto for_each = [&](auto&& work) {
-      parallel_for(clusters, jobs_, [&](std::int64_t i, int worker) {
-        if (const Index c = first + static_cast<Index>(i); needed[at(c)] && !stopped()) work(c, worker);
-      });
+    const std::int64_t clusters = std::ssize(needed_of_level(level));
+    if (clusters == 0) continue;
+    const auto share = [&](double of_level) {
+      return (double(begun) + of_level * double(clusters)) / double(count);
     };
-    for_each([&](Index c, int) {
-      Front front = level == tree.levels ? leaf_front(c) : joined_front(c);
-      thin_out(c, cut, front);
-      fronts_[at(c)] = std::move(front);
-    });
-    const std::vector<Index> groups = groups_of(first, clusters);
-    parallel_for(std::ssize(groups) - 1, jobs_, [&](std::int64_t group, int worker) {
-      if (stopped()) return;
-      couple(groups[at(group)], groups[at(group + 1)], workspaces_[at(worker)]);
-      for (Index c = groups[at(group)]; c < groups[at(group + 1)]; ++c)
-        if (needed[at(c)] && !stopped()) tick(CompressionStage::far, count);
-    });
-    for_each([&](Index c, int) { take_off(c); });
-    if (stopped_) return false;
+    if (!make_fronts(level, cut, told(CompressionStage::far, share(0.0), share(front_share))) ||
+        !make_couplings(level, told(CompressionStage::far, share(front_share), share(1.0))))
+      return false;
+    begun += clusters;
     if (level == tree.levels) continue;
     const Index below = tree.first_of_level(level + 1);
-    for (Index c = below; c < below + 2 * clusters; ++c) {
+    for (Index c = below; c < tree.first_of_level(level + 2); ++c) {
       fronts_[at(c)].response = fronts_[at(c)].load = {};
       fronts_[at(c)].W = {};
     }
@@ -454,17 +500,23 @@ HierarchicalMatrix Compression::Impl::packed() {
 
 /// Skeletons have errors of their own: what loads that chose nothing tell beyond what pair_error has is
 /// shared out in proportion to the pairs. Their bases are orthonormal, but for L.
-void Compression::Impl::check(HierarchicalMatrix& matrix) {
+bool Compression::Impl::check(HierarchicalMatrix& matrix) {
   std::vector<Index> nodes(at(matrix.tree.nodes));
   std::iota(nodes.begin(), nodes.end(), 0);
   const NodeRange all{0, matrix.tree.nodes};
-  Rows missing(matrix.order(), checks);
-  parallel_for(checks, jobs_, [&](std::int64_t k, int) {
+  std::vector<Eigen::VectorXd> displaced(checks);
+  SharedItems loads;
+  loads.count = checks;
+  loads.work = [&](std::int64_t k, int) {
     const Eigen::VectorXd f = load_.col(samples + k);
-    Eigen::VectorXd u(f.size());
+    Eigen::VectorXd& u = displaced[at(k)];
+    u.resize(f.size());
     displace(matrix, nodes, {f.data(), at(f.size())}, {&all, 1}, {u.data(), at(u.size())});
-    missing.col(k) = response_.col(samples + k) - u;
-  });
+  };
+  loads.carry = [&](std::int64_t k, Parcel& results) { results.carry(displaced[at(k)]); };
+  if (!sharing_.for_each(loads)) return false;
+  Rows missing(matrix.order(), checks);
+  for (Index k = 0; k < checks; ++k) missing.col(k) = response_.col(samples + k) - displaced[at(k)];
   std::vector<double> squared(at(matrix.tree.leaves()));
   parallel_for(matrix.tree.leaves(), jobs_, [&](std::int64_t leaf, int) {
     const Index c = matrix.tree.first_leaf() + static_cast<Index>(leaf);
@@ -485,11 +537,12 @@ void Compression::Impl::check(HierarchicalMatrix& matrix) {
   const double share = whole > 0.0 ? std::max(0.5 * measured - known, 0.0) / whole : 0.0;
   for (std::size_t p = 0; p < of_pair.size(); ++p)
     matrix.pair_error[p] = std::hypot(matrix.pair_error[p], std::sqrt(share * of_pair[p]));
+  return true;
 }
 
 Compression::Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
-                         const ClusteredNodes& nodes, int jobs, CompressionProgress progress)
-    : impl_(std::make_unique<Impl>(factor, stored_dofs, dimension, nodes, jobs, std::move(progress))) {}
+                         const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress)
+    : impl_(std::make_unique<Impl>(factor, stored_dofs, dimension, nodes, sharing, std::move(progress))) {}
 
 Compression::~Compression() = default;
 
@@ -503,9 +556,10 @@ bool Compression::prepare(const FetchNear& fetch) {
 
 std::shared_ptr<HierarchicalMatrix> Compression::compress(double cut) {
   if (!impl_->climb(skeleton_share * cut)) return nullptr;
-  auto matrix = std::make_shared<HierarchicalMatrix>(recompressed(impl_->packed(), cut, impl_->jobs()));
-  impl_->check(*matrix);
-  return matrix;
+  std::optional<HierarchicalMatrix> recompressed_matrix =
+      recompressed(impl_->packed(), cut, impl_->sharing());
+  if (!recompressed_matrix || !impl_->check(*recompressed_matrix)) return nullptr;
+  return std::make_shared<HierarchicalMatrix>(*std::move(recompressed_matrix));
 }
 
 HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension) {

@@ -10,6 +10,7 @@
 #include "matrices/hierarchical.h"
 #include "precompute/compression/cluster_pairs.h"
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 
@@ -23,7 +24,7 @@ enum class CompressionStage : std::uint8_t { near, samples, far };
 using CompressionProgress = std::function<bool(CompressionStage, double)>;
 
 /// Gives the entries of the near pairs in which leaf [0, leaves) is the column, as `solve_near` did. Called
-/// by several threads at once.
+/// by several threads at once, for each leaf in one of the processes that share the work.
 using FetchNear = std::function<void(Index leaf, std::span<float> entries)>;
 
 /// Xi of the stored dofs as a HierarchicalMatrix.
@@ -33,14 +34,14 @@ using FetchNear = std::function<void(Index leaf, std::span<float> entries)>;
 /// rows of V say how the others follow them; the coupling of a far pair is then the block of Xi between two
 /// skeletons. What loads on the near do is taken off with the near pairs and, going up the tree, with the
 /// couplings of each level, so that the same random loads serve all levels (Boukaram and others, arXiv
-/// 2506.16759). Bases and couplings that are too fine so far are recompressed at last. The result depends on
-/// neither `jobs` nor who solved for the near pairs.
+/// 2506.16759). Bases and couplings that are too fine so far are recompressed at last. The result does
+/// not depend on who shares the work.
 class Compression {
  public:
   /// `stored_dofs` [d N] are dofs of K, d a node, in the order of `nodes`, -1 where held. All are kept by
   /// reference.
   Compression(const Factor& factor, std::span<const std::int64_t> stored_dofs, int dimension,
-              const ClusteredNodes& nodes, int jobs, CompressionProgress progress);
+              const ClusteredNodes& nodes, Sharing& sharing, CompressionProgress progress);
   ~Compression();
   Compression(const Compression&) = delete;
   Compression& operator=(const Compression&) = delete;

@@ -30,12 +30,16 @@ Matrix own_block(const HierarchicalMatrix& matrix, Index leaf) {
   return block(matrix.near, matrix.near_at[at(matrix.first_near_pair(leaf))], n, n);
 }
 
+std::shared_ptr<float[]> floats(std::int64_t count) {
+  return std::shared_ptr<float[]>(new float[at(std::max<std::int64_t>(count, 1))]);
+}
+
 class Recompression {
  public:
-  Recompression(const HierarchicalMatrix& matrix, double cut, int jobs)
+  Recompression(const HierarchicalMatrix& matrix, double cut, Sharing& sharing)
       : from_(matrix),
         cut_(cut),
-        jobs_(jobs),
+        sharing_(sharing),
         L_(at(matrix.tree.leaves())),
         Q_(at(matrix.tree.clusters())),
         R_(Q_.size()),
@@ -44,32 +48,85 @@ class Recompression {
         rows_(Q_.size()),
         S_(matrix.far_pair.size()) {}
 
-  HierarchicalMatrix run() {
-    parallel_for(std::ssize(L_), jobs_, [&](std::int64_t leaf, int) {
+  std::optional<HierarchicalMatrix> run() {
+    parallel_for(std::ssize(L_), sharing_.jobs(), [&](std::int64_t leaf, int) {
       L_[at(leaf)] = root_of_leaf(from_, static_cast<Index>(leaf));
     });
-    for (int level = from_.tree.levels; level >= 0; --level)
-      for_level(level, [&](Index c) { orthogonalise(c); });
-    parallel_for(std::ssize(S_), jobs_, [&](std::int64_t p, int) {
-      const auto [row, column] = from_.far_pair[at(p)];
-      const Matrix S = block(from_.coupling, from_.coupling_at[at(p)], rank(row), rank(column));
-      S_[at(p)] = (R_[at(row)] * S * R_[at(column)].transpose()).cast<float>();
-    });
-    for (int level = 0; level <= from_.tree.levels; ++level) for_level(level, [&](Index c) { weigh(c); });
-    for (int level = from_.tree.levels; level >= 0; --level) for_level(level, [&](Index c) { truncate(c); });
-    return packed();
+    if (orthogonalise_all() && turn_couplings() && weigh_all() && truncate_all()) return packed();
+    return {};
   }
 
  private:
   [[nodiscard]] Eigen::Index rank(Index c) const { return from_.rank[at(c)]; }
   [[nodiscard]] bool is_leaf(Index c) const { return c >= from_.tree.first_leaf(); }
 
-  template <class Work>
-  void for_level(int level, Work&& work) {
+  /// Clusters of a level that have a basis.
+  [[nodiscard]] std::vector<Index> clusters_of(int level) const {
+    std::vector<Index> clusters;
     const Index first = from_.tree.first_of_level(level);
-    parallel_for(Index{1} << level, jobs_, [&](std::int64_t i, int) {
-      if (const Index c = first + static_cast<Index>(i); rank(c) > 0) work(c);
-    });
+    for (Index c = first; c < first + (Index{1} << level); ++c)
+      if (rank(c) > 0) clusters.push_back(c);
+    return clusters;
+  }
+
+  /// work(c) and carry(c, results) for those.
+  template <class Work, class Carry>
+  bool for_level(int level, Work&& work, Carry&& carry) {
+    const std::vector<Index> clusters = clusters_of(level);
+    SharedItems items;
+    items.count = std::ssize(clusters);
+    items.work = [&](std::int64_t item, int) { work(clusters[at(item)]); };
+    items.carry = [&](std::int64_t item, Parcel& results) { carry(clusters[at(item)], results); };
+    return sharing_.for_each(items);
+  }
+
+  bool orthogonalise_all() {
+    const auto carry = [&](Index c, Parcel& results) {
+      results.carry(Q_[at(c)]);
+      results.carry(R_[at(c)]);
+    };
+    for (int level = from_.tree.levels; level >= 0; --level)
+      if (!for_level(
+              level, [&](Index c) { orthogonalise(c); }, carry))
+        return false;
+    return true;
+  }
+
+  /// S between orthonormal bases.
+  bool turn_couplings() {
+    SharedItems pairs;
+    pairs.count = std::ssize(S_);
+    pairs.work = [&](std::int64_t p, int) {
+      const auto [row, column] = from_.far_pair[at(p)];
+      const Matrix S = block(from_.coupling, from_.coupling_at[at(p)], rank(row), rank(column));
+      S_[at(p)] = (R_[at(row)] * S * R_[at(column)].transpose()).cast<float>();
+    };
+    pairs.carry = [&](std::int64_t p, Parcel& results) { results.carry(S_[at(p)]); };
+    return sharing_.for_each(pairs);
+  }
+
+  bool weigh_all() {
+    const auto carry = [&](Index c, Parcel& results) { results.carry(weights_[at(c)]); };
+    for (int level = 0; level <= from_.tree.levels; ++level)
+      if (!for_level(
+              level, [&](Index c) { weigh(c); }, carry))
+        return false;
+    return true;
+  }
+
+  bool truncate_all() {
+    const auto carry = [&](Index c, Parcel& results) {
+      results.carry(U_[at(c)]);
+      results.carry(rows_[at(c)]);
+    };
+    for (int level = from_.tree.levels; level >= 0; --level) {
+      if (!for_level(
+              level, [&](Index c) { truncate(c); }, carry))
+        return false;
+      if (level == from_.tree.levels) continue;
+      for (const Index below : clusters_of(level + 1)) rows_[at(below)].resize(0, 0);
+    }
+    return true;
   }
 
   /// Q R of a leaf's L^-1 V, and of the children's R E.
@@ -135,11 +192,9 @@ class Recompression {
   /// The orthonormal basis of a cluster, a row for each of its dofs.
   [[nodiscard]] Matrix spread_out(Index c) {
     if (is_leaf(c)) return Q_[at(c)];
-    Matrix &a = rows_[at(2 * c + 1)], &b = rows_[at(2 * c + 2)];
+    const Matrix &a = rows_[at(2 * c + 1)], &b = rows_[at(2 * c + 2)];
     Matrix V(a.rows() + b.rows(), Q_[at(c)].cols());
     V << a * part(c, 2 * c + 1), b * part(c, 2 * c + 2);
-    a.resize(0, 0);
-    b.resize(0, 0);
     return V;
   }
 
@@ -170,7 +225,9 @@ class Recompression {
   [[nodiscard]] std::vector<Products> products() {
     std::vector<Products> all(U_.size());
     for (int level = from_.tree.levels; level >= 0; --level) {
-      for_level(level, [&](Index c) {
+      const std::vector<Index> clusters = clusters_of(level);
+      parallel_for(std::ssize(clusters), sharing_.jobs(), [&](std::int64_t item, int) {
+        const Index c = clusters[at(item)];
         Products& of = all[at(c)];
         const Eigen::Index kept = U_[at(c)].cols();
         if (is_leaf(c)) {
@@ -189,36 +246,49 @@ class Recompression {
     return all;
   }
 
-  /// |V S V^T - V' S' V'^T| of each pair, Frobenius' norm.
-  [[nodiscard]] std::vector<double> pair_errors() {
+  static void put(const Matrix& entries, float* to) {
+    Eigen::Map<FloatRows>(to, entries.rows(), entries.cols()) = entries.cast<float>();
+  }
+
+  [[nodiscard]] std::optional<HierarchicalMatrix> packed() {
+    HierarchicalMatrix matrix = from_;
+    for (std::size_t c = 0; c < U_.size(); ++c) matrix.rank[c] = static_cast<Index>(U_[c].cols());
+    matrix.index();
+    if (!pack_couplings(matrix)) return {};
+    pack_bases(matrix);
+    return matrix;
+  }
+
+  /// Couplings, and the errors |V S V^T - V' S' V'^T| of pairs, Frobenius' norm.
+  bool pack_couplings(HierarchicalMatrix& matrix) {
     const std::vector<Products> all = products();
-    std::vector<double> errors(S_.size());
-    parallel_for(std::ssize(S_), jobs_, [&](std::int64_t p, int) {
+    const std::shared_ptr<float[]> coupling = floats(matrix.coupling_at.back());
+    matrix.pair_error.resize(S_.size());
+    SharedItems pairs;
+    pairs.count = std::ssize(S_);
+    pairs.work = [&](std::int64_t p, int) {
       const auto [row, column] = from_.far_pair[at(p)];
       const Products &a = all[at(row)], &b = all[at(column)];
       const Matrix S = S_[at(p)].cast<double>(), kept = coupling_of(at(p));
       const double squared = S.squaredNorm() -
                              2.0 * (a.with_old.transpose() * S * b.with_old).cwiseProduct(kept).sum() +
                              (a.with_itself * kept * b.with_itself).cwiseProduct(kept).sum();
-      errors[at(p)] = std::sqrt(std::max(squared, 0.0));
-    });
-    return errors;
+      matrix.pair_error[at(p)] = std::sqrt(std::max(squared, 0.0));
+      put(kept, coupling.get() + matrix.coupling_at[at(p)]);
+    };
+    pairs.carry = [&](std::int64_t p, Parcel& results) {
+      results.carry(matrix.pair_error[at(p)]);
+      results.carry(std::span(coupling.get() + matrix.coupling_at[at(p)],
+                              coupling.get() + matrix.coupling_at[at(p + 1)]));
+    };
+    matrix.coupling = coupling;
+    return sharing_.for_each(pairs);
   }
 
-  [[nodiscard]] HierarchicalMatrix packed() {
-    HierarchicalMatrix matrix = from_;
-    matrix.pair_error = pair_errors();
-    for (std::size_t c = 0; c < U_.size(); ++c) matrix.rank[c] = static_cast<Index>(U_[c].cols());
-    matrix.index();
-    const auto floats = [](std::int64_t count) {
-      return std::shared_ptr<float[]>(new float[at(std::max<std::int64_t>(count, 1))]);
-    };
-    const auto put = [](const Matrix& entries, float* to) {
-      Eigen::Map<FloatRows>(to, entries.rows(), entries.cols()) = entries.cast<float>();
-    };
-    const auto basis = floats(matrix.basis_at.back()), transfer = floats(matrix.transfer_at.back()),
-               coupling = floats(matrix.coupling_at.back());
-    for (Index c = 0; c < matrix.tree.clusters(); ++c) {
+  void pack_bases(HierarchicalMatrix& matrix) const {
+    const auto basis = floats(matrix.basis_at.back()), transfer = floats(matrix.transfer_at.back());
+    parallel_for(matrix.tree.clusters(), sharing_.jobs(), [&](std::int64_t item, int) {
+      const auto c = static_cast<Index>(item);
       if (is_leaf(c) && U_[at(c)].cols() > 0) {
         const std::int64_t leaf = c - matrix.tree.first_leaf();
         const Matrix own = own_block(matrix, static_cast<Index>(leaf));
@@ -230,17 +300,14 @@ class Recompression {
       const Index parent = ClusterTree::parent(c);
       if (c > 0 && rank(parent) > 0 && U_[at(c)].cols() > 0)
         put(transfer_of(parent, c), transfer.get() + matrix.transfer_at[at(c)]);
-    }
-    for (std::size_t p = 0; p < S_.size(); ++p) put(coupling_of(p), coupling.get() + matrix.coupling_at[p]);
+    });
     matrix.basis = basis;
     matrix.transfer = transfer;
-    matrix.coupling = coupling;
-    return matrix;
   }
 
   const HierarchicalMatrix& from_;
   double cut_;
-  int jobs_;
+  Sharing& sharing_;
   std::vector<Matrix> L_;                           // [leaves]
   std::vector<Matrix> Q_, R_, U_, weights_, rows_;  // [clusters]
   std::vector<FloatRows> S_;                        // [far pairs] between orthonormal bases
@@ -273,8 +340,9 @@ Matrix root_of_leaf(const HierarchicalMatrix& matrix, Index leaf) {
   return factor.matrixL();
 }
 
-HierarchicalMatrix recompressed(const HierarchicalMatrix& matrix, double cut, int jobs) {
-  return Recompression(matrix, cut, jobs).run();
+std::optional<HierarchicalMatrix> recompressed(const HierarchicalMatrix& matrix, double cut,
+                                               Sharing& sharing) {
+  return Recompression(matrix, cut, sharing).run();
 }
 
 }  // namespace palpate

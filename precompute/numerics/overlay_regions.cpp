@@ -3,12 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <mutex>
 #include <optional>
 
 #include "base/error.h"
-#include "base/parallel.h"
 #include "formats/packed.h"
 #include "meshes/selection.h"
 #include "overlay/condensation.h"
@@ -77,24 +74,27 @@ OverlayPlan plan_overlays(const Model& model, const OverlayRegions& overlay, con
 }
 
 StoredOverlay condense_overlays(const Model& model, const OverlayRegions& overlay,
-                                const std::vector<Index>& centres, int jobs,
+                                const std::vector<Index>& centres, Sharing& sharing,
                                 const std::function<bool(double)>& done) {
   StoredOverlay result{overlay.refinement, overlay.rings, centres,
                        std::vector<CondensedPatch>(centres.size())};
   const ElementsAtNodes at(model.mesh);
-  std::atomic<bool> stopped{false};
-  std::size_t finished = 0;
-  std::mutex mutex;  // progress and its counter
-  std::vector<std::optional<PatchMeshes>> meshes(static_cast<std::size_t>(jobs));
-  parallel_for(std::ssize(centres), jobs, [&](std::int64_t item, int worker) {
-    if (stopped) return;
+  std::vector<std::optional<PatchMeshes>> meshes(static_cast<std::size_t>(sharing.jobs()));
+  SharedItems patches;
+  patches.count = std::ssize(centres);
+  patches.work = [&](std::int64_t item, int worker) {
     const auto k = static_cast<std::size_t>(item);
     std::optional<PatchMeshes>& own = meshes[static_cast<std::size_t>(worker)];
     if (!own) own.emplace(model, at, overlay);
     result.patches[k] = condense(model, own->round(centres[k]));
-    const std::scoped_lock lock(mutex);
-    if (!done(static_cast<double>(++finished) / static_cast<double>(centres.size()))) stopped = true;
-  });
+  };
+  patches.carry = [&](std::int64_t item, Parcel& results) {
+    CondensedPatch& patch = result.patches[static_cast<std::size_t>(item)];
+    results.carry(patch.surface);
+    for (Eigen::MatrixXd* matrix : {&patch.G, &patch.T, &patch.compliance}) results.carry(*matrix);
+  };
+  patches.done = done;
+  sharing.for_each(patches);
   return result;
 }
 

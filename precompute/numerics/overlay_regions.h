@@ -8,6 +8,7 @@
 
 #include "formats/model.h"
 #include "precompute/description/description.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 
@@ -22,11 +23,11 @@ struct OverlayPlan {
 /// for a region that selects nothing, or nothing that can be touched and is free along some axis.
 OverlayPlan plan_overlays(const Model& model, const OverlayRegions& overlay, const std::string& file);
 
-/// Condenses one patch round each centre, `jobs` at a time; the result does not depend on them. `done` is
-/// told the share (0..1) of patches that are done, from one thread at a time; when it returns false, the rest
-/// is left out. Needs the materials beside what the plan does. Throws Error for elements that are too flat.
+/// Condenses one patch round each centre; the result does not depend on who shares them. `done` is told the
+/// share (0..1) of patches that are done; when it returns false, the rest is left out. Needs the materials
+/// beside what the plan does. Throws Error for elements that are too flat.
 StoredOverlay condense_overlays(const Model& model, const OverlayRegions& overlay,
-                                const std::vector<Index>& centres, int jobs,
+                                const std::vector<Index>& centres, Sharing& sharing,
                                 const std::function<bool(double)>& done);
 
 }  // namespace palpate

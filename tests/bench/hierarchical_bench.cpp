@@ -81,7 +81,8 @@ Forms make_forms(const ElasticBody& body, const Surface& surface) {
   factor.factorize();
   const test::ClusteredBody stored(body.mesh, stiffness,
                                    stored_dof_marks(body.mesh, surface, stiffness, Scope::surface, 0), {});
-  Compression compression(factor, stored.dofs, body.mesh.dimension(), stored.clusters, processors(),
+  ThreadSharing threads(processors());
+  Compression compression(factor, stored.dofs, body.mesh.dimension(), stored.clusters, threads,
                           [](CompressionStage, double) { return true; });
   compression.prepare();
   std::shared_ptr<const HierarchicalMatrix> matrix = compression.compress(4e-4);

@@ -21,6 +21,16 @@ KILLS = int(os.environ.get("PALPATE_RANK_KILLS", "4"))  # of a rank and of a who
 HAS_MUMPS = "dmumps" in run("ldd", RANKS).stdout
 
 
+def compressed_toml(cells):
+    return cube_toml(cells).replace('precision = "double"\n', 'compression = "h2"\n')
+
+
+def overlays_toml(cells, radius):
+    """The cube with patches around all nodes of its top that are less than `radius` from the middle."""
+    return (cube_toml(cells, scope="layers").replace('"layers"', '"layers"\nlayers = 2')
+            + f"[overlay]\n[[overlay.region]]\nsphere = {{center = [0.5, 0.5, 1], radius = {radius}}}\n")
+
+
 class RanksTest(ProgramTest):
     def command(self, ranks, *arguments):
         return [*MPIRUN, "-n", str(ranks), str(RANKS), *map(str, arguments)]
@@ -99,12 +109,10 @@ class Bytes(RanksTest):
         self.check(self.write("model.toml", text), 1, 2, 4)
 
     def test_compressed(self):
-        self.check(self.write("model.toml", cube_toml(9).replace('precision = "double"\n', 'compression = "h2"\n')), 2, 4)
+        self.check(self.write("model.toml", compressed_toml(14)), 1, 2, 4)
 
     def test_modes_and_overlays(self):
-        text = cube_toml(6, scope="layers").replace('"layers"', '"layers"\nlayers = 2')
-        self.check(self.write("model.toml", text + '[dynamics]\nmethod = "modal"\nmodes = 10\n[overlay]\n[[overlay.region]]\n'
-                              "sphere = {center = [0.5, 0.5, 1], radius = 0.3}\n"), 2)
+        self.check(self.write("model.toml", overlays_toml(6, 0.3) + '[dynamics]\nmethod = "modal"\nmodes = 10\n'), 1, 2, 4)
 
     def test_ranks_of_a_node_share_a_factor(self):
         model = self.write("model.toml", cube_toml(8))
@@ -249,6 +257,31 @@ class Dying(RanksTest):
         self.own_factors(2, model, "-o", output)
         self.assertEqual(output.read_bytes(), data)
         self.assertEqual(list(self.folder.glob("x.palpate.hdf.*")), [])
+
+    def check_killed_in(self, stage, model):
+        """The bytes after a rank was killed as soon as the job told that it is at this stage."""
+        data = self.straight(model)
+        output = self.folder / "x.palpate.hdf"
+        for victim in (0, 1):
+            job = subprocess.Popen(self.command(2, model, "-o", output, "--factor", "rank", "--jobs", "1"), cwd=self.folder, stderr=subprocess.PIPE, text=True)
+            self.addCleanup(job.stderr.close)
+            line = ""
+            while stage not in line:
+                line = job.stderr.readline()
+                self.assertNotEqual(line, "", f"it has ended before it told of {stage}")
+            os.kill(self.pids(job)[victim], signal.SIGKILL)
+            rest = job.stderr.read()
+            self.assertNotEqual(job.wait(timeout=200), 0, rest)
+            self.assertFalse(output.exists())
+        self.own_factors(2, model, "-o", output)
+        self.assertEqual(output.read_bytes(), data)
+        self.assertEqual(list(self.folder.glob("x.palpate.hdf.*")), [])
+
+    def test_a_rank_that_is_killed_among_far_pairs(self):
+        self.check_killed_in("far pairs, ", self.write("model.toml", compressed_toml(12)))
+
+    def test_a_rank_that_is_killed_among_overlays(self):
+        self.check_killed_in("overlays, ", self.write("model.toml", overlays_toml(8, 0.4)))
 
     def test_a_job_that_is_killed_at_any_moment(self):
         model = self.write("model.toml", cube_toml(14))

@@ -148,9 +148,10 @@ void report(const HierarchicalMatrix& matrix, const Options& options, const Prob
     fmt::print("  level {}: ranks {} to {}, median {}\n", level, ranks.front(), ranks.back(),
                ranks[ranks.size() / 2]);
   }
+  ThreadSharing threads(options.jobs);
   const auto errors =
       certify(matrix, *problem.factor, problem.stored_dofs, problem.places.points, problem.places.touchable,
-              options.touches, 100000, options.jobs, [](double) { return true; });
+              options.touches, 100000, threads, [](double) { return true; });
   for (const TouchErrors& e : errors) {
     fmt::print(
         "  touches of {} nodes: median {:.2e}, 99 % {:.2e}, worst {:.2e}; {} bounds, force off by {:.3f} "
@@ -164,8 +165,9 @@ void report(const HierarchicalMatrix& matrix, const Options& options, const Prob
 }
 
 void from_loads(const Options& options, const Problem& problem) {
+  ThreadSharing threads(options.jobs);
   Compression compression(*problem.factor, problem.stored_dofs, problem.model.dimension(), problem.clusters,
-                          options.jobs, [](CompressionStage, double) { return true; });
+                          threads, [](CompressionStage, double) { return true; });
   compression.prepare();
   fmt::print("near pairs and random loads: {}\n", lap());
   std::fflush(stdout);
@@ -196,8 +198,9 @@ void from_columns(const Options& options, const Problem& problem) {
   fmt::print("all columns: {}; {:.3f} GB kept\n", lap(), 1e-9 * double(columns->kept_bytes()));
   columns.reset();
   std::fflush(stdout);
+  ThreadSharing threads(options.jobs);
   for (const double coarser : options.cut) {
-    const HierarchicalMatrix matrix = recompressed(finer, coarser, options.jobs);
+    const HierarchicalMatrix matrix = recompressed(finer, coarser, threads).value();
     fmt::print("cut {:g}: {}\n", coarser, lap());
     report(matrix, options, problem);
   }

@@ -40,7 +40,8 @@ class Bar : public test::InvertedBody {
   }
 
   [[nodiscard]] HierarchicalMatrix sketched(double cut) const {
-    Compression compression(factor(), stored().dofs, 3, stored().clusters, 1,
+    ThreadSharing one(1);
+    Compression compression(factor(), stored().dofs, 3, stored().clusters, one,
                             [](CompressionStage, double) { return true; });
     compression.prepare();
     return *compression.compress(cut);
@@ -76,9 +77,10 @@ const Bar& bar() {
 TEST(ColumnCompression, ForcesAreThoseOfTheInverseWithinTheCut) {
   ASSERT_GT(bar().stored().clusters.far_pair.size(), 20U);
   ASSERT_GT(std::count(bar().stored().dofs.begin(), bar().stored().dofs.end(), -1), 20);
+  ThreadSharing one(1);
   for (const double cut : {1e-2, 1e-3, 1e-4}) {
     const HierarchicalMatrix finer = bar().compression().compress(0.1 * cut),
-                             matrix = recompressed(finer, cut, 1), sketched = bar().sketched(cut);
+                             matrix = recompressed(finer, cut, one).value(), sketched = bar().sketched(cut);
     EXPECT_LT(bar().force_error(finer), 0.5 * cut) << cut;
     const double error = bar().force_error(matrix);
     EXPECT_LT(error, 2.0 * cut) << cut;

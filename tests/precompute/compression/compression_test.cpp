@@ -29,7 +29,8 @@ struct CompressionOptions {
 std::optional<HierarchicalMatrix> compress(const Factor& factor, std::span<const std::int64_t> stored_dofs,
                                            int dimension, const ClusteredNodes& nodes,
                                            const CompressionOptions& options, CompressionProgress progress) {
-  Compression compression(factor, stored_dofs, dimension, nodes, options.jobs, std::move(progress));
+  ThreadSharing threads(options.jobs);
+  Compression compression(factor, stored_dofs, dimension, nodes, threads, std::move(progress));
   if (!compression.prepare()) return std::nullopt;
   const std::shared_ptr<HierarchicalMatrix> matrix = compression.compress(options.cut);
   return matrix == nullptr ? std::nullopt : std::optional(*matrix);
@@ -52,7 +53,8 @@ class Body : public test::InvertedBody {
   [[nodiscard]] std::vector<TouchErrors> certified(const HierarchicalMatrix& matrix,
                                                    std::span<const Index> touchable, std::int64_t touches,
                                                    int jobs = 1) const {
-    return certify(matrix, factor(), stored().dofs, stored().points, touchable, touches, 0, jobs,
+    ThreadSharing threads(jobs);
+    return certify(matrix, factor(), stored().dofs, stored().points, touchable, touches, 0, threads,
                    [](double) { return true; });
   }
 };
@@ -476,11 +478,12 @@ TEST(Certificate, WithNothingToTouchOrWhereItIsStopped) {
   const Body& body = clamped_bar();
   const HierarchicalMatrix matrix = body.compressed({});
   for (const TouchErrors& of_count : body.certified(matrix, {}, 5)) EXPECT_TRUE(of_count.errors.empty());
+  ThreadSharing one(1);
   int done = 0;
   std::size_t measured = 0;
   for (const TouchErrors& of_count :
        certify(matrix, body.factor(), body.stored().dofs, body.stored().points, body.stored().touchable, 100,
-               0, 1, [&](double) { return ++done < 6; }))
+               0, one, [&](double) { return ++done < 6; }))
     measured += of_count.errors.size();
   EXPECT_EQ(measured, 6U);
 }
