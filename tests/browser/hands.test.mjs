@@ -9,6 +9,7 @@ import { choose, open_cube, part, recorded, settled, top } from './steps.mjs';
 after(close);
 
 const small = { viewport: { width: 900, height: 600 } };
+const small_picture = { width: 800, height: 500 }; // quick to draw
 const banner = (page) => part(page, 'banner-text');
 const scrub_to = (page, frame) =>
   page.evaluate((value) => {
@@ -181,7 +182,7 @@ test('how a model is looked at is kept, and an address opens it', async (t) => {
 });
 
 test('pictures are saved twice and four times as fine, on white or on nothing', async (t) => {
-  const { page } = await open_cube(t);
+  const { page } = await open_cube(t, { viewport: small_picture, is_drawn: true });
   const { width, height } = await part(page, 'view').boundingBox();
   const save = async (size, ground) => {
     await part(page, 'view-menu').click();
@@ -210,7 +211,7 @@ test('a recording is filmed, its playhead is where the picture is, and watchers 
   const at = await folder(t);
   const session = await recorded(t, at, 0.1);
   const served = await serve(t, ['view', session, '--view-address', '127.0.0.1:0'], at);
-  const page = await ready(await visit(t, served.url, small));
+  const page = await ready(await visit(t, served.url, { viewport: small_picture, is_drawn: true }));
   const watcher = await ready(await visit(t, served.url, small));
   const { frames } = await told(page, 'state');
   await scrub_to(page, Math.floor(frames / 2));

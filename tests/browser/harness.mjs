@@ -1,7 +1,7 @@
 // The programs and the browser for the tests of the viewer's page.
 import assert from 'node:assert/strict';
 import { execFile, spawn } from 'node:child_process';
-import { mkdtemp, rm, writeFile } from 'node:fs/promises';
+import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
@@ -23,12 +23,20 @@ export async function folder(t) {
   return made;
 }
 
-/// Bakes a description; returns the file.
+const baked = new Map(); // bytes of what was baked from a description
+
+/// Bakes a description, once however many tests want it; returns the file.
 export async function bake(into, toml, name = 'model') {
+  const file = path.join(into, `${name}.palpate.hdf`);
+  const known = `${name}\n${toml}`;
+  if (baked.has(known)) {
+    await writeFile(file, baked.get(known));
+    return file;
+  }
   const description = path.join(into, `${name}.toml`);
   await writeFile(description, toml);
-  const file = path.join(into, `${name}.palpate.hdf`);
   await run(precompute, [description, '-o', file], { cwd: into });
+  baked.set(known, await readFile(file));
   return file;
 }
 
@@ -115,8 +123,16 @@ export async function close() {
   browser = null;
 }
 
-/// A page of its own context, which notes what goes wrong in it: errors of scripts, and requests to anywhere but the runtime.
-export async function visit(t, url, options = {}, before = null) {
+/// Leaves the body's canvas empty and out of sight: a browser without a graphics card spends most of its time on what tests of buttons and numbers do not look at.
+function draw_nothing() {
+  for (const name of ['clear', 'drawArrays', 'drawElements', 'drawElementsInstanced']) WebGL2RenderingContext.prototype[name] = () => undefined;
+  const style = document.createElement('style');
+  style.textContent = '.stage > canvas { visibility: hidden; }';
+  document.addEventListener('DOMContentLoaded', () => document.head.append(style));
+}
+
+/// A page of its own context, which notes what goes wrong in it: errors of scripts, and requests to anywhere but the runtime. Its body is seen only if it `is_drawn`.
+export async function visit(t, url, { is_drawn = false, ...options } = {}, before = null) {
   const context = await (await open()).newContext({ viewport: { width: 1280, height: 800 }, colorScheme: 'dark', ...options });
   t.after(() => context.close());
   const page = await context.newPage();
@@ -127,6 +143,7 @@ export async function visit(t, url, options = {}, before = null) {
     const to = new URL(request.url());
     if (['http:', 'https:', 'ws:', 'wss:'].includes(to.protocol) && to.host !== new URL(url).host) page.complaints.push(`asks ${to}`);
   });
+  if (!is_drawn) await page.addInitScript(draw_nothing);
   if (before) await page.addInitScript(before);
   await page.goto(url);
   return page;

@@ -27,19 +27,23 @@ half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
 const sphere = 0.012; // [m]
 const place = [0.02, -0.015, 0.05];
 
-async function open_block(t, options = {}) {
+async function serve_block(t) {
   const at = await folder(t);
   const file = await bake(at, block, 'block');
-  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', '--tool', `sphere:${sphere}`], at);
-  return { at, served, page: await ready(await visit(t, served.url, options)) };
+  return { at, served: await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', '--tool', `sphere:${sphere}`], at) };
 }
 
-const small = { viewport: { width: 760, height: 500 } }; // quick to draw
+async function open_block(t, options) {
+  const { served } = await serve_block(t);
+  return { served, page: await ready(await visit(t, served.url, options)) };
+}
+
+const small = { viewport: { width: 760, height: 500 }, is_drawn: true }; // quick to draw
 
 const set_field = (page, field) => part(page, 'field').selectOption(field);
 
 test('a body at rest stands out from the ground, 3 to 1, in every colouring and theme', async (t) => {
-  const { page } = await open_block(t, small);
+  const { page } = await open_block(t, { ...small, viewport: { width: 640, height: 420 } });
   await bare(page);
   const found = {};
   for (const theme of ['dark', 'light']) {
@@ -60,8 +64,9 @@ test('a body at rest stands out from the ground, 3 to 1, in every colouring and 
       await part(page, 'map').selectOption(map, { force: true });
       await rest(page);
       await keep_pixels(page, map);
-      found[`${theme} ${map}`] = (await contrast(page, map, 'ground')).median.toFixed(2);
-      assert.ok((await contrast(page, map, 'ground')).median >= 3, `${theme}, ${map}: ${JSON.stringify(found)}`);
+      const { median } = await contrast(page, map, 'ground');
+      found[`${theme} ${map}`] = median.toFixed(2);
+      assert.ok(median >= 3, `${theme}, ${map}: ${JSON.stringify(found)}`);
     }
     await part(page, 'map').selectOption('viridis', { force: true });
   }
@@ -70,8 +75,10 @@ test('a body at rest stands out from the ground, 3 to 1, in every colouring and 
 });
 
 test('a press of 5 mm is seen in the plain view: 12 grey levels around the tool', async (t) => {
+  const { served } = await serve_block(t);
   for (const theme of ['dark', 'light']) {
-    const { page } = await open_block(t, { ...small, colorScheme: theme });
+    const page = await ready(await visit(t, served.url, { ...small, colorScheme: theme }));
+    await until(page, () => window.palpate.state.you === 'controller');
     await bare(page);
     await rest(page);
     await keep_pixels(page, 'before');
@@ -97,7 +104,7 @@ test('a press of 5 mm is seen in the plain view: 12 grey levels around the tool'
 });
 
 test('arrows keep their size on the screen when the view zooms, and a legend says what they mean', async (t) => {
-  const { page } = await open_block(t);
+  const { page } = await open_block(t, small);
   await choose(page, 'press', 0.004);
   const { x, y } = await project(page, place);
   await page.mouse.move(x, y);
@@ -153,20 +160,15 @@ test('a stiffer ball within is seen: by material, cut open, and through the surf
 });
 
 test('no text is cut off or covered, and every target is large enough, at five sizes', async (t) => {
-  const { at, page: mouse, served } = await open_block(t);
-  await mouse.context().close();
+  const { at, served } = await serve_block(t);
   const html = path.join(at, 'out.html');
   await run(runtime, ['export', await recorded(t, at), '--html', html]);
-  for (const [width, height, hasTouch] of layouts) {
-    const options = { viewport: { width, height }, hasTouch, isMobile: hasTouch };
-    const target = hasTouch ? 44 : 24;
-    const check = async (page, what) => {
-      await page.waitForTimeout(120);
-      const faults = await faults_of_layout(page, target);
-      assert.deepEqual(faults, [], `${width} × ${height}, ${what}`);
-    };
-    const page = await ready(await visit(t, served.url, options));
-    await until(page, () => window.palpate.state.you === 'controller');
+  const check = async (page, what) => {
+    await page.waitForTimeout(120);
+    const { width, height, hasTouch } = page.window;
+    assert.deepEqual(await faults_of_layout(page, hasTouch ? 44 : 24), [], `${width} × ${height}, ${what}`);
+  };
+  const check_live = async (page) => {
     await set_field(page, 'von-mises');
     const { x, y } = await project(page, place);
     await page.mouse.move(x, y);
@@ -180,26 +182,40 @@ test('no text is cut off or covered, and every target is large enough, at five s
     await page.keyboard.press('v');
     await page.keyboard.press('?');
     await check(page, 'with the help');
-    await page.context().close();
-    const replay = await ready(await visit(t, `file://${html}`, options));
-    await set_field(replay, 'von-mises');
-    await check(replay, 'a recording');
-    const [first, ...others] = await replay.locator('.numbers > :visible').evaluateAll((tiles) => tiles.map((tile) => tile.getBoundingClientRect().toJSON()));
+    await page.keyboard.press('Escape');
+  };
+  const check_recorded = async (page) => {
+    await set_field(page, 'von-mises');
+    await check(page, 'a recording');
+    const [first, ...others] = await page.locator('.numbers > :visible').evaluateAll((tiles) => tiles.map((tile) => tile.getBoundingClientRect().toJSON()));
     const right = Math.max(first.right, ...others.map((tile) => tile.right));
     for (const tile of [first, ...others]) {
       const is_last = ![first, ...others].some((other) => Math.abs(other.top - tile.top) < 2 && other.left > tile.left + 2);
-      if (is_last) assert.ok(right - tile.right < 2, `a row of the numbers has a hole at ${width} × ${height}`);
+      if (is_last) assert.ok(right - tile.right < 2, `a row of the numbers has a hole at ${page.window.width} × ${page.window.height}`);
     }
-    const scrub = await part(replay, 'scrub').boundingBox();
+    const scrub = await part(page, 'scrub').boundingBox();
     assert.ok(scrub.width >= 90, `a slider of ${scrub.width} px`);
-    assert.deepEqual(replay.complaints, []);
-    await replay.context().close();
+  };
+  // A page is opened once with touch and once without, and its window takes the sizes in turn.
+  for (const touch of [true, false]) {
+    const sizes = layouts.filter(([, , hasTouch]) => hasTouch === touch);
+    for (const [url, act] of [[served.url, check_live], [`file://${html}`, check_recorded]]) {
+      const [width, height] = sizes[0];
+      const page = await ready(await visit(t, url, { viewport: { width, height }, hasTouch: touch, isMobile: touch }));
+      if (act === check_live) await until(page, () => window.palpate.state.you === 'controller');
+      for (const [width, height, hasTouch] of sizes) {
+        page.window = { width, height, hasTouch };
+        await page.setViewportSize({ width, height });
+        await act(page);
+      }
+      assert.deepEqual(page.complaints, []);
+      await page.context().close();
+    }
   }
 });
 
 test('axe-core finds nothing serious, in both themes', async (t) => {
-  const { at, page: first, served } = await open_block(t);
-  await first.context().close();
+  const { at, served } = await serve_block(t);
   const html = path.join(at, 'out.html');
   await run(runtime, ['export', await recorded(t, at), '--html', html]);
   for (const colorScheme of ['dark', 'light']) {

@@ -5,7 +5,7 @@ import { existsSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
 import { after, test } from 'node:test';
 import { close, example, open, project, ready, serve, source, told, until, visit } from './harness.mjs';
-import { open_cube, part, settled, top } from './steps.mjs';
+import { open_cube, part, serve_cube, settled, top } from './steps.mjs';
 
 after(close);
 
@@ -37,7 +37,7 @@ test('one steers, any number watch, and control goes on', async (t) => {
 });
 
 test('the page comes back by itself when its connection is lost, and after a reload', async (t) => {
-  const { served } = await open_cube(t);
+  const { served } = await serve_cube(t);
   const page = await visit(t, served.url, {}, () => {
     window.sockets = [];
     window.WebSocket = class extends WebSocket {
@@ -89,7 +89,7 @@ test('the help opens the book, if scripts/docs has built it, and the book can be
 });
 
 test('foreign pages are refused', async (t) => {
-  const { served } = await open_cube(t);
+  const { served } = await serve_cube(t);
   const { search } = new URL(served.url);
   const status = (headers, query = search) =>
     new Promise((resolve, reject) => {

@@ -3,8 +3,8 @@ import assert from 'node:assert/strict';
 import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { bake, close, cube, folder, near, open, project, ready, run, runtime, serve, shelf, source, told, until, visit } from './harness.mjs';
-import { choose, open_cube, part, probe, settled, top } from './steps.mjs';
+import { bake, close, cube, folder, near, project, ready, run, runtime, serve, shelf, source, told, until, visit } from './harness.mjs';
+import { choose, open_cube, part, probe, serve_cube, settled, top } from './steps.mjs';
 
 after(close);
 
@@ -65,9 +65,7 @@ test('a sphere presses as a script does', async (t) => {
 });
 
 test('fingers press too', async (t) => {
-  const { served } = await open_cube(t);
-  const first = await open();
-  for (const context of first.contexts()) await context.close(); // control is free
+  const { served } = await serve_cube(t);
   const page = await ready(await visit(t, served.url, { hasTouch: true, isMobile: true, viewport: { width: 420, height: 800 } }));
   await until(page, () => window.palpate.state.you === 'controller');
   const { x, y } = await project(page, top);
@@ -208,7 +206,7 @@ test('a press with room for all its contacts is no best effort', async (t) => {
 });
 
 test('the picture is the stored one', async (t) => {
-  const { page } = await open_cube(t, { args: ['--tool', 'sphere:0.15', '--coupling', '100'], viewport: { width: 1280, height: 800 } });
+  const { page } = await open_cube(t, { args: ['--tool', 'sphere:0.15', '--coupling', '100'], viewport: { width: 1280, height: 800 }, is_drawn: true });
   await part(page, 'field').selectOption('von-mises');
   await choose(page, 'press', 0.1);
   const { x, y } = await project(page, top);

@@ -10,7 +10,7 @@ import { choose, leaf_through, open_cube, part, recorded, settled, top } from '.
 after(close);
 
 test('the page comes whole from the runtime and asks nobody else', async (t) => {
-  const { page } = await open_cube(t);
+  const { page } = await open_cube(t, { is_drawn: true });
   await assert.doesNotReject(part(page, 'stage').locator('canvas').first().waitFor());
   assert.equal(await part(page, 'model').innerText(), 'cube');
   assert.equal(await part(page, 'connection').innerText(), 'connected');
@@ -152,7 +152,7 @@ test('a recording that fails says so at once', async (t) => {
 });
 
 test('pictures and shapes can be saved', async (t) => {
-  const { page } = await open_cube(t);
+  const { page } = await open_cube(t, { is_drawn: true });
   const save = async (id) => {
     const [download] = await Promise.all([page.waitForEvent('download'), part(page, id).click()]);
     return readFile(await download.path());

@@ -6,13 +6,17 @@ import { bake, cube, folder, ready, run, runtime, serve, told, until, visit } fr
 
 export const top = [0.5, 0.5, 1]; // a node of the cube, which its 6 cells an edge have there
 
-/// The cube with a page, in a folder of its own: { at, file, page, served }.
-export async function open_cube(t, { cells = 6, args = ['--tool', 'point'], toml = '', viewport = { width: 1010, height: 640 } } = {}) {
+/// The cube in a folder of its own, for pages to come: { at, file, served }.
+export async function serve_cube(t, { cells = 6, args = ['--tool', 'point'], toml = '' } = {}) {
   const at = await folder(t);
   const file = await bake(at, cube(cells, toml));
-  const served = await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', ...args], at);
-  const page = await ready(await visit(t, served.url, { viewport }));
-  return { at, file, served, page };
+  return { at, file, served: await serve(t, ['play', file, '--view', '--view-address', '127.0.0.1:0', ...args], at) };
+}
+
+/// The same with a page: { at, file, served, page }.
+export async function open_cube(t, { viewport = { width: 1010, height: 640 }, is_drawn = false, ...options } = {}) {
+  const cube = await serve_cube(t, options);
+  return { ...cube, page: await ready(await visit(t, cube.served.url, { viewport, is_drawn })) };
 }
 
 export const part = (page, id) => page.getByTestId(id);

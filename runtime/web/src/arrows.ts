@@ -1,6 +1,6 @@
 // Arrows of the forces on the body: of each contact, and of all together at the tool. They are as long on the screen as forces are large.
-import { BackSide, ConeGeometry, CylinderGeometry, GreaterDepth, Group, InstancedMesh, Matrix4, MeshBasicMaterial, Quaternion, Vector3 } from 'three';
-import { nice_ceiling } from './format';
+import { BackSide, Box3, ConeGeometry, CylinderGeometry, GreaterDepth, Group, InstancedMesh, Matrix4, MeshBasicMaterial, Quaternion, Vector3 } from 'three';
+import { nice_ceiling, round_below } from './format';
 import { floats_of_contact, type Frame } from './wire';
 
 const most = 256;
@@ -23,6 +23,7 @@ class ArrowSet {
   constructor(
     colour: number,
     private readonly thickness_: number, // pixels
+    private readonly box_: Box3,
   ) {
     const plain = new MeshBasicMaterial({ color: colour });
     const hidden = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.3, depthFunc: GreaterDepth, depthWrite: false });
@@ -46,6 +47,7 @@ class ArrowSet {
   /** From `tail` so many pixels along `way`, of length 1. */
   add(tail: Vector3, way: Vector3, pixels: number, pixel: number): void {
     if (this.count_ === most || !(pixels > shortest)) return;
+    this.box_.expandByPoint(tail).expandByPoint(tail.clone().addScaledVector(way, pixels * pixel));
     const turn = new Quaternion().setFromUnitVectors(up, way);
     const size = Math.min(head, 0.6 * pixels) * (this.thickness_ / 2.4) ** 0.5 * pixel;
     const thick = Math.min(this.thickness_, 0.12 * pixels) * pixel;
@@ -70,9 +72,13 @@ class ArrowSet {
 
 export class Arrows {
   readonly group = new Group();
-  private readonly contacts_ = new ArrowSet(0xf07c3e, 1.3);
-  private readonly whole_ = new ArrowSet(0xf2c14e, 2.4);
-  private full_ = 0; // force of the longest arrow [N]
+  /** Around all from tail to tip. */
+  readonly box = new Box3();
+  private readonly contacts_ = new ArrowSet(0xf07c3e, 1.3, this.box);
+  private readonly whole_ = new ArrowSet(0xf2c14e, 2.4, this.box);
+  private own_ = 0; // force of the longest arrow [N], as this picture's forces want it
+  /** The same of what is shown beside: a force is as long in both pictures. */
+  beside = 0;
 
   constructor() {
     this.group.add(this.contacts_.group, this.whole_.group);
@@ -80,22 +86,34 @@ export class Arrows {
 
   /** What the legend says: a force [N] and how many pixels long it is; 0: there is none. */
   get legend(): { force: number; pixels: number } {
-    return { force: 0.5 * this.full_, pixels: 0.5 * longest };
+    const force = round_below(0.6 * this.full);
+    return { force, pixels: force > 0 ? (longest * force) / this.full : 0 };
+  }
+
+  /** The force of the longest arrow, without what is shown beside [N]. */
+  get own(): number {
+    return this.own_;
+  }
+
+  private get full(): number {
+    return Math.max(this.own_, this.beside);
   }
 
   /** Forgets how long forces were. */
   forget(): void {
-    this.full_ = 0;
+    this.own_ = 0;
   }
 
   /** `radius` of the tool [m], which the whole force's arrow does not hide in. The scale follows as forces grow, and shrinks far below. */
   show(frame: Frame, radius: number, pixel_at: PixelSize): void {
     this.contacts_.clear();
     this.whole_.clear();
+    this.box.makeEmpty();
     const force = new Vector3().fromArray(frame.force);
     const size = force.length();
-    if (size > this.full_ || (size > 0 && size < 0.02 * this.full_)) this.full_ = nice_ceiling(size);
-    if (!(this.full_ > 0)) return;
+    if (size > this.own_ || (size > 0 && size < 0.02 * this.own_)) this.own_ = nice_ceiling(size);
+    const { full } = this;
+    if (!(full > 0)) return;
     let inwards = 0;
     for (let c = 0; c < frame.contact.length; c += floats_of_contact) {
       const place = new Vector3().fromArray(frame.contact, c);
@@ -105,7 +123,7 @@ export class Arrows {
       inwards -= normal.dot(along);
       if (!(own > 0)) continue;
       const pixel = pixel_at(place);
-      const pixels = (longest * own) / this.full_;
+      const pixels = (longest * own) / full;
       const way = along.divideScalar(own);
       // Outside of the body, where it can be seen: the tip of one that presses, the tail of one that pulls.
       this.contacts_.add(way.dot(normal) < 0 ? place.addScaledVector(way, -pixels * pixel) : place, way, pixels, pixel);
@@ -113,7 +131,7 @@ export class Arrows {
     if (!(size > 0)) return;
     const tool = new Vector3().fromArray(frame.tool);
     const pixel = pixel_at(tool);
-    const pixels = (longest * size) / this.full_;
+    const pixels = (longest * size) / full;
     const way = force.divideScalar(size);
     const presses = frame.contact.length === 0 || inwards > 0;
     const gap = radius + 3 * pixel;

@@ -8,7 +8,7 @@ import type { Vec3 } from './words';
 export type Shared =
   | { about: 'look'; look: KeptLook; theme: string }
   | { about: 'eye'; place: Place | null; towards: Vec3 } // no place: all of the body, from there
-  | { about: 'range'; field: Field; typed: number | null; largest: number } // each has its own
+  | { about: 'range'; field: Field; typed: number | null; largest: number; force: number } // each has its own: of colours, and of the longest arrow [N]
   | { about: 'time'; time: number }; // [s], of recordings
 
 const mark = 'palpate beside';

@@ -1,9 +1,12 @@
 // Elements of the page.
 
-/** The element with this data-testid, of the kind that is expected. */
+const found = new Map<string, Element>(); // all are in index.html and stay: they are looked for once
+
+/** The element of index.html with this data-testid, of the kind that is expected. */
 export function by_id<E extends HTMLElement>(id: string, kind: new () => E): E {
-  const element = document.querySelector(`[data-testid="${id}"]`);
+  const element = found.get(id) ?? document.querySelector(`[data-testid="${id}"]`);
   if (!(element instanceof kind)) throw new Error(`the page has no ${kind.name} named ${id}`);
+  found.set(id, element);
   return element;
 }
 
@@ -17,13 +20,36 @@ export function write(element: HTMLElement, text: string): void {
   if (element.textContent !== text) element.textContent = text;
 }
 
+const styles = new WeakMap<HTMLElement, string>();
+
+/** Sets an element's own style only when it is another: the browser would lay out again even for the same. */
+export function set_style(element: HTMLElement, property: string, value: string): void {
+  const wanted = `${property}: ${value}`;
+  if (styles.get(element) === wanted) return;
+  styles.set(element, wanted);
+  element.style.setProperty(property, value);
+}
+
 /** Shows what the runtime has, unless somebody is typing there. */
 export function show_value(element: HTMLInputElement | HTMLSelectElement, value: string): void {
   if (document.activeElement !== element && element.value !== value) element.value = value;
 }
 
-/** Lengths in style.css grow with large screens: pixels of what is one at the usual size. */
-export const rem = (): number => parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+let rem_ = 0;
+
+/** Lengths may have changed. */
+export function forget_rem(): void {
+  rem_ = 0;
+}
+
+/** Lengths in style.css grow with large screens: pixels of what is one at the usual size. Asked for in each picture, it is read once per size of the window. */
+export function rem(): number {
+  if (rem_ === 0) {
+    rem_ = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+    addEventListener('resize', forget_rem, { once: true, capture: true });
+  }
+  return rem_;
+}
 
 /** Lets a file be saved. */
 export function save(blob: Blob, name: string): void {

@@ -55,7 +55,7 @@ export class Eye {
   private is_fitted_ = true; // the person has not turned or moved it since
 
   constructor(
-    private readonly canvas_: HTMLElement,
+    private readonly pad_: HTMLElement,
     private readonly margins_: () => Margins,
   ) {
     this.controls_ = this.make_controls();
@@ -111,7 +111,7 @@ export class Eye {
       this.shape_cameras();
       return;
     }
-    const height = Math.max(1, this.canvas_.clientHeight);
+    const height = Math.max(1, this.pad_.clientHeight);
     const { width: wide, height: high } = this.opening();
     const full = this.is_flat ? 0.84 : 0.94; // a tool stands beside a body in the plane
     const shares = { wide: (wide / height) * full, high: (high / height) * full };
@@ -177,7 +177,7 @@ export class Eye {
 
   /** Where the pixel looks: into the picture. */
   ray(client_x: number, client_y: number): Ray {
-    const area = this.canvas_.getBoundingClientRect();
+    const area = this.pad_.getBoundingClientRect();
     const place = new Vector2(((client_x - area.left) / area.width) * 2 - 1, 1 - ((client_y - area.top) / area.height) * 2);
     const caster = new Raycaster();
     this.camera_.updateMatrixWorld();
@@ -194,7 +194,7 @@ export class Eye {
 
   /** Metres that a pixel of the page shows at a place. */
   pixel_at(place: Vector3): number {
-    const height = Math.max(1, this.canvas_.clientHeight);
+    const height = Math.max(1, this.pad_.clientHeight);
     if (this.camera_ === this.orthographic_) {
       const { top, bottom, zoom } = this.orthographic_;
       return (top - bottom) / zoom / height;
@@ -219,7 +219,7 @@ export class Eye {
   project(x: number, y: number, z: number): { x: number; y: number } {
     this.camera_.updateMatrixWorld();
     const seen = new Vector3(x, y, z).project(this.camera_);
-    const area = this.canvas_.getBoundingClientRect();
+    const area = this.pad_.getBoundingClientRect();
     return { x: area.left + ((seen.x + 1) / 2) * area.width, y: area.top + ((1 - seen.y) / 2) * area.height };
   }
 
@@ -262,7 +262,7 @@ export class Eye {
   }
 
   private shape_cameras(): void {
-    const { clientWidth: width, clientHeight: height } = this.canvas_;
+    const { clientWidth: width, clientHeight: height } = this.pad_;
     if (width === 0 || height === 0) return;
     const aspect = width / height;
     this.perspective_.aspect = aspect;
@@ -273,7 +273,7 @@ export class Eye {
 
   /** What is free of controls: its size and by how much its middle is right of and below the picture's [pixels]. */
   private opening(): { width: number; height: number; right: number; below: number } {
-    const { clientWidth: width, clientHeight: height } = this.canvas_;
+    const { clientWidth: width, clientHeight: height } = this.pad_;
     const { top, bottom, left, right } = this.margins_();
     return {
       width: Math.max(0.4 * width, width - left - right),
@@ -291,7 +291,7 @@ export class Eye {
   }
 
   private make_controls(): OrbitControls {
-    const controls = new OrbitControls(this.camera_, this.canvas_);
+    const controls = new OrbitControls(this.camera_, this.pad_);
     controls.enableRotate = !this.is_flat;
     controls.zoomToCursor = true;
     controls.mouseButtons = this.is_flat

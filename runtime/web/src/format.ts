@@ -52,6 +52,13 @@ export function nice_ceiling(value: number): number {
   return step * power;
 }
 
+/** The longest of 1, 2, 5 times a power of ten that is not above `value`. */
+export function round_below(value: number): number {
+  if (!(value > 0)) return 0;
+  const power = 10 ** Math.floor(Math.log10(value));
+  return ([5, 2, 1].find((one) => one * power <= value * (1 + 1e-9)) ?? 1) * power;
+}
+
 /** Round numbers from `low` to `high`, some `wanted` of them. */
 export function nice_ticks(low: number, high: number, wanted = 5): number[] {
   if (!(high > low)) return [low];

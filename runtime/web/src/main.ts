@@ -2,7 +2,7 @@
 import './style.css';
 import { Beside, Neighbour, type Shared } from './beside';
 import { of_frame, RecentEfforts, sentence } from './best_effort';
-import { button, input, part, select, show_value, toast, write } from './dom';
+import { button, forget_rem, input, part, select, show_value, toast, write } from './dom';
 import { FileSource, stored_session } from './file_source';
 import { format_si, format_time, short_number } from './format';
 import { History } from './history';
@@ -29,6 +29,7 @@ import type { Mode, Said, State, Word } from './words';
 
 const live_samples = 60_000; // more than ten seconds at the highest rate
 const plot_wait = 100; // [ms] between drawings of the plots
+const idle_plot_wait = 300; // while nothing is touched: they only move along
 const playhead_wait = 40; // and in a recording, where they show what the picture is of
 const numbers_wait = 100;
 const timing_wait = 500;
@@ -103,7 +104,7 @@ class Page implements Listener {
     view.before_drawing = () => {
       this.picture_.has_tool = !this.is_hand() || this.hand_.has_moved; // until then it waits far from the body
       prepared();
-      this.drawing_.show_range_unit(this.picture_.automatic_range);
+      if (this.picture_.bar_is_new) this.drawing_.show_range_unit(this.picture_.automatic_range);
     };
     const marked = view.after_drawing;
     view.after_drawing = () => {
@@ -181,6 +182,7 @@ class Page implements Listener {
     document.body.classList.toggle('live', mode === 'live');
     document.body.classList.toggle('served', mode !== 'file');
     document.body.classList.toggle('pane', this.neighbour_.is_there);
+    forget_rem();
     if (this.neighbour_.is_there && window.innerHeight <= 480 && !document.body.classList.contains('folded')) this.toggle_panel();
   }
 
@@ -334,16 +336,16 @@ class Page implements Listener {
       'Shift+ArrowDown': () => eye.turn(0, -0.1),
       ...fields,
     });
-    const { canvas } = this.picture_.view;
-    window.addEventListener('pointerdown', () => canvas.classList.add('by-pointer'), { capture: true }); // its focus needs no ring
-    window.addEventListener('keydown', () => canvas.classList.remove('by-pointer'));
-    canvas.addEventListener('keydown', (event) => {
+    const { pad } = this.picture_.view;
+    window.addEventListener('pointerdown', () => pad.classList.add('by-pointer'), { capture: true }); // its focus needs no ring
+    window.addEventListener('keydown', () => pad.classList.remove('by-pointer'));
+    pad.addEventListener('keydown', (event) => {
       if (event.key !== 'Enter') return;
       event.preventDefault();
       this.hand_.key_press();
     });
-    window.addEventListener('pointerdown', ({ target }) => target === canvas && this.state_?.paused && this.mode_ === 'live' && nudge(), { capture: true });
-    canvas.addEventListener('blur', () => this.hand_.release_key());
+    window.addEventListener('pointerdown', ({ target }) => target === pad && this.state_?.paused && this.mode_ === 'live' && nudge(), { capture: true });
+    pad.addEventListener('blur', () => this.hand_.release_key());
   }
 
   private escape(): void {
@@ -374,8 +376,8 @@ class Page implements Listener {
   private share_picture(): void {
     if (!this.neighbour_.is_there || this.kept_for_ === '') return;
     this.neighbour_.say(this.shared_eye());
-    const { own_range: largest, body } = this.picture_;
-    this.neighbour_.say({ about: 'range', field: body.field, typed: this.drawing_.typed_range, largest });
+    const { own_range: largest, own_force: force, body } = this.picture_;
+    this.neighbour_.say({ about: 'range', field: body.field, typed: this.drawing_.typed_range, largest, force });
   }
 
   private shared_eye(): Shared {
@@ -396,6 +398,7 @@ class Page implements Listener {
       this.neighbour_.note(this.shared_eye());
     } else if (shared.about === 'range') {
       this.picture_.range_beside = shared;
+      this.picture_.force_beside = shared.force;
       if (shared.field === this.picture_.body.field) this.drawing_.typed_range = shared.typed;
       this.picture_.view.draw();
     } else {
@@ -503,7 +506,7 @@ class Page implements Listener {
         this.plots_.cursor = this.mode_ === 'live' ? null : (this.picture_.frame?.time ?? null);
         this.plots_.draw(this.history_, this.state_?.rate ?? 1000, this.mode_ !== 'live');
       });
-    }, this.mode_ === 'live' ? plot_wait : playhead_wait);
+    }, this.mode_ !== 'live' ? playhead_wait : (this.picture_.frame?.contact.length ?? 0) > 0 ? plot_wait : idle_plot_wait);
   }
 
   private felt(): Felt {

@@ -5,6 +5,7 @@ const very_slow = 200; // two of them are enough
 const quick = 24;
 const patience_slow = 3; // pictures
 const patience_quick = 45;
+const block_share = 0.34; // from here on blocks cost less than smoothness
 
 export class Pace {
   /** Bounds of `share`. */
@@ -14,6 +15,12 @@ export class Pace {
   share = 1;
   /** Of a picture that rests: below 1 where a whole one would take too long. */
   rest_share = 1;
+  /** Shade is kept for some pictures: what goes first, as it is hardly seen. */
+  is_thrifty = false;
+  /** Drawn pixels become blocks on the screen, which a browser without a graphics card enlarges in half the time; only where `may_be_blocky`. */
+  is_blocky = false;
+  /** The window is so large that enlarging counts. */
+  may_be_blocky = false;
   private slow_ = 0;
   private quick_ = 0;
   private skipped_ = 2; // pictures that do not count: what came before is in their time
@@ -26,8 +33,8 @@ export class Pace {
     }
     this.slow_ = wait > slow ? this.slow_ + 1 : 0;
     this.quick_ = wait < quick ? this.quick_ + 1 : Math.max(0, this.quick_ - 2);
-    if (this.slow_ >= (wait > very_slow ? 2 : patience_slow)) this.change(Math.max(0.35, Math.sqrt(slow / wait)));
-    else if (this.quick_ >= patience_quick) this.change(1.15);
+    if (this.slow_ >= (wait > very_slow ? 2 : patience_slow)) this.save(Math.max(0.35, Math.sqrt(slow / wait)));
+    else if (this.quick_ >= patience_quick) this.spend(1.15);
   }
 
   /** A whole picture was drawn in `took` [ms]. */
@@ -36,8 +43,26 @@ export class Pace {
     if (took > 1200) this.rest_share = Math.max(this.least, 0.7 * this.rest_share);
   }
 
-  private change(by: number): void {
-    this.share = Math.min(this.most, Math.max(this.least, this.share * by));
+  /** In this order: shade is kept, pixels are fewer, they are blocks, they are fewer still. */
+  private save(by: number): void {
+    const wants_blocks = this.may_be_blocky && !this.is_blocky;
+    const least = wants_blocks ? Math.max(this.least, block_share) : this.least;
+    if (!this.is_thrifty) this.is_thrifty = true;
+    else if (wants_blocks && this.share <= least) this.is_blocky = true;
+    else this.share = Math.max(least, this.share * by);
+    this.begin();
+  }
+
+  /** And back. */
+  private spend(by: number): void {
+    const is_coarse = this.share < Math.min(this.most, block_share);
+    if (this.is_blocky && !is_coarse) this.is_blocky = false;
+    else if (this.share < this.most) this.share = Math.min(this.most, this.share * by);
+    else this.is_thrifty = false;
+    this.begin();
+  }
+
+  private begin(): void {
     this.slow_ = this.quick_ = 0;
     this.skipped_ = 2;
   }

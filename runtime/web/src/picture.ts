@@ -15,6 +15,7 @@ import type { Frame, Patch, Scene } from './wire';
 import type { Model } from './words';
 
 const kept_patches = 4;
+const bar_wait = 100; // [ms] between numbers of the colour bar while things move
 const still = 1e-5; // of the body's size: what moves less is not drawn anew
 
 /** Whether two frames look the same, for a body of this size. */
@@ -154,6 +155,9 @@ export class Picture {
     this.place_tool(drawn);
     this.body.prepare(this.view.canvas.width / Math.max(1, this.view.canvas.clientWidth), this.view.light.tool);
     this.view.body_box = this.body.box;
+    this.view.seen_box.copy(this.body.box);
+    if (this.tool_.group.visible) this.tool_.add_to(this.view.seen_box);
+    if (this.arrows_.group.visible) this.view.seen_box.union(this.arrows_.box);
     this.colour(drawn);
   }
 
@@ -187,13 +191,29 @@ export class Picture {
     const low = field_traits[drawn.field].is_signed ? -high : is_log ? high / log_span : 0;
     const colouring: Colouring = { map: drawn.map, is_log, isolines: drawn.isolines ? 12 : 0 };
     this.body.show_range(low, high, colouring);
-    this.bar.show(drawn.field, low, high, shown.largest, colouring, this.model_?.materials ?? []);
     this.automatic_range = automatic;
+    const now = performance.now();
+    this.bar_is_new = this.view.drawing.rests || drawn.field !== this.bar_field_ || now - this.bar_at_ > bar_wait;
+    if (!this.bar_is_new) return;
+    this.bar_at_ = now;
+    this.bar_field_ = drawn.field;
+    this.bar.show(drawn.field, low, high, shown.largest, colouring, this.model_?.materials ?? []);
   }
+  /** The bar is of this picture: numbers that change with each cannot be read, and each costs the page a layout. */
+  bar_is_new = true;
+  private bar_at_ = -Infinity; // [ms]
+  private bar_field_: Field | null = null;
   /** The largest number of the range as it comes by itself. */
   automatic_range = 0;
   /** The same without what is shown beside. */
   own_range = 0;
+  /** The force of the longest arrow, without what is shown beside [N]; and of what is, whose arrows are as long for a force. */
+  get own_force(): number {
+    return this.arrows_.own;
+  }
+  set force_beside(force: number) {
+    this.arrows_.beside = force;
+  }
   /** Of what is shown beside, which has the same colours. */
   range_beside: { field: Field | null; largest: number } = { field: null, largest: 0 };
 }

@@ -44,6 +44,7 @@ export class Hand {
   private word_: Point | null = null; // what is wanted and was not said
   private last_: Point | null = null;
   private last_at_ = -Infinity;
+  private beats_ = false; // a beat is under way
 
   /**
    * `settings` gives null where the pointer is no hand now, or a sentence that says what keeps it from being one. `send` says a
@@ -68,12 +69,18 @@ export class Hand {
     area.addEventListener('wheel', (event) => this.wheel(event), { capture: true, passive: false });
     area.addEventListener('contextmenu', (event) => event.preventDefault());
     window.addEventListener('blur', () => this.release());
-    const beat = () => {
-      this.beat(performance.now());
-      requestAnimationFrame(beat);
-    };
-    requestAnimationFrame(beat);
     setInterval(() => this.beat(performance.now()), longest_wait / 2); // pictures may take longer than the runtime waits
+  }
+
+  /** Says what is wanted with the next picture; a page that nobody touches has none. */
+  private want_beat(): void {
+    if (this.beats_) return;
+    this.beats_ = true;
+    requestAnimationFrame(() => {
+      this.beats_ = false;
+      this.beat(performance.now());
+      if (this.word_) this.want_beat();
+    });
   }
 
   get is_pressed(): boolean {
@@ -90,13 +97,13 @@ export class Hand {
     if (!press) return;
     this.press_ = null;
     this.changed_(null);
-    this.view_.canvas.style.cursor = '';
+    this.view_.pad.style.cursor = '';
     const settings = this.settings_();
     if (settings && typeof settings !== 'string') this.want_hover(settings, press.now, press.orientation, settings.clearance);
   }
 
   private down(event: PointerEvent): void {
-    if (event.target !== this.view_.canvas) return;
+    if (event.target !== this.view_.pad) return;
     if (this.press_) {
       this.begin_pinch(event);
       event.stopPropagation();
@@ -106,9 +113,9 @@ export class Hand {
     if (!this.begin(event.clientX, event.clientY, event.pointerId)) return;
     event.stopPropagation();
     event.preventDefault();
-    this.view_.canvas.setPointerCapture(event.pointerId);
-    this.view_.canvas.style.cursor = 'grabbing';
-    this.view_.canvas.focus({ preventScroll: true });
+    this.view_.pad.setPointerCapture(event.pointerId);
+    this.view_.pad.style.cursor = 'grabbing';
+    this.view_.pad.focus({ preventScroll: true });
   }
 
   /** Presses what is there in the window; gives whether that is a body that may be touched. */
@@ -151,7 +158,7 @@ export class Hand {
     at.x += right;
     at.y += down;
     if (this.press_?.id === key_id) this.slide(at.x, at.y);
-    else if (!this.press_) this.hover_ = { ...at };
+    else if (!this.press_) this.want_hover_at({ ...at });
   }
 
   /** Presses where the tool is, or lets go. */
@@ -185,7 +192,7 @@ export class Hand {
     const press = this.press_;
     if (!press) {
       if (event.pointerType === 'touch' || event.buttons !== 0) this.hover_ = null;
-      else this.hover_ = event.target === this.view_.canvas ? { x: event.clientX, y: event.clientY } : null;
+      else this.want_hover_at(event.target === this.view_.pad ? { x: event.clientX, y: event.clientY } : null);
       return;
     }
     event.stopPropagation();
@@ -290,11 +297,18 @@ export class Hand {
       press.now = { point: plus(press.start.point, way), normal: press.start.normal };
     }
     this.word_ = { type: 'point', position, orientation: press.orientation, grab: press.mode === 'grab', lifted: false };
+    this.want_beat();
   }
 
   private want_hover(settings: HandSettings, hit: Hit, orientation: Quaternion, clearance: number): void {
     const position = pressed_position(hit.point, hit.normal, settings.shape.radius, -clearance);
     this.word_ = { type: 'point', position, orientation, grab: false, lifted: true };
+    this.want_beat();
+  }
+
+  private want_hover_at(at: { x: number; y: number } | null): void {
+    this.hover_ = at;
+    if (at) this.want_beat();
   }
 
   private follow_hover(): void {
@@ -304,7 +318,7 @@ export class Hand {
     const settings = this.settings_();
     const hit = settings === null ? null : this.hit(at.x, at.y, this.body_.surface);
     this.hovering_ = hit !== null;
-    this.view_.canvas.style.cursor = this.hovering_ ? 'pointer' : '';
+    this.view_.pad.style.cursor = this.hovering_ ? 'pointer' : '';
     if (hit && settings && typeof settings !== 'string') this.want_hover(settings, hit, turn_onto(hit.normal, this.dimension()), settings.clearance);
   }
 

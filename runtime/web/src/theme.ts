@@ -4,6 +4,7 @@ export const themes = ['auto', 'dark', 'light'] as const;
 export type Theme = (typeof themes)[number];
 
 const prefers_light = matchMedia('(prefers-color-scheme: light)');
+const colours = new Map<string, string>(); // of the theme as it is: plots ask for some twenty each time
 
 export class ThemeChoice {
   private choice_: Theme = 'auto';
@@ -29,11 +30,14 @@ export class ThemeChoice {
 
   private apply(): void {
     document.documentElement.dataset.theme = this.is_light ? 'light' : 'dark';
+    colours.clear();
     this.changed();
   }
 }
 
 /** The colour that a custom property of style.css has now. */
 export function css_colour(name: string): string {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  let colour = colours.get(name);
+  if (colour === undefined) colours.set(name, (colour = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()));
+  return colour;
 }

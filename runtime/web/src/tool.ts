@@ -1,5 +1,5 @@
 // The tool where it is, and as a rim where the hand wants it.
-import { CapsuleGeometry, Color, Group, LatheGeometry, Mesh, ShaderMaterial, SphereGeometry, Vector2, Vector3, type BufferGeometry, type Camera } from 'three';
+import { CapsuleGeometry, Color, Group, LatheGeometry, Mesh, ShaderMaterial, SphereGeometry, Vector2, Vector3, type Box3, type BufferGeometry, type Camera } from 'three';
 import { tissue, tint } from './colours';
 import { light_glsl, type Light } from './light';
 import { disc_profile, type ToolShape } from './pose';
@@ -110,6 +110,11 @@ export class ToolView {
     place(this.tool_, tool);
     place(this.ghost_, device);
     this.ghost_.visible = this.tool_.position.distanceTo(this.ghost_.position) > 0.03 * this.radius;
+  }
+
+  /** Makes a box hold all that is drawn of it. */
+  add_to(box: Box3): void {
+    for (const mesh of [this.tool_, this.ghost_]) if (mesh.visible) box.expandByObject(mesh);
   }
 
   /** Its shade falls as this camera sees it; a tool that is not seen throws none. */

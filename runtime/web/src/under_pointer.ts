@@ -21,7 +21,7 @@ export class UnderPointer {
     private readonly body_: Body,
   ) {
     view_.element.addEventListener('pointermove', (event) => {
-      this.at_ = event.target === view_.canvas && event.pointerType !== 'touch' && event.buttons === 0 ? { x: event.clientX, y: event.clientY } : null;
+      this.at_ = event.target === view_.pad && event.pointerType !== 'touch' && event.buttons === 0 ? { x: event.clientX, y: event.clientY } : null;
     });
     view_.element.addEventListener('pointerdown', () => (this.at_ = null), { capture: true }); // the tool is there
     view_.element.addEventListener('pointerleave', () => (this.at_ = null));

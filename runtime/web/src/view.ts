@@ -1,5 +1,6 @@
 // The picture: what is drawn, when, and how finely.
 import { Box3, GridHelper, Group, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
+import { set_style } from './dom';
 import { Eye, type Margins } from './eye';
 import { Light } from './light';
 import { Pace } from './pace';
@@ -12,6 +13,10 @@ const most_pixels = 2; // of the drawing for one of the page, along a side
 const most_drawn = 6e6; // pixels of the drawing
 const least_drawn = 1.1e5;
 const smooth = 1.5; // pixels along a side that become one of a picture that rests
+const cut_margin = 24; // pixels of the page around what is drawn: arrows are thick
+const cut_step = 32;
+const shade_pictures = 4; // that share one shade, where time is short
+const many_pixels = 4e6; // of the screen, that the browser takes long to put together without a graphics card
 const shade_reach = 0.16; // of half the body's diagonal
 
 /** How often and how finely is drawn, for tests and measurements. */
@@ -35,6 +40,10 @@ export class View {
 
   /** Around the body as it is now. */
   body_box = new Box3();
+  /** Around all that is drawn, but for the grid. */
+  readonly seen_box = new Box3();
+  /** What the pointer touches: as large as the stage, of which the picture may show a part only. */
+  readonly pad = document.createElement('div');
 
   /** Every picture is drawn whole, as for a video. */
   is_whole = false;
@@ -51,6 +60,8 @@ export class View {
   private readonly handed_over_ = new MessageChannel();
   private rest_timer_ = 0;
   private size_ = '';
+  private shade_age_ = 0; // pictures
+  private shade_seen_ = ''; // the camera that the shade is of
 
   constructor(
     readonly element: HTMLElement,
@@ -59,14 +70,16 @@ export class View {
     this.renderer_.setClearAlpha(0);
     this.renderer_.autoClear = false;
     this.renderer_.localClippingEnabled = true;
-    this.canvas.tabIndex = 0;
-    this.canvas.setAttribute('role', 'application');
-    this.canvas.setAttribute('aria-label', 'The body. Arrow keys move the tool, Enter presses and lifts it, Shift and arrows turn the view; ? lists all keys');
-    this.canvas.dataset.testid = 'view';
-    element.prepend(this.canvas);
+    this.canvas.setAttribute('aria-hidden', 'true');
+    this.pad.className = 'pad';
+    this.pad.tabIndex = 0;
+    this.pad.setAttribute('role', 'application');
+    this.pad.setAttribute('aria-label', 'The body. Arrow keys move the tool, Enter presses and lifts it, Shift and arrows turn the view; ? lists all keys');
+    this.pad.dataset.testid = 'view';
+    element.prepend(this.canvas, this.pad);
     this.shade_ = new Shade(this.light, section_.cut);
     this.scene.add(this.still_);
-    this.eye = new Eye(this.canvas, () => this.margins());
+    this.eye = new Eye(this.pad, () => this.margins());
     this.eye.changed = () => this.draw();
     new ResizeObserver(() => this.resize()).observe(element);
     this.handed_over_.port1.onmessage = () => (this.done_at_ = performance.now());
@@ -150,13 +163,13 @@ export class View {
   private set_bounds(width: number, height: number): void {
     const screen = this.screen_pixels();
     this.pace_.most = Math.min(Math.max(1, most_pixels / screen), Math.sqrt(most_drawn / (width * height)) / screen);
+    this.pace_.may_be_blocky = width * height * window.devicePixelRatio ** 2 > many_pixels;
     this.pace_.least = Math.min(0.4, Math.sqrt(least_drawn / (width * height)) / screen);
   }
 
-  /** Where the body is in the picture. */
-  private around(): Around {
+  /** Where a box is in the picture. */
+  private around({ min, max }: Box3): Around {
     const { camera } = this.eye;
-    const { min, max } = this.body_box;
     const low = new Vector2(1, 1);
     const high = new Vector2(-1, -1);
     for (let k = 0; k < 8; ++k) {
@@ -169,6 +182,16 @@ export class View {
     low.clampScalar(-1, 1);
     high.clampScalar(-1, 1);
     return { left: 0.5 + 0.5 * low.x, below: 0.5 + 0.5 * low.y, width: 0.5 * (high.x - low.x), height: 0.5 * (high.y - low.y) };
+  }
+
+  /** While it moves the canvas is cut down to where something is drawn: without a graphics card the browser puts together all of it, however little is there. */
+  private cut_canvas(is_whole: boolean): void {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const { left, below, width: wide, height: high } = this.around(this.seen_box);
+    const outwards = (share: number, size: number) => Math.max(0, Math.floor((share * size - cut_margin) / cut_step) * cut_step);
+    const sides = [outwards(1 - below - high, height), outwards(1 - left - wide, width), outwards(below, height), outwards(left, width)];
+    this.canvas.classList.toggle('blocky', !is_whole && this.pace_.is_blocky);
+    set_style(this.canvas, 'clip-path', is_whole || this.grid_ ? 'none' : `inset(${sides.map((side) => `${side}px`).join(' ')})`);
   }
 
   private screen_pixels(): number {
@@ -195,7 +218,18 @@ export class View {
     Object.assign(this.drawing, { pictures: this.drawing.pictures + 1, share, rests: is_fine });
     this.before_drawing();
     this.render(ratio, is_fine);
+    this.cut_canvas(is_fine);
     this.after_drawing();
+  }
+
+  /** Whether this picture has the shade of one before: while nobody turns the view a press changes little of it from one to the next. */
+  private keeps_shade(is_fine: boolean): boolean {
+    const { projectionMatrix, matrixWorldInverse } = this.eye.camera;
+    const seen = `${projectionMatrix.elements} ${matrixWorldInverse.elements}`;
+    const is_kept = !is_fine && this.pace_.is_thrifty && seen === this.shade_seen_ && ++this.shade_age_ < shade_pictures;
+    if (!is_kept) this.shade_age_ = 0;
+    this.shade_seen_ = seen;
+    return is_kept;
   }
 
   private render(ratio: number, is_fine: boolean): void {
@@ -210,7 +244,7 @@ export class View {
     if (this.eye.is_flat) this.light.without_shade();
     else {
       this.shade_.set_cut(this.section_.is_on);
-      this.shade_.draw(renderer, this.scene, camera, [canvas.width, canvas.height], this.around(), shade_reach * radius, is_fine);
+      if (!this.keeps_shade(is_fine)) this.shade_.draw(renderer, this.scene, camera, [canvas.width, canvas.height], this.around(this.body_box), shade_reach * radius, is_fine);
     }
     renderer.clear();
     renderer.render(this.scene, camera);

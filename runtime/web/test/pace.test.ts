@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { round_below } from '../src/marks';
+import { round_below } from '../src/format';
 import { Pace } from '../src/pace';
 
 const times = (count: number, act: () => void) => Array.from({ length: count }, act);
@@ -14,6 +14,22 @@ test('pictures that are slow become coarser, and fine again where there is time'
   assert.ok(coarse < 0.6 && coarse >= 0.4, `${coarse}`);
   times(400, () => pace.note(16));
   assert.equal(pace.share, 1);
+});
+
+test('shade is saved first and pixels last, and all of it comes back', () => {
+  const pace = new Pace();
+  Object.assign(pace, { may_be_blocky: true, least: 0.1 });
+  const seen: string[] = [];
+  const look = () => {
+    const now = [pace.is_thrifty ? 'thrifty' : '', pace.share < 1 ? (pace.share < 0.3 ? 'few' : 'fewer') : '', pace.is_blocky ? 'blocks' : ''].join(' ').trim();
+    if (seen.at(-1) !== now) seen.push(now);
+  };
+  look();
+  times(60, () => (pace.note(120), look()));
+  assert.deepEqual(seen, ['', 'thrifty', 'thrifty fewer', 'thrifty fewer blocks', 'thrifty few blocks']);
+  assert.ok(Math.abs(pace.share - 0.1) < 1e-9);
+  times(1500, () => (pace.note(16), look()));
+  assert.deepEqual(seen.slice(5), ['thrifty fewer blocks', 'thrifty fewer', 'thrifty', '']);
 });
 
 test('one slow picture changes nothing, and what a whole one took does not count', () => {
