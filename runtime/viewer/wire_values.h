@@ -1,6 +1,7 @@
 // Displacements and stresses of a picture as whole numbers, and what changed of them since another picture.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -18,7 +19,7 @@ struct WireValues {
   std::int32_t exponent_u = 0;       ///< displacements are in 2^this [m]
   std::int32_t exponent_stress = 0;  ///< stresses are in 2^this [Pa]
   /// [n] each: along x, y, z, and 1 + von Mises stress, 0 where that is not known
-  std::vector<std::int32_t> channel[4];
+  std::array<std::vector<std::int32_t>, 4> channel;
 };
 
 /// Rounds a picture that fits (wire.h). Displacements are off by at most 1/10 000 of the largest component,
