@@ -211,10 +211,11 @@ void check_free_space(const std::filesystem::path& path, std::int64_t needed) {
   auto available = static_cast<std::int64_t>(disk.f_bavail) * static_cast<std::int64_t>(disk.f_frsize);
   struct stat status = {};
   if (::stat(path.c_str(), &status) == 0) available += status.st_blocks * 512;
-  if (needed > available)
+  if (needed > available) {
     throw Error("the disk is too full: " + std::to_string(megabytes(needed)) + " MB are needed, " +
                     std::to_string(available / 1'000'000) + " MB are free",
                 path.string(), hint_for(ENOSPC));
+  }
 }
 
 void reserve_space(const FileDescriptor& file, std::int64_t offset, std::int64_t bytes) {

@@ -186,6 +186,26 @@ void for_each_mesh_field(ElementType element, Visitor&& visit) {
                             nodes});
 }
 
+/// What VTK asks for beside the soft links.
+template <class Visitor>
+void for_each_vtk_field(Visitor&& visit) {
+  using Int64s = std::vector<std::int64_t>;
+  visit(Field<std::int64_t>{
+      "/VTKHDF/NumberOfPoints",
+      {{Count::one}},
+      [](const Model& m) { return Int64s{static_cast<std::int64_t>(m.mesh.nodes.size())}; },
+      nullptr});
+  visit(Field<std::int64_t>{"/VTKHDF/NumberOfCells",
+                            {{Count::one}},
+                            [](const Model& m) { return Int64s{std::int64_t{m.mesh.elements()}}; },
+                            nullptr});
+  visit(Field<std::int64_t>{
+      "/VTKHDF/NumberOfConnectivityIds",
+      {{Count::one}},
+      [](const Model& m) { return Int64s{static_cast<std::int64_t>(m.mesh.connectivity.size())}; },
+      nullptr});
+}
+
 /// Datasets that are known before the Green's functions, of a body made of `element`; a field's counts and
 /// limits are set by those above it.
 template <class Visitor>
@@ -242,22 +262,7 @@ void for_each_body_field(ElementType element, Visitor&& visit) {
                             [](Model& m, const Bytes& v) { m.model_toml.assign(v.begin(), v.end()); }});
   visit(Field<std::uint8_t>{
       "/provenance/sources", {{Count::bytes_of_sources}}, sources_text, put_sources_text});
-
-  // What VTK asks for beside the soft links.
-  visit(Field<std::int64_t>{
-      "/VTKHDF/NumberOfPoints",
-      {{Count::one}},
-      [](const Model& m) { return Int64s{static_cast<std::int64_t>(m.mesh.nodes.size())}; },
-      nullptr});
-  visit(Field<std::int64_t>{"/VTKHDF/NumberOfCells",
-                            {{Count::one}},
-                            [](const Model& m) { return Int64s{std::int64_t{m.mesh.elements()}}; },
-                            nullptr});
-  visit(Field<std::int64_t>{
-      "/VTKHDF/NumberOfConnectivityIds",
-      {{Count::one}},
-      [](const Model& m) { return Int64s{static_cast<std::int64_t>(m.mesh.connectivity.size())}; },
-      nullptr});
+  for_each_vtk_field(visit);
 }
 
 /// Datasets that are added last.

@@ -331,10 +331,11 @@ std::vector<JournalRange> ModelWriter::Impl::undamaged(const std::vector<Journal
 void ModelWriter::Impl::join_in(const std::string& journal_text,
                                 std::function<void(const std::string&)> to_report) {
   const std::optional<JournalContents> begun = read_journal(journal_text);
-  if (!begun || begun->frame.key != frame.key || begun->frame.packed_at.size() != matrices.size())
+  if (!begun || begun->frame.key != frame.key || begun->frame.packed_at.size() != matrices.size()) {
     throw Error("another rank has computed another model than this one", path.string(),
                 "Start the same build of palpate-precompute-mpi on all nodes, on one kind of processor, with "
                 "the same files");
+  }
   const std::string unshared =
       "Write to a folder that all nodes share, or bake in parts: palpate-precompute --part K/N";
   std::error_code missing;
@@ -525,10 +526,11 @@ void ModelWriter::Impl::take_over(const FileDescriptor& file, std::int64_t origi
     copied.update(bytes);
     write_exactly(data, bytes, at);
   }
-  if (copied.digits() != range.checksum)
+  if (copied.digits() != range.checksum) {
     throw Error("has changed since it was made: its columns " + std::to_string(range.first) + " to " +
                     std::to_string(range.first + range.count - 1) + " have another checksum",
                 file.path().string(), "Copy it again, or give its --part again");
+  }
   record(range);
 }
 
@@ -569,7 +571,7 @@ void ModelWriter::Impl::write_compressed(hdf5::File& file, const Model& extra) {
 }
 
 void ModelWriter::Impl::seal(const std::vector<Probe>& probes,
-                             const std::shared_ptr<const HierarchicalMatrix>& compressed) {
+                             std::shared_ptr<const HierarchicalMatrix> compressed) {
   Model extra;
   extra.compressed = compressed;
   extra.mesh.element = element;

@@ -477,7 +477,7 @@ std::string RankTeam::share(std::string text) {
 
 /// MPI counts in ints, so pages are exchanged.
 void RankTeam::exchange(const std::string& bytes, const std::function<void(std::string_view)>& take) {
-  const MPI_Comm team = impl_->team;
+  MPI_Comm team = impl_->team;
   const auto ranks = static_cast<std::size_t>(size());
   std::vector<std::int64_t> sizes(ranks);
   const std::int64_t own = std::ssize(bytes);

@@ -82,6 +82,7 @@ std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor&
   const SelectedSolver solver(factor);
   std::vector<SelectedSolver::Workspace> workspaces(static_cast<std::size_t>(sharing.jobs()));
   std::vector<TouchErrors> result;
+  result.reserve(std::size(certified_nodes));
   for (const Index nodes : certified_nodes) result.push_back({nodes, {}});
   struct Measured {
     double error = -1.0, bound_share = 0.0;  // -1: not yet
@@ -106,10 +107,11 @@ std::vector<TouchErrors> certify(const HierarchicalMatrix& matrix, const Factor&
     Rows exact(std::ssize(dofs), std::ssize(dofs)), C = exact;
     solver.solve(dofs, dofs, workspaces[static_cast<std::size_t>(worker)],
                  {exact.data(), static_cast<std::size_t>(exact.size())});
-    for (std::size_t k = 0; k < nodes.size(); ++k)
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
       gather_blocks(matrix, nodes[k], nodes,
                     {C.data() + std::int64_t{d} * static_cast<std::int64_t>(k) * C.cols(),
                      static_cast<std::size_t>(d * C.cols())});
+    }
     const Eigen::MatrixXd u = touch_displacements(arms, d, random);
     measured[static_cast<std::size_t>(item)] = {touch_error(exact.cast<long double>(), C, u, d),
                                                 bound_share(matrix, nodes, exact, C, u)};

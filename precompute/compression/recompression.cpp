@@ -26,7 +26,7 @@ Matrix block(const std::shared_ptr<const float[]>& entries, std::int64_t first, 
 /// The block of Xi of a leaf with itself.
 Matrix own_block(const HierarchicalMatrix& matrix, Index leaf) {
   const Index c = matrix.tree.first_leaf() + leaf;
-  const Eigen::Index n = matrix.dimension * (matrix.tree.end(c) - matrix.tree.begin(c));
+  const Eigen::Index n = Eigen::Index{matrix.dimension} * (matrix.tree.end(c) - matrix.tree.begin(c));
   return block(matrix.near, matrix.near_at[at(matrix.first_near_pair(leaf))], n, n);
 }
 
@@ -85,10 +85,11 @@ class Recompression {
       results.carry(Q_[at(c)]);
       results.carry(R_[at(c)]);
     };
-    for (int level = from_.tree.levels; level >= 0; --level)
+    for (int level = from_.tree.levels; level >= 0; --level) {
       if (!for_level(
               level, [&](Index c) { orthogonalise(c); }, carry))
         return false;
+    }
     return true;
   }
 
@@ -107,10 +108,11 @@ class Recompression {
 
   bool weigh_all() {
     const auto carry = [&](Index c, Parcel& results) { results.carry(weights_[at(c)]); };
-    for (int level = 0; level <= from_.tree.levels; ++level)
+    for (int level = 0; level <= from_.tree.levels; ++level) {
       if (!for_level(
               level, [&](Index c) { weigh(c); }, carry))
         return false;
+    }
     return true;
   }
 
@@ -181,11 +183,12 @@ class Recompression {
       tail += std::max(eigen.eigenvalues()[dropped], 0.0) * V.col(dropped).array().square();
       if (tail.maxCoeff() > cut_ * cut_) break;
     }
-    if (const Eigen::Index kept = k - dropped; kept > most_rank)
+    if (const Eigen::Index kept = k - dropped; kept > most_rank) {
       throw Error("a cluster of " + std::to_string(from_.tree.end(c) - from_.tree.begin(c)) +
                       " stored nodes needs " + std::to_string(kept) + " terms, " + std::to_string(most_rank) +
                       " are possible",
                   "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
+    }
     U_[at(c)] = eigen.eigenvectors().rightCols(k - dropped).rowwise().reverse();
   }
 
@@ -333,10 +336,11 @@ Matrix root_of_leaf(const HierarchicalMatrix& matrix, Index leaf) {
   for (double& own : Xi.diagonal())
     if (own == 0.0) own = 1.0;  // held
   const Eigen::LLT<Matrix> factor(Xi);
-  if (factor.info() != Eigen::Success)
+  if (factor.info() != Eigen::Success) {
     throw Error("the compliance of " + std::to_string(Xi.rows()) +
                     " dofs of the surface that are side by side is not positive definite in single precision",
                 "[storage] compression", "Set compression = \"none\"");
+  }
   return factor.matrixL();
 }
 
