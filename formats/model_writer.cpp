@@ -571,7 +571,7 @@ void ModelWriter::Impl::write_compressed(hdf5::File& file, const Model& extra) {
 }
 
 void ModelWriter::Impl::seal(const std::vector<Probe>& probes,
-                             std::shared_ptr<const HierarchicalMatrix> compressed) {
+                             const std::shared_ptr<const HierarchicalMatrix>& compressed) {
   Model extra;
   extra.compressed = compressed;
   extra.mesh.element = element;

@@ -46,7 +46,7 @@ std::vector<Check> check_columns(const Model& model, const Factor& factor,
       far{"far pairs", 0.0, matrix.tolerance};
   const SelectedSolver solve(factor);
   SelectedSolver::Workspace workspace;
-  const int d = matrix.dimension;
+  const Eigen::Index d = matrix.dimension;
   std::vector<Index> nodes(model.stored_nodes.size());
   std::iota(nodes.begin(), nodes.end(), 0);
   Rows blocks(d, matrix.order()), exact(matrix.order(), d);

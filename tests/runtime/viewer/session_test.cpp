@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "runtime/app/export.h"
 #include "runtime/app/session_pictures.h"
-#include "runtime/app/view.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/web/page.h"
 #include "tests/support/viewer_decoder.h"
@@ -302,7 +302,7 @@ class Export : public Recorded {
     return page;
   }
   static Exported exported(const ExportOptions& options) {
-    EXPECT_EQ(export_html(options), 0);
+    EXPECT_EQ(export_session(options), 0);
     std::ifstream stream(options.html, std::ios::binary);
     const std::string page{std::istreambuf_iterator<char>(stream), {}};
     std::string around;
@@ -367,15 +367,15 @@ TEST_F(Export, ChoosesPictures) {
 TEST_F(Export, SaysWhatCannotBe) {
   ExportOptions late = options();
   late.from = 2.0;
-  EXPECT_EQ(hint_of([&] { export_html(late); }), "it lasts from 0 to 1 s");
+  EXPECT_EQ(hint_of([&] { export_session(late); }), "it lasts from 0 to 1 s");
   ExportOptions backwards = options();
   backwards.from = 0.5;
   backwards.to = 0.4;
-  EXPECT_EQ(hint_of([&] { export_html(backwards); }), "it lasts from 0 to 1 s");
+  EXPECT_EQ(hint_of([&] { export_session(backwards); }), "it lasts from 0 to 1 s");
   EXPECT_FALSE(std::filesystem::exists(late.html));
   ExportOptions nowhere = options();
   nowhere.html = folder_ / "none" / "touch.html";
-  EXPECT_NE(hint_of([&] { export_html(nowhere); }), "");
+  EXPECT_NE(hint_of([&] { export_session(nowhere); }), "");
 }
 
 }  // namespace
