@@ -1,5 +1,6 @@
-/* Plays poses through palpate.h: a line `x y z qw qx qy qz grab` a tick on standard input; status and the bits
- * of force and torque on standard output; at the end what a tick cost, in nanoseconds: median and 99.9 %. */
+/* Plays poses through palpate.h: a line `x y z qw qx qy qz grab` a tick on standard input; status and the
+ * bits of force and torque on standard output; at the end what a tick cost, in nanoseconds: median and 99.9
+ * %. */
 #define _POSIX_C_SOURCE 200809L
 #include <inttypes.h>
 #include <stdio.h>

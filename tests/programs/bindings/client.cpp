@@ -42,7 +42,8 @@ int main(int count, char** words) {
     }
     std::sort(times.begin(), times.end());
     if (!times.empty())
-      std::printf("# %" PRId64 " %" PRId64 "\n", times[times.size() / 2], times[(times.size() - 1) * 999 / 1000]);
+      std::printf("# %" PRId64 " %" PRId64 "\n", times[times.size() / 2],
+                  times[(times.size() - 1) * 999 / 1000]);
   } catch (const palpate::Error& error) {
     std::fprintf(stderr, "error: %s\nhint: %s\n", error.what(), error.hint().c_str());
     return 1;
