@@ -12,16 +12,17 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
+#include "base/words.h"
 #include "base/write_file.h"
 #include "formats/outputs/output_paths.h"
 #include "formats/recording_parts.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/exports/gltf.h"
 #include "runtime/exports/ticks_table.h"
-#include "runtime/exports/vtu_series.h"
 #include "runtime/loop/session_check.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
+#include "runtime/viewer/seen_surface.h"
 #include "runtime/viewer/wire.h"
 #include "runtime/web/page.h"
 
@@ -98,6 +99,23 @@ void tell(const std::filesystem::path& file, const Chosen& chosen, std::size_t b
              chosen.seconds(), 1e-6 * static_cast<double>(bytes));
 }
 
+/// "00042.vtu"
+std::string frame_name(std::size_t number) {
+  return fmt::format("{:05}.vtu", number);
+}
+
+/// The collection (.pvd) of pictures that lie in `folder` beside it, with their times.
+std::string series_pvd(const std::filesystem::path& folder, std::span<const SurfacePicture> pictures) {
+  std::string text = "<?xml version=\"1.0\"?>\n<!-- palpate " PALPATE_VERSION
+                     " -->\n<VTKFile type=\"Collection\" "
+                     "version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
+  for (std::size_t k = 0; k < pictures.size(); ++k) {
+    text += fmt::format("<DataSet timestep=\"{}\" file=\"{}\"/>\n", pictures[k].frame.time,
+                        xml_escaped((folder / frame_name(k)).string()));
+  }
+  return text + "</Collection>\n</VTKFile>\n";
+}
+
 /// The pictures of a series, in a folder beside the collection.
 std::filesystem::path frames_folder(const std::filesystem::path& pvd) {
   std::filesystem::path folder = pvd;
@@ -117,13 +135,13 @@ void expect_only_frames(const std::filesystem::path& folder, bool force) {
 }
 
 /// Returns the bytes of all pictures.
-std::size_t write_series(const std::filesystem::path& pvd, const RecordedSurface& surface,
+std::size_t write_series(const std::filesystem::path& pvd, const Scene& scene,
                          std::span<const SurfacePicture> pictures) {
   const std::filesystem::path folder = frames_folder(pvd);
   std::size_t bytes = 0;
   std::filesystem::create_directories(folder);
   for (std::size_t k = 0; k < pictures.size(); ++k) {
-    const std::string text = frame_vtu(surface, pictures[k].frame);
+    const std::string text = surface_vtu(pictures[k], scene, nullptr);
     write_file(folder / frame_name(k), text);
     bytes += text.size();
   }
@@ -183,7 +201,7 @@ int export_session(const ExportOptions& options) {
     write_file(gltf, scene);
     tell(options.gltf, chosen, scene.size());
   }
-  if (!vtu.empty()) tell(options.vtu, chosen, write_series(vtu, pictures.surface(), all));
+  if (!vtu.empty()) tell(options.vtu, chosen, write_series(vtu, pictures.scene(), all));
   return exit_ok;
 }
 

@@ -179,6 +179,7 @@ int palpate_get(const palpate_session* session, int tool, palpate_result* result
 
 /* What a tool is from the next tick on: its coupling, largest force, friction, reach and hand-over. Its shape
  * (radius, length, disc_radius) stays that of palpate_create: a surface cannot be pushed aside within a tick.
+ * palpate_reset takes the change back.
  * Returns 0; -1, and nothing changes, where the number is none, the shape is another, a value makes no sense,
  * or the size is refused. Real-time safe; a function of the loop. */
 int palpate_set_tool(palpate_session* session, int number, const palpate_tool* tool) PALPATE_NOEXCEPT;

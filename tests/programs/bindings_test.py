@@ -9,20 +9,11 @@ import unittest
 
 import numpy
 
-from programs import BINARY, PRECOMPUTE, RUNTIME, SOURCE, cube_toml, run
+from programs import HAS_SANITIZERS, PRECOMPUTE, RUNTIME, SOURCE, cube_toml, done, run
 
 HERE = pathlib.Path(__file__).resolve().parent / "bindings"
 LIBRARY = SOURCE / "runtime" / "library"
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
-HAS_SANITIZERS = "PALPATE_SANITIZE:STRING=\n" not in (BINARY / "CMakeCache.txt").read_text()
-
-
-def done(*command, **options):
-    """The output of a command that must succeed."""
-    result = run(*command, **options)
-    if result.returncode != 0:
-        raise AssertionError(f"{command} failed:\n{result.stdout}{result.stderr}")
-    return result.stdout
 
 
 def clients(folder):

@@ -10,7 +10,7 @@ import unittest
 
 import h5py
 
-from programs import BINARY, PRECOMPUTE, SOURCE, cube_toml, run
+from programs import BINARY, PRECOMPUTE, SOURCE, cube_toml, done, run
 
 HEADER_FUNCTIONS = set(re.findall(r"\b(palpate_\w+)\(", (SOURCE / "runtime" / "library" / "palpate.h").read_text()))
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"]
@@ -24,14 +24,6 @@ add_executable(own_loop own_loop.c)
 target_compile_options(own_loop PRIVATE {" ".join(WARNINGS)})
 target_link_libraries(own_loop PRIVATE palpate::palpate)
 """
-
-
-def done(*command, **options):
-    """The output of a command that must succeed."""
-    result = run(*command, **options)
-    if result.returncode != 0:
-        raise AssertionError(f"{command} failed:\n{result.stdout}{result.stderr}")
-    return result.stdout
 
 
 def sanitizers():

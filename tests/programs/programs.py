@@ -16,12 +16,22 @@ BINARY = pathlib.Path(os.environ["PALPATE_BINARY_DIR"])
 PRECOMPUTE = BINARY / "precompute" / "palpate-precompute"
 RUNTIME = BINARY / "runtime" / "palpate-runtime"
 MODELS = SOURCE / "meshes" / "models"
+# They must be in a process from its beginning, and neither Debian's Python nor mono has them.
+HAS_SANITIZERS = "PALPATE_SANITIZE:STRING=\n" not in (BINARY / "CMakeCache.txt").read_text()
 
 
 def run(program, *arguments, cwd=None, **options):
     """The finished process, with its output as text."""
     return subprocess.run([str(program), *map(str, arguments)], cwd=cwd, text=True, capture_output=True,
                           timeout=240, check=False, **options)
+
+
+def done(*command, **options):
+    """The output of a command that must succeed."""
+    result = run(*command, **options)
+    if result.returncode != 0:
+        raise AssertionError(f"{command} failed:\n{result.stdout}{result.stderr}")
+    return result.stdout
 
 
 def recorded(file, field):

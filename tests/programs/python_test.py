@@ -12,7 +12,7 @@ import unittest
 import h5py
 import numpy
 
-from programs import BINARY, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
+from programs import BINARY, HAS_SANITIZERS, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
 
 os.environ["PATH"] = os.pathsep.join([str(PRECOMPUTE.parent), str(RUNTIME.parent), os.environ["PATH"]])
 sys.path.insert(0, str(SOURCE / "runtime" / "python"))
@@ -20,8 +20,6 @@ sys.path.insert(0, str(SOURCE / "runtime" / "python"))
 import palpate  # noqa: E402
 from palpate import library  # noqa: E402
 
-# Sanitizers must be in the process from its beginning, and Debian's Python has none.
-HAS_SANITIZERS = "PALPATE_SANITIZE:STRING=\n" not in (BINARY / "CMakeCache.txt").read_text()
 STRUCTS = {"palpate_tool": library.CTool, "palpate_pose": library.CPose, "palpate_overlay": library.COverlay,
            "palpate_options": library.COptions, "palpate_result": library.CResult, "palpate_counts": library.CCounts}
 
@@ -91,6 +89,9 @@ class Forces(PythonTest):
                 other.set_tool(0, palpate.Tool(radius=0.2))
             with self.assertRaises(IndexError):
                 other.set_tool(1, rough)
+            other.reset()
+            self.assertEqual(other.tools, [slippery])
+            self.assertFalse(numpy.array_equal(one.play(rubbed()), other.play(rubbed())))
 
     def test_press_on_the_surface(self):
         with palpate.Session(self.cube, palpate.Tool(radius=0.1), stress_ticks=1) as session:

@@ -90,6 +90,7 @@ class Session:
                  stress_ticks: int = 0):
         self.tools = [tools] if isinstance(tools, Tool) else list(tools)
         self.tick = tick
+        self._created = list(self.tools)
         self._library = load()
         self._session = None
         c_tools = (CTool * len(self.tools))(*[c_tool(tool) for tool in self.tools])
@@ -178,8 +179,9 @@ class Session:
         return forces
 
     def reset(self) -> None:
-        """Back to a body that nobody has touched."""
+        """Back to a body that nobody has touched, and to the tools that the session was made with."""
         self._library.palpate_reset(self._open())
+        self.tools = list(self._created)
         self._status = 0
 
     @property
