@@ -8,9 +8,8 @@ import tempfile
 import unittest
 import zipfile
 
-from programs import BINARY, SOURCE, cube_toml, run
+from programs import BINARY, HAS_SANITIZERS, SOURCE, cube_toml, run
 
-HAS_SANITIZERS = "PALPATE_SANITIZE:STRING=\n" not in (BINARY / "CMakeCache.txt").read_text()
 PUSH = """
 import palpate
 palpate.bake("cube.toml", "cube.palpate.hdf")
