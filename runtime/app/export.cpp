@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -122,9 +123,12 @@ std::filesystem::path frames_folder(const std::filesystem::path& pvd) {
   return folder.replace_extension(".frames");
 }
 
-/// Throws Error where the folder has files that an earlier series did not put there.
+/// Throws Error where the folder is a file, or has files that an earlier series did not put there.
 void expect_only_frames(const std::filesystem::path& folder, bool force) {
-  if (force || !std::filesystem::exists(folder)) return;
+  if (!std::filesystem::exists(folder)) return;
+  if (!std::filesystem::is_directory(folder))
+    throw Error("is a file, where the pictures' folder is to be", folder.string(), "name another --vtu file");
+  if (force) return;
   std::size_t count = 0;
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder)) ++count;
   for (std::size_t k = 0; k < count; ++k) {
@@ -139,7 +143,9 @@ std::size_t write_series(const std::filesystem::path& pvd, const Scene& scene,
                          std::span<const SurfacePicture> pictures) {
   const std::filesystem::path folder = frames_folder(pvd);
   std::size_t bytes = 0;
-  std::filesystem::create_directories(folder);
+  std::error_code reason;
+  std::filesystem::create_directory(folder, reason);
+  if (reason) throw Error("cannot be made: " + reason.message(), folder.string(), "write elsewhere");
   for (std::size_t k = 0; k < pictures.size(); ++k) {
     const std::string text = surface_vtu(pictures[k], scene, nullptr);
     write_file(folder / frame_name(k), text);

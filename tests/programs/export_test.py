@@ -189,6 +189,8 @@ class Series(ExportTest):
                          [f"{k:05}.vtu" for k in range(len(self.chosen(5)))])
         self.write("touch.frames/mine.txt", "mine")
         self.assert_refused(self.export("--vtu", "touch.pvd"), "touch.frames: has files that are no pictures", "--force")
+        self.write("taken.frames", "a file")
+        self.assert_refused(self.export("--vtu", "taken.pvd", "--force"), "taken.frames: is a file", "another --vtu")
         self.exported("--vtu", "touch.pvd", "--force")
         self.assertEqual((self.folder / "touch.frames" / "mine.txt").read_text(), "mine")
 
