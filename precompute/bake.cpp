@@ -22,6 +22,7 @@
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/factor.h"
 #include "precompute/numerics/greens_solver.h"
+#include "precompute/numerics/inertia.h"
 #include "precompute/numerics/loads.h"
 #include "precompute/numerics/meshed_body.h"
 #include "precompute/numerics/overlay_regions.h"
@@ -334,20 +335,26 @@ Plans announce_plans(const Description& description, const BakeOptions& options,
   if (description.dynamics) {
     plans.dynamics = announce_dynamics(description, plan, stiffness, progress);
     plan.dynamics_bytes = plans.dynamics.memory_bytes;
+    if (plans.dynamics.method == DynamicsMethod::modal) plan.dynamics_bytes += inertia_bytes(factor);
     if (plans.dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
       plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   }
   return plans;
 }
 
-void add_dynamics(const Description& description, const DynamicsPlan& plan, const ElasticBody& body,
+/// False, in all processes, when interrupted.
+bool add_dynamics(const Description& description, const DynamicsPlan& plan, const ElasticBody& body,
                   const Stiffness& stiffness, const Factor& factor,
-                  const std::vector<std::int64_t>& stored_dofs, Model& model, Progress& progress) {
-  if (!description.dynamics) return;
+                  const std::vector<std::int64_t>& stored_dofs, Sharing& sharing, Model& model,
+                  Progress& progress) {
+  if (!description.dynamics) return true;
   if (plan.method == DynamicsMethod::modal) progress.begin(modes_stage);
-  model.dynamics =
-      describe_dynamics(*description.dynamics, plan, stiffness.K,
-                        assemble_mass(body, stiffness, description.dynamics->lumped), factor, stored_dofs);
+  std::optional<StoredDynamics> dynamics = describe_dynamics(
+      *description.dynamics, plan, stiffness.K, assemble_mass(body, stiffness, description.dynamics->lumped),
+      factor, stored_dofs, sharing);
+  if (!dynamics) return false;
+  model.dynamics = *std::move(dynamics);
+  return true;
 }
 
 /// What is found once the file is begun.
@@ -657,8 +664,10 @@ bool Bake::describe() {
                                                            options_.jobs, model_, progress_, interrupt_);
   if (team_.any(!whole)) return false;
   if (take_up()) return true;
-  add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, model_,
-               progress_);
+  TeamSharing sharing(team_, options_.jobs, [&] { return interrupt_.requested(); });
+  if (!add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, sharing,
+                    model_, progress_))
+    return false;
   if (!plans_.compression) {
     progress_.begin(precision_stage);
     precision_ = decide_precision(description_, *elastic_, stiffness_, *factor_, stored_as_.dofs, team_,

@@ -17,7 +17,7 @@ inline void wait(MPI_Request& request) {
     MPI_Test(&request, &done, MPI_STATUS_IGNORE);
     if (done != 0) return;
     pause_for(pause);
-    pause = std::min<std::chrono::microseconds>(2 * pause, std::chrono::milliseconds(5));
+    pause = std::min<std::chrono::microseconds>(5 * pause / 4, std::chrono::milliseconds(5));
   }
 }
 

@@ -117,9 +117,10 @@ MassAndDamping mass_and_damping(const SparseMatrix& K, const SparseMatrix& M, co
   return result;
 }
 
-StoredDynamics describe_dynamics(const DynamicsOptions& options, const DynamicsPlan& plan,
-                                 const SparseMatrix& K, const SparseMatrix& M, const Factor& factor,
-                                 std::span<const std::int64_t> stored_dofs) {
+std::optional<StoredDynamics> describe_dynamics(const DynamicsOptions& options, const DynamicsPlan& plan,
+                                                const SparseMatrix& K, const SparseMatrix& M,
+                                                const Factor& factor,
+                                                std::span<const std::int64_t> stored_dofs, Sharing& sharing) {
   StoredDynamics result;
   result.method = plan.method;
   result.lumped = options.lumped;
@@ -128,9 +129,10 @@ StoredDynamics describe_dynamics(const DynamicsOptions& options, const DynamicsP
   if (plan.method == DynamicsMethod::packed) {
     result.matrices = mass_and_damping(K, M, options.damping, stored_dofs);
   } else {
-    Modes modes = lowest_modes(factor, K, M, plan.modes);
-    result.omega = std::move(modes.omega);
-    result.shapes = at_stored_dofs(modes.shapes, stored_dofs);
+    std::optional<Modes> modes = lowest_modes(factor, K, M, plan.modes, sharing);
+    if (!modes) return {};
+    result.omega = std::move(modes->omega);
+    result.shapes = at_stored_dofs(modes->shapes, stored_dofs);
   }
   return result;
 }
@@ -152,7 +154,8 @@ StoredDynamics make_dynamics(const Model& model, const DynamicsOptions& options,
   const DynamicsPlan plan = plan_dynamics(options, model.scope, model.stored_dofs(), stiffness.K, precision);
   Factor factor(stiffness.K, stiffness.node_start);
   factor.factorize();
-  StoredDynamics result = describe_dynamics(options, plan, stiffness.K, M, factor, stored_dofs);
+  ThreadSharing alone(1);
+  StoredDynamics result = *describe_dynamics(options, plan, stiffness.K, M, factor, stored_dofs, alone);
   if (plan.method != DynamicsMethod::packed) return result;
 
   const SparseMatrix K_bar = effective_stiffness(stiffness.K, M, options.damping, options.newmark);

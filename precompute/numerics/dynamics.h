@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
 #include "precompute/description/description.h"
 #include "precompute/numerics/assembly.h"
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 
@@ -31,10 +33,11 @@ DynamicsPlan plan_dynamics(const DynamicsOptions& options, Scope scope, std::int
 MassAndDamping mass_and_damping(const SparseMatrix& K, const SparseMatrix& M, const Rayleigh& damping,
                                 std::span<const std::int64_t> stored_dofs);
 
-/// Everything but the packed inverse. `factor`: of K, computed.
-StoredDynamics describe_dynamics(const DynamicsOptions& options, const DynamicsPlan& plan,
-                                 const SparseMatrix& K, const SparseMatrix& M, const Factor& factor,
-                                 std::span<const std::int64_t> stored_dofs);
+/// Everything but the packed inverse. `factor`: of K, computed. Nothing where the sharing was stopped.
+std::optional<StoredDynamics> describe_dynamics(const DynamicsOptions& options, const DynamicsPlan& plan,
+                                                const SparseMatrix& K, const SparseMatrix& M,
+                                                const Factor& factor,
+                                                std::span<const std::int64_t> stored_dofs, Sharing& sharing);
 
 /// Dof of K of each stored dof of the model, -1 where it is held.
 std::vector<std::int64_t> stored_dofs_of(const Model& model, const Stiffness& stiffness);

@@ -3,9 +3,11 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "precompute/numerics/factor.h"
+#include "precompute/numerics/sharing.h"
 
 namespace palpate {
 
@@ -26,17 +28,20 @@ bool dense_modes(std::int64_t count, std::int64_t dofs) noexcept;
 /// Bytes that lowest_modes takes at most.
 std::int64_t modes_bytes(std::int64_t count, std::int64_t dofs) noexcept;
 
-/// The `count` <= n lowest modes, by Lanczos' method on K^-1 M (implicitly restarted; Sorensen 1992), where
+/// The `count` <= n lowest modes, by block Lanczos on K^-1 M with thick restarts (Wu and Simon 2000), where
 /// they are more than a third of all by a dense solver. `factor`: of K, computed. K and M: lower triangles.
-/// That none is left out is proved by Sylvester's law of inertia. Throws Error where they cannot be found.
-Modes lowest_modes(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M, std::int64_t count);
+/// That none is left out is proved by Sylvester's law of inertia. Bytes depend on no number of threads or
+/// processes. Nothing where the sharing was stopped. Throws Error where they cannot be found.
+std::optional<Modes> lowest_modes(const Factor& factor, const SparseMatrix& K, const SparseMatrix& M,
+                                  std::int64_t count, Sharing& sharing);
 
-/// How many omega^2 are below `square` [1/s^2]: the negative pivots of K - square M (Sylvester). Throws Error
-/// where a pivot is zero.
-std::int64_t modes_below(const SparseMatrix& K, const SparseMatrix& M, double square);
+/// How many omega^2 are below `square` [1/s^2]: the negative pivots of K - square M (Sylvester). `analysed`:
+/// K. Throws Error where a pivot is zero.
+std::int64_t modes_below(const Factor& analysed, const SparseMatrix& K, const SparseMatrix& M, double square);
 
 /// Whether the `omega`, ascending, are the lowest with none left out: counted in a gap as high up among them
 /// as there is one.
-bool none_left_out(const SparseMatrix& K, const SparseMatrix& M, const std::vector<double>& omega);
+bool none_left_out(const Factor& analysed, const SparseMatrix& K, const SparseMatrix& M,
+                   const std::vector<double>& omega);
 
 }  // namespace palpate

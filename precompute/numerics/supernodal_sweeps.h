@@ -43,6 +43,9 @@ class SupernodalSweeps {
     return supernode_of_[static_cast<std::size_t>(position)];
   }
 
+  /// Positions of a supernode's rows, its own columns first.
+  [[nodiscard]] std::span<const std::int64_t> rows(const Supernode& s) const noexcept;
+
   /// Room for so many right-hand sides.
   void prepare(Workspace& workspace, std::int64_t width) const;
   [[nodiscard]] std::int64_t workspace_bytes(std::int64_t width) const;
@@ -56,6 +59,9 @@ class SupernodalSweeps {
   /// X_s := L_ss^-T (X_s - L_bs^T X_below); X_s of a supernode that is not on the path counts as zero.
   void backward(const Supernode& s, bool on_path, std::int64_t active, std::int64_t width,
                 Workspace& workspace) const;
+
+  /// B [n, width], column-major, of the dofs of K, becomes K^-1 B. Room is made.
+  void solve(double* B, std::int64_t width, Workspace& workspace) const;
 
  private:
   const Factor& factor_;

@@ -114,6 +114,9 @@ class Bytes(RanksTest):
     def test_modes_and_overlays(self):
         self.check(self.write("model.toml", overlays_toml(6, 0.3) + '[dynamics]\nmethod = "modal"\nmodes = 10\n'), 1, 2, 4)
 
+    def test_modes_on_more_rows_and_columns_than_one_rank_takes(self):
+        self.check(self.write("model.toml", cube_toml(11) + '[dynamics]\nmethod = "modal"\nmodes = 30\n'), 1, 2, 3, 8)
+
     def test_ranks_of_a_node_share_a_factor(self):
         model = self.write("model.toml", cube_toml(8))
         data = self.straight(model)

@@ -80,7 +80,10 @@ struct Body {
     factor.factorize();
   }
 
-  [[nodiscard]] Modes modes(std::int64_t count) const { return lowest_modes(factor, stiffness.K, M, count); }
+  [[nodiscard]] Modes modes(std::int64_t count) const {
+    ThreadSharing alone(1);
+    return *lowest_modes(factor, stiffness.K, M, count, alone);
+  }
 };
 
 /// omega^2 of all modes by a dense solver, and the residual and the masses of the modes that were found.
@@ -196,16 +199,75 @@ TEST(Modes, TwiceTheSameFrequencyIsFoundTwice) {
   expect_modes(body, 20);
   const Modes modes = body.modes(2);
   EXPECT_NEAR(modes.omega[1] / modes.omega[0], 1.0, 1e-9);
-  EXPECT_EQ(modes_below(body.stiffness.K, body.M, 0.5 * std::pow(modes.omega[0], 2)), 0);
-  EXPECT_EQ(modes_below(body.stiffness.K, body.M, 1.01 * std::pow(modes.omega[0], 2)), 2);
+  EXPECT_EQ(modes_below(body.factor, body.stiffness.K, body.M, 0.5 * std::pow(modes.omega[0], 2)), 0);
+  EXPECT_EQ(modes_below(body.factor, body.stiffness.K, body.M, 1.01 * std::pow(modes.omega[0], 2)), 2);
 }
 
 TEST(Modes, OneThatIsLeftOutIsNoticed) {
   const Body body(partly_held_block({ElementType::tet4, Analysis::solid}));
   std::vector<double> omega = body.modes(8).omega;
-  EXPECT_TRUE(none_left_out(body.stiffness.K, body.M, omega));
+  EXPECT_TRUE(none_left_out(body.factor, body.stiffness.K, body.M, omega));
   omega.erase(omega.begin() + 3);
-  EXPECT_FALSE(none_left_out(body.stiffness.K, body.M, omega));
+  EXPECT_FALSE(none_left_out(body.factor, body.stiffness.K, body.M, omega));
+}
+
+/// Ten beams that do not touch have each frequency ten times, those of square section twenty times: more than
+/// a block of vectors can tell apart at once.
+TEST(Modes, AFrequencyOfManyShapesIsFoundAsOften) {
+  const Mesh beam = test::block(ElementType::hex8, {0.2, 0.02, 0.02}, {6, 1, 1});
+  Mesh beams = beam;
+  for (Index i = 1; i < 10; ++i) {
+    const auto before = static_cast<Index>(beams.nodes.size());
+    for (const Vec3& x : beam.nodes) beams.nodes.push_back(x + Vec3(0.0, 0.05 * i, 0.0));
+    for (const Index node : beam.connectivity) beams.connectivity.push_back(node + before);
+  }
+  test::ElasticCase all(beams, soft);
+  const Body body(all.hold(at_left, 7));
+  expect_modes(body, 45);
+  const Modes modes = body.modes(20);
+  EXPECT_NEAR(modes.omega[19] / modes.omega[0], 1.0, 1e-9);
+  EXPECT_GT(modes.omega[20] / modes.omega[0], 1.5);
+}
+
+/// Fronts of more columns than are eliminated together; against all omega^2 by a dense solver.
+TEST(Modes, AreCountedBelowAnyFrequency) {
+  test::ElasticCase block(test::distorted_block(ElementType::hex8, size, {6, 6, 6}), soft);
+  const Body body(block.hold(at_left, 7));
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> all(dense(body.stiffness.K), dense(body.M),
+                                                               Eigen::EigenvaluesOnly);
+  const VectorXd& squares = all.eigenvalues();
+  for (Eigen::Index i = 0; i < squares.size(); i += 40) {
+    const double below = i == 0 ? 0.0 : squares[i - 1];
+    if (squares[i] - below < 1e-6 * squares[i]) continue;
+    EXPECT_EQ(modes_below(body.factor, body.stiffness.K, body.M, (below + squares[i]) / 2.0), i);
+  }
+}
+
+/// Stops at the given call.
+class StoppedSharing : public ThreadSharing {
+ public:
+  explicit StoppedSharing(int calls) : ThreadSharing(1), calls_(calls) {}
+  bool for_each(const SharedItems& items) override { return --calls_ > 0 && ThreadSharing::for_each(items); }
+
+ private:
+  int calls_;
+};
+
+TEST(Modes, AreTheSameByManyThreadsAndNoneWhereStopped) {
+  test::ElasticCase beam(test::block(ElementType::hex8, {0.2, 0.05, 0.05}, {30, 7, 7}), soft);
+  const Body body(beam.hold(at_left, 7));
+  ASSERT_GT(body.stiffness.K.rows(), 4096);  // more than one item of rows
+  const auto by = [&](Sharing& sharing) {
+    return lowest_modes(body.factor, body.stiffness.K, body.M, 30, sharing);
+  };
+  ThreadSharing one(1), three(3);
+  const Modes expected = *by(one), modes = *by(three);
+  EXPECT_EQ(modes.omega, expected.omega);
+  EXPECT_EQ(modes.shapes, expected.shapes);
+  for (const int call : {1, 2, 10, 50}) {
+    StoppedSharing stopped(call);
+    EXPECT_FALSE(by(stopped)) << "stopped at call " << call;
+  }
 }
 
 /// A bar that is held at its left and free to thin moves along itself with omega_i = (2 i - 1) pi / 2
