@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { bake, close, folder, project, ready, run, runtime, serve, until, visit } from './harness.mjs';
+import { bake, close, folder, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
 import { bare, barriers, contrast, difference, faults_of_layout, keep_ground, keep_pixels, layouts, rest } from './looks.mjs';
 import { choose, part, recorded, settled } from './steps.mjs';
 
@@ -132,6 +132,37 @@ test('arrows keep their size on the screen when the view zooms, and a legend say
   assert.ok(before > 50 && Math.abs(zoomed / before - 1) < 0.25, `${before} pixels of the arrow, ${zoomed} from farther away`);
 });
 
+test('axes have names, and lines of the plots are told apart without colours', async (t) => {
+  const { page } = await open_block(t);
+  assert.deepEqual((await part(page, 'axes').locator('text').allTextContents()).sort(), ['x', 'y', 'z']);
+  const styles = await page.locator('.key').first().locator('i').evaluateAll((lines) => lines.map((line) => getComputedStyle(line).borderTopStyle));
+  assert.ok(new Set(styles).size >= 3, `the lines of the force: ${styles}`);
+});
+
+test('where the body is held it is hatched', async (t) => {
+  const { page } = await open_block(t, small);
+  await bare(page);
+  await part(page, 'look-from').evaluate((select) => {
+    select.value = 'bottom';
+    select.dispatchEvent(new Event('change'));
+  });
+  const red = async (name) => {
+    await rest(page);
+    await keep_pixels(page, name);
+    const { x, y } = await project(page, [0, 0, 0]);
+    const { left, top } = await part(page, 'stage').evaluate((stage) => stage.getBoundingClientRect().toJSON());
+    return page.evaluate(([key, i, j]) => {
+      const { data, width } = window.kept_pixels[key];
+      const square = Array.from({ length: 1600 }, (_, k) => data[4 * ((j + Math.floor(k / 40)) * width + i + (k % 40))]);
+      return square.sort((a, b) => a - b)[800]; // the nodes' dots are few
+    }, [name, Math.round(x - left), Math.round(y - top)]);
+  };
+  const hatched = await red('hatched');
+  await part(page, 'show-held').evaluate((box) => box.click());
+  const plain = await red('plain');
+  assert.ok(plain - hatched > 20, `red of the held ground: ${hatched}, without hatching ${plain}`);
+});
+
 test('a stiffer ball within is seen: by material, cut open, and through the surface', async (t) => {
   const { page } = await open_block(t, small);
   await bare(page);
@@ -211,6 +242,45 @@ test('no text is cut off or covered, and every target is large enough, at five s
       assert.deepEqual(page.complaints, []);
       await page.context().close();
     }
+  }
+});
+
+test('body and arrow keep off the legend, the colours and the cards, at five sizes', async (t) => {
+  const { served } = await serve_block(t);
+  const around = (page, ids) =>
+    page.evaluate((names) => names.map((name) => document.querySelector(`[data-testid="${name}"]`)).filter((card) => card.offsetHeight > 0).map((card) => ({ name: card.dataset.testid, ...card.getBoundingClientRect().toJSON() })), ids);
+  const lies_on = (box, cards) => cards.filter((card) => Math.min(box.right, card.right) - Math.max(box.left, card.left) > 0 && Math.min(box.bottom, card.bottom) - Math.max(box.top, card.top) > 0).map(({ name }) => name);
+  for (const touch of [true, false]) {
+    const sizes = layouts.filter(([, , hasTouch]) => hasTouch === touch);
+    const page = await ready(await visit(t, served.url, { viewport: { width: sizes[0][0], height: sizes[0][1] }, hasTouch: touch, isMobile: touch }));
+    await until(page, () => window.palpate.state.you === 'controller');
+    for (const [width, height] of sizes) {
+      await page.setViewportSize({ width, height });
+      for (const field of ['material', 'von-mises']) {
+        await set_field(page, field);
+        await rest(page);
+        const what = `${width} × ${height}, ${field}`;
+        const cards = await around(page, ['colour-card', 'materials', 'colour-gradient', 'hand']);
+        assert.equal(cards.some(({ name }) => name === 'materials'), field === 'material', what);
+        assert.deepEqual(lies_on((await told(page, 'seen')).body, cards), [], `${what}: the body lies on a card`);
+        for (const at of [[-0.04, 0.048, 0.05], [0.02, -0.015, 0.05], [0.048, 0.048, 0.05]]) { // the farthest edge, which is the highest in the picture, and the corner beside the legend
+          const { x, y } = await project(page, at);
+          await page.mouse.move(x, y);
+          await page.mouse.down();
+          await settled(page);
+          await rest(page);
+          const ends = (await told(page, 'seen')).arrow;
+          await page.mouse.up();
+          await until(page, () => window.palpate.lastFrame.contacts === 0);
+          const [a, b] = ends;
+          const box = { left: Math.min(a.x, b.x) - 2, right: Math.max(a.x, b.x) + 2, top: Math.min(a.y, b.y) - 2, bottom: Math.max(a.y, b.y) + 2 };
+          assert.deepEqual(lies_on(box, cards), [], `${what}: the arrow of a press at ${at} runs under a card`);
+          assert.ok(Math.hypot(a.x - b.x, a.y - b.y) > 5, `${what}: an arrow from ${JSON.stringify(a)} to ${JSON.stringify(b)}`);
+        }
+      }
+    }
+    assert.deepEqual(page.complaints, []);
+    await page.context().close();
   }
 });
 

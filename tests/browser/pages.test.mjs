@@ -38,18 +38,14 @@ test('one steers, any number watch, and control goes on', async (t) => {
 
 test('the page comes back by itself when its connection is lost, and after a reload', async (t) => {
   const { served } = await serve_cube(t);
-  const page = await visit(t, served.url, {}, () => {
-    window.sockets = [];
-    window.WebSocket = class extends WebSocket {
-      constructor(...args) {
-        super(...args);
-        window.sockets.push(this);
-      }
-    };
+  const page = await ready(await visit(t, served.url));
+  await page.evaluate(() => {
+    const badge = document.querySelector('[data-testid="connection"]');
+    window.seen_states = [];
+    new MutationObserver(() => window.seen_states.push(badge.dataset.state)).observe(badge, { attributes: true });
   });
-  await ready(page);
-  await page.evaluate(() => window.sockets.at(-1).close());
-  await until(page, () => window.sockets.length > 1 && document.querySelector('[data-testid="connection"]').dataset.state === 'live');
+  await page.workers()[0].evaluate(() => globalThis.palpate.lose());
+  await until(page, () => window.seen_states.includes('lost') && window.seen_states.at(-1) === 'live');
   const count = await told(page, 'frames');
   await until(page, (before) => window.palpate.frames > before + 5, count);
   await page.reload();

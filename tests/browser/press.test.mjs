@@ -4,6 +4,7 @@ import { readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, test } from 'node:test';
 import { bake, close, cube, folder, near, project, ready, run, runtime, serve, shelf, source, told, until, visit } from './harness.mjs';
+import { rest } from './looks.mjs';
 import { choose, open_cube, part, probe, serve_cube, settled, top } from './steps.mjs';
 
 after(close);
@@ -213,6 +214,7 @@ test('the picture is the stored one', async (t) => {
   await page.mouse.move(x, y);
   await page.mouse.down();
   await settled(page);
+  await rest(page);
   const canvas = await part(page, 'stage').locator('canvas').first().screenshot({ animations: 'disabled' });
   await page.mouse.up();
   const stored = path.join(source, 'tests/browser/pressed-cube.png');

@@ -15,6 +15,13 @@ test('the page comes whole from the runtime and asks nobody else', async (t) => 
   assert.equal(await part(page, 'model').innerText(), 'cube');
   assert.equal(await part(page, 'connection').innerText(), 'connected');
   assert.match(await part(page, 'role').innerText(), /you steer, by mouse/);
+  const words = await part(page, 'panel').innerText();
+  for (const word of ['too slow', 'late start', 'computing', 'best effort']) assert.ok(words.includes(word), `the panel says "${word}"`);
+  await part(page, 'scale').evaluate((slider) => {
+    slider.value = '100';
+    slider.dispatchEvent(new Event('input'));
+  });
+  assert.match(await part(page, 'scaled-note').innerText(), /^Displacements × 20: to touch the body, draw it true to scale/);
   assert.deepEqual(page.complaints, []);
 });
 

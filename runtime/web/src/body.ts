@@ -53,9 +53,8 @@ export class Body {
   private u_ = new Float32Array(0);
   private value_ = new Float32Array(0);
   private known_ = new Float32Array(0);
-  private placed_: { topology: Topology | null; frame_u: Int16Array | undefined; version: number; scale: number } = {
+  private placed_: { topology: Topology | null; version: number; scale: number } = {
     topology: null,
-    frame_u: undefined,
     version: 0,
     scale: 1,
   };
@@ -116,9 +115,10 @@ export class Body {
   /** A section shows the inside of what is left. */
   is_cut = false;
 
-  /** Before a picture: pixels of the drawing for one of the page, and what throws a shade, as Light has it. */
-  prepare(pixel: number, tool: number): void {
+  /** Before a picture: pixels of the drawing for one of the page, what throws a shade, as Light has it, and whether light is that of the nodes. */
+  prepare(pixel: number, tool: number, is_rough: boolean): void {
     this.material_.set({ pixel });
+    this.material_.set_rough(is_rough && !this.is_cut && this.scene_?.dimension === 3 && !this.interior_.mesh.visible);
     for (const material of [this.material_, this.interior_.mesh.material]) {
       material.set_cut(this.is_cut);
       material.set_tool(tool);
@@ -183,8 +183,8 @@ export class Body {
   private place(topology: Topology): void {
     const placed = this.placed_;
     const version = this.frame_?.version ?? 0;
-    if (placed.topology === topology && placed.frame_u === this.frame_?.u && placed.version === version && placed.scale === this.scale) return;
-    this.placed_ = { topology, frame_u: this.frame_?.u, version, scale: this.scale };
+    if (placed.topology === topology && placed.version === version && placed.scale === this.scale) return;
+    this.placed_ = { topology, version, scale: this.scale };
     const position = this.attribute('position');
     const place = position.array as Float32Array;
     const { node, rest } = topology;

@@ -1,7 +1,7 @@
 // What the body's surface looks like: plain and a little wet, or in colours that say numbers.
 import { Color, DataTexture, DoubleSide, FrontSide, LinearFilter, NearestFilter, RGBAFormat, ShaderMaterial, SRGBColorSpace, Vector2, Vector4 } from 'three';
 import { map_texels, material_colours, tint, tissue, type MapName } from './colours';
-import { light_glsl, type Light } from './light';
+import { light_glsl, seen_glsl, type Light } from './light';
 
 const most_materials = 256;
 
@@ -23,10 +23,27 @@ function materials_texture(): DataTexture {
   return texture;
 }
 
+/** Light on the body: what it throws back of its own colour, and how it shines, glosses and glows; `open` is what its own shade leaves of sky and key lamp. */
+const body_light = /* glsl */ `
+${light_glsl}
+void light_body(vec3 place, vec3 normal, vec3 eye, vec2 open, out vec3 diffuse, out vec3 gloss) {
+  float near_tool = tool_open(place, normal);
+  float sky = open.r * (0.2 + 0.8 * near_tool);
+  float key = open.g * tool_shade(place, key_way) * mix(0.4, 1.0, open.r) * mix(0.45, 1.0, near_tool);
+  Lit lit = light_at(place, normal, eye, sky, key);
+  diffuse = lit.diffuse;
+  gloss = vec3(lit.shine, lit.gloss, (1.0 - abs(dot(normal, key_way))) * key);
+}
+`;
+
 const vertex = /* glsl */ `
 attribute vec4 shown;
 varying vec4 v_shown;
 varying vec3 v_normal, v_place, v_world;
+#ifdef ROUGH
+varying vec3 v_diffuse, v_gloss;
+${body_light}
+#endif
 void main() {
   vec4 place = modelViewMatrix * vec4(position, 1.0);
   v_shown = shown;
@@ -34,6 +51,10 @@ void main() {
   v_place = place.xyz;
   v_normal = normalMatrix * normal;
   gl_Position = projectionMatrix * place;
+#ifdef ROUGH
+  vec3 eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-place.xyz);
+  light_body(place.xyz, normalize(v_normal), eye, texture2D(open_map, 0.5 + 0.5 * gl_Position.xy / gl_Position.w).rg, v_diffuse, v_gloss);
+#endif
 }`;
 
 const fragment = /* glsl */ `
@@ -44,7 +65,12 @@ uniform vec2 range;
 uniform vec4 cut;
 uniform vec3 tissue, tint;
 uniform float is_log, lines, shows_held, pixel;
-${light_glsl}
+${seen_glsl}
+#ifdef ROUGH
+varying vec3 v_diffuse, v_gloss;
+#else
+${body_light}
+#endif
 
 float share_of(float value) {
   if (is_log > 0.5) return value > 0.0 && range.y > 0.0 ? 1.0 + log(value / range.y) / log(1000.0) : 0.0;
@@ -84,21 +110,20 @@ void main() {
   }
   float alpha = 1.0;
 #ifndef FLAT
+#ifdef ROUGH
+  vec3 diffuse = v_diffuse, gloss = v_gloss;
+#else
   vec3 eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-v_place);
   vec3 normal = normalize(v_normal);
   if (!gl_FrontFacing) normal = -normal;
-  vec2 open = texture2D(open_map, gl_FragCoord.xy / picture_size).rg;
-  float near_tool = tool_open(v_place, normal);
-  float sky = open.r * (0.2 + 0.8 * near_tool);
-  float key = open.g * tool_shade(v_place, key_way) * mix(0.4, 1.0, open.r) * mix(0.45, 1.0, near_tool);
-  Lit lit = light_at(v_place, normal, eye, sky, key);
+  vec3 diffuse, gloss;
+  light_body(v_place, normal, eye, texture2D(open_map, gl_FragCoord.xy / picture_size).rg, diffuse, gloss);
+#endif
 #if COLOURING == 0
-  float thin = 1.0 - abs(dot(normal, key_way));
-  vec3 glow = vec3(0.10, 0.02, 0.012) * thin * key;
-  colour = colour * lit.diffuse + glow + vec3(1.0, 0.97, 0.93) * (0.75 * lit.shine + 0.16 * lit.gloss) * (1.0 - 0.8 * held);
+  colour = colour * diffuse + vec3(0.10, 0.02, 0.012) * gloss.z + vec3(1.0, 0.97, 0.93) * (0.75 * gloss.x + 0.16 * gloss.y) * (1.0 - 0.8 * held);
 #else
-  float bright = dot(lit.diffuse, vec3(0.2126, 0.7152, 0.0722));
-  colour = colour * mix(0.35, 1.0, min(1.0, bright)) * mix(1.0, bright, 0.45) + vec3(0.10 * lit.shine + 0.05 * lit.gloss);
+  float bright = dot(diffuse, vec3(0.2126, 0.7152, 0.0722));
+  colour = colour * mix(0.35, 1.0, min(1.0, bright)) * mix(1.0, bright, 0.45) + vec3(0.10 * gloss.x + 0.05 * gloss.y);
 #endif
   if (!gl_FrontFacing) colour *= 0.55;
 #ifdef VEIL
@@ -106,8 +131,7 @@ void main() {
   alpha = mix(0.16, 0.85, away * away);
 #endif
 #endif
-  gl_FragColor = vec4(colour, alpha);
-  #include <colorspace_fragment>
+  gl_FragColor = vec4(as_seen(colour), alpha);
 }`;
 
 /** One for the body, one each for what lies in it; `set` changes what is shown. */
@@ -159,6 +183,11 @@ export class BodyMaterial extends ShaderMaterial {
   /** Whether a section cuts it. */
   set_cut(on: boolean): void {
     this.define('CUT', on);
+  }
+
+  /** Whether light is that of the nodes, put between them: not where both sides are seen, or what lies behind. */
+  set_rough(on: boolean): void {
+    this.define('ROUGH', on);
   }
 
   /** Another code where another tool throws its shade. */

@@ -1,5 +1,5 @@
 // From where the body is seen: camera, projection, upright axis, and what turns and moves them.
-import { Box3, MOUSE, OrthographicCamera, PerspectiveCamera, Plane, Raycaster, TOUCH, Vector2, Vector3 } from 'three';
+import { Box2, Box3, MOUSE, OrthographicCamera, PerspectiveCamera, Plane, Raycaster, TOUCH, Vector2, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { first_direction, fit_places, guessed_up, turned_up, type Upright } from './outlook';
 import type { Scene as SceneMessage } from './wire';
@@ -53,6 +53,8 @@ export class Eye {
   private upright_: Upright = 'auto';
   private wants_parallel_ = false;
   private is_fitted_ = true; // the person has not turned or moved it since
+  private height_ = 0; // of the pad [px], as it was when the cameras took their shape
+  private readonly free_ = new Box2(); // of controls, where the picture is from -1 to 1
 
   constructor(
     private readonly pad_: HTMLElement,
@@ -194,7 +196,7 @@ export class Eye {
 
   /** Metres that a pixel of the page shows at a place. */
   pixel_at(place: Vector3): number {
-    const height = Math.max(1, this.pad_.clientHeight);
+    const height = Math.max(1, this.height_);
     if (this.camera_ === this.orthographic_) {
       const { top, bottom, zoom } = this.orthographic_;
       return (top - bottom) / zoom / height;
@@ -213,6 +215,19 @@ export class Eye {
   /** Into the picture, of length 1. */
   looking(): Vec3 {
     return this.camera_.getWorldDirection(new Vector3()).toArray();
+  }
+
+  /** How many of `pixels` of the page from a place along a way of length 1 are free of controls. */
+  room(from: Vector3, way: Vector3, pixels: number): number {
+    const begin = from.clone().project(this.camera_);
+    const end = from.clone().addScaledVector(way, pixels * this.pixel_at(from)).project(this.camera_);
+    let share = 1;
+    for (const axis of ['x', 'y'] as const) {
+      const [at, to] = [begin[axis], end[axis]];
+      const bound = to < at ? this.free_.min[axis] : this.free_.max[axis];
+      if ((to - bound) * (to - at) > 0) share = Math.min(share, (bound - at) / (to - at));
+    }
+    return Math.max(0, share) * pixels;
   }
 
   /** The pixel of the window that shows a place. */
@@ -263,11 +278,15 @@ export class Eye {
 
   private shape_cameras(): void {
     const { clientWidth: width, clientHeight: height } = this.pad_;
+    this.height_ = height;
     if (width === 0 || height === 0) return;
     const aspect = width / height;
     this.perspective_.aspect = aspect;
     Object.assign(this.orthographic_, { left: -this.half_ * aspect, right: this.half_ * aspect, top: this.half_, bottom: -this.half_ });
     const { right, below } = this.opening();
+    const margins = this.margins_();
+    this.free_.min.set(-1 + (2 * margins.left) / width, -1 + (2 * margins.bottom) / height);
+    this.free_.max.set(1 - (2 * margins.right) / width, 1 - (2 * margins.top) / height);
     for (const camera of [this.perspective_, this.orthographic_]) camera.setViewOffset(width, height, -right, -below, width, height);
   }
 

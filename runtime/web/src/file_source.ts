@@ -42,6 +42,8 @@ export class FileSource implements Source {
     });
   }
 
+  more(): void {} // it gives what is sought
+
   send(word: Word): void {
     if (word.type === 'seek') this.seek(word.frame);
   }

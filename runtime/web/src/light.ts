@@ -30,6 +30,16 @@ export class Light {
   }
 }
 
+/** What the screen is given. */
+export const seen_glsl = /* glsl */ `
+/** Linear light as the screen wants it, within half a grey level of sRGB's curve: roots cost far less than its power. */
+vec3 as_seen(vec3 colour) {
+  vec3 x = clamp(colour, 0.0, 1.0);
+  vec3 root = sqrt(x), root4 = sqrt(root);
+  return max(12.92 * min(x, 0.0031), 0.662002687 * root + 0.684122060 * root4 - 0.323583601 * sqrt(root4) - 0.022541147 * x);
+}
+`;
+
 /** Where `TOOL` is defined. */
 export const light_glsl = /* glsl */ `
 uniform sampler2D open_map, shape_map;

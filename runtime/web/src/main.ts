@@ -3,6 +3,7 @@ import './style.css';
 import { Beside, Neighbour, type Shared } from './beside';
 import { of_frame, RecentEfforts, sentence } from './best_effort';
 import { button, forget_rem, input, part, select, show_value, toast, write } from './dom';
+import type { Margins } from './eye';
 import { FileSource, stored_session } from './file_source';
 import { format_si, format_time, short_number } from './format';
 import { History } from './history';
@@ -31,8 +32,9 @@ const live_samples = 60_000; // more than ten seconds at the highest rate
 const plot_wait = 100; // [ms] between drawings of the plots
 const idle_plot_wait = 300; // while nothing is touched: they only move along
 const playhead_wait = 40; // and in a recording, where they show what the picture is of
+const plot_share = 0.06; // of the time is theirs, where the page is slow
 const numbers_wait = 100;
-const timing_wait = 500;
+const timing_wait = 1000;
 const keep_wait = 500; // [ms] before how a model is looked at is kept
 const key_pixels = 8; // that an arrow key moves the tool
 
@@ -49,6 +51,7 @@ class Page implements Listener {
   private frames_ = 0;
   private ticks_ = 0;
   private plots_wanted_ = false;
+  private plots_took_ = 0; // [ms]
   private lost_ = 'the program'; // why there is no connection; empty: there is one
   private kept_for_ = ''; // the model whose look is shown
   private keep_timer_ = 0;
@@ -109,13 +112,14 @@ class Page implements Listener {
     const marked = view.after_drawing;
     view.after_drawing = () => {
       marked();
+      setTimeout(() => this.source_.more()); // once the browser has taken the picture
       this.saving_.drawn();
       this.share_picture();
       if (this.mode_ !== 'live') this.want_plots(); // the playhead is where the picture is
     };
     view.margins = () => this.margins();
     const watch = new ResizeObserver(() => view.eye.resize());
-    for (const id of ['hand', 'replay']) watch.observe(part(id));
+    for (const id of ['colour-card', 'materials', 'hand', 'replay']) watch.observe(part(id));
     view.eye.taken = () => this.want_keep();
     this.replay_.sought = (time) => this.neighbour_.say({ about: 'time', time });
     this.listen();
@@ -160,20 +164,21 @@ class Page implements Listener {
     }
   }
 
-  pictured(message: Message): void {
+  pictured(message: Message): boolean {
     if (message.kind === 'scene') {
       this.picture_.take_scene(message);
     } else if (message.kind === 'patch') {
       this.picture_.take_patch(message);
     } else if (message.kind === 'frame') {
       ++this.frames_;
-      this.picture_.take_frame(message);
+      return this.picture_.take_frame(message);
     } else {
       this.ticks_ += message.count;
       this.history_.add(message);
       this.efforts_.take(message, performance.now());
       this.want_plots();
     }
+    return false;
   }
 
   private take_mode(mode: Mode): void {
@@ -457,21 +462,17 @@ class Page implements Listener {
     }
   }
 
-  /** How much of the stage is above what stands at its bottom [px]. */
-  private free_above_bottom(): number | null {
-    const tops = ['hand', 'replay', 'scale-bar']
-      .map((id) => part(id))
-      .filter((card) => card.offsetHeight > 0)
-      .map((card) => card.getBoundingClientRect().top);
-    return tops.length > 0 ? Math.min(...tops) - part('stage').getBoundingClientRect().top : null;
-  }
-
-  private margins(): { top: number; bottom: number; left: number; right: number } {
-    const { clientWidth: width, clientHeight: height } = part('stage');
+  /** What of the stage is covered by controls, from its sides [px]: the body and the arrow of its force are elsewhere. */
+  private margins(): Margins {
+    const stage = part('stage').getBoundingClientRect();
+    const shown = (ids: string[]) => ids.map((id) => part(id)).filter((card) => card.offsetHeight > 0).map((card) => card.getBoundingClientRect());
     const rem = parseFloat(getComputedStyle(document.documentElement).fontSize);
-    const is_small = width < 700 || height < 420;
-    const free = this.free_above_bottom() ?? height - (is_small ? 3.4 : 4.2) * rem;
-    return { top: (is_small ? 3 : 3.4) * rem, bottom: height - free + 0.4 * rem, left: (is_small ? 0.5 : 1.5) * rem, right: (width < 480 ? 4.2 : 5.2) * rem };
+    const is_small = stage.width < 700 || stage.height < 420;
+    const above = Math.max(0, ...shown(['colour-card']).map(({ bottom }) => bottom - stage.top));
+    const below = Math.max(0, ...shown(['hand', 'replay', 'scale-bar']).map(({ top }) => stage.bottom - top)) || (is_small ? 3.4 : 4.2) * rem;
+    const beside = Math.max(0, ...shown(['materials']).map(({ left }) => stage.right - left));
+    const bar = (stage.width < 480 ? 4.2 : 5.2) * rem; // room that is kept for the colours' bar, so that the body does not jump with it
+    return { top: above + 0.4 * rem, bottom: below + 0.4 * rem, left: (is_small ? 0.5 : 1.5) * rem, right: Math.max(bar, beside + 0.5 * rem) };
   }
 
   /** Plays all of a recording once, and saves what is seen. */
@@ -500,13 +501,16 @@ class Page implements Listener {
   private want_plots(): void {
     if (this.plots_wanted_) return;
     this.plots_wanted_ = true;
+    const wait = this.mode_ !== 'live' ? playhead_wait : (this.picture_.frame?.contact.length ?? 0) > 0 ? plot_wait : idle_plot_wait;
     setTimeout(() => {
       requestAnimationFrame(() => {
         this.plots_wanted_ = false;
+        const began = performance.now();
         this.plots_.cursor = this.mode_ === 'live' ? null : (this.picture_.frame?.time ?? null);
         this.plots_.draw(this.history_, this.state_?.rate ?? 1000, this.mode_ !== 'live');
+        queueMicrotask(() => (this.plots_took_ = performance.now() - began)); // uPlot draws in one of its own, before
       });
-    }, this.mode_ !== 'live' ? playhead_wait : (this.picture_.frame?.contact.length ?? 0) > 0 ? plot_wait : idle_plot_wait);
+    }, Math.max(wait, this.plots_took_ / plot_share));
   }
 
   private felt(): Felt {
@@ -584,6 +588,17 @@ class Page implements Listener {
       },
       get picture() {
         return { ...page.picture_.view.drawing };
+      },
+      /** Around the body in the window, and the ends of the whole force's arrow [px]. */
+      get seen() {
+        const { body, arrow, view } = page.picture_;
+        const { position } = body.surface;
+        const places = Array.from({ length: position.length / 3 }, (_, i) => view.eye.project(position[3 * i]!, position[3 * i + 1]!, position[3 * i + 2]!));
+        const [x, y] = [places.map((place) => place.x), places.map((place) => place.y)];
+        return {
+          body: { left: Math.min(...x), right: Math.max(...x), top: Math.min(...y), bottom: Math.max(...y) },
+          arrow: arrow?.map((place) => view.eye.project(...place.toArray())) ?? null,
+        };
       },
       get underPointer() {
         return page.under_pointer_.text;

@@ -1,5 +1,5 @@
 // The body, the tool and the forces in one picture, drawn as the person wants it.
-import { Vector3 } from 'three';
+import type { Vector3 } from 'three';
 import { Arrows } from './arrows';
 import { Body, type Colouring } from './body';
 import { ColourBar } from './colour_bar';
@@ -20,8 +20,7 @@ const still = 1e-5; // of the body's size: what moves less is not drawn anew
 
 /** Whether two frames look the same, for a body of this size. */
 export function looks_same(a: Frame, b: Frame, size: number): boolean {
-  if (a.u !== b.u || a.version !== b.version || a.patch !== b.patch || a.contact.length !== b.contact.length || a.number === b.number) return false;
-  if (a.stress !== b.stress) return false;
+  if (a.version !== b.version || a.patch !== b.patch || a.contact.length !== b.contact.length || a.number === b.number) return false;
   const apart = Math.hypot(...[0, 1, 2].map((k) => a.tool[k]! - b.tool[k]!), ...[0, 1, 2].map((k) => a.device[k]! - b.device[k]!));
   const turned = Math.hypot(...[3, 4, 5, 6].map((k) => a.tool[k]! - b.tool[k]!));
   const force = Math.hypot(...a.force);
@@ -86,12 +85,13 @@ export class Picture {
     while (this.patches_.size > kept_patches) this.patches_.delete(this.patches_.keys().next().value!);
   }
 
-  /** Only what looks another way than the picture before is drawn. */
-  take_frame(frame: Frame): void {
+  /** Only what looks another way than the picture before is drawn; gives whether it is. */
+  take_frame(frame: Frame): boolean {
     this.latest_ = frame;
     const size = this.model_?.size ?? 2 * this.view.eye.radius;
-    if (this.shown_ && looks_same(this.shown_, frame, size)) return;
+    if (this.shown_ && looks_same(this.shown_, frame, size)) return false;
     this.view.draw();
+    return true;
   }
 
   take_model(model: Model, tool: string | undefined): void {
@@ -153,7 +153,7 @@ export class Picture {
     }
     this.body.show_edges(drawn.edges || this.body.scene?.dimension === 2);
     this.place_tool(drawn);
-    this.body.prepare(this.view.canvas.width / Math.max(1, this.view.canvas.clientWidth), this.view.light.tool);
+    this.body.prepare(this.view.canvas.width / Math.max(1, this.view.extent.width), this.view.light.tool, this.view.is_rough);
     this.view.body_box = this.body.box;
     this.view.seen_box.copy(this.body.box);
     if (this.tool_.group.visible) this.tool_.add_to(this.view.seen_box);
@@ -163,8 +163,8 @@ export class Picture {
 
   /** Pixels of the page for one of an arrow: more on large screens, fewer on phones. */
   private get arrow_unit(): number {
-    const { clientWidth, clientHeight } = this.view.element;
-    return rem() * Math.min(1, Math.max(0.5, Math.min(clientWidth, clientHeight) / (560 * rem())));
+    const { width, height } = this.view.extent;
+    return rem() * Math.min(1, Math.max(0.5, Math.min(width, height) / (560 * rem())));
   }
 
   private place_tool(drawn: Drawn): void {
@@ -174,7 +174,8 @@ export class Picture {
     const is_seen = frame !== null && drawn.scale === 1; // beside a body that is drawn larger they would be in the wrong place
     if (frame) {
       this.tool_.show(frame.tool, frame.device);
-      this.arrows_.show(frame, this.tool_.radius, (place: Vector3) => this.arrow_unit * eye.pixel_at(place));
+      const unit = this.arrow_unit;
+      this.arrows_.show(frame, this.tool_.radius, (place) => unit * eye.pixel_at(place), (from, way, pixels) => eye.room(from, way, unit * pixels) / unit);
     }
     this.tool_.group.visible = is_seen && drawn.tool && this.has_tool && frame.tool.every(Number.isFinite);
     this.arrows_.group.visible = is_seen && drawn.arrows;
@@ -210,6 +211,10 @@ export class Picture {
   /** The force of the longest arrow, without what is shown beside [N]; and of what is, whose arrows are as long for a force. */
   get own_force(): number {
     return this.arrows_.own;
+  }
+  /** The whole force's arrow, where it is drawn. */
+  get arrow(): [Vector3, Vector3] | null {
+    return this.arrows_.group.visible ? this.arrows_.whole : null;
   }
   set force_beside(force: number) {
     this.arrows_.beside = force;

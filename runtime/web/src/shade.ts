@@ -20,7 +20,8 @@ import type { Light } from './light';
 
 /** The layer of what casts shade on itself. */
 export const shape_layer = 1;
-const coarseness = 2; // pixels of the picture for each of the shade
+const coarseness = 2; // pixels of the picture for each of the shade, along a side
+const quick_coarseness = 4; // where time is short
 
 /** Normal and depth of what is seen, in four bytes. `cut` is the section's plane. */
 export function shape_material(cut: { value: Vector4 }, depth_range: { value: Vector2 }): ShaderMaterial {
@@ -195,9 +196,10 @@ export class Shade {
     this.sheet_scene_.add(this.sheet_);
   }
 
-  /** Of what is on the layer of shapes, for a picture of this size, all of which is within `around`; `reach` is how far shade goes [m]. */
-  draw(renderer: WebGLRenderer, scene: Scene, camera: Camera, [width, height]: [number, number], around: Around, reach: number, is_fine: boolean): void {
-    const [w, h] = [Math.max(1, Math.ceil(width / coarseness)), Math.max(1, Math.ceil(height / coarseness))];
+  /** Of what is on the layer of shapes, for a picture of this size, all of which is within `around`; `reach` is how far shade goes [m]. Coarser if time is short (`is_thrifty`) and the picture is not to be fine. */
+  draw(renderer: WebGLRenderer, scene: Scene, camera: Camera, [width, height]: [number, number], around: Around, reach: number, is_fine: boolean, is_thrifty: boolean): void {
+    const coarse = is_thrifty && !is_fine ? quick_coarseness : coarseness;
+    const [w, h] = [Math.max(1, Math.ceil(width / coarse)), Math.max(1, Math.ceil(height / coarse))];
     for (const target of [this.shape_, this.rough_, this.open_]) target.setSize(w, h);
     this.shared_.texels.value.set(1 / w, 1 / h);
     this.shared_.size.value.set(w, h);

@@ -4,7 +4,8 @@ import type { Picture } from './wire';
 
 export interface Listener {
   said(message: Said): void;
-  pictured(picture: Picture): void;
+  /** Gives whether a picture is drawn of it. */
+  pictured(picture: Picture): boolean;
   /** `note` is empty while all is well. */
   connected(is_connected: boolean, note: string): void;
 }
@@ -12,4 +13,6 @@ export interface Listener {
 /** A run at the other end of a socket, or a session that stands in the page. */
 export interface Source {
   send(word: Word): void;
+  /** A picture was drawn: the source may give the next one. */
+  more(): void;
 }

@@ -1,7 +1,7 @@
 // The tool where it is, and as a rim where the hand wants it.
 import { CapsuleGeometry, Color, Group, LatheGeometry, Mesh, ShaderMaterial, SphereGeometry, Vector2, Vector3, type Box3, type BufferGeometry, type Camera } from 'three';
 import { tissue, tint } from './colours';
-import { light_glsl, type Light } from './light';
+import { light_glsl, seen_glsl, type Light } from './light';
 import { disc_profile, type ToolShape } from './pose';
 
 const size_of_point = 0.008; // of the body's
@@ -19,6 +19,7 @@ const steel = /* glsl */ `
 varying vec3 v_normal, v_place;
 uniform float clear, size;
 uniform vec3 body_colour;
+${seen_glsl}
 ${light_glsl}
 void main() {
   vec3 eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-v_place);
@@ -36,8 +37,7 @@ void main() {
   float edge = pow(1.0 - max(0.0, dot(normal, eye)), 3.0);
   vec3 colour = vec3(0.46, 0.50, 0.56) * lit.diffuse * 0.75 * (1.0 - 0.75 * sees_body) + room * mix(mix(0.22, 0.75, edge), 0.75, sees_body) * mix(1.0, 0.7, deep) + vec3(1.4 * lit.shine);
   float alpha = mix(1.0, mix(0.20, 0.92, edge) + 0.8 * lit.shine, clear);
-  gl_FragColor = vec4(colour, clamp(alpha, 0.0, 1.0));
-  #include <colorspace_fragment>
+  gl_FragColor = vec4(as_seen(colour), clamp(alpha, 0.0, 1.0));
 }`;
 
 const rim = /* glsl */ `

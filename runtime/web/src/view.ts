@@ -26,6 +26,13 @@ export interface Drawing {
   rests: boolean;
 }
 
+/** Whether the processor draws, as far as the browser says. */
+function draws_in_software(renderer: WebGLRenderer): boolean {
+  const gl = renderer.getContext();
+  const names = gl.getExtension('WEBGL_debug_renderer_info');
+  return names !== null && /swiftshader|llvmpipe|softpipe|software|basic render/i.test(String(gl.getParameter(names.UNMASKED_RENDERER_WEBGL)));
+}
+
 export class View {
   readonly scene = new Scene();
   readonly light = new Light();
@@ -45,11 +52,15 @@ export class View {
   /** What the pointer touches: as large as the stage, of which the picture may show a part only. */
   readonly pad = document.createElement('div');
 
+  /** Of the element [px]: asked of it in each picture, the browser would lay out the page each time. */
+  extent = { width: 0, height: 0 };
+
   /** Every picture is drawn whole, as for a video. */
   is_whole = false;
 
   private readonly renderer_ = new WebGLRenderer({ antialias: false, alpha: true, stencil: true });
   private readonly shade_: Shade;
+  private readonly is_software_: boolean;
   private readonly pace_ = new Pace();
   private grid_: GridHelper | null = null;
   private readonly still_ = new Group();
@@ -77,6 +88,7 @@ export class View {
     this.pad.setAttribute('aria-label', 'The body. Arrow keys move the tool, Enter presses and lifts it, Shift and arrows turn the view; ? lists all keys');
     this.pad.dataset.testid = 'view';
     element.prepend(this.canvas, this.pad);
+    this.is_software_ = draws_in_software(this.renderer_);
     this.shade_ = new Shade(this.light, section_.cut);
     this.scene.add(this.still_);
     this.eye = new Eye(this.pad, () => this.margins());
@@ -84,6 +96,11 @@ export class View {
     new ResizeObserver(() => this.resize()).observe(element);
     this.handed_over_.port1.onmessage = () => (this.done_at_ = performance.now());
     this.resize();
+  }
+
+  /** Light of this picture is that of the body's nodes. */
+  get is_rough(): boolean {
+    return !this.drawing.rests && this.pace_.is_rough;
   }
 
   get canvas(): HTMLCanvasElement {
@@ -114,9 +131,11 @@ export class View {
 
   resize(): void {
     const { clientWidth: width, clientHeight: height } = this.element;
+    this.extent = { width, height };
     if (width === 0 || height === 0) return;
     this.size_ = '';
     this.set_bounds(width, height);
+    if (this.is_software_) this.pace_.begin_coarse();
     this.canvas.style.width = `${width}px`;
     this.canvas.style.height = `${height}px`;
     this.eye.resize();
@@ -186,7 +205,7 @@ export class View {
 
   /** While it moves the canvas is cut down to where something is drawn: without a graphics card the browser puts together all of it, however little is there. */
   private cut_canvas(is_whole: boolean): void {
-    const { clientWidth: width, clientHeight: height } = this.element;
+    const { width, height } = this.extent;
     const { left, below, width: wide, height: high } = this.around(this.seen_box);
     const outwards = (share: number, size: number) => Math.max(0, Math.floor((share * size - cut_margin) / cut_step) * cut_step);
     const sides = [outwards(1 - below - high, height), outwards(1 - left - wide, width), outwards(below, height), outwards(left, width)];
@@ -206,7 +225,7 @@ export class View {
   }
 
   private picture(share: number, is_fine: boolean): void {
-    const { clientWidth: width, clientHeight: height } = this.element;
+    const { width, height } = this.extent;
     if (width === 0 || height === 0) return;
     const ratio = share * this.screen_pixels();
     const size = `${width} ${height} ${ratio}`;
@@ -244,7 +263,7 @@ export class View {
     if (this.eye.is_flat) this.light.without_shade();
     else {
       this.shade_.set_cut(this.section_.is_on);
-      if (!this.keeps_shade(is_fine)) this.shade_.draw(renderer, this.scene, camera, [canvas.width, canvas.height], this.around(this.body_box), shade_reach * radius, is_fine);
+      if (!this.keeps_shade(is_fine)) this.shade_.draw(renderer, this.scene, camera, [canvas.width, canvas.height], this.around(this.body_box), shade_reach * radius, is_fine, this.pace_.is_thrifty);
     }
     renderer.clear();
     renderer.render(this.scene, camera);

@@ -42,9 +42,10 @@ test('pictures of a page are what they are, in whatever order they are asked for
       if (message.type === 'state' && message.frame === 0 && shown.length > 0) loaded();
     },
     pictured: (picture: Picture) => {
-      if (picture.kind !== 'frame') return;
+      if (picture.kind !== 'frame') return false;
       last = picture;
       shown.push(picture.u[0]!);
+      return true;
     },
   });
   await is_loaded;

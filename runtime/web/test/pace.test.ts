@@ -28,8 +28,23 @@ test('shade is saved first and pixels last, and all of it comes back', () => {
   times(60, () => (pace.note(120), look()));
   assert.deepEqual(seen, ['', 'thrifty', 'thrifty fewer', 'thrifty fewer blocks', 'thrifty few blocks']);
   assert.ok(Math.abs(pace.share - 0.1) < 1e-9);
+  assert.ok(pace.is_rough, 'light goes last');
   times(1500, () => (pace.note(16), look()));
   assert.deepEqual(seen.slice(5), ['thrifty fewer blocks', 'thrifty fewer', 'thrifty', '']);
+  assert.equal(pace.is_rough, false);
+});
+
+test('very slow pictures save all at once, and without a graphics card they begin so', () => {
+  const slow = new Pace();
+  Object.assign(slow, { may_be_blocky: true, least: 0.1 });
+  times(4, () => slow.note(700)); // two do not count
+  assert.ok(slow.is_thrifty && slow.is_blocky && slow.share < 0.36, `${slow.share}`);
+  const software = new Pace();
+  Object.assign(software, { may_be_blocky: true, least: 0.1 });
+  software.begin_coarse();
+  assert.ok(software.is_thrifty && software.is_blocky && software.share < 0.3, `${software.share}`);
+  times(1500, () => software.note(16));
+  assert.ok(software.share === 1 && !software.is_blocky && !software.is_thrifty, 'it comes back where there is time');
 });
 
 test('one slow picture changes nothing, and what a whole one took does not count', () => {
