@@ -105,7 +105,7 @@ std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
   if (!overlays.centres.empty())
     stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs) / ranks});
   if (dynamics.method == DynamicsMethod::modal)
-    stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes)});
+    stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes, jobs * ranks)});
   if (compression) {
     const std::vector<Stage> more = compression_stages(*compression, ranks);
     stages.insert(stages.end(), more.begin(), more.end());

@@ -3,6 +3,7 @@
 #include <cblas.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <string>
@@ -31,7 +32,8 @@ constexpr double checksum_rate = 1e9;         // while the file is read back [by
 constexpr double solve_rate = 3.5e9;          // of one right-hand side [flop/s] (measured)
 constexpr double solves_for_precision = 900;  // of eight places of 30 nodes, and of the smooth part
 constexpr double solves_at_the_end = 4;       // of the probes
-constexpr double solves_per_mode = 6;  // of Lanczos' method, its products of vectors among them (measured)
+constexpr double solves_per_mode = 5;  // of block Lanczos, its products of vectors among them (measured)
+constexpr double modes_alone = 0.4;    // share of that which each process does (measured)
 constexpr double overlay_seconds_per_byte = 1e-8;  // of patches of two rings (measured)
 
 /// Multiply-adds a second of one thread in products shaped as the sweeps are.
@@ -121,9 +123,11 @@ double overlay_seconds(std::int64_t bytes, int jobs) {
   return overlay_seconds_per_byte * static_cast<double>(bytes) / working(jobs);
 }
 
-double modes_seconds(const Plan& plan, std::int64_t modes) {
+double modes_seconds(const Plan& plan, std::int64_t modes, int threads) {
+  constexpr int most = 2;  // solve at a time
+  const double share = modes_alone + (1.0 - modes_alone) / std::clamp(threads, 1, most);
   const double solves = solves_per_mode * static_cast<double>(modes);
-  return solves * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
+  return share * solves * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
 }
 
 void check_memory(const Plan& plan, int ranks) {

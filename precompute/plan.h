@@ -42,8 +42,8 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
 /// What overlays of so many bytes take, condensed by `jobs` threads [s].
 double overlay_seconds(std::int64_t bytes, int jobs);
 
-/// What Lanczos' method takes for so many modes [s].
-double modes_seconds(const Plan& plan, std::int64_t modes);
+/// What block Lanczos takes for so many modes, by so many threads [s].
+double modes_seconds(const Plan& plan, std::int64_t modes, int threads);
 
 /// Throws Error with the numbers when the plan needs more memory than is free, for so many ranks on this
 /// machine.
