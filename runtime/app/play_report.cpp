@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <string_view>
 
 #include "base/json_text.h"
 #include "runtime/app/best_effort_report.h"
 #include "runtime/background/live_motion.h"
+#include "runtime/background/warped_motion.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
 
@@ -195,6 +197,31 @@ const LiveMotion* live_motion(const PlayedRun& run) {
   return run.motion != nullptr ? dynamic_cast<const LiveMotion*>(&run.motion->stepper()) : nullptr;
 }
 
+const WarpedMotion* warped_motion(const PlayedRun& run) {
+  return run.motion != nullptr ? dynamic_cast<const WarpedMotion*>(&run.motion->stepper()) : nullptr;
+}
+
+constexpr double degrees_a_radian = 180.0 / std::numbers::pi;
+constexpr double most_warp_residual = 1e-3;  // that needs no word
+
+void print_warp(const WarpTelling& warp) {
+  fmt::print(stderr, "warp: the surface turned by up to {:.3g} degrees, its compliance {} times\n",
+             degrees_a_radian * warp.largest_rotation, warp.turns);
+  if (warp.last_residual > most_warp_residual)
+    print_warning(fmt::format("at the end the warped body was not in balance: its next step would have changed "
+                              "it by {:.2g} of its displacement. Its forces bend it further than --warp knows, or "
+                              "it was still moving",
+                              warp.last_residual));
+}
+
+Json json_warp(const WarpTelling& warp) {
+  return {{"largest_rotation_deg", degrees_a_radian * warp.largest_rotation},
+          {"last_rotation_deg", degrees_a_radian * warp.last_rotation},
+          {"compliance_turns", warp.turns},
+          {"steps_unbalanced", warp.unbalanced},
+          {"last_residual", warp.last_residual}};
+}
+
 void print_live(const Body& body, const LiveTelling& live) {
   const LiveCounts& counts = live.counts;
   fmt::print(
@@ -247,8 +274,12 @@ Json json_live(const Body& body, const LiveTelling& live) {
 }
 
 Json json_dynamics(const Body& body, const MotionSource* motion) {
-  Json json = {{"method", body.live() != nullptr ? "live" : name_of(body.model().dynamics.method)},
-               {"contact", body.contact_model() == ContactModel::quasi_static ? "quasi-static" : "dynamic"}};
+  const bool is_warped = body.contact_model() == ContactModel::warped;
+  const bool is_dynamic = !is_warped && body.contact_model() != ContactModel::quasi_static;
+  Json json = {{"method", body.live() != nullptr ? "live"
+                          : is_warped            ? "none"
+                                                 : name_of(body.model().dynamics.method)},
+               {"contact", is_dynamic ? "dynamic" : "quasi-static"}};
   if (motion != nullptr) {
     json["steps"] = motion->steps();
     json["longest_step_s"] = motion->longest_step();
@@ -321,6 +352,7 @@ void print_report(const PlayedRun& run) {
                1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
   }
   if (const LiveMotion* live = live_motion(run)) print_live(run.body, live->telling());
+  if (const WarpedMotion* warped = warped_motion(run)) print_warp(warped->telling());
   if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
   if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
 }
@@ -361,6 +393,7 @@ std::string json_report(const PlayedRun& run) {
   if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay.value());
   json["dynamics"] = json_dynamics(run.body, run.motion);
   if (const LiveMotion* live = live_motion(run)) json["live"] = json_live(run.body, live->telling());
+  if (const WarpedMotion* warped = warped_motion(run)) json["warp"] = json_warp(warped->telling());
   if (!run.options.record.empty()) {
     json["recording"] = run.options.record.string();
     json["recording_failed"] = run.recording_failure ? Json(in_one_line(*run.recording_failure)) : Json();

@@ -86,7 +86,8 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
           {"element", traits(model.mesh.element).name},
           {"size", body.bounds().diagonal().norm()},
           {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
-          {"moves", model.dynamics.method != DynamicsMethod::none},
+          {"moves", model.dynamics.method != DynamicsMethod::none &&
+                        body.contact_model() != ContactModel::warped},
           {"loads", has_loads(model)},
           {"materials", youngs_moduli(model)},
           {"overlay_rings", overlay_rings(body)},

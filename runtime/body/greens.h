@@ -44,6 +44,9 @@ class Greens {
   /// form with static correction). Modes of the same dofs.
   void add_modes(const Modes& modes, std::span<const double> weights);
 
+  /// R_i Xi_ij R_j^T in the same memory: forces and displacement of each node turned by its rotation [nodes].
+  [[nodiscard]] Greens turned(std::vector<Mat3> rotations) const;
+
   [[nodiscard]] std::int64_t order() const noexcept { return order_; }  ///< n, number of stored dofs
   [[nodiscard]] int dimension() const noexcept { return dimension_; }   ///< d, dofs a node
   [[nodiscard]] Index nodes() const noexcept { return nodes_; }
@@ -92,6 +95,12 @@ class Greens {
                     std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
 
  private:
+  void gather_unturned(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
+  void turn_blocks(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
+  void displace_unturned(std::span<const Index> nodes, std::span<const double> f,
+                         std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
+  void displace_turned(std::span<const Index> nodes, std::span<const double> f,
+                       std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
   void gather_static(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
   void displace_statically(std::span<const Index> nodes, std::span<const double> f,
                            std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
@@ -112,6 +121,7 @@ class Greens {
   bool split_;
   std::int64_t terms_ = 0;
   std::shared_ptr<const double[]> left_, right_;  // [n x terms_] one and the same for W alone
+  std::shared_ptr<const std::vector<Mat3>> rotations_;  // [nodes] null: none
 };
 
 }  // namespace palpate
