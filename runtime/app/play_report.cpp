@@ -7,7 +7,9 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "base/json_text.h"
 #include "runtime/app/best_effort_report.h"
@@ -15,6 +17,8 @@
 #include "runtime/background/warped_motion.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
+#include "runtime/warp/studied_range.h"
+#include "runtime/warp/surface_change.h"
 
 namespace palpate {
 namespace {
@@ -312,6 +316,28 @@ Json json_safety(const LoopReport& report) {
   return {{"largest_shown_N", report.largest_shown}, {"faults", faults}};
 }
 
+/// Against the mesh, after the last tick.
+SurfaceChange last_change(const PlayedRun& run) {
+  const Body& body = run.body;
+  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
+  std::vector<Vec3> u(body.surface_rest_positions().size());
+  MotionSnapshot motion(body);
+  run.state.surface.motion.snapshot(motion);
+  surface_displacement(body, run.state.surface.near.load(), stored, u, &motion);
+  const std::vector<Vec3> mesh = body.surface_in_mesh();
+  for (std::size_t node = 0; node < u.size(); ++node)
+    u[node] += body.surface_rest_positions()[node] - mesh[node];
+  return surface_change(body, mesh, u);
+}
+
+Json json_surface(const PlayedRun& run) {
+  const SurfaceChange change = last_change(run);
+  const std::optional<double> studied = studied_rotation(run.body);
+  return {{"last_rotation_deg", degrees_a_radian * change.rotation},
+          {"last_strain", change.strain},
+          {"studied_rotation_deg", studied ? Json(degrees_a_radian * *studied) : Json()}};
+}
+
 Json json_device(const PlayedRun& run) {
   Json json = {{"name", run.options.device.text}};
   if (run.link != nullptr) {
@@ -387,6 +413,7 @@ std::string json_report(const PlayedRun& run) {
   json["status_ticks"] = status;
   json["best_effort"] = to_json(report.best_effort);
   json["room"] = json_room(run.state);
+  json["surface"] = json_surface(run);
   json["device"] = json_device(run);
   if (run.settings.safety) json["safety"] = json_safety(report);
   if (run.options.device.kind == DeviceChoice::Kind::replay) json["replay"] = json_replay(report.replay);

@@ -99,12 +99,12 @@ inline std::vector<Bent> bend(const Mesh& mesh, const BendingLaw& law, BendingLo
   Vec3 direction = face.up();
   for (int k = 1; k <= most_steps; ++k) {
     std::vector<Vec3> x;
-    for (int round = 0; round < 60; ++round) {
+    for (int round = 0; round < 40; ++round) {
       x = law(face.spread(k * force_step * direction));
       const Vec3 next = load == BendingLoad::follows ? face.direction(x) : face.up();
       const double change = (next - direction).norm();
       direction = next;
-      if (change < 1e-7) break;
+      if (change < 1e-5) break;
     }
     curve.push_back({.force = k * force_step, .angle = face.angle(x), .tip = face.moved(x)});
     if (curve.back().angle > most_angle) break;
@@ -167,7 +167,7 @@ inline BendingLaw warped(const Body& body) {
   auto warp = std::make_shared<SurfaceWarp>(body);
   auto balance = std::make_shared<WarpBalance>(*warp);
   return [&body, warp, balance](const std::vector<Vec3>& f) {
-    balance->find(all_stored(body), on_stored(body, f), {.tolerance = 1e-9, .most_rounds = 400});
+    balance->find(all_stored(body), on_stored(body, f), {.tolerance = 1e-7, .most_rounds = 100});
     std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
     warp->displacement(balance->place(), u);
     return places_of(body, u);
@@ -184,7 +184,7 @@ inline BendingLaw turned_blocks(const Body& body) {
     const std::vector<double> given = on_stored(body, f);
     std::vector<double> turned = given, u(given.size()), before(given.size());
     std::vector<Mat3> R;
-    for (int round = 0; round < 2000; ++round) {
+    for (int round = 0; round < 200; ++round) {
       warp->rotations(*place, R);
       for (Index k = 0; k < body.greens().nodes(); ++k)
         set_vector(turned, d, k, R[static_cast<std::size_t>(k)].transpose() * vector_at(given, d, k));
@@ -197,7 +197,7 @@ inline BendingLaw turned_blocks(const Body& body) {
       }
       before = u;
       warp->warp(u, *place);
-      if (change < 1e-9 * most) break;
+      if (change < 1e-6 * most) break;
     }
     warp->rotations(*place, R);
     for (Index k = 0; k < body.greens().nodes(); ++k)
