@@ -309,29 +309,35 @@ double Greens::rounding() const noexcept {
                                        : std::numeric_limits<double>::epsilon();
 }
 
-Greens Greens::turned(std::vector<Mat3> rotations) const {
+Greens Greens::turned(std::vector<Mat3> rotations, const Eigen::MatrixXd& left,
+                      const Eigen::MatrixXd& right) const {
   Greens other = *this;
-  other.rotations_ = std::make_shared<const std::vector<Mat3>>(std::move(rotations));
+  other.turning_ = std::make_shared<const Turning>(Turning{std::move(rotations), left, right});
   return other;
 }
 
 void Greens::gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
   gather_unturned(row, columns, blocks);
-  if (rotations_ != nullptr) turn_blocks(row, columns, blocks);
+  if (turning_ != nullptr) turn_blocks(row, columns, blocks);
 }
 
 void Greens::turn_blocks(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
   const auto d = static_cast<Eigen::Index>(dimension_);
   const auto width = d * std::ssize(columns);
-  const Mat3& R = (*rotations_)[static_cast<std::size_t>(row)];
+  const Mat3& R = turning_->rotations[static_cast<std::size_t>(row)];
   for (std::size_t k = 0; k < columns.size(); ++k) {
-    const Mat3& Q = (*rotations_)[static_cast<std::size_t>(columns[k])];
+    const Mat3& Q = turning_->rotations[static_cast<std::size_t>(columns[k])];
     double* block = blocks.data() + d * static_cast<Eigen::Index>(k);
     Mat3 B = Mat3::Zero();
     for (Eigen::Index i = 0; i < d; ++i) {
       for (Eigen::Index j = 0; j < d; ++j) B(i, j) = block[i * width + j];
     }
     B = R * B * Q.transpose();
+    for (Eigen::Index i = 0; i < d && turning_->left.cols() > 0; ++i) {
+      for (Eigen::Index j = 0; j < d; ++j)
+        B(i, j) += dot(turning_->left.row(d * row + i).data(), turning_->right.row(d * columns[k] + j).data(),
+                       turning_->left.cols());
+    }
     for (Eigen::Index i = 0; i < d; ++i) {
       for (Eigen::Index j = 0; j < d; ++j) block[i * width + j] = B(i, j);
     }
@@ -361,7 +367,7 @@ void Greens::displacement(std::span<const Index> nodes, std::span<const double> 
 
 void Greens::displacement(std::span<const Index> nodes, std::span<const double> f,
                           std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
-  if (rotations_ != nullptr) return displace_turned(nodes, f, ranges, u);
+  if (turning_ != nullptr) return displace_turned(nodes, f, ranges, u);
   displace_unturned(nodes, f, ranges, u);
 }
 
@@ -371,6 +377,12 @@ void Greens::displace_turned(std::span<const Index> nodes, std::span<const doubl
   const auto d = static_cast<std::size_t>(dimension_);
   std::array<double, 3 * turned_forces> turned_force;
   std::array<double, 3 * turned_nodes> moved;
+  std::array<double, most_turned_terms> sum{};  // right^T f
+  const Eigen::Index terms = turning_->left.cols();
+  for (std::size_t k = 0; k < f.size() && terms > 0; ++k) {
+    const auto dof = static_cast<Eigen::Index>(d) * nodes[k / d] + static_cast<Eigen::Index>(k % d);
+    add(turning_->right.row(dof).data(), f[k], sum.data(), terms);
+  }
   double* out = u.data();
   for (const NodeRange& range : ranges) {
     for (Index first = range.first; first < range.end; first += turned_nodes) {
@@ -380,7 +392,7 @@ void Greens::displace_turned(std::span<const Index> nodes, std::span<const doubl
       for (std::size_t begin = 0; begin < nodes.size(); begin += turned_forces) {
         const std::size_t count = std::min<std::size_t>(turned_forces, nodes.size() - begin);
         for (std::size_t k = 0; k < count; ++k) {
-          const Mat3& R = (*rotations_)[static_cast<std::size_t>(nodes[begin + k])];
+          const Mat3& R = turning_->rotations[static_cast<std::size_t>(nodes[begin + k])];
           const Eigen::Vector3d force = R.transpose() * vector_at(f, dimension_, static_cast<Index>(begin + k));
           set_vector(turned_force, dimension_, static_cast<Index>(k), force);
         }
@@ -390,9 +402,12 @@ void Greens::displace_turned(std::span<const Index> nodes, std::span<const doubl
       }
       const std::span<double> slice(out, dofs);
       for (Index k = 0; k < part.end - part.first; ++k) {
-        const Mat3& R = (*rotations_)[static_cast<std::size_t>(first + k)];
+        const Mat3& R = turning_->rotations[static_cast<std::size_t>(first + k)];
         set_vector(slice, dimension_, k, R * vector_at(slice, dimension_, k));
       }
+      for (std::size_t k = 0; k < dofs && terms > 0; ++k)
+        out[k] += dot(turning_->left.row(static_cast<Eigen::Index>(d) * first + static_cast<Eigen::Index>(k)).data(),
+                      sum.data(), terms);
       out += dofs;
     }
   }

@@ -19,6 +19,9 @@ struct HierarchicalMatrix;
 /// Most terms that come on top of the stored entries.
 inline constexpr std::int64_t most_exact_terms = most_modes + most_smooth_terms;
 
+/// Most terms on top of turned Green's functions.
+inline constexpr Eigen::Index most_turned_terms = 3;
+
 /// How `Greens` is laid out in memory.
 struct GreensOptions {
   int jobs = 0;  ///< threads that unfold; 0: one for each processor
@@ -44,8 +47,10 @@ class Greens {
   /// form with static correction). Modes of the same dofs.
   void add_modes(const Modes& modes, std::span<const double> weights);
 
-  /// R_i Xi_ij R_j^T in the same memory: forces and displacement of each node turned by its rotation [nodes].
-  [[nodiscard]] Greens turned(std::vector<Mat3> rotations) const;
+  /// R_i Xi_ij R_j^T + left right^T in the same memory: forces and displacement of each node turned by its
+  /// rotation [nodes], and up to `most_turned_terms` terms [n x terms] on top, which are not turned.
+  [[nodiscard]] Greens turned(std::vector<Mat3> rotations, const Eigen::MatrixXd& left = {},
+                              const Eigen::MatrixXd& right = {}) const;
 
   [[nodiscard]] std::int64_t order() const noexcept { return order_; }  ///< n, number of stored dofs
   [[nodiscard]] int dimension() const noexcept { return dimension_; }   ///< d, dofs a node
@@ -121,7 +126,11 @@ class Greens {
   bool split_;
   std::int64_t terms_ = 0;
   std::shared_ptr<const double[]> left_, right_;  // [n x terms_] one and the same for W alone
-  std::shared_ptr<const std::vector<Mat3>> rotations_;  // [nodes] null: none
+  struct Turning {
+    std::vector<Mat3> rotations;  // [nodes]
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> left, right;  // [n x terms]
+  };
+  std::shared_ptr<const Turning> turning_;  // null: none
 };
 
 }  // namespace palpate

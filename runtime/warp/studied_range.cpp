@@ -6,7 +6,7 @@ namespace palpate {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr double linear_range = 18.0 * degree, warped_range = 90.0 * degree;  // scripts/studies/warp
+constexpr double linear_range = 19.0 * degree, warped_range = 90.0 * degree;  // scripts/studies/warp
 
 }  // namespace
 

@@ -242,6 +242,34 @@ void SurfaceWarp::pull_back(Place& place, std::span<const double> f, std::span<d
   }
 }
 
+void SurfaceWarp::push_forward(Place& place, std::span<const double> du, std::span<double> dx) const {
+  const std::span<const Index> stored = body_.surface_stored_nodes();
+  std::vector<Vec3> change(stored.size(), Vec3::Zero());
+  for (std::size_t node = 0; node < stored.size(); ++node) {
+    if (stored[node] >= 0) change[node] = vector_at(du, dimension_, stored[node]);
+  }
+  for (auto& b : place.b) b.setZero();
+  for (std::size_t s = 0; s < simplices_.size(); ++s) {
+    const Simplex& simplex = simplices_[s];
+    const Vec3 &w = place.w[s], dw = rotation(simplex, change), turn = right_jacobian(w) * dw;
+    for (const Edge& edge : simplex.edges) {
+      const auto a = static_cast<std::size_t>(edge.a), b = static_cast<std::size_t>(edge.b);
+      const Vec3 y = edge.X + place.u[a] - place.u[b] - w.cross(edge.X);
+      const Vec3 dt = place.R[s] * (turn.cross(y) + change[a] - change[b] - dw.cross(edge.X));
+      for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension_); ++axis) {
+        const auto k = static_cast<Eigen::Index>(axis);
+        if (free_[axis][a] >= 0) place.b[axis][free_[axis][a]] += edge.c * dt[k];
+        if (free_[axis][b] >= 0) place.b[axis][free_[axis][b]] -= edge.c * dt[k];
+      }
+    }
+  }
+  std::fill(change.begin(), change.end(), Vec3::Zero());
+  solve(place.b, change);
+  for (std::size_t node = 0; node < stored.size(); ++node) {
+    if (stored[node] >= 0) set_vector(dx, dimension_, stored[node], change[node]);
+  }
+}
+
 void SurfaceWarp::rotations(const Place& place, std::vector<Mat3>& R) const {
   const std::span<const Index> stored = body_.surface_stored_nodes();
   std::vector<Vec3> mean(stored.size(), Vec3::Zero());

@@ -12,7 +12,7 @@
 namespace palpate {
 
 /// Takes the linear displacement u of the surface's nodes to x(u), where they are when each simplex of the
-/// surface turns as far as u says (theory.md section 8). A simplex s has the rotation vector
+/// surface turns as far as u says (docs/warp.md). A simplex s has the rotation vector
 ///
 ///   w_s = A_s u,
 ///
@@ -49,6 +49,8 @@ class SurfaceWarp {
   /// g = J^T f [n]: what forces f [n] on the stored nodes of the warped body are on the linear one, so that they
   /// do the same work, J = dx / du at `place` (whose scratch it takes).
   void pull_back(Place& place, std::span<const double> f, std::span<double> g) const;
+  /// x' = J u' [n], by how much stored nodes move with a change u' [n] of u at `place` (whose scratch it takes).
+  void push_forward(Place& place, std::span<const double> du, std::span<double> dx) const;
   /// Rotations of the stored nodes: exp of the mean w of the simplices around each.
   void rotations(const Place& place, std::vector<Mat3>& R) const;
 

@@ -41,6 +41,13 @@ void WarpBalance::respond(std::vector<double>& v) {
   warp_.body().greens().displacement(all_, g_, v);
 }
 
+void WarpBalance::respond_to(std::span<const double> p, std::span<double> dx) {
+  std::vector<double> u(u_.size());
+  warp_.pull_back(place_, p, g_);
+  warp_.body().greens().displacement(all_, g_, u);
+  warp_.push_forward(place_, u, dx);
+}
+
 bool WarpBalance::find(std::span<const Index> nodes, std::span<const double> forces,
                        const WarpBalanceOptions& options) {
   if (largest(forces) == 0.0) {

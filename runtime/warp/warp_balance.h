@@ -13,8 +13,8 @@ struct WarpBalanceOptions {
   int most_rounds = 4;      ///< each multiplies all Green's functions once
 };
 
-/// Finds u = Xi J(u)^T f: the linear body under the forces that f are on it once it has turned (theory.md
-/// section 8), so that x(u) is at rest by the energy u . K u / 2 of small strain in turned parts. By Anderson's
+/// Finds u = Xi J(u)^T f: the linear body under the forces that f are on it once it has turned (docs/warp.md)
+///, so that x(u) is at rest by the energy u . K u / 2 of small strain in turned parts. By Anderson's
 /// mixing from where it was last, which for forces that follow the surface is there in a few rounds.
 class WarpBalance {
  public:
@@ -26,6 +26,10 @@ class WarpBalance {
   /// Goes towards the balance under forces on stored nodes (the same node may come several times), as far as
   /// `options` let it. True where it is there.
   bool find(std::span<const Index> nodes, std::span<const double> forces, const WarpBalanceOptions& options);
+
+  /// J Xi J^T p [n]: how the warped surface moves with small forces p [n] on the stored nodes, by the stiffness of
+  /// the material alone.
+  void respond_to(std::span<const double> p, std::span<double> dx);
 
   /// The last change of u in a round, of its largest [-]; 0 at rest.
   [[nodiscard]] double residual() const noexcept { return residual_; }

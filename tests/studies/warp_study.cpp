@@ -6,6 +6,7 @@
 // body of the same mesh. scripts/studies/warp makes tables and a picture of it.
 #include <fmt/format.h>
 
+#include <cstdio>
 #include <numbers>
 
 #include "tests/support/warp_cases.h"
@@ -33,6 +34,7 @@ void study(ElementType type, BendingLoad load) {
       fmt::print("{},{},{},{},{:.5f},{:.5f}\n", traits(type).name,
                  load == BendingLoad::follows ? "follows" : "upright", name, angle, error.force,
                  error.displacement);
+      std::fflush(stdout);
     }
   }
 }
@@ -43,7 +45,7 @@ void study(ElementType type, BendingLoad load) {
 int main() {
   using namespace palpate;
   fmt::print("element,load,law,angle,force,displacement\n");
-  for (const ElementType type : {ElementType::quad4, ElementType::hex8, ElementType::tet10}) {
+  for (const ElementType type : {ElementType::quad4}) {
     test::study(type, test::BendingLoad::follows);
     test::study(type, test::BendingLoad::upright);
   }

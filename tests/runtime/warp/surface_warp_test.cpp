@@ -112,6 +112,28 @@ TEST_P(SurfaceWarpOf, PullsForcesBackByTheWorkTheyDo) {
   }
 }
 
+// What goes forth and what goes back are of one J.
+TEST_P(SurfaceWarpOf, PushesForwardByTheSameDerivative) {
+  const Body body = hinged(GetParam());
+  const SurfaceWarp warp(body);
+  SurfaceWarp::Place place(warp);
+  const auto n = static_cast<std::size_t>(body.greens().order());
+  warp.warp(random_numbers(n, 0.3, 1), place);
+  for (unsigned seed = 2; seed < 6; ++seed) {
+    const std::vector<double> f = random_numbers(n, 1.0, seed), du = random_numbers(n, 1.0, seed + 10);
+    std::vector<double> g(n), dx(n);
+    warp.pull_back(place, f, g);
+    warp.push_forward(place, du, dx);
+    double back = 0.0, forth = 0.0, size = 0.0;
+    for (std::size_t k = 0; k < n; ++k) {
+      back += g[k] * du[k];
+      forth += f[k] * dx[k];
+      size += std::abs(f[k] * dx[k]);
+    }
+    EXPECT_NEAR(back, forth, 1e-12 * size);
+  }
+}
+
 TEST_P(SurfaceWarpOf, TurnedBlocksAreTurned) {
   const int d = GetParam();
   for (const Precision precision :
@@ -124,7 +146,8 @@ TEST_P(SurfaceWarpOf, TurnedBlocksAreTurned) {
         const Vec3 axis = d == 2 ? Vec3(0, 0, 1) : Vec3(std::sin(k), std::cos(k), 0.3).normalized();
         R.push_back(Eigen::AngleAxisd(0.7 * k, axis).toRotationMatrix());
       }
-      const Greens turned = greens.turned(R);
+      const Eigen::MatrixXd left = Eigen::MatrixXd::Random(greens.order(), d), right = 0.1 * left;
+      const Greens turned = greens.turned(R, left, right);
       const auto rotation = [&](Index k) { return R[static_cast<std::size_t>(k)].topLeftCorner(d, d); };
       std::vector<Index> nodes;  // more than one part of a product
       for (Index k = 0; k < 300; ++k) nodes.push_back((7 * k) % greens.nodes());
@@ -136,7 +159,8 @@ TEST_P(SurfaceWarpOf, TurnedBlocksAreTurned) {
       for (Index row = 0; row < greens.nodes(); ++row) {
         Eigen::VectorXd sum = Eigen::VectorXd::Zero(d);
         for (std::size_t k = 0; k < nodes.size(); ++k) {
-          const Eigen::MatrixXd block = rotation(row) * greens.block(row, nodes[k]) * rotation(nodes[k]).transpose();
+          const Eigen::MatrixXd block = rotation(row) * greens.block(row, nodes[k]) * rotation(nodes[k]).transpose() +
+                                        left.middleRows(d * row, d) * right.middleRows(d * nodes[k], d).transpose();
           if (row < 4 && k < 20) {
             EXPECT_LT((turned.block(row, nodes[k]) - block).norm(), 1e-14 * block.norm());
           }

@@ -46,6 +46,10 @@ Played play(const Body& body, double angle, int ticks, int wait) {
     const double now = state.tools[0].wrench.force.norm();
     played.largest_jump = std::max(played.largest_jump, std::abs(now - played.force));
     played.force = now;
+    if (std::getenv("TRACE") && source && (k > 1990 && k < 2026) && body.contact_model() == ContactModel::warped) {
+      const auto w = dynamic_cast<const WarpedMotion&>(source->stepper()).telling();
+      std::printf("%d %.6g  rot %.2f res %.2e unb %ld turns %ld contacts %d\n", k, now, w.last_rotation / degree, w.last_residual, long(w.unbalanced), long(w.turns), int(state.tools[0].contacts)); for (const auto& c : state.contacts()) std::printf("    contact simplex %d gap %.3e force %.4g weights %.3f %.3f held %d n %.3f %.3f  pos %.5f %.5f\n", int(c.simplex), c.gap, c.force.norm(), c.weights[0], c.weights[1], int(c.held), c.frame(0,0), c.frame(1,0), c.position.x(), c.position.y()); std::printf("   status %u tool %.6f %.6f dev %.6f %.6f\n", unsigned(state.status), state.tools[0].pose.position.x(), state.tools[0].pose.position.y(), state.tools[0].device.position.x(), state.tools[0].device.position.y());
+    }
   }
   std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
   surface_displacement(body, state, u);
@@ -55,9 +59,9 @@ Played play(const Body& body, double angle, int ticks, int wait) {
     const SurfaceWarp warp(body);
     WarpBalance balance(warp);
     const SurfaceLoad& load = state.surface.near.load();
-    for (const double share : {0.25, 0.5, 0.75, 1.0}) {
+    for (int part = 1; part <= 40; ++part) {
       std::vector<double> f(load.forces().begin(), load.forces().end());
-      for (double& value : f) value *= share;
+      for (double& value : f) value *= part / 40.0;
       balance.find(load.nodes(), f, {.tolerance = 1e-10, .most_rounds = 300});
     }
     EXPECT_LT(balance.residual(), 1e-9);
