@@ -212,10 +212,11 @@ void print_warp(const WarpTelling& warp) {
   fmt::print(stderr, "warp: the surface turned by up to {:.3g} degrees, its compliance {} times\n",
              degrees_a_radian * warp.largest_rotation, warp.turns);
   if (warp.last_residual > most_warp_residual)
-    print_warning(fmt::format("at the end the warped body was not in balance: its next step would have changed "
-                              "it by {:.2g} of its displacement. Its forces bend it further than --warp knows, or "
-                              "it was still moving",
-                              warp.last_residual));
+    print_warning(
+        fmt::format("at the end the warped body was not in balance: its next step would have changed "
+                    "it by {:.2g} of its displacement. Its forces bend it further than --warp knows, or "
+                    "it was still moving",
+                    warp.last_residual));
 }
 
 Json json_warp(const WarpTelling& warp) {

@@ -97,8 +97,8 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
           {"element", traits(model.mesh.element).name},
           {"size", body.bounds().diagonal().norm()},
           {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
-          {"moves", model.dynamics.method != DynamicsMethod::none &&
-                        body.contact_model() != ContactModel::warped},
+          {"moves",
+           model.dynamics.method != DynamicsMethod::none && body.contact_model() != ContactModel::warped},
           {"loads", has_loads(model)},
           {"materials", youngs_moduli(model)},
           {"studied_rotation", number_or_null(studied_rotation(body))},

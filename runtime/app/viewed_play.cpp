@@ -133,15 +133,14 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   }
   auto session = std::make_unique<PlaySession>(
       std::move(options), *body_, input_,
-      SessionViewer{
-          .control = &control_,
-          .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
-          .pictures =
-              [this](SurfacePicture picture) {
-                take_change(picture.change);
-                server_->show_picture(std::move(picture), body_.get());
-              },
-          .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
+      SessionViewer{.control = &control_,
+                    .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
+                    .pictures =
+                        [this](SurfacePicture picture) {
+                          take_change(picture.change);
+                          server_->show_picture(std::move(picture), body_.get());
+                        },
+                    .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
   session->latch(latched_);
   const std::lock_guard lock(mutex_);
   state_.settings = settled;

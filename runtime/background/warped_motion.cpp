@@ -103,7 +103,8 @@ void WarpedMotion::turn_compliance(const MotionJob& job) {
   Greens turned = body_.greens().turned(R_);
   if (!job.load.empty()) {
     const int d = body_.dimension();
-    Eigen::MatrixXd P(std::ssize(x_), d), E(std::ssize(x_), d);  // spread forces, and what W lacks of J Xi J^T P
+    Eigen::MatrixXd P(std::ssize(x_), d),
+        E(std::ssize(x_), d);  // spread forces, and what W lacks of J Xi J^T P
     std::vector<Index> nodes(static_cast<std::size_t>(body_.greens().nodes()));
     std::iota(nodes.begin(), nodes.end(), 0);
     std::vector<double> true_x(x_.size()), by_turned(x_.size());

@@ -28,7 +28,7 @@ constexpr std::size_t nodes_ahead =
 constexpr std::int64_t u_chunk =
     2048;  // doubles of u that stay in the first-level cache while all rows pass by
 constexpr Index turned_forces = 128, turned_nodes = 64;  // of a part of a turned product
-constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is fetched
+constexpr std::int64_t ahead_bytes = 1024;               // how far ahead of its use a row is fetched
 
 /// Whole cache lines a row, and an odd number of them, so that equal columns of neighbouring rows do not fall
 /// into one cache set.
@@ -393,7 +393,8 @@ void Greens::displace_turned(std::span<const Index> nodes, std::span<const doubl
         const std::size_t count = std::min<std::size_t>(turned_forces, nodes.size() - begin);
         for (std::size_t k = 0; k < count; ++k) {
           const Mat3& R = turning_->rotations[static_cast<std::size_t>(nodes[begin + k])];
-          const Eigen::Vector3d force = R.transpose() * vector_at(f, dimension_, static_cast<Index>(begin + k));
+          const Eigen::Vector3d force =
+              R.transpose() * vector_at(f, dimension_, static_cast<Index>(begin + k));
           set_vector(turned_force, dimension_, static_cast<Index>(k), force);
         }
         displace_unturned(nodes.subspan(begin, count), {turned_force.data(), d * count}, {&part, 1},
@@ -406,8 +407,9 @@ void Greens::displace_turned(std::span<const Index> nodes, std::span<const doubl
         set_vector(slice, dimension_, k, R * vector_at(slice, dimension_, k));
       }
       for (std::size_t k = 0; k < dofs && terms > 0; ++k)
-        out[k] += dot(turning_->left.row(static_cast<Eigen::Index>(d) * first + static_cast<Eigen::Index>(k)).data(),
-                      sum.data(), terms);
+        out[k] += dot(
+            turning_->left.row(static_cast<Eigen::Index>(d) * first + static_cast<Eigen::Index>(k)).data(),
+            sum.data(), terms);
       out += dofs;
     }
   }

@@ -39,7 +39,8 @@ void check_warp(const BodyOptions& options) {
   const auto refuse = [](const char* why, const char* option) {
     throw Error(why, option, std::string("leave out ") + option + " or --warp");
   };
-  if (options.live.solver) refuse("a live solver turns by itself, and has no Green's functions to warp", "--solver");
+  if (options.live.solver)
+    refuse("a live solver turns by itself, and has no Green's functions to warp", "--solver");
   if (options.refinement > 1) refuse("overlays are of the body at rest, and do not turn", "--overlay");
   if (options.contact == ContactModel::dynamic) refuse("a warped body has no inertia", "--contact");
 }

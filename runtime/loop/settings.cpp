@@ -261,11 +261,12 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
   visit(Setting{"overlay-memory", group, "MB", "MB", "512", "most memory that overlays may use", megabytes,
                 s.overlay.has_value()},
         s.overlay_memory);
-  visit(Setting{"warp", group, "yes|no", "", "no",
-                "parts of the body that turn take their stiffness with them: for bodies that bend far, without "
-                "a solver",
-                any_number, s.warp},
-        s.warp);
+  visit(
+      Setting{"warp", group, "yes|no", "", "no",
+              "parts of the body that turn take their stiffness with them: for bodies that bend far, without "
+              "a solver",
+              any_number, s.warp},
+      s.warp);
 }
 
 /// Visits the settings of the live solver.

@@ -14,7 +14,8 @@
 namespace palpate {
 namespace {
 
-constexpr double least_share = 1e-12;  // of the longest edge squared: a triangle's area, else it has no direction
+constexpr double least_share =
+    1e-12;  // of the longest edge squared: a triangle's area, else it has no direction
 
 /// Groups of surface nodes that simplices join.
 class Parts {
@@ -67,7 +68,8 @@ void SurfaceWarp::add_triangle(const std::array<Index, 3>& nodes) {
   double longest = 0.0;
   for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, (X[(k + 1) % 3] - X[k]).squaredNorm());
   if (!(normal.norm() > least_share * longest)) return;
-  Simplex simplex{.nodes = nodes, .h = {}, .N = normal.normalized(), .size = 0.5 * normal.norm(), .edges = {}};
+  Simplex simplex{
+      .nodes = nodes, .h = {}, .N = normal.normalized(), .size = 0.5 * normal.norm(), .edges = {}};
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t a = (k + 1) % 3, b = (k + 2) % 3;
     // The gradient of node k's shape function is N x (X_b - X_a) / |normal|, and h = N x gradient.
@@ -85,13 +87,13 @@ void SurfaceWarp::add_line(Index a, Index b) {
   if (!(length > 0.0)) return;
   // w = z N . (u_a - u_b) / length, N across the line: as of a triangle with h along -z and its normal N.
   const Vec3 N = Vec3::UnitZ().cross(X) / length, h = -Vec3::UnitZ() / length;
-  simplices_.push_back({.nodes = {a, b, a},
-                        .h = {h, -h, Vec3::Zero()},
-                        .N = N,
-                        .size = length,
-                        .edges = {Edge{.a = a, .b = b, .c = 1.0 / length, .X = X},
-                                  Edge{.a = a, .b = b, .c = 0.0, .X = X},
-                                  Edge{.a = a, .b = b, .c = 0.0, .X = X}}});
+  simplices_.push_back(
+      {.nodes = {a, b, a},
+       .h = {h, -h, Vec3::Zero()},
+       .N = N,
+       .size = length,
+       .edges = {Edge{.a = a, .b = b, .c = 1.0 / length, .X = X}, Edge{.a = a, .b = b, .c = 0.0, .X = X},
+                 Edge{.a = a, .b = b, .c = 0.0, .X = X}}});
 }
 
 /// A node that is not stored is held along every axis.
@@ -121,10 +123,11 @@ void SurfaceWarp::check_held() const {
     for (const Simplex& simplex : simplices_) {
       if (is_held[static_cast<std::size_t>(parts.of(simplex.nodes[0]))]) continue;
       const Vec3& at = body_.surface_rest_positions()[static_cast<std::size_t>(simplex.nodes[0])];
-      throw Error(fmt::format("nothing holds the part of the surface at ({:.4g}, {:.4g}, {:.4g}) m along {}, and "
-                              "rotations add up along the surface from where it is held",
-                              at.x(), at.y(), at.z(), "xyz"[axis]),
-                  "--warp", "fix a region of that surface, or play it with --solver corotational");
+      throw Error(
+          fmt::format("nothing holds the part of the surface at ({:.4g}, {:.4g}, {:.4g}) m along {}, and "
+                      "rotations add up along the surface from where it is held",
+                      at.x(), at.y(), at.z(), "xyz"[axis]),
+          "--warp", "fix a region of that surface, or play it with --solver corotational");
     }
   }
 }

@@ -22,34 +22,36 @@ namespace palpate {
 ///
 ///   min_x sum_edges c_ab |x_a - x_b - t_ab|^2, held nodes where they rest,
 ///
-/// a sparse system that is factored once (c: half the cotangent of the angle across, in the plane 1 / length).
-/// So rotation adds up along the body: a tip is where all below it have turned it to. x(u) is u to first order.
+/// a sparse system that is factored once (c: half the cotangent of the angle across, in the plane 1 /
+/// length). So rotation adds up along the body: a tip is where all below it have turned it to. x(u) is u to
+/// first order.
 ///
 /// Const once made: any number of threads may use it, each with a `Place` of its own.
 class SurfaceWarp {
  public:
-  /// `body`: all of its stored nodes lie on its surface; it must live as long. Throws Error where a part of the
-  /// surface has no held node along some axis.
+  /// `body`: all of its stored nodes lie on its surface; it must live as long. Throws Error where a part of
+  /// the surface has no held node along some axis.
   explicit SurfaceWarp(const Body& body);
 
   /// What is found on the way from u to x, and memory for it.
   struct Place {
     explicit Place(const SurfaceWarp& warp);
-    std::vector<Vec3> u;              ///< [S] linear displacement [m]
-    std::vector<Vec3> w;              ///< [simplices] rotation vectors [rad]
-    std::vector<Mat3> R;              ///< [simplices] exp(w)
-    std::vector<Vec3> x;              ///< [S] x(u) [m]
-    std::array<Eigen::VectorXd, 3> b; ///< by axis [free nodes along it]: scratch
+    std::vector<Vec3> u;               ///< [S] linear displacement [m]
+    std::vector<Vec3> w;               ///< [simplices] rotation vectors [rad]
+    std::vector<Mat3> R;               ///< [simplices] exp(w)
+    std::vector<Vec3> x;               ///< [S] x(u) [m]
+    std::array<Eigen::VectorXd, 3> b;  ///< by axis [free nodes along it]: scratch
   };
 
   /// Fills `place` for u [n] of the stored nodes.
   void warp(std::span<const double> u, Place& place) const;
   /// x(u) less where the nodes rest [n], of the stored nodes.
   void displacement(const Place& place, std::span<double> moved) const noexcept;
-  /// g = J^T f [n]: what forces f [n] on the stored nodes of the warped body are on the linear one, so that they
-  /// do the same work, J = dx / du at `place` (whose scratch it takes).
+  /// g = J^T f [n]: what forces f [n] on the stored nodes of the warped body are on the linear one, so that
+  /// they do the same work, J = dx / du at `place` (whose scratch it takes).
   void pull_back(Place& place, std::span<const double> f, std::span<double> g) const;
-  /// x' = J u' [n], by how much stored nodes move with a change u' [n] of u at `place` (whose scratch it takes).
+  /// x' = J u' [n], by how much stored nodes move with a change u' [n] of u at `place` (whose scratch it
+  /// takes).
   void push_forward(Place& place, std::span<const double> du, std::span<double> dx) const;
   /// Rotations of the stored nodes: exp of the mean w of the simplices around each.
   void rotations(const Place& place, std::vector<Mat3>& R) const;
@@ -83,7 +85,8 @@ class SurfaceWarp {
   const Body& body_;
   int dimension_;
   std::vector<Simplex> simplices_;
-  std::array<std::vector<Index>, 3> free_;  // [S] by axis: number among those that can move along it, -1: held
+  std::array<std::vector<Index>, 3>
+      free_;  // [S] by axis: number among those that can move along it, -1: held
   std::array<Index, 3> free_count_{};
   std::array<std::unique_ptr<Factor>, 3> factor_;
 };

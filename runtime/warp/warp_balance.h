@@ -27,14 +27,16 @@ class WarpBalance {
   /// `options` let it. True where it is there.
   bool find(std::span<const Index> nodes, std::span<const double> forces, const WarpBalanceOptions& options);
 
-  /// J Xi J^T p [n]: how the warped surface moves with small forces p [n] on the stored nodes, by the stiffness of
-  /// the material alone.
+  /// J Xi J^T p [n]: how the warped surface moves with small forces p [n] on the stored nodes, by the
+  /// stiffness of the material alone.
   void respond_to(std::span<const double> p, std::span<double> dx);
 
   /// The last change of u in a round, of its largest [-]; 0 at rest.
   [[nodiscard]] double residual() const noexcept { return residual_; }
   [[nodiscard]] const SurfaceWarp::Place& place() const noexcept { return place_; }
-  [[nodiscard]] std::span<const double> linear() const noexcept { return {u_.data(), u_.size()}; }  ///< u [n] [m]
+  [[nodiscard]] std::span<const double> linear() const noexcept {
+    return {u_.data(), u_.size()};
+  }  ///< u [n] [m]
 
  private:
   /// What a round came to: v = Xi J(u)^T f, r = v - u.

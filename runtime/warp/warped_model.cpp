@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-constexpr double least_step = 0.005;  // [s]
+constexpr double least_step = 0.005;    // [s]
 constexpr double bytes_a_second = 4e9;  // of Green's functions that a thread multiplies by
 constexpr double rounds_a_step = 2.0;
 
@@ -22,7 +22,8 @@ std::shared_ptr<const void> part_of(std::span<const T> packed, std::int64_t orde
   std::shared_ptr<T[]> part(new T[static_cast<std::size_t>(packed_size(n))]);
   for (std::int64_t j = 0; j < n; ++j) {
     for (std::int64_t i = j; i < n; ++i) {
-      const auto [low, high] = std::minmax(dofs[static_cast<std::size_t>(i)], dofs[static_cast<std::size_t>(j)]);
+      const auto [low, high] =
+          std::minmax(dofs[static_cast<std::size_t>(i)], dofs[static_cast<std::size_t>(j)]);
       part[packed_index(i, j, n)] = packed[static_cast<std::size_t>(packed_index(high, low, order))];
     }
   }
@@ -34,7 +35,8 @@ PackedGreens part_of(const PackedGreens& greens, const std::vector<std::int64_t>
   if (const SmoothPart* all = greens.smooth().get(); all != nullptr) {
     auto part = std::make_shared<SmoothPart>();
     part->terms = all->terms;
-    for (const std::int64_t dof : dofs) part->rows.insert(part->rows.end(), all->row(dof), all->row(dof) + all->terms);
+    for (const std::int64_t dof : dofs)
+      part->rows.insert(part->rows.end(), all->row(dof), all->row(dof) + all->terms);
     smooth = std::move(part);
   }
   const std::shared_ptr<const void> data = has_float_entries(greens.precision())
@@ -52,7 +54,8 @@ void keep_surface(Model& model) {
   for (std::size_t k = 0; k < model.stored_nodes.size(); ++k) {
     if (!on_surface[static_cast<std::size_t>(model.stored_nodes[k])]) continue;
     nodes.push_back(model.stored_nodes[k]);
-    for (int axis = 0; axis < d; ++axis) dofs.push_back(std::int64_t{d} * static_cast<std::int64_t>(k) + axis);
+    for (int axis = 0; axis < d; ++axis)
+      dofs.push_back(std::int64_t{d} * static_cast<std::int64_t>(k) + axis);
   }
   if (nodes.size() < model.stored_nodes.size()) {
     if (model.compressed != nullptr) {
@@ -70,9 +73,10 @@ void keep_surface(Model& model) {
 
 Model warped_model(Model model) {
   if (model.scope == Scope::none) {
-    throw Error("the file has no Green's functions to warp: its scope is none", model.name,
-                "leave out --warp and give it a --solver, or set another scope in [storage] and precompute it "
-                "again");
+    throw Error(
+        "the file has no Green's functions to warp: its scope is none", model.name,
+        "leave out --warp and give it a --solver, or set another scope in [storage] and precompute it "
+        "again");
   }
   keep_surface(model);
   model.overlay = {};

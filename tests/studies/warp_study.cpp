@@ -24,11 +24,11 @@ void study(ElementType type, BendingLoad load) {
   const double step = 1e-6 * (d == 2 ? 1.5 : 4.0) * degree / first.angle;
   const double most = (load == BendingLoad::follows ? 95.0 : 65.0) * degree;
   const std::vector<Bent> truth = bend(model.mesh, corotational(model), load, step, most);
-  const std::vector<std::pair<const char*, BendingLaw>> laws = {{"linear", small_strain(body)},
-                                                                {"turned", turned_blocks(body)},
-                                                                {"warped", warped(body)}};
+  const std::vector<std::pair<const char*, BendingLaw>> laws = {
+      {"linear", small_strain(body)}, {"turned", turned_blocks(body)}, {"warped", warped(body)}};
   for (const auto& [name, law] : laws) {
-    const auto curve = bend(model.mesh, law, load, step, 1.5 * most, static_cast<int>(1.5 * static_cast<double>(truth.size())));
+    const auto curve = bend(model.mesh, law, load, step, 1.5 * most,
+                            static_cast<int>(1.5 * static_cast<double>(truth.size())));
     for (int angle = 5; angle <= (load == BendingLoad::follows ? 90 : 60); angle += 5) {
       const BendingError error = bending_error(truth, curve, angle * degree, d);
       fmt::print("{},{},{},{},{:.5f},{:.5f}\n", traits(type).name,

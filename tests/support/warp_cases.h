@@ -40,14 +40,14 @@ inline Model bent_model(ElementType type, Scope scope = Scope::surface) {
   return model;
 }
 
-/// How a cantilever is loaded: a force along the end face as it has turned, as a smooth tool would press it, or one
-/// that stays upright.
+/// How a cantilever is loaded: a force along the end face as it has turned, as a smooth tool would press it,
+/// or one that stays upright.
 enum class BendingLoad { follows, upright };
 
 /// A bent cantilever: the force at its end and what it came to.
 struct Bent {
-  double force = 0.0;     ///< [N]
-  double angle = 0.0;     ///< by which the end face has turned [rad]
+  double force = 0.0;       ///< [N]
+  double angle = 0.0;       ///< by which the end face has turned [rad]
   Vec3 tip = Vec3::Zero();  ///< displacement of its middle [m]
 };
 
@@ -132,7 +132,8 @@ inline BendingLaw corotational(const Model& model, LiveLaw law = LiveLaw::corota
 inline std::vector<double> on_stored(const Body& body, const std::vector<Vec3>& f) {
   std::vector<double> forces;
   for (const Index node : body.model().stored_nodes) {
-    for (int axis = 0; axis < body.dimension(); ++axis) forces.push_back(f[static_cast<std::size_t>(node)][axis]);
+    for (int axis = 0; axis < body.dimension(); ++axis)
+      forces.push_back(f[static_cast<std::size_t>(node)][axis]);
   }
   return forces;
 }
@@ -227,8 +228,8 @@ struct BendingError {
   double displacement;  ///< of the tip's displacement under the same force, of that displacement [-]
 };
 
-inline BendingError bending_error(const std::vector<Bent>& truth, const std::vector<Bent>& curve, double angle,
-                                  int dimension) {
+inline BendingError bending_error(const std::vector<Bent>& truth, const std::vector<Bent>& curve,
+                                  double angle, int dimension) {
   const auto by_angle = [](const Bent& bent) { return bent.angle; };
   const auto force = [](const Bent& bent) { return bent.force; };
   const auto height = [dimension](const Bent& bent) { return rise(bent, dimension); };

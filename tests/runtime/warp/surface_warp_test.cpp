@@ -61,7 +61,8 @@ TEST_P(SurfaceWarpOf, RigidTurnsAreExact) {
     warp.rotations(place, R);
     for (const Mat3& at : R) EXPECT_LT((at - turn).norm(), 1e-12);
     std::vector<Vec3> moved = place.x;
-    for (std::size_t node = 0; node < moved.size(); ++node) moved[node] -= body.surface_rest_positions()[node];
+    for (std::size_t node = 0; node < moved.size(); ++node)
+      moved[node] -= body.surface_rest_positions()[node];
     const SurfaceChange change = surface_change(body, body.surface_rest_positions(), moved);
     EXPECT_NEAR(change.rotation, angle, 1e-7);
     EXPECT_LT(change.strain, 1e-12);
@@ -159,16 +160,19 @@ TEST_P(SurfaceWarpOf, TurnedBlocksAreTurned) {
       for (Index row = 0; row < greens.nodes(); ++row) {
         Eigen::VectorXd sum = Eigen::VectorXd::Zero(d);
         for (std::size_t k = 0; k < nodes.size(); ++k) {
-          const Eigen::MatrixXd block = rotation(row) * greens.block(row, nodes[k]) * rotation(nodes[k]).transpose() +
-                                        left.middleRows(d * row, d) * right.middleRows(d * nodes[k], d).transpose();
+          const Eigen::MatrixXd block =
+              rotation(row) * greens.block(row, nodes[k]) * rotation(nodes[k]).transpose() +
+              left.middleRows(d * row, d) * right.middleRows(d * nodes[k], d).transpose();
           if (row < 4 && k < 20) {
             EXPECT_LT((turned.block(row, nodes[k]) - block).norm(), 1e-14 * block.norm());
           }
           for (int i = 0; i < d; ++i) {
-            for (int j = 0; j < d; ++j) sum[i] += block(i, j) * f[static_cast<std::size_t>(d) * k + static_cast<std::size_t>(j)];
+            for (int j = 0; j < d; ++j)
+              sum[i] += block(i, j) * f[static_cast<std::size_t>(d) * k + static_cast<std::size_t>(j)];
           }
         }
-        for (int i = 0; i < d; ++i) EXPECT_NEAR(u[static_cast<std::size_t>(d * row + i)], sum[i], 1e-12 * largest);
+        for (int i = 0; i < d; ++i)
+          EXPECT_NEAR(u[static_cast<std::size_t>(d * row + i)], sum[i], 1e-12 * largest);
       }
     }
   }
@@ -189,7 +193,9 @@ TEST_P(SurfaceWarpOf, LeavesTheInteriorOut) {
     const int d = GetParam();
     for (std::int64_t i = 0; i < part.stored_dofs(); ++i) {
       for (std::int64_t j = 0; j < part.stored_dofs(); ++j) {
-        const auto dof = [&](std::int64_t k) { return std::int64_t{d} * place[static_cast<std::size_t>(k / d)] + k % d; };
+        const auto dof = [&](std::int64_t k) {
+          return std::int64_t{d} * place[static_cast<std::size_t>(k / d)] + k % d;
+        };
         ASSERT_EQ(part.greens(i, j), all(dof(i), dof(j)));
       }
     }
@@ -209,30 +215,35 @@ TEST(Warping, ACoupleBendsABarToAnArc) {
       std::vector<Vec3> f = face.spread(Vec3::UnitX());
       const Vec3 across(std::cos(angle), std::sin(angle), 0.0);
       for (std::size_t k = 0; k < f.size(); ++k)
-        f[k] = -couple / test::bent_height * (model.mesh.nodes[k].y() / test::bent_height - 0.5) * f[k].x() * across;
+        f[k] = -couple / test::bent_height * (model.mesh.nodes[k].y() / test::bent_height - 0.5) * f[k].x() *
+               across;
       x = law(f);
       angle = face.angle(x);
     }
   }
-  const Vec3 arc(test::bent_length * (std::sin(angle) / angle - 1.0), test::bent_length * (1.0 - std::cos(angle)) / angle, 0);
+  const Vec3 arc(test::bent_length * (std::sin(angle) / angle - 1.0),
+                 test::bent_length * (1.0 - std::cos(angle)) / angle, 0);
   EXPECT_LT((face.moved(x) - arc).norm(), 0.01 * arc.norm()) << angle;
 }
 
-// Stored figures of scripts/studies/warp: against a corotational body of the same mesh, pushed by a force that turns
-// with the end. Small strain leaves 5 % in displacement at 7 degrees; warping stays within 2 % to a right angle, as
-// what is left is that shear and strain are those of the body at rest.
+// Stored figures of scripts/studies/warp: against a corotational body of the same mesh, pushed by a force
+// that turns with the end. Small strain leaves 5 % in displacement at 7 degrees; warping stays within 2 % to
+// a right angle, as what is left is that shear and strain are those of the body at rest.
 TEST(Warping, StaysNearTheCorotationalBodyUpToARightAngle) {
   const Model model = test::bent_model(ElementType::quad4);
   const Body body(warped_model(model), {}, 1, ContactModel::warped);
   const double degree = std::numbers::pi / 180.0;
-  const double force = 1e-6 * 3.0 * degree /
-                       test::bend(model.mesh, test::small_strain(body), test::BendingLoad::follows, 1e-6, 1.0, 1).back().angle;
+  const double force =
+      1e-6 * 3.0 * degree /
+      test::bend(model.mesh, test::small_strain(body), test::BendingLoad::follows, 1e-6, 1.0, 1).back().angle;
   const auto curve = [&](const test::BendingLaw& law, double most) {
     return test::bend(model.mesh, law, test::BendingLoad::follows, force, most * degree, 60);
   };
   const auto truth = curve(test::corotational(model), 93.0), warped = curve(test::warped(body), 100.0),
              linear = curve(test::small_strain(body), 100.0);
-  const auto error = [&](const auto& of, double angle) { return test::bending_error(truth, of, angle * degree, 2); };
+  const auto error = [&](const auto& of, double angle) {
+    return test::bending_error(truth, of, angle * degree, 2);
+  };
   for (const auto& [angle, of_force, of_displacement] :
        {std::array{30.0, 0.0016, 0.0016}, {60.0, 0.0067, 0.0059}, {90.0, 0.0176, 0.0118}}) {
     EXPECT_NEAR(error(warped, angle).force, of_force, 0.002) << angle;

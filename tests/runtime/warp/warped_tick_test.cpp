@@ -17,7 +17,8 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180.0, radius = 0.003;
 
-/// Where a ball is that bends a cantilever down to an arc: it presses on the upper side, at 0.9 of the length.
+/// Where a ball is that bends a cantilever down to an arc: it presses on the upper side, at 0.9 of the
+/// length.
 Vec3 on_arc(double angle) {
   const double s = 0.9 * test::bent_length, k = std::max(angle, 1e-9) / test::bent_length;
   const double turned = k * s, out = 0.5 * test::bent_height + radius;
@@ -29,7 +30,7 @@ struct Played {
   double force = 0.0;       // at the end [N]
   double largest_jump = 0;  // of the force from tick to tick [N]
   double angle = 0.0;       // of the end face [rad]
-  double off = 0.0;         // of the surface against a warp to the end under the same forces, of its displacement
+  double off = 0.0;  // of the surface against a warp to the end under the same forces, of its displacement
 };
 
 /// Bends a body by a ball and waits.
@@ -46,10 +47,6 @@ Played play(const Body& body, double angle, int ticks, int wait) {
     const double now = state.tools[0].wrench.force.norm();
     played.largest_jump = std::max(played.largest_jump, std::abs(now - played.force));
     played.force = now;
-    if (std::getenv("TRACE") && source && (k > 1990 && k < 2026) && body.contact_model() == ContactModel::warped) {
-      const auto w = dynamic_cast<const WarpedMotion&>(source->stepper()).telling();
-      std::printf("%d %.6g  rot %.2f res %.2e unb %ld turns %ld contacts %d\n", k, now, w.last_rotation / degree, w.last_residual, long(w.unbalanced), long(w.turns), int(state.tools[0].contacts)); for (const auto& c : state.contacts()) std::printf("    contact simplex %d gap %.3e force %.4g weights %.3f %.3f held %d n %.3f %.3f  pos %.5f %.5f\n", int(c.simplex), c.gap, c.force.norm(), c.weights[0], c.weights[1], int(c.held), c.frame(0,0), c.frame(1,0), c.position.x(), c.position.y()); std::printf("   status %u tool %.6f %.6f dev %.6f %.6f\n", unsigned(state.status), state.tools[0].pose.position.x(), state.tools[0].pose.position.y(), state.tools[0].device.position.x(), state.tools[0].device.position.y());
-    }
   }
   std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
   surface_displacement(body, state, u);
@@ -77,20 +74,23 @@ Played play(const Body& body, double angle, int ticks, int wait) {
   return played;
 }
 
-// The study and the tick are of one body: at rest the tick's surface is what WarpBalance finds under the tick's
-// forces, and the force on the tool that of the corotational body, bent by the same ball.
+// The study and the tick are of one body: at rest the tick's surface is what WarpBalance finds under the
+// tick's forces, and the force on the tool that of the corotational body, bent by the same ball.
 TEST(WarpedTick, IsWhatTheStudyFindsAndFeelsLikeTheCorotationalBody) {
   const Model model = test::bent_model(ElementType::quad4);
   const Body warped(warped_model(model), {}, 1, ContactModel::warped), linear{Model(model)};
   const Body live = test::live_session(model, {.solver = LiveLaw::corotational, .mass_damping = 20.0});
   for (const double angle : {10.0, 45.0, 80.0, 120.0}) {
-    const Played by_warp = play(warped, angle * degree, 2000, 500), by_live = play(live, angle * degree, 2000, 2000),
+    const Played by_warp = play(warped, angle * degree, 2000, 500),
+                 by_live = play(live, angle * degree, 2000, 2000),
                  by_linear = play(linear, angle * degree, 2000, 100);
-    std::printf("%g degrees: end face at %.1f, %.1f, %.1f; force %.5g corotational, warped %+.2f %%, linear %+.2f %%; off %.1e; "
-                "jump %.2g %%\n",
-                angle, by_live.angle / degree, by_warp.angle / degree, by_linear.angle / degree, by_live.force,
-                100 * (by_warp.force / by_live.force - 1), 100 * (by_linear.force / by_live.force - 1), by_warp.off,
-                100 * by_warp.largest_jump / by_warp.force);
+    std::printf(
+        "%g degrees: end face at %.1f, %.1f, %.1f; force %.5g corotational, warped %+.2f %%, linear %+.2f "
+        "%%; off %.1e; "
+        "jump %.2g %%\n",
+        angle, by_live.angle / degree, by_warp.angle / degree, by_linear.angle / degree, by_live.force,
+        100 * (by_warp.force / by_live.force - 1), 100 * (by_linear.force / by_live.force - 1), by_warp.off,
+        100 * by_warp.largest_jump / by_warp.force);
     EXPECT_LT(by_warp.off, 1e-4);
     EXPECT_NEAR(by_warp.force / by_live.force, 1.0, 0.05);
     EXPECT_NEAR(by_warp.angle / by_live.angle, 1.0, 0.02);
