@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// Of a displaced surface, where each is largest.
+/// The largest rotation and the largest strain on a displaced surface.
 struct SurfaceChange {
   double rotation = 0.0;  ///< by which a simplex has turned [rad]
   double strain = 0.0;    ///< principal strain within a simplex, stretch less 1, without its sign [-]
