@@ -127,7 +127,7 @@ class Greens {
   std::int64_t terms_ = 0;
   std::shared_ptr<const double[]> left_, right_;  // [n x terms_] one and the same for W alone
   struct Turning {
-    std::vector<Mat3> rotations;  // [nodes]
+    std::vector<Mat3> rotations;                                                         // [nodes]
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> left, right;  // [n x terms]
   };
   std::shared_ptr<const Turning> turning_;  // null: none
