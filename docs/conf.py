@@ -56,6 +56,7 @@ CHAPTERS = {
         "overlays",
         "dynamics",
         "live",
+        "warp",
         "probe",
         "viewer",
         "recordings",

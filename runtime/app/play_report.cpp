@@ -6,13 +6,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "base/json_text.h"
 #include "runtime/app/best_effort_report.h"
 #include "runtime/background/live_motion.h"
+#include "runtime/background/warped_motion.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
+#include "runtime/warp/studied_range.h"
+#include "runtime/warp/surface_change.h"
 
 namespace palpate {
 namespace {
@@ -195,6 +201,32 @@ const LiveMotion* live_motion(const PlayedRun& run) {
   return run.motion != nullptr ? dynamic_cast<const LiveMotion*>(&run.motion->stepper()) : nullptr;
 }
 
+const WarpedMotion* warped_motion(const PlayedRun& run) {
+  return run.motion != nullptr ? dynamic_cast<const WarpedMotion*>(&run.motion->stepper()) : nullptr;
+}
+
+constexpr double degrees_a_radian = 180.0 / std::numbers::pi;
+constexpr double most_warp_residual = 1e-3;  // that needs no word
+
+void print_warp(const WarpTelling& warp) {
+  fmt::print(stderr, "warp: the surface turned by up to {:.3g} degrees, its compliance {} times\n",
+             degrees_a_radian * warp.largest_rotation, warp.turns);
+  if (warp.last_residual > most_warp_residual)
+    print_warning(
+        fmt::format("at the end the warped body was not in balance: its next step would have changed "
+                    "it by {:.2g} of its displacement. Its forces bend it further than --warp knows, or "
+                    "it was still moving",
+                    warp.last_residual));
+}
+
+Json json_warp(const WarpTelling& warp) {
+  return {{"largest_rotation_deg", degrees_a_radian * warp.largest_rotation},
+          {"last_rotation_deg", degrees_a_radian * warp.last_rotation},
+          {"compliance_turns", warp.turns},
+          {"steps_unbalanced", warp.unbalanced},
+          {"last_residual", warp.last_residual}};
+}
+
 void print_live(const Body& body, const LiveTelling& live) {
   const LiveCounts& counts = live.counts;
   fmt::print(
@@ -247,8 +279,12 @@ Json json_live(const Body& body, const LiveTelling& live) {
 }
 
 Json json_dynamics(const Body& body, const MotionSource* motion) {
-  Json json = {{"method", body.live() != nullptr ? "live" : name_of(body.model().dynamics.method)},
-               {"contact", body.contact_model() == ContactModel::quasi_static ? "quasi-static" : "dynamic"}};
+  const bool is_warped = body.contact_model() == ContactModel::warped;
+  const bool is_dynamic = !is_warped && body.contact_model() != ContactModel::quasi_static;
+  Json json = {{"method", body.live() != nullptr ? "live"
+                          : is_warped            ? "none"
+                                                 : name_of(body.model().dynamics.method)},
+               {"contact", is_dynamic ? "dynamic" : "quasi-static"}};
   if (motion != nullptr) {
     json["steps"] = motion->steps();
     json["longest_step_s"] = motion->longest_step();
@@ -279,6 +315,28 @@ Json json_safety(const LoopReport& report) {
   Json faults;
   for (std::size_t k = 1; k < fault_names.size(); ++k) faults[fault_names[k].second] = report.faults[k];
   return {{"largest_shown_N", report.largest_shown}, {"faults", faults}};
+}
+
+/// Against the mesh, after the last tick.
+SurfaceChange last_change(const PlayedRun& run) {
+  const Body& body = run.body;
+  std::vector<double> stored(static_cast<std::size_t>(body.greens().order()));
+  std::vector<Vec3> u(body.surface_rest_positions().size());
+  MotionSnapshot motion(body);
+  run.state.surface.motion.snapshot(motion);
+  surface_displacement(body, run.state.surface.near.load(), stored, u, &motion);
+  const std::vector<Vec3> mesh = body.surface_in_mesh();
+  for (std::size_t node = 0; node < u.size(); ++node)
+    u[node] += body.surface_rest_positions()[node] - mesh[node];
+  return surface_change(body, mesh, u);
+}
+
+Json json_surface(const PlayedRun& run) {
+  const SurfaceChange change = last_change(run);
+  const std::optional<double> studied = studied_rotation(run.body);
+  return {{"last_rotation_deg", degrees_a_radian * change.rotation},
+          {"last_strain", change.strain},
+          {"studied_rotation_deg", studied ? Json(degrees_a_radian * *studied) : Json()}};
 }
 
 Json json_device(const PlayedRun& run) {
@@ -321,6 +379,7 @@ void print_report(const PlayedRun& run) {
                1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
   }
   if (const LiveMotion* live = live_motion(run)) print_live(run.body, live->telling());
+  if (const WarpedMotion* warped = warped_motion(run)) print_warp(warped->telling());
   if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
   if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
 }
@@ -355,12 +414,14 @@ std::string json_report(const PlayedRun& run) {
   json["status_ticks"] = status;
   json["best_effort"] = to_json(report.best_effort);
   json["room"] = json_room(run.state);
+  json["surface"] = json_surface(run);
   json["device"] = json_device(run);
   if (run.settings.safety) json["safety"] = json_safety(report);
   if (run.options.device.kind == DeviceChoice::Kind::replay) json["replay"] = json_replay(report.replay);
   if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay.value());
   json["dynamics"] = json_dynamics(run.body, run.motion);
   if (const LiveMotion* live = live_motion(run)) json["live"] = json_live(run.body, live->telling());
+  if (const WarpedMotion* warped = warped_motion(run)) json["warp"] = json_warp(warped->telling());
   if (!run.options.record.empty()) {
     json["recording"] = run.options.record.string();
     json["recording_failed"] = run.recording_failure ? Json(in_one_line(*run.recording_failure)) : Json();

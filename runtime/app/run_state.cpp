@@ -9,6 +9,7 @@
 #include "runtime/body/overlay_rings.h"
 #include "runtime/loop/monitor.h"
 #include "runtime/viewer/run_words.h"
+#include "runtime/warp/studied_range.h"
 
 namespace palpate {
 namespace {
@@ -17,6 +18,10 @@ using Json = nlohmann::json;
 
 Json text_or_null(const std::optional<std::string>& text) {
   return text ? Json(*text) : Json();
+}
+
+Json number_or_null(const std::optional<double>& number) {
+  return number ? Json(*number) : Json();
 }
 
 Json error_or_null(const std::optional<Error>& error) {
@@ -36,6 +41,11 @@ std::string_view name_of(const Names& names, std::size_t number) {
 Json fault_or_null(Fault fault) {
   if (fault == Fault::none) return {};
   return {{"name", name_of(fault_names, static_cast<std::size_t>(fault))}, {"remedy", fault_remedy(fault)}};
+}
+
+Json change_or_null(const std::optional<SurfaceChange>& change) {
+  if (!change) return {};
+  return {{"rotation", change->rotation}, {"strain", change->strain}};
 }
 
 bool has_loads(const Model& model) {
@@ -71,6 +81,7 @@ nlohmann::json to_json(const RunState& state) {
           {"refused", error_or_null(state.refused)},
           {"locked", text_or_null(state.locked)},
           {"fault", fault_or_null(state.fault)},
+          {"change", change_or_null(state.change)},
           {"phase", name_of(safety_phase_names, static_cast<std::size_t>(state.phase))}};
 }
 
@@ -86,9 +97,11 @@ nlohmann::json describe_model(const Body& body, const std::string& file) {
           {"element", traits(model.mesh.element).name},
           {"size", body.bounds().diagonal().norm()},
           {"bounds", {vector(body.bounds().min()), vector(body.bounds().max())}},
-          {"moves", model.dynamics.method != DynamicsMethod::none},
+          {"moves",
+           model.dynamics.method != DynamicsMethod::none && body.contact_model() != ContactModel::warped},
           {"loads", has_loads(model)},
           {"materials", youngs_moduli(model)},
+          {"studied_rotation", number_or_null(studied_rotation(body))},
           {"overlay_rings", overlay_rings(body)},
           {"overlay_refinement", {least_refinement, most_refinement}}};
 }

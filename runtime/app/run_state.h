@@ -10,6 +10,7 @@
 #include "runtime/body/body.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/fault.h"
+#include "runtime/warp/surface_change.h"
 
 namespace palpate {
 
@@ -32,6 +33,7 @@ struct RunState {
   std::optional<std::string> locked;      ///< why settings cannot be changed
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
+  std::optional<SurfaceChange> change{};  ///< of the surface that was shown last
   SettingsText settings;
 };
 

@@ -133,18 +133,21 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   }
   auto session = std::make_unique<PlaySession>(
       std::move(options), *body_, input_,
-      SessionViewer{
-          .control = &control_,
-          .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
-          .pictures =
-              [this](SurfacePicture picture) { server_->show_picture(std::move(picture), body_.get()); },
-          .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
+      SessionViewer{.control = &control_,
+                    .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
+                    .pictures =
+                        [this](SurfacePicture picture) {
+                          take_change(picture.change);
+                          server_->show_picture(std::move(picture), body_.get());
+                        },
+                    .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
   session->latch(latched_);
   const std::lock_guard lock(mutex_);
   state_.settings = settled;
   state_.busy.reset();
   state_.ticks = 0;
   state_.misses = 0;
+  state_.change.reset();
   state_.recording.reset();
   if (!plan.record.empty()) state_.recording = plan.record.string();
   if (!options_.session) {
@@ -358,6 +361,12 @@ void ViewedPlay::take_recording_failure(const Error& reason) {
   state_.recording_failed = reason;
   changed_ = true;
   tell_.notify_all();
+}
+
+/// By the thread that makes pictures; pages are told with the next state.
+void ViewedPlay::take_change(const SurfaceChange& change) {
+  const std::lock_guard lock(mutex_);
+  state_.change = change;
 }
 
 void ViewedPlay::take_ticks(std::span<const TickNote> notes) {

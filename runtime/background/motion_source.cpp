@@ -5,6 +5,7 @@
 
 #include "runtime/background/live_motion.h"
 #include "runtime/background/packed_motion.h"
+#include "runtime/background/warped_motion.h"
 #include "runtime/tick/surface_motion.h"
 
 namespace palpate {
@@ -21,6 +22,7 @@ int processors_beside_the_tick() {
 
 std::unique_ptr<MotionStepper> make_stepper(const Body& body, int jobs) {
   if (body.live() != nullptr) return std::make_unique<LiveMotion>(body);
+  if (body.contact_model() == ContactModel::warped) return std::make_unique<WarpedMotion>(body);
   return std::make_unique<PackedMotion>(body, jobs);
 }
 

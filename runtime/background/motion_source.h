@@ -1,4 +1,4 @@
-// Steps packed dynamics or a live body beside the tick.
+// Steps packed dynamics, a live or a warped body beside the tick.
 #pragma once
 
 #include <atomic>
@@ -19,13 +19,13 @@ struct MotionSourceOptions {
   int jobs = 0;               ///< threads that multiply; 0: one for each processor but one
 };
 
-/// Does the jobs of a state's FreeMotion for a live body or one of packed dynamics: after each tick `post`,
-/// before the next one `receive`. In the background neither waits: a step that is not there in time comes
-/// later, and the body's time stands still meanwhile.
+/// Does the jobs of a state's FreeMotion for a live or warped body or one of packed dynamics: after each tick
+/// `post`, before the next one `receive`. In the background neither waits: a step that is not there in time
+/// comes later, and the body's time stands still meanwhile.
 class MotionSource {
  public:
   /// `body` must live as long; `state` is one that the loop will use, or a copy. Throws Error unless the
-  /// body is live or its dynamics are packed.
+  /// body is live or warped, or its dynamics are packed.
   MotionSource(const Body& body, const State& state, const MotionSourceOptions& options);
   ~MotionSource();
   MotionSource(const MotionSource&) = delete;

@@ -22,6 +22,7 @@ enum class ContactModel : std::uint8_t {
   quasi_static,  ///< the body's stiffness: Xi
   dynamic,       ///< its inertia and viscosity too: K_bar^-1 of one time step (theory.md section 5)
   live,          ///< a live body's: the compliance of one of its steps, of several ticks
+  warped,        ///< Xi turned with the body, which is warped beside the tick
 };
 
 /// The free surface node that is nearest to a point.

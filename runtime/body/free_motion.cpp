@@ -19,6 +19,8 @@ std::int64_t count_ticks(const Body& body, double tick) {
   if (model.dynamics.method == DynamicsMethod::none) return 1;
   const double step = model.dynamics.newmark.time_step;
   const double ticks = std::round(step / tick);
+  if (body.contact_model() == ContactModel::warped)  // its steps are of no time of the body
+    return static_cast<std::int64_t>(std::max(1.0, ticks));
   const bool dynamic = body.contact_model() == ContactModel::dynamic;
   const bool fits = ticks >= 1.0 && std::abs(ticks * tick - step) <= 1e-9 * step;
   if (body.live() != nullptr && !fits) {
@@ -79,7 +81,7 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
       ticks_per_step_(count_ticks(body, tick)),
       decay_(std::exp(-tick * static_cast<double>(ticks_per_step_) / tuning.body.settling)),
       dynamic_contact_(body.contact_model() != ContactModel::quasi_static),
-      active_(body.contact_model() == ContactModel::live),
+      active_(body.contact_model() == ContactModel::live || body.contact_model() == ContactModel::warped),
       phase_(ticks_per_step_),
       pending_(make_let_go(dimension_, room(body, most_loads))),
       job_{.release = make_let_go(dimension_, room(body, most_loads)),

@@ -35,7 +35,7 @@ struct MotionSample {
   std::int64_t step = 0;    ///< of the job that it answers
   std::int64_t let_go = 0;  ///< how many are in it
   std::vector<double> u;    ///< [n] without contact forces at the end of the step after [m]
-  /// What contact forces act by from then on, for a live body; null: the body's Green's functions.
+  /// What contact forces act by from then on, for a live or warped body; null: the body's Green's functions.
   std::shared_ptr<const Greens> compliance{};
   bool is_near_limit = false;  ///< a live body's explicit step is close to the longest stable one
 };

@@ -15,6 +15,7 @@
 #include "base/memory.h"
 #include "matrices/hierarchical.h"
 #include "matrices/hierarchical_product.h"
+#include "runtime/solve/node_vectors.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
@@ -26,7 +27,8 @@ constexpr std::size_t nodes_ahead =
     4;  // of a slice of u, loaded nodes ahead of their use that rows are fetched
 constexpr std::int64_t u_chunk =
     2048;  // doubles of u that stay in the first-level cache while all rows pass by
-constexpr std::int64_t ahead_bytes = 1024;  // how far ahead of its use a row is fetched
+constexpr Index turned_forces = 128, turned_nodes = 64;  // of a part of a turned product
+constexpr std::int64_t ahead_bytes = 1024;               // how far ahead of its use a row is fetched
 
 /// Whole cache lines a row, and an odd number of them, so that equal columns of neighbouring rows do not fall
 /// into one cache set.
@@ -307,7 +309,43 @@ double Greens::rounding() const noexcept {
                                        : std::numeric_limits<double>::epsilon();
 }
 
+Greens Greens::turned(std::vector<Mat3> rotations, const Eigen::MatrixXd& left,
+                      const Eigen::MatrixXd& right) const {
+  Greens other = *this;
+  other.turning_ = std::make_shared<const Turning>(Turning{std::move(rotations), left, right});
+  return other;
+}
+
 void Greens::gather(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
+  gather_unturned(row, columns, blocks);
+  if (turning_ != nullptr) turn_blocks(row, columns, blocks);
+}
+
+void Greens::turn_blocks(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept {
+  const auto d = static_cast<Eigen::Index>(dimension_);
+  const auto width = d * std::ssize(columns);
+  const Mat3& R = turning_->rotations[static_cast<std::size_t>(row)];
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const Mat3& Q = turning_->rotations[static_cast<std::size_t>(columns[k])];
+    double* block = blocks.data() + d * static_cast<Eigen::Index>(k);
+    Mat3 B = Mat3::Zero();
+    for (Eigen::Index i = 0; i < d; ++i) {
+      for (Eigen::Index j = 0; j < d; ++j) B(i, j) = block[i * width + j];
+    }
+    B = R * B * Q.transpose();
+    for (Eigen::Index i = 0; i < d && turning_->left.cols() > 0; ++i) {
+      for (Eigen::Index j = 0; j < d; ++j)
+        B(i, j) += dot(turning_->left.row(d * row + i).data(), turning_->right.row(d * columns[k] + j).data(),
+                       turning_->left.cols());
+    }
+    for (Eigen::Index i = 0; i < d; ++i) {
+      for (Eigen::Index j = 0; j < d; ++j) block[i * width + j] = B(i, j);
+    }
+  }
+}
+
+void Greens::gather_unturned(Index row, std::span<const Index> columns,
+                             std::span<double> blocks) const noexcept {
   gather_static(row, columns, blocks);
   if (terms_ == 0) return;
   const std::int64_t d = dimension_;
@@ -329,6 +367,56 @@ void Greens::displacement(std::span<const Index> nodes, std::span<const double> 
 
 void Greens::displacement(std::span<const Index> nodes, std::span<const double> f,
                           std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
+  if (turning_ != nullptr) return displace_turned(nodes, f, ranges, u);
+  displace_unturned(nodes, f, ranges, u);
+}
+
+/// In parts of forces and of nodes that fit on the stack.
+void Greens::displace_turned(std::span<const Index> nodes, std::span<const double> f,
+                             std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
+  const auto d = static_cast<std::size_t>(dimension_);
+  std::array<double, 3 * turned_forces> turned_force;
+  std::array<double, 3 * turned_nodes> moved;
+  std::array<double, most_turned_terms> sum{};  // right^T f
+  const Eigen::Index terms = turning_->left.cols();
+  for (std::size_t k = 0; k < f.size() && terms > 0; ++k) {
+    const auto dof = static_cast<Eigen::Index>(d) * nodes[k / d] + static_cast<Eigen::Index>(k % d);
+    add(turning_->right.row(dof).data(), f[k], sum.data(), terms);
+  }
+  double* out = u.data();
+  for (const NodeRange& range : ranges) {
+    for (Index first = range.first; first < range.end; first += turned_nodes) {
+      const NodeRange part{first, std::min<Index>(first + turned_nodes, range.end)};
+      const std::size_t dofs = d * static_cast<std::size_t>(part.end - part.first);
+      std::fill_n(out, dofs, 0.0);
+      for (std::size_t begin = 0; begin < nodes.size(); begin += turned_forces) {
+        const std::size_t count = std::min<std::size_t>(turned_forces, nodes.size() - begin);
+        for (std::size_t k = 0; k < count; ++k) {
+          const Mat3& R = turning_->rotations[static_cast<std::size_t>(nodes[begin + k])];
+          const Eigen::Vector3d force =
+              R.transpose() * vector_at(f, dimension_, static_cast<Index>(begin + k));
+          set_vector(turned_force, dimension_, static_cast<Index>(k), force);
+        }
+        displace_unturned(nodes.subspan(begin, count), {turned_force.data(), d * count}, {&part, 1},
+                          {moved.data(), dofs});
+        for (std::size_t k = 0; k < dofs; ++k) out[k] += moved[k];
+      }
+      const std::span<double> slice(out, dofs);
+      for (Index k = 0; k < part.end - part.first; ++k) {
+        const Mat3& R = turning_->rotations[static_cast<std::size_t>(first + k)];
+        set_vector(slice, dimension_, k, R * vector_at(slice, dimension_, k));
+      }
+      for (std::size_t k = 0; k < dofs && terms > 0; ++k)
+        out[k] += dot(
+            turning_->left.row(static_cast<Eigen::Index>(d) * first + static_cast<Eigen::Index>(k)).data(),
+            sum.data(), terms);
+      out += dofs;
+    }
+  }
+}
+
+void Greens::displace_unturned(std::span<const Index> nodes, std::span<const double> f,
+                               std::span<const NodeRange> ranges, std::span<double> u) const noexcept {
   displace_statically(nodes, f, ranges, u);
   if (terms_ > 0) add_exact_terms(nodes, f, ranges, u);
 }

@@ -19,6 +19,9 @@ struct HierarchicalMatrix;
 /// Most terms that come on top of the stored entries.
 inline constexpr std::int64_t most_exact_terms = most_modes + most_smooth_terms;
 
+/// Most terms on top of turned Green's functions.
+inline constexpr Eigen::Index most_turned_terms = 3;
+
 /// How `Greens` is laid out in memory.
 struct GreensOptions {
   int jobs = 0;  ///< threads that unfold; 0: one for each processor
@@ -43,6 +46,11 @@ class Greens {
   /// K_bar^-1 of the modes, and of what they do not carry the static response (theory.md section 5, modal
   /// form with static correction). Modes of the same dofs.
   void add_modes(const Modes& modes, std::span<const double> weights);
+
+  /// R_i Xi_ij R_j^T + left right^T in the same memory: forces and displacement of each node turned by its
+  /// rotation [nodes], and up to `most_turned_terms` terms [n x terms] on top, which are not turned.
+  [[nodiscard]] Greens turned(std::vector<Mat3> rotations, const Eigen::MatrixXd& left = {},
+                              const Eigen::MatrixXd& right = {}) const;
 
   [[nodiscard]] std::int64_t order() const noexcept { return order_; }  ///< n, number of stored dofs
   [[nodiscard]] int dimension() const noexcept { return dimension_; }   ///< d, dofs a node
@@ -92,6 +100,12 @@ class Greens {
                     std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
 
  private:
+  void gather_unturned(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
+  void turn_blocks(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
+  void displace_unturned(std::span<const Index> nodes, std::span<const double> f,
+                         std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
+  void displace_turned(std::span<const Index> nodes, std::span<const double> f,
+                       std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
   void gather_static(Index row, std::span<const Index> columns, std::span<double> blocks) const noexcept;
   void displace_statically(std::span<const Index> nodes, std::span<const double> f,
                            std::span<const NodeRange> ranges, std::span<double> u) const noexcept;
@@ -112,6 +126,11 @@ class Greens {
   bool split_;
   std::int64_t terms_ = 0;
   std::shared_ptr<const double[]> left_, right_;  // [n x terms_] one and the same for W alone
+  struct Turning {
+    std::vector<Mat3> rotations;                                                         // [nodes]
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> left, right;  // [n x terms]
+  };
+  std::shared_ptr<const Turning> turning_;  // null: none
 };
 
 }  // namespace palpate

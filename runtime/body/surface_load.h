@@ -39,7 +39,7 @@ struct SurfaceLoad {
   std::vector<Index> node;
   std::vector<double> force;
   std::shared_ptr<const Patch> patch;        ///< null: no overlay
-  std::shared_ptr<const Greens> compliance;  ///< of a live body that has changed; null: the body's
+  std::shared_ptr<const Greens> compliance;  ///< of a body that has changed; null: the body's
   Index patch_count = 0;                     ///< forces on surface nodes of the patch
   std::vector<Index> patch_place;
   std::vector<double> patch_force;

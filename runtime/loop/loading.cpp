@@ -14,6 +14,7 @@
 #include "runtime/body/scaled_model.h"
 #include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
+#include "runtime/warp/warped_model.h"
 
 namespace palpate {
 namespace {
@@ -33,6 +34,17 @@ void print_loaded(const Body& body, double seconds) {
   }
 }
 
+/// What a warped body is not.
+void check_warp(const BodyOptions& options) {
+  const auto refuse = [](const char* why, const char* option) {
+    throw Error(why, option, std::string("leave out ") + option + " or --warp");
+  };
+  if (options.live.solver)
+    refuse("a live solver turns by itself, and has no Green's functions to warp", "--solver");
+  if (options.refinement > 1) refuse("overlays are of the body at rest, and do not turn", "--overlay");
+  if (options.contact == ContactModel::dynamic) refuse("a warped body has no inertia", "--contact");
+}
+
 }  // namespace
 
 Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
@@ -50,6 +62,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
     print_warning(file.string() + ": " + warning);
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
+  if (options.warp) check_warp(options);
   if (options.live.solver) {
     if (options.refinement > 1) {
       throw Error("overlays refine Green's functions, and a live solver has none", "--overlay",
@@ -62,6 +75,9 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
     auto live = std::make_shared<const LiveParts>(make_live_parts(model, options.live));
     model = live_model(std::move(model), *live, options.live);
     return {std::move(model), std::move(live)};
+  }
+  if (options.warp) {
+    return Body(warped_model(std::move(model)), {}, 1, ContactModel::warped);
   }
   return Body(std::move(model), {}, options.refinement, options.contact);
 }

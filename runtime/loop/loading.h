@@ -17,6 +17,7 @@ struct BodyOptions {
   double load_scale = 1.0;  ///< see scale_loads
   double stiffness_scale = 1.0;
   LiveSettings live{};
+  bool warp = false;  ///< Green's functions turn with the body, see SurfaceWarp
 
   bool operator==(const BodyOptions&) const = default;
 };

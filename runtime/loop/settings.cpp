@@ -261,6 +261,12 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
   visit(Setting{"overlay-memory", group, "MB", "MB", "512", "most memory that overlays may use", megabytes,
                 s.overlay.has_value()},
         s.overlay_memory);
+  visit(
+      Setting{"warp", group, "yes|no", "", "no",
+              "parts of the body that turn take their stiffness with them: for bodies that bend far, without "
+              "a solver",
+              any_number, s.warp},
+      s.warp);
 }
 
 /// Visits the settings of the live solver.
@@ -359,8 +365,8 @@ void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
 /// nothing compiles.
 template <class SomeSettings, class Visitor>
 void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
-  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_memory, live, rate,
-         motion_scale, force_scale, origin, axes, safety] = settings;
+  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_memory, warp, live,
+         rate, motion_scale, force_scale, origin, axes, safety] = settings;
   for_each_tool_setting(tool, visit);
   visit(Setting{"reach", SettingGroup::tool, "METRES", "m", "the longest edge of the surface",
                 "a grab that touches nothing takes hold of the nearest surface within this distance of the "
@@ -444,7 +450,8 @@ BodyOptions Settings::body() const {
           .contact = contact,
           .load_scale = load_scale,
           .stiffness_scale = stiffness_scale,
-          .live = live};
+          .live = live,
+          .warp = warp};
 }
 
 Tool parse_shape(const std::string& text) {

@@ -32,6 +32,7 @@ struct Settings {
   double stiffness_scale = 1.0;                              ///< of all Young's moduli
   std::optional<OverlayOptions> overlay;                     ///< none: the body's own mesh
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
+  bool warp = false;                                         ///< Green's functions turn with the body
   LiveSettings live;                                         ///< a solver in place of Green's functions
   std::int64_t rate = 1000;                                  ///< ticks a second
   double motion_scale = 1.0;                                 ///< as in WorkspaceOptions

@@ -10,6 +10,7 @@ import { History } from './history';
 import { as_hash, keep, keep_theme, kept_of, kept_theme, of_hash, type Kept } from './kept';
 import { on_keys } from './keyboard';
 import { near_limit } from './live_controls';
+import { show_light } from './range_light';
 import { LiveSource, socket_url } from './live_source';
 import { show_felt, show_timing, type Felt } from './numbers';
 import { Picture } from './picture';
@@ -224,6 +225,7 @@ class Page implements Listener {
     show_told(told_of(state, this.mode_, this.lost_));
     if (!state?.model) return;
     this.run_.show(state, this.mode_, this.lost_ === '');
+    show_light(state);
     part('hand').hidden = !this.is_hand();
     document.body.classList.toggle('lost', this.lost_ !== '');
   }

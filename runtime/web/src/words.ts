@@ -28,6 +28,7 @@ export interface Model {
   loads: boolean;
   overlay_rings?: number; // the most that an overlay may have; 0: none may be
   overlay_refinement?: [number, number]; // least and most
+  studied_rotation?: number | null; // up to which forces were found right within 5 % [rad]; null: no bound is known
   materials?: number[]; // Young's moduli [Pa] in the order of their numbers; absent: not known
 }
 
@@ -52,6 +53,7 @@ export interface State {
   fault: { name: string; remedy: string } | null;
   phase: string;
   misses: number;
+  change?: { rotation: number; strain: number } | null; // the largest of the surface [rad], [-]; null: not known
   settings: Record<string, string>;
   defaults: { radius: number; reach: number; friction: number; depth: number };
   session?: string; // name of a recording's file

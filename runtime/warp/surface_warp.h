@@ -1,0 +1,94 @@
+// The surface of a body whose parts turn by what their linear displacement says.
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/body/body.h"
+
+namespace palpate {
+
+/// Takes the linear displacement u of the surface's nodes to x(u), where they are when each simplex of the
+/// surface turns as far as u says (docs/warp.md). A simplex s has the rotation vector
+///
+///   w_s = A_s u,
+///
+/// from the curl of u within it and the tilt of its normal: on a surface without shear tractions that is the
+/// rotation of the body there. Its edges X_ab become t_ab = exp(w_s) (X_ab + u_a - u_b - w_s x X_ab), turned
+/// and with their small strain. Where the nodes are follows from all edges at once,
+///
+///   min_x sum_edges c_ab |x_a - x_b - t_ab|^2, held nodes where they rest,
+///
+/// a sparse system that is factored once (c: half the cotangent of the angle across, in the plane 1 /
+/// length). So rotation adds up along the body: a tip is where all below it have turned it to. x(u) is u to
+/// first order.
+///
+/// Const once made: any number of threads may use it, each with a `Place` of its own.
+class SurfaceWarp {
+ public:
+  /// `body`: all of its stored nodes lie on its surface; it must live as long. Throws Error where a part of
+  /// the surface has no held node along some axis.
+  explicit SurfaceWarp(const Body& body);
+
+  /// What is found on the way from u to x, and memory for it.
+  struct Place {
+    explicit Place(const SurfaceWarp& warp);
+    std::vector<Vec3> u;               ///< [S] linear displacement [m]
+    std::vector<Vec3> w;               ///< [simplices] rotation vectors [rad]
+    std::vector<Mat3> R;               ///< [simplices] exp(w)
+    std::vector<Vec3> x;               ///< [S] x(u) [m]
+    std::array<Eigen::VectorXd, 3> b;  ///< by axis [free nodes along it]: scratch
+  };
+
+  /// Fills `place` for u [n] of the stored nodes.
+  void warp(std::span<const double> u, Place& place) const;
+  /// x(u) less where the nodes rest [n], of the stored nodes.
+  void displacement(const Place& place, std::span<double> moved) const noexcept;
+  /// g = J^T f [n]: what forces f [n] on the stored nodes of the warped body are on the linear one, so that
+  /// they do the same work, J = dx / du at `place` (whose scratch it takes).
+  void pull_back(Place& place, std::span<const double> f, std::span<double> g) const;
+  /// x' = J u' [n], by how much stored nodes move with a change u' [n] of u at `place` (whose scratch it
+  /// takes).
+  void push_forward(Place& place, std::span<const double> du, std::span<double> dx) const;
+  /// Rotations of the stored nodes: exp of the mean w of the simplices around each.
+  void rotations(const Place& place, std::vector<Mat3>& R) const;
+
+  [[nodiscard]] const Body& body() const noexcept { return body_; }
+
+ private:
+  struct Edge {
+    Index a, b;  // surface nodes
+    double c;    // weight
+    Vec3 X;      // from b to a at rest [m]
+  };
+  /// Its edges, and h_k and N of w = sum_k N (h_k . u_k) / 2 - h_k (N . u_k).
+  struct Simplex {
+    std::array<Index, 3> nodes;
+    std::array<Vec3, 3> h;
+    Vec3 N;
+    double size;  // area, in the plane length [m^2, m]
+    std::array<Edge, 3> edges;
+  };
+  using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
+
+  void add_triangle(const std::array<Index, 3>& nodes);
+  void add_line(Index a, Index b);
+  void number_free_nodes();
+  void check_held() const;
+  void factor();
+  void solve(std::array<Eigen::VectorXd, 3>& b, std::vector<Vec3>& x) const;
+  [[nodiscard]] Vec3 rotation(const Simplex& simplex, const std::vector<Vec3>& u) const noexcept;
+
+  const Body& body_;
+  int dimension_;
+  std::vector<Simplex> simplices_;
+  std::array<std::vector<Index>, 3>
+      free_;  // [S] by axis: number among those that can move along it, -1: held
+  std::array<Index, 3> free_count_{};
+  std::array<std::unique_ptr<Factor>, 3> factor_;
+};
+
+}  // namespace palpate
