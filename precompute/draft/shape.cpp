@@ -15,12 +15,14 @@
 namespace palpate {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, ShapeKind>, 6> endings = {{{".stl", ShapeKind::surface},
+constexpr std::array<std::pair<std::string_view, ShapeKind>, 8> endings = {{{".stl", ShapeKind::surface},
                                                                             {".obj", ShapeKind::surface},
                                                                             {".ply", ShapeKind::surface},
                                                                             {".off", ShapeKind::surface},
                                                                             {".inr", ShapeKind::image},
-                                                                            {".inr.gz", ShapeKind::image}}};
+                                                                            {".inr.gz", ShapeKind::image},
+                                                                            {".nii", ShapeKind::image},
+                                                                            {".nii.gz", ShapeKind::image}}};
 constexpr double staircase = 1.5;
 
 /// The ending in small letters that a name has, or null.

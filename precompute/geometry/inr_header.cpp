@@ -1,20 +1,16 @@
 #include "precompute/geometry/inr_header.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "base/error.h"
-#include "base/regular_file.h"
 #include "base/words.h"
+#include "precompute/geometry/unpacked_file.h"
 
 namespace palpate {
 namespace {
@@ -23,18 +19,6 @@ constexpr std::string_view magic = "#INRIMAGE-4#{";
 constexpr std::string_view header_end = "##}";
 constexpr std::size_t largest_header = 65'536;
 const char* const complete_file = "use a complete INR file (.inr, .inr.gz) with one label a voxel";
-
-using GzFile = std::unique_ptr<gzFile_s, int (*)(gzFile)>;
-
-/// Reads plain files as they are, gzipped ones unpacked.
-GzFile open_unpacked(const std::filesystem::path& file) {
-  const int fd = open_regular_file(file, O_RDONLY);
-  GzFile stream(gzdopen(fd, "rb"), gzclose);
-  if (!stream) {
-    throw Error("there is no memory to read the file", file.string(), "close other programs and try again");
-  }
-  return stream;
-}
 
 /// A field's value that is a whole number from 1; `fallback` where the header lacks the field.
 std::int64_t field(std::string_view header, std::string_view name, std::int64_t fallback,
@@ -58,18 +42,6 @@ std::int64_t field(std::string_view header, std::string_view name, std::int64_t 
   return value;
 }
 
-/// Bytes from here to the end, or `enough` where there are more.
-std::int64_t count_bytes(gzFile_s* stream, std::int64_t enough) {
-  std::vector<char> chunk(1 << 20);
-  std::int64_t count = 0;
-  while (count < enough) {
-    const int size = gzread(stream, chunk.data(), static_cast<unsigned>(chunk.size()));
-    if (size <= 0) break;
-    count += size;
-  }
-  return count;
-}
-
 }  // namespace
 
 std::int64_t check_inr_header(const std::filesystem::path& file) {
@@ -91,11 +63,7 @@ std::int64_t check_inr_header(const std::filesystem::path& file) {
     voxels *= static_cast<double>(size);
     product += fmt::format("{}{} {}", product.empty() ? "" : " x ", name, size);
   }
-  if (voxels > static_cast<double>(most_voxels)) {
-    throw Error(fmt::format("the image's header asks for {} = {:.3g} voxels; {:.1g} are read at most",
-                            product, voxels, static_cast<double>(most_voxels)),
-                where, "crop the image or scale it down, or correct the header");
-  }
+  check_voxels(product, voxels, where);
   const std::int64_t bits = field(header, "PIXSIZE", 8, where);
   if (bits > 64) {
     throw Error(fmt::format("PIXSIZE of the image's header is {} bits", bits), where, complete_file);

@@ -6,9 +6,6 @@
 
 namespace palpate {
 
-/// Voxels that an image may have; a whole-body CT has 1e9.
-constexpr std::int64_t most_voxels = 1'000'000'000;
-
 /// Bytes that the reader of an image will hold: the file's, or those of a gzipped one unpacked. Throws Error
 /// with the field's name when the file is an INR image (plain or gzipped) whose dimensions are below 1, come
 /// to more than most_voxels, or ask for more bytes than the file holds. Other files are left to their reader.

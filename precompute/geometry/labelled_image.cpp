@@ -14,27 +14,24 @@
 #include "base/error.h"
 #include "base/regular_file.h"
 #include "base/words.h"
+#include "precompute/geometry/image_labels.h"
 #include "precompute/geometry/inr_header.h"
+#include "precompute/geometry/nifti_image.h"
 
 namespace palpate {
 namespace {
 
 constexpr double largest_spacing_ratio = 100.0;  // slices of 5 mm with pixels of 0.1 mm have 50
 constexpr double voxels_per_edge = 20.0;
+constexpr double least_turn = 0.1;  // of the image's axes that is told [degrees]
 const char* const complete_file =
-    "use a complete INR file (.inr, .inr.gz) with one label a voxel and positive VX, VY, VZ";
+    "use a complete INR or NIfTI file (.inr, .inr.gz, .nii, .nii.gz) with one label per voxel and positive "
+    "VX, "
+    "VY, VZ or pixdim";
 constexpr std::size_t smallest_speck = 8;  // [voxels] less would be smoothed away
 
-enum ReadStatus : int { read_ok = 0, not_an_image = 1, not_scalar = 2 };
-
-struct ImageHeader {
-  std::array<Index, 3> size{};
-  std::array<double, 3> spacing{};
-  std::array<double, 3> origin{};
-};
-
-/// Reads the image and sends its header and its voxels as labels.
-ChildResult read_labels(const std::string& file) {
+/// Reads an INR image and sends its header and its voxels as labels.
+ChildResult read_inr_labels(const std::string& file) {
   CGAL::Image_3 image;
   if (!image.read(file) || image.size() == 0) {
     return {not_an_image, {}};
@@ -57,31 +54,28 @@ ChildResult read_labels(const std::string& file) {
       }
     }
   }
-  ChildResult result;
-  append_array(result.bytes, std::span<const ImageHeader>(&header, 1));
-  append_array(result.bytes, std::span<const std::int32_t>(labels));
-  return result;
+  return image_labels(header, labels);
 }
 
 /// Refuses voxel sides and an origin that no image has.
 void check_geometry(const VoxelGrid& grid, const std::string& where) {
   const double smallest = grid.spacing.minCoeff(), largest = grid.spacing.maxCoeff();
   if (!(smallest > 1e-30 && largest < 1e30 && largest <= largest_spacing_ratio * smallest)) {
-    throw Error(fmt::format("the voxels' sides VX, VY, VZ are {}, {}, {}", shown(grid.spacing[0]),
+    throw Error(fmt::format("the voxels' sides (VX, VY, VZ; pixdim) are {}, {}, {}", shown(grid.spacing[0]),
                             shown(grid.spacing[1]), shown(grid.spacing[2])),
                 where,
                 fmt::format("they must be positive, and none more than {} times another: correct the header",
                             largest_spacing_ratio));
   }
   if (!(grid.origin.cwiseAbs().maxCoeff() < 1e12 * largest)) {
-    throw Error(fmt::format("the image's origin TX, TY, TZ is ({}, {}, {})", shown(grid.origin[0]),
-                            shown(grid.origin[1]), shown(grid.origin[2])),
+    throw Error(fmt::format("the image's origin (TX, TY, TZ; sform, qform) is ({}, {}, {})",
+                            shown(grid.origin[0]), shown(grid.origin[1]), shown(grid.origin[2])),
                 where, "correct the header");
   }
 }
 
 /// Marks the voxels that carry one of the labels (all but 0 where none are listed).
-VoxelBody select(const Bytes& bytes, const ImageGeometry& image) {
+VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std::string>& notes) {
   const std::string where = image.file.string();
   const std::vector<int>& wanted = image.labels;
   std::span<const std::byte> rest = bytes;
@@ -99,6 +93,9 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image) {
     fail_on_answer();
   }
   check_geometry(body, where);
+  if (header.turned > least_turn)
+    notes.push_back(fmt::format(
+        "the image is turned by {:.1f} degrees in space; the body has the image's axes", header.turned));
 
   std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
   body.inside.reserve(labels.size());
@@ -138,19 +135,22 @@ VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                               std::vector<std::string>& notes) {
   const std::string where = image.file.string();
   check_regular_file(image.file, "Check image = \"...\" in [geometry]");
-  // in a child: CGAL's reader prints on the screen, and crashes on some damaged files
+  const bool nifti = is_nifti(image.file);
+  // in a child: readers print on the screen, and CGAL's crashes on some damaged files
   const std::string path = std::filesystem::absolute(image.file).string();
-  const ChildTask task = {.name = "the image reader",
-                          .where = where,
-                          .limits = reading_limits(check_inr_header(image.file)),
-                          .hint = complete_file};
-  const ChildResult read = run_in_child(task, [&] { return read_labels(path); });
+  const ChildTask task = {
+      .name = "the image reader",
+      .where = where,
+      .limits = reading_limits(nifti ? check_nifti_header(image.file) : check_inr_header(image.file)),
+      .hint = complete_file};
+  const ChildResult read =
+      run_in_child(task, [&] { return nifti ? read_nifti_labels(path) : read_inr_labels(path); });
   if (read.status != read_ok) {
     throw Error(
         read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
         where, complete_file);
   }
-  VoxelBody body = crop(select(read.bytes, image), 2);
+  VoxelBody body = crop(select(read.bytes, image, notes), 2);
   if (edge_length * voxels_per_edge < body.spacing.minCoeff()) {
     throw Error(
         fmt::format("edge_length is {} of the image's units, its voxels are {} x {} x {}", shown(edge_length),

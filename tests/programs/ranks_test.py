@@ -186,6 +186,12 @@ class Distributed(RanksTest):
         text = cube_toml(3, scope="full") + '[dynamics]\nmethod = "packed"\n'
         self.check(self.write("model.toml", text), 2, matrices=("greens/packed", "dynamics/inverse"))
 
+    def test_modes(self):
+        model = self.write("model.toml", cube_toml(4) + '[dynamics]\nmethod = "modal"\nmodes = 30\n')
+        self.check(model, 2, matrices=("greens/packed", "dynamics/modes/omega"))
+        result = run(PRECOMPUTE, "verify", self.bake(3, model))
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+
     def test_compressed_is_verified(self):
         model = self.write("model.toml", cube_toml(4).replace('precision = "double"\n', 'compression = "h2"\n'))
         result = run(PRECOMPUTE, "verify", self.bake(2, model))

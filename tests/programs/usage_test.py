@@ -58,6 +58,21 @@ def png(width, height):
         chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
+def nii(size):
+    """A ball as NIfTI; x and z run backwards."""
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, 3, size, size, size, 1, 1, 1, 1)
+    struct.pack_into("<2h", header, 70, 2, 8)
+    struct.pack_into("<8f", header, 76, 1, 1, 1, 1, 0, 0, 0, 0)
+    struct.pack_into("<f", header, 108, 352)
+    header[123] = 2
+    struct.pack_into("<h", header, 254, 1)
+    struct.pack_into("<12f", header, 280, -1, 0, 0, size, 0, 1, 0, 0, 0, 0, -1, size)
+    header[344:348] = b"n+1\0"
+    return bytes(header) + inr(size)[256:]
+
+
 def inr(size):
     """A ball of label 1."""
     head = f"#INRIMAGE-4#{{\nXDIM={size}\nYDIM={size}\nZDIM={size}\nVDIM=1\nTYPE=unsigned fixed\nPIXSIZE=8 bits\nCPU=decm\nVX=1\nVY=1\nVZ=1\n"
@@ -161,7 +176,8 @@ class NotADescription(ProgramTest):
                 self.assertTrue((self.folder / (name.split(".")[0] + ".palpate.hdf")).exists())
 
     def test_surfaces_and_images_get_one_by_themselves(self):
-        for name, content in (("cube.off", OFF.encode()), ("ball.inr", inr(40)), ("ball2.inr.gz", gzip.compress(inr(40)))):
+        for name, content in (("cube.off", OFF.encode()), ("ball.inr", inr(40)), ("ball2.inr.gz", gzip.compress(inr(40))),
+                              ("ball3.nii", nii(40)), ("ball4.nii.gz", gzip.compress(nii(40)))):
             with self.subTest(name=name):
                 (self.folder / name).write_bytes(content)
                 result = run(PRECOMPUTE, name, "--surface-nodes", "300", cwd=self.folder)

@@ -16,6 +16,7 @@ const mark = 'palpate beside';
 interface Letter {
   mark: typeof mark;
   shared: Shared | null; // null: the page is there and asks what the other one has, or that was all of it
+  leads?: boolean; // with the latter: what this page has from the beginning counts for both
 }
 
 function letter_of(event: MessageEvent<unknown>): Letter | null {
@@ -37,6 +38,7 @@ export class Neighbour {
   readonly is_there = has_neighbour();
   private readonly known_ = new Map<string, string>(); // what both have, and the range that was said
   private has_begun_ = false; // until then the other one's is what counts
+  private leads_ = false;
 
   /** `begun`: the other one's was all heard. */
   constructor(hear: (shared: Shared) => void, begun: () => void) {
@@ -46,6 +48,7 @@ export class Neighbour {
       if (event.source !== window.parent || !letter) return;
       if (!letter.shared) {
         this.has_begun_ = true;
+        this.leads_ = letter.leads === true;
         begun();
         return;
       }
@@ -63,8 +66,10 @@ export class Neighbour {
   say(shared: Shared): void {
     const text = JSON.stringify(shared);
     if (!this.has_begun_ || this.known_.get(shared.about) === text) return;
+    // Both would say what they begin with, and each take the other's.
+    const follows = !this.leads_ && !this.known_.has(shared.about) && (shared.about === 'eye' || shared.about === 'look');
     this.known_.set(shared.about, text);
-    this.post(shared);
+    if (!follows) this.post(shared);
   }
 
   /** What came of what was heard is what both have: it is not said again. */
@@ -77,7 +82,7 @@ export class Neighbour {
   }
 }
 
-/** The page that has both in it, and carries what one says to the other. Which is there first leads the other one. */
+/** The page that has both in it, and carries what one says to the other. Both begin with what the first one has. */
 export class Beside {
   private readonly panes_: HTMLIFrameElement[];
   private readonly said_ = new Map<string, Shared>(); // last of each, and of both for ranges
@@ -101,12 +106,12 @@ export class Beside {
         this.carry(1 - from, letter.shared);
       } else {
         for (const [what, shared] of this.said_) if (what !== `range of ${from}`) this.carry(from, shared);
-        this.carry(from, null);
+        this.carry(from, null, from === 0);
       }
     });
   }
 
-  private carry(to: number, shared: Shared | null): void {
-    this.panes_[to]?.contentWindow?.postMessage({ mark, shared } satisfies Letter, location.origin);
+  private carry(to: number, shared: Shared | null, leads = false): void {
+    this.panes_[to]?.contentWindow?.postMessage({ mark, shared, leads } satisfies Letter, location.origin);
   }
 }

@@ -1,0 +1,238 @@
+#include "precompute/geometry/nifti_image.h"
+
+#include <fmt/format.h>
+#include <nifti2_io.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "precompute/geometry/unpacked_file.h"
+
+namespace palpate {
+namespace {
+
+using Image = std::unique_ptr<nifti_image, void (*)(nifti_image*)>;
+
+/// A number at an offset of a header of either byte order.
+template <class T>
+T number_at(std::span<const char> header, std::size_t offset, bool swapped) {
+  std::array<char, sizeof(T)> bytes{};
+  std::memcpy(bytes.data(), header.data() + offset, sizeof(T));
+  if (swapped) std::ranges::reverse(bytes);
+  return std::bit_cast<T>(bytes);
+}
+
+/// What a header says of the voxels.
+struct Dimensions {
+  std::array<std::int64_t, 8> dim{};  // their number, then each
+  std::int64_t bits = 0;              // of a voxel
+  double offset = 0.0;                // of the first voxel in the file [byte]
+};
+
+std::optional<Dimensions> read_dimensions(std::span<const char> header) {
+  constexpr std::int32_t size_1 = 348, size_2 = 540;
+  if (header.size() < size_1) return {};
+  for (const bool swapped : {false, true}) {
+    const auto size = number_at<std::int32_t>(header, 0, swapped);
+    Dimensions result;
+    if (size == size_1 && std::string_view(header.data() + 344, 3) == "n+1") {
+      for (std::size_t i = 0; i < 8; ++i)
+        result.dim.at(i) = number_at<std::int16_t>(header, 40 + 2 * i, swapped);
+      result.bits = number_at<std::int16_t>(header, 72, swapped);
+      result.offset = static_cast<double>(number_at<float>(header, 108, swapped));
+      return result;
+    }
+    if (size == size_2 && header.size() >= size_2 && std::string_view(header.data() + 4, 3) == "n+2") {
+      for (std::size_t i = 0; i < 8; ++i)
+        result.dim.at(i) = number_at<std::int64_t>(header, 16 + 8 * i, swapped);
+      result.bits = number_at<std::int16_t>(header, 14, swapped);
+      result.offset = static_cast<double>(number_at<std::int64_t>(header, 168, swapped));
+      return result;
+    }
+  }
+  return {};
+}
+
+template <class T>
+std::vector<std::int32_t> rounded(const nifti_image& image, std::size_t voxels) {
+  const bool scaled =
+      image.scl_slope != 0.0 && std::isfinite(image.scl_slope) && std::isfinite(image.scl_inter);
+  const double slope = scaled ? image.scl_slope : 1.0, shift = scaled ? image.scl_inter : 0.0;
+  constexpr double most = 2147483647.0;
+  std::vector<std::int32_t> labels;
+  labels.reserve(voxels);
+  for (const T value : std::span(static_cast<const T*>(image.data), voxels)) {
+    const double label = slope * static_cast<double>(value) + shift;
+    labels.push_back(
+        static_cast<std::int32_t>(std::lround(std::isnan(label) ? 0.0 : std::clamp(label, -most, most))));
+  }
+  return labels;
+}
+
+/// The voxels as labels; none for colours and complex numbers.
+std::vector<std::int32_t> labels_of(const nifti_image& image, std::size_t voxels) {
+  switch (image.datatype) {
+    case NIFTI_TYPE_UINT8:
+      return rounded<std::uint8_t>(image, voxels);
+    case NIFTI_TYPE_INT8:
+      return rounded<std::int8_t>(image, voxels);
+    case NIFTI_TYPE_UINT16:
+      return rounded<std::uint16_t>(image, voxels);
+    case NIFTI_TYPE_INT16:
+      return rounded<std::int16_t>(image, voxels);
+    case NIFTI_TYPE_UINT32:
+      return rounded<std::uint32_t>(image, voxels);
+    case NIFTI_TYPE_INT32:
+      return rounded<std::int32_t>(image, voxels);
+    case NIFTI_TYPE_UINT64:
+      return rounded<std::uint64_t>(image, voxels);
+    case NIFTI_TYPE_INT64:
+      return rounded<std::int64_t>(image, voxels);
+    case NIFTI_TYPE_FLOAT32:
+      return rounded<float>(image, voxels);
+    case NIFTI_TYPE_FLOAT64:
+      return rounded<double>(image, voxels);
+    default:
+      return {};
+  }
+}
+
+double millimetres(int unit) {
+  if (unit == NIFTI_UNITS_METER) return 1e3;
+  return unit == NIFTI_UNITS_MICRON ? 1e-3 : 1.0;
+}
+
+/// Which axis of the image runs along each of space, and whether backwards.
+struct Axes {
+  std::array<std::size_t, 3> from{};
+  std::array<bool, 3> backwards{};
+};
+
+Axes axes_of(const nifti_dmat44& to_space) {
+  std::array<int, 3> codes{};
+  nifti_dmat44_to_orientation(to_space, &codes[0], &codes[1], &codes[2]);
+  Axes axes{{0, 1, 2}, {}};
+  if (std::ranges::find(codes, 0) != codes.end()) return axes;  // a singular matrix
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto along = static_cast<std::size_t>((codes.at(axis) - NIFTI_L2R) / 2);
+    axes.from.at(along) = axis;
+    axes.backwards.at(along) = (codes.at(axis) - NIFTI_L2R) % 2 == 1;
+  }
+  return axes;
+}
+
+/// The image along the axes of space.
+ChildResult along_space(const nifti_image& image, const std::array<std::size_t, 3>& size,
+                        const std::vector<std::int32_t>& labels) {
+  const nifti_dmat44& to_space = image.sform_code > 0 ? image.sto_xyz : image.qto_xyz;
+  const Axes axes = axes_of(to_space);
+  const double unit = millimetres(image.xyz_units);
+  Eigen::Matrix3d directions;
+  Eigen::Vector3d corner;
+  for (int row = 0; row < 3; ++row) {
+    corner[row] = to_space.m[row][3];
+    for (int column = 0; column < 3; ++column) directions(row, column) = to_space.m[row][column];
+  }
+  const std::array<std::size_t, 3> stride = {1, size[0], size[0] * size[1]};
+  ImageHeader header;
+  std::array<std::ptrdiff_t, 3> step{};
+  std::ptrdiff_t first = 0;
+  for (std::size_t along = 0; along < 3; ++along) {
+    const std::size_t from = axes.from.at(along);
+    const auto column = directions.col(static_cast<Eigen::Index>(from));
+    const auto count = static_cast<std::ptrdiff_t>(size.at(from)),
+               pace = static_cast<std::ptrdiff_t>(stride.at(from));
+    header.size.at(along) = static_cast<Index>(count);
+    header.spacing.at(along) = unit * column.norm();
+    const double cosine = std::abs(column[static_cast<Eigen::Index>(along)]) / column.norm();
+    header.turned = std::max(header.turned, std::acos(std::min(cosine, 1.0)) * 180.0 / std::numbers::pi);
+    const bool backwards = axes.backwards.at(along);
+    step.at(along) = backwards ? -pace : pace;
+    if (!backwards) continue;
+    first += (count - 1) * pace;
+    corner += static_cast<double>(count - 1) * column;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    header.origin.at(axis) = unit * corner[static_cast<Eigen::Index>(axis)];
+  std::vector<std::int32_t> turned;
+  turned.reserve(labels.size());
+  for (std::ptrdiff_t k = 0; k < header.size[2]; ++k)
+    for (std::ptrdiff_t j = 0; j < header.size[1]; ++j)
+      for (std::ptrdiff_t i = 0; i < header.size[0]; ++i)
+        turned.push_back(labels[static_cast<std::size_t>(first + i * step[0] + j * step[1] + k * step[2])]);
+  return image_labels(header, turned);
+}
+
+}  // namespace
+
+bool is_nifti(const std::filesystem::path& file) {
+  std::string name = file.filename().string();
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name.ends_with(".nii") || name.ends_with(".nii.gz");
+}
+
+std::int64_t check_nifti_header(const std::filesystem::path& file) {
+  const std::string where = file.string();
+  const auto file_bytes = static_cast<std::int64_t>(std::filesystem::file_size(file));
+  const GzFile stream = open_unpacked(file);
+  std::vector<char> header(540);
+  header.resize(static_cast<std::size_t>(
+      std::max(0, gzread(stream.get(), header.data(), static_cast<unsigned>(header.size())))));
+  const std::optional<Dimensions> said = read_dimensions(header);
+  if (!said) return file_bytes;
+  const auto& [dim, bits, offset] = *said;
+  double voxels = 1.0;
+  std::string product;
+  for (std::size_t i = 1; i <= static_cast<std::size_t>(std::clamp<std::int64_t>(dim[0], 0, 7)); ++i) {
+    if (dim.at(i) < 1)
+      throw Error(fmt::format("dim[{}] of the image's header is {}, not a whole number from 1", i, dim.at(i)),
+                  where, "correct the header");
+    voxels *= static_cast<double>(dim.at(i));
+    product += fmt::format("{}{}", product.empty() ? "" : " x ", dim.at(i));
+  }
+  check_voxels(product, voxels, where);
+  const double needed = offset + voxels * static_cast<double>(bits) / 8.0;
+  if (!(bits >= 0 && bits <= 256 && offset >= 0.0 && offset < 1e9))
+    throw Error(fmt::format("bitpix and vox_offset of the image's header are {} and {}", bits, offset), where,
+                "correct the header");
+  const auto bytes = static_cast<std::int64_t>(std::ceil(needed));
+  const auto read = std::ssize(header);
+  const std::int64_t present = read + count_bytes(stream.get(), bytes - read);
+  if (present < bytes)
+    throw Error(
+        fmt::format("the image's header asks for {} voxels of {} bits, {} bytes, but the file has only {} "
+                    "bytes",
+                    product, bits, bytes, present),
+        where, "get the whole file, or correct the header");
+  return std::max(file_bytes, bytes);
+}
+
+ChildResult read_nifti_labels(const std::string& file) {
+  nifti_set_debug_level(0);
+  const Image image(nifti_image_read(file.c_str(), 1), nifti_image_free);
+  if (!image || image->data == nullptr) return {not_an_image, {}};
+  std::array<std::size_t, 3> size{};
+  std::size_t voxels = 1;
+  for (int i = 0; i < 3; ++i) {
+    size.at(static_cast<std::size_t>(i)) = i < image->ndim ? static_cast<std::size_t>(image->dim[i + 1]) : 1;
+    voxels *= size.at(static_cast<std::size_t>(i));
+  }
+  if (voxels != static_cast<std::size_t>(image->nvox)) return {not_scalar, {}};
+  const std::vector<std::int32_t> labels = labels_of(*image, voxels);
+  if (labels.empty()) return {not_scalar, {}};
+  return along_space(*image, size, labels);
+}
+
+}  // namespace palpate

@@ -1,0 +1,281 @@
+// Labelled images in NIfTI: bytes written here by the format's definition, against the same image as INR.
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "precompute/geometry/labelled_image.h"
+#include "precompute/geometry/nifti_image.h"
+#include "tests/support/geometry_shapes.h"
+
+namespace palpate::nifti_test {
+namespace {
+
+using testing::error_of;
+using testing::expect_mentions;
+using testing::TempFolder;
+
+constexpr std::array<int, 3> size = {9, 8, 7};
+const Vec3 spacing(1.0, 1.5, 2.0), origin(10.0, -20.0, 30.0);
+
+/// A body without symmetry: a block with an arm along each axis, of different labels and lengths.
+int label_at(int i, int j, int k) {
+  const auto within = [](int x, int low, int high) { return x >= low && x <= high; };
+  if (within(i, 1, 3) && within(j, 1, 3) && within(k, 1, 3)) return 1;
+  if (within(i, 4, 7) && within(j, 1, 2) && within(k, 1, 2)) return 2;
+  if (within(i, 1, 2) && within(j, 4, 6) && within(k, 2, 3)) return 3;
+  if (within(i, 2, 3) && within(j, 2, 3) && within(k, 4, 5)) return 4;
+  return 0;
+}
+
+/// How the image lies in a file.
+struct Layout {
+  std::array<int, 3> axis = {0, 1, 2};  // of space, along which each of the file's runs
+  std::array<bool, 3> backwards{};
+  int version = 1;
+  bool swapped = false;                    // byte order
+  int datatype = 2;                        // 2 uint8, 4 int16, 16 float32
+  float slope = 0.0F;                      // 0: values are labels
+  int units = 2;                           // 1 metres, 2 millimetres, 3 micrometres
+  double unit = 1.0;                       // of the file's lengths [mm]
+  double turn = 0.0;                       // of the whole about z [rad]
+  std::array<int, 4> more = {1, 1, 1, 1};  // dimensions beyond three
+};
+
+class Writer {
+ public:
+  explicit Writer(bool swapped) : swapped_(swapped) {}
+
+  template <class T>
+  void put(std::size_t offset, T value) {
+    auto bytes = std::bit_cast<std::array<char, sizeof(T)>>(value);
+    if (swapped_) std::ranges::reverse(bytes);
+    text_.resize(std::max(text_.size(), offset + sizeof(T)), '\0');
+    std::ranges::copy(bytes, text_.begin() + static_cast<std::ptrdiff_t>(offset));
+  }
+  template <class T>
+  void add(T value) {
+    put(text_.size(), value);
+  }
+  void text(std::size_t offset, const std::string& what) {
+    for (std::size_t i = 0; i < what.size(); ++i) put(offset + i, what[i]);
+  }
+  [[nodiscard]] const std::string& bytes() const { return text_; }
+
+ private:
+  bool swapped_;
+  std::string text_;
+};
+
+/// Rows of the file's matrix, from voxel numbers to space.
+std::array<std::array<double, 4>, 3> matrix_of(const Layout& layout) {
+  Eigen::Matrix3d columns = Eigen::Matrix3d::Zero();
+  Vec3 corner = origin;
+  for (int s = 0; s < 3; ++s) {
+    const auto at = static_cast<std::size_t>(s);
+    const int axis = layout.axis.at(at);
+    columns(axis, s) = (layout.backwards.at(at) ? -1.0 : 1.0) * spacing[axis];
+    if (layout.backwards.at(at))
+      corner[axis] += (size.at(static_cast<std::size_t>(axis)) - 1) * spacing[axis];
+  }
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(layout.turn, Vec3::UnitZ()).toRotationMatrix();
+  columns = turn * columns / layout.unit;
+  corner = turn * corner / layout.unit;
+  std::array<std::array<double, 4>, 3> rows{};
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t c = 0; c < 4; ++c)
+      rows.at(r).at(c) =
+          c < 3 ? columns(static_cast<int>(r), static_cast<int>(c)) : corner[static_cast<int>(r)];
+  return rows;
+}
+
+std::string nifti(const Layout& layout) {
+  Writer file(layout.swapped);
+  const bool first = layout.version == 1;
+  const int bits = layout.datatype == 2 ? 8 : layout.datatype == 4 ? 16 : 32;
+  std::array<std::int64_t, 8> dim = {3};
+  for (std::size_t s = 0; s < 3; ++s) dim.at(s + 1) = size.at(static_cast<std::size_t>(layout.axis.at(s)));
+  for (std::size_t s = 0; s < 4; ++s) dim.at(s + 4) = layout.more.at(s);
+  if (layout.more != std::array<int, 4>{1, 1, 1, 1}) dim[0] = 7;
+  const auto rows = matrix_of(layout);
+  std::array<double, 8> sides = {1.0};
+  for (std::size_t s = 0; s < 3; ++s) sides.at(s + 1) = spacing[layout.axis.at(s)] / layout.unit;
+  if (first) {
+    file.put<std::int32_t>(0, 348);
+    for (std::size_t i = 0; i < 8; ++i) {
+      file.put(40 + 2 * i, static_cast<std::int16_t>(dim.at(i)));
+      file.put(76 + 4 * i, static_cast<float>(sides.at(i)));
+    }
+    file.put(70, static_cast<std::int16_t>(layout.datatype));
+    file.put(72, static_cast<std::int16_t>(bits));
+    file.put(108, 352.0F);
+    file.put(112, layout.slope);
+    file.put(123, static_cast<char>(layout.units));
+    file.put<std::int16_t>(254, 1);  // sform_code: scanner
+    for (std::size_t r = 0; r < 3; ++r)
+      for (std::size_t c = 0; c < 4; ++c)
+        file.put(280 + 16 * r + 4 * c, static_cast<float>(rows.at(r).at(c)));
+    file.text(344, std::string("n+1\0", 4));
+    file.put<std::int32_t>(348, 0);
+  } else {
+    file.put<std::int32_t>(0, 540);
+    file.text(4, std::string("n+2\0\r\n\x1a\n", 8));
+    file.put(12, static_cast<std::int16_t>(layout.datatype));
+    file.put(14, static_cast<std::int16_t>(bits));
+    for (std::size_t i = 0; i < 8; ++i) {
+      file.put(16 + 8 * i, dim.at(i));
+      file.put(104 + 8 * i, sides.at(i));
+    }
+    file.put<std::int64_t>(168, 544);
+    file.put(176, static_cast<double>(layout.slope));
+    file.put<std::int32_t>(348, 1);  // sform_code
+    for (std::size_t r = 0; r < 3; ++r)
+      for (std::size_t c = 0; c < 4; ++c) file.put(400 + 32 * r + 8 * c, rows.at(r).at(c));
+    file.put<std::int32_t>(500, layout.units);
+    file.put<std::int32_t>(540, 0);
+  }
+  const double slope = layout.slope == 0.0F ? 1.0 : static_cast<double>(layout.slope);
+  std::array<int, 3> at{};  // in space
+  const auto run = [&](std::size_t s, int number) {
+    const auto axis = static_cast<std::size_t>(layout.axis.at(s));
+    at.at(axis) = layout.backwards.at(s) ? size.at(axis) - 1 - number : number;
+  };
+  for (int c = 0; c < dim[3]; ++c)
+    for (int b = 0; b < dim[2]; ++b)
+      for (int a = 0; a < dim[1]; ++a) {
+        run(0, a);
+        run(1, b);
+        run(2, c);
+        const double value = label_at(at[0], at[1], at[2]) / slope;
+        if (layout.datatype == 2) file.add(static_cast<unsigned char>(value));
+        if (layout.datatype == 4) file.add(static_cast<std::int16_t>(value));
+        if (layout.datatype == 16) file.add(static_cast<float>(value));
+      }
+  return file.bytes();
+}
+
+std::string inr() {
+  std::string text =
+      "#INRIMAGE-4#{\nXDIM=9\nYDIM=8\nZDIM=7\nVDIM=1\nTYPE=unsigned fixed\nPIXSIZE=8 "
+      "bits\nSCALE=2**0\nCPU=decm\n"
+      "VX=1\nVY=1.5\nVZ=2\nTX=10\nTY=-20\nTZ=30\n";
+  text.resize(252, '\n');
+  text += "##}\n";
+  for (int k = 0; k < size[2]; ++k)
+    for (int j = 0; j < size[1]; ++j)
+      for (int i = 0; i < size[0]; ++i) text += static_cast<char>(label_at(i, j, k));
+  return text;
+}
+
+class NiftiImage : public ::testing::Test {
+ protected:
+  VoxelBody read(const std::string& name, const std::string& bytes) {
+    return read_labelled_image({folder_.write(name, bytes), {}, true}, 10.0, notes_);
+  }
+
+  void expect_same(const VoxelBody& body) {
+    EXPECT_EQ(body.size, expected_.size);
+    EXPECT_EQ(body.inside, expected_.inside);
+    EXPECT_EQ(body.labels, expected_.labels);
+    EXPECT_LT((body.spacing - expected_.spacing).norm(), 1e-5);
+    EXPECT_LT((body.origin - expected_.origin).norm(), 1e-4);
+  }
+
+  std::string error(const std::string& bytes) {
+    return error_of([&] { read("a.nii", bytes); });
+  }
+
+  TempFolder folder_;
+  std::vector<std::string> notes_;
+  VoxelBody expected_ = read("scan.inr", inr());
+};
+
+/// All 48 ways in which a file's axes can run along those of space; half of them would mirror the body.
+TEST_F(NiftiImage, LiesInSpaceAsItsMatrixSays) {
+  Layout layout;
+  do {
+    for (int flips = 0; flips < 8; ++flips) {
+      for (std::size_t s = 0; s < 3; ++s) layout.backwards.at(s) = ((flips >> s) & 1) != 0;
+      expect_same(read("a.nii", nifti(layout)));
+    }
+  } while (std::next_permutation(layout.axis.begin(), layout.axis.end()));
+}
+
+TEST_F(NiftiImage, OfEachKindIsTheSame) {
+  for (const int version : {1, 2})
+    for (const bool swapped : {false, true})
+      for (const int datatype : {2, 4, 16}) {
+        Layout layout;
+        layout.version = version;
+        layout.swapped = swapped;
+        layout.datatype = datatype;
+        SCOPED_TRACE(testing::at(version * 100 + datatype));
+        expect_same(read("a.nii", nifti(layout)));
+      }
+}
+
+TEST_F(NiftiImage, HasLengthsInMillimetresAndScaledValues) {
+  Layout layout;
+  layout.units = 1;
+  layout.unit = 1e3;
+  layout.datatype = 16;
+  layout.slope = 0.5F;
+  expect_same(read("metres.nii", nifti(layout)));
+  layout.units = 3;
+  layout.unit = 1e-3;
+  expect_same(read("micrometres.nii", nifti(layout)));
+}
+
+TEST_F(NiftiImage, GzippedIsTheSame) {
+  const std::string path = (folder_.path() / "A.NII.GZ").string(), bytes = nifti({});
+  const gzFile file = gzopen(path.c_str(), "wb");
+  gzwrite(file, bytes.data(), static_cast<unsigned>(bytes.size()));
+  gzclose(file);
+  EXPECT_EQ(check_nifti_header(path), std::ssize(bytes));
+  expect_same(read_labelled_image({path, {}, true}, 10.0, notes_));
+}
+
+TEST_F(NiftiImage, ThatIsTurnedIsToldSo) {
+  Layout layout;
+  layout.turn = 0.2;
+  notes_.clear();
+  const VoxelBody body = read("a.nii", nifti(layout));
+  EXPECT_EQ(body.labels, expected_.labels);
+  ASSERT_FALSE(notes_.empty());
+  expect_mentions(notes_[0], {"turned by 11.5 degrees"});
+}
+
+TEST_F(NiftiImage, HeadersThatLieAreRefused) {
+  const std::string whole = nifti({});
+  const auto with = [&](std::size_t offset, auto value) {
+    std::string bytes = whole;
+    const auto raw = std::bit_cast<std::array<char, sizeof value>>(value);
+    std::ranges::copy(raw, bytes.begin() + static_cast<std::ptrdiff_t>(offset));
+    return error(bytes);
+  };
+  expect_mentions(with(42, std::int16_t{0}), {"a.nii", "dim[1]", "is 0"});
+  expect_mentions(with(44, std::int16_t{-3}), {"dim[2]", "is -3"});
+  expect_mentions(with(46, std::int16_t{30'000}), {"asks for", "bytes"});
+  expect_mentions(with(72, std::int16_t{-8}), {"bitpix"});
+  expect_mentions(with(108, 1e30F), {"vox_offset"});
+  expect_mentions(with(108, std::numeric_limits<float>::quiet_NaN()), {"vox_offset"});
+  expect_mentions(with(70, std::int16_t{128}), {"a.nii"});  // colours
+  expect_mentions(with(280, std::numeric_limits<float>::quiet_NaN()), {"a.nii"});
+  expect_mentions(with(280, 1e20F), {"sides"});
+  expect_mentions(error(whole.substr(0, whole.size() - 1)), {"only", "bytes"});
+  expect_mentions(error(whole.substr(0, 200)), {"not a readable image"});
+  expect_mentions(error("this is no image\n"), {"not a readable image"});
+  Layout moving;
+  moving.more = {2, 1, 1, 1};
+  std::string film = nifti(moving);
+  film += film.substr(352);
+  expect_mentions(error(film), {"several values"});
+}
+
+}  // namespace
+}  // namespace palpate::nifti_test
