@@ -168,6 +168,7 @@ class Page implements Listener {
   pictured(message: Message): boolean {
     if (message.kind === 'scene') {
       this.picture_.take_scene(message);
+      if (this.state_?.model) this.show_kept(this.state_.model.file); // the next state may be long in coming
     } else if (message.kind === 'patch') {
       this.picture_.take_patch(message);
     } else if (message.kind === 'frame') {
