@@ -168,10 +168,12 @@ ChildResult along_space(const nifti_image& image, const std::array<std::size_t, 
     header.origin.at(axis) = unit * corner[static_cast<Eigen::Index>(axis)];
   std::vector<std::int32_t> turned;
   turned.reserve(labels.size());
-  for (std::ptrdiff_t k = 0; k < header.size[2]; ++k)
-    for (std::ptrdiff_t j = 0; j < header.size[1]; ++j)
+  for (std::ptrdiff_t k = 0; k < header.size[2]; ++k) {
+    for (std::ptrdiff_t j = 0; j < header.size[1]; ++j) {
       for (std::ptrdiff_t i = 0; i < header.size[0]; ++i)
         turned.push_back(labels[static_cast<std::size_t>(first + i * step[0] + j * step[1] + k * step[2])]);
+    }
+  }
   return image_labels(header, turned);
 }
 
@@ -210,12 +212,13 @@ std::int64_t check_nifti_header(const std::filesystem::path& file) {
   const auto bytes = static_cast<std::int64_t>(std::ceil(needed));
   const auto read = std::ssize(header);
   const std::int64_t present = read + count_bytes(stream.get(), bytes - read);
-  if (present < bytes)
+  if (present < bytes) {
     throw Error(
         fmt::format("the image's header asks for {} voxels of {} bits, {} bytes, but the file has only {} "
                     "bytes",
                     product, bits, bytes, present),
         where, "get the whole file, or correct the header");
+  }
   return std::max(file_bytes, bytes);
 }
 
