@@ -33,7 +33,7 @@ struct RunState {
   std::optional<std::string> locked;      ///< why settings cannot be changed
   SafetyPhase phase = SafetyPhase::active;
   Fault fault = Fault::none;
-  std::optional<SurfaceChange> change{};  ///< of the surface that was shown last
+  std::optional<SurfaceChange> change{};  ///< of the surface that was shown half a second ago, or less
   SettingsText settings;
 };
 

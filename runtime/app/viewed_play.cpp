@@ -137,7 +137,7 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
                     .ticks = [this](std::span<const TickNote> notes) { take_ticks(notes); },
                     .pictures =
                         [this](SurfacePicture picture) {
-                          take_change(picture.change);
+                          take_change(picture.frame);
                           server_->show_picture(std::move(picture), body_.get());
                         },
                     .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
@@ -363,8 +363,16 @@ void ViewedPlay::take_recording_failure(const Error& reason) {
   tell_.notify_all();
 }
 
-/// By the thread that makes pictures; pages are told with the next state.
-void ViewedPlay::take_change(const SurfaceChange& change) {
+/// By the thread that makes pictures, no more often than pages are told: it takes milliseconds.
+void ViewedPlay::take_change(const SurfaceFrame& frame) {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_change_) return;
+  next_change_ = now + state_period;
+  const std::vector<Vec3> mesh = body_->surface_in_mesh();
+  std::vector<Vec3> u(mesh.size());
+  for (std::size_t node = 0; node < u.size(); ++node)
+    u[node] = Eigen::Map<const Eigen::Vector3f>(frame.displacement.data() + 3 * node).cast<double>();
+  const SurfaceChange change = surface_change(*body_, mesh, u);
   const std::lock_guard lock(mutex_);
   state_.change = change;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <memory>
@@ -75,7 +76,7 @@ class ViewedPlay : public ViewedRun {
   void begin_making(const char* what);
   void refuse(const Error& why);
   void take_recording_failure(const Error& reason);
-  void take_change(const SurfaceChange& change);
+  void take_change(const SurfaceFrame& frame);
   void take_ticks(std::span<const TickNote> notes);
   void tell_states(const std::stop_token& over);
 
@@ -93,6 +94,8 @@ class ViewedPlay : public ViewedRun {
   bool recording_failed_ = false;
 
   Fault latched_ = Fault::none;  // of the session before, where a hand is in the device
+
+  std::chrono::steady_clock::time_point next_change_{};  // of the surface, to be found
 
   mutable std::mutex mutex_;  // of what follows; the loop takes it never
   Plan requested_;            // of the next session

@@ -52,8 +52,7 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
           .presses = std::vector<NodalPress>(3 * state.contact_points.size() +
                                              static_cast<std::size_t>(state.surface.near.capacity())),
           .forces = std::vector<NodalForce>(2 * static_cast<std::size_t>(state.surface.near.capacity()))}),
-      mesh_(body.surface_in_mesh()),
-      rest_(mesh_),
+      rest_(body.surface_in_mesh()),
       stored_(body.greens().order()),
       u_(rest_.size()),
       stress_(body),
@@ -158,7 +157,6 @@ void SurfaceFrames::compute(const Moment& moment) {
     u_[node] += rest_[node];
     append(u_[node], frame.displacement);
   }
-  picture.change = surface_change(body_, mesh_, u_);
   show_stress(moment, frame);
   show_pressure(moment, frame);
   for (std::size_t k = 0; k < moment.touch_count; ++k) picture.contacts.push_back(moment.touches[k]);

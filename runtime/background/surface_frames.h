@@ -16,7 +16,6 @@
 #include "runtime/background/surface_stress.h"
 #include "runtime/body/free_motion.h"
 #include "runtime/tick/state.h"
-#include "runtime/warp/surface_change.h"
 
 namespace palpate {
 
@@ -37,7 +36,6 @@ struct SurfacePicture {
   double greens_error = 0.0;           ///< ToolState::greens_error [N]
   std::vector<SeenContact> contacts;   ///< those that are closed
   std::shared_ptr<const Patch> patch;  ///< null: no overlay
-  SurfaceChange change;                ///< of the surface against the mesh, loads and tools together
   /// In the plane, where all free nodes are stored: of all mesh nodes, without an overlay's refinement; else
   /// empty.
   std::vector<float> plane_displacement;  ///< [N x 3] node + displacement is what is seen [m]
@@ -107,7 +105,6 @@ class SurfaceFrames {
   SurfaceFramesOptions options_;
   Sink sink_;
   Latest<Moment> moments_;
-  std::vector<Vec3> mesh_;      // [S] without loads
   std::vector<Vec3> rest_;      // [S] u0
   std::vector<double> stored_;  // [n] scratch
   std::vector<Vec3> u_;         // [S] u, then u0 + u

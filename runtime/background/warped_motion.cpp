@@ -15,7 +15,16 @@ constexpr WarpBalanceOptions effort{.tolerance = 1e-4, .most_rounds = 3};
 constexpr double most_turn = 0.03;    // [rad] by which W is behind
 constexpr double most_wrong = 0.3;    // share of how far a step moved loaded nodes by which W was off
 constexpr double least_wrong = 1e-6;  // share of their displacement: less does not matter
-constexpr double least_part = 1e-4;   // of the largest: smaller parts of what W lacks are rounding
+constexpr double least_part = 1e-6;   // of the largest: smaller parts of a compliance are rounding
+
+/// Of a symmetric matrix without negative eigenvalues, where it is not zero but for rounding.
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& A) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(0.5 * (A + A.transpose()));
+  const double least = least_part * parts.eigenvalues().maxCoeff();
+  const Eigen::VectorXd inverse =
+      parts.eigenvalues().unaryExpr([=](double part) { return part > least ? 1.0 / part : 0.0; });
+  return parts.eigenvectors() * inverse.asDiagonal() * parts.eigenvectors().transpose();
+}
 
 /// Sine of half the angle between rotations: |A - B| = 2 sqrt(2) sin(angle / 2).
 double half_sine(const Mat3& A, const Mat3& B) {
@@ -103,30 +112,26 @@ void WarpedMotion::turn_compliance(const MotionJob& job) {
   Greens turned = body_.greens().turned(R_);
   if (!job.load.empty()) {
     const int d = body_.dimension();
-    Eigen::MatrixXd P(std::ssize(x_), d),
-        E(std::ssize(x_), d);  // spread forces, and what W lacks of J Xi J^T P
+    // Spread forces, how the body moves with them, and how turned blocks alone would have it.
+    Eigen::MatrixXd P(std::ssize(x_), d), S(std::ssize(x_), d), T(std::ssize(x_), d);
     std::vector<Index> nodes(static_cast<std::size_t>(body_.greens().nodes()));
     std::iota(nodes.begin(), nodes.end(), 0);
-    std::vector<double> true_x(x_.size()), by_turned(x_.size());
+    std::vector<double> moved(x_.size());
+    const auto column = [](const std::vector<double>& values) {
+      return Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values));
+    };
     for (int axis = 0; axis < d; ++axis) {
       const std::vector<double> p = spread(job, axis);
-      balance_.respond_to(p, true_x);
-      turned.displacement(nodes, p, by_turned);
-      for (Eigen::Index k = 0; k < P.rows(); ++k) {
-        const auto dof = static_cast<std::size_t>(k);
-        P(k, axis) = p[dof];
-        E(k, axis) = true_x[dof] - by_turned[dof];
-      }
+      P.col(axis) = column(p);
+      balance_.respond_to(p, moved);
+      S.col(axis) = column(moved);
+      turned.displacement(nodes, p, moved);
+      T.col(axis) = column(moved);
     }
-    const Eigen::MatrixXd lacking = E.transpose() * P;  // symmetric
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(0.5 * (lacking + lacking.transpose()));
-    const double most = parts.eigenvalues().cwiseAbs().maxCoeff();
-    Eigen::VectorXd inverse = Eigen::VectorXd::Zero(d);
-    for (Eigen::Index k = 0; k < d; ++k) {
-      if (std::abs(parts.eigenvalues()[k]) > least_part * most) inverse[k] = 1.0 / parts.eigenvalues()[k];
-    }
-    const Eigen::MatrixXd right = E * parts.eigenvectors();
-    turned = body_.greens().turned(R_, right * inverse.asDiagonal(), right);
+    Eigen::MatrixXd left(P.rows(), 2 * d), right(P.rows(), 2 * d);
+    left << S * inverse_of(S.transpose() * P), -T * inverse_of(T.transpose() * P);
+    right << S, T;
+    turned = body_.greens().turned(R_, left, right);
   }
   turned_ = std::make_shared<const Greens>(std::move(turned));
   R_turned_ = R_;

@@ -22,9 +22,9 @@ struct WarpTelling {
 /// Warps a body beside the tick. The tick meets x = x(f_p) + W (f - f_p): f_p are the forces of the last job,
 /// x where the warped body is under them, and W the Green's functions turned with the surface, R_i Xi_ij
 /// R_j^T, with terms on top by which it is J Xi J^T for forces that are spread as those of the job are, in
-/// any direction (a symmetric secant update of rank d, SR1). So an error of W does not add up: at rest the
-/// body is where WarpBalance has it. W is made anew where the surface has turned, or where W was wrong about
-/// the last step.
+/// any direction (Davidon, Fletcher and Powell's update of rank 2 d, which stays positive). So an error of W
+/// does not add up: at rest the body is where WarpBalance has it. W is made anew where the surface has
+/// turned, or where W was wrong about the last step.
 class WarpedMotion final : public MotionStepper {
  public:
   /// `body` must be warped (ContactModel), and live as long. Throws Error where it cannot be.

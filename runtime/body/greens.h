@@ -20,7 +20,7 @@ struct HierarchicalMatrix;
 inline constexpr std::int64_t most_exact_terms = most_modes + most_smooth_terms;
 
 /// Most terms on top of turned Green's functions.
-inline constexpr Eigen::Index most_turned_terms = 3;
+inline constexpr Eigen::Index most_turned_terms = 6;
 
 /// How `Greens` is laid out in memory.
 struct GreensOptions {

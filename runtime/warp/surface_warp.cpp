@@ -177,14 +177,13 @@ Vec3 SurfaceWarp::rotation(const Simplex& simplex, const std::vector<Vec3>& u) c
   return w + 0.5 * spin * simplex.N;
 }
 
-void SurfaceWarp::join(const Edge& edge, const Vec3& t, Place& place) const {
-  const std::span<const Vec3> rest = body_.surface_rest_positions();
+void SurfaceWarp::join(const Edge& edge, const Vec3& t, std::span<const Vec3> held, Place& place) const {
   const auto a = static_cast<std::size_t>(edge.a), b = static_cast<std::size_t>(edge.b);
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension_); ++axis) {
     const auto k = static_cast<Eigen::Index>(axis);
     const Index to_a = free_[axis][a], to_b = free_[axis][b];
-    if (to_a >= 0) place.b[axis][to_a] += edge.c * (t[k] + (to_b < 0 ? rest[b][k] : 0.0));
-    if (to_b >= 0) place.b[axis][to_b] -= edge.c * (t[k] - (to_a < 0 ? rest[a][k] : 0.0));
+    if (to_a >= 0) place.b[axis][to_a] += edge.c * (t[k] + (to_b < 0 ? held[b][k] : 0.0));
+    if (to_b >= 0) place.b[axis][to_b] -= edge.c * (t[k] - (to_a < 0 ? held[a][k] : 0.0));
   }
 }
 
@@ -193,6 +192,7 @@ void SurfaceWarp::warp(std::span<const double> u, Place& place) const {
   for (std::size_t node = 0; node < stored.size(); ++node)
     place.u[node] = stored[node] < 0 ? Vec3(Vec3::Zero()) : vector_at(u, dimension_, stored[node]);
   for (auto& b : place.b) b.setZero();
+  const std::span<const Vec3> rest = body_.surface_rest_positions();
   for (std::size_t s = 0; s < simplices_.size(); ++s) {
     const Simplex& simplex = simplices_[s];
     const Vec3 w = rotation(simplex, place.u);
@@ -200,7 +200,7 @@ void SurfaceWarp::warp(std::span<const double> u, Place& place) const {
     place.R[s] = exp_of(w);
     for (const Edge& edge : simplex.edges) {
       const auto a = static_cast<std::size_t>(edge.a), b = static_cast<std::size_t>(edge.b);
-      join(edge, place.R[s] * (edge.X + place.u[a] - place.u[b] - w.cross(edge.X)), place);
+      join(edge, place.R[s] * (edge.X + place.u[a] - place.u[b] - w.cross(edge.X)), rest, place);
     }
   }
   solve(place.b, place.x);
@@ -262,12 +262,7 @@ void SurfaceWarp::push_forward(Place& place, std::span<const double> du, std::sp
     for (const Edge& edge : simplex.edges) {
       const auto a = static_cast<std::size_t>(edge.a), b = static_cast<std::size_t>(edge.b);
       const Vec3 y = edge.X + place.u[a] - place.u[b] - w.cross(edge.X);
-      const Vec3 dt = place.R[s] * (turn.cross(y) + change[a] - change[b] - dw.cross(edge.X));
-      for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension_); ++axis) {
-        const auto k = static_cast<Eigen::Index>(axis);
-        if (free_[axis][a] >= 0) place.b[axis][free_[axis][a]] += edge.c * dt[k];
-        if (free_[axis][b] >= 0) place.b[axis][free_[axis][b]] -= edge.c * dt[k];
-      }
+      join(edge, place.R[s] * (turn.cross(y) + change[a] - change[b] - dw.cross(edge.X)), change, place);
     }
   }
   std::fill(change.begin(), change.end(), Vec3::Zero());

@@ -80,8 +80,9 @@ class SurfaceWarp {
   void check_held() const;
   void factor();
   void solve(std::array<Eigen::VectorXd, 3>& b, std::vector<Vec3>& x) const;
-  /// The edge is to become t: what it adds to the right-hand sides.
-  void join(const Edge& edge, const Vec3& t, Place& place) const;
+  /// The edge is to become t: what it adds to the right-hand sides. `held` [S]: where nodes are that cannot
+  /// move.
+  void join(const Edge& edge, const Vec3& t, std::span<const Vec3> held, Place& place) const;
   [[nodiscard]] Vec3 rotation(const Simplex& simplex, const std::vector<Vec3>& u) const noexcept;
 
   const Body& body_;

@@ -13,9 +13,10 @@ struct WarpBalanceOptions {
   int most_rounds = 4;      ///< each multiplies all Green's functions once
 };
 
-/// Finds u = Xi J(u)^T f: the linear body under the forces that f are on it once it has turned (docs/warp.md)
-///, so that x(u) is at rest by the energy u . K u / 2 of small strain in turned parts. By Anderson's
-/// mixing from where it was last, which for forces that follow the surface is there in a few rounds.
+/// Finds u = Xi J(u)^T f: the linear body under the forces that f are on it once it has turned
+/// (docs/warp.md), so that x(u) is at rest by the energy u . K u / 2 of small strain in turned parts. By
+/// Anderson's mixing from where it was last, which for forces that follow the surface is there in a few
+/// rounds.
 class WarpBalance {
  public:
   /// `warp` must live as long.
