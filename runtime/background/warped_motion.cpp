@@ -17,7 +17,7 @@ constexpr double most_wrong = 0.3;    // share of how far a step moved loaded no
 constexpr double least_wrong = 1e-6;  // share of their displacement: less does not matter
 constexpr double least_part = 1e-6;   // of the largest: smaller parts of a compliance are rounding
 
-/// Of a symmetric matrix without negative eigenvalues, where it is not zero but for rounding.
+/// The inverse of a symmetric matrix without negative eigenvalues, where it is not zero but for rounding.
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& A) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(0.5 * (A + A.transpose()));
   const double least = least_part * parts.eigenvalues().maxCoeff();
