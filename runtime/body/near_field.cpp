@@ -492,8 +492,12 @@ void NearField::displace() noexcept {
   for (Index place = 0; place < count_; ++place) {
     if (!is_loaded(place)) continue;
     const double* f = force_.data() + std::ptrdiff_t{dimension_} * place;
-    for (int axis = 0; axis < dimension_; ++axis)
-      palpate::add(row(dimension_ * place + axis).data(), f[axis], displacement_.data(), width);
+    if (dimension_ == 3) {
+      add_three(row(3 * place).data(), stride_, f, displacement_.data(), width);
+    } else {
+      for (int axis = 0; axis < dimension_; ++axis)
+        palpate::add(row(dimension_ * place + axis).data(), f[axis], displacement_.data(), width);
+    }
     if (patch() != nullptr) load_patch(place);
   }
   spread(force_);

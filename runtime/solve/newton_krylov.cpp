@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/solve/symmetric_product.h"
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
 
@@ -19,71 +20,11 @@ Index padded(Index rows) noexcept {
   return (rows + width - 1) / width * width;
 }
 
-/// y = A x, four rows at a time.
-void multiply(const float* __restrict A, std::ptrdiff_t stride, const float* __restrict x,
-              float* __restrict y, std::ptrdiff_t rows, std::ptrdiff_t columns) noexcept {
-  std::ptrdiff_t i = 0;
-  for (; i + 4 <= rows; i += 4) {
-    const float* __restrict a = A + i * stride;
-    float s0 = 0.0F, s1 = 0.0F, s2 = 0.0F, s3 = 0.0F;
-#pragma omp simd reduction(+ : s0, s1, s2, s3)
-    for (std::ptrdiff_t k = 0; k < columns; ++k) {
-      s0 += a[k] * x[k];
-      s1 += a[stride + k] * x[k];
-      s2 += a[2 * stride + k] * x[k];
-      s3 += a[3 * stride + k] * x[k];
-    }
-    y[i] = s0;
-    y[i + 1] = s1;
-    y[i + 2] = s2;
-    y[i + 3] = s3;
-  }
-  for (; i < rows; ++i) y[i] = dot(A + i * stride, x, columns);
-}
-
-/// Y = A X for three vectors, `apart` from each other: A is read once, two rows at a time.
-void multiply_three(const float* __restrict A, std::ptrdiff_t stride, const float* __restrict x,
-                    float* __restrict y, std::ptrdiff_t apart, std::ptrdiff_t rows,
-                    std::ptrdiff_t columns) noexcept {
-  const float* __restrict x1 = x + apart;
-  const float* __restrict x2 = x + 2 * apart;
-  std::ptrdiff_t i = 0;
-  for (; i + 2 <= rows; i += 2) {
-    const float* __restrict a = A + i * stride;
-    const float* __restrict b = a + stride;
-    float a0 = 0.0F, a1 = 0.0F, a2 = 0.0F, b0 = 0.0F, b1 = 0.0F, b2 = 0.0F;
-#pragma omp simd reduction(+ : a0, a1, a2, b0, b1, b2)
-    for (std::ptrdiff_t k = 0; k < columns; ++k) {
-      a0 += a[k] * x[k];
-      a1 += a[k] * x1[k];
-      a2 += a[k] * x2[k];
-      b0 += b[k] * x[k];
-      b1 += b[k] * x1[k];
-      b2 += b[k] * x2[k];
-    }
-    y[i] = a0;
-    y[apart + i] = a1;
-    y[2 * apart + i] = a2;
-    y[i + 1] = b0;
-    y[apart + i + 1] = b1;
-    y[2 * apart + i + 1] = b2;
-  }
-  for (; i < rows; ++i) {
-    for (std::ptrdiff_t s = 0; s < 3; ++s) y[s * apart + i] = dot(A + i * stride, x + s * apart, columns);
-  }
-}
-
 /// y += the first `rows` rows of A by their factors, three of them in one pass.
 void add_rows(const float* __restrict A, std::ptrdiff_t stride, int rows, const Vec3& factors,
               float* __restrict y, std::ptrdiff_t columns) noexcept {
   const Eigen::Vector3f by = factors.cast<float>();
-  if (rows == 3) {
-    const float f0 = by[0], f1 = by[1], f2 = by[2];
-#pragma omp simd
-    for (std::ptrdiff_t k = 0; k < columns; ++k)
-      y[k] += f0 * A[k] + f1 * A[stride + k] + f2 * A[2 * stride + k];
-    return;
-  }
+  if (rows == 3) return add_three(A, stride, by.data(), y, columns);
   for (int i = 0; i < rows; ++i) {
     if (by[i] != 0.0F) add(A + i * stride, by[i], y, columns);
   }
@@ -111,6 +52,10 @@ std::array<float, 9> by_rows(const Eigen::Matrix3d& A) noexcept {
     for (int j = 0; j < 3; ++j) entries[3 * i + j] = static_cast<float>(A(i, j));
   }
   return entries;
+}
+
+SymmetricRows compliance(const ContactProblem& problem) noexcept {
+  return {problem.single_row(0), problem.single_stride, problem.rows, problem.padded_rows()};
 }
 
 Vec3 tangential(const Vec3& v, const Vec3& n) noexcept {
@@ -243,8 +188,7 @@ void NewtonKrylov::find_motion(const ContactProblem& problem) noexcept {
 
 /// r by what the forces change by.
 void NewtonKrylov::move_by_change(const ContactProblem& problem) noexcept {
-  multiply(problem.single_row(0), problem.single_stride, change_.data(), product_.data(), rows_,
-           padded_rows_);
+  multiply(compliance(problem), change_.data(), product_.data());
   count_product();
   for (std::size_t i = 0; i < static_cast<std::size_t>(rows_); ++i) r_[i] += product_[i];
 }
@@ -462,10 +406,9 @@ void NewtonKrylov::test(const float* motion, float* out) const noexcept {
 /// v = W x of the first systems, in step, so that W is read once for all of them.
 void NewtonKrylov::multiply_by_compliance(const ContactProblem& problem, int systems) noexcept {
   if (systems == 1) {
-    multiply(problem.single_row(0), problem.single_stride, x_.data(), v_.data(), rows_, padded_rows_);
+    multiply(compliance(problem), x_.data(), v_.data());
   } else {
-    multiply_three(problem.single_row(0), problem.single_stride, x_.data(), v_.data(), stride_, rows_,
-                   padded_rows_);
+    multiply_three(compliance(problem), x_.data(), v_.data(), stride_);
   }
   count_product();
 }

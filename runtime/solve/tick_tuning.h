@@ -86,7 +86,7 @@ struct ManyTuning {
   double open_gap = 0.02;        ///< [edge] a contact without force that is farther is left out of the tick
   double least_residual = 2e-8;  ///< [largest force] of the guess: nothing is to be done
   double no_change = 1e-7;  ///< [largest force] in a tick in which nothing moves: rounding changes as much
-  double reduction = 0.01;  ///< [residual of the guess] that a tick reaches at least: rest is reached
+  double reduction = 0.1;   ///< [residual of the guess] that a tick reaches at least: rest is reached
   double tolerance = 1e-4;  ///< [largest force]
   double rough_tolerance = 3e-4;  ///< [largest force] beyond `smooth_work`,
   double smooth_work = 3e6;       ///< multiplications,

@@ -22,6 +22,15 @@ void add(const Real* __restrict x, Real factor, Real* __restrict y, std::ptrdiff
   for (std::ptrdiff_t i = 0; i < count; ++i) y[i] += factor * x[i];
 }
 
+/// y += three rows x, `stride` apart, by their factors: y is read and written once.
+template <typename Real>
+void add_three(const Real* __restrict x, std::ptrdiff_t stride, const Real* factors, Real* __restrict y,
+               std::ptrdiff_t count) noexcept {
+  const Real f0 = factors[0], f1 = factors[1], f2 = factors[2];
+#pragma omp simd
+  for (std::ptrdiff_t i = 0; i < count; ++i) y[i] += f0 * x[i] + f1 * x[stride + i] + f2 * x[2 * stride + i];
+}
+
 /// y -= factor x
 template <typename Real>
 void subtract(const Real* __restrict x, Real factor, Real* __restrict y, std::ptrdiff_t count) noexcept {

@@ -83,6 +83,15 @@ bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nod
   return room;
 }
 
+/// The nearest point of a simplex that a sphere touches at its corners alone: where the sphere's middle is
+/// far from it, the nearest corner.
+NearestPoint nearest_of_chord(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
+                              double radius) noexcept {
+  const NearestPoint corner = nearest_corner(tree, nodes, core);
+  const double far = 0.5 * radius;
+  return corner.squared_distance > far * far ? corner : nearest_points(tree, nodes, core, true);
+}
+
 /// The simplices nearest to the tool by what the tree knows, at most as many as may be looked at: fills
 /// scratch.found and `nearest` of scratch.pairs, and returns how many.
 std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
@@ -92,7 +101,10 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
   std::size_t count = 0;
   for (std::size_t k = 0; k < std::min(all, scratch.found.size()); ++k) {
     const Index simplex = scratch.found[k];
-    const NearestPoint nearest = nearest_points(tree, nodes_of(body, simplex), core, is_point);
+    const SimplexNodes nodes = nodes_of(body, simplex);
+    const NearestPoint nearest = touches_corners_alone(body, tool.tool, simplex)
+                                     ? nearest_of_chord(tree, nodes, core, tool.tool.radius)
+                                     : nearest_points(tree, nodes, core, is_point);
     if (nearest.squared_distance > reach * reach) continue;
     scratch.found[count] = simplex;
     scratch.found_distance[simplex] = nearest.squared_distance;
@@ -356,9 +368,14 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
   const SimplexNodes nodes = nodes_of(body, seen.simplex);
   const std::size_t corners = body.dimension() == 2 ? 2 : 3;
   const bool seen_from_outside = seen.height >= 0.0 && !touch.inside;
+  const double reach = state.tools[touch.number].tool.radius + touch.margin;
+  const auto is_done = [&](Index node) {
+    return (touch.core.origin - tree.position(node)).squaredNorm() > reach * reach ||
+           is_found(scratch, touch, tree, node);
+  };
   for (std::size_t n = 0; n < corners; ++n) {
     const int place = is_extended ? 2 : 0;
-    if (!is_extended && seen_from_outside && is_found(scratch, touch, tree, nodes[n])) continue;
+    if (!is_extended && seen_from_outside && is_done(nodes[n])) continue;
     touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
     if (is_extended && corners == 3) touch_edge(body, state, scratch, touch, seen, n);
   }

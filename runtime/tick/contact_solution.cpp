@@ -71,9 +71,17 @@ double penetration(const State& state) noexcept {
   return deepest;
 }
 
-/// Whether the contact points have come to lie so deep that another pass is wanted.
+bool is_merged(const ContactPoint& contact) noexcept {
+  return contact.aggregate >= 0 && !contact.held;
+}
+
+/// Whether the contact points have come to lie so deep that another pass is wanted. Where some are merged,
+/// the gaps of those that part are right to what merging neglects, and no pass makes them better.
 bool is_rough(const Body& body, const State& state) noexcept {
-  return penetration(state) > tuning.passes.penetration * body.mean_surface_edge();
+  const std::span<const ContactPoint> contacts = state.contacts();
+  const bool some_merged = std::any_of(contacts.begin(), contacts.end(), is_merged);
+  const double most = some_merged ? tuning.merging.defect : tuning.passes.penetration;
+  return penetration(state) > most * body.mean_surface_edge();
 }
 
 /// Whether another pass would be quick, and is not past a release, from which the body swings.

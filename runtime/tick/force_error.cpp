@@ -21,19 +21,6 @@ void leave_out(const Body& body, const State& state, Scratch& scratch, LeftOut p
   scratch.left_out[scratch.left_out_count++] = place;
 }
 
-/// The corner of a simplex that is nearest to the core's origin.
-NearestPoint nearest_corner(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core) noexcept {
-  NearestPoint nearest;
-  nearest.squared_distance = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < 3 && nodes[k] >= 0; ++k) {
-    const double squared = (core.origin - tree.position(nodes[k])).squaredNorm();
-    if (squared >= nearest.squared_distance) continue;
-    nearest = {.on_simplex = tree.position(nodes[k]), .on_core = core.origin, .squared_distance = squared};
-    nearest.weights[k] = 1.0;
-  }
-  return nearest;
-}
-
 /// How deep the tool has come to be there [m].
 double depth_now(const State& state, const LeftOut& place) noexcept {
   const Vec3 apart = state.tools[place.tool].pose.position - state.surface.tree.position(place.node);

@@ -1,6 +1,7 @@
 #include "runtime/touch/touching_pair.h"
 
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "runtime/solve/nearest_on_disc.h"
@@ -87,6 +88,18 @@ Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept
 NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
                             bool is_point) noexcept {
   return is_point ? nearest_on_simplex(tree, nodes, core.origin) : nearest_to_core(tree, nodes, core);
+}
+
+NearestPoint nearest_corner(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core) noexcept {
+  NearestPoint nearest;
+  nearest.squared_distance = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < 3 && nodes[k] >= 0; ++k) {
+    const double squared = (core.origin - tree.position(nodes[k])).squaredNorm();
+    if (squared >= nearest.squared_distance) continue;
+    nearest = {.on_simplex = tree.position(nodes[k]), .on_core = core.origin, .squared_distance = squared};
+    nearest.weights[k] = 1.0;
+  }
+  return nearest;
 }
 
 TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,

@@ -38,6 +38,9 @@ Vec3 outward_normal(const SurfaceTree& tree, const SimplexNodes& nodes) noexcept
 NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
                             bool is_point) noexcept;
 
+/// The corner of a simplex that is nearest to the core's origin.
+NearestPoint nearest_corner(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core) noexcept;
+
 /// The pair of a simplex and the core of which these are the nearest points.
 TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
                        const NearestPoint& nearest) noexcept;
