@@ -43,6 +43,7 @@ struct Arguments {
   ExportOptions exported;
   std::vector<std::filesystem::path> recordings;
   std::string view_address = "127.0.0.1:8017";
+  bool view_framed = false;
   HelpArguments help;
 };
 
@@ -130,6 +131,7 @@ CLI::App* add_view(CLI::App& app, Arguments& arguments) {
   view->add_option("--view-address", arguments.view_address, "address at which the page is served")
       ->type_name("[ADDRESS:]PORT")
       ->capture_default_str();
+  view->add_flag("--view-framed", arguments.view_framed, view_framed_help);
   view->footer(
       "To touch a model itself: palpate-runtime play FILE --view\n"
       "Example:\n"
@@ -289,7 +291,9 @@ int run(int argc, char** argv) {
     }
     if (devices_command->parsed()) return devices(arguments.devices);
     if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.force);
-    if (view_command->parsed()) return view(arguments.recordings, read_view_address(arguments.view_address));
+    if (view_command->parsed()) {
+      return view(arguments.recordings, read_viewer(arguments.view_address, arguments.view_framed));
+    }
     if (export_command->parsed()) return export_session(arguments.exported);
     if (push_command->parsed()) return push(arguments.push);
     if (play_command->parsed()) return play_and_name_next(read_play(arguments.play));

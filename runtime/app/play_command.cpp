@@ -57,6 +57,7 @@ void add_viewer(CLI::App& play, PlayArguments& arguments) {
                   "address at which --view serves the page; default: 127.0.0.1:8017; port 0: any free one")
       ->type_name("[ADDRESS:]PORT")
       ->group(viewer_group);
+  play.add_flag("--view-framed", arguments.view_framed, view_framed_help)->group(viewer_group);
   play.add_option("--beside", arguments.beside, "with --view: a recording that is shown beside the body")
       ->type_name("SESSION.h5")
       ->group(viewer_group);
@@ -158,9 +159,12 @@ DeviceChoice read_device(const std::string& text, const std::string& profile) {
 
 /// What shows it, and what moves the tool then.
 void read_view(PlayArguments& arguments, PlayOptions& options) {
-  if (arguments.view) options.view = read_view_address(arguments.view_address.value_or("8017"));
+  if (arguments.view)
+    options.view = read_viewer(arguments.view_address.value_or("8017"), arguments.view_framed);
   if (arguments.view_address && !arguments.view)
     throw CLI::ValidationError("--view-address", "it is for --view, which is not given");
+  if (arguments.view_framed && !arguments.view)
+    throw CLI::ValidationError("--view-framed", "it is for --view, which is not given");
   if (!arguments.beside.empty() && !arguments.view)
     throw CLI::ValidationError("--beside", "it is for --view, which is not given");
   options.beside = arguments.beside;
@@ -195,13 +199,15 @@ double read_frame_rate(const std::optional<std::string>& text) {
 
 }  // namespace
 
-ViewerOptions read_view_address(const std::string& text) {
+ViewerOptions read_viewer(const std::string& address, bool framed) {
   ViewerOptions viewer;
-  const std::size_t colon = text.rfind(':');
-  if (colon != std::string::npos) viewer.address = text.substr(0, colon);
-  const std::optional<Index> port = parse_index(colon == std::string::npos ? text : text.substr(colon + 1));
+  viewer.framed = framed;
+  const std::size_t colon = address.rfind(':');
+  if (colon != std::string::npos) viewer.address = address.substr(0, colon);
+  const std::optional<Index> port =
+      parse_index(colon == std::string::npos ? address : address.substr(colon + 1));
   if (!port || *port > UINT16_MAX || viewer.address.empty())
-    throw CLI::ValidationError("--view-address", "'" + text + "' is not [ADDRESS:]PORT");
+    throw CLI::ValidationError("--view-address", "'" + address + "' is not [ADDRESS:]PORT");
   viewer.port = static_cast<std::uint16_t>(*port);
   return viewer;
 }

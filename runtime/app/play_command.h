@@ -21,6 +21,7 @@ struct PlayArguments {
   bool fast = false;
   bool view = false;
   std::optional<std::string> view_address;
+  bool view_framed = false;
   std::string beside;
   std::string record;
   std::optional<std::string> record_frames;
@@ -40,8 +41,11 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments);
 /// wrong arguments, Error for a session that cannot be read.
 PlayOptions read_play(PlayArguments arguments);
 
-/// The address of the viewer for `play` and `view`: "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
-ViewerOptions read_view_address(const std::string& text);
+/// The viewer of `play` and `view` at "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
+ViewerOptions read_viewer(const std::string& address, bool framed);
+
+constexpr const char* view_framed_help =
+    "let other pages of this machine, as a notebook's, show the viewer in a frame";
 
 /// Overlay options of `play` and `probe`: "r=3,rings=2". Throws CLI::ParseError.
 OverlayOptions read_overlay(const std::string& text);

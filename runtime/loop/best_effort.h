@@ -20,7 +20,7 @@ class DecadeHistogram {
   static constexpr int per_decade = 40;
   static constexpr int least_decade = -15;
   static constexpr int decades = 24;
-  std::array<std::int64_t, decades * per_decade> classes_{};
+  std::array<std::int64_t, std::size_t{decades} * per_decade> classes_{};
   std::int64_t total_ = 0;
 };
 

@@ -37,6 +37,7 @@ struct DetectionTuning {
   double still_steep = 0.15;  ///< [sin] where it touched so in the tick before
   double rim_apart = 0.1;     ///< [edge of the simplex] where an edge passes over a disc's rim is a contact
                               ///< point of its own if this far from where the two are nearest
+  double ahead = 0.05;        ///< [edge] of what is that much beyond a tool's reach, a node a tick comes near
   double on_surface = 1e-6;   ///< [edge] nearer, the normal is the face's and not the distance's
 };
 

@@ -83,6 +83,24 @@ bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nod
   return room;
 }
 
+/// Whether a node of a simplex is to move and not in the near field.
+bool has_far_node(const Body& body, const NearField& near, const SimplexNodes& nodes) noexcept {
+  return std::any_of(nodes.begin(), nodes.end(), [&](Index node) {
+    return node >= 0 && body.surface_moves(node) && near.place_of(node) < 0;
+  });
+}
+
+/// Puts one node into the near field that will be wanted soon, as those that come all at once take long.
+void want_ahead(const Body& body, SurfaceState& surface, const Scratch& scratch) noexcept {
+  if (scratch.simplex_ahead < 0 || surface.near.count() == surface.near.capacity()) return;
+  for (const Index node : nodes_of(body, scratch.simplex_ahead)) {
+    if (!has_far_node(body, surface.near, {node, -1, -1})) continue;
+    bool moved = false;
+    want_nodes(body, surface, {node, -1, -1}, moved);
+    return;
+  }
+}
+
 /// The nearest point of a simplex that a sphere touches at its corners alone: where the sphere's middle is
 /// far from it, the nearest corner.
 NearestPoint nearest_of_chord(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core,
@@ -94,10 +112,14 @@ NearestPoint nearest_of_chord(const SurfaceTree& tree, const SimplexNodes& nodes
 
 /// The simplices nearest to the tool by what the tree knows, at most as many as may be looked at: fills
 /// scratch.found and `nearest` of scratch.pairs, and returns how many.
-std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch& scratch, ToolState& tool,
-                              const Core& core, double reach) noexcept {
-  const std::size_t all = near_core(tree, core, reach, scratch.found);
+std::size_t nearest_simplices(const Body& body, const SurfaceState& surface, Scratch& scratch,
+                              ToolState& tool, const Core& core, double reach) noexcept {
+  const SurfaceTree& tree = surface.tree;
+  const double ahead = reach + tuning.detection.ahead * body.mean_surface_edge();
+  const std::size_t all = near_core(tree, core, ahead, scratch.found);
   const bool is_point = has_point_core(tool.tool);
+  double nearest_ahead = ahead * ahead;
+  scratch.simplex_ahead = -1;
   std::size_t count = 0;
   for (std::size_t k = 0; k < std::min(all, scratch.found.size()); ++k) {
     const Index simplex = scratch.found[k];
@@ -105,7 +127,13 @@ std::size_t nearest_simplices(const Body& body, const SurfaceTree& tree, Scratch
     const NearestPoint nearest = touches_corners_alone(body, tool.tool, simplex)
                                      ? nearest_of_chord(tree, nodes, core, tool.tool.radius)
                                      : nearest_points(tree, nodes, core, is_point);
-    if (nearest.squared_distance > reach * reach) continue;
+    if (nearest.squared_distance > reach * reach) {
+      if (nearest.squared_distance < nearest_ahead && has_far_node(body, surface.near, nodes)) {
+        nearest_ahead = nearest.squared_distance;
+        scratch.simplex_ahead = simplex;
+      }
+      continue;
+    }
     scratch.found[count] = simplex;
     scratch.found_distance[simplex] = nearest.squared_distance;
     if (count < scratch.pairs.size()) scratch.pairs[count].nearest = nearest;
@@ -481,11 +509,12 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
                     .lost = tuning.detection.deepest_inside * body.mean_surface_edge(),
                     .first_candidate = scratch.candidate_count};
   const double reach = std::max(tool.tool.radius + touch.margin, touch.lost);
-  const std::size_t count = nearest_simplices(body, state.surface.tree, scratch, tool, touch.core, reach);
+  const std::size_t count = nearest_simplices(body, state.surface, scratch, tool, touch.core, reach);
   touch.is_known = has_point_core(tool.tool) && count < scratch.pairs.size();
   for (std::size_t k = count; k < scratch.found_count; ++k)
     leave_out_simplex(body, state, scratch, number, touch.core, scratch.found[k]);
   keep_usable(body, state, scratch, touch, count);
+  if (scratch.is_first_pass) want_ahead(body, state.surface, scratch);
   look_from_origin(body, state.surface.tree, scratch, touch);
   if (is_lost(body, state.surface.tree, touch)) {
     tool.engaged = false;

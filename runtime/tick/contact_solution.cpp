@@ -214,8 +214,8 @@ void find_force_changes(Scratch& scratch, int changes) noexcept {
   } else if (problem.frictionless) {
     scratch.active_set.derivative(problem, changes, scratch.row_change, scratch.force_change);
   } else {
-    for (int s = 0; s < changes; ++s) {
-      const auto begin = static_cast<std::size_t>(s * problem.rows);
+    for (std::size_t s = 0; s < static_cast<std::size_t>(changes); ++s) {
+      const std::size_t begin = s * static_cast<std::size_t>(problem.rows);
       scratch.cone_solver.derivative(problem, std::span(scratch.row_change).subspan(begin),
                                      std::span(scratch.force_change).subspan(begin));
     }

@@ -70,6 +70,7 @@ struct Scratch {
   std::vector<ContactPoint> candidates;  ///< [24 max_contacts tools] detection: before they are merged, and
                                          ///< the deepest chosen
   Index candidate_count = 0;
+  Index simplex_ahead = -1;               ///< detection: soon to be within a tool's reach; -1: none
   std::vector<Index> candidate_at_node;   ///< [S] detection: candidate at a surface node that was found last
   std::vector<Index> candidates_between;  ///< [as candidates] detection: those that are no surface node
   Index between_count = 0;

@@ -54,8 +54,14 @@ std::string_view path_in_run(const Request& request, const ServedAddress& served
   return run_of(request, served) == 0 ? path : path.substr(second_run.size() - 1);
 }
 
-/// `framed`: pages of this server may have it in them; `frames`: it has others of this server in it.
-Response page(std::string_view host, bool framed, bool frames) {
+/// Whose pages may have one in a frame. `by_own`: those of this server. Notebooks are served by this machine.
+std::string ancestors(const ServedAddress& served, bool by_own) {
+  if (served.framed) return "'self' http://localhost:* http://127.0.0.1:*";
+  return by_own ? "'self'" : "'none'";
+}
+
+/// `frames`: it has others of this server in it.
+Response page(std::string_view host, const std::string& ancestors, bool frames) {
   Response response(http::status::ok, http_version);
   response.set(http::field::content_type, "text/html; charset=utf-8");
   response.set("Content-Security-Policy",
@@ -63,7 +69,7 @@ Response page(std::string_view host, bool framed, bool frames) {
                            "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; "
                            "connect-src 'self' ws://{} blob: data:; base-uri 'none'; form-action 'none'; "
                            "frame-src {}; frame-ancestors {}",
-                           host, frames ? "'self'" : "'none'", framed ? "'self'" : "'none'"));
+                           host, frames ? "'self'" : "'none'", ancestors));
   response.body() = viewer_page();
   return response;
 }
@@ -143,8 +149,9 @@ Response answer(const Request& request, const ServedAddress& served,
   const std::string_view path = path_in_run(request, served);
   const std::string_view host = view(request[http::field::host]);
   const bool has_two = served.runs > 1;
-  if (path == "/") return guarded(page(host, has_two, false));
-  if (has_two && target_of(request).path == both_runs) return guarded(page(host, false, true));
+  if (path == "/") return guarded(page(host, ancestors(served, has_two), false));
+  if (has_two && target_of(request).path == both_runs)
+    return guarded(page(host, ancestors(served, false), true));
   const bool is_stl = path == "/surface.stl";
   if (!is_stl && path != "/surface.vtu")
     return guarded(plain(http::status::not_found, "There is no such page."));

@@ -30,7 +30,12 @@ ViewerPort::ViewerPort(const ViewerOptions& options) {
     throw Error("'" + options.address + "' is not an IP address", "viewer",
                 "give one of this machine, such as 127.0.0.1, or 0.0.0.0 for all of them");
   }
-  served_ = {.address = options.address, .port = 0, .token = random_token(), .book = options.book, .runs = 1};
+  served_ = {.address = options.address,
+             .port = 0,
+             .token = random_token(),
+             .book = options.book,
+             .runs = 1,
+             .framed = options.framed};
   const tcp::endpoint wanted(address, options.port);
   asio::io_context context;
   tcp::acceptor acceptor(context);

@@ -15,6 +15,7 @@ struct ViewerOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 8017;                 ///< 0: any that is free
   std::filesystem::path book = find_book();  ///< folder of the book's site; empty: none is served
+  bool framed = false;  ///< pages of this machine's other servers, as notebooks, may have it in a frame
 };
 
 /// Where it is served, the secret that each request must show, and the book beside it.
@@ -24,6 +25,7 @@ struct ServedAddress {
   std::string token;           ///< 128 random bits as hexadecimal digits
   std::filesystem::path book;  ///< empty: there is none
   std::size_t runs = 1;        ///< that are shown, one or two
+  bool framed = false;         ///< as in ViewerOptions
 };
 
 /// An address that is taken, so that what comes next cannot fail for it: who connects waits until a

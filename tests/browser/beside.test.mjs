@@ -138,19 +138,34 @@ test('no text is cut off or covered, and every target is large enough, at five s
   }
 });
 
+/// A page of another address with a frame that shows `url`.
+async function framing(t, url) {
+  const foreign = createServer((_, response) => response.end(`<!doctype html><iframe src="${url}" width="800" height="450"></iframe>`));
+  await new Promise((resolve) => foreign.listen(0, '127.0.0.1', resolve));
+  t.after(() => foreign.close());
+  const context = await (await open()).newContext(window_size);
+  t.after(() => context.close());
+  return { page: await context.newPage(), address: `http://127.0.0.1:${foreign.address().port}/` };
+}
+
+test('a notebook may have it in a frame where that is asked for', async (t) => {
+  const at = await folder(t);
+  const served = await serve(t, ['view', await recorded(t, at), '--view-address', '127.0.0.1:0', '--view-framed'], at);
+  const { page, address } = await framing(t, served.url);
+  await page.goto(address);
+  const inner = await (await page.locator('iframe').elementHandle()).contentFrame();
+  await ready(inner);
+  assert.equal((await told(inner, 'state')).you, 'controller');
+});
+
 test('pages of other addresses cannot have it in them', async (t) => {
   const at = await folder(t);
   const session = await recorded(t, at);
   const served = await serve(t, ['view', session, session, '--view-address', '127.0.0.1:0'], at);
   const own = served.url.replace('/beside', '/');
-  const foreign = createServer((_, response) => response.end(`<!doctype html><iframe src="${own}"></iframe>`));
-  await new Promise((resolve) => foreign.listen(0, '127.0.0.1', resolve));
-  t.after(() => foreign.close());
-  const context = await (await open()).newContext();
-  t.after(() => context.close());
-  const page = await context.newPage();
+  const { page, address } = await framing(t, own);
   const refused = page.waitForEvent('console', { predicate: (said) => /frame-ancestors/.test(said.text()) });
-  await page.goto(`http://127.0.0.1:${foreign.address().port}/`);
+  await page.goto(address);
   await refused;
   assert.equal(await page.frames()[1].evaluate(() => window.palpate === undefined), true);
   const { stderr } = await run(runtime, ['view', session, session, session]).catch((error) => error);

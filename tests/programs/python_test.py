@@ -8,6 +8,7 @@ import tempfile
 import threading
 import time
 import unittest
+import urllib.request
 
 import h5py
 import numpy
@@ -200,6 +201,31 @@ class Files(PythonTest):
         session.close()
         with self.assertRaisesRegex(palpate.Error, "closed"):
             session.step((0, 0, 2))
+
+
+class Viewers(PythonTest):
+    def test_a_body_and_a_recording_show_themselves(self):
+        session = self.shared / "shown.h5"
+        result = run(RUNTIME, "play", self.cube, "--device", f"script:{self.script()}", "--tool", "sphere:0.1", "--fast", "--record", session)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        for file, options in ((self.cube, ("--tool", "sphere:0.1")), (session, ())):
+            with palpate.Viewer(file, *options, height=300) as viewer:
+                with urllib.request.urlopen(viewer.address, timeout=20) as page:
+                    self.assertIn("http://localhost:*", page.headers["Content-Security-Policy"])
+                shown = viewer._repr_html_()
+                self.assertIn(f'<iframe src="{viewer.address}"', shown)
+                self.assertIn('height="300"', shown)
+            self.assertFalse(viewer.running)
+            self.assertNotIn("iframe", viewer._repr_html_())
+
+    def script(self):
+        script = self.shared / "shown.csv"
+        script.write_text("t,x,y,z\n0,0.5,0.5,1.15\n0.2,0.5,0.5,1.05\n")
+        return script
+
+    def test_what_cannot_be_shown_is_told(self):
+        with self.assertRaisesRegex(palpate.Error, "nowhere.h5"):
+            palpate.Viewer("nowhere.h5")
 
 
 class Loops(PythonTest):

@@ -13,5 +13,6 @@ from .library import Error
 from .loop import Loop
 from .programs import bake, probe
 from .session import Felt, Overlay, Session, Tool
+from .viewer import Viewer
 
-__all__ = ["Body", "Error", "Felt", "Loop", "Overlay", "Recording", "Session", "Tool", "bake", "probe"]
+__all__ = ["Body", "Error", "Felt", "Loop", "Overlay", "Recording", "Session", "Tool", "Viewer", "bake", "probe"]

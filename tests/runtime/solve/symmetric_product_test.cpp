@@ -21,11 +21,12 @@ struct Random {
     std::mt19937 random(static_cast<unsigned>(count));
     std::uniform_real_distribution<float> share(-1.0F, 1.0F);
     for (std::ptrdiff_t i = 0; i < rows; ++i) {
-      for (std::ptrdiff_t k = 0; k < stride; ++k)
+      for (std::ptrdiff_t k = 0; k < stride; ++k) {
         A[at(i * stride + k)] = k >= columns ? std::numeric_limits<float>::quiet_NaN()
                                 : k >= rows  ? 0.0F
                                 : k < i      ? A[at(k * stride + i)]
                                              : share(random);
+      }
     }
     for (int s = 0; s < 3; ++s) {
       for (std::ptrdiff_t k = 0; k < rows; ++k) x[at(s * stride + k)] = share(random);

@@ -641,6 +641,15 @@ TEST_F(Viewer, WatchersOfAReplayLeafForThemselves) {
   EXPECT_EQ(run_.words(), std::vector<std::string>{"seek 9"});
 }
 
+TEST_F(Viewer, ItIsInFramesOfOthersOnlyWhereThatIsAskedFor) {
+  const auto policy = [&] {
+    return std::string(test::ask(served(), {.target = "/"})["Content-Security-Policy"]);
+  };
+  EXPECT_TRUE(policy().ends_with("frame-ancestors 'none'")) << policy();
+  server_ = serve({.port = 0, .framed = true});
+  EXPECT_TRUE(policy().ends_with("frame-ancestors 'self' http://localhost:* http://127.0.0.1:*")) << policy();
+}
+
 TEST_F(Viewer, TwoRunsHavePagesOfTheirOwn) {
   for (const char* target : {"/2/", "/beside"})
     EXPECT_EQ(test::ask(served(), {.target = target}).result_int(), 404U) << target << ": there is one run";

@@ -1,0 +1,78 @@
+"""The viewer in a notebook, or in a browser beside a script."""
+
+from __future__ import annotations
+
+import html
+import os
+import re
+import subprocess
+import threading
+
+from .library import Error, program
+
+Path = str | os.PathLike[str]
+
+
+class Viewer:
+    """A body to push, or a recording to look at, in the viewer: `palpate-runtime play FILE --view` or `view FILE` in the background.
+    In a notebook it shows itself where it is the last thing of a cell; elsewhere open `address` in a browser. Ends with `close()`,
+    with its `with` block, or with Python. `options` are those of the command line: Viewer("liver.palpate.hdf", "--tool", "sphere:0.008").
+    Throws Error with what palpate-runtime says."""
+
+    def __init__(self, file: Path, *options: str, height: int = 560):
+        name = os.fspath(file)
+        command = ["play", name, "--view"] if name.endswith(".palpate.hdf") else ["view", name]
+        self.height = height
+        self._process = subprocess.Popen(
+            [program("palpate-runtime"), *command, "--view-address", "0", "--view-framed", *options],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.address = self._wait_for_address()
+        threading.Thread(target=self._drain, daemon=True).start()
+
+    def _wait_for_address(self) -> str:
+        assert self._process.stdout is not None
+        said = []
+        for line in self._process.stdout:
+            said.append(line)
+            found = re.match(r"open (http://\S+)", line)
+            if found:
+                return found[1]
+        self._process.wait()
+        raise Error.of_text("".join(said))
+
+    def _drain(self) -> None:
+        assert self._process.stdout is not None
+        for _ in self._process.stdout:
+            pass
+
+    @property
+    def running(self) -> bool:
+        """Whether the viewer can still be looked at."""
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        """Ends the viewer as Ctrl-C does, so that a recording of it (`--record`) is whole."""
+        if self.running:
+            self._process.send_signal(2)
+            try:
+                self._process.wait(timeout=10)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+    def __enter__(self) -> Viewer:
+        return self
+
+    def __exit__(self, *unused: object) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if hasattr(self, "_process"):
+            self.close()
+
+    def _repr_html_(self) -> str:
+        address = html.escape(self.address)
+        if not self.running:
+            return "<p>This viewer has ended.</p>"
+        return (f'<iframe src="{address}" width="100%" height="{int(self.height)}" style="border:0"></iframe>'
+                f'<p><a href="{address}" target="_blank">Open it in a page of its own</a></p>')
