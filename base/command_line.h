@@ -124,10 +124,11 @@ inline std::string help_page(const CLI::App& app, const std::string& command) {
 /// What `help` prints. Throws CLI::ParseError for a command that there is not.
 inline std::string help_page(const CLI::App& app, const HelpArguments& arguments) {
   if (arguments.format == "text") return help_page(app, arguments.command);
-  if (!arguments.command.empty())
+  if (!arguments.command.empty()) {
     throw CLI::ParseError(
         "--format " + arguments.format + " is of the whole program: leave out '" + arguments.command + "'",
         CLI::ExitCodes::ExtrasError);
+  }
   const CommandText program = command_tree(app);
   if (arguments.format == "man")
     return man_page(program, PALPATE_VERSION, {"palpate-precompute", "palpate-runtime"});

@@ -224,9 +224,10 @@ std::string meant_by(const CLI::App& app, const std::string& word) {
     return "palpate-runtime play " + word + " --view shows it and lets you push it. " + see;
   if (word.ends_with(".toml"))
     return "palpate-precompute " + word + " makes the file that is played with. " + see;
-  for (const char* const ending : {".stl", ".obj", ".ply", ".off", ".inr", ".inr.gz"})
+  for (const char* const ending : {".stl", ".obj", ".ply", ".off", ".inr", ".inr.gz", ".nii", ".nii.gz"}) {
     if (word.ends_with(ending))
-      return "palpate-runtime push " + word + " makes a body of it that you can push. " + see;
+      return fmt::format("palpate-runtime push {} makes a body of it that you can push. {}", word, see);
+  }
   const auto command = meant(word, {"push", "probe", "play", "view", "export", "session", "devices", "help"});
   return command ? "Did you mean palpate-runtime " + *command + "? " + see
                  : fmt::format("Commands are {}. {}", commands, see);
