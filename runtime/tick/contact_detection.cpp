@@ -83,22 +83,20 @@ bool want_nodes(const Body& body, SurfaceState& surface, const SimplexNodes& nod
   return room;
 }
 
-/// Whether a node of a simplex is to move and not in the near field.
-bool has_far_node(const Body& body, const NearField& near, const SimplexNodes& nodes) noexcept {
-  return std::any_of(nodes.begin(), nodes.end(), [&](Index node) {
+/// A node of a simplex that moves and is not in the near field, -1 where there is none.
+Index far_node_of(const Body& body, const NearField& near, const SimplexNodes& nodes) noexcept {
+  const auto far = std::find_if(nodes.begin(), nodes.end(), [&](Index node) {
     return node >= 0 && body.surface_moves(node) && near.place_of(node) < 0;
   });
+  return far == nodes.end() ? -1 : *far;
 }
 
 /// Puts one node into the near field that will be wanted soon, as those that come all at once take long.
 void want_ahead(const Body& body, SurfaceState& surface, const Scratch& scratch) noexcept {
   if (scratch.simplex_ahead < 0 || surface.near.count() == surface.near.capacity()) return;
-  for (const Index node : nodes_of(body, scratch.simplex_ahead)) {
-    if (!has_far_node(body, surface.near, {node, -1, -1})) continue;
-    bool moved = false;
-    want_nodes(body, surface, {node, -1, -1}, moved);
-    return;
-  }
+  const Index node = far_node_of(body, surface.near, nodes_of(body, scratch.simplex_ahead));
+  bool moved = false;
+  want_nodes(body, surface, {node, -1, -1}, moved);
 }
 
 /// The nearest point of a simplex that a sphere touches at its corners alone: where the sphere's middle is
@@ -128,7 +126,7 @@ std::size_t nearest_simplices(const Body& body, const SurfaceState& surface, Scr
                                      ? nearest_of_chord(tree, nodes, core, tool.tool.radius)
                                      : nearest_points(tree, nodes, core, is_point);
     if (nearest.squared_distance > reach * reach) {
-      if (nearest.squared_distance < nearest_ahead && has_far_node(body, surface.near, nodes)) {
+      if (nearest.squared_distance < nearest_ahead && far_node_of(body, surface.near, nodes) >= 0) {
         nearest_ahead = nearest.squared_distance;
         scratch.simplex_ahead = simplex;
       }

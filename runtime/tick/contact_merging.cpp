@@ -29,10 +29,6 @@ std::int64_t feature_of_nobody(Index number) noexcept {
   return std::numeric_limits<std::int64_t>::min() + number;
 }
 
-bool is_group(const ContactPoint& contact) noexcept {
-  return contact.aggregate >= 0 && !contact.held;
-}
-
 /// The surface node that a contact point is at, -1 where it is at none or at several.
 Index vertex_of(const ContactPoint& contact) noexcept {
   if (contact.aggregate >= 0) return none;
@@ -333,6 +329,10 @@ bool merge_last(const Body& body, const NearField& near, Scratch& scratch,
 }
 
 }  // namespace
+
+bool is_group(const ContactPoint& contact) noexcept {
+  return contact.aggregate >= 0 && !contact.held;
+}
 
 void merge_contacts(const Body& body, State& state, Scratch& scratch) noexcept {
   Merging merging(body, state, scratch);

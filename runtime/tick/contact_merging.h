@@ -5,6 +5,9 @@
 
 namespace palpate {
 
+/// Whether a contact point stands for neighbouring nodes that were merged.
+[[nodiscard]] bool is_group(const ContactPoint& contact) noexcept;
+
 /// Where more nodes than tuning.merging.from carried force, or scratch.candidates are nearly as many as there
 /// is room for, replaces those at nodes of a group (Body::aggregates) that carried force by one. Its force is
 /// spread over the nodes as theirs was, its gap is their mean by the same weights: so nothing changes when

@@ -7,6 +7,7 @@
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/assemble_contact.h"
 #include "runtime/tick/contact_detection.h"
+#include "runtime/tick/contact_merging.h"
 #include "runtime/tick/release.h"
 #include "runtime/tick/surface_motion.h"
 #include "runtime/tick/tool_motion.h"
@@ -71,15 +72,11 @@ double penetration(const State& state) noexcept {
   return deepest;
 }
 
-bool is_merged(const ContactPoint& contact) noexcept {
-  return contact.aggregate >= 0 && !contact.held;
-}
-
 /// Whether the contact points have come to lie so deep that another pass is wanted. Where some are merged,
 /// the gaps of those that part are right to what merging neglects, and no pass makes them better.
 bool is_rough(const Body& body, const State& state) noexcept {
   const std::span<const ContactPoint> contacts = state.contacts();
-  const bool some_merged = std::any_of(contacts.begin(), contacts.end(), is_merged);
+  const bool some_merged = std::any_of(contacts.begin(), contacts.end(), is_group);
   const double most = some_merged ? tuning.merging.defect : tuning.passes.penetration;
   return penetration(state) > most * body.mean_surface_edge();
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import os
 import re
+import signal
 import subprocess
 import threading
 
@@ -14,14 +15,14 @@ Path = str | os.PathLike[str]
 
 
 class Viewer:
-    """A body to push, or a recording to look at, in the viewer: `palpate-runtime play FILE --view` or `view FILE` in the background.
+    """A body to push, or a recording (.h5) to look at, in the viewer: `palpate-runtime play FILE --view` or `view FILE` in the background.
     In a notebook it shows itself where it is the last thing of a cell; elsewhere open `address` in a browser. Ends with `close()`,
     with its `with` block, or with Python. `options` are those of the command line: Viewer("liver.palpate.hdf", "--tool", "sphere:0.008").
     Throws Error with what palpate-runtime says."""
 
     def __init__(self, file: Path, *options: str, height: int = 560):
         name = os.fspath(file)
-        command = ["play", name, "--view"] if name.endswith(".palpate.hdf") else ["view", name]
+        command = ["view", name] if name.endswith(".h5") else ["play", name, "--view"]
         self.height = height
         self._process = subprocess.Popen(
             [program("palpate-runtime"), *command, "--view-address", "0", "--view-framed", *options],
@@ -37,13 +38,15 @@ class Viewer:
             found = re.match(r"open (http://\S+)", line)
             if found:
                 return found[1]
+        self._process.stdout.close()
         self._process.wait()
         raise Error.of_text("".join(said))
 
     def _drain(self) -> None:
         assert self._process.stdout is not None
-        for _ in self._process.stdout:
-            pass
+        with self._process.stdout as lines:  # or the program would wait for a reader
+            for _ in lines:
+                pass
 
     @property
     def running(self) -> bool:
@@ -53,7 +56,7 @@ class Viewer:
     def close(self) -> None:
         """Ends the viewer as Ctrl-C does, so that a recording of it (`--record`) is whole."""
         if self.running:
-            self._process.send_signal(2)
+            self._process.send_signal(signal.SIGINT)
             try:
                 self._process.wait(timeout=10)
             except subprocess.TimeoutExpired:
