@@ -122,6 +122,11 @@ struct LoadOptions {
 /// caller are left alone.
 Model load_model(const std::filesystem::path& path, const LoadOptions& options = {});
 
+/// What a file says of its body alone: mesh, surface, materials, supports, loads and description. Takes
+/// milliseconds, as neither Green's functions nor dynamics and overlays are read. Throws Error as
+/// `load_model`.
+Model load_outline(const std::filesystem::path& path);
+
 /// The sources of a loaded model that are no longer what they were: a sentence for each ("model.toml changed
 /// since …", "… is gone"). `model_path` is the baked file; empty when nothing is stale.
 std::vector<std::string> stale_sources(const Model& model, const std::filesystem::path& model_path);

@@ -58,9 +58,11 @@ class Reader {
 
   Model read();
   BegunModel read_begun();
+  Model read_outline();
 
  private:
   void read_known();
+  void read_body();
   template <class T>
   void read_attribute(const Attribute<T>& attribute);
   template <class T>
@@ -110,11 +112,21 @@ BegunModel Reader::read_begun() {
   return {std::move(model_), header_.precision};
 }
 
-/// What is known before the Green's functions.
-void Reader::read_known() {
+Model Reader::read_outline() {
+  read_version(file_);
+  read_body();
+  return std::move(model_);
+}
+
+void Reader::read_body() {
   for_each_attribute([this](const auto& attribute) { read_attribute(attribute); });
   if (model_.scope == Scope::none) counts_.allow_none_stored();
   for_each_body_field(model_.mesh.element, [this](const auto& field) { read_field(field); });
+}
+
+/// What is known before the Green's functions.
+void Reader::read_known() {
+  read_body();
   if (model_.scope == Scope::none && (file_.has(overlay_group) || file_.has(dynamics_group)))
     refuse(where_, "the scope is none, but there are overlays or dynamics");
   if (file_.has(overlay_group)) {
@@ -306,10 +318,22 @@ std::optional<BegunModel> read_begun_model(const std::filesystem::path& partial)
   }
 }
 
-Model load_model(const std::filesystem::path& path, const LoadOptions& options) {
+namespace {
+
+hdf5::Contents contents_of(const std::filesystem::path& path) {
   FileDescriptor bytes = open_file(path, OpenMode::read);
   check_superblock(bytes, {"a Palpate file", give_a_model, precompute_again});
-  return Reader(hdf5::Contents::read(std::move(bytes)), options).read();
+  return hdf5::Contents::read(std::move(bytes));
+}
+
+}  // namespace
+
+Model load_model(const std::filesystem::path& path, const LoadOptions& options) {
+  return Reader(contents_of(path), options).read();
+}
+
+Model load_outline(const std::filesystem::path& path) {
+  return Reader(contents_of(path), {}).read_outline();
 }
 
 }  // namespace palpate

@@ -19,6 +19,7 @@
 #include "runtime/app/probe.h"
 #include "runtime/app/session.h"
 #include "runtime/app/view.h"
+#include "runtime/gallery/gallery.h"
 #include "runtime/loop/numbers.h"
 #include "runtime/push/push_command.h"
 
@@ -123,9 +124,11 @@ CLI::App* add_session(CLI::App& app, Arguments& arguments) {
 }
 
 CLI::App* add_view(CLI::App& app, Arguments& arguments) {
-  CLI::App* view = app.add_subcommand("view", "show a recording in a browser, or two side by side");
-  view->add_option("SESSION.h5", arguments.recordings, "recording; two are shown side by side")
-      ->required()
+  CLI::App* view = app.add_subcommand(
+      "view", "show a recording in a browser, two side by side, or all that is in a folder");
+  view->add_option("SESSION.h5|FOLDER", arguments.recordings,
+                   "recording; two are shown side by side; or a folder, the current one without, whose "
+                   "bodies and recordings are shown to choose from")
       ->expected(1, 2)
       ->type_name("");
   view->add_option("--view-address", arguments.view_address, "address at which the page is served")
@@ -134,7 +137,8 @@ CLI::App* add_view(CLI::App& app, Arguments& arguments) {
   view->add_flag("--view-framed", arguments.view_framed, view_framed_help);
   view->footer(
       "To touch a model itself: palpate-runtime play FILE --view\n"
-      "Example:\n"
+      "Examples:\n"
+      "  palpate-runtime view\n"
       "  palpate-runtime view touch.h5\n"
       "  palpate-runtime view coarse.h5 fine.h5");
   return view;
@@ -258,6 +262,15 @@ int push(const PushArguments& arguments) {
   return play(options);
 }
 
+/// One or two recordings, or a folder.
+int view_files(const std::vector<std::filesystem::path>& files, const ViewerOptions& options) {
+  if (files.empty()) return show_gallery(".", options);
+  std::error_code problem;
+  if (files.size() == 1 && std::filesystem::is_directory(files.front(), problem))
+    return show_gallery(files.front(), options);
+  return view(files, options);
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Lets a tool touch a precomputed elastic body and computes the finite-element forces.",
                "palpate-runtime");
@@ -268,6 +281,7 @@ int run(int argc, char** argv) {
       "Examples:\n"
       "  palpate-runtime push organ.stl                  make a body of a surface and push it in a browser\n"
       "  palpate-runtime play cube.palpate.hdf --view    push a precomputed one\n"
+      "  palpate-runtime view                            choose from what this folder has\n"
       "  palpate-runtime help play                       more about a command\n"
       "Exit status: 0 done, 1 bad input or file, 2 wrong arguments, 3 a replay differed, 130 interrupted.");
   Arguments arguments;
@@ -293,7 +307,7 @@ int run(int argc, char** argv) {
     if (devices_command->parsed()) return devices(arguments.devices);
     if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.force);
     if (view_command->parsed()) {
-      return view(arguments.recordings, read_viewer(arguments.view_address, arguments.view_framed));
+      return view_files(arguments.recordings, read_viewer(arguments.view_address, arguments.view_framed));
     }
     if (export_command->parsed()) return export_session(arguments.exported);
     if (push_command->parsed()) return push(arguments.push);

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -37,41 +38,41 @@ class LeaveSignals {
     ignore.sa_handler = SIG_IGN;
     for (std::size_t i = 0; i < signals.size(); ++i) sigaction(signals.at(i), &ignore, &before_.at(i));
   }
-  ~LeaveSignals() { restore(); }
-  LeaveSignals(const LeaveSignals&) = delete;
-  LeaveSignals& operator=(const LeaveSignals&) = delete;
-
-  void restore() const noexcept {
+  ~LeaveSignals() {
     for (std::size_t i = 0; i < signals.size(); ++i) sigaction(signals.at(i), &before_.at(i), nullptr);
   }
+  LeaveSignals(const LeaveSignals&) = delete;
+  LeaveSignals& operator=(const LeaveSignals&) = delete;
 
  private:
   static constexpr std::array<int, 2> signals = {SIGINT, SIGTERM};
   std::array<struct sigaction, signals.size()> before_{};
 };
 
-[[noreturn]] void be_program(int output, const std::filesystem::path& program,
-                             const std::vector<std::string>& arguments) {
+/// A child begins with no signal blocked, whatever its parent waits for.
+void let_all_signals() {
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+}
+
+/// No file descriptor of this program is its own, as they are closed on exec.
+[[noreturn]] void be_program(int output, const OtherProgram::Start& start) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);
-  dup2(output, STDOUT_FILENO);
-  std::string name = program.string();
-  std::vector<std::string> words = arguments;
+  dup2(output, start.read == OtherProgram::Stream::output ? STDOUT_FILENO : STDERR_FILENO);
+  if (!start.has_terminal) {
+    setpgid(0, 0);
+    const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+    dup2(nothing, STDIN_FILENO);
+  }
+  if (!start.folder.empty() && ::chdir(start.folder.c_str()) != 0) _exit(cannot_be_started);
+  std::string name = start.program.string();
+  std::vector<std::string> words = start.arguments;
   std::vector<char*> pointers = {name.data()};
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
-  ::execv(program.c_str(), pointers.data());
+  ::execv(name.c_str(), pointers.data());
   _exit(cannot_be_started);
-}
-
-std::string read_all(int pipe) {
-  std::string text;
-  std::array<char, 4096> chunk{};
-  for (;;) {
-    const ssize_t size = ::read(pipe, chunk.data(), chunk.size());
-    if (size < 0 && errno == EINTR) continue;
-    if (size <= 0) return text;
-    text.append(chunk.data(), static_cast<std::size_t>(size));
-  }
 }
 
 int wait_for(pid_t child) {
@@ -97,27 +98,60 @@ std::filesystem::path find_program(const std::string& name) {
               "install or build " + name + ", or add its folder to the PATH");
 }
 
-ProgramEnd run_other_program(const std::filesystem::path& program,
-                             const std::vector<std::string>& arguments) {
+OtherProgram::OtherProgram(const Start& start) : program_(start.program), leads_(!start.has_terminal) {
   std::array<int, 2> pipe{};
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0)
-    throw Error(std::string("cannot make a pipe: ") + std::strerror(errno), program.string(),
+    throw Error(std::string("cannot make a pipe: ") + std::strerror(errno), program_.string(),
                 "close other programs and try again");
-  const LeaveSignals signals;
   const pid_t child = ::fork();
   if (child == 0) {
-    signals.restore();
-    be_program(pipe[1], program, arguments);
+    let_all_signals();
+    be_program(pipe[1], start);
   }
   ::close(pipe[1]);
-  ProgramEnd end;
-  if (child > 0) {
-    end.output = read_all(pipe[0]);
-    end.status = wait_for(child);
+  if (child > 0 && leads_) setpgid(child, child);  // as it does itself: whoever comes first
+  output_ = pipe[0];
+  process_ = child;
+  if (child >= 0) return;
+  ::close(output_);
+  throw Error("cannot be started", program_.string(), "close other programs and try again");
+}
+
+OtherProgram::~OtherProgram() {
+  end();
+  if (process_ > 0) wait_for(process_);
+  ::close(output_);
+}
+
+std::string OtherProgram::read() {
+  std::array<char, 4096> chunk{};
+  for (;;) {
+    const ssize_t size = ::read(output_, chunk.data(), chunk.size());
+    if (size < 0 && errno == EINTR) continue;
+    return {chunk.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
   }
-  ::close(pipe[0]);
-  if (child < 0 || end.status == cannot_be_started)
-    throw Error("cannot be started", program.string(), "check that it is a program for this machine");
+}
+
+void OtherProgram::end() noexcept {
+  const int process = process_;
+  if (process > 0) ::kill(leads_ ? -process : process, SIGTERM);
+}
+
+int OtherProgram::wait() {
+  const int status = wait_for(process_);
+  process_ = -1;
+  if (status == cannot_be_started)
+    throw Error("cannot be started", program_.string(), "check that it is a program for this machine");
+  return status;
+}
+
+ProgramEnd run_other_program(const std::filesystem::path& program,
+                             const std::vector<std::string>& arguments) {
+  OtherProgram other({.program = program, .arguments = arguments});
+  const LeaveSignals signals;  // from now on: what it inherits is as it was
+  ProgramEnd end;
+  for (std::string text = other.read(); !text.empty(); text = other.read()) end.output += text;
+  end.status = other.wait();
   return end;
 }
 

@@ -1,6 +1,7 @@
 // Programs beside this one.
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,6 +11,42 @@ namespace palpate {
 /// The program of this name beside the running one, in the folder of that name beside it (as in a build
 /// tree), or on the PATH. Throws Error where there is none.
 [[nodiscard]] std::filesystem::path find_program(const std::string& name);
+
+/// A program that runs beside this one, in a folder of its own if it is given one. Of what it prints one
+/// stream is read here, the other one goes where this program's does. It ends with the thread that started
+/// it.
+class OtherProgram {
+ public:
+  enum class Stream { output, errors };
+
+  struct Start {
+    std::filesystem::path program;
+    std::vector<std::string> arguments;
+    Stream read = Stream::output;
+    std::filesystem::path folder{};  ///< that it works in; empty: this program's
+    bool has_terminal = true;        ///< else it hears no keys of a person, nor signals that they send
+  };
+
+  /// Throws Error where there is no room for another program.
+  explicit OtherProgram(const Start& start);
+  ~OtherProgram();  ///< ends it and waits for that
+  OtherProgram(const OtherProgram&) = delete;
+  OtherProgram& operator=(const OtherProgram&) = delete;
+
+  /// What it prints next, at most some kilobytes; empty once it prints nothing more.
+  [[nodiscard]] std::string read();
+  /// Asks it to end, and without a terminal all that it has started. Any thread may.
+  void end() noexcept;
+  /// Its exit status, once it has ended; 128 + the signal that ended it. Throws Error where it could not be
+  /// started at all.
+  int wait();
+
+ private:
+  std::filesystem::path program_;
+  bool leads_ = false;  // a process group
+  int output_ = -1;
+  std::atomic<int> process_ = -1;
+};
 
 /// How another program ended.
 struct ProgramEnd {

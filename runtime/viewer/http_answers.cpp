@@ -10,7 +10,6 @@
 #include "runtime/viewer/admission.h"
 #include "runtime/viewer/book_files.h"
 #include "runtime/viewer/seen_surface.h"
-#include "runtime/web/page.h"
 
 namespace palpate {
 namespace {
@@ -18,34 +17,12 @@ namespace {
 namespace beast = boost::beast;
 namespace http = beast::http;
 
-constexpr unsigned http_version = 11;  // 1.1
 constexpr std::string_view book_path = "/book/";
 constexpr std::string_view second_run = "/2/";
 constexpr std::string_view both_runs = "/beside";
 
-std::string_view view(beast::string_view text) {
-  return {text.data(), text.size()};
-}
-
 Target target_of(const Request& request) {
-  return split_target(view(request.target()));
-}
-
-Response plain(http::status status, const std::string& text) {
-  Response response(status, http_version);
-  response.set(http::field::content_type, "text/plain; charset=utf-8");
-  response.body() = text + "\n";
-  return response;
-}
-
-/// What every answer has: nothing of it is for other pages, and the token in the address stays here.
-Response guarded(Response response) {
-  response.keep_alive(false);
-  response.set(http::field::cache_control, "no-store");
-  response.set("X-Content-Type-Options", "nosniff");
-  response.set("Referrer-Policy", "no-referrer");
-  response.set("Cross-Origin-Resource-Policy", "same-origin");
-  return response;
+  return split_target(text_view(request.target()));
 }
 
 /// Path of a request; the second run's without what is before it, as the first one's would be.
@@ -54,29 +31,9 @@ std::string_view path_in_run(const Request& request, const ServedAddress& served
   return run_of(request, served) == 0 ? path : path.substr(second_run.size() - 1);
 }
 
-/// Whose pages may have one in a frame. `by_own`: those of this server. Notebooks are served by this machine.
-std::string ancestors(const ServedAddress& served, bool by_own) {
-  if (served.framed) return "'self' http://localhost:* http://127.0.0.1:*";
-  return by_own ? "'self'" : "'none'";
-}
-
-/// `frames`: it has others of this server in it.
-Response page(std::string_view host, const std::string& ancestors, bool frames) {
-  Response response(http::status::ok, http_version);
-  response.set(http::field::content_type, "text/html; charset=utf-8");
-  response.set("Content-Security-Policy",
-               fmt::format("default-src 'none'; script-src 'unsafe-inline' blob:; worker-src blob:; "
-                           "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src data:; "
-                           "connect-src 'self' ws://{} blob: data:; base-uri 'none'; form-action 'none'; "
-                           "frame-src {}; frame-ancestors {}",
-                           host, frames ? "'self'" : "'none'", ancestors));
-  response.body() = viewer_page();
-  return response;
-}
-
 Response surface_file(bool is_stl, const DrawnPicture& shown) {
   try {
-    Response response(http::status::ok, http_version);
+    Response response;
     response.set(http::field::content_type, is_stl ? "model/stl" : "application/octet-stream");
     response.set(http::field::content_disposition,
                  fmt::format("attachment; filename=\"surface-tick-{}.{}\"", shown.picture.frame.tick,
@@ -104,20 +61,11 @@ bool wants_socket(const Request& request, const ServedAddress& served) {
 }
 
 std::optional<Response> refusal(const Request& request, const ServedAddress& served) {
-  const std::string_view host = view(request[http::field::host]);
-  if (request.count(http::field::host) != 1 || !is_served(host, served.address, served.port))
-    return guarded(
-        plain(http::status::forbidden, "Open the viewer at the address that the runtime printed."));
-  if (request.count(http::field::origin) > 0 && !is_own_page(view(request[http::field::origin]), host))
-    return guarded(plain(http::status::forbidden, "Pages of other addresses may not ask."));
-  if (request.method() != http::verb::get && request.method() != http::verb::head) {
-    Response response = guarded(plain(http::status::method_not_allowed, "Only GET and HEAD are answered."));
-    response.set(http::field::allow, "GET, HEAD");
-    return response;
-  }
-  if (!wants_book(request) && !is_same_token(target_of(request).token, served.token))
-    return guarded(
-        plain(http::status::forbidden, "Open the whole address that the runtime printed, with its token."));
+  if (std::optional<Response> refused = foreign_refusal(request, served)) return refused;
+  if (request.method() != http::verb::get && request.method() != http::verb::head)
+    return method_refusal("GET, HEAD");
+  if (!wants_book(request))
+    if (std::optional<Response> refused = token_refusal(request, served)) return refused;
   if (wants_socket(request, served)) {
     const auto offered = request.find(http::field::sec_websocket_protocol);
     if (offered != request.end() && !http::token_list(offered->value()).exists(subprotocol))
@@ -134,7 +82,7 @@ Response full_house() {
 Response book_answer(const Request& request, const std::filesystem::path& book) {
   std::optional<BookFile> file = read_book_file(book, target_of(request).path.substr(book_path.size()));
   if (!file) return guarded(plain(http::status::not_found, "There is no such page in the book."));
-  Response response(http::status::ok, http_version);
+  Response response;
   response.set(http::field::content_type, file->content_type);
   response.set("Content-Security-Policy",
                "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
@@ -147,11 +95,11 @@ Response book_answer(const Request& request, const std::filesystem::path& book) 
 Response answer(const Request& request, const ServedAddress& served,
                 const std::optional<DrawnPicture>& shown) {
   const std::string_view path = path_in_run(request, served);
-  const std::string_view host = view(request[http::field::host]);
+  const std::string_view host = text_view(request[http::field::host]);
   const bool has_two = served.runs > 1;
-  if (path == "/") return guarded(page(host, ancestors(served, has_two), false));
+  if (path == "/") return guarded(page_answer(host, ancestors(served, has_two), false));
   if (has_two && target_of(request).path == both_runs)
-    return guarded(page(host, ancestors(served, false), true));
+    return guarded(page_answer(host, ancestors(served, false), true));
   const bool is_stl = path == "/surface.stl";
   if (!is_stl && path != "/surface.vtu")
     return guarded(plain(http::status::not_found, "There is no such page."));

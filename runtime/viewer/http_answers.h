@@ -8,12 +8,12 @@
 #include <string>
 
 #include "runtime/viewer/broadcast.h"
+#include "runtime/viewer/http_guard.h"
 #include "runtime/viewer/viewer_port.h"
 
 namespace palpate {
 
 using Request = boost::beast::http::request<boost::beast::http::empty_body>;
-using Response = boost::beast::http::response<boost::beast::http::string_body>;
 
 /// Subprotocol of the WebSocket.
 inline constexpr const char* subprotocol = "palpate.2";

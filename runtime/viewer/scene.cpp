@@ -64,10 +64,8 @@ bool all_free_nodes_stored(const Body& body) {
   return true;
 }
 
-void fill_plane(const Body& body, Scene& scene) {
-  const Model& model = body.model();
+void fill_plane(const Model& model, Scene& scene) {
   scene.is_plane = true;
-  scene.surface_nodes.assign(body.surface_mesh_nodes().begin(), body.surface_mesh_nodes().end());
   scene.nodes = model.mesh.nodes;
   scene.held = model.fixed;
   std::vector<Line> edges;
@@ -134,10 +132,20 @@ Scene make_scene(const Body& body, std::uint32_t number) {
   scene.number = number;
   scene.dimension = body.dimension();
   if (body.dimension() == 2 && all_free_nodes_stored(body)) {
-    fill_plane(body, scene);
+    fill_plane(body.model(), scene);
+    scene.surface_nodes.assign(body.surface_mesh_nodes().begin(), body.surface_mesh_nodes().end());
   } else {
     fill_surface(body, scene);
   }
+  scene.order = order_along_curve(scene.nodes);
+  return scene;
+}
+
+Scene make_plane_scene(const Model& model, std::uint32_t number) {
+  Scene scene;
+  scene.number = number;
+  scene.dimension = 2;
+  fill_plane(model, scene);
   scene.order = order_along_curve(scene.nodes);
   return scene;
 }

@@ -51,6 +51,9 @@ struct ScenePatch {
 /// The scene of a body. Throws Error when the model's surface is not that of its mesh.
 Scene make_scene(const Body& body, std::uint32_t number);
 
+/// The scene of a body in the plane, all of whose elements are drawn, of which nothing but the mesh is there.
+Scene make_plane_scene(const Model& model, std::uint32_t number);
+
 /// The scene of an overlay on the body of `scene`. Its number is left 0.
 ScenePatch make_scene_patch(const Body& body, const Scene& scene, const Patch& patch);
 

@@ -128,6 +128,20 @@ TEST(ModelFile, WithoutGreensFunctionsHoldsTheRest) {
   EXPECT_EQ(files_in(folder), Names{"a.palpate.hdf"});
 }
 
+TEST(ModelFile, TheOutlineIsTheBodyWithoutTheRest) {
+  const Folder folder;
+  const Model written = write_sample(folder / "a.palpate.hdf", Precision::double_precision);
+  const Model read = load_outline(folder / "a.palpate.hdf");
+  EXPECT_EQ(read.name, written.name);
+  EXPECT_EQ(read.mesh.nodes, written.mesh.nodes);
+  EXPECT_EQ(read.mesh.connectivity, written.mesh.connectivity);
+  EXPECT_EQ(read.surface, written.surface);
+  EXPECT_EQ(read.fixed, written.fixed);
+  EXPECT_EQ(read.rest_displacement, written.rest_displacement);
+  EXPECT_EQ(read.greens.order(), 0);
+  EXPECT_TRUE(read.probes.empty());
+}
+
 TEST(ModelFile, GreensFunctionsStartOnAPage) {
   const Folder folder;
   const Model model = write_sample(folder / "a.palpate.hdf");

@@ -38,6 +38,11 @@ export function format_si(value: number, unit: string, digits = 3): string {
   return `${format_number(value / factor, digits)} ${prefix}${unit}`;
 }
 
+/** "46 MB". */
+export function format_bytes(bytes: number): string {
+  return bytes < 1000 ? `${bytes} B` : format_si(bytes, 'B', 2);
+}
+
 /** "3:07.25", of seconds. */
 export function format_time(seconds: number): string {
   const minutes = Math.floor(seconds / 60);

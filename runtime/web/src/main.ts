@@ -12,6 +12,7 @@ import { on_keys } from './keyboard';
 import { near_limit } from './live_controls';
 import { show_light } from './range_light';
 import { LiveSource, socket_url } from './live_source';
+import { Gallery, show_way_back } from './gallery';
 import { show_felt, show_timing, type Felt } from './numbers';
 import { Picture } from './picture';
 import { Plots } from './plots';
@@ -125,6 +126,7 @@ class Page implements Listener {
     this.replay_.sought = (time) => this.neighbour_.say({ about: 'time', time });
     this.listen();
     this.listen_keys();
+    show_way_back();
     this.choose_theme(kept_theme() as Theme);
     this.drawing_.tell();
     setInterval(() => this.show_numbers(), numbers_wait);
@@ -631,4 +633,5 @@ class Page implements Listener {
 }
 
 if (/\/beside$/.test(location.pathname)) new Beside();
+else if (/\/gallery$/.test(location.pathname)) new Gallery();
 else new Page();

@@ -171,6 +171,14 @@ export class View {
     return { canvas: this.canvas, shrink };
   }
 
+  /** It draws no more, and its context is free. */
+  dispose(): void {
+    clearTimeout(this.rest_timer_);
+    this.is_wanted_ = true;
+    this.renderer_.dispose();
+    this.renderer_.forceContextLoss();
+  }
+
   private floor(box: Box3, up: Vector3, cell: number): Vector3 {
     const centre = box.getCenter(new Vector3());
     const low = box.min.dot(up) < box.max.dot(up) ? box.min : box.max;

@@ -1,0 +1,27 @@
+#include "runtime/gallery/gallery.h"
+
+#include <fmt/core.h>
+#include <signal.h>
+
+#include "base/error.h"
+#include "runtime/gallery/gallery_folder.h"
+#include "runtime/gallery/gallery_server.h"
+
+namespace palpate {
+
+int show_gallery(const std::filesystem::path& folder, const ViewerOptions& options) {
+  sigset_t ends;  // blocked before the server's thread begins, which inherits that
+  sigemptyset(&ends);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
+  pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+  const std::size_t items = list_gallery(folder).size();
+  const std::filesystem::path place = std::filesystem::canonical(folder);
+  const GalleryServer server(place, options);
+  fmt::print(stderr, "{}: {} to choose from\n", place.string(), items);
+  fmt::print(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
+  int signal = 0;
+  sigwait(&ends, &signal);
+  return exit_ok;
+}
+
+}  // namespace palpate

@@ -1,0 +1,13 @@
+// palpate-runtime view FOLDER: all that is in a folder, to choose from.
+#pragma once
+
+#include <filesystem>
+
+#include "runtime/viewer/viewer_port.h"
+
+namespace palpate {
+
+/// Serves the gallery of a folder until SIGINT or SIGTERM. Returns the exit code; throws Error.
+int show_gallery(const std::filesystem::path& folder, const ViewerOptions& options);
+
+}  // namespace palpate

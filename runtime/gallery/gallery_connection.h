@@ -1,0 +1,46 @@
+// One request to a gallery.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "runtime/gallery/gallery_answers.h"
+
+namespace palpate {
+
+/// Reads it, has it answered, and is gone. For the server's thread.
+class GalleryConnection : public std::enable_shared_from_this<GalleryConnection> {
+ public:
+  /// `answers` and `served` must live as long.
+  GalleryConnection(boost::asio::ip::tcp::socket socket, GalleryAnswers& answers, const ServedAddress& served)
+      : stream_(std::move(socket)), answers_(answers), served_(served) {}
+  ~GalleryConnection();  ///< a file that has not come whole is removed
+  GalleryConnection(const GalleryConnection&) = delete;
+  GalleryConnection& operator=(const GalleryConnection&) = delete;
+
+  void start();
+
+ private:
+  using ErrorCode = boost::system::error_code;
+  using FileParser = boost::beast::http::request_parser<boost::beast::http::file_body>;
+
+  void answer_request();
+  void take_file();
+  void keep_file(const ErrorCode& problem);
+  void respond(Response response);
+
+  boost::beast::tcp_stream stream_;
+  GalleryAnswers& answers_;
+  const ServedAddress& served_;
+  boost::beast::flat_buffer buffer_;
+  std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
+  std::optional<FileParser> file_;
+  std::filesystem::path temporary_;  // where the file comes; empty: none does
+  std::optional<Response> response_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,107 @@
+#include "runtime/gallery/gallery_folder.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+#include "base/error.h"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t longest_name = 200;
+
+constexpr std::array<std::pair<std::string_view, GalleryKind>, 12> endings = {{
+    {".palpate.hdf", GalleryKind::body},
+    {".h5", GalleryKind::recording},
+    {".stl", GalleryKind::source},
+    {".obj", GalleryKind::source},
+    {".ply", GalleryKind::source},
+    {".off", GalleryKind::source},
+    {".inr", GalleryKind::source},
+    {".inr.gz", GalleryKind::source},
+    {".nii", GalleryKind::source},
+    {".nii.gz", GalleryKind::source},
+    {".model.toml", GalleryKind::source},
+    {"model.toml", GalleryKind::source},
+}};
+
+std::string_view ending_of(std::string_view name) {
+  std::string_view longest;
+  for (const auto& [ending, kind] : endings)
+    if (name.ends_with(ending) && ending.size() > longest.size()) longest = ending;
+  return longest;
+}
+
+std::string_view stem_of(std::string_view name) {
+  return name.substr(0, name.size() - ending_of(name).size());
+}
+
+double seconds_since_1970(fs::file_time_type time) {
+  const auto system = std::chrono::file_clock::to_sys(time);
+  return std::chrono::duration<double>(system.time_since_epoch()).count();
+}
+
+/// Nothing where it is gone meanwhile, or no plain file.
+std::optional<GalleryItem> item_of(const fs::directory_entry& entry) {
+  const std::string name = entry.path().filename().string();
+  const std::optional<GalleryKind> kind = gallery_kind(name);
+  std::error_code problem;
+  if (!kind || !entry.is_regular_file(problem)) return std::nullopt;
+  const auto bytes = static_cast<std::int64_t>(entry.file_size(problem));
+  const fs::file_time_type modified = problem ? fs::file_time_type() : entry.last_write_time(problem);
+  if (problem) return std::nullopt;
+  return GalleryItem{.name = name, .kind = *kind, .bytes = bytes, .modified = seconds_since_1970(modified)};
+}
+
+}  // namespace
+
+std::optional<GalleryKind> gallery_kind(std::string_view name) {
+  const bool has_control = std::any_of(
+      name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; });
+  if (name.empty() || name.size() > longest_name || name.front() == '.' || has_control ||
+      name.find('/') != std::string_view::npos)
+    return std::nullopt;
+  const std::string_view ending = ending_of(name);
+  for (const auto& [known, kind] : endings)
+    if (known == ending && !ending.empty()) return kind;
+  return std::nullopt;
+}
+
+std::vector<GalleryItem> list_gallery(const fs::path& folder) {
+  std::error_code problem;
+  fs::directory_iterator entries(folder, problem);
+  if (problem)
+    throw Error("cannot be read: " + problem.message(), folder.string(),
+                "give a folder with bodies or recordings: palpate-runtime view FOLDER");
+  std::vector<GalleryItem> items;
+  for (const fs::directory_entry& entry : entries)
+    if (std::optional<GalleryItem> item = item_of(entry)) items.push_back(std::move(*item));
+  const auto has_body = [&](const GalleryItem& source) {
+    return std::any_of(items.begin(), items.end(), [&](const GalleryItem& other) {
+      return other.kind == GalleryKind::body && stem_of(other.name) == stem_of(source.name);
+    });
+  };
+  std::vector<GalleryItem> shown;
+  for (const GalleryItem& item : items)
+    if (item.kind != GalleryKind::source || !has_body(item)) shown.push_back(item);
+  std::sort(shown.begin(), shown.end(), [](const GalleryItem& a, const GalleryItem& b) {
+    return std::tie(a.kind, a.name) < std::tie(b.kind, b.name);
+  });
+  return shown;
+}
+
+std::string free_name(const fs::path& folder, const std::string& wanted) {
+  std::string name = wanted;
+  const std::string stem(stem_of(wanted)), ending(ending_of(wanted));
+  for (int k = 2; fs::exists(fs::symlink_status(folder / name)); ++k)
+    name = stem + "-" + std::to_string(k) + ending;
+  return name;
+}
+
+}  // namespace palpate

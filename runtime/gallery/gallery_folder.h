@@ -1,0 +1,38 @@
+// What there is in a folder to push, to look at or to make a body of.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate {
+
+/// Told by the name's ending.
+enum class GalleryKind : std::uint8_t {
+  body,       ///< NAME.palpate.hdf
+  recording,  ///< SESSION.h5
+  source,     ///< what palpate-runtime push makes a body of: a surface, a labelled image, a description
+};
+
+struct GalleryItem {
+  std::string name;  ///< of the file in the folder
+  GalleryKind kind = GalleryKind::body;
+  std::int64_t bytes = 0;
+  double modified = 0.0;  ///< [s] since 1970
+};
+
+/// What a file of this name is; nothing for a name that is none of a file here: hidden, with a folder in it,
+/// or with another ending.
+[[nodiscard]] std::optional<GalleryKind> gallery_kind(std::string_view name);
+
+/// Bodies, then recordings, then sources that no body there was made of by name; each by name. Throws Error
+/// where the folder cannot be read.
+[[nodiscard]] std::vector<GalleryItem> list_gallery(const std::filesystem::path& folder);
+
+/// A name like `wanted` that no file of the folder has: `wanted` itself, or with a number before its ending.
+[[nodiscard]] std::string free_name(const std::filesystem::path& folder, const std::string& wanted);
+
+}  // namespace palpate

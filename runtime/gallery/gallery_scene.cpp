@@ -1,0 +1,70 @@
+#include "runtime/gallery/gallery_scene.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "base/error.h"
+#include "formats/model_file.h"
+#include "formats/recording.h"
+#include "runtime/body/surface_numbering.h"
+#include "runtime/gallery/gallery_folder.h"
+#include "runtime/viewer/scene.h"
+#include "runtime/viewer/wire.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::uint32_t only_scene = 1;
+
+/// In space.
+RecordedSurface surface_at_rest(const Model& model) {
+  SurfaceNumbering numbering = number_surface(model.surface, model.mesh.nodes.size());
+  RecordedSurface surface;
+  surface.simplices = std::move(numbering.simplices);
+  for (const Index node : numbering.mesh_nodes) {
+    const auto at = static_cast<std::size_t>(node);
+    surface.nodes.push_back(model.mesh.nodes[at] + model.rest_displacement[at]);
+    surface.held.push_back(model.fixed[at]);
+  }
+  return surface;
+}
+
+double felt(const TickRecord& tick) {
+  return tick.force[0] * tick.force[0] + tick.force[1] * tick.force[1] + tick.force[2] * tick.force[2];
+}
+
+/// The frame of the largest force that a tick with a picture felt.
+std::int64_t telling_frame(const Recording& recording) {
+  const auto largest = std::max_element(recording.ticks.begin(), recording.ticks.end(),
+                                        [](const auto& a, const auto& b) { return felt(a) < felt(b); });
+  if (largest == recording.ticks.end()) return 0;
+  const std::vector<double>& times = recording.frames.time;
+  const auto after = std::lower_bound(times.begin(), times.end(), largest->time);
+  return std::min(after - times.begin(), std::ssize(times) - 1);
+}
+
+RecordedSurface surface_as_pressed(const RecordingFile& file) {
+  RecordedSurface surface = file.recording().frames.surface;
+  if (file.recording().frames.tick.empty() || surface.nodes.empty())
+    throw Error("has no pictures of the surface", "recording", "record it without --record-frames 0");
+  const SurfaceFrame frame = file.frame(telling_frame(file.recording()));
+  for (std::size_t i = 0; i < surface.nodes.size(); ++i)
+    surface.nodes[i] += Eigen::Map<const Eigen::Vector3f>(frame.displacement.data() + 3 * i).cast<double>();
+  return surface;
+}
+
+}  // namespace
+
+std::string gallery_scene(const std::filesystem::path& file) {
+  const std::optional<GalleryKind> kind = gallery_kind(file.filename().string());
+  if (kind == GalleryKind::body) {
+    const Model model = load_outline(file);
+    return encode_scene(model.dimension() == 2 ? make_plane_scene(model, only_scene)
+                                               : make_scene(surface_at_rest(model), only_scene));
+  }
+  if (kind == GalleryKind::recording)
+    return encode_scene(make_scene(surface_as_pressed(RecordingFile(file)), only_scene));
+  throw Error("has no picture before a body is made of it", file.filename().string(), "open it");
+}
+
+}  // namespace palpate

@@ -1,0 +1,143 @@
+// All that is in a folder, to choose from, in a real browser against the real runtime.
+import assert from 'node:assert/strict';
+import { readdirSync, readFileSync } from 'node:fs';
+import { copyFile, readdir, readFile, rm, writeFile } from 'node:fs/promises';
+import path from 'node:path';
+import { after, test } from 'node:test';
+import { bake, close, cube, folder, ready, serve, told, until, visit } from './harness.mjs';
+import { barriers, faults_of_layout } from './looks.mjs';
+import { part, recorded } from './steps.mjs';
+
+after(close);
+
+const item = (page, name) => page.locator(`[data-name="${name}"]`);
+
+/// Command lines of the processes that one has started.
+const children_of = (pid) =>
+  readdirSync('/proc')
+    .filter((one) => /^\d+$/.test(one))
+    .flatMap((one) => {
+      try {
+        const stat = readFileSync(`/proc/${one}/stat`, 'utf8');
+        return Number(stat.slice(stat.lastIndexOf(')') + 2).split(' ')[1]) === pid ? [readFileSync(`/proc/${one}/cmdline`, 'utf8').replaceAll('\0', ' ')] : [];
+      } catch {
+        return []; // it has ended
+      }
+    });
+
+/// A folder with a cube, a press of it, a plate, a file that is cut off and one that is nothing of ours: { at, served }.
+async function gallery(t) {
+  const at = await folder(t);
+  await recorded(t, at, 0.1);
+  const body = path.join(at, 'model.palpate.hdf');
+  await copyFile(body, path.join(at, 'cube.palpate.hdf'));
+  await writeFile(path.join(at, 'broken.palpate.hdf'), (await readFile(body)).subarray(0, 5000));
+  await writeFile(path.join(at, 'notes.txt'), 'nothing');
+  await rm(path.join(at, 'model.toml'));
+  await writeFile(path.join(at, 'lump.obj'), 'this is no surface\n');
+  return { at, served: await serve(t, ['view', '--view-address', '127.0.0.1:0'], at) };
+}
+
+const shown = (page) => page.locator('[data-testid="item"]').evaluateAll((all) => all.map((one) => one.dataset.name));
+
+test('a body is chosen, left, and a recording chosen', async (t) => {
+  const { served } = await gallery(t);
+  assert.match(served.url, /\/gallery\?token=/);
+  const page = await visit(t, served.url, { is_drawn: true });
+  const picture = (name) => item(page, name).locator('img');
+  await picture('cube.palpate.hdf').waitFor();
+  await picture('push.h5').waitFor();
+  assert.deepEqual(await shown(page), ['broken.palpate.hdf', 'cube.palpate.hdf', 'model.palpate.hdf', 'push.h5', 'lump.obj']);
+  assert.match(await item(page, 'broken.palpate.hdf').locator('.problem').innerText(), /broken\.palpate\.hdf: the file is truncated/);
+  const [rest, same, pressed] = await Promise.all(['cube.palpate.hdf', 'model.palpate.hdf', 'push.h5'].map((name) => picture(name).getAttribute('src')));
+  assert.equal(rest, same);
+  assert.notEqual(rest, pressed); // where it felt most
+  const colours = await page.evaluate(async (url) => {
+    const bitmap = await createImageBitmap(await (await fetch(url)).blob());
+    const pen = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+    pen.drawImage(bitmap, 0, 0);
+    return [[0.5, 0.5], [0.02, 0.02]].map(([x, y]) => [...pen.getImageData(x * bitmap.width, y * bitmap.height, 1, 1).data]);
+  }, rest);
+  assert.ok(colours[0][0] > 100 && colours[0][3] === 255 && colours[1][3] === 0, `${colours}: a red body on no ground`);
+  assert.deepEqual(page.complaints, []);
+
+  await item(page, 'cube.palpate.hdf').click();
+  await ready(page);
+  assert.equal((await told(page, 'state')).model.name, 'cube');
+  assert.equal((await told(page, 'state')).you, 'controller');
+  assert.equal(children_of(served.child.pid).length, 1);
+  const port = new URL(page.url()).port;
+
+  await part(page, 'to-gallery').click();
+  await item(page, 'push.h5').click();
+  await ready(page);
+  assert.equal((await told(page, 'state')).session, 'push.h5');
+  const left = children_of(served.child.pid);
+  assert.ok(left.length === 1 && left[0].includes('push.h5'), left.join('; '));
+  assert.equal(new URL(page.url()).port, port); // so that the page finds what it keeps
+  await served.stop();
+  await assert.rejects(fetch(page.url()));
+});
+
+test('what cannot be opened is told with its reason', async (t) => {
+  const { served } = await gallery(t);
+  const page = await visit(t, served.url);
+  await item(page, 'broken.palpate.hdf').click();
+  const opening = part(page, 'opening');
+  await until(page, () => /cannot be shown/.test(document.querySelector('[data-testid="opening"] h2')?.textContent));
+  assert.match(await opening.innerText(), /error: .*truncated[^]*hint: /);
+  await page.keyboard.press('Escape');
+  assert.equal(await opening.isVisible(), false);
+  await item(page, 'lump.obj').click(); // palpate-precompute says why
+  await until(page, () => /lump.obj cannot be shown/.test(document.querySelector('[data-testid="opening"] h2')?.textContent));
+  assert.match(await opening.innerText(), /error: .*lump\.obj/);
+  await part(page, 'close').click();
+  assert.deepEqual(await shown(page), ['broken.palpate.hdf', 'cube.palpate.hdf', 'model.palpate.hdf', 'push.h5', 'lump.obj']);
+});
+
+test('a file that is dropped lands in the folder and is opened', async (t) => {
+  const at = await folder(t);
+  const other = await folder(t);
+  const file = await bake(other, cube(4), 'small');
+  const served = await serve(t, ['view', at, '--view-address', '127.0.0.1:0'], other);
+  const page = await visit(t, served.url);
+  await page.getByText('There is nothing here yet').waitFor();
+  const drop = async (name, bytes) => {
+    const data = await page.evaluateHandle(
+      ([as, base64]) => {
+        const transfer = new DataTransfer();
+        transfer.items.add(new File([Uint8Array.from(atob(base64), (one) => one.charCodeAt(0))], as));
+        return transfer;
+      },
+      [name, bytes.toString('base64')],
+    );
+    await page.dispatchEvent('main', 'drop', { dataTransfer: data });
+  };
+  const bytes = await readFile(file);
+  await drop('small.palpate.hdf', bytes);
+  await ready(page);
+  assert.equal((await told(page, 'state')).model.name, 'cube');
+  assert.deepEqual(await readFile(path.join(at, 'small.palpate.hdf')), bytes);
+
+  await part(page, 'to-gallery').click();
+  await item(page, 'small.palpate.hdf').waitFor();
+  await part(page, 'add').setInputFiles({ name: 'small.palpate.hdf', mimeType: '', buffer: bytes }); // what is there stays
+  await ready(page);
+  assert.deepEqual(await readdir(at), ['small-2.palpate.hdf', 'small.palpate.hdf']);
+
+  await part(page, 'to-gallery').click();
+  await item(page, 'small-2.palpate.hdf').waitFor();
+  await drop('letter.txt', Buffer.from('dear'));
+  await until(page, () => /letter.txt cannot be shown/.test(document.querySelector('[data-testid="opening"] h2')?.textContent));
+  assert.deepEqual(await readdir(at), ['small-2.palpate.hdf', 'small.palpate.hdf']);
+});
+
+for (const [width, height, hasTouch, colorScheme] of [[360, 640, true, 'light'], [1280, 800, false, 'dark']]) {
+  test(`the gallery is laid out in ${width} × ${height}, ${colorScheme}`, async (t) => {
+    const { served } = await gallery(t);
+    const page = await visit(t, served.url, { viewport: { width, height }, hasTouch, colorScheme });
+    await item(page, 'push.h5').locator('img').waitFor();
+    assert.deepEqual(await faults_of_layout(page, hasTouch ? 44 : 24), []);
+    assert.deepEqual(await barriers(page), []);
+  });
+}
