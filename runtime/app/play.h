@@ -8,7 +8,7 @@
 
 #include "formats/recording.h"
 #include "runtime/loop/settings.h"
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 

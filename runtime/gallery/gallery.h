@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 

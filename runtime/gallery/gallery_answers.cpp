@@ -12,7 +12,7 @@
 #include "base/json_text.h"
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/gallery/gallery_scene.h"
-#include "runtime/viewer/admission.h"
+#include "runtime/serving/admission.h"
 
 namespace palpate {
 namespace {
@@ -63,8 +63,8 @@ Response json_answer(const json& value) {
   return guarded(std::move(response));
 }
 
-Response missing(const std::string& sentence) {
-  return guarded(plain(http::status::not_found, sentence));
+Response no_such(const std::string& what) {
+  return guarded(plain(http::status::not_found, "There is no such " + what + "."));
 }
 
 }  // namespace
@@ -130,9 +130,9 @@ Response GalleryAnswers::answer(const RequestHeader& request, const ServedAddres
     if (path == "/close") return close();
     if (path == "/opened") return opened();
   } catch (const Error& error) {
-    return missing(to_text(error));
+    return guarded(plain(http::status::not_found, to_text(error)));
   }
-  return missing("There is no such page.");
+  return no_such("page");
 }
 
 Response GalleryAnswers::items() const {
@@ -151,7 +151,7 @@ bool GalleryAnswers::has(const std::string& name) const {
 }
 
 Response GalleryAnswers::scene(const std::string& name) const {
-  if (!has(name)) return missing("There is no such file in the folder.");
+  if (!has(name)) return no_such("file in the folder");
   Response response;
   response.set(http::field::content_type, "application/octet-stream");
   response.body() = gallery_scene(folder_ / name);
@@ -160,7 +160,7 @@ Response GalleryAnswers::scene(const std::string& name) const {
 
 /// What was shown before ends first: two large bodies at once are too much.
 Response GalleryAnswers::open(const std::string& name, std::uint16_t port) {
-  if (!has(name)) return missing("There is no such file in the folder.");
+  if (!has(name)) return no_such("file in the folder");
   opened_.reset();
   ViewerOptions beside = options_;
   beside.port = port_beside(options_, port);

@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "runtime/gallery/opened_item.h"
-#include "runtime/viewer/http_guard.h"
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/http_guard.h"
+#include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 

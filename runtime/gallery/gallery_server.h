@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "runtime/gallery/gallery_answers.h"
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 

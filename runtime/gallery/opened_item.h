@@ -11,7 +11,7 @@
 
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/push/other_program.h"
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 

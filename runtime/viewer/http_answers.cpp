@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "base/error.h"
-#include "runtime/viewer/admission.h"
-#include "runtime/viewer/book_files.h"
+#include "runtime/serving/admission.h"
+#include "runtime/serving/book_files.h"
 #include "runtime/viewer/seen_surface.h"
 
 namespace palpate {

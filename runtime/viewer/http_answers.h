@@ -8,8 +8,8 @@
 #include <string>
 
 #include "runtime/viewer/broadcast.h"
-#include "runtime/viewer/http_guard.h"
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/http_guard.h"
+#include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 

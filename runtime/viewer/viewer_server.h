@@ -12,7 +12,7 @@
 #include "runtime/loop/monitor.h"
 #include "runtime/viewer/scene.h"
 #include "runtime/viewer/viewed_run.h"
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 

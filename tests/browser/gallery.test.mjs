@@ -33,7 +33,7 @@ async function gallery(t) {
   await copyFile(body, path.join(at, 'cube.palpate.hdf'));
   await writeFile(path.join(at, 'broken.palpate.hdf'), (await readFile(body)).subarray(0, 5000));
   await writeFile(path.join(at, 'notes.txt'), 'nothing');
-  await rm(path.join(at, 'model.toml'));
+  await rm(path.join(at, 'model.toml'), { force: true }); // what was baked before comes without
   await writeFile(path.join(at, 'lump.obj'), 'this is no surface\n');
   return { at, served: await serve(t, ['view', '--view-address', '127.0.0.1:0'], at) };
 }

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "runtime/viewer/admission.h"
+#include "runtime/serving/admission.h"
 #include "runtime/viewer/page_word.h"
 #include "runtime/viewer/run_words.h"
 #include "runtime/viewer/tick_history.h"

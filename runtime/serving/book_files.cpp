@@ -1,4 +1,4 @@
-#include "runtime/viewer/book_files.h"
+#include "runtime/serving/book_files.h"
 
 #include <algorithm>
 #include <array>

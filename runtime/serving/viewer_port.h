@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "runtime/viewer/book_files.h"
+#include "runtime/serving/book_files.h"
 
 namespace palpate {
 

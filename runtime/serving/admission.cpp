@@ -1,4 +1,4 @@
-#include "runtime/viewer/admission.h"
+#include "runtime/serving/admission.h"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>

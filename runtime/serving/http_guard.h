@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 

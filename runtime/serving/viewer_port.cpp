@@ -1,4 +1,4 @@
-#include "runtime/viewer/viewer_port.h"
+#include "runtime/serving/viewer_port.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "runtime/viewer/admission.h"
+#include "runtime/serving/admission.h"
 
 namespace palpate {
 namespace {

@@ -1,8 +1,8 @@
-#include "runtime/viewer/http_guard.h"
+#include "runtime/serving/http_guard.h"
 
 #include <fmt/format.h>
 
-#include "runtime/viewer/admission.h"
+#include "runtime/serving/admission.h"
 #include "runtime/web/page.h"
 
 namespace palpate {

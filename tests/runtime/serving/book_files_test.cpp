@@ -1,5 +1,5 @@
 // Which files of the book's folder are served.
-#include "runtime/viewer/book_files.h"
+#include "runtime/serving/book_files.h"
 
 #include <gtest/gtest.h>
 
