@@ -12,8 +12,10 @@ namespace Palpate
     public sealed class PalpateException : Exception
     {
         public string Hint { get; }
+        /// <summary>"argument", "file", "memory", "state", "incomplete" or "internal", as palpate.h has them.</summary>
+        public string Code { get; }
 
-        public PalpateException(string reason, string hint) : base(reason) { Hint = hint; }
+        public PalpateException(string reason, string hint, string code) : base(reason) { Hint = hint; Code = code; }
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -154,11 +156,7 @@ namespace Palpate
             {
                 overlay.Free();
             }
-            if (session == IntPtr.Zero)
-            {
-                string told = Encoding.UTF8.GetString(error, 0, Math.Max(0, Array.IndexOf(error, (byte)0)));
-                throw new PalpateException(Part(told, "error: "), Part(told, "hint: "));
-            }
+            if (session == IntPtr.Zero) throw Failure(error, Native.palpate_last_code());
             counts.size = (UIntPtr)Marshal.SizeOf(typeof(Native.Counts));
             Native.palpate_surface_counts(session, ref counts);
         }
@@ -196,6 +194,23 @@ namespace Palpate
         public bool SetTool(int number, Tool tool) { return Native.palpate_set_tool(Open(), number, ref tool) == 0; }
 
         public void Reset() { Native.palpate_reset(Open()); }
+
+        /// <summary>Records each tick of a tool from now on, from the untouched body, with so many pictures of the surface a second. Throws PalpateException.</summary>
+        public void Record(string file, double pictures = 60, int tool = 0)
+        {
+            var options = new Native.RecordOptions { size = (UIntPtr)Marshal.SizeOf(typeof(Native.RecordOptions)), tool = tool, pictures = pictures };
+            var error = new byte[4096];
+            int code = Native.palpate_record(Open(), Encoding.UTF8.GetBytes(file + "\0"), ref options, error, (UIntPtr)error.Length);
+            if (code != 0) throw Failure(error, code);
+        }
+
+        /// <summary>Ends the recording. Throws PalpateException.</summary>
+        public void EndRecording()
+        {
+            var error = new byte[4096];
+            int code = Native.palpate_record_end(Open(), error, (UIntPtr)error.Length);
+            if (code != 0) throw Failure(error, code);
+        }
 
         /// <summary>Fills positions at rest, 3 Nodes numbers [m].</summary>
         public void Rest(double[] xyz) { Native.palpate_surface_rest(Open(), Room(xyz, 3 * Nodes)); }
@@ -246,6 +261,12 @@ namespace Palpate
             return numbers;
         }
 
+        static PalpateException Failure(byte[] error, int code)
+        {
+            string told = Encoding.UTF8.GetString(error, 0, Math.Max(0, Array.IndexOf(error, (byte)0)));
+            return new PalpateException(Part(told, "error: "), Part(told, "hint: "), Marshal.PtrToStringAnsi(Native.palpate_code_name(code)));
+        }
+
         static string Part(string told, string name)
         {
             foreach (string line in told.Split('\n'))
@@ -271,6 +292,14 @@ namespace Palpate
         }
 
         [StructLayout(LayoutKind.Sequential)]
+        internal struct RecordOptions
+        {
+            internal UIntPtr size;
+            internal int tool;
+            internal double pictures;
+        }
+
+        [StructLayout(LayoutKind.Sequential)]
         internal struct Counts
         {
             internal UIntPtr size;
@@ -292,6 +321,14 @@ namespace Palpate
         internal static extern int palpate_set_tool(IntPtr session, int number, ref Tool tool);
         [DllImport(Library)]
         internal static extern void palpate_reset(IntPtr session);
+        [DllImport(Library)]
+        internal static extern int palpate_last_code();
+        [DllImport(Library)]
+        internal static extern IntPtr palpate_code_name(int code);
+        [DllImport(Library)]
+        internal static extern int palpate_record(IntPtr session, byte[] file, ref RecordOptions options, byte[] error, UIntPtr errorSize);
+        [DllImport(Library)]
+        internal static extern int palpate_record_end(IntPtr session, byte[] error, UIntPtr errorSize);
         [DllImport(Library)]
         internal static extern int palpate_surface_counts(IntPtr session, ref Counts counts);
         [DllImport(Library)]

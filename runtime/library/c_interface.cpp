@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -18,8 +19,12 @@
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/body/body.h"
+#include "runtime/library/c_error.h"
 #include "runtime/library/palpate.h"
+#include "runtime/library/session_recording.h"
 #include "runtime/library/sized_struct.h"
+#include "runtime/loop/settings.h"
+#include "runtime/safety/monotonic_clock.h"
 #include "runtime/solve/node_vectors.h"
 #include "runtime/tick/step.h"
 
@@ -51,6 +56,7 @@ constexpr palpate_tool default_tool = PALPATE_TOOL_INIT;
 constexpr palpate_pose default_pose = PALPATE_POSE_INIT;
 constexpr palpate_overlay default_overlay = PALPATE_OVERLAY_INIT;
 constexpr palpate_options default_options = PALPATE_OPTIONS_INIT;
+constexpr palpate_record_options default_record_options = PALPATE_RECORD_OPTIONS_INIT;
 
 Tool to_tool(const palpate_tool& tool) {
   Tool result{.radius = tool.radius,
@@ -98,25 +104,18 @@ palpate_result to_result(const ToolState& state) noexcept {
   return result;
 }
 
-void copy_text(std::string_view text, char* to, std::size_t size) noexcept {
-  if (to == nullptr || size == 0) return;
-  const std::size_t length = std::min(text.size(), size - 1);
-  std::copy_n(text.data(), length, to);
-  to[length] = '\0';
-}
-
 /// Element `k`, called `name`, of an array of structs that the macro `init` initializes.
 template <typename Struct>
 Struct read_or_throw(const Struct* first, std::size_t k, const Struct& defaults, const std::string& name,
-                     const std::string& init) {
+                     const std::string& init, const char* place = "palpate_create") {
   if (const auto read = read_struct(first, k, defaults)) return *read;
   if (!is_size_of<Struct>(first->size)) {
-    throw Error("the size of " + name + " is " + std::to_string(first->size) + " bytes", "palpate_create",
+    throw Error("the size of " + name + " is " + std::to_string(first->size) + " bytes", place,
                 "begin with " + init + ", which sets it");
   }
   throw Error("libpalpate " PALPATE_VERSION " cannot read " + name +
                   ": a member that it does not know is set, or its size is not that of the first",
-              "palpate_create",
+              place,
               "begin with " + init + ", and use a libpalpate as new as the palpate.h that you compile with");
 }
 
@@ -157,6 +156,30 @@ std::int64_t read_stress_ticks(std::int64_t ticks) {
               "ask for 1 or more, or for 0 to have none");
 }
 
+/// Ticks a second of a session that is recorded.
+std::int64_t whole_rate(double tick) {
+  const double rate = std::round(1.0 / tick);
+  if (tick_rates.contains(rate) && std::abs(rate * tick - 1.0) < 1e-9) return static_cast<std::int64_t>(rate);
+  throw Error("a tick of " + std::to_string(tick) + " s is not 1/rate of a whole rate " +
+                  std::string(tick_rates.words),
+              "palpate_record", "create the session with another options.tick");
+}
+
+/// What a replay of the session needs.
+Settings settings_of(const Tool& tool, const StateOptions& options, const palpate_overlay& overlay,
+                     ContactModel contact) {
+  Settings settings;
+  settings.tool = tool;
+  settings.reach = std::max(tool.reach, std::numeric_limits<double>::min());  // none is not to be said there
+  settings.max_contacts = options.max_contacts;
+  settings.contact = contact;
+  if (overlay.refinement > 1)
+    settings.overlay = OverlayOptions{.refinement = overlay.refinement, .rings = overlay.rings};
+  settings.overlay_memory = overlay.memory;
+  settings.rate = whole_rate(options.tick);
+  return settings;
+}
+
 /// Whether a tool can become another between two ticks: its shape stays, and all else makes sense.
 bool can_become(const Tool& tool, const Tool& next) noexcept {
   const auto is_bound = [](double value) { return value > 0.0; };  // infinite for none
@@ -189,9 +212,12 @@ struct FoundStress {
 };
 
 struct palpate_session {
-  palpate_session(Model model, const StateOptions& options, const palpate_overlay& overlay,
+  palpate_session(std::string name, Model model, const StateOptions& options, const palpate_overlay& overlay,
                   ContactModel contact, std::int64_t stress_ticks)
-      : body(std::move(model), {}, overlay.refinement, contact),
+      : file(std::move(name)),
+        state_options(options),
+        overlay_options(overlay),
+        body(std::move(model), {}, overlay.refinement, contact),
         untouched(body, with_room(options, body, overlay)),
         state(untouched),
         poses(options.tools.size()),
@@ -221,6 +247,14 @@ struct palpate_session {
     shown.publish();
   }
 
+  void reset() noexcept {
+    state = untouched;
+    publish();
+  }
+
+  std::string file;
+  StateOptions state_options;
+  palpate_overlay overlay_options;
   Body body;
   State untouched;
   State state;
@@ -232,7 +266,9 @@ struct palpate_session {
   std::optional<MotionSource> motion;
   std::int64_t ticks = 0;
   Latest<FoundStress> stress{FoundStress{}};
-  std::optional<SurfaceFrames> frames;  // last: its thread hands stress over
+  std::optional<SurfaceFrames> frames;  // its thread hands stress over
+  std::optional<SessionRecording> recording;
+  std::size_t recorded_tool = 0;
 };
 
 extern "C" {
@@ -253,30 +289,29 @@ palpate_session* palpate_create(const char* file, const palpate_tool* tools, int
 palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
                                              int max_contacts, const palpate_options* options, char* error,
                                              size_t error_size) noexcept {
-  copy_text("", error, error_size);
-  try {
-    if (file == nullptr) throw Error("there is no file name", "palpate_create", "name a .palpate.hdf file");
-    if (options == nullptr)
-      throw Error("there are no options", "palpate_create_with_options", "begin with PALPATE_OPTIONS_INIT");
-    const palpate_options wanted =
-        read_or_throw(options, 0, default_options, "the options", "PALPATE_OPTIONS_INIT");
-    const palpate_overlay overlay = read_overlay(wanted.overlay);
-    StateOptions state = read_tools(tools, tool_count, max_contacts);
-    state.tick = wanted.tick;
-    const ContactModel contact =
-        wanted.dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
-    const std::int64_t stress_ticks = read_stress_ticks(wanted.stress_ticks);
-    return std::make_unique<palpate_session>(load_model(file), state, overlay, contact, stress_ticks)
-        .release();
-  } catch (...) {
-    try {
-      const Error told =
-          handled_error("palpate_create", "close other programs, or precompute with fewer surface nodes");
-      copy_text(to_text(told), error, error_size);
-    } catch (...) {  // no memory even for that
-    }
-    return nullptr;
-  }
+  std::unique_ptr<palpate_session> session;
+  tell_failure("palpate_create", "close other programs, or precompute with fewer surface nodes", error,
+               error_size, [&](int& code) {
+                 if (file == nullptr)
+                   throw Error("there is no file name", "palpate_create", "name a .palpate.hdf file");
+                 if (options == nullptr)
+                   throw Error("there are no options", "palpate_create_with_options",
+                               "begin with PALPATE_OPTIONS_INIT");
+                 const palpate_options wanted =
+                     read_or_throw(options, 0, default_options, "the options", "PALPATE_OPTIONS_INIT");
+                 const palpate_overlay overlay = read_overlay(wanted.overlay);
+                 StateOptions state = read_tools(tools, tool_count, max_contacts);
+                 state.tick = wanted.tick;
+                 const ContactModel contact =
+                     wanted.dynamic_contact != 0 ? ContactModel::dynamic : ContactModel::quasi_static;
+                 const std::int64_t stress_ticks = read_stress_ticks(wanted.stress_ticks);
+                 code = PALPATE_ERROR_FILE;
+                 Model model = load_model(file);
+                 code = PALPATE_ERROR_ARGUMENT;
+                 session = std::make_unique<palpate_session>(file, std::move(model), state, overlay, contact,
+                                                             stress_ticks);
+               });
+  return session.release();
 }
 
 void palpate_destroy(palpate_session* session) noexcept {
@@ -290,12 +325,16 @@ uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexc
     if (!pose) return PALPATE_POSE_NOT_FINITE;
     session->poses[k] = to_pose(*pose);
   }
+  const std::int64_t begun = session->recording ? monotonic_now() : 0;
   if (session->overlays) session->overlays->serve(session->state);
   if (session->motion) session->motion->receive(session->state);
   const StepStatus status = step(session->body, session->state, session->poses);
   if (session->motion) session->motion->post(session->state);
   session->publish();
   if (session->frames) session->frames->post(session->state, session->ticks, 0.0);
+  if (session->recording)
+    session->recording->note(session->poses[session->recorded_tool],
+                             session->overlays ? session->overlays->centre() : -1, monotonic_now() - begun);
   ++session->ticks;
   return static_cast<uint32_t>(status);
 }
@@ -319,8 +358,63 @@ int palpate_set_tool(palpate_session* session, int number, const palpate_tool* t
 }
 
 void palpate_reset(palpate_session* session) noexcept {
-  session->state = session->untouched;
-  session->publish();
+  if (!session->recording) session->reset();
+}
+
+int palpate_record(palpate_session* session, const char* file, const palpate_record_options* options,
+                   char* error, size_t error_size) noexcept {
+  constexpr const char* place = "palpate_record";
+  return tell_failure(place, "close other programs", error, error_size, [&](int& code) {
+    if (file == nullptr) throw Error("there is no file name", place, "name the recording, OUT.h5");
+    if (options == nullptr)
+      throw Error("there are no options", place, "begin with PALPATE_RECORD_OPTIONS_INIT");
+    const palpate_record_options wanted = read_or_throw(options, 0, default_record_options, "the options",
+                                                        "PALPATE_RECORD_OPTIONS_INIT", place);
+    const std::size_t tools = session->state.tools.size();
+    if (wanted.tool < 0 || static_cast<std::size_t>(wanted.tool) >= tools)
+      throw Error("there is no tool " + std::to_string(wanted.tool), place,
+                  "name one of 0 to " + std::to_string(tools - 1));
+    if (!(wanted.pictures >= 0.0) || std::isinf(wanted.pictures))
+      throw Error(std::to_string(wanted.pictures) + " pictures a second were asked for", place,
+                  "ask for 0 or more");
+    const auto tool = static_cast<std::size_t>(wanted.tool);
+    const Settings settings = settings_of(session->state.tools[tool].tool, session->state_options,
+                                          session->overlay_options, session->body.contact_model());
+    code = PALPATE_ERROR_STATE;
+    if (session->recording)
+      throw Error("a recording is being made", place, "end it by palpate_record_end first");
+    code = PALPATE_ERROR_FILE;
+    session->reset();
+    session->recorded_tool = tool;
+    session->recording.emplace(session->body, session->state,
+                               SessionRecording::Options{.file = file,
+                                                         .model = session->file,
+                                                         .settings = settings,
+                                                         .tool = tool,
+                                                         .pictures = wanted.pictures});
+  });
+}
+
+int palpate_record_end(palpate_session* session, char* error, size_t error_size) noexcept {
+  constexpr const char* place = "palpate_record_end";
+  return tell_failure(place, "close other programs", error, error_size, [&](int& code) {
+    code = PALPATE_ERROR_STATE;
+    if (!session->recording) throw Error("no recording is being made", place, "begin one by palpate_record");
+    code = PALPATE_ERROR_FILE;
+    std::int64_t dropped = 0;
+    try {
+      session->recording->finish();
+      dropped = session->recording->dropped();
+      session->recording.reset();
+    } catch (...) {
+      session->recording.reset();
+      throw;
+    }
+    code = PALPATE_ERROR_INCOMPLETE;
+    if (dropped > 0)
+      throw Error(std::to_string(dropped) + " ticks or pictures found no room", place,
+                  "record to a faster disk, or fewer pictures a second");
+  });
 }
 
 int palpate_surface_counts(const palpate_session* session, palpate_counts* counts) noexcept {

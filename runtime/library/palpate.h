@@ -114,6 +114,23 @@ typedef struct palpate_overlay {
 #define PALPATE_OVERLAY_INIT \
   { sizeof(palpate_overlay), 3, 2, (size_t)512 << 20 }
 
+/* Why a function could not do what it was asked for. */
+enum palpate_code {
+  PALPATE_OK = 0,
+  PALPATE_ERROR_ARGUMENT = 1, /* what it was given makes no sense, or does not fit the body */
+  PALPATE_ERROR_FILE = 2, /* a file is not there, is not what it should be, is damaged or cannot be written */
+  PALPATE_ERROR_MEMORY = 3,     /* there is not enough memory */
+  PALPATE_ERROR_STATE = 4,      /* not now: a recording is being made, or none is */
+  PALPATE_ERROR_INCOMPLETE = 5, /* a recording lacks ticks or pictures for which there was no room or disk */
+  PALPATE_ERROR_INTERNAL = 6    /* a mistake of the library's own */
+};
+
+/* "argument", "file" and so on, "ok" for PALPATE_OK; NULL for what is not one of these. Real-time safe. */
+const char* palpate_code_name(int code) PALPATE_NOEXCEPT;
+
+/* Of the last call of this thread that takes `error`: why it failed, PALPATE_OK where it did not. */
+int palpate_last_code(void) PALPATE_NOEXCEPT;
+
 /* How a session is to be, beyond its tools. */
 typedef struct palpate_options {
   size_t size; /* sizeof(palpate_options) */
@@ -185,8 +202,98 @@ int palpate_get(const palpate_session* session, int tool, palpate_result* result
 int palpate_set_tool(palpate_session* session, int number, const palpate_tool* tool) PALPATE_NOEXCEPT;
 
 /* To the state after palpate_create: a body that nobody has touched. Takes no memory, but too long for a
- * tick. */
+ * tick. While a session is recorded nothing happens: a recording is of one run. */
 void palpate_reset(palpate_session* session) PALPATE_NOEXCEPT;
+
+/* --- Recordings, which palpate-runtime view, session and export read --- */
+
+/* How a session is recorded. */
+typedef struct palpate_record_options {
+  size_t size;     /* sizeof(palpate_record_options) */
+  int tool;        /* whose ticks are kept: a recording has one tool, and tells the pictures' */
+  double pictures; /* of the surface, a second; 0: none */
+} palpate_record_options;
+
+/* Tool 0, 60 pictures a second. */
+#define PALPATE_RECORD_OPTIONS_INIT \
+  { sizeof(palpate_record_options), 0, 60.0 }
+
+/* Records each tick from now on to `file` (OUT.h5), in the place of what was there, until palpate_record_end
+ * or palpate_destroy. Begins with the untouched body (palpate_reset), as a replay does: of a session with one
+ * tool that nobody changes meanwhile, `palpate-runtime play BODY --device replay:OUT.h5` repeats every tick
+ * to the last bit. options.tick must be 1/rate of a whole rate from 1000 to 5000 ticks a second. Threads of
+ * the session write; palpate_step stays real-time safe. The file is a valid recording at each instant.
+ * Returns PALPATE_OK, or a code with the reason in `error` as palpate_create has it. Not while another thread
+ * uses a function of the loop. */
+int palpate_record(palpate_session* session, const char* file, const palpate_record_options* options,
+                   char* error, size_t error_size) PALPATE_NOEXCEPT;
+
+/* Ends the recording, whose file is one plain file then. Returns as palpate_record. Takes some time. Not
+ * while another thread uses a function of the loop. */
+int palpate_record_end(palpate_session* session, char* error, size_t error_size) PALPATE_NOEXCEPT;
+
+/* A recording that is read back: by palpate_record or by palpate-runtime play --record. */
+typedef struct palpate_recording palpate_recording;
+
+/* Reads and proves all of it except the pictures' values. Returns NULL as palpate_create. Forks once, as that
+ * does. */
+palpate_recording* palpate_recording_open(const char* file, char* error, size_t error_size) PALPATE_NOEXCEPT;
+
+/* NULL is ignored. */
+void palpate_recording_close(palpate_recording* recording) PALPATE_NOEXCEPT;
+
+typedef struct palpate_recording_counts {
+  size_t size; /* sizeof(palpate_recording_counts) */
+  int64_t ticks;
+  int64_t rate; /* ticks a second */
+  int64_t pictures;
+  int32_t nodes; /* of the surface */
+  int32_t simplices;
+  int32_t corners; /* of a simplex: 3, triangles; in the plane 2, lines */
+} palpate_recording_counts;
+
+#define PALPATE_RECORDING_COUNTS_INIT \
+  { sizeof(palpate_recording_counts), 0, 0, 0, 0, 0, 0 }
+
+/* Fills the members that `counts` has. Returns 0; -1 where the size is refused. */
+int palpate_recording_count(const palpate_recording* recording,
+                            palpate_recording_counts* counts) PALPATE_NOEXCEPT;
+
+/* What was wanted and felt in a tick. Given to palpate_step one after the other, the poses repeat a session.
+ */
+typedef struct palpate_recorded_tick {
+  size_t size;           /* sizeof(palpate_recorded_tick) */
+  double time;           /* since the first tick [s] */
+  double position[3];    /* where the device wanted the tool [m] */
+  double orientation[4]; /* quaternion w, x, y, z */
+  int grab;
+  double force[3];            /* on the hand [N] */
+  double torque[3];           /* on the hand [N m] */
+  double tool_position[3];    /* [m] */
+  double tool_orientation[4]; /* quaternion w, x, y, z */
+  int contacts;
+  uint32_t status; /* bits of palpate_status */
+} palpate_recorded_tick;
+
+#define PALPATE_RECORDED_TICK_INIT                                                                 \
+  {                                                                                                \
+    sizeof(palpate_recorded_tick), 0.0, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, 0, {0.0, 0.0, 0.0}, \
+        {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, 0, 0                               \
+  }
+
+/* Fills the members that `tick` has for tick 0, 1, ... Returns 0; -1 where the number is none, and all is
+ * zero, or the size is refused, and nothing is written. Real-time safe. */
+int palpate_recording_tick(const palpate_recording* recording, int64_t number,
+                           palpate_recorded_tick* tick) PALPATE_NOEXCEPT;
+
+/* As palpate_surface_rest and palpate_surface_simplices, of the surface that was recorded. */
+void palpate_recording_rest(const palpate_recording* recording, double* xyz) PALPATE_NOEXCEPT;
+void palpate_recording_simplices(const palpate_recording* recording, int32_t* corners) PALPATE_NOEXCEPT;
+
+/* Displacement of the surface nodes in picture 0, 1, ..., 3 `nodes` numbers [m], and its time since the first
+ * tick [s]. Reads it from the file. Returns as palpate_record. */
+int palpate_recording_picture(const palpate_recording* recording, int64_t number, float* xyz, double* time,
+                              char* error, size_t error_size) PALPATE_NOEXCEPT;
 
 /* --- The surface, for the eye --- */
 

@@ -19,10 +19,11 @@ namespace palpate {
 /// What could not be done (`what`), and what to do about it (`hint`).
 class Error : public std::runtime_error {
  public:
-  /// By what palpate_create says: lines "error: ..." and "hint: ...".
-  explicit Error(std::string_view told)
-      : std::runtime_error(part(told, "error: ")), hint_(part(told, "hint: ")) {}
+  /// By what palpate_create says: lines "error: ..." and "hint: ..."; `code` is one of palpate_code.
+  explicit Error(std::string_view told, int code = palpate_last_code())
+      : std::runtime_error(part(told, "error: ")), hint_(part(told, "hint: ")), code_(code) {}
   [[nodiscard]] const std::string& hint() const noexcept { return hint_; }
+  [[nodiscard]] int code() const noexcept { return code_; }
 
  private:
   static std::string part(std::string_view told, std::string_view name) {
@@ -33,7 +34,15 @@ class Error : public std::runtime_error {
   }
 
   std::string hint_;
+  int code_;
 };
+
+/// Calls a function of palpate.h that puts its reason into `text` of this size. Throws Error where it fails.
+template <class Call>
+void check(Call&& call) {
+  std::string error(4096, '\0');
+  if (const int code = call(error.data(), error.size()); code != PALPATE_OK) throw Error(error.c_str(), code);
+}
 
 /// Names of the status bits of a tick.
 inline std::vector<std::string> status_names(std::uint32_t status) {
@@ -114,6 +123,20 @@ class Session {
 
   void reset() noexcept { palpate_reset(session_.get()); }
 
+  /// Records each tick of a tool from now on, from the untouched body. Throws Error.
+  void record(const std::string& file, double pictures = 60.0, int tool = 0) {
+    palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
+    options.tool = tool;
+    options.pictures = pictures;
+    check([&](char* error, std::size_t size) {
+      return palpate_record(session_.get(), file.c_str(), &options, error, size);
+    });
+  }
+  /// Ends the recording. Throws Error.
+  void end_recording() {
+    check([&](char* error, std::size_t size) { return palpate_record_end(session_.get(), error, size); });
+  }
+
   /// Positions of the surface nodes at rest [3 nodes] [m].
   [[nodiscard]] std::vector<double> rest() const {
     std::vector<double> xyz(3 * nodes());
@@ -166,6 +189,49 @@ class Session {
 
   std::size_t tools_;
   std::unique_ptr<palpate_session, End> session_;
+};
+
+/// A recording that is read back.
+class Recording {
+ public:
+  /// Throws Error.
+  explicit Recording(const std::string& file) {
+    std::string error(4096, '\0');
+    recording_.reset(palpate_recording_open(file.c_str(), error.data(), error.size()));
+    if (recording_ == nullptr) throw Error(error.c_str());
+  }
+
+  [[nodiscard]] palpate_recording_counts counts() const noexcept {
+    palpate_recording_counts all = PALPATE_RECORDING_COUNTS_INIT;
+    palpate_recording_count(recording_.get(), &all);
+    return all;
+  }
+
+  /// Tick 0, 1, ...; all zero where there is none. Real-time safe.
+  [[nodiscard]] palpate_recorded_tick tick(std::int64_t number) const noexcept {
+    palpate_recorded_tick told = PALPATE_RECORDED_TICK_INIT;
+    palpate_recording_tick(recording_.get(), number, &told);
+    return told;
+  }
+
+  /// Displacement of the surface nodes in picture 0, 1, ... [3 nodes] [m]. Throws Error.
+  [[nodiscard]] std::vector<float> picture(std::int64_t number) const {
+    std::vector<float> xyz(3 * static_cast<std::size_t>(counts().nodes));
+    check([&](char* error, std::size_t size) {
+      return palpate_recording_picture(recording_.get(), number, xyz.data(), nullptr, error, size);
+    });
+    return xyz;
+  }
+
+  /// For the functions of palpate.h.
+  [[nodiscard]] palpate_recording* get() noexcept { return recording_.get(); }
+
+ private:
+  struct Close {
+    void operator()(palpate_recording* recording) const noexcept { palpate_recording_close(recording); }
+  };
+
+  std::unique_ptr<palpate_recording, Close> recording_;
 };
 
 }  // namespace palpate

@@ -1,12 +1,11 @@
 #include "runtime/loop/loop.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <ctime>
-#include <limits>
 #include <utility>
 
+#include "runtime/loop/tick_record.h"
 #include "runtime/safety/monotonic_clock.h"
 #include "runtime/touch/contact_nodes.h"
 
@@ -14,27 +13,11 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t second = 1'000'000'000;  // ns
-constexpr double largest_float = std::numeric_limits<float>::max();
 
 /// Returns early when a signal comes.
 void sleep_until(std::int64_t due) noexcept {
   const timespec time{.tv_sec = due / second, .tv_nsec = due % second};
   clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
-}
-
-void set(double (&vector)[3], const Vec3& value) noexcept {
-  std::copy_n(value.data(), 3, vector);
-}
-
-void set(double (&wxyz)[4], const Eigen::Quaterniond& value) noexcept {
-  const std::array<double, 4> numbers = {value.w(), value.x(), value.y(), value.z()};
-  std::copy(numbers.begin(), numbers.end(), wxyz);
-}
-
-void set(double (&symmetric)[6], const Eigen::Matrix3d& value) noexcept {
-  const std::array<double, 6> numbers = {value(0, 0), value(1, 1), value(2, 2),
-                                         value(0, 1), value(1, 2), value(2, 0)};
-  std::copy(numbers.begin(), numbers.end(), symmetric);
 }
 
 void note_largest(double value, double time, double& largest, double& largest_time) noexcept {
@@ -290,24 +273,10 @@ class Loop {
   [[nodiscard]] TickRecord record() const noexcept {
     TickRecord record;
     record.time = time();
-    set(record.device_position, in_body_.pose.position);
-    set(record.device_orientation, in_body_.pose.orientation);
-    set(record.tool_position, tool().pose.position);
-    set(record.tool_orientation, tool().pose.orientation);
-    set(record.force, -tool().wrench.force);
-    set(record.torque, -tool().wrench.torque);
-    set(record.stiffness, tool().local.stiffness);
-    record.contacts = tool().contacts;
-    record.status = static_cast<std::uint32_t>(parts_.state.status);
+    record_tool(record, parts_.body, parts_.state, tool(), in_body_.pose,
+                parts_.overlays != nullptr ? parts_.overlays->centre() : -1);
     const std::int64_t compute = options_.fast ? 0 : compute_ns_;
     record.compute_ns = static_cast<std::uint32_t>(std::min<std::int64_t>(compute, UINT32_MAX));
-    record.grab = in_body_.pose.grab ? 1 : 0;
-    if (parts_.overlays != nullptr && parts_.overlays->centre() >= 0)
-      record.patch = parts_.body.mesh_node(parts_.overlays->centre());
-    record.motion_step = parts_.state.surface.motion.sample_step();
-    record.force_error = static_cast<float>(std::min<double>(tool().force_error, largest_float));
-    record.left_out = tool().left_out;
-    record.greens_error = static_cast<float>(std::min<double>(tool().greens_error, largest_float));
 
     set(record.handle_position, news_.state.pose.position);
     set(record.handle_orientation, news_.state.pose.orientation);

@@ -11,6 +11,10 @@ import numpy
 
 from programs import HAS_SANITIZERS, PRECOMPUTE, RUNTIME, SOURCE, cube_toml, done, run
 
+sys.path.insert(0, str(SOURCE / "runtime" / "python"))
+
+import palpate  # noqa: E402
+
 HERE = pathlib.Path(__file__).resolve().parent / "bindings"
 LIBRARY = SOURCE / "runtime" / "library"
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
@@ -63,6 +67,29 @@ class Clients(unittest.TestCase):
         self.assertGreater(numbers[149, 2], 0.01, "it is pressed")
         self.assertLess(numbers[399, 0], -1e-3, "it rubs")
         self.assertLess(numbers[-1, 2], -1e-3, "it pulls")
+
+    def test_record_what_a_replay_repeats_to_the_last_bit(self):
+        felt = []
+        for k, (language, client) in enumerate(self.clients.items()):
+            recording = self.folder / f"by_{k}.h5"
+            lines = done(*client, self.cube, recording, input=poses(), env=environment()).splitlines()[:-1]
+            replay = run(RUNTIME, "play", self.cube, "--device", f"replay:{recording}", "--fast", cwd=self.folder)
+            self.assertEqual(replay.returncode, 0, f"{language}: {replay.stderr}")
+            self.assertIn("all forces of 550 ticks are those of the session, bit by bit", replay.stderr)
+            with palpate.Recording(recording) as read:
+                force = -read["force"]  # on the hand
+                self.assertEqual([["%016x" % word for word in row] for row in force.view(numpy.uint64)], [line.split()[1:4] for line in lines], language)
+                self.assertGreater(len(read.frames["tick"]), 2)
+                felt.append(force)
+        self.assertEqual(len(felt), 4)
+
+    def test_a_recording_that_cannot_be_made_is_told(self):
+        told = {}
+        for language, client in self.clients.items():
+            result = run(*client, self.cube, self.folder / "no" / "such.h5", input="", env=environment())
+            self.assertNotEqual(result.returncode, 0, language)
+            told[language] = result.stderr
+            self.assertIn("no/such.h5", result.stderr, language)
 
     def test_say_the_same_of_what_is_wrong(self):
         told = {}

@@ -22,7 +22,8 @@ import palpate  # noqa: E402
 from palpate import library  # noqa: E402
 
 STRUCTS = {"palpate_tool": library.CTool, "palpate_pose": library.CPose, "palpate_overlay": library.COverlay,
-           "palpate_options": library.COptions, "palpate_result": library.CResult, "palpate_counts": library.CCounts}
+           "palpate_options": library.COptions, "palpate_result": library.CResult, "palpate_counts": library.CCounts,
+           "palpate_record_options": library.CRecordOptions}
 
 
 def compiled(folder, source):
@@ -182,6 +183,13 @@ class Files(PythonTest):
             self.assertGreater(abs(recording.frames["displacement"][-1]).max(), 0)
             with self.assertRaisesRegex(KeyError, "force"):
                 recording["forse"]
+            data = recording.xarray()
+            self.assertEqual(set(data.variables) - {"axis", "quaternion", "symmetric"}, set(recording))
+            self.assertTrue(numpy.array_equal(data.force.sel(axis="z"), recording["force"][:, 2]))
+            self.assertTrue(numpy.array_equal(data.tool_orientation.sel(quaternion="w"), recording["tool_orientation"][:, 0]))
+            self.assertTrue(numpy.array_equal(data.stiffness.sel(symmetric="zz"), recording["stiffness"][:, 2]))
+            self.assertEqual(float(data.force.sel(time=0.1, axis="z")), recording["force"][-1, 2])
+            self.assertEqual(data.attrs["tool"], "sphere:0.1")
 
     def test_open_body_and_session_bear_each_other(self):
         with palpate.Body(self.cube) as body, palpate.Session(self.cube, palpate.Tool(radius=0.1)) as session:
@@ -197,6 +205,9 @@ class Files(PythonTest):
                 case()
             self.assertTrue(caught.exception.reason)
             self.assertTrue(caught.exception.hint, caught.exception.reason)
+        with self.assertRaises(palpate.Error) as caught:
+            palpate.Session(self.cube, palpate.Tool(radius=-1))
+        self.assertEqual(caught.exception.code, "argument")
         session = palpate.Session(self.cube, palpate.Tool(radius=0.1))
         session.close()
         with self.assertRaisesRegex(palpate.Error, "closed"):

@@ -142,6 +142,23 @@ class Recording(_File):
         lines = text_of(self.file.attrs["options"]).splitlines()
         return dict(line.split("=", 1) for line in lines if "=" in line)
 
+    def xarray(self) -> Any:
+        """All ticks as an xarray.Dataset: a variable for each field along `time` [s], those of several numbers also along `axis`,
+        `quaternion` or `symmetric`. The run's options are its attributes."""
+        import xarray
+
+        widths = {3: ("axis", list("xyz")), 4: ("quaternion", list("wxyz")), 6: ("symmetric", ["xx", "yy", "zz", "xy", "yz", "zx"])}
+        variables: dict[str, Any] = {}
+        coordinates: dict[str, Any] = {"time": ("time", self["time"], {"units": "s"})}
+        for name in self:
+            if name == "time":
+                continue
+            values = self[name]
+            along = [widths[width] for width in values.shape[1:]]
+            coordinates.update(along)
+            variables[name] = (["time", *(dimension for dimension, _ in along)], values)
+        return xarray.Dataset(variables, coordinates, self.options)
+
     @property
     def frames(self) -> Any:
         """The group of the frames; a frame is read when it is asked for: frames["displacement"][7]."""

@@ -10,20 +10,22 @@ from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_float, c_int
 
 
 class Error(Exception):
-    """What could not be done, and why. `hint`: what to do about it, empty where nothing is known."""
+    """What could not be done, and why. `hint`: what to do about it, empty where nothing is known. `code`: of an error of
+    the library "argument", "file", "memory", "state", "incomplete" or "internal", as palpate.h has them; else empty."""
 
-    def __init__(self, reason: str, hint: str = ""):
+    def __init__(self, reason: str, hint: str = "", code: str = ""):
         super().__init__(f"{reason}\nhint: {hint}" if hint else reason)
         self.reason = reason
         self.hint = hint
+        self.code = code
 
     @classmethod
-    def of_text(cls, text: str) -> Error:
+    def of_text(cls, text: str, code: str = "") -> Error:
         """By what a program or the library says: lines `error: ...` and `hint: ...`."""
         lines = text.strip().splitlines()
         told = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
         hints = [line.removeprefix("hint: ") for line in lines if line.startswith("hint: ")]
-        return cls("\n".join(told or lines), "\n".join(hints))
+        return cls("\n".join(told or lines), "\n".join(hints), code)
 
 
 class CTool(Structure):
@@ -56,7 +58,15 @@ class CCounts(Structure):
     _fields_ = [("size", c_size_t), ("nodes", c_int32), ("simplices", c_int32), ("corners", c_int32)]
 
 
+class CRecordOptions(Structure):
+    _fields_ = [("size", c_size_t), ("tool", c_int), ("pictures", c_double)]
+
+
 FUNCTIONS = {
+    "palpate_code_name": (c_char_p, [c_int]),
+    "palpate_last_code": (c_int, []),
+    "palpate_record": (c_int, [c_void_p, c_char_p, POINTER(CRecordOptions), c_char_p, c_size_t]),
+    "palpate_record_end": (c_int, [c_void_p, c_char_p, c_size_t]),
     "palpate_status_name": (c_char_p, [c_uint32]),
     "palpate_create_with_options": (c_void_p, [c_char_p, POINTER(CTool), c_int, c_int, POINTER(COptions), c_char_p, c_size_t]),
     "palpate_destroy": (None, [c_void_p]),

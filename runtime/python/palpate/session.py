@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy
 
-from .library import CCounts, COptions, COverlay, CPose, CResult, CTool, Error, load
+from .library import CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error, load
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 FLOATS = ctypes.POINTER(ctypes.c_float)
@@ -100,7 +100,7 @@ class Session:
         self._session = self._library.palpate_create_with_options(
             os.fsencode(file), c_tools, len(self.tools), max_contacts, ctypes.byref(options), error, len(error))
         if self._session is None:
-            raise Error.of_text(error.value.decode(errors="replace"))
+            raise self._failure(error, self._library.palpate_last_code())
         self._poses = (CPose * len(self.tools))()
         for pose in self._poses:
             pose.size, pose.orientation = ctypes.sizeof(CPose), (1.0, 0.0, 0.0, 0.0)
@@ -183,6 +183,25 @@ class Session:
         self._library.palpate_reset(self._open())
         self.tools = list(self._created)
         self._status = 0
+
+    def record(self, file: str | os.PathLike[str], *, pictures: float = 60.0, tool: int = 0) -> None:
+        """Records each tick of a tool from now on, from the untouched body, with so many pictures of the surface a second.
+        `palpate.Recording` reads it, and `palpate-runtime play BODY --device replay:FILE` repeats it. Throws Error."""
+        options = CRecordOptions(ctypes.sizeof(CRecordOptions), tool, pictures)
+        error = ctypes.create_string_buffer(4096)
+        code = self._library.palpate_record(self._open(), os.fsencode(file), ctypes.byref(options), error, len(error))
+        if code != 0:
+            raise self._failure(error, code)
+
+    def end_recording(self) -> None:
+        """The recording is one plain file then. Throws Error."""
+        error = ctypes.create_string_buffer(4096)
+        code = self._library.palpate_record_end(self._open(), error, len(error))
+        if code != 0:
+            raise self._failure(error, code)
+
+    def _failure(self, error: ctypes.Array[ctypes.c_char], code: int) -> Error:
+        return Error.of_text(error.value.decode(errors="replace"), self._library.palpate_code_name(code).decode())
 
     @property
     def rest(self) -> numpy.ndarray:

@@ -22,6 +22,7 @@ static class Client
             tool.CouplingStiffness = 500;
             using (var session = new Session(words.Length > 0 ? words[0] : "", tool))
             {
+                if (words.Length > 1) session.Record(words[1]);
                 var times = new List<long>();
                 var watch = new Stopwatch();
                 string line;
@@ -35,6 +36,7 @@ static class Client
                     times.Add(watch.ElapsedTicks * 1000000000 / Stopwatch.Frequency);
                     Console.WriteLine(status + Bits(felt.Force) + Bits(felt.Torque));
                 }
+                if (words.Length > 1) session.EndRecording();
                 times.Sort();
                 if (times.Count > 0) Console.WriteLine("# " + times[times.Count / 2] + " " + times[(times.Count - 1) * 999 / 1000]);
             }

@@ -1,5 +1,6 @@
-/* Plays poses through palpate.h: a line `x y z qw qx qy qz grab` a tick on standard input; status and the
- * bits of force and torque on standard output; at the end what a tick cost, in nanoseconds: median and 99.9
+/* Plays poses through palpate.h, and records them if a second file is named: a line `x y z qw qx qy qz grab`
+ * a tick on standard input; status and the bits of force and torque on standard output; at the end what a
+ * tick cost, in nanoseconds: median and 99.9
  * %. */
 #define _POSIX_C_SOURCE 200809L
 #include <inttypes.h>
@@ -40,6 +41,11 @@ int main(int count, char** words) {
     fputs(error, stderr);
     return 1;
   }
+  const palpate_record_options recorded = PALPATE_RECORD_OPTIONS_INIT;
+  if (count > 2 && palpate_record(session, words[2], &recorded, error, sizeof error) != PALPATE_OK) {
+    fputs(error, stderr);
+    return 1;
+  }
   static int64_t times[1 << 20];
   size_t ticks = 0;
   palpate_pose pose = PALPATE_POSE_INIT;
@@ -55,6 +61,10 @@ int main(int count, char** words) {
     print(felt.force);
     print(felt.torque);
     putchar('\n');
+  }
+  if (count > 2 && palpate_record_end(session, error, sizeof error) != PALPATE_OK) {
+    fputs(error, stderr);
+    return 1;
   }
   palpate_destroy(session);
   qsort(times, ticks, sizeof times[0], by_size);

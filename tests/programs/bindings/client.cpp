@@ -27,6 +27,7 @@ int main(int count, char** words) {
     tool.friction = 0.3;
     tool.coupling_stiffness = 500.0;
     palpate::Session session(count > 1 ? words[1] : "", tool);
+    if (count > 2) session.record(words[2]);
     std::vector<std::int64_t> times;
     palpate_pose pose = palpate::make_pose(0.0, 0.0, 0.0);
     double *p = pose.position, *q = pose.orientation;
@@ -40,6 +41,7 @@ int main(int count, char** words) {
       print(felt.torque);
       std::printf("\n");
     }
+    if (count > 2) session.end_recording();
     std::sort(times.begin(), times.end());
     if (!times.empty())
       std::printf("# %" PRId64 " %" PRId64 "\n", times[times.size() / 2],

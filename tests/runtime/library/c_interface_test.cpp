@@ -361,6 +361,172 @@ TEST(CInterfaceErrors, SayWhatIsWrongAndWhatToDo) {
     EXPECT_NE(refusal(file.c_str(), bad, 2, 8).find(piece), std::string::npos);
 }
 
+TEST(CInterfaceErrors, CodesTellWhatKindTheyAre) {
+  const palpate_tool good = sphere(0.1), bad = sphere(-0.5);
+  const std::string file = golden("cube2");
+  EXPECT_NE(refusal("/no/such.palpate.hdf", &good, 1, 8), "");
+  EXPECT_EQ(palpate_last_code(), PALPATE_ERROR_FILE);
+  for (const palpate_tool* tool : {static_cast<const palpate_tool*>(nullptr), &bad}) {
+    EXPECT_NE(refusal(file.c_str(), tool, 1, 8), "");
+    EXPECT_EQ(palpate_last_code(), PALPATE_ERROR_ARGUMENT);
+  }
+  const Session session = open("cube2", {good});
+  EXPECT_EQ(palpate_last_code(), PALPATE_OK);
+  std::set<std::string> names;
+  for (int code = PALPATE_OK; code <= PALPATE_ERROR_INTERNAL; ++code) names.insert(palpate_code_name(code));
+  EXPECT_EQ(names.size(), 7U);
+  EXPECT_STREQ(palpate_code_name(PALPATE_ERROR_FILE), "file");
+  EXPECT_EQ(palpate_code_name(-1), nullptr);
+  EXPECT_EQ(palpate_code_name(PALPATE_ERROR_INTERNAL + 1), nullptr);
+}
+
+/// palpate_record with these options; the code, which the text tells of.
+int record(palpate_session* session, const char* file, const palpate_record_options* options) {
+  char error[400];
+  const int code = palpate_record(session, file, options, error, sizeof error);
+  EXPECT_EQ(code == PALPATE_OK, std::string(error).empty()) << error;
+  EXPECT_EQ(palpate_last_code(), code);
+  return code;
+}
+
+int end_recording(palpate_session* session) {
+  char error[400];
+  const int code = palpate_record_end(session, error, sizeof error);
+  EXPECT_EQ(code == PALPATE_OK, std::string(error).empty()) << error;
+  return code;
+}
+
+struct Closed {
+  void operator()(palpate_recording* recording) const { palpate_recording_close(recording); }
+};
+using Recorded = std::unique_ptr<palpate_recording, Closed>;
+
+palpate_pose pressing(int tick) {
+  return {sizeof(palpate_pose),
+          {0.5, 0.5, 1.15 - 0.0004 * std::min(tick, 200)},
+          {1.0, 0.0, 0.0, 0.0},
+          tick > 250 ? 1 : 0};
+}
+
+TEST(CInterfaceRecording, HoldsWhatWasWantedAndFelt) {
+  const auto file = std::filesystem::temp_directory_path() / "palpate_c_interface_recording.h5";
+  const Session session = open("cube2", {sphere(0.1), sphere(0.05)});
+  const palpate_pose far{sizeof(palpate_pose), {5.0, 5.0, 5.0}, {1.0, 0.0, 0.0, 0.0}, 0};
+  for (int tick = 0; tick < 100; ++tick)  // what was before is not in it
+    palpate_step(session.get(), std::array{pressing(tick + 100), far}.data());
+  palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
+  options.pictures = 100.0;
+  ASSERT_EQ(record(session.get(), file.c_str(), &options), PALPATE_OK);
+  std::vector<palpate_result> felt;
+  std::vector<std::uint32_t> status;
+  std::vector<double> last(3 * static_cast<std::size_t>(counts_of(session.get()).nodes));
+  for (int tick = 0; tick < 300; ++tick) {
+    if (tick == 150) palpate_reset(session.get());  // a recording is of one run
+    status.push_back(palpate_step(session.get(), std::array{pressing(tick), far}.data()));
+    felt.push_back(result_of(session.get(), 0));
+    std::this_thread::sleep_for(std::chrono::microseconds(200));  // pictures are made meanwhile
+  }
+  palpate_surface_displacement(session.get(), last.data());
+  ASSERT_EQ(end_recording(session.get()), PALPATE_OK);
+  palpate_step(session.get(), std::array{pressing(0), far}.data());  // and after it
+
+  char error[400];
+  const Recorded read(palpate_recording_open(file.c_str(), error, sizeof error));
+  ASSERT_NE(read, nullptr) << error;
+  palpate_recording_counts counts = PALPATE_RECORDING_COUNTS_INIT;
+  ASSERT_EQ(palpate_recording_count(read.get(), &counts), 0);
+  ASSERT_EQ(counts.ticks, 300);
+  EXPECT_EQ(counts.rate, 1000);
+  EXPECT_EQ(counts.nodes, counts_of(session.get()).nodes);
+  EXPECT_EQ(counts.simplices, counts_of(session.get()).simplices);
+  EXPECT_EQ(counts.corners, 3);
+  for (int tick = 0; tick < 300; ++tick) {
+    const auto k = static_cast<std::size_t>(tick);
+    palpate_recorded_tick told = PALPATE_RECORDED_TICK_INIT;
+    ASSERT_EQ(palpate_recording_tick(read.get(), tick, &told), 0);
+    EXPECT_EQ(told.time, tick / 1000.0);
+    EXPECT_EQ(vector(told.position), vector(pressing(tick).position));
+    EXPECT_EQ(told.grab, pressing(tick).grab);
+    EXPECT_EQ(vector(told.force), vector(felt[k].force)) << tick;
+    EXPECT_EQ(vector(told.torque), vector(felt[k].torque));
+    EXPECT_EQ(vector(told.tool_position), vector(felt[k].tool_position));
+    EXPECT_EQ(told.contacts, felt[k].contacts);
+    EXPECT_EQ(told.status, status[k]);
+  }
+  EXPECT_GT(felt.back().force[2], 0.0);
+  palpate_recorded_tick none = PALPATE_RECORDED_TICK_INIT;
+  none.time = 7.0;
+  for (const int tick : {-1, 300}) EXPECT_EQ(palpate_recording_tick(read.get(), tick, &none), -1);
+  EXPECT_EQ(none.time, 0.0);
+
+  std::vector<double> rest(last.size()), wanted(last.size());
+  palpate_recording_rest(read.get(), rest.data());
+  palpate_surface_rest(session.get(), wanted.data());
+  EXPECT_EQ(rest, wanted);
+  std::vector<std::int32_t> corners(static_cast<std::size_t>(3 * counts.simplices)), same(corners.size());
+  palpate_recording_simplices(read.get(), corners.data());
+  palpate_surface_simplices(session.get(), same.data());
+  EXPECT_EQ(corners, same);
+  ASSERT_GT(counts.pictures, 1);
+  std::vector<float> picture(last.size());
+  double time = 0.0;
+  ASSERT_EQ(
+      palpate_recording_picture(read.get(), counts.pictures - 1, picture.data(), &time, error, sizeof error),
+      0);
+  EXPECT_GT(time, 0.2);  // while it is held, which displaces the same
+  for (std::size_t k = 0; k < last.size(); ++k) EXPECT_NEAR(picture[k], last[k], 1e-6);
+  EXPECT_EQ(
+      palpate_recording_picture(read.get(), counts.pictures, picture.data(), &time, error, sizeof error),
+      PALPATE_ERROR_ARGUMENT);
+  std::filesystem::remove(file);
+  std::filesystem::remove(std::filesystem::path(file).replace_extension(".xdmf"));
+}
+
+TEST(CInterfaceRecording, WhatCannotBeIsRefused) {
+  const auto file = std::filesystem::temp_directory_path() / "palpate_c_interface_refused.h5";
+  const Session session = open("cube2", {sphere(0.1)});
+  palpate_record_options good = PALPATE_RECORD_OPTIONS_INIT;
+  EXPECT_EQ(end_recording(session.get()), PALPATE_ERROR_STATE);
+  EXPECT_EQ(record(session.get(), nullptr, &good), PALPATE_ERROR_ARGUMENT);
+  EXPECT_EQ(record(session.get(), file.c_str(), nullptr), PALPATE_ERROR_ARGUMENT);
+  for (const int tool : {-1, 1}) {
+    palpate_record_options bad = good;
+    bad.tool = tool;
+    EXPECT_EQ(record(session.get(), file.c_str(), &bad), PALPATE_ERROR_ARGUMENT);
+  }
+  for (const double pictures : {-1.0, nan, HUGE_VAL}) {
+    palpate_record_options bad = good;
+    bad.pictures = pictures;
+    EXPECT_EQ(record(session.get(), file.c_str(), &bad), PALPATE_ERROR_ARGUMENT);
+  }
+  palpate_record_options unset = good;
+  unset.size = 0;
+  EXPECT_EQ(record(session.get(), file.c_str(), &unset), PALPATE_ERROR_ARGUMENT);
+  EXPECT_EQ(record(session.get(), "/no/such/folder/a.h5", &good), PALPATE_ERROR_FILE);
+  EXPECT_FALSE(std::filesystem::exists(file));
+  ASSERT_EQ(record(session.get(), file.c_str(), &good), PALPATE_OK);
+  EXPECT_EQ(record(session.get(), file.c_str(), &good), PALPATE_ERROR_STATE);
+  EXPECT_EQ(end_recording(session.get()), PALPATE_OK);
+
+  palpate_options slow = PALPATE_OPTIONS_INIT;
+  slow.tick = 0.0007;
+  const palpate_tool tool = sphere(0.1);
+  char error[400];
+  const Session odd(
+      palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 24, &slow, error, sizeof error));
+  ASSERT_NE(odd, nullptr) << error;
+  EXPECT_EQ(record(odd.get(), file.c_str(), &good), PALPATE_ERROR_ARGUMENT);
+
+  palpate_recording* none = palpate_recording_open("/no/such.h5", error, sizeof error);
+  EXPECT_EQ(none, nullptr);
+  EXPECT_EQ(palpate_last_code(), PALPATE_ERROR_FILE);
+  none = palpate_recording_open(golden("cube2").c_str(), error, sizeof error);
+  EXPECT_EQ(none, nullptr);
+  EXPECT_NE(std::string(error).find("hint: "), std::string::npos);
+  palpate_recording_close(nullptr);
+  std::filesystem::remove(file);
+}
+
 TEST(CInterfaceErrors, AFileThatIsNoModelIsNamed) {
   const auto file = std::filesystem::temp_directory_path() / "palpate_c_interface_no_model.hdf";
   std::ofstream(file) << "not a model";

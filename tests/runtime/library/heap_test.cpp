@@ -11,6 +11,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -504,17 +505,26 @@ TEST(OwnLoop, MakesNoHeapCall) {
       if (tick == 500) palpate_reset(session);
     }
   };
+  const auto count = [&] {
 #if PALPATE_OWN_MALLOC
-  heap_calls = 0;
-  counting = true;
-  loop();
-  counting = false;
-  EXPECT_EQ(heap_calls, 0);
+    heap_calls = 0;
+    counting = true;
+    loop();
+    counting = false;
+    EXPECT_EQ(heap_calls, 0);
 #else
-  loop();
+    loop();
 #endif
+  };
+  count();
   EXPECT_GT(touching, 500);
+  const std::string recording = testing::TempDir() + "palpate_heap_own_loop.h5";
+  const palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
+  ASSERT_EQ(palpate_record(session, recording.c_str(), &options, nullptr, 0), PALPATE_OK);
+  count();
   palpate_destroy(session);
+  std::filesystem::remove(recording);
+  std::filesystem::remove_all(recording + ".parts");
 }
 
 static_assert(noexcept(step(std::declval<const Body&>(), std::declval<State&>(),
