@@ -154,8 +154,8 @@ struct Arguments {
 void add_bake(CLI::App& app, Arguments& arguments) {
   app.add_option(
          "MODEL.toml", arguments.model,
-         "description of the body; or a surface (.stl, .obj, .ply, .off) or a labelled image (.inr, .nii, "
-         "with or without .gz), of which the description NAME.model.toml is written beside it first")
+         "description of the body; or a surface (.stl, .obj, .ply, .off) or a labelled image (.nrrd, "
+         ".nii, .inr, also with .gz), of which the description NAME.model.toml is written beside it first")
       ->type_name("");
   add_bake_options(app, arguments.bake);
   app.add_flag("--unless-done", arguments.unless_done,

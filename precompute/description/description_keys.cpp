@@ -30,28 +30,28 @@ KeyTable top_level() {
 }
 
 KeyTable geometry() {
-  return {
-      "[geometry]",
-      {{"surface", "", "", "closed triangle surface: a file .off, .obj, .stl (ASCII or binary) or .ply",
-        alternative},
-       {"image", "", "",
-        "labelled image: a file .inr, .nii or one of these with .gz, with one label per voxel", alternative},
-       {"volume", "", "",
-        "mesh of one kind of element, in space or in the plane: a file .msh (Gmsh 2.2 or 4.1, ASCII), "
-        ".mesh (Medit), .node/.ele (TetGen) or .vtk (legacy ASCII)",
-        alternative},
-       {"box", "file units", "", "table; six tetrahedra or one hexahedron per cell", alternative},
-       {"cylinder", "file units", "", "table; along z from 0", alternative},
-       {"sphere", "file units", "", "table; about the origin", alternative},
-       {"rectangle", "file units", "", "table; plane bodies", alternative},
-       {"polygon", "file units", "", "table; plane bodies", alternative},
-       {"picture", "pixels", "",
-        "plane bodies: a file .png or .pbm; every pixel that is not black is body, the lower left corner "
-        "of the picture is the origin",
-        alternative},
-       {"labels", "", "all but 0", "`image` only: list of the labels that are body"},
-       {"scale", "m", shown(Description{}.scale),
-        "metres per unit of the geometry: 0.001 for millimetres; for a picture, metres per pixel"}}};
+  return {"[geometry]",
+          {{"surface", "", "", "closed triangle surface: a file .off, .obj, .stl (ASCII or binary) or .ply",
+            alternative},
+           {"image", "", "",
+            "labelled image: a file .inr, .nii, one of these with .gz, or .nrrd, with one label per voxel",
+            alternative},
+           {"volume", "", "",
+            "mesh of one kind of element, in space or in the plane: a file .msh (Gmsh 2.2 or 4.1, ASCII), "
+            ".mesh (Medit), .node/.ele (TetGen) or .vtk (legacy ASCII)",
+            alternative},
+           {"box", "file units", "", "table; six tetrahedra or one hexahedron per cell", alternative},
+           {"cylinder", "file units", "", "table; along z from 0", alternative},
+           {"sphere", "file units", "", "table; about the origin", alternative},
+           {"rectangle", "file units", "", "table; plane bodies", alternative},
+           {"polygon", "file units", "", "table; plane bodies", alternative},
+           {"picture", "pixels", "",
+            "plane bodies: a file .png or .pbm; every pixel that is not black is body, the lower left corner "
+            "of the picture is the origin",
+            alternative},
+           {"labels", "", "all but 0", "`image` only: list of the labels that are body"},
+           {"scale", "m", shown(Description{}.scale),
+            "metres per unit of the geometry: 0.001 for millimetres; for a picture, metres per pixel"}}};
 }
 
 // Tables of a shape.

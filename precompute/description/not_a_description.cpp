@@ -17,7 +17,7 @@ struct Kind {
   std::string_view ending, key, what;
 };
 
-constexpr std::array<Kind, 15> geometry_endings = {{{".off", "surface", "a surface"},
+constexpr std::array<Kind, 16> geometry_endings = {{{".off", "surface", "a surface"},
                                                     {".obj", "surface", "a surface"},
                                                     {".stl", "surface", "a surface"},
                                                     {".ply", "surface", "a surface"},
@@ -25,6 +25,7 @@ constexpr std::array<Kind, 15> geometry_endings = {{{".off", "surface", "a surfa
                                                     {".inr.gz", "image", "an image"},
                                                     {".nii", "image", "an image"},
                                                     {".nii.gz", "image", "an image"},
+                                                    {".nrrd", "image", "an image"},
                                                     {".msh", "volume", "a volume mesh"},
                                                     {".mesh", "volume", "a volume mesh"},
                                                     {".node", "volume", "a volume mesh"},

@@ -59,7 +59,7 @@ double ask_number(const Conversation& with, const std::string& question, double 
 }
 
 void ask_file(const Conversation& with, std::filesystem::path& file) {
-  ask(with, "Surface (.stl, .obj, .ply, .off) or labelled image (.inr, .nii, also with .gz)", "",
+  ask(with, "Surface (.stl, .obj, .ply, .off) or labelled image (.nrrd, .nii, .inr)", "",
       [&](const std::string& answer) -> std::string {
         if (answer.empty()) return "a file is needed";
         if (!shape_kind(answer)) return "'" + printable(answer) + "' is no surface or image by its name";

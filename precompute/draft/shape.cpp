@@ -10,19 +10,20 @@
 #include <utility>
 
 #include "base/error.h"
-#include "precompute/geometry/labelled_image.h"
+#include "precompute/images/labelled_image.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, ShapeKind>, 8> endings = {{{".stl", ShapeKind::surface},
+constexpr std::array<std::pair<std::string_view, ShapeKind>, 9> endings = {{{".stl", ShapeKind::surface},
                                                                             {".obj", ShapeKind::surface},
                                                                             {".ply", ShapeKind::surface},
                                                                             {".off", ShapeKind::surface},
                                                                             {".inr", ShapeKind::image},
                                                                             {".inr.gz", ShapeKind::image},
                                                                             {".nii", ShapeKind::image},
-                                                                            {".nii.gz", ShapeKind::image}}};
+                                                                            {".nii.gz", ShapeKind::image},
+                                                                            {".nrrd", ShapeKind::image}}};
 constexpr double staircase = 1.5;
 
 /// The ending in small letters that a name has, or null.

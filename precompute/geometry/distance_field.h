@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "precompute/geometry/voxel_body.h"
+#include "precompute/images/voxel_body.h"
 
 namespace palpate {
 

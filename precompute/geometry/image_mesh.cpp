@@ -17,7 +17,7 @@
 #include "meshes/element.h"
 #include "precompute/geometry/distance_field.h"
 #include "precompute/geometry/interface_crossings.h"
-#include "precompute/geometry/labelled_image.h"
+#include "precompute/images/labelled_image.h"
 #include "precompute/geometry/mesh3.h"
 #include "precompute/geometry/mesh_bytes.h"
 #include "precompute/geometry/mesh_parts.h"

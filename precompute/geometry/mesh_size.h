@@ -5,7 +5,7 @@
 
 #include "base/child_process.h"
 #include "precompute/description/description.h"
-#include "precompute/geometry/voxel_body.h"
+#include "precompute/images/voxel_body.h"
 #include "precompute/surfaces/surface_input.h"
 
 namespace palpate {

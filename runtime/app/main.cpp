@@ -228,7 +228,8 @@ std::string meant_by(const CLI::App& app, const std::string& word) {
     return "palpate-runtime play " + word + " --view shows it and lets you push it. " + see;
   if (word.ends_with(".toml"))
     return "palpate-precompute " + word + " makes the file that is played with. " + see;
-  for (const char* const ending : {".stl", ".obj", ".ply", ".off", ".inr", ".inr.gz", ".nii", ".nii.gz"}) {
+  for (const char* const ending :
+       {".stl", ".obj", ".ply", ".off", ".inr", ".inr.gz", ".nii", ".nii.gz", ".nrrd"}) {
     if (word.ends_with(ending))
       return fmt::format("palpate-runtime push {} makes a body of it that you can push. {}", word, see);
   }

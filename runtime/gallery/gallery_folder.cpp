@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t longest_name = 200;
 
-constexpr std::array<std::pair<std::string_view, GalleryKind>, 12> endings = {{
+constexpr std::array<std::pair<std::string_view, GalleryKind>, 13> endings = {{
     {".palpate.hdf", GalleryKind::body},
     {".h5", GalleryKind::recording},
     {".stl", GalleryKind::source},
@@ -27,6 +27,7 @@ constexpr std::array<std::pair<std::string_view, GalleryKind>, 12> endings = {{
     {".inr.gz", GalleryKind::source},
     {".nii", GalleryKind::source},
     {".nii.gz", GalleryKind::source},
+    {".nrrd", GalleryKind::source},
     {".model.toml", GalleryKind::source},
     {"model.toml", GalleryKind::source},
 }};

@@ -44,7 +44,7 @@ std::string output_of(const std::string& report) {
 CLI::App* add_push(CLI::App& app, PushArguments& arguments) {
   CLI::App* push = app.add_subcommand("push", "do all that it takes to push a body in a browser");
   push->add_option("FILE", arguments.file,
-                   "surface (.stl, .obj, .ply, .off), labelled image (.inr, .nii, also with .gz), "
+                   "surface (.stl, .obj, .ply, .off), labelled image (.nrrd, .nii, .inr), "
                    "description (.toml) or "
                    "precomputed "
                    "model NAME.palpate.hdf")

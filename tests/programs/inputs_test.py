@@ -27,7 +27,7 @@ class Irregular(ProgramTest):
         self.refuse(".", "a folder")
 
     def test_a_fifo_as_geometry(self):
-        for kind, name in (("surface", "a.off"), ("surface", "a.ply"), ("image", "a.inr"), ("image", "a.inr.gz"), ("image", "a.nii"), ("volume", "a.msh"), ("volume", "a.vtk"),
+        for kind, name in (("surface", "a.off"), ("surface", "a.ply"), ("image", "a.inr"), ("image", "a.inr.gz"), ("image", "a.nii"), ("image", "a.nrrd"), ("volume", "a.msh"), ("volume", "a.vtk"),
                            ("volume", "a.node"), ("picture", "a.png")):
             os.mkfifo(self.folder / name)
             mesh = "[mesh]\nedge_length = 1\n" if kind in ("image", "picture") else ""
@@ -91,7 +91,7 @@ class Fuzzed(ProgramTest):
     """The first of the files of scripts/fuzz-programs: the same ones every time."""
 
     def test_surfaces_images_and_descriptions(self):
-        result = run(SOURCE / "scripts" / "fuzz-programs", "--kinds", "obj,ply,off,stl,inr,nii,toml", "--runs", "60", "--no-memory-limit")
+        result = run(SOURCE / "scripts" / "fuzz-programs", "--kinds", "obj,ply,off,stl,inr,nii,nrrd,toml", "--runs", "60", "--no-memory-limit")
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 
 

@@ -668,7 +668,7 @@ class Tools(ProgramTest):
 
 class Usage(ProgramTest):
     def test_a_file_without_a_command_is_told_what_it_is_for(self):
-        for file, command in (("touch.h5", "view"), ("liver.palpate.hdf", "play"), ("organ.stl", "push"), ("organ.nii", "push"), ("organ.nii.gz", "push")):
+        for file, command in (("touch.h5", "view"), ("liver.palpate.hdf", "play"), ("organ.stl", "push"), ("organ.nii", "push"), ("organ.nii.gz", "push"), ("organ.nrrd", "push")):
             told = run(RUNTIME, file)
             self.assertEqual(told.returncode, 2)
             self.assertIn(f"hint: palpate-runtime {command} {file}", told.stderr)

@@ -4,7 +4,7 @@
 #include <zlib.h>
 
 #include "precompute/geometry/image_mesh.h"
-#include "precompute/geometry/inr_header.h"
+#include "precompute/images/inr_header.h"
 #include "precompute/geometry/mesh_bytes.h"
 #include "precompute/geometry/mesh_size.h"
 #include "precompute/geometry/picture_reader.h"

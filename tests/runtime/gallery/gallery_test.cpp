@@ -37,7 +37,7 @@ TEST(GalleryFolder, KindsAreThoseOfTheEnding) {
   EXPECT_EQ(gallery_kind("a.palpate.hdf"), GalleryKind::body);
   EXPECT_EQ(gallery_kind("a.h5"), GalleryKind::recording);
   for (const char* const name : {"a.stl", "a.obj", "a.ply", "a.off", "a.inr", "a.inr.gz", "a.nii", "a.nii.gz",
-                                 "model.toml", "a.model.toml"})
+                                 "a.nrrd", "model.toml", "a.model.toml"})
     EXPECT_EQ(gallery_kind(name), GalleryKind::source) << name;
   const std::string no_name(300, 'a');
   for (const std::string& name : std::vector<std::string>{"", "a", "a.hdf", "a.gz", ".h5", ".a.stl",

@@ -9,29 +9,22 @@
 #include <limits>
 #include <string>
 
-#include "precompute/geometry/labelled_image.h"
-#include "precompute/geometry/nifti_image.h"
+#include "precompute/images/labelled_image.h"
+#include "precompute/images/nifti_image.h"
 #include "tests/support/geometry_shapes.h"
+#include "tests/support/labelled_sample.h"
 
 namespace palpate::nifti_test {
 namespace {
 
+using test::inr;
+using test::label_at;
+using test::origin;
+using test::size;
+using test::spacing;
 using testing::error_of;
 using testing::expect_mentions;
 using testing::TempFolder;
-
-constexpr std::array<int, 3> size = {9, 8, 7};
-const Vec3 spacing(1.0, 1.5, 2.0), origin(10.0, -20.0, 30.0);
-
-/// A body without symmetry: a block with an arm along each axis, of different labels and lengths.
-int label_at(int i, int j, int k) {
-  const auto within = [](int x, int low, int high) { return x >= low && x <= high; };
-  if (within(i, 1, 3) && within(j, 1, 3) && within(k, 1, 3)) return 1;
-  if (within(i, 4, 7) && within(j, 1, 2) && within(k, 1, 2)) return 2;
-  if (within(i, 1, 2) && within(j, 4, 6) && within(k, 2, 3)) return 3;
-  if (within(i, 2, 3) && within(j, 2, 3) && within(k, 4, 5)) return 4;
-  return 0;
-}
 
 /// How the image lies in a file.
 struct Layout {
@@ -157,19 +150,6 @@ std::string nifti(const Layout& layout) {
         if (layout.datatype == 16) file.add(static_cast<float>(value));
       }
   return file.bytes();
-}
-
-std::string inr() {
-  std::string text =
-      "#INRIMAGE-4#{\nXDIM=9\nYDIM=8\nZDIM=7\nVDIM=1\nTYPE=unsigned fixed\nPIXSIZE=8 "
-      "bits\nSCALE=2**0\nCPU=decm\n"
-      "VX=1\nVY=1.5\nVZ=2\nTX=10\nTY=-20\nTZ=30\n";
-  text.resize(252, '\n');
-  text += "##}\n";
-  for (int k = 0; k < size[2]; ++k)
-    for (int j = 0; j < size[1]; ++j)
-      for (int i = 0; i < size[0]; ++i) text += static_cast<char>(label_at(i, j, k));
-  return text;
 }
 
 class NiftiImage : public ::testing::Test {

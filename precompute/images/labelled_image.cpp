@@ -1,10 +1,11 @@
-#include "precompute/geometry/labelled_image.h"
+#include "precompute/images/labelled_image.h"
 
 #define CGAL_USE_ZLIB 1  // .inr.gz
 #include <CGAL/Image_3.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -14,9 +15,10 @@
 #include "base/error.h"
 #include "base/regular_file.h"
 #include "base/words.h"
-#include "precompute/geometry/image_labels.h"
-#include "precompute/geometry/inr_header.h"
-#include "precompute/geometry/nifti_image.h"
+#include "precompute/images/image_labels.h"
+#include "precompute/images/inr_header.h"
+#include "precompute/images/nifti_image.h"
+#include "precompute/images/nrrd_image.h"
 
 namespace palpate {
 namespace {
@@ -25,9 +27,8 @@ constexpr double largest_spacing_ratio = 100.0;  // slices of 5 mm with pixels o
 constexpr double voxels_per_edge = 20.0;
 constexpr double least_turn = 0.1;  // of the image's axes that is told [degrees]
 const char* const complete_file =
-    "use a complete INR or NIfTI file (.inr, .inr.gz, .nii, .nii.gz) with one label per voxel and positive "
-    "VX, "
-    "VY, VZ or pixdim";
+    "use a complete INR, NIfTI or NRRD file (.inr, .inr.gz, .nii, .nii.gz, .nrrd) with one label per voxel "
+    "and positive VX, VY, VZ, pixdim or space directions";
 constexpr std::size_t smallest_speck = 8;  // [voxels] less would be smoothed away
 
 /// Reads an INR image and sends its header and its voxels as labels.
@@ -57,18 +58,33 @@ ChildResult read_inr_labels(const std::string& file) {
   return image_labels(header, labels);
 }
 
+/// Files of a kind: which they are, their header's check, and their reader.
+struct ImageKind {
+  bool (*is)(const std::filesystem::path& file);
+  std::int64_t (*check)(const std::filesystem::path& file);
+  ChildResult (*read)(const std::string& file);
+};
+
+const ImageKind& kind_of(const std::filesystem::path& file) {
+  static constexpr std::array<ImageKind, 2> kinds = {
+      {{is_nifti, check_nifti_header, read_nifti_labels}, {is_nrrd, check_nrrd_header, read_nrrd_labels}}};
+  static constexpr ImageKind inr = {nullptr, check_inr_header, read_inr_labels};
+  const auto* const found = std::ranges::find_if(kinds, [&](const ImageKind& kind) { return kind.is(file); });
+  return found == kinds.end() ? inr : *found;
+}
+
 /// Refuses voxel sides and an origin that no image has.
 void check_geometry(const VoxelGrid& grid, const std::string& where) {
   const double smallest = grid.spacing.minCoeff(), largest = grid.spacing.maxCoeff();
   if (!(smallest > 1e-30 && largest < 1e30 && largest <= largest_spacing_ratio * smallest)) {
-    throw Error(fmt::format("the voxels' sides (VX, VY, VZ; pixdim) are {}, {}, {}", shown(grid.spacing[0]),
-                            shown(grid.spacing[1]), shown(grid.spacing[2])),
+    throw Error(fmt::format("the voxels' sides (VX, VY, VZ; pixdim; space directions) are {}, {}, {}",
+                            shown(grid.spacing[0]), shown(grid.spacing[1]), shown(grid.spacing[2])),
                 where,
                 fmt::format("they must be positive, and none more than {} times another: correct the header",
                             largest_spacing_ratio));
   }
   if (!(grid.origin.cwiseAbs().maxCoeff() < 1e12 * largest)) {
-    throw Error(fmt::format("the image's origin (TX, TY, TZ; sform, qform) is ({}, {}, {})",
+    throw Error(fmt::format("the image's origin (TX, TY, TZ; sform, qform; space origin) is ({}, {}, {})",
                             shown(grid.origin[0]), shown(grid.origin[1]), shown(grid.origin[2])),
                 where, "correct the header");
   }
@@ -135,16 +151,14 @@ VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                               std::vector<std::string>& notes) {
   const std::string where = image.file.string();
   check_regular_file(image.file, "Check image = \"...\" in [geometry]");
-  const bool nifti = is_nifti(image.file);
+  const ImageKind& kind = kind_of(image.file);
   // in a child: readers print on the screen, and CGAL's crashes on some damaged files
   const std::string path = std::filesystem::absolute(image.file).string();
-  const ChildTask task = {
-      .name = "the image reader",
-      .where = where,
-      .limits = reading_limits(nifti ? check_nifti_header(image.file) : check_inr_header(image.file)),
-      .hint = complete_file};
-  const ChildResult read =
-      run_in_child(task, [&] { return nifti ? read_nifti_labels(path) : read_inr_labels(path); });
+  const ChildTask task = {.name = "the image reader",
+                          .where = where,
+                          .limits = reading_limits(kind.check(image.file)),
+                          .hint = complete_file};
+  const ChildResult read = run_in_child(task, [&] { return kind.read(path); });
   if (read.status != read_ok) {
     throw Error(
         read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",

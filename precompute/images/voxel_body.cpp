@@ -1,4 +1,4 @@
-#include "precompute/geometry/voxel_body.h"
+#include "precompute/images/voxel_body.h"
 
 #include <fmt/format.h>
 

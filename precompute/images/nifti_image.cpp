@@ -1,9 +1,8 @@
-#include "precompute/geometry/nifti_image.h"
+#include "precompute/images/nifti_image.h"
 
 #include <fmt/format.h>
 #include <nifti2_io.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -11,14 +10,14 @@
 #include <cstddef>
 #include <cstring>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "base/error.h"
-#include "precompute/geometry/unpacked_file.h"
+#include "precompute/images/image_axes.h"
+#include "precompute/images/unpacked_file.h"
 
 namespace palpate {
 namespace {
@@ -114,69 +113,6 @@ double millimetres(int unit) {
   return unit == NIFTI_UNITS_MICRON ? 1e-3 : 1.0;
 }
 
-/// Which axis of the image runs along each of space, and whether backwards.
-struct Axes {
-  std::array<std::size_t, 3> from{};
-  std::array<bool, 3> backwards{};
-};
-
-Axes axes_of(const nifti_dmat44& to_space) {
-  std::array<int, 3> codes{};
-  nifti_dmat44_to_orientation(to_space, &codes[0], &codes[1], &codes[2]);
-  Axes axes{{0, 1, 2}, {}};
-  if (std::ranges::find(codes, 0) != codes.end()) return axes;  // a singular matrix
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto along = static_cast<std::size_t>((codes.at(axis) - NIFTI_L2R) / 2);
-    axes.from.at(along) = axis;
-    axes.backwards.at(along) = (codes.at(axis) - NIFTI_L2R) % 2 == 1;
-  }
-  return axes;
-}
-
-/// The image along the axes of space.
-ChildResult along_space(const nifti_image& image, const std::array<std::size_t, 3>& size,
-                        const std::vector<std::int32_t>& labels) {
-  const nifti_dmat44& to_space = image.sform_code > 0 ? image.sto_xyz : image.qto_xyz;
-  const Axes axes = axes_of(to_space);
-  const double unit = millimetres(image.xyz_units);
-  Eigen::Matrix3d directions;
-  Eigen::Vector3d corner;
-  for (int row = 0; row < 3; ++row) {
-    corner[row] = to_space.m[row][3];
-    for (int column = 0; column < 3; ++column) directions(row, column) = to_space.m[row][column];
-  }
-  const std::array<std::size_t, 3> stride = {1, size[0], size[0] * size[1]};
-  ImageHeader header;
-  std::array<std::ptrdiff_t, 3> step{};
-  std::ptrdiff_t first = 0;
-  for (std::size_t along = 0; along < 3; ++along) {
-    const std::size_t from = axes.from.at(along);
-    const auto column = directions.col(static_cast<Eigen::Index>(from));
-    const auto count = static_cast<std::ptrdiff_t>(size.at(from)),
-               pace = static_cast<std::ptrdiff_t>(stride.at(from));
-    header.size.at(along) = static_cast<Index>(count);
-    header.spacing.at(along) = unit * column.norm();
-    const double cosine = std::abs(column[static_cast<Eigen::Index>(along)]) / column.norm();
-    header.turned = std::max(header.turned, std::acos(std::min(cosine, 1.0)) * 180.0 / std::numbers::pi);
-    const bool backwards = axes.backwards.at(along);
-    step.at(along) = backwards ? -pace : pace;
-    if (!backwards) continue;
-    first += (count - 1) * pace;
-    corner += static_cast<double>(count - 1) * column;
-  }
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    header.origin.at(axis) = unit * corner[static_cast<Eigen::Index>(axis)];
-  std::vector<std::int32_t> turned;
-  turned.reserve(labels.size());
-  for (std::ptrdiff_t k = 0; k < header.size[2]; ++k) {
-    for (std::ptrdiff_t j = 0; j < header.size[1]; ++j) {
-      for (std::ptrdiff_t i = 0; i < header.size[0]; ++i)
-        turned.push_back(labels[static_cast<std::size_t>(first + i * step[0] + j * step[1] + k * step[2])]);
-    }
-  }
-  return image_labels(header, turned);
-}
-
 }  // namespace
 
 bool is_nifti(const std::filesystem::path& file) {
@@ -235,7 +171,12 @@ ChildResult read_nifti_labels(const std::string& file) {
   if (voxels != static_cast<std::size_t>(image->nvox)) return {not_scalar, {}};
   const std::vector<std::int32_t> labels = labels_of(*image, voxels);
   if (labels.empty()) return {not_scalar, {}};
-  return along_space(*image, size, labels);
+  const nifti_dmat44& to_space = image->sform_code > 0 ? image->sto_xyz : image->qto_xyz;
+  ImagePlace place;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) place.to_space(row, column) = to_space.m[row][column];
+  place.unit = millimetres(image->xyz_units);
+  return along_space(place, size, labels);
 }
 
 }  // namespace palpate

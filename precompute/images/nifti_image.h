@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "precompute/geometry/image_labels.h"
+#include "precompute/images/image_labels.h"
 
 namespace palpate {
 

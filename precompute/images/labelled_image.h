@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "precompute/description/description.h"
-#include "precompute/geometry/voxel_body.h"
+#include "precompute/images/voxel_body.h"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "precompute/geometry/inr_header.h"
+#include "precompute/images/inr_header.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "base/words.h"
-#include "precompute/geometry/unpacked_file.h"
+#include "precompute/images/unpacked_file.h"
 
 namespace palpate {
 namespace {

@@ -1,4 +1,4 @@
-#include "precompute/geometry/unpacked_file.h"
+#include "precompute/images/unpacked_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
