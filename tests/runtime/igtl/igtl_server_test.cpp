@@ -55,12 +55,11 @@ class IgtlServing : public testing::Test {
     }
   }
 
-  Body body_{test::unit_model(3, cells_, Scope::surface, Precision::double_precision)};
+  Body body_{test::unit_model(3, 8, Scope::surface, Precision::double_precision)};
   std::optional<IgtlServer> server_;
   int port_ = 0;
 
  private:
-  static constexpr int cells_ = 8;
   double time_ = 0.0;
 };
 
