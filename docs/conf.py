@@ -59,6 +59,7 @@ CHAPTERS = {
         "warp",
         "probe",
         "viewer",
+        "slicer",
         "recordings",
         "devices",
         "safety",

@@ -21,9 +21,9 @@
 #include "runtime/exports/gltf.h"
 #include "runtime/exports/ticks_table.h"
 #include "runtime/loop/session_check.h"
+#include "runtime/scene/seen_surface.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
-#include "runtime/viewer/seen_surface.h"
 #include "runtime/viewer/wire.h"
 #include "runtime/web/page.h"
 

@@ -1,5 +1,7 @@
 #include "runtime/app/play.h"
 
+#include <fmt/core.h>
+
 #include <atomic>
 #include <csignal>
 #include <memory>
@@ -14,6 +16,7 @@
 #include "runtime/app/play_session.h"
 #include "runtime/app/session_view.h"
 #include "runtime/app/viewed_play.h"
+#include "runtime/igtl/igtl_server.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/monitor.h"
 #include "runtime/loop/output.h"
@@ -64,6 +67,12 @@ OutputPaths check_outputs(PlayOptions& options) {
   return paths;
 }
 
+std::unique_ptr<IgtlServer> serve_igtl(ListeningSocket socket) {
+  const ListenAddress& address = socket.address();
+  fmt::print(stderr, "OpenIGTLink clients find the run at {}, port {}\n", address.address, address.port);
+  return std::make_unique<IgtlServer>(std::move(socket));
+}
+
 int exit_code(const LoopReport& report, bool recording_failed) {
   if (recording_failed) return exit_input_error;
   if (report.interrupted) return exit_interrupted;
@@ -83,6 +92,8 @@ int play(PlayOptions options) {
   if (!options.beside.empty()) beside.emplace(options.beside);
   std::optional<ViewerPort> port;
   if (options.view) port.emplace(*options.view);
+  std::optional<ListeningSocket> igtl_socket;
+  if (options.igtl) igtl_socket.emplace(*options.igtl, "--igtl");
   InputSource input = make_input_source(options, guardian ? &*guardian : nullptr);
   std::unique_ptr<const Body> body =
       load_and_print(options.file, options.model_toml, options.settings.body());
@@ -90,8 +101,10 @@ int play(PlayOptions options) {
   if (options.session) warn_of_other_model(*options.session, *body);
   if (input.link != nullptr)
     wait_for(*input.link, options.device.kind == DeviceChoice::Kind::bridge, stop_asked);
+  std::unique_ptr<IgtlServer> igtl = igtl_socket ? serve_igtl(std::move(*igtl_socket)) : nullptr;
   if (port) {
-    ViewedPlay viewed(options, input, std::move(body), std::move(*port), beside ? &*beside : nullptr);
+    ViewedPlay viewed(options, input, std::move(body), std::move(*port), beside ? &*beside : nullptr,
+                      igtl.get());
     const LoopReport report = viewed.run(stop_asked);
     return exit_code(report, viewed.recording_failed());
   }
@@ -99,7 +112,12 @@ int play(PlayOptions options) {
   settle_tool(options, *body);
   options.settings = apply_defaults(options.settings, input, *body);
   print_device(input, options.settings);
-  PlaySession session(options, *body, input);
+  SessionViewer viewer;
+  if (igtl != nullptr) {
+    igtl->show_scene(std::make_shared<const Scene>(make_scene(*body, 1)));
+    viewer.pictures = [&](SurfacePicture picture) { igtl->show_picture(std::move(picture), *body); };
+  }
+  PlaySession session(options, *body, input, viewer);
   const LoopReport& report = session.run(stop_asked);
   session.tell();
   return exit_code(report, session.recording_failure().has_value());

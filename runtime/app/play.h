@@ -8,6 +8,7 @@
 
 #include "formats/recording.h"
 #include "runtime/loop/settings.h"
+#include "runtime/serving/listening_socket.h"
 #include "runtime/serving/viewer_port.h"
 
 namespace palpate {
@@ -43,6 +44,7 @@ struct PlayOptions {
   std::optional<int> processor;    ///< that the loop is to have for itself
   bool fast = false;
   std::optional<ViewerOptions> view;  ///< where it is shown in a browser
+  std::optional<ListenAddress> igtl;  ///< where OpenIGTLink clients are sent it
   std::filesystem::path beside;       ///< recording that the browser shows beside it; empty: none
   std::filesystem::path record;       ///< empty: nothing is recorded
   double record_frames = 60.0;        ///< of the surface a second; 0: none

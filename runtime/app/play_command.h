@@ -23,6 +23,7 @@ struct PlayArguments {
   std::optional<std::string> view_address;
   bool view_framed = false;
   std::string beside;
+  std::optional<std::string> igtl;
   std::string record;
   std::optional<std::string> record_frames;
   std::string report;
@@ -40,6 +41,9 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments);
 /// What they mean. For a replay, what is not given is as it was in the session. Throws CLI::ParseError for
 /// wrong arguments, Error for a session that cannot be read.
 PlayOptions read_play(PlayArguments arguments);
+
+/// The place to listen at of an option, "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
+ListenAddress read_address(const std::string& text, const char* option);
 
 /// The viewer of `play` and `view` at "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
 ViewerOptions read_viewer(const std::string& address, bool framed);

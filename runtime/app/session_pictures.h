@@ -10,7 +10,7 @@
 #include "formats/recording.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/loop/monitor.h"
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 
 namespace palpate {
 

@@ -18,7 +18,7 @@
 #include "runtime/loop/loading.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/session_xdmf.h"
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 
 namespace palpate {
 namespace {
@@ -49,7 +49,7 @@ bool is_of_the_run(const Setting& setting) {
 }  // namespace
 
 ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body,
-                       ViewerPort port, SessionView* beside)
+                       ViewerPort port, SessionView* beside, IgtlServer* igtl)
     : options_(std::move(options)),
       input_(input),
       body_(std::move(body)),
@@ -59,6 +59,7 @@ ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<
       size_(body_->bounds().diagonal().norm()),
       port_(std::move(port)),
       beside_(beside),
+      igtl_(igtl),
       requested_{.text = options_.settings_text, .settings = options_.settings, .record = options_.record} {
   if (options_.device.kind == DeviceChoice::Kind::mouse) add_mouse(input_, options_, *body_);
   state_.device = options_.device.text;
@@ -138,6 +139,7 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
                     .pictures =
                         [this](SurfacePicture picture) {
                           take_change(picture.frame);
+                          if (igtl_ != nullptr) igtl_->show_picture(picture, *body_);
                           server_->show_picture(std::move(picture), body_.get());
                         },
                     .recording_failed = [this](const Error& reason) { take_recording_failure(reason); }});
@@ -187,7 +189,9 @@ void ViewedPlay::show_body() {
     state_.defaults = describe_defaults(*body_);
     changed_ = true;
   }
-  server_->show_scene(std::make_shared<const Scene>(make_scene(*body_, number)));
+  const auto scene = std::make_shared<const Scene>(make_scene(*body_, number));
+  server_->show_scene(scene);
+  if (igtl_ != nullptr) igtl_->show_scene(scene);
   tell_.notify_all();
 }
 

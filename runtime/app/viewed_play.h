@@ -16,6 +16,7 @@
 #include "runtime/app/play_session.h"
 #include "runtime/app/run_state.h"
 #include "runtime/app/session_view.h"
+#include "runtime/igtl/igtl_server.h"
 #include "runtime/viewer/viewed_run.h"
 #include "runtime/viewer/viewer_server.h"
 
@@ -27,9 +28,10 @@ namespace palpate {
 class ViewedPlay : public ViewedRun {
  public:
   /// `input` as make_input_source left it, `body` as the options ask for it; `port`: where it is shown;
-  /// `beside`: a recording that is shown beside it and lives as long, null for none.
+  /// `beside`: a recording that is shown beside it, `igtl`: who else is sent its pictures. Both live as long;
+  /// null for none.
   ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<const Body> body, ViewerPort port,
-             SessionView* beside = nullptr);
+             SessionView* beside = nullptr, IgtlServer* igtl = nullptr);
 
   /// Serves the pages, says where once the first session could begin, and goes on until `stop` or the end of
   /// a duration that the options give. Tells of the last session, whose report it returns. Throws Error. To
@@ -89,6 +91,7 @@ class ViewedPlay : public ViewedRun {
   double size_;     // of the body [m]
   ViewerPort port_;
   SessionView* beside_;
+  IgtlServer* igtl_;
   ViewerServer* server_ = nullptr;
   LoopControl control_;
   bool recording_failed_ = false;

@@ -8,7 +8,7 @@
 #include "formats/recording.h"
 #include "runtime/body/surface_numbering.h"
 #include "runtime/gallery/gallery_folder.h"
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 #include "runtime/viewer/wire.h"
 
 namespace palpate {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "runtime/serving/book_files.h"
+#include "runtime/serving/listening_socket.h"
 
 namespace palpate {
 
@@ -34,20 +35,16 @@ class ViewerPort {
  public:
   /// Takes the address and draws the token. Throws Error (port in use, address unknown).
   explicit ViewerPort(const ViewerOptions& options);
-  ~ViewerPort();
-  ViewerPort(ViewerPort&& other) noexcept;
-  ViewerPort(const ViewerPort&) = delete;
-  ViewerPort& operator=(const ViewerPort&) = delete;
 
   [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
   /// What to open in a browser of this machine: http://127.0.0.1:8017/PAGE?token=...
   [[nodiscard]] std::string url(const std::string& page = "") const;
   /// The listening socket, which is the caller's from now on.
-  [[nodiscard]] int release() noexcept;
+  [[nodiscard]] int release() noexcept { return socket_.release(); }
 
  private:
+  ListeningSocket socket_;
   ServedAddress served_;
-  int socket_ = -1;
 };
 
 }  // namespace palpate

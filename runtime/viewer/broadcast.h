@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/scene/drawn_picture.h"
 #include "runtime/viewer/run_words.h"
-#include "runtime/viewer/scene.h"
 #include "runtime/viewer/tick_history.h"
 #include "runtime/viewer/wire_values.h"
 
@@ -23,13 +23,6 @@ struct Message {
   explicit operator bool() const noexcept { return bytes != nullptr; }
 };
 Message text_message(std::string text);
-
-/// A picture and what it is drawn on.
-struct DrawnPicture {
-  std::shared_ptr<const Scene> scene;
-  std::shared_ptr<const ScenePatch> patch;  ///< null: none
-  SurfacePicture picture;
-};
 
 /// Encoded when the first page wants it. Counts tell a page whether it has been sent what there is. For the
 /// server's thread.

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "base/error.h"
+#include "runtime/scene/seen_surface.h"
 #include "runtime/serving/admission.h"
 #include "runtime/serving/book_files.h"
-#include "runtime/viewer/seen_surface.h"
 
 namespace palpate {
 namespace {

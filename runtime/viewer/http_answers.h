@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "runtime/viewer/broadcast.h"
 #include "runtime/serving/http_guard.h"
 #include "runtime/serving/viewer_port.h"
+#include "runtime/viewer/broadcast.h"
 
 namespace palpate {
 

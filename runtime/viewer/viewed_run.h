@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "runtime/safety/pointer_pose.h"
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 
 namespace palpate {
 

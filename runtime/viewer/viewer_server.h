@@ -10,9 +10,9 @@
 
 #include "runtime/background/surface_frames.h"
 #include "runtime/loop/monitor.h"
-#include "runtime/viewer/scene.h"
-#include "runtime/viewer/viewed_run.h"
+#include "runtime/scene/scene.h"
 #include "runtime/serving/viewer_port.h"
+#include "runtime/viewer/viewed_run.h"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "runtime/viewer/seen_values.h"
+#include "runtime/scene/seen_values.h"
 
 namespace palpate {
 namespace {
@@ -110,14 +110,6 @@ std::string encode_patch(std::uint32_t scene, const ScenePatch& patch) {
   add_nodes(message, patch.outline);
   if (!patch.materials.empty()) add_bytes_of(message, patch.materials);
   return message.take();
-}
-
-bool fits(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch) {
-  const std::vector<float>& of_scene =
-      scene.is_plane ? picture.plane_displacement : picture.frame.displacement;
-  if (of_scene.size() < 3 * scene.nodes.size()) return false;
-  return patch == nullptr || patch->surface_nodes.empty() ||
-         picture.frame.displacement.size() >= 3 * (static_cast<std::size_t>(patch->surface_nodes.back()) + 1);
 }
 
 std::string encode_frame(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch,

@@ -7,7 +7,7 @@
 
 #include "runtime/background/surface_frames.h"
 #include "runtime/loop/monitor.h"
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 #include "runtime/viewer/wire_values.h"
 
 namespace palpate {
@@ -15,9 +15,6 @@ namespace palpate {
 /// Each as the bytes of one message.
 std::string encode_scene(const Scene& scene);
 std::string encode_patch(std::uint32_t scene, const ScenePatch& patch);
-
-/// Whether a picture has values for all nodes of the scene and of the patch (null: none).
-bool fits(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch);
 
 /// A picture that fits: `values` are its own, of which only what differs from `base` is in the message (null:
 /// all of them). Who reads it must have that base.

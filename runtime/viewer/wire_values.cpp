@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "runtime/viewer/seen_values.h"
+#include "runtime/scene/seen_values.h"
 
 namespace palpate {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 
 namespace palpate {
 
@@ -22,7 +22,7 @@ struct WireValues {
   std::array<std::vector<std::int32_t>, 4> channel;
 };
 
-/// Rounds a picture that fits (wire.h). Displacements are off by at most 1/10 000 of the largest component,
+/// Rounds a picture that fits (scene.h). Displacements are off by at most 1/10 000 of the largest component,
 /// stresses by 1/8 192 of the largest. What is not finite counts as 0, a stress as not known.
 WireValues wire_values(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch,
                        std::uint32_t number);

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "runtime/viewer/node_order.h"
+#include "runtime/scene/node_order.h"
 #include "runtime/viewer/wire.h"
 
 namespace palpate {

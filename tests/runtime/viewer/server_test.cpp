@@ -12,7 +12,7 @@
 
 #include "base/error.h"
 #include "runtime/body/patch_maker.h"
-#include "runtime/viewer/node_order.h"
+#include "runtime/scene/node_order.h"
 #include "runtime/viewer/viewer_server.h"
 #include "runtime/web/page.h"
 #include "tests/support/meshes_files.h"

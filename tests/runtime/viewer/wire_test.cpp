@@ -12,8 +12,8 @@
 
 #include "base/error.h"
 #include "runtime/body/patch_maker.h"
-#include "runtime/viewer/node_order.h"
-#include "runtime/viewer/seen_surface.h"
+#include "runtime/scene/node_order.h"
+#include "runtime/scene/seen_surface.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/viewer_decoder.h"
 

@@ -1,12 +1,12 @@
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 
 #include <algorithm>
 
 #include "meshes/surface.h"
 #include "meshes/topology.h"
 #include "runtime/body/surface_numbering.h"
-#include "runtime/viewer/inner_surface.h"
-#include "runtime/viewer/node_order.h"
+#include "runtime/scene/inner_surface.h"
+#include "runtime/scene/node_order.h"
 
 namespace palpate {
 namespace {
@@ -181,6 +181,14 @@ ScenePatch make_scene_patch(const Body& body, const Scene& scene, const Patch& p
   drawn.triangles = grouped<3>(simplices);
   drawn.outline = outline_of(drawn.triangles);
   return drawn;
+}
+
+bool fits(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch) {
+  const std::vector<float>& of_scene =
+      scene.is_plane ? picture.plane_displacement : picture.frame.displacement;
+  if (of_scene.size() < 3 * scene.nodes.size()) return false;
+  return patch == nullptr || patch->surface_nodes.empty() ||
+         picture.frame.displacement.size() >= 3 * (static_cast<std::size_t>(patch->surface_nodes.back()) + 1);
 }
 
 Scene make_scene(const RecordedSurface& surface, std::uint32_t number) {

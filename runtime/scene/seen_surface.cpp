@@ -1,4 +1,4 @@
-#include "runtime/viewer/seen_surface.h"
+#include "runtime/scene/seen_surface.h"
 
 #include <bit>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "meshes/readers/vtu_writer.h"
-#include "runtime/viewer/seen_values.h"
+#include "runtime/scene/seen_values.h"
 
 namespace palpate {
 namespace {
@@ -68,29 +68,33 @@ std::string surface_stl(const SurfacePicture& picture, const Scene& scene, const
   return bytes;
 }
 
-std::string surface_vtu(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch) {
+SeenMesh seen_mesh(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch) {
   const SeenValues values(picture, scene, patch);
   const std::size_t nodes = values.scene_nodes() + values.patch_nodes();
-  std::vector<Vec3> positions;
-  std::vector<double> displacement;
-  std::vector<double> von_mises;
-  std::vector<double> pressure(nodes);
+  SeenMesh mesh;
+  mesh.pressure.resize(nodes);
   for (std::size_t k = 0; k < nodes; ++k) {
-    positions.push_back(seen(values, scene, patch, k));
-    displacement.insert(displacement.end(), values.displacement(k), values.displacement(k) + 3);
-    von_mises.push_back(values.von_mises(k));
+    mesh.nodes.push_back(seen(values, scene, patch, k));
+    mesh.displacement.insert(mesh.displacement.end(), values.displacement(k), values.displacement(k) + 3);
+    mesh.von_mises.push_back(values.von_mises(k));
   }
   for (const SeenValues::Pressure& p : values.pressures())
-    pressure[static_cast<std::size_t>(p.node)] = p.value;
+    mesh.pressure[static_cast<std::size_t>(p.node)] = p.value;
 
-  std::vector<Index> cells = seen_triangles(scene, patch);
-  const ElementType element = cells.empty() ? ElementType::line2 : ElementType::tri3;
-  if (cells.empty()) {
-    for (const std::array<Index, 2>& edge : scene.edges) cells.insert(cells.end(), edge.begin(), edge.end());
-  }
-  const std::array<NodalField, 3> fields = {
-      {{"displacement", 3, displacement}, {"von_mises", 1, von_mises}, {"pressure", 1, pressure}}};
-  return vtu_text(positions, element, cells, fields);
+  mesh.cells = seen_triangles(scene, patch);
+  if (!mesh.cells.empty()) return mesh;
+  mesh.cell = ElementType::line2;
+  for (const std::array<Index, 2>& edge : scene.edges)
+    mesh.cells.insert(mesh.cells.end(), edge.begin(), edge.end());
+  return mesh;
+}
+
+std::string surface_vtu(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch) {
+  const SeenMesh mesh = seen_mesh(picture, scene, patch);
+  const std::array<NodalField, 3> fields = {{{"displacement", 3, mesh.displacement},
+                                             {"von_mises", 1, mesh.von_mises},
+                                             {"pressure", 1, mesh.pressure}}};
+  return vtu_text(mesh.nodes, mesh.cell, mesh.cells, fields);
 }
 
 }  // namespace palpate

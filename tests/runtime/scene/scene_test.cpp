@@ -1,5 +1,5 @@
 // What a viewer draws, against areas and counts that are known.
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 
 #include <gtest/gtest.h>
 

@@ -57,6 +57,9 @@ Scene make_plane_scene(const Model& model, std::uint32_t number);
 /// The scene of an overlay on the body of `scene`. Its number is left 0.
 ScenePatch make_scene_patch(const Body& body, const Scene& scene, const Patch& patch);
 
+/// Whether a picture has values for all nodes of the scene and of the patch (null: none).
+bool fits(const SurfacePicture& picture, const Scene& scene, const ScenePatch* patch);
+
 /// The scene of a recording: all of its surface with the edges of its triangles.
 Scene make_scene(const RecordedSurface& surface, std::uint32_t number);
 

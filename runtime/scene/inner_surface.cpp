@@ -1,4 +1,4 @@
-#include "runtime/viewer/inner_surface.h"
+#include "runtime/scene/inner_surface.h"
 
 #include <algorithm>
 #include <unordered_map>

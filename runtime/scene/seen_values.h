@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 
 namespace palpate {
 

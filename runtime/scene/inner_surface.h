@@ -2,7 +2,7 @@
 #pragma once
 
 #include "formats/model.h"
-#include "runtime/viewer/scene.h"
+#include "runtime/scene/scene.h"
 
 namespace palpate {
 

@@ -1,4 +1,4 @@
-#include "runtime/viewer/node_order.h"
+#include "runtime/scene/node_order.h"
 
 #include <algorithm>
 #include <array>

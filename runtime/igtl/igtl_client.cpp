@@ -1,0 +1,82 @@
+#include "runtime/igtl/igtl_client.h"
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/write.hpp>
+#include <utility>
+
+namespace palpate {
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+constexpr auto longest_silence = std::chrono::seconds(5);
+constexpr int send_room = 256 << 10;            // what waits in it is seen late [bytes]
+constexpr std::size_t most_at_once = 64 << 10;  // between two looks whether the client takes anything [bytes]
+
+asio::const_buffer buffer_of(const IgtlBroadcast::Bytes& bytes) {
+  return bytes ? asio::buffer(*bytes) : asio::const_buffer();
+}
+
+}  // namespace
+
+IgtlClient::IgtlClient(asio::ip::tcp::socket socket, IgtlBroadcast& broadcast)
+    : socket_(std::move(socket)), broadcast_(broadcast) {
+  error_code ignored;  // it does without
+  socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
+  socket_.set_option(asio::socket_base::send_buffer_size(send_room), ignored);
+}
+
+void IgtlClient::send_news() {
+  if (is_sending_ || is_gone_ || is_served()) return;
+  sending_ = {};
+  if (surfaces_ != broadcast_.surfaces()) sending_[0] = broadcast_.surface_message();
+  if (pictures_ != broadcast_.pictures()) sending_[1] = broadcast_.hand_message();
+  surfaces_ = broadcast_.surfaces();
+  pictures_ = broadcast_.pictures();
+  is_sending_ = true;
+  progress_ = Clock::now();
+  const std::array<asio::const_buffer, 2> buffers = {buffer_of(sending_[0]), buffer_of(sending_[1])};
+  asio::async_write(
+      socket_, buffers,
+      [self = shared_from_this()](const error_code& problem, std::size_t) {
+        self->progress_ = Clock::now();
+        return problem ? 0 : most_at_once;
+      },
+      [self = shared_from_this()](const error_code& problem, std::size_t) { self->take_sent(problem); });
+}
+
+void IgtlClient::take_sent(const error_code& problem) {
+  is_sending_ = false;
+  if (problem) {
+    is_gone_ = true;
+  } else {
+    send_news();
+  }
+}
+
+void IgtlClient::read_some() {
+  if (is_reading_ || is_gone_) return;
+  is_reading_ = true;
+  socket_.async_read_some(asio::buffer(said_),
+                          [self = shared_from_this()](const error_code& problem, std::size_t) {
+                            self->is_reading_ = false;
+                            if (problem) self->is_gone_ = true;
+                          });
+}
+
+bool IgtlClient::is_lost(Clock::time_point now) const {
+  return is_gone_ || (is_sending_ && now - progress_ > longest_silence);
+}
+
+bool IgtlClient::is_served() const {
+  return !is_sending_ && pictures_ == broadcast_.pictures() && surfaces_ == broadcast_.surfaces();
+}
+
+void IgtlClient::cut() {
+  is_gone_ = true;
+  error_code ignored;
+  socket_.close(ignored);
+}
+
+}  // namespace palpate

@@ -1,0 +1,29 @@
+// What is sent, as whole messages of OpenIGTLink, version 1 of its header.
+#pragma once
+
+#include <string>
+
+#include "runtime/scene/drawn_picture.h"
+
+namespace palpate {
+
+// Device names of the messages.
+constexpr const char* igtl_surface_name = "Palpate surface";
+constexpr const char* igtl_tool_name = "Palpate tool";
+constexpr const char* igtl_force_name = "Palpate force";
+
+// All have the time of the tick since the run began as their time stamp. Coordinates are those of the model,
+// in millimetres.
+
+/// POLYDATA: what is seen of the body, as triangles or, without any, as lines; of each node the size of its
+/// displacement [mm], von Mises stress and contact pressure [Pa].
+std::string igtl_surface(const DrawnPicture& drawn);
+
+/// TRANSFORM: pose of the tool.
+std::string igtl_tool(const SurfacePicture& picture);
+
+/// STRING: force on the hand and its torque about the tool's origin, as the JSON object
+/// {"force_N":[x,y,z],"torque_Nm":[x,y,z]}.
+std::string igtl_force(const SurfacePicture& picture);
+
+}  // namespace palpate

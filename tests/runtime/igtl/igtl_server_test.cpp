@@ -1,0 +1,182 @@
+// The OpenIGTLink server over real sockets.
+#include "runtime/igtl/igtl_server.h"
+
+#include <gtest/gtest.h>
+#include <igtlPolyDataMessage.h>
+#include <igtlStringMessage.h>
+#include <igtlTransformMessage.h>
+
+#include <algorithm>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read.hpp>
+#include <chrono>
+#include <optional>
+#include <random>
+#include <thread>
+
+#include "base/error.h"
+#include "runtime/igtl/igtl_messages.h"
+#include "tests/support/igtl_reader.h"
+#include "tests/support/runtime_model.h"
+
+namespace palpate::igtl_server_test {
+namespace {
+
+using test::IgtlReader;
+
+/// A server of a small body, and pictures of which each is a second later.
+class IgtlServing : public testing::Test {
+ protected:
+  void SetUp() override {
+    ListeningSocket socket({}, "test");
+    port_ = socket.address().port;
+    server_.emplace(std::move(socket));
+    server_->show_scene(std::make_shared<const Scene>(make_scene(body_, 1)));
+  }
+
+  /// The time of the picture that it shows.
+  double show() {
+    SurfacePicture picture;
+    picture.frame.displacement.assign(3 * body_.surface_in_mesh().size(), 0.001F);
+    picture.frame.von_mises.resize(body_.surface_in_mesh().size());
+    picture.frame.time = ++time_;
+    server_->show_picture(std::move(picture), body_);
+    return time_;
+  }
+
+  /// Whether the client is shown what comes.
+  void expect_served(IgtlReader& client) {
+    const double shown = show();
+    for (;;) {
+      const auto surface = client.next<igtl::PolyDataMessage>();
+      ASSERT_TRUE(surface) << "it was turned away";
+      if (test::time_of(*surface) >= shown) return;
+    }
+  }
+
+  Body body_{test::unit_model(3, 8, Scope::surface, Precision::double_precision)};
+  std::optional<IgtlServer> server_;
+  int port_ = 0;
+
+ private:
+  double time_ = 0.0;
+};
+
+TEST_F(IgtlServing, SendsSurfaceToolAndForce) {
+  IgtlReader client(port_);
+  const double shown = show();
+  const auto surface = client.next<igtl::PolyDataMessage>();
+  const auto tool = test::unpack<igtl::TransformMessage>(client.read());
+  const auto force = test::unpack<igtl::StringMessage>(client.read());
+  ASSERT_TRUE(surface && tool && force);
+  EXPECT_EQ(test::time_of(*surface), shown);
+  EXPECT_EQ(test::time_of(*tool), shown);
+  EXPECT_EQ(test::time_of(*force), shown);
+  EXPECT_EQ(surface->GetPoints()->GetNumberOfPoints(), std::ssize(body_.surface_in_mesh()));
+}
+
+TEST_F(IgtlServing, WhoComesLaterIsSentWhatStands) {
+  const double shown = show();
+  for (int k = 0; k < 3; ++k) {
+    IgtlReader client(port_);
+    EXPECT_EQ(test::time_of(*client.next<igtl::PolyDataMessage>()), shown);
+  }
+}
+
+TEST_F(IgtlServing, ThePictureOfTheEndIsSent) {
+  IgtlReader client(port_);
+  expect_served(client);
+  SurfacePicture last;
+  last.frame.displacement.resize(3 * body_.surface_in_mesh().size());
+  last.frame.time = 1.001;  // sooner than the pace
+  server_->show_picture(std::move(last), body_);
+  server_.reset();
+  double time = 0.0;
+  while (const auto surface = client.next<igtl::PolyDataMessage>()) time = test::time_of(*surface);
+  EXPECT_NEAR(time, 1.001, 1e-9);
+}
+
+TEST_F(IgtlServing, EightClientsAtOnceAndNoMore) {
+  static_assert(most_igtl_clients == 8);
+  std::vector<std::unique_ptr<IgtlReader>> clients;
+  for (std::size_t k = 0; k < most_igtl_clients; ++k) {
+    clients.push_back(std::make_unique<IgtlReader>(port_));
+    expect_served(*clients.back());
+  }
+  IgtlReader another(port_);
+  show();
+  EXPECT_EQ(another.read(), "") << "it is turned away";
+  for (const auto& client : clients) expect_served(*client);
+  clients.pop_back();
+  for (int attempt = 0; attempt < 500;
+       ++attempt) {  // one is gone, which the server sees with nothing to send
+    IgtlReader later(port_);
+    if (!later.read().empty()) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  FAIL() << "a place is free, and nobody gets it";
+}
+
+TEST_F(IgtlServing, WhatClientsSayDoesNoHarm) {
+  std::mt19937 random(3);
+  std::string noise(100'000, '\0');
+  for (char& c : noise) c = static_cast<char>(random() & 0xFFU);
+  auto get = igtl::GetPolyDataMessage::New();
+  get->SetDeviceName("Palpate surface");
+  get->Pack();
+  const std::string query(static_cast<const char*>(get->GetPackPointer()),
+                          static_cast<std::size_t>(get->GetPackSize()));
+  std::string huge = query;
+  std::fill_n(huge.begin() + 42, 8, '\xFF');  // size of the body
+  IgtlReader other(port_);
+  for (const std::string& said :
+       {query, query.substr(0, 30), huge, noise, std::string("GET / HTTP/1.1\r\nHost: there\r\n\r\n")}) {
+    IgtlReader client(port_);
+    client.say(said);
+    expect_served(client);
+    client.say(said);
+    expect_served(client);
+    expect_served(other);
+  }
+}
+
+TEST_F(IgtlServing, WhoReadsNothingHoldsUpNobodyAndIsCut) {
+  namespace asio = boost::asio;
+  asio::io_context context;
+  asio::ip::tcp::socket stalled(context);
+  stalled.open(asio::ip::tcp::v4());
+  stalled.set_option(asio::socket_base::receive_buffer_size(4096));
+  stalled.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(port_)});
+  IgtlReader other(port_);
+  using Clock = std::chrono::steady_clock;
+  for (const auto end = Clock::now() + std::chrono::seconds(7); Clock::now() < end;) expect_served(other);
+
+  // What was under way is still in the sockets' own room, and then it ends.
+  timeval wait{.tv_sec = 60, .tv_usec = 0};
+  setsockopt(stalled.native_handle(), SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait);
+  std::vector<char> room(1 << 20);
+  std::size_t received = 0;
+  ssize_t got = 0;
+  while ((got = recv(stalled.native_handle(), room.data(), room.size(), 0)) > 0)
+    received += static_cast<std::size_t>(got);
+  EXPECT_TRUE(got == 0 || errno == ECONNRESET) << errno;
+  EXPECT_LT(received, 4U << 20U);
+  expect_served(other);
+}
+
+TEST(IgtlSocket, RefusesWhatItCannotHave) {
+  const ListeningSocket first({}, "--igtl");
+  try {
+    const ListeningSocket second(first.address(), "--igtl");
+    FAIL() << "the port is taken twice";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where(), "127.0.0.1:" + std::to_string(first.address().port));
+    EXPECT_NE(std::string(error.hint()).find("choose another port"), std::string::npos);
+  }
+  EXPECT_THROW(ListeningSocket({.address = "somewhere", .port = 0}, "--igtl"), Error);
+  EXPECT_THROW(ListeningSocket({.address = "192.0.2.1", .port = 0}, "--igtl"), Error);  // of no machine
+}
+
+}  // namespace
+}  // namespace palpate::igtl_server_test
