@@ -116,8 +116,10 @@ export class Gallery {
     if (text === this.shown_) return;
     this.shown_ = text;
     const { folder, items } = JSON.parse(text) as { folder: string; items: Item[] };
-    document.title = `Palpate – ${folder.split('/').pop() ?? ''}`;
-    this.note_.textContent = folder;
+    const name = folder.split('/').pop() ?? folder;
+    document.title = `Palpate – ${name}`;
+    this.note_.textContent = name;
+    this.note_.title = folder;
     this.items_.replaceChildren(...(Object.keys(kinds) as Kind[]).flatMap((kind) => this.group(kind, items.filter((item) => item.kind === kind))));
     if (items.length === 0) this.items_.append(this.nothing());
     await this.draw(items, theme.is_light);
