@@ -169,7 +169,7 @@ export class Gallery {
         this.pictures_.set(`${item.name} ${item.modified}`, url);
         if (place) this.put(place, url);
       } catch (error) {
-        place?.replaceChildren(element('small', (error as Error).message.split('\n')[0]!.replace(/^error: /, ''), { className: 'problem' }));
+        place?.replaceChildren(element('small', (error as Error).message.split('\n')[0]!.replace(/^error: (.*\/)?/, ''), { className: 'problem' }));
       }
     }
     drawer.dispose();
