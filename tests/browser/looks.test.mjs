@@ -190,6 +190,15 @@ test('a stiffer ball within is seen: by material, cut open, and through the surf
   assert.ok(cut > 1000 && through > 1000 && closed < 0.1 * Math.min(cut, through), `blue pixels: closed ${closed}, cut ${cut}, through ${through}`);
 });
 
+test('without a graphics card the ground of a very large window is even, as a gradient is copied into each picture', async (t) => {
+  const { served } = await serve_block(t);
+  const page = await ready(await visit(t, served.url, { viewport: { width: 1280, height: 800 } }));
+  const gradient = () => part(page, 'stage').evaluate((stage) => getComputedStyle(stage).backgroundImage);
+  assert.match(await gradient(), /radial-gradient/);
+  await page.setViewportSize({ width: 3840, height: 2160 });
+  await until(page, () => getComputedStyle(document.querySelector('[data-testid="stage"]')).backgroundImage === 'none');
+});
+
 test('no text is cut off or covered, and every target is large enough, at five sizes', async (t) => {
   const { at, served } = await serve_block(t);
   const html = path.join(at, 'out.html');

@@ -1,6 +1,5 @@
 // How finely pictures are drawn: as finely as the machine keeps up with while they change, and whole once they rest.
 
-const slow = 40; // [ms] a picture that is too slow
 const very_slow = 200; // two of them are enough
 const quick = 24;
 const patience_slow = 3; // pictures
@@ -23,6 +22,8 @@ export class Pace {
   is_blocky = false;
   /** Light is that of the body's nodes, not of each pixel: what goes last. */
   is_rough = false;
+  /** [ms] of a picture that is too slow. */
+  slow = 40;
   /** The window is so large that enlarging counts. */
   may_be_blocky = false;
   /** There is no graphics card: pictures begin coarse, and do not have to be slow first. */
@@ -43,9 +44,9 @@ export class Pace {
       --this.skipped_;
       return;
     }
-    this.slow_ = wait > slow ? this.slow_ + 1 : 0;
+    this.slow_ = wait > this.slow ? this.slow_ + 1 : 0;
     this.quick_ = wait < quick ? this.quick_ + 1 : Math.max(0, this.quick_ - 2);
-    if (this.slow_ >= (wait > very_slow ? 2 : patience_slow)) this.save(Math.max(0.35, Math.sqrt(slow / wait)), wait > very_slow);
+    if (this.slow_ >= (wait > very_slow ? 2 : patience_slow)) this.save(Math.max(0.35, Math.sqrt(this.slow / wait)), wait > very_slow);
     else if (this.quick_ >= patience_quick) this.spend(1.15);
   }
 

@@ -136,6 +136,7 @@ export class View {
     this.size_ = '';
     this.set_bounds(width, height);
     if (this.is_software_) this.pace_.begin_coarse();
+    this.element.classList.toggle('even', this.is_software_ && this.pace_.may_be_blocky); // a browser without a graphics card copies a gradient into each picture
     this.canvas.style.width = `${width}px`;
     this.canvas.style.height = `${height}px`;
     this.eye.resize();
@@ -191,6 +192,7 @@ export class View {
     const screen = this.screen_pixels();
     this.pace_.most = Math.min(Math.max(1, most_pixels / screen), Math.sqrt(most_drawn / (width * height)) / screen);
     this.pace_.may_be_blocky = width * height * window.devicePixelRatio ** 2 > many_pixels;
+    this.pace_.slow = matchMedia('(pointer: coarse)').matches ? 31 : 40; // a finger is on what it moves
     this.pace_.least = Math.min(0.4, Math.sqrt(least_drawn / (width * height)) / screen);
   }
 

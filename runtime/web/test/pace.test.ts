@@ -16,6 +16,14 @@ test('pictures that are slow become coarser, and fine again where there is time'
   assert.equal(pace.share, 1);
 });
 
+test('what is too slow for a finger is quick enough for a mouse', () => {
+  const [mouse, finger] = [new Pace(), new Pace()];
+  finger.slow = 31;
+  for (const pace of [mouse, finger]) times(40, () => pace.note(36));
+  assert.deepEqual([mouse.is_thrifty, mouse.share], [false, 1]);
+  assert.ok(finger.is_thrifty && finger.share < 1);
+});
+
 test('shade is saved first and pixels last, and all of it comes back', () => {
   const pace = new Pace();
   Object.assign(pace, { may_be_blocky: true, least: 0.1 });
