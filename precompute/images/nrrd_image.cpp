@@ -156,10 +156,11 @@ std::int64_t check_nrrd_header(const std::filesystem::path& file) {
   for (std::string word; sizes >> word;) {
     std::int64_t size = 0;
     const auto [end, status] = std::from_chars(word.data(), word.data() + word.size(), size);
-    if (status != std::errc() || end != word.data() + word.size() || size < 1)
+    if (status != std::errc() || end != word.data() + word.size() || size < 1) {
       throw Error(
           fmt::format("sizes of the image's header has \"{}\", not a whole number from 1", shortened(word)),
           where, complete_file);
+    }
     voxels *= static_cast<double>(size);
     product += fmt::format("{}{}", product.empty() ? "" : " x ", size);
   }
@@ -168,10 +169,11 @@ std::int64_t check_nrrd_header(const std::filesystem::path& file) {
   const std::string encoding = header->field("encoding");
   if (encoding == "raw" || encoding == "gzip" || encoding == "gz") {
     const std::int64_t present = count_voxels(file, *header, needed);
-    if (present < needed)
+    if (present < needed) {
       throw Error(fmt::format("the image's header asks for {} voxels, {} bytes, but only {} bytes follow it",
                               product, needed, present),
                   where, "get the whole file, or correct the header");
+    }
   }
   return std::max(file_bytes, needed);
 }

@@ -137,11 +137,12 @@ Response GalleryAnswers::answer(const RequestHeader& request, const ServedAddres
 
 Response GalleryAnswers::items() const {
   json items = json::array();
-  for (const GalleryItem& item : list_gallery(folder_))
+  for (const GalleryItem& item : list_gallery(folder_)) {
     items.push_back({{"name", item.name},
                      {"kind", name_of(item.kind)},
                      {"bytes", item.bytes},
                      {"modified", item.modified}});
+  }
   return json_answer({{"folder", folder_.string()}, {"version", PALPATE_VERSION}, {"items", items}});
 }
 

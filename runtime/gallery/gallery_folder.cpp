@@ -1,5 +1,7 @@
 #include "runtime/gallery/gallery_folder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -101,7 +103,7 @@ std::string free_name(const fs::path& folder, const std::string& wanted) {
   std::string name = wanted;
   const std::string stem(stem_of(wanted)), ending(ending_of(wanted));
   for (int k = 2; fs::exists(fs::symlink_status(folder / name)); ++k)
-    name = stem + "-" + std::to_string(k) + ending;
+    name = fmt::format("{}-{}{}", stem, k, ending);
   return name;
 }
 

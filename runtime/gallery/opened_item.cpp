@@ -15,8 +15,9 @@ constexpr std::size_t kept_lines = 12;
 constexpr std::string_view before_url = "open ";
 constexpr std::string_view after_url = " in a browser";
 
-std::vector<std::string> arguments_for(const std::string& name, const ViewerOptions& options) {
-  const std::string file = "./" + name;  // no option, whatever it begins with
+std::vector<std::string> arguments_for(const std::filesystem::path& folder, const std::string& name,
+                                       const ViewerOptions& options) {
+  const std::string file = (folder / name).string();  // whole: pages keep their looks by it
   std::vector<std::string> words;
   switch (*gallery_kind(name)) {
     case GalleryKind::body:
@@ -43,11 +44,11 @@ std::string url_in(std::string_view line) {
 
 }  // namespace
 
-OpenedItem::OpenedItem(std::filesystem::path folder, std::string name, const ViewerOptions& options) {
+OpenedItem::OpenedItem(const std::filesystem::path& folder, std::string name, const ViewerOptions& options) {
   OtherProgram::Start start{.program = std::filesystem::read_symlink("/proc/self/exe"),
-                            .arguments = arguments_for(name, options),
+                            .arguments = arguments_for(folder, name, options),
                             .read = OtherProgram::Stream::errors,
-                            .folder = std::move(folder),
+                            .folder = folder,
                             .has_terminal = false};
   state_.name = std::move(name);
   watcher_ = std::thread([this, start = std::move(start)] { watch(start); });

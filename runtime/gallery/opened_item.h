@@ -20,7 +20,7 @@ namespace palpate {
 class OpenedItem {
  public:
   /// `name` is one of `folder`, in which what is recorded and made lands; it is shown as `options` say.
-  OpenedItem(std::filesystem::path folder, std::string name, const ViewerOptions& options);
+  OpenedItem(const std::filesystem::path& folder, std::string name, const ViewerOptions& options);
   ~OpenedItem();  ///< ends it; what it records is whole then
   OpenedItem(const OpenedItem&) = delete;
   OpenedItem& operator=(const OpenedItem&) = delete;

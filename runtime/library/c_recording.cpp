@@ -104,10 +104,11 @@ int palpate_recording_picture(const palpate_recording* recording, int64_t number
                               char* error, size_t error_size) noexcept {
   return tell_failure("palpate_recording_picture", "close other programs", error, error_size, [&](int& code) {
     const int64_t pictures = std::ssize(frames_of(recording).tick);
-    if (number < 0 || number >= pictures)
+    if (number < 0 || number >= pictures) {
       throw Error("there is no picture " + std::to_string(number), "palpate_recording_picture",
                   "ask for 0 to " + std::to_string(pictures - 1) + ", of which there are " +
                       std::to_string(pictures));
+    }
     code = PALPATE_ERROR_FILE;
     const SurfaceFrame frame = recording->file.frame(number);
     if (xyz != nullptr) std::copy(frame.displacement.begin(), frame.displacement.end(), xyz);

@@ -4,10 +4,10 @@
 #include <zlib.h>
 
 #include "precompute/geometry/image_mesh.h"
-#include "precompute/images/inr_header.h"
 #include "precompute/geometry/mesh_bytes.h"
 #include "precompute/geometry/mesh_size.h"
 #include "precompute/geometry/picture_reader.h"
+#include "precompute/images/inr_header.h"
 #include "tests/support/geometry_shapes.h"
 
 namespace palpate::hostile_test {
