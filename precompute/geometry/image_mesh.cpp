@@ -17,12 +17,12 @@
 #include "meshes/element.h"
 #include "precompute/geometry/distance_field.h"
 #include "precompute/geometry/interface_crossings.h"
-#include "precompute/images/labelled_image.h"
 #include "precompute/geometry/mesh3.h"
 #include "precompute/geometry/mesh_bytes.h"
 #include "precompute/geometry/mesh_parts.h"
 #include "precompute/geometry/mesh_size.h"
 #include "precompute/geometry/tetgen_mesh.h"
+#include "precompute/images/labelled_image.h"
 
 namespace palpate {
 namespace {
