@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -20,11 +19,6 @@ namespace palpate {
 namespace {
 
 constexpr double views_a_second = 60.0;
-
-std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) {
-  const double ticks = static_cast<double>(rate) / frames_a_second;
-  return std::max<std::int64_t>(std::llround(std::min(ticks, 1e15)), 1);
-}
 
 Tool tool_of(const Settings& settings, const Body& body) {
   Tool tool = settings.tool;

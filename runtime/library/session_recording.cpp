@@ -1,7 +1,6 @@
 #include "runtime/library/session_recording.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "runtime/loop/tick_record.h"
@@ -29,8 +28,8 @@ SessionRecording::SessionRecording(const Body& body, const State& state, const O
       start_(monotonic_now()),
       recorder_(options.file, info_of(options, body), recorded_surface(body)) {
   if (!(options.pictures > 0.0)) return;
-  const std::int64_t between = std::llround(static_cast<double>(rate_) / options.pictures);
-  frames_.emplace(body, state, SurfaceFramesOptions{.ticks_per_frame = std::max<std::int64_t>(between, 1)},
+  frames_.emplace(body, state,
+                  SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(rate_, options.pictures)},
                   [this](SurfacePicture picture) { recorder_.push_frame(std::move(picture.frame)); });
 }
 

@@ -1,6 +1,8 @@
 #include "runtime/loop/recorder.h"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "base/error.h"
@@ -17,6 +19,11 @@ constexpr auto interval = std::chrono::milliseconds(500);    // between checkpoi
 constexpr std::size_t most_waiting = std::size_t{32} << 20;  // bytes, for a checkpoint that is not due yet
 
 }  // namespace
+
+std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) noexcept {
+  const double ticks = static_cast<double>(rate) / frames_a_second;
+  return std::max<std::int64_t>(std::llround(std::min(ticks, 1e15)), 1);
+}
 
 Recorder::Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface,
                    OnFailure on_failure)

@@ -15,6 +15,9 @@
 
 namespace palpate {
 
+/// Ticks from one frame to the next, 1 or more, where so many frames a second are wanted (above 0).
+[[nodiscard]] std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) noexcept;
+
 /// A thread that writes a session to an HDF5 recording, fed through bounded lock-free rings: of ticks by one
 /// other thread, of frames by one too. Every half second all of it is put into the recording, so that no more
 /// is lost however the program ends. Where that fails (a full disk) nothing is kept any more, the reason is
