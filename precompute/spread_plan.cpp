@@ -15,7 +15,7 @@ constexpr std::int64_t scalar = sizeof(double);
 // buffers for each doubling of the ranks, and what the rank with most has against the mean.
 constexpr double one_rank = 1.45, each_doubling = 0.3, uneven = 1.15;
 constexpr double solve_efficiency = 0.5;   // of sweeps together against those of a process alone
-constexpr double factor_efficiency = 0.6;  // of factorising together
+constexpr double together_efficiency = 0.6;  // of factorising together
 constexpr double paths = 1.5;              // loads are swept to the root and back through all of the factor
 constexpr std::int64_t touched_columns = 90;  // of a place that the precision is chosen by
 constexpr std::int64_t touched_copies = 3;    // loads, residuals and solutions, of these in long double
@@ -40,7 +40,7 @@ void spread_plan(const SpreadMemory& memory, std::int64_t entries, int ranks, in
   const double all = plan.flops;
   plan.flops = paths * 2.0 * static_cast<double>(plan.factor_entries) * static_cast<double>(plan.stored_dofs);
   plan.seconds *= plan.flops / std::max(all, 1.0) / solve_efficiency;  // of one process
-  plan.factor_seconds /= factor_efficiency * ranks * jobs;
+  plan.factor_seconds /= together_efficiency * ranks * jobs;
   plan.precision_seconds /= solve_efficiency * ranks;
 }
 

@@ -14,11 +14,10 @@
 #include "precompute/numerics/fixed_nodes.h"
 #include "precompute/numerics/loads.h"
 #include "precompute/numerics/overlay_regions.h"
+#include "precompute/verify_matrix.h"
 
 namespace palpate {
 namespace {
-
-constexpr double same_sum = 1e-12;  // two sums of the same integrals, relative
 
 bool by_tag(const Selection& where) {
   return std::holds_alternative<SelectTag>(where);

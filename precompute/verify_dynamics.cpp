@@ -14,7 +14,6 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
-constexpr double same_sum = 1e-12;  // two sums of the same element integrals, relative
 constexpr double residual_bound = 1e-6, mass_bound = 1e-6;
 constexpr std::int64_t completed_modes = 4;  // whose inside is solved for
 

@@ -13,6 +13,7 @@ namespace palpate {
 
 inline constexpr double solver_safety = 100.0;  ///< times `solver_error` may a column be wrong by
 inline constexpr double sum_rounding = 1e-13;   ///< of sums of products, relative to the largest
+inline constexpr double same_sum = 1e-12;       ///< two sums of the same element integrals, relative
 
 /// Rounding of one stored entry, relative to what is stored (R with split precision).
 double unit_roundoff(Precision precision) noexcept;

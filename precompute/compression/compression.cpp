@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "matrices/hierarchical_product.h"
+#include "precompute/compression/float_entries.h"
 #include "precompute/compression/recompression.h"
 #include "precompute/compression/selected_solver.h"
 
@@ -31,10 +32,6 @@ constexpr Index leaves_estimated = 64;        // whose flops are counted for an 
 constexpr std::int64_t loads_at_once = 32;    // solved together
 constexpr double front_share = 0.3;           // of the time of far pairs, a guess
 constexpr Index checks = 32;                  // more loads, that tell how far off the pairs are
-
-std::size_t at(std::int64_t i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Rows of a matrix as combinations of some of them.
 struct Interpolation {
@@ -74,10 +71,6 @@ Interpolation interpolate(const Rows& A, const Eigen::MatrixXd& W, double cut) {
     }
   }
   return result;
-}
-
-std::shared_ptr<float[]> floats(std::int64_t count) {
-  return std::shared_ptr<float[]>(new float[at(std::max<std::int64_t>(count, 1))]);
 }
 
 }  // namespace

@@ -7,16 +7,13 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "precompute/compression/float_entries.h"
 
 namespace palpate {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-std::size_t at(std::int64_t i) {
-  return static_cast<std::size_t>(i);
-}
 
 Matrix block(const std::shared_ptr<const float[]>& entries, std::int64_t first, Eigen::Index rows,
              Eigen::Index columns) {
@@ -28,10 +25,6 @@ Matrix own_block(const HierarchicalMatrix& matrix, Index leaf) {
   const Index c = matrix.tree.first_leaf() + leaf;
   const Eigen::Index n = Eigen::Index{matrix.dimension} * (matrix.tree.end(c) - matrix.tree.begin(c));
   return block(matrix.near, matrix.near_at[at(matrix.first_near_pair(leaf))], n, n);
-}
-
-std::shared_ptr<float[]> floats(std::int64_t count) {
-  return std::shared_ptr<float[]>(new float[at(std::max<std::int64_t>(count, 1))]);
 }
 
 class Recompression {

@@ -9,7 +9,7 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t most_patches = 4096;
-constexpr auto pause = std::chrono::microseconds(500);
+constexpr auto request_pause = std::chrono::microseconds(500);
 
 }  // namespace
 
@@ -112,7 +112,7 @@ const std::shared_ptr<const Patch>* PatchSource::find(const PatchKey& key) const
 void PatchSource::build_wishes() {
   while (!stop_) {
     ++round_;
-    if (!build_next(requests_.read())) std::this_thread::sleep_for(pause);
+    if (!build_next(requests_.read())) std::this_thread::sleep_for(request_pause);
   }
 }
 
@@ -211,7 +211,7 @@ void PatchSource::make_room() {
 }
 
 void PatchSource::deliver(Delivery delivery) {
-  while (!deliveries_.push(delivery) && !stop_) std::this_thread::sleep_for(pause);
+  while (!deliveries_.push(delivery) && !stop_) std::this_thread::sleep_for(request_pause);
 }
 
 }  // namespace palpate

@@ -12,7 +12,7 @@
 namespace palpate {
 namespace {
 
-constexpr auto pause = std::chrono::milliseconds(1);
+constexpr auto frame_pause = std::chrono::milliseconds(1);
 
 /// A body in the plane, all of whose nodes that can move are stored.
 bool knows_interior(const Body& body) {
@@ -132,7 +132,7 @@ void SurfaceFrames::work() {
     } else if (last) {
       return;
     } else {
-      std::this_thread::sleep_for(pause);
+      std::this_thread::sleep_for(frame_pause);
     }
   }
 }
