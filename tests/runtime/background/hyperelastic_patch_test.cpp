@@ -1,0 +1,280 @@
+// Neo-Hookean patches in a linear body: against the body with its fine mesh as one sparse system, and under
+// the tick.
+#include "runtime/background/hyperelastic_patch.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "runtime/body/near_field.h"
+#include "tests/support/mixed_body.h"
+#include "tests/support/runtime_model.h"
+
+namespace palpate::hyperelastic_patch_test {
+namespace {
+
+using Eigen::VectorXd;
+using test::MixedBody;
+
+struct Case {
+  ElementType element;
+  int cells;
+  int refinement;
+  int rings;
+  double rest = 0.0;  // size of the displacement by the file's loads [m]
+};
+
+std::string name_of(const testing::TestParamInfo<Case>& tested) {
+  const Case& c = tested.param;
+  return std::string(traits(c.element).name) + "Cells" + std::to_string(c.cells) + "Refinement" +
+         std::to_string(c.refinement) + "Rings" + std::to_string(c.rings) + (c.rest > 0.0 ? "Loaded" : "");
+}
+
+Model model_of(const Case& c) {
+  Model model = test::unit_model(c.element, c.cells, Scope::full, Precision::double_precision);
+  test::set_rest(model, c.rest);
+  return model;
+}
+
+class HyperelasticPatches : public testing::TestWithParam<Case> {
+ protected:
+  Body body_{model_of(GetParam()), {}, GetParam().refinement};
+  int d_ = body_.dimension();
+  Index centre_ = body_.mesh_node(body_.nearest_surface_node(test::top_middle(d_)).node);
+  Vec3 top_ = body_.model().mesh.nodes[static_cast<std::size_t>(centre_)];
+
+  [[nodiscard]] PatchMesh mesh() const {
+    const ElementsAtNodes at(body_.model().mesh);
+    return make_patch_mesh(body_.model(), at,
+                           rings_round(body_.model().mesh, at, {&centre_, 1}, GetParam().rings),
+                           GetParam().refinement);
+  }
+
+  /// The surface node nearest to a point of the mesh.
+  [[nodiscard]] Index node_at(const Vec3& point) const {
+    const std::vector<Vec3> nodes = body_.surface_in_mesh();
+    const auto found = std::min_element(nodes.begin(), nodes.end(), [&](const Vec3& a, const Vec3& b) {
+      return (a - point).squaredNorm() < (b - point).squaredNorm();
+    });
+    return static_cast<Index>(found - nodes.begin());
+  }
+
+  /// Under the tool: nodes around the middle of the top, pressed down and to the side; and one beside it.
+  struct Push {
+    std::vector<Index> nodes;
+    std::vector<Vec3> forces;
+  };
+  [[nodiscard]] Push push(double size) const {
+    const double fine = 1.0 / (GetParam().cells * GetParam().refinement);
+    Push push;
+    const auto add = [&](double along, double share) {
+      push.nodes.push_back(node_at(top_ + Vec3(along * fine, 0.0, 0.0)));
+      push.forces.push_back(size * share * test::upright(d_, 0.3, 0.1, -1.0));
+    };
+    add(0.0, 1.0);
+    add(-1.0, 0.7);
+    add(1.0, 0.6);
+    push.nodes.push_back(node_at(test::upright(d_, 0.0, 0.0, 1.0)));  // a corner
+    push.forces.push_back(0.1 * size * test::upright(d_, -0.2, 0.0, -1.0));
+    return push;
+  }
+  /// Large enough for strains of tens of per cent.
+  [[nodiscard]] double large() const { return d_ == 2 ? 0.06 : 0.012; }
+
+  /// Displacement of a surface node by a displacement of the body's and the fine mesh's nodes.
+  [[nodiscard]] Vec3 at_surface(const PatchMesh& mesh, const VectorXd& body, const VectorXd& local,
+                                Index node) const {
+    const Vec3 place = body_.surface_in_mesh()[static_cast<std::size_t>(node)];
+    Vec3 u = Vec3::Zero();
+    for (std::size_t k = 0; k < mesh.local.nodes.size(); ++k) {
+      if ((mesh.local.nodes[k] - place).norm() > 1e-9) continue;
+      u.head(d_) = local.segment(d_ * static_cast<Eigen::Index>(k), d_);
+      return u;
+    }
+    const SurfaceParts parts = body_.surface_parts(node);
+    for (std::size_t p = 0; p < parts.stored.size(); ++p) {
+      const Eigen::Index mesh_node = body_.mesh_node(parts.stored[p]);
+      u.head(d_) += parts.weights[p] * body.segment(d_ * mesh_node, d_);
+    }
+    return u;
+  }
+
+  /// Where forces take all surface nodes, by the sparse system. [S]
+  [[nodiscard]] std::vector<Vec3> reference(const PatchMesh& mesh, const Push& push,
+                                            LiveLaw law = LiveLaw::neo_hookean) const {
+    MixedBody mixed(body_.model(), mesh, LiveLaw::linear, law);
+    VectorXd force = VectorXd::Zero(mixed.dofs());
+    for (std::size_t k = 0; k < push.nodes.size(); ++k) {
+      const Vec3 place = body_.surface_in_mesh()[static_cast<std::size_t>(push.nodes[k])];
+      const auto on = [&](const std::vector<Vec3>& nodes, const MixedBody::Sparse& Z) {
+        for (std::size_t node = 0; node < nodes.size(); ++node) {
+          if ((nodes[node] - place).norm() > 1e-9) continue;
+          VectorXd f = VectorXd::Zero(Z.rows());
+          f.segment(d_ * static_cast<Eigen::Index>(node), d_) = push.forces[k].head(d_);
+          force += Z.transpose() * f;
+          return true;
+        }
+        return false;
+      };
+      EXPECT_TRUE(on(mesh.local.nodes, mixed.of_patch()) || on(body_.model().mesh.nodes, mixed.of_body()));
+    }
+    VectorXd q = VectorXd::Zero(mixed.dofs()), multipliers;
+    const MixedBody::Sparse none(0, mixed.dofs());
+    EXPECT_TRUE(mixed.find(force, none, VectorXd(0), q, multipliers));
+    const VectorXd body = mixed.of_body() * q, local = mixed.of_patch() * q;
+    std::vector<Vec3> u;
+    for (Index node = 0; node < std::ssize(body_.surface_rest_positions()); ++node)
+      u.push_back(at_surface(mesh, body, local, node));
+    return u;
+  }
+
+  /// Where forces take all surface nodes, as the tick has it with a patch. [S]
+  [[nodiscard]] std::vector<Vec3> felt(const std::shared_ptr<const Patch>& patch, const Push& push) const {
+    const auto g = static_cast<Index>(patch->stored_nodes().size());
+    NearField near(body_, static_cast<Index>(push.nodes.size()) + 8, g);
+    near.begin_tick();
+    EXPECT_TRUE(near.change_patch(body_, patch));
+    for (const Index node : push.nodes) EXPECT_TRUE(near.want(body_, node));
+    for (std::size_t k = 0; k < push.nodes.size(); ++k)
+      near.load(near.place_of(push.nodes[k]), push.forces[k]);
+    near.displace();
+    std::vector<double> stored(static_cast<std::size_t>(body_.greens().order()));
+    std::vector<Vec3> u(body_.surface_rest_positions().size());
+    surface_displacement(body_, near.load(), stored, u);
+    for (Index place = 0; place < near.count(); ++place) {
+      const Vec3& by_load = u[static_cast<std::size_t>(near.node(place))];
+      EXPECT_LT((near.displacement(place) - by_load).norm(), 1e-10 * (1e-3 + by_load.norm()));
+    }
+    return u;
+  }
+
+  static double largest(const std::vector<Vec3>& u) {
+    double most = 0.0;
+    for (const Vec3& at : u) most = std::max(most, at.norm());
+    return most;
+  }
+  /// Of the largest of b.
+  static double apart(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+    double most = 0.0;
+    for (std::size_t k = 0; k < a.size(); ++k) most = std::max(most, (a[k] - b[k]).norm());
+    return most / largest(b);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Elements, HyperelasticPatches,
+                         testing::Values(Case{ElementType::tri3, 4, 3, 1}, Case{ElementType::quad4, 4, 2, 1},
+                                         Case{ElementType::tet4, 4, 2, 1},
+                                         Case{ElementType::tet4, 3, 2, 1, 0.03},
+                                         Case{ElementType::hex8, 3, 2, 1},
+                                         Case{ElementType::tet4, 2, 2, 4}),  // the whole body
+                         name_of);
+
+TEST_P(HyperelasticPatches, BalanceWhereTheMixedBodyDoes) {
+  HyperelasticPatch patch(body_, mesh());
+  const Push push = this->push(large());
+  const PatchBalance report = patch.find(push.nodes, push.forces, {.tolerance = 1e-11, .most_steps = 60});
+  EXPECT_TRUE(report.converged) << report.residual;
+  EXPECT_EQ(report.inverted, 0);
+  const std::vector<Vec3> truth = reference(patch.mesh(), push);
+  EXPECT_LT(apart(felt(patch.linearise(), push), truth), 1e-8);
+  // It is another place than where the linear body is, or this would tell nothing.
+  EXPECT_GT(apart(reference(patch.mesh(), push, LiveLaw::linear), truth), 0.02);
+}
+
+TEST_P(HyperelasticPatches, AreTheLinearOverlayForSmallForces) {
+  HyperelasticPatch patch(body_, mesh());
+  Push push = this->push(1e-6 * large());
+  ASSERT_TRUE(patch.find(push.nodes, push.forces, {.tolerance = 1e-9, .most_steps = 20}).converged);
+  const auto linear =
+      std::make_shared<const Patch>(body_, patch.mesh(), condense(body_.model(), patch.mesh()));
+  // Under loads the patch is deformed at rest, and another body.
+  const double most = GetParam().rest > 0.0 ? 0.2 : 1e-4;
+  EXPECT_LT(apart(felt(patch.linearise(), push), felt(linear, push)), most);
+}
+
+// Differences of the balance under other forces, in the patch and beside it.
+TEST_P(HyperelasticPatches, HaveTheTangentOfTheirBalance) {
+  HyperelasticPatch patch(body_, mesh());
+  const Push push = this->push(large());
+  const PatchEffort exact{.tolerance = 1e-12, .most_steps = 60};
+  patch.find(push.nodes, push.forces, exact);
+  const std::shared_ptr<const Patch> tangent = patch.linearise();
+  const std::vector<Vec3> here = felt(tangent, push);
+  for (const std::size_t changed : {std::size_t{0}, push.nodes.size() - 1}) {
+    for (int axis = 0; axis < d_; ++axis) {
+      const double by = 1e-4 * large();
+      std::vector<std::vector<Vec3>> moved;
+      Push other = push;
+      for (const double side : {-1.0, 1.0}) {
+        other = push;
+        other.forces[changed][axis] += side * by;
+        patch.find(other.nodes, other.forces, exact);
+        moved.push_back(felt(patch.linearise(), other));
+      }
+      const std::vector<Vec3> by_tangent = felt(tangent, other);
+      std::vector<Vec3> expected, found;
+      for (std::size_t node = 0; node < here.size(); ++node) {
+        expected.emplace_back(0.5 * (moved[1][node] - moved[0][node]));
+        found.emplace_back(by_tangent[node] - here[node]);
+      }
+      EXPECT_LT(apart(found, expected), 1e-3) << "force " << changed << " along " << axis;
+    }
+  }
+}
+
+// What does not balance yet is not lost: the tick goes on with Newton's method.
+TEST_P(HyperelasticPatches, GoOnWithNewtonsMethodUnderTheTick) {
+  HyperelasticPatch patch(body_, mesh()), at_once(body_, mesh());
+  const Push push = this->push(0.3 * large());
+  patch.find(push.nodes, push.forces, {.tolerance = 1e-12, .most_steps = 1});
+  at_once.find(push.nodes, push.forces, {.tolerance = 1e-12, .most_steps = 2});
+  const VectorXd u = at_once.local_displacement();
+  const std::vector<Vec3> next = felt(patch.linearise(), push);
+  for (std::size_t k = 0; k < push.nodes.size() - 1; ++k) {
+    const Vec3 there = at_surface(patch.mesh(), {}, u, push.nodes[k]);
+    EXPECT_LT((next[static_cast<std::size_t>(push.nodes[k])] - there).norm(), 1e-8 * there.norm());
+  }
+}
+
+// Forces that turn elements inside out: no step is left without an end, and nothing is not a number.
+TEST_P(HyperelasticPatches, SurviveForcesThatTurnElementsInsideOut) {
+  HyperelasticPatch patch(body_, mesh());
+  const Push push = this->push(100.0 * large());
+  int cuts = 0;
+  Index inverted = 0;
+  for (int job = 0; job < 20; ++job) {
+    const PatchBalance report = patch.find(push.nodes, push.forces, {});
+    cuts += report.cuts;
+    inverted = std::max(inverted, report.inverted);
+    ASSERT_TRUE(std::isfinite(report.residual));
+    const std::shared_ptr<const Patch> tangent = patch.linearise();
+    ASSERT_NE(tangent, nullptr);
+    ASSERT_TRUE(tangent->offset().allFinite());
+    for (Index dof = 0; dof < tangent->offset().size(); ++dof)
+      ASSERT_TRUE(std::isfinite(tangent->compliance(dof)[dof]));
+  }
+  EXPECT_GT(cuts, 0);
+  EXPECT_GT(inverted, 0);
+  // And back.
+  const Push light = this->push(1e-3 * large());
+  PatchBalance report;
+  for (int job = 0; job < 40 && !report.converged; ++job) report = patch.find(light.nodes, light.forces, {});
+  EXPECT_TRUE(report.converged) << report.residual;
+  EXPECT_EQ(report.inverted, 0);
+}
+
+TEST(HyperelasticPatch, RefusesInitialStrain) {
+  Model model = test::unit_model(ElementType::tri3, 2, Scope::full, Precision::double_precision);
+  model.materials[0].initial_strain[0] = 0.01;
+  const Body body(std::move(model), {}, 2);
+  const ElementsAtNodes at(body.model().mesh);
+  EXPECT_THROW(HyperelasticPatch(body, make_patch_mesh(body.model(), at, {0}, 2)), Error);
+}
+
+}  // namespace
+}  // namespace palpate::hyperelastic_patch_test
