@@ -5,13 +5,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/error.h"
+#include "runtime/background/patch_source.h"
 #include "runtime/body/near_field.h"
+#include "runtime/tick/step.h"
 #include "tests/support/mixed_body.h"
 #include "tests/support/runtime_model.h"
 
@@ -20,6 +24,8 @@ namespace {
 
 using Eigen::VectorXd;
 using test::MixedBody;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 struct Case {
   ElementType element;
@@ -266,6 +272,151 @@ TEST_P(HyperelasticPatches, SurviveForcesThatTurnElementsInsideOut) {
   for (int job = 0; job < 40 && !report.converged; ++job) report = patch.find(light.nodes, light.forces, {});
   EXPECT_TRUE(report.converged) << report.residual;
   EXPECT_EQ(report.inverted, 0);
+}
+
+/// The same body with a sphere on its top.
+class UnderTheTick : public HyperelasticPatches {
+ protected:
+  double radius_ = 0.3;
+  Index room_ = patch_room(body_, GetParam().rings, 1);
+  Vec3 surface_ = [this] {
+    const auto node = static_cast<std::size_t>(body_.nearest_surface_node(top_).node);
+    return body_.rest_position(static_cast<Index>(node));
+  }();
+
+  [[nodiscard]] State state() const {
+    return State(body_, {.tools = {Tool{.radius = radius_, .hand_over = infinity}}, .patch_nodes = room_});
+  }
+  [[nodiscard]] PatchSourceOptions options(PatchLaw law, bool in_background = false) const {
+    return {.rings = GetParam().rings, .law = law, .in_background = in_background};
+  }
+  [[nodiscard]] ToolPose pose(double depth) const {
+    return {.position = surface_ + test::upright(d_, 0.013, 0.007, radius_ - depth)};
+  }
+  /// Down to `depth`, and then it rests.
+  void press(State& state, PatchSource& source, double depth, int resting = 150) const {
+    for (int tick = 0; tick < 100 + resting; ++tick) {
+      source.serve(state);
+      step(body_, state, pose(depth * std::min(1.0, tick / 50.0 - 1.0)));
+    }
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Elements, UnderTheTick,
+                         testing::Values(Case{ElementType::tri3, 4, 3, 1}, Case{ElementType::quad4, 4, 2, 2},
+                                         Case{ElementType::tet4, 4, 2, 1},
+                                         Case{ElementType::tet4, 3, 2, 1, 0.03}),
+                         name_of);
+
+TEST_P(UnderTheTick, IsFeltAtRestAsTheMixedBodyIs) {
+  State state = this->state();
+  PatchSource source(body_, state, options(PatchLaw::neo_hookean));
+  press(state, source, 0.12);
+  ASSERT_GT(state.tools.front().contacts, 0);
+  EXPECT_EQ(state.status, StepStatus::ok);
+  EXPECT_EQ(source.tangents()->telling().failed, 0);
+
+  // The mixed body under the forces of the contacts is where the tick has it,
+  PatchMaker maker(body_, GetParam().rings);
+  const Index centre = source.centre();
+  const PatchMesh mesh = maker.mesh({&centre, 1});
+  Push push;
+  Vec3 sum = Vec3::Zero();
+  const NearField& near = state.surface.near;
+  for (Index place = 0; place < near.count(); ++place) {
+    push.nodes.push_back(near.node(place));
+    push.forces.push_back(near.force(place));
+    sum -= near.force(place);
+  }
+  const std::vector<Vec3> truth = reference(mesh, push);
+  for (Index place = 0; place < near.count(); ++place) {
+    const Vec3& u = truth[static_cast<std::size_t>(near.node(place))];
+    EXPECT_LT((near.displacement(place) - u).norm(), 1e-6 * largest(truth));
+    const Vec3 at = body_.surface_rest_positions()[static_cast<std::size_t>(near.node(place))] + u;
+    EXPECT_LT((state.surface.tree.position(near.node(place)) - at).norm(), 1e-6 * largest(truth));
+  }
+  // so that these are the forces of its contact: nothing is in the tool, and what carries force is on it.
+  for (const ContactPoint& contact : state.contacts()) {
+    EXPECT_GT(contact.gap, -1e-6);
+    if (contact.force.norm() > 0.0) EXPECT_LT(std::abs(contact.gap), 1e-6);
+  }
+  const Vec3 felt = state.tools.front().contact_wrench.force;
+  EXPECT_LT((felt - sum).norm(), 1e-9 * felt.norm());
+
+  // It is not that of a linear overlay.
+  State other = this->state();
+  PatchSource linear(body_, other, options(PatchLaw::linear));
+  press(other, linear, 0.12);
+  EXPECT_GT((other.tools.front().contact_wrench.force - felt).norm(), 0.01 * felt.norm());
+  EXPECT_EQ(linear.tangents(), nullptr);
+}
+
+// All of the surface, not only near the tool, is where the mixed body has it once it was renewed.
+TEST_P(UnderTheTick, MovesTheFarSurfaceToo) {
+  State state = this->state();
+  PatchSource source(body_, state, options(PatchLaw::neo_hookean));
+  press(state, source, 0.12, 300);
+  PatchMaker maker(body_, GetParam().rings);
+  const Index centre = source.centre();
+  Push push;
+  for (Index place = 0; place < state.surface.near.count(); ++place) {
+    push.nodes.push_back(state.surface.near.node(place));
+    push.forces.push_back(state.surface.near.force(place));
+  }
+  const std::vector<Vec3> truth = reference(maker.mesh({&centre, 1}), push);
+  for (std::size_t node = 0; node < truth.size(); ++node) {
+    const Vec3 u =
+        state.surface.tree.position(static_cast<Index>(node)) - body_.surface_rest_positions()[node];
+    EXPECT_LT((u - truth[node]).norm(), 1e-6 * largest(truth)) << node;
+  }
+}
+
+TEST_P(UnderTheTick, FeelsTheSameByTheBuilderAndGoesBackToRest) {
+  State at_once = this->state();
+  PatchSource own(body_, at_once, options(PatchLaw::neo_hookean));
+  press(at_once, own, 0.1);
+  const Vec3 force = at_once.tools.front().contact_wrench.force;
+
+  State state = this->state();
+  PatchSource source(body_, state, options(PatchLaw::neo_hookean, true));
+  press(state, source, 0.1, 0);
+  const auto wait = [&](double depth, const auto& is_there) {
+    for (int tick = 0; tick < 20000 && !is_there(); ++tick) {
+      source.serve(state);
+      step(body_, state, pose(depth));
+      std::this_thread::sleep_for(std::chrono::microseconds(500));
+    }
+    return is_there();
+  };
+  EXPECT_TRUE(wait(0.1, [&] {
+    return (state.tools.front().contact_wrench.force - force).norm() < 1e-6 * force.norm();
+  })) << (state.tools.front().contact_wrench.force - force).norm() / force.norm();
+  EXPECT_TRUE(state.surface.patch->has_offset());
+  EXPECT_TRUE(wait(-0.1, [&] { return !state.surface.patch->has_offset(); }));
+  EXPECT_TRUE(wait(-0.1, [&] {
+    const std::span<const Vec3> rest = body_.surface_rest_positions();
+    double most = 0.0;
+    for (std::size_t node = 0; node < rest.size(); ++node)
+      most = std::max(most, (state.surface.tree.position(static_cast<Index>(node)) - rest[node]).norm());
+    return most < 1e-12;
+  }));
+}
+
+// A push that turns elements inside out is felt all the same, and told.
+TEST_P(UnderTheTick, TellsElementsInsideOut) {
+  State state = this->state();
+  PatchSource source(body_, state, options(PatchLaw::neo_hookean));
+  press(state, source, 0.8, 50);
+  const Vec3 force = state.tools.front().wrench.force;
+  EXPECT_TRUE(force.allFinite());
+  EXPECT_GT(force.norm(), 0.0);
+  const PatchTangentTelling telling = source.tangents()->telling();
+  EXPECT_GT(telling.made, 0);
+  EXPECT_GT(telling.with_inverted + telling.cuts, 0);
+  for (const Vec3& rest : body_.surface_rest_positions()) {
+    const auto node = static_cast<Index>(&rest - body_.surface_rest_positions().data());
+    EXPECT_TRUE(state.surface.tree.position(node).allFinite());
+  }
 }
 
 TEST(HyperelasticPatch, RefusesInitialStrain) {
