@@ -10,7 +10,7 @@
 namespace palpate {
 
 /// Condenses a patch as `condense` does, by any symmetric stiffness K of its local dofs, and forces f on the
-/// free ones beside it (theory.md section 4.5).
+/// free ones beside it (docs/overlays.md).
 class TangentCondensation {
  public:
   /// `patch` must live as long.

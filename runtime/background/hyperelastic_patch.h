@@ -28,7 +28,7 @@ struct PatchBalance {
 };
 
 /// Finds where forces on the surface take a body whose patch is neo-Hookean: the energy of the patch's fine
-/// mesh, and of the linear body around it by its Green's functions, is least (theory.md section 4.5). The
+/// mesh, and of the linear body around it by its Green's functions, is least (docs/overlays.md). The
 /// body's rest under its loads is kept: there the patch is deformed by u0, and in balance. For one thread at
 /// a time.
 class HyperelasticPatch {

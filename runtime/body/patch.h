@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// Where a patch is under no forces by the tangent of a law that is not linear (theory.md section 4.5): what
+/// Where a patch is under no forces by the tangent of a law that is not linear (docs/overlays.md): what
 /// comes on top of the linear answer.
 struct PatchOffset {
   Eigen::VectorXd forces;  ///< [d g] that act on Q all the time [N]
