@@ -117,17 +117,20 @@ class HyperelasticPatches : public testing::TestWithParam<Case> {
     VectorXd force = VectorXd::Zero(mixed.dofs());
     for (std::size_t k = 0; k < push.nodes.size(); ++k) {
       const Vec3 place = body_.surface_in_mesh()[static_cast<std::size_t>(push.nodes[k])];
-      const auto on = [&](const std::vector<Vec3>& nodes, const MixedBody::Sparse& Z) {
-        for (std::size_t node = 0; node < nodes.size(); ++node) {
-          if ((nodes[node] - place).norm() > 1e-9) continue;
-          VectorXd f = VectorXd::Zero(Z.rows());
-          f.segment(d_ * static_cast<Eigen::Index>(node), d_) = push.forces[k].head(d_);
-          force += Z.transpose() * f;
-          return true;
-        }
-        return false;
+      const auto put = [&](const MixedBody::Sparse& Z, std::ptrdiff_t node, const Vec3& on_node) {
+        VectorXd f = VectorXd::Zero(Z.rows());
+        f.segment(d_ * node, d_) = on_node.head(d_);
+        force += Z.transpose() * f;
       };
-      EXPECT_TRUE(on(mesh.local.nodes, mixed.of_patch()) || on(body_.model().mesh.nodes, mixed.of_body()));
+      const auto in_patch = std::find_if(mesh.local.nodes.begin(), mesh.local.nodes.end(),
+                                         [&](const Vec3& node) { return (node - place).norm() < 1e-9; });
+      if (in_patch != mesh.local.nodes.end()) {
+        put(mixed.of_patch(), in_patch - mesh.local.nodes.begin(), push.forces[k]);
+        continue;
+      }
+      const SurfaceParts parts = body_.surface_parts(push.nodes[k]);
+      for (std::size_t part = 0; part < parts.stored.size(); ++part)
+        put(mixed.of_body(), body_.mesh_node(parts.stored[part]), parts.weights[part] * push.forces[k]);
     }
     VectorXd q = VectorXd::Zero(mixed.dofs()), multipliers;
     const MixedBody::Sparse none(0, mixed.dofs());
@@ -406,13 +409,13 @@ TEST_P(UnderTheTick, FeelsTheSameByTheBuilderAndGoesBackToRest) {
 TEST_P(UnderTheTick, TellsElementsInsideOut) {
   State state = this->state();
   PatchSource source(body_, state, options(PatchLaw::neo_hookean));
-  press(state, source, 0.8, 50);
+  press(state, source, 0.45, 50);
   const Vec3 force = state.tools.front().wrench.force;
   EXPECT_TRUE(force.allFinite());
   EXPECT_GT(force.norm(), 0.0);
   const PatchTangentTelling telling = source.tangents()->telling();
   EXPECT_GT(telling.made, 0);
-  EXPECT_GT(telling.with_inverted + telling.cuts, 0);
+  EXPECT_GT(telling.with_inverted + telling.cuts, 0) << telling.last_residual;
   for (const Vec3& rest : body_.surface_rest_positions()) {
     const auto node = static_cast<Index>(&rest - body_.surface_rest_positions().data());
     EXPECT_TRUE(state.surface.tree.position(node).allFinite());
