@@ -33,9 +33,8 @@ constexpr double most_patch_residual = 1e-3;  // that needs no word
 
 void print_tangents(const PatchTangentTelling& telling) {
   fmt::print(stderr,
-             "overlay, neo-hookean: {} patches linearised (longest {:.1f} ms), {} steps of Newton's method, "
-             "{} of them cut in half\n",
-             telling.made, 1e3 * telling.longest, telling.steps, telling.cuts);
+             "overlay, neo-hookean: {} patches linearised (longest {:.1f} ms), steps cut in half {} times\n",
+             telling.made, 1e3 * telling.longest, telling.cuts);
   if (telling.with_inverted > 0) {
     print_warning(
         fmt::format("in {} patches the tool turned elements inside out, {} points at most: the "
@@ -221,9 +220,7 @@ Json json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
   if (overlays.tangents() == nullptr) return json;
   const PatchTangentTelling telling = overlays.tangents()->telling();
   json["neo_hookean"] = {{"made", telling.made},
-                         {"unbalanced", telling.unbalanced},
                          {"failed", telling.failed},
-                         {"newton_steps", telling.steps},
                          {"steps_cut", telling.cuts},
                          {"with_inverted_elements", telling.with_inverted},
                          {"most_inverted", telling.most_inverted},

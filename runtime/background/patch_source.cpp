@@ -64,6 +64,7 @@ void PatchSource::post_load(const State& state, const PatchKey& wanted) noexcept
   load.clear();
   load.key = wanted.empty() ? used_ : wanted;
   const NearField& near = state.surface.near;
+  load.by = near.patch().get();
   for (Index place = 0; place < near.count(); ++place) {
     const Vec3 force = near.force(place);
     if (!force.isZero(0.0)) load.add(near.node(place), force);

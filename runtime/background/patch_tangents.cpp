@@ -8,7 +8,9 @@
 namespace palpate {
 namespace {
 
-constexpr PatchEffort effort{.tolerance = 1e-8, .most_steps = 3};
+// One step: that is where the tick's contact, by the last tangent, has the surface. Further steps under
+// forces that stay as they are lead away from a contact that is steady and would not be under such forces.
+constexpr PatchEffort effort{.tolerance = 1e-8, .most_steps = 1};
 constexpr double no_change = 1e-6;  // of forces: what the tangent then leaves out is its square
 
 }  // namespace
@@ -27,6 +29,7 @@ bool PatchTangents::follow(const PatchLoad& load) noexcept {
       take(nullptr);
       return true;
     }
+    if (load.by != patch_.get() && patch_ != nullptr && load.key == key_) return false;
     if (is_settled(load)) return false;
     make(load);
   } catch (const std::exception&) {  // there is no memory, or the elements are too flat: the tick goes on
@@ -66,8 +69,6 @@ void PatchTangents::make(const PatchLoad& load) {
     const std::lock_guard lock(mutex_);
     telling_.made += patch != nullptr ? 1 : 0;
     telling_.failed += patch == nullptr ? 1 : 0;
-    telling_.unbalanced += report.converged ? 0 : 1;
-    telling_.steps += report.steps;
     telling_.cuts += report.cuts;
     telling_.with_inverted += report.inverted > 0 ? 1 : 0;
     telling_.most_inverted = std::max(telling_.most_inverted, report.inverted);

@@ -23,6 +23,7 @@ struct PatchLoad {
   [[nodiscard]] std::span<const Vec3> applied() const noexcept { return {forces.data(), count}; }
 
   PatchKey key;
+  const Patch* by = nullptr;  ///< the patch that the tick had
   std::size_t count = 0;
   std::vector<Index> nodes;
   std::vector<Vec3> forces;
@@ -31,9 +32,7 @@ struct PatchLoad {
 /// What is told of the search for balance.
 struct PatchTangentTelling {
   std::int64_t made = 0;           ///< patches that were linearised
-  std::int64_t unbalanced = 0;     ///< of them before the balance was found: a later one goes on
   std::int64_t failed = 0;         ///< that could not be made
-  std::int64_t steps = 0;          ///< of Newton's method
   std::int64_t cuts = 0;           ///< times that one was cut in half
   std::int64_t with_inverted = 0;  ///< patches with quadrature points that are inside out
   Index most_inverted = 0;
@@ -50,7 +49,8 @@ class PatchTangents {
   /// `body` and `maker` must live as long.
   PatchTangents(const Body& body, PatchMaker& maker) : body_(body), maker_(maker) {}
 
-  /// Goes on under a load, to another patch or, without forces, to none. False where nothing is to be done.
+  /// Goes on under a load, to another patch or, without forces, to none. False where nothing is to be done,
+  /// or the load is of a tick that did not have the last patch yet.
   bool follow(const PatchLoad& load) noexcept;
 
   /// Of the last patch.
