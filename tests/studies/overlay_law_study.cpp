@@ -29,7 +29,7 @@ constexpr int refinement = 2;
 struct Options {
   std::vector<double> widths = {8, 16};
   std::vector<double> rings = {1, 2, 3, 4};
-  std::vector<double> levels = {0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25, 0.275, 0.3};
+  std::vector<double> levels = {0.05, 0.1, 0.15, 0.2, 0.25, 0.3};
   int cells = 10;
 };
 
