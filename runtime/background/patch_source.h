@@ -71,7 +71,7 @@ class PatchSource {
   [[nodiscard]] double longest_build() const noexcept { return longest_build_; }  ///< [s]
   [[nodiscard]] std::int64_t failed() const noexcept { return failed_; }  ///< patches that could not be made
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }     ///< that the cache takes
-  /// Of a law that is not linear; null for linear ones.
+  /// What makes patches of a law that is not linear; null for linear ones.
   [[nodiscard]] const PatchTangents* tangents() const noexcept { return tangents_ ? &*tangents_ : nullptr; }
 
  private:

@@ -53,7 +53,7 @@ class PatchTangents {
   /// or the load is of a tick that did not have the last patch yet.
   bool follow(const PatchLoad& load) noexcept;
 
-  /// Of the last patch.
+  /// Where the last patch is.
   [[nodiscard]] const PatchKey& key() const noexcept { return key_; }
   [[nodiscard]] const std::shared_ptr<const Patch>& patch() const noexcept { return patch_; }  ///< null: none
   [[nodiscard]] PatchTangentTelling telling() const;                                           ///< any thread
