@@ -29,6 +29,32 @@ double microseconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) * 1e-3;
 }
 
+constexpr double most_patch_residual = 1e-3;  // that needs no word
+
+void print_tangents(const PatchTangentTelling& telling) {
+  fmt::print(stderr,
+             "overlay, neo-hookean: {} patches linearised (longest {:.1f} ms), steps cut in half {} times\n",
+             telling.made, 1e3 * telling.longest, telling.cuts);
+  if (telling.with_inverted > 0) {
+    print_warning(
+        fmt::format("in {} patches the tool turned elements inside out, {} points at most: the "
+                    "elements are too large for a push so deep, or the overlay reaches too few "
+                    "rings (take another --overlay)",
+                    telling.with_inverted, telling.most_inverted));
+  }
+  if (telling.failed > 0)
+    print_warning(
+        fmt::format("{} neo-Hookean patches could not be made: the one before, or a linear one, "
+                    "was used",
+                    telling.failed));
+  if (telling.last_residual > most_patch_residual) {
+    print_warning(
+        fmt::format("at the end the neo-Hookean patch was not in balance: {:.2g} of the forces were "
+                    "left",
+                    telling.last_residual));
+  }
+}
+
 void print_overlays(const PatchSource& overlays) {
   const PatchCounts& counts = overlays.counts();
   const auto in_contact = static_cast<double>(std::max<std::int64_t>(counts.in_contact, 1));
@@ -43,6 +69,7 @@ void print_overlays(const PatchSource& overlays) {
         fmt::format("{} overlays could not be made: the elements there are too flat, or those of the file do "
                     "not belong to its mesh (precompute it again)",
                     overlays.failed()));
+  if (overlays.tangents() != nullptr) print_tangents(overlays.tangents()->telling());
 }
 
 void print_loop(const LoopReport& report, bool fast) {
@@ -179,17 +206,27 @@ Json json_tool(const Tool& tool) {
 
 Json json_overlays(const PatchSource& overlays, const OverlayOptions& options) {
   const PatchCounts& counts = overlays.counts();
-  return {{"refinement", options.refinement},
-          {"rings", options.rings},
-          {"built", overlays.built()},
-          {"failed", overlays.failed()},
-          {"longest_build_s", overlays.longest_build()},
-          {"bytes", overlays.bytes()},
-          {"switches", counts.switches},
-          {"ticks_near", counts.ticks},
-          {"older_ticks_near", counts.older},
-          {"ticks_in_contact", counts.in_contact},
-          {"older_ticks_in_contact", counts.older_in_contact}};
+  Json json = {{"refinement", options.refinement},
+               {"rings", options.rings},
+               {"built", overlays.built()},
+               {"failed", overlays.failed()},
+               {"longest_build_s", overlays.longest_build()},
+               {"bytes", overlays.bytes()},
+               {"switches", counts.switches},
+               {"ticks_near", counts.ticks},
+               {"older_ticks_near", counts.older},
+               {"ticks_in_contact", counts.in_contact},
+               {"older_ticks_in_contact", counts.older_in_contact}};
+  if (overlays.tangents() == nullptr) return json;
+  const PatchTangentTelling telling = overlays.tangents()->telling();
+  json["neo_hookean"] = {{"made", telling.made},
+                         {"failed", telling.failed},
+                         {"steps_cut", telling.cuts},
+                         {"with_inverted_elements", telling.with_inverted},
+                         {"most_inverted", telling.most_inverted},
+                         {"last_residual", telling.last_residual},
+                         {"longest_s", telling.longest}};
+  return json;
 }
 
 std::string_view name_of(DynamicsMethod method) {

@@ -53,6 +53,7 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
     if (options_.session) check_overlays(*options_.session, body, options_.device.target);
     overlays_.emplace(body, state_,
                       PatchSourceOptions{.rings = settings.overlay->rings,
+                                         .law = settings.overlay_law,
                                          .memory = settings.overlay_memory,
                                          .in_background = in_background});
   }

@@ -10,8 +10,13 @@ namespace {
 
 constexpr std::size_t most_patches = 4096;
 constexpr auto request_pause = std::chrono::microseconds(500);
+constexpr std::int64_t tangent_stride = 5;  // ticks from one tangent to the next, without a builder
 
 }  // namespace
+
+const char* name_of(PatchLaw law) noexcept {
+  return law == PatchLaw::linear ? "linear" : "neo-hookean";
+}
 
 PatchSource::PatchSource(const Body& body, const State& state, const PatchSourceOptions& options)
     : body_(body),
@@ -22,7 +27,10 @@ PatchSource::PatchSource(const Body& body, const State& state, const PatchSource
       first_slot_(static_cast<std::size_t>(body.greens().nodes()), -1),
       next_slot_(most_patches, -1),
       requests_(PatchRequests{}),
-      deliveries_(2 * most_patches) {
+      deliveries_(2 * most_patches),
+      loads_(PatchLoad(static_cast<std::size_t>(state.surface.near.capacity()))),
+      delivered_tangents_(Tangent{}) {
+  if (options_.law != PatchLaw::linear) tangents_.emplace(body, maker_);
   for (std::size_t slot = most_patches; slot-- > 0;) free_slots_.push_back(static_cast<Index>(slot));
   if (options_.in_background) builder_ = std::thread([this] { build_wishes(); });
 }
@@ -42,34 +50,74 @@ void PatchSource::serve(State& state) noexcept {
   requests_.publish();
   receive();
   const PatchKey& wanted = choice_.now();
+  post_load(state, wanted);
   state.surface.patch_is_older = false;
-  if (wanted.empty()) return;
-  if (!(wanted == used_ && state.surface.patch != nullptr)) {
-    const std::shared_ptr<const Patch>* patch = find(wanted);
-    state.surface.patch_is_older = patch == nullptr;
-    if (patch != nullptr) {
-      if (state.surface.patch != nullptr) ++counts_.switches;
-      state.surface.patch = *patch;
-      used_ = wanted;
-    }
+  if (!take_tangent(state, wanted) && !wanted.empty())
+    state.surface.patch_is_older = !take_linear(state, wanted);
+  if (!wanted.empty()) count(state);
+}
+
+/// Gives the builder the forces of the last tick. Without one, does its work.
+void PatchSource::post_load(const State& state, const PatchKey& wanted) noexcept {
+  if (!tangents_) return;
+  PatchLoad& load = loads_.next();
+  load.clear();
+  load.key = wanted.empty() ? used_ : wanted;
+  const NearField& near = state.surface.near;
+  load.by = near.patch().get();
+  for (Index place = 0; place < near.count(); ++place) {
+    const Vec3 force = near.force(place);
+    if (!force.isZero(0.0)) load.add(near.node(place), force);
   }
-  count(state);
+  const bool is_due = state.ticks % tangent_stride == 0 || !(load.key == tangents_->key());
+  if (!options_.in_background && is_due) follow_load(load);
+  loads_.publish();
+}
+
+/// Where there is a patch by a tangent, it is used, also of another place, until there is one of this.
+bool PatchSource::take_tangent(State& state, const PatchKey& wanted) noexcept {
+  if (!tangents_) return false;
+  std::shared_ptr<const Patch>& patch = state.surface.patch;
+  const Tangent& tangent = delivered_tangents_.read();
+  if (tangent.patch == nullptr) {  // the last one is of forces that are no more
+    if (patch == nullptr || !patch->has_offset()) return false;
+    const std::shared_ptr<const Patch>* linear = find(used_);
+    patch = linear != nullptr ? *linear : nullptr;
+    return false;
+  }
+  if (patch != tangent.patch) {
+    if (patch != nullptr && !(used_ == tangent.key)) ++counts_.switches;
+    patch = tangent.patch;
+    used_ = tangent.key;
+  }
+  state.surface.patch_is_older = !wanted.empty() && !(wanted == used_);
+  return true;
+}
+
+/// False where the patch that is wanted is not there.
+bool PatchSource::take_linear(State& state, const PatchKey& wanted) noexcept {
+  if (wanted == used_ && state.surface.patch != nullptr) return true;
+  const std::shared_ptr<const Patch>* patch = find(wanted);
+  if (patch == nullptr) return false;
+  if (state.surface.patch != nullptr) ++counts_.switches;
+  state.surface.patch = *patch;
+  used_ = wanted;
+  return true;
 }
 
 void PatchSource::serve(State& state, Index centre, bool older) noexcept {
-  state.surface.patch_is_older = older;
-  if (centre < 0) return;
+  if (centre < 0) {
+    state.surface.patch_is_older = older;
+    return;
+  }
   PatchKey key;
   key.add(centre);
   ++round_;
   build(key);
   receive();
-  const std::shared_ptr<const Patch>* patch = find(key);
-  if (patch != nullptr && !(key == used_ && state.surface.patch != nullptr)) {
-    if (state.surface.patch != nullptr) ++counts_.switches;
-    state.surface.patch = *patch;
-    used_ = key;
-  }
+  post_load(state, key);
+  if (!take_tangent(state, key)) static_cast<void>(take_linear(state, key));
+  state.surface.patch_is_older = older;
   count(state);
 }
 
@@ -112,7 +160,10 @@ const std::shared_ptr<const Patch>* PatchSource::find(const PatchKey& key) const
 void PatchSource::build_wishes() {
   while (!stop_) {
     ++round_;
-    if (!build_next(requests_.read())) std::this_thread::sleep_for(request_pause);
+    const PatchRequests& requests = requests_.read();
+    if (tangents_ && (requests.count == 0 || !build(requests.keys[0])) && follow_load(loads_.read()))
+      continue;
+    if (!build_next(requests)) std::this_thread::sleep_for(request_pause);
   }
 }
 
@@ -189,6 +240,16 @@ bool PatchSource::build(const PatchKey& key) {
   free_slots_.pop_back();
   kept.patch = patch;
   deliver({kept.slot, key, std::move(patch)});
+  return true;
+}
+
+/// Goes on with the patch by a tangent under a load. False where nothing is to be done.
+bool PatchSource::follow_load(const PatchLoad& load) noexcept {
+  if (!tangents_->follow(load)) return false;
+  Tangent& next = delivered_tangents_.next();
+  next.key = tangents_->key();
+  next.patch = tangents_->patch();
+  delivered_tangents_.publish();
   return true;
 }
 

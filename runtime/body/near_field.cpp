@@ -27,6 +27,7 @@ NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
       displacement_(force_.size()),
       begun_(force_.size()),
       last_motion_(force_.size()),
+      offset_(force_.size()),
       blocks_(static_cast<std::size_t>(dimension_) * force_.size()),
       base_(at(std::min(parts_ * capacity, body.greens().nodes()))),
       base_uses_(base_.size()),
@@ -125,23 +126,37 @@ void NearField::add(const Body& body, Index surface_node) noexcept {
   connect(body, place);
   for (Index dof = dimension_ * place; dof < dimension_ * (place + 1); ++dof) {
     force_[at(dof)] = 0.0;
-    displacement_[at(dof)] = dot(row(dof).data(), force_.data(), std::ptrdiff_t{dimension_} * place);
+    displacement_[at(dof)] =
+        offset_[at(dof)] + dot(row(dof).data(), force_.data(), std::ptrdiff_t{dimension_} * place);
     begun_[at(dof)] = displacement_[at(dof)];
     last_motion_[at(dof)] = 0.0;
   }
 }
 
-/// Enters a node beside the patch: the stored nodes that it follows, and how the patch responds to it.
+/// Enters a node: where it is without forces and, beside the patch, the stored nodes that it follows and how
+/// the patch responds to it.
 void NearField::enter(const Body& body, Index place) noexcept {
   part_count_[at(place)] = 0;
-  if (patch_place(place) >= 0) return;
+  std::fill_n(offset_.begin() + std::ptrdiff_t{dimension_} * place, dimension_, 0.0);
   if (is_group(place)) {
     for_each_member(place,
                     [&](Index member, double, const Eigen::Matrix3d&) { follow(body, place, member); });
     return;
   }
-  follow(body, place, node(place));
-  if (patch() != nullptr) respond(body, place);
+  if (patch_place(place) < 0) {
+    follow(body, place, node(place));
+    if (patch() != nullptr) respond(body, place);
+  }
+  if (patch() != nullptr && patch()->has_offset()) find_offset(place);
+}
+
+void NearField::find_offset(Index place) noexcept {
+  const Index in_patch = patch_place(place);
+  for (Index axis = 0; axis < dimension_; ++axis) {
+    offset_[at(dimension_ * place + axis)] =
+        in_patch >= 0 ? patch()->offset()[dimension_ * in_patch + axis]
+                      : dot(X(dimension_ * place + axis), patch()->offset_forces().data(), patch_dofs());
+  }
 }
 
 /// Enters what a surface node that is at a place, or one of several there, follows.
@@ -353,7 +368,8 @@ void NearField::move(Index from, Index to) noexcept {
     move_members(member_weight_);
     move_members(member_map_);
   }
-  for (std::vector<double>* of_dofs : {&force_, &last_force_, &displacement_, &begun_, &last_motion_}) {
+  for (std::vector<double>* of_dofs :
+       {&force_, &last_force_, &displacement_, &begun_, &last_motion_, &offset_}) {
     std::copy_n(of_dofs->begin() + std::ptrdiff_t{dimension_} * from, dimension_,
                 of_dofs->begin() + std::ptrdiff_t{dimension_} * to);
   }
@@ -487,7 +503,7 @@ void NearField::for_each_stored_force(Visit&& visit) const noexcept {
 
 void NearField::displace() noexcept {
   const std::ptrdiff_t width = std::ptrdiff_t{dimension_} * count_;
-  std::fill_n(displacement_.data(), width, 0.0);
+  std::copy_n(offset_.data(), width, displacement_.data());
   load_.clear();
   for (Index place = 0; place < count_; ++place) {
     if (!is_loaded(place)) continue;
@@ -501,6 +517,8 @@ void NearField::displace() noexcept {
     if (patch() != nullptr) load_patch(place);
   }
   spread(force_);
+  if (patch() != nullptr && patch()->has_offset())
+    palpate::add(patch()->offset_forces().data(), 1.0, patch_force_.data(), patch_dofs());
   for_each_stored_force([this](Index stored, const double* f) { load_.add(stored, f); });
 }
 
@@ -517,6 +535,10 @@ Vec3 NearField::force(Index place) const noexcept {
 
 Vec3 NearField::displacement(Index place) const noexcept {
   return vector_at(displacement_, dimension_, place);
+}
+
+Vec3 NearField::offset(Index place) const noexcept {
+  return vector_at(offset_, dimension_, place);
 }
 
 Vec3 NearField::last_motion(Index place) const noexcept {

@@ -108,6 +108,8 @@ class NearField {
   [[nodiscard]] Vec3 force(Index place) const noexcept;
   /// Displacement at a place by the forces of the last `displace` [m].
   [[nodiscard]] Vec3 displacement(Index place) const noexcept;
+  /// Displacement at a place without forces [m]: zero but for patches that have an offset.
+  [[nodiscard]] Vec3 offset(Index place) const noexcept;
   /// What the displacement at a place changed by in the tick before [m]; zero where it was not here.
   [[nodiscard]] Vec3 last_motion(Index place) const noexcept;
   /// The forces of the last `displace`.
@@ -127,6 +129,7 @@ class NearField {
   void connect_within_patch(Index place) noexcept;
   void connect_beside_patch(const Body& body, Index place) noexcept;
   void respond(const Body& body, Index place) noexcept;
+  void find_offset(Index place) noexcept;
   void spread(std::span<const double> forces) noexcept;
   void load_base(std::size_t part, const Vec3& f) noexcept;
   void load_bases(Index place, const Vec3& f) noexcept;
@@ -166,6 +169,7 @@ class NearField {
   std::vector<double> displacement_;   // [d capacity]
   std::vector<double> begun_;          // [d capacity] displacement at the tick's begin
   std::vector<double> last_motion_;    // [d capacity]
+  std::vector<double> offset_;         // [d capacity] displacement without forces
   std::vector<double> blocks_;         // [d x d capacity] block row of a node that comes
   // Stored nodes that those beside the patch follow, each once.
   Index base_count_ = 0;

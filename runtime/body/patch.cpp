@@ -7,11 +7,8 @@
 #include "runtime/body/overlay.h"
 
 namespace palpate {
-namespace {
-
 using Eigen::MatrixXd;
 
-/// The surface node that each local node on the surface is.
 std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
                                    const std::vector<Index>& local_nodes) {
   std::vector<Index> number(mesh.local.nodes.size(), -1);
@@ -34,8 +31,6 @@ std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
   return result;
 }
 
-}  // namespace
-
 MatrixXd overlay_correction(const MatrixXd& G, const MatrixXd& greens) {
   const MatrixXd softened = MatrixXd::Identity(G.rows(), G.cols()) - G * greens;
   const MatrixXd M = softened.partialPivLu().solve(G);
@@ -43,6 +38,10 @@ MatrixXd overlay_correction(const MatrixXd& G, const MatrixXd& greens) {
 }
 
 Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed)
+    : Patch(body, mesh, condensed, PatchOffset{}) {}
+
+Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed,
+             const PatchOffset& offset)
     : elements_(mesh.elements), stored_nodes_(stored_nodes_of(body, mesh)) {
   const auto d = static_cast<Eigen::Index>(body.dimension());
   const std::vector<Index> numbers = surface_numbers(body, mesh, condensed.surface);
@@ -68,11 +67,16 @@ Patch::Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& cond
   compliance_ = 0.5 * (compliance + compliance.transpose());
   response_ = H;
   correction_ = M;
+  if (offset.forces.size() == 0) return;
+  const Eigen::VectorXd moved = greens * offset.forces;  // of Q, without the overlay
+  offset_forces_ = offset.forces + M * moved;
+  offset_ = H * moved + offset.surface(dofs);
 }
 
 std::size_t Patch::bytes() const noexcept {
   return sizeof(double) *
-             static_cast<std::size_t>(compliance_.size() + response_.size() + correction_.size()) +
+             static_cast<std::size_t>(compliance_.size() + response_.size() + correction_.size() +
+                                      offset_.size() + offset_forces_.size()) +
          sizeof(Index) * (elements_.size() + surface_nodes_.size() + stored_nodes_.size());
 }
 

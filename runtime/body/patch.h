@@ -10,6 +10,14 @@
 
 namespace palpate {
 
+/// Where a patch is under no forces by the tangent of a law that is not linear (docs/overlays.md): what
+/// comes on top of the linear answer.
+struct PatchOffset {
+  Eigen::VectorXd forces;  ///< [d g] that act on Q all the time [N]
+  Eigen::VectorXd
+      surface;  ///< [d m] displacement of the surface, in the order of CondensedPatch::surface [m]
+};
+
 /// A patch of the body's surface with a finer mesh under it, condensed (theory.md section 4): whatever the
 /// refinement, what a tick needs is here. d dofs a node; Q are the g nodes of the body in the patch. Const
 /// once made; any number of threads may use it.
@@ -18,6 +26,8 @@ class Patch {
   /// A patch of a body whose surface is refined as the patch's mesh. Throws Error when a node of Q is not
   /// stored, as the file keeps too few layers below the surface.
   Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed);
+  /// One by a tangent about a deformed place: `offset` is what is there without forces.
+  Patch(const Body& body, const PatchMesh& mesh, const CondensedPatch& condensed, const PatchOffset& offset);
 
   /// [m] surface nodes of the body (Body::simplices), ascending.
   [[nodiscard]] std::span<const Index> surface_nodes() const noexcept { return surface_nodes_; }
@@ -36,6 +46,13 @@ class Patch {
   /// Row [d g] of M [N/m]: forces on Q that, beside forces elsewhere, stand for the overlay (Overlay).
   [[nodiscard]] const double* correction(Index dof) const noexcept { return correction_.row(dof).data(); }
 
+  /// Whether it is moved without forces, as patches by a tangent are; else the next two are empty.
+  [[nodiscard]] bool has_offset() const noexcept { return offset_.size() > 0; }
+  /// [d m] displacement of the surface's dofs under no forces [m].
+  [[nodiscard]] const Eigen::VectorXd& offset() const noexcept { return offset_; }
+  /// [d g] forces on Q that, without the overlay, move the rest of the body as it is under no forces [N].
+  [[nodiscard]] const Eigen::VectorXd& offset_forces() const noexcept { return offset_forces_; }
+
   /// Memory that it takes.
   [[nodiscard]] std::size_t bytes() const noexcept;
   /// Memory that one of this takes.
@@ -50,7 +67,13 @@ class Patch {
   Rows compliance_;
   Rows response_;
   Rows correction_;
+  Eigen::VectorXd offset_;
+  Eigen::VectorXd offset_forces_;
 };
+
+/// The surface node (Body::simplices) that each of some local nodes on the surface is.
+std::vector<Index> surface_numbers(const Body& body, const PatchMesh& mesh,
+                                   const std::vector<Index>& local_nodes);
 
 /// M = (I - G Xi_QQ)^-1 G, symmetric (theory.md section 4).
 Eigen::MatrixXd overlay_correction(const Eigen::MatrixXd& G, const Eigen::MatrixXd& greens);

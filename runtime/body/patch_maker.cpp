@@ -50,15 +50,20 @@ PatchMaker::PatchMaker(const Body& body, int rings)
       cuts_(body.model().mesh.element, body.refinement()),
       rings_(rings) {}
 
-std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
+PatchMesh PatchMaker::mesh(std::span<const Index> centres) {
   const Model& model = body_.model();
   std::vector<Index> nodes;
   for (const Index centre : centres) nodes.push_back(body_.mesh_node(centre));
-  const PatchMesh mesh = make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
+  return make_patch_mesh(model, at_, cuts_, rings_round(model.mesh, at_, nodes, rings_));
+}
+
+std::shared_ptr<const Patch> PatchMaker::make(std::span<const Index> centres) {
+  const Model& model = body_.model();
+  const PatchMesh mesh = this->mesh(centres);
   const CondensedPatch* ready = centres.size() == 1 ? stored(centres[0]) : nullptr;
   if (ready == nullptr) return std::make_shared<const Patch>(body_, mesh, condense(model, mesh));
   if (!fits(*ready, mesh, body_.dimension()))
-    throw Error("the overlay that is stored for node " + std::to_string(nodes[0]) +
+    throw Error("the overlay that is stored for node " + std::to_string(body_.mesh_node(centres[0])) +
                     " does not belong to the fine mesh there",
                 model.name, "precompute it again");
   return std::make_shared<const Patch>(body_, mesh, *ready);

@@ -26,6 +26,9 @@ class PatchMaker {
   /// the file has is not of this patch.
   [[nodiscard]] std::shared_ptr<const Patch> make(std::span<const Index> centres);
 
+  /// The fine mesh of that patch. Throws Error as `make` does.
+  [[nodiscard]] PatchMesh mesh(std::span<const Index> centres);
+
   /// What the file has of the patch round a stored node, null where it has none as the body's and ours are.
   [[nodiscard]] const CondensedPatch* stored(Index centre) const noexcept;
 

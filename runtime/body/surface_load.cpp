@@ -52,6 +52,7 @@ void patch_displacement(const SurfaceLoad& load, Index first, std::span<double> 
     const Index dof = d * first + static_cast<Index>(k);
     const double* C = load.patch->compliance(dof);
     double sum = dot(load.patch->response(dof), load.beside.data(), body_dofs);
+    if (load.patch->has_offset()) sum += load.patch->offset()[dof];
     for (Index i = 0; i < load.patch_count; ++i) {
       const double* by = C + dofs(d, load.patch_place[i]);
       const double* f = load.patch_force.data() + dofs(d, i);

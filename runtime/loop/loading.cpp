@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <string>
@@ -45,6 +46,26 @@ void check_warp(const BodyOptions& options) {
   if (options.contact == ContactModel::dynamic) refuse("a warped body has no inertia", "--contact");
 }
 
+/// Leaves out what a body whose overlays are neo-Hookean has no place for.
+void prepare_for_law(Model& model, const BodyOptions& options) {
+  if (options.refinement == 1) {
+    throw Error("the law is that of overlays, and there is none", "--overlay-law",
+                "give an --overlay, or leave out --overlay-law");
+  }
+  if (options.contact == ContactModel::dynamic) {
+    throw Error("a body whose overlays are neo-Hookean has no inertia", "--contact",
+                "leave out --contact or --overlay-law");
+  }
+  for (const Material& material : model.materials) {
+    const auto& strain = material.initial_strain;
+    if (std::any_of(strain.begin(), strain.end(), [](double s) { return s != 0.0; })) {
+      throw Error("the neo-hookean law has no place for the initial strain of the file's materials",
+                  "--overlay-law", "leave it out, or precompute the model without initial strain");
+    }
+  }
+  model.dynamics = {};
+}
+
 }  // namespace
 
 Body load_body(const std::filesystem::path& file, const std::filesystem::path& model_toml,
@@ -63,6 +84,7 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
   if (options.warp) check_warp(options);
+  if (options.overlay_law != PatchLaw::linear) prepare_for_law(model, options);
   if (options.live.solver) {
     if (options.refinement > 1) {
       throw Error("overlays refine Green's functions, and a live solver has none", "--overlay",

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "formats/outputs/output_paths.h"
+#include "runtime/background/patch_source.h"
 #include "runtime/body/body.h"
 #include "runtime/live/live_settings.h"
 
@@ -13,6 +14,7 @@ namespace palpate {
 /// What of a file is made a body.
 struct BodyOptions {
   int refinement = 1;  ///< of the surface, see Body
+  PatchLaw overlay_law = PatchLaw::linear;
   ContactModel contact = ContactModel::quasi_static;
   double load_scale = 1.0;  ///< see scale_loads
   double stiffness_scale = 1.0;

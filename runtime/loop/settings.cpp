@@ -71,6 +71,9 @@ std::string text_of(SolverKind kind) {
 std::string text_of(bool yes) {
   return yes ? "yes" : "no";
 }
+std::string text_of(PatchLaw law) {
+  return name_of(law);
+}
 std::string text_of(const OverlayOptions& overlay) {
   return fmt::format("r={},rings={}", overlay.refinement, overlay.rings);
 }
@@ -162,6 +165,10 @@ void read_value(const Setting& setting, const std::string& text, SolverKind& kin
 
 void read_value(const Setting& setting, const std::string& text, bool& yes) {
   yes = read_name(setting, text, {true, false});
+}
+
+void read_value(const Setting& setting, const std::string& text, PatchLaw& law) {
+  law = read_name(setting, text, {PatchLaw::linear, PatchLaw::neo_hookean});
 }
 
 void read_value(const Setting&, const std::string& text, OverlayOptions& overlay) {
@@ -258,6 +265,11 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
                             most_rings, least_refinement, most_refinement),
                 any_number, s.overlay.has_value()},
         s.overlay);
+  visit(Setting{"overlay-law", group, "linear|neo-hookean", "", "linear",
+                "how the finer mesh answers deformation: linear, as the body around it, or neo-hookean, for "
+                "large strain under the tool",
+                any_number, s.overlay_law != PatchLaw::linear},
+        s.overlay_law);
   visit(Setting{"overlay-memory", group, "MB", "MB", "512", "most memory that overlays may use", megabytes,
                 s.overlay.has_value()},
         s.overlay_memory);
@@ -365,8 +377,8 @@ void for_each_frame_setting(SomeSettings& s, Visitor&& visit) {
 /// nothing compiles.
 template <class SomeSettings, class Visitor>
 void for_each_setting(SomeSettings&& settings, Visitor&& visit) {
-  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_memory, warp, live,
-         rate, motion_scale, force_scale, origin, axes, safety] = settings;
+  auto& [tool, reach, max_contacts, contact, load_scale, stiffness_scale, overlay, overlay_law,
+         overlay_memory, warp, live, rate, motion_scale, force_scale, origin, axes, safety] = settings;
   for_each_tool_setting(tool, visit);
   visit(Setting{"reach", SettingGroup::tool, "METRES", "m", "the longest edge of the surface",
                 "a grab that touches nothing takes hold of the nearest surface within this distance of the "
@@ -447,6 +459,7 @@ WorkspaceOptions Settings::workspace() const {
 
 BodyOptions Settings::body() const {
   return {.refinement = overlay ? overlay->refinement : 1,
+          .overlay_law = overlay_law,
           .contact = contact,
           .load_scale = load_scale,
           .stiffness_scale = stiffness_scale,

@@ -28,9 +28,10 @@ struct Settings {
   std::optional<double> reach;  ///< [m]; else the longest edge of the surface
   Index max_contacts = 256;
   ContactModel contact = ContactModel::quasi_static;
-  double load_scale = 1.0;                                   ///< of the file's loads
-  double stiffness_scale = 1.0;                              ///< of all Young's moduli
-  std::optional<OverlayOptions> overlay;                     ///< none: the body's own mesh
+  double load_scale = 1.0;                ///< of the file's loads
+  double stiffness_scale = 1.0;           ///< of all Young's moduli
+  std::optional<OverlayOptions> overlay;  ///< none: the body's own mesh
+  PatchLaw overlay_law = PatchLaw::linear;
   std::size_t overlay_memory = PatchSourceOptions{}.memory;  ///< [bytes]
   bool warp = false;                                         ///< Green's functions turn with the body
   LiveSettings live;                                         ///< a solver in place of Green's functions

@@ -53,11 +53,12 @@ ContactRow tilt_row(const Body& body, const NearField& near, const ContactPoint&
   return row;
 }
 
-/// Motion along a row of the body's surface going back to rest.
+/// Motion along a row of the body's surface going back to where it is without forces.
 double unloading(const NearField& near, const ContactRow& row) noexcept {
   double motion = 0.0;
   for (std::size_t n = 0; n < 3; ++n) {
-    if (row.places[n] >= 0) motion += row.body[n].dot(near.displacement(row.places[n]));
+    if (row.places[n] >= 0)
+      motion += row.body[n].dot(near.displacement(row.places[n]) - near.offset(row.places[n]));
   }
   return motion;
 }

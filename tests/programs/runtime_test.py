@@ -473,6 +473,26 @@ class PlayOverlay(ProgramTest):
             for name, values in expected.items():
                 numpy.testing.assert_array_equal(found[name], values, err_msg=f"{overlay}: {name}")
 
+    def test_a_neo_hookean_overlay_is_told_replayed_and_refused(self):
+        file = self.bake(cube_toml(4, scope="layers"))
+        script = self.write("press.csv", "t,x,y,z\n0,0.4,0.5,1.25\n0.1,0.4,0.5,1.1\n0.2,0.4,0.5,1.1\n0.3,0.4,0.5,1.25\n")
+        law = ("--overlay", "r=2,rings=1", "--overlay-law", "neo-hookean")
+        press = ("play", file, "--tool", "sphere:0.2", "--fast", "--report", "report.json", "--device")
+        result = run(RUNTIME, *press, f"script:{script}", *law, "--record", "out.h5", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("overlay, neo-hookean: ", result.stderr)
+        told = json.loads((self.folder / "report.json").read_text())["overlay"]["neo_hookean"]
+        self.assertGreater(told["made"], 5)
+        self.assertEqual((told["failed"], told["most_inverted"]), (0, 0))
+        self.assertEqual(run(RUNTIME, *press, "replay:out.h5", cwd=self.folder).returncode, 0)
+        result = run(RUNTIME, *press, f"script:{script}", "--overlay", "r=2,rings=1", cwd=self.folder)
+        self.assertNotIn("neo_hookean", json.loads((self.folder / "report.json").read_text())["overlay"])
+        for options, named in (((*law[2:],), "--overlay-law"), ((*law, "--contact", "dynamic"), "--contact"), ((*law, "--warp", "yes"), "--overlay"),
+                               (("--overlay", "r=2,rings=1", "--overlay-law", "rubber"), "--overlay-law")):
+            result = run(RUNTIME, *press, f"script:{script}", *options, cwd=self.folder)
+            self.assertNotEqual(result.returncode, 0)
+            self.assertIn(named, result.stderr)
+
     def test_over_everything_it_is_the_finer_cube(self):
         coarse = self.bake(cube_toml(2, scope="full"), name="coarse.toml")
         fine = self.bake(cube_toml(4, scope="full"), name="fine.toml")

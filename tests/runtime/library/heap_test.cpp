@@ -225,6 +225,8 @@ class OverlayTick : public Tick {
     }
   }
 
+  void exercise_beside(const PatchSourceOptions& options);
+
   Body overlaid_{
       test::unit_model(GetParam(), GetParam() == 3 ? 4 : 20, Scope::full, Precision::double_precision),
       {},
@@ -261,7 +263,15 @@ TEST_P(OverlayTick, MakesNoHeapCall) {
 
 // With the thread that builds patches and lets them go beside it, which takes memory all the time.
 TEST_P(OverlayTick, MakesNoHeapCallBesideTheBuilder) {
-  PatchSource source(overlaid_, with_, {.rings = 1, .memory = 1 << 16});
+  exercise_beside({.rings = 1, .memory = 1 << 16});
+}
+
+TEST_P(OverlayTick, MakesNoHeapCallBesideTheBuilderOfNeoHookeanPatches) {
+  exercise_beside({.rings = 1, .law = PatchLaw::neo_hookean, .memory = 1 << 16});
+}
+
+void OverlayTick::exercise_beside(const PatchSourceOptions& options) {
+  PatchSource source(overlaid_, with_, options);
   const auto exercise = [&] {
     for (int round = 0; round < 20; ++round) {
       for (std::size_t k = 0; k < poses_.size(); ++k) {
@@ -282,6 +292,7 @@ TEST_P(OverlayTick, MakesNoHeapCallBesideTheBuilder) {
   exercise();
 #endif
   EXPECT_GT(source.built(), 1);
+  EXPECT_TRUE(source.tangents() == nullptr || source.tangents()->telling().made > 1);
 }
 
 TEST_P(OverlayTick, MakesNoSystemCall) {

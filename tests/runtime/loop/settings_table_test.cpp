@@ -23,6 +23,7 @@ const SettingsText others = {{"tool", "capsule:0.25,0.5"},
                              {"load-scale", "0"},
                              {"stiffness-scale", "2"},
                              {"overlay", "r=16,rings=16"},
+                             {"overlay-law", "neo-hookean"},
                              {"overlay-memory", "64"},
                              {"warp", "yes"},
                              {"rate", "5000"},
@@ -48,17 +49,18 @@ const SettingsText others = {{"tool", "capsule:0.25,0.5"},
                              {"wall-friction", "0.25"}};
 
 TEST(SettingsTable, HasEachMember) {
-  const auto& [tool, reach, contacts, contact, load, stiffness, overlay, memory, warp, live, rate, motion,
-               force, origin, axes, safety] = Settings{};
+  const auto& [tool, reach, contacts, contact, load, stiffness, overlay, law, memory, warp, live, rate,
+               motion, force, origin, axes, safety] = Settings{};
   const Settings all = read_settings(others);
-  const auto& [tool2, reach2, contacts2, contact2, load2, stiffness2, overlay2, memory2, warp2, live2, rate2,
-               motion2, force2, origin2, axes2, safety2] = all;
+  const auto& [tool2, reach2, contacts2, contact2, load2, stiffness2, overlay2, law2, memory2, warp2, live2,
+               rate2, motion2, force2, origin2, axes2, safety2] = all;
   EXPECT_NE(reach, reach2);
   EXPECT_NE(contacts, contacts2);
   EXPECT_NE(contact, contact2);
   EXPECT_NE(load, load2);
   EXPECT_NE(stiffness, stiffness2);
   EXPECT_NE(overlay.has_value(), overlay2.has_value());
+  EXPECT_NE(law, law2);
   EXPECT_NE(memory, memory2);
   EXPECT_NE(warp, warp2);
   const auto& [solver, step, integrator, step_solver, gravity, by_mass, by_stiffness, yield, creep,
