@@ -4,9 +4,9 @@
 
 #include <chrono>
 
+#include "meshes/node_vectors.h"
 #include "runtime/background/element_stress.h"
 #include "runtime/body/surface_load.h"
-#include "runtime/solve/node_vectors.h"
 #include "runtime/touch/contact_nodes.h"
 
 namespace palpate {

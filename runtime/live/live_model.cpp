@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "base/error.h"
-#include "runtime/live/balance.h"
 #include "runtime/live/step_compliance.h"
 #include "runtime/live/wall_contacts.h"
+#include "statics/balance.h"
 
 namespace palpate {
 namespace {

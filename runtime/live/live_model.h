@@ -2,9 +2,9 @@
 #pragma once
 
 #include "formats/model.h"
-#include "runtime/live/live_body.h"
 #include "runtime/live/live_settings.h"
 #include "runtime/live/live_stepper.h"
+#include "statics/live_body.h"
 
 namespace palpate {
 

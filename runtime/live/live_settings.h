@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "runtime/live/integrator.h"
-#include "runtime/live/live_law.h"
-#include "runtime/live/solver_kind.h"
+#include "statics/live_law.h"
+#include "statics/solver_kind.h"
 
 namespace palpate {
 

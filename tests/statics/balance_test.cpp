@@ -1,5 +1,5 @@
 // Rest under loads, flow past the yield, and springs against Young's modulus.
-#include "runtime/live/balance.h"
+#include "statics/balance.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "runtime/live/live_body.h"
+#include "statics/live_body.h"
 
 #include <fmt/format.h>
 
