@@ -25,6 +25,7 @@ struct AxisBox {
 /// held, without weight.
 struct LiveSettings {
   std::optional<LiveLaw> solver;                           ///< none: Green's functions
+  std::optional<double> poissons_ratio{};                  ///< of all materials; none: the file's
   double step = 0.005;                                     ///< of the solver; a whole number of ticks [s]
   Integrator integrator = Integrator::implicit_euler;      ///< not explicit Euler
   SolverKind step_solver = SolverKind::factor;             ///< of the equations of an implicit step
