@@ -106,6 +106,27 @@ struct StoredDynamics {
   }
 };
 
+/// How far off small strain and warping are over how far the body turns, against a corotational body of its
+/// mesh that a growing force on some nodes bends (docs/warp.md).
+struct WarpStudy {
+  /// Errors of one of the two at each level, relative to the corotational body; infinite where it has no
+  /// answer.
+  struct Errors {
+    std::vector<double> force;         ///< [L] of the force that moves the nodes as far [-]
+    std::vector<double> displacement;  ///< [L] of the nodes' mean displacement under the same force [-]
+  };
+
+  std::vector<Index>
+      nodes;  ///< [P] mesh nodes on the surface that share the force, ascending; none: no study
+  Vec3 direction = Vec3::Zero();  ///< of the force at rest [-]; it turns with the nodes
+  std::vector<double> force;      ///< [L] ascending [N]
+  std::vector<double> rotation;   ///< [L] of the corotational body's surface, at most, ascending [rad]
+  Errors linear;                  ///< by small strain
+  Errors warped;                  ///< by warping
+
+  [[nodiscard]] bool any() const noexcept { return !nodes.empty(); }
+};
+
 /// Everything baked. Constant once loaded; shared by all threads.
 /// With d = dimension(), a stored dof is d k + axis for stored node k; `stored_nodes[k]` is its mesh node.
 /// A node that is held along some axes only is stored whole: rows and columns of its held dofs are zero.
@@ -133,6 +154,7 @@ struct Model {
   std::vector<Probe> probes;
   StoredOverlay overlay;
   StoredDynamics dynamics;
+  WarpStudy warp;
   /// Xi of the stored dofs [m/N], packed or, with `greens` empty, in nested low-rank form.
   PackedGreens greens;
   std::shared_ptr<const HierarchicalMatrix> compressed;

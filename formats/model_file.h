@@ -15,7 +15,7 @@
 namespace palpate {
 
 inline constexpr int format_major = 3;  ///< another major version is refused: "precompute it again"
-inline constexpr int format_minor = 5;  ///< newer minor versions are read, what they add is ignored
+inline constexpr int format_minor = 6;  ///< newer minor versions are read, what they add is ignored
 
 struct BakePart;
 

@@ -31,6 +31,15 @@ Surface extract_surface(const Mesh& mesh);
 /// of its middles), lines in the plane. [simplices * d] mesh node numbers, oriented as the facets.
 std::vector<Index> surface_simplices(const Surface& surface);
 
+/// The nodes on a surface, numbered from 0.
+struct SurfaceNumbering {
+  std::vector<Index> mesh_nodes;  ///< [S] mesh node of each, ascending
+  std::vector<Index> simplices;   ///< [F * d] the surface's simplices in this numbering, order kept
+};
+
+/// Numbers the nodes of `simplices` [F * d], which are nodes of a mesh of `mesh_nodes`.
+SurfaceNumbering number_surface(std::span<const Index> simplices, std::size_t mesh_nodes);
+
 /// For each mesh node, the smallest number of elements between it and the surface: 0 on the surface, 1 for
 /// nodes that share an element with a surface node, and so on. [N]
 std::vector<Index> layers_below_surface(const Mesh& mesh, const Surface& surface);

@@ -32,6 +32,7 @@
 #include "precompute/progress.h"
 #include "precompute/spread_plan.h"
 #include "precompute/team_sharing.h"
+#include "precompute/warping/warp_study.h"
 
 namespace palpate {
 namespace {
@@ -78,6 +79,9 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
 constexpr const char* factor_stage = "factorising K";
 constexpr const char* overlay_stage = "overlays";
 constexpr const char* modes_stage = "looking for modes";
+constexpr const char* warp_stage = "bending the body";
+constexpr double warp_factors =
+    75.0;  // per level: some 25 without supernodes, which take three times as long
 constexpr const char* precision_stage = "choosing the precision";
 constexpr const char* inverse_factor_stage = "factorising K_bar";
 constexpr const char* write_stage = "writing the file";
@@ -87,6 +91,7 @@ struct Plans {
   std::optional<CompressionPlan> compression;
   OverlayPlan overlays;
   DynamicsPlan dynamics;
+  Index warp_levels = 0;  // of a study of [warp]
 };
 
 /// What the stages that solve columns have in common.
@@ -100,12 +105,13 @@ struct Shared {
 
 /// What follows the plan, by so many ranks.
 std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
-  const auto& [plan, compression, overlays, dynamics] = plans;
+  const auto& [plan, compression, overlays, dynamics, warp_levels] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
     stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs) / ranks});
   if (dynamics.method == DynamicsMethod::modal)
     stages.push_back({modes_stage, modes_seconds(plan, dynamics.modes, jobs * ranks)});
+  if (warp_levels > 0) stages.push_back({warp_stage, warp_factors * warp_levels * plan.factor_seconds});
   if (compression) {
     const std::vector<Stage> more = compression_stages(*compression, ranks);
     stages.insert(stages.end(), more.begin(), more.end());
@@ -313,6 +319,7 @@ Plans announce_plans(const Description& description, const BakeOptions& options,
                      const Stiffness& stiffness, const Factor& factor, const GreensSolver& solver,
                      Progress& progress) {
   Plans plans{make_plan(model.mesh, factor, solver, description.precision, options.jobs), {}, {}, {}};
+  if (description.warp) plans.warp_levels = description.warp->levels;
   Plan& plan = plans.plan;
   if (wants_compression(description, plan.stored_dofs / model.dimension())) {
     const StoredNumbering stored = number_stored(solver, stiffness, model.dimension());
@@ -354,6 +361,22 @@ bool add_dynamics(const Description& description, const DynamicsPlan& plan, cons
       factor, stored_dofs, sharing);
   if (!dynamics) return false;
   model.dynamics = *std::move(dynamics);
+  return true;
+}
+
+/// Bends the body where that is asked for. False, in all processes, when interrupted.
+bool add_warp(const Description& description, Team& team, Model& model, Progress& progress,
+              const InterruptGuard& interrupt) {
+  if (!description.warp) return true;
+  progress.begin(warp_stage);
+  const std::optional<WarpStudyResult> result = study_warp(model, *description.warp, [&](double share) {
+    progress.reach(share);
+    return !interrupt.requested();
+  });
+  if (team.any(!result)) return false;
+  model.warp = result->study;
+  progress.line(range_text(model.warp));
+  if (!result->note.empty()) progress.line("note: the study of [warp] " + result->note);
   return true;
 }
 
@@ -668,6 +691,7 @@ bool Bake::describe() {
   if (!add_dynamics(description_, plans_.dynamics, *elastic_, stiffness_, *factor_, stored_as_.dofs, sharing,
                     model_, progress_))
     return false;
+  if (!add_warp(description_, team_, model_, progress_, interrupt_)) return false;
   if (!plans_.compression) {
     progress_.begin(precision_stage);
     precision_ = decide_precision(description_, *elastic_, stiffness_, *factor_, stored_as_.dofs, team_,

@@ -72,6 +72,15 @@ constexpr FieldMeaning model_fields[] = {
      "overlay after another"},
     {"/overlay/T", "displacement of the surface's nodes by that of the body's nodes; row by row"},
     {"/overlay/compliance", "K_L⁻¹ on the surface's nodes [m/N]: lower triangles"},
+    {"/warp/nodes", "mesh nodes on the surface that shared the force, ascending"},
+    {"/warp/direction", "of the force at rest, of length 1; it turned with the nodes"},
+    {"/warp/force", "size of the force at each level, ascending [N]"},
+    {"/warp/rotation",
+     "largest rotation of a surface triangle (in the plane, line) of the corotational body, ascending [rad]"},
+    {"/warp/linear",
+     "errors of small strain, of the corotational body's: of the force that moves the nodes as far (with its "
+     "sign; infinity: none does), and of their mean displacement under the same force"},
+    {"/warp/warped", "errors of the warped body, likewise; infinity where no balance was found"},
     {"/greens/packed",
      "Green's functions Ξ of the stored dofs [m/N]: lower triangle, column by column from the diagonal down "
      "(LAPACK `uplo = 'L'`); starts at a multiple of 4096 bytes. In split precision the remainder R"},

@@ -44,6 +44,7 @@ class Datasets {
     const auto take = [&]<class T>(const Field<T>& field) { add<T>(element, field.path, field.shape); };
     for_each_body_field(element, take);
     for_each_overlay_field(take);
+    for_each_warp_field(take);
     visit_greens_errors(take);
     for (const DynamicsMethod method : {DynamicsMethod::packed, DynamicsMethod::modal}) {
       model.dynamics.method = method;
@@ -112,6 +113,10 @@ std::string symbol_of(Count count) {
       return "c";
     case Count::certified:
       return "t";
+    case Count::warp_nodes:
+      return "p";
+    case Count::warp_levels:
+      return "l";
   }
   return "";
 }
@@ -232,7 +237,8 @@ constexpr const char* model_letters =
     "*N* nodes, *E* elements of *k* nodes, *d* dimensions, *F* surface simplices, *M* materials, *S* stored "
     "nodes, *n* = *d S* stored dofs, *P* probes, *O* overlays of *g* nodes and *q* surface nodes, *m* modes, "
     "*e* entries of the mass matrix, *w* smooth terms, *a* near and *b* far pairs of *c* clusters, *t* kinds "
-    "of touches. Nodes and vectors have three components in the plane "
+    "of touches, *p* loaded nodes and *l* levels of a study of warping. Nodes and vectors have three "
+    "components in the plane "
     "too; the third is 0 there.";
 
 }  // namespace
@@ -252,6 +258,8 @@ Page file_fields_page() {
   text += "## Green's functions\n\n" + group_table(rows, {"/greens"});
   text +=
       "## Overlays\n\nFiles without overlays do not have this group.\n\n" + group_table(rows, {"/overlay"});
+  text += "## Study of warping\n\nFiles without `[warp]`, and those before 3.6, do not have this group.\n\n" +
+          group_table(rows, {"/warp"});
   text += "## Dynamics\n\nFiles without `[dynamics]` do not have this group.\n\n" +
           group_table(rows, {"/dynamics"});
   text += "## Probes, quality and origin\n\n" +

@@ -133,7 +133,9 @@ Page model_keys_page() {
                   "What acts all the time, any number. Each has exactly one of these keys and, except for "
                   "`gravity`, one selection.");
   text +=
-      "## Selections\n\nOne of these in each `[[fixed]]`, `[[load]]` and `[[overlay.region]]`. Positions are "
+      "## Selections\n\nOne of these in each `[[fixed]]`, `[[load]]` and `[[overlay.region]]`, at most one "
+      "in "
+      "`[warp]`. Positions are "
       "those of the scaled geometry, in metres.\n\n" +
       keys(selection_title);
   text += section("[storage]",
@@ -144,6 +146,11 @@ Page model_keys_page() {
                   "See [overlays](../overlays.md).");
   text += section("[dynamics]", "Free vibration after the body was let go. See [dynamics](../dynamics.md).");
   text += subsection("[dynamics] damping", "damping = {...}");
+  text += section(
+      "[warp]",
+      "A study of how far the body may turn, kept in the file. The table may be empty; besides these "
+      "keys it takes a selection of what is loaded, by default the end farthest from what is held. See "
+      "[warping](../warp.md#the-range-of-a-body).");
   return {"model-keys", text};
 }
 

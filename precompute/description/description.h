@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <variant>
@@ -122,6 +123,15 @@ struct DynamicsOptions {
   std::string place;           ///< of `modes`, else of the table: file, line and column, for errors
 };
 
+/// A study of how far the body may turn until small strain and warping are wrong.
+struct WarpOptions {
+  std::optional<Selection> where;         ///< what is loaded; empty: the free end
+  std::optional<Vec3> direction;          ///< of the force at rest; empty: along which that gives way most
+  double angle = 0.5 * std::numbers::pi;  ///< rotation of the surface at which it ends [rad]
+  Index levels = 12;                      ///< of the force until then, about
+  std::string place;                      ///< of the table: file, line and column, for errors
+};
+
 /// How the Green's functions are stored.
 enum class StorageForm : std::uint8_t {
   automatic,   ///< compressed where there are many stored nodes
@@ -149,6 +159,7 @@ struct Description {
   double tolerance = 0.005;  ///< compressed: most that forces may be off, relative to the largest [-]
   std::optional<OverlayRegions> overlay;
   std::optional<DynamicsOptions> dynamics;
+  std::optional<WarpOptions> warp;
 };
 
 /// Reads and checks model.toml. Relative files are taken from its folder. Throws Error with file, line and

@@ -40,6 +40,10 @@ std::vector<Fixing> read_fixed(const TomlTable& root, int dimension);
 OverlayRegions read_overlay(const TomlTable& overlay, int dimension, Scope scope, Index layers);
 /// [dynamics], for what [storage] keeps.
 DynamicsOptions read_dynamics(const TomlTable& dynamics, Scope scope);
+/// [warp], a table of `keys_of("[warp]")` and the kinds of selections.
+WarpOptions read_warp(const TomlTable& warp, int dimension);
+/// The keys of a table and those of selections.
+Keys with_selections(Keys keys);
 /// Every [[load]], possibly none.
 std::vector<Load> read_loads(const TomlTable& root, int dimension);
 

@@ -18,7 +18,7 @@
 #include "runtime/live/live_model.h"
 #include "runtime/loop/output.h"
 #include "runtime/warp/studied_range.h"
-#include "runtime/warp/surface_change.h"
+#include "statics/surface_change.h"
 
 namespace palpate {
 namespace {
@@ -365,7 +365,7 @@ SurfaceChange last_change(const PlayedRun& run) {
   const std::vector<Vec3> mesh = body.surface_in_mesh();
   for (std::size_t node = 0; node < u.size(); ++node)
     u[node] += body.surface_rest_positions()[node] - mesh[node];
-  return surface_change(body, mesh, u);
+  return surface_change(body.dimension(), body.simplices(), mesh, u);
 }
 
 Json json_surface(const PlayedRun& run) {

@@ -9,11 +9,11 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
+#include "meshes/node_vectors.h"
 #include "runtime/app/probe_field.h"
 #include "runtime/body/prescribed_nodes.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/output.h"
-#include "runtime/solve/node_vectors.h"
 
 namespace palpate {
 namespace {

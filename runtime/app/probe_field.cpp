@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "base/write_file.h"
+#include "meshes/node_vectors.h"
 #include "meshes/readers/vtu_writer.h"
 #include "runtime/body/surface_numbering.h"
-#include "runtime/solve/node_vectors.h"
 
 namespace palpate {
 namespace {

@@ -10,7 +10,7 @@
 #include "runtime/body/body.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/fault.h"
-#include "runtime/warp/surface_change.h"
+#include "statics/surface_change.h"
 
 namespace palpate {
 

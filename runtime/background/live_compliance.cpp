@@ -4,7 +4,7 @@
 #include <cmath>
 #include <exception>
 
-#include "runtime/live/polar.h"
+#include "statics/polar.h"
 
 namespace palpate {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "meshes/node_vectors.h"
 #include "runtime/live/live_model.h"
-#include "runtime/solve/node_vectors.h"
 
 namespace palpate {
 

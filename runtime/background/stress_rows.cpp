@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "statics/polar.h"
+
 namespace palpate {
 
 Stress stress_of(const Mat3& tensor) noexcept {
@@ -67,6 +69,26 @@ void StressRows::apply(std::span<const Vec3> u, std::span<Stress> stress) const 
       for (int i = 0; i < 6; ++i) sum[i] += b[i] * v[0] + b[6 + i] * v[1] + b[12 + i] * v[2];
     }
     for (int i = 0; i < 6; ++i) stress[row][i] = sum[i];
+  }
+}
+
+void StressRows::apply_turned(std::span<const Vec3> at, bool is_plane, std::span<const Vec3> u,
+                              std::span<Mat3> turn, std::span<Stress> stress) const noexcept {
+  for (std::size_t row = 0; row < constant.size(); ++row) {
+    const auto begin = static_cast<std::size_t>(first[row]), end = static_cast<std::size_t>(first[row + 1]);
+    Mat3 fit = Mat3::Zero();  // is what turns them by the same rotation, and stretches
+    for (std::size_t k = begin; k < end; ++k) {
+      const Vec3 X = at[node[k]] - at[row];
+      fit.noalias() += (X + u[node[k]] - u[row]) * X.transpose();
+    }
+    turn[row] = is_plane ? nearest_rotation_in_plane(fit) : nearest_rotation(fit);
+    Stress sum = constant[row];
+    for (std::size_t k = begin; k < end; ++k) {
+      const Vec3 X = at[node[k]] - at[row];
+      const Vec3 strained = turn[row].transpose() * (X + u[node[k]] - u[row]) - X;
+      sum.noalias() += Eigen::Map<const StressBlock>(block.data() + 18 * k) * strained;
+    }
+    stress[row] = sum;
   }
 }
 

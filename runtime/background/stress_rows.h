@@ -50,6 +50,13 @@ struct StressRows {
 
   /// Stress of all rows by the displacement of all nodes [m].
   void apply(std::span<const Vec3> u, std::span<Stress> stress) const noexcept;
+
+  /// Stress where parts of the body have turned, of each row in its own frame: what turns the nodes of a row
+  /// as one about its own is taken off their displacement first. For rows whose number is that of their node,
+  /// and that a shift of all nodes does not change. `at` [nodes]: where they are in the mesh [m]. Fills
+  /// `turn` [rows] with the rotations.
+  void apply_turned(std::span<const Vec3> at, bool is_plane, std::span<const Vec3> u, std::span<Mat3> turn,
+                    std::span<Stress> stress) const noexcept;
 };
 
 /// Collects the weighted mean of what elements say of the stress at their nodes.

@@ -4,9 +4,9 @@
 
 #include <chrono>
 
+#include "meshes/node_vectors.h"
 #include "runtime/background/element_stress.h"
 #include "runtime/body/surface_load.h"
-#include "runtime/solve/node_vectors.h"
 #include "runtime/touch/contact_nodes.h"
 
 namespace palpate {
@@ -62,7 +62,8 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
     rest_[node] = body.surface_rest_positions()[node] - rest_[node];
   if (knows_interior(body)) {
     const std::size_t nodes = body.model().mesh.nodes.size();
-    interior_ = {element_stress(body.model()), std::vector<Vec3>(nodes), std::vector<Stress>(nodes)};
+    interior_ = {element_stress(body.model()), std::vector<Vec3>(nodes), std::vector<Stress>(nodes),
+                 std::vector<Mat3>(parts_turn(body) ? nodes : 0)};
   }
   if (options_.in_background) worker_ = std::thread([this] { work(); });
 }
@@ -189,7 +190,11 @@ void SurfaceFrames::show_interior(SurfacePicture& picture) {
     if (stored >= 0) interior.u[node] += vector_at(stored_, body_.dimension(), stored);
     append(interior.u[node], picture.plane_displacement);
   }
-  interior.rows.apply(interior.u, interior.stress);
+  if (interior.turn.empty()) {
+    interior.rows.apply(interior.u, interior.stress);
+  } else {
+    interior.rows.apply_turned(body_.model().mesh.nodes, true, interior.u, interior.turn, interior.stress);
+  }
   for (const Stress& stress : interior.stress)
     picture.plane_von_mises.push_back(static_cast<float>(von_mises(stress)));
 }

@@ -92,6 +92,7 @@ class SurfaceFrames {
     StressRows rows;
     std::vector<Vec3> u;         // [N] u0 + u
     std::vector<Stress> stress;  // [N]
+    std::vector<Mat3> turn;      // [N] of the nodes' frames, where parts of the body turn
   };
 
   void take_contacts(const State& state, Moment& moment) const noexcept;

@@ -9,6 +9,7 @@
 #include "meshes/element.h"
 #include "meshes/surface.h"
 #include "meshes/topology.h"
+#include "runtime/live/live_model.h"
 
 namespace palpate {
 namespace {
@@ -87,11 +88,17 @@ void spread_middles(std::span<const Index> nodes, std::vector<std::uint8_t>& don
 
 }  // namespace
 
+bool parts_turn(const Body& body) noexcept {
+  if (body.live() != nullptr) return body.live()->body.options().law != LiveLaw::linear;
+  return body.contact_model() == ContactModel::warped;
+}
+
 SurfaceStress::SurfaceStress(const Body& body)
     : body_(body),
       position_(body.surface_in_mesh()),
       facet_type_(traits(body.model().mesh.element).facet),
       body_force_(body.surface_mesh_nodes().size()),
+      turn_(parts_turn(body) ? body.surface_mesh_nodes().size() : 0),
       in_patch_(body.model().mesh.elements()),
       on_patch_(position_.size()),
       weight_(position_.size()) {
@@ -324,11 +331,19 @@ void SurfaceStress::evaluate(std::span<const Vec3> u, std::span<const Vec3> cont
          k < static_cast<std::size_t>(fine.first[node + 1]); ++k)
       body_force_[parents_[k]] += fine.weights[k] * contact_force[node];
   }
-  rows_.apply(u, stress);
+  const bool turns = !turn_.empty();
+  if (turns) {
+    rows_.apply_turned(position_, body_.dimension() == 2, u, turn_, stress);
+  } else {
+    rows_.apply(u, stress);
+  }
   for (std::size_t node = 0; node < nodes; ++node) {
     if (body_force_[node].isZero(0.0)) continue;
-    for (std::size_t k = first_of_force_[node]; k < first_of_force_[node + 1]; ++k)
-      stress[row_of_force_[k]].noalias() += by_force_[k] * body_force_[node];
+    for (std::size_t k = first_of_force_[node]; k < first_of_force_[node + 1]; ++k) {
+      const auto row = static_cast<std::size_t>(row_of_force_[k]);
+      const Vec3 force = turns ? Vec3(turn_[row].transpose() * body_force_[node]) : body_force_[node];
+      stress[row].noalias() += by_force_[k] * force;
+    }
   }
   for (std::size_t node = nodes; node < position_.size(); ++node) {
     stress[node].setZero();

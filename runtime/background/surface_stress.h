@@ -14,6 +14,9 @@
 
 namespace palpate {
 
+/// Whether the parts of a body turn, so that its strain is small in frames of theirs alone.
+bool parts_turn(const Body& body) noexcept;
+
 /// The surface's displacement gives the strain within the surface as the elements have it, and the forces on
 /// it give the traction t = sigma n; with the material's D the other components follow: with e the strain
 /// within the surface, P = I - n n^T and sigma_0 = D eps_0
@@ -22,8 +25,10 @@ namespace palpate {
 /// Evaluated at the nodes of each facet, and averaged there with the facets' areas as weights: what a facet
 /// says is known on it alone, whatever volume is behind it. At edges each facet has the traction of its own
 /// side (SideTractions), so that an even stress is found exactly there too. Small strain: normals and areas
-/// are those of the mesh. Facets whose nodes are all held along some axis have an unknown traction and do not
-/// count. The weight of the body is no traction: it is found as what interior nodes carry.
+/// are those of the mesh. Of a body whose parts turn (warped, or live by another law than the linear one) the
+/// stress of a node is in the frame that has turned with the facets around it, forces too: von Mises stress
+/// is the same in any frame. Facets whose nodes are all held along some axis have an unknown traction and do
+/// not count. The weight of the body is no traction: it is found as what interior nodes carry.
 class SurfaceStress {
  public:
   /// `body` must live as long.
@@ -91,6 +96,7 @@ class SurfaceStress {
   std::vector<StressBlock> by_force_;            // [1/m^2]
   // Scratch.
   std::vector<Vec3> body_force_;        // [body's]
+  std::vector<Mat3> turn_;              // [body's] of their frames; none of a body by small strain
   std::vector<std::uint8_t> in_patch_;  // [elements]
   std::vector<std::uint8_t> on_patch_;  // [S]
   std::vector<double> weight_;          // [S]

@@ -6,7 +6,7 @@
 #include <exception>
 #include <numeric>
 
-#include "runtime/solve/node_vectors.h"
+#include "meshes/node_vectors.h"
 
 namespace palpate {
 namespace {
@@ -35,8 +35,8 @@ double half_sine(const Mat3& A, const Mat3& B) {
 
 WarpedMotion::WarpedMotion(const Body& body)
     : body_(body),
-      warp_(body),
-      balance_(warp_),
+      warp_(warp_surface(body)),
+      balance_(warp_, linear_response(body)),
       R_(static_cast<std::size_t>(body.greens().nodes()), Mat3::Identity()),
       R_turned_(R_),
       by_load_(static_cast<std::size_t>(body.greens().order())),

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "runtime/background/motion_stepper.h"
-#include "runtime/warp/warp_balance.h"
+#include "runtime/warp/body_warp.h"
 
 namespace palpate {
 

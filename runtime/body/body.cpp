@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "matrices/hierarchical.h"
+#include "meshes/surface.h"
 #include "runtime/body/modal_newmark.h"
 #include "runtime/body/surface_numbering.h"
 #include "runtime/live/live_model.h"

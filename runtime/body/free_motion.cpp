@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "runtime/solve/node_vectors.h"
+#include "meshes/node_vectors.h"
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
 

@@ -15,7 +15,7 @@
 #include "base/memory.h"
 #include "matrices/hierarchical.h"
 #include "matrices/hierarchical_product.h"
-#include "runtime/solve/node_vectors.h"
+#include "meshes/node_vectors.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {

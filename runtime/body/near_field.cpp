@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "runtime/solve/node_vectors.h"
+#include "meshes/node_vectors.h"
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/solve/vector_loops.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/solve/node_vectors.h"
+#include "meshes/node_vectors.h"
 
 namespace palpate {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "meshes/node_vectors.h"
 #include "runtime/body/free_motion.h"
-#include "runtime/solve/node_vectors.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {

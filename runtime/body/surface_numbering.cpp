@@ -60,20 +60,6 @@ std::vector<OwnedSimplex> boundary_simplices(const Mesh& mesh) {
 
 }  // namespace
 
-SurfaceNumbering number_surface(std::span<const Index> simplices, std::size_t mesh_nodes) {
-  std::vector<Index> number(mesh_nodes, -1);
-  for (const Index node : simplices) number[node] = 0;
-  SurfaceNumbering result;
-  for (std::size_t node = 0; node < mesh_nodes; ++node) {
-    if (number[node] < 0) continue;
-    number[node] = static_cast<Index>(result.mesh_nodes.size());
-    result.mesh_nodes.push_back(static_cast<Index>(node));
-  }
-  result.simplices.reserve(simplices.size());
-  for (const Index node : simplices) result.simplices.push_back(number[node]);
-  return result;
-}
-
 std::vector<Index> surface_elements(const Model& model) {
   const std::vector<OwnedSimplex> boundary = boundary_simplices(model.mesh);
   const auto d = static_cast<std::size_t>(model.dimension());

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
-#include "runtime/body/surface_numbering.h"
+#include "meshes/surface.h"
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/scene/scene.h"
 #include "runtime/viewer/wire.h"

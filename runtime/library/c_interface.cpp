@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "base/latest.h"
 #include "formats/model_file.h"
+#include "meshes/node_vectors.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
@@ -25,7 +26,6 @@
 #include "runtime/library/sized_struct.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/monotonic_clock.h"
-#include "runtime/solve/node_vectors.h"
 #include "runtime/tick/step.h"
 
 namespace palpate {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "runtime/live/live_forces.h"
+#include "statics/live_forces.h"
 
 namespace palpate {
 namespace {

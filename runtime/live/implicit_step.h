@@ -5,8 +5,8 @@
 
 #include "runtime/live/integrator.h"
 #include "runtime/live/live_state.h"
-#include "runtime/live/tangent_solver.h"
 #include "runtime/live/wall_contacts.h"
+#include "statics/tangent_solver.h"
 
 namespace palpate {
 

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "base/error.h"
-#include "runtime/live/balance.h"
 #include "runtime/live/step_compliance.h"
 #include "runtime/live/wall_contacts.h"
+#include "statics/balance.h"
 
 namespace palpate {
 namespace {
@@ -53,6 +53,11 @@ PackedGreens compliance_at(const LiveParts& live, const Eigen::VectorXd& x, cons
   return compliance.take();
 }
 
+void use_poissons_ratio(const LiveSettings& settings, std::vector<Material>& materials) {
+  if (!settings.poissons_ratio) return;
+  for (Material& material : materials) material.poissons_ratio = *settings.poissons_ratio;
+}
+
 }  // namespace
 
 LiveParts make_live_parts(const Model& model, const LiveSettings& settings) {
@@ -66,6 +71,7 @@ LiveParts make_live_parts(const Model& model, const LiveSettings& settings) {
     input.fixed.clear();
     input.held_displacement.clear();
   }
+  use_poissons_ratio(settings, input.materials);
   LiveParts parts{LiveBody(std::move(input), live_options(settings)),
                   stepper_options(settings, model.dimension())};
   check_start(parts.body, parts.stepper.walls);
@@ -76,6 +82,7 @@ LiveParts make_live_parts(const Model& model, const LiveSettings& settings) {
 Model live_model(Model model, const LiveParts& live, const LiveSettings& settings) {
   const LiveBody& body = live.body;
   if (settings.free) std::fill(model.fixed.begin(), model.fixed.end(), std::uint8_t{0});
+  use_poissons_ratio(settings, model.materials);
   const int d = body.dimension();
   const unsigned all_axes = (1U << static_cast<unsigned>(d)) - 1U;
   std::vector<Index> on_surface = model.surface;

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "formats/model.h"
-#include "runtime/live/live_body.h"
 #include "runtime/live/live_settings.h"
 #include "runtime/live/live_stepper.h"
+#include "statics/live_body.h"
 
 namespace palpate {
 
@@ -14,8 +14,8 @@ struct LiveParts {
   StepperOptions stepper;
 };
 
-/// The body of a model; with `free` nothing of it is held. Throws Error for settings that do not fit it, and
-/// for explicit steps longer than is stable.
+/// The body of a model; with `free` nothing of it is held, and with a Poisson's ratio its materials have
+/// that. Throws Error for settings that do not fit it, and for explicit steps longer than is stable.
 LiveParts make_live_parts(const Model& model, const LiveSettings& settings);
 
 /// The model with what the tick needs of a live body in place of its Green's functions, overlays and

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "runtime/live/integrator.h"
-#include "runtime/live/live_law.h"
-#include "runtime/live/solver_kind.h"
+#include "statics/live_law.h"
+#include "statics/solver_kind.h"
 
 namespace palpate {
 
@@ -25,6 +25,7 @@ struct AxisBox {
 /// held, without weight.
 struct LiveSettings {
   std::optional<LiveLaw> solver;                           ///< none: Green's functions
+  std::optional<double> poissons_ratio{};                  ///< of all materials; none: the file's
   double step = 0.005;                                     ///< of the solver; a whole number of ticks [s]
   Integrator integrator = Integrator::implicit_euler;      ///< not explicit Euler
   SolverKind step_solver = SolverKind::factor;             ///< of the equations of an implicit step

@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 
-#include "runtime/live/live_forces.h"
 #include "runtime/live/wall_contacts.h"
+#include "statics/live_forces.h"
 
 namespace palpate {
 

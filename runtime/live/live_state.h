@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "runtime/live/live_body.h"
+#include "statics/live_body.h"
 
 namespace palpate {
 

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "runtime/live/implicit_step.h"
-#include "runtime/live/live_forces.h"
 #include "runtime/live/plastic_flow.h"
 #include "runtime/live/stability.h"
+#include "statics/live_forces.h"
 
 namespace palpate {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "runtime/live/live_forces.h"
+#include "statics/live_forces.h"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "runtime/live/live_forces.h"
+#include "statics/live_forces.h"
 
 namespace palpate {
 

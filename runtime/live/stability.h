@@ -5,7 +5,7 @@
 #include <span>
 
 #include "runtime/live/integrator.h"
-#include "runtime/live/live_body.h"
+#include "statics/live_body.h"
 
 namespace palpate {
 

@@ -4,11 +4,11 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "runtime/live/live_body.h"
-#include "runtime/live/tangent_solver.h"
 #include "runtime/live/walls.h"
 #include "runtime/solve/cone_solver.h"
 #include "runtime/solve/contact_problem.h"
+#include "statics/live_body.h"
+#include "statics/tangent_solver.h"
 
 namespace palpate {
 

@@ -21,6 +21,8 @@ constexpr NumberRange contact_counts{1.0, 1000.0, true, true, "from 1 to 1000"};
 
 constexpr NumberRange live_steps{0.0, 0.1, false, true, "greater than 0 and at most 0.1"};
 
+constexpr NumberRange poissons_ratios{-1.0, 0.5, false, false, "between -1 and 1/2, both excluded"};
+
 constexpr NumberRange megabytes{1.0, 1e9, true, true, "of megabytes, from 1 on"};
 constexpr NumberRange positive_or_infinite{0.0, std::numeric_limits<double>::infinity(), false, true,
                                            "greater than 0, or inf"};
@@ -284,8 +286,8 @@ void for_each_body_setting(SomeSettings& s, Visitor&& visit) {
 /// Visits the settings of the live solver.
 template <class SomeSettings, class Visitor>
 void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
-  auto& [solver, step, integrator, step_solver, gravity, mass_damping, stiffness_damping, yield, creep,
-         most_plastic, free, floor, room, obstacle, wall_friction] = live;
+  auto& [solver, poissons_ratio, step, integrator, step_solver, gravity, mass_damping, stiffness_damping,
+         yield, creep, most_plastic, free, floor, room, obstacle, wall_friction] = live;
   constexpr SettingGroup group = SettingGroup::live;
   const bool is_told = live.solver.has_value();
   visit(
@@ -296,6 +298,10 @@ void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
           "the tool meets the compliance of one step",
           any_number, is_told},
       solver);
+  visit(Setting{"poissons-ratio", group, "NU", "", "that of the model",
+                "Poisson's ratio of all materials of a live body", poissons_ratios,
+                is_told && poissons_ratio.has_value()},
+        poissons_ratio);
   visit(Setting{"live-step", group, "S", "s", "0.005", "time step of the solver, a whole number of ticks",
                 live_steps, is_told},
         step);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "runtime/solve/node_vectors.h"
+#include "meshes/node_vectors.h"
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/contact_solution.h"
 #include "runtime/tick/force_error.h"

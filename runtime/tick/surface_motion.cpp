@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/solve/node_vectors.h"
+#include "meshes/node_vectors.h"
 #include "runtime/solve/tick_tuning.h"
 #include "runtime/touch/touching_pair.h"
 

@@ -2,6 +2,8 @@
 
 #include <numbers>
 
+#include "statics/range_of_errors.h"
+
 namespace palpate {
 namespace {
 
@@ -12,7 +14,11 @@ constexpr double linear_range = 19.0 * degree, warped_range = 90.0 * degree;  //
 
 std::optional<double> studied_rotation(const Body& body) noexcept {
   if (body.live() != nullptr) return std::nullopt;
-  return body.contact_model() == ContactModel::warped ? warped_range : linear_range;
+  const bool is_warped = body.contact_model() == ContactModel::warped;
+  if (const WarpStudy& study = body.model().warp; study.any())
+    return range_within(study.rotation, is_warped ? study.warped.force : study.linear.force,
+                        good_bending_error);
+  return is_warped ? warped_range : linear_range;
 }
 
 }  // namespace palpate

@@ -96,7 +96,7 @@ test('a live body has settings of its own, which are taken and refused with a re
     await until(page, ([key, now]) => window.palpate.state.settings[key] === now && !window.palpate.state.busy, [name, value]);
     await until(page, () => window.palpate.ready);
   };
-  for (const [name, value] of Object.entries({ yield: '0.05', creep: '20', 'most-plastic': '0.5', 'live-step': '0.01', 'mass-damping': '2', 'stiffness-damping': '0.01', 'wall-friction': '0.25', gravity: '0,0,-5' })) {
+  for (const [name, value] of Object.entries({ yield: '0.05', creep: '20', 'most-plastic': '0.5', 'live-step': '0.01', 'mass-damping': '2', 'stiffness-damping': '0.01', 'wall-friction': '0.25', gravity: '0,0,-5', 'poissons-ratio': '0.45' })) {
     await part(page, name).fill(value);
     await part(page, name).press('Enter');
     await taken(name, value);

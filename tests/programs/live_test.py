@@ -180,6 +180,8 @@ class Live(ProgramTest):
                                  (("--solver", "linear", "--integrator", "explicit-euler"), "none of implicit-euler"),
                                  (("--solver", "linear", "--integrator", "verlet", "--live-step", "0.05"), "the longest stable one is"),
                                  (("--solver", "linear", "--creep", "-1"), "not a number that is"),
+                                 (("--solver", "linear", "--poissons-ratio", "0.5"), "between -1 and 1/2"),
+                                 (("--poissons-ratio", "0.4"), "--solver, which is not given"),
                                  (("--solver", "linear", "--live-step", "0"), "not a number that is")):
             result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", *arguments, cwd=self.folder)
             self.assertNotEqual(result.returncode, 0, arguments)

@@ -2,12 +2,14 @@
 
 import json
 import math
+import signal
+import subprocess
 import unittest
 
 import h5py
 import numpy
 
-from programs import MODELS, RUNTIME, ProgramTest, run
+from programs import MODELS, PRECOMPUTE, RUNTIME, ProgramTest, run
 
 LENGTH, HEIGHT, RADIUS = 0.08, 0.01, 0.003
 TONGUE = """name = "tongue"
@@ -65,6 +67,63 @@ class Warp(ProgramTest):
         self.assertGreater(of_linear["surface"]["last_rotation_deg"], 19)
         self.assertNotIn("warp", of_linear)
         self.assertIn("warp: the surface turned", said)
+
+    def test_the_range_is_that_of_the_body_where_it_was_bent(self):
+        file = self.bake(TONGUE + "[warp]\nlevels = 6\n")
+        inspected = run(PRECOMPUTE, "inspect", file)
+        self.assertRegex(inspected.stdout, r"warping +forces within 5 % up to \d\d degrees by small strain, 9\d warped \(studied to 9\d\)")
+        with h5py.File(file) as model:
+            rotation, linear = model["/warp/rotation"][:], model["/warp/linear"][:, 0]
+            self.assertLess(abs(model["/warp/warped"][:, 0]).max(), 0.05)
+            last = int((abs(linear) > 0.05).argmax())  # the first level beyond
+            before = (rotation[last - 1], abs(linear[last - 1])) if last else (0.0, 0.0)
+        expected = before[0] + (0.05 - before[1]) / (abs(linear[last]) - before[1]) * (rotation[last] - before[0])
+        _, of_linear, _ = self.play(file, 10, seconds=0.1)
+        _, of_warped, _ = self.play(file, 10, "--warp", "yes", seconds=0.1)
+        self.assertAlmostEqual(of_linear["surface"]["studied_rotation_deg"], math.degrees(expected), places=3)
+        self.assertNotAlmostEqual(of_linear["surface"]["studied_rotation_deg"], 19.0, places=3)  # what holds without
+        self.assertAlmostEqual(of_warped["surface"]["studied_rotation_deg"], math.degrees(rotation[-1]), places=3)
+        verified = run(PRECOMPUTE, "verify", file)
+        self.assertEqual(verified.returncode, 0, verified.stdout + verified.stderr)
+        self.assertRegex(verified.stdout, r"warping +ok")
+
+    def test_a_study_that_is_interrupted_writes_nothing(self):
+        model = self.write("model.toml", TONGUE.replace("[16, 2, 2]", "[32, 4, 4]") + "[warp]\nlevels = 200\n")
+        with subprocess.Popen([PRECOMPUTE, model, "-o", "x.palpate.hdf"], cwd=self.folder, stderr=subprocess.PIPE, text=True) as process:
+            said = ""
+            while "bending the body" not in said:
+                line = process.stderr.readline()
+                self.assertNotEqual(line, "", said)
+                said += line
+            process.send_signal(signal.SIGINT)
+            said += process.stderr.read()
+        self.assertNotEqual(process.returncode, 0)
+        self.assertIn("interrupted: nothing was written", said)
+        self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
+
+    def test_a_table_of_mistakes_is_refused_by_key(self):
+        for lines, words in (("angle = 170", "at most 150"), ("angel = 20", "angle"), ("levels = 0", "levels"), ("direction = [0, 0, 0]", "zero vector"),
+                             ('lowest = { axis = "x", percent = 1 }', "no node of the surface that is free")):
+            model = self.write("model.toml", TONGUE + f"[warp]\n{lines}\n")
+            result = run(PRECOMPUTE, model, cwd=self.folder)
+            self.assertNotEqual(result.returncode, 0, lines)
+            self.assertIn(words, result.stderr)
+            self.assertIn("model.toml", result.stderr)
+
+    def test_compressed_bodies_are_warped_too(self):
+        plain = self.bake(TONGUE)
+        of_plain, _, _ = self.play(plain, 40, "--warp", "yes", seconds=0.3)
+        plain.unlink()
+        compressed = self.bake(TONGUE.replace('precision = "double"', 'compression = "h2"\ntolerance = 1e-3'))
+        of_compressed, report, _ = self.play(compressed, 40, "--warp", "yes", seconds=0.3)
+        self.assertLess(report["warp"]["last_residual"], 1e-3)
+        self.assertGreater(of_plain[-1], 0)
+        self.assertAlmostEqual(of_compressed[-1] / of_plain[-1], 1.0, delta=1e-4)
+        deep = self.bake(TONGUE.replace('scope = "surface"\nprecision = "double"', 'scope = "layers"\ncompression = "h2"'))
+        refused = run(RUNTIME, "play", deep, "--device", f"script:{self.folder / 'bend.csv'}", "--fast", "--warp", "yes", cwd=self.folder)
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("nodes below the surface", refused.stderr)
+        self.assertIn('scope = "surface"', refused.stderr)
 
     def test_without_it_nothing_is_another(self):
         file = self.bake(TONGUE)

@@ -15,8 +15,8 @@
 #include <string>
 #include <string_view>
 
-#include "runtime/live/balance.h"
 #include "runtime/live/live_stepper.h"
+#include "statics/balance.h"
 #include "tests/support/live_bodies.h"
 
 namespace palpate::test {

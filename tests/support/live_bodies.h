@@ -5,7 +5,7 @@
 #include <random>
 
 #include "meshes/generate.h"
-#include "runtime/live/live_forces.h"
+#include "statics/live_forces.h"
 
 namespace palpate::test {
 

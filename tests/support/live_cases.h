@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/live/balance.h"
+#include "statics/balance.h"
 #include "tests/support/live_bodies.h"
 
 namespace palpate::test {

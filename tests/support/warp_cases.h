@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "meshes/generate.h"
+#include "meshes/node_vectors.h"
 #include "runtime/body/body.h"
-#include "runtime/live/balance.h"
 #include "runtime/live/live_model.h"
-#include "runtime/solve/node_vectors.h"
-#include "runtime/warp/warp_balance.h"
+#include "runtime/warp/body_warp.h"
 #include "runtime/warp/warped_model.h"
+#include "statics/balance.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::test {
@@ -165,8 +165,8 @@ inline BendingLaw small_strain(const Body& body) {
 
 /// As `play --warp yes` has it, to the end.
 inline BendingLaw warped(const Body& body) {
-  auto warp = std::make_shared<SurfaceWarp>(body);
-  auto balance = std::make_shared<WarpBalance>(*warp);
+  auto warp = std::make_shared<SurfaceWarp>(warp_surface(body));
+  auto balance = std::make_shared<WarpBalance>(*warp, linear_response(body));
   return [&body, warp, balance](const std::vector<Vec3>& f) {
     balance->find(all_stored(body), on_stored(body, f), {.tolerance = 1e-7, .most_rounds = 100});
     std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
@@ -177,7 +177,7 @@ inline BendingLaw warped(const Body& body) {
 
 /// The plain form, u = R_i Xi_ij R_j^T f with the rotations of the linear displacement Xi_ij R_j^T f.
 inline BendingLaw turned_blocks(const Body& body) {
-  auto warp = std::make_shared<SurfaceWarp>(body);
+  auto warp = std::make_shared<SurfaceWarp>(warp_surface(body));
   auto place = std::make_shared<SurfaceWarp::Place>(*warp);
   return [&body, warp, place](const std::vector<Vec3>& f) {
     const int d = body.dimension();

@@ -7,6 +7,7 @@ const near_limit_bit = 1 << 14; // StepStatus::near_step_limit
 
 // Its boxes, by the setting's name, with what holds where nothing is set.
 const numbers: Record<string, string> = {
+  'poissons-ratio': '',
   'live-step': '0.005',
   'mass-damping': '1',
   'stiffness-damping': '0.001',

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "meshes/node_vectors.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/body/patch_maker.h"
-#include "runtime/solve/node_vectors.h"
 #include "tests/support/dynamics_sample.h"
 #include "tests/support/runtime_tool.h"
 

@@ -9,8 +9,8 @@
 #include <set>
 #include <vector>
 
+#include "meshes/node_vectors.h"
 #include "runtime/solve/nearest_point.h"
-#include "runtime/solve/node_vectors.h"
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 

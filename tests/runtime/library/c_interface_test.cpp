@@ -18,10 +18,10 @@
 #include <vector>
 
 #include "formats/model_file.h"
+#include "meshes/node_vectors.h"
 #include "runtime/background/patch_source.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/library/palpate.h"
-#include "runtime/solve/node_vectors.h"
 #include "runtime/tick/status.h"
 #include "runtime/tick/step.h"
 #include "tests/support/folders.h"

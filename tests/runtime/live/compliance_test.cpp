@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "runtime/background/live_motion.h"
 #include "runtime/background/motion_source.h"
@@ -13,6 +14,12 @@
 
 namespace palpate::live_compliance_test {
 namespace {
+
+std::vector<Index> all_nodes(const Body& body) {
+  std::vector<Index> nodes(static_cast<std::size_t>(body.greens().nodes()));
+  std::iota(nodes.begin(), nodes.end(), 0);
+  return nodes;
+}
 
 using Eigen::VectorXd;
 
@@ -256,6 +263,32 @@ TEST(LiveReplay, DoesTheStepsThatThereWere) {
   };
   EXPECT_EQ(play(false), play(false));
   EXPECT_NE(play(false), play(true));
+}
+
+// A Poisson's ratio of the session's is as good as one of the file's: to the last bit.
+TEST(LivePoissonsRatio, IsThatOfAFileThatHasIt) {
+  for (const int d : {2, 3}) {
+    Model model = test::unit_model(d, 2, Scope::surface, Precision::double_precision);
+    Model other = model;
+    for (Material& material : other.materials) material.poissons_ratio = 0.45;
+    const LiveSettings plain{.solver = LiveLaw::corotational},
+        changed{.solver = LiveLaw::corotational, .poissons_ratio = 0.45};
+    const Body of_file = test::live_session(other, plain), of_session = test::live_session(model, changed),
+               before = test::live_session(model, plain);
+    EXPECT_EQ(of_session.model().materials[0].poissons_ratio, 0.45);
+    double most_changed = 0.0;
+    for (std::int64_t j = 0; j < of_file.greens().order(); ++j) {
+      std::vector<double> f(static_cast<std::size_t>(of_file.greens().order()), 0.0), a(f), b(f), c(f);
+      f[static_cast<std::size_t>(j)] = 1.0;
+      const std::vector<Index> all = all_nodes(of_file);
+      of_file.greens().displacement(all, f, a);
+      of_session.greens().displacement(all, f, b);
+      before.greens().displacement(all, f, c);
+      EXPECT_EQ(a, b) << j;
+      most_changed = std::max(most_changed, std::abs(a[0] - c[0]) / std::abs(c[0]));
+    }
+    EXPECT_GT(most_changed, 0.01);
+  }
 }
 
 }  // namespace

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "runtime/live/balance.h"
 #include "runtime/live/live_stepper.h"
+#include "statics/balance.h"
 #include "tests/support/dynamics_bodies.h"
 #include "tests/support/live_bodies.h"
 

@@ -33,6 +33,7 @@ const SettingsText others = {{"tool", "capsule:0.25,0.5"},
                              {"axes", "x,-z,y"},
                              {"safety", "max_force=2"},
                              {"solver", "neo-hookean"},
+                             {"poissons-ratio", "0.45"},
                              {"live-step", "0.002"},
                              {"integrator", "midpoint"},
                              {"step-solver", "cg"},
@@ -63,11 +64,12 @@ TEST(SettingsTable, HasEachMember) {
   EXPECT_NE(law, law2);
   EXPECT_NE(memory, memory2);
   EXPECT_NE(warp, warp2);
-  const auto& [solver, step, integrator, step_solver, gravity, by_mass, by_stiffness, yield, creep,
+  const auto& [solver, poisson, step, integrator, step_solver, gravity, by_mass, by_stiffness, yield, creep,
                most_plastic, free, floor, room, obstacle, wall_friction] = live;
-  const auto& [solver2, step2, integrator2, step_solver2, gravity2, by_mass2, by_stiffness2, yield2, creep2,
-               most_plastic2, free2, floor2, room2, obstacle2, wall_friction2] = live2;
+  const auto& [solver2, poisson2, step2, integrator2, step_solver2, gravity2, by_mass2, by_stiffness2, yield2,
+               creep2, most_plastic2, free2, floor2, room2, obstacle2, wall_friction2] = live2;
   EXPECT_NE(solver, solver2);
+  EXPECT_NE(poisson, poisson2);
   EXPECT_NE(step, step2);
   EXPECT_NE(integrator, integrator2);
   EXPECT_NE(step_solver, step_solver2);

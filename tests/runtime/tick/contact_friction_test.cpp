@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "meshes/generate.h"
+#include "meshes/node_vectors.h"
 #include "runtime/solve/cone_solver.h"
-#include "runtime/solve/node_vectors.h"
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 #include "tests/support/runtime_tool.h"

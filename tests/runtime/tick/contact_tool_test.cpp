@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/solve/node_vectors.h"
+#include "meshes/node_vectors.h"
 #include "runtime/tick/hand_force.h"
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"

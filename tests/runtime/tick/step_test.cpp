@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "meshes/node_vectors.h"
 #include "runtime/body/prescribed_nodes.h"
-#include "runtime/solve/node_vectors.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::step_test {

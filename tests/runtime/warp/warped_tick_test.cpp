@@ -54,9 +54,9 @@ Played play(const Body& body, double angle, int ticks, int wait) {
   const test::EndFace face(body.model().mesh);
   played.angle = -face.angle(test::places_of(body, u));
   if (body.contact_model() == ContactModel::warped) {
-    const SurfaceWarp warp(body);
+    const SurfaceWarp warp(warp_surface(body));
     played.residual = dynamic_cast<const WarpedMotion&>(source->stepper()).telling().last_residual;
-    WarpBalance balance(warp);
+    WarpBalance balance(warp, linear_response(body));
     const SurfaceLoad& load = state.surface.near.load();
     for (int part = 1; part <= 40; ++part) {
       std::vector<double> f(load.forces().begin(), load.forces().end());

@@ -1,10 +1,10 @@
-#include "runtime/live/balance.h"
+#include "statics/balance.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/live/live_forces.h"
-#include "runtime/live/tangent_solver.h"
+#include "statics/live_forces.h"
+#include "statics/tangent_solver.h"
 
 namespace palpate {
 namespace {

@@ -1,5 +1,5 @@
 // The rotation in a deformation gradient, against a singular value decomposition.
-#include "runtime/live/polar.h"
+#include "statics/polar.h"
 
 #include <gtest/gtest.h>
 

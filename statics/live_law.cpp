@@ -1,4 +1,4 @@
-#include "runtime/live/live_law.h"
+#include "statics/live_law.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/live/polar.h"
+#include "statics/polar.h"
 
 namespace palpate {
 namespace {

@@ -1,12 +1,13 @@
-#include "runtime/warp/surface_change.h"
+#include "statics/surface_change.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "runtime/live/polar.h"
+#include "statics/polar.h"
 
 namespace palpate {
 namespace {
@@ -27,10 +28,10 @@ Mat3 frame_of(const std::array<Vec3, 3>& x, std::size_t dimension) noexcept {
 
 }  // namespace
 
-SurfaceChange surface_change(const Body& body, std::span<const Vec3> rest, std::span<const Vec3> u) noexcept {
+SurfaceChange surface_change(int dimension, std::span<const Index> simplices, std::span<const Vec3> rest,
+                             std::span<const Vec3> u) noexcept {
   SurfaceChange largest;
-  const auto d = static_cast<std::size_t>(body.dimension());
-  const std::span<const Index> simplices = body.simplices();
+  const auto d = static_cast<std::size_t>(dimension);
   for (std::size_t first = 0; first + d <= simplices.size(); first += d) {
     std::array<Vec3, 3> X, x;
     for (std::size_t k = 0; k < d; ++k) {

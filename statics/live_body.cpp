@@ -1,4 +1,4 @@
-#include "runtime/live/live_body.h"
+#include "statics/live_body.h"
 
 #include <fmt/format.h>
 
@@ -31,6 +31,25 @@ Mat3 strain_tensor(const std::array<double, 6>& strain) {
   return tensor;
 }
 
+/// The loads of a file without the forces that stand there for initial strain, which the laws know by
+/// themselves.
+std::vector<Vec3> loads_alone(const Model& model) {
+  std::vector<Vec3> loads = model.rest_force;
+  if (loads.empty()) return loads;
+  const Mesh& mesh = model.mesh;
+  const int d = mesh.dimension();
+  for (Index e = 0; e < mesh.elements(); ++e) {
+    const Material& material = model.materials[static_cast<std::size_t>(model.material_of_element[e])];
+    const auto& strain = material.initial_strain;
+    if (std::all_of(strain.begin(), strain.end(), [](double s) { return s == 0.0; })) continue;
+    const ElementVector f = element_stress_force(mesh.element, element_nodes(mesh, e),
+                                                 initial_stress(material, model.analysis), model.thickness);
+    Eigen::Index k = 0;
+    for (const Index node : mesh.element_nodes(e)) loads[node].head(d) -= f.segment(d * k++, d);
+  }
+  return loads;
+}
+
 }  // namespace
 
 LiveInput live_input(const Model& model) {
@@ -41,7 +60,7 @@ LiveInput live_input(const Model& model) {
           .material_of_element = model.material_of_element,
           .fixed = model.fixed,
           .held_displacement = model.rest_displacement,
-          .load = model.rest_force};
+          .load = loads_alone(model)};
 }
 
 LiveBody::LiveBody(LiveInput input, const LiveOptions& options)

@@ -9,9 +9,9 @@
 #include "formats/newmark.h"
 #include "meshes/material.h"
 #include "meshes/mesh.h"
-#include "runtime/live/live_law.h"
-#include "runtime/live/springs.h"
-#include "runtime/live/tangent_pattern.h"
+#include "statics/live_law.h"
+#include "statics/springs.h"
+#include "statics/tangent_pattern.h"
 
 namespace palpate {
 

@@ -1,15 +1,17 @@
-#include "runtime/warp/surface_warp.h"
+#include "statics/surface_warp.h"
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "base/error.h"
-#include "runtime/live/polar.h"
-#include "runtime/solve/node_vectors.h"
-#include "runtime/warp/rotation_vector.h"
+#include "meshes/node_vectors.h"
+#include "statics/polar.h"
+#include "statics/rotation_vector.h"
 
 namespace palpate {
 namespace {
@@ -38,15 +40,21 @@ class Parts {
 }  // namespace
 
 SurfaceWarp::Place::Place(const SurfaceWarp& warp)
-    : u(warp.body_.surface_rest_positions().size(), Vec3::Zero()),
+    : u(warp.surface_.rest.size(), Vec3::Zero()),
       w(warp.simplices_.size(), Vec3::Zero()),
       R(warp.simplices_.size(), Mat3::Identity()),
-      x(warp.body_.surface_rest_positions().begin(), warp.body_.surface_rest_positions().end()) {
+      x(warp.surface_.rest) {
   for (std::size_t axis = 0; axis < 3; ++axis) b[axis] = Eigen::VectorXd::Zero(warp.free_count_[axis]);
 }
 
-SurfaceWarp::SurfaceWarp(const Body& body) : body_(body), dimension_(body.dimension()) {
-  const std::span<const Index> nodes = body.simplices();
+Index WarpSurface::stored_nodes() const noexcept {
+  Index last = -1;
+  for (const Index number : stored) last = std::max(last, number);
+  return last + 1;
+}
+
+SurfaceWarp::SurfaceWarp(WarpSurface surface) : surface_(std::move(surface)), dimension_(surface_.dimension) {
+  const std::span<const Index> nodes = surface_.simplices;
   const auto d = static_cast<std::size_t>(dimension_);
   for (std::size_t k = 0; k + d <= nodes.size(); k += d) {
     if (d == 3) {
@@ -61,7 +69,7 @@ SurfaceWarp::SurfaceWarp(const Body& body) : body_(body), dimension_(body.dimens
 }
 
 void SurfaceWarp::add_triangle(const std::array<Index, 3>& nodes) {
-  const std::span<const Vec3> rest = body_.surface_rest_positions();
+  const std::span<const Vec3> rest = surface_.rest;
   std::array<Vec3, 3> X;
   for (std::size_t k = 0; k < 3; ++k) X[k] = rest[static_cast<std::size_t>(nodes[k])];
   const Vec3 normal = (X[1] - X[0]).cross(X[2] - X[0]);  // twice the area
@@ -81,7 +89,7 @@ void SurfaceWarp::add_triangle(const std::array<Index, 3>& nodes) {
 }
 
 void SurfaceWarp::add_line(Index a, Index b) {
-  const std::span<const Vec3> rest = body_.surface_rest_positions();
+  const std::span<const Vec3> rest = surface_.rest;
   const Vec3 X = rest[static_cast<std::size_t>(a)] - rest[static_cast<std::size_t>(b)];
   const double length = X.norm();
   if (!(length > 0.0)) return;
@@ -98,19 +106,18 @@ void SurfaceWarp::add_line(Index a, Index b) {
 
 /// A node that is not stored is held along every axis.
 void SurfaceWarp::number_free_nodes() {
-  const std::span<const Index> stored = body_.surface_stored_nodes();
+  const std::span<const Index> stored = surface_.stored;
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension_); ++axis) {
     free_[axis].assign(stored.size(), -1);
     for (std::size_t node = 0; node < stored.size(); ++node) {
       if (stored[node] < 0) continue;
-      const auto fixed = body_.model().fixed[static_cast<std::size_t>(body_.mesh_node(stored[node]))];
-      if (((fixed >> axis) & 1U) == 0) free_[axis][node] = free_count_[axis]++;
+      if (((surface_.held[node] >> axis) & 1U) == 0) free_[axis][node] = free_count_[axis]++;
     }
   }
 }
 
 void SurfaceWarp::check_held() const {
-  Parts parts(body_.surface_rest_positions().size());
+  Parts parts(surface_.rest.size());
   for (const Simplex& simplex : simplices_) {
     parts.join(simplex.nodes[0], simplex.nodes[1]);
     parts.join(simplex.nodes[0], simplex.nodes[2]);
@@ -122,12 +129,13 @@ void SurfaceWarp::check_held() const {
     }
     for (const Simplex& simplex : simplices_) {
       if (is_held[static_cast<std::size_t>(parts.of(simplex.nodes[0]))]) continue;
-      const Vec3& at = body_.surface_rest_positions()[static_cast<std::size_t>(simplex.nodes[0])];
+      const Vec3& at = surface_.rest[static_cast<std::size_t>(simplex.nodes[0])];
       throw Error(
           fmt::format("nothing holds the part of the surface at ({:.4g}, {:.4g}, {:.4g}) m along {}, and "
                       "rotations add up along the surface from where it is held",
                       at.x(), at.y(), at.z(), "xyz"[axis]),
-          "--warp", "fix a region of that surface, or play it with --solver corotational");
+          "warping",
+          "fix a region of that surface, or play the body with --solver corotational and no --warp");
     }
   }
 }
@@ -152,7 +160,7 @@ void SurfaceWarp::factor() {
     factor_[axis] = std::make_unique<Factor>(L);
     if (factor_[axis]->info() == Eigen::Success && (factor_[axis]->vectorD().array() > 0.0).all()) continue;
     throw Error("the edges of the surface do not say where its nodes are: it has triangles without area",
-                "--warp", "mesh the body anew, or play it with --solver corotational");
+                "warping", "mesh the body anew, or play it with --solver corotational and no --warp");
   }
 }
 
@@ -188,11 +196,11 @@ void SurfaceWarp::join(const Edge& edge, const Vec3& t, std::span<const Vec3> he
 }
 
 void SurfaceWarp::warp(std::span<const double> u, Place& place) const {
-  const std::span<const Index> stored = body_.surface_stored_nodes();
+  const std::span<const Index> stored = surface_.stored;
   for (std::size_t node = 0; node < stored.size(); ++node)
     place.u[node] = stored[node] < 0 ? Vec3(Vec3::Zero()) : vector_at(u, dimension_, stored[node]);
   for (auto& b : place.b) b.setZero();
-  const std::span<const Vec3> rest = body_.surface_rest_positions();
+  const std::span<const Vec3> rest = surface_.rest;
   for (std::size_t s = 0; s < simplices_.size(); ++s) {
     const Simplex& simplex = simplices_[s];
     const Vec3 w = rotation(simplex, place.u);
@@ -207,15 +215,15 @@ void SurfaceWarp::warp(std::span<const double> u, Place& place) const {
 }
 
 void SurfaceWarp::displacement(const Place& place, std::span<double> moved) const noexcept {
-  const std::span<const Index> stored = body_.surface_stored_nodes();
+  const std::span<const Index> stored = surface_.stored;
   for (std::size_t node = 0; node < stored.size(); ++node) {
     if (stored[node] < 0) continue;
-    set_vector(moved, dimension_, stored[node], place.x[node] - body_.surface_rest_positions()[node]);
+    set_vector(moved, dimension_, stored[node], place.x[node] - surface_.rest[node]);
   }
 }
 
 void SurfaceWarp::pull_back(Place& place, std::span<const double> f, std::span<double> g) const {
-  const std::span<const Index> stored = body_.surface_stored_nodes();
+  const std::span<const Index> stored = surface_.stored;
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension_); ++axis) {
     for (std::size_t node = 0; node < stored.size(); ++node) {
       if (free_[axis][node] >= 0)
@@ -250,7 +258,7 @@ void SurfaceWarp::pull_back(Place& place, std::span<const double> f, std::span<d
 }
 
 void SurfaceWarp::push_forward(Place& place, std::span<const double> du, std::span<double> dx) const {
-  const std::span<const Index> stored = body_.surface_stored_nodes();
+  const std::span<const Index> stored = surface_.stored;
   std::vector<Vec3> change(stored.size(), Vec3::Zero());
   for (std::size_t node = 0; node < stored.size(); ++node) {
     if (stored[node] >= 0) change[node] = vector_at(du, dimension_, stored[node]);
@@ -273,7 +281,7 @@ void SurfaceWarp::push_forward(Place& place, std::span<const double> du, std::sp
 }
 
 void SurfaceWarp::rotations(const Place& place, std::vector<Mat3>& R) const {
-  const std::span<const Index> stored = body_.surface_stored_nodes();
+  const std::span<const Index> stored = surface_.stored;
   std::vector<Vec3> mean(stored.size(), Vec3::Zero());
   std::vector<double> size(stored.size(), 0.0);
   for (std::size_t s = 0; s < simplices_.size(); ++s) {
@@ -284,7 +292,7 @@ void SurfaceWarp::rotations(const Place& place, std::vector<Mat3>& R) const {
       size[node] += simplices_[s].size;
     }
   }
-  R.assign(static_cast<std::size_t>(body_.greens().nodes()), Mat3::Identity());
+  R.assign(static_cast<std::size_t>(surface_.stored_nodes()), Mat3::Identity());
   for (std::size_t node = 0; node < stored.size(); ++node) {
     if (stored[node] >= 0 && size[node] > 0.0)
       R[static_cast<std::size_t>(stored[node])] = exp_of(mean[node] / size[node]);

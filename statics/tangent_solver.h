@@ -5,8 +5,8 @@
 #include <Eigen/SparseCholesky>
 #include <optional>
 
-#include "runtime/live/solver_kind.h"
-#include "runtime/live/tangent_pattern.h"
+#include "statics/solver_kind.h"
+#include "statics/tangent_pattern.h"
 
 namespace palpate {
 

@@ -3,13 +3,25 @@
 
 #include <Eigen/SparseCholesky>
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "runtime/body/body.h"
+#include "meshes/mesh.h"
 
 namespace palpate {
+
+/// A surface as warping wants it: S nodes on it, of which n / d have a displacement.
+struct WarpSurface {
+  int dimension = 3;               ///< d
+  std::vector<Vec3> rest;          ///< [S] where its nodes rest [m]
+  std::vector<Index> simplices;    ///< [F d] nodes of its triangles, in the plane of its lines, outward
+  std::vector<Index> stored;       ///< [S] number in arrays [n], -1 of nodes that are held along every axis
+  std::vector<std::uint8_t> held;  ///< [S] bit `axis` is set where the node is held along it
+
+  [[nodiscard]] Index stored_nodes() const noexcept;  ///< n / d, one more than the largest number
+};
 
 /// Takes the linear displacement u of the surface's nodes to x(u), where they are when each simplex of the
 /// surface turns as far as u says (docs/warp.md). A simplex s has the rotation vector
@@ -29,9 +41,8 @@ namespace palpate {
 /// Const once made: any number of threads may use it, each with a `Place` of its own.
 class SurfaceWarp {
  public:
-  /// `body`: all of its stored nodes lie on its surface; it must live as long. Throws Error where a part of
-  /// the surface has no held node along some axis.
-  explicit SurfaceWarp(const Body& body);
+  /// Throws Error where a part of the surface has no held node along some axis.
+  explicit SurfaceWarp(WarpSurface surface);
 
   /// What is found on the way from u to x, and memory for it.
   struct Place {
@@ -56,7 +67,7 @@ class SurfaceWarp {
   /// Rotations of the stored nodes: exp of the mean w of the simplices around each.
   void rotations(const Place& place, std::vector<Mat3>& R) const;
 
-  [[nodiscard]] const Body& body() const noexcept { return body_; }
+  [[nodiscard]] const WarpSurface& surface() const noexcept { return surface_; }
 
  private:
   struct Edge {
@@ -85,7 +96,7 @@ class SurfaceWarp {
   void join(const Edge& edge, const Vec3& t, std::span<const Vec3> held, Place& place) const;
   [[nodiscard]] Vec3 rotation(const Simplex& simplex, const std::vector<Vec3>& u) const noexcept;
 
-  const Body& body_;
+  WarpSurface surface_;
   int dimension_;
   std::vector<Simplex> simplices_;
   std::array<std::vector<Index>, 3>

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "base/error.h"
-#include "runtime/warp/surface_change.h"
+#include "statics/surface_change.h"
 #include "tests/support/warp_cases.h"
 
 namespace palpate::surface_warp_test {
@@ -46,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(Dimension, SurfaceWarpOf, testing::Values(2, 3));
 // A small rotation of the whole body, made large: the body turns about what holds it, undistorted.
 TEST_P(SurfaceWarpOf, RigidTurnsAreExact) {
   const Body body = hinged(GetParam());
-  const SurfaceWarp warp(body);
+  const SurfaceWarp warp(warp_surface(body));
   SurfaceWarp::Place place(warp);
   const Vec3 axis = GetParam() == 2 ? Vec3(0, 0, 1) : Vec3(Vec3(1, 2, -2) / 3.0);
   std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
@@ -63,7 +63,8 @@ TEST_P(SurfaceWarpOf, RigidTurnsAreExact) {
     std::vector<Vec3> moved = place.x;
     for (std::size_t node = 0; node < moved.size(); ++node)
       moved[node] -= body.surface_rest_positions()[node];
-    const SurfaceChange change = surface_change(body, body.surface_rest_positions(), moved);
+    const SurfaceChange change =
+        surface_change(body.dimension(), body.simplices(), body.surface_rest_positions(), moved);
     EXPECT_NEAR(change.rotation, angle, 1e-7);
     EXPECT_LT(change.strain, 1e-12);
   }
@@ -71,7 +72,7 @@ TEST_P(SurfaceWarpOf, RigidTurnsAreExact) {
 
 TEST_P(SurfaceWarpOf, IsTheLinearDisplacementToFirstOrder) {
   const Body body = hinged(GetParam());
-  const SurfaceWarp warp(body);
+  const SurfaceWarp warp(warp_surface(body));
   SurfaceWarp::Place place(warp);
   const std::vector<double> u = random_numbers(static_cast<std::size_t>(body.greens().order()), 1.0, 5);
   const auto off = [&](double size) {
@@ -89,7 +90,7 @@ TEST_P(SurfaceWarpOf, IsTheLinearDisplacementToFirstOrder) {
 // Forces do the same work on the linear body as on the warped one: J^T by differences of x.
 TEST_P(SurfaceWarpOf, PullsForcesBackByTheWorkTheyDo) {
   const Body body = hinged(GetParam());
-  const SurfaceWarp warp(body);
+  const SurfaceWarp warp(warp_surface(body));
   SurfaceWarp::Place place(warp), other(warp);
   const auto n = static_cast<std::size_t>(body.greens().order());
   for (const double size : {0.0, 0.02, 0.3}) {
@@ -116,7 +117,7 @@ TEST_P(SurfaceWarpOf, PullsForcesBackByTheWorkTheyDo) {
 // What goes forth and what goes back are of one J.
 TEST_P(SurfaceWarpOf, PushesForwardByTheSameDerivative) {
   const Body body = hinged(GetParam());
-  const SurfaceWarp warp(body);
+  const SurfaceWarp warp(warp_surface(body));
   SurfaceWarp::Place place(warp);
   const auto n = static_cast<std::size_t>(body.greens().order());
   warp.warp(random_numbers(n, 0.3, 1), place);
@@ -262,7 +263,7 @@ TEST(Warping, APartOfTheSurfaceThatNothingHoldsIsRefused) {
   model.greens = test::pack(test::random_definite(model.stored_dofs(), 3), Precision::double_precision);
   const Body body(warped_model(std::move(model)), {}, 1, ContactModel::warped);
   try {
-    const SurfaceWarp warp(body);
+    const SurfaceWarp warp(warp_surface(body));
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("along x"), std::string::npos) << error.what();
@@ -274,7 +275,7 @@ TEST(Warping, AStretchedSurfaceTellsItsStrain) {
   const std::vector<Vec3> rest(body.surface_rest_positions().begin(), body.surface_rest_positions().end());
   std::vector<Vec3> u;
   for (const Vec3& x : rest) u.emplace_back(0.25 * x.x(), -0.1 * x.y(), 0.0);
-  const SurfaceChange change = surface_change(body, rest, u);
+  const SurfaceChange change = surface_change(body.dimension(), body.simplices(), rest, u);
   EXPECT_NEAR(change.strain, 0.25, 1e-12);
   EXPECT_NEAR(change.rotation, 0.0, 1e-7);
 }

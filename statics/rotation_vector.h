@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "runtime/live/polar.h"
+#include "statics/polar.h"
 
 namespace palpate {
 

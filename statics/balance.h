@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "runtime/live/live_body.h"
+#include "statics/live_body.h"
 
 namespace palpate {
 

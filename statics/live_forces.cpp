@@ -1,4 +1,4 @@
-#include "runtime/live/live_forces.h"
+#include "statics/live_forces.h"
 
 #include <Eigen/LU>
 #include <algorithm>

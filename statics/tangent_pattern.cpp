@@ -1,4 +1,4 @@
-#include "runtime/live/tangent_pattern.h"
+#include "statics/tangent_pattern.h"
 
 #include <algorithm>
 

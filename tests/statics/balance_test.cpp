@@ -1,10 +1,12 @@
 // Rest under loads, flow past the yield, and springs against Young's modulus.
-#include "runtime/live/balance.h"
+#include "statics/balance.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 
+#include "formats/model.h"
+#include "meshes/element.h"
 #include "runtime/live/plastic_flow.h"
 #include "tests/support/live_bodies.h"
 
@@ -89,6 +91,42 @@ TEST(Balance, CorotationalBarIsHookeanAtAnyStretch) {
     EXPECT_TRUE(find_balance(body, VectorXd::Zero(x.size()), {}, x).converged);
     // P_11 = E (stretch - 1) where P_22 = P_33 = 0.
     EXPECT_NEAR(end_force(body, x, {}), 5e3 * (stretch - 1) * width * width, 1e-9);
+  }
+}
+
+// A file's loads have the forces of initial strain among them, which the laws know by themselves: by small
+// strain the forces alone do the same.
+TEST(Balance, AFilesInitialStrainActsOnce) {
+  for (const ElementType type : {ElementType::quad4, ElementType::tet4}) {
+    LiveInput by_forces = test::live_block(type);
+    test::hold(
+        by_forces, [](const Vec3& x) { return x.x() < 1e-9; }, 7);
+    Model model;
+    model.mesh = by_forces.mesh;
+    model.analysis = by_forces.analysis;
+    model.thickness = by_forces.thickness;
+    model.materials = by_forces.materials;
+    model.materials[0].initial_strain = {0.01, -0.02, 0.0, 0.03, 0.0, 0.0};
+    model.material_of_element = by_forces.material_of_element;
+    model.fixed = by_forces.fixed;
+    model.rest_force.assign(model.mesh.nodes.size(), Vec3(1e-4, 0.0, 0.0));
+    const int d = model.dimension();
+    const StressVector stress = initial_stress(model.materials[0], model.analysis);
+    for (Index e = 0; e < model.mesh.elements(); ++e) {
+      const ElementVector f =
+          element_stress_force(model.mesh.element, element_nodes(model.mesh, e), stress, model.thickness);
+      Eigen::Index k = 0;
+      for (const Index node : model.mesh.element_nodes(e))
+        model.rest_force[static_cast<std::size_t>(node)].head(d) += f.segment(d * k++, d);
+    }
+    by_forces.load = model.rest_force;
+    const LiveBody of_file(live_input(model), {.law = LiveLaw::linear}),
+        of_forces(by_forces, {.law = LiveLaw::linear});
+    VectorXd a = of_file.start(), b = of_forces.start();
+    ASSERT_TRUE(find_balance(of_file, of_file.load(), {}, a).converged);
+    ASSERT_TRUE(find_balance(of_forces, of_forces.load(), {}, b).converged);
+    EXPECT_GT((b - of_forces.rest()).lpNorm<Eigen::Infinity>(), 1e-4);
+    EXPECT_LT((a - b).lpNorm<Eigen::Infinity>(), 1e-11);
   }
 }
 

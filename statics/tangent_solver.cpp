@@ -1,4 +1,4 @@
-#include "runtime/live/tangent_solver.h"
+#include "statics/tangent_solver.h"
 
 #include <cmath>
 

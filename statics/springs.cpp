@@ -1,4 +1,4 @@
-#include "runtime/live/springs.h"
+#include "statics/springs.h"
 
 #include <algorithm>
 #include <map>

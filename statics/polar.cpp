@@ -1,4 +1,4 @@
-#include "runtime/live/polar.h"
+#include "statics/polar.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>

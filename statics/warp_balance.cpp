@@ -1,9 +1,9 @@
-#include "runtime/warp/warp_balance.h"
+#include "statics/warp_balance.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 namespace palpate {
 namespace {
@@ -19,16 +19,14 @@ double largest(std::span<const double> values) {
 
 }  // namespace
 
-WarpBalance::WarpBalance(const SurfaceWarp& warp)
+WarpBalance::WarpBalance(const SurfaceWarp& warp, LinearResponse linear)
     : warp_(warp),
+      linear_(std::move(linear)),
       place_(warp),
-      all_(static_cast<std::size_t>(warp.body().greens().nodes())),
-      u_(static_cast<std::size_t>(warp.body().greens().order())),
+      u_(static_cast<std::size_t>(warp.surface().dimension * warp.surface().stored_nodes())),
       f_(u_.size()),
       g_(u_.size()),
-      rounds_(most_mixed, {std::vector<double>(u_.size()), std::vector<double>(u_.size())}) {
-  std::iota(all_.begin(), all_.end(), 0);
-}
+      rounds_(most_mixed, {std::vector<double>(u_.size()), std::vector<double>(u_.size())}) {}
 
 void WarpBalance::rest() {
   std::fill(u_.begin(), u_.end(), 0.0);
@@ -38,13 +36,13 @@ void WarpBalance::rest() {
 
 void WarpBalance::respond(std::vector<double>& v) {
   warp_.pull_back(place_, f_, g_);
-  warp_.body().greens().displacement(all_, g_, v);
+  linear_(g_, v);
 }
 
 void WarpBalance::respond_to(std::span<const double> p, std::span<double> dx) {
   std::vector<double> u(u_.size());
   warp_.pull_back(place_, p, g_);
-  warp_.body().greens().displacement(all_, g_, u);
+  linear_(g_, u);
   warp_.push_forward(place_, u, dx);
 }
 
@@ -54,7 +52,7 @@ bool WarpBalance::find(std::span<const Index> nodes, std::span<const double> for
     rest();
     return true;
   }
-  const auto d = static_cast<std::size_t>(warp_.body().dimension());
+  const auto d = static_cast<std::size_t>(warp_.surface().dimension);
   std::fill(f_.begin(), f_.end(), 0.0);
   for (std::size_t k = 0; k < forces.size(); ++k)
     f_[d * static_cast<std::size_t>(nodes[k / d]) + k % d] += forces[k];

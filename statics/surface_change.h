@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "runtime/body/body.h"
+#include "meshes/mesh.h"
 
 namespace palpate {
 
@@ -13,7 +13,9 @@ struct SurfaceChange {
   double strain = 0.0;    ///< principal strain within a simplex, stretch less 1, without its sign [-]
 };
 
-/// `rest` [S]: where the body's surface nodes are without it; `u` [S]: displacement from there [m].
-SurfaceChange surface_change(const Body& body, std::span<const Vec3> rest, std::span<const Vec3> u) noexcept;
+/// `simplices` [F d]: nodes of triangles, in the plane of lines; `rest` [S]: where the nodes are without it;
+/// `u` [S]: displacement from there [m].
+SurfaceChange surface_change(int dimension, std::span<const Index> simplices, std::span<const Vec3> rest,
+                             std::span<const Vec3> u) noexcept;
 
 }  // namespace palpate

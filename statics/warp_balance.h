@@ -1,12 +1,16 @@
 // The linear displacement under which a body that turns carries its forces.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
-#include "runtime/warp/surface_warp.h"
+#include "statics/surface_warp.h"
 
 namespace palpate {
+
+/// How the linear body answers: fills u [n] with Xi f, for forces f [n] on all stored nodes.
+using LinearResponse = std::function<void(std::span<const double> f, std::span<double> u)>;
 
 struct WarpBalanceOptions {
   double tolerance = 1e-4;  ///< of the largest linear displacement: what a further round may change
@@ -19,8 +23,8 @@ struct WarpBalanceOptions {
 /// rounds.
 class WarpBalance {
  public:
-  /// `warp` must live as long.
-  explicit WarpBalance(const SurfaceWarp& warp);
+  /// `warp` must live as long, and what `linear` refers to.
+  WarpBalance(const SurfaceWarp& warp, LinearResponse linear);
 
   /// Back to the body without forces.
   void rest();
@@ -35,9 +39,7 @@ class WarpBalance {
   /// The last change of u in a round, of its largest [-]; 0 at rest.
   [[nodiscard]] double residual() const noexcept { return residual_; }
   [[nodiscard]] const SurfaceWarp::Place& place() const noexcept { return place_; }
-  [[nodiscard]] std::span<const double> linear() const noexcept {
-    return {u_.data(), u_.size()};
-  }  ///< u [n] [m]
+  [[nodiscard]] std::span<const double> linear() const noexcept { return u_; }  ///< u [n] [m]
 
  private:
   /// What a round came to: v = Xi J(u)^T f, r = v - u.
@@ -50,8 +52,8 @@ class WarpBalance {
   void keep_within_reach();
 
   const SurfaceWarp& warp_;
+  LinearResponse linear_;
   SurfaceWarp::Place place_;
-  std::vector<Index> all_;  // stored nodes
   std::vector<double> u_, f_, g_;
   std::vector<Round> rounds_;  // [most of mixing] the last ones, in turn
   double residual_ = 0.0;
