@@ -8,7 +8,7 @@ namespace {
 
 using Eigen::MatrixXd;
 
-std::size_t at(Index i) noexcept {
+std::size_t number(Index i) noexcept {
   return static_cast<std::size_t>(i);
 }
 
@@ -18,7 +18,7 @@ PatchLayers::PatchLayers(const PatchMesh& patch, int dimension, const std::vecto
     : layer_of_(patch.local.nodes.size(), unreached), first_dof_(patch.free_dof.size(), -1) {
   const auto d = static_cast<std::size_t>(dimension);
   const auto is_free = [&](Index node) {
-    const auto first = patch.free_dof.begin() + static_cast<std::ptrdiff_t>(d * at(node));
+    const auto first = patch.free_dof.begin() + static_cast<std::ptrdiff_t>(d * number(node));
     return std::any_of(first, first + dimension, [](Index dof) { return dof >= 0; });
   };
   for (std::size_t node = 0; node < layer_of_.size(); ++node) {
@@ -26,7 +26,7 @@ PatchLayers::PatchLayers(const PatchMesh& patch, int dimension, const std::vecto
   }
   std::vector<Index> reached;
   for (const Index node : surface) {
-    if (layer_of_[at(node)] == unreached) reached.push_back(node);
+    if (layer_of_[number(node)] == unreached) reached.push_back(node);
   }
   if (reached.empty()) sizes_.push_back(0);
   while (!reached.empty()) {
@@ -42,8 +42,8 @@ PatchLayers::PatchLayers(const PatchMesh& patch, int dimension, const std::vecto
 void PatchLayers::add_layer(const std::vector<Index>& nodes, const PatchMesh& patch, std::size_t d) {
   Index size = 0;
   for (const Index node : nodes) {
-    layer_of_[at(node)] = count();
-    for (std::size_t dof = d * at(node); dof < d * (at(node) + 1); ++dof) {
+    layer_of_[number(node)] = count();
+    for (std::size_t dof = d * number(node); dof < d * (number(node) + 1); ++dof) {
       if (patch.free_dof[dof] >= 0) first_dof_[dof] = size++;
     }
   }
@@ -55,10 +55,10 @@ std::vector<Index> PatchLayers::next_to(const PatchMesh& patch) const {
   std::vector<Index> found;
   for (Index e = 0; e < patch.local.elements(); ++e) {
     const auto nodes = patch.local.element_nodes(e);
-    const auto is_last = [&](Index node) { return layer_of_[at(node)] == count() - 1; };
+    const auto is_last = [&](Index node) { return layer_of_[number(node)] == count() - 1; };
     if (std::none_of(nodes.begin(), nodes.end(), is_last)) continue;
     std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(found),
-                 [&](Index node) { return layer_of_[at(node)] == unreached; });
+                 [&](Index node) { return layer_of_[number(node)] == unreached; });
   }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
@@ -109,7 +109,7 @@ void put_surface(const PatchLayers& layers, const SurfaceLayer& surface,
   std::vector<Eigen::Index> place(static_cast<std::size_t>(result.T.rows()));
   for (std::size_t dof = 0; dof < place.size(); ++dof) {
     const auto width = static_cast<std::size_t>(d);
-    const std::size_t local = width * at(result.surface[dof / width]) + dof % width;
+    const std::size_t local = width * number(result.surface[dof / width]) + dof % width;
     place[dof] = layers.place_of(local);
     result.T.row(static_cast<Eigen::Index>(dof)) = shape.row(static_cast<Eigen::Index>(local));
   }

@@ -6,7 +6,7 @@
 
 #include "meshes/element.h"
 #include "runtime/body/overlay.h"
-#include "runtime/live/live_forces.h"
+#include "statics/live_forces.h"
 
 namespace palpate {
 namespace {

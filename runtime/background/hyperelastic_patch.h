@@ -9,7 +9,7 @@
 
 #include "overlay/tangent_condensation.h"
 #include "runtime/body/patch.h"
-#include "runtime/live/live_body.h"
+#include "statics/live_body.h"
 
 namespace palpate {
 

@@ -10,7 +10,7 @@ namespace {
 
 // One step: that is where the tick's contact, by the last tangent, has the surface. Further steps under
 // forces that stay as they are lead away from a contact that is steady and would not be under such forces.
-constexpr PatchEffort effort{.tolerance = 1e-8, .most_steps = 1};
+constexpr PatchEffort patch_effort{.tolerance = 1e-8, .most_steps = 1};
 constexpr double no_change = 1e-6;  // of forces: what the tangent then leaves out is its square
 
 }  // namespace
@@ -61,7 +61,7 @@ void PatchTangents::make(const PatchLoad& load) {
     law_ = std::make_unique<HyperelasticPatch>(
         body_, maker_.mesh({key_.centres.data(), static_cast<std::size_t>(key_.count())}));
   }
-  const PatchBalance report = law_->find(nodes_, forces_, effort);
+  const PatchBalance report = law_->find(nodes_, forces_, patch_effort);
   std::shared_ptr<const Patch> patch = law_->linearise();
   is_balanced_ = report.converged || patch == nullptr;
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;

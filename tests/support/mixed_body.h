@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "overlay/patch_mesh.h"
-#include "runtime/live/live_forces.h"
+#include "statics/live_forces.h"
 
 namespace palpate::test {
 
