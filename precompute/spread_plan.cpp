@@ -14,9 +14,9 @@ constexpr std::int64_t scalar = sizeof(double);
 // Of MUMPS with 30 % of work space, against the factor (measured on 1 to 8 ranks): fronts and contributions,
 // buffers for each doubling of the ranks, and what the rank with most has against the mean.
 constexpr double one_rank = 1.45, each_doubling = 0.3, uneven = 1.15;
-constexpr double solve_efficiency = 0.5;   // of sweeps together against those of a process alone
+constexpr double solve_efficiency = 0.5;     // of sweeps together against those of a process alone
 constexpr double together_efficiency = 0.6;  // of factorising together
-constexpr double paths = 1.5;              // loads are swept to the root and back through all of the factor
+constexpr double paths = 1.5;                // loads are swept to the root and back through all of the factor
 constexpr std::int64_t touched_columns = 90;  // of a place that the precision is chosen by
 constexpr std::int64_t touched_copies = 3;    // loads, residuals and solutions, of these in long double
 
