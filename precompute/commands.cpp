@@ -215,9 +215,8 @@ CLI::App* add_inspect(CLI::App& app, Arguments& arguments) {
       ->required()
       ->type_name("");
   command->footer(
-      "Prints materials, mesh and mesh quality, fixed and stored nodes, overlays, dynamics, the study of "
-      "warping and source "
-      "files.\n"
+      "Prints materials, mesh and mesh quality, fixed and stored nodes, overlays, dynamics, warping and "
+      "source files.\n"
       "Example:\n"
       "  palpate-precompute inspect cube.palpate.hdf");
   return command;

@@ -15,7 +15,8 @@
 
 /// Takes the place of TetGen's own function of this name: that of 1.5.0 frees its memory, throws, and frees
 /// it again, so that every error becomes a crash.
-[[noreturn]] void stop_tetgen(tetgenmesh* mesh, int code) __asm__("_Z15terminatetetgenP10tetgenmeshi");
+[[noreturn, gnu::visibility("default")]] void stop_tetgen(tetgenmesh* mesh, int code) __asm__(
+    "_Z15terminatetetgenP10tetgenmeshi");
 void stop_tetgen(tetgenmesh* /*mesh*/, int code) {
   throw code;
 }

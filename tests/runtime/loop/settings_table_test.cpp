@@ -152,9 +152,9 @@ TEST(SettingsTable, HasTheDefaults) {
       in_words.insert(setting.name);
     }
   }
-  EXPECT_EQ(in_words,
-            (std::set<std::string>{"tool", "friction", "coupling", "coupling-torsion", "max-force", "reach",
-                                   "overlay", "origin", "safety", "solver", "floor", "room", "obstacle"}));
+  EXPECT_EQ(in_words, (std::set<std::string>{"tool", "friction", "coupling", "coupling-torsion", "max-force",
+                                             "reach", "overlay", "origin", "poissons-ratio", "safety",
+                                             "solver", "floor", "room", "obstacle"}));
   Settings read = read_settings(defaults), made;
   read.live.solver = made.live.solver = LiveLaw::corotational;  // else the others of it are not told
   read.overlay = made.overlay = OverlayOptions{};               // else its memory is not told
