@@ -85,7 +85,7 @@ std::vector<Index> surface_simplices(const Surface& surface) {
 
 SurfaceNumbering number_surface(std::span<const Index> simplices, std::size_t mesh_nodes) {
   std::vector<Index> number(mesh_nodes, -1);
-  for (const Index node : simplices) number[node] = 0;
+  for (const Index node : simplices) number[static_cast<std::size_t>(node)] = 0;
   SurfaceNumbering result;
   for (std::size_t node = 0; node < mesh_nodes; ++node) {
     if (number[node] < 0) continue;
@@ -93,7 +93,7 @@ SurfaceNumbering number_surface(std::span<const Index> simplices, std::size_t me
     result.mesh_nodes.push_back(static_cast<Index>(node));
   }
   result.simplices.reserve(simplices.size());
-  for (const Index node : simplices) result.simplices.push_back(number[node]);
+  for (const Index node : simplices) result.simplices.push_back(number[static_cast<std::size_t>(node)]);
   return result;
 }
 
