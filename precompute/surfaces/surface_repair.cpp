@@ -36,8 +36,9 @@ using Halfedge = SurfaceMesh::Halfedge_index;
 
 constexpr std::size_t most_edges_without_delaunay = 300;  // CGAL takes the cube of that in time
 constexpr double least_filling =
-    1e-5;                           // volume / area^1.5: 0.094 of a ball, 7e-4 of a pipe's wall of 1 : 400
-constexpr double wrap_alpha = 0.5;  // of the edge
+    1e-5;                            // volume / area^1.5: 0.094 of a ball, 7e-4 of a pipe's wall of 1 : 400
+constexpr double most_change = 0.1;  // of the volume: replacing triangles where a surface intersects itself
+constexpr double wrap_alpha = 0.5;   // of the edge
 constexpr std::size_t bytes_per_triangle = 100;  // of a file
 
 std::string counted(std::size_t count, const char* one, const char* many) {
@@ -194,6 +195,12 @@ std::optional<Answer> attempt(const ChildTask& task, const Work& work) {
   }
 }
 
+/// Whether a surface encloses what another does, but for a little.
+bool is_about(const TriangleSurface& surface, const TriangleSurface& other) {
+  const double volume = std::abs(enclosed_volume(other));
+  return std::abs(std::abs(enclosed_volume(surface)) - volume) <= most_change * volume;
+}
+
 /// Throws where there is no body.
 void check_filled(const TriangleSurface& surface, const std::string& where) {
   const double volume = std::abs(enclosed_volume(surface)), size = std::pow(area(surface), 1.5);
@@ -233,7 +240,8 @@ RepairedSurface repair_surface(const std::filesystem::path& file, SurfaceParts p
       result.problem = problem_of(result.surface);
       return result;
     });
-    if (untangled && untangled->problem.empty()) {
+    // CGAL cuts out as much as it needs, and may be left with a small part of the body.
+    if (untangled && untangled->problem.empty() && is_about(untangled->surface, answer.surface)) {
       answer.repairs.push_back("where it " + answer.problem + ", its triangles were replaced");
       answer.surface = std::move(untangled->surface);
       answer.problem.clear();

@@ -1,4 +1,5 @@
 // The tables of settings and of safety bounds: each member stands in them.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <set>
