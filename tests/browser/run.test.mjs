@@ -79,6 +79,34 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   assert.deepEqual(page.complaints, []);
 });
 
+test('warp is turned on and off, and keeps out what it has no place for', async (t) => {
+  const { page } = await open_cube(t, { toml: '[storage]\nscope = "layers"\nlayers = 2\n', args: ['--tool', 'sphere:0.1'] });
+  const studied = async () => (180 / Math.PI) * (await told(page, 'state')).model.studied_rotation;
+  near(await studied(), 19, 0.01, 'range of small strain');
+  const turn = async (name, value) => {
+    await part(page, name).click();
+    await until(page, ([key, now]) => (window.palpate.state.settings[key] ?? null) === now && !window.palpate.state.busy, [name, value]);
+    await until(page, () => window.palpate.ready);
+  };
+  await turn('warp', 'yes');
+  near(await studied(), 90, 0.01, 'range of a warped body');
+  assert.equal(await part(page, 'overlay').isDisabled(), true);
+  assert.match(await part(page, 'overlay').getAttribute('title'), /warped/);
+  await choose(page, 'press', 0.02);
+  const { x, y } = await project(page, top);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  const felt = await settled(page);
+  await page.mouse.up();
+  assert.ok(felt.force[2] < 0, `it pushes the body down: ${felt.force}`);
+  await turn('warp', null);
+  near(await studied(), 19, 0.01, 'range of small strain again');
+  await turn('overlay', 'r=3,rings=2');
+  assert.equal(await part(page, 'warp').isDisabled(), true);
+  assert.match(await part(page, 'warp').getAttribute('title'), /Not with overlay/);
+  assert.deepEqual(page.complaints, []);
+});
+
 test('a live body has settings of its own, which are taken and refused with a reason', async (t) => {
   const at = await folder(t);
   const soft = cube(3).replace('youngs_modulus = 1.0', 'youngs_modulus = 1e6\ndensity = 1000').replace(/\[\[fixed\]\][^]*$/, '[storage]\nscope = "none"\n');

@@ -19,7 +19,7 @@ export function light_title(light: Light, change: NonNullable<State['change']>, 
   const range = `Largest rotation of the surface; its largest strain is ${strain} %. Forces were found right within 5 % up to a rotation of ${(degrees * studied).toFixed(0)}°`;
   if (light === 'good') return `${range}.`;
   if (light === 'near') return `${range}, of which this is more than half.`;
-  return `${range}: for this one ${is_warped ? '' : 'play with --warp yes, or '}play with --solver corotational.`;
+  return `${range}: for this one ${is_warped ? '' : 'turn on Warp, or '}play with --solver corotational.`;
 }
 
 /** The light beside the contacts. */

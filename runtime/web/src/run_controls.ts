@@ -49,6 +49,7 @@ export class RunControls {
     this.on_number('stiffness-scale', 'stiffness-scale', 1e-9);
     select('contact').addEventListener('change', () => this.change('contact', select('contact').value));
     for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).addEventListener('change', () => this.change_overlay(id));
+    input('warp').addEventListener('change', () => this.change('warp', input('warp').checked ? 'yes' : null));
   }
 
   toggle_pause(): void {
@@ -141,11 +142,27 @@ export class RunControls {
     const overlay = /^(?:r=(\d+))?,?(?:rings=(\d+))?/.exec(settings.overlay ?? '');
     if (overlay?.[1]) show_value(input('overlay-r'), overlay[1]);
     if (overlay?.[2]) show_value(input('overlay-rings'), overlay[2]);
+    this.show_warp(state);
     this.live_.show(state);
     show_value(input('stiffness-scale'), settings['stiffness-scale'] ?? '1');
     show_value(input('load-scale'), settings['load-scale'] ?? '1');
     input('load-scale').disabled = !model.loads;
     input('load-scale').title = model.loads ? 'Gravity and other loads of the model, times this' : 'This model has no loads';
+  }
+
+  /** A warped body has no inertia and no overlays. */
+  private show_warp({ settings }: State): void {
+    const is_warped = settings.warp === 'yes';
+    const in_the_way = settings.overlay !== undefined ? 'overlay' : settings.contact === 'dynamic' ? 'dynamic contact' : '';
+    const warp = input('warp');
+    warp.checked = is_warped;
+    warp.disabled = !is_warped && in_the_way !== '';
+    warp.title = warp.disabled ? `Not with ${in_the_way}: turn that off first` : 'Parts that turn take their stiffness with them, without a solver';
+    input('overlay').title = is_warped ? 'A warped body has no overlays' : 'A finer mesh under the tool';
+    if (!is_warped) return;
+    for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).disabled = true;
+    part('overlay-note').hidden = true;
+    select('contact').title = 'A warped body has no inertia';
   }
 
   /** No more is offered than the file has layers for. */
@@ -154,7 +171,7 @@ export class RunControls {
     for (const id of ['overlay', 'overlay-r', 'overlay-rings']) input(id).disabled = most === 0;
     const field = input('overlay-rings');
     field.max = String(Math.max(most, 1));
-    if (Number(field.value) > Number(field.max)) field.value = field.max;
+    if (most > 0 && Number(field.value) > most) field.value = field.max;
     const why = `This file keeps ${rings === 0 ? 'no layers' : `layers for ${rings} ${rings === 1 ? 'ring' : 'rings'}`} below the surface; precomputed with more [storage] layers it would have more`;
     write(part('overlay-note'), `${why}.`);
     part('overlay-note').hidden = most > 0;
