@@ -55,6 +55,11 @@ void add_jobs(CLI::App& command, BakeOptions& options) {
       ->check(CLI::Range(1, 1024));
 }
 
+/// The command by which a baked body is touched.
+std::string to_touch(const std::string& file, bool has_greens) {
+  return has_greens ? "palpate-runtime play " + file + " --view" : "palpate-runtime push " + file;
+}
+
 }  // namespace
 
 void add_bake_options(CLI::App& app, BakeOptions& options) {
@@ -84,7 +89,8 @@ std::string next_steps(const BakeSummary& bake) {
   if (bake.result == BakeResult::part_done)
     return "next, once all parts are there: palpate-precompute join " + bake.model + "\n";
   if (bake.result != BakeResult::done) return "";
-  return "next: palpate-precompute verify " + output + "\n      palpate-runtime play " + output + " --view\n";
+  const bool has_greens = bake.plan.stored_dofs > 0;
+  return "next: palpate-precompute verify " + output + "\n      " + to_touch(output, has_greens) + "\n";
 }
 
 namespace {
@@ -128,10 +134,11 @@ int run_bake(const std::string& model, const BakeOptions& options, bool unless_d
 }
 
 int run_verify(const std::string& file) {
-  const VerifyReport report = verify(load_model(file), file);
+  const Model model = load_model(file);
+  const VerifyReport report = verify(model, file);
   std::fputs(to_text(report).c_str(), stdout);
   if (!report.passed()) return exit_differs;
-  std::fprintf(stderr, "next: palpate-runtime play %s --view\n", file.c_str());
+  std::fprintf(stderr, "next: %s\n", to_touch(file, model.scope != Scope::none).c_str());
   return exit_ok;
 }
 

@@ -11,7 +11,7 @@
 namespace palpate {
 namespace {
 
-constexpr const char* group = "A surface or an image";
+constexpr const char* group = "A surface, an image or a picture";
 
 void tell(const std::string& line) {
   std::fputs((line + "\n").c_str(), stderr);
@@ -30,18 +30,21 @@ DraftOptions options_of(const DraftArguments& arguments) {
 }  // namespace
 
 bool DraftArguments::given() const {
-  return !unit.empty() || !parts.empty() || strict || renew || nodes != ShapeOptions{}.nodes;
+  return !unit.empty() || !parts.empty() || strict || renew || nodes;
 }
 
 void add_draft_options(CLI::App& app, DraftArguments& arguments) {
-  app.add_option("--unit", arguments.unit,
-                 "unit of the file, or metres per unit; default: guessed by the size")
+  app.add_option(
+         "--unit", arguments.unit,
+         "unit of the file, or metres per unit (of a picture: per pixel); default: guessed by the size")
       ->option_text(unit_choices)
       ->check([](const std::string& text) {
         return read_unit(text) ? "" : "'" + text + "' is none of " + unit_choices;
       })
       ->group(group);
-  app.add_option("--surface-nodes", arguments.nodes, "nodes on the surface of the mesh, about; default: 4000")
+  app.add_option(
+         "--surface-nodes", arguments.nodes,
+         "nodes on the surface of the mesh, about; default: 4000; on the outline of a picture's body 100")
       ->option_text("N")
       ->check(CLI::Range(50, 200'000))
       ->group(group);
@@ -57,9 +60,10 @@ void add_draft_options(CLI::App& app, DraftArguments& arguments) {
 }
 
 CLI::App* add_new(CLI::App& app, std::string& file, DraftArguments& arguments) {
-  CLI::App* command =
-      app.add_subcommand("new", "ask questions and write the description of a surface or an image");
-  command->add_option("FILE", file, "surface or labelled image; default: it is asked for")->type_name("");
+  CLI::App* command = app.add_subcommand(
+      "new", "ask questions and write the description of a surface, an image or a picture");
+  command->add_option("FILE", file, "surface, labelled image or picture; default: it is asked for")
+      ->type_name("");
   command->add_flag("--renew", arguments.renew, "write NAME.model.toml anew where it is there already");
   command->footer(
       "An empty answer takes what stands in brackets. Answers may come from a pipe, one per line.\n"
@@ -70,8 +74,9 @@ CLI::App* add_new(CLI::App& app, std::string& file, DraftArguments& arguments) {
 
 void check_draft_options(const std::string& model, const DraftArguments& arguments) {
   if (!arguments.given() || shape_kind(model)) return;
-  throw CLI::ValidationError("--unit, --surface-nodes, --parts, --strict and --renew",
-                             "they are for a surface or an image, and '" + model + "' is none by its name");
+  throw CLI::ValidationError(
+      "--unit, --surface-nodes, --parts, --strict and --renew",
+      "they are for a surface, an image or a picture, and '" + model + "' is none by its name");
 }
 
 std::string described(const std::string& model, const DraftArguments& arguments) {

@@ -14,7 +14,7 @@ struct DraftArguments {
   std::string parts;
   bool strict = false;
   bool renew = false;
-  int nodes = ShapeOptions{}.nodes;
+  std::optional<int> nodes{};
 
   [[nodiscard]] bool given() const;  ///< any that only a surface or an image has a use for
 };

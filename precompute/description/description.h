@@ -39,10 +39,12 @@ struct PolygonGeometry {
   std::vector<std::vector<Vec3>> holes;
 };
 
-/// Black-and-white picture (PNG, PBM): the pixels that are not black are the body (Sito). A pixel is a square
-/// of one geometry unit; x to the right, y up, the lower left corner of the picture at the origin.
+/// Black-and-white picture (PNG, PBM): the pixels that are not black are the body (Sito), or those that are.
+/// A pixel is a square of one geometry unit; x to the right, y up, the lower left corner of the picture at
+/// the origin.
 struct PictureGeometry {
   std::filesystem::path file;
+  bool dark = false;  ///< what is black is the body
 };
 
 using Geometry = std::variant<SurfaceGeometry, ImageGeometry, VolumeGeometry, PolygonGeometry,

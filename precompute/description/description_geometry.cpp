@@ -90,6 +90,10 @@ Geometry read_geometry(const TomlTable& geometry, std::string_view kind,
     geometry.fail("labels", "[geometry] labels apply to images only, this geometry is a " + std::string(kind),
                   "remove labels");
   }
+  if (kind != "picture" && geometry.has("dark")) {
+    geometry.fail("dark", "[geometry] dark applies to pictures only, this geometry is a " + std::string(kind),
+                  "remove dark");
+  }
   if (kind == "surface") {
     return SurfaceGeometry{file()};
   }
@@ -104,7 +108,7 @@ Geometry read_geometry(const TomlTable& geometry, std::string_view kind,
     return VolumeGeometry{file()};
   }
   if (kind == "picture") {
-    return PictureGeometry{file()};
+    return PictureGeometry{file(), geometry.boolean("dark", false)};
   }
   if (kind == "polygon") {
     return read_polygon(geometry.table(kind, keys_of("[geometry] polygon")));

@@ -52,6 +52,7 @@ KeyTable geometry() {
             "of the picture is the origin",
             alternative},
            {"labels", "", "all but 0", "`image` only: list of the labels that are body"},
+           {"dark", "", "false", "`picture` only: what is black is body, as in a drawing on white paper"},
            {"scale", "m", shown(Description{}.scale),
             "metres per unit of the geometry: 0.001 for millimetres; for a picture, metres per pixel"}}};
 }

@@ -19,11 +19,24 @@ constexpr std::string_view repaired_mark = "# repaired by palpate-precompute\n";
 constexpr std::array<double, 3> wrap_offsets = {usual_wrap_offset, 0.15, 0.3};    // of the edge
 
 double edge_length(const Shape& shape, const UnitGuess& unit, const DraftOptions& options) {
-  return edge_for_nodes(shape.area, options.shape.nodes) * unit.unit.metres;
+  const int nodes = options.shape.nodes_of(shape.kind);
+  return (shape.kind == ShapeKind::picture ? shape.area / nodes : edge_for_nodes(shape.area, nodes)) *
+         unit.unit.metres;
+}
+
+DraftValues values_of(const Shape& shape, const DraftOptions& options) {
+  return options.values.value_or(usual_values(shape.kind));
+}
+
+/// A picture has no unit: its body is 10 cm long.
+UnitGuess unit_of_pixels(double longest_side) {
+  const std::string metres = fmt::format("{:.3g}", 0.1 / longest_side);
+  return {*read_unit(metres), fmt::format("the body is {} pixels long, and so 10 cm", longest_side)};
 }
 
 UnitGuess unit_of(const Shape& shape, const DraftOptions& options) {
   if (options.unit) return {*options.unit, "it was given"};
+  if (shape.kind == ShapeKind::picture) return unit_of_pixels(shape.size.maxCoeff());
   return guess_unit(shape.size.maxCoeff());
 }
 
@@ -79,13 +92,41 @@ void tell_decisions(const Shape& shape, const UnitGuess& unit, const DraftOption
                     const Tell& tell) {
   tell(fmt::format("unit: {}, as {}; another one: --unit {}", unit.unit.name, unit.why, unit_choices));
   const double edge = edge_length(shape, unit, options);
-  tell(fmt::format("edge length: {}, for about {} surface nodes", length_text(edge), options.shape.nodes));
-  tell(fmt::format("tissue: E = {} Pa, nu = {}; held: the lowest {} % along {}",
-                   options.values.youngs_modulus, options.values.poissons_ratio, options.values.percent,
-                   options.values.down));
+  const DraftValues values = values_of(shape, options);
+  const bool is_picture = shape.kind == ShapeKind::picture;
+  tell(fmt::format("edge length: {}, for about {} {}nodes", length_text(edge),
+                   options.shape.nodes_of(shape.kind), is_picture ? "outline " : "surface "));
+  if (is_picture) {
+    tell(fmt::format("body: what is {} in the picture, which nothing holds", shape.dark ? "dark" : "light"));
+    tell(fmt::format("jelly: E = {} Pa, nu = {}", values.youngs_modulus, values.poissons_ratio));
+    return;
+  }
+  tell(fmt::format("tissue: E = {} Pa, nu = {}; held: the lowest {} % along {}", values.youngs_modulus,
+                   values.poissons_ratio, values.percent, values.down));
+}
+
+/// The end of a picture's description.
+std::string picture_text(const DraftValues& values) {
+  return fmt::format(
+      "\n[material]\nyoungs_modulus = {}  # pascals: jelly\npoissons_ratio = {}\n"
+      "density = {}  # kg/m^3\nfriction = {}  # between the body and a tool\n"
+      "\n# Nothing holds the body: it falls and is thrown. To hold it: [[fixed]] (docs/model-toml.md)\n"
+      "\n[storage]\nscope = \"none\"  # no Green's functions: it is solved while you touch it "
+      "(docs/live.md)\n",
+      values.youngs_modulus, values.poissons_ratio, values.density, values.friction);
 }
 
 }  // namespace
+
+DraftValues usual_values(ShapeKind kind) {
+  DraftValues values;
+  if (kind == ShapeKind::picture) {
+    values.youngs_modulus = 2e4;
+    values.poissons_ratio = 0.3;
+    values.density = 1000.0;
+  }
+  return values;
+}
 
 std::filesystem::path draft_file(const std::filesystem::path& shape) {
   return shape.parent_path() / (shape_name(shape) + ".model.toml");
@@ -93,27 +134,39 @@ std::filesystem::path draft_file(const std::filesystem::path& shape) {
 
 std::string draft_text(const std::filesystem::path& file, const std::string& repaired, const Shape& shape,
                        const UnitGuess& unit, const DraftOptions& options) {
-  const DraftValues& values = options.values;
+  const DraftValues values = values_of(shape, options);
   const std::string name = file.filename().string();
-  const bool is_surface = shape.kind == ShapeKind::surface;
+  const bool is_surface = shape.kind == ShapeKind::surface, is_picture = shape.kind == ShapeKind::picture;
+  const int nodes = options.shape.nodes_of(shape.kind);
   std::string text = fmt::format(
       "# Drafted by palpate-precompute from {}. It is yours: change what is wrong, then run\n"
       "#   palpate-precompute {}\n"
-      "name = {}\n\n[geometry]\n",
+      "name = {}\n{}\n[geometry]\n",
       printable(name), printable(draft_file(file).filename().string()),
-      toml_string(values.name.empty() ? shape_name(file) : values.name));
-  text += fmt::format("{} = {}\n", is_surface ? "surface" : "image",
+      toml_string(values.name.empty() ? shape_name(file) : values.name),
+      is_picture ? "plane = \"strain\"  # \"stress\" for a thin sheet\n" : "");
+  text += fmt::format("{} = {}\n",
+                      is_surface   ? "surface"
+                      : is_picture ? "picture"
+                                   : "image",
                       toml_string(repaired.empty() ? name : repaired));
   for (const std::string& repair : shape.repairs) text += "# repaired: " + repair + "\n";
-  text += fmt::format("scale = {}  # metres per unit of the file ({}): {}\n", unit.unit.metres,
-                      unit.unit.name, unit.why);
+  if (is_picture) {
+    text += fmt::format("dark = {}  # whether what is dark is the body, or what is light\n", shape.dark);
+    text += fmt::format("scale = {}  # metres per pixel: {}\n", unit.unit.metres, unit.why);
+  } else {
+    text += fmt::format("scale = {}  # metres per unit of the file ({}): {}\n", unit.unit.metres,
+                        unit.unit.name, unit.why);
+  }
   text += fmt::format(
-      "\n[mesh]\nedge_length = {:.3g}  # metres: about {} surface nodes; half of it makes four times as "
+      "\n[mesh]\nedge_length = {:.3g}  # metres: about {} nodes on the {}; half of it makes {} times as "
       "many\n",
-      edge_length(shape, unit, options), options.shape.nodes);
+      edge_length(shape, unit, options), nodes, is_picture ? "outline" : "surface",
+      is_picture ? "two" : "four");
   if (is_surface)
     text += shape.remesh ? "remesh = true\n"
                          : "remesh = false  # the triangles of the surface are of that size\n";
+  if (is_picture) return text + picture_text(values);
   text += fmt::format(
       "\n[material]\nyoungs_modulus = {}  # pascals: soft tissue, about that of healthy liver\n"
       "poissons_ratio = {}  # below 0.5; from 0.47 on add element = \"tet10\" to [mesh]\n"
@@ -145,7 +198,7 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
   std::string repaired;
   if (shape.kind == ShapeKind::surface) {
     const std::size_t told = shape.repairs.size();
-    const double edge = edge_for_nodes(shape.area, options.shape.nodes);
+    const double edge = edge_for_nodes(shape.area, options.shape.nodes_of(shape.kind));
     const std::filesystem::path surface = options.shape.strict ? file : make_meshable(file, edge, shape);
     for (std::size_t i = told; i < shape.repairs.size(); ++i) tell("repaired: " + shape.repairs[i]);
     if (surface != file) {

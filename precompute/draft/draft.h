@@ -1,4 +1,4 @@
-// A model.toml for a surface or an image.
+// A model.toml for a surface, an image or a picture.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,7 @@ namespace palpate {
 
 /// What a drafted model.toml says besides the shape. Defaults are those of soft tissue: E and nu of healthy
 /// liver, rounded (Roulot et al., J. Hepatology 48, 2008: 5.5 +- 1.6 kPa), density and friction as the liver
-/// of meshes/models.
+/// of meshes/models. Nothing holds a body in the plane.
 struct DraftValues {
   std::string name;              ///< empty: that of the file
   double youngs_modulus = 5e3;   ///< [Pa]
@@ -27,15 +27,18 @@ struct DraftValues {
 /// How a draft is made.
 struct DraftOptions {
   ShapeOptions shape{};
-  std::optional<LengthUnit> unit{};  ///< empty: guessed
-  bool renew = false;                ///< a description that is there is written anew
-  DraftValues values{};
+  std::optional<LengthUnit> unit{};     ///< empty: guessed
+  bool renew = false;                   ///< a description that is there is written anew
+  std::optional<DraftValues> values{};  ///< empty: the usual ones of the kind
 };
+
+/// Soft tissue; for pictures jelly, E = 20 kPa and nu = 0.3, which keeps its shape under its own weight.
+DraftValues usual_values(ShapeKind kind);
 
 /// Takes a line for a person.
 using Tell = std::function<void(const std::string&)>;
 
-/// The description that belongs to a surface or an image: "organ.model.toml" beside "organ.stl".
+/// The description that belongs to a shape: "organ.model.toml" beside "organ.stl".
 std::filesystem::path draft_file(const std::filesystem::path& shape);
 
 /// The text of a description of a shape in `file` (where repaired, in `repaired`, a name in the same folder).
@@ -43,7 +46,7 @@ std::filesystem::path draft_file(const std::filesystem::path& shape);
 std::string draft_text(const std::filesystem::path& file, const std::string& repaired, const Shape& shape,
                        const UnitGuess& unit, const DraftOptions& options);
 
-/// Writes the description of a surface or an image beside it, and a surface that was repaired as
+/// Writes the description of a shape beside it, and a surface that was repaired as
 /// NAME.repaired.off, and returns the description's file. A description that is there already is used as it
 /// is; each decision is told. Throws Error for a file that cannot be used, for options that would change a
 /// description that is there, unless `renew`, and where it cannot be written.

@@ -59,10 +59,11 @@ double ask_number(const Conversation& with, const std::string& question, double 
 }
 
 void ask_file(const Conversation& with, std::filesystem::path& file) {
-  ask(with, "Surface (.stl, .obj, .ply, .off) or labelled image (.nrrd, .nii, .inr)", "",
-      [&](const std::string& answer) -> std::string {
+  ask(with, "Surface (.stl, .obj, .ply, .off), labelled image (.nrrd, .nii, .inr) or picture (.png, .pbm)",
+      "", [&](const std::string& answer) -> std::string {
         if (answer.empty()) return "a file is needed";
-        if (!shape_kind(answer)) return "'" + printable(answer) + "' is no surface or image by its name";
+        if (!shape_kind(answer))
+          return "'" + printable(answer) + "' is no surface, image or picture by its name";
         if (!std::filesystem::is_regular_file(answer)) return "there is no file '" + printable(answer) + "'";
         file = answer;
         return "";
@@ -94,7 +95,8 @@ void ask_axis(const Conversation& with, DraftValues& values) {
 std::filesystem::path draft_by_questions(std::filesystem::path file, DraftOptions options,
                                          const Conversation& with) {
   if (file.empty()) ask_file(with, file);
-  DraftValues& values = options.values;
+  const ShapeKind kind = shape_kind(file).value_or(ShapeKind::surface);
+  DraftValues& values = options.values.emplace(usual_values(kind));
   ask(with, "Name of the model", shape_name(file), [&](const std::string& answer) -> std::string {
     if (answer.empty() || answer.find('/') != std::string::npos) return "a name without / is needed";
     values.name = answer;
@@ -106,11 +108,14 @@ std::filesystem::path draft_by_questions(std::filesystem::path file, DraftOption
                                      values.youngs_modulus, 0.0, stiffest);
   values.poissons_ratio =
       ask_number(with, "Poisson's ratio (soft tissue 0.45 to 0.49)", values.poissons_ratio, -1.0, 0.5);
-  ask_axis(with, values);
-  values.percent =
-      ask_number(with, "How much of the height is held, in per cent", values.percent, 0.0, 100.0);
-  options.shape.nodes = static_cast<int>(ask_number(with, "Nodes on the surface (more are finer and slower)",
-                                                    options.shape.nodes, 50.0, 200'000.0));
+  if (kind != ShapeKind::picture) {
+    ask_axis(with, values);
+    values.percent =
+        ask_number(with, "How much of the height is held, in per cent", values.percent, 0.0, 100.0);
+  }
+  const std::string where = kind == ShapeKind::picture ? "Nodes on the outline" : "Nodes on the surface";
+  options.shape.nodes = static_cast<int>(ask_number(with, where + " (more are finer and slower)",
+                                                    options.shape.nodes_of(kind), 50.0, 200'000.0));
   return draft(file, options, true, [&](const std::string& line) { with.questions << line << '\n'; });
 }
 

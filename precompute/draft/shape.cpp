@@ -2,29 +2,34 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <limits>
+#include <numbers>
 #include <string_view>
 #include <utility>
 
 #include "base/error.h"
+#include "precompute/geometry/picture_reader.h"
 #include "precompute/images/labelled_image.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, ShapeKind>, 9> endings = {{{".stl", ShapeKind::surface},
-                                                                            {".obj", ShapeKind::surface},
-                                                                            {".ply", ShapeKind::surface},
-                                                                            {".off", ShapeKind::surface},
-                                                                            {".inr", ShapeKind::image},
-                                                                            {".inr.gz", ShapeKind::image},
-                                                                            {".nii", ShapeKind::image},
-                                                                            {".nii.gz", ShapeKind::image},
-                                                                            {".nrrd", ShapeKind::image}}};
-constexpr double staircase = 1.5;
+constexpr std::array<std::pair<std::string_view, ShapeKind>, 11> endings = {{{".stl", ShapeKind::surface},
+                                                                             {".obj", ShapeKind::surface},
+                                                                             {".ply", ShapeKind::surface},
+                                                                             {".off", ShapeKind::surface},
+                                                                             {".inr", ShapeKind::image},
+                                                                             {".inr.gz", ShapeKind::image},
+                                                                             {".nii", ShapeKind::image},
+                                                                             {".nii.gz", ShapeKind::image},
+                                                                             {".nrrd", ShapeKind::image},
+                                                                             {".png", ShapeKind::picture},
+                                                                             {".pbm", ShapeKind::picture}}};
+constexpr double staircase = 1.5, plane_staircase = 4.0 / std::numbers::pi;
 
 /// The ending in small letters that a name has, or null.
 const std::pair<std::string_view, ShapeKind>* ending_of(const std::filesystem::path& file) {
@@ -56,7 +61,7 @@ Shape read_whole_surface(const std::filesystem::path& file) {
 }
 
 Shape read_repaired_surface(const std::filesystem::path& file, const ShapeOptions& options) {
-  RepairedSurface repaired = repair_surface(file, options.parts, options.nodes);
+  RepairedSurface repaired = repair_surface(file, options.parts, options.nodes_of(ShapeKind::surface));
   Shape shape;
   measure(repaired.surface, shape);
   shape.repairs = std::move(repaired.repairs);
@@ -89,6 +94,40 @@ Shape read_image(const std::filesystem::path& file) {
   return shape;
 }
 
+/// Whether more than half of the pixels along the picture's edges are body, as paper is.
+bool is_paper(const PixelBody& body) {
+  Index rim = 0, inside = 0;
+  for (Index j = 0; j < body.height; ++j) {
+    for (Index i = 0; i < body.width; ++i) {
+      if (i > 0 && j > 0 && i + 1 < body.width && j + 1 < body.height) continue;
+      ++rim;
+      inside += body.is_body(i, j) ? 1 : 0;
+    }
+  }
+  return 2 * inside > rim;
+}
+
+bool is_empty(const PixelBody& body) {
+  return std::ranges::none_of(body.inside, [](std::uint8_t pixel) { return pixel != 0; });
+}
+
+Shape read_picture_shape(const std::filesystem::path& file) {
+  Shape shape;
+  shape.kind = ShapeKind::picture;
+  PixelBody body = read_picture({file});
+  shape.dark = is_empty(body) || is_paper(body);  // dark on what is transparent has nothing light
+  if (shape.dark) body = read_picture({file, true});
+  std::vector<std::string> notes;  // the bake tells them
+  keep_one_body(body, file.string(), notes);
+  Eigen::AlignedBox2i box;
+  for (const std::vector<LatticePoint>& outline : trace_outlines(body)) {
+    for (const LatticePoint& corner : outline) box.extend(Eigen::Vector2i(corner[0], corner[1]));
+    shape.area += static_cast<double>(outline.size()) / plane_staircase;
+  }
+  shape.size.head<2>() = box.sizes().cast<double>();
+  return shape;
+}
+
 }  // namespace
 
 std::optional<ShapeKind> shape_kind(const std::filesystem::path& file) {
@@ -103,7 +142,9 @@ std::string shape_name(const std::filesystem::path& file) {
 }
 
 Shape read_shape(const std::filesystem::path& file, const ShapeOptions& options) {
-  if (shape_kind(file) == ShapeKind::image) return read_image(file);
+  const std::optional<ShapeKind> kind = shape_kind(file);
+  if (kind == ShapeKind::image) return read_image(file);
+  if (kind == ShapeKind::picture) return read_picture_shape(file);
   return options.strict ? read_whole_surface(file) : read_repaired_surface(file, options);
 }
 

@@ -1,4 +1,4 @@
-// A surface or an image that a person has, and what it takes to use it.
+// A surface, an image or a picture that a person has, and what it takes to use it.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,13 @@
 namespace palpate {
 
 /// What a file describes a body by.
-enum class ShapeKind : std::uint8_t { surface, image };
+enum class ShapeKind : std::uint8_t {
+  surface,
+  image,    ///< labelled, in space
+  picture,  ///< of a body in the plane
+};
 
-/// Surface or image by the file's name; nothing for every other file.
+/// By the file's name; nothing for every other file.
 std::optional<ShapeKind> shape_kind(const std::filesystem::path& file);
 
 /// The file's name without folder and ending: "organ" of "in/organ.inr.gz".
@@ -26,20 +30,27 @@ struct Shape {
   std::vector<std::string> repairs;  ///< surfaces: what was repaired, a sentence each
   TriangleSurface repaired;          ///< the surface then; empty where the file is whole
   Vec3 size = Vec3::Zero();          ///< of the box around it [file units]
-  double area = 0.0;                 ///< of the boundary [file units^2]
+  double area = 0.0;                 ///< of the boundary; of pictures its length [file units^2, file units]
   bool remesh = true;                ///< surfaces: the edge length is to be that of the boundary too
+  bool dark = false;                 ///< pictures: drawn dark on a light ground
 };
 
 /// How a shape is taken.
 struct ShapeOptions {
   SurfaceParts parts = SurfaceParts::largest;
-  bool strict = false;  ///< repair nothing
-  int nodes = 4000;     ///< on the surface of the mesh that is to come
+  bool strict = false;         ///< repair nothing
+  std::optional<int> nodes{};  ///< on the surface of the mesh that is to come; of pictures the outline
+
+  [[nodiscard]] int nodes_of(ShapeKind kind) const noexcept {
+    return nodes.value_or(kind == ShapeKind::picture ? 100 : 4000);
+  }
 };
 
-/// Reads a surface and repairs it, or measures an image: its boundary is that of the voxels that are not 0,
-/// whose staircase is taken for 3/2 of the smooth area, the mean over all directions of |n_x| + |n_y| +
-/// |n_z|. Throws Error for files that cannot be used; strict, also for surfaces that would need a repair.
+/// Reads a surface and repairs it, or measures an image or a picture. The boundary of an image is that of the
+/// voxels that are not 0, whose staircase is taken for 3/2 of the smooth area, the mean over all directions
+/// of |n_x| + |n_y| + |n_z|; that of a picture, of pixels, for 4/pi of the smooth length. A picture is dark
+/// on light where more than half of its rim would be body else. Throws Error for files that cannot be used;
+/// strict, also for surfaces that would need a repair.
 Shape read_shape(const std::filesystem::path& file, const ShapeOptions& options);
 
 }  // namespace palpate

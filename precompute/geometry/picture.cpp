@@ -108,7 +108,7 @@ PolygonGeometry outline(const PixelBody& body, double edge_length) {
 Mesh mesh_picture(const PictureGeometry& picture, const MeshOptions& options,
                   std::vector<std::string>& notes) {
   const std::string where = picture.file.string();
-  PixelBody body = read_picture(picture.file);
+  PixelBody body = read_picture(picture);
   keep_one_body(body, where, notes);
   return mesh_polygon(outline(body, *options.edge_length), options, where, notes);
 }

@@ -46,7 +46,8 @@ struct PngImage {
   ~PngImage() { png_image_free(&image); }
 };
 
-PixelBody read_png(const std::string& bytes, const std::string& where) {
+/// What is not black is body. Transparent pixels lie over `ground`.
+PixelBody read_png(const std::string& bytes, const png_color& ground, const std::string& where) {
   PngImage png;
   const auto check = [&](int is_good) {
     if (is_good == 0) {
@@ -57,23 +58,22 @@ PixelBody read_png(const std::string& bytes, const std::string& where) {
   check(png_image_begin_read_from_memory(&png.image, bytes.data(), bytes.size()));
   PixelBody body = blank(png.image.width, png.image.height, where);
   png.image.format = PNG_FORMAT_GRAY;
-  const png_color black{0, 0, 0};
   std::vector<unsigned char> grey(body.inside.size());
   const auto upwards = -static_cast<png_int_32>(body.width);  // the first row in memory is the lowest
-  check(png_image_finish_read(&png.image, &black, grey.data(), upwards, nullptr));
+  check(png_image_finish_read(&png.image, &ground, grey.data(), upwards, nullptr));
   std::transform(grey.begin(), grey.end(), body.inside.begin(),
                  [](unsigned char value) { return static_cast<std::uint8_t>(value >= first_white); });
   return body;
 }
 
 /// Reads a PNG in a child, as libpng is foreign code.
-PixelBody read_png_in_child(const std::string& bytes, const std::string& where) {
+PixelBody read_png_in_child(const std::string& bytes, const png_color& ground, const std::string& where) {
   const ChildTask task = {.name = "libpng",
                           .where = where,
                           .limits = reading_limits(static_cast<std::int64_t>(bytes.size())),
                           .hint = save_again};
   const ChildResult result = run_in_child(task, [&] {
-    const PixelBody body = read_png(bytes, where);
+    const PixelBody body = read_png(bytes, ground, where);
     ChildResult answer;
     append_array(answer.bytes, std::span<const Index>(std::array{body.width, body.height}));
     append_array(answer.bytes, std::span(body.inside));
@@ -177,13 +177,13 @@ class PbmReader {
   const std::string& where_;
 };
 
-}  // namespace
-
-PixelBody read_picture(const std::filesystem::path& file) {
-  const std::string where = file.string();
-  const std::string bytes = read_all(file, "Check picture = \"...\" in [geometry]");
+/// What is not black is body.
+PixelBody read_light(const PictureGeometry& picture) {
+  const std::string where = picture.file.string();
+  const std::string bytes = read_all(picture.file, "Check picture = \"...\" in [geometry]");
   if (bytes.starts_with(png_signature)) {
-    return read_png_in_child(bytes, where);
+    const png_color black{0, 0, 0}, white{255, 255, 255};
+    return read_png_in_child(bytes, picture.dark ? white : black, where);
   }
   if (bytes.starts_with("P1")) {
     return PbmReader(bytes, where).plain();
@@ -192,6 +192,15 @@ PixelBody read_picture(const std::filesystem::path& file) {
     return PbmReader(bytes, where).raw();
   }
   throw Error("this is neither a PNG nor a PBM picture", where, save_again);
+}
+
+}  // namespace
+
+PixelBody read_picture(const PictureGeometry& picture) {
+  PixelBody body = read_light(picture);
+  if (!picture.dark) return body;
+  for (std::uint8_t& pixel : body.inside) pixel = pixel == 0 ? 1 : 0;
+  return body;
 }
 
 }  // namespace palpate

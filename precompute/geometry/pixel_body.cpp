@@ -125,7 +125,7 @@ void drop_small_parts(PixelBody& body, const std::string& where, std::vector<std
     largest = std::max(largest, part.is_body ? part.pixels : 0);
   }
   if (largest == 0) {
-    throw Error("the picture has no body: all its pixels are black", where,
+    throw Error("the picture has no body: all its pixels are black, or white where dark is true", where,
                 "paint the body white; a pixel is black when its grey value is below 128");
   }
   std::vector<Part> bodies;

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/program.h"
 #include "base/spelling.h"
+#include "formats/model_file.h"
 #include "runtime/app/devices_command.h"
 #include "runtime/app/export.h"
 #include "runtime/app/play_command.h"
@@ -22,6 +23,7 @@
 #include "runtime/gallery/gallery.h"
 #include "runtime/loop/numbers.h"
 #include "runtime/push/push_command.h"
+#include "runtime/push/solved_settings.h"
 
 namespace {
 
@@ -229,7 +231,7 @@ std::string meant_by(const CLI::App& app, const std::string& word) {
   if (word.ends_with(".toml"))
     return "palpate-precompute " + word + " makes the file that is played with. " + see;
   for (const char* const ending :
-       {".stl", ".obj", ".ply", ".off", ".inr", ".inr.gz", ".nii", ".nii.gz", ".nrrd"}) {
+       {".stl", ".obj", ".ply", ".off", ".inr", ".inr.gz", ".nii", ".nii.gz", ".nrrd", ".png", ".pbm"}) {
     if (word.ends_with(ending))
       return fmt::format("palpate-runtime push {} makes a body of it that you can push. {}", word, see);
   }
@@ -253,6 +255,7 @@ int push(const PushArguments& arguments) {
   play_arguments.file = arguments.file;
   play_arguments.view = true;
   play_arguments.view_address = arguments.view_address;
+  play_arguments.view_framed = arguments.view_framed;
   play_arguments.duration = arguments.duration;
   PlayOptions options = read_play(play_arguments);
   if (!is_baked(arguments)) {
@@ -260,6 +263,11 @@ int push(const PushArguments& arguments) {
     if (baked.status != exit_ok) return baked.status;
     options.file = baked.file;
   }
+  options.settings_text = solved_settings(load_outline(options.file));
+  options.settings = read_settings(options.settings_text);
+  if (!options.settings_text.empty())
+    fmt::print(stderr, "solved while you touch it: palpate-runtime play {} --view {}\n",
+               options.file.string(), option_text(options.settings_text));
   return play(options);
 }
 
@@ -286,7 +294,8 @@ int run(int argc, char** argv) {
       "  palpate-runtime help play                       more about a command\n"
       "Exit status: 0 done, 1 bad input or file, 2 wrong arguments, 3 a replay differed, 130 interrupted.");
   Arguments arguments;
-  const CLI::App* push_command = add_push(app, arguments.push);
+  CLI::App* push_command = add_push(app, arguments.push);
+  push_command->add_flag("--view-framed", arguments.push.view_framed, view_framed_help);
   const CLI::App* play_command = add_play(app, arguments.play);
   const CLI::App* view_command = add_view(app, arguments);
   const CLI::App* probe_command = add_probe(app, arguments);

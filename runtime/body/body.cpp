@@ -69,9 +69,10 @@ FineSurface surface_as_it_is(const Model& model) {
 /// Those that contact is to meet; of dynamic contact with modes still without them.
 Greens take_greens(Model& model, const GreensOptions& options, ContactModel contact) {
   if (model.scope == Scope::none) {
-    throw Error("the file has no Green's functions: its scope is none", model.name,
-                "play it with --solver, e.g. --solver corotational, or set another scope in [storage] and "
-                "precompute it again");
+    throw Error(
+        "the file has no Green's functions: its scope is none", model.name,
+        "palpate-runtime push FILE solves it while you touch it, as play --solver corotational does; or set "
+        "another scope in [storage] and precompute it again");
   }
   check_sizes(model);
   PackedGreens greens = std::exchange(model.greens, {});

@@ -109,7 +109,7 @@ std::optional<Response> GalleryAnswers::drop_refusal(const RequestHeader& reques
   if (gallery_kind(name_in(request))) return std::nullopt;
   return guarded(plain(http::status::unsupported_media_type,
                        "This is neither a body (.palpate.hdf), a recording (.h5), a surface (.stl, .obj, "
-                       ".ply, .off) nor a labelled image (.nrrd, .nii, .inr)."));
+                       ".ply, .off), a labelled image (.nrrd, .nii, .inr) nor a picture (.png, .pbm)."));
 }
 
 Response GalleryAnswers::keep_file(const RequestHeader& request,

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t longest_name = 200;
 
-constexpr std::array<std::pair<std::string_view, GalleryKind>, 13> endings = {{
+constexpr std::array<std::pair<std::string_view, GalleryKind>, 15> endings = {{
     {".palpate.hdf", GalleryKind::body},
     {".h5", GalleryKind::recording},
     {".stl", GalleryKind::source},
@@ -30,6 +30,8 @@ constexpr std::array<std::pair<std::string_view, GalleryKind>, 13> endings = {{
     {".nii", GalleryKind::source},
     {".nii.gz", GalleryKind::source},
     {".nrrd", GalleryKind::source},
+    {".png", GalleryKind::source},
+    {".pbm", GalleryKind::source},
     {".model.toml", GalleryKind::source},
     {"model.toml", GalleryKind::source},
 }};
@@ -39,6 +41,11 @@ std::string_view ending_of(std::string_view name) {
   for (const auto& [ending, kind] : endings)
     if (name.ends_with(ending) && ending.size() > longest.size()) longest = ending;
   return longest;
+}
+
+/// Most pictures in a folder are of something else: they become bodies where they are dropped.
+bool is_picture(std::string_view name) {
+  return ending_of(name) == ".png" || ending_of(name) == ".pbm";
 }
 
 std::string_view stem_of(std::string_view name) {
@@ -92,7 +99,8 @@ std::vector<GalleryItem> list_gallery(const fs::path& folder) {
   };
   std::vector<GalleryItem> shown;
   for (const GalleryItem& item : items)
-    if (item.kind != GalleryKind::source || !has_body(item)) shown.push_back(item);
+    if (item.kind != GalleryKind::source || (!has_body(item) && !is_picture(item.name)))
+      shown.push_back(item);
   std::sort(shown.begin(), shown.end(), [](const GalleryItem& a, const GalleryItem& b) {
     return std::tie(a.kind, a.name) < std::tie(b.kind, b.name);
   });

@@ -28,8 +28,8 @@ struct GalleryItem {
 /// or with another ending.
 [[nodiscard]] std::optional<GalleryKind> gallery_kind(std::string_view name);
 
-/// Bodies, then recordings, then sources that no body there was made of by name; each by name. Throws Error
-/// where the folder cannot be read.
+/// Bodies, then recordings, then sources that no body there was made of by name, without pictures; each by
+/// name. Throws Error where the folder cannot be read.
 [[nodiscard]] std::vector<GalleryItem> list_gallery(const std::filesystem::path& folder);
 
 /// A name like `wanted` that no file of the folder has: `wanted` itself, or with a number before its ending.

@@ -21,17 +21,15 @@ std::vector<std::string> arguments_for(const std::filesystem::path& folder, cons
   std::vector<std::string> words;
   switch (*gallery_kind(name)) {
     case GalleryKind::body:
-      words = {"play", file, "--view"};
+    case GalleryKind::source:
+      words = {"push", file};
       break;
     case GalleryKind::recording:
       words = {"view", file};
       break;
-    case GalleryKind::source:
-      words = {"push", file};
-      break;
   }
   words.insert(words.end(), {"--view-address", fmt::format("{}:{}", options.address, options.port)});
-  if (options.framed && gallery_kind(name) != GalleryKind::source) words.emplace_back("--view-framed");
+  if (options.framed) words.emplace_back("--view-framed");
   return words;
 }
 

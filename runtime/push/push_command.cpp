@@ -43,19 +43,21 @@ std::string output_of(const std::string& report) {
 
 CLI::App* add_push(CLI::App& app, PushArguments& arguments) {
   CLI::App* push = app.add_subcommand("push", "do all that it takes to push a body in a browser");
-  push->add_option("FILE", arguments.file,
-                   "surface (.stl, .obj, .ply, .off), labelled image (.nrrd, .nii, .inr), "
-                   "description (.toml) or "
-                   "precomputed "
-                   "model NAME.palpate.hdf")
+  push->add_option(
+          "FILE", arguments.file,
+          "surface (.stl, .obj, .ply, .off), labelled image (.nrrd, .nii, .inr), picture (.png, .pbm), "
+          "description (.toml) or precomputed model NAME.palpate.hdf")
       ->required()
       ->type_name("");
   add_handed_on(*push, arguments, "output", "FILE",
                 "file to write; default: NAME.palpate.hdf in the current folder");
   add_handed_on(*push, arguments, "unit", "UNIT",
-                "unit of a surface or an image: mm, cm, m, um, in, or metres per unit; default: guessed");
-  add_handed_on(*push, arguments, "surface-nodes", "N",
-                "about how many nodes its surface has; default: 4000");
+                "unit of a surface or an image: mm, cm, m, um, in, or metres per unit (of a picture: per "
+                "pixel); default: "
+                "guessed");
+  add_handed_on(
+      *push, arguments, "surface-nodes", "N",
+      "about how many nodes its surface has; default: 4000; on the outline of a picture's body 100");
   add_handed_on(*push, arguments, "parts", "largest|all", "which of several parts are the body");
   add_handed_on(*push, arguments, "strict", "", "refuse a surface that needs a repair");
   add_handed_on(*push, arguments, "renew", "", "write NAME.model.toml anew");
@@ -65,9 +67,11 @@ CLI::App* add_push(CLI::App& app, PushArguments& arguments) {
   push->add_option("--duration", arguments.duration, "stop after this time [s]")->type_name("S");
   push->footer(
       "Runs palpate-precompute where the model is not there or its sources have changed, then plays it as\n"
-      "palpate-runtime play FILE --view does, which has more options.\n"
+      "palpate-runtime play FILE --view does, which has more options. A body of a picture, which nothing\n"
+      "holds, is solved while you touch it: it falls, and keeps deep dents.\n"
       "Examples:\n"
       "  palpate-runtime push organ.stl\n"
+      "  palpate-runtime push drawing.png\n"
       "  palpate-runtime push organ.stl --unit cm --renew");
   return push;
 }

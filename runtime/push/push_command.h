@@ -14,6 +14,7 @@ struct PushArguments {
   std::vector<std::string> for_precompute;  ///< options that are handed on, with their values
   std::optional<std::string> view_address;
   std::optional<std::string> duration;
+  bool view_framed = false;
 };
 
 /// Adds the subcommand.
@@ -32,4 +33,5 @@ struct Baked {
 /// Bakes by palpate-precompute, in a process of its own, what is not baked yet. Throws Error where the
 /// program is not there or does not say what it wrote.
 [[nodiscard]] Baked bake_first(const PushArguments& arguments);
+
 }  // namespace palpate

@@ -127,9 +127,21 @@ test('a file that is dropped lands in the folder and is opened', async (t) => {
 
   await part(page, 'to-gallery').click();
   await item(page, 'small-2.palpate.hdf').waitFor();
+  const disc = Array.from({ length: 60 }, (_, y) => Array.from({ length: 60 }, (_, x) => (Math.hypot(x - 29.5, y - 29.5) < 20 ? 1 : 0)).join(' '));
+  await drop('disc.pbm', Buffer.from(`P1\n60 60\n${disc.join('\n')}\n`)); // a drawing becomes a body that falls
+  await ready(page);
+  const { model, settings } = await told(page, 'state');
+  assert.deepEqual([model.name, model.dimension, settings.solver, settings.gravity], ['disc', 2, 'corotational', '0,-9.81,0']);
+  await part(page, 'to-gallery').click();
+  await item(page, 'disc.palpate.hdf').click();
+  await ready(page);
+  assert.equal((await told(page, 'state')).settings.solver, 'corotational');
+  await part(page, 'to-gallery').click();
+  await item(page, 'small-2.palpate.hdf').waitFor();
+  const before = await readdir(at);
   await drop('letter.txt', Buffer.from('dear'));
   await until(page, () => /letter.txt cannot be shown/.test(document.querySelector('[data-testid="opening"] h2')?.textContent));
-  assert.deepEqual(await readdir(at), ['small-2.palpate.hdf', 'small.palpate.hdf']);
+  assert.deepEqual(await readdir(at), before);
 });
 
 for (const [width, height, hasTouch, colorScheme] of [[360, 640, true, 'light'], [1280, 800, false, 'dark']]) {

@@ -32,7 +32,7 @@ const kinds: Record<Kind, { title: string; does: string }> = {
   source: { title: 'To make a body of', does: 'make a body of it and push it' },
 };
 
-const endings = /\.(palpate\.hdf|h5|stl|obj|ply|off|inr|inr\.gz|nii|nii\.gz|nrrd)$/i;
+const endings = /\.(palpate\.hdf|h5|stl|obj|ply|off|inr|inr\.gz|nii|nii\.gz|nrrd|png|pbm)$/i;
 
 function element<K extends keyof HTMLElementTagNameMap>(kind: K, text = '', values: Partial<HTMLElementTagNameMap[K]> = {}): HTMLElementTagNameMap[K] {
   const made = document.createElement(kind);
@@ -126,7 +126,7 @@ export class Gallery {
   }
 
   private nothing(): HTMLElement {
-    return element('p', 'There is nothing here yet. Drop a surface (.stl, .obj, .ply, .off), a labelled image (.nrrd, .nii, .inr) or a baked body (.palpate.hdf) on this page.', { className: 'nothing' });
+    return element('p', 'There is nothing here yet. Drop a surface (.stl, .obj, .ply, .off), a labelled image (.nrrd, .nii, .inr), a picture of a body in the plane (.png, .pbm) or a baked body (.palpate.hdf) on this page.', { className: 'nothing' });
   }
 
   private group(kind: Kind, items: Item[]): HTMLElement[] {
@@ -230,7 +230,7 @@ export class Gallery {
     for (const file of files) {
       this.show_opening({ name: file.name, said: ['It is being copied into the folder.'], url: '', ended: false });
       try {
-        if (!endings.test(file.name)) throw new Error('This is no body (.palpate.hdf), recording (.h5), surface (.stl, .obj, .ply, .off) or labelled image (.nrrd, .nii, .inr).');
+        if (!endings.test(file.name)) throw new Error('This is no body (.palpate.hdf), recording (.h5), surface (.stl, .obj, .ply, .off), labelled image (.nrrd, .nii, .inr) or picture (.png, .pbm).');
         const { name } = (await (await ask('drop', { method: 'POST', body: file }, file.name)).json()) as { name: string };
         if (files.length === 1) await this.open(name);
       } catch (error) {

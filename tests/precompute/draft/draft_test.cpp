@@ -128,6 +128,43 @@ TEST_F(DraftTest, NamesAreWrittenAsTomlWantsThem) {
   EXPECT_EQ(read_description(file).name, "an \"organ\" of\\mine");
 }
 
+/// A disc of radius 40 in a picture of 100 x 120 pixels, as a plain PBM: '1' is black.
+std::string disc(bool is_dark) {
+  std::string text = "P1\n100 120\n";
+  for (int row = 0; row < 120; ++row) {
+    for (int column = 0; column < 100; ++column)
+      text += (std::hypot(column - 49.5, row - 59.5) < 40.0) == is_dark ? '1' : '0';
+    text += '\n';
+  }
+  return text;
+}
+
+TEST_F(DraftTest, DrawingBecomesAFreeBodyInThePlane) {
+  for (const bool is_dark : {true, false}) {
+    const std::string name = is_dark ? "dark" : "light";
+    told_.clear();
+    const std::filesystem::path file = draft(folder_.write(name + ".pbm", disc(is_dark)), {}, false, tell());
+    expect_mentions(told_, {"80 pixels long, and so 10 cm", "100 outline nodes",
+                            "what is " + name + " in the picture", "E = 20000 Pa"});
+    const Description description = read_description(file);
+    EXPECT_EQ(std::get<PictureGeometry>(description.geometry).dark, is_dark);
+    EXPECT_EQ(std::get<PictureGeometry>(description.geometry).file, folder_.path() / (name + ".pbm"));
+    EXPECT_EQ(description.analysis, Analysis::plane_strain);
+    EXPECT_NEAR(description.scale, 0.1 / 80.0, 1e-5);
+    // The circle's length, which its pixels show to some per cent.
+    const double edge = 0.1 * std::numbers::pi / 100.0;
+    EXPECT_NEAR(*description.mesh.edge_length, edge, 0.03 * edge);
+    EXPECT_EQ(description.scope, Scope::none);
+    EXPECT_TRUE(description.fixed.empty());
+  }
+}
+
+TEST_F(DraftTest, PictureWithoutABodyIsRefused) {
+  const std::filesystem::path paper = folder_.write("paper.pbm", "P1\n3 2\n000000\n");
+  expect_mentions(error_of([&] { draft(paper, {}, false, tell()); }), {"paper.pbm", "no body"});
+  EXPECT_FALSE(std::filesystem::exists(draft_file(paper)));
+}
+
 TEST_F(DraftTest, QuestionsAreAnsweredThroughAPipe) {
   const std::filesystem::path surface = open_ball("organ.off");
   std::istringstream answers(surface.string() + "\nliver\nmm\n8e3\n\ny\n25\n300\n");

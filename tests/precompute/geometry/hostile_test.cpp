@@ -133,7 +133,7 @@ TEST_F(HostileInput, FifosAndFoldersAreNoInput) {
                     mesh_image({folder_.path() / "a.inr", {}, false}, options, notes_);
                   }),
                   {"is a FIFO"});
-  expect_mentions(error_of([&] { read_picture(folder_.path() / "a.png"); }), {"is a FIFO"});
+  expect_mentions(error_of([&] { read_picture({folder_.path() / "a.png"}); }), {"is a FIFO"});
   expect_mentions(error_of([&] { read_surface(folder_.path(), notes_); }), {"is a folder"});
 }
 

@@ -98,7 +98,7 @@ class Picture : public ::testing::Test {
   /// Number of white pixels of a picture file.
   double count(const Bytes& file) { return static_cast<double>(pixels(read(file))); }
 
-  PixelBody read(const Bytes& file) { return read_picture(folder_.write("read", file)); }
+  PixelBody read(const Bytes& file) { return read_picture({folder_.write("read", file)}); }
 
   TempFolder folder_;
   std::vector<std::string> notes_;
@@ -115,6 +115,23 @@ TEST_F(Picture, WhiteIsARectangle) {
     EXPECT_NEAR(length, 10.0, 1e-9);
   }
   EXPECT_TRUE(notes_.empty());
+}
+
+TEST_F(Picture, DarkIsTheOtherSide) {
+  const auto file = [](int format, const Bytes& on, const Bytes& off) {
+    Bytes channels;
+    for (int pixel = 0; pixel < 6; ++pixel) channels += pixel % 3 == 0 ? on : off;
+    return png(3, 2, format, channels);
+  };
+  for (const Bytes& drawn : {file(PNG_FORMAT_GRAY, Bytes("\0", 1), "\xff"),              // black on white
+                             file(PNG_FORMAT_GA, Bytes("\0\xff", 2), Bytes("\0\0", 2)),  // black on nothing
+                             Bytes("P1 3 2 1 0 0 1 0 0")}) {
+    const std::filesystem::path path = folder_.write("drawn", drawn);
+    EXPECT_EQ(read_picture({path, true}).inside, (std::vector<std::uint8_t>{1, 0, 0, 1, 0, 0}));
+  }
+  EXPECT_EQ(pixels(read_picture(
+                {folder_.write("nothing", file(PNG_FORMAT_GA, Bytes("\0\xff", 2), Bytes("\0\0", 2)))})),
+            0);
 }
 
 TEST_F(Picture, CornersStay) {
@@ -253,9 +270,9 @@ TEST_F(Picture, BadBodies) {
 TEST_F(Picture, UnreadableFiles) {
   const Bytes good = drawing(40, 30, [](double x, double y) { return x + y < 35; });
   const auto error = [&](const Bytes& file) { return error_of([&] { read(file); }); };
-  expect_mentions(error_of([&] { read_picture(folder_.path() / "none.png"); }),
+  expect_mentions(error_of([&] { read_picture({folder_.path() / "none.png"}); }),
                   {"none.png", "No such file", "picture ="});
-  expect_mentions(error_of([&] { read_picture(folder_.path()); }), {"is a folder"});
+  expect_mentions(error_of([&] { read_picture({folder_.path()}); }), {"is a folder"});
   for (const Bytes& file : {Bytes(), Bytes("hello"), Bytes("P5 1 1 255\n\xff"), Bytes("\xff\xd8\xff\xe0")}) {
     expect_mentions(error(file), {"read", "neither a PNG nor a PBM"});
   }

@@ -37,7 +37,7 @@ TEST(GalleryFolder, KindsAreThoseOfTheEnding) {
   EXPECT_EQ(gallery_kind("a.palpate.hdf"), GalleryKind::body);
   EXPECT_EQ(gallery_kind("a.h5"), GalleryKind::recording);
   for (const char* const name : {"a.stl", "a.obj", "a.ply", "a.off", "a.inr", "a.inr.gz", "a.nii", "a.nii.gz",
-                                 "a.nrrd", "model.toml", "a.model.toml"})
+                                 "a.nrrd", "a.png", "a.pbm", "model.toml", "a.model.toml"})
     EXPECT_EQ(gallery_kind(name), GalleryKind::source) << name;
   const std::string no_name(300, 'a');
   for (const std::string& name : std::vector<std::string>{"", "a", "a.hdf", "a.gz", ".h5", ".a.stl",
@@ -48,7 +48,7 @@ TEST(GalleryFolder, KindsAreThoseOfTheEnding) {
 TEST(GalleryFolder, BodiesComeBeforeRecordingsAndWhatNoBodyWasMadeOf) {
   const ScratchFolder folder;
   for (const char* const name :
-       {"b.palpate.hdf", "a.palpate.hdf", "z.h5", "b.stl", "c.stl", "notes.txt", ".a.stl"})
+       {"b.palpate.hdf", "a.palpate.hdf", "z.h5", "b.stl", "c.stl", "plot.png", "notes.txt", ".a.stl"})
     static_cast<void>(folder.write(name, "12345"));
   std::filesystem::create_directory(folder.path() / "d.palpate.hdf");
   std::vector<std::string> names;
