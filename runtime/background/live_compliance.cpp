@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::int64_t most_dofs = 3000;  // a larger W takes hundreds of megabytes, and seconds
 constexpr Index slice = 24;               // columns a step: about the work of a factorisation
+constexpr Index plane_slice = 96;         // in the plane, where factors are small and all nodes are stored
 constexpr int least_steps = 10;           // from one renewal to the next
 constexpr double most_change = 0.02;      // of deformation gradients, root mean square
 constexpr double least_change = 0.002;    // below it, W is wrong for other reasons
@@ -103,7 +104,7 @@ bool LiveCompliance::go_on(const LiveState& state, double error) {
   look(state, now_);
   ++steps_since_;
   if (is_making_) {
-    if (maker_.go_on(slice)) {
+    if (maker_.go_on(live_.dimension() == 2 ? plane_slice : slice)) {
       is_making_ = false;
       steps_since_ = 0;
       W_ = maker_.take();

@@ -15,6 +15,7 @@ namespace palpate {
 namespace {
 
 constexpr Index columns_at_once = 64;
+constexpr Eigen::Index most_seen_dofs = 3000;  // of a body in the plane, that is drawn with its inside
 
 /// Throws Error where nodes that can move begin in a wall.
 void check_start(const LiveBody& body, const std::vector<Wall>& walls) {
@@ -53,6 +54,15 @@ PackedGreens compliance_at(const LiveParts& live, const Eigen::VectorXd& x, cons
   return compliance.take();
 }
 
+/// All, or those on the surface, ascending.
+std::vector<Index> nodes_in(const Model& model) {
+  std::vector<Index> nodes = model.surface;
+  if (model.scope == Scope::full) nodes = model.mesh.connectivity;
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
+}
+
 void use_poissons_ratio(const LiveSettings& settings, std::vector<Material>& materials) {
   if (!settings.poissons_ratio) return;
   for (Material& material : materials) material.poissons_ratio = *settings.poissons_ratio;
@@ -85,14 +95,11 @@ Model live_model(Model model, const LiveParts& live, const LiveSettings& setting
   use_poissons_ratio(settings, model.materials);
   const int d = body.dimension();
   const unsigned all_axes = (1U << static_cast<unsigned>(d)) - 1U;
-  std::vector<Index> on_surface = model.surface;
-  std::sort(on_surface.begin(), on_surface.end());
-  on_surface.erase(std::unique(on_surface.begin(), on_surface.end()), on_surface.end());
+  model.scope = d == 2 && body.dofs() <= most_seen_dofs ? Scope::full : Scope::surface;
   model.stored_nodes.clear();
-  for (const Index node : on_surface) {
+  for (const Index node : nodes_in(model)) {
     if ((model.fixed[node] & all_axes) != all_axes) model.stored_nodes.push_back(node);
   }
-  model.scope = Scope::surface;
   model.layers = 0;
   model.overlay = {};
   model.probes.clear();

@@ -48,6 +48,7 @@ export class Eye {
   private controls_: OrbitControls;
   private box_ = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
   private body_: SceneMessage | null = null;
+  private floor_: number | null = null; // that the body may fall on
   private towards_: Vec3 = [0, -1, 0];
   private up_: Vec3 = [0, 0, 1];
   private upright_: Upright = 'auto';
@@ -88,6 +89,13 @@ export class Eye {
     this.settle();
   }
 
+  /** Height of a floor below the body, which is to be in view with it; null: there is none. */
+  set_floor(height: number | null): void {
+    if (height === this.floor_) return;
+    this.floor_ = height;
+    if (this.is_fitted_) this.fit();
+  }
+
   set_upright(upright: Upright): void {
     if (upright === this.upright_) return;
     this.upright_ = upright;
@@ -120,8 +128,19 @@ export class Eye {
     const towards: Vec3 = this.is_flat ? [0, 0, 1] : this.towards_;
     const up: Vec3 = this.is_flat ? [0, 1, 0] : this.up_;
     const slope = Math.tan((this.perspective_.fov * Math.PI) / 360);
-    const { target, away } = fit_places(this.body_.position, towards, up, slope, shares, this.camera_ === this.orthographic_);
+    const { target, away } = fit_places(this.places(this.body_), towards, up, slope, shares, this.camera_ === this.orthographic_);
     this.go(towards, new Vector3(...target), away);
+  }
+
+  /** The body's, and where it would lie on the floor. */
+  private places(body: SceneMessage): Float32Array {
+    if (this.floor_ === null) return body.position;
+    const { min, max } = this.box_;
+    const below = [min.x, max.x].flatMap((x) => (this.is_flat ? [x, this.floor_!, 0] : [x, min.y, this.floor_!, x, max.y, this.floor_!]));
+    const places = new Float32Array(body.position.length + below.length);
+    places.set(body.position);
+    places.set(below, body.position.length);
+    return places;
   }
 
   look_from(name: string): void {

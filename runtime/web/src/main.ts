@@ -208,7 +208,7 @@ class Page implements Listener {
     if (recorded && !state.recording && state.model && !state.refused) toast(`Recorded ${recorded}`, `palpate-runtime view ${recorded}`, 'note');
     this.state_ = state;
     if (!state.model) return;
-    this.picture_.take_model(state.model, state.settings.tool);
+    this.picture_.take_model(state.model, state.settings);
     this.under_pointer_.model = state.model;
     const suits = `${state.model.file} ${state.settings.tool}`;
     if (this.depth_for_ !== suits) {

@@ -10,6 +10,7 @@ import { Section, type SectionAxis } from './section';
 import { parse_tool } from './pose';
 import { ToolView } from './tool';
 import { View } from './view';
+import { Walls } from './walls';
 import type { Drawn } from './view_controls';
 import type { Frame, Patch, Scene } from './wire';
 import type { Model } from './words';
@@ -39,6 +40,7 @@ export class Picture {
 
   private readonly tool_ = new ToolView(this.view.light);
   private readonly arrows_ = new Arrows();
+  private readonly walls_ = new Walls();
   private readonly range_ = new Range();
   private readonly patches_ = new Map<number, Patch>();
   private latest_: Frame | null = null; // not drawn yet
@@ -51,7 +53,7 @@ export class Picture {
   constructor() {
     this.marks = new Marks(this.view.eye);
     this.body.shows = (place) => this.section_.shows(place);
-    this.view.scene.add(this.body.group, this.section_.group, this.tool_.group, this.arrows_.group);
+    this.view.scene.add(this.body.group, this.section_.group, this.tool_.group, this.arrows_.group, this.walls_.group);
     this.view.before_drawing = () => this.prepare();
     this.view.after_drawing = () => {
       const { force, pixels } = this.arrows_.legend;
@@ -94,12 +96,24 @@ export class Picture {
     return true;
   }
 
-  take_model(model: Model, tool: string | undefined): void {
+  /** The model as the state tells it, with its settings. */
+  take_model(model: Model, settings: Record<string, string>): void {
     this.model_ = model;
+    this.take_walls(settings);
+    const { tool } = settings;
     const shape = `${tool} ${model.size} ${model.dimension}`;
     if (shape === this.shape_) return;
     this.shape_ = shape;
     this.tool_.take_shape(parse_tool(tool), model.size, model.dimension);
+    this.view.draw();
+  }
+
+  /** What the body falls on is in view with it. */
+  private take_walls(settings: Record<string, string>): void {
+    const { eye } = this.view;
+    const floor = this.walls_.take(settings, eye.box, eye.is_flat);
+    if (floor === undefined) return;
+    eye.set_floor(floor);
     this.view.draw();
   }
 
@@ -134,6 +148,7 @@ export class Picture {
 
   set_ink(ink: string, is_light: boolean): void {
     this.body.ink = parseInt(ink.slice(1), 16);
+    this.walls_.set_ink(ink);
     this.view.light.uniforms.is_light.value = is_light ? 1 : 0;
     this.view.draw();
   }
@@ -158,6 +173,7 @@ export class Picture {
     this.view.seen_box.copy(this.body.box);
     if (this.tool_.group.visible) this.tool_.add_to(this.view.seen_box);
     if (this.arrows_.group.visible) this.view.seen_box.union(this.arrows_.box);
+    if (this.walls_.group.visible) this.view.seen_box.union(this.walls_.box);
     this.colour(drawn);
   }
 
