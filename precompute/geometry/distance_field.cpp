@@ -24,6 +24,9 @@ class LineTransform {
     for (std::size_t p = 0; p < n; ++p) {
       f_[p] = static_cast<double>(line[p * stride]);
     }
+    if (std::ranges::all_of(f_, [this](double f) { return f == f_[0]; })) {
+      return;  // as far everywhere, as most lines away from the body: they stay
+    }
     std::size_t last = 0;
     apex_[0] = 0;
     from_[0] = -std::numeric_limits<double>::infinity();

@@ -118,7 +118,8 @@ inline std::vector<LargeCase> large_cases() {
   return cases;
 }
 
-/// The figures of all levels by a law. Each level is reached in parts.
+/// The figures of all levels by a law. Each level is reached in parts, of which all but the last are no more
+/// than where the next one begins.
 inline std::vector<double> solve_large(const LargeCase& large, LiveLaw law) {
   const LiveBody body(large.input, {.law = law});
   Eigen::VectorXd x = body.start(), f;
@@ -138,7 +139,9 @@ inline std::vector<double> solve_large(const LargeCase& large, LiveLaw law) {
           if ((large.moved_axes >> axis) & 1) x[3 * node + axis] = to[axis];
         }
       }
-      if (!find_balance(body, none, {}, x, {.most_steps = 200}).converged) return figures;
+      const double tolerance = part < large.parts ? 1e-4 : BalanceOptions{}.tolerance;
+      if (!find_balance(body, none, {}, x, {.tolerance = tolerance, .most_steps = 200}).converged)
+        return figures;
     }
     reached = level;
     internal_forces(body, x, {}, f);
