@@ -122,7 +122,7 @@ inline std::vector<LargeCase> large_cases() {
 /// than where the next one begins.
 inline std::vector<double> solve_large(const LargeCase& large, LiveLaw law) {
   const LiveBody body(large.input, {.law = law});
-  Eigen::VectorXd x = body.start(), f;
+  Eigen::VectorXd x = body.start(), before, f;
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(x.size());
   std::vector<double> figures;
   double reached = large.name.starts_with("bar") ? 1.0 : large.name.starts_with("bending") ? 1e-3 : 0.0;
@@ -133,6 +133,9 @@ inline std::vector<double> solve_large(const LargeCase& large, LiveLaw law) {
     }
     for (int part = 1; part <= large.parts; ++part) {
       const double at = reached + (level - reached) * part / large.parts;
+      const Eigen::VectorXd now = x;
+      if (part > 1) x += now - before;  // as far again
+      before = now;
       for (const Index node : large.moved) {
         const Vec3 to = large.place(large.input.mesh.nodes[static_cast<std::size_t>(node)], at);
         for (int axis = 0; axis < 3; ++axis) {

@@ -39,8 +39,8 @@ std::vector<Eigen::Index> dofs_of(int dimension, std::span<const Index> nodes) {
   return dofs;
 }
 
-/// The block of K's inverse at the dofs `kept`: the inverse of what is left of K once the other dofs, `inner`,
-/// are eliminated.
+/// The block of K's inverse at the dofs `kept`: the inverse of what is left of K once the dofs `inner`, all
+/// others, are eliminated.
 Eigen::MatrixXd inverse_at(const Eigen::MatrixXd& K, const std::vector<Eigen::Index>& kept,
                            const std::vector<Eigen::Index>& inner) {
   Eigen::MatrixXd left = K(kept, kept);
