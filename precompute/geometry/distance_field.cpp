@@ -9,6 +9,8 @@
 namespace palpate {
 namespace {
 
+constexpr std::size_t lines_at_once = 16;  // of floats side by side: what the processor fetches at once
+
 /// Replaces f by min_q f(q) + (spacing (p - q))^2 along one line: the lower envelope of parabolas.
 class LineTransform {
  public:
@@ -18,11 +20,12 @@ class LineTransform {
         apex_(f_.size()),
         from_(f_.size() + 1) {}
 
-  /// Line of the given length with `stride` between its entries.
-  void operator()(float* line, std::size_t stride) {
+  /// Line of the given length.
+  void operator()(float* line) {
     const std::size_t n = f_.size();
-    for (std::size_t p = 0; p < n; ++p) {
-      f_[p] = static_cast<double>(line[p * stride]);
+    std::copy_n(line, n, f_.begin());
+    if (std::ranges::all_of(f_, [this](double f) { return f == f_[0]; })) {
+      return;  // as far everywhere, as most lines away from the body: they stay
     }
     std::size_t last = 0;
     apex_[0] = 0;
@@ -42,7 +45,7 @@ class LineTransform {
         ++active;
       }
       const double away = static_cast<double>(p) - static_cast<double>(apex_[active]);
-      line[p * stride] = static_cast<float>(f_[apex_[active]] + spacing2_ * away * away);
+      line[p] = static_cast<float>(f_[apex_[active]] + spacing2_ * away * away);
     }
   }
 
@@ -70,8 +73,17 @@ std::vector<float> distance_to(const VoxelGrid& grid, const std::vector<std::uin
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto n = static_cast<std::size_t>(grid.size[axis]);
     LineTransform transform(grid.size[axis], grid.spacing[static_cast<Eigen::Index>(axis)]);
-    for (std::size_t line = 0; line < d2.size() / n; ++line) {
-      transform(d2.data() + line / stride * stride * n + line % stride, stride);
+    std::vector<float> copies(lines_at_once * n);
+    for (std::size_t line = 0, count = 0; line < d2.size() / n; line += count) {
+      count = std::min(lines_at_once, stride - line % stride);  // side by side
+      float* const first = d2.data() + line / stride * stride * n + line % stride;
+      for (std::size_t p = 0; p < n; ++p) {
+        for (std::size_t l = 0; l < count; ++l) copies[l * n + p] = first[p * stride + l];
+      }
+      for (std::size_t l = 0; l < count; ++l) transform(copies.data() + l * n);
+      for (std::size_t p = 0; p < n; ++p) {
+        for (std::size_t l = 0; l < count; ++l) first[p * stride + l] = copies[l * n + p];
+      }
     }
     stride *= n;
   }

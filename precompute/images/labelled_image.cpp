@@ -115,7 +115,12 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
 
   std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
   body.inside.reserve(labels.size());
-  for (const std::int32_t label : labels) {
+  for (std::size_t v = 0; v < labels.size(); ++v) {
+    if (v > 0 && labels[v] == labels[v - 1]) {  // most are
+      body.inside.push_back(body.inside.back());
+      continue;
+    }
+    const std::int32_t label = labels[v];
     const auto [entry, is_new] = selected.try_emplace(label, 0);
     if (is_new) {
       entry->second =

@@ -38,33 +38,85 @@ void for_neighbours(const VoxelGrid& grid, std::size_t voxel, const Work& work) 
   }
 }
 
-/// Numbers the parts; `part_of` gets each voxel's.
+/// Numbers that turn out to be of the same part: each has an earlier one, and the first has itself.
+class EqualNumbers {
+ public:
+  Index add() {
+    earlier_.push_back(count());
+    return earlier_.back();
+  }
+  [[nodiscard]] Index count() const noexcept { return static_cast<Index>(earlier_.size()); }
+  Index first(Index number) {
+    Index* earlier = &at(number);
+    while (*earlier != number) {
+      *earlier = at(*earlier);  // halves the way for the next search
+      number = *earlier;
+      earlier = &at(number);
+    }
+    return number;
+  }
+  void join(Index a, Index b) {
+    const auto [low, high] = std::minmax({first(a), first(b)});
+    at(high) = low;
+  }
+
+ private:
+  Index& at(Index number) { return earlier_[static_cast<std::size_t>(number)]; }
+
+  std::vector<Index> earlier_;
+};
+
+/// Gives each voxel the number of an equal one before it, along x, y or z, or a new one; returns which of
+/// these numbers are of the same part (Rosenfeld and Pfaltz, Sequential operations in digital picture
+/// processing, 1966).
+template <typename Value>
+EqualNumbers number_voxels(const VoxelGrid& grid, const std::vector<Value>& values,
+                           std::vector<Index>& number_of) {
+  EqualNumbers equal;
+  const std::array<std::size_t, 3> stride = {1, grid.at(0, 1, 0), grid.at(0, 0, 1)};
+  std::size_t v = 0;
+  for (Index k = 0; k < grid.size[2]; ++k) {
+    for (Index j = 0; j < grid.size[1]; ++j) {
+      for (Index i = 0; i < grid.size[0]; ++i, ++v) {
+        Index number = -1;
+        const std::array<bool, 3> has_before = {i > 0, j > 0, k > 0};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          if (!has_before[axis] || values[v - stride[axis]] != values[v]) {
+            continue;
+          }
+          const Index before = number_of[v - stride[axis]];
+          if (number >= 0 && before != number) {
+            equal.join(before, number);
+          }
+          number = before;
+        }
+        number_of[v] = number >= 0 ? number : equal.add();
+      }
+    }
+  }
+  return equal;
+}
+
+/// Numbers the parts in the order of their first voxels; `part_of` gets each voxel's.
 template <typename Value>
 std::vector<Part<Value>> find_parts(const VoxelGrid& grid, const std::vector<Value>& values,
                                     std::vector<Index>& part_of) {
-  std::vector<Part<Value>> parts;
-  part_of.assign(values.size(), -1);
-  std::vector<std::size_t> front;
+  part_of.resize(values.size());
+  EqualNumbers equal = number_voxels(grid, values, part_of);
+  std::vector<Index> parts_of_numbers;
+  Index count = 0;
+  for (Index number = 0; number < equal.count(); ++number) {  // the first of a part is its first voxel's
+    const Index first = equal.first(number);
+    parts_of_numbers.push_back(first == number ? count++ : parts_of_numbers[static_cast<std::size_t>(first)]);
+  }
+  std::vector<Part<Value>> parts(static_cast<std::size_t>(count));
   for (std::size_t v = 0; v < values.size(); ++v) {
-    if (part_of[v] >= 0) {
-      continue;
+    part_of[v] = parts_of_numbers[static_cast<std::size_t>(part_of[v])];
+    Part<Value>& part = parts[static_cast<std::size_t>(part_of[v])];
+    if (part.voxels++ == 0) {
+      part.value = values[v];
+      part.first = v;
     }
-    const auto number = static_cast<Index>(parts.size());
-    Part<Value> part{values[v], 0, v};
-    part_of[v] = number;
-    front.push_back(v);
-    while (!front.empty()) {
-      const std::size_t voxel = front.back();
-      front.pop_back();
-      ++part.voxels;
-      for_neighbours(grid, voxel, [&](std::size_t next) {
-        if (part_of[next] < 0 && values[next] == part.value) {
-          part_of[next] = number;
-          front.push_back(next);
-        }
-      });
-    }
-    parts.push_back(part);
   }
   return parts;
 }
@@ -224,6 +276,9 @@ std::size_t join_across_edges(VoxelBody& body) {
        before != filled;) {  // a filled voxel may touch another one along an edge
     before = filled;
     for (std::size_t v = 0; v + stride[1] + stride[2] < body.inside.size(); ++v) {
+      if (body.inside[v] == body.inside[v + stride[0]] && body.inside[v] == body.inside[v + stride[1]]) {
+        continue;  // so no pair below differs along its first axis
+      }
       for (const auto& [a, b] : {std::pair{0U, 1U}, {0U, 2U}, {1U, 2U}}) {
         std::uint8_t &here = body.inside[v], &along_a = body.inside[v + stride[a]],
                      &along_b = body.inside[v + stride[b]], &across = body.inside[v + stride[a] + stride[b]];

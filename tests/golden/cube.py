@@ -27,10 +27,11 @@ def stiffness(nodes, tets, youngs_modulus, poissons_ratio):
         coordinates = np.column_stack([np.ones(4), nodes[tet]])
         volume = abs(np.linalg.det(coordinates)) / 6
         gradients = np.linalg.inv(coordinates)[1:].T  # row a: grad N_a
-        for (p, a), (q, b) in itertools.product(enumerate(tet), repeat=2):
-            outer = np.outer(gradients[p], gradients[q])
-            block = lame * outer + shear * outer.T + shear * np.trace(outer) * np.eye(3)
-            K[3 * a:3 * a + 3, 3 * b:3 * b + 3] += volume * block
+        products = np.einsum("pi,qj->piqj", gradients, gradients)
+        dots = np.einsum("piqi,kl->pkql", products, np.eye(3))
+        blocks = lame * products + shear * (products.transpose(0, 3, 2, 1) + dots)
+        dofs = (3 * tet[:, None] + np.arange(3)).ravel()
+        K[np.ix_(dofs, dofs)] += volume * blocks.reshape(12, 12)
     return K
 
 

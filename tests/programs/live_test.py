@@ -36,8 +36,8 @@ class Live(ProgramTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         return json.loads(result.stdout), result.stderr
 
-    def force(self, file, depth, *arguments):
-        report, _ = self.play(file, press(depth), "--record", "touch.h5", *arguments)
+    def force(self, file, depth, *arguments, seconds=1.0):
+        report, _ = self.play(file, press(depth, seconds), "--record", "touch.h5", *arguments)
         with h5py.File(self.folder / "touch.h5") as recording:
             force = -recording["ticks/force"][:, 2]
         (self.folder / "touch.h5").unlink()
@@ -71,12 +71,13 @@ class Live(ProgramTest):
 
     def test_explicit_integrators_and_conjugate_gradients_press_alike(self):
         file = self.bake(BLOCK)
-        reference, _ = self.force(file, 0.004, "--solver", "corotational", "--live-step", "0.001", "--mass-damping", "20")
-        for options in (("--step-solver", "cg"), ("--integrator", "semi-implicit-euler"), ("--integrator", "verlet"), ("--integrator", "rk4")):
-            force, report = self.force(file, 0.004, "--solver", "corotational", "--live-step", "0.001", "--mass-damping", "20", "--stiffness-damping", "0", *options)
-            self.assertAlmostEqual(force / reference, 1, delta=0.01, msg=options)
+        options = ("--solver", "corotational", "--live-step", "0.001", "--mass-damping", "20")
+        reference, _ = self.force(file, 0.004, *options, seconds=0.6)
+        for way in (("--step-solver", "cg"), ("--integrator", "semi-implicit-euler"), ("--integrator", "verlet"), ("--integrator", "rk4")):
+            force, report = self.force(file, 0.004, *options, "--stiffness-damping", "0", *way, seconds=0.6)
+            self.assertAlmostEqual(force / reference, 1, delta=0.01, msg=way)
             self.assertEqual(report["live"]["steps_stopped"], 0)
-            explicit = "--integrator" in options
+            explicit = "--integrator" in way
             self.assertEqual(report["live"]["longest_stable_step_s"] is not None, explicit)
 
     def test_a_step_near_the_limit_is_told(self):
@@ -97,9 +98,9 @@ class Live(ProgramTest):
     def test_equal_runs_are_equal_and_replay_to_the_bit(self):
         file = self.bake(BLOCK)
         options = ("--solver", "corotational", "--yield", "0.05", "--creep", "20", "--gravity", "0,0,-9.81")
-        report, _ = self.play(file, press(0.006), "--record", "a.h5", *options)
+        report, _ = self.play(file, press(0.006, 0.5), "--record", "a.h5", *options)
         self.assertGreater(report["live"]["compliance_renewals"], 0)
-        self.play(file, press(0.006), "--record", "b.h5", *options)
+        self.play(file, press(0.006, 0.5), "--record", "b.h5", *options)
         with h5py.File(self.folder / "a.h5") as a, h5py.File(self.folder / "b.h5") as b:
             numpy.testing.assert_array_equal(a["ticks/force"][:], b["ticks/force"][:])
             frames = a["frames/displacement"][:]
@@ -128,7 +129,9 @@ class Live(ProgramTest):
             self.assertNotIn("greens", stored)
             self.assertEqual(stored["dofs/stored_nodes"].shape, (0,))
         for solver in ("corotational", "neo-hookean", "mass-spring"):
-            self.assertEqual(self.force(file, 0.003, "--solver", solver)[0], self.force(whole, 0.003, "--solver", solver)[0], solver)
+            bare, other = (self.force(body, 0.003, "--solver", solver, seconds=0.2)[0] for body in (file, whole))
+            self.assertGreater(bare, 0)
+            self.assertEqual(bare, other, solver)
         for program, command in ((PRECOMPUTE, "inspect"), (PRECOMPUTE, "verify")):
             result = run(program, command, file, cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)

@@ -29,10 +29,15 @@ def wheel(folder):
     return next(folder.glob("palpate-*.whl"))
 
 
+@unittest.skipIf(HAS_SANITIZERS, "Debian's Python cannot load a library with sanitizers")
 class Wheel(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.wheel = wheel(pathlib.Path(folder.name))
+
     def setUp(self):
-        if HAS_SANITIZERS:
-            self.skipTest("Debian's Python cannot load a library with sanitizers")
         temporary = tempfile.TemporaryDirectory()
         self.addCleanup(temporary.cleanup)
         self.folder = pathlib.Path(temporary.name)
@@ -41,7 +46,7 @@ class Wheel(unittest.TestCase):
         (self.folder / "cube.toml").write_text(cube_toml(4))
         subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", self.folder / "venv"], check=True)
         python = self.folder / "venv" / "bin" / "python"
-        subprocess.run([python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", wheel(self.folder)], check=True, timeout=240)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", self.wheel], check=True, timeout=240)
         bare = {"PATH": "/usr/bin:/bin", "HOME": str(self.folder)}
         done = subprocess.run([python, "-c", PUSH], cwd=self.folder, env=bare, capture_output=True, text=True, check=False, timeout=240)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -57,9 +62,8 @@ class Wheel(unittest.TestCase):
         self.assertEqual(left, [])
 
     def test_says_what_it_needs_and_repeats(self):
-        first = wheel(self.folder).read_bytes()
-        self.assertEqual(wheel(self.folder).read_bytes(), first)
-        with zipfile.ZipFile(next(self.folder.glob("*.whl"))) as files:
+        self.assertEqual(wheel(self.folder).read_bytes(), self.wheel.read_bytes())
+        with zipfile.ZipFile(self.wheel) as files:
             said = files.read(next(name for name in files.namelist() if name.endswith("METADATA"))).decode()
         needed = re.search(r"apt install (.*)", said)[1].split()
         self.assertIn("libhdf5-103-1", needed)

@@ -269,9 +269,15 @@ TEST(Compressed, ANearlyIncompressibleBodyKeepsItsTolerance) {
     EXPECT_LE(model.compressed->certificate[6 * row + 4], tolerance) << row;
 }
 
+/// A file of its own for each test, baked once for all.
 class AlteredFile : public testing::Test, public test::BakedBody {
  protected:
-  AlteredFile() { bake_body(stored(small, "compression = \"h2\"")); }
+  AlteredFile() {
+    static const std::string text = stored(small, "compression = \"h2\"");
+    static const std::string baked = (bake_body(text), bytes());
+    std::ofstream(folder_ / "model.toml") << text;
+    std::ofstream(file_, std::ios::binary) << baked;
+  }
 };
 
 TEST_F(AlteredFile, IsVerifiedUntilThen) {
