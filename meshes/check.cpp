@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <map>
 #include <numeric>
@@ -145,18 +146,16 @@ struct RigidMotions {
     return matrix;
   }
 
-  /// A basis of the motions that move no held dof: the null space by singular value decomposition. [6,
-  /// motions left]
+  /// A basis of the motions that move no held dof: the null space by LU with full pivoting. [6, motions left]
   [[nodiscard]] Eigen::MatrixXd left_over() const {
     constexpr double negligible = 1e-9;
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(at_held_dofs(), Eigen::ComputeFullV);
-    const Eigen::VectorXd& values = svd.singularValues();  // descending
-    const auto rank = (values.array() > negligible * values[0]).count();
-    const auto motions = static_cast<Eigen::Index>(possible.size());
-    Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(6, motions - rank);
-    for (Eigen::Index i = 0; i < motions; ++i) {
-      basis.row(possible[static_cast<std::size_t>(i)]) = svd.matrixV().row(i).tail(motions - rank);
-    }
+    Eigen::FullPivLU<Eigen::MatrixXd> lu(at_held_dofs());
+    lu.setThreshold(negligible);
+    Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(6, lu.dimensionOfKernel());
+    if (basis.cols() == 0) return basis;
+    const Eigen::MatrixXd kernel = lu.kernel();
+    for (std::size_t i = 0; i < possible.size(); ++i)
+      basis.row(possible[i]) = kernel.row(static_cast<Eigen::Index>(i));
     return basis;
   }
 };
@@ -170,7 +169,7 @@ Vec3 rounded(const Vec3& x, double size) {
 Motion a_turning_motion(const Eigen::MatrixXd& left) {
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::MatrixXd turning = left.bottomRows(3);
-    const Eigen::VectorXd combination = turning.colPivHouseholderQr().solve(Vec3::Unit(axis));
+    const Eigen::VectorXd combination = turning.fullPivLu().solve(Vec3::Unit(axis));
     if ((turning * combination - Vec3::Unit(axis)).norm() < 1e-6) return left * combination;
   }
   return left.col(left.cols() - 1);

@@ -126,7 +126,8 @@ void drop_small_parts(PixelBody& body, const std::string& where, std::vector<std
   }
   if (largest == 0) {
     throw Error("the picture has no body: all its pixels are black, or white where dark is true", where,
-                "paint the body white; a pixel is black when its grey value is below 128");
+                "paint the body white on black, or black on white; a pixel is black when its grey value is "
+                "below 128");
   }
   std::vector<Part> bodies;
   std::vector<bool> is_small(parts.size());

@@ -4,7 +4,7 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { copyFile, readdir, readFile, rm, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { bake, close, cube, folder, ready, serve, told, until, visit } from './harness.mjs';
+import { bake, close, cube, folder, near, ready, serve, told, until, visit } from './harness.mjs';
 import { barriers, faults_of_layout } from './looks.mjs';
 import { part, recorded } from './steps.mjs';
 
@@ -144,6 +144,40 @@ test('a file that is dropped lands in the folder and is opened', async (t) => {
   assert.deepEqual(await readdir(at), before);
 });
 
+test('what is drawn becomes a body that falls', async (t) => {
+  const at = await folder(t);
+  const served = await serve(t, ['view', at, '--view-address', '127.0.0.1:0'], at);
+  const page = await visit(t, served.url, { viewport: { width: 1000, height: 800 } });
+  await part(page, 'draw').click();
+  assert.ok(await part(page, 'drop-it').isDisabled(), 'there is nothing to drop yet');
+  const paper = await part(page, 'paper').boundingBox();
+  const line = async (places) => {
+    const on = places.map(([x, y]) => [paper.x + x * paper.width, paper.y + y * paper.height]);
+    await page.mouse.move(...on[0]);
+    await page.mouse.down();
+    for (const place of on) await page.mouse.move(...place, { steps: 5 });
+    await page.mouse.up();
+  };
+  const dark = () => page.evaluate(() => {
+    const { data } = document.querySelector('[data-testid="paper"]').getContext('2d').getImageData(0, 0, 720, 480);
+    return data.filter((value, k) => k % 4 === 0 && value < 128).length / (720 * 480);
+  });
+  const square = [[0.3, 0.3], [0.7, 0.3], [0.7, 0.7], [0.3, 0.7], [0.3, 0.31]];
+  await line(square);
+  // 288 x 192 pixels within the line and a round pen of 30 around it.
+  near(await dark(), (318 * 222 - (4 - Math.PI) * 15 ** 2) / (720 * 480), 0.02, 'a closed line is filled');
+  const whole = await dark();
+  await part(page, 'rubber').check();
+  await line([[0.5, 0.5], [0.52, 0.5]]);
+  near(whole - (await dark()), (14.4 * 30 + Math.PI * 15 ** 2) / (720 * 480), 0.05, 'the rubber makes a hole');
+  assert.deepEqual(page.complaints, []);
+  await part(page, 'drop-it').click();
+  await ready(page);
+  const { model, settings } = await told(page, 'state');
+  assert.deepEqual([model.name, model.dimension, settings.solver], ['drawing', 2, 'corotational']);
+  assert.ok((await readdir(at)).includes('drawing.palpate.hdf'));
+});
+
 for (const [width, height, hasTouch, colorScheme] of [[360, 640, true, 'light'], [1280, 800, false, 'dark']]) {
   test(`the gallery is laid out in ${width} × ${height}, ${colorScheme}`, async (t) => {
     const { served } = await gallery(t);
@@ -151,6 +185,13 @@ for (const [width, height, hasTouch, colorScheme] of [[360, 640, true, 'light'],
     await item(page, 'push.h5').locator('img').waitFor();
     assert.deepEqual(await faults_of_layout(page, hasTouch ? 44 : 24), []);
     assert.deepEqual(await barriers(page), []);
+    await part(page, 'draw').click();
+    await part(page, 'paper').waitFor();
+    const words = ['Draw a body in one', 'Pen', 'rubber', 'Clear', 'Cancel', 'Drop it']; // what lies behind the dialog is covered, as it is meant to be
+    const faults = (await faults_of_layout(page, hasTouch ? 44 : 24)).filter((fault) => !/ is covered by /.test(fault) || words.some((word) => fault.startsWith(`"${word}`)));
+    assert.deepEqual(faults, []);
+    assert.deepEqual(await barriers(page), [], 'with the paper');
+    await page.keyboard.press('Escape');
     await item(page, 'cube.palpate.hdf').click();
     await ready(page);
     assert.deepEqual(await faults_of_layout(page, hasTouch ? 44 : 24), [], 'with the way back');

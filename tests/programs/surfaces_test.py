@@ -120,7 +120,7 @@ scope = "surface"
         self.write("model.toml", "")
         result = run(PRECOMPUTE, "model.toml", "--strict", cwd=self.folder)
         self.assertEqual(result.returncode, 2)
-        self.assertIn("they are for a surface or an image", result.stderr)
+        self.assertIn("they are for a surface, an image or a picture", result.stderr)
         self.write("box.off", off())
         result = run(PRECOMPUTE, "box.off", "--unit", "miles", cwd=self.folder)
         self.assertEqual(result.returncode, 2)

@@ -80,3 +80,10 @@ export function toast(message: string, hint = '', kind: 'error' | 'note' = 'erro
   element.addEventListener('click', () => element.remove());
   setTimeout(() => element.remove(), kind === 'error' ? 9000 : 4000);
 }
+
+/** A new element with its text and properties. */
+export function element<K extends keyof HTMLElementTagNameMap>(kind: K, text = '', values: Partial<HTMLElementTagNameMap[K]> = {}): HTMLElementTagNameMap[K] {
+  const made = document.createElement(kind);
+  made.textContent = text;
+  return Object.assign(made, values);
+}

@@ -1,5 +1,6 @@
 // All that is in a folder: what is chosen is opened by a runtime of its own, whose page takes the place of this one.
-import { by_id } from './dom';
+import { by_id, element } from './dom';
+import { Drawing } from './drawing';
 import { format_bytes } from './format';
 import { kept_theme } from './kept';
 import { SmallPictures } from './small_picture';
@@ -33,12 +34,6 @@ const kinds: Record<Kind, { title: string; does: string }> = {
 };
 
 const endings = /\.(palpate\.hdf|h5|stl|obj|ply|off|inr|inr\.gz|nii|nii\.gz|nrrd|png|pbm)$/i;
-
-function element<K extends keyof HTMLElementTagNameMap>(kind: K, text = '', values: Partial<HTMLElementTagNameMap[K]> = {}): HTMLElementTagNameMap[K] {
-  const made = document.createElement(kind);
-  made.textContent = text;
-  return Object.assign(made, values);
-}
 
 /** This server's, with the token of this page. */
 const address = (path: string, name = '') => `./${path}${location.search}${name && `&name=${encodeURIComponent(name)}`}`;
@@ -85,17 +80,21 @@ export class Gallery {
     file.onchange = () => void this.take([...(file.files ?? [])]);
     const add = element('button', 'Add a file', { title: 'A surface, a labelled image, a body or a recording is put into the folder and opened' });
     add.onclick = () => file.click();
+    const drawing = new Drawing((picture) => void this.take([picture]));
+    const pen = element('button', 'Draw a body', { title: 'What you draw falls, and you push and dent it' });
+    pen.dataset.testid = 'draw';
+    pen.onclick = () => drawing.open();
     const bar = element('header', '', { className: 'bar' });
     const title = element('div', '', { className: 'name' });
     title.append(name, element('strong', 'Palpate'), this.note_);
-    bar.append(title, add, file);
+    bar.append(title, pen, add, file);
     const main = element('main', '', { className: 'gallery' });
     main.append(this.items_);
     this.items_.dataset.testid = 'items';
     this.note_.dataset.testid = 'folder';
     this.opening_.dataset.testid = 'opening';
     document.body.className = 'gallery';
-    document.body.replaceChildren(bar, main, this.opening_);
+    document.body.replaceChildren(bar, main, this.opening_, drawing.dialog);
     this.listen_drops();
     void this.go_on(theme);
   }
