@@ -44,7 +44,7 @@ void add_draft_options(CLI::App& app, DraftArguments& arguments) {
       ->group(group);
   app.add_option(
          "--surface-nodes", arguments.nodes,
-         "nodes on the surface of the mesh, about; default: 4000; on the outline of a picture's body 100")
+         "nodes on the surface of the mesh, about; default: 4000; on the outline of a picture's body 60")
       ->option_text("N")
       ->check(CLI::Range(50, 200'000))
       ->group(group);

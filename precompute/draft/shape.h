@@ -42,7 +42,7 @@ struct ShapeOptions {
   std::optional<int> nodes{};  ///< on the surface of the mesh that is to come; of pictures the outline
 
   [[nodiscard]] int nodes_of(ShapeKind kind) const noexcept {
-    return nodes.value_or(kind == ShapeKind::picture ? 100 : 4000);
+    return nodes.value_or(kind == ShapeKind::picture ? 60 : 4000);
   }
 };
 

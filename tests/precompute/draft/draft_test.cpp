@@ -144,7 +144,7 @@ TEST_F(DraftTest, DrawingBecomesAFreeBodyInThePlane) {
     const std::string name = is_dark ? "dark" : "light";
     told_.clear();
     const std::filesystem::path file = draft(folder_.write(name + ".pbm", disc(is_dark)), {}, false, tell());
-    expect_mentions(told_, {"80 pixels long, and so 10 cm", "100 outline nodes",
+    expect_mentions(told_, {"80 pixels long, and so 10 cm", "60 outline nodes",
                             "what is " + name + " in the picture", "E = 20000 Pa"});
     const Description description = read_description(file);
     EXPECT_EQ(std::get<PictureGeometry>(description.geometry).dark, is_dark);
@@ -152,7 +152,7 @@ TEST_F(DraftTest, DrawingBecomesAFreeBodyInThePlane) {
     EXPECT_EQ(description.analysis, Analysis::plane_strain);
     EXPECT_NEAR(description.scale, 0.1 / 80.0, 1e-5);
     // The circle's length, which its pixels show to some per cent.
-    const double edge = 0.1 * std::numbers::pi / 100.0;
+    const double edge = 0.1 * std::numbers::pi / 60.0;
     EXPECT_NEAR(*description.mesh.edge_length, edge, 0.03 * edge);
     EXPECT_EQ(description.scope, Scope::none);
     EXPECT_TRUE(description.fixed.empty());
