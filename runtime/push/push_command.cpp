@@ -55,9 +55,8 @@ CLI::App* add_push(CLI::App& app, PushArguments& arguments) {
                 "unit of a surface or an image: mm, cm, m, um, in, or metres per unit (of a picture: per "
                 "pixel); default: "
                 "guessed");
-  add_handed_on(
-      *push, arguments, "surface-nodes", "N",
-      "about how many nodes its surface has; default: 4000; on the outline of a picture's body 60");
+  add_handed_on(*push, arguments, "surface-nodes", "N",
+                "about how many nodes its surface has; default: 4000; on the outline of a picture's body 60");
   add_handed_on(*push, arguments, "parts", "largest|all", "which of several parts are the body");
   add_handed_on(*push, arguments, "strict", "", "refuse a surface that needs a repair");
   add_handed_on(*push, arguments, "renew", "", "write NAME.model.toml anew");
