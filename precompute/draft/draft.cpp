@@ -20,7 +20,7 @@ constexpr std::array<double, 3> wrap_offsets = {usual_wrap_offset, 0.15, 0.3};  
 
 double edge_length(const Shape& shape, const UnitGuess& unit, const DraftOptions& options) {
   const int nodes = options.shape.nodes_of(shape.kind);
-  return (shape.kind == ShapeKind::picture ? shape.area / nodes : edge_for_nodes(shape.area, nodes)) *
+  return (shape.kind == ShapeKind::picture ? shape.boundary / nodes : edge_for_nodes(shape.boundary, nodes)) *
          unit.unit.metres;
 }
 
@@ -198,7 +198,7 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
   std::string repaired;
   if (shape.kind == ShapeKind::surface) {
     const std::size_t told = shape.repairs.size();
-    const double edge = edge_for_nodes(shape.area, options.shape.nodes_of(shape.kind));
+    const double edge = edge_for_nodes(shape.boundary, options.shape.nodes_of(shape.kind));
     const std::filesystem::path surface = options.shape.strict ? file : make_meshable(file, edge, shape);
     for (std::size_t i = told; i < shape.repairs.size(); ++i) tell("repaired: " + shape.repairs[i]);
     if (surface != file) {

@@ -47,7 +47,7 @@ void measure(const TriangleSurface& surface, Shape& shape) {
     high = high.cwiseMax(x);
   }
   shape.size = high - low;
-  shape.area = area(surface);
+  shape.boundary = area(surface);
 }
 
 Shape read_whole_surface(const std::filesystem::path& file) {
@@ -89,7 +89,7 @@ Shape read_image(const std::filesystem::path& file) {
       read_labelled_image({file, {}, false}, std::numeric_limits<double>::max(), shape.repairs);
   for (int axis = 0; axis < 3; ++axis)  // less the empty rim of two voxels on each side
     shape.size[axis] = body.spacing[axis] * (body.size.at(static_cast<std::size_t>(axis)) - 4);
-  shape.area = boundary_area(body);
+  shape.boundary = boundary_area(body);
   shape.repairs.clear();  // the bake tells them
   return shape;
 }
@@ -122,7 +122,7 @@ Shape read_picture_shape(const std::filesystem::path& file) {
   Eigen::AlignedBox2i box;
   for (const std::vector<LatticePoint>& outline : trace_outlines(body)) {
     for (const LatticePoint& corner : outline) box.extend(Eigen::Vector2i(corner[0], corner[1]));
-    shape.area += static_cast<double>(outline.size()) / plane_staircase;
+    shape.boundary += static_cast<double>(outline.size()) / plane_staircase;
   }
   shape.size.head<2>() = box.sizes().cast<double>();
   return shape;

@@ -30,7 +30,7 @@ struct Shape {
   std::vector<std::string> repairs;  ///< surfaces: what was repaired, a sentence each
   TriangleSurface repaired;          ///< the surface then; empty where the file is whole
   Vec3 size = Vec3::Zero();          ///< of the box around it [file units]
-  double area = 0.0;                 ///< of the boundary; of pictures its length [file units^2, file units]
+  double boundary = 0.0;             ///< its area; of pictures its length [file units^2, file units]
   bool remesh = true;                ///< surfaces: the edge length is to be that of the boundary too
   bool dark = false;                 ///< pictures: drawn dark on a light ground
 };

@@ -180,7 +180,7 @@ class PbmReader {
 /// What is not black is body.
 PixelBody read_light(const PictureGeometry& picture) {
   const std::string where = picture.file.string();
-  const std::string bytes = read_all(picture.file, "Check picture = \"...\" in [geometry]");
+  const std::string bytes = read_all(picture.file, "Check the path, or picture = \"...\" in [geometry]");
   if (bytes.starts_with(png_signature)) {
     const png_color black{0, 0, 0}, white{255, 255, 255};
     return read_png_in_child(bytes, picture.dark ? white : black, where);

@@ -113,8 +113,7 @@ void for_each_square(const PixelBody& body, const Visit& visit) {
   }
   throw Error(fmt::format("the picture has {} bodies: {}{}", bodies.size(), list,
                           bodies.size() > listed_bodies ? "; ..." : ""),
-              where,
-              "keep one and paint the others black (rows and columns count from the top left, from 0)");
+              where, "keep one and paint over the others (rows and columns count from the top left, from 0)");
 }
 
 void drop_small_parts(PixelBody& body, const std::string& where, std::vector<std::string>& notes) {

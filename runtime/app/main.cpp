@@ -11,6 +11,7 @@
 
 #include "base/command_line.h"
 #include "base/error.h"
+#include "base/printable.h"
 #include "base/program.h"
 #include "base/spelling.h"
 #include "formats/model_file.h"
@@ -267,7 +268,7 @@ int push(const PushArguments& arguments) {
   options.settings = read_settings(options.settings_text);
   if (!options.settings_text.empty())
     fmt::print(stderr, "solved while you touch it: palpate-runtime play {} --view {}\n",
-               options.file.string(), option_text(options.settings_text));
+               printable(options.file.string()), option_text(options.settings_text));
   return play(options);
 }
 

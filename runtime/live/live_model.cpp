@@ -15,7 +15,8 @@ namespace palpate {
 namespace {
 
 constexpr Index columns_at_once = 64;
-constexpr Eigen::Index most_seen_dofs = 3000;  // of a body in the plane, that is drawn with its inside
+constexpr Eigen::Index most_seen_dofs =
+    3000;  // of a body in the plane whose inside is seen; a larger W is not renewed
 
 /// Throws Error where nodes that can move begin in a wall.
 void check_start(const LiveBody& body, const std::vector<Wall>& walls) {

@@ -16,7 +16,7 @@ std::string room_around(const Eigen::AlignedBox3d& body, int up) {
   const double size = body.sizes().maxCoeff();
   Vec3 low = body.min() - Vec3::Constant(walls * size), high = body.max() + Vec3::Constant(walls * size);
   low[up] = body.min()[up] - falls * size;
-  return fmt::format("{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g}", low.x(), low.y(), low.z(), high.x(),
+  return fmt::format("{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}", low.x(), low.y(), low.z(), high.x(),
                      high.y(), high.z());
 }
 

@@ -5,7 +5,7 @@ import path from 'node:path';
 import { after, test } from 'node:test';
 import { bake, close, cube, folder, near, project, ready, run, runtime, serve, shelf, source, told, until, visit } from './harness.mjs';
 import { rest } from './looks.mjs';
-import { choose, open_cube, part, probe, serve_cube, settled, top } from './steps.mjs';
+import { choose, open_cube, part, pressed, probe, serve_cube, settled, top } from './steps.mjs';
 
 after(close);
 
@@ -48,11 +48,7 @@ test('pressing pushes inwards, deeper is more, by the wheel too, and letting go 
 test('a sphere presses as a script does', async (t) => {
   const { at, file, page } = await open_cube(t, { args: ['--tool', 'sphere:0.1', '--coupling', '100'] });
   await choose(page, 'press', 0.03);
-  const { x, y } = await project(page, top);
-  await page.mouse.move(x, y);
-  await page.mouse.down();
-  const felt = await settled(page);
-  await page.mouse.up();
+  const felt = await pressed(page, top);
   const [px, py, pz] = felt.device;
   const touch = path.join(at, 'touch.csv');
   await writeFile(touch, `t,x,y,z\n0,${px},${py},1.2\n0.5,${px},${py},${pz}\n1.5,${px},${py},${pz}\n`);

@@ -5,7 +5,7 @@ import { readFile, rm } from 'node:fs/promises';
 import path from 'node:path';
 import { after, test } from 'node:test';
 import { bake, close, cube, example, folder, near, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
-import { choose, leaf_through, open_cube, part, recorded, settled, top } from './steps.mjs';
+import { choose, leaf_through, open_cube, part, pressed, recorded, settled, top } from './steps.mjs';
 
 after(close);
 
@@ -51,11 +51,7 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   await until(page, () => window.palpate.state.settings.tool === 'sphere:0.1');
   await choose(page, 'press', 0.02);
   const push = async () => {
-    const { x, y } = await project(page, top);
-    await page.mouse.move(x, y);
-    await page.mouse.down();
-    const felt = await settled(page);
-    await page.mouse.up();
+    const felt = await pressed(page, top);
     await until(page, () => window.palpate.lastFrame.contacts === 0);
     return felt.force[2] / felt.depth;
   };
@@ -93,11 +89,7 @@ test('warp is turned on and off, and keeps out what it has no place for', async 
   assert.equal(await part(page, 'overlay').isDisabled(), true);
   assert.match(await part(page, 'overlay').getAttribute('title'), /warped/);
   await choose(page, 'press', 0.02);
-  const { x, y } = await project(page, top);
-  await page.mouse.move(x, y);
-  await page.mouse.down();
-  const felt = await settled(page);
-  await page.mouse.up();
+  const felt = await pressed(page, top);
   assert.ok(felt.force[2] < 0, `it pushes the body down: ${felt.force}`);
   await turn('warp', null);
   near(await studied(), 19, 0.01, 'range of small strain again');

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { writeFile } from 'node:fs/promises';
 import path from 'node:path';
-import { bake, cube, folder, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
+import { bake, cube, folder, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
 
 export const top = [0.5, 0.5, 1]; // a node of the cube, which its 6 cells an edge have there
 
@@ -40,6 +40,16 @@ export async function settled(page) {
     return then && now.contacts > 0 && now.tick > then.tick && Math.hypot(...now.force.map((f, k) => f - then.force[k])) < 1e-4 * size;
   });
   return told(page, 'lastFrame');
+}
+
+/// Presses at a place of the body until it rests, and lifts: the frame before that.
+export async function pressed(page, place) {
+  const { x, y } = await project(page, place);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  const felt = await settled(page);
+  await page.mouse.up();
+  return felt;
 }
 
 /// The force on the body [N] that displaces the top's node by `d` [m], by the sparse route of its own command.

@@ -3,7 +3,6 @@
 import importlib.machinery
 import importlib.util
 import unittest
-import unittest.mock
 
 import numpy as np
 
@@ -50,7 +49,5 @@ class Hertz(ProgramTest):
         np.testing.assert_array_equal(self.force[self.radius >= a + 0.1], 0)
 
     def test_a_shallow_press_is_not_held_out_by_edges(self):
-        # Edges of L are chords of the sphere: touched, they add 1.5 L^2 / (8 R depth), 4.7 % here with L the diagonal of a cell. The cells are fine
-        # as far as twice the contact's radius.
-        with unittest.mock.patch.object(study, "FINE", 0.3):
-            self.assertAlmostEqual(self.error(20, 0.02), -0.3, delta=0.3)
+        # Edges of L are chords of the sphere: touched, they add 1.5 L^2 / (8 R depth), 4.7 % here with L the diagonal of a cell.
+        self.assertAlmostEqual(self.error(20, 0.02), -0.4, delta=0.3)

@@ -58,7 +58,7 @@ class Parts(PartsTest):
                    "[overlay]\n[[overlay.region]]\nsphere = {center = [0.5, 0.5, 1], radius = 0.3}\n", 3)
 
     def test_compressed(self):
-        text = cube_toml(8).replace('precision = "double"\n', COMPRESSED)
+        text = cube_toml(12).replace('precision = "double"\n', COMPRESSED)
         self.check(text, 1, 4)
 
     def test_more_parts_than_blocks_of_columns(self):

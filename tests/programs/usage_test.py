@@ -168,12 +168,14 @@ class NotADescription(ProgramTest):
         return re.sub("(?m)^    ", "", text)
 
     def test_geometry_gets_a_model_toml_that_works(self):
-        name = "Two Tets.mesh"
-        (self.folder / name).write_text(MEDIT)
-        model = self.write("model.toml", self.starter(run(PRECOMPUTE, name, cwd=self.folder), name, "a volume mesh"))
-        result = run(PRECOMPUTE, model, cwd=self.folder)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertTrue((self.folder / "Two Tets.palpate.hdf").exists())
+        # A picture by itself becomes a body; whose parts are to be joined it is none.
+        for command, name, content, what in (([], "Two Tets.mesh", MEDIT.encode(), "a volume mesh"), (["join"], "sheet.png", png(40, 20), "a picture")):
+            with self.subTest(name=name):
+                (self.folder / name).write_bytes(content)
+                model = self.write("model.toml", self.starter(run(PRECOMPUTE, *command, name, cwd=self.folder), name, what))
+                result = run(PRECOMPUTE, model, cwd=self.folder)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertTrue((self.folder / (name.split(".")[0] + ".palpate.hdf")).exists())
 
     def test_surfaces_and_images_get_one_by_themselves(self):
         for name, content in (("cube.off", OFF.encode()), ("ball.inr", inr(40)), ("ball2.inr.gz", gzip.compress(inr(40))),

@@ -111,9 +111,8 @@ export class Picture {
   /** What the body falls on is in view with it. */
   private take_walls(settings: Record<string, string>): void {
     const { eye } = this.view;
-    const floor = this.walls_.take(settings, eye.box, eye.is_flat);
-    if (floor === undefined) return;
-    eye.set_floor(floor);
+    if (!this.walls_.take(settings, eye.box, eye.is_flat)) return;
+    eye.set_floor(this.walls_.floor);
     this.view.draw();
   }
 

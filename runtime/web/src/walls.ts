@@ -81,6 +81,7 @@ export function wall_lines(settings: Record<string, string>, box: Box3, is_plane
 export class Walls {
   readonly group = new Group();
   readonly box = new Box3();
+  floor: number | null = null; // height of the highest one
   private readonly lines_ = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ transparent: true, opacity: 0.7 }));
   private shown_ = '';
 
@@ -93,16 +94,17 @@ export class Walls {
     this.lines_.material.color = new Color(ink);
   }
 
-  /** Of a body at rest in a box; gives the floor's height where it is another than before, null where there is none, else nothing. */
-  take(settings: Record<string, string>, box: Box3, is_plane: boolean): number | null | undefined {
+  /** Of a body at rest in a box; gives whether they are others than before. */
+  take(settings: Record<string, string>, box: Box3, is_plane: boolean): boolean {
     const key = JSON.stringify([settings.floor, settings.room, settings.obstacle, box.min, box.max, is_plane]);
-    if (key === this.shown_) return undefined;
+    if (key === this.shown_) return false;
     this.shown_ = key;
     const { lines, floor } = wall_lines(settings, box, is_plane);
     this.group.visible = lines.length > 0;
     this.lines_.geometry.setAttribute('position', new Float32BufferAttribute(lines.flat(), 3));
     this.box.setFromArray(lines.flat());
     this.lines_.geometry.computeBoundingSphere();
-    return floor;
+    this.floor = floor;
+    return true;
   }
 }

@@ -47,6 +47,16 @@ TEST(SolvedSettings, WhatNothingHoldsFallsIntoARoomAroundIt) {
   }
 }
 
+// Numbers are written out: a body that is far from the origin does not begin in its walls.
+TEST(SolvedSettings, RoomIsAroundABodyFarAway) {
+  Model model = outline(ElementType::tri3);
+  for (Vec3& node : model.mesh.nodes) node += Vec3(1234.5678, -87.654321, 0.0);
+  const LiveSettings live = read_settings(solved_settings(model)).live;
+  ASSERT_TRUE(live.room);
+  const double left = model.mesh.nodes.front().x();
+  EXPECT_NEAR(left - live.room->low.x(), 0.2, 1e-5);
+}
+
 TEST(SolvedSettings, AreWrittenAsOptions) {
   EXPECT_EQ(option_text({{"creep", "20"}, {"solver", "corotational"}}), "--creep 20 --solver corotational");
   EXPECT_EQ(option_text({}), "");
