@@ -20,12 +20,12 @@ const scrub_to = (page, frame) =>
 
 test('keys move the tool, press, deepen and lift; with Shift they turn the view', async (t) => {
   const { page } = await open_cube(t, { args: ['--tool', 'sphere:0.1'] });
+  const outline = () => part(page, 'view').evaluate((canvas) => getComputedStyle(canvas).outlineStyle);
   await choose(page, 'press', 0.02);
   await page.keyboard.press('t');
   await part(page, 'view').focus();
   await page.keyboard.press('ArrowRight'); // a key, not a pointer, has the focus now
-  const ring = await part(page, 'view').evaluate((canvas) => getComputedStyle(canvas).outlineStyle);
-  assert.notEqual(ring, 'none');
+  assert.notEqual(await outline(), 'none');
   await page.keyboard.press('Enter');
   const pressed = await settled(page);
   assert.ok(pressed.force[2] < 0, `force ${pressed.force}`);
@@ -41,7 +41,9 @@ test('keys move the tool, press, deepen and lift; with Shift they turn the view'
   assert.ok(Math.hypot(...after_keys.map((one, k) => one - before[k])) > 0.05, 'the view turned');
   assert.equal(await page.evaluate(() => document.activeElement.dataset.testid), 'view');
   await page.mouse.click(20, 400);
-  assert.equal(await part(page, 'view').evaluate((canvas) => getComputedStyle(canvas).outlineStyle), 'none');
+  assert.equal(await outline(), 'none', 'a pointer needs no ring');
+  await page.keyboard.press('ArrowRight');
+  assert.notEqual(await outline(), 'none', 'a key does again');
   assert.deepEqual(page.complaints, []);
 });
 
@@ -152,7 +154,7 @@ test('how a model is looked at is kept, and an address opens it', async (t) => {
   await part(page, 'up').selectOption('y');
   const above = await project(page, [0.5, 1, 0.5]);
   const below = await project(page, [0.5, 0, 0.5]);
-  assert.ok(above.y < below.y - 50, 'y is up');
+  assert.ok(above.y < below.y - 50 && Math.abs(above.x - below.x) < 0.05 * (below.y - above.y), 'y is upright in the picture');
   await part(page, 'look-from').selectOption('front');
   await part(page, 'show-parallel').check();
   await page.keyboard.press('Shift+ArrowRight');
