@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "statics/polar.h"
 
@@ -26,6 +27,11 @@ Mat3 frame_of(const std::array<Vec3, 3>& x, std::size_t dimension) noexcept {
   return frame;
 }
 
+/// `change` is |F - I|: a stretch is no further from 1, and the nearest rotation R has |R - I| <= 2 |F - I|.
+bool can_be_larger(const SurfaceChange& largest, double change) noexcept {
+  return change > largest.strain || change > std::numbers::sqrt2 * std::sin(0.5 * largest.rotation);
+}
+
 }  // namespace
 
 SurfaceChange surface_change(int dimension, std::span<const Index> simplices, std::span<const Vec3> rest,
@@ -39,8 +45,11 @@ SurfaceChange surface_change(int dimension, std::span<const Index> simplices, st
       X[k] = rest[node];
       x[k] = rest[node] + u[node];
     }
-    const Mat3 F = frame_of(x, d) * frame_of(X, d).inverse();
-    if (!F.allFinite()) continue;  // a simplex without size says nothing
+    const Mat3 rest_frame = frame_of(X, d);
+    const Mat3 change = (frame_of(x, d) - rest_frame) * rest_frame.inverse();
+    if (!change.allFinite()) continue;  // a simplex without size says nothing
+    if (!can_be_larger(largest, change.norm())) continue;
+    const Mat3 F = Mat3::Identity() + change;
     const Mat3 R = nearest_rotation(F);
     largest.rotation = std::max(largest.rotation, std::acos(std::clamp(0.5 * (R.trace() - 1.0), -1.0, 1.0)));
     const Eigen::SelfAdjointEigenSolver<Mat3> stretches(F.transpose() * F, Eigen::EigenvaluesOnly);
