@@ -174,7 +174,7 @@ WireValues wire_values(const SurfacePicture& picture, const Scene& scene, const 
   const double units_of_u = std::ldexp(1.0, -values.exponent_u);
   const double units_of_stress = std::ldexp(1.0, -values.exponent_stress);
   const auto rounded = [](float value, double units) {
-    return static_cast<std::int32_t>(std::lrint(static_cast<double>(value) * units));
+    return static_cast<std::int32_t>(std::rint(static_cast<double>(value) * units));
   };
   for (std::vector<std::int32_t>& channel : values.channel) channel.resize(nodes);
   for (std::size_t k = 0; k < nodes; ++k) {
