@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/packed.h"
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
@@ -18,7 +19,19 @@ ActiveSet::ActiveSet(Index max_rows)
       state_(max_rows),
       signed_(max_rows),
       z_(3 * static_cast<std::size_t>(max_rows)),
-      entries_(static_cast<std::size_t>(max_rows) + 1) {}
+      entries_(static_cast<std::size_t>(max_rows) + 1),
+      lower_(packed_size(max_rows)) {}
+
+/// Takes the first `count` of active_ into the factor together; false where they depend on each other.
+bool ActiveSet::activate_all(const ContactProblem& problem, Index count) noexcept {
+  double* to = lower_.data();
+  for (Index j = 0; j < count; ++j) {
+    const double* row = problem.row(active_[j]);
+    for (Index i = j; i < count; ++i) *to++ = row[active_[i]];
+  }
+  const std::span<const double> lower(lower_.data(), to);
+  return factor_.assign(count, lower) == CapacitanceStatus::ok;
+}
 
 bool ActiveSet::activate(const ContactProblem& problem, Index row) noexcept {
   const Index count = factor_.nodes();
@@ -87,20 +100,31 @@ Index ActiveSet::most_violated(const ContactProblem& problem) const noexcept {
   return found;
 }
 
-bool ActiveSet::solve(ContactProblem& problem) noexcept {
-  factor_.clear();
-  rounds_ = 0;
+/// The rows that carry force in the guess are active, but for those that depend on others.
+void ActiveSet::begin(ContactProblem& problem) noexcept {
   std::fill_n(state_.begin(), problem.rows, Row::inactive);
   for (Index k = 0; k < problem.contacts; ++k) {
     std::fill_n(signed_.begin() + problem.first_row(k), problem.rows_of(k), problem.held[k]);
   }
+  Index count = 0;
   for (Index i = 0; i < problem.rows; ++i) {
     const auto row = static_cast<std::size_t>(i);
     if (signed_[row] == 0) problem.lambda[row] = std::max(problem.lambda[row], 0.0);
-    const bool wanted = signed_[row] != 0 || problem.lambda[row] > 0.0;
-    if (!wanted || !activate(problem, i)) problem.lambda[row] = 0.0;
+    if (signed_[row] != 0 || problem.lambda[row] > 0.0) active_[count++] = i;
   }
+  if (activate_all(problem, count)) {
+    for (Index k = 0; k < count; ++k) state_[active_[k]] = Row::active;
+    return;
+  }
+  for (Index k = 0; k < count; ++k) {  // active_ is written over no farther than it is read
+    const Index row = active_[k];
+    if (!activate(problem, row)) problem.lambda[row] = 0.0;
+  }
+}
 
+bool ActiveSet::solve(ContactProblem& problem) noexcept {
+  rounds_ = 0;
+  begin(problem);
   const int most_rounds = 3 * problem.rows + 10;
   Index entered = -1;
   while (rounds_ < most_rounds) {

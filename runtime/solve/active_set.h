@@ -32,6 +32,8 @@ class ActiveSet {
  private:
   enum class Row : std::uint8_t { inactive, active, dependent };
 
+  void begin(ContactProblem& problem) noexcept;
+  [[nodiscard]] bool activate_all(const ContactProblem& problem, Index count) noexcept;
   bool activate(const ContactProblem& problem, Index row) noexcept;
   void deactivate(Index position) noexcept;
   void solve_active(std::span<const double> b) noexcept;
@@ -44,6 +46,7 @@ class ActiveSet {
   std::vector<std::uint8_t> signed_;  // [rows] of held contacts: their force may have any sign
   std::vector<double> z_;             // [3 x active] the solution with all gaps of the active rows closed
   std::vector<double> entries_;       // [active + 1] a row of W there
+  std::vector<double> lower_;         // W of the rows that begin active, packed
   int rounds_ = 0;
 };
 

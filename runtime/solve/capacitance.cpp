@@ -38,6 +38,24 @@ void subtract_columns(const std::array<const double*, D>& L, const std::array<do
   }
 }
 
+constexpr std::int64_t panel = 4;  // columns that are taken out of the later ones together
+
+/// The same for two columns y and z of it at once, `z` a row shorter: L is read once.
+void subtract_columns(const std::array<const double*, panel>& L, const std::array<double, panel>& x,
+                      const std::array<double, panel>& w, double* __restrict y, double* __restrict z,
+                      std::int64_t count) noexcept {
+#pragma omp simd
+  for (std::int64_t i = 0; i < count; ++i) {
+    double sum = 0.0, other = 0.0;
+    for (std::size_t p = 0; p < panel; ++p) {
+      sum += L[p][i] * x[p];
+      other += L[p][i] * w[p];
+    }
+    y[i] -= sum;
+    z[i] -= other;
+  }
+}
+
 /// Givens rotation of the column pair (L, w) that keeps L L^T + w w^T and zeroes w at the top.
 void rotate_in(double* __restrict L, double* __restrict w, std::int64_t count) noexcept {
   const double r = std::hypot(L[0], w[0]);
@@ -155,6 +173,62 @@ void CapacitanceMatrix::remove_node(Index k) noexcept {
 CapacitanceStatus CapacitanceMatrix::add(std::span<const double> blocks) noexcept {
   if (nodes_ == max_nodes_) return CapacitanceStatus::full;
   return with_dimension(dimension_, [&](auto d) { return add_node<d>(blocks); });
+}
+
+/// Cholesky of columns [first, end), from which the former ones are taken out already. The diagonal of C is
+/// in rows_.
+bool CapacitanceMatrix::factor_panel(std::int64_t first, std::int64_t end, std::int64_t rows) noexcept {
+  for (std::int64_t j = first; j < end; ++j) {
+    double* to = column(j);
+    for (std::int64_t k = first; k < j; ++k) {
+      const double* from = column(k) + (j - k);
+      subtract(from, from[0], to, rows - j);
+    }
+    if (!(to[0] > pivot_tolerance * rows_[j] && std::isfinite(to[0]))) return false;
+    const double scale = 1.0 / std::sqrt(to[0]);
+    for (std::int64_t i = 0; i < rows - j; ++i) to[i] *= scale;
+  }
+  return true;
+}
+
+/// Takes the panel from column `first` on out of all later columns, two at a time.
+void CapacitanceMatrix::subtract_panel(std::int64_t first, std::int64_t rows) noexcept {
+  std::array<const double*, panel> L;
+  std::array<double, panel> x, w;
+  for (std::int64_t j = first + panel; j < rows; j += 2) {
+    for (std::size_t p = 0; p < panel; ++p) {
+      L[p] = column(first + static_cast<std::int64_t>(p)) - (first + static_cast<std::int64_t>(p)) + j;
+      x[p] = L[p][0];
+    }
+    double* y = column(j);
+    if (j + 1 == rows) {
+      subtract_columns<panel>(L, x, y, 1);
+      return;
+    }
+    for (std::size_t p = 0; p < panel; ++p) {
+      y[0] -= L[p][0] * x[p];
+      w[p] = (++L[p])[0];
+    }
+    subtract_columns(L, x, w, y + 1, column(j + 1), rows - j - 1);
+  }
+}
+
+CapacitanceStatus CapacitanceMatrix::assign(Index nodes, std::span<const double> lower) noexcept {
+  clear();
+  if (nodes > max_nodes_) return CapacitanceStatus::full;
+  const std::int64_t m = std::int64_t{dimension_} * nodes;
+  for (std::int64_t j = 0; j < m; ++j) {
+    const double* from = lower.data() + packed_column(j, m);
+    std::copy(from, from + (m - j), column(j));
+    rows_[j] = from[0];
+  }
+  for (std::int64_t first = 0; first < m; first += panel) {
+    const std::int64_t end = std::min(first + panel, m);
+    if (!factor_panel(first, end, m)) return CapacitanceStatus::not_positive_definite;
+    if (end - first == panel) subtract_panel(first, m);
+  }
+  nodes_ = nodes;
+  return CapacitanceStatus::ok;
 }
 
 void CapacitanceMatrix::remove(Index k) noexcept {

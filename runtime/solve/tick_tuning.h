@@ -83,7 +83,7 @@ struct ConeTuning {
 struct ManyTuning {
   int few_contacts = 36;         ///< contact points that the direct solvers have room for, where some rub,
   int few_closed = 10;           ///< of which so many may be closed;
-  int few_frictionless = 160;    ///< and contact points where none rubs
+  int few_frictionless = 200;    ///< and contact points where none rubs
   double open_gap = 0.02;        ///< [edge] a contact without force that is farther is left out of the tick
   double least_residual = 2e-8;  ///< [largest force] of the guess: nothing is to be done
   double no_change = 1e-7;  ///< [largest force] in a tick in which nothing moves: rounding changes as much
