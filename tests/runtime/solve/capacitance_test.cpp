@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <string>
 #include <vector>
@@ -34,6 +35,19 @@ class Capacitance {
         (*xi_)(dofs({node}), dofs(columns));
     const CapacitanceStatus status = C_.add({blocks.data(), static_cast<std::size_t>(blocks.size())});
     if (status == CapacitanceStatus::ok) nodes_ = columns;
+    return status;
+  }
+
+  /// In place of those that are held.
+  CapacitanceStatus assign(const std::vector<Index>& nodes) {
+    nodes_ = nodes;
+    const Eigen::MatrixXd C = fresh();
+    std::vector<double> lower;
+    for (Eigen::Index j = 0; j < C.cols(); ++j) {
+      for (Eigen::Index i = j; i < C.rows(); ++i) lower.push_back(C(i, j));
+    }
+    const CapacitanceStatus status = C_.assign(static_cast<Index>(nodes.size()), lower);
+    if (status != CapacitanceStatus::ok) nodes_.clear();
     return status;
   }
 
@@ -97,6 +111,37 @@ TEST_P(CapacitanceMatrices, FactorIsThatOfAFreshFactorisation) {
   Capacitance capacitance(xi, GetParam(), 60);
   for (Index node = 59; node >= 0; --node) ASSERT_EQ(capacitance.add(node), CapacitanceStatus::ok);
   EXPECT_EQ(capacitance.C_.nodes(), 60);
+  EXPECT_LT(capacitance.error(), 1e-13);
+}
+
+// As many columns as go together, some fewer and some more; the factor then grows and shrinks as any.
+TEST_P(CapacitanceMatrices, TakesManyNodesAtOnce) {
+  const Eigen::MatrixXd xi = random_greens(GetParam(), 40);
+  for (const Index count : {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 37}) {
+    Capacitance capacitance(xi, GetParam(), 40);
+    ASSERT_EQ(capacitance.add(39), CapacitanceStatus::ok);
+    std::vector<Index> nodes(static_cast<std::size_t>(count));
+    std::iota(nodes.rbegin(), nodes.rend(), 0);
+    ASSERT_EQ(capacitance.assign(nodes), CapacitanceStatus::ok) << count;
+    EXPECT_EQ(capacitance.C_.nodes(), count);
+    EXPECT_LT(capacitance.error(), 1e-13) << count;
+    ASSERT_EQ(capacitance.add(38), CapacitanceStatus::ok);
+    capacitance.remove(0);
+    EXPECT_LT(capacitance.error(), 1e-13) << count << ", and one more, and one less";
+  }
+}
+
+TEST_P(CapacitanceMatrices, HoldsNoneOfManyThatDependOnEachOtherOrDoNotFit) {
+  const Eigen::MatrixXd xi = random_greens(GetParam(), 8);
+  Capacitance capacitance(xi, GetParam(), 6);
+  for (const std::vector<Index>& nodes : {std::vector<Index>{0, 1, 2, 3, 4, 1}, std::vector<Index>{2, 2}}) {
+    ASSERT_EQ(capacitance.assign({5, 6}), CapacitanceStatus::ok);
+    EXPECT_EQ(capacitance.assign(nodes), CapacitanceStatus::not_positive_definite);
+    EXPECT_EQ(capacitance.C_.nodes(), 0);
+  }
+  EXPECT_EQ(capacitance.assign({0, 1, 2, 3, 4, 5, 6}), CapacitanceStatus::full);
+  EXPECT_EQ(capacitance.C_.nodes(), 0);
+  EXPECT_EQ(capacitance.assign({0, 1, 2, 3, 4, 5}), CapacitanceStatus::ok);
   EXPECT_LT(capacitance.error(), 1e-13);
 }
 
