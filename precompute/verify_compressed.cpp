@@ -16,8 +16,8 @@ namespace {
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Vector = Eigen::VectorXd;
 
-constexpr std::int64_t touches = 16;     // of each number of nodes
-constexpr std::uint64_t seed = 1 << 20;  // others than those of the certificate
+constexpr std::int64_t verified_touches = 16;  // of each number of nodes
+constexpr std::uint64_t seed = 1 << 20;        // others than those of the certificate
 
 std::vector<Check> check_probes(const Model& model) {
   const double tolerance = model.compressed->tolerance;
@@ -79,8 +79,8 @@ Check check_touches(const Model& model, const Factor& factor, std::span<const st
   const auto [points, touchable] = touchable_points(model, model.stored_nodes);
   ThreadSharing threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   Check check{"touches", 0.0, model.compressed->tolerance};
-  for (const TouchErrors& errors : certify(*model.compressed, factor, stored_dofs, points, touchable, touches,
-                                           seed, threads, [](double) { return true; }))
+  for (const TouchErrors& errors : certify(*model.compressed, factor, stored_dofs, points, touchable,
+                                           verified_touches, seed, threads, [](double) { return true; }))
     check.error = std::max(check.error, errors.quantile(1.0));
   return check;
 }

@@ -36,9 +36,10 @@ bool by_tag(const Load& load) {
       load);
 }
 
-class Comparison {
+class DescriptionComparison {
  public:
-  Comparison(const Model& model, const Description& description) : model_(model), asked_(description) {}
+  DescriptionComparison(const Model& model, const Description& description)
+      : model_(model), asked_(description) {}
 
   std::vector<std::string> differences() {
     compare_header();
@@ -188,7 +189,7 @@ class Comparison {
 std::vector<std::string> description_differences(const Model& model, const std::filesystem::path& file) {
   try {
     const Description description = parse_description(model.model_toml, file.parent_path() / "model_toml");
-    return Comparison(model, description).differences();
+    return DescriptionComparison(model, description).differences();
   } catch (const Error& error) {
     return {fmt::format("/model_toml does not describe this file: {}", error.what())};
   }

@@ -25,8 +25,8 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t largest_header = 1 << 20;  // Slicer's segments are described there
-const char* const complete_file = "use a complete NRRD file (.nrrd) with one label a voxel";
+constexpr std::size_t largest_nrrd_header = 1 << 20;  // Slicer's segments are described there
+const char* const complete_nrrd = "use a complete NRRD file (.nrrd) with one label a voxel";
 
 /// What a header says, by field.
 struct Header {
@@ -142,7 +142,7 @@ bool is_nrrd(const std::filesystem::path& file) {
 std::int64_t check_nrrd_header(const std::filesystem::path& file) {
   const std::string where = file.string();
   const auto file_bytes = static_cast<std::int64_t>(std::filesystem::file_size(file));
-  std::string text(largest_header, '\0');
+  std::string text(largest_nrrd_header, '\0');
   text.resize(static_cast<std::size_t>(
       std::max(0, gzread(open_unpacked(file).get(), text.data(), static_cast<unsigned>(text.size())))));
   const std::optional<Header> header = parse(text);
@@ -159,7 +159,7 @@ std::int64_t check_nrrd_header(const std::filesystem::path& file) {
     if (status != std::errc() || end != word.data() + word.size() || size < 1) {
       throw Error(
           fmt::format("sizes of the image's header has \"{}\", not a whole number from 1", shortened(word)),
-          where, complete_file);
+          where, complete_nrrd);
     }
     voxels *= static_cast<double>(size);
     product += fmt::format("{}{}", product.empty() ? "" : " x ", size);

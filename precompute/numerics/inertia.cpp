@@ -17,10 +17,6 @@ using Matrix = Eigen::MatrixXd;
 
 constexpr std::int64_t panel = 64;  // columns that are eliminated together
 
-blasint blas(std::int64_t i) {
-  return static_cast<blasint>(i);
-}
-
 /// Entries of A by the supernode of their column in P A P^T.
 class EntriesBySupernode {
  public:

@@ -1,7 +1,5 @@
 #include "precompute/numerics/supernodal_sweeps.h"
 
-#include <cblas.h>
-
 #include <algorithm>
 
 namespace palpate {
@@ -12,9 +10,6 @@ const std::int64_t* row_positions(const cholmod_factor& L) {
 }
 const double* values(const cholmod_factor& L) {
   return static_cast<const double*>(L.x);
-}
-blasint blas(std::int64_t i) {
-  return static_cast<blasint>(i);
 }
 
 }  // namespace

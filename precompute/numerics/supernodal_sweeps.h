@@ -1,6 +1,8 @@
 // The steps of forward and backward substitution, a supernode at a time.
 #pragma once
 
+#include <cblas.h>
+
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -8,6 +10,11 @@
 #include "precompute/numerics/factor.h"
 
 namespace palpate {
+
+/// A size as BLAS takes it.
+inline blasint blas(std::int64_t size) {
+  return static_cast<blasint>(size);
+}
 
 /// Block of columns of a supernodal factor that share their rows.
 struct Supernode {

@@ -141,13 +141,13 @@ void fill_holes(SurfaceMesh& mesh, std::vector<std::string>& repairs) {
 }
 
 /// What a child sends: a surface, and what was done or is still wrong.
-struct Answer {
+struct Mended {
   TriangleSurface surface;
   std::vector<std::string> repairs;
   std::string problem;
 };
 
-ChildResult sent(const Answer& answer) {
+ChildResult sent(const Mended& answer) {
   Bytes bytes;
   append_surface(bytes, answer.surface);
   append_array(bytes, std::span<const char>(answer.problem));
@@ -155,13 +155,13 @@ ChildResult sent(const Answer& answer) {
   return {0, std::move(bytes)};
 }
 
-Answer received(const ChildResult& result) {
+Mended received(const ChildResult& result) {
   std::span<const std::byte> bytes = result.bytes;
   const auto text = [&] {
     const std::vector<char> letters = take_array<char>(bytes);
     return std::string(letters.begin(), letters.end());
   };
-  Answer answer;
+  Mended answer;
   answer.surface = take_surface(bytes);
   answer.problem = text();
   while (!bytes.empty()) answer.repairs.push_back(text());
@@ -169,8 +169,8 @@ Answer received(const ChildResult& result) {
 }
 
 /// Everything but self-intersections.
-Answer mend(const std::filesystem::path& file, const std::string& where, SurfaceParts parts) {
-  Answer answer;
+Mended mend(const std::filesystem::path& file, const std::string& where, SurfaceParts parts) {
+  Mended answer;
   PolygonSoup soup = read_polygon_soup(file, where);
   SurfaceMesh mesh = clean(soup, answer.repairs);
   if (parts == SurfaceParts::largest) keep_largest(mesh, answer.repairs);
@@ -187,7 +187,7 @@ Answer mend(const std::filesystem::path& file, const std::string& where, Surface
 
 /// `work` on a surface, in a child; nothing where the child fails.
 template <class Work>
-std::optional<Answer> attempt(const ChildTask& task, const Work& work) {
+std::optional<Mended> attempt(const ChildTask& task, const Work& work) {
   try {
     return received(run_in_child(task, [&] { return sent(work()); }));
   } catch (const Error&) {
@@ -225,7 +225,7 @@ RepairedSurface repair_surface(const std::filesystem::path& file, SurfaceParts p
       .where = where,
       .limits = repair_limits(static_cast<std::int64_t>(std::filesystem::file_size(file))),
       .hint = "repair the surface in a mesh editor, or export it again"};
-  Answer answer = received(run_in_child(task, [&] {
+  Mended answer = received(run_in_child(task, [&] {
     try {
       return sent(mend(path, where, parts));
     } catch (const CGAL::Failure_exception&) {
@@ -234,8 +234,8 @@ RepairedSurface repair_surface(const std::filesystem::path& file, SurfaceParts p
   }));
   check_filled(answer.surface, where);
   if (answer.problem.starts_with("intersects")) {
-    std::optional<Answer> untangled = attempt(task, [&] {
-      Answer result;
+    std::optional<Mended> untangled = attempt(task, [&] {
+      Mended result;
       result.surface = without_self_intersections(answer.surface);
       result.problem = problem_of(result.surface);
       return result;
@@ -264,8 +264,8 @@ TriangleSurface wrapped_surface(const TriangleSurface& surface, double edge, dou
                           .where = where,
                           .limits = repair_limits(bytes),
                           .hint = "repair the surface in a mesh editor"};
-  Answer answer = received(run_in_child(task, [&] {
-    Answer wrap;
+  Mended answer = received(run_in_child(task, [&] {
+    Mended wrap;
     wrap.surface = wrap_surface(surface, wrap_alpha * edge, offset * edge);
     wrap.problem = problem_of(wrap.surface);
     return sent(wrap);

@@ -14,21 +14,19 @@
 namespace palpate {
 namespace {
 
-using Json = nlohmann::json;
-
-Json text_or_null(const std::optional<std::string>& text) {
-  return text ? Json(*text) : Json();
+nlohmann::json text_or_null(const std::optional<std::string>& text) {
+  return text ? nlohmann::json(*text) : nlohmann::json();
 }
 
-Json number_or_null(const std::optional<double>& number) {
-  return number ? Json(*number) : Json();
+nlohmann::json number_or_null(const std::optional<double>& number) {
+  return number ? nlohmann::json(*number) : nlohmann::json();
 }
 
-Json error_or_null(const std::optional<Error>& error) {
-  return error ? error_members(*error) : Json();
+nlohmann::json error_or_null(const std::optional<Error>& error) {
+  return error ? error_members(*error) : nlohmann::json();
 }
 
-Json vector(const Vec3& v) {
+nlohmann::json vector(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
@@ -38,12 +36,12 @@ std::string_view name_of(const Names& names, std::size_t number) {
   return names[std::min(number, names.size() - 1)].second;
 }
 
-Json fault_or_null(Fault fault) {
+nlohmann::json fault_or_null(Fault fault) {
   if (fault == Fault::none) return {};
   return {{"name", name_of(fault_names, static_cast<std::size_t>(fault))}, {"remedy", fault_remedy(fault)}};
 }
 
-Json change_or_null(const std::optional<SurfaceChange>& change) {
+nlohmann::json change_or_null(const std::optional<SurfaceChange>& change) {
   if (!change) return {};
   return {{"rotation", change->rotation}, {"strain", change->strain}};
 }

@@ -12,7 +12,7 @@ namespace palpate {
 namespace {
 
 constexpr WarpBalanceOptions effort{.tolerance = 1e-4, .most_rounds = 3};
-constexpr double most_turn = 0.03;    // [rad] by which W is behind
+constexpr double most_behind = 0.03;  // [rad] by which W is behind
 constexpr double most_wrong = 0.3;    // share of how far a step moved loaded nodes by which W was off
 constexpr double least_wrong = 1e-6;  // share of their displacement: less does not matter
 constexpr double least_part = 1e-6;   // of the largest: smaller parts of a compliance are rounding
@@ -78,7 +78,7 @@ bool WarpedMotion::must_turn(const MotionJob& job) const {
   double behind = 0.0;
   for (std::size_t node = 0; node < R_.size(); ++node)
     behind = std::max(behind, half_sine(R_[node], R_turned_[node]));
-  if (behind > 0.5 * most_turn) return true;
+  if (behind > 0.5 * most_behind) return true;
   if (turned_ == nullptr || job.load.empty()) return false;
   // Where the tick had the loaded nodes, against where they are.
   std::vector<double> by_load(x_.size());

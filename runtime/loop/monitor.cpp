@@ -17,8 +17,8 @@ namespace palpate {
 namespace {
 
 constexpr auto pause = std::chrono::milliseconds(20);
-constexpr int pauses_a_line = 25;   // half a second
-constexpr std::size_t room = 8192;  // ticks that may wait: more than a second of the fastest loop
+constexpr int pauses_a_line = 25;         // half a second
+constexpr std::size_t most_notes = 8192;  // ticks that may wait: more than a second of the fastest loop
 
 double microseconds(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) * 1e-3;
@@ -85,7 +85,7 @@ std::string histogram_bars(const TimeHistogram& histogram) {
 }
 
 Monitor::Monitor(const MonitorOptions& options)
-    : options_(options), notes_(room), thread_([this] { run(); }) {}
+    : options_(options), notes_(most_notes), thread_([this] { run(); }) {}
 
 Monitor::~Monitor() {
   stop_ = true;

@@ -6,7 +6,7 @@
 #include "base/toml_text.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::toml_table_test {
 namespace {
 
 using test::error_of;
@@ -107,4 +107,4 @@ TEST(TomlTable, OfSeveralKeysOneIsGiven) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::toml_table_test

@@ -10,7 +10,7 @@
 #include "base/regular_file.h"
 #include "tests/support/meshes_files.h"
 
-namespace palpate {
+namespace palpate::write_file_test {
 namespace {
 
 using test::error_of;
@@ -91,4 +91,4 @@ TEST(WriteFile, WhatCannotBeWrittenLeavesWhatWasThere) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::write_file_test

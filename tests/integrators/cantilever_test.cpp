@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "tests/integrators/timoshenko_beam.h"
+#include "tests/support/dense_algebra.h"
 #include "tests/support/dynamics_bodies.h"
 
 namespace palpate::cantilever_test {
@@ -84,10 +85,9 @@ std::vector<double> lowest_modes(const Equation& equation, std::size_t count) {
     const Eigen::MatrixXd MX = M * X;
     for (Eigen::Index j = 0; j < X.cols(); ++j) X.col(j) = solver.solve(MX.col(j));
     const Eigen::MatrixXd KX = K * X, MX_after = M * X;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(X.transpose() * KX,
-                                                                         X.transpose() * MX_after);
-    X = X * ritz.eigenvectors();
-    squares = ritz.eigenvalues();
+    const test::Eigenpairs ritz = test::eigenpairs_of(X.transpose() * KX, X.transpose() * MX_after);
+    X = X * ritz.vectors;
+    squares = ritz.values;
   }
   std::vector<double> omega;
   for (std::size_t k = 0; k < count; ++k) omega.push_back(std::sqrt(squares[static_cast<Eigen::Index>(k)]));

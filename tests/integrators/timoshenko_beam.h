@@ -1,7 +1,7 @@
 // Bending frequencies of a cantilever by beam theory.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <cmath>
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>

@@ -3,13 +3,14 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <cstdio>
 #include <limits>
 #include <numeric>
 #include <random>
 
 #include "meshes/element.h"
+#include "tests/support/dense_algebra.h"
 #include "tests/support/meshes_bodies.h"
 #include "tests/support/meshes_files.h"
 
@@ -316,8 +317,7 @@ void compare_with_stiffness(const Mesh& mesh, Analysis analysis) {
     for (Eigen::Index dof = 0; dof < dofs; ++dof) {
       if ((fixed[static_cast<std::size_t>(dof / d)] >> dof % d & 1) == 0) free.push_back(dof);
     }
-    const Eigen::VectorXd values =
-        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(K(free, free), Eigen::EigenvaluesOnly).eigenvalues();
+    const Eigen::VectorXd values = test::eigenvalues_of(K(free, free));
     const auto zeros = (values.array() < 1e-10 * values.maxCoeff()).count();
     if (zeros == 0) {
       ++held_fully;

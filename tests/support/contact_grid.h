@@ -1,7 +1,7 @@
 // A contact problem of many points whose compliance is known.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <random>

@@ -1,10 +1,12 @@
 #include "tests/support/coulomb_solver.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "tests/support/dense_algebra.h"
 
 namespace palpate::test {
 
@@ -42,8 +44,7 @@ double CoulombSolver::residual(const VectorXd& force) const {
 
 VectorXd CoulombSolver::without_friction(const std::vector<Eigen::Index>& closed) const {
   VectorXd next = VectorXd::Zero(b.size());
-  const VectorXd forces = Eigen::MatrixXd(W(closed, closed)).ldlt().solve(VectorXd(-b(closed)));
-  next(closed) = forces;
+  next(closed) = solved(W(closed, closed), -b(closed));
   return next;
 }
 

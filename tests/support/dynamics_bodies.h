@@ -1,10 +1,11 @@
 // What the tests of the time integrators let swing.
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/SparseCore>
 
 #include "meshes/generate.h"
 #include "tests/integrators/integrators.h"
+#include "tests/support/dense_algebra.h"
 #include "tests/support/precompute_case.h"
 
 namespace palpate::test {
@@ -47,10 +48,8 @@ struct Modes {
 };
 
 inline Modes all_modes(const Equation& equation) {
-  // Eigen's solver reads the lower triangles only.
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(Eigen::MatrixXd(equation.K),
-                                                                         Eigen::MatrixXd(equation.M));
-  return {solver.eigenvalues().cwiseSqrt(), solver.eigenvectors()};
+  const Eigenpairs pairs = eigenpairs_of(Eigen::MatrixXd(equation.K), Eigen::MatrixXd(equation.M));
+  return {pairs.values.cwiseSqrt(), pairs.vectors};
 }
 
 }  // namespace palpate::test

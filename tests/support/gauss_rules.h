@@ -1,12 +1,13 @@
 // Quadrature of the tests' own, of any order, to check the elements' rules and integrals against.
 #pragma once
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <cmath>
 #include <utility>
 #include <vector>
 
 #include "meshes/element.h"
+#include "tests/support/dense_algebra.h"
 
 namespace palpate::test {
 
@@ -20,11 +21,11 @@ inline bool is_simplex(ElementType type) {
 inline std::vector<std::pair<double, double>> gauss_legendre(int n) {
   Eigen::MatrixXd jacobi = Eigen::MatrixXd::Zero(n, n);
   for (int k = 1; k < n; ++k) jacobi(k, k - 1) = k / std::sqrt(4.0 * k * k - 1.0);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(jacobi);
+  const Eigenpairs pairs = eigenpairs_of(jacobi);
   std::vector<std::pair<double, double>> rule;
   rule.reserve(static_cast<std::size_t>(n));
   for (int k = 0; k < n; ++k) {
-    rule.emplace_back((1.0 + solver.eigenvalues()[k]) / 2.0, std::pow(solver.eigenvectors()(0, k), 2));
+    rule.emplace_back((1.0 + pairs.values[k]) / 2.0, std::pow(pairs.vectors(0, k), 2));
   }
   return rule;
 }

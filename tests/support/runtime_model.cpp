@@ -15,6 +15,7 @@
 #include "meshes/element.h"
 #include "meshes/generate.h"
 #include "meshes/surface.h"
+#include "tests/support/dense_algebra.h"
 
 namespace palpate::test {
 namespace {
@@ -49,7 +50,7 @@ Eigen::MatrixXd inverse_at(const Eigen::MatrixXd& K, const std::vector<Eigen::In
     const Eigen::MatrixXd Y = factor.matrixL().solve(K(inner, kept));
     left.selfadjointView<Eigen::Lower>().rankUpdate(Y.transpose(), -1.0);
   }
-  return left.llt().solve(Eigen::MatrixXd::Identity(left.rows(), left.cols()));
+  return inverse_of(left);
 }
 
 double height(const Model& model, std::size_t node) {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -14,6 +14,7 @@
 #include "precompute/compression/recompression.h"
 #include "tests/support/compression/hierarchical_sample.h"
 #include "tests/support/compression/inverted_body.h"
+#include "tests/support/dense_algebra.h"
 
 namespace palpate::column_compression_test {
 namespace {
@@ -61,7 +62,7 @@ class Bar : public test::InvertedBody {
         for (int axis = 0; axis < 3; ++axis) dofs.push_back(3 * nodes[std::size_t(k)] + axis);
       const Eigen::VectorXd u = Eigen::VectorXd::NullaryExpr(std::ssize(dofs), [&] { return entry(random); });
       const Eigen::MatrixXd exact = Xi()(dofs, dofs), C = compressed(dofs, dofs);
-      const Eigen::VectorXd f_0 = exact.llt().solve(u), f = C.llt().solve(u);
+      const Eigen::VectorXd f_0 = test::solved(exact, u), f = test::solved(C, u);
       worst = std::max(worst, (f - f_0).lpNorm<Eigen::Infinity>() / f_0.lpNorm<Eigen::Infinity>());
     }
     return worst;

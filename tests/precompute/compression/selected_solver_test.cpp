@@ -4,7 +4,7 @@
 #include <cblas.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "meshes/generate.h"
+#include "tests/support/dense_algebra.h"
 #include "tests/support/precompute_case.h"
 
 namespace palpate::selected_solver_test {
@@ -40,7 +41,7 @@ struct Body {
 
   static Eigen::MatrixXd dense_inverse(const SparseMatrix& K) {
     const Eigen::MatrixXd full = Eigen::MatrixXd(K).selfadjointView<Eigen::Lower>();
-    return full.llt().solve(Eigen::MatrixXd::Identity(full.rows(), full.cols()));
+    return test::inverse_of(full);
   }
 
   [[nodiscard]] Rows expected(const Dofs& rows, const Dofs& columns) const {

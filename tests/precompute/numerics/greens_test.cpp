@@ -1,7 +1,7 @@
 // Green's functions against the dense inverse.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 
 #include "formats/model.h"
@@ -10,6 +10,7 @@
 #include "meshes/surface.h"
 #include "precompute/numerics/greens_solver.h"
 #include "precompute/numerics/scope.h"
+#include "tests/support/dense_algebra.h"
 #include "tests/support/precompute_case.h"
 
 namespace palpate::greens_test {
@@ -69,7 +70,7 @@ Eigen::MatrixXd greens(const GreensSolver& solver, std::int64_t width, Blocks bl
 /// The same block of the dense inverse of K.
 Eigen::MatrixXd dense_inverse(const SparseMatrix& K, const std::vector<std::int64_t>& dofs) {
   const Eigen::MatrixXd full = Eigen::MatrixXd(K).selfadjointView<Eigen::Lower>();
-  const Eigen::MatrixXd inverse = full.llt().solve(Eigen::MatrixXd::Identity(full.rows(), full.cols()));
+  const Eigen::MatrixXd inverse = test::inverse_of(full);
   Eigen::MatrixXd block(static_cast<Eigen::Index>(dofs.size()), static_cast<Eigen::Index>(dofs.size()));
   for (std::size_t i = 0; i < dofs.size(); ++i) {
     for (std::size_t j = 0; j < dofs.size(); ++j) {

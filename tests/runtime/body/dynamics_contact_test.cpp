@@ -1,13 +1,14 @@
 // Dynamic contact: the tool meets inertia and viscosity.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <numbers>
 
 #include "base/error.h"
 #include "runtime/background/motion_source.h"
 #include "runtime/body/packed_newmark.h"
+#include "tests/support/dense_algebra.h"
 #include "tests/support/dynamics_sample.h"
 #include "tests/support/runtime_tool.h"
 
@@ -51,8 +52,7 @@ TEST(DynamicContact, IsTheConstrainedNewmarkStep) {
   const test::SparseRoute sparse(model);
   const MatrixXd K_bar = effective_stiffness(sparse.equation.K, sparse.equation.M, model.dynamics.damping,
                                              model.dynamics.newmark);
-  const MatrixXd inverse =
-      K_bar.selfadjointView<Eigen::Lower>().llt().solve(MatrixXd::Identity(K_bar.rows(), K_bar.cols()));
+  const MatrixXd inverse = test::inverse_of(K_bar);
 
   Loop loop(test::swinging_model(ElementType::tet4, test::packed()), test::plain({.reach = 0.5}));
   const Index held = loop.body.nearest_surface_node(Vec3(1.0, 1.0, 1.0)).node;

@@ -1,7 +1,7 @@
 // The runtime's Newmark steps, packed and modal, against a sparse solve in every step and each other.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
 
 #include "base/error.h"

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "overlay/condensation.h"
 #include "runtime/tick/step.h"
+#include "tests/support/dense_algebra.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::scaled_model_test {
@@ -104,8 +105,7 @@ TEST(ScaledStiffness, SwingsFaster) {
   constexpr double mass = 3.0;
   Model model = full_model(2);
   const auto frequencies = [&] {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(stiffness_of(model), Eigen::EigenvaluesOnly);
-    const Eigen::VectorXd lowest = (eigen.eigenvalues().head(4) / mass).cwiseSqrt();
+    const Eigen::VectorXd lowest = (test::eigenvalues_of(stiffness_of(model)).head(4) / mass).cwiseSqrt();
     return std::vector<double>(lowest.begin(), lowest.end());
   };
   model.dynamics.method = DynamicsMethod::modal;
@@ -137,7 +137,7 @@ Model loaded_model() {
   for (std::size_t k = 0; k < model.stored_nodes.size(); ++k)
     f.segment<3>(3 * static_cast<Eigen::Index>(k)) =
         model.rest_force[static_cast<std::size_t>(model.stored_nodes[k])];
-  const Eigen::VectorXd u = stiffness_of(model).ldlt().solve(f);
+  const Eigen::VectorXd u = test::solved(stiffness_of(model), f);
   for (std::size_t k = 0; k < model.stored_nodes.size(); ++k)
     model.rest_displacement[static_cast<std::size_t>(model.stored_nodes[k])] =
         u.segment<3>(3 * static_cast<Eigen::Index>(k));

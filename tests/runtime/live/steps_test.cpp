@@ -1,7 +1,7 @@
 // Steps of live bodies: against the linear integrators of the study, and what each keeps.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
 
 #include "base/error.h"

@@ -1,13 +1,13 @@
 // The contact solvers against the conditions that define the answer, enumeration, and finite differences.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <random>
 #include <vector>
 
 #include "runtime/solve/active_set.h"
 #include "runtime/solve/cone_solver.h"
+#include "tests/support/dense_algebra.h"
 
 namespace palpate::solvers_test {
 namespace {
@@ -111,7 +111,7 @@ TEST(ActiveSet, FindsTheOneSetThatEnumerationFinds) {
       }
       Eigen::VectorXd lambda = Eigen::VectorXd::Zero(n);
       const Eigen::VectorXd b_in = b(in);
-      const Eigen::VectorXd closed = Eigen::MatrixXd(W(in, in)).llt().solve(-b_in);
+      const Eigen::VectorXd closed = test::solved(W(in, in), -b_in);
       lambda(in) = closed;
       if (lambda.minCoeff() < 0.0 || (b + W * lambda).minCoeff() < -1e-15) continue;
       ++found;

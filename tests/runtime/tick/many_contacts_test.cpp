@@ -1,7 +1,7 @@
 // What contact of many points keeps from tick to tick, against the same made anew.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <limits>
 #include <optional>

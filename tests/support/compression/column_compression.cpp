@@ -2,7 +2,7 @@
 
 #include <cblas.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <ctime>
 #include <memory>

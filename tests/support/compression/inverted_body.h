@@ -3,7 +3,6 @@
 
 #include <cblas.h>
 
-#include <Eigen/Cholesky>
 #include <cstdint>
 #include <utility>
 
@@ -11,6 +10,7 @@
 #include "precompute/numerics/factor.h"
 #include "precompute/numerics/scope.h"
 #include "tests/support/compression/clustered_body.h"
+#include "tests/support/dense_algebra.h"
 #include "tests/support/precompute_case.h"
 
 namespace palpate::test {
@@ -29,7 +29,7 @@ class InvertedBody {
     openblas_set_num_threads(1);  // as a bake does
     factor_.factorize();
     const Eigen::MatrixXd K = Eigen::MatrixXd(stiffness_.K).selfadjointView<Eigen::Lower>();
-    const Eigen::MatrixXd inverse = K.llt().solve(Eigen::MatrixXd::Identity(K.rows(), K.cols()));
+    const Eigen::MatrixXd inverse = inverse_of(K);
     const auto n = std::ssize(stored_.dofs);
     Xi_ = Eigen::MatrixXd::Zero(n, n);
     for (Eigen::Index i = 0; i < n; ++i) {
