@@ -40,7 +40,7 @@ void subtract_columns(const std::array<const double*, D>& L, const std::array<do
 
 constexpr std::int64_t panel = 4;  // columns that are taken out of the later ones together
 
-/// The same for two columns y and z of it at once, `z` a row shorter: L is read once.
+/// y -= L x and z -= L w for the part of L below two diagonal entries: L is read once.
 void subtract_columns(const std::array<const double*, panel>& L, const std::array<double, panel>& x,
                       const std::array<double, panel>& w, double* __restrict y, double* __restrict z,
                       std::int64_t count) noexcept {
