@@ -27,7 +27,8 @@ Mat3 frame_of(const std::array<Vec3, 3>& x, std::size_t dimension) noexcept {
   return frame;
 }
 
-/// `change` is |F - I|: a stretch is no further from 1, and the nearest rotation R has |R - I| <= 2 |F - I|.
+/// Whether a simplex can exceed the largest so far whose deformation gradient F is `change` = |F - I| from
+/// none: its stretches are no further from 1, and its rotation R has |R - I| <= 2 |F - I|.
 bool can_be_larger(const SurfaceChange& largest, double change) noexcept {
   return change > largest.strain || change > std::numbers::sqrt2 * std::sin(0.5 * largest.rotation);
 }

@@ -175,8 +175,8 @@ CapacitanceStatus CapacitanceMatrix::add(std::span<const double> blocks) noexcep
   return with_dimension(dimension_, [&](auto d) { return add_node<d>(blocks); });
 }
 
-/// Cholesky of columns [first, end), from which the former ones are taken out already. The diagonal of C is
-/// in rows_.
+/// Cholesky of columns [first, end), from which the former ones are taken out already; false where a pivot is
+/// no more than rounding of the diagonal of C, which is in rows_.
 bool CapacitanceMatrix::factor_panel(std::int64_t first, std::int64_t end, std::int64_t rows) noexcept {
   for (std::int64_t j = first; j < end; ++j) {
     double* to = column(j);

@@ -39,8 +39,8 @@ class CapacitanceMatrix {
   [[nodiscard]] CapacitanceStatus add(std::span<const double> blocks) noexcept;
 
   /// Holds `nodes` nodes at once, in place of those that are held: `lower` is C, lower packed by columns
-  /// (formats/packed.h). The same but for rounding as adding one after the other, in a third of the time.
-  /// None is held unless ok.
+  /// (formats/packed.h). As by adding one after the other but for rounding, in a third of the time.
+  /// Holds none unless ok.
   [[nodiscard]] CapacitanceStatus assign(Index nodes, std::span<const double> lower) noexcept;
 
   /// Drops the node at position k, 0 <= k < m; the later ones move up by one.

@@ -13,7 +13,6 @@ namespace palpate {
 namespace {
 
 constexpr Index leaf_size = 4;
-constexpr double lead = 0.6;  // [margin] of an anchor, at most
 // Each split halves the simplices, so that no leaf is deeper than the bits of their number.
 constexpr std::size_t max_depth = 32;
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -112,8 +111,7 @@ void SurfaceTree::move(Index node, const Vec3& position) noexcept {
   const bool is_near = (position.array() >= anchor.array() - margin_).all() &&
                        (position.array() <= anchor.array() + margin_).all();
   if (is_near) return;
-  // Ahead of the node, which mostly moves on: its next refit is later by as much.
-  anchor = position + (position - anchor).cwiseMin(lead * margin_).cwiseMax(-lead * margin_);
+  anchor = position;
   Index last_leaf = -1;
   for (const Index place : places_around(node)) {
     const Index leaf = leaf_[at(place)];

@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <span>
+#include <vector>
 
 #include "base/error.h"
 #include "statics/surface_change.h"
@@ -278,6 +281,35 @@ TEST(Warping, AStretchedSurfaceTellsItsStrain) {
   const SurfaceChange change = surface_change(body.dimension(), body.simplices(), rest, u);
   EXPECT_NEAR(change.strain, 0.25, 1e-12);
   EXPECT_NEAR(change.rotation, 0.0, 1e-7);
+}
+
+// The largest of many simplices is that of each by itself, however far the others have changed.
+TEST(Warping, TheLargestChangeIsThatOfSomeSimplex) {
+  for (const int dimension : {2, 3}) {
+    const auto d = static_cast<std::size_t>(dimension);
+    const std::vector<double> random = random_numbers(6 * 3 * 500, 1.0, 7);
+    for (std::size_t round = 0; round + 6 * 3 * 10 <= random.size(); round += 6 * 3 * 10) {
+      std::vector<Index> simplices;
+      std::vector<Vec3> rest, u;
+      SurfaceChange largest;
+      for (std::size_t k = 0; k < 10; ++k) {
+        const double* number = random.data() + round + 18 * k;
+        const double size = 0.3 * std::abs(number[0]);
+        for (std::size_t corner = 0; corner < d; ++corner, number += 6) {
+          simplices.push_back(static_cast<Index>(rest.size()));
+          rest.emplace_back(number[0], number[1], dimension == 3 ? number[2] : 0.0);
+          u.emplace_back(size * number[3], size * number[4], dimension == 3 ? size * number[5] : 0.0);
+        }
+        const SurfaceChange alone =
+            surface_change(dimension, std::span(simplices).subspan(d * k, d), rest, u);
+        largest.rotation = std::max(largest.rotation, alone.rotation);
+        largest.strain = std::max(largest.strain, alone.strain);
+      }
+      const SurfaceChange change = surface_change(dimension, simplices, rest, u);
+      EXPECT_EQ(change.rotation, largest.rotation) << dimension;
+      EXPECT_EQ(change.strain, largest.strain) << dimension;
+    }
+  }
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ Eigen::VectorXd eigenvalues_of(const Eigen::MatrixXd& A);
 /// The lambda of A x = lambda B x, ascending; A symmetric, B symmetric positive definite.
 Eigen::VectorXd eigenvalues_of(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B);
 
+/// Solutions of A x = lambda B x; A symmetric, B symmetric positive definite.
 struct Eigenpairs {
   Eigen::VectorXd values;   ///< [n] ascending
   Eigen::MatrixXd vectors;  ///< [n, n] columns x with x^T B x = 1
