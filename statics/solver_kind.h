@@ -6,7 +6,7 @@
 namespace palpate {
 
 enum class SolverKind : std::uint8_t {
-  factor,              ///< LDL^T of each matrix, the order of elimination found once
+  factor,              ///< L L^T of each matrix, the order of elimination found once
   conjugate_gradient,  ///< conjugate gradients, preconditioned by the factor of an older matrix
 };
 

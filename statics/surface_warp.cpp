@@ -157,8 +157,8 @@ void SurfaceWarp::factor() {
     }
     Eigen::SparseMatrix<double> L(free_count_[axis], free_count_[axis]);
     L.setFromTriplets(entries.begin(), entries.end());
-    factor_[axis] = std::make_unique<Factor>(L);
-    if (factor_[axis]->info() == Eigen::Success && (factor_[axis]->vectorD().array() > 0.0).all()) continue;
+    factor_[axis].analyse(L);
+    if (factor_[axis].factorise(L)) continue;
     throw Error("the edges of the surface do not say where its nodes are: it has triangles without area",
                 "warping", "mesh the body anew, or play it with --solver corotational and no --warp");
   }
@@ -167,7 +167,7 @@ void SurfaceWarp::factor() {
 /// x of the nodes that can move, from b by axis, which is lost.
 void SurfaceWarp::solve(std::array<Eigen::VectorXd, 3>& b, std::vector<Vec3>& x) const {
   for (std::size_t axis = 0; axis < static_cast<std::size_t>(dimension_); ++axis) {
-    b[axis] = factor_[axis]->solve(b[axis]);
+    b[axis] = factor_[axis].solve(b[axis]);
     for (std::size_t node = 0; node < x.size(); ++node) {
       if (free_[axis][node] >= 0) x[node][static_cast<Eigen::Index>(axis)] = b[axis][free_[axis][node]];
     }

@@ -1,13 +1,12 @@
 // The surface of a body whose parts turn by what their linear displacement says.
 #pragma once
 
-#include <Eigen/SparseCholesky>
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
+#include "matrices/sparse_cholesky.h"
 #include "meshes/mesh.h"
 
 namespace palpate {
@@ -83,7 +82,6 @@ class SurfaceWarp {
     double size;  // area, in the plane length [m^2, m]
     std::array<Edge, 3> edges;
   };
-  using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
   void add_triangle(const std::array<Index, 3>& nodes);
   void add_line(Index a, Index b);
@@ -102,7 +100,7 @@ class SurfaceWarp {
   std::array<std::vector<Index>, 3>
       free_;  // [S] by axis: number among those that can move along it, -1: held
   std::array<Index, 3> free_count_{};
-  std::array<std::unique_ptr<Factor>, 3> factor_;
+  std::array<SparseCholesky, 3> factor_;
 };
 
 }  // namespace palpate

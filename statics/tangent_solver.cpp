@@ -11,11 +11,10 @@ bool TangentSolver::set(const LiveMatrix& A) {
 }
 
 bool TangentSolver::factorise() {
-  if (!is_analysed_) factor_.analyzePattern(*A_);
+  if (!is_analysed_) factor_.analyse(*A_);
   is_analysed_ = true;
-  factor_.factorize(*A_);
   ++factorisations_;
-  is_factorised_ = factor_.info() == Eigen::Success && factor_.vectorD().minCoeff() > 0.0;
+  is_factorised_ = factor_.factorise(*A_);
   return is_factorised_;
 }
 

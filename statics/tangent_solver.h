@@ -2,9 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/SparseCholesky>
 #include <optional>
 
+#include "matrices/sparse_cholesky.h"
 #include "statics/solver_kind.h"
 #include "statics/tangent_pattern.h"
 
@@ -39,7 +39,7 @@ class TangentSolver {
 
   TangentSolverOptions options_;
   const LiveMatrix* A_ = nullptr;
-  Eigen::SimplicialLDLT<LiveMatrix> factor_;
+  SparseCholesky factor_;
   bool is_analysed_ = false;
   bool is_factorised_ = false;
   std::int64_t factorisations_ = 0;

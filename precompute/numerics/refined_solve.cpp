@@ -33,6 +33,21 @@ Eigen::MatrixXd residual(const SparseMatrix& K, const Eigen::MatrixXd& b, const 
   return r.cast<double>();
 }
 
+/// Adds to x what `solve` gives of its residual, as long as that becomes less.
+template <class Solve, class Residual>
+void refine(Refined& x, const Solve& solve, const Residual& residual_of) {
+  const long double largest = x.cwiseAbs().maxCoeff();
+  long double before = largest;
+  for (int step = 0; step < most_steps; ++step) {
+    const Eigen::MatrixXd change = solve(residual_of(x));
+    const long double size = change.cwiseAbs().maxCoeff();
+    if (!(size < before)) break;  // nothing more is to be had
+    x += change.cast<long double>();
+    if (size * size <= fine * before * largest) break;  // the next change would be as much smaller again
+    before = size;
+  }
+}
+
 }  // namespace
 
 RefinedSolution solve_plain(const Factor& factor, const Eigen::MatrixXd& b) {
@@ -43,17 +58,18 @@ RefinedSolution solve_plain(const Factor& factor, const Eigen::MatrixXd& b) {
 
 RefinedSolution solve_refined(const Factor& factor, const SparseMatrix& K, const Eigen::MatrixXd& b) {
   RefinedSolution solution = solve_plain(factor, b);
-  const long double largest = solution.refined.cwiseAbs().maxCoeff();
-  long double before = largest;
-  for (int step = 0; step < most_steps; ++step) {
-    const Eigen::MatrixXd change = solve(factor, residual(K, b, solution.refined));
-    const long double size = change.cwiseAbs().maxCoeff();
-    if (!(size < before)) break;  // nothing more is to be had
-    solution.refined += change.cast<long double>();
-    if (size * size <= fine * before * largest) break;  // the next change would be as much smaller again
-    before = size;
-  }
+  refine(
+      solution.refined, [&](const Eigen::MatrixXd& r) { return solve(factor, r); },
+      [&](const Refined& x) { return residual(K, b, x); });
   return solution;
+}
+
+Refined solve_refined(const Eigen::LLT<Eigen::MatrixXd>& factor, const Refined& A, const Eigen::MatrixXd& b) {
+  Refined x = factor.solve(b).cast<long double>();
+  refine(
+      x, [&](const Eigen::MatrixXd& r) -> Eigen::MatrixXd { return factor.solve(r); },
+      [&](const Refined& y) -> Eigen::MatrixXd { return (b.cast<long double>() - A * y).cast<double>(); });
+  return x;
 }
 
 }  // namespace palpate

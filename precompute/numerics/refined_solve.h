@@ -19,6 +19,10 @@ struct RefinedSolution {
 /// Solves for the columns of b [n, columns]. `factor`: of K, computed; K: the lower triangle.
 RefinedSolution solve_refined(const Factor& factor, const SparseMatrix& K, const Eigen::MatrixXd& b);
 
+/// A^-1 b of a dense matrix [n x n] whose factor in double precision is given, refined.
+RefinedSolution::Refined solve_refined(const Eigen::LLT<Eigen::MatrixXd>& factor,
+                                       const RefinedSolution::Refined& A, const Eigen::MatrixXd& b);
+
 /// Without refinement: both by the factor alone.
 RefinedSolution solve_plain(const Factor& factor, const Eigen::MatrixXd& b);
 

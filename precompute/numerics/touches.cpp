@@ -50,10 +50,11 @@ Matrix touch_displacements(std::span<const Vec3> arms, int d, std::mt19937_64& r
 
 double touch_error(const Refined& reference_C, const Matrix& C, const Matrix& u, int d) {
   const Eigen::Index size = u.rows();
-  const Eigen::LLT<Refined> reference(reference_C.topLeftCorner(size, size));
+  const Refined A = reference_C.topLeftCorner(size, size);
+  const Eigen::LLT<Matrix> reference(A.cast<double>());
   const Eigen::LLT<Matrix> stored(C.topLeftCorner(size, size));
   if (reference.info() != Eigen::Success || stored.info() != Eigen::Success) return infinity;
-  const Refined f_0 = reference.solve(u.cast<long double>());
+  const Refined f_0 = solve_refined(reference, A, u);
   const Matrix f = stored.solve(u);
   double worst = 0.0;
   for (Eigen::Index k = 0; k < u.cols(); ++k) {

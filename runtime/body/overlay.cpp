@@ -1,11 +1,11 @@
 #include "runtime/body/overlay.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/SparseCholesky>
 #include <string>
 #include <utility>
 
 #include "base/error.h"
+#include "matrices/sparse_cholesky.h"
 #include "meshes/element.h"
 #include "runtime/body/patch.h"
 
@@ -78,8 +78,9 @@ std::vector<Index> stored_nodes_of(const Body& body, const PatchMesh& patch) {
 Overlay::Overlay(const Body& body, PatchMesh patch)
     : patch_(std::move(patch)), stored_(stored_nodes_of(body, patch_)) {
   const PatchStiffness stiffness = assemble_patch(body.model(), patch_);
-  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor(stiffness.K_L);
-  if (factor.info() != Eigen::Success)
+  SparseCholesky factor;
+  factor.analyse(stiffness.K_L);
+  if (!factor.factorise(stiffness.K_L))
     throw Error("the stiffness of an overlay is not positive definite", body.model().name,
                 "the elements there are too flat: mesh the body anew");
   recover_ = -factor.solve(stiffness.K_LG);
