@@ -53,7 +53,7 @@ Mat3 nearest_rotation(const Mat3& F) noexcept {
 }
 
 Mat3 nearest_rotation_in_plane(const Mat3& F) noexcept {
-  const double c = F(0, 0) + F(1, 1), s = F(1, 0) - F(0, 1), length = std::hypot(c, s);
+  const double c = F(0, 0) + F(1, 1), s = F(1, 0) - F(0, 1), length = std::sqrt(c * c + s * s);
   Mat3 R = Mat3::Identity();
   if (!(length > 0.0)) return R;
   R.topLeftCorner<2, 2>() << c / length, -s / length, s / length, c / length;

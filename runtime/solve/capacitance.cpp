@@ -58,7 +58,7 @@ void subtract_columns(const std::array<const double*, panel>& L, const std::arra
 
 /// Givens rotation of the column pair (L, w) that keeps L L^T + w w^T and zeroes w at the top.
 void rotate_in(double* __restrict L, double* __restrict w, std::int64_t count) noexcept {
-  const double r = std::hypot(L[0], w[0]);
+  const double r = std::sqrt(L[0] * L[0] + w[0] * w[0]);
   const double c = L[0] / r;
   const double s = w[0] / r;
 #pragma omp simd

@@ -21,7 +21,7 @@ double largest_force(const ContactProblem& problem) noexcept {
 struct Tangential {
   double x = 0.0;
   double y = 0.0;
-  [[nodiscard]] double norm() const noexcept { return std::hypot(x, y); }
+  [[nodiscard]] double norm() const noexcept { return std::sqrt(x * x + y * y); }
   /// The nearest point within a disc.
   [[nodiscard]] Tangential within(double radius) const noexcept {
     const double length = norm();
