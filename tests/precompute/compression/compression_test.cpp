@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -352,6 +354,34 @@ TEST(Touches, ErrorIsThatOfTheLargestForce) {
                      touch_error(exact.topLeftCorner(2 * d, 2 * d).cast<long double>(),
                                  C.topLeftCorner(2 * d, 2 * d), first, d));
   }
+}
+
+// Of a matrix whose condition is 1e10 a factor in double precision has forces some 1e-6 off: the reference,
+// which is refined, tells so as a factor in extended precision does.
+TEST(Touches, ReferenceIsRightBeyondDoublePrecision) {
+  using Extended = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+  std::mt19937_64 random(5);
+  const int d = 3, n = 5 * d;
+  const Eigen::MatrixXd Q =
+      Eigen::MatrixXd::NullaryExpr(n, n, [&] { return uniform(random); }).householderQr().householderQ();
+  const Eigen::VectorXd scales =
+      Eigen::VectorXd::LinSpaced(n, 0.0, -10.0).unaryExpr([](double x) { return std::pow(10.0, x); });
+  Eigen::MatrixXd C = Q * scales.asDiagonal() * Q.transpose();
+  C = (0.5 * (C + C.transpose())).eval();
+  const Eigen::MatrixXd u = Eigen::MatrixXd::NullaryExpr(n, 2, [&] { return uniform(random); });
+  const Extended f = C.llt().solve(u).cast<long double>(),
+                 f_0 = C.cast<long double>().llt().solve(u.cast<long double>());
+  double worst = 0.0;
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    long double difference = 0.0L, largest = 0.0L;
+    for (Eigen::Index node = 0; node < n / d; ++node) {
+      difference = std::max(difference, (f - f_0).col(k).segment(d * node, d).norm());
+      largest = std::max(largest, f_0.col(k).segment(d * node, d).norm());
+    }
+    worst = std::max(worst, static_cast<double>(difference / largest));
+  }
+  EXPECT_GT(worst, 1e-9);
+  EXPECT_NEAR(touch_error(C.cast<long double>(), C, u, d), worst, 0.01 * worst);
 }
 
 TEST(Touches, DisplacementsAreAlongAxesLinearAndRandom) {
