@@ -17,15 +17,14 @@ class SparseCholesky {
   /// Finds the order of elimination and where each entry of L lies. Of A the lower triangle is read.
   void analyse(const Eigen::SparseMatrix<double>& A);
 
-  /// Factorises a matrix of the pattern that was analysed. False when it is not positive definite or not
-  /// finite: there is no factor then.
+  /// Factorises a matrix of the pattern that was analysed, compressed as it was. False when it is not
+  /// positive definite or not finite: there is no factor then.
   bool factorise(const Eigen::SparseMatrix<double>& A);
 
   /// A^-1 b [n x columns] of the last matrix that was factorised.
   [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const;
   [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& b) const;  ///< of one column
 
-  [[nodiscard]] Eigen::Index order() const noexcept { return std::ssize(position_); }  ///< n
   [[nodiscard]] std::int64_t entries() const noexcept { return std::ssize(values_); }  ///< stored, of L
 
  private:
