@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/OrderingMethods>
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 namespace palpate {
@@ -138,8 +137,8 @@ void SparseCholesky::find_supernodes(const std::vector<int>& parent, const std::
     if (!merged.empty() && parent[at(last)] == merged.back().first) {
       Supernode& next = merged.back();
       const int columns = one.columns + next.columns;
-      const double more = zeros.back() + double{1.0} * one.columns * (one.columns + next.rows - one.rows),
-                   all = 0.5 * columns * (columns + 1) + double{1.0} * columns * next.below();
+      const double more = zeros.back() + 1.0 * one.columns * (one.columns + next.rows - one.rows),
+                   all = 0.5 * columns * (columns + 1) + 1.0 * columns * next.below();
       if (may_have_zeros(columns, more / all)) {
         next = {.first = one.first, .columns = columns, .rows = one.columns + next.rows};
         zeros.back() = more;
@@ -152,11 +151,17 @@ void SparseCholesky::find_supernodes(const std::vector<int>& parent, const std::
   supernodes_.assign(merged.rbegin(), merged.rend());
 }
 
-/// The rows of each supernode: those of A and those that its children leave.
-void SparseCholesky::find_rows(const std::vector<std::vector<int>>& before) {
-  std::vector<int> of_column(before.size());
+/// [n] The supernode of each column.
+std::vector<int> SparseCholesky::supernode_of_column() const {
+  std::vector<int> of_column(position_.size());
   for (std::size_t s = 0; s < supernodes_.size(); ++s)
     std::fill_n(of_column.begin() + supernodes_[s].first, supernodes_[s].columns, static_cast<int>(s));
+  return of_column;
+}
+
+/// The rows of each supernode: those of A and those that its children leave.
+void SparseCholesky::find_rows(const std::vector<std::vector<int>>& before) {
+  const std::vector<int> of_column = supernode_of_column();
   std::vector<std::vector<int>> rows(supernodes_.size());
   for (int row = 0; row < std::ssize(before); ++row) {
     for (const int column : before[at(row)]) {
@@ -201,9 +206,7 @@ void SparseCholesky::find_rows(const std::vector<std::vector<int>>& before) {
 
 /// Where each entry of A goes.
 void SparseCholesky::find_places(const Eigen::SparseMatrix<double>& A) {
-  std::vector<int> of_column(position_.size());
-  for (std::size_t s = 0; s < supernodes_.size(); ++s)
-    std::fill_n(of_column.begin() + supernodes_[s].first, supernodes_[s].columns, static_cast<int>(s));
+  const std::vector<int> of_column = supernode_of_column();
   places_.clear();
   places_.reserve(static_cast<std::size_t>(A.nonZeros()));
   for (int k = 0; k < A.outerSize(); ++k) {

@@ -43,6 +43,7 @@ class SparseCholesky {
   [[nodiscard]] static std::vector<int> column_counts(const std::vector<std::vector<int>>& before,
                                                       const std::vector<int>& parent);
   void find_supernodes(const std::vector<int>& parent, const std::vector<int>& counts);
+  [[nodiscard]] std::vector<int> supernode_of_column() const;
   void find_rows(const std::vector<std::vector<int>>& before);
   void find_places(const Eigen::SparseMatrix<double>& A);
   void find_room();
