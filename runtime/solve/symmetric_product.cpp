@@ -1,13 +1,54 @@
 #include "runtime/solve/symmetric_product.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::ptrdiff_t block = 8;  // rows that are done together, and a register's floats
+constexpr std::ptrdiff_t block = 8;  // rows of a square on the diagonal
+#ifdef __AVX__
+constexpr std::ptrdiff_t lanes = 8;
+#else
+constexpr std::ptrdiff_t lanes = 4;
+#endif
+using Lanes [[gnu::vector_size(lanes * sizeof(float))]] = float;
+using Four [[gnu::vector_size(4 * sizeof(float))]] = float;
+
+Lanes load(const float* from) noexcept {
+  Lanes value;
+  std::memcpy(&value, from, sizeof value);
+  return value;
+}
+
+void store(Lanes value, float* to) noexcept {
+  std::memcpy(to, &value, sizeof value);
+}
+
+#ifdef __AVX__
+Four folded(Lanes value) noexcept {
+  return __builtin_shufflevector(value, value, 0, 1, 2, 3) + __builtin_shufflevector(value, value, 4, 5, 6, 7);
+}
+#else
+Four folded(Lanes value) noexcept {
+  return value;
+}
+#endif
+
+/// Sums of products along four rows, lane by lane.
+struct Sums {
+  Lanes first{}, second{}, third{}, fourth{};
+};
+
+/// The four lane sums of each of `of`.
+Four totals(const Sums& of) noexcept {
+  const Four a = folded(of.first), b = folded(of.second), c = folded(of.third), d = folded(of.fourth);
+  const Four ab = __builtin_shufflevector(a, b, 0, 1, 4, 5) + __builtin_shufflevector(a, b, 2, 3, 6, 7);
+  const Four cd = __builtin_shufflevector(c, d, 0, 1, 4, 5) + __builtin_shufflevector(c, d, 2, 3, 6, 7);
+  return __builtin_shufflevector(ab, cd, 0, 2, 4, 6) + __builtin_shufflevector(ab, cd, 1, 3, 5, 7);
+}
 
 /// y += a square of the diagonal times x: its rows are its columns.
 void add_diagonal_block(const float* __restrict a, std::ptrdiff_t stride, const float* __restrict x,
@@ -19,23 +60,35 @@ void add_diagonal_block(const float* __restrict a, std::ptrdiff_t stride, const 
 }
 
 /// y of four rows beginning at `i` += their entries from `begin` on, times x; and y there += their transpose.
+/// Sums of two runs of columns go on beside each other, as one would wait for itself. The four rows that come
+/// next are asked for early: rows are too short for the processor to see where it goes on.
 void add_four_rows(const float* __restrict a, std::ptrdiff_t stride, const float* __restrict x,
                    float* __restrict y, std::ptrdiff_t i, std::ptrdiff_t begin, std::ptrdiff_t end) noexcept {
   const float x0 = x[i], x1 = x[i + 1], x2 = x[i + 2], x3 = x[i + 3];
-  float s0 = 0.0F, s1 = 0.0F, s2 = 0.0F, s3 = 0.0F;
-#pragma omp simd reduction(+ : s0, s1, s2, s3)
-  for (std::ptrdiff_t k = begin; k < end; ++k) {
-    const float a0 = a[k], a1 = a[stride + k], a2 = a[2 * stride + k], a3 = a[3 * stride + k];
-    s0 += a0 * x[k];
-    s1 += a1 * x[k];
-    s2 += a2 * x[k];
-    s3 += a3 * x[k];
-    y[k] += a0 * x0 + a1 * x1 + a2 * x2 + a3 * x3;
+  const auto add_row = [](const float* row, Lanes xk, float by, Lanes& sum, Lanes& yk) {
+    const Lanes ak = load(row);
+    sum += ak * xk;
+    yk += ak * by;
+  };
+  const auto add = [=](std::ptrdiff_t k, Sums& sums) {
+    const Lanes xk = load(x + k);
+    Lanes yk = load(y + k);
+    add_row(a + k, xk, x0, sums.first, yk);
+    add_row(a + stride + k, xk, x1, sums.second, yk);
+    add_row(a + 2 * stride + k, xk, x2, sums.third, yk);
+    add_row(a + 3 * stride + k, xk, x3, sums.fourth, yk);
+    store(yk, y + k);
+  };
+  Sums even, odd;
+  std::ptrdiff_t k = begin;
+  for (; k + 2 * lanes <= end; k += 2 * lanes) {
+    for (std::ptrdiff_t j = 4; j < 8; ++j) __builtin_prefetch(a + j * stride + k);
+    add(k, even);
+    add(k + lanes, odd);
   }
-  y[i] += s0;
-  y[i + 1] += s1;
-  y[i + 2] += s2;
-  y[i + 3] += s3;
+  for (; k < end; k += lanes) add(k, even);
+  const Four sums = totals(even) + totals(odd);
+  for (int j = 0; j < 4; ++j) y[i + j] += sums[j];
 }
 
 /// As add_four_rows, of two rows and three vectors.
@@ -47,26 +100,27 @@ void add_two_rows(const float* __restrict a, std::ptrdiff_t stride, const float*
   float* __restrict yb = y + apart;
   float* __restrict yc = y + 2 * apart;
   const float p0 = x[i], p1 = x[i + 1], q0 = xb[i], q1 = xb[i + 1], r0 = xc[i], r1 = xc[i + 1];
-  float s0 = 0.0F, s1 = 0.0F, t0 = 0.0F, t1 = 0.0F, u0 = 0.0F, u1 = 0.0F;
-#pragma omp simd reduction(+ : s0, s1, t0, t1, u0, u1)
-  for (std::ptrdiff_t k = begin; k < end; ++k) {
-    const float a0 = a[k], a1 = a[stride + k];
-    s0 += a0 * x[k];
-    s1 += a1 * x[k];
-    t0 += a0 * xb[k];
-    t1 += a1 * xb[k];
-    u0 += a0 * xc[k];
-    u1 += a1 * xc[k];
-    y[k] += a0 * p0 + a1 * p1;
-    yb[k] += a0 * q0 + a1 * q1;
-    yc[k] += a0 * r0 + a1 * r1;
+  Sums s, t;
+  for (std::ptrdiff_t k = begin; k < end; k += lanes) {
+    const Lanes a0 = load(a + k), a1 = load(a + stride + k);
+    const Lanes xk = load(x + k), xbk = load(xb + k), xck = load(xc + k);
+    s.first += a0 * xk;
+    s.second += a1 * xk;
+    s.third += a0 * xbk;
+    s.fourth += a1 * xbk;
+    t.first += a0 * xck;
+    t.second += a1 * xck;
+    store(load(y + k) + a0 * p0 + a1 * p1, y + k);
+    store(load(yb + k) + a0 * q0 + a1 * q1, yb + k);
+    store(load(yc + k) + a0 * r0 + a1 * r1, yc + k);
   }
-  y[i] += s0;
-  y[i + 1] += s1;
-  yb[i] += t0;
-  yb[i + 1] += t1;
-  yc[i] += u0;
-  yc[i + 1] += u1;
+  const Four of_both = totals(s), of_third = totals(t);
+  y[i] += of_both[0];
+  y[i + 1] += of_both[1];
+  yb[i] += of_both[2];
+  yb[i + 1] += of_both[3];
+  yc[i] += of_third[0];
+  yc[i + 1] += of_third[1];
 }
 
 /// The rows from `begin` on, fewer than a block: beyond them there is nothing.
