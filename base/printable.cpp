@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstdint>
 #include <cstdio>
 #include <vector>
@@ -85,6 +86,23 @@ std::string printable(std::string_view text, std::size_t longest) {
   const std::size_t tail = longest / 3;
   const std::size_t head = longest - 1 - tail;
   return clean.substr(0, begins[head]) + "…" + clean.substr(begins[begins.size() - tail]);
+}
+
+std::string shell_word(std::string_view text) {
+  const auto is_plain = [](unsigned char c) {
+    return c >= 0x80 || std::isalnum(c) != 0 ||
+           std::string_view("%+,-./:=@_").find(static_cast<char>(c)) != std::string_view::npos;
+  };
+  if (!text.empty() && std::all_of(text.begin(), text.end(), is_plain)) return printable(text);
+  std::string word = "'";
+  for (const char c : text) {
+    if (c == '\'') {
+      word += "'\\''";
+    } else {
+      word += c;
+    }
+  }
+  return printable(word + "'");
 }
 
 std::string printable_lines(std::string_view text, std::string_view indent) {

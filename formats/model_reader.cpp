@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/file_io.h"
 #include "base/memory.h"
+#include "base/printable.h"
 #include "formats/begun_model.h"
 #include "formats/checksum.h"
 #include "formats/content_hash.h"
@@ -37,7 +38,7 @@ std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
   const auto format = file.text_attribute("/", "format");
   if (format == "palpate-recording")
     throw Error("is a recording, not a model", where,
-                "palpate-runtime view " + where + " shows it; a model is a NAME.palpate.hdf");
+                "palpate-runtime view " + shell_word(where) + " shows it; a model is a NAME.palpate.hdf");
   if (format != "palpate") throw Error("is an HDF5 file, but not a Palpate file", where, give_a_model);
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version) refuse(where, "the attribute version is missing");

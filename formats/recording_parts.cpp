@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/printable.h"
 #include "base/write_file.h"
 #include "formats/checksum.h"
 #include "formats/compressed_row.h"
@@ -343,7 +344,7 @@ RecordingHead read_head(const hdf5::Contents& file) {
   const auto format = file.text_attribute("/", "format");
   if (format == "palpate")
     throw Error("is a model, not a recording", path,
-                "palpate-runtime play " + path + " --view shows it and lets you push it");
+                "palpate-runtime play " + shell_word(path) + " --view shows it and lets you push it");
   if (format != format_name)
     throw Error("is not a recording", path, "Give a recording that palpate-runtime has written");
   const auto version = file.integer_attribute("/", "version", 2);

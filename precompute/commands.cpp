@@ -57,7 +57,8 @@ void add_jobs(CLI::App& command, BakeOptions& options) {
 
 /// The command by which a baked body is touched.
 std::string to_touch(const std::string& file, bool has_greens) {
-  return has_greens ? "palpate-runtime play " + file + " --view" : "palpate-runtime push " + file;
+  return has_greens ? "palpate-runtime play " + shell_word(file) + " --view"
+                    : "palpate-runtime push " + shell_word(file);
 }
 
 }  // namespace
@@ -87,10 +88,11 @@ BakeSummary bake_model(const std::string& model, BakeOptions options, Team& team
 std::string next_steps(const BakeSummary& bake) {
   const std::string output = bake.output.string();
   if (bake.result == BakeResult::part_done)
-    return "next, once all parts are there: palpate-precompute join " + bake.model + "\n";
+    return "next, once all parts are there: palpate-precompute join " + shell_word(bake.model) + "\n";
   if (bake.result != BakeResult::done) return "";
   const bool has_greens = bake.plan.stored_dofs > 0;
-  return "next: palpate-precompute verify " + output + "\n      " + to_touch(output, has_greens) + "\n";
+  return "next: palpate-precompute verify " + shell_word(output) + "\n      " + to_touch(output, has_greens) +
+         "\n";
 }
 
 namespace {

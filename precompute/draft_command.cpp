@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "base/error.h"
+#include "base/printable.h"
 #include "precompute/draft/questions.h"
 
 namespace palpate {
@@ -88,7 +89,7 @@ int run_new(const std::string& file, const DraftArguments& arguments) {
   const std::filesystem::path description = draft_by_questions(
       file, options_of(arguments),
       {.answers = std::cin, .questions = std::cerr, .is_terminal = ::isatty(STDIN_FILENO) != 0});
-  tell("next: palpate-precompute " + description.string());
+  tell("next: palpate-precompute " + shell_word(description.string()));
   return exit_ok;
 }
 

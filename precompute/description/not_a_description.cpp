@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/printable.h"
 #include "base/toml_text.h"
 
 namespace palpate {
@@ -58,9 +59,9 @@ void check_is_description(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path)) return;
   if (std::filesystem::is_directory(path)) {
     const bool has_one = std::filesystem::exists(path / "model.toml");
-    throw Error(
-        "is a folder", file,
-        has_one ? "palpate-precompute " + (path / "model.toml").string() : "Give the path of a model.toml");
+    throw Error("is a folder", file,
+                has_one ? "palpate-precompute " + shell_word((path / "model.toml").string())
+                        : "Give the path of a model.toml");
   }
   std::string name = path.filename().string();
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -74,10 +75,10 @@ void check_is_description(const std::filesystem::path& path) {
   }
   if (name.ends_with(".hdf"))
     throw Error("is a baked model already", file,
-                "palpate-runtime play " + file + " --view shows it, palpate-precompute inspect " + file +
-                    " says what is in it");
+                "palpate-runtime play " + shell_word(file) + " --view shows it, palpate-precompute inspect " +
+                    shell_word(file) + " says what is in it");
   if (name.ends_with(".h5"))
-    throw Error("is a recording", file, "palpate-runtime view " + file + " shows it");
+    throw Error("is a recording", file, "palpate-runtime view " + shell_word(file) + " shows it");
 }
 
 }  // namespace palpate

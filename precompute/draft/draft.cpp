@@ -142,7 +142,7 @@ std::string draft_text(const std::filesystem::path& file, const std::string& rep
       "# Drafted by palpate-precompute from {}. It is yours: change what is wrong, then run\n"
       "#   palpate-precompute {}\n"
       "name = {}\n{}\n[geometry]\n",
-      printable(name), printable(draft_file(file).filename().string()),
+      printable(name), shell_word(draft_file(file).filename().string()),
       toml_string(values.name.empty() ? shape_name(file) : values.name),
       is_picture ? "plane = \"strain\"  # \"stress\" for a thin sheet\n" : "");
   text += fmt::format("{} = {}\n",
@@ -208,7 +208,7 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
   }
   write_file(description, draft_text(file, repaired, shape, unit, options));
   tell(fmt::format("wrote {}{}: change it and run palpate-precompute {}", printable(description.string()),
-                   is_there ? " anew" : "", printable(description.string())));
+                   is_there ? " anew" : "", shell_word(description.string())));
   return description;
 }
 

@@ -226,15 +226,16 @@ constexpr std::string_view commands = "push, play, view, probe, session, export 
 std::string meant_by(const CLI::App& app, const std::string& word) {
   if (word.empty() || word.starts_with('-') || find_command(app, word) != nullptr) return "";
   const std::string see = "See palpate-runtime --help";
-  if (word.ends_with(".h5")) return "palpate-runtime view " + word + " shows a recording. " + see;
+  if (word.ends_with(".h5")) return "palpate-runtime view " + shell_word(word) + " shows a recording. " + see;
   if (word.ends_with(".hdf"))
-    return "palpate-runtime play " + word + " --view shows it and lets you push it. " + see;
+    return "palpate-runtime play " + shell_word(word) + " --view shows it and lets you push it. " + see;
   if (word.ends_with(".toml"))
-    return "palpate-precompute " + word + " makes the file that is played with. " + see;
+    return "palpate-precompute " + shell_word(word) + " makes the file that is played with. " + see;
   for (const char* const ending :
        {".stl", ".obj", ".ply", ".off", ".inr", ".inr.gz", ".nii", ".nii.gz", ".nrrd", ".png", ".pbm"}) {
     if (word.ends_with(ending))
-      return fmt::format("palpate-runtime push {} makes a body of it that you can push. {}", word, see);
+      return fmt::format("palpate-runtime push {} makes a body of it that you can push. {}", shell_word(word),
+                         see);
   }
   const auto command = meant(word, {"push", "probe", "play", "view", "export", "session", "devices", "help"});
   return command ? "Did you mean palpate-runtime " + *command + "? " + see
@@ -246,7 +247,7 @@ int play_and_name_next(const PlayOptions& options) {
   const bool has_pictures = options.record_frames > 0.0;
   if (!options.record.empty())
     fmt::print(stderr, "next: palpate-runtime {} {}\n", has_pictures ? "view" : "session",
-               options.record.string());
+               shell_word(options.record.string()));
   return status;
 }
 
@@ -268,7 +269,7 @@ int push(const PushArguments& arguments) {
   options.settings = read_settings(options.settings_text);
   if (!options.settings_text.empty())
     fmt::print(stderr, "solved while you touch it: palpate-runtime play {} --view {}\n",
-               printable(options.file.string()), option_text(options.settings_text));
+               shell_word(options.file.string()), option_text(options.settings_text));
   return play(options);
 }
 

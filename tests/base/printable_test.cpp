@@ -46,6 +46,17 @@ TEST(Printable, CutsTheMiddleOutOfLongText) {
   EXPECT_EQ(printable("äöüß", 3), "ä…ß");
 }
 
+TEST(Printable, QuotesAWordThatAShellWouldTakeApart) {
+  for (const char* const word : {"liver.palpate.hdf", "../a/b-c_d:1,2=3@4+5%", "Größe"})
+    EXPECT_EQ(shell_word(word), word);
+  EXPECT_EQ(shell_word("my liver.stl"), "'my liver.stl'");
+  EXPECT_EQ(shell_word("a;b"), "'a;b'");
+  EXPECT_EQ(shell_word("$HOME"), "'$HOME'");
+  EXPECT_EQ(shell_word("it's"), "'it'\\''s'");
+  EXPECT_EQ(shell_word(""), "''");
+  EXPECT_EQ(shell_word("a\nb"), "'a\\nb'");
+}
+
 TEST(Printable, KeepsLinesWhereItIsAskedTo) {
   EXPECT_EQ(printable_lines("a\n\x1b[2J\nb"), "a\n\\x1b[2J\nb");
   EXPECT_EQ(printable_lines("a\nhint: b", "  "), "a\n  hint: b");

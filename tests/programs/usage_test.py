@@ -212,6 +212,16 @@ class Next(ProgramTest):
         without = run(RUNTIME, "play", "cube.palpate.hdf", "--device", "script:touch.csv", "--fast", cwd=self.folder)
         self.assertNotIn("next:", without.stderr)
 
+    def test_it_can_be_typed_whatever_the_name(self):
+        folder = self.folder / "it's mine"
+        folder.mkdir()
+        self.write("it's mine/model.toml", cube_toml(2))
+        baked = run(PRECOMPUTE, "it's mine/model.toml", "-o", "it's mine/a body.palpate.hdf", cwd=self.folder)
+        command = re.search("next: (palpate-precompute verify .*)", baked.stderr).group(1)
+        self.assertEqual(command, "palpate-precompute verify 'it'\\''s mine/a body.palpate.hdf'")
+        verified = run("sh", "-c", command.replace("palpate-precompute", str(PRECOMPUTE), 1), cwd=self.folder)
+        self.assertEqual(verified.returncode, 0, verified.stderr)
+
 
 class WrongKind(ProgramTest):
     def test_a_model_is_no_recording_and_the_reverse(self):
