@@ -485,6 +485,11 @@ void NewtonKrylov::take_best() noexcept {
   std::copy_n(best_r_.begin(), padded_rows_, r_.begin());
 }
 
+/// What another round costs at least, with a step of Newton's method or without [multiplications].
+double NewtonKrylov::round_work(bool with_step) const noexcept {
+  return (with_step ? tuning.many.fewest_steps : tuning.many.sweeps) * product_work();
+}
+
 bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   products_ = 0;
   work_ = 0.0;
@@ -500,8 +505,12 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   double last = std::numeric_limits<double>::infinity();
   int failures = 0;
   bool newton = false;
+  // At rest each tick goes on from where the last one ended.
+  const bool moves = wanted == tuning.many.tolerance;
   const auto is_done = [&] {
     if (best_ <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
+    const double next = work_ + round_work(newton && failures < tuning.many.most_failures);
+    if (moves && best_ <= tuning.many.late_tolerance && next >= tuning.many.late_work) return true;
     return best_ <= tuning.many.rough_tolerance &&
            (work_ >= tuning.many.smooth_work || failures >= tuning.many.rough_failures);
   };

@@ -112,6 +112,7 @@ class NewtonKrylov {
   void solve_reduced(const ContactProblem& problem, int systems) noexcept;
   bool fill_guess(std::span<const double> dlambda, int changes) noexcept;
   [[nodiscard]] double product_work() const noexcept;
+  [[nodiscard]] double round_work(bool with_step) const noexcept;
   void count_product() noexcept;
   [[nodiscard]] int most_steps() const noexcept;
   void take_best() noexcept;

@@ -29,7 +29,8 @@ void store(Lanes value, float* to) noexcept {
 
 #ifdef __AVX__
 Four folded(Lanes value) noexcept {
-  return __builtin_shufflevector(value, value, 0, 1, 2, 3) + __builtin_shufflevector(value, value, 4, 5, 6, 7);
+  return __builtin_shufflevector(value, value, 0, 1, 2, 3) +
+         __builtin_shufflevector(value, value, 4, 5, 6, 7);
 }
 #else
 Four folded(Lanes value) noexcept {

@@ -22,8 +22,8 @@ void add(const Real* __restrict x, Real factor, Real* __restrict y, std::ptrdiff
   for (std::ptrdiff_t i = 0; i < count; ++i) y[i] += factor * x[i];
 }
 
-/// y += three rows x, `stride` apart, by their factors: y is read and written once. The three rows after them are
-/// asked for early, as they mostly come next.
+/// y += three rows x, `stride` apart, by their factors: y is read and written once. The three rows after them
+/// are asked for early, as they mostly come next.
 template <typename Real>
 void add_three(const Real* __restrict x, std::ptrdiff_t stride, const Real* factors, Real* __restrict y,
                std::ptrdiff_t count) noexcept {

@@ -316,7 +316,12 @@ class Dying(RanksTest):
         output = self.folder / "x.palpate.hdf"
         arguments = [RANKS, model, "-o", output, "--factor", "rank", "--jobs", "1"]
         limited = ["sh", "-c", 'trap "" XFSZ; ulimit -f 1; exec "$0" "$@"', *arguments]
-        result = run(*MPIRUN, "-n", "1", *arguments, ":", "-n", "1", *limited, cwd=self.folder)
+        for _ in range(5):
+            result = run(*MPIRUN, "-n", "1", *arguments, ":", "-n", "1", *limited, cwd=self.folder)
+            if result.returncode != 0:
+                break
+            self.assertEqual(output.read_bytes(), data)  # on a busy machine all tiles may fall to the other rank, which can write
+            output.unlink()
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertEqual(result.stderr.count("error: "), 1, result.stderr)
         self.assertRegex(result.stderr, r"error: rank 1 on \S+: .*File too large")
