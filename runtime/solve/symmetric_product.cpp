@@ -27,6 +27,7 @@ void store(Lanes value, float* to) noexcept {
   std::memcpy(to, &value, sizeof value);
 }
 
+/// Four lanes with the same total.
 #ifdef __AVX__
 Four folded(Lanes value) noexcept {
   return __builtin_shufflevector(value, value, 0, 1, 2, 3) +
@@ -43,7 +44,7 @@ struct Sums {
   Lanes first{}, second{}, third{}, fourth{};
 };
 
-/// The four lane sums of each of `of`.
+/// The total of the lanes of each of the four.
 Four totals(const Sums& of) noexcept {
   const Four a = folded(of.first), b = folded(of.second), c = folded(of.third), d = folded(of.fourth);
   const Four ab = __builtin_shufflevector(a, b, 0, 1, 4, 5) + __builtin_shufflevector(a, b, 2, 3, 6, 7);
