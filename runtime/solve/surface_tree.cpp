@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -15,6 +16,7 @@ namespace {
 constexpr Index leaf_size = 4;
 // Each split halves the simplices, so that no leaf is deeper than the bits of their number.
 constexpr std::size_t max_depth = 32;
+constexpr std::size_t word_bits = 64;  // of marks
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 std::size_t at(Index i) noexcept {
@@ -57,6 +59,7 @@ SurfaceTree::SurfaceTree(std::span<const Index> simplices, int corners, std::spa
     nodes_.insert(nodes_.end(), nodes.begin(), nodes.end());
   }
   connect_nodes();
+  marks_.assign((cells_.size() + word_bits - 1) / word_bits, 0);
   for (Index cell = static_cast<Index>(cells_.size()); cell-- > 0;) fit(cell);
 }
 
@@ -112,16 +115,27 @@ void SurfaceTree::move(Index node, const Vec3& position) noexcept {
                        (position.array() <= anchor.array() + margin_).all();
   if (is_near) return;
   anchor = position;
-  Index last_leaf = -1;
-  for (const Index place : places_around(node)) {
-    const Index leaf = leaf_[at(place)];
-    if (leaf != last_leaf) refit_upwards(leaf);
-    last_leaf = leaf;
-  }
+  for (const Index place : places_around(node)) mark(leaf_[at(place)]);
 }
 
-void SurfaceTree::refit_upwards(Index leaf) noexcept {
-  for (Index cell = leaf; cell >= 0 && fit(cell); cell = cells_[at(cell)].parent) {
+void SurfaceTree::mark(Index cell) noexcept {
+  const std::size_t word = at(cell) / word_bits;
+  marks_[word] |= std::uint64_t{1} << (at(cell) % word_bits);
+  marks_end_ = std::max(marks_end_, word + 1);
+}
+
+void SurfaceTree::refit() noexcept {
+  // From the last cell to the first: children come before their parents.
+  while (marks_end_ > 0) {
+    const std::uint64_t word = marks_[marks_end_ - 1];
+    if (word == 0) {
+      --marks_end_;
+      continue;
+    }
+    const std::size_t bit = word_bits - 1 - static_cast<std::size_t>(std::countl_zero(word));
+    const std::size_t cell = (marks_end_ - 1) * word_bits + bit;
+    marks_[marks_end_ - 1] = word & ~(std::uint64_t{1} << bit);
+    if (fit(static_cast<Index>(cell)) && cells_[cell].parent >= 0) mark(cells_[cell].parent);
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -17,9 +18,9 @@ struct NearestSimplex {
 };
 
 /// Bounding volume tree over the simplices of a surface whose nodes move. Boxes are a margin larger than what
-/// they enclose, so that a node that moves less than that costs nothing, and one that moves on costs a path
-/// to the root from each leaf around it: there is never a refit of the whole tree, and boxes shrink as they
-/// grow. All memory is taken at construction; no call allocates.
+/// they enclose, so that a node that moves less than that costs nothing, and those that move on cost the paths
+/// from the leaves around them to the root, once where paths join: there is never a refit of the whole tree,
+/// and boxes shrink as they grow. All memory is taken at construction; no call allocates.
 class SurfaceTree {
  public:
   /// `simplices`: [F * corners] nodes of triangles (corners = 3) or lines (2); `positions`: [S] of the nodes
@@ -30,8 +31,11 @@ class SurfaceTree {
   /// Where the node was last moved to [m].
   [[nodiscard]] const Vec3& position(Index node) const noexcept { return positions_[node]; }
 
-  /// Moves a node; `position` must be finite.
+  /// Moves a node; `position` must be finite. The boxes follow in `refit`.
   void move(Index node, const Vec3& position) noexcept;
+
+  /// Boxes of all that has moved. Call before asking what is where.
+  void refit() noexcept;
 
   /// A box around the whole surface, at most two margins larger than it on each side [m].
   [[nodiscard]] Eigen::AlignedBox3d bounds() const noexcept {
@@ -68,7 +72,7 @@ class SurfaceTree {
 
   /// Sets the box of a cell by what it encloses; false if it was so before.
   bool fit(Index cell) noexcept;
-  void refit_upwards(Index leaf) noexcept;
+  void mark(Index cell) noexcept;
 
   [[nodiscard]] std::span<const Index> nodes_at(Index place) const noexcept;
   [[nodiscard]] std::span<const Index> places_around(Index node) const noexcept;
@@ -87,6 +91,8 @@ class SurfaceTree {
   std::vector<Index> leaf_;         // [F] cell of each place
   std::vector<Index> first_place_;  // [S + 1] of each node in places_
   std::vector<Index> places_;       // [F * corners] around each node, ascending
+  std::vector<std::uint64_t> marks_;  // a bit for each cell that is to be fitted
+  std::size_t marks_end_ = 0;         // no word of marks from here on has any
 };
 
 }  // namespace palpate

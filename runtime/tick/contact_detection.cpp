@@ -97,6 +97,7 @@ void want_ahead(const Body& body, SurfaceState& surface, const Scratch& scratch)
   const Index node = far_node_of(body, surface.near, nodes_of(body, scratch.simplex_ahead));
   bool moved = false;
   want_nodes(body, surface, {node, -1, -1}, moved);
+  surface.tree.refit();
 }
 
 /// The nearest point of a simplex that a sphere touches at its corners alone: where the sphere's middle is
@@ -284,6 +285,7 @@ void keep_usable(const Body& body, State& state, Scratch& scratch, ToolContact& 
     scratch.pairs[touch.usable].nearest = scratch.pairs[k].nearest;
     scratch.found[touch.usable++] = simplex;
   }
+  state.surface.tree.refit();
   touch.is_known = touch.is_known && !moved;
 }
 
@@ -555,6 +557,7 @@ void update_held(const Body& body, State& state) noexcept {
     contact.arm = tool.pose.orientation * contact.tool_point;
     state.contact_points[kept++] = contact;
   }
+  state.surface.tree.refit();
   state.held_count = kept;
 }
 

@@ -115,6 +115,7 @@ StepStatus step(const Body& body, State& state, std::span<const ToolPose> poses)
   renew_stored_displacement(body, state.surface);
   renew_far_surface(body, state.surface, scratch, state.ticks);
   renew_patch_surface(body, state.surface, scratch);
+  state.surface.tree.refit();
   return end_tick(state);
 }
 

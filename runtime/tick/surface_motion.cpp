@@ -151,6 +151,7 @@ void move_near_surface(const Body& body, SurfaceState& surface) noexcept {
     const Vec3 position = unloaded_position(body, surface, node) + surface.near.displacement(place);
     if (position.allFinite()) surface.tree.move(node, position);
   }
+  surface.tree.refit();
 }
 
 void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexcept {
@@ -173,6 +174,7 @@ void follow_free_motion(const Body& body, State& state, Scratch& scratch) noexce
         if (body.surface_moves(node)) move_far(body, surface, node, stored_displacement(body, surface, node));
       }
     }
+    surface.tree.refit();
   }
 }
 
