@@ -8,13 +8,19 @@
 #include "runtime/solve/vector_loops.h"
 
 namespace palpate {
+namespace {
+
+constexpr std::ptrdiff_t beyond_row = 2;  // numbers that may be read there: four at the last node
+
+}  // namespace
+
 NearField::NearField(const Body& body, Index capacity, Index patch_nodes)
     : dimension_(body.dimension()),
       capacity_(capacity),
       surface_nodes_(static_cast<Index>(body.surface_rest_positions().size())),
       parts_(std::max(body.most_surface_parts(), body.aggregates().most_members())),
       most_members_(body.aggregates().most_members()),
-      stride_((static_cast<std::ptrdiff_t>(dimension_) * capacity + 7) / 8 * 8),
+      stride_((static_cast<std::ptrdiff_t>(dimension_) * capacity + beyond_row + 7) / 8 * 8),
       patch_stride_((static_cast<std::ptrdiff_t>(dimension_) * patch_nodes + 7) / 8 * 8),
       patch_room_(patch_nodes),
       place_(at(body.aggregate_node(body.aggregates().count())), -1),

@@ -35,7 +35,7 @@ class NearField {
   [[nodiscard]] Index place_of(Index surface_node) const noexcept { return place_[surface_node]; }
   /// Surface node at a place.
   [[nodiscard]] Index node(Index place) const noexcept { return nodes_[place]; }
-  /// Row of C [d m] of one dof, d place + axis.
+  /// Row of C [d m] of one dof, d place + axis. At each node four numbers may be read, whatever the last is.
   [[nodiscard]] std::span<const double> row(Index dof) const noexcept {
     return {C_.data() + static_cast<std::ptrdiff_t>(dof) * stride_,
             static_cast<std::size_t>(dimension_ * count_)};

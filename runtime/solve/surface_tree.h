@@ -18,9 +18,9 @@ struct NearestSimplex {
 };
 
 /// Bounding volume tree over the simplices of a surface whose nodes move. Boxes are a margin larger than what
-/// they enclose, so that a node that moves less than that costs nothing, and those that move on cost the paths
-/// from the leaves around them to the root, once where paths join: there is never a refit of the whole tree,
-/// and boxes shrink as they grow. All memory is taken at construction; no call allocates.
+/// they enclose, so that a node that moves less than that costs nothing, and those that move on cost the
+/// paths from the leaves around them to the root, once where paths join: there is never a refit of the whole
+/// tree, and boxes shrink as they grow. All memory is taken at construction; no call allocates.
 class SurfaceTree {
  public:
   /// `simplices`: [F * corners] nodes of triangles (corners = 3) or lines (2); `positions`: [S] of the nodes
@@ -83,14 +83,14 @@ class SurfaceTree {
 
   int corners_;
   double margin_;
-  std::vector<Vec3> positions_;     // [S]
-  std::vector<Vec3> anchors_;       // [S] where the boxes think that the nodes are: never a margin away
-  std::vector<Cell> cells_;         // parents before children, first child next to its parent
-  std::vector<Index> numbers_;      // [F] simplex at each place in the order of the leaves
-  std::vector<Index> nodes_;        // [F * corners] of the simplex at each place
-  std::vector<Index> leaf_;         // [F] cell of each place
-  std::vector<Index> first_place_;  // [S + 1] of each node in places_
-  std::vector<Index> places_;       // [F * corners] around each node, ascending
+  std::vector<Vec3> positions_;       // [S]
+  std::vector<Vec3> anchors_;         // [S] where the boxes think that the nodes are: never a margin away
+  std::vector<Cell> cells_;           // parents before children, first child next to its parent
+  std::vector<Index> numbers_;        // [F] simplex at each place in the order of the leaves
+  std::vector<Index> nodes_;          // [F * corners] of the simplex at each place
+  std::vector<Index> leaf_;           // [F] cell of each place
+  std::vector<Index> first_place_;    // [S + 1] of each node in places_
+  std::vector<Index> places_;         // [F * corners] around each node, ascending
   std::vector<std::uint64_t> marks_;  // a bit for each cell that is to be fitted
   std::size_t marks_end_ = 0;         // no word of marks from here on has any
 };

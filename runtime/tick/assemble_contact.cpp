@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "runtime/solve/tick_tuning.h"
@@ -287,29 +288,40 @@ int only_node(const ContactRow& row) noexcept {
   return only;
 }
 
+/// Three numbers of a node, and a fourth beside them that counts for nothing.
+using Four [[gnu::vector_size(4 * sizeof(double))]] = double;
+
+Four four_at(const double* numbers) noexcept {
+  Four four;
+  std::memcpy(&four, numbers, sizeof(four));
+  return four;
+}
+
 /// W = J Xi J^T of rows that have one node each: of Xi only what is asked for.
 template <int D>
 void assemble_between_nodes(const NearField& near, Scratch& scratch) noexcept {
   ContactProblem& problem = scratch.problem;
-  for (Index j = 0; j < problem.rows; ++j) {
-    const ContactRow& by = scratch.rows[j];
-    const auto from = static_cast<std::size_t>(only_node(by));
-    const Vec3& f = by.body[from];
+  const auto rows = static_cast<std::size_t>(problem.rows);
+  for (std::size_t i = 0; i < rows; ++i) {
+    const ContactRow& row = scratch.rows[i];
+    const auto n = static_cast<std::size_t>(only_node(row));
+    const Vec3& body = row.body[n];
+    scratch.row_first[i] = std::ptrdiff_t{D} * row.places[n];
+    scratch.row_body[i] = {body.x(), body.y(), D == 3 ? body.z() : 0.0, 0.0};
+  }
+  for (std::size_t j = 0; j < rows; ++j) {
+    const std::array<double, 4>& f = scratch.row_body[j];
     std::array<const double*, D> c;
-    for (int axis = 0; axis < D; ++axis)
-      c[static_cast<std::size_t>(axis)] = near.row(D * by.places[from] + axis).data();
-    for (Index i = j; i < problem.rows; ++i) {
-      const ContactRow& at = scratch.rows[i];
-      const auto to = static_cast<std::size_t>(only_node(at));
-      const std::ptrdiff_t first = std::ptrdiff_t{D} * at.places[to];
-      double w = 0.0;
-      for (int a = 0; a < D; ++a) {
-        double u = 0.0;
-        for (int axis = 0; axis < D; ++axis) u += f[axis] * c[static_cast<std::size_t>(axis)][first + a];
-        w += at.body[to][a] * u;
-      }
-      problem.w(i, j) = w;
-      problem.w(j, i) = w;
+    for (std::size_t axis = 0; axis < D; ++axis)
+      c[axis] = near.row(static_cast<Index>(scratch.row_first[j]) + static_cast<Index>(axis)).data();
+    for (std::size_t i = j; i < rows; ++i) {
+      const std::ptrdiff_t first = scratch.row_first[i];
+      Four u = f[0] * four_at(c[0] + first);
+      for (std::size_t axis = 1; axis < D; ++axis) u += f[axis] * four_at(c[axis] + first);
+      const Four w = u * four_at(scratch.row_body[i].data());
+      const double sum = D == 3 ? w[0] + w[1] + w[2] : w[0] + w[1];
+      problem.w(static_cast<Index>(i), static_cast<Index>(j)) = sum;
+      problem.w(static_cast<Index>(j), static_cast<Index>(i)) = sum;
     }
   }
 }

@@ -289,21 +289,37 @@ void keep_usable(const Body& body, State& state, Scratch& scratch, ToolContact& 
   touch.is_known = touch.is_known && !moved;
 }
 
+/// The pair of the core's origin. Of a simplex that is touched at its corners alone, normal and height are
+/// left out: few of these are asked for.
+void look_at(const Body& body, const SurfaceTree& tree, const Tool& tool, const ToolContact& touch,
+             Index simplex, TouchingPair& pair) noexcept {
+  const bool is_chord = touches_corners_alone(body, tool, simplex);
+  if (!is_chord && !touch.is_known) {
+    pair = pair_of_end(body, tree, simplex, touch.core, 0);
+    return;
+  }
+  const SimplexNodes nodes = nodes_of(body, simplex);
+  pair.simplex = simplex;
+  pair.place = 0;
+  if (!touch.is_known) pair.nearest = nearest_of_chord(tree, nodes, touch.core, tool.radius);
+  pair.distance = std::sqrt(pair.nearest.squared_distance);
+  if (!is_chord) find_height(tree, nodes, pair);
+}
+
 /// Fills the pairs of the core's origin, and tells on which side of the nearest simplices it is.
-void look_from_origin(const Body& body, const SurfaceTree& tree, Scratch& scratch,
+void look_from_origin(const Body& body, const SurfaceTree& tree, const Tool& tool, Scratch& scratch,
                       ToolContact& touch) noexcept {
   for (Index k = 0; k < touch.usable; ++k) {
-    TouchingPair& pair = scratch.pairs[k];
-    const Index simplex = scratch.found[k];
-    pair = touch.is_known ? make_pair(tree, nodes_of(body, simplex), simplex, 0, pair.nearest)
-                          : pair_of_end(body, tree, simplex, touch.core, 0);
-    touch.nearest_distance = std::min(touch.nearest_distance, pair.distance);
+    look_at(body, tree, tool, touch, scratch.found[k], scratch.pairs[k]);
+    touch.nearest_distance = std::min(touch.nearest_distance, scratch.pairs[k].distance);
   }
   const double as_near = touch.nearest_distance + tuning.detection.on_surface * body.mean_surface_edge();
   double side = 0.0;
   for (Index k = 0; k < touch.usable; ++k) {
-    const TouchingPair& pair = scratch.pairs[k];
-    if (pair.distance <= as_near) side += pair.height;
+    TouchingPair& pair = scratch.pairs[k];
+    if (pair.distance > as_near) continue;
+    find_height(tree, nodes_of(body, pair.simplex), pair);
+    side += pair.height;
   }
   touch.inside = side < 0.0;
 }
@@ -388,6 +404,13 @@ void touch_rim(const Body& body, State& state, Scratch& scratch, const ToolConta
   }
 }
 
+/// Whether the core's origin makes no candidate of a node: it is out of reach, or has its candidate already.
+bool is_done(const Scratch& scratch, const ToolContact& touch, const SurfaceTree& tree, double reach,
+             Index node) noexcept {
+  return (touch.core.origin - tree.position(node)).squaredNorm() > reach * reach ||
+         is_found(scratch, touch, tree, node);
+}
+
 /// On what is flat as seen from it, a segment, disc or large sphere has its one nearest point now at the one
 /// side, now at the other: all corners under it are contact points, and under a segment or disc the edges.
 void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
@@ -397,37 +420,50 @@ void touch_corners(const Body& body, State& state, Scratch& scratch, const ToolC
   const std::size_t corners = body.dimension() == 2 ? 2 : 3;
   const bool seen_from_outside = seen.height >= 0.0 && !touch.inside;
   const double reach = state.tools[touch.number].tool.radius + touch.margin;
-  const auto is_done = [&](Index node) {
-    return (touch.core.origin - tree.position(node)).squaredNorm() > reach * reach ||
-           is_found(scratch, touch, tree, node);
-  };
   for (std::size_t n = 0; n < corners; ++n) {
     const int place = is_extended ? 2 : 0;
-    if (!is_extended && seen_from_outside && is_done(nodes[n])) continue;
+    if (!is_extended && seen_from_outside && is_done(scratch, touch, tree, reach, nodes[n])) continue;
     touch_pair(body, state, scratch, touch, pair_of_corner(tree, nodes, seen, n, touch.core, place));
     if (is_extended && corners == 3) touch_edge(body, state, scratch, touch, seen, n);
   }
 }
 
-/// Contact points of one tool with one simplex. Between its nodes the surface is smooth: its triangles are
-/// chords of a sphere that is large against them, and would hold it out by edge^2 / 6 R.
+/// Contact points of a sphere with a simplex that it touches at its corners alone. Between its nodes the
+/// surface is smooth: its triangles are chords of a sphere that is large against them, and would hold it out
+/// by edge^2 / 6 R. From outside and not deep, most simplices have no corner left that others had not.
+void touch_chord(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
+                 const TouchingPair& nearest) noexcept {
+  const SurfaceTree& tree = state.surface.tree;
+  const SimplexNodes nodes = nodes_of(body, nearest.simplex);
+  const double reach = state.tools[touch.number].tool.radius + touch.margin;
+  if (nearest.distance > reach) return;
+  if (!touch.inside && touch.nearest_distance >= touch.lost &&
+      std::all_of(nodes.begin(), nodes.end(),
+                  [&](Index node) { return node < 0 || is_done(scratch, touch, tree, reach, node); }))
+    return;
+  TouchingPair pair = nearest;
+  find_height(tree, nodes, pair);
+  touch_corners(body, state, scratch, touch, pair, false);
+}
+
+/// Contact points of one tool with one simplex.
 void touch_simplex(const Body& body, State& state, Scratch& scratch, const ToolContact& touch,
                    const TouchingPair& nearest) noexcept {
-  TouchingPair pair = nearest;
   const Tool& tool = state.tools[touch.number].tool;
   const SurfaceTree& tree = state.surface.tree;
-  const Index simplex = pair.simplex;
+  const Index simplex = nearest.simplex;
+  if (touches_corners_alone(body, tool, simplex)) return touch_chord(body, state, scratch, touch, nearest);
+  TouchingPair pair = nearest;
   const bool is_disc = touch.core.disc_radius > 0.0;
   const bool is_extended = !has_point_core(tool);
-  const bool is_chord = touches_corners_alone(body, tool, simplex);
   // The middle of a disc is no more in the way than what is around it, unless it has to be pushed out.
-  if (!is_chord && (!is_disc || touch.inside)) touch_pair(body, state, scratch, touch, pair);
+  if (!is_disc || touch.inside) touch_pair(body, state, scratch, touch, pair);
   if (is_extended) {
     if (!is_disc) touch_pair(body, state, scratch, touch, pair_of_end(body, tree, simplex, touch.core, 1));
     pair = pair_of_core(body, tree, simplex, touch.core);
     if (!is_flat_under_rim(body, scratch, touch, pair)) touch_pair(body, state, scratch, touch, pair);
   }
-  const bool is_flat = is_extended || is_chord || tool.radius > body.mean_surface_edge();
+  const bool is_flat = is_extended || tool.radius > body.mean_surface_edge();
   if (!is_flat || pair.distance - tool.radius > touch.margin) return;
   touch_corners(body, state, scratch, touch, pair, is_extended);
   if (is_disc) touch_rim(body, state, scratch, touch, simplex);
@@ -515,7 +551,7 @@ void find_candidates(const Body& body, State& state, Scratch& scratch, Index num
     leave_out_simplex(body, state, scratch, number, touch.core, scratch.found[k]);
   keep_usable(body, state, scratch, touch, count);
   if (scratch.is_first_pass) want_ahead(body, state.surface, scratch);
-  look_from_origin(body, state.surface.tree, scratch, touch);
+  look_from_origin(body, state.surface.tree, tool.tool, scratch, touch);
   if (is_lost(body, state.surface.tree, touch)) {
     tool.engaged = false;
     tool.status |= StepStatus::inside_body;
@@ -557,8 +593,8 @@ void update_held(const Body& body, State& state) noexcept {
     contact.arm = tool.pose.orientation * contact.tool_point;
     state.contact_points[kept++] = contact;
   }
-  state.surface.tree.refit();
   state.held_count = kept;
+  state.surface.tree.refit();
 }
 
 }  // namespace

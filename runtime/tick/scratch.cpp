@@ -78,6 +78,8 @@ Scratch::Scratch(const Body& body, Index tools, Index max_contacts, const NearFi
       problem(body.dimension(), body.dimension() * max_contacts, few_rows(body, max_contacts),
               most_rows(body, many(max_contacts))),
       rows(size(most_rows(body, max_contacts))),
+      row_first(size(few_rows(body, max_contacts))),
+      row_body(row_first.size()),
       row_response(size(body.dimension() * near.capacity())),
       guess_force(row_response.size()),
       upcoming(last_contacts.size()),

@@ -1,6 +1,8 @@
 // The workspace of a tick.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -83,9 +85,11 @@ struct Scratch {
   bool was_improved = false;              ///< solution: few contacts took a second solver, in the last pass
   ContactProblem problem;                 ///< [rows] assembly: W and b; solution: lambda
   std::vector<ContactRow> rows;           ///< [rows] assembly: J
-  std::vector<double> row_response;       ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
-  std::vector<double> guess_force;        ///< [d near_nodes] assembly of many contacts [N]
-  std::vector<UpcomingContact> upcoming;  ///< [max_contacts] assembly of many contacts
+  std::vector<std::ptrdiff_t> row_first;  ///< [few rows] assembly: column of C of the one node of a row
+  std::vector<std::array<double, 4>> row_body;  ///< [few rows] assembly: what the row has of it
+  std::vector<double> row_response;             ///< [d near_nodes] assembly: a column of Xi J^T [m/N]
+  std::vector<double> guess_force;              ///< [d near_nodes] assembly of many contacts [N]
+  std::vector<UpcomingContact> upcoming;        ///< [max_contacts] assembly of many contacts
   std::vector<Index> order;  ///< [max_contacts] assembly of many contacts: who comes to each place
   std::vector<Eigen::Matrix3d> response;  ///< [max_contacts] linearise of many contacts: change of the force
                                           ///< by a motion of the tool's device, a column an axis [N/m]

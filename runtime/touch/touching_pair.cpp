@@ -52,6 +52,12 @@ TouchingPair pair_of(Index simplex, const Vec3& normal, int place, const Nearest
           .distance = across.norm()};
 }
 
+/// The pair of a simplex and the core of which these are the nearest points.
+TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
+                       const NearestPoint& nearest) noexcept {
+  return pair_of(simplex, outward_normal(tree, nodes), place, nearest);
+}
+
 }  // namespace
 
 SimplexNodes nodes_of(const Body& body, Index simplex) noexcept {
@@ -102,9 +108,9 @@ NearestPoint nearest_corner(const SurfaceTree& tree, const SimplexNodes& nodes, 
   return nearest;
 }
 
-TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
-                       const NearestPoint& nearest) noexcept {
-  return pair_of(simplex, outward_normal(tree, nodes), place, nearest);
+void find_height(const SurfaceTree& tree, const SimplexNodes& nodes, TouchingPair& pair) noexcept {
+  pair.normal = outward_normal(tree, nodes);
+  pair.height = (pair.nearest.on_core - pair.nearest.on_simplex).dot(pair.normal);
 }
 
 TouchingPair pair_of_end(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,

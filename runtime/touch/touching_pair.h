@@ -41,9 +41,8 @@ NearestPoint nearest_points(const SurfaceTree& tree, const SimplexNodes& nodes, 
 /// The corner of a simplex that is nearest to the core's origin.
 NearestPoint nearest_corner(const SurfaceTree& tree, const SimplexNodes& nodes, const Core& core) noexcept;
 
-/// The pair of a simplex and the core of which these are the nearest points.
-TouchingPair make_pair(const SurfaceTree& tree, const SimplexNodes& nodes, Index simplex, int place,
-                       const NearestPoint& nearest) noexcept;
+/// Sets the normal of a pair, and the height of the core's point over the simplex.
+void find_height(const SurfaceTree& tree, const SimplexNodes& nodes, TouchingPair& pair) noexcept;
 
 /// The pair of a simplex and an end of the core: 0 its origin, 1 its end.
 TouchingPair pair_of_end(const Body& body, const SurfaceTree& tree, Index simplex, const Core& core,
