@@ -291,10 +291,8 @@ int only_node(const ContactRow& row) noexcept {
 /// Three numbers of a node, and a fourth beside them that counts for nothing.
 using Four [[gnu::vector_size(4 * sizeof(double))]] = double;
 
-Four four_at(const double* numbers) noexcept {
-  Four four;
+void read(const double* numbers, Four& four) noexcept {
   std::memcpy(&four, numbers, sizeof(four));
-  return four;
 }
 
 /// W = J Xi J^T of rows that have one node each: of Xi only what is asked for.
@@ -316,9 +314,14 @@ void assemble_between_nodes(const NearField& near, Scratch& scratch) noexcept {
       c[axis] = near.row(static_cast<Index>(scratch.row_first[j]) + static_cast<Index>(axis)).data();
     for (std::size_t i = j; i < rows; ++i) {
       const std::ptrdiff_t first = scratch.row_first[i];
-      Four u = f[0] * four_at(c[0] + first);
-      for (std::size_t axis = 1; axis < D; ++axis) u += f[axis] * four_at(c[axis] + first);
-      const Four w = u * four_at(scratch.row_body[i].data());
+      Four w{};
+      Four numbers;
+      for (std::size_t axis = 0; axis < D; ++axis) {
+        read(c[axis] + first, numbers);
+        w += f[axis] * numbers;
+      }
+      read(scratch.row_body[i].data(), numbers);
+      w *= numbers;
       const double sum = D == 3 ? w[0] + w[1] + w[2] : w[0] + w[1];
       problem.w(static_cast<Index>(i), static_cast<Index>(j)) = sum;
       problem.w(static_cast<Index>(j), static_cast<Index>(i)) = sum;

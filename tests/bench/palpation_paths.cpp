@@ -252,7 +252,8 @@ std::vector<ToolPose> palpation_poses(const Body& body, const Palpation& palpati
 
     const Vec3 centre = next.centre(palpation.radius, wanted);
     const double felt = palpation.radius - surface.distance(centre);  // more where the surface is hollow
-    const bool too_deep = felt > felt_now && felt > std::max(0.0, wanted) + 0.3 * palpation.radius;
+    const double hollow = 0.3 * std::min(palpation.radius, palpation.most_depth);
+    const bool too_deep = felt > felt_now && felt > std::max(0.0, wanted) + hollow;
     if (next.place.free && !too_deep) {
       walker = next;
       depth_now = wanted;

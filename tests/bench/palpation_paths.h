@@ -47,11 +47,12 @@ class RestSurface {
 /// changing speeds, lifts off, and now and then grabs what it presses, moves with it and lets go. Smooth, and
 /// the same for the same seed.
 struct Palpation {
-  double radius = 0.005;      ///< of the sphere [m]
-  double most_depth = 0.006;  ///< that it presses in [m]
-  double most_speed = 0.2;    ///< of the device [m/s]
-  double turning = 0.0;       ///< of the device, about an axis that changes [rad/s]
-  bool steady = false;        ///< always at that depth and speed, without lifting or grabbing
+  double radius = 0.005;  ///< of the sphere [m]
+  double most_depth =
+      0.006;                ///< that it presses in [m]; 0.3 of it (or of the radius) more where it is hollow
+  double most_speed = 0.2;  ///< of the device [m/s]
+  double turning = 0.0;     ///< of the device, about an axis that changes [rad/s]
+  bool steady = false;      ///< always at that depth and speed, without lifting or grabbing
   std::uint64_t seed = 1;
 };
 

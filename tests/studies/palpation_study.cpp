@@ -1,7 +1,7 @@
 // Random palpation of a baked body at 1 kHz, and what its slowest ticks are made of.
 //
 //   palpation_study MODEL.palpate.hdf [--seconds S] [--seed N] [--radius M] [--depth M] [--turning RAD/S]
-//                   [--friction MU]
+//                   [--friction MU] [--coupling N/M]
 //
 // A sphere (5 mm unless told otherwise) presses, slides, lifts and grabs all over the body in real time;
 // every tick is timed. Then the same motion is played twice more without waiting, the same ticks to the bit,
@@ -266,6 +266,7 @@ void print_statuses(const Run& run) {
 struct Touch {
   double work = 0.0;
   double turnover = 0.0;
+  bool was_lost = false;  // the tool got so deep in a tick that no contact brought it out
 };
 
 /// All touches of a run, by the mean of a tick's forces at its two ends. The body is at rest before and after
@@ -283,6 +284,9 @@ std::vector<Touch> touches(const Run& run, const std::vector<ToolPose>& poses) {
           0.5 * (run.torque[k] + run.torque[k - 1]).dot(turned.angle() * turned.axis());
       found.back().work += work;
       found.back().turnover += std::abs(work);
+      for (const std::size_t tick : {k - 1, k}) {
+        if (has(run.status[tick], StepStatus::inside_body)) found.back().was_lost = true;
+      }
     }
     was_touched = is_touched;
   }
@@ -295,7 +299,12 @@ void print_touches(const std::vector<Touch>& found) {
   double least_share = least;
   double sum = 0.0;
   std::int64_t negative = 0;
+  std::int64_t lost = 0;
   for (const Touch& touch : found) {
+    if (touch.was_lost) {
+      ++lost;
+      continue;
+    }
     least = std::min(least, touch.work);
     least_share = std::min(least_share, touch.work / touch.turnover);
     sum += touch.work;
@@ -304,8 +313,8 @@ void print_touches(const std::vector<Touch>& found) {
   fmt::print(
       "\n{} touches from free to free: the hand's work is {:.3g} J in all, {:.3g} J at least in one ({:.2g} "
       "of "
-      "what went to and fro there), negative in {}\n",
-      found.size(), sum, least, least_share, negative);
+      "what went to and fro there), negative in {}; not counted: {} in which the tool was lost in the body\n",
+      std::ssize(found) - lost, sum, least, least_share, negative, lost);
 }
 
 struct Arguments {
@@ -313,6 +322,7 @@ struct Arguments {
   double seconds = 600.0;
   test::Palpation palpation;
   std::optional<double> friction;
+  double coupling = std::numeric_limits<double>::infinity();  // [N/m]
 };
 
 void study(const Arguments& arguments) {
@@ -320,7 +330,9 @@ void study(const Arguments& arguments) {
   const double radius = arguments.palpation.radius;
   const auto poses = test::palpation_poses(body, arguments.palpation,
                                            static_cast<std::int64_t>(arguments.seconds / test::tick));
-  const State start(body, {.tools = {Tool{.radius = radius, .friction = arguments.friction}}});
+  const State start(body, {.tools = {Tool{.radius = radius,
+                                          .coupling_stiffness = arguments.coupling,
+                                          .friction = arguments.friction}}});
   double way = 0.0;
   std::int64_t grabs = 0;
   for (std::size_t k = 1; k < poses.size(); ++k) {
@@ -394,6 +406,8 @@ Arguments read_arguments(int argc, char** argv) {
       arguments.palpation.turning = value;
     } else if (name == "--friction") {
       arguments.friction = value;
+    } else if (name == "--coupling") {
+      arguments.coupling = value;
     } else {
       throw Error("is no option", name, "see the head of palpation_study.cpp");
     }
