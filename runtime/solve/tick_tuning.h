@@ -92,7 +92,7 @@ struct ManyTuning {
   double rough_tolerance = 3e-4;  ///< [largest force] beyond `smooth_work`,
   double smooth_work = 3e6;       ///< multiplications,
   int rough_failures = 3;         ///< or where steps of Newton's method have failed so often
-  double late_tolerance = 1e-3;  ///< [largest force] where, while something moves, another round would exceed
+  double late_tolerance = 1e-3;  ///< [largest force] where another round would exceed
   double late_work = 5e6;        ///< multiplications. Measured: spheres of 150 and 500 mm on the liver with
                                  ///< edges of 3.6 mm, friction 0.2 (docs/decisions-contact.md)
   double accepted = 3e-3;        ///< [largest force] at the end of the budget
