@@ -505,10 +505,12 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   double last = std::numeric_limits<double>::infinity();
   int failures = 0;
   bool newton = false;
+  // At rest each tick goes on from where the last one ended.
+  const bool moves = wanted == tuning.many.tolerance;
   const auto is_done = [&] {
     if (best_ <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
     const double next = work_ + round_work(newton && failures < tuning.many.most_failures);
-    if (best_ <= tuning.many.late_tolerance && next >= tuning.many.late_work) return true;
+    if (moves && best_ <= tuning.many.late_tolerance && next >= tuning.many.late_work) return true;
     return best_ <= tuning.many.rough_tolerance &&
            (work_ >= tuning.many.smooth_work || failures >= tuning.many.rough_failures);
   };

@@ -92,10 +92,10 @@ struct ManyTuning {
   double rough_tolerance = 3e-4;  ///< [largest force] beyond `smooth_work`,
   double smooth_work = 3e6;       ///< multiplications,
   int rough_failures = 3;         ///< or where steps of Newton's method have failed so often
-  double late_tolerance = 1e-3;   ///< [largest force] where another round would exceed
-  double late_work = 5e6;         ///< multiplications. Measured: spheres of 150 and 500 mm on the liver with
-                                  ///< edges of 3.6 mm, friction 0.2 (docs/decisions-contact.md)
-  double accepted = 3e-3;         ///< [largest force] at the end of the budget
+  double late_tolerance = 1e-3;  ///< [largest force] where, while something moves, another round would exceed
+  double late_work = 5e6;        ///< multiplications. Measured: spheres of 150 and 500 mm on the liver with
+                                 ///< edges of 3.6 mm, friction 0.2 (docs/decisions-contact.md)
+  double accepted = 3e-3;        ///< [largest force] at the end of the budget
   int most_rounds = 60;      ///< of sweeps, and steps of Newton's method before they have failed. With 20 a
                              ///< disc that slides left 11 of 300 ticks unsolved, with 60 it leaves 2
   double most_work = 1.4e7;  ///< multiplications
