@@ -69,6 +69,7 @@ struct ContactProblem {
   Index rows = 0;
   bool frictionless = true;        ///< no contact has friction
   bool many = false;               ///< W is in single precision, and friction's rows are along the axes
+  bool moves = false;              ///< a device, the body or its overlay has moved in this tick
   bool coupled = false;            ///< ... and in `single_W`, else in `body_W`
   std::vector<Index> first;        ///< [contacts + 1]
   std::vector<double> friction;    ///< [contacts] mu

@@ -505,8 +505,8 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   double last = std::numeric_limits<double>::infinity();
   int failures = 0;
   bool newton = false;
-  // At rest each tick goes on from where the last one ended.
-  const bool moves = wanted == tuning.many.tolerance;
+  // At rest each tick goes on from where the last one ended, also towards it.
+  const bool moves = problem.moves || wanted == tuning.many.tolerance;
   const auto is_done = [&] {
     if (best_ <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
     const double next = work_ + round_work(newton && failures < tuning.many.most_failures);

@@ -43,6 +43,7 @@ class NewtonKrylov {
                   std::span<double> dlambda) noexcept;
 
   [[nodiscard]] int products() const noexcept { return products_; }  ///< with W, of the last `solve`
+  [[nodiscard]] int rounds() const noexcept { return rounds_; }      ///< of the last `solve`
   [[nodiscard]] double residual() const noexcept {
     return residual_;
   }  ///< of the last `solve` [largest force]

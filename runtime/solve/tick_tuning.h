@@ -54,6 +54,7 @@ struct AssemblyTuning {
 /// Newton's passes within a tick.
 struct PassTuning {
   int most = 3;                ///< passes in a tick
+  Index most_rows = 150;       ///< of W where contacts are many: three passes with more would exceed 1 ms
   double penetration = 0.002;  ///< [edge] a deeper one calls for another pass
   double most_motion = 0.25;   ///< [edge] and what the tools may move: farther, the surface retreats
 };

@@ -83,8 +83,10 @@ bool is_rough(const Body& body, const State& state) noexcept {
 
 /// Whether another pass would be quick, and is not past a release, from which the body swings.
 bool may_repeat(const Body& body, const State& state, const Scratch& scratch) noexcept {
-  const bool was_easy = scratch.problem.many ? scratch.newton_krylov.was_easy()
-                                             : scratch.problem.frictionless || scratch.cone_solver.was_easy();
+  const ContactProblem& problem = scratch.problem;
+  const bool was_easy = problem.many
+                            ? problem.rows <= tuning.passes.most_rows && scratch.newton_krylov.was_easy()
+                            : problem.frictionless || scratch.cone_solver.was_easy();
   return was_easy && !scratch.was_improved && !is_released(body, state);
 }
 
@@ -250,6 +252,7 @@ void apply_forces(State& state, const Scratch& scratch) noexcept {
 
 ContactOutcome solve_contact(const Body& body, State& state, Scratch& scratch) noexcept {
   scratch.is_first_pass = true;
+  scratch.problem.moves = state.still_ticks == 0;
   find_contacts(body, state, scratch);
   change_patch(body, state);
   bool rough = is_rough(body, state);

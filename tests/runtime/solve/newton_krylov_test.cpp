@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "runtime/solve/active_set.h"
@@ -86,6 +87,34 @@ TEST(NewtonKrylov, ASolutionStaysAsItIs) {
     ASSERT_TRUE(tick());
     ASSERT_LT((grid.sum(grid.lambda()) - before).norm(), 1e-9 * before.norm()) << k;
   }
+}
+
+/// Rounds of a tick of 588 rows whose guess is off by 5e-4 of the largest force, and what is left.
+std::pair<int, double> off_by_little(bool moves) {
+  Grid grid(14, 0.3, 2.0, 0.3, true);
+  NewtonKrylov solver(196, 588);
+  for (int k = 0; k < 20; ++k) {
+    grid.begin();
+    solver.solve(grid.problem);
+  }
+  EXPECT_LT(solver.residual(), 1e-6);
+  for (Index i = 0; i < grid.problem.rows; ++i)
+    grid.problem.lambda[static_cast<std::size_t>(i)] *= 1.0 + 5e-4 * std::sin(0.5 * i);
+  grid.begin();
+  grid.problem.moves = moves;
+  EXPECT_TRUE(solver.solve(grid.problem));
+  return {solver.rounds(), solver.residual()};
+}
+
+// A step of Newton's method with so many rows is late: it is taken at rest, which has to be reached, and not
+// while a tool moves.
+TEST(NewtonKrylov, LateStepsAreTakenAtRest) {
+  const auto [at_rest, left_at_rest] = off_by_little(false);
+  const auto [moving, left_moving] = off_by_little(true);
+  EXPECT_EQ(moving, 1) << "sweeps alone";
+  EXPECT_GT(at_rest, 1);
+  EXPECT_LT(left_at_rest, 0.5 * left_moving);
+  EXPECT_LT(left_moving, tuning.many.late_tolerance);
 }
 
 // What is predicted of the forces' change is where it begins: a right prediction costs one product, a wrong

@@ -6,8 +6,11 @@
 #include <limits>
 #include <optional>
 #include <random>
+#include <span>
+#include <utility>
 #include <vector>
 
+#include "runtime/solve/tick_tuning.h"
 #include "runtime/tick/compliance.h"
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
@@ -264,6 +267,34 @@ TEST_P(ManyContacts, ForeseeTheirForces) {
   const auto median = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
   std::nth_element(shares.begin(), median, shares.end());
   EXPECT_LT(*median, 0.5);
+}
+
+/// Rows of a tick in which a sphere slides far and deeper, and whether it made more than one pass: then the
+/// last one began with other contact points than the tick.
+std::pair<Index, bool> slide_far(double radius) {
+  State state(cube(), {.tools = {plain({.radius = radius, .friction = 0.3})}, .max_contacts = 256});
+  const Vec3 pressed(0.4, 0.5, 1.0 + radius - 0.06);
+  go(cube(), state, Vec3(0.4, 0.5, 1.0 + radius + 0.01), pose(pressed), 200);
+  hold(cube(), state, pose(pressed), 20);
+  const std::vector<ContactPoint> before(state.contacts().begin(), state.contacts().end());
+  step(cube(), state, pose(pressed + Vec3(0.1, 0.0, -0.02)));
+  EXPECT_TRUE(state.scratch.problem.many);
+  const auto last =
+      std::span(state.scratch.last_contacts).first(static_cast<std::size_t>(state.scratch.last_count));
+  const bool same = std::equal(before.begin(), before.end(), last.begin(), last.end(),
+                               [](const ContactPoint& a, const ContactPoint& b) {
+                                 return a.feature == b.feature && a.position == b.position;
+                               });
+  return {state.scratch.problem.rows, !same};
+}
+
+TEST(Passes, AreRepeatedWhereRowsAreFew) {
+  const auto [few, few_repeat] = slide_far(2.0);
+  const auto [many, many_repeat] = slide_far(4.0);
+  EXPECT_LE(few, tuning.passes.most_rows);
+  EXPECT_TRUE(few_repeat);
+  EXPECT_GT(many, tuning.passes.most_rows);
+  EXPECT_FALSE(many_repeat);
 }
 
 TEST(Remember, FindsContactsByTheirFeature) {
