@@ -62,6 +62,23 @@ Vec3 tangential(const Vec3& v, const Vec3& n) noexcept {
   return v - n.dot(v) * n;
 }
 
+/// How rounds of sweeps and steps of Newton's method get on.
+struct Progress {
+  double last = std::numeric_limits<double>::infinity();  // smallest residual after a round
+  int failures = 0;                                       // steps that gained little
+  bool newton = false;                                    // the first round has none
+
+  [[nodiscard]] bool has_step() const noexcept { return newton && failures < tuning.many.most_failures; }
+
+  /// Takes down what residual a round has reached.
+  void note(double reached) noexcept {
+    if (newton && reached > tuning.many.gain * last) ++failures;
+    if (!(reached <= 4.0 * last)) failures = tuning.many.most_failures;
+    last = std::min(last, reached);
+    newton = true;
+  }
+};
+
 }  // namespace
 
 NewtonKrylov::NewtonKrylov(Index max_contacts, Index max_rows)
@@ -502,33 +519,28 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
   const double wanted =
       std::clamp(tuning.many.reduction * best_, tuning.many.least_residual, tuning.many.tolerance);
   if (best_ > wanted) predict(problem);
-  double last = std::numeric_limits<double>::infinity();
-  int failures = 0;
-  bool newton = false;
+  Progress progress;
   // At rest each tick goes on from where the last one ended, also towards it.
   const bool moves = problem.moves || wanted == tuning.many.tolerance;
   const auto is_done = [&] {
     if (best_ <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
-    const double next = work_ + round_work(newton && failures < tuning.many.most_failures);
+    const double next = work_ + round_work(progress.has_step());
     if (moves && best_ <= tuning.many.late_tolerance && next >= tuning.many.late_work) return true;
     return best_ <= tuning.many.rough_tolerance &&
-           (work_ >= tuning.many.smooth_work || failures >= tuning.many.rough_failures);
+           (work_ >= tuning.many.smooth_work || progress.failures >= tuning.many.rough_failures);
   };
   while (!is_done()) {
     ++rounds_;
-    if (newton && failures < tuning.many.most_failures && !newton_step(problem)) {
-      failures = tuning.many.most_failures;
+    if (progress.has_step() && !newton_step(problem)) {
+      progress.failures = tuning.many.most_failures;
       take_best();
     }
     for (int k = 0; k < tuning.many.sweeps; ++k) sweep(problem);
     find_residual();
     const double reached = residual_;
     if (reached < best_) keep_best();
-    if (newton && reached > tuning.many.gain * last) ++failures;
-    if (!(reached <= 4.0 * last)) failures = tuning.many.most_failures;
-    if (failures == tuning.many.most_failures && reached > best_) take_best();
-    last = std::min(last, reached);
-    newton = true;
+    progress.note(reached);
+    if (progress.failures == tuning.many.most_failures && reached > best_) take_best();
   }
   if (residual_ > best_) take_best();
   for (Index i = 0; i < rows_; ++i)
