@@ -106,7 +106,7 @@ bool renew_near_runs(const Body& body, SurfaceState& surface, Scratch& scratch, 
     const auto [begin, end] = ranges[k];
     const Index run = sweep.near_runs[sweep.next_near_run];
     const Index stopped = renew_nodes(body, surface, u, begin, end, moves);
-    u += body.dimension() * (end - begin);
+    u += std::ptrdiff_t{body.dimension()} * (end - begin);
     sweep.done_of_run = stopped - runs.begin(run);
     if (stopped < end) break;
     sweep.done_of_run = 0;
