@@ -520,7 +520,7 @@ bool NewtonKrylov::solve(ContactProblem& problem) noexcept {
       std::clamp(tuning.many.reduction * best_, tuning.many.least_residual, tuning.many.tolerance);
   if (best_ > wanted) predict(problem);
   Progress progress;
-  // At rest each tick goes on from where the last one ended, also towards it.
+  // Rest is reached over ticks, each from where the last one ended: no step is too late there.
   const bool moves = problem.moves || wanted == tuning.many.tolerance;
   const auto is_done = [&] {
     if (best_ <= wanted || rounds_ >= tuning.many.most_rounds || work_ >= tuning.many.most_work) return true;
