@@ -25,9 +25,10 @@ bool is_inside(const std::filesystem::path& path, const std::filesystem::path& f
 }
 
 /// What stands there may be replaced.
-void check_existing(const std::filesystem::path& file, OutputKind kind, bool force) {
-  if (force || ::access(file.c_str(), F_OK) != 0) return;
-  const std::string elsewhere = "write to another file, or replace this one with --force";
+void check_existing(const std::filesystem::path& file, OutputKind kind, std::optional<bool> force) {
+  if (force.value_or(false) || ::access(file.c_str(), F_OK) != 0) return;
+  const std::string elsewhere = std::string("write to another file, or ") +
+                                (force ? "replace this one with --force" : "remove this one first");
   if (::access(file.c_str(), W_OK) != 0 && errno == EACCES)
     throw Error("is there and write-protected", file.string(), elsewhere);
   if (!is_ours(file, kind))

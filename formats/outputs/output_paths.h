@@ -19,8 +19,9 @@ namespace palpate {
 /// long as the run: it holds pipes open, so that their readers wait.
 class OutputPaths {
  public:
-  /// `force`: existing files may be replaced whatever they are, unless the run reads them.
-  explicit OutputPaths(bool force) : force_(force) {}
+  /// `force`: whether --force was given, with which existing files may be replaced whatever they are, unless
+  /// the run reads them; nothing where there is no such option.
+  explicit OutputPaths(std::optional<bool> force = {}) : force_(force) {}
 
   /// A file or folder that the run reads, and what it is, "the script". One that is not there is nobody's
   /// loss. Throws Error where an output would destroy it.
@@ -42,7 +43,7 @@ class OutputPaths {
   void refuse_outputs(const Known& output) const;
   void add_beside(const std::filesystem::path& path, const std::string& what);
 
-  bool force_;
+  std::optional<bool> force_;
   std::vector<Known> inputs_;
   std::vector<Known> outputs_;
   std::vector<FileDescriptor> pipes_;

@@ -56,7 +56,7 @@ void use_existing(const std::filesystem::path& file, const std::filesystem::path
 /// Writes the surface that a shape has been repaired to beside it, where it was.
 std::filesystem::path write_repaired(const std::filesystem::path& file, const Shape& shape) {
   if (shape.repaired.triangles.empty()) return file;
-  OutputPaths outputs(false);
+  OutputPaths outputs;
   outputs.add_input(file, "the surface");
   const std::filesystem::path path = outputs.add(file.parent_path() / (shape_name(file) + ".repaired.off"),
                                                  OutputKind::surface, "the repaired surface");

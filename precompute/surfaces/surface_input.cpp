@@ -204,7 +204,7 @@ std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const s
   }
   try {
     const std::filesystem::path file =
-        OutputPaths(false).add(stem + ".bad-faces.off", OutputKind::faces, "self-intersections");
+        OutputPaths().add(stem + ".bad-faces.off", OutputKind::faces, "self-intersections");
     write_file(file, out.str());
     return file;
   } catch (const Error&) {

@@ -122,7 +122,7 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   options.settings = apply_defaults(options.settings, input_, *body_);
   options.record = plan.record;
   if (!plan.record.empty() && plan.record != options_.record) {  // which was looked at before
-    OutputPaths paths(false);
+    OutputPaths paths;
     add_recording(paths, plan.record, "record");
   }
   print_device(input_, options.settings);

@@ -24,6 +24,8 @@
 #include "runtime/library/palpate.h"
 #include "runtime/library/session_recording.h"
 #include "runtime/library/sized_struct.h"
+#include "runtime/loop/loading.h"
+#include "runtime/loop/session_xdmf.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/monotonic_clock.h"
 #include "runtime/tick/step.h"
@@ -178,6 +180,15 @@ Settings settings_of(const Tool& tool, const StateOptions& options, const palpat
   settings.overlay_memory = overlay.memory;
   settings.rate = whole_rate(options.tick);
   return settings;
+}
+
+/// Where a session of `model`, loaded from `loaded`, may record: by the rules of the programs' outputs.
+std::filesystem::path recording_output(const Model& model, const std::filesystem::path& loaded,
+                                       const char* wanted) {
+  OutputPaths paths;
+  paths.add_input(loaded, "the model");
+  add_sources(paths, model, loaded);
+  return add_recording(paths, wanted, "palpate_record");
 }
 
 /// Whether a tool can become another between two ticks: its shape stays, and all else makes sense.
@@ -384,10 +395,11 @@ int palpate_record(palpate_session* session, const char* file, const palpate_rec
     if (session->recording)
       throw Error("a recording is being made", place, "end it by palpate_record_end first");
     code = PALPATE_ERROR_FILE;
+    const std::filesystem::path output = recording_output(session->body.model(), session->file, file);
     session->reset();
     session->recorded_tool = tool;
     session->recording.emplace(session->body, session->state,
-                               SessionRecording::Options{.file = file,
+                               SessionRecording::Options{.file = output,
                                                          .model = session->file,
                                                          .settings = settings,
                                                          .tool = tool,

@@ -185,7 +185,8 @@ class Session:
         self._status = 0
 
     def record(self, file: str | os.PathLike[str], *, pictures: float = 60.0, tool: int = 0) -> None:
-        """Records each tick of a tool from now on, from the untouched body, with so many pictures of the surface a second.
+        """Records each tick of a tool from now on, from the untouched body, with so many pictures of the surface a second. What
+        stands at `file` is replaced only where it is empty or an earlier recording.
         `palpate.Recording` reads it, and `palpate-runtime play BODY --device replay:FILE` repeats it. Throws Error."""
         options = CRecordOptions(ctypes.sizeof(CRecordOptions), tool, pictures)
         error = ctypes.create_string_buffer(4096)

@@ -1,5 +1,6 @@
 // palpate.h: the same as the C++ step, behind functions that never throw.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -25,6 +26,7 @@
 #include "runtime/tick/status.h"
 #include "runtime/tick/step.h"
 #include "tests/support/folders.h"
+#include "tests/support/meshes_files.h"
 
 namespace palpate::c_interface_test {
 namespace {
@@ -527,6 +529,60 @@ TEST(CInterfaceRecording, WhatCannotBeIsRefused) {
   EXPECT_NE(std::string(error).find("hint: "), std::string::npos);
   palpate_recording_close(nullptr);
   std::filesystem::remove(file);
+}
+
+/// The rules of the programs' outputs (docs/errors.md): nothing but an earlier recording or an empty file is
+/// replaced, under whatever name, and what stands there stays.
+TEST(CInterfaceRecording, ReplacesNothingButARecording) {
+  namespace fs = std::filesystem;
+  const test::ScratchFolder folder;
+  const fs::path model = folder.path() / "mine.palpate.hdf", text = folder.path() / "notes.txt";
+  fs::copy_file(golden("cube2"), model);
+  std::ofstream(text) << "of a stranger";
+  fs::copy_file(text, folder.path() / "source.csv");
+  fs::create_symlink("mine.palpate.hdf", folder.path() / "soft.h5");
+  fs::create_symlink("soft.h5", folder.path() / "twice.h5");
+  fs::create_symlink("nothing", folder.path() / "dangling.h5");
+  fs::create_symlink("loop.h5", folder.path() / "loop.h5");
+  fs::create_hard_link(model, folder.path() / "hard.h5");
+  fs::create_directory(folder.path() / "folder.h5");
+  fs::create_symlink("/dev/null", folder.path() / "null.h5");
+  ASSERT_EQ(::mkfifo((folder.path() / "pipe.h5").c_str(), 0600), 0);
+  const auto bytes = [](const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const std::string whole = bytes(model);
+  const palpate_tool tool = sphere(0.1);
+  char error[600];
+  const Session session(palpate_create(model.c_str(), &tool, 1, 24, error, sizeof error));
+  ASSERT_NE(session, nullptr) << error;
+  const palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
+  for (const char* name :
+       {"mine.palpate.hdf", "soft.h5", "twice.h5", "hard.h5", "folder.h5/../mine.palpate.hdf", "notes.txt",
+        "dangling.h5", "loop.h5", "folder.h5", "null.h5", "pipe.h5", ""}) {
+    const std::string file = *name == '\0' ? "" : (folder.path() / name).string();
+    EXPECT_EQ(palpate_record(session.get(), file.c_str(), &options, error, sizeof error), PALPATE_ERROR_FILE)
+        << name;
+    EXPECT_NE(std::string(error).find("hint: "), std::string::npos) << name;
+    EXPECT_EQ(std::string(error).find("--force"), std::string::npos) << "there is none here: " << error;
+  }
+  EXPECT_EQ(palpate_record(session.get(), "/dev/null", &options, error, sizeof error), PALPATE_ERROR_FILE);
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  EXPECT_EQ(bytes(model), whole);
+  EXPECT_EQ(bytes(text), "of a stranger");
+  EXPECT_TRUE(fs::is_symlink(folder.path() / "soft.h5"));
+  EXPECT_TRUE(fs::is_fifo(folder.path() / "pipe.h5"));
+
+  const palpate_pose pose = PALPATE_POSE_INIT;
+  std::ofstream(folder.path() / "empty.h5").flush();
+  for (const char* name : {"empty.h5", "empty.h5"}) {  // the second time it is a recording
+    ASSERT_EQ(palpate_record(session.get(), (folder.path() / name).c_str(), &options, error, sizeof error),
+              PALPATE_OK)
+        << error;
+    palpate_step(session.get(), &pose);
+    ASSERT_EQ(end_recording(session.get()), PALPATE_OK);
+  }
 }
 
 TEST(CInterfaceErrors, AFileThatIsNoModelIsNamed) {
