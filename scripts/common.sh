@@ -16,10 +16,10 @@ has_node() {
   command -v npm >/dev/null && [ "$(node -p 'process.versions.node.split(".")[0] >= 18' 2>/dev/null)" = true ]
 }
 
-# Installs what scripts/packages.txt names and is not there yet.
+# install_packages PART...: what scripts/packages.txt names in these parts and is not there yet
 install_packages() {
   local wanted missing
-  wanted=$(grep -v '^#' "$root/scripts/packages.txt")
+  wanted=$(awk -v parts=" $* " '/^#/ { next } /^\[/ { taken = index(parts, " " substr($0, 2, length($0) - 2) " "); next } taken' "$root/scripts/packages.txt")
   # shellcheck disable=SC2086
   missing=$(comm -23 <(printf '%s\n' $wanted | sort) \
     <({
@@ -41,14 +41,15 @@ install_packages() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing
 }
 
-# build PRESET [TARGET ...]: what was compiled before, here or in another clone, comes from a compiler cache.
+# build PRESET [TARGET ...]: what was compiled before, here or in another clone, comes from a compiler cache, with -Werror or without.
+configure_options=()
 build() {
   local preset=$1
   shift
   say "building ($preset)"
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
-  export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=true CCACHE_SLOPPINESS=pch_defines,time_macros
-  cmake --preset "$preset" >/dev/null
+  export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=true CCACHE_SLOPPINESS=pch_defines,time_macros CCACHE_IGNOREOPTIONS=-Werror
+  cmake --preset "$preset" "${configure_options[@]}" >/dev/null
   cmake --build "$root/build/$preset" --parallel "$jobs" ${1:+--target "$@"}
 }
 
@@ -64,4 +65,28 @@ fetch_liver() {
     return
   done
   fail "liver.inr.gz was not found in libcgal-demo's archives" "Reinstall the package: apt-get install --reinstall libcgal-demo"
+}
+
+# empty_debian SUITE FOLDER: a Debian with its essential packages alone, in which chroot works; for root. leave_debian FOLDER ends and removes it.
+empty_debian() {
+  local suite=$1 system=$2 mirror file
+  [ "$(id -u)" -eq 0 ] || fail "this is not root" "debootstrap and chroot need root"
+  command -v debootstrap >/dev/null || fail "debootstrap is missing" "apt-get install debootstrap"
+  mirror=$(sed -n 's/^deb \(\[[^]]*\] \)\?\(http[^ ]*\) .*/\2/p;s/^URIs: //p' /etc/apt/sources.list /etc/apt/sources.list.d/* 2>/dev/null | grep -m 1 '/debian/*$' || true)
+  say "an empty Debian ($suite)"
+  debootstrap --variant=minbase "$suite" "$system" "${mirror:-http://deb.debian.org/debian}" >/dev/null
+  echo force-unsafe-io >"$system/etc/dpkg/dpkg.cfg.d/quick"  # it is thrown away
+  # As this machine reaches its registries.
+  for file in /etc/apt/apt.conf.d /etc/apt/trusted.gpg.d /etc/ssl/certs /usr/local/share/ca-certificates /etc/npmrc /etc/pip.conf; do
+    if [ -e "$file" ]; then mkdir -p "$system$(dirname "$file")" && cp -a "$file" "$system$(dirname "$file")/"; fi
+  done
+  mount -t proc proc "$system/proc"
+  mount -t sysfs -o ro sysfs "$system/sys"
+  mount --rbind --make-rslave /dev "$system/dev"
+  chroot "$system" apt-get update -qq
+}
+
+leave_debian() {
+  umount -l "$1/proc" "$1/sys" "$1/dev" 2>/dev/null || true
+  rm -rf --one-file-system "$1"
 }

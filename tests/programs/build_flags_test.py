@@ -1,4 +1,4 @@
-"""-Werror and -march=native are for our presets: a project that adds this source tree to its own gets neither."""
+"""Flags and packages that are for us alone: -march=native for our presets, -Werror for tests, GoogleTest for tests."""
 
 import json
 import pathlib
@@ -26,8 +26,8 @@ class BuildFlags(unittest.TestCase):
     def flags_of_c_interface(self, *configure):
         """Those of FLAGS with which c_interface.cpp is compiled; configures only."""
         build = self.folder / "build"
-        result = subprocess.run(["cmake", *configure, "-G", "Ninja", "-B", build], cwd=SOURCE, capture_output=True, text=True)
-        self.assertEqual(result.returncode, 0, result.stderr)
+        self.configured = subprocess.run(["cmake", *configure, "-G", "Ninja", "-B", build], cwd=SOURCE, capture_output=True, text=True)
+        self.assertEqual(self.configured.returncode, 0, self.configured.stderr)
         commands = {pathlib.Path(entry["file"]).name: entry["command"].split()
                     for entry in json.loads((build / "compile_commands.json").read_text())}
         command = commands["c_interface.cpp"]
@@ -38,10 +38,15 @@ class BuildFlags(unittest.TestCase):
         (self.folder / "CMakeLists.txt").write_text(OUTSIDE)
         self.assertEqual(self.flags_of_c_interface("-S", self.folder), set())
 
-    def test_our_presets_have_both(self):
-        for preset in ("release", "asan"):
+    def test_presets_are_for_this_processor_and_those_of_tests_refuse_warnings(self):
+        for preset, flags in (("release", {"-march=native"}), ("asan", FLAGS)):
             with self.subTest(preset):
-                self.assertEqual(self.flags_of_c_interface("--preset", preset, "-DPALPATE_TESTS=OFF", "-DPALPATE_WEB=OFF", "-DCMAKE_UNITY_BUILD=OFF"), FLAGS)
+                self.assertEqual(self.flags_of_c_interface("--preset", preset, "-DPALPATE_TESTS=OFF", "-DPALPATE_WEB=OFF", "-DCMAKE_UNITY_BUILD=OFF"), flags)
+
+    def test_programs_are_built_without_what_tests_need(self):
+        self.flags_of_c_interface("--preset", "release", "-DPALPATE_WEB=OFF", "-DCMAKE_UNITY_BUILD=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_GTest=ON")
+        self.assertIn("Without tests, as these are missing: GTest. scripts/test installs them.", self.configured.stdout)
+        self.assertNotIn("step_test.cpp", (self.folder / "build" / "compile_commands.json").read_text())
 
 
 if __name__ == "__main__":

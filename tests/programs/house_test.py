@@ -23,6 +23,8 @@ class Rules(unittest.TestCase):
         self.write("meshes/mesh.cpp", '#include "meshes/mesh.h"\n// theory.md section 1\n')
         self.write("docs/theory.md", "# Theory\n\n## 1. Linear elastostatics\n")
         self.write("docs/pictures/house.svg", PICTURE)
+        self.write("docs/architecture.md", "| folder | library |\n|---|---|\n| `base` | x |\n| `meshes`, `scripts` | y |\n")
+        self.write(".clang-tidy", "HeaderFilterRegex: '(base|meshes)/[a-z0-9]+\\.h$'\n")
 
     def write(self, name, text):
         file = self.root / name
@@ -73,6 +75,27 @@ class Rules(unittest.TestCase):
     def test_a_folder_on_no_floor_is_refused(self):
         self.write("runtime/attic/old.cpp", "")
         self.refused("runtime/attic/old.cpp: its folder is on no floor")
+
+    def test_a_header_that_shows_cgal_stays_in_its_folder(self):
+        self.write("base/kernel.h", "#include <CGAL/Point_3.h>\n")
+        self.write("base/error.h", '#include "base/kernel.h"\n')
+        self.refused("meshes/mesh.h:1: includes base/error.h, which includes CGAL")
+        self.assertNotIn("base/error.h:1", self.check()[1])
+        self.write("meshes/mesh.h", '#include "base/words.h"\n')
+        self.write("base/words.h", "")
+        self.assertEqual(self.check()[0], 0, self.check()[1])
+        self.write("tests/base/error_test.cpp", '\n#include "base/kernel.h"\n')
+        self.refused("tests/base/error_test.cpp:2: includes base/kernel.h, which includes CGAL")
+
+    def test_a_folder_that_clang_tidy_does_not_see_is_refused(self):
+        self.write(".clang-tidy", "HeaderFilterRegex: '(base|mesh)/[a-z]+\\.h$'\n")
+        self.refused(".clang-tidy: HeaderFilterRegex leaves out the headers of meshes")
+
+    def test_a_folder_that_the_book_does_not_list_is_refused(self):
+        self.write("docs/architecture.md", "| `base` | x |\n")
+        self.refused("docs/architecture.md: its table of folders lacks meshes")
+        self.write("docs/architecture.md", "| `meshes` | x |\n| `base` | y |\n")
+        self.refused("docs/architecture.md: its table of folders is not in the order of FLOORS, from meshes on")
 
     def test_a_section_that_is_not_there_is_refused(self):
         self.write("meshes/mesh.cpp", "// theory.md section 2\n")
