@@ -113,9 +113,9 @@ std::optional<std::pair<const Edge*, const Edge*>> find_collision(const std::vec
 
 /// A point that two edges have in common.
 Point common_point(const Kernel::Segment_2& a, const Kernel::Segment_2& b) {
-  const auto common = CGAL::intersection(a, b);
-  const Point* point = common ? boost::get<Point>(&*common) : nullptr;
-  return point != nullptr ? *point : a.has_on(b.source()) ? b.source() : b.target();
+  Point point;
+  if (CGAL::assign(point, CGAL::Object(CGAL::intersection(a, b)))) return point;
+  return a.has_on(b.source()) ? b.source() : b.target();
 }
 
 void check_crossings(const std::vector<Line>& lines, const std::string& where) {

@@ -48,8 +48,6 @@ class HyperelasticPatch {
   [[nodiscard]] std::shared_ptr<const Patch> linearise();
 
   [[nodiscard]] const PatchMesh& mesh() const noexcept { return mesh_; }
-  /// Displacement [d g] of the body's nodes in the patch, on top of the rest [m].
-  [[nodiscard]] const Eigen::VectorXd& body_displacement() const noexcept { return place_.u_Q; }
   /// Displacement [d local nodes] of the fine mesh, on top of the rest [m].
   [[nodiscard]] Eigen::VectorXd local_displacement() const { return displacement(place_); }
 

@@ -261,14 +261,14 @@ bool ConeSolver::newton_step(ContactProblem& problem) noexcept {
 /// nothing changed, when none does.
 bool ConeSolver::search_along_step(ContactProblem& problem, double& now) noexcept {
   std::copy_n(problem.lambda.begin(), problem.rows, newton_.begin());
-  for (const double share : {1.0, 0.5, 0.25, 0.1}) {
+  for (const double share : tuning.cone.step_shares) {
     if (share < 1.0) {
       for (std::size_t i = 0; i < static_cast<std::size_t>(problem.rows); ++i)
         problem.lambda[i] = from_[i] + share * (newton_[i] - from_[i]);
       find_motion(problem);
     }
     const double then = residual(problem);
-    if (then > (1.0 - 0.5 * share) * now) continue;
+    if (then > (1.0 - tuning.cone.least_gain * share) * now) continue;
     now = then;
     return true;
   }
@@ -300,7 +300,8 @@ bool ConeSolver::iterate(ContactProblem& problem, int rounds) noexcept {
     if (stepped && search_along_step(problem, now)) continue;
     // Newton may run in circles between sets of closed contacts: tuning.cone.sweeps from where it would go,
     // at times from here.
-    start_from(problem, stepped && round % 5 != 4 ? newton_ : from_);
+    const bool returns = (round + 1) % tuning.cone.return_stride == 0;
+    start_from(problem, stepped && !returns ? newton_ : from_);
     for (int k = 0; k < tuning.cone.sweeps; ++k) sweep(problem);
     work_ += (3.0 * tuning.cone.sweeps + 4.0) * std::pow(problem.rows, 2) * tuning.cone.local_rounds;
     now = residual(problem);

@@ -67,13 +67,13 @@ struct ContactProblem {
   Index single_stride;  ///< of single_W
   Index contacts = 0;
   Index rows = 0;
-  bool frictionless = true;        ///< no contact has friction
-  bool many = false;               ///< W is in single precision, and friction's rows are along the axes
-  bool moves = false;              ///< a device, the body or its overlay has moved in this tick
-  bool coupled = false;            ///< ... and in `single_W`, else in `body_W`
-  std::vector<Index> first;        ///< [contacts + 1]
-  std::vector<double> friction;    ///< [contacts] mu
-  std::vector<Vec3> normal;        ///< [contacts] in the rows' axes
+  bool frictionless = true;      ///< no contact has friction
+  bool many = false;             ///< W is in single precision, and friction's rows are along the axes
+  bool moves = false;            ///< a device, the body or its overlay has moved in this tick
+  bool coupled = false;          ///< of many contacts: W with its couplings is in single_W; else it is body_W
+  std::vector<Index> first;      ///< [contacts + 1]
+  std::vector<double> friction;  ///< [contacts] mu
+  std::vector<Vec3> normal;      ///< [contacts] in the rows' axes
   std::vector<std::uint8_t> held;  ///< [contacts]
   std::vector<Index> owner;        ///< [contacts] contact that a held row is there for, else -1
   std::vector<double> W;           ///< [rows x stride] [m/N]

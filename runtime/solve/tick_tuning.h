@@ -77,6 +77,11 @@ struct ConeTuning {
   double next_share = 0.5;  ///< [spring before] measured with first_share: of 250 problems of a sphere and a
                             ///< point sliding over the liver that plain rounds had not solved, these solve
                             ///< 220, the rest to 2e-4 of the force
+  /// [Newton's step] tried in turn, the whole step first: near the solution it converges quadratically.
+  std::array<double, 4> step_shares = {1.0, 0.5, 0.25, 0.1};
+  double least_gain = 0.5;  ///< [residual times the share taken] a share that gains less is not taken
+  int return_stride = 5;  ///< rounds without a step taken sweep from the step's end, one out of so many from
+                          ///< its start, as steps can run in circles
 };
 
 /// The solver for contact of many points. The numbers are those of a comparison of solvers on the demo's
