@@ -1,4 +1,5 @@
-// Recorded sessions: every tick of a run, and pictures of the surface at display rate.
+// Recorded sessions: every tick of a run, and what shows the surface at display rate. The layout is
+// documented in docs/recording-format.md.
 #pragma once
 
 #include <cstdint>
@@ -51,7 +52,7 @@ struct TickRecord {
   std::uint8_t event = 0;
   std::int64_t motion_step = 0;  ///< packed dynamics: the last step whose answer had arrived
 
-  /// estimate of the error of `force` where the tick was a best effort, else 0 [N]; recordings from 4.3 on
+  /// estimate of the error of `force` where the tick was a best effort, else 0 [N]
   float force_error = 0.0F;
   /// contact points that the tool pressed on and that found no room; recordings from 4.3 on
   std::int32_t left_out = 0;
@@ -86,87 +87,112 @@ struct SessionInfo {
   std::string options;       ///< lines "name=value\n"
 };
 
-/// The frames of a session except for their values at the nodes, which RecordingFile reads.
-struct RecordedFrames {
-  RecordedSurface surface;
-  std::vector<std::int64_t> tick;  ///< [F]
-  std::vector<double> time;        ///< [F] since the start of the run [s]
-  bool has_stress = true;          ///< and pressure: recordings from 4.1 on
+/// What contacts put on the surface at one moment: with the model, all of its picture follows from that.
+struct ContactLoads {
+  std::int64_t tick = 0;
+  double time = 0.0;           ///< since the start of the run [s]
+  std::vector<Index> node{};   ///< [n] loaded surface nodes, each once, ascending
+  std::vector<float> force{};  ///< [n x 3] on the body [N]
+  std::vector<float> press{};  ///< [n] what contact points press with along their normals [N]
 };
 
-/// Writes a session to HDF5. From the first `checkpoint` on PATH is a valid recording at each instant,
-/// however the program ends: it shows the datasets of complete files in PATH.parts as its own (virtual
-/// datasets). `finish` makes it one plain file. Not for the tick: a recorder thread calls it.
+/// When the surface was looked at.
+struct PictureTime {
+  std::int64_t tick = 0;
+  double time = 0.0;  ///< since the start of the run [s]
+};
+
+/// Something that happened, in words.
+struct RecordedEvent {
+  double time = 0.0;  ///< since the start of the run [s]
+  std::string text;
+};
+
+/// Writes a session to an MCAP file that only grows: what `checkpoint` put there is whole however the program
+/// ends. `finish` adds the index. Not for the tick: a recorder thread calls it.
 class RecordingWriter {
  public:
   /// Takes the place of what was recorded to PATH before. Throws Error when PATH cannot be made, or is being
   /// recorded to.
-  RecordingWriter(std::filesystem::path path, const SessionInfo& info, const RecordedSurface& surface = {});
+  RecordingWriter(const std::filesystem::path& path, const SessionInfo& info,
+                  const RecordedSurface& surface = {});
   ~RecordingWriter();  ///< without `finish`, what the last `checkpoint` kept is there
   RecordingWriter(const RecordingWriter&) = delete;
   RecordingWriter& operator=(const RecordingWriter&) = delete;
 
-  /// Only into memory, until the next `checkpoint`.
-  void append(std::span<const TickRecord> ticks);
+  // Only into memory, until the next `checkpoint`, or until there is enough for a chunk: then they throw what
+  // `checkpoint` throws.
+  void append(const TickRecord& tick);
+  void append(const ContactLoads& loads);
   /// The frame has as many nodes as the surface. Without stress or pressure (empty): not a number, and none.
-  void append(SurfaceFrame frame);
+  void append(const SurfaceFrame& frame);
+  void append(const RecordedEvent& event);
 
-  /// Puts all that was appended into PATH. Throws Error when that fails, with PATH as it was; then what was
-  /// appended waits for the next one.
+  /// Puts all that was appended into the file. Throws Error when that fails (a full disk), with the file as
+  /// it was after the last one that did not; nothing may be appended then.
   void checkpoint();
 
-  /// Makes PATH one plain file, whose bytes depend on what was appended only. Throws Error when that fails,
-  /// with PATH as the last `checkpoint` left it.
+  /// The rest and the index. The bytes of the file depend on what was appended and on when `checkpoint` was
+  /// called only. Throws Error as `checkpoint` does.
   void finish();
-
-  /// The frames that were appended.
-  [[nodiscard]] const RecordedFrames& frames() const noexcept;
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
-/// A recorded session.
+/// A recording that is open. Ticks and pictures are read as they are asked for, so that a recording of hours
+/// takes no memory to speak of. It stays as it was when it was opened, also while it is still being recorded.
+/// One thread uses it at a time.
+class RecordingFile {
+ public:
+  /// Finds all that is in it and proves all but stored pictures: checksums, sizes, ascending times, counts
+  /// and numbers that can be. Throws Error (the field is named) when it is no recording or is damaged.
+  explicit RecordingFile(const std::filesystem::path& path);
+  ~RecordingFile();
+  RecordingFile(RecordingFile&&) noexcept;
+  RecordingFile& operator=(RecordingFile&&) noexcept;
+
+  [[nodiscard]] const std::filesystem::path& path() const noexcept;
+  [[nodiscard]] const SessionInfo& info() const noexcept;
+  [[nodiscard]] const std::string& generator() const noexcept;  ///< program and version
+  [[nodiscard]] const RecordedSurface& surface() const noexcept;
+  /// False where it was killed, or is being recorded: its index is missing (`finish_recording`).
+  [[nodiscard]] bool finished() const noexcept;
+
+  [[nodiscard]] std::int64_t ticks() const noexcept;  ///< how many
+  /// A row of the ticks, 0 .. ticks() - 1. Quick one after the other, as a chunk of them is kept. Throws
+  /// Error when it cannot be read any more.
+  [[nodiscard]] TickRecord tick(std::int64_t row) const;
+
+  [[nodiscard]] const std::vector<PictureTime>& pictures() const noexcept;
+  /// Whether pictures are stored; else `loads` has what they follow from.
+  [[nodiscard]] bool stores_pictures() const noexcept;
+  /// Picture 0 .. pictures().size() - 1 as it is stored. Throws Error when it is damaged.
+  [[nodiscard]] SurfaceFrame frame(std::int64_t number) const;
+  /// What picture 0 .. pictures().size() - 1 follows from, where they are not stored. Throws Error.
+  [[nodiscard]] ContactLoads loads(std::int64_t number) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// All ticks of a session in memory, for a replay.
 struct Recording {
   SessionInfo info;
   std::string generator;  ///< program and version
   std::vector<TickRecord> ticks;
-  RecordedFrames frames;
-  bool finished = true;  ///< else it was killed, or is being recorded: see `finish_recording`
 };
 
-/// Reads a recording back, also one that was killed, and proves all of it: checksums (from version 4.2 on),
-/// sizes that belong together, places, times and counts that can be. Throws Error (the field is named) when
-/// it is not one or is damaged. Starts a child process for a moment (see hdf5::Contents).
+/// Reads all ticks of a recording. Throws Error as RecordingFile.
 Recording read_recording(const std::filesystem::path& path);
 
-struct RecordingFiles;
+/// Whether a program records to it now.
+bool is_being_recorded(const std::filesystem::path& path);
 
-/// A recording whose frames are read as they are needed. It stays whole for as long as this lives, also while
-/// it is still being recorded.
-class RecordingFile {
- public:
-  /// Reads and proves it as `read_recording` does. Throws Error.
-  explicit RecordingFile(const std::filesystem::path& path);
-
-  /// Everything except the frames' values at the nodes.
-  [[nodiscard]] const Recording& recording() const noexcept { return recording_; }
-
-  /// One frame. Recordings before 4.1 have neither stress nor pressure: then those are empty. Throws Error
-  /// when it is not there.
-  [[nodiscard]] SurfaceFrame frame(std::int64_t number) const;
-
-  /// Displacement [frames x S x 3] of some frames [m]. Throws Error when they are not all there.
-  [[nodiscard]] std::vector<float> displacement(std::int64_t first, std::int64_t frames) const;
-
- private:
-  std::shared_ptr<const RecordingFiles> files_;
-  Recording recording_;
-};
-
-/// Makes a recording that was killed one plain file and removes its parts; nothing where that is so already.
-/// False, and nothing happens, while it is being recorded. Throws Error.
+/// Adds the index to a recording that was killed; nothing where it is there. False, and nothing happens,
+/// while it is being recorded. Throws Error.
 bool finish_recording(const std::filesystem::path& path);
 
 }  // namespace palpate
