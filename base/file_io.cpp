@@ -137,6 +137,12 @@ bool lock_file(const FileDescriptor& file) {
   return true;
 }
 
+bool is_locked(const FileDescriptor& file) {
+  if (::flock(file.get(), LOCK_SH | LOCK_NB) != 0) return errno == EWOULDBLOCK;
+  ::flock(file.get(), LOCK_UN);
+  return false;
+}
+
 std::int64_t file_size(const FileDescriptor& file) {
   struct stat status = {};
   if (::fstat(file.get(), &status) != 0) fail("read the file's size", file.path(), errno);

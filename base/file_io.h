@@ -45,6 +45,9 @@ FileDescriptor open_file(const std::filesystem::path& path, OpenMode mode);
 /// the file system knows no locks.
 bool lock_file(const FileDescriptor& file);
 
+/// Whether a program has it locked now.
+bool is_locked(const FileDescriptor& file);
+
 /// [byte]
 std::int64_t file_size(const FileDescriptor& file);
 

@@ -1,114 +1,120 @@
 #include "formats/recording.h"
 
 #include <algorithm>
-#include <chrono>
+#include <charconv>
 #include <cmath>
-#include <cstring>
-#include <thread>
+#include <iterator>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <utility>
 
 #include "base/error.h"
+#include "base/printable.h"
 #include "base/write_file.h"
-#include "formats/recording_parts.h"
-#include "formats/superblock.h"
+#include "formats/hdf5_contents.h"
+#include "formats/mcap.h"
+#include "formats/recording_messages.h"
 
 namespace palpate {
 namespace {
 
 constexpr const char* hint = "Copy the file again, or record the session again";
+constexpr const char* give_another = "Give a recording that palpate-runtime has written";
+constexpr const char* record_again = "Record the session again";
 constexpr double longest_time = 1e9;                                          // s
 constexpr std::int64_t longest_ns = std::int64_t{1'000'000'000'000'000'000};  // ns
+constexpr std::int64_t highest_rate = 1'000'000;                              // ticks a second
+constexpr std::uint64_t no_chunk = ~std::uint64_t{0};
 
-hdf5::Contents open_master(const std::filesystem::path& path) {
-  FileDescriptor file = open_file(path, OpenMode::read);
-  check_superblock(file, {"a recording", "Give a recording that palpate-runtime has written", hint});
-  return hdf5::Contents::read(std::move(file));
+/// Says what an HDF5 file is, which recordings were once and models are.
+[[noreturn]] void refuse_hdf5(const std::filesystem::path& path) {
+  const std::string format = hdf5::Contents::read(path).text_attribute("/", "format").value_or("");
+  if (format == "palpate")
+    throw Error(
+        "is a model, not a recording", path.string(),
+        "palpate-runtime play " + shell_word(path.string()) + " --view shows it and lets you push it");
+  if (format == "palpate-recording")
+    throw Error("is a recording in HDF5, as versions before the first release made them", path.string(),
+                record_again);
+  throw Error("is not a recording", path.string(), give_another);
 }
 
-// ---- rows ----
-
-void read_ticks(const hdf5::Contents& part, const RecordingHead& head, std::vector<TickRecord>& ticks) {
-  const auto before = ticks.size();
-  const std::int64_t rows = part.locate("/ticks/time", hdf5::element_type<double>(), 1).dims[0];
-  ticks.resize(before + static_cast<std::size_t>(rows));
-  for_each_tick_field(head, [&]<class Member>(const char* name, int components, Member TickRecord::*member) {
-    const auto width = static_cast<std::size_t>(components);
-    std::vector<Scalar<Member>> values(static_cast<std::size_t>(rows) * width);
-    part.read_rows(name, hdf5::element_type<Scalar<Member>>(), 0, rows, values.data());
-    for (std::size_t i = 0; i < static_cast<std::size_t>(rows); ++i)
-      std::memcpy(&(ticks[before + i].*member), &values[i * width], sizeof(Member));
-  });
+mcap::Layout layout_of(const FileDescriptor& file) {
+  std::string start(mcap::magic.size(), '\0');
+  start.resize(read_some(file, std::as_writable_bytes(std::span(start)), 0));
+  if (start.starts_with("\x89HDF")) refuse_hdf5(file.path());
+  if (start != mcap::magic) throw Error("is not a recording", file.path().string(), give_another);
+  return mcap::read_layout(file);
 }
 
-std::int64_t count_frames(const hdf5::Contents& part) {
-  return part.locate("/frames/time", hdf5::element_type<double>(), 1).dims[0];
-}
-
-template <class T>
-void append_column(const hdf5::Contents& part, const char* name, std::vector<T>& column) {
-  const std::int64_t rows = count_frames(part);
-  const std::size_t before = column.size();
-  column.resize(before + static_cast<std::size_t>(rows));
-  part.read_rows(name, hdf5::element_type<T>(), 0, rows, column.data() + before);
-}
-
-/// Values [frames x width] of some frames.
-template <class T>
-std::vector<T> read_some(const RecordingFiles& recording, const char* name, std::size_t width,
-                         std::int64_t first, std::int64_t frames) {
-  std::vector<T> values;
-  std::int64_t before = 0, found = 0;
-  for (const std::size_t file : recording.frame_files) {
-    const hdf5::Contents& part = recording.files[file];
-    const std::int64_t here = count_frames(part);
-    const std::int64_t begin = std::max(first - before, std::int64_t{0});
-    const std::int64_t end = std::min(first + frames - before, here);
-    if (begin < end) {
-      const std::size_t at = values.size();
-      values.resize(at + width * static_cast<std::size_t>(end - begin));
-      part.read_rows(name, hdf5::element_type<T>(), begin, end - begin, values.data() + at);
-    }
-    found += std::max(end - begin, std::int64_t{0});
-    before += here;
-  }
-  if (first < 0 || found != frames) {
-    throw Error("has " + std::to_string(before) + " frames, not " + std::to_string(frames) + " from number " +
-                    std::to_string(first) + " on",
-                recording.files.front().path().string(), "Ask for frames that are there");
-  }
-  return values;
+/// What is said of the run. Throws Error unless it is a recording of this version.
+SessionInfo info_of(const mcap::Layout& layout, const std::string& path, std::string& generator) {
+  const auto said = std::ranges::find(layout.metadata, "palpate", &mcap::Metadata::name);
+  const auto value = [&](const char* key) {
+    const auto found = said->values.find(key);
+    return found == said->values.end() ? std::string() : found->second;
+  };
+  if (said == layout.metadata.end() || value("format") != "palpate-recording")
+    throw Error("is an MCAP file, but not a recording of Palpate's", path, give_another);
+  if (!value("version").starts_with("5."))
+    throw Error("is a recording of another version", path, record_again);
+  generator = value("generator");
+  SessionInfo info{.model_path = value("model"),
+                   .content_hash = value("content_hash"),
+                   .device = value("device"),
+                   .options = value("options")};
+  const std::string rate = value("rate");
+  const auto [end, failed] = std::from_chars(rate.data(), rate.data() + rate.size(), info.rate);
+  if (failed != std::errc() || end != rate.data() + rate.size() || info.rate < 1 || info.rate > highest_rate)
+    throw Error("does not say how many ticks a second has", path, record_again);
+  return info;
 }
 
 // ---- what can be ----
 
-/// Says what is wrong with an entry of a dataset.
+/// Says what is wrong with a number of a message.
 class Checker {
  public:
   explicit Checker(std::string where) : where_(std::move(where)) {}
 
   template <class T>
-  void expect(bool possible, const char* name, std::size_t row, T value, const char* needed) const {
+  void expect(bool possible, const char* topic, std::size_t row, const char* name, T value,
+              const char* needed) const {
     if (possible) return;
-    throw Error(std::string(name) + ", row " + std::to_string(row) + ", holds " + std::to_string(value) +
-                    ", which is not " + needed,
+    throw Error(std::string(topic) + ", row " + std::to_string(row) + ": " + name + " is " +
+                    std::to_string(value) + ", which is not " + needed,
                 where_, hint);
+  }
+  void expect_whole(bool whole, const char* topic, std::size_t row) const {
+    if (!whole)
+      throw Error(std::string(topic) + ", row " + std::to_string(row) + ": is no whole message", where_,
+                  hint);
   }
 
  private:
   std::string where_;
 };
 
+constexpr const char* on_surface = "/surface";
+constexpr const char* on_tick = "/tool/0/tick";
+
 void check_surface(const RecordedSurface& surface, const Checker& check) {
+  const auto nodes = std::ssize(surface.nodes);
+  check.expect(surface.corners == 2 || surface.corners == 3, on_surface, 0, "corners", surface.corners,
+               "2 or 3");
+  check.expect(std::ssize(surface.simplices) % surface.corners == 0, on_surface, 0, "simplices",
+               surface.simplices.size(), "a multiple of their corners");
+  check.expect(std::ssize(surface.held) == nodes, on_surface, 0, "held", surface.held.size(),
+               "as many as nodes");
   for (std::size_t i = 0; i < surface.nodes.size(); ++i)
     for (const double x : surface.nodes[i])
-      check.expect(std::isfinite(x), "/surface/nodes", i, x, "a finite number");
-  const auto nodes = std::ssize(surface.nodes);
-  for (std::size_t i = 0; i < surface.simplices.size(); ++i) {
-    check.expect(surface.simplices[i] >= 0 && surface.simplices[i] < nodes, "/surface/simplices",
-                 i / static_cast<std::size_t>(surface.corners), surface.simplices[i],
-                 "a node of the surface");
-  }
+      check.expect(std::isfinite(x), on_surface, i, "node", x, "a finite number");
+  for (std::size_t i = 0; i < surface.simplices.size(); ++i)
+    check.expect(surface.simplices[i] >= 0 && surface.simplices[i] < nodes, on_surface, i, "simplices",
+                 surface.simplices[i], "a node of the surface");
   for (std::size_t i = 0; i < surface.held.size(); ++i)
-    check.expect(surface.held[i] < 8, "/surface/held", i, int{surface.held[i]}, "a set of axes");
+    check.expect(surface.held[i] < 8, on_surface, i, "held", int{surface.held[i]}, "a set of axes");
 }
 
 bool is_time(double time) {
@@ -119,103 +125,267 @@ bool is_moment(std::int64_t ns) {
   return ns >= -longest_ns && ns <= longest_ns;
 }
 
-void check_ticks(const std::vector<TickRecord>& ticks, const Checker& check) {
-  double before = -1.0;
-  for (std::size_t k = 0; k < ticks.size(); ++k) {
-    const TickRecord& tick = ticks[k];
-    check.expect(is_time(tick.time) && tick.time > before, "/ticks/time", k, tick.time,
-                 "a time after the one before it");
-    before = tick.time;
-    check.expect(tick.contacts >= 0, "/ticks/contacts", k, tick.contacts, "a number of contacts");
-    check.expect(std::isfinite(tick.force_error) && tick.force_error >= 0.0F, "/ticks/force_error", k,
-                 tick.force_error, "the size of an error");
-    check.expect(std::isfinite(tick.greens_error) && tick.greens_error >= 0.0F, "/ticks/greens_error", k,
-                 tick.greens_error, "the size of an error");
-    check.expect(tick.left_out >= 0, "/ticks/left_out", k, tick.left_out, "a number of contacts");
-    check.expect(tick.patch >= -1, "/ticks/patch", k, tick.patch, "a node, or -1 for none");
-    check.expect(tick.grab <= 1, "/ticks/grab", k, int{tick.grab}, "0 or 1");
-    check.expect(is_moment(tick.arrived_ns), "/ticks/arrived_ns", k, tick.arrived_ns,
-                 "a time of this session");
-    check.expect(is_moment(tick.begun_ns), "/ticks/begun_ns", k, tick.begun_ns, "a time of this session");
-  }
+bool is_error(float value) {
+  return std::isfinite(value) && value >= 0.0F;
 }
 
-void check_frames(const RecordedFrames& frames, const Checker& check) {
-  for (std::size_t k = 0; k < frames.tick.size(); ++k) {
-    check.expect(frames.tick[k] >= (k > 0 ? frames.tick[k - 1] : 0), "/frames/tick", k, frames.tick[k],
-                 "a tick after that of the frame before it");
-    check.expect(is_time(frames.time[k]) && (k == 0 || frames.time[k] >= frames.time[k - 1]), "/frames/time",
-                 k, frames.time[k], "a time after that of the frame before it");
-  }
+void check_tick(const TickRecord& tick, double before, std::size_t row, const Checker& check) {
+  const auto expect = [&](bool possible, const char* name, auto value, const char* needed) {
+    check.expect(possible, on_tick, row, name, value, needed);
+  };
+  expect(is_time(tick.time) && tick.time > before, "time", tick.time, "a time after the one before it");
+  expect(tick.contacts >= 0, "contacts", tick.contacts, "a number of contacts");
+  expect(is_error(tick.force_error), "force_error", tick.force_error, "the size of an error");
+  expect(is_error(tick.greens_error), "greens_error", tick.greens_error, "the size of an error");
+  expect(tick.left_out >= 0, "left_out", tick.left_out, "a number of contacts");
+  expect(tick.patch >= -1, "patch", tick.patch, "a node, or -1 for none");
+  expect(tick.grab <= 1, "grab", int{tick.grab}, "0 or 1");
+  expect(is_moment(tick.arrived_ns), "arrived_ns", tick.arrived_ns, "a time of this session");
+  expect(is_moment(tick.begun_ns), "begun_ns", tick.begun_ns, "a time of this session");
 }
 
-Recording read_once(const std::filesystem::path& path, const RecordingFiles& files) {
-  check_rows(files);
-  Recording recording;
-  recording.info = files.head.info;
-  recording.generator = files.head.generator;
-  recording.frames.surface = files.head.surface;
-  recording.frames.has_stress = files.head.has_stress;
-  recording.finished = !std::filesystem::exists(parts_folder(path));
-  for (const std::size_t file : files.tick_files) read_ticks(files.files[file], files.head, recording.ticks);
-  for (const std::size_t file : files.frame_files) {
-    append_column(files.files[file], "/frames/tick", recording.frames.tick);
-    append_column(files.files[file], "/frames/time", recording.frames.time);
+void check_loads(const ContactLoads& loads, std::size_t nodes, std::size_t row, const Checker& check) {
+  constexpr const char* topic = "/contacts";
+  check.expect(loads.force.size() == 3 * loads.node.size(), topic, row, "force", loads.force.size(),
+               "three for each node");
+  check.expect(loads.press.size() == loads.node.size(), topic, row, "press", loads.press.size(),
+               "one for each node");
+  Index before = -1;
+  for (const Index node : loads.node) {
+    check.expect(node > before && node < static_cast<std::int64_t>(nodes), topic, row, "node", node,
+                 "a node of the surface behind the one before it");
+    before = node;
   }
-  const Checker check(path.string());
-  check_surface(recording.frames.surface, check);
-  check_ticks(recording.ticks, check);
-  check_frames(recording.frames, check);
-  return recording;
+  for (const float f : loads.force) check.expect(std::isfinite(f), topic, row, "force", f, "a finite number");
+  for (const float f : loads.press) check.expect(std::isfinite(f), topic, row, "press", f, "a finite number");
 }
 
 }  // namespace
 
-RecordingFile::RecordingFile(const std::filesystem::path& path) {
-  // While it is recorded its parts are merged under a reader's hands: then what is there now is read.
-  constexpr int attempts = 5;
-  for (int attempt = 1;; ++attempt) {
-    try {
-      files_ = std::make_shared<const RecordingFiles>(open_recording(open_master(path)));
-      recording_ = read_once(path, *files_);
-      return;
-    } catch (const Error&) {
-      if (attempt == attempts || !std::filesystem::exists(parts_folder(path))) throw;
+struct RecordingFile::Impl {
+  /// A message that is read when it is asked for.
+  struct Place {
+    std::uint64_t chunk;
+    std::uint64_t offset;
+  };
+  struct TickChunk {
+    std::uint64_t chunk;
+    std::int64_t first;  // row
+  };
+
+  explicit Impl(const std::filesystem::path& path)
+      : file(open_file(path, OpenMode::read)), layout(layout_of(file)), check(path.string()) {
+    info = info_of(layout, path.string(), generator);
+    for (const mcap::Channel& channel : layout.channels) {
+      for (const ChannelKind& kind : channel_kinds()) {
+        if (channel.topic == kind.topic && channel.encoding == "cdr")
+          kinds.emplace_back(channel.id, kind.channel);
+      }
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    for (std::uint64_t k = 0; k < layout.chunks.size(); ++k) read(k);
+    if (!surface)
+      throw Error("ends before its surface: it was killed as it began", path.string(), record_again);
+    chunk_in_memory = no_chunk;
+    records = {};
   }
+
+  /// Nothing for a channel that is not ours.
+  [[nodiscard]] std::optional<RecordedChannel> kind_of(std::uint16_t channel) const {
+    for (const auto& [id, kind] : kinds)
+      if (id == channel) return kind;
+    return std::nullopt;
+  }
+
+  void read(std::uint64_t chunk) {
+    if (layout.chunks[chunk].size == 0) return;
+    if (has_pictures(chunk)) return note_pictures(chunk);
+    load(chunk);
+    for (const mcap::Message& message : mcap::messages_of(file.path(), records)) take(message, chunk);
+  }
+
+  [[nodiscard]] bool has_pictures(std::uint64_t chunk) const {
+    const auto first = mcap::message_starts(file, layout.chunks[chunk], 1);
+    return kind_of(first.front().message.channel) == RecordedChannel::pictures;
+  }
+
+  void note_pictures(std::uint64_t chunk) {
+    for (const mcap::MessageStart& start : mcap::message_starts(file, layout.chunks[chunk])) {
+      const std::size_t row = pictures.size();
+      PictureTime time;
+      check.expect_whole(kind_of(start.message.channel) == RecordedChannel::pictures && surface &&
+                             (stores_pictures || pictures.empty()) && from_start(start.first, time) &&
+                             start.size == picture_bytes(),
+                         "/pictures", row);
+      note(time, {chunk, start.message.offset}, "/pictures");
+      stores_pictures = true;
+    }
+  }
+
+  /// Of a message with a picture.
+  [[nodiscard]] std::uint64_t picture_bytes() const {
+    const std::size_t numbers = surface->nodes.size();
+    return to_message(SurfaceFrame{}).size() + 5 * sizeof(float) * numbers;
+  }
+
+  void note(const PictureTime& time, Place place, const char* topic) {
+    const std::size_t row = pictures.size();
+    const PictureTime before = row > 0 ? pictures.back() : PictureTime{};
+    check.expect(time.tick >= before.tick, topic, row, "tick", time.tick,
+                 "a tick after that of the picture before it");
+    check.expect(is_time(time.time) && time.time >= before.time, topic, row, "time", time.time,
+                 "a time after that of the picture before it");
+    pictures.push_back(time);
+    places.push_back(place);
+  }
+
+  void take(const mcap::Message& message, std::uint64_t chunk) {
+    const std::optional<RecordedChannel> kind = kind_of(message.channel);
+    if (kind == RecordedChannel::tick) return take_tick(message.data, chunk);
+    if (kind == RecordedChannel::contacts) {
+      ContactLoads loads;
+      const std::size_t row = pictures.size();
+      check.expect_whole(from_message(message.data, loads) && surface && !stores_pictures, "/contacts", row);
+      check_loads(loads, surface->nodes.size(), row, check);
+      note({loads.tick, loads.time}, {chunk, message.offset}, "/contacts");
+    } else if (kind == RecordedChannel::surface) {
+      check.expect_whole(!surface && from_message(message.data, surface.emplace()), on_surface, 0);
+      check_surface(*surface, check);
+    } else {
+      check.expect_whole(kind != RecordedChannel::pictures, "/pictures", pictures.size());
+    }
+  }
+
+  void take_tick(std::string_view message, std::uint64_t chunk) {
+    TickRecord tick;
+    check.expect_whole(from_message(message, tick), on_tick, static_cast<std::size_t>(ticks));
+    check_tick(tick, last_time, static_cast<std::size_t>(ticks), check);
+    last_time = tick.time;
+    if (tick_chunks.empty() || tick_chunks.back().chunk != chunk) tick_chunks.push_back({chunk, ticks});
+    ++ticks;
+  }
+
+  /// Puts a chunk into memory.
+  void load(std::uint64_t chunk) {
+    if (chunk_in_memory == chunk) return;
+    chunk_in_memory = no_chunk;
+    records = mcap::read_chunk(file, layout.chunks[chunk]);
+    tick_messages.clear();
+    for (const mcap::Message& message : mcap::messages_of(file.path(), records)) {
+      if (kind_of(message.channel) == RecordedChannel::tick) tick_messages.push_back(message.data);
+    }
+    chunk_in_memory = chunk;
+  }
+
+  std::string_view message(std::int64_t picture) {
+    if (picture < 0 || picture >= std::ssize(places)) {
+      throw Error(
+          "has " + std::to_string(places.size()) + " pictures, and no number " + std::to_string(picture),
+          file.path().string(), "Ask for one that is there");
+    }
+    const Place& place = places[static_cast<std::size_t>(picture)];
+    load(place.chunk);
+    return mcap::message_at(file.path(), records, place.offset).data;
+  }
+
+  FileDescriptor file;
+  mcap::Layout layout;
+  Checker check;
+  SessionInfo info;
+  std::string generator;
+  std::vector<std::pair<std::uint16_t, RecordedChannel>> kinds;
+  std::optional<RecordedSurface> surface;
+  std::vector<TickChunk> tick_chunks;
+  std::int64_t ticks = 0;
+  double last_time = -1.0;
+  std::vector<PictureTime> pictures;
+  std::vector<Place> places;
+  bool stores_pictures = false;
+  std::uint64_t chunk_in_memory = no_chunk;
+  std::string records;
+  std::vector<std::string_view> tick_messages;  // of these records
+};
+
+RecordingFile::RecordingFile(const std::filesystem::path& path) : impl_(std::make_unique<Impl>(path)) {}
+RecordingFile::~RecordingFile() = default;
+RecordingFile::RecordingFile(RecordingFile&&) noexcept = default;
+RecordingFile& RecordingFile::operator=(RecordingFile&&) noexcept = default;
+
+const std::filesystem::path& RecordingFile::path() const noexcept {
+  return impl_->file.path();
+}
+const SessionInfo& RecordingFile::info() const noexcept {
+  return impl_->info;
+}
+const std::string& RecordingFile::generator() const noexcept {
+  return impl_->generator;
+}
+const RecordedSurface& RecordingFile::surface() const noexcept {
+  return *impl_->surface;
+}
+bool RecordingFile::finished() const noexcept {
+  return impl_->layout.finished;
+}
+std::int64_t RecordingFile::ticks() const noexcept {
+  return impl_->ticks;
+}
+const std::vector<PictureTime>& RecordingFile::pictures() const noexcept {
+  return impl_->pictures;
+}
+bool RecordingFile::stores_pictures() const noexcept {
+  return impl_->stores_pictures;
 }
 
-std::vector<float> RecordingFile::displacement(std::int64_t first, std::int64_t frames) const {
-  return read_some<float>(*files_, "/frames/displacement", 3 * files_->head.surface.nodes.size(), first,
-                          frames);
+TickRecord RecordingFile::tick(std::int64_t row) const {
+  const auto& chunks = impl_->tick_chunks;
+  const auto after = std::ranges::upper_bound(chunks, row, {}, &Impl::TickChunk::first);
+  if (after == chunks.begin() || row >= impl_->ticks)
+    throw Error("has " + std::to_string(impl_->ticks) + " ticks, and no row " + std::to_string(row),
+                path().string(), "Ask for one that is there");
+  const Impl::TickChunk& chunk = *std::prev(after);
+  impl_->load(chunk.chunk);
+  TickRecord tick;
+  const auto place = static_cast<std::size_t>(row - chunk.first);
+  impl_->check.expect_whole(
+      place < impl_->tick_messages.size() && from_message(impl_->tick_messages[place], tick), on_tick,
+      static_cast<std::size_t>(row));
+  return tick;
 }
 
 SurfaceFrame RecordingFile::frame(std::int64_t number) const {
-  const std::size_t nodes = files_->head.surface.nodes.size();
   SurfaceFrame frame;
-  frame.displacement = displacement(number, 1);
-  if (files_->head.has_stress) {
-    frame.von_mises = read_some<float>(*files_, "/frames/von_mises", nodes, number, 1);
-    frame.pressure = read_some<float>(*files_, "/frames/pressure", nodes, number, 1);
-  }
-  frame.tick = read_some<std::int64_t>(*files_, "/frames/tick", 1, number, 1).front();
-  frame.time = read_some<double>(*files_, "/frames/time", 1, number, 1).front();
+  const std::size_t nodes = surface().nodes.size();
+  impl_->check.expect_whole(from_message(impl_->message(number), frame) &&
+                                frame.displacement.size() == 3 * nodes && frame.von_mises.size() == nodes &&
+                                frame.pressure.size() == nodes,
+                            "/pictures", static_cast<std::size_t>(number));
   return frame;
 }
 
-Recording read_recording(const std::filesystem::path& path) {
-  return RecordingFile(path).recording();
+ContactLoads RecordingFile::loads(std::int64_t number) const {
+  ContactLoads loads;
+  const std::string_view message = impl_->message(number);
+  impl_->check.expect_whole(from_message(message, loads), "/contacts", static_cast<std::size_t>(number));
+  check_loads(loads, surface().nodes.size(), static_cast<std::size_t>(number), impl_->check);
+  return loads;
 }
 
-bool finish_recording(const std::filesystem::path& recording) {
-  const std::filesystem::path path = link_target(recording);
-  if (!std::filesystem::exists(parts_folder(path))) return true;
-  const std::optional<FileDescriptor> lock = lock_parts(path);
-  if (!lock) return false;
-  const RecordingFiles files = open_recording(open_master(path));
-  const hdf5::Quiet quiet;
-  merge_recording(path, parts_of(files), files.head);
+Recording read_recording(const std::filesystem::path& path) {
+  const RecordingFile file(path);
+  Recording recording{.info = file.info(), .generator = file.generator(), .ticks = {}};
+  recording.ticks.reserve(static_cast<std::size_t>(file.ticks()));
+  for (std::int64_t row = 0; row < file.ticks(); ++row) recording.ticks.push_back(file.tick(row));
+  return recording;
+}
+
+bool is_being_recorded(const std::filesystem::path& path) {
+  return is_locked(open_file(path, OpenMode::read));
+}
+
+bool finish_recording(const std::filesystem::path& path) {
+  FileDescriptor file = open_file(link_target(path), OpenMode::write);
+  if (!lock_file(file)) return false;
+  mcap::Layout layout = layout_of(file);
+  if (!layout.finished) mcap::Writer(std::move(file), std::move(layout)).finish();
   return true;
 }
 

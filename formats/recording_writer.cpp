@@ -1,126 +1,136 @@
-#include <iterator>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <map>
 #include <string>
 
 #include "base/error.h"
-#include "formats/recording_parts.h"
+#include "base/write_file.h"
+#include "formats/mcap.h"
+#include "formats/recording.h"
+#include "formats/recording_messages.h"
 
 namespace palpate {
 namespace {
 
-/// Parts of one level that are merged into one of the next. A reader opens all parts that there are, and the
-/// system lets it open a thousand files: of a part each half second that is enough for years.
-constexpr std::size_t fan = 16;
+constexpr std::size_t enough = std::size_t{4} << 20;  // bytes of messages that make a chunk
+constexpr std::size_t most_steps = 100;               // of others that come first
+
+bool is_same_file(const FileDescriptor& file, const std::filesystem::path& path) {
+  struct stat open {
+  }, named{};
+  return ::fstat(file.get(), &open) == 0 && ::lstat(path.c_str(), &named) == 0 &&
+         open.st_dev == named.st_dev && open.st_ino == named.st_ino;
+}
+
+[[noreturn]] void refuse_second(const std::filesystem::path& path) {
+  throw Error("is being recorded by another program", path.string(), "Wait for it, or record elsewhere");
+}
+
+/// Makes PATH.partial, or takes over one that a program left which was killed, and locks it: of all that
+/// begin to record to PATH at once one has it.
+FileDescriptor make_locked(const std::filesystem::path& path, const std::filesystem::path& partial) {
+  for (std::size_t step = 0; step < most_steps; ++step) {
+    open_file(partial, OpenMode::read_append).close();
+    FileDescriptor file = open_file(partial, OpenMode::write);
+    if (!lock_file(file)) break;
+    if (!is_same_file(file, partial)) continue;  // it has become a recording meanwhile
+    if (::ftruncate(file.get(), 0) == 0) return file;
+  }
+  refuse_second(path);
+}
+
+std::uint64_t nanoseconds(double seconds) {
+  return static_cast<std::uint64_t>(std::llround(1e9 * seconds));
+}
 
 }  // namespace
 
 struct RecordingWriter::Impl {
-  struct Level {
-    RecordingPart part;
-    int level = 0;
-  };
-
-  Impl(std::filesystem::path to, const SessionInfo& info, const RecordedSurface& surface)
-      : path(std::move(to)), head{.info = info, .generator = "palpate " PALPATE_VERSION, .surface = surface} {
-    shown.surface = surface;
-    std::optional<FileDescriptor> locked = lock_parts(path);
-    if (!locked)
-      throw Error("is being recorded by another program", path.string(), "Wait for it, or record elsewhere");
-    lock = std::move(*locked);
-    try {
-      write_master(path, head, {});
-    } catch (...) {
-      leave_folder_if_empty();
-      throw;
+  Impl(FileDescriptor file, const SessionInfo& info, const RecordedSurface& surface)
+      : writer(std::move(file), "palpate " PALPATE_VERSION) {
+    writer.add(mcap::Metadata{.name = "palpate",
+                              .values = {{"format", "palpate-recording"},
+                                         {"version", "5.0"},
+                                         {"generator", "palpate " PALPATE_VERSION},
+                                         {"model", info.model_path},
+                                         {"content_hash", info.content_hash},
+                                         {"device", info.device},
+                                         {"rate", std::to_string(info.rate)},
+                                         {"options", info.options},
+                                         {"clock", "since the start of the run"},
+                                         {"units", "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns"}}});
+    for (const ChannelKind& kind : channel_kinds()) {
+      const auto id = static_cast<std::uint16_t>(kind.channel);
+      writer.add(mcap::Schema{.id = id, .name = kind.schema, .encoding = "ros2msg", .data = kind.definition});
+      writer.add(mcap::Channel{.id = id,
+                               .schema = id,
+                               .topic = kind.topic,
+                               .encoding = "cdr",
+                               .metadata = {{"offered_qos_profiles", ""}}});
     }
-    clear_parts(path);  // of an earlier recording, which nothing names any more
+    append(RecordedChannel::settings, 0.0, settings_message(info.options));
+    append(RecordedChannel::surface, 0.0, to_message(surface));
+    checkpoint();
   }
 
-  /// Removes a folder of parts that holds nothing but the lock.
-  void leave_folder_if_empty() const {
-    std::error_code ignored;
-    const std::filesystem::directory_iterator all(parts_folder(path), ignored);
-    if (std::distance(begin(all), end(all)) <= 1) remove_parts(path);
+  void append(RecordedChannel channel, double time, const std::string& message) {
+    mcap::Chunk& chunk = channel == RecordedChannel::pictures ? pictures : others;
+    chunk.append(static_cast<std::uint16_t>(channel), sequence[channel]++, nanoseconds(time), message);
+    if (chunk.bytes() >= enough) writer.write(chunk);
   }
 
-  std::filesystem::path next_file() { return parts_folder(path) / (std::to_string(files++) + ".h5"); }
-
-  [[nodiscard]] std::vector<RecordingPart> parts() const {
-    std::vector<RecordingPart> all;
-    for (const Level& level : levels) all.push_back(level.part);
-    return all;
+  void checkpoint() {
+    writer.write(others);
+    writer.write(pictures);
   }
 
-  /// The last parts into one, as long as there are enough of one level.
-  void merge_levels() {
-    while (levels.size() >= fan && levels[levels.size() - fan].level == levels.back().level) {
-      std::vector<RecordingPart> parts;
-      for (auto it = levels.end() - fan; it != levels.end(); ++it) parts.push_back(it->part);
-      const int level = levels.back().level + 1;
-      const RecordingPart merged = merge_parts(next_file(), parts, head);
-      levels.resize(levels.size() - fan);
-      levels.push_back({merged, level});
-      for (const RecordingPart& part : parts) replaced.push_back(part.file);
-    }
-  }
-
-  std::filesystem::path path;
-  RecordingHead head;
-  RecordedFrames shown;  // surface and times of all frames
-  FileDescriptor lock;
-  std::vector<TickRecord> ticks;  // since the last checkpoint
-  std::vector<SurfaceFrame> frames;
-  std::vector<Level> levels;
-  std::vector<std::filesystem::path> replaced;  // by merging, and no longer named by the master
-  bool is_behind = false;                       // the master shows fewer parts than there are
-  std::int64_t files = 0;
+  mcap::Writer writer;
+  mcap::Chunk others, pictures;
+  std::map<RecordedChannel, std::uint32_t> sequence;  // of the next message
 };
 
-RecordingWriter::RecordingWriter(std::filesystem::path path, const SessionInfo& info,
+RecordingWriter::RecordingWriter(const std::filesystem::path& path, const SessionInfo& info,
                                  const RecordedSurface& surface) {
-  const hdf5::Quiet quiet;
-  impl_ = std::make_unique<Impl>(std::move(path), info, surface);
+  const std::filesystem::path partial = with_suffix(path, ".partial");
+  FileDescriptor file = make_locked(path, partial);
+  try {
+    if (std::filesystem::is_regular_file(path) && is_being_recorded(path)) refuse_second(path);
+    impl_ = std::make_unique<Impl>(std::move(file), info, surface);
+    rename_file(partial, path);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(partial, ignored);
+    throw;
+  }
 }
 
 RecordingWriter::~RecordingWriter() = default;
 
-void RecordingWriter::append(std::span<const TickRecord> ticks) {
-  impl_->ticks.insert(impl_->ticks.end(), ticks.begin(), ticks.end());
+void RecordingWriter::append(const TickRecord& tick) {
+  impl_->append(RecordedChannel::tick, tick.time, to_message(tick));
 }
 
-void RecordingWriter::append(SurfaceFrame frame) {
-  impl_->shown.tick.push_back(frame.tick);
-  impl_->shown.time.push_back(frame.time);
-  impl_->frames.push_back(std::move(frame));
+void RecordingWriter::append(const ContactLoads& loads) {
+  impl_->append(RecordedChannel::contacts, loads.time, to_message(loads));
+}
+
+void RecordingWriter::append(const SurfaceFrame& frame) {
+  impl_->append(RecordedChannel::pictures, frame.time, to_message(frame));
+}
+
+void RecordingWriter::append(const RecordedEvent& event) {
+  impl_->append(RecordedChannel::events, event.time, to_message(event));
 }
 
 void RecordingWriter::checkpoint() {
-  const hdf5::Quiet quiet;
-  Impl& self = *impl_;
-  if (!self.ticks.empty() || !self.frames.empty()) {
-    self.levels.push_back({write_part(self.next_file(), self.ticks, self.frames, self.head)});
-    self.is_behind = true;
-    self.ticks.clear();
-    self.frames.clear();
-  }
-  if (!self.is_behind) return;
-  // Whoever has opened the master before the last one has had the time since then to open their parts.
-  std::vector<std::filesystem::path> to_remove;
-  to_remove.swap(self.replaced);
-  self.merge_levels();
-  write_master(self.path, self.head, self.parts());
-  self.is_behind = false;
-  std::error_code ignored;
-  for (const std::filesystem::path& file : to_remove) std::filesystem::remove(file, ignored);
+  impl_->checkpoint();
 }
 
 void RecordingWriter::finish() {
-  const hdf5::Quiet quiet;
   checkpoint();
-  merge_recording(impl_->path, impl_->parts(), impl_->head);
-}
-
-const RecordedFrames& RecordingWriter::frames() const noexcept {
-  return impl_->shown;
+  impl_->writer.finish();
 }
 
 }  // namespace palpate
