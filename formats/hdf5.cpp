@@ -17,8 +17,6 @@ namespace {
 constexpr hsize_t alignment = 4096;  // a page
 constexpr std::size_t longest_written_text = 4096;
 constexpr std::size_t highest_rank = 4;
-constexpr unsigned deflate_level = 1;  // what the file says: nobody compresses these rows again
-constexpr const char* defect_hint = "this is a defect of Palpate; please report it";
 constexpr const char* disk_hint = "Check the disk and the folder's permissions";
 
 /// We close every file ourselves; the library's own exit handler crashes after a close that failed (full
@@ -37,13 +35,6 @@ bool is_ascii(const std::string& text) {
   for (const char c : text)
     if (static_cast<unsigned char>(c) > 127) return false;
   return true;
-}
-
-/// The library takes % in the names of sources for the beginning of a format; %% is one %.
-std::string doubled_percents(const std::string& text) {
-  std::string doubled;
-  for (const char c : text) doubled.append(c == '%' ? 2 : 1, c);
-  return doubled;
 }
 
 struct Rows {
@@ -246,88 +237,6 @@ void File::write_rows(const std::string& dataset, const ElementType& type, std::
   const Rows selected = select_rows(opened, first, rows);
   if (H5Dwrite(opened.get(), type.id, selected.memory.get(), selected.file.get(), H5P_DEFAULT, data) < 0)
     fail("write " + dataset);
-}
-
-CompressedRows File::write_compressed(const std::string& dataset, const ElementType& type,
-                                      std::span<const std::int64_t> dims) {
-  make_group(dataset.substr(0, dataset.rfind('/')));
-  const std::vector<hsize_t> sizes(dims.begin(), dims.end());
-  std::vector<hsize_t> chunk = sizes;
-  chunk[0] = 1;
-  const Id space(H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose);
-  const Id creation = timeless(H5P_DATASET_CREATE);
-  H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data());
-  H5Pset_shuffle(creation.get());
-  H5Pset_deflate(creation.get(), deflate_level);
-  H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
-  Id made(H5Dcreate2(id(), dataset.c_str(), type.id, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
-          H5Dclose);
-  if (!made.valid()) fail("make " + dataset);
-  CompressedRows rows(std::move(made), sizes.size(), path_.string(), dataset);
-  // With the first chunk the library makes the list of all chunks, right behind it. A first chunk of one
-  // byte, which is then written anew behind the list, leaves no list among the rows.
-  if (sizes[0] > 1) rows.write(0, std::array{std::byte{0}});
-  return rows;
-}
-
-CompressedRows::CompressedRows(Id dataset, std::size_t rank, std::string where, std::string name)
-    : dataset_(std::move(dataset)), rank_(rank), where_(std::move(where)), name_(std::move(name)) {}
-
-void CompressedRows::write(hsize_t row, std::span<const std::byte> bytes) {
-  std::array<hsize_t, highest_rank> start = {row};
-  if (H5Dwrite_chunk(dataset_.get(), H5P_DEFAULT, 0, start.data(), bytes.size(), bytes.data()) < 0)
-    throw Error("cannot write " + name_ + ": " + reason(), where_, disk_hint);
-}
-
-void CompressedRows::append(std::span<const std::byte> compressed) {
-  write(ends_.size() - 1, compressed);
-  ends_.push_back(ends_.back() + std::ssize(compressed));
-}
-
-std::vector<std::int64_t> CompressedRows::starts() const {
-  const Id space(H5Dget_space(dataset_.get()), H5Sclose);
-  const auto place_of = [&](hsize_t row) {
-    std::array<hsize_t, highest_rank> start = {};
-    unsigned skipped = 0;
-    haddr_t at = HADDR_UNDEF;
-    hsize_t bytes = 0;
-    H5Dget_chunk_info(dataset_.get(), space.get(), row, start.data(), &skipped, &at, &bytes);
-    return static_cast<std::int64_t>(at);
-  };
-  std::vector<std::int64_t> starts = ends_;
-  const std::int64_t first = place_of(0);
-  for (std::int64_t& start : starts) start += first;
-  if (const std::size_t last = starts.size() - 2; place_of(last) != starts[last])
-    throw Error(name_ + " has rows that do not lie one after another", where_, defect_hint);
-  return starts;
-}
-
-void File::write_virtual(const std::string& dataset, const ElementType& type,
-                         std::span<const std::int64_t> row, std::span<const VirtualSource> sources) {
-  make_group(dataset.substr(0, dataset.rfind('/')));
-  std::vector<hsize_t> sizes = {0};
-  sizes.insert(sizes.end(), row.begin(), row.end());
-  for (const VirtualSource& source : sources) sizes[0] += static_cast<hsize_t>(source.rows);
-  const Id space(H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr), H5Sclose);
-  const Id creation = timeless(H5P_DATASET_CREATE);
-  H5Pset_layout(creation.get(), H5D_VIRTUAL);
-  if (constexpr double missing = std::numeric_limits<double>::quiet_NaN(); H5Tget_class(type.id) == H5T_FLOAT)
-    H5Pset_fill_value(creation.get(), H5T_NATIVE_DOUBLE, &missing);
-  std::vector<hsize_t> start(sizes.size()), part = sizes;
-  for (const VirtualSource& source : sources) {
-    part[0] = static_cast<hsize_t>(source.rows);
-    const Id of_part(H5Screate_simple(static_cast<int>(part.size()), part.data(), nullptr), H5Sclose);
-    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, part.data(), nullptr);
-    if (H5Pset_virtual(creation.get(), space.get(), doubled_percents(source.file).c_str(), dataset.c_str(),
-                       of_part.get()) < 0)
-      fail("make " + dataset);
-    start[0] += part[0];
-  }
-  H5Sselect_all(space.get());
-  const Id made(
-      H5Dcreate2(id(), dataset.c_str(), type.id, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
-      H5Dclose);
-  if (!made.valid()) fail("make " + dataset);
 }
 
 void File::close() {

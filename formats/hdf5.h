@@ -43,32 +43,6 @@ struct ElementType {
 template <class T>
 ElementType element_type();
 
-/// Rows of a dataset of another file, for a virtual dataset.
-struct VirtualSource {
-  std::string file;  ///< relative to the folder of the file that holds the virtual dataset
-  std::int64_t rows = 0;
-};
-
-/// A dataset whose rows are compressed, each in a chunk of its own (shuffle, deflate), while it is written:
-/// the rows come in order and lie one after another in the file. Throws Error as File does.
-class CompressedRows {
- public:
-  /// Takes the next row, as `compress_row` makes it. No more than there are rows.
-  void append(std::span<const std::byte> compressed);
-  /// Where the rows begin in the file, [rows + 1]; all of them have been appended.
-  [[nodiscard]] std::vector<std::int64_t> starts() const;
-
- private:
-  friend class File;
-  CompressedRows(Id dataset, std::size_t rank, std::string where, std::string name);
-  void write(hsize_t row, std::span<const std::byte> bytes);
-
-  Id dataset_;
-  std::size_t rank_;
-  std::string where_, name_;
-  std::vector<std::int64_t> ends_ = {0};  // of the rows, from the first one's start on
-};
-
 /// An HDF5 file that we write: what is in others' files is read by Contents. Objects carry no times, so equal
 /// calls make equal files. All throw Error (where = the file; fields are named).
 class File {
@@ -92,15 +66,6 @@ class File {
   /// Rows [first, first + rows) of a dataset that `write` has reserved.
   void write_rows(const std::string& dataset, const ElementType& type, std::int64_t first, std::int64_t rows,
                   const void* data);
-  /// Dataset of compressed rows; makes its group. `dims` has neither zeros nor, with its row, 4 GiB. Nothing
-  /// else may be written to the file until all rows are appended.
-  CompressedRows write_compressed(const std::string& dataset, const ElementType& type,
-                                  std::span<const std::int64_t> dims);
-  /// Virtual dataset: all rows of the datasets of the same name in other files, one after the other; a row
-  /// has the shape `row`. Makes its group. Numbers whose file is missing read as not a number where there is
-  /// one.
-  void write_virtual(const std::string& dataset, const ElementType& type, std::span<const std::int64_t> row,
-                     std::span<const VirtualSource> sources);
   void write_attribute(const std::string& object, const std::string& name, const std::string& text);
   void write_attribute(const std::string& object, const std::string& name,
                        std::span<const std::int64_t> values);

@@ -11,7 +11,6 @@
 
 #include "base/child_process.h"
 #include "base/error.h"
-#include "formats/compressed_row.h"
 
 namespace palpate::hdf5 {
 namespace {
@@ -22,21 +21,12 @@ constexpr const char* altered_hint = "Copy the file again, or precompute it agai
 constexpr std::size_t longest_text = 4096;
 constexpr hssize_t most_integers = 16;       // of an attribute
 constexpr std::size_t most_dims = 4;         // that are reported
-constexpr std::size_t most_things = 10'000;  // groups, datasets, attributes and sources of a file
-constexpr hsize_t most_rows = 10'000'000;    // that are compressed
-constexpr hsize_t most_row_bytes = hsize_t{4} << 30;
+constexpr std::size_t most_things = 10'000;  // groups, datasets and attributes of a file
 constexpr int deepest = 8;
 constexpr std::chrono::seconds longest_look{5};  // of the processor: whole files take milliseconds
 constexpr std::int64_t most_memory = std::int64_t{512} << 20;
 
 // ---- what the child finds ----
-
-/// The library takes %% in the names of sources for one %.
-std::string single_percents(std::string text) {
-  for (std::size_t at = text.find("%%"); at != std::string::npos; at = text.find("%%", at + 1))
-    text.erase(at, 1);
-  return text;
-}
 
 /// What the library sees in a file.
 class Walk {
@@ -166,69 +156,7 @@ class Walk {
     const haddr_t offset = layout == H5D_CONTIGUOUS ? H5Dget_offset(dataset.get()) : HADDR_UNDEF;
     described.offset = offset == HADDR_UNDEF ? std::numeric_limits<std::uint64_t>::max() : offset;
     described.is_in_one_piece = layout == H5D_CONTIGUOUS && H5Pget_external_count(creation.get()) == 0;
-    if (layout == H5D_VIRTUAL) described.sources = sources_of(creation);
-    if (layout == H5D_CHUNKED) describe_rows(dataset, space, creation, described);
     described.is_readable = true;
-  }
-
-  /// Whether each row is a chunk, shuffled and deflated.
-  static bool has_compressed_rows(const Id& creation, const std::vector<std::uint64_t>& dims) {
-    std::array<hsize_t, H5S_MAX_RANK> chunk = {};
-    const int rank = H5Pget_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data());
-    if (rank != std::ssize(dims) || rank < 1 || chunk[0] != 1) return false;
-    if (!std::equal(dims.begin() + 1, dims.end(), chunk.begin() + 1)) return false;
-    const auto filter = [&](unsigned k) {
-      unsigned flags = 0, values = 0;
-      std::size_t count = 0;
-      return H5Pget_filter2(creation.get(), k, &flags, &count, &values, 0, nullptr, nullptr);
-    };
-    return H5Pget_nfilters(creation.get()) == 2 && filter(0) == H5Z_FILTER_SHUFFLE &&
-           filter(1) == H5Z_FILTER_DEFLATE;
-  }
-
-  /// Rows that lie one after another. To ask for the place of each would take the library through all before
-  /// it; that of the last one and all sizes tell as much.
-  static void describe_rows(const Id& dataset, const Id& space, const Id& creation,
-                            Contents::Object& described) {
-    const std::vector<std::uint64_t>& dims = described.dims;
-    if (described.rank != std::ssize(dims) || dims.empty() || dims[0] < 1 || dims[0] > most_rows) return;
-    if (!has_compressed_rows(creation, dims)) return;
-    std::array<hsize_t, most_dims> start = {};
-    std::vector<std::uint64_t> sizes;
-    hsize_t size = 0, sum = 0;
-    for (hsize_t row = 0; row < dims[0]; ++row) {
-      start[0] = row;
-      if (H5Dget_chunk_storage_size(dataset.get(), start.data(), &size) < 0 || size == 0) return;
-      if (size > most_row_bytes) return;
-      sizes.push_back(size);
-      sum += size;
-    }
-    const auto place_of = [&](hsize_t row) {
-      unsigned skipped = 0;
-      haddr_t at = HADDR_UNDEF;
-      hsize_t bytes = 0;
-      H5Dget_chunk_info(dataset.get(), space.get(), row, start.data(), &skipped, &at, &bytes);
-      return at;
-    };
-    const haddr_t first = place_of(0), last = place_of(dims[0] - 1);
-    if (first == HADDR_UNDEF || last != first + sum - size) return;
-    described.offset = first;
-    described.row_bytes = std::move(sizes);
-  }
-
-  std::vector<std::string> sources_of(const Id& creation) {
-    std::size_t sources = 0;
-    if (H5Pget_virtual_count(creation.get(), &sources) < 0) refuse(reason());
-    count(sources);
-    std::vector<std::string> files;
-    for (std::size_t i = 0; i < sources; ++i) {
-      std::string name(longest_text, '\0');
-      const ssize_t length = H5Pget_virtual_filename(creation.get(), i, name.data(), name.size());
-      if (length < 0 || static_cast<std::size_t>(length) >= name.size())
-        refuse("a virtual dataset does not say where its rows are");
-      files.push_back(single_percents(name.substr(0, static_cast<std::size_t>(length))));
-    }
-    return files;
   }
 
   std::string where_;
@@ -264,9 +192,6 @@ void pack(Bytes& bytes, const Contents::Object& object) {
   pack(bytes, static_cast<std::uint64_t>(object.rank));
   append_array(bytes, std::span(object.dims));
   pack(bytes, object.offset);
-  append_array(bytes, std::span(object.row_bytes));
-  pack(bytes, object.sources.size());
-  for (const std::string& source : object.sources) pack(bytes, source);
 }
 
 /// Believes nothing: a child in which the library went wrong may have sent anything. Throws Error.
@@ -314,8 +239,6 @@ class Unpacker {
     object.rank = static_cast<std::int64_t>(number());
     object.dims = take_array<std::uint64_t>(rest_);
     object.offset = number();
-    object.row_bytes = take_array<std::uint64_t>(rest_);
-    for (std::uint64_t left = number(); left > 0; --left) object.sources.push_back(text());
     return object;
   }
 
@@ -323,17 +246,15 @@ class Unpacker {
 };
 
 /// The child's work.
-ChildResult look_at(const std::vector<FileDescriptor>& files) {
+ChildResult look_at(const FileDescriptor& file) {
   const Quiet quiet;
   H5PLset_loading_state(0);  // no code from elsewhere, whatever filter a file asks for
   ChildResult result;
-  for (const FileDescriptor& file : files) {
-    const Contents::Objects objects = Walk(file).take();
-    pack(result.bytes, objects.size());
-    for (const auto& [path, object] : objects) {
-      pack(result.bytes, path);
-      pack(result.bytes, object);
-    }
+  const Contents::Objects objects = Walk(file).take();
+  pack(result.bytes, objects.size());
+  for (const auto& [path, object] : objects) {
+    pack(result.bytes, path);
+    pack(result.bytes, object);
   }
   return result;
 }
@@ -346,28 +267,15 @@ std::string text_of(std::span<const std::int64_t> dims) {
 
 }  // namespace
 
-std::vector<Contents> Contents::read(std::vector<FileDescriptor> files) {
-  std::vector<Contents> all;
-  if (files.empty()) return all;
-  const std::filesystem::path& first = files.front().path();
+Contents Contents::read(FileDescriptor file) {
   const ChildTask task = {.name = "the file's HDF5 structure is damaged: the HDF5 library",
-                          .where = (files.size() == 1 ? first : first.parent_path()).string(),
+                          .where = file.path().string(),
                           .limits = child_limits(longest_look, most_memory),
                           .hint = altered_hint,
                           .stop_at_signals = false};
-  const ChildResult result = run_in_child(task, [&] { return look_at(files); });
-  Unpacker unpacker(result.bytes);
-  for (FileDescriptor& file : files) {
-    Objects objects = unpacker.objects();
-    all.push_back(Contents(std::move(file), std::move(objects)));
-  }
-  return all;
-}
-
-Contents Contents::read(FileDescriptor file) {
-  std::vector<FileDescriptor> one;
-  one.push_back(std::move(file));
-  return std::move(read(std::move(one)).front());
+  const ChildResult result = run_in_child(task, [&] { return look_at(file); });
+  Objects objects = Unpacker(result.bytes).objects();
+  return {std::move(file), std::move(objects)};
 }
 
 const Contents::Object& Contents::dataset(const std::string& path) const {
@@ -421,53 +329,16 @@ Stored Contents::locate(const std::string& path, const ElementType& type, std::s
   return inside(path, std::move(stored), found);
 }
 
-Stored Contents::locate_rows(const std::string& path, const ElementType& type, std::size_t rank) const {
-  const Object& found = dataset(path);
-  if (found.row_bytes.empty()) return locate(path, type, rank);
-  Stored stored = shape(path, type, rank);
-  const auto wrong = [&] {
-    return Error(path + " has rows of impossible sizes", this->path().string(), altered_hint);
-  };
-  if (stored.dims.empty() || std::ssize(found.row_bytes) != stored.dims[0]) throw wrong();
-  stored.bytes = 0;
-  for (const std::uint64_t bytes : found.row_bytes) {
-    if (bytes > most_row_bytes || __builtin_add_overflow(stored.bytes, bytes, &stored.bytes)) throw wrong();
-  }
-  stored = inside(path, std::move(stored), found);
-  stored.row_starts = {stored.offset};
-  for (const std::uint64_t bytes : found.row_bytes)
-    stored.row_starts.push_back(stored.row_starts.back() + static_cast<std::int64_t>(bytes));
-  return stored;
-}
-
 void Contents::read_rows(const std::string& path, const ElementType& type, std::int64_t first,
                          std::int64_t rows, void* data) const {
-  const Stored stored = locate_rows(path, type, dataset(path).dims.size());
+  const Stored stored = locate(path, type, dataset(path).dims.size());
   if (rows == 0) return;
   if (stored.dims.empty() || first < 0 || rows < 0 || first > stored.dims[0] || rows > stored.dims[0] - first)
     throw Error(path + " has not so many rows", this->path().string(), altered_hint);
   auto row_bytes = static_cast<std::int64_t>(type.bytes);
   for (std::size_t k = 1; k < stored.dims.size(); ++k) row_bytes *= stored.dims[k];
   auto* into = static_cast<std::byte*>(data);
-  if (stored.row_starts.empty()) {
-    read_exactly(file_, {into, static_cast<std::size_t>(rows * row_bytes)},
-                 stored.offset + first * row_bytes);
-    return;
-  }
-  std::vector<std::byte> compressed;
-  for (std::int64_t row = first; row < first + rows; ++row, into += row_bytes) {
-    const std::int64_t begin = stored.row_starts[static_cast<std::size_t>(row)],
-                       end = stored.row_starts[static_cast<std::size_t>(row) + 1];
-    compressed.resize(static_cast<std::size_t>(end - begin));
-    read_exactly(file_, compressed, begin);
-    if (!expand_row(compressed, type.bytes, {into, static_cast<std::size_t>(row_bytes)}))
-      throw Error(path + ", row " + std::to_string(row) + ", is damaged: it does not expand",
-                  this->path().string(), altered_hint);
-  }
-}
-
-std::vector<std::string> Contents::virtual_sources(const std::string& path) const {
-  return dataset(path).sources;
+  read_exactly(file_, {into, static_cast<std::size_t>(rows * row_bytes)}, stored.offset + first * row_bytes);
 }
 
 const Contents::Attribute* Contents::attribute(const std::string& object, const std::string& name) const {

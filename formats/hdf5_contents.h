@@ -20,8 +20,6 @@ struct Stored {
   std::vector<std::int64_t> dims;
   std::int64_t offset = 0;  ///< of its first byte
   std::int64_t bytes = 0;   ///< in the file
-  /// Where the rows begin in the file, [rows + 1], where each is compressed (shuffle, deflate); else empty.
-  std::vector<std::int64_t> row_starts{};
 };
 
 /// Groups, datasets and attributes of a file. The HDF5 library crashes on crafted files and may take all
@@ -34,8 +32,6 @@ class Contents {
   /// HDF5 file.
   static Contents read(FileDescriptor file);
   static Contents read(const std::filesystem::path& path) { return read(open_file(path, OpenMode::read)); }
-  /// What several files hold, looked at by one child.
-  static std::vector<Contents> read(std::vector<FileDescriptor> files);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return file_.path(); }
   [[nodiscard]] const FileDescriptor& file() const noexcept { return file_; }
@@ -46,16 +42,9 @@ class Contents {
   /// Finds a dataset and proves that it has this type and rank, lies in one piece, and inside the file.
   [[nodiscard]] Stored locate(const std::string& dataset, const ElementType& type, std::size_t rank) const;
 
-  /// Finds a dataset of compressed rows, or one that `locate` finds.
-  [[nodiscard]] Stored locate_rows(const std::string& dataset, const ElementType& type,
-                                   std::size_t rank) const;
-
-  /// Rows [first, first + rows) of a dataset that `locate_rows` finds, as they were before compression.
+  /// Rows [first, first + rows) of a dataset that `locate` finds.
   void read_rows(const std::string& dataset, const ElementType& type, std::int64_t first, std::int64_t rows,
                  void* data) const;
-
-  /// The files of a virtual dataset as File::write_virtual was given them; none where it is another kind.
-  [[nodiscard]] std::vector<std::string> virtual_sources(const std::string& dataset) const;
 
   /// Value of a fixed-length text attribute; nothing where it is missing or of another kind.
   [[nodiscard]] std::optional<std::string> text_attribute(const std::string& object,
@@ -78,10 +67,6 @@ class Contents {
     std::int64_t rank = 0;              ///< -1: of no simple shape
     std::vector<std::uint64_t> dims{};  ///< of the first few dimensions
     std::uint64_t offset = 0;           ///< of what lies in one piece and is not empty
-    /// Stored bytes of the rows, where each is a compressed chunk and they lie one after another from
-    /// `offset` on.
-    std::vector<std::uint64_t> row_bytes{};
-    std::vector<std::string> sources{};  ///< of a virtual dataset
   };
   using Objects = std::map<std::string, Object>;  ///< by path
 

@@ -127,6 +127,9 @@ Model load_model(const std::filesystem::path& path, const LoadOptions& options =
 /// `load_model`.
 Model load_outline(const std::filesystem::path& path);
 
+/// The content hash that a file has in it, without a look at the rest; empty where it is no model.
+std::string stored_content_hash(const std::filesystem::path& path);
+
 /// The sources of a loaded model that are no longer what they were: a sentence for each ("model.toml changed
 /// since …", "… is gone"). `model_path` is the baked file; empty when nothing is stale.
 std::vector<std::string> stale_sources(const Model& model, const std::filesystem::path& model_path);

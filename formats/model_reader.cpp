@@ -339,4 +339,12 @@ Model load_outline(const std::filesystem::path& path) {
   return Reader(contents_of(path), {}).read_outline();
 }
 
+std::string stored_content_hash(const std::filesystem::path& path) {
+  try {
+    return contents_of(path).text_attribute("/", "content_hash").value_or("");
+  } catch (const Error&) {
+    return "";
+  }
+}
+
 }  // namespace palpate

@@ -369,8 +369,7 @@ ContactLoads RecordingFile::loads(std::int64_t number) const {
   return loads;
 }
 
-Recording read_recording(const std::filesystem::path& path) {
-  const RecordingFile file(path);
+Recording read_recording(const RecordingFile& file) {
   Recording recording{.info = file.info(), .generator = file.generator(), .ticks = {}};
   recording.ticks.reserve(static_cast<std::size_t>(file.ticks()));
   for (std::int64_t row = 0; row < file.ticks(); ++row) recording.ticks.push_back(file.tick(row));

@@ -54,10 +54,9 @@ struct TickRecord {
 
   /// estimate of the error of `force` where the tick was a best effort, else 0 [N]
   float force_error = 0.0F;
-  /// contact points that the tool pressed on and that found no room; recordings from 4.3 on
+  /// contact points that the tool pressed on and that found no room
   std::int32_t left_out = 0;
-  /// what `force` may be off by at most as compressed Green's functions are not exact; 0 where they are [N];
-  /// recordings from 4.4 on
+  /// what `force` may be off by at most as compressed Green's functions are not exact; 0 where they are [N]
   float greens_error = 0.0F;
 };
 
@@ -185,8 +184,8 @@ struct Recording {
   std::vector<TickRecord> ticks;
 };
 
-/// Reads all ticks of a recording. Throws Error as RecordingFile.
-Recording read_recording(const std::filesystem::path& path);
+/// Reads all ticks of a recording. Throws Error.
+Recording read_recording(const RecordingFile& file);
 
 /// Whether a program records to it now.
 bool is_being_recorded(const std::filesystem::path& path);

@@ -135,11 +135,12 @@ constexpr FieldMeaning model_fields[] = {
     {"/probes/forces", "forces on the stored dofs [N] ..."},
     {"/probes/displacements", "... and the displacements that they must give [m]"}};
 
-constexpr FieldMeaning recording_attributes[] = {
+constexpr FieldMeaning recording_metadata[] = {
     {"format", "`palpate-recording`"},
-    {"version", "two integers: major, minor. Another major version is refused"},
+    {"version", "major and minor. Another major version is refused"},
     {"generator", "program and version that wrote the file"},
-    {"units", "of the datasets"},
+    {"units", "of the fields"},
+    {"clock", "what times are counted from"},
     {"model", "path of the model"},
     {"content_hash", "that of the model"},
     {"device", "the input source"},
@@ -154,8 +155,8 @@ std::span<const FieldMeaning> model_attribute_meanings() {
 std::span<const FieldMeaning> model_field_meanings() {
   return model_fields;
 }
-std::span<const FieldMeaning> recording_attribute_meanings() {
-  return recording_attributes;
+std::span<const FieldMeaning> recording_metadata_meanings() {
+  return recording_metadata;
 }
 
 }  // namespace palpate

@@ -9,7 +9,6 @@
 #include "base/error.h"
 #include "base/write_file.h"
 #include "formats/journal.h"
-#include "formats/recording_parts.h"
 
 namespace palpate {
 namespace {
@@ -98,10 +97,7 @@ std::filesystem::path OutputPaths::add(const std::filesystem::path& path, Output
     add_beside(with_suffix(file, ".progress"), what);
     expect_own_journal(file);
   }
-  if (kind == OutputKind::recording) {
-    add_beside(parts_folder(file), what);
-    expect_own_parts(file);
-  }
+  if (kind == OutputKind::recording) add_beside(with_suffix(file, ".partial"), what);
   expect_writable_folder(file);
   return file;
 }

@@ -39,6 +39,7 @@ struct Arguments {
   std::vector<std::string> displace;
   bool json = false;
   bool force = false;
+  bool finish = false;
   std::optional<std::string> overlay;
   std::string field;
   PlayArguments play;
@@ -113,13 +114,9 @@ CLI::App* add_devices(CLI::App& app, Arguments& arguments) {
 
 CLI::App* add_session(CLI::App& app, Arguments& arguments) {
   CLI::App* session = app.add_subcommand("session", "print what a recording contains");
-  session
-      ->add_option("SESSION.h5", arguments.file,
-                   "recording of play; if the run was killed, its parts are first merged into one file")
-      ->required()
-      ->type_name("");
+  session->add_option("SESSION.h5", arguments.file, "recording of play")->required()->type_name("");
   session->add_flag("--json", arguments.json, "print JSON");
-  session->add_flag("--force", arguments.force, force_help);
+  session->add_flag("--finish", arguments.finish, "add its index to a recording whose run was killed");
   session->footer(
       "Example:\n"
       "  palpate-runtime session touch.h5");
@@ -317,7 +314,7 @@ int run(int argc, char** argv) {
       return exit_ok;
     }
     if (devices_command->parsed()) return devices(arguments.devices);
-    if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.force);
+    if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.finish);
     if (view_command->parsed()) {
       return view_files(arguments.recordings, read_viewer(arguments.view_address, arguments.view_framed));
     }

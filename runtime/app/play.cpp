@@ -10,7 +10,6 @@
 
 #include "base/error.h"
 #include "formats/outputs/output_paths.h"
-#include "formats/recording_parts.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/app/input_source.h"
 #include "runtime/app/play_session.h"
@@ -21,7 +20,6 @@
 #include "runtime/loop/monitor.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/real_time.h"
-#include "runtime/loop/session_xdmf.h"
 
 namespace palpate {
 namespace {
@@ -49,18 +47,13 @@ OutputPaths check_outputs(PlayOptions& options) {
   if (!options.model_toml.empty()) paths.add_input(options.model_toml, "the model's description");
   if (!options.device.profile.empty()) paths.add_input(options.device.profile, "the device's profile");
   if (options.device.kind == Kind::script) paths.add_input(options.device.target, "the script");
-  if (options.device.kind == Kind::replay) {
+  if (options.device.kind == Kind::replay)
     paths.add_input(options.device.target, "the session that is replayed");
-    paths.add_input(parts_folder(options.device.target), "the replayed session's parts");
-  }
-  if (!options.beside.empty()) {
-    paths.add_input(options.beside, "the recording beside it");
-    paths.add_input(parts_folder(options.beside), "the parts of the recording beside it");
-  }
-  if (!options.record.empty()) options.record = add_recording(paths, options.record, "--record");
+  if (!options.beside.empty()) paths.add_input(options.beside, "the recording beside it");
   const auto add = [&paths](std::filesystem::path& file, OutputKind kind, const char* option) {
     if (!file.empty()) file = paths.add(file, kind, option);
   };
+  add(options.record, OutputKind::recording, "--record");
   add(options.surface, OutputKind::grid, "--surface");
   add(options.contacts, OutputKind::contacts, "--contacts");
   if (options.report != standard_output) add(options.report, OutputKind::report, "--report");

@@ -73,15 +73,19 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
         });
   }
   if (recorder_ && options_.record_frames > 0.0) {
+    const bool contacts_only = pictures_follow_from_contacts(body);
     frames_.emplace(
         body, state_,
         SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(settings.rate, options_.record_frames),
-                             .in_background = !options_.fast},
-        [this, fast = options_.fast](SurfacePicture picture) {
+                             .in_background = !options_.fast,
+                             .contacts_only = contacts_only},
+        [this, contacts_only, fast = options_.fast](SurfacePicture picture) {
+          RecordedPicture recorded = contacts_only ? RecordedPicture(std::move(picture.loads))
+                                                   : RecordedPicture(std::move(picture.frame));
           if (fast) {
-            recorder_->push_frame_waiting(std::move(picture.frame));
+            recorder_->push_picture_waiting(std::move(recorded));
           } else {
-            recorder_->push_frame(std::move(picture.frame));
+            recorder_->push_picture(std::move(recorded));
           }
         });
   }
@@ -152,7 +156,7 @@ void PlaySession::tell() const {
                          .motion = motion_ ? &*motion_ : nullptr,
                          .link = input_.link,
                          .dropped = recorder_ ? recorder_->dropped() : 0,
-                         .dropped_frames = recorder_ ? recorder_->dropped_frames() : 0,
+                         .dropped_frames = recorder_ ? recorder_->dropped_pictures() : 0,
                          .recording_failure = recording_failure_};
   print_report(played);
   std::optional<Error> first;

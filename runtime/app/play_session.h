@@ -43,7 +43,7 @@ class PlaySession {
   /// What is latched, none without safety rules. Not during `run`.
   [[nodiscard]] Fault fault() const noexcept { return safety_ ? safety_->fault() : Fault::none; }
 
-  /// To the end, to `stop` or until the viewer's control says `leave`. What was recorded is one plain file
+  /// To the end, to `stop` or until the viewer's control says `leave`. What was recorded has its index
   /// then, unless that failed.
   const LoopReport& run(const std::atomic<bool>& stop);
 

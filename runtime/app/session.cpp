@@ -14,7 +14,6 @@
 #include "runtime/app/best_effort_report.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/session_check.h"
-#include "runtime/loop/session_xdmf.h"
 
 namespace palpate {
 namespace {
@@ -63,25 +62,23 @@ std::string status_text(const SessionSummary& summary) {
 }
 
 /// How it ended.
-enum class Ending { finished, merged, going_on };
+enum class Ending { finished, killed, finished_now, going_on };
 
-constexpr std::string_view ending_names[] = {"finished", "killed, now one file", "being recorded"};
+constexpr std::string_view ending_names[] = {"finished", "killed: --finish adds its index",
+                                             "killed, has its index now", "being recorded"};
 
-Ending finish(const std::filesystem::path& path, const Recording& recording, bool force) {
-  if (recording.finished) return Ending::finished;
-  OutputPaths(force).add(xdmf_path(path), OutputKind::frames, "session");
-  if (!finish_recording(path)) return Ending::going_on;
-  write_xdmf(path, recording.frames);
-  return Ending::merged;
+Ending ending_of(const RecordingFile& recording, bool finish) {
+  if (recording.finished()) return Ending::finished;
+  if (finish) return finish_recording(recording.path()) ? Ending::finished_now : Ending::going_on;
+  return is_being_recorded(recording.path()) ? Ending::going_on : Ending::killed;
 }
 
-void print_text(const std::filesystem::path& path, const Recording& recording, const SessionSummary& s,
-                Ending ending) {
+void print_text(const RecordingFile& recording, const SessionSummary& s, Ending ending) {
   const auto microseconds = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
-  const SessionInfo& info = recording.info;
-  const std::size_t frames = recording.frames.time.size();
-  fmt::print("{}: {}, by {}\n", printable(path.string()), ending_names[static_cast<int>(ending)],
-             printable(recording.generator));
+  const SessionInfo& info = recording.info();
+  const std::size_t pictures = recording.pictures().size();
+  fmt::print("{}: {}, by {}\n", printable(recording.path().string()), ending_names[static_cast<int>(ending)],
+             printable(recording.generator()));
   fmt::print("model            {} ({})\n", printable(info.model_path), printable(info.content_hash));
   fmt::print("device           {}\n", info.device.empty() ? "unknown" : printable(info.device));
   fmt::print("options          {}\n", printable(in_one_line(info.options)));
@@ -99,26 +96,25 @@ void print_text(const std::filesystem::path& path, const Recording& recording, c
   fmt::print("faults           {}\n", faults_text(s));
   fmt::print("status           {}\n", status_text(s));
   if (s.best_effort.ticks > 0) fmt::print("best effort      {}\n", in_words(s.best_effort, s.ticks));
-  if (frames == 0) {
-    fmt::print("frames           none\n");
+  if (pictures == 0) {
+    fmt::print("pictures         none\n");
   } else {
-    fmt::print("frames           {} of {} surface nodes; for ParaView: {}\n", frames,
-               recording.frames.surface.nodes.size(),
-               ending == Ending::going_on ? "not before the end" : xdmf_path(path).string());
+    fmt::print("pictures         {} of {} surface nodes, {}\n", pictures, recording.surface().nodes.size(),
+               recording.stores_pictures() ? "stored" : "computed by the model");
   }
 }
 
-void print_json(const std::filesystem::path& path, const Recording& recording, const SessionSummary& s,
-                Ending ending) {
+void print_json(const RecordingFile& recording, const SessionSummary& s, Ending ending) {
   auto faults = nlohmann::ordered_json::array();
   for (const SessionFault& fault : s.faults)
     faults.push_back({{"fault", fault_name(fault.fault)}, {"time_s", fault.time}});
   nlohmann::ordered_json status;
   for (std::size_t k = 0; k < status_names.size(); ++k) status[status_names[k].second] = s.status_ticks[k];
-  const SessionInfo& info = recording.info;
-  const nlohmann::ordered_json json = {{"recording", path.string()},
-                                       {"generator", recording.generator},
-                                       {"was_killed", ending == Ending::merged},
+  const SessionInfo& info = recording.info();
+  const bool was_killed = ending == Ending::killed || ending == Ending::finished_now;
+  const nlohmann::ordered_json json = {{"recording", recording.path().string()},
+                                       {"generator", recording.generator()},
+                                       {"was_killed", was_killed},
                                        {"going_on", ending == Ending::going_on},
                                        {"model", info.model_path},
                                        {"content_hash", info.content_hash},
@@ -142,55 +138,48 @@ void print_json(const std::filesystem::path& path, const Recording& recording, c
                                        {"faults", faults},
                                        {"status_ticks", status},
                                        {"best_effort", to_json(s.best_effort)},
-                                       {"frames", recording.frames.time.size()},
-                                       {"surface_nodes", recording.frames.surface.nodes.size()}};
+                                       {"pictures", recording.pictures().size()},
+                                       {"stores_pictures", recording.stores_pictures()},
+                                       {"surface_nodes", recording.surface().nodes.size()}};
   fmt::print("{}", json_text(json, 2));
 }
 
 }  // namespace
 
-SessionSummary summarise(const Recording& recording) {
-  SessionSummary summary;
-  summary.ticks = std::ssize(recording.ticks);
-  if (recording.ticks.empty()) return summary;
-  const auto rate = static_cast<double>(recording.info.rate);
-  const auto number = [&](const TickRecord& tick) -> std::int64_t { return std::llround(tick.time * rate); };
-  const auto due = [&](std::int64_t k) -> std::int64_t {
-    return std::llround(static_cast<double>(k) / rate * second);
+void Summarising::add(const TickRecord& tick) {
+  const auto k = std::llround(tick.time * rate_);
+  const auto due = [&](std::int64_t number) {
+    return std::llround(static_cast<double>(number) / rate_ * second);
   };
-  auto fault = static_cast<std::uint8_t>(Fault::none);
-  for (const TickRecord& tick : recording.ticks) {
-    const std::int64_t k = number(tick);
-    if (tick.contacts > 0) ++summary.in_contact;
-    for (std::size_t bit = 0; bit < status_names.size(); ++bit) {
-      if (has(static_cast<StepStatus>(tick.status), status_names[bit].first)) ++summary.status_ticks[bit];
-    }
-    summary.best_effort.add(static_cast<StepStatus>(tick.status), length(tick.force), tick.force_error,
-                            tick.left_out, tick.time);
-    note_largest(length(tick.force), tick.time, summary.largest_force, summary.largest_force_time);
-    note_largest(length(tick.shown_force), tick.time, summary.largest_shown, summary.largest_shown_time);
-    summary.worst_lateness = std::max(summary.worst_lateness, tick.begun_ns - due(k));
-    if (tick.begun_ns + tick.compute_ns > due(k + 1)) ++summary.deadline_misses;
-    summary.compute.add(tick.compute_ns);
-    if (tick.fault != fault && tick.fault != 0)
-      summary.faults.push_back({static_cast<Fault>(tick.fault), tick.time});
-    fault = tick.fault;
+  if (summary_.ticks == 0) first_ = k;
+  ++summary_.ticks;
+  summary_.missing = k - first_ + 1 - summary_.ticks;
+  summary_.seconds = static_cast<double>(k - first_ + 1) / rate_;
+  if (tick.contacts > 0) ++summary_.in_contact;
+  for (std::size_t bit = 0; bit < status_names.size(); ++bit) {
+    if (has(static_cast<StepStatus>(tick.status), status_names[bit].first)) ++summary_.status_ticks[bit];
   }
-  const std::int64_t first = number(recording.ticks.front()), last = number(recording.ticks.back());
-  summary.missing = last - first + 1 - summary.ticks;
-  summary.seconds = static_cast<double>(last - first + 1) / rate;
-  return summary;
+  summary_.best_effort.add(static_cast<StepStatus>(tick.status), length(tick.force), tick.force_error,
+                           tick.left_out, tick.time);
+  note_largest(length(tick.force), tick.time, summary_.largest_force, summary_.largest_force_time);
+  note_largest(length(tick.shown_force), tick.time, summary_.largest_shown, summary_.largest_shown_time);
+  summary_.worst_lateness = std::max<std::int64_t>(summary_.worst_lateness, tick.begun_ns - due(k));
+  if (tick.begun_ns + tick.compute_ns > due(k + 1)) ++summary_.deadline_misses;
+  summary_.compute.add(tick.compute_ns);
+  if (tick.fault != fault_ && tick.fault != 0)
+    summary_.faults.push_back({static_cast<Fault>(tick.fault), tick.time});
+  fault_ = tick.fault;
 }
 
-int session(const std::filesystem::path& file, bool json, bool force) {
-  const std::filesystem::path path = link_target(file);
-  const Recording recording = read_session(path);
-  const Ending ending = finish(path, recording, force);
-  const SessionSummary summary = summarise(recording);
+int session(const std::filesystem::path& file, bool json, bool finish) {
+  const RecordingFile recording = open_session(link_target(file));
+  Summarising sums(recording.info().rate);
+  for (std::int64_t row = 0; row < recording.ticks(); ++row) sums.add(recording.tick(row));
+  const Ending ending = ending_of(recording, finish);
   if (json) {
-    print_json(path, recording, summary, ending);
+    print_json(recording, sums.summary(), ending);
   } else {
-    print_text(path, recording, summary, ending);
+    print_text(recording, sums.summary(), ending);
   }
   return exit_ok;
 }

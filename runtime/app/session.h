@@ -39,11 +39,24 @@ struct SessionSummary {
   std::vector<SessionFault> faults;
 };
 
-/// Tick k is due k / `rate` seconds after the start of the run; which k a tick is follows from its time.
-SessionSummary summarise(const Recording& recording);
+/// Sums ticks up, one after the other. Tick k is due k / `rate` seconds after the start of the run; which k a
+/// tick is follows from its time.
+class Summarising {
+ public:
+  explicit Summarising(std::int64_t rate) noexcept : rate_(static_cast<double>(rate)) {}
 
-/// Prints what is in a recording, on the standard output; one that was killed is made one file first, with
-/// its description for ParaView, over another file only by `force`. Returns the exit code; throws Error.
-int session(const std::filesystem::path& recording, bool json, bool force);
+  void add(const TickRecord& tick);
+  [[nodiscard]] const SessionSummary& summary() const noexcept { return summary_; }
+
+ private:
+  double rate_;
+  SessionSummary summary_;
+  std::int64_t first_ = 0;  // number of the first tick
+  std::uint8_t fault_ = 0;  // of the tick before
+};
+
+/// Prints what is in a recording, on the standard output. `finish`: one that was killed gets its index first.
+/// Returns the exit code; throws Error.
+int session(const std::filesystem::path& recording, bool json, bool finish);
 
 }  // namespace palpate

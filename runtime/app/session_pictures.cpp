@@ -43,30 +43,46 @@ TickNote note_of(const TickRecord& tick, std::int64_t rate) {
           .fault = static_cast<Fault>(tick.fault)};
 }
 
+RecordingFile with_pictures(RecordingFile file) {
+  if (file.pictures().empty() || file.surface().nodes.empty()) {
+    throw Error("has no pictures of the surface", file.path().string(),
+                "record it again without --record-frames 0; palpate-runtime session tells what is in it");
+  }
+  return file;
+}
+
 }  // namespace
 
 SessionPictures::SessionPictures(const std::filesystem::path& path)
-    : file_(path), name_(path.filename().string()) {
-  check_session(recording(), path);
-  if (frames() == 0 || recording().frames.surface.nodes.empty()) {
-    throw Error("has no pictures of the surface", path.string(),
-                "record it again without --record-frames 0; palpate-runtime session tells what is in it");
+    : file_(with_pictures(open_session(path))), pictures_(file_) {}
+
+std::vector<double> SessionPictures::times() const {
+  std::vector<double> times;
+  for (const PictureTime& picture : file_.pictures()) times.push_back(picture.time);
+  return times;
+}
+
+/// The tick with this number, or the last one before it; nothing where there is none.
+std::optional<TickRecord> SessionPictures::tick(std::int64_t number) const {
+  const std::int64_t rate = file_.info().rate;
+  std::int64_t row = std::min(number, file_.ticks() - 1);  // where none is missing
+  if (row < 0) return std::nullopt;
+  TickRecord found = file_.tick(row);
+  if (number_of(found, rate) <= number) return found;
+  std::int64_t end = row;  // behind the one that is wanted
+  for (row = -1; end - row > 1;) {
+    const std::int64_t middle = row + (end - row) / 2;
+    found = file_.tick(middle);
+    (number_of(found, rate) <= number ? row : end) = middle;
   }
+  if (row < 0) return std::nullopt;
+  return file_.tick(row);
 }
 
-/// The tick with this number, or the last one before it; null where there is none.
-const TickRecord* SessionPictures::tick(std::int64_t number) const {
-  const std::int64_t rate = recording().info.rate;
-  const auto after =
-      std::upper_bound(recording().ticks.begin(), recording().ticks.end(), number,
-                       [&](std::int64_t wanted, const TickRecord& t) { return wanted < number_of(t, rate); });
-  return after == recording().ticks.begin() ? nullptr : &*std::prev(after);
-}
-
-SurfacePicture SessionPictures::picture(std::int64_t frame) const {
+SurfacePicture SessionPictures::picture(std::int64_t frame) {
   SurfacePicture picture;
-  picture.frame = file_.frame(frame);
-  if (const TickRecord* then = tick(picture.frame.tick)) {
+  picture.frame = pictures_.frame(frame);
+  if (const std::optional<TickRecord> then = tick(picture.frame.tick)) {
     picture.device = {.orientation = quaternion_of(then->device_orientation),
                       .position = vector_of(then->device_position),
                       .grab = then->grab != 0};
@@ -83,24 +99,24 @@ SurfacePicture SessionPictures::picture(std::int64_t frame) const {
 }
 
 std::string SessionPictures::name() const {
-  std::string name = std::filesystem::path(recording().info.model_path).filename().string();
+  std::string name = std::filesystem::path(file_.info().model_path).filename().string();
   if (const std::size_t suffix = name.find(".palpate.hdf"); suffix != std::string::npos) name.resize(suffix);
   return name;
 }
 
 Tool SessionPictures::tool() const {
-  return read_settings(split_settings(recording().info.options)).tool;
+  return read_settings(split_settings(file_.info().options)).tool;
 }
 
 nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
   using nlohmann::json;
-  const RecordedSurface& surface = recording().frames.surface;
+  const RecordedSurface& surface = file_.surface();
   Eigen::AlignedBox3d bounds;
   for (const Vec3& node : surface.nodes) bounds.extend(node);
   const auto point = [](const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); };
   RunState state;
   state.model = {{"name", name()},
-                 {"file", recording().info.model_path},
+                 {"file", file_.info().model_path},
                  {"dimension", surface.corners},
                  {"nodes", nullptr},
                  {"surface_nodes", surface.nodes.size()},
@@ -112,13 +128,13 @@ nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
                  {"moves", false},
                  {"loads", false}};
   state.defaults = {{"radius", 0.0}, {"reach", 0.0}, {"friction", 0.0}, {"depth", 0.0}};
-  state.device = recording().info.device;
-  state.rate = recording().info.rate;
-  state.ticks = std::ssize(recording().ticks);
+  state.device = file_.info().device;
+  state.rate = file_.info().rate;
+  state.ticks = file_.ticks();
   state.locked = "this is a recording";
-  state.settings = split_settings(recording().info.options);
+  state.settings = split_settings(file_.info().options);
   json told = to_json(state);
-  told.update({{"session", name_},
+  told.update({{"session", file_.path().filename().string()},
                {"frames", times.size()},
                {"frame", 0},
                {"duration", times.empty() ? 0.0 : times.back()},
@@ -127,11 +143,11 @@ nlohmann::json SessionPictures::state(const std::vector<double>& times) const {
 }
 
 std::vector<TickRun> SessionPictures::ticks() const {
-  const std::int64_t rate = recording().info.rate;
-  const std::int64_t stride = (std::ssize(recording().ticks) + most_samples - 1) / most_samples;
+  const std::int64_t rate = file_.info().rate;
+  const std::int64_t stride = (file_.ticks() + most_samples - 1) / most_samples;
   std::vector<TickRun> runs;
-  for (std::size_t k = 0; k < recording().ticks.size(); k += static_cast<std::size_t>(stride)) {
-    const TickNote note = note_of(recording().ticks[k], rate);
+  for (std::int64_t k = 0; k < file_.ticks(); k += stride) {
+    const TickNote note = note_of(file_.tick(k), rate);
     if (runs.empty() || note.number != runs.back().notes.back().number + stride)
       runs.push_back({.notes = {}, .stride = stride});
     runs.back().notes.push_back(note);

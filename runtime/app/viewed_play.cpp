@@ -17,7 +17,6 @@
 #include "runtime/body/overlay_rings.h"
 #include "runtime/loop/loading.h"
 #include "runtime/loop/output.h"
-#include "runtime/loop/session_xdmf.h"
 #include "runtime/scene/scene.h"
 
 namespace palpate {
@@ -123,7 +122,7 @@ std::unique_ptr<PlaySession> ViewedPlay::begin_act(const Plan& plan) {
   options.record = plan.record;
   if (!plan.record.empty() && plan.record != options_.record) {  // which was looked at before
     OutputPaths paths;
-    add_recording(paths, plan.record, "record");
+    paths.add(plan.record, OutputKind::recording, "record");
   }
   print_device(input_, options.settings);
   if (options.settings.overlay) begin_making("the overlay is being made");

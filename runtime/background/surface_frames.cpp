@@ -51,16 +51,9 @@ SurfaceFrames::SurfaceFrames(const Body& body, const State& state, const Surface
           .touches = std::vector<SeenContact>(state.contact_points.size()),
           .presses = std::vector<NodalPress>(3 * state.contact_points.size() +
                                              static_cast<std::size_t>(state.surface.near.capacity())),
-          .forces = std::vector<NodalForce>(2 * static_cast<std::size_t>(state.surface.near.capacity()))}),
-      rest_(body.surface_in_mesh()),
-      stored_(body.greens().order()),
-      u_(rest_.size()),
-      stress_(body),
-      force_(rest_.size(), Vec3::Zero()),
-      nodal_stress_(rest_.size()) {
-  for (std::size_t node = 0; node < rest_.size(); ++node)
-    rest_[node] = body.surface_rest_positions()[node] - rest_[node];
-  if (knows_interior(body)) {
+          .forces = std::vector<NodalForce>(2 * static_cast<std::size_t>(state.surface.near.capacity()))}) {
+  if (!options_.contacts_only) maker_.emplace(body);
+  if (maker_ && knows_interior(body)) {
     const std::size_t nodes = body.model().mesh.nodes.size();
     interior_ = {element_stress(body.model()), std::vector<Vec3>(nodes), std::vector<Stress>(nodes),
                  std::vector<Mat3>(parts_turn(body) ? nodes : 0)};
@@ -140,8 +133,15 @@ void SurfaceFrames::work() {
 
 void SurfaceFrames::compute(const Moment& moment) {
   computed_ = moment.tick;
-  surface_displacement(body_, moment.load, stored_, u_, &moment.motion);
+  const std::span<const NodalForce> forces(moment.forces.data(), moment.force_count);
+  const std::span<const NodalPress> presses(moment.presses.data(), moment.press_count);
   SurfacePicture picture;
+  if (!maker_) {
+    picture.loads = contact_loads(forces, presses);
+    picture.loads.tick = moment.tick;
+    picture.loads.time = moment.time;
+    return sink_(std::move(picture));
+  }
   picture.device = moment.device;
   picture.tool = moment.tool;
   picture.on_body = moment.on_body;
@@ -150,36 +150,12 @@ void SurfaceFrames::compute(const Moment& moment) {
   picture.left_out = moment.left_out;
   picture.greens_error = moment.greens_error;
   picture.patch = moment.load.patch;
-  SurfaceFrame& frame = picture.frame;
-  frame.tick = moment.tick;
-  frame.time = moment.time;
-  frame.displacement.reserve(3 * u_.size());
-  for (std::size_t node = 0; node < u_.size(); ++node) {
-    u_[node] += rest_[node];
-    append(u_[node], frame.displacement);
-  }
-  show_stress(moment, frame);
-  show_pressure(moment, frame);
+  picture.frame.tick = moment.tick;
+  picture.frame.time = moment.time;
+  maker_->show(moment.load, &moment.motion, forces, presses, picture.frame);
   for (std::size_t k = 0; k < moment.touch_count; ++k) picture.contacts.push_back(moment.touches[k]);
   if (interior_) show_interior(picture);
   sink_(std::move(picture));
-}
-
-void SurfaceFrames::show_stress(const Moment& moment, SurfaceFrame& frame) {
-  const std::span<const NodalForce> forces(moment.forces.data(), moment.force_count);
-  for (const NodalForce& loaded : forces) force_[loaded.node] += loaded.force;
-  stress_.evaluate(u_, force_, moment.load.patch.get(), nodal_stress_);
-  for (const NodalForce& loaded : forces) force_[loaded.node].setZero();
-  frame.von_mises.reserve(nodal_stress_.size());
-  for (const Stress& stress : nodal_stress_) frame.von_mises.push_back(static_cast<float>(von_mises(stress)));
-}
-
-void SurfaceFrames::show_pressure(const Moment& moment, SurfaceFrame& frame) const {
-  frame.pressure.resize(u_.size());
-  for (std::size_t k = 0; k < moment.press_count; ++k) {
-    const auto node = static_cast<std::size_t>(moment.presses[k].node);
-    frame.pressure[node] += static_cast<float>(moment.presses[k].force / stress_.areas()[node]);
-  }
 }
 
 void SurfaceFrames::show_interior(SurfacePicture& picture) {
@@ -187,7 +163,7 @@ void SurfaceFrames::show_interior(SurfacePicture& picture) {
   for (std::size_t node = 0; node < interior.u.size(); ++node) {
     interior.u[node] = body_.model().rest_displacement[node];
     const Index stored = body_.stored_node(static_cast<Index>(node));
-    if (stored >= 0) interior.u[node] += vector_at(stored_, body_.dimension(), stored);
+    if (stored >= 0) interior.u[node] += vector_at(maker_->stored_displacement(), body_.dimension(), stored);
     append(interior.u[node], picture.plane_displacement);
   }
   if (interior.turn.empty()) {

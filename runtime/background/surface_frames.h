@@ -12,8 +12,8 @@
 
 #include "base/latest.h"
 #include "formats/recording.h"
+#include "runtime/background/picture_maker.h"
 #include "runtime/background/seen_contact.h"
-#include "runtime/background/surface_stress.h"
 #include "runtime/body/free_motion.h"
 #include "runtime/tick/state.h"
 
@@ -21,15 +21,17 @@ namespace palpate {
 
 struct SurfaceFramesOptions {
   std::int64_t ticks_per_frame = 16;
-  bool in_background = true;  ///< else `post` computes the frame itself: equal runs stay equal
+  bool in_background = true;   ///< else `post` computes the frame itself: equal runs stay equal
+  bool contacts_only = false;  ///< nothing is computed: of a picture `loads` alone, with tick and time
 };
 
 /// What is seen at one moment.
 struct SurfacePicture {
   SurfaceFrame frame;
-  ToolPose device;  ///< where the hand wants the tool
-  ToolPose tool;    ///< where it is
-  Wrench on_body;   ///< the opposite of what the hand feels
+  ContactLoads loads;  ///< SurfaceFramesOptions::contacts_only
+  ToolPose device;     ///< where the hand wants the tool
+  ToolPose tool;       ///< where it is
+  Wrench on_body;      ///< the opposite of what the hand feels
   StepStatus status = StepStatus::ok;
   double force_error = 0.0;            ///< how far the force may be off, where it is a best effort [N]
   Index left_out = 0;                  ///< contact points that found no room
@@ -59,15 +61,6 @@ class SurfaceFrames {
   void post(const State& state, std::int64_t tick, double time) noexcept;
 
  private:
-  /// What a closed contact point presses a surface node with along its normal [N].
-  struct NodalPress {
-    Index node = -1;
-    double force = 0.0;
-  };
-  struct NodalForce {
-    Index node = -1;  // surface node
-    Vec3 force = Vec3::Zero();
-  };
   struct Moment {
     ToolPose device{};
     ToolPose tool{};
@@ -98,22 +91,15 @@ class SurfaceFrames {
   void take_contacts(const State& state, Moment& moment) const noexcept;
   void work();
   void compute(const Moment& moment);
-  void show_stress(const Moment& moment, SurfaceFrame& frame);
-  void show_pressure(const Moment& moment, SurfaceFrame& frame) const;
   void show_interior(SurfacePicture& picture);
 
   const Body& body_;
   SurfaceFramesOptions options_;
   Sink sink_;
   Latest<Moment> moments_;
-  std::vector<Vec3> rest_;      // [S] u0
-  std::vector<double> stored_;  // [n] scratch
-  std::vector<Vec3> u_;         // [S] u, then u0 + u
-  SurfaceStress stress_;
-  std::vector<Vec3> force_;           // [S] of the contacts
-  std::vector<Stress> nodal_stress_;  // [S]
-  std::optional<Interior> interior_;  // in the plane, where all of it is known
-  std::int64_t computed_ = -1;        // tick of the last frame
+  std::optional<PictureMaker> maker_;  // none of contacts alone
+  std::optional<Interior> interior_;   // in the plane, where all of it is known
+  std::int64_t computed_ = -1;         // tick of the last frame
   std::atomic<bool> stop_ = false;
   std::thread worker_;
 };

@@ -33,21 +33,27 @@ double felt(const TickRecord& tick) {
   return tick.force[0] * tick.force[0] + tick.force[1] * tick.force[1] + tick.force[2] * tick.force[2];
 }
 
-/// The frame of the largest force that a tick with a picture felt.
-std::int64_t telling_frame(const Recording& recording) {
-  const auto largest = std::max_element(recording.ticks.begin(), recording.ticks.end(),
-                                        [](const auto& a, const auto& b) { return felt(a) < felt(b); });
-  if (largest == recording.ticks.end()) return 0;
-  const std::vector<double>& times = recording.frames.time;
-  const auto after = std::lower_bound(times.begin(), times.end(), largest->time);
-  return std::min(after - times.begin(), std::ssize(times) - 1);
+/// The picture of the largest force that a tick with a picture felt.
+std::int64_t telling_picture(const RecordingFile& recording) {
+  double largest = -1.0, time = 0.0;
+  for (std::int64_t row = 0; row < recording.ticks(); ++row) {
+    const TickRecord tick = recording.tick(row);
+    if (felt(tick) <= largest) continue;
+    largest = felt(tick);
+    time = tick.time;
+  }
+  const std::vector<PictureTime>& pictures = recording.pictures();
+  const auto after = std::ranges::lower_bound(pictures, time, {}, &PictureTime::time);
+  return std::min(after - pictures.begin(), std::ssize(pictures) - 1);
 }
 
+/// Where pictures are computed, at rest: that needs no model.
 RecordedSurface surface_as_pressed(const RecordingFile& file) {
-  RecordedSurface surface = file.recording().frames.surface;
-  if (file.recording().frames.tick.empty() || surface.nodes.empty())
+  RecordedSurface surface = file.surface();
+  if (file.pictures().empty() || surface.nodes.empty())
     throw Error("has no pictures of the surface", "recording", "record it without --record-frames 0");
-  const SurfaceFrame frame = file.frame(telling_frame(file.recording()));
+  if (!file.stores_pictures()) return surface;
+  const SurfaceFrame frame = file.frame(telling_picture(file));
   for (std::size_t i = 0; i < surface.nodes.size(); ++i)
     surface.nodes[i] += Eigen::Map<const Eigen::Vector3f>(frame.displacement.data() + 3 * i).cast<double>();
   return surface;

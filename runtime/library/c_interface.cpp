@@ -25,7 +25,6 @@
 #include "runtime/library/session_recording.h"
 #include "runtime/library/sized_struct.h"
 #include "runtime/loop/loading.h"
-#include "runtime/loop/session_xdmf.h"
 #include "runtime/loop/settings.h"
 #include "runtime/safety/monotonic_clock.h"
 #include "runtime/tick/step.h"
@@ -188,7 +187,7 @@ std::filesystem::path recording_output(const Model& model, const std::filesystem
   OutputPaths paths;
   paths.add_input(loaded, "the model");
   add_sources(paths, model, loaded);
-  return add_recording(paths, wanted, "palpate_record");
+  return paths.add(wanted, OutputKind::recording, "palpate_record");
 }
 
 /// Whether a tool can become another between two ticks: its shape stays, and all else makes sense.

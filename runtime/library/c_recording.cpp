@@ -1,21 +1,18 @@
 // The C functions that read recordings back.
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "formats/recording.h"
 #include "runtime/library/c_error.h"
 #include "runtime/library/palpate.h"
 #include "runtime/library/sized_struct.h"
+#include "runtime/loop/recorded_pictures.h"
 #include "runtime/loop/session_check.h"
 
 using namespace palpate;
-
-struct palpate_recording {
-  explicit palpate_recording(const char* name) : file(name) { check_session(file.recording(), name); }
-
-  RecordingFile file;
-};
 
 namespace {
 
@@ -45,11 +42,17 @@ palpate_recorded_tick tick_of(const TickRecord& record) noexcept {
   return tick;
 }
 
-const RecordedFrames& frames_of(const palpate_recording* recording) noexcept {
-  return recording->file.recording().frames;
-}
-
 }  // namespace
+
+struct palpate_recording {
+  explicit palpate_recording(const char* name) : file(open_session(name)) {
+    for (std::int64_t row = 0; row < file.ticks(); ++row) ticks.push_back(tick_of(file.tick(row)));
+  }
+
+  RecordingFile file;
+  std::vector<palpate_recorded_tick> ticks;
+  mutable std::optional<RecordedPictures> pictures;  // from the first that is asked for on
+};
 
 extern "C" {
 
@@ -57,7 +60,7 @@ palpate_recording* palpate_recording_open(const char* file, char* error, size_t 
   std::unique_ptr<palpate_recording> recording;
   tell_failure("palpate_recording_open", "close other programs", error, error_size, [&](int& code) {
     if (file == nullptr)
-      throw Error("there is no file name", "palpate_recording_open", "name a recording, OUT.h5");
+      throw Error("there is no file name", "palpate_recording_open", "name a recording, OUT.mcap");
     code = PALPATE_ERROR_FILE;
     recording = std::make_unique<palpate_recording>(file);
   });
@@ -69,13 +72,13 @@ void palpate_recording_close(palpate_recording* recording) noexcept {
 }
 
 int palpate_recording_count(const palpate_recording* recording, palpate_recording_counts* counts) noexcept {
-  const Recording& read = recording->file.recording();
-  const RecordedSurface& surface = read.frames.surface;
+  const RecordingFile& file = recording->file;
+  const RecordedSurface& surface = file.surface();
   const palpate_recording_counts all{
       .size = sizeof(palpate_recording_counts),
-      .ticks = std::ssize(read.ticks),
-      .rate = read.info.rate,
-      .pictures = std::ssize(read.frames.tick),
+      .ticks = file.ticks(),
+      .rate = file.info().rate,
+      .pictures = std::ssize(file.pictures()),
       .nodes = static_cast<int32_t>(surface.nodes.size()),
       .simplices = static_cast<int32_t>(surface.simplices.size()) / surface.corners,
       .corners = surface.corners};
@@ -84,33 +87,33 @@ int palpate_recording_count(const palpate_recording* recording, palpate_recordin
 
 int palpate_recording_tick(const palpate_recording* recording, int64_t number,
                            palpate_recorded_tick* tick) noexcept {
-  const std::vector<TickRecord>& ticks = recording->file.recording().ticks;
-  const bool exists = number >= 0 && number < std::ssize(ticks);
+  const bool exists = number >= 0 && number < std::ssize(recording->ticks);
   const palpate_recorded_tick told =
-      exists ? tick_of(ticks[static_cast<std::size_t>(number)]) : palpate_recorded_tick{};
+      exists ? recording->ticks[static_cast<std::size_t>(number)] : palpate_recorded_tick{};
   return write_struct(told, tick) && exists ? 0 : -1;
 }
 
 void palpate_recording_rest(const palpate_recording* recording, double* xyz) noexcept {
-  for (const Vec3& position : frames_of(recording).surface.nodes) xyz = std::copy_n(position.data(), 3, xyz);
+  for (const Vec3& position : recording->file.surface().nodes) xyz = std::copy_n(position.data(), 3, xyz);
 }
 
 void palpate_recording_simplices(const palpate_recording* recording, int32_t* corners) noexcept {
-  const std::vector<Index>& simplices = frames_of(recording).surface.simplices;
+  const std::vector<Index>& simplices = recording->file.surface().simplices;
   std::copy(simplices.begin(), simplices.end(), corners);
 }
 
 int palpate_recording_picture(const palpate_recording* recording, int64_t number, float* xyz, double* time,
                               char* error, size_t error_size) noexcept {
   return tell_failure("palpate_recording_picture", "close other programs", error, error_size, [&](int& code) {
-    const int64_t pictures = std::ssize(frames_of(recording).tick);
+    const int64_t pictures = std::ssize(recording->file.pictures());
     if (number < 0 || number >= pictures) {
       throw Error("there is no picture " + std::to_string(number), "palpate_recording_picture",
                   "ask for 0 to " + std::to_string(pictures - 1) + ", of which there are " +
                       std::to_string(pictures));
     }
     code = PALPATE_ERROR_FILE;
-    const SurfaceFrame frame = recording->file.frame(number);
+    if (!recording->pictures) recording->pictures.emplace(recording->file);
+    const SurfaceFrame frame = recording->pictures->frame(number);
     if (xyz != nullptr) std::copy(frame.displacement.begin(), frame.displacement.end(), xyz);
     if (time != nullptr) *time = frame.time;
   });

@@ -220,12 +220,12 @@ typedef struct palpate_record_options {
 
 /* Records each tick from now on to `file` (OUT.h5), until palpate_record_end or palpate_destroy. By the rules
  * of the programs: what stands there is replaced only where it is empty or an earlier recording, and never
- * the model, its sources or anything but a regular file, under whatever name. Begins with the untouched body (palpate_reset), as a replay does: of a session with one
- * tool that nobody changes meanwhile, `palpate-runtime play BODY --device replay:OUT.h5` repeats every tick
- * to the last bit. options.tick must be 1/rate of a whole rate from 1000 to 5000 ticks a second. Threads of
- * the session write; palpate_step stays real-time safe. The file is a valid recording at each instant.
- * Returns PALPATE_OK, or a code with the reason in `error` as palpate_create has it. Not while another thread
- * uses a function of the loop. */
+ * the model, its sources or anything but a regular file, under whatever name. Begins with the untouched body
+ * (palpate_reset), as a replay does: of a session with one tool that nobody changes meanwhile,
+ * `palpate-runtime play BODY --device replay:OUT.h5` repeats every tick to the last bit. options.tick must be
+ * 1/rate of a whole rate from 1000 to 5000 ticks a second. Threads of the session write; palpate_step stays
+ * real-time safe. The file is a valid recording at each instant. Returns PALPATE_OK, or a code with the
+ * reason in `error` as palpate_create has it. Not while another thread uses a function of the loop. */
 int palpate_record(palpate_session* session, const char* file, const palpate_record_options* options,
                    char* error, size_t error_size) PALPATE_NOEXCEPT;
 
@@ -292,7 +292,9 @@ void palpate_recording_rest(const palpate_recording* recording, double* xyz) PAL
 void palpate_recording_simplices(const palpate_recording* recording, int32_t* corners) PALPATE_NOEXCEPT;
 
 /* Displacement of the surface nodes in picture 0, 1, ..., 3 `nodes` numbers [m], and its time since the first
- * tick [s]. Reads it from the file. Returns as palpate_record. */
+ * tick [s]. Where the file holds only the forces of contacts (palpate_record with options.pictures, of a body
+ * without dynamics), it is computed by the model, which is loaded with the first one and has to be where it
+ * was or beside the recording. One thread at a time. Returns as palpate_record. */
 int palpate_recording_picture(const palpate_recording* recording, int64_t number, float* xyz, double* time,
                               char* error, size_t error_size) PALPATE_NOEXCEPT;
 

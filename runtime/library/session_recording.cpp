@@ -28,9 +28,14 @@ SessionRecording::SessionRecording(const Body& body, const State& state, const O
       start_(monotonic_now()),
       recorder_(options.file, info_of(options, body), recorded_surface(body)) {
   if (!(options.pictures > 0.0)) return;
+  const bool contacts_only = pictures_follow_from_contacts(body);
   frames_.emplace(body, state,
-                  SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(rate_, options.pictures)},
-                  [this](SurfacePicture picture) { recorder_.push_frame(std::move(picture.frame)); });
+                  SurfaceFramesOptions{.ticks_per_frame = ticks_per_frame(rate_, options.pictures),
+                                       .contacts_only = contacts_only},
+                  [this, contacts_only](SurfacePicture picture) {
+                    recorder_.push_picture(contacts_only ? RecordedPicture(std::move(picture.loads))
+                                                         : RecordedPicture(std::move(picture.frame)));
+                  });
 }
 
 void SessionRecording::note(const ToolPose& wanted, Index centre, std::int64_t compute_ns) noexcept {

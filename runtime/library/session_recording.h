@@ -35,7 +35,7 @@ class SessionRecording {
 
   /// Ticks and pictures that are not in it.
   [[nodiscard]] std::int64_t dropped() const noexcept {
-    return recorder_.dropped() + recorder_.dropped_frames();
+    return recorder_.dropped() + recorder_.dropped_pictures();
   }
 
  private:

@@ -10,12 +10,12 @@
 namespace palpate {
 
 /// Shows the surface at the moments of a recording: as it is stored, or computed from the forces of its
-/// contacts with the model that it was recorded with. One thread uses it at a time.
+/// contacts by the model that it was recorded with. One thread uses it at a time.
 class RecordedPictures {
  public:
   /// `recording` must live as long. Where pictures are computed the model is looked for where it was, and
   /// beside the recording; the first file with its content hash is loaded. Throws Error where there is none,
-  /// or the model cannot be loaded.
+  /// or it cannot be loaded.
   explicit RecordedPictures(const RecordingFile& recording);
 
   /// Picture 0 .. pictures().size() - 1. Throws Error when it cannot be read.

@@ -1,22 +1,42 @@
 #include "runtime/loop/recorder.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "base/error.h"
 #include "runtime/loop/output.h"
-#include "runtime/loop/session_xdmf.h"
+#include "runtime/safety/device.h"
+#include "runtime/safety/fault.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::size_t ring_seconds = 16;  // ticks for which there is room
-constexpr std::size_t frame_ring = 256;   // four seconds at 60 Hz
+constexpr std::size_t ring_seconds = 16;   // ticks for which there is room
+constexpr std::size_t picture_ring = 256;  // four seconds at 60 Hz
 constexpr auto recorder_pause = std::chrono::milliseconds(1);
-constexpr auto interval = std::chrono::milliseconds(500);    // between checkpoints
-constexpr std::size_t most_waiting = std::size_t{32} << 20;  // bytes, for a checkpoint that is not due yet
+constexpr auto interval = std::chrono::milliseconds(500);  // between checkpoints
+constexpr int at_once = 1000;                              // ticks, and pictures, between looks at the clock
+
+constexpr std::array<std::pair<DeviceEvent, const char*>, 6> event_texts = {{
+    {DeviceEvent::opened_again, "the device is back"},
+    {DeviceEvent::lost, "the device is lost"},
+    {DeviceEvent::acknowledged, "the fault was acknowledged"},
+    {DeviceEvent::input_lost, "who moved the tool is gone"},
+    {DeviceEvent::lifted, "the tool was lifted"},
+    {DeviceEvent::resumed, "the run goes on after a pause"},
+}};
+
+/// "phase: active"
+template <class Names>
+std::string named(const char* what, const Names& names, std::uint8_t number) {
+  for (const auto& [known, name] : names)
+    if (static_cast<std::uint8_t>(known) == number) return std::string(what) + ": " + name;
+  return what;
+}
 
 }  // namespace
 
@@ -27,11 +47,10 @@ std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) noexcept
 
 Recorder::Recorder(const std::filesystem::path& path, const SessionInfo& info, const RecordedSurface& surface,
                    OnFailure on_failure)
-    : path_(path),
-      on_failure_(std::move(on_failure)),
+    : on_failure_(std::move(on_failure)),
       writer_(path, info, surface),
       ticks_(ring_seconds * static_cast<std::size_t>(info.rate)),
-      frames_(frame_ring),
+      pictures_(picture_ring),
       thread_([this] { write(); }) {}
 
 Recorder::~Recorder() {
@@ -44,16 +63,16 @@ bool Recorder::try_push(const TickRecord& tick) noexcept {
   return !failed_ && ticks_.push(copy);
 }
 
-bool Recorder::try_push(SurfaceFrame& frame) noexcept {
-  return !failed_ && frames_.push(frame);
+bool Recorder::try_push(RecordedPicture& picture) noexcept {
+  return !failed_ && pictures_.push(picture);
 }
 
 void Recorder::push(const TickRecord& tick) noexcept {
   if (!try_push(tick)) ++dropped_;
 }
 
-void Recorder::push_frame(SurfaceFrame frame) noexcept {
-  if (!try_push(frame)) ++dropped_frames_;
+void Recorder::push_picture(RecordedPicture picture) noexcept {
+  if (!try_push(picture)) ++dropped_pictures_;
 }
 
 void Recorder::push_waiting(const TickRecord& tick) noexcept {
@@ -63,9 +82,9 @@ void Recorder::push_waiting(const TickRecord& tick) noexcept {
   }
 }
 
-void Recorder::push_frame_waiting(SurfaceFrame frame) noexcept {
-  while (!try_push(frame)) {
-    if (failed_) return push_frame(std::move(frame));
+void Recorder::push_picture_waiting(RecordedPicture picture) noexcept {
+  while (!try_push(picture)) {
+    if (failed_) return push_picture(std::move(picture));
     std::this_thread::sleep_for(recorder_pause);
   }
 }
@@ -75,39 +94,45 @@ void Recorder::finish() {
   thread_.join();
   if (failed_) std::rethrow_exception(failure_);
   writer_.finish();
-  write_xdmf(path_, writer_.frames());
 }
 
-/// Bytes that were taken out of the rings.
-std::size_t Recorder::take_all() {
-  std::size_t taken = 0;
+void Recorder::note_events(const TickRecord& tick) {
+  const auto say = [&](const std::string& text) { writer_.append({.time = tick.time, .text = text}); };
+  const auto begun = static_cast<DeviceEvent>(tick.event & ~last_.event);
+  for (const auto& [event, text] : event_texts)
+    if (has(begun, event)) say(text);
+  if (tick.phase != last_.phase) say(named("phase", safety_phase_names, tick.phase));
+  if (tick.fault != last_.fault) say(named("fault", fault_names, tick.fault));
+  last_ = tick;
+}
+
+/// Whether anything was in the rings.
+bool Recorder::take_all() {
   TickRecord tick;
-  for (; taken < most_waiting && ticks_.pop(tick); taken += sizeof tick) writer_.append({&tick, 1});
-  SurfaceFrame frame;
-  while (taken < most_waiting && frames_.pop(frame)) {
-    const std::size_t numbers = frame.displacement.size() + frame.von_mises.size() + frame.pressure.size();
-    taken += sizeof frame + numbers * sizeof(float);
-    writer_.append(std::move(frame));
+  int ticks = 0, pictures = 0;
+  for (; ticks < at_once && ticks_.pop(tick); ++ticks) {
+    note_events(tick);
+    writer_.append(tick);
   }
-  return taken;
+  RecordedPicture picture;
+  for (; pictures < at_once && pictures_.pop(picture); ++pictures)
+    std::visit([&](const auto& shown) { writer_.append(shown); }, picture);
+  return ticks > 0 || pictures > 0;
 }
 
 void Recorder::write() noexcept {
   try {
     auto last = std::chrono::steady_clock::now();
-    std::size_t waiting = 0;
     for (;;) {
       const bool closing = closing_;  // read before the rings: nothing is pushed after closing
-      const std::size_t taken = take_all();
-      waiting += taken;
-      if (closing && taken == 0) break;
+      const bool taken = take_all();
+      if (closing && !taken) break;
       const auto now = std::chrono::steady_clock::now();
-      if (now - last >= interval || waiting >= most_waiting) {
+      if (now - last >= interval) {
         writer_.checkpoint();
         last = now;
-        waiting = 0;
       }
-      if (taken == 0) std::this_thread::sleep_for(recorder_pause);
+      if (!taken) std::this_thread::sleep_for(recorder_pause);
     }
     writer_.checkpoint();
   } catch (const std::exception& error) {

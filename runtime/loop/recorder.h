@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <variant>
 
 #include "base/error.h"
 #include "base/ring.h"
@@ -18,8 +19,11 @@ namespace palpate {
 /// Ticks from one frame to the next, 1 or more, where so many frames a second are wanted (above 0).
 [[nodiscard]] std::int64_t ticks_per_frame(std::int64_t rate, double frames_a_second) noexcept;
 
-/// A thread that writes a session to an HDF5 recording, fed through bounded lock-free rings: of ticks by one
-/// other thread, of frames by one too. Every half second all of it is put into the recording, so that no more
+/// What shows the surface: where contact forces say all, these alone.
+using RecordedPicture = std::variant<ContactLoads, SurfaceFrame>;
+
+/// A thread that writes a session to a recording, fed through bounded lock-free rings: of ticks by one other
+/// thread, of pictures by one too. Every half second all of it is put into the recording, so that no more
 /// is lost however the program ends. Where that fails (a full disk) nothing is kept any more, the reason is
 /// told at once, and the run goes on.
 class Recorder {
@@ -36,41 +40,41 @@ class Recorder {
 
   /// Hands a tick over; never blocks. A full ring drops it and counts.
   void push(const TickRecord& tick) noexcept;
-  /// Hands a frame over, likewise.
-  void push_frame(SurfaceFrame frame) noexcept;
+  /// Hands a picture over, likewise.
+  void push_picture(RecordedPicture picture) noexcept;
 
   /// Hands a tick over, waiting for room. Only for runs that nobody feels.
   void push_waiting(const TickRecord& tick) noexcept;
-  /// Hands a frame over, likewise.
-  void push_frame_waiting(SurfaceFrame frame) noexcept;
+  /// Hands a picture over, likewise.
+  void push_picture_waiting(RecordedPicture picture) noexcept;
 
-  /// Writes what is left and makes the recording one plain file, with a description of its frames for
-  /// ParaView beside it where there are any. Throws Error when any of it could not be written; what could is
-  /// in the recording.
+  /// Writes what is left, and the index. Throws Error when any of it could not be written; what could is in
+  /// the recording.
   void finish();
 
   /// Ticks for which there was no room, or no disk any more.
   [[nodiscard]] std::int64_t dropped() const noexcept { return dropped_; }
-  /// Frames for which there was no room, or no disk any more.
-  [[nodiscard]] std::int64_t dropped_frames() const noexcept { return dropped_frames_; }
+  /// Pictures for which there was no room, or no disk any more.
+  [[nodiscard]] std::int64_t dropped_pictures() const noexcept { return dropped_pictures_; }
 
  private:
   bool try_push(const TickRecord& tick) noexcept;
-  bool try_push(SurfaceFrame& frame) noexcept;
+  bool try_push(RecordedPicture& picture) noexcept;
   void write() noexcept;
   void fail(const std::exception& reason) noexcept;
-  std::size_t take_all();
+  bool take_all();
+  void note_events(const TickRecord& tick);
 
-  std::filesystem::path path_;
   OnFailure on_failure_;
   RecordingWriter writer_;
   Ring<TickRecord> ticks_;
-  Ring<SurfaceFrame> frames_;
+  Ring<RecordedPicture> pictures_;
   std::atomic<bool> closing_ = false;
   std::atomic<bool> failed_ = false;
   std::exception_ptr failure_;
   std::atomic<std::int64_t> dropped_ = 0;
-  std::atomic<std::int64_t> dropped_frames_ = 0;
+  std::atomic<std::int64_t> dropped_pictures_ = 0;
+  TickRecord last_;  // that was written
   std::thread thread_;
 };
 

@@ -33,27 +33,32 @@ bool is_named(const Names& names, std::uint8_t number) {
 
 }  // namespace
 
-void check_session(const Recording& session, const std::filesystem::path& where) {
+void check_session(const RecordingFile& session) {
   const std::uint32_t status_bits = all_status_bits();
-  for (std::size_t k = 0; k < session.ticks.size(); ++k) {
-    const TickRecord& tick = session.ticks[k];
+  for (std::int64_t k = 0; k < session.ticks(); ++k) {
+    const TickRecord tick = session.tick(k);
     const auto expect = [&](bool known, const char* name, std::uint32_t value, const char* kind) {
       if (known) return;
-      throw Error(
-          fmt::format("{}, row {}, holds {}, which is no {}", name, k, value, kind), where.string(),
-          "copy the file again; if it is whole, read it with the version that made it: " + session.generator);
+      throw Error(fmt::format("/tool/0/tick, row {}: {} is {}, which is no {}", k, name, value, kind),
+                  session.path().string(),
+                  "copy the file again; if it is whole, read it with the version that made it: " +
+                      session.generator());
     };
-    expect(is_named(safety_phase_names, tick.phase), "/ticks/phase", tick.phase, "phase of safety");
-    expect(is_named(fault_names, tick.fault), "/ticks/fault", tick.fault, "fault");
-    expect((tick.event & ~all_events) == 0, "/ticks/event", tick.event, "set of events");
-    expect((tick.status & ~status_bits) == 0, "/ticks/status", tick.status, "set of status bits");
+    expect(is_named(safety_phase_names, tick.phase), "phase", tick.phase, "phase of safety");
+    expect(is_named(fault_names, tick.fault), "fault", tick.fault, "fault");
+    expect((tick.event & ~all_events) == 0, "event", tick.event, "set of events");
+    expect((tick.status & ~status_bits) == 0, "status", tick.status, "set of status bits");
   }
 }
 
-Recording read_session(const std::filesystem::path& path) {
-  Recording session = read_recording(path);
-  check_session(session, path);
+RecordingFile open_session(const std::filesystem::path& path) {
+  RecordingFile session(path);
+  check_session(session);
   return session;
+}
+
+Recording read_session(const std::filesystem::path& path) {
+  return read_recording(open_session(path));
 }
 
 void check_overlays(const Recording& session, const Body& body, const std::filesystem::path& where) {
@@ -63,11 +68,11 @@ void check_overlays(const Recording& session, const Body& body, const std::files
     if (node < 0) continue;
     const Index stored = node < nodes ? body.stored_node(node) : -1;
     if (stored >= 0 && body.surface_node_of_stored(stored) >= 0) continue;
-    throw Error(fmt::format("/ticks/patch, row {}, holds {}, which is no node that an overlay can lie round: "
-                            "the body has {} nodes",
-                            k, node, nodes),
-                where.string(),
-                "replay it with the model that it was recorded with: " + session.info.model_path);
+    throw Error(
+        fmt::format("/tool/0/tick, row {}: patch is {}, which is no node that an overlay can lie round: "
+                    "the body has {} nodes",
+                    k, node, nodes),
+        where.string(), "replay it with the model that it was recorded with: " + session.info.model_path);
   }
 }
 

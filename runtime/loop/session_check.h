@@ -9,10 +9,13 @@
 namespace palpate {
 
 /// Proves that the ticks of a recording hold only phases, faults, events and status bits that there are.
-/// Throws Error (where = `where`, the field is named).
-void check_session(const Recording& session, const std::filesystem::path& where);
+/// Throws Error (the field is named).
+void check_session(const RecordingFile& session);
 
-/// Reads a recording and checks it. Throws Error.
+/// Opens a recording and checks it. Throws Error.
+RecordingFile open_session(const std::filesystem::path& path);
+
+/// Reads all ticks of one that is checked. Throws Error.
 Recording read_session(const std::filesystem::path& path);
 
 /// Proves that a replay on this body finds the nodes round which the session had its overlays. Throws Error.
