@@ -60,40 +60,6 @@ class IgnoredPipeSignal {
   struct sigaction before_ {};
 };
 
-/// A new file that nothing else has opened, under the first free name beside `target`: what a killed run or a
-/// stranger left there is neither followed nor touched.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(std::filesystem::path target, mode_t mode = 0666) : target_(std::move(target)) {
-    constexpr int most = 1000;
-    for (int k = 1; fd_ < 0; ++k) {
-      path_ = target_.string() + ".partial" + (k > 1 ? std::to_string(k) : "");
-      fd_ = make_new_file(path_, mode);
-      if (fd_ < 0 && (errno != EEXIST || k == most)) fail(target_, errno);
-    }
-  }
-  ~TemporaryFile() {
-    if (fd_ < 0) return;
-    ::close(fd_);
-    ::unlink(path_.c_str());
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  void write(std::string_view bytes) {
-    if (const int error = write_all(fd_, bytes)) fail(target_, error);
-  }
-
-  void take_its_place() {
-    rename_durably(path_, target_);
-    ::close(std::exchange(fd_, -1));
-  }
-
- private:
-  std::filesystem::path target_, path_;
-  int fd_ = -1;
-};
-
 std::optional<struct stat> status_of(const std::filesystem::path& file) {
   struct stat status {};
   if (::stat(file.c_str(), &status) == 0) return status;
@@ -143,18 +109,59 @@ int open_stream(const std::filesystem::path& file) {
   return fd;
 }
 
-void write_file(const std::filesystem::path& file, std::string_view bytes) {
+TemporaryFile::TemporaryFile(std::filesystem::path target, mode_t mode) : target_(std::move(target)) {
+  constexpr int most = 1000;
+  for (int k = 1; fd_ < 0; ++k) {
+    path_ = target_.string() + ".partial" + (k > 1 ? std::to_string(k) : "");
+    fd_ = make_new_file(path_, mode);
+    if (fd_ < 0 && (errno != EEXIST || k == most)) fail(target_, errno);
+  }
+}
+
+TemporaryFile::~TemporaryFile() {
+  if (fd_ < 0) return;
+  ::close(fd_);
+  ::unlink(path_.c_str());
+}
+
+void TemporaryFile::write(std::string_view bytes) {
+  if (const int error = write_all(fd_, bytes)) fail(target_, error);
+}
+
+void TemporaryFile::take_its_place() {
+  rename_durably(path_, target_);
+  ::close(std::exchange(fd_, -1));
+}
+
+FileWriter::FileWriter(const std::filesystem::path& file) {
   const WriteTarget target = write_target(file);
   if (target == WriteTarget::regular) {
-    replace_file(link_target(file), bytes);
+    temporary_.emplace(link_target(file));
+    return;
+  }
+  std::fflush(stdout);  // what was printed before
+  const int fd = target == WriteTarget::stream ? open_stream(file) : ::dup(standard_stream(*status_of(file)));
+  stream_ = FileDescriptor(fd, file);
+}
+
+void FileWriter::write(std::string_view bytes) {
+  bytes_ += bytes.size();
+  if (temporary_) {
+    temporary_->write(bytes);
     return;
   }
   const IgnoredPipeSignal ignored;
-  std::fflush(stdout);  // what was printed before
-  const int fd = target == WriteTarget::stream ? open_stream(file) : ::dup(standard_stream(*status_of(file)));
-  const int error = write_all(fd, bytes);
-  ::close(fd);
-  if (error != 0) fail(file, error);
+  if (const int error = write_all(stream_.get(), bytes)) fail(stream_.path(), error);
+}
+
+void FileWriter::finish() {
+  if (temporary_) temporary_->take_its_place();
+}
+
+void write_file(const std::filesystem::path& file, std::string_view bytes) {
+  FileWriter writer(file);
+  writer.write(bytes);
+  writer.finish();
 }
 
 void replace_file(const std::filesystem::path& file, std::string_view bytes, mode_t mode) {

@@ -3,10 +3,49 @@
 
 #include <sys/types.h>
 
+#include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string_view>
 
+#include "base/file_io.h"
+
 namespace palpate {
+
+/// A new file that nothing else has opened, under the first free name beside `target`: what a killed run or a
+/// stranger left there is neither followed nor touched. Is removed again unless it takes the target's place.
+class TemporaryFile {
+ public:
+  /// With the rights `mode` (less the umask). Throws Error with the system's reason, as the others.
+  explicit TemporaryFile(std::filesystem::path target, mode_t mode = 0666);
+  ~TemporaryFile();
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  void write(std::string_view bytes);
+  void take_its_place();  ///< of the target, once
+
+ private:
+  std::filesystem::path target_, path_;
+  int fd_ = -1;
+};
+
+/// A file that is written piece by piece, and else as `write_file` does it: a regular file is whole or as it
+/// was. Throws Error.
+class FileWriter {
+ public:
+  explicit FileWriter(const std::filesystem::path& file);
+
+  void write(std::string_view bytes);
+  void finish();  ///< a regular file takes its place; without this it does not
+  [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }  ///< that were written
+
+ private:
+  std::optional<TemporaryFile> temporary_;  // of a regular file
+  FileDescriptor stream_;
+  std::size_t bytes_ = 0;
+};
 
 /// Writes `bytes` to `file`. A regular file is written under a fresh temporary name beside it and renamed, so
 /// that it is whole or as it was. Of a symbolic link to a file the target is written. Pipes, terminals and

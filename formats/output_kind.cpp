@@ -71,8 +71,10 @@ std::string_view name_of(OutputKind kind) noexcept {
       return "model";
     case OutputKind::recording:
       return "recording";
+    case OutputKind::hdf5:
+      return "recording as HDF5";
     case OutputKind::frames:
-      return "recording's description for ParaView";
+      return "description of pictures for ParaView";
     case OutputKind::report:
       return "report";
     case OutputKind::contacts:
@@ -97,8 +99,43 @@ std::string_view name_of(OutputKind kind) noexcept {
   return "";
 }
 
+std::span<const std::string_view> endings_of(OutputKind kind) noexcept {
+  static constexpr std::string_view hdf5[] = {".hdf", ".h5", ".hdf5", ".vtkhdf"}, mcap[] = {".mcap"},
+                                    xdmf[] = {".xdmf", ".xmf"}, json[] = {".json"}, csv[] = {".csv"},
+                                    vtu[] = {".vtu"}, html[] = {".html", ".htm"}, glb[] = {".glb"},
+                                    pvd[] = {".pvd"}, off[] = {".off"};
+  switch (kind) {
+    case OutputKind::model:
+    case OutputKind::hdf5:
+      return hdf5;
+    case OutputKind::recording:
+      return mcap;
+    case OutputKind::frames:
+      return xdmf;
+    case OutputKind::report:
+      return json;
+    case OutputKind::contacts:
+    case OutputKind::field:
+    case OutputKind::ticks:
+      return csv;
+    case OutputKind::grid:
+      return vtu;
+    case OutputKind::page:
+      return html;
+    case OutputKind::scene:
+      return glb;
+    case OutputKind::series:
+      return pvd;
+    case OutputKind::faces:
+    case OutputKind::surface:
+      return off;
+  }
+  return {};
+}
+
 bool needs_regular_file(OutputKind kind) noexcept {
-  return kind == OutputKind::model || kind == OutputKind::recording || kind == OutputKind::frames;
+  return kind == OutputKind::model || kind == OutputKind::recording || kind == OutputKind::hdf5 ||
+         kind == OutputKind::frames;
 }
 
 bool is_ours(const std::filesystem::path& file, OutputKind kind) {
@@ -108,9 +145,11 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
   if (text.empty()) return true;
   switch (kind) {
     case OutputKind::model:
-    case OutputKind::recording:
+    case OutputKind::hdf5:
       return text.starts_with("\x89HDF\r\n\x1a\n") &&
              hdf5_format(file) == (kind == OutputKind::model ? "palpate" : "palpate-recording");
+    case OutputKind::recording:
+      return text.starts_with("\x89MCAP0\r\n") && contains(text, "palpate-recording");
     case OutputKind::frames:
       return is_our_xml(text, "<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [\n<!ENTITY t '<Topology ");
     case OutputKind::report:

@@ -3,14 +3,16 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string_view>
 
 namespace palpate {
 
 enum class OutputKind : std::uint8_t {
   model,      ///< NAME.palpate.hdf
-  recording,  ///< HDF5
-  frames,     ///< a recording's frames for ParaView, .xdmf
+  recording,  ///< MCAP
+  hdf5,       ///< a recording as HDF5, .h5
+  frames,     ///< its pictures for ParaView, .xdmf
   report,     ///< of a run, JSON
   contacts,   ///< table of contact points, CSV
   field,      ///< table of displacements, CSV
@@ -25,6 +27,9 @@ enum class OutputKind : std::uint8_t {
 
 /// "table of contact points"
 [[nodiscard]] std::string_view name_of(OutputKind kind) noexcept;
+
+/// How names of this kind end, ".json", in small letters; the usual one first.
+[[nodiscard]] std::span<const std::string_view> endings_of(OutputKind kind) noexcept;
 
 /// Whether the programs can only write it to a regular file, and not to a pipe.
 [[nodiscard]] bool needs_regular_file(OutputKind kind) noexcept;

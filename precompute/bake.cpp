@@ -499,7 +499,10 @@ std::filesystem::path check_output(const Description& description, const BakeOpt
 BakeOptions with_paths(const Description& description, const BakeOptions& asked, Team& team) {
   BakeOptions options = asked;
   if (options.join) options.parts = find_parts(options.output, options.parts);
-  if (options.part) options.output = part_path(options.output, options.part->number, options.part->parts);
+  if (options.part) {
+    expect_ending(options.output, OutputKind::model, "the model (--output)");
+    options.output = part_path(options.output, options.part->number, options.part->parts);
+  }
   if (options.dry_run) return options;
   const auto output = team.leads() ? check_output(description, options) : std::filesystem::path();
   options.output = team.share(output.string());

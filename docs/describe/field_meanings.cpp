@@ -135,17 +135,11 @@ constexpr FieldMeaning model_fields[] = {
     {"/probes/forces", "forces on the stored dofs [N] ..."},
     {"/probes/displacements", "... and the displacements that they must give [m]"}};
 
-constexpr FieldMeaning recording_metadata[] = {
-    {"format", "`palpate-recording`"},
-    {"version", "major and minor. Another major version is refused"},
-    {"generator", "program and version that wrote the file"},
-    {"units", "of the fields"},
-    {"clock", "what times are counted from"},
-    {"model", "path of the model"},
-    {"content_hash", "that of the model"},
-    {"device", "the input source"},
-    {"rate", "ticks per second"},
-    {"options", "lines `name=value`, such as `overlay=r=3,rings=2`"}};
+constexpr FieldMeaning recording_attributes[] = {
+    {"format", "`palpate-recording`"},     {"generator", "program and version that recorded"},
+    {"units", "of the datasets"},          {"model", "path of the model"},
+    {"content_hash", "that of the model"}, {"device", "the input source"},
+    {"rate", "ticks per second"},          {"options", "lines `name=value`, such as `overlay=r=3,rings=2`"}};
 
 }  // namespace
 
@@ -155,8 +149,8 @@ std::span<const FieldMeaning> model_attribute_meanings() {
 std::span<const FieldMeaning> model_field_meanings() {
   return model_fields;
 }
-std::span<const FieldMeaning> recording_metadata_meanings() {
-  return recording_metadata;
+std::span<const FieldMeaning> recording_attribute_meanings() {
+  return recording_attributes;
 }
 
 }  // namespace palpate

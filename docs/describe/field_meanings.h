@@ -16,6 +16,6 @@ struct FieldMeaning {
 
 [[nodiscard]] std::span<const FieldMeaning> model_attribute_meanings();
 [[nodiscard]] std::span<const FieldMeaning> model_field_meanings();
-[[nodiscard]] std::span<const FieldMeaning> recording_metadata_meanings();
+[[nodiscard]] std::span<const FieldMeaning> recording_attribute_meanings();
 
 }  // namespace palpate

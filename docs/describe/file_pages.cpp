@@ -15,7 +15,7 @@
 #include "formats/hierarchical_fields.h"
 #include "formats/model_file.h"
 #include "formats/precision_fields.h"
-#include "formats/recording_messages.h"
+#include "runtime/exports/session_hdf5.h"
 
 namespace palpate {
 namespace {
@@ -216,45 +216,21 @@ std::string group_table(const Rows& rows, const std::vector<std::string>& groups
   return markdown_table({"dataset", "type", "shape", "what"}, chosen);
 }
 
-/// Fields of a tick's message by the members that they hold.
-class TickRows {
- public:
-  template <class T>
-  void number(const char* type, const std::string& name, const T&) {
-    add(name, type, meaning(name));
-  }
-  template <std::size_t n>
-  void numbers(const std::string& name, const double (&)[n]) {
-    add(name, fmt::format("float64[{}]", n), meaning(name));
-  }
-  void vector(const std::string& name, const double (&)[3]) {
-    add(name, "geometry_msgs/Vector3", meaning(name));
-  }
-  void pose(const std::string& name, const double (&)[3], const double (&)[4]) {
-    add(name, "geometry_msgs/Pose", meaning(name + "_position"));
-  }
-  void wrench(const std::string& name, const double (&)[3], const double (&)[3]) {
-    const std::string before = name == "wrench" ? "" : name + "_";
-    add(name, "geometry_msgs/Wrench",
-        "`force`: " + meaning(before + "force") + "; `torque`: " + meaning(before + "torque"));
-  }
-
+/// A dataset of ticks by the member that it holds.
+Rows tick_rows() {
+  const std::vector<Declaration> header = declarations_of("formats/recording.h");
+  const std::vector<Member>& members = declaration(header, "TickRecord").members;
   Rows rows;
-
- private:
-  void add(const std::string& name, const std::string& type, const std::string& what) {
-    rows.push_back({code(name), type, what});
+  for (const TickColumn& column : tick_columns()) {
+    const auto member = std::ranges::find(members, column.name, &Member::name);
+    if (member == members.end() || member->comment.empty())
+      throw Error("has no doc comment", "TickRecord::" + column.name, "add it to formats/recording.h");
+    rows.push_back({code("/ticks/" + column.name), column.type.name,
+                    column.components == 1 ? "*T*" : fmt::format("*T*, {}", column.components),
+                    member->comment});
   }
-  [[nodiscard]] std::string meaning(const std::string& name) const {
-    const auto member = std::ranges::find(members_, name, &Member::name);
-    if (member == members_.end() || member->comment.empty())
-      throw Error("has no doc comment", "TickRecord::" + name, "add it to formats/recording.h");
-    return member->comment;
-  }
-
-  std::vector<Declaration> header_ = declarations_of("formats/recording.h");
-  std::vector<Member> members_ = declaration(header_, "TickRecord").members;
-};
+  return rows;
+}
 
 constexpr const char* model_letters =
     "*N* nodes, *E* elements of *k* nodes, *d* dimensions, *F* surface simplices, *M* materials, *S* stored "
@@ -291,24 +267,33 @@ Page file_fields_page() {
 }
 
 Page recording_fields_page() {
-  Rows metadata;
-  for (const FieldMeaning& value : recording_metadata_meanings())
-    metadata.push_back({code(std::string(value.path)), std::string(value.meaning)});
-  TickRows ticks;
-  const TickRecord any;
-  for_each_tick_field(any, ticks);
+  Rows attributes;
+  for (const FieldMeaning& attribute : recording_attribute_meanings())
+    attributes.push_back({code(std::string(attribute.path)), std::string(attribute.meaning)});
+  Rows surface = {
+      {"`/surface/nodes`", "float64", "*S*, 3", "the surface without loads [m]"},
+      {"`/surface/simplices`", "int32", "*F*, *d*", "its triangles; lines in the plane"},
+      {"`/surface/held`", "uint8", "*S*", "bit 0, 1, 2 is set where the node is held along x, y, z"},
+      {"`/frames/tick`", "int64", "*R*", "the tick that a picture shows"},
+      {"`/frames/time`", "float64", "*R*", "when that was, since the start [s]"},
+      {"`/frames/displacement`", "float32", "*R*, *S*, 3", "u0 + u: node + displacement is what is seen [m]"},
+      {"`/frames/von_mises`", "float32", "*R*, *S*",
+       "von Mises stress [Pa]; not a number where it is not known"},
+      {"`/frames/pressure`", "float32", "*R*, *S*",
+       "contact pressure [Pa], positive where the tool presses, negative where a grab pulls"}};
   std::string text =
       "# Fields of a recording\n\n"
-      "What a recording holds (`play --record OUT.mcap`). Guide: [recordings](../recordings.md); layout: "
-      "[format](../recording-format.md). Bits and numbers of `status`, `fault` and `phase`: [status "
-      "bits](status-bits.md).\n\n## Metadata\n\n" +
-      markdown_table({"key", "value"}, metadata) + "## Ticks\n\nA message on `/tool/0/tick` each tick.\n\n" +
-      markdown_table({"field", "type", "what"}, ticks.rows) +
-      "## Other channels\n\nPictures are taken at display rate (`--record-frames`).\n";
-  for (const ChannelKind& kind : channel_kinds()) {
-    if (kind.channel == RecordedChannel::tick) continue;
-    text += fmt::format("\n`{}`, {}:\n\n```text\n{}```\n", kind.topic, kind.schema, kind.definition);
-  }
+      "All fields of a recording, by the names that `palpate.read` gives them (without `/ticks/`) and that "
+      "datasets have after `palpate-runtime export SESSION.mcap --hdf5 OUT.h5`. *T* ticks, *R* pictures, *S* "
+      "surface nodes, *F* surface simplices of *d* nodes. Guide: [recordings](../recordings.md). How the "
+      "recording itself lies on disk: [format](../recording-format.md). Bits and numbers of `status`, "
+      "`fault` "
+      "and `phase`: [status bits](status-bits.md).\n\n## Attributes\n\n";
+  text += markdown_table({"root attribute", "value"}, attributes);
+  text +=
+      "## Ticks\n\nOne row per tick.\n\n" + markdown_table({"dataset", "type", "shape", "what"}, tick_rows());
+  text += "## Surface and pictures\n\nPictures are taken at display rate (`--record-frames`).\n\n" +
+          markdown_table({"dataset", "type", "shape", "what"}, surface);
   return {"recording-fields", text};
 }
 

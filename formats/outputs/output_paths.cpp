@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <system_error>
 
@@ -35,7 +36,27 @@ void check_existing(const std::filesystem::path& file, OutputKind kind, std::opt
                 file.string(), elsewhere);
 }
 
+/// What follows the last dot of a name, with it, in small letters; empty where that is no word.
+std::string ending_of(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0; };
+  const bool is_word = ending.size() > 1 && std::isalpha(static_cast<unsigned char>(ending[1])) != 0 &&
+                       std::all_of(ending.begin() + 1, ending.end(), is_plain);
+  return is_word ? ending : "";
+}
+
 }  // namespace
+
+void expect_ending(const std::filesystem::path& file, OutputKind kind, const std::string& what) {
+  const std::string ending = ending_of(file);
+  const auto endings = endings_of(kind);
+  if (ending.empty() || std::find(endings.begin(), endings.end(), ending) != endings.end()) return;
+  const std::string usual(endings.front());
+  throw Error("ends in " + ending + ", and " + what + " is a " + usual + " file", file.string(),
+              "name it " + std::filesystem::path(file).replace_extension(usual).filename().string());
+}
 
 OutputPaths::Known OutputPaths::known(const std::filesystem::path& path, const std::string& what) {
   std::error_code failed;
@@ -92,6 +113,8 @@ std::filesystem::path OutputPaths::add(const std::filesystem::path& path, Output
   refuse_outputs(output);
   outputs_.push_back(std::move(output));
   check_existing(file, kind, force_);
+  expect_ending(path, kind, what);
+  expect_ending(file, kind, what);
   if (kind == OutputKind::model) {
     add_beside(with_suffix(file, ".partial"), what);
     add_beside(with_suffix(file, ".progress"), what);

@@ -13,6 +13,10 @@
 
 namespace palpate {
 
+/// Other programs go by the ending of a name: throws Error where it is a word and not one of the kind's, as
+/// `endings_of` has them. A name without one may be anything. `what`: "the report (--report)".
+void expect_ending(const std::filesystem::path& file, OutputKind kind, const std::string& what);
+
 /// Decides which paths a run may write, before its work begins. An output never takes the place of what the
 /// run reads, nor of another of its outputs, under whatever name (links). It takes the place of an existing
 /// file only where that is empty or an earlier output of the same kind, or where that is forced. Lives as
@@ -28,7 +32,8 @@ class OutputPaths {
   void add_input(const std::filesystem::path& path, const std::string& what);
 
   /// Returns where to write the output: of a symbolic link to a file, that file. Throws Error, with the
-  /// reason, where it may not or cannot be written. `option` says what asks for it, "--record".
+  /// reason, where it may not or cannot be written, or has another format's ending. `option` says what asks
+  /// for it, "--record".
   std::filesystem::path add(const std::filesystem::path& path, OutputKind kind, const std::string& option);
 
  private:

@@ -77,7 +77,7 @@ void check_is_description(const std::filesystem::path& path) {
     throw Error("is a baked model already", file,
                 "palpate-runtime play " + shell_word(file) + " --view shows it, palpate-precompute inspect " +
                     shell_word(file) + " says what is in it");
-  if (name.ends_with(".h5"))
+  if (name.ends_with(".mcap"))
     throw Error("is a recording", file, "palpate-runtime view " + shell_word(file) + " shows it");
 }
 

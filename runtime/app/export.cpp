@@ -2,10 +2,12 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
-#include <span>
+#include <ranges>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -16,11 +18,12 @@
 #include "base/words.h"
 #include "base/write_file.h"
 #include "formats/outputs/output_paths.h"
-#include "formats/recording_parts.h"
+#include "formats/recording.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/exports/gltf.h"
+#include "runtime/exports/session_hdf5.h"
+#include "runtime/exports/session_xdmf.h"
 #include "runtime/exports/ticks_table.h"
-#include "runtime/loop/session_check.h"
 #include "runtime/scene/seen_surface.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
@@ -33,13 +36,19 @@ namespace {
 /// One in so many of a page's pictures is whole; from it the page makes those after it that it jumps to.
 constexpr std::size_t pictures_per_whole = 30;
 
+constexpr std::size_t most_page_bytes = std::size_t{1} << 29U;  // before it is packed
+
 /// Pictures of a glTF scene: each is a morph target, and each has a weight at the time of each.
 constexpr std::size_t most_targets = 1000;
+constexpr std::size_t most_scene_bytes = std::size_t{1} << 30U;  // the format itself ends at 4 GiB
 
-/// Numbers of the frames that go into the page.
-std::vector<std::int64_t> choose(const SessionPictures& pictures, const ExportOptions& options) {
+constexpr double usual_fps = 30.0;
+constexpr std::size_t table_block = 1 << 20;  // bytes that are written at once
+
+/// Numbers of the pictures that are written, `fps` a second at most.
+std::vector<std::int64_t> choose(const SessionPictures& pictures, const ExportOptions& options, double fps) {
   std::vector<std::int64_t> chosen;
-  const double spacing = (1.0 - 1e-6) / options.fps;
+  const double spacing = (1.0 - 1e-6) / fps;
   for (std::int64_t k = 0; k < pictures.frames(); ++k) {
     const double time = pictures.time(k);
     if (time < options.from || (options.to && time > *options.to)) continue;
@@ -63,14 +72,16 @@ struct Chosen {
   [[nodiscard]] double seconds() const {
     return pictures.time(frames.back()) - pictures.time(frames.front());
   }
-  [[nodiscard]] std::vector<SurfacePicture> read() const {
-    std::vector<SurfacePicture> all;
-    for (const std::int64_t frame : frames) all.push_back(pictures.picture(frame));
-    return all;
-  }
+  [[nodiscard]] SurfacePicture picture(std::size_t k) const { return pictures.picture(frames[k]); }
 };
 
-std::string html_page(const Chosen& chosen) {
+/// What pages and scenes are too large for is asked for in parts.
+[[noreturn]] void refuse(const std::string& what, const ExportOptions& options, const std::string& most) {
+  throw Error(what, options.recording.string(),
+              "ask for at most " + most + " by a lower --fps, or a part by --from and --to");
+}
+
+std::string html_page(const Chosen& chosen, const ExportOptions& options) {
   const SessionPictures& pictures = chosen.pictures;
   std::vector<double> times;
   times.reserve(chosen.frames.size());
@@ -86,7 +97,10 @@ std::string html_page(const Chosen& chosen) {
     archive.add_binary(encode_ticks(scene.number, run.notes, run.stride));
   std::optional<WireValues> base;
   for (std::size_t k = 0; k < chosen.frames.size(); ++k) {
-    const SurfacePicture picture = pictures.picture(chosen.frames[k]);
+    if (archive.bytes() > most_page_bytes)
+      refuse(fmt::format("a page of {} pictures is too large for a browser", chosen.frames.size()), options,
+             fmt::format("{} pictures", k));
+    const SurfacePicture picture = chosen.picture(k);
     WireValues values = wire_values(picture, scene, nullptr, static_cast<std::uint32_t>(k + 1));
     const bool is_whole = k % pictures_per_whole == 0;
     archive.add_binary(encode_frame(picture, scene, nullptr, values, is_whole ? nullptr : &*base));
@@ -103,18 +117,6 @@ void tell(const std::filesystem::path& file, const Chosen& chosen, std::size_t b
 /// "00042.vtu"
 std::string frame_name(std::size_t number) {
   return fmt::format("{:05}.vtu", number);
-}
-
-/// The collection (.pvd) of pictures that lie in `folder` beside it, with their times.
-std::string series_pvd(const std::filesystem::path& folder, std::span<const SurfacePicture> pictures) {
-  std::string text = "<?xml version=\"1.0\"?>\n<!-- palpate " PALPATE_VERSION
-                     " -->\n<VTKFile type=\"Collection\" "
-                     "version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
-  for (std::size_t k = 0; k < pictures.size(); ++k) {
-    text += fmt::format("<DataSet timestep=\"{}\" file=\"{}\"/>\n", pictures[k].frame.time,
-                        xml_escaped((folder / frame_name(k)).string()));
-  }
-  return text + "</Collection>\n</VTKFile>\n";
 }
 
 /// The pictures of a series, in a folder beside the collection.
@@ -138,37 +140,97 @@ void expect_only_frames(const std::filesystem::path& folder, bool force) {
   }
 }
 
-/// Returns the bytes of all pictures.
-std::size_t write_series(const std::filesystem::path& pvd, const Scene& scene,
-                         std::span<const SurfacePicture> pictures) {
+/// The pictures, and the collection (.pvd) that lists them with their times. Returns the bytes of all
+/// pictures.
+std::size_t write_series(const std::filesystem::path& pvd, const Chosen& chosen) {
   const std::filesystem::path folder = frames_folder(pvd);
-  std::size_t bytes = 0;
+  const Scene scene = chosen.pictures.scene();
   std::error_code reason;
   std::filesystem::create_directory(folder, reason);
   if (reason) throw Error("cannot be made: " + reason.message(), folder.string(), "write elsewhere");
-  for (std::size_t k = 0; k < pictures.size(); ++k) {
-    const std::string text = surface_vtu(pictures[k], scene, nullptr);
+  FileWriter collection(pvd);
+  collection.write("<?xml version=\"1.0\"?>\n<!-- palpate " PALPATE_VERSION
+                   " -->\n<VTKFile type=\"Collection\" "
+                   "version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n");
+  std::size_t bytes = 0;
+  for (std::size_t k = 0; k < chosen.frames.size(); ++k) {
+    const SurfacePicture picture = chosen.picture(k);
+    const std::string text = surface_vtu(picture, scene, nullptr);
     write_file(folder / frame_name(k), text);
     bytes += text.size();
+    collection.write(fmt::format("<DataSet timestep=\"{}\" file=\"{}\"/>\n", picture.frame.time,
+                                 xml_escaped((folder.filename() / frame_name(k)).string())));
   }
-  for (std::size_t k = pictures.size(); std::filesystem::remove(folder / frame_name(k)); ++k) {
+  for (std::size_t k = chosen.frames.size(); std::filesystem::remove(folder / frame_name(k)); ++k) {
   }  // of a longer series before
-  write_file(pvd, series_pvd(folder.filename(), pictures));
+  collection.write("</Collection>\n</VTKFile>\n");
+  collection.finish();
   return bytes;
 }
 
-/// The ticks from options.from to options.to.
-void write_ticks(const ExportOptions& options, const std::filesystem::path& csv) {
-  const Recording recording = read_session(options.recording);
-  std::vector<TickRecord> ticks;
-  for (const TickRecord& tick : recording.ticks) {
-    if (tick.time >= options.from && (!options.to || tick.time <= *options.to)) ticks.push_back(tick);
-  }
-  if (ticks.empty())
+/// The ticks from options.from to options.to; there are some.
+TickRange choose_ticks(const RecordingFile& recording, const ExportOptions& options) {
+  const auto rows = std::views::iota(std::int64_t{0}, recording.ticks());
+  const auto count_until = [&](auto&& is_before) {
+    return std::ranges::partition_point(
+               rows, [&](std::int64_t row) { return is_before(recording.tick(row).time); }) -
+           rows.begin();
+  };
+  const TickRange chosen{
+      count_until([&](double time) { return time < options.from; }),
+      options.to ? count_until([&](double time) { return time <= *options.to; }) : recording.ticks()};
+  if (chosen.begin >= chosen.end)
     throw Error("has no ticks in that time", options.recording.string(),
                 "palpate-runtime session tells how long it is");
-  write_file(csv, ticks_table(ticks));
-  fmt::print(stderr, "{}: {} ticks\n", options.csv.string(), ticks.size());
+  return chosen;
+}
+
+void write_table(const RecordingFile& recording, const ExportOptions& options,
+                 const std::filesystem::path& csv) {
+  const TickRange ticks = choose_ticks(recording, options);
+  FileWriter table(csv);
+  std::string text(ticks_names());
+  for (std::int64_t row = ticks.begin; row < ticks.end; ++row) {
+    text += ticks_line(recording.tick(row));
+    if (text.size() < table_block && row + 1 < ticks.end) continue;
+    table.write(text);
+    text.clear();
+  }
+  table.finish();
+  fmt::print(stderr, "{}: {} ticks\n", options.csv.string(), ticks.end - ticks.begin);
+}
+
+void write_scene(const Chosen& chosen, const ExportOptions& options, const std::filesystem::path& gltf) {
+  const SessionPictures& pictures = chosen.pictures;
+  const std::size_t count = chosen.frames.size();
+  const std::size_t each = std::max<std::size_t>(glb_bytes(pictures.surface(), 1) / 2, 1);
+  const std::size_t most = std::min(most_targets, most_scene_bytes / each);
+  if (count > most)
+    refuse(fmt::format("{} pictures were asked for as glTF", count), options, fmt::format("{}", most));
+  FileWriter file(gltf);
+  write_glb(file, pictures.name(), pictures.surface(), pictures.tool(), count,
+            [&](std::size_t k) { return chosen.picture(k); });
+  file.finish();
+  tell(options.gltf, chosen, file.bytes());
+}
+
+/// Ticks and, where there are any, pictures, with their description.
+void write_numbers(const RecordingFile& recording, const SessionPictures* pictures,
+                   const ExportOptions& options, const std::filesystem::path& hdf5) {
+  const TickRange ticks = choose_ticks(recording, options);
+  std::vector<std::int64_t> frames;
+  if (pictures != nullptr)
+    frames = choose(*pictures, options, options.fps.value_or(std::numeric_limits<double>::infinity()));
+  write_hdf5(hdf5, recording, ticks, frames, [&](std::int64_t k) { return pictures->picture(k).frame; });
+  std::vector<double> times;
+  for (const std::int64_t k : frames) times.push_back(pictures->time(k));
+  if (frames.empty()) {
+    std::filesystem::remove(xdmf_path(hdf5));  // of an earlier one
+  } else {
+    write_xdmf(hdf5, recording.surface(), times);
+  }
+  fmt::print(stderr, "{}: {} ticks, {} pictures\n", options.hdf5.string(), ticks.end - ticks.begin,
+             frames.size());
 }
 
 }  // namespace
@@ -176,38 +238,32 @@ void write_ticks(const ExportOptions& options, const std::filesystem::path& csv)
 int export_session(const ExportOptions& options) {
   OutputPaths paths(options.force);
   paths.add_input(options.recording, "the recording");
-  paths.add_input(parts_folder(options.recording), "the recording's parts");
   const auto output = [&](const std::filesystem::path& file, OutputKind kind, const char* option) {
     return file.empty() ? file : paths.add(file, kind, option);
   };
   const std::filesystem::path html = output(options.html, OutputKind::page, "--html"),
                               gltf = output(options.gltf, OutputKind::scene, "--gltf"),
                               vtu = output(options.vtu, OutputKind::series, "--vtu"),
-                              csv = output(options.csv, OutputKind::ticks, "--csv");
+                              csv = output(options.csv, OutputKind::ticks, "--csv"),
+                              hdf5 = output(options.hdf5, OutputKind::hdf5, "--hdf5");
+  if (!hdf5.empty()) paths.add(xdmf_path(hdf5), OutputKind::frames, "--hdf5");
   if (!vtu.empty()) expect_only_frames(frames_folder(vtu), options.force);
-  if (!csv.empty()) write_ticks(options, csv);
-  if (html.empty() && gltf.empty() && vtu.empty()) return exit_ok;
 
-  const SessionPictures pictures(options.recording);
-  const Chosen chosen{pictures, choose(pictures, options)};
+  const RecordingFile recording(options.recording);
+  if (!csv.empty()) write_table(recording, options, csv);
+  const bool shows = !html.empty() || !gltf.empty() || !vtu.empty();
+  std::optional<SessionPictures> pictures;
+  if (shows || (!hdf5.empty() && !recording.pictures().empty())) pictures.emplace(options.recording);
+  if (!hdf5.empty()) write_numbers(recording, pictures ? &*pictures : nullptr, options, hdf5);
+  if (!shows) return exit_ok;
+  const Chosen chosen{*pictures, choose(*pictures, options, options.fps.value_or(usual_fps))};
   if (!html.empty()) {
-    const std::string page = html_page(chosen);
+    const std::string page = html_page(chosen, options);
     write_file(html, page);
     tell(options.html, chosen, page.size());
   }
-  if (gltf.empty() && vtu.empty()) return exit_ok;
-  const std::vector<SurfacePicture> all = chosen.read();
-  if (!gltf.empty()) {
-    if (chosen.frames.size() > most_targets) {
-      throw Error(
-          fmt::format("{} pictures were asked for as glTF", chosen.frames.size()), options.recording.string(),
-          fmt::format("ask for at most {} by a lower --fps, or a part by --from and --to", most_targets));
-    }
-    const std::string scene = glb_of(pictures.name(), pictures.surface(), pictures.tool(), all);
-    write_file(gltf, scene);
-    tell(options.gltf, chosen, scene.size());
-  }
-  if (!vtu.empty()) tell(options.vtu, chosen, write_series(vtu, pictures.scene(), all));
+  if (!gltf.empty()) write_scene(chosen, options, gltf);
+  if (!vtu.empty()) tell(options.vtu, chosen, write_series(vtu, chosen));
   return exit_ok;
 }
 

@@ -114,19 +114,19 @@ CLI::App* add_devices(CLI::App& app, Arguments& arguments) {
 
 CLI::App* add_session(CLI::App& app, Arguments& arguments) {
   CLI::App* session = app.add_subcommand("session", "print what a recording contains");
-  session->add_option("SESSION.h5", arguments.file, "recording of play")->required()->type_name("");
+  session->add_option("SESSION.mcap", arguments.file, "recording of play")->required()->type_name("");
   session->add_flag("--json", arguments.json, "print JSON");
   session->add_flag("--finish", arguments.finish, "add its index to a recording whose run was killed");
   session->footer(
       "Example:\n"
-      "  palpate-runtime session touch.h5");
+      "  palpate-runtime session touch.mcap");
   return session;
 }
 
 CLI::App* add_view(CLI::App& app, Arguments& arguments) {
   CLI::App* view = app.add_subcommand(
       "view", "show a recording in a browser, two side by side, or all that is in a folder");
-  view->add_option("SESSION.h5|FOLDER", arguments.recordings,
+  view->add_option("SESSION.mcap|FOLDER", arguments.recordings,
                    "recording; two are shown side by side; or a folder, the current one without, whose "
                    "bodies and recordings are shown to choose from")
       ->expected(1, 2)
@@ -139,8 +139,8 @@ CLI::App* add_view(CLI::App& app, Arguments& arguments) {
       "To touch a model itself: palpate-runtime play FILE --view\n"
       "Examples:\n"
       "  palpate-runtime view\n"
-      "  palpate-runtime view touch.h5\n"
-      "  palpate-runtime view coarse.h5 fine.h5");
+      "  palpate-runtime view touch.mcap\n"
+      "  palpate-runtime view coarse.mcap fine.mcap");
   return view;
 }
 
@@ -151,8 +151,8 @@ std::string check_number(const std::string& text) {
 
 CLI::App* add_export(CLI::App& app, ExportOptions& options) {
   CLI::App* exported = app.add_subcommand(
-      "export", "write a recording as a web page, a glTF scene, for ParaView or as a table");
-  exported->add_option("SESSION.h5", options.recording, "recording")->required()->type_name("");
+      "export", "write a recording as a web page, a glTF scene, for ParaView, as HDF5 or as a table");
+  exported->add_option("SESSION.mcap", options.recording, "recording")->required()->type_name("");
   CLI::Option_group* outputs = exported->add_option_group("outputs", "one of them at least");
   outputs->add_option("--html", options.html, "one web page that needs no program")->type_name("OUT.html");
   outputs
@@ -163,9 +163,13 @@ CLI::App* add_export(CLI::App& app, ExportOptions& options) {
                    "a collection for ParaView; its pictures go into the folder OUT.frames")
       ->type_name("OUT.pvd");
   outputs->add_option("--csv", options.csv, "the ticks as a table")->type_name("OUT.csv");
-  outputs->require_option(1, 4);
+  outputs
+      ->add_option("--hdf5", options.hdf5,
+                   "ticks and pictures for h5py and MATLAB, with OUT.xdmf for ParaView beside it")
+      ->type_name("OUT.h5");
+  outputs->require_option(1, 5);
   exported->add_flag("--force", options.force, force_help);
-  exported->add_option("--fps", options.fps, "most pictures per second; default: 30")
+  exported->add_option("--fps", options.fps, "most pictures per second; default: 30, and all for --hdf5")
       ->option_text("N")
       ->check(CLI::PositiveNumber)
       ->check(check_number);
@@ -179,8 +183,8 @@ CLI::App* add_export(CLI::App& app, ExportOptions& options) {
       ->check(check_number);
   exported->footer(
       "Example:\n"
-      "  palpate-runtime export touch.h5 --html touch.html\n"
-      "  palpate-runtime export touch.h5 --gltf touch.glb --fps 10");
+      "  palpate-runtime export touch.mcap --html touch.html\n"
+      "  palpate-runtime export touch.mcap --gltf touch.glb --fps 10");
   return exported;
 }
 
@@ -223,7 +227,7 @@ constexpr std::string_view commands = "push, play, view, probe, session, export 
 std::string meant_by(const CLI::App& app, const std::string& word) {
   if (word.empty() || word.starts_with('-') || find_command(app, word) != nullptr) return "";
   const std::string see = "See palpate-runtime --help";
-  if (word.ends_with(".h5")) return "palpate-runtime view " + shell_word(word) + " shows a recording. " + see;
+  if (word.ends_with(".mcap")) return "palpate-runtime view " + shell_word(word) + " shows a recording. " + see;
   if (word.ends_with(".hdf"))
     return "palpate-runtime play " + shell_word(word) + " --view shows it and lets you push it. " + see;
   if (word.ends_with(".toml"))

@@ -41,7 +41,7 @@ void add_input(CLI::App& play, PlayArguments& arguments) {
                   "what moves the tool: a CSV with the columns t,x,y,z[,qw,qx,qy,qz][,grab] (s, m, "
                   "quaternion, 0 or 1); a recording; a HID device (palpate-runtime devices lists them); "
                   "another process; or, with --view, the pointer in the browser, which is then the default")
-      ->type_name("script:TOUCH.csv|replay:SESSION.h5|hid[:WHICH]|bridge[:[ADDRESS:]PORT]|mouse")
+      ->type_name("script:TOUCH.csv|replay:SESSION.mcap|hid[:WHICH]|bridge[:[ADDRESS:]PORT]|mouse")
       ->group(input_group);
   play.add_option("--profile", arguments.profile,
                   "profile of the HID device if its ids do not tell: a built-in name or a file")
@@ -59,7 +59,7 @@ void add_viewer(CLI::App& play, PlayArguments& arguments) {
       ->group(viewer_group);
   play.add_flag("--view-framed", arguments.view_framed, view_framed_help)->group(viewer_group);
   play.add_option("--beside", arguments.beside, "with --view: a recording that is shown beside the body")
-      ->type_name("SESSION.h5")
+      ->type_name("SESSION.mcap")
       ->group(viewer_group);
   play.add_option(
           "--igtl", arguments.igtl,
@@ -91,8 +91,8 @@ void add_loop(CLI::App& play, PlayArguments& arguments) {
 }
 
 void add_outputs(CLI::App& play, PlayArguments& arguments) {
-  play.add_option("--record", arguments.record, "record every tick in this HDF5 file")
-      ->type_name("OUT.h5")
+  play.add_option("--record", arguments.record, "record every tick in this MCAP file")
+      ->type_name("OUT.mcap")
       ->group(output_group);
   play.add_option("--record-frames", arguments.record_frames,
                   "how often the surface is recorded [1/s]; 0: never; default: 60")
@@ -159,7 +159,7 @@ DeviceChoice read_device(const std::string& text, const std::string& profile) {
     return {.kind = kind, .target = target, .profile = profile, .text = text};
   }
   throw CLI::ValidationError("--device", "'" + text +
-                                             "' is none of script:FILE.csv, replay:SESSION.h5, hid[:WHICH], "
+                                             "' is none of script:FILE.csv, replay:SESSION.mcap, hid[:WHICH], "
                                              "bridge[:[ADDRESS:]PORT] and, with --view, mouse");
 }
 
@@ -252,8 +252,8 @@ CLI::App* add_play(CLI::App& app, PlayArguments& arguments) {
       "\nExamples:\n"
       "  palpate-runtime play liver.palpate.hdf --view --tool sphere:0.008\n"
       "  palpate-runtime play liver.palpate.hdf --device script:touch.csv --tool sphere:0.005 --record "
-      "touch.h5\n"
-      "  palpate-runtime play liver.palpate.hdf --device replay:touch.h5\n"
+      "touch.mcap\n"
+      "  palpate-runtime play liver.palpate.hdf --device replay:touch.mcap\n"
       "  palpate-runtime play block.palpate.hdf --view --solver corotational --free yes \\\n"
       "      --gravity 0,0,-9.81 --floor -0.05 --yield 0.05\n"
       "  palpate-runtime play liver.palpate.hdf --device hid --profile polhem_v1 --tool sphere:0.008 "

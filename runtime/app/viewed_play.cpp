@@ -25,14 +25,14 @@ namespace {
 constexpr auto state_period = std::chrono::milliseconds(500);
 constexpr auto pause_for_wishes = std::chrono::milliseconds(20);
 
-/// FILE-STEM-YYYYmmdd-HHMMSS.h5 in the working directory; with a number where that is there already.
+/// FILE-STEM-YYYYmmdd-HHMMSS.mcap in the working directory; with a number where that is there already.
 std::filesystem::path name_recording(const std::filesystem::path& model) {
   std::filesystem::path stem = model.stem();  // without .hdf
   if (stem.extension() == ".palpate") stem = stem.stem();
   const std::string name =
       fmt::format("{}-{:%Y%m%d-%H%M%S}", stem.string(), fmt::localtime(std::time(nullptr)));
-  std::filesystem::path path = name + ".h5";
-  for (int k = 2; std::filesystem::exists(path); ++k) path = fmt::format("{}-{}.h5", name, k);
+  std::filesystem::path path = name + ".mcap";
+  for (int k = 2; std::filesystem::exists(path); ++k) path = fmt::format("{}-{}.mcap", name, k);
   return path;
 }
 

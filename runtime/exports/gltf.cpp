@@ -117,8 +117,16 @@ std::vector<std::uint32_t> corners_of(const std::vector<Index>& simplices) {
   return {simplices.begin(), simplices.end()};
 }
 
+/// When each picture was taken, and where the tool was.
+struct Moments {
+  std::vector<double> times;
+  std::vector<ToolPose> tools;
+};
+
 /// The surface at rest without loads; its targets are the pictures.
-json surface_mesh(const RecordedSurface& surface, std::span<const SurfacePicture> pictures, Buffer& buffer) {
+json surface_mesh(const RecordedSurface& surface, std::size_t pictures,
+                  const std::function<SurfacePicture(std::size_t)>& picture_of, Moments& moments,
+                  Buffer& buffer) {
   const bool is_solid = surface.corners == 3;
   const std::vector<Vec3> normals = is_solid ? normals_of(surface, surface.nodes) : std::vector<Vec3>{};
   json primitive = {{"attributes", {{"POSITION", buffer.add(floats_of(surface.nodes), 3, vertex_buffer)}}},
@@ -126,14 +134,17 @@ json surface_mesh(const RecordedSurface& surface, std::span<const SurfacePicture
                     {"material", 0}};
   if (is_solid) primitive["attributes"]["NORMAL"] = buffer.add(floats_of(normals), 3, vertex_buffer);
   primitive["indices"] = buffer.add(corners_of(surface.simplices));
-  for (const SurfacePicture& picture : pictures) {
+  for (std::size_t k = 0; k < pictures; ++k) {
+    const SurfacePicture picture = picture_of(k);
+    moments.times.push_back(picture.frame.time);
+    moments.tools.push_back(picture.tool);
     const std::vector<Vec3> places = displaced(surface, picture.frame);
     json target = {{"POSITION", buffer.add(picture.frame.displacement, 3, vertex_buffer)}};
     if (is_solid)
       target["NORMAL"] = buffer.add(change(normals, normals_of(surface, places)), 3, vertex_buffer);
     primitive["targets"].push_back(target);
   }
-  Floats weights(pictures.size(), 0.0F);
+  Floats weights(pictures, 0.0F);
   weights.front() = 1.0F;
   return {{"name", "surface"}, {"primitives", json::array({primitive})}, {"weights", weights}};
 }
@@ -148,14 +159,13 @@ json mesh_of_tool(const ToolMesh& mesh, Buffer& buffer) {
 }
 
 /// In each picture its own target, and the tool where it was.
-json animation(std::span<const SurfacePicture> pictures, int surface_node, int tool_node, Buffer& buffer) {
-  Floats times, weights, places, turns;
-  const double begin = pictures.front().frame.time;
-  for (std::size_t k = 0; k < pictures.size(); ++k) {
-    times.push_back(static_cast<float>(pictures[k].frame.time - begin));
-    weights.resize(weights.size() + pictures.size(), 0.0F);
-    weights[k * pictures.size() + k] = 1.0F;
-    const ToolPose& tool = pictures[k].tool;
+json animation(const Moments& moments, int surface_node, int tool_node, Buffer& buffer) {
+  const std::size_t pictures = moments.times.size();
+  Floats times, weights(pictures * pictures, 0.0F), places, turns;
+  for (std::size_t k = 0; k < pictures; ++k) {
+    times.push_back(static_cast<float>(moments.times[k] - moments.times.front()));
+    weights[k * pictures + k] = 1.0F;
+    const ToolPose& tool = moments.tools[k];
     for (const double x : tool.position) places.push_back(static_cast<float>(x));
     for (const double x : tool.orientation.coeffs()) turns.push_back(static_cast<float>(x));  // x, y, z, w
   }
@@ -175,17 +185,25 @@ void append(std::string& bytes, std::uint32_t number) {
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(number >> shift & 0xFFU);
 }
 
-void append_chunk(std::string& bytes, const char* kind, std::string chunk, char filling) {
+/// Head of a chunk of so many bytes.
+std::string chunk_head(const char* kind, std::size_t bytes) {
+  std::string head;
+  append(head, static_cast<std::uint32_t>(bytes));
+  return head.append(kind, 4);
+}
+
+void fill_up(std::string& chunk, char filling) {
   chunk.resize((chunk.size() + 3) / 4 * 4, filling);
-  append(bytes, static_cast<std::uint32_t>(chunk.size()));
-  bytes.append(kind, 4);
-  bytes += chunk;
 }
 
 }  // namespace
 
-std::string glb_of(const std::string& name, const RecordedSurface& surface, const Tool& tool,
-                   std::span<const SurfacePicture> pictures) {
+std::size_t glb_bytes(const RecordedSurface& surface, std::size_t pictures) noexcept {
+  return sizeof(float) * 3 * surface.nodes.size() * (pictures + 1) * (surface.corners == 3 ? 2 : 1);
+}
+
+void write_glb(FileWriter& file, const std::string& name, const RecordedSurface& surface, const Tool& tool,
+               std::size_t pictures, const std::function<SurfacePicture(std::size_t)>& picture) {
   Eigen::AlignedBox3d bounds;
   for (const Vec3& node : surface.nodes) bounds.extend(node);
   Buffer buffer;
@@ -200,19 +218,25 @@ std::string glb_of(const std::string& name, const RecordedSurface& surface, cons
   scene["materials"] = json::array(
       {material("body", {0.62, 0.24, 0.2, 1.0}, 0.45), material("tool", {0.75, 0.77, 0.8, 1.0}, 0.3)});
   const ToolMesh seen_tool = tool_mesh(tool, point_share * bounds.diagonal().norm());
-  scene["meshes"] = json::array({surface_mesh(surface, pictures, buffer), mesh_of_tool(seen_tool, buffer)});
-  scene["animations"] = json::array({animation(pictures, 1, 2, buffer)});
+  Moments moments;
+  json body = surface_mesh(surface, pictures, picture, moments, buffer);
+  scene["meshes"] = json::array({std::move(body), mesh_of_tool(seen_tool, buffer)});
+  scene["animations"] = json::array({animation(moments, 1, 2, buffer)});
   scene["bufferViews"] = buffer.views;
   scene["accessors"] = buffer.accessors;
   scene["buffers"] = json::array({{{"byteLength", buffer.bytes.size()}}});
 
-  std::string chunks;
-  append_chunk(chunks, "JSON", scene.dump(), ' ');
-  append_chunk(chunks, "BIN\0", std::move(buffer.bytes), '\0');
-  std::string file = "glTF";
-  append(file, 2);
-  append(file, static_cast<std::uint32_t>(glb_header + chunks.size()));
-  return file + chunks;
+  std::string text = scene.dump();
+  fill_up(text, ' ');
+  fill_up(buffer.bytes, '\0');
+  constexpr std::size_t head_bytes = 8;  // of a chunk
+  std::string head = "glTF";
+  append(head, 2);
+  append(head, static_cast<std::uint32_t>(glb_header + 2 * head_bytes + text.size() + buffer.bytes.size()));
+  file.write(head + chunk_head("JSON", text.size()));
+  file.write(text);
+  file.write(chunk_head("BIN\0", buffer.bytes.size()));
+  file.write(buffer.bytes);
 }
 
 }  // namespace palpate

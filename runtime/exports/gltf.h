@@ -1,19 +1,25 @@
 // A recording as a glTF 2.0 scene, for Blender, game engines and browsers.
 #pragma once
 
-#include <span>
+#include <cstddef>
+#include <functional>
 #include <string>
 
+#include "base/write_file.h"
 #include "formats/recording.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/touch/tool.h"
 
 namespace palpate {
 
-/// Bytes of a .glb file: the surface with a morph target for each picture, the tool, and an animation that
+/// Writes a .glb file: the surface with a morph target for each picture, the tool, and an animation that
 /// moves both, with lengths in metres. Between two pictures the surface goes straight. The body's z becomes
-/// glTF's y, which is up there. In the plane the surface is lines. `pictures`: at least one, times ascending.
-[[nodiscard]] std::string glb_of(const std::string& name, const RecordedSurface& surface, const Tool& tool,
-                                 std::span<const SurfacePicture> pictures);
+/// glTF's y, which is up there. In the plane the surface is lines. `picture` gives each of `pictures`, at
+/// least one, one after the other, times ascending. Throws Error where that or `file` does.
+void write_glb(FileWriter& file, const std::string& name, const RecordedSurface& surface, const Tool& tool,
+               std::size_t pictures, const std::function<SurfacePicture(std::size_t)>& picture);
+
+/// Bytes of the binary part of so many pictures.
+[[nodiscard]] std::size_t glb_bytes(const RecordedSurface& surface, std::size_t pictures) noexcept;
 
 }  // namespace palpate

@@ -108,7 +108,7 @@ bool GalleryAnswers::brings_file(const RequestHeader& request) {
 std::optional<Response> GalleryAnswers::drop_refusal(const RequestHeader& request) {
   if (gallery_kind(name_in(request))) return std::nullopt;
   return guarded(plain(http::status::unsupported_media_type,
-                       "This is neither a body (.palpate.hdf), a recording (.h5), a surface (.stl, .obj, "
+                       "This is neither a body (.palpate.hdf), a recording (.mcap), a surface (.stl, .obj, "
                        ".ply, .off), a labelled image (.nrrd, .nii, .inr) nor a picture (.png, .pbm)."));
 }
 

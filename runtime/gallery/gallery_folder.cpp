@@ -20,7 +20,7 @@ constexpr std::size_t longest_name = 200;
 
 constexpr std::array<std::pair<std::string_view, GalleryKind>, 15> endings = {{
     {".palpate.hdf", GalleryKind::body},
-    {".h5", GalleryKind::recording},
+    {".mcap", GalleryKind::recording},
     {".stl", GalleryKind::source},
     {".obj", GalleryKind::source},
     {".ply", GalleryKind::source},

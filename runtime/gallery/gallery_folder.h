@@ -13,7 +13,7 @@ namespace palpate {
 /// Told by the name's ending.
 enum class GalleryKind : std::uint8_t {
   body,       ///< NAME.palpate.hdf
-  recording,  ///< SESSION.h5
+  recording,  ///< SESSION.mcap
   source,     ///< what palpate-runtime push makes a body of: a surface, a labelled image, a description
 };
 

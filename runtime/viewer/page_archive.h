@@ -15,6 +15,8 @@ class PageArchive {
   void add_text(std::string_view json) { add(json, 0); }
   void add_binary(std::string_view bytes) { add(bytes, 1); }
 
+  [[nodiscard]] std::size_t bytes() const noexcept { return messages_.size(); }
+
   /// `page` with all messages in it: deflated, as base64, in a script element "palpate-session" that no
   /// browser runs.
   [[nodiscard]] std::string page(std::string_view page) const;

@@ -46,10 +46,10 @@ test('a body is chosen, left, and a recording chosen', async (t) => {
   const page = await visit(t, served.url, { is_drawn: true });
   const picture = (name) => item(page, name).locator('img');
   await picture('cube.palpate.hdf').waitFor();
-  await picture('push.h5').waitFor();
-  assert.deepEqual(await shown(page), ['broken.palpate.hdf', 'cube.palpate.hdf', 'model.palpate.hdf', 'push.h5', 'lump.obj']);
+  await picture('push.mcap').waitFor();
+  assert.deepEqual(await shown(page), ['broken.palpate.hdf', 'cube.palpate.hdf', 'model.palpate.hdf', 'push.mcap', 'lump.obj']);
   assert.match(await item(page, 'broken.palpate.hdf').locator('.problem').innerText(), /broken\.palpate\.hdf: the file is truncated/);
-  const [rest, same, pressed] = await Promise.all(['cube.palpate.hdf', 'model.palpate.hdf', 'push.h5'].map((name) => picture(name).getAttribute('src')));
+  const [rest, same, pressed] = await Promise.all(['cube.palpate.hdf', 'model.palpate.hdf', 'push.mcap'].map((name) => picture(name).getAttribute('src')));
   assert.equal(rest, same);
   assert.notEqual(rest, pressed); // where it felt most
   const colours = await page.evaluate(async (url) => {
@@ -69,11 +69,11 @@ test('a body is chosen, left, and a recording chosen', async (t) => {
   const port = new URL(page.url()).port;
 
   await part(page, 'to-gallery').click();
-  await item(page, 'push.h5').click();
+  await item(page, 'push.mcap').click();
   await ready(page);
-  assert.equal((await told(page, 'state')).session, 'push.h5');
+  assert.equal((await told(page, 'state')).session, 'push.mcap');
   const left = children_of(served.child.pid);
-  assert.ok(left.length === 1 && left[0].includes('push.h5'), left.join('; '));
+  assert.ok(left.length === 1 && left[0].includes('push.mcap'), left.join('; '));
   assert.equal(new URL(page.url()).port, port); // so that the page finds what it keeps
   await served.stop();
   await assert.rejects(fetch(page.url()));
@@ -92,7 +92,7 @@ test('what cannot be opened is told with its reason', async (t) => {
   await until(page, () => /lump.obj cannot be shown/.test(document.querySelector('[data-testid="opening"] h2')?.textContent));
   assert.match(await opening.innerText(), /error: .*lump\.obj/);
   await part(page, 'close').click();
-  assert.deepEqual(await shown(page), ['broken.palpate.hdf', 'cube.palpate.hdf', 'model.palpate.hdf', 'push.h5', 'lump.obj']);
+  assert.deepEqual(await shown(page), ['broken.palpate.hdf', 'cube.palpate.hdf', 'model.palpate.hdf', 'push.mcap', 'lump.obj']);
 });
 
 test('a file that is dropped lands in the folder and is opened', async (t) => {
@@ -182,7 +182,7 @@ for (const [width, height, hasTouch, colorScheme] of [[360, 640, true, 'light'],
   test(`the gallery is laid out in ${width} × ${height}, ${colorScheme}`, async (t) => {
     const { served } = await gallery(t);
     const page = await visit(t, served.url, { viewport: { width, height }, hasTouch, colorScheme });
-    await item(page, 'push.h5').locator('img').waitFor();
+    await item(page, 'push.mcap').locator('img').waitFor();
     assert.deepEqual(await faults_of_layout(page, hasTouch ? 44 : 24), []);
     assert.deepEqual(await barriers(page), []);
     await part(page, 'draw').click();

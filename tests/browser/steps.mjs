@@ -64,7 +64,7 @@ export async function recorded(t, at, radius = 0, ...options) {
   const touch = path.join(at, 'touch.csv');
   const row = (time, z) => `${time},0.5,0.5,${z + radius}\n`;
   await writeFile(touch, `t,x,y,z\n${row(0, 1.1)}${row(0.5, 0.95)}${row(1, 0.95)}${row(1.5, 1.1)}`);
-  const session = path.join(at, 'push.h5');
+  const session = path.join(at, 'push.mcap');
   const tool = radius > 0 ? `sphere:${radius}` : 'point';
   await run(runtime, ['play', file, '--device', `script:${touch}`, '--fast', '--record', session, '--tool', tool, ...options], { cwd: at });
   return session;

@@ -71,7 +71,7 @@ class Clients(unittest.TestCase):
     def test_record_what_a_replay_repeats_to_the_last_bit(self):
         felt = []
         for k, (language, client) in enumerate(self.clients.items()):
-            recording = self.folder / f"by_{k}.h5"
+            recording = self.folder / f"by_{k}.mcap"
             lines = done(*client, self.cube, recording, input=poses(), env=environment()).splitlines()[:-1]
             replay = run(RUNTIME, "play", self.cube, "--device", f"replay:{recording}", "--fast", cwd=self.folder)
             self.assertEqual(replay.returncode, 0, f"{language}: {replay.stderr}")
@@ -86,10 +86,10 @@ class Clients(unittest.TestCase):
     def test_a_recording_that_cannot_be_made_is_told(self):
         told = {}
         for language, client in self.clients.items():
-            result = run(*client, self.cube, self.folder / "no" / "such.h5", input="", env=environment())
+            result = run(*client, self.cube, self.folder / "no" / "such.mcap", input="", env=environment())
             self.assertNotEqual(result.returncode, 0, language)
             told[language] = result.stderr
-            self.assertIn("no/such.h5", result.stderr, language)
+            self.assertIn("no/such.mcap", result.stderr, language)
 
     def test_say_the_same_of_what_is_wrong(self):
         told = {}

@@ -10,11 +10,10 @@ import subprocess
 import time
 import unittest
 
-import h5py
 import numpy
 
 from bridge_key import key_file, read_key, seal
-from programs import BINARY, RUNTIME, ProgramTest, cube_toml, recorded, run
+from programs import BINARY, RUNTIME, ProgramTest, cube_toml, palpate, recorded, run
 
 BRIDGE = BINARY / "runtime" / "palpate-bridge-example"
 SPRING = 300.0  # of the example's hand [N/m]
@@ -51,18 +50,18 @@ class Felt(ProgramTest):
 
     def play(self, *arguments):
         return self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--tool", "sphere:0.01", "--origin",
-                          "0.05,0.05,0.12", "--safety", PATIENT, "--record", "session.h5", "--report", "report.json", *arguments)
+                          "0.05,0.05,0.12", "--safety", PATIENT, "--record", "session.mcap", "--report", "report.json", *arguments)
 
     def hand(self, seconds, depth, period=0.0, start=0.0):
         return self.start(BRIDGE, "--port", self.port, "--seconds", seconds, "--rate", 1000, "--from", f"0,0,{start}", "--to",
                           f"0,0,{-depth}", "--period", period)
 
     def recorded(self, field):
-        return recorded(self.folder / "session.h5", field)
+        return recorded(self.folder / "session.mcap", field)
 
     def shown(self):
         """The size of the force on the hand in each tick up to now."""
-        return numpy.linalg.norm(numpy.reshape(self.recorded("ticks/shown_force"), (-1, 3)), axis=1)
+        return numpy.linalg.norm(numpy.reshape(self.recorded("shown_force"), (-1, 3)), axis=1)
 
     def finish(self, process, code=0):
         _, messages = process.communicate(timeout=120)
@@ -79,12 +78,12 @@ class Felt(ProgramTest):
         self.assertEqual(report["ticks"], 4000)
         self.assertGreater(report["ticks_in_contact"], 1000)
         self.assertEqual(sum(report["safety"]["faults"].values()), 0)
-        with h5py.File(self.folder / "session.h5") as session:
-            ticks = session["ticks"]
-            end = slice(3800, 4000)
-            z, force = ticks["handle_position"][end, 2], ticks["shown_force"][end, 2]
-            shown, computed = ticks["shown_force"][end], ticks["force"][end]
-            t = ticks["arrived_ns"][end] * 1e-9
+        session = palpate.read(self.folder / "session.mcap")
+        ticks = session
+        end = slice(3800, 4000)
+        z, force = ticks["handle_position"][end, 2], ticks["shown_force"][end, 2]
+        shown, computed = ticks["shown_force"][end], ticks["force"][end]
+        t = ticks["arrived_ns"][end] * 1e-9
         numpy.testing.assert_allclose(shown, -computed, rtol=1e-9, atol=1e-9)
         self.assertGreater(force.min(), 0.3)
         # The target of the hand began its way when the bridge was started, a little before the loop: its spring's force
@@ -98,22 +97,22 @@ class Felt(ProgramTest):
     def test_a_killed_session_opens_and_its_replay_is_the_same_bit_by_bit(self):
         runtime = self.play("--overlay", "r=2,rings=1")
         self.hand(60, 0.03, 1.5)
-        self.wait_for(lambda: len(force := self.recorded("ticks/force")) >= 2500 and numpy.abs(force).max() > 0.1, runtime)
+        self.wait_for(lambda: len(force := self.recorded("force")) >= 2500 and numpy.abs(force).max() > 0.1, runtime)
         runtime.send_signal(signal.SIGKILL)
         runtime.wait()
-        with h5py.File(self.folder / "session.h5") as session:
-            force = session["ticks/force"][:]
+        session = palpate.read(self.folder / "session.mcap")
+        force = session["force"]
         self.assertGreaterEqual(len(force), 2500)
         self.assertGreater(numpy.abs(force).max(), 0.1)
-        replay = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--record", "again.h5", "--report", "-", cwd=self.folder)
+        replay = run(RUNTIME, "play", self.file, "--device", "replay:session.mcap", "--fast", "--record", "again.mcap", "--report", "-", cwd=self.folder)
         self.assertEqual(replay.returncode, 0, replay.stderr)
         report = json.loads(replay.stdout)
         self.assertEqual((report["replay"]["ticks"], report["replay"]["different_ticks"]), (len(force), 0), replay.stderr)
         self.assertIsNone(report["replay"]["first_different_tick"])
-        with h5py.File(self.folder / "again.h5") as again:
-            numpy.testing.assert_array_equal(again["ticks/force"][:], force)
+        again = palpate.read(self.folder / "again.mcap")
+        numpy.testing.assert_array_equal(again["force"], force)
         # It is a comparison: with another tool it is another session.
-        other = run(RUNTIME, "play", self.file, "--device", "replay:session.h5", "--fast", "--tool", "sphere:0.012", "--report", "-", cwd=self.folder)
+        other = run(RUNTIME, "play", self.file, "--device", "replay:session.mcap", "--fast", "--tool", "sphere:0.012", "--report", "-", cwd=self.folder)
         self.assertEqual(other.returncode, 3, other.stderr)
         told = json.loads(other.stdout)["replay"]
         self.assertGreater(told["different_ticks"], 100)
@@ -125,9 +124,9 @@ class Felt(ProgramTest):
         self.wait_for(lambda: (self.shown() > 0.1).any(), runtime)
         first.kill()
         first.wait()
-        self.wait_for(lambda: numpy.any(self.recorded("ticks/fault")), runtime)
+        self.wait_for(lambda: numpy.any(self.recorded("fault")), runtime)
         self.hand(600, 0.03, 1.0)
-        gone = numpy.nonzero(self.recorded("ticks/fault"))[0][0]
+        gone = numpy.nonzero(self.recorded("fault"))[0][0]
         self.wait_for(lambda: (self.shown()[gone:] > 0.1).any(), runtime)
         runtime.send_signal(signal.SIGINT)
         messages = self.finish(runtime, 130)
@@ -135,9 +134,9 @@ class Felt(ProgramTest):
         self.assertIn("the device is back", messages)
         report = json.loads((self.folder / "report.json").read_text())
         self.assertEqual(report["device"]["opened_again"], 1)
-        with h5py.File(self.folder / "session.h5") as session:
-            shown = numpy.linalg.norm(session["ticks/shown_force"][:], axis=1)
-            fault = session["ticks/fault"][:]
+        session = palpate.read(self.folder / "session.mcap")
+        shown = numpy.linalg.norm(session["shown_force"], axis=1)
+        fault = session["fault"]
         gone, = numpy.nonzero(fault)
         self.assertEqual(shown[gone].max(), 0)
         self.assertGreater(shown[: gone[0]].max(), 0.1)
@@ -156,15 +155,15 @@ class Felt(ProgramTest):
 
     def fault_is_acknowledged(self, acknowledge):
         runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--origin", "0.05,0.05,0.12", "--safety",
-                             CALM + ",max_speed=0.1", "--record", "session.h5", "--report", "report.json")
+                             CALM + ",max_speed=0.1", "--record", "session.mcap", "--report", "report.json")
         self.hand(600, 0.0, 3.5, 0.15)  # 0.13 m/s at most, at 0.9 s: free space all the way, slow for half of the time
-        self.wait_for(lambda: numpy.any(self.recorded("ticks/fault")), runtime)
+        self.wait_for(lambda: numpy.any(self.recorded("fault")), runtime)
 
         def acknowledged_for_long():
             """It must come while the hand is slow."""
             acknowledge(runtime)
             time.sleep(0.3)
-            fault, event = self.recorded("ticks/fault"), self.recorded("ticks/event")
+            fault, event = self.recorded("fault"), self.recorded("event")
             return any(len(fault) >= k + 400 and not fault[k : k + 400].any() for k in numpy.flatnonzero(numpy.bitwise_and(event, 4)))
 
         self.wait_for(acknowledged_for_long, runtime)
@@ -173,8 +172,8 @@ class Felt(ProgramTest):
         self.assertIn("no force, too_fast: the handle moved faster than max_speed. Press Enter to go on, or: kill -USR1 "
                       f"{runtime.pid}", messages)
         self.assertIn("acknowledged; force begins again out of contact", messages)
-        with h5py.File(self.folder / "session.h5") as session:
-            fault, event = session["ticks/fault"][:], session["ticks/event"][:]
+        session = palpate.read(self.folder / "session.mcap")
+        fault, event = session["fault"], session["event"]
         acknowledged, latched = numpy.flatnonzero(event & 4), numpy.flatnonzero(fault)
         self.assertEqual(set(fault[latched[0] : acknowledged[0]]), {1}, "nothing else ends it")
         ended = 1 + numpy.flatnonzero((fault[:-1] == 1) & (fault[1:] == 0))
@@ -227,8 +226,8 @@ class Felt(ProgramTest):
                 except OSError:
                     pass
                 self.assertEqual(struct.unpack_from("<I", last, 32)[0], 0, "the last word is no force")
-            with h5py.File(self.folder / "session.h5") as session:
-                self.assertGreater(len(session["ticks/time"]), 100)
+            session = palpate.read(self.folder / "session.mcap")
+            self.assertGreater(len(session["time"]), 100)
 
     def test_the_example_finds_the_body_by_itself(self):
         """docs/devices.md's two commands: without --to the hand goes down until it feels something."""
@@ -287,7 +286,7 @@ class Choice(ProgramTest):
                 (("--view", "--origin", "0,0,1"), ("--origin", "in the body's frame")),
                 (("--device", f"script:{script}", "--load-scale", "-1"), ("--load-scale", "not a number that is 0 or more")),
                 (("--device", f"script:{script}", "--stiffness-scale", "0"), ("--stiffness-scale", "not a number that is greater than 0")),
-                (("--device", "mouse-trap"), ("is none of script:FILE.csv, replay:SESSION.h5, hid[:WHICH]",)),
+                (("--device", "mouse-trap"), ("is none of script:FILE.csv, replay:SESSION.mcap, hid[:WHICH]",)),
                 (("--device", "script:"), ("is none of",)),
                 (("--device", "hid", "--fast"), ("--fast", "a hand cannot be run ahead of")),
                 (("--device", f"script:{script}", "--profile", "polhem_v1"), ("--profile", "--device hid")),
@@ -302,7 +301,7 @@ class Choice(ProgramTest):
             self.assertEqual(result.returncode, 2, f"{arguments}: {result.stderr}")
             for piece in pieces:
                 self.assertIn(piece, result.stderr)
-        for device, pieces in (("replay:none.h5", ("none.h5",)), (f"replay:{file}", ("is a model, not a recording",)),
+        for device, pieces in (("replay:none.mcap", ("none.mcap",)), (f"replay:{file}", ("is a model, not a recording",)),
                                ("bridge:70000", ("70000",)), ("bridge:1.2.3.4:4270", ("1.2.3.4",))):
             self.assert_refused(run(RUNTIME, "play", file, "--device", device, cwd=self.folder), *pieces)
         self.assert_refused(run(RUNTIME, "play", file, "--device", f"script:{script}", "--cpu", "4000", cwd=self.folder),
@@ -333,12 +332,12 @@ class Scripted(ProgramTest):
         forces = {}
         for rate in (1000, 5000):
             result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--rate", rate, "--fast",
-                         "--record", f"{rate}.h5", cwd=self.folder)
+                         "--record", f"{rate}.mcap", cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
-            with h5py.File(self.folder / f"{rate}.h5") as session:
-                self.assertEqual(session.attrs["rate"], rate)
-                self.assertEqual(len(session["ticks/time"]), 3 * rate // 10 + 1)
-                forces[rate] = session["ticks/force"][:: rate // 1000]
+            session = palpate.read(self.folder / f"{rate}.mcap")
+            self.assertEqual(session.rate, rate)
+            self.assertEqual(len(session["time"]), 3 * rate // 10 + 1)
+            forces[rate] = session["force"][:: rate // 1000]
         self.assertGreater(numpy.abs(forces[1000]).max(), 0.3)
         # The path is the same, so it differs by what a tick's motion is in the contact's linearisation.
         numpy.testing.assert_allclose(forces[5000], forces[1000], atol=0.02 * numpy.abs(forces[1000]).max())
@@ -346,18 +345,18 @@ class Scripted(ProgramTest):
     def test_safety_where_it_is_asked_for(self):
         file = self.bake(SMALL_CUBE)
         script = self.write("press.csv", "t,x,y,z\n0,0.05,0.05,0.12\n0.3,0.05,0.05,0.1\n0.8,0.05,0.05,0.1001\n")
-        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.h5", "--report", "-")
+        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.mcap", "--report", "-")
         plain = run(*common, cwd=self.folder)
         self.assertEqual(plain.returncode, 0, plain.stderr)
         self.assertNotIn("safety", json.loads(plain.stdout))
-        with h5py.File(self.folder / "a.h5") as session:
-            numpy.testing.assert_array_equal(session["ticks/shown_force"][:], -session["ticks/force"][:])
+        session = palpate.read(self.folder / "a.mcap")
+        numpy.testing.assert_array_equal(session["shown_force"], -session["force"])
         guarded = run(*common, "--safety", "max_force=0.2,ramp=0.1,max_damping=0", cwd=self.folder)
         self.assertEqual(guarded.returncode, 0, guarded.stderr)
         self.assertAlmostEqual(json.loads(guarded.stdout)["safety"]["largest_shown_N"], 0.2, places=12)
-        with h5py.File(self.folder / "a.h5") as session:
-            computed = numpy.linalg.norm(session["ticks/force"][:], axis=1)
-            shown = numpy.linalg.norm(session["ticks/shown_force"][:], axis=1)
+        session = palpate.read(self.folder / "a.mcap")
+        computed = numpy.linalg.norm(session["force"], axis=1)
+        shown = numpy.linalg.norm(session["shown_force"], axis=1)
         self.assertGreater(computed.max(), 0.4)
         numpy.testing.assert_allclose(shown[200:], numpy.minimum(computed, 0.2)[200:], atol=1e-6)
 

@@ -6,12 +6,11 @@ import re
 import time
 import unittest
 
-import h5py
 import numpy
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from programs import BINARY, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
+from programs import BINARY, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, palpate, run
 
 TIP = (0.3, 0.01, 0.015)
 
@@ -112,10 +111,10 @@ class Swing(ProgramTest):
             file = self.bake(beam_toml(method, ratio=0.4))
             force = {}
             for contact in ("quasi-static", "dynamic"):
-                report, _ = self.play(file, push, "--contact", contact, "--tool", "sphere:0.005", "--coupling", "300", "--record", "push.h5")
+                report, _ = self.play(file, push, "--contact", contact, "--tool", "sphere:0.005", "--coupling", "300", "--record", "push.mcap")
                 self.assertEqual(report["dynamics"]["contact"], contact)
-                with h5py.File(self.folder / "push.h5") as recording:
-                    force[contact] = -recording["ticks/force"][:, 1]  # on the body, downwards
+                recording = palpate.read(self.folder / "push.mcap")
+                force[contact] = -recording["force"][:, 1]  # on the body, downwards
             static = force["quasi-static"]
             self.assertGreater(static[-1], 0.05)
             self.assertAlmostEqual(static.max(), static[-1], delta=0.02 * static[-1])

@@ -1,6 +1,7 @@
-"""Recordings as other programs read them: glTF and grids by VTK's readers, the table by numpy."""
+"""Recordings as other programs read them: glTF and grids by VTK's readers, the table by numpy, HDF5 by h5py."""
 
 import json
+import re
 import struct
 import unittest
 import xml.etree.ElementTree
@@ -11,25 +12,25 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOGeometry import vtkGLTFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from programs import RUNTIME, SOURCE, ProgramTest, run
+from programs import RUNTIME, SOURCE, ProgramTest, palpate, pictures, run
 
 SCRIPT = "t,x,y,z\n0,0.5,0.5,1.25\n0.2,0.5,0.5,1.05\n0.4,0.7,0.5,1.05\n"
 
 
 class ExportTest(ProgramTest):
-    def record(self, tool="sphere:0.1", body="cube2", script=SCRIPT):
+    def record(self, tool="sphere:0.1", body="cube2", script=SCRIPT, options=()):
         self.write("script.csv", script)
         file = SOURCE / "tests" / "golden" / body / f"{body}.palpate.hdf"
-        done = run(RUNTIME, "play", file, "--device", "script:script.csv", "--tool", tool, "--fast", "--record", "touch.h5", cwd=self.folder)
+        done = run(RUNTIME, "play", file, "--device", "script:script.csv", "--tool", tool, "--fast", "--record", "touch.mcap", "--force",
+                   *options, cwd=self.folder)
         self.assertEqual(done.returncode, 0, done.stderr)
-        with h5py.File(self.folder / "touch.h5") as session:
-            self.rest = session["/surface/nodes"][:]
-            self.simplices = session["/surface/simplices"][:]
-            self.frames = {name: session[f"/frames/{name}"][:] for name in ("time", "displacement", "von_mises", "pressure")}
-            self.ticks = {name: session[f"/ticks/{name}"][:] for name in ("time", "tool_position", "force", "contacts", "status")}
+        shown = pictures(self.folder / "touch.mcap")
+        self.rest, self.simplices = shown["surface/nodes"], shown["surface/simplices"]
+        self.frames = {name: shown[f"frames/{name}"] for name in ("time", "displacement", "von_mises", "pressure")}
+        self.ticks = palpate.read(self.folder / "touch.mcap")
 
     def export(self, *arguments):
-        return run(RUNTIME, "export", "touch.h5", *arguments, cwd=self.folder)
+        return run(RUNTIME, "export", "touch.mcap", *arguments, cwd=self.folder)
 
     def exported(self, *arguments):
         done = self.export(*arguments)
@@ -216,10 +217,134 @@ class Table(ExportTest):
         self.write("mine.csv", "a,b\n1,2\n")
         self.assert_refused(self.export("--csv", "mine.csv"), "mine.csv")
         self.assertEqual((self.folder / "mine.csv").read_text(), "a,b\n1,2\n")
-        self.assert_refused(self.export("--gltf", "touch.h5"), "touch.h5")
+        self.assert_refused(self.export("--gltf", "touch.mcap"), "touch.mcap")
         asked_for_nothing = self.export()
         self.assertEqual(asked_for_nothing.returncode, 2)
         self.assertIn("--gltf", asked_for_nothing.stderr)
+
+
+def evaluate(item, folder):
+    """The numbers of an XDMF DataItem, by the format's description: HDF, HyperSlab and the Function that adds."""
+    kind, own = item.get("ItemType", "Uniform"), item.findall("DataItem")
+    if kind == "Function":
+        assert item.get("Function") == "$0 + $1" and len(own) == 2, item.attrib
+        values = evaluate(own[0], folder) + evaluate(own[1], folder)
+    elif kind == "HyperSlab":
+        start, stride, count = numpy.array(own[0].text.split(), int).reshape(3, -1)
+        whole = evaluate(own[1], folder)
+        values = whole[tuple(slice(s, s + n * by, by) for s, by, n in zip(start, stride, count))]
+    else:
+        file, dataset = item.text.strip().split(":")
+        with h5py.File(folder / file) as hdf:
+            values = hdf[dataset][:]
+    return values.reshape([int(size) for size in item.get("Dimensions").split()])
+
+
+class Hdf5(ExportTest):
+    def test_has_each_tick_and_what_the_run_was(self):
+        self.record()
+        self.assertRegex(self.exported("--hdf5", "touch.h5"), r"^touch\.h5: 401 ticks, \d+ pictures\n$")
+        with h5py.File(self.folder / "touch.h5") as hdf:
+            self.assertEqual(set(hdf["ticks"]), set(self.ticks))
+            for name, values in hdf["ticks"].items():
+                numpy.testing.assert_array_equal(values, self.ticks[name], name)
+                self.assertEqual(values.dtype, self.ticks[name].dtype, name)
+            self.assertEqual(hdf.attrs["format"], b"palpate-recording")
+            for name in ("generator", "model", "content_hash", "device", "options", "units"):
+                self.assertEqual(hdf.attrs[name].decode(), self.ticks.info[name])
+            self.assertEqual(hdf.attrs["rate"], 1000)
+            for name, values in self.ticks.surface.items():
+                numpy.testing.assert_array_equal(hdf["surface"][name], values, name)
+            told = hdf["frames/tick"][:]
+        looked_at = [message["tick"] for message in self.ticks.messages("/contacts")]
+        numpy.testing.assert_array_equal(told, looked_at)
+        self.assertEqual([file.name for file in self.folder.glob("*.partial*")], [])
+
+    def test_is_what_the_reference_says(self):
+        self.record()
+        self.exported("--hdf5", "touch.h5")
+        page = (SOURCE / "docs" / "reference" / "recording-fields.md").read_text()
+        rows = {name: rest.split(" | ") for name, rest in re.findall(r"^\| `([^`]+)` \| (.*) \|$", page, re.MULTILINE)}
+        with h5py.File(self.folder / "touch.h5") as hdf:
+            found = {}
+            hdf.visititems(lambda name, item: found.update({f"/{name}": item}) if isinstance(item, h5py.Dataset) else None)
+            self.assertEqual(set(rows), set(found) | set(hdf.attrs))
+            for name, item in found.items():
+                kind, shape = rows[name][:2]
+                self.assertEqual((str(item.dtype), item.ndim), (kind, shape.count(", ") + 1), name)
+                for size, words in zip(item.shape, shape.split(", ")):
+                    self.assertTrue(not words.isdigit() or int(words) == size, name)
+
+    def test_pictures_are_what_the_surface_file_shows(self):
+        """Those that are computed from contact forces, and those of a body that moves by itself, which are stored."""
+        plane = "t,x,y,z\n0,0.5,1.25,0\n0.2,0.5,1.05,0\n"
+        for body, script, options, topic in (("cube2", SCRIPT, (), "/contacts"), ("plate2", plane, (), "/contacts"),
+                                             ("cube2", SCRIPT, ("--solver", "corotational"), "/pictures")):
+            self.record(body=body, script=script, options=("--record-frames", "1000", "--surface", "last.vtu", *options))
+            self.assertEqual(len(self.ticks.messages(topic)), len(self.ticks))
+            reader = vtkXMLUnstructuredGridReader()
+            reader.SetFileName(str(self.folder / "last.vtu"))
+            reader.Update()
+            data = reader.GetOutput().GetPointData()
+            u = vtk_to_numpy(data.GetArray("displacement"))
+            self.assertGreater(abs(u).max(), 0.001)
+            numpy.testing.assert_allclose(self.frames["displacement"][-1], u, rtol=1e-5, atol=1e-8)
+            for name in ("von_mises", "pressure"):
+                shown = vtk_to_numpy(data.GetArray(name))
+                numpy.testing.assert_allclose(self.frames[name][-1], shown, rtol=1e-4, atol=1e-5 * numpy.nanmax(abs(shown)), err_msg=name)
+            held = self.ticks.surface["held"] == 2 ** self.simplices.shape[1] - 1
+            self.assertTrue((numpy.isfinite(self.frames["von_mises"][-1]) | held).all())
+
+    def test_part_of_it_and_fewer_pictures(self):
+        self.record()
+        self.exported("--hdf5", "part.h5", "--from", "0.1", "--to", "0.2", "--fps", "20")
+        with h5py.File(self.folder / "part.h5") as hdf:
+            numpy.testing.assert_array_equal(hdf["ticks/time"], self.ticks["time"][100:201])
+            self.assertEqual(len(hdf["frames/time"]), 2)
+        self.assert_refused(self.export("--hdf5", "none.h5", "--from", "7"), "has no ticks in that time")
+        self.assertFalse((self.folder / "none.h5").exists())
+
+    def test_without_pictures(self):
+        self.write("script.csv", SCRIPT)
+        file = SOURCE / "tests" / "golden" / "cube2" / "cube2.palpate.hdf"
+        result = run(RUNTIME, "play", file, "--device", "script:script.csv", "--fast", "--record", "touch.mcap", "--record-frames", "0", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(self.exported("--hdf5", "touch.h5"), "touch.h5: 401 ticks, 0 pictures\n")
+        self.assertFalse((self.folder / "touch.xdmf").exists())
+
+    def test_description_for_paraview(self):
+        for body, script, kind in (("cube2", SCRIPT, "Triangle"), ("plate2", "t,x,y,z\n0,0.5,1.25,0\n0.2,0.5,1.05,0\n", "Polyline")):
+            self.record(body=body, script=script)
+            name = "Länge & 'so' 50% <1>.h5"
+            self.exported("--hdf5", name, "--force")
+            path = (self.folder / name).with_suffix(".xdmf")
+            grids = xml.etree.ElementTree.parse(path).getroot().find("Domain").find("Grid")
+            self.assertEqual((grids.get("GridType"), grids.get("CollectionType")), ("Collection", "Temporal"))
+            self.assertEqual(len(grids), len(self.frames["time"]))
+            for k, grid in enumerate(grids):
+                self.assertEqual(float(grid.find("Time").get("Value")), self.frames["time"][k])
+                topology = grid.find("Topology")
+                self.assertEqual((topology.get("TopologyType"), int(topology.get("NumberOfElements"))), (kind, len(self.simplices)))
+                numpy.testing.assert_array_equal(evaluate(topology.find("DataItem"), self.folder), self.simplices)
+                attributes = {a.get("Name"): evaluate(a.find("DataItem"), self.folder) for a in grid.findall("Attribute")}
+                self.assertEqual(sorted(attributes), ["contact pressure", "displacement", "von Mises stress"])
+                for shown, dataset in (("displacement", "displacement"), ("von Mises stress", "von_mises"), ("contact pressure", "pressure")):
+                    numpy.testing.assert_array_equal(attributes[shown], self.frames[dataset][k])
+                x = evaluate(grid.find("Geometry").find("DataItem"), self.folder)
+                numpy.testing.assert_array_equal(x, self.rest + self.frames["displacement"][k])
+            self.assertLess(path.stat().st_size / len(grids), 1200, "bytes a picture")
+
+    def test_takes_the_place_of_an_earlier_one_and_of_nothing_else(self):
+        self.record()
+        for _ in range(2):
+            self.exported("--hdf5", "touch.h5")
+        model = SOURCE / "tests" / "golden" / "cube2" / "cube2.palpate.hdf"
+        (self.folder / "cube.hdf").write_bytes(model.read_bytes())
+        self.assert_refused(self.export("--hdf5", "cube.hdf"), "cube.hdf: is there already and is not a recording as HDF5")
+        self.write("mine.xdmf", "mine")
+        self.assert_refused(self.export("--hdf5", "mine.h5"), "mine.xdmf", "--force")
+        self.assertEqual((self.folder / "mine.xdmf").read_text(), "mine")
+        self.assertEqual((self.folder / "cube.hdf").read_bytes(), model.read_bytes())
 
 
 if __name__ == "__main__":

@@ -4,13 +4,14 @@ import os
 import re
 import resource
 import signal
+import struct
 import subprocess
 import time
 
 import h5py
 import numpy
 
-from programs import BINARY, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
+from programs import BINARY, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, palpate, records_of, run, set_tick
 
 TOUCH = "t,x,y,z\n0,0.4,0.5,1.3\n0.1,0.4,0.5,1.1\n0.2,0.4,0.5,1.3\n"
 TOOL = ("--tool", "sphere:0.15")
@@ -21,8 +22,8 @@ class FilesTest(ProgramTest):
         """A baked cube and a recording of a touch."""
         self.write("touch.csv", TOUCH)
         file = self.bake(cube_toml(3, scope="full"))
-        self.play(file, "--device", "script:touch.csv", *TOOL, "--record", "touch.h5", *arguments)
-        return file, self.folder / "touch.h5"
+        self.play(file, "--device", "script:touch.csv", *TOOL, "--record", "touch.mcap", *arguments)
+        return file, self.folder / "touch.mcap"
 
     def play(self, file, *arguments):
         result = run(RUNTIME, "play", file, "--fast", *arguments, cwd=self.folder)
@@ -46,53 +47,45 @@ def readers(model, recording):
 
 
 class Recordings(FilesTest):
-    def test_a_flipped_bit_is_named_by_all_that_read_it(self):
+    def test_a_flipped_bit_is_told_by_all_that_read_it(self):
         model, recording = self.record("--overlay", "r=2,rings=1")
         whole = recording.read_bytes()
-        with h5py.File(recording) as file:
-            places = {name: file[name].id.get_offset() for name in ("/ticks/patch", "/ticks/force", "/surface/nodes")}
-            places["/frames/displacement"] = file["/frames/displacement"].id.get_chunk_info(0).byte_offset  # compressed rows follow it
-        for name, offset in places.items():
+        chunks = [(at, begin, end) for at, kind, begin, end in records_of(whole) if kind == 6]
+        pictures = [chunk for chunk in chunks if chunk[2] - chunk[1] > 20_000 and b"\x03\0" == whole[chunk[1] + 49 : chunk[1] + 51]]
+        self.assertTrue(0 < len(pictures) < len(chunks))
+        for at, begin, end in (chunks[0], pictures[-1]):
             damaged = bytearray(whole)
-            damaged[offset + 402] ^= 0x40
+            damaged[(begin + end) // 2] ^= 0x40
             recording.write_bytes(damaged)
-            for command in readers(model, recording):
-                self.expect_refused([f"{name} was altered", "touch.h5"], *command)
+            readers_of_all = readers(model, recording) if (at, begin, end) == chunks[0] else readers(model, recording)[1:2]  # pictures are read when they are looked at
+            for command in readers_of_all:
+                self.expect_refused([f"byte {at} was altered", "touch.mcap"], *command)
+            with self.assertRaisesRegex(palpate.Error, "checksum"):
+                palpate.read(recording)
 
     def test_a_node_that_the_body_does_not_have_is_refused(self):
         model, recording = self.record("--overlay", "r=2,rings=1")
         for node, says in ((1_000_000_000, "holds 1000000000"), (64, "holds 64"), (21, "holds 21")):  # 21 is inside, with one of 3 x 3 x 3 cells around
-            self.set_tick(recording, "patch", 30, node)
+            set_tick(recording, "patch", 30, node)
             # The body is loaded before, which is told.
             self.assert_refused(run(RUNTIME, "play", model, "--device", f"replay:{recording}", "--fast", cwd=self.folder),
-                                f"/ticks/patch, row 30, {says}", str(model))
-
-    def set_tick(self, recording, name, row, value):
-        """A recording of version 4.1, which had no checksums and did not compress."""
-        with h5py.File(recording, "r+", libver=("v110", "v110")) as file:
-            for field in ("/frames/displacement", "/frames/von_mises", "/frames/pressure"):
-                values = file[field][:]
-                del file[field]
-                file[field] = values
-            file["/ticks/" + name][row] = value
-            del file.attrs["version"]
-            file.attrs["version"] = [4, 1]
+                                "row 30", says, str(model))
 
     def test_numbers_that_mean_nothing_are_refused(self):
         model, recording = self.record()
         whole = recording.read_bytes()
         for name, value in (("phase", 5), ("fault", 9), ("event", 64), ("status", 1 << 31), ("grab", 2), ("contacts", -1), ("time", -1.0)):
             recording.write_bytes(whole)
-            self.set_tick(recording, name, 30, value)
+            set_tick(recording, name, 30, value)
             for command in readers(model, recording):
-                self.expect_refused([f"/ticks/{name}, row 30, holds"], *command)
+                self.expect_refused([name, "row 30"], *command)
 
-    def test_of_version_41_are_replayed(self):
+    def test_of_hdf5_are_refused_in_one_sentence(self):
         model, recording = self.record()
-        with h5py.File(recording) as file:
-            phase = file["/ticks/phase"][30]
-        self.set_tick(recording, "phase", 30, phase)
-        self.assertIn("bit by bit", self.play(model, "--device", f"replay:{recording}").stderr)
+        with h5py.File(recording, "w") as file:
+            file.attrs["format"] = b"palpate-recording"
+        for command in readers(model, recording):
+            self.expect_refused(["touch.mcap", "is a recording in HDF5"], *command)
 
 
 class NoFiles(FilesTest):
@@ -119,12 +112,27 @@ class CleanText(FilesTest):
     ESCAPE = "\x1b]0;owned\x07\x1b[2J\u202e"
     SHOWN = "\\x1b]0;owned\\x07\\x1b[2J\\u202e"
 
+    @staticmethod
+    def write_info(recording, info):
+        """Changes what the file says of the run. Its end, which says where things lie, is left out."""
+        def text(value):
+            return struct.pack("<I", len(value.encode())) + value.encode()
+
+        whole = recording.read_bytes()
+        pairs = b"".join(text(name) + text(value) for name, value in info.items())
+        content = text("palpate") + struct.pack("<I", len(pairs)) + pairs
+        data = whole[:8]
+        for at, kind, _, end in records_of(whole):
+            if kind == 15:
+                break
+            data += struct.pack("<BQ", 12, len(content)) + content if kind == 12 else whole[at:end]
+        recording.write_bytes(data)
+
     def test_of_a_recordings_attributes(self):
         model, recording = self.record()
-        with h5py.File(recording, "r+", libver=("v110", "v110")) as file:
-            for name in ("generator", "model", "content_hash", "device"):
-                del file.attrs[name]
-                file.attrs.create(name, (name + self.ESCAPE).encode(), dtype="S80")
+        info = palpate.read(recording).info
+        info.update({name: name + self.ESCAPE for name in ("generator", "model", "content_hash", "device")})
+        self.write_info(recording, info)
         result = run(RUNTIME, "session", recording)
         self.assertEqual(result.returncode, 0, result.stderr)
         for name in ("generator", "model", "content_hash", "device"):

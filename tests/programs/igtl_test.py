@@ -9,10 +9,9 @@ import struct
 import subprocess
 import time
 
-import h5py
 import numpy
 
-from programs import RUNTIME, SOURCE, ProgramTest, run
+from programs import RUNTIME, SOURCE, ProgramTest, palpate, pictures, run
 
 CUBE = SOURCE / "tests" / "golden" / "cube2" / "cube2.palpate.hdf"
 TOUCH = "t,x,y,z,qw,qx,qy,qz\n0,0.5,0.5,1.3,1,0,0,0\n0.5,0.52,0.47,1.05,0.8,0,0.6,0\n1.5,0.52,0.47,1.0,0.6,0,0.8,0\n"
@@ -143,46 +142,46 @@ class IgtlTest(ProgramTest):
 
 class Messages(IgtlTest):
     def test_are_what_the_run_recorded(self):
-        with self.playing("--device", "script:touch.csv", "--friction", "0.3", "--record", "out.h5", script=TOUCH) as (process, connect):
+        with self.playing("--device", "script:touch.csv", "--friction", "0.3", "--record", "out.mcap", script=TOUCH) as (process, connect):
             client = connect()
             messages = list(iter(client.next, None))
             process.communicate(timeout=60)
             self.assertEqual(process.returncode, 0)
         self.assertEqual({(message.kind, message.name) for message in messages},
                          {("POLYDATA", "Palpate surface"), ("TRANSFORM", "Palpate tool"), ("STRING", "Palpate force")})
-        with h5py.File(self.folder / "out.h5") as session:
-            times = session["ticks/time"][:]
-            frames = session["frames/time"][:]
-            rest = session["surface/nodes"][:]
-            triangles = session["surface/simplices"][:].reshape(-1, 3)
-            compared = {"POLYDATA": 0, "TRANSFORM": 0, "STRING": 0}
-            pressed = 0.0
-            for message in messages:
-                tick = int(numpy.argmin(abs(times - message.time)))
-                self.assertLess(abs(times[tick] - message.time), 1e-8)
-                if message.kind == "POLYDATA":
-                    frame = int(numpy.argmin(abs(frames - message.time)))
-                    if abs(frames[frame] - message.time) > 1e-8:
-                        continue  # dropped by one of both
-                    nodes, cells, values = message.surface()
-                    displacement = session["frames/displacement"][frame].reshape(-1, 3)
-                    numpy.testing.assert_allclose(nodes, 1000 * (rest + displacement), rtol=0, atol=2e-4)
-                    numpy.testing.assert_array_equal(cells, triangles)
-                    numpy.testing.assert_allclose(values["displacement [mm]"], 1000 * numpy.linalg.norm(displacement, axis=1), rtol=1e-5, atol=1e-6)
-                    numpy.testing.assert_array_equal(values["von Mises stress [Pa]"], session["frames/von_mises"][frame])
-                    numpy.testing.assert_array_equal(values["contact pressure [Pa]"], session["frames/pressure"][frame])
-                    pressed = max(pressed, values["contact pressure [Pa]"].max())
-                elif message.kind == "TRANSFORM":
-                    rotation, position = message.pose()
-                    w, x, y, z = session["ticks/tool_orientation"][tick]
-                    numpy.testing.assert_allclose(position, 1000 * session["ticks/tool_position"][tick], rtol=0, atol=2e-4)
-                    numpy.testing.assert_allclose(rotation @ [0, 0, 1], [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], atol=1e-6)
-                    numpy.testing.assert_allclose(rotation @ rotation.T, numpy.eye(3), atol=1e-6)
-                else:
-                    told = json.loads(message.text())
-                    numpy.testing.assert_array_equal(told["force_N"], -session["ticks/force"][tick])  # which is on the body
-                    numpy.testing.assert_array_equal(told["torque_Nm"], -session["ticks/torque"][tick])
-                compared[message.kind] += 1
+        session = palpate.read(self.folder / "out.mcap")
+        times, force, torque = session["time"], session["force"], session["torque"]
+        orientation, position_of = session["tool_orientation"], session["tool_position"]
+        shown = pictures(self.folder / "out.mcap")
+        frames, rest, triangles = (shown[name] for name in ("frames/time", "surface/nodes", "surface/simplices"))
+        compared = {"POLYDATA": 0, "TRANSFORM": 0, "STRING": 0}
+        pressed = 0.0
+        for message in messages:
+            tick = int(numpy.argmin(abs(times - message.time)))
+            self.assertLess(abs(times[tick] - message.time), 1e-8)
+            if message.kind == "POLYDATA":
+                frame = int(numpy.argmin(abs(frames - message.time)))
+                if abs(frames[frame] - message.time) > 1e-8:
+                    continue  # dropped by one of both
+                nodes, cells, values = message.surface()
+                displacement = shown["frames/displacement"][frame]
+                numpy.testing.assert_allclose(nodes, 1000 * (rest + displacement), rtol=0, atol=2e-4)
+                numpy.testing.assert_array_equal(cells, triangles)
+                numpy.testing.assert_allclose(values["displacement [mm]"], 1000 * numpy.linalg.norm(displacement, axis=1), rtol=1e-5, atol=1e-6)
+                numpy.testing.assert_array_equal(values["von Mises stress [Pa]"], shown["frames/von_mises"][frame])
+                numpy.testing.assert_array_equal(values["contact pressure [Pa]"], shown["frames/pressure"][frame])
+                pressed = max(pressed, values["contact pressure [Pa]"].max())
+            elif message.kind == "TRANSFORM":
+                rotation, position = message.pose()
+                w, x, y, z = orientation[tick]
+                numpy.testing.assert_allclose(position, 1000 * position_of[tick], rtol=0, atol=2e-4)
+                numpy.testing.assert_allclose(rotation @ [0, 0, 1], [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], atol=1e-6)
+                numpy.testing.assert_allclose(rotation @ rotation.T, numpy.eye(3), atol=1e-6)
+            else:
+                told = json.loads(message.text())
+                numpy.testing.assert_array_equal(told["force_N"], -force[tick])  # which is on the body
+                numpy.testing.assert_array_equal(told["torque_Nm"], -torque[tick])
+            compared[message.kind] += 1
         self.assertGreater(min(compared.values()), 10)
         self.assertGreater(pressed, 0)
 
@@ -254,7 +253,7 @@ class Clients(IgtlTest):
 class Refusals(IgtlTest):
     def test_before_the_run_begins(self):
         self.write("touch.csv", TOUCH)
-        play = (RUNTIME, "play", CUBE, "--device", "script:touch.csv", "--record", "out.h5")
+        play = (RUNTIME, "play", CUBE, "--device", "script:touch.csv", "--record", "out.mcap")
         with socket.create_server(("127.0.0.1", 0)) as taken:
             port = taken.getsockname()[1]
             refused = run(*play, "--igtl", port, cwd=self.folder)
@@ -262,7 +261,7 @@ class Refusals(IgtlTest):
             self.assertNotIn("loaded in", refused.stderr, "the port is looked at first")
         self.assert_refused(run(*play, "--igtl", "elsewhere:0", cwd=self.folder), "--igtl: 'elsewhere' is not an IP address", "127.0.0.1")
         self.assert_refused(run(*play, "--igtl", "192.0.2.1:0", cwd=self.folder), "192.0.2.1:0: cannot listen")  # of no machine
-        self.assertFalse((self.folder / "out.h5").exists())
+        self.assertFalse((self.folder / "out.mcap").exists())
 
     def test_wrong_arguments(self):
         self.write("touch.csv", TOUCH)

@@ -6,7 +6,7 @@ import unittest
 import h5py
 import numpy
 
-from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
+from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, palpate, run
 
 BLOCK = """name = "block"
 [geometry]
@@ -37,10 +37,10 @@ class Live(ProgramTest):
         return json.loads(result.stdout), result.stderr
 
     def force(self, file, depth, *arguments, seconds=1.0):
-        report, _ = self.play(file, press(depth, seconds), "--record", "touch.h5", *arguments)
-        with h5py.File(self.folder / "touch.h5") as recording:
-            force = -recording["ticks/force"][:, 2]
-        (self.folder / "touch.h5").unlink()
+        report, _ = self.play(file, press(depth, seconds), "--record", "touch.mcap", *arguments)
+        recording = palpate.read(self.folder / "touch.mcap")
+        force = -recording["force"][:, 2]
+        (self.folder / "touch.mcap").unlink()
         return force[-1], report
 
     def test_a_light_press_is_that_of_the_greens_functions(self):
@@ -98,23 +98,24 @@ class Live(ProgramTest):
     def test_equal_runs_are_equal_and_replay_to_the_bit(self):
         file = self.bake(BLOCK)
         options = ("--solver", "corotational", "--yield", "0.05", "--creep", "20", "--gravity", "0,0,-9.81")
-        report, _ = self.play(file, press(0.006, 0.5), "--record", "a.h5", *options)
+        report, _ = self.play(file, press(0.006, 0.5), "--record", "a.mcap", *options)
         self.assertGreater(report["live"]["compliance_renewals"], 0)
-        self.play(file, press(0.006, 0.5), "--record", "b.h5", *options)
-        with h5py.File(self.folder / "a.h5") as a, h5py.File(self.folder / "b.h5") as b:
-            numpy.testing.assert_array_equal(a["ticks/force"][:], b["ticks/force"][:])
-            frames = a["frames/displacement"][:]
-            self.assertGreater(numpy.abs(frames).max(), 0.004)
-        result = run(RUNTIME, "play", file, "--device", "replay:a.h5", "--fast", cwd=self.folder)
+        self.play(file, press(0.006, 0.5), "--record", "b.mcap", *options)
+        a = palpate.read(self.folder / "a.mcap")
+        b = palpate.read(self.folder / "b.mcap")
+        numpy.testing.assert_array_equal(a["force"], b["force"])
+        frames = a.frames["displacement"][:]
+        self.assertGreater(numpy.abs(frames).max(), 0.004)
+        result = run(RUNTIME, "play", file, "--device", "replay:a.mcap", "--fast", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("bit by bit", result.stderr)
 
     def test_a_free_body_falls_on_the_floor_and_stays_there(self):
         file = self.bake(BLOCK)
         away = "t,x,y,z\n0,0.02,0.02,0.5\n1.5,0.02,0.02,0.5\n"
-        self.play(file, away, "--record", "fall.h5", "--solver", "corotational", "--free", "yes", "--gravity", "0,0,-9.81", "--floor", "-0.05")
-        with h5py.File(self.folder / "fall.h5") as recording:
-            u, nodes, time = recording["frames/displacement"][:], recording["surface/nodes"][:], recording["frames/time"][:]
+        self.play(file, away, "--record", "fall.mcap", "--solver", "corotational", "--free", "yes", "--gravity", "0,0,-9.81", "--floor", "-0.05")
+        recording = palpate.read(self.folder / "fall.mcap")
+        u, nodes, time = recording.frames["displacement"][:], recording.surface["nodes"], recording.frames["time"][:]
         self.assertLess(numpy.abs(u[1]).max(), 3e-3)
         heights = (nodes + u)[..., 2].min(axis=1)
         self.assertAlmostEqual(heights[-1], -0.05, delta=1e-3)
@@ -145,10 +146,10 @@ class Live(ProgramTest):
         free = "\n".join(line for line in BLOCK.splitlines() if "fixed" not in line and "half_space" not in line)
         file = self.bake(free.replace('precision = "double"', 'scope = "none"'))
         away = "t,x,y,z\n0,0.02,0.02,0.5\n1,0.02,0.02,0.5\n"
-        self.play(file, away, "--record", "fall.h5", "--solver", "corotational", "--gravity", "2,0,-9.81", "--room", "-0.1,-0.1,-0.05,0.15,0.15,0.2",
+        self.play(file, away, "--record", "fall.mcap", "--solver", "corotational", "--gravity", "2,0,-9.81", "--room", "-0.1,-0.1,-0.05,0.15,0.15,0.2",
                   "--obstacle", "0.06,-0.1,-0.06,0.1,0.15,0.0", "--wall-friction", "0")
-        with h5py.File(self.folder / "fall.h5") as recording:
-            last = (recording["surface/nodes"][:] + recording["frames/displacement"][-1])
+        recording = palpate.read(self.folder / "fall.mcap")
+        last = recording.surface["nodes"] + recording.frames["displacement"][-1]
         self.assertAlmostEqual(last[:, 2].min(), -0.05, delta=1e-3)
         self.assertGreater(last[:, 0].min(), 0.01)  # it has slid
         self.assertLess(last[:, 0].max(), 0.061)    # against the obstacle
@@ -157,10 +158,10 @@ class Live(ProgramTest):
         file = self.bake(BLOCK)
         script = "t,x,y,z\n0,0.02,0.02,0.037\n0.4,0.02,0.02,0.031\n0.8,0.02,0.02,0.031\n1.2,0.02,0.02,0.05\n2.4,0.02,0.02,0.05\n"
         for options, least, most in (((), 0, 1e-2), (("--yield", "0.05", "--creep", "20"), 0.5, 0.95)):
-            report, _ = self.play(file, script, "--record", "dent.h5", "--solver", "corotational", *options)
-            with h5py.File(self.folder / "dent.h5") as recording:
-                down = -recording["frames/displacement"][..., 2].min(axis=1)
-            (self.folder / "dent.h5").unlink()
+            report, _ = self.play(file, script, "--record", "dent.mcap", "--solver", "corotational", *options)
+            recording = palpate.read(self.folder / "dent.mcap")
+            down = -recording.frames["displacement"][:][..., 2].min(axis=1)
+            (self.folder / "dent.mcap").unlink()
             self.assertGreater(down.max(), 5e-3)
             self.assertTrue(least <= down[-1] / down.max() <= most, (options, down[-1], down.max()))
             self.assertEqual(report["live"]["plastic_work_J"] > 0, bool(options))

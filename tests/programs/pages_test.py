@@ -87,7 +87,7 @@ class Completion(ProgramTest):
 
     def setUp(self):
         super().setUp()
-        for name in ("touch.csv", "notes.txt", "model.toml", "cube.palpate.hdf", "touch.h5", "organ.stl", "deep/other.csv", "a file.csv"):
+        for name in ("touch.csv", "notes.txt", "model.toml", "cube.palpate.hdf", "touch.mcap", "organ.stl", "deep/other.csv", "a file.csv"):
             file = self.folder / name
             file.parent.mkdir(exist_ok=True)
             file.touch()
@@ -125,10 +125,10 @@ printf '%s\\n' "${{COMPREPLY[@]}}" """
                 ("palpate-runtime play --contact ", ["dynamic", "quasi-static"]), ("palpate-runtime play --contact=d", ["dynamic"]),
                 ("palpate-runtime play --tool ", ["capsule:", "disc:", "point", "sphere:"]), ("palpate-runtime play --tool=s", ["sphere:"]),
                 ("palpate-runtime play --device s", ["script:"]), ("palpate-runtime play --device script:t", ["touch.csv"]),
-                ("palpate-runtime play --device=script:t", ["touch.csv"]), ("palpate-runtime play --device replay:", ["deep", "touch.h5"]),
+                ("palpate-runtime play --device=script:t", ["touch.csv"]), ("palpate-runtime play --device replay:", ["deep", "touch.mcap"]),
                 ("palpate-runtime play --device script:deep/", ["deep/other.csv"]), ("palpate-runtime play --device script:a", ["a file.csv"]),
                 ("palpate-runtime play --rate ", []), ("palpate-runtime play cube.palpate.hdf --vi", ["--view", "--view-address", "--view-framed"]),
-                ("palpate-runtime export t", ["touch.h5"]), ("palpate-precompute m", ["model.toml"]), ("palpate-precompute o", ["organ.stl"]), ("palpate-runtime push ", ["cube.palpate.hdf", "deep", "model.toml", "organ.stl"]), ("palpate-precompute ver", ["verify"]),
+                ("palpate-runtime export t", ["touch.mcap"]), ("palpate-precompute m", ["model.toml"]), ("palpate-precompute o", ["organ.stl"]), ("palpate-runtime push ", ["cube.palpate.hdf", "deep", "model.toml", "organ.stl"]), ("palpate-precompute ver", ["verify"]),
                 ("palpate-precompute verify c", ["cube.palpate.hdf"]), ("palpate-precompute compare cube.palpate.hdf c", ["cube.palpate.hdf"]),
                 ("palpate-precompute model.toml -o n", ["notes.txt"])):
             with self.subTest(line=line):
@@ -153,7 +153,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}" """
         self.assertEqual(self.fish(RUNTIME, "palpate-runtime pl"), {"play"})
         self.assertEqual(self.fish(RUNTIME, "palpate-runtime play --contact "), {"quasi-static", "dynamic"})
         self.assertIn("cube.palpate.hdf", self.fish(RUNTIME, "palpate-runtime play c"))
-        self.assertIn("touch.h5", self.fish(RUNTIME, "palpate-runtime session t"))
+        self.assertIn("touch.mcap", self.fish(RUNTIME, "palpate-runtime session t"))
         self.assertIn("model.toml", self.fish(PRECOMPUTE, "palpate-precompute m"))
 
     def zsh(self, line):

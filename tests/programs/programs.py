@@ -4,9 +4,11 @@ import json
 import os
 import pathlib
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
+import zlib
 
 import h5py
 import numpy
@@ -16,6 +18,11 @@ BINARY = pathlib.Path(os.environ["PALPATE_BINARY_DIR"])
 PRECOMPUTE = BINARY / "precompute" / "palpate-precompute"
 RUNTIME = BINARY / "runtime" / "palpate-runtime"
 MODELS = SOURCE / "meshes" / "models"
+os.environ["PATH"] = os.pathsep.join([str(PRECOMPUTE.parent), str(RUNTIME.parent), os.environ["PATH"]])
+sys.path.insert(0, str(SOURCE / "runtime" / "python"))
+
+import palpate  # noqa: E402
+
 # They must be in a process from its beginning, and neither Debian's Python nor mono has them.
 HAS_SANITIZERS = "PALPATE_SANITIZE:STRING=\n" not in (BINARY / "CMakeCache.txt").read_text()
 
@@ -36,15 +43,42 @@ def done(*command, **options):
 
 def recorded(file, field):
     """A field of a recording that goes on, as far as it is; nothing where there is none yet."""
-    for _ in range(100):  # it may just be replaced
-        try:
-            with h5py.File(file) as session:
-                return session[field][:]
-        except FileNotFoundError:
-            break
-        except (OSError, KeyError):
-            time.sleep(0.02)
-    return numpy.array([], dtype=int)
+    try:
+        return palpate.read(file)[field]
+    except palpate.Error:
+        return numpy.array([], dtype=int)  # it has not begun
+
+
+def pictures(recording):
+    """The surface and the pictures of a recording, "surface/nodes" and so on: those that are computed too."""
+    with tempfile.TemporaryDirectory() as folder:
+        done(RUNTIME, "export", recording, "--hdf5", pathlib.Path(folder) / "pictures.h5")
+        with h5py.File(pathlib.Path(folder) / "pictures.h5") as hdf:
+            return {f"{group}/{name}": values[:] for group in ("surface", "frames") for name, values in hdf[group].items()}
+
+
+def records_of(data):
+    """Where each record of an MCAP file begins, its kind, and where its content begins and ends."""
+    at = 8
+    while at + 9 <= len(data) - 8:
+        size = int.from_bytes(data[at + 1 : at + 9], "little")
+        yield at, data[at], at + 9, at + 9 + size
+        at += 9 + size
+
+
+def set_tick(recording, field, row, value):
+    """Changes a number of a tick, and the checksum of its chunk with it."""
+    read = palpate.read(recording)
+    at, kind = read._columns[field]  # where the message has it
+    place = int(read._ticks._channel.places[row]) + at
+    data = bytearray(recording.read_bytes())
+    number = numpy.array(value, kind.base).tobytes()
+    data[place : place + len(number)] = number
+    for _, kind, begin, end in records_of(data):
+        if kind == 6 and begin < place < end:
+            inside = begin + 40  # two times, size, checksum, no compression, size
+            data[begin + 24 : begin + 28] = zlib.crc32(data[inside:end]).to_bytes(4, "little")
+    recording.write_bytes(data)
 
 
 def cube_toml(cells, scope="surface", precision="double", name="cube"):

@@ -1,9 +1,7 @@
 """The Python package: the same forces as a C client and probe to the last bit, files as h5py sees them, a loop of its own."""
 
 import ctypes
-import os
 import pathlib
-import sys
 import tempfile
 import threading
 import time
@@ -13,13 +11,9 @@ import urllib.request
 import h5py
 import numpy
 
-from programs import BINARY, HAS_SANITIZERS, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
+from programs import BINARY, HAS_SANITIZERS, RUNTIME, SOURCE, ProgramTest, cube_toml, palpate, run
 
-os.environ["PATH"] = os.pathsep.join([str(PRECOMPUTE.parent), str(RUNTIME.parent), os.environ["PATH"]])
-sys.path.insert(0, str(SOURCE / "runtime" / "python"))
-
-import palpate  # noqa: E402
-from palpate import library  # noqa: E402
+from palpate import library  # by way of programs
 
 STRUCTS = {"palpate_tool": library.CTool, "palpate_pose": library.CPose, "palpate_overlay": library.COverlay,
            "palpate_options": library.COptions, "palpate_result": library.CResult, "palpate_counts": library.CCounts,
@@ -172,24 +166,27 @@ class Files(PythonTest):
 
     def test_recording_has_the_ticks_of_play(self):
         script = self.write("touch.csv", "t,x,y,z\n0,0.5,0.5,1.2\n0.1,0.5,0.5,1.05\n")
-        done = run(RUNTIME, "play", self.cube, "--device", f"script:{script}", "--tool", "sphere:0.1", "--fast", "--record", "touch.h5",
+        done = run(RUNTIME, "play", self.cube, "--device", f"script:{script}", "--tool", "sphere:0.1", "--fast", "--record", "touch.mcap",
                    cwd=self.folder)
         self.assertEqual(done.returncode, 0, done.stderr)
-        with palpate.Recording(self.folder / "touch.h5") as recording:
-            self.assertEqual(len(recording), 101)
-            self.assertIn("status", list(recording))
-            self.assertLess(recording["force"][-1, 2], 0)  # on the body
-            self.assertIn("tool", recording.options)
-            self.assertGreater(abs(recording.frames["displacement"][-1]).max(), 0)
-            with self.assertRaisesRegex(KeyError, "force"):
-                recording["forse"]
-            data = recording.xarray()
-            self.assertEqual(set(data.variables) - {"axis", "quaternion", "symmetric"}, set(recording))
-            self.assertTrue(numpy.array_equal(data.force.sel(axis="z"), recording["force"][:, 2]))
-            self.assertTrue(numpy.array_equal(data.tool_orientation.sel(quaternion="w"), recording["tool_orientation"][:, 0]))
-            self.assertTrue(numpy.array_equal(data.stiffness.sel(symmetric="zz"), recording["stiffness"][:, 2]))
-            self.assertEqual(float(data.force.sel(time=0.1, axis="z")), recording["force"][-1, 2])
-            self.assertEqual(data.attrs["tool"], "sphere:0.1")
+        recording = palpate.read(self.folder / "touch.mcap")
+        self.assertEqual(len(recording), 101)
+        self.assertIn("status", list(recording))
+        self.assertLess(recording["force"][-1, 2], 0)  # on the body
+        self.assertIn("tool", recording.options)
+        loads = recording.messages("/contacts")[-1]
+        numpy.testing.assert_allclose(loads["force"].reshape(-1, 3).sum(0), recording["force"][loads["tick"]], rtol=1e-5, atol=1e-9)
+        with self.assertRaisesRegex(palpate.Error, "--hdf5"):
+            recording.frames
+        with self.assertRaisesRegex(KeyError, "force"):
+            recording["forse"]
+        data = recording.xarray()
+        self.assertEqual(set(data.variables) - {"axis", "quaternion", "symmetric"}, set(recording))
+        self.assertTrue(numpy.array_equal(data.force.sel(axis="z"), recording["force"][:, 2]))
+        self.assertTrue(numpy.array_equal(data.tool_orientation.sel(quaternion="w"), recording["tool_orientation"][:, 0]))
+        self.assertTrue(numpy.array_equal(data.stiffness.sel(symmetric="zz"), recording["stiffness"][:, 2]))
+        self.assertEqual(float(data.force.sel(time=0.1, axis="z")), recording["force"][-1, 2])
+        self.assertEqual(data.attrs["tool"], "sphere:0.1")
 
     def test_open_body_and_session_bear_each_other(self):
         with palpate.Body(self.cube) as body, palpate.Session(self.cube, palpate.Tool(radius=0.1)) as session:
@@ -198,7 +195,7 @@ class Files(PythonTest):
 
     def test_what_is_wrong_is_told_with_a_hint(self):
         cases = [lambda: palpate.Session(self.folder / "none.palpate.hdf", palpate.Tool()), lambda: palpate.Body(self.folder / "none.h5"),
-                 lambda: palpate.Recording(self.cube), lambda: palpate.bake(self.folder / "none.toml", self.folder / "none.palpate.hdf"),
+                 lambda: palpate.read(self.cube), lambda: palpate.bake(self.folder / "none.toml", self.folder / "none.palpate.hdf"),
                  lambda: palpate.probe(self.cube, [[0, 0, 1]], node=[10**6]), lambda: palpate.Session(self.cube, palpate.Tool(radius=-1))]
         for case in cases:
             with self.assertRaises(palpate.Error) as caught:
@@ -216,7 +213,7 @@ class Files(PythonTest):
 
 class Viewers(PythonTest):
     def test_a_body_and_a_recording_show_themselves(self):
-        session = self.shared / "shown.h5"
+        session = self.shared / "shown.mcap"
         result = run(RUNTIME, "play", self.cube, "--device", f"script:{self.script()}", "--tool", "sphere:0.1", "--fast", "--record", session)
         self.assertEqual(result.returncode, 0, result.stderr)
         for file, options in ((self.cube, ("--tool", "sphere:0.1")), (session, ())):

@@ -8,12 +8,11 @@ import subprocess
 import time
 import unittest
 
-import h5py
 import numpy
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, recorded, run
+from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, palpate, recorded, run
 
 TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
 HANDING_OVER = 1 << 10  # runtime/tick/status.h
@@ -228,15 +227,15 @@ class Plane(ProgramTest):
     def test_play_ignores_z(self):
         file = self.bake(square_toml(scope="surface"))
         script = self.write("touch.csv", "t,x,y,z,grab\n0,0.5,1,0.5,1\n0.1,0.5,0.9,0.7,1\n")
-        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", cwd=self.folder)
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.mcap", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
-        with h5py.File(self.folder / "out.h5") as recording:
-            ticks = recording["ticks"]
-            numpy.testing.assert_allclose(ticks["device_position"][-1], [0.5, 0.9, 0.7])
-            numpy.testing.assert_array_equal(ticks["tool_position"][:, 2], 0)
-            numpy.testing.assert_array_equal(ticks["force"][:, 2], 0)
-            answer = self.probe(file, "--node", self.MIDDLE, "--displace", "0,-0.1")
-            numpy.testing.assert_allclose(ticks["force"][-1], answer["total_force"], rtol=1e-7, atol=1e-9)
+        recording = palpate.read(self.folder / "out.mcap")
+        ticks = recording
+        numpy.testing.assert_allclose(ticks["device_position"][-1], [0.5, 0.9, 0.7])
+        numpy.testing.assert_array_equal(ticks["tool_position"][:, 2], 0)
+        numpy.testing.assert_array_equal(ticks["force"][:, 2], 0)
+        answer = self.probe(file, "--node", self.MIDDLE, "--displace", "0,-0.1")
+        numpy.testing.assert_allclose(ticks["force"][-1], answer["total_force"], rtol=1e-7, atol=1e-9)
 
 
 class Rest(ProgramTest):
@@ -307,13 +306,13 @@ class Rest(ProgramTest):
         file = self.bake(rollers_toml(True, 0.5))
         # Point (1, 1), node 24, rests at (0.85, 1.5).
         script = self.write("touch.csv", "t,x,y,z,grab\n0,0.85,1.5,0,1\n0.1,0.85,1.45,0,1\n")
-        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", "--reach", "0.001",
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.mcap", "--reach", "0.001",
                      cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
-        with h5py.File(self.folder / "out.h5") as recording:
-            self.assertLess(numpy.linalg.norm(recording["ticks/force"][0]), 1e-12)
-            answer = self.probe(file, "--node", 24, "--displace", "0,-0.05")
-            numpy.testing.assert_allclose(recording["ticks/force"][-1], answer["total_force"], rtol=1e-7, atol=1e-9)
+        recording = palpate.read(self.folder / "out.mcap")
+        self.assertLess(numpy.linalg.norm(recording["force"][0]), 1e-12)
+        answer = self.probe(file, "--node", 24, "--displace", "0,-0.05")
+        numpy.testing.assert_allclose(recording["force"][-1], answer["total_force"], rtol=1e-7, atol=1e-9)
 
 
 class Play(ProgramTest):
@@ -323,36 +322,36 @@ class Play(ProgramTest):
     def test_fast_runs_are_equal_to_the_last_bit(self):
         file = self.bake(cube_toml(4))
         script = self.write("touch.csv", TOUCH)
-        for name in ("one.h5", "two.h5"):
+        for name in ("one.mcap", "two.mcap"):
             result = self.play(file, "--device", f"script:{script}", "--fast", "--record", name, "--report", "-")
             self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertEqual((self.folder / "one.h5").read_bytes(), (self.folder / "two.h5").read_bytes())
+        self.assertEqual((self.folder / "one.mcap").read_bytes(), (self.folder / "two.mcap").read_bytes())
 
         report = json.loads(result.stdout)
         self.assertEqual(report["ticks"], 301)
         self.assertEqual(report["dropped_ticks"], 0)
         self.assertAlmostEqual(report["largest_force_time_s"], 0.2)
-        with h5py.File(self.folder / "one.h5") as recording:
-            ticks = recording["ticks"]
-            self.assertEqual(len(ticks["time"]), 301)
-            force = numpy.linalg.norm(ticks["force"], axis=1)
-            self.assertAlmostEqual(force.max(), report["largest_force_N"])
-            jumps = numpy.linalg.norm(numpy.diff(ticks["force"], axis=0), axis=1)
-            self.assertAlmostEqual(jumps.max(), report["largest_jump_N"])
-            self.assertEqual(numpy.argmax(jumps) + 1, round(1000 * report["largest_jump_time_s"]))
-            self.assertEqual(report["ticks_in_contact"], numpy.count_nonzero(ticks["contacts"]))
-            self.assertEqual((report["most_contacts"], report["ticks_begun_inside"]), (1, 0))
-            # The tool holds the node at the middle of the top, the nearest of the surface: the force is that of a probe.
-            moved = ticks["device_position"][200] - ticks["device_position"][0]
-            answer = self.probe(file, "--node", "112", "--displace", ",".join(map(repr, moved.tolist())))
-            numpy.testing.assert_allclose(ticks["force"][200], answer["nodes"][0]["force"], rtol=1e-7, atol=1e-9)
-            self.assertEqual(ticks["compute_ns"][:].max(), 0)
+        recording = palpate.read(self.folder / "one.mcap")
+        ticks = recording
+        self.assertEqual(len(ticks["time"]), 301)
+        force = numpy.linalg.norm(ticks["force"], axis=1)
+        self.assertAlmostEqual(force.max(), report["largest_force_N"])
+        jumps = numpy.linalg.norm(numpy.diff(ticks["force"], axis=0), axis=1)
+        self.assertAlmostEqual(jumps.max(), report["largest_jump_N"])
+        self.assertEqual(numpy.argmax(jumps) + 1, round(1000 * report["largest_jump_time_s"]))
+        self.assertEqual(report["ticks_in_contact"], numpy.count_nonzero(ticks["contacts"]))
+        self.assertEqual((report["most_contacts"], report["ticks_begun_inside"]), (1, 0))
+        # The tool holds the node at the middle of the top, the nearest of the surface: the force is that of a probe.
+        moved = ticks["device_position"][200] - ticks["device_position"][0]
+        answer = self.probe(file, "--node", "112", "--displace", ",".join(map(repr, moved.tolist())))
+        numpy.testing.assert_allclose(ticks["force"][200], answer["nodes"][0]["force"], rtol=1e-7, atol=1e-9)
+        self.assertEqual(ticks["compute_ns"][:].max(), 0)
 
     def test_real_time_run_with_report_and_reach(self):
         file = self.bake(cube_toml(4))
         script = self.write("touch.csv", TOUCH)
         start = time.monotonic()
-        result = self.play(file, "--device", f"script:{script}", "--report", "report.json", "--reach", "0.01", "--record", "out.h5")
+        result = self.play(file, "--device", f"script:{script}", "--report", "report.json", "--reach", "0.01", "--record", "out.mcap")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertGreaterEqual(time.monotonic() - start, 0.3)
         self.assertEqual(result.stdout, "")
@@ -368,7 +367,7 @@ class Play(ProgramTest):
         file = self.bake(cube_toml(4))
         script = self.write("below.csv", "t,x,y,z\n0,0.5,0.5,-0.2\n0.1,0.5,0.5,-0.09\n0.2,0.5,0.5,-0.09\n0.3,0.5,0.5,-0.2\n")
         play = ("--device", f"script:{script}", "--fast", "--tool", "sphere:0.1", "--report", "-")
-        rigid = self.play(file, *play, "--record", "rigid.h5")
+        rigid = self.play(file, *play, "--record", "rigid.mcap")
         coupled = self.play(file, *play, "--coupling", "0.5")
         limited = self.play(file, *play, "--max-force", "0.25")
         above = self.write("above.csv", "t,x,y,z\n0,0.5,0.5,1.2\n0.1,0.5,0.5,1.09\n0.2,0.5,0.5,1.09\n")
@@ -386,27 +385,27 @@ class Play(ProgramTest):
         self.assertEqual(json.loads(limited.stdout)["largest_force_N"], 0.25)
         self.assertEqual(json.loads(free.stdout)["status_ticks"]["rigid_contact"], 0)
         self.assertNotIn("warning", free.stderr)
-        session = run(RUNTIME, "session", self.folder / "rigid.h5")
+        session = run(RUNTIME, "session", self.folder / "rigid.mcap")
         self.assertIn(f"rigid_contact in {json.loads(rigid.stdout)['status_ticks']['rigid_contact']} ticks", session.stdout)
-        session = json.loads(run(RUNTIME, "session", self.folder / "rigid.h5", "--json").stdout)
+        session = json.loads(run(RUNTIME, "session", self.folder / "rigid.mcap", "--json").stdout)
         self.assertEqual(session["status_ticks"], json.loads(rigid.stdout)["status_ticks"])
 
     def test_interrupt_finishes_the_recording(self):
         file = self.bake(cube_toml(4))
         script = self.write("long.csv", "t,x,y,z\n0,0.5,0.5,1\n600,0.5,0.5,0.9\n")
         for stop in (signal.SIGINT, signal.SIGTERM):
-            (self.folder / "out.h5").unlink(missing_ok=True)
-            process = subprocess.Popen([RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.h5", "--report", "-"],
+            (self.folder / "out.mcap").unlink(missing_ok=True)
+            process = subprocess.Popen([RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.mcap", "--report", "-"],
                                        cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-            self.wait_for(lambda: len(recorded(self.folder / "out.h5", "ticks/time")) > 0, process)
+            self.wait_for(lambda: len(recorded(self.folder / "out.mcap", "time")) > 0, process)
             process.send_signal(stop)
             output, messages = process.communicate(timeout=60)
             self.assertEqual(process.returncode, 130, messages)
             report = json.loads(output)
             self.assertTrue(report["interrupted"])
-            with h5py.File(self.folder / "out.h5") as recording:
-                self.assertEqual(len(recording["ticks/time"]), report["ticks"])
-            self.assertEqual(sorted(p.name for p in self.folder.iterdir()), ["long.csv", "model.palpate.hdf", "model.toml", "out.h5", "out.xdmf"])
+            recording = palpate.read(self.folder / "out.mcap")
+            self.assertEqual(len(recording["time"]), report["ticks"])
+            self.assertEqual(sorted(p.name for p in self.folder.iterdir()), ["long.csv", "model.palpate.hdf", "model.toml", "out.mcap"])
 
     def test_stale_model_is_told(self):
         file = self.bake(cube_toml(3))
@@ -421,14 +420,14 @@ class Play(ProgramTest):
         file = self.bake(cube_toml(3))
         script = self.write("bad.csv", "t,x,y,z\n0,0,0,zero\n")
         for device, piece in ((script, "bad.csv:2"), (self.folder / "none.csv", "none.csv")):
-            self.assert_refused(self.play(file, "--device", f"script:{device}", "--record", "out.h5"), piece)
-        self.assertFalse((self.folder / "out.h5").exists())
+            self.assert_refused(self.play(file, "--device", f"script:{device}", "--record", "out.mcap"), piece)
+        self.assertFalse((self.folder / "out.mcap").exists())
 
     def test_recording_that_cannot_be_written(self):
         file = self.bake(cube_toml(3))
         script = self.write("touch.csv", TOUCH)
-        result = self.play(file, "--device", f"script:{script}", "--fast", "--record", "no/out.h5")
-        self.assert_refused(result, "out.h5")
+        result = self.play(file, "--device", f"script:{script}", "--fast", "--record", "no/out.mcap")
+        self.assert_refused(result, "out.mcap")
 
     def test_scripts_that_feel_nothing_are_told_why(self):
         file = self.bake(cube_toml(3))
@@ -451,10 +450,10 @@ class PlayOverlay(ProgramTest):
     def ticks(self, file, overlay):
         script = self.write("slide.csv", self.SCRIPT)
         result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--overlay", overlay,
-                     "--record", "out.h5", cwd=self.folder)
+                     "--record", "out.mcap", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
-        with h5py.File(self.folder / "out.h5") as recording:
-            return {name: data[:] for name, data in recording["ticks"].items()}
+        recording = palpate.read(self.folder / "out.mcap")
+        return {name: recording[name] for name in recording}
 
     def test_overlays_of_the_file_change_nothing_but_the_time(self):
         toml = cube_toml(4, scope="layers")
@@ -478,13 +477,13 @@ class PlayOverlay(ProgramTest):
         script = self.write("press.csv", "t,x,y,z\n0,0.4,0.5,1.25\n0.1,0.4,0.5,1.1\n0.2,0.4,0.5,1.1\n0.3,0.4,0.5,1.25\n")
         law = ("--overlay", "r=2,rings=1", "--overlay-law", "neo-hookean")
         press = ("play", file, "--tool", "sphere:0.2", "--fast", "--report", "report.json", "--device")
-        result = run(RUNTIME, *press, f"script:{script}", *law, "--record", "out.h5", cwd=self.folder)
+        result = run(RUNTIME, *press, f"script:{script}", *law, "--record", "out.mcap", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("overlay, neo-hookean: ", result.stderr)
         told = json.loads((self.folder / "report.json").read_text())["overlay"]["neo_hookean"]
         self.assertGreater(told["made"], 5)
         self.assertEqual((told["failed"], told["most_inverted"]), (0, 0))
-        self.assertEqual(run(RUNTIME, *press, "replay:out.h5", cwd=self.folder).returncode, 0)
+        self.assertEqual(run(RUNTIME, *press, "replay:out.mcap", cwd=self.folder).returncode, 0)
         result = run(RUNTIME, *press, f"script:{script}", "--overlay", "r=2,rings=1", cwd=self.folder)
         self.assertNotIn("neo_hookean", json.loads((self.folder / "report.json").read_text())["overlay"])
         for options, named in (((*law[2:],), "--overlay-law"), ((*law, "--contact", "dynamic"), "--contact"), ((*law, "--warp", "yes"), "--overlay"),
@@ -499,18 +498,18 @@ class PlayOverlay(ProgramTest):
         script = self.write("press.csv", "t,x,y,z\n0,0.4,0.5,1.25\n0.1,0.4,0.5,1.17\n0.3,0.45,0.5,1.17\n")
         forces, surfaces = [], []
         for file, overlay in ((coarse, ("--overlay", "r=2,rings=4")), (fine, ())):
-            result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--record", "out.h5",
+            result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--record", "out.mcap",
                          "--surface", "out.vtu", "--report", "report.json", *overlay, cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
             report = json.loads((self.folder / "report.json").read_text())
-            with h5py.File(self.folder / "out.h5") as recording:
-                forces.append(recording["ticks/force"][:])
-                options = recording.attrs["options"].decode().splitlines()
-                self.assertEqual([line for line in options if line.startswith("overlay=")],
-                                 [f"overlay={overlay[1]}"] if overlay else [])
-                touched = recording["ticks/contacts"][:] > 0
-                self.assertTrue(touched[-1])
-                self.assertEqual((recording["ticks/patch"][:][touched] >= 0).all(), bool(overlay))
+            recording = palpate.read(self.folder / "out.mcap")
+            forces.append(recording["force"])
+            options = recording.info["options"].splitlines()
+            self.assertEqual([line for line in options if line.startswith("overlay=")],
+                             [f"overlay={overlay[1]}"] if overlay else [])
+            touched = recording["contacts"] > 0
+            self.assertTrue(touched[-1])
+            self.assertEqual((recording["patch"][touched] >= 0).all(), bool(overlay))
             if overlay:
                 self.assertEqual((report["overlay"]["refinement"], report["overlay"]["rings"]), (2, 4))
                 self.assertEqual(report["overlay"]["older_ticks_in_contact"], 0)
@@ -540,11 +539,11 @@ class Tools(ProgramTest):
 
     def play(self, file, script, *arguments):
         script = self.write("script.csv", script)
-        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.h5", "--contacts", "out.csv", "--report", "-",
+        result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.mcap", "--contacts", "out.csv", "--report", "-",
                      *arguments, cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
-        with h5py.File(self.folder / "out.h5") as recording:
-            ticks = {name: values[:] for name, values in recording["ticks"].items()}
+        recording = palpate.read(self.folder / "out.mcap")
+        ticks = {name: recording[name] for name in recording}
         contacts = numpy.atleast_1d(numpy.genfromtxt(self.folder / "out.csv", delimiter=",", names=True))
         return json.loads(result.stdout), ticks, contacts
 
@@ -679,16 +678,16 @@ class Tools(ProgramTest):
         file = self.bake(cube_toml(6))
         script = self.write("touch.csv", self.PRESS)
         play = (RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--tool", "sphere:0.2")
-        few = run(*play, "--max-contacts", "2", "--record", "few.h5", cwd=self.folder)
+        few = run(*play, "--max-contacts", "2", "--record", "few.mcap", cwd=self.folder)
         words = r"in \d+ ticks \(\d+ %\) the force was a best effort, .* contact points found no room"
         self.assertRegex(few.stderr, "warning: " + words)
         self.assertNotIn("best effort", run(*play, cwd=self.folder).stderr)
-        self.assertRegex(run(RUNTIME, "session", "few.h5", cwd=self.folder).stdout, "best effort +" + words)
+        self.assertRegex(run(RUNTIME, "session", "few.mcap", cwd=self.folder).stdout, "best effort +" + words)
 
 
 class Usage(ProgramTest):
     def test_a_file_without_a_command_is_told_what_it_is_for(self):
-        for file, command in (("touch.h5", "view"), ("liver.palpate.hdf", "play"), ("organ.stl", "push"), ("organ.nii", "push"), ("organ.nii.gz", "push"), ("organ.nrrd", "push")):
+        for file, command in (("touch.mcap", "view"), ("liver.palpate.hdf", "play"), ("organ.stl", "push"), ("organ.nii", "push"), ("organ.nii.gz", "push"), ("organ.nrrd", "push")):
             told = run(RUNTIME, file)
             self.assertEqual(told.returncode, 2)
             self.assertIn(f"hint: palpate-runtime {command} {file}", told.stderr)

@@ -105,7 +105,7 @@ class Usage(ProgramTest):
 
     def test_runtime_names_the_command_that_is_meant(self):
         for word, piece in (("liver.palpate.hdf", "palpate-runtime play liver.palpate.hdf --view"),
-                            ("touch.h5", "palpate-runtime view touch.h5"), ("model.toml", "palpate-precompute model.toml"),
+                            ("touch.mcap", "palpate-runtime view touch.mcap"), ("model.toml", "palpate-precompute model.toml"),
                             ("pley", "palpate-runtime play?"), ("sesion", "palpate-runtime session?"),
                             ("bogus", "play, view, probe, session, export or devices")):
             with self.subTest(word=word):
@@ -190,7 +190,7 @@ class NotADescription(ProgramTest):
     def test_files_of_ours_and_folders(self):
         file = self.bake(cube_toml(2), name="cube.toml")
         self.assert_refused(run(PRECOMPUTE, file), "is a baked model already", f"palpate-runtime play {file} --view", "inspect")
-        recording = self.write("touch.h5", "")
+        recording = self.write("touch.mcap", "")
         self.assert_refused(run(PRECOMPUTE, recording), "is a recording", f"palpate-runtime view {recording}")
         self.write("model.toml", cube_toml(2))
         self.assert_refused(run(PRECOMPUTE, self.folder), "is a folder", f"palpate-precompute {self.folder / 'model.toml'}")
@@ -206,9 +206,9 @@ class Next(ProgramTest):
         self.assertIn("next: palpate-runtime play cube.palpate.hdf --view", verified.stderr)
         self.write("touch.csv", "t,x,y,z,grab\n0,0.5,0.5,1.2,0\n0.1,0.5,0.5,0.9,0\n")
         played = run(RUNTIME, "play", "cube.palpate.hdf", "--device", "script:touch.csv", "--fast", "--tool", "sphere:0.1",
-                     "--record", "touch.h5", cwd=self.folder)
+                     "--record", "touch.mcap", cwd=self.folder)
         self.assertEqual(played.returncode, 0, played.stderr)
-        self.assertIn("next: palpate-runtime view touch.h5", played.stderr)
+        self.assertIn("next: palpate-runtime view touch.mcap", played.stderr)
         without = run(RUNTIME, "play", "cube.palpate.hdf", "--device", "script:touch.csv", "--fast", cwd=self.folder)
         self.assertNotIn("next:", without.stderr)
 
@@ -227,7 +227,7 @@ class WrongKind(ProgramTest):
     def test_a_model_is_no_recording_and_the_reverse(self):
         file = self.bake(cube_toml(2), name="cube.toml")
         touch = self.write("touch.csv", "t,x,y,z,grab\n0,0.5,0.5,1.2,0\n0.1,0.5,0.5,0.9,0\n")
-        recording = self.folder / "touch.h5"
+        recording = self.folder / "touch.mcap"
         self.assertEqual(run(RUNTIME, "play", file, "--device", f"script:{touch}", "--fast", "--record", recording).returncode, 0)
         for arguments in (("view", file), ("session", file), ("export", file, "--html", self.folder / "x.html")):
             with self.subTest(command=arguments[0]):
@@ -239,14 +239,14 @@ class WrongKind(ProgramTest):
     def test_a_broken_recording_gets_its_reason(self):
         file = self.bake(cube_toml(2), name="cube.toml")
         touch = self.write("touch.csv", "t,x,y,z,grab\n0,0.5,0.5,1.2,0\n0.1,0.5,0.5,0.9,0\n")
-        recording = self.folder / "touch.h5"
+        recording = self.folder / "touch.mcap"
         self.assertEqual(run(RUNTIME, "play", file, "--device", f"script:{touch}", "--fast", "--record", recording).returncode, 0)
         whole = recording.read_bytes()
         for broken, reason in ((b"", "empty"), (b"hello", "not"), (whole[: len(whole) // 2], "truncated"), (whole[:20], "truncated")):
             recording.write_bytes(broken)
             for command in ("session", "view"):
                 result = run(RUNTIME, command, recording)
-                self.assert_refused(result, "touch.h5", reason)
+                self.assert_refused(result, "touch.mcap", reason)
                 self.assertNotIn("no reason given", result.stderr)
 
 

@@ -33,7 +33,7 @@ class ViewTest(ProgramTest):
 
     def record(self, *arguments):
         self.write("touch.csv", TOUCH)
-        result = run(RUNTIME, "play", CUBE, "--device", "script:touch.csv", "--tool", "sphere:0.1", "--fast", "--record", "touch.h5",
+        result = run(RUNTIME, "play", CUBE, "--device", "script:touch.csv", "--tool", "sphere:0.1", "--fast", "--record", "touch.mcap",
                      *arguments, cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
 
@@ -101,7 +101,7 @@ class PlayView(ViewTest):
         """What is refused is refused before anybody opens a page for it."""
         self.write("broken.palpate.hdf", "nothing")
         for arguments in (("play", "broken.palpate.hdf", "--view"), (*self.PLAY, "--overlay", "r=3,rings=1"),
-                          (*self.PLAY, "--contact", "dynamic"), (*self.PLAY, "--record", "none/out.h5")):
+                          (*self.PLAY, "--contact", "dynamic"), (*self.PLAY, "--record", "none/out.mcap")):
             with self.subTest(arguments=arguments):
                 result = run(RUNTIME, *arguments, "--view-address", "0", "--duration", "0.1", cwd=self.folder)
                 if arguments[-1] == "r=3,rings=1" and result.returncode == 0:
@@ -139,11 +139,11 @@ class PlayView(ViewTest):
 
     def test_a_recording_beside_it(self):
         self.record()
-        with self.started(*self.PLAY, "--view-address", "0", "--beside", "touch.h5") as (process, url):
+        with self.started(*self.PLAY, "--view-address", "0", "--beside", "touch.mcap") as (process, url):
             for page in ("beside", "", "2/"):
                 self.assertEqual(status_of(url.replace("/beside?", f"/{page}?")), 200)
             self.assertEqual(self.end(process, signal.SIGTERM)[0], 130)
-        over_itself = run(RUNTIME, *self.PLAY, "--view-address", "0", "--beside", "touch.h5", "--record", "touch.h5", cwd=self.folder)
+        over_itself = run(RUNTIME, *self.PLAY, "--view-address", "0", "--beside", "touch.mcap", "--record", "touch.mcap", cwd=self.folder)
         self.assert_refused(over_itself, "the recording beside it")
 
     def test_wrong_arguments(self):
@@ -151,7 +151,7 @@ class PlayView(ViewTest):
         self.assert_usage("what is shown keeps the clock", *self.PLAY, "--fast", "--device", "script:touch.csv")
         self.assert_usage("it is for --view, which is not given", "play", CUBE, "--device", "script:touch.csv", "--view-address", "0")
         self.assert_usage("or --view (to move it with the pointer", "play", CUBE)
-        self.assert_usage("it is for --view, which is not given", "play", CUBE, "--device", "script:touch.csv", "--beside", "touch.h5")
+        self.assert_usage("it is for --view, which is not given", "play", CUBE, "--device", "script:touch.csv", "--beside", "touch.mcap")
         self.assert_usage("give --view too", "play", CUBE, "--device", "mouse")
         self.assert_usage("the pointer is in the body's frame already", *self.PLAY, "--motion-scale", "2")
         self.assert_usage("profiles are for --device hid", *self.PLAY, "--profile", "polhem_v1")
@@ -161,14 +161,14 @@ class View(ViewTest):
     def test_shows_a_recording_until_it_is_stopped(self):
         self.record()
         for number in (signal.SIGINT, signal.SIGTERM):
-            with self.started("view", "touch.h5", "--view-address", "0") as (process, url):
+            with self.started("view", "touch.mcap", "--view-address", "0") as (process, url):
                 self.assertEqual(status_of(url), 200)
                 self.assertEqual(status_of(url.replace("/?", "/surface.vtu?")), 200)
                 self.assertEqual(self.end(process, number), (0, ""))
 
     def test_shows_two_side_by_side(self):
         self.record()
-        with self.started("view", "touch.h5", "touch.h5", "--view-address", "0") as (process, url):
+        with self.started("view", "touch.mcap", "touch.mcap", "--view-address", "0") as (process, url):
             self.assertIn("/beside?token=", url)
             for page in ("beside", "", "2/", "2/surface.vtu"):
                 self.assertEqual(status_of(url.replace("/beside?", f"/{page}?")), 200)
@@ -176,20 +176,20 @@ class View(ViewTest):
 
     def test_address(self):
         self.record()
-        self.assert_taken("view", "touch.h5")
-        self.assert_asks_for_token("view", "touch.h5")
-        self.assert_wrong_addresses("view", "touch.h5")
+        self.assert_taken("view", "touch.mcap")
+        self.assert_asks_for_token("view", "touch.mcap")
+        self.assert_wrong_addresses("view", "touch.mcap")
 
     def test_refuses_what_it_cannot_show(self):
         self.assert_refused(run(RUNTIME, "view", CUBE), "is a model, not a recording", "play")
-        self.assert_refused(run(RUNTIME, "view", "none.h5", cwd=self.folder), "none.h5")
+        self.assert_refused(run(RUNTIME, "view", "none.mcap", cwd=self.folder), "none.mcap")
         self.record("--record-frames", "0")
-        self.assert_refused(run(RUNTIME, "view", "touch.h5", cwd=self.folder), "touch.h5", "--record-frames 0")
+        self.assert_refused(run(RUNTIME, "view", "touch.mcap", cwd=self.folder), "touch.mcap", "--record-frames 0")
 
 
 class Export(ViewTest):
     def export(self, *arguments, html="touch.html"):
-        return run(RUNTIME, "export", "touch.h5", "--html", html, *arguments, cwd=self.folder)
+        return run(RUNTIME, "export", "touch.mcap", "--html", html, *arguments, cwd=self.folder)
 
     def test_writes_a_page(self):
         self.record()
@@ -205,9 +205,9 @@ class Export(ViewTest):
         self.record()
         self.assert_refused(self.export("--from", "3"), "has no pictures from 3 s on", "It lasts from 0 to 0.187 s")
         self.assert_refused(self.export(html="none/touch.html"), "none/touch.html: cannot be written")
-        self.assert_refused(run(RUNTIME, "export", "none.h5", "--html", "touch.html", cwd=self.folder), "none.h5")
+        self.assert_refused(run(RUNTIME, "export", "none.mcap", "--html", "touch.html", cwd=self.folder), "none.mcap")
         self.assertFalse((self.folder / "touch.html").exists())
-        self.assert_usage("--html", "export", "touch.h5")
+        self.assert_usage("--html", "export", "touch.mcap")
         for option, text in (("--fps", "0"), ("--fps", "-1"), ("--fps", "nan"), ("--from", "-1"), ("--to", "soon")):
             with self.subTest(option=option, text=text):
-                self.assert_usage(option, "export", "touch.h5", "--html", "touch.html", f"{option}={text}")
+                self.assert_usage(option, "export", "touch.mcap", "--html", "touch.html", f"{option}={text}")

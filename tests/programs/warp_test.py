@@ -9,7 +9,7 @@ import unittest
 import h5py
 import numpy
 
-from programs import MODELS, PRECOMPUTE, RUNTIME, ProgramTest, run
+from programs import MODELS, PRECOMPUTE, RUNTIME, ProgramTest, palpate, run
 
 LENGTH, HEIGHT, RADIUS = 0.08, 0.01, 0.003
 TONGUE = """name = "tongue"
@@ -45,11 +45,11 @@ def bend(degrees, seconds):
 class Warp(ProgramTest):
     def play(self, file, degrees, *arguments, seconds=1.0, radius=RADIUS):
         path = self.write("bend.csv", bend(degrees, seconds))
-        result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", "--tool", f"sphere:{radius}", "--report", "-", "--record", "bend.h5", "--force",
+        result = run(RUNTIME, "play", file, "--device", f"script:{path}", "--fast", "--tool", f"sphere:{radius}", "--report", "-", "--record", "bend.mcap", "--force",
                      *arguments, cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
-        with h5py.File(self.folder / "bend.h5") as recording:
-            return numpy.linalg.norm(recording["ticks/force"][:], axis=1), json.loads(result.stdout), result.stderr
+        recording = palpate.read(self.folder / "bend.mcap")
+        return numpy.linalg.norm(recording["force"], axis=1), json.loads(result.stdout), result.stderr
 
     def test_it_feels_like_the_corotational_body_where_small_strain_does_not(self):
         file = self.bake(TONGUE)
@@ -135,12 +135,12 @@ class Warp(ProgramTest):
     def test_runs_are_equal_and_replay(self):
         file = self.bake(TONGUE)
         one, _, _ = self.play(file, 40, "--warp", "yes", seconds=0.2)
-        self.write("keep.h5", "")
-        (self.folder / "bend.h5").rename(self.folder / "keep.h5")
+        self.write("keep.mcap", "")
+        (self.folder / "bend.mcap").rename(self.folder / "keep.mcap")
         other, _, _ = self.play(file, 40, "--warp", "yes", seconds=0.2)
         self.assertGreater(one[-1], 0)
         numpy.testing.assert_array_equal(one, other)
-        result = run(RUNTIME, "play", file, "--device", "replay:keep.h5", "--fast", "--report", "-", cwd=self.folder)
+        result = run(RUNTIME, "play", file, "--device", "replay:keep.mcap", "--fast", "--report", "-", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(json.loads(result.stdout)["replay"]["different_ticks"], 0)
 

@@ -6,13 +6,14 @@
         felt = session.step((0.5, 0.5, 1.05))
         print(felt.force)
 
-All units are SI. Needs numpy; files need h5py too. The book describes it on its page "Python"."""
+All units are SI. Needs numpy; Body needs h5py too. The book describes it on its page "Python"."""
 
-from .files import Body, Recording
+from .files import Body, Recording, read
 from .library import Error
 from .loop import Loop
 from .programs import bake, probe
 from .session import Felt, Overlay, Session, Tool
 from .viewer import Viewer
 
-__all__ = ["Body", "Error", "Felt", "Loop", "Overlay", "Recording", "Session", "Tool", "Viewer", "bake", "probe"]
+__all__ = ["Body", "Error", "Felt", "Loop", "Overlay", "Recording", "Session", "Tool", "Viewer", "bake", "probe",
+           "read"]

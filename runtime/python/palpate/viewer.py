@@ -15,14 +15,14 @@ Path = str | os.PathLike[str]
 
 
 class Viewer:
-    """A body to push, or a recording (.h5) to look at, in the viewer: `palpate-runtime play FILE --view` or `view FILE` in the background.
+    """A body to push, or a recording (.mcap) to look at, in the viewer: `palpate-runtime play FILE --view` or `view FILE` in the background.
     In a notebook it shows itself where it is the last thing of a cell; elsewhere open `address` in a browser. Ends with `close()`,
     with its `with` block, or with Python. `options` are those of the command line: Viewer("liver.palpate.hdf", "--tool", "sphere:0.008").
     Throws Error with what palpate-runtime says."""
 
     def __init__(self, file: Path, *options: str, height: int = 560):
         name = os.fspath(file)
-        command = ["view", name] if name.endswith(".h5") else ["play", name, "--view"]
+        command = ["view", name] if name.endswith(".mcap") else ["play", name, "--view"]
         self.height = height
         self._process = subprocess.Popen(
             [program("palpate-runtime"), *command, "--view-address", "0", "--view-framed", *options],

@@ -33,7 +33,7 @@ const kinds: Record<Kind, { title: string; does: string }> = {
   source: { title: 'To make a body of', does: 'make a body of it and push it' },
 };
 
-const endings = /\.(palpate\.hdf|h5|stl|obj|ply|off|inr|inr\.gz|nii|nii\.gz|nrrd|png|pbm)$/i;
+const endings = /\.(palpate\.hdf|mcap|stl|obj|ply|off|inr|inr\.gz|nii|nii\.gz|nrrd|png|pbm)$/i;
 
 /** This server's, with the token of this page. */
 const address = (path: string, name = '') => `./${path}${location.search}${name && `&name=${encodeURIComponent(name)}`}`;
@@ -140,7 +140,7 @@ export class Gallery {
       if (known) this.put(picture, known);
       else if (kind === 'source') picture.append(element('span', item.name.replace(/^.*\.(?=[^.]+(\.gz)?$)/, ''), { className: 'ending' }));
       const day = new Date(1000 * item.modified).toLocaleDateString(undefined, { dateStyle: 'medium' });
-      card.append(picture, element('strong', item.name.replace(/\.palpate\.hdf$|\.h5$/, '')), element('small', `${format_bytes(item.bytes)} · ${day}`));
+      card.append(picture, element('strong', item.name.replace(/\.palpate\.hdf$|\.mcap$/, '')), element('small', `${format_bytes(item.bytes)} · ${day}`));
       card.onclick = () => void this.open(item.name);
       const one = element('li');
       one.append(card);
@@ -229,7 +229,7 @@ export class Gallery {
     for (const file of files) {
       this.show_opening({ name: file.name, said: ['It is being copied into the folder.'], url: '', ended: false });
       try {
-        if (!endings.test(file.name)) throw new Error('This is no body (.palpate.hdf), recording (.h5), surface (.stl, .obj, .ply, .off), labelled image (.nrrd, .nii, .inr) or picture (.png, .pbm).');
+        if (!endings.test(file.name)) throw new Error('This is no body (.palpate.hdf), recording (.mcap), surface (.stl, .obj, .ply, .off), labelled image (.nrrd, .nii, .inr) or picture (.png, .pbm).');
         const { name } = (await (await ask('drop', { method: 'POST', body: file }, file.name)).json()) as { name: string };
         if (files.length === 1) await this.open(name);
       } catch (error) {

@@ -52,9 +52,6 @@ class Fields(unittest.TestCase):
     def test_models(self):
         self.check("file-fields.md", sorted(SAMPLES.glob("*.palpate.hdf")))
 
-    def test_recordings(self):
-        self.check("recording-fields.md", [SAMPLES / "recording.h5"])
-
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,12 +1,10 @@
-#include "runtime/loop/session_xdmf.h"
+#include "runtime/exports/session_xdmf.h"
 
 #include <fmt/format.h>
 
 #include <array>
 #include <iterator>
-#include <span>
 #include <string>
-#include <system_error>
 
 #include "base/write_file.h"
 
@@ -46,43 +44,29 @@ struct Scalar {
 constexpr std::array<Scalar, 2> nodal_scalars = {
     {{'s', "von_mises", "von Mises stress"}, {'p', "pressure", "contact pressure"}}};
 
-std::span<const Scalar> scalars_of(const RecordedFrames& frames) {
-  return frames.has_stress ? std::span<const Scalar>(nodal_scalars) : std::span<const Scalar>();
-}
-
 }  // namespace
 
-std::filesystem::path xdmf_path(const std::filesystem::path& recording) {
-  return std::filesystem::path(recording).replace_extension(".xdmf");
+std::filesystem::path xdmf_path(const std::filesystem::path& hdf5) {
+  return std::filesystem::path(hdf5).replace_extension(".xdmf");
 }
 
-std::filesystem::path add_recording(OutputPaths& paths, const std::filesystem::path& recording,
-                                    const std::string& option) {
-  const std::filesystem::path file = paths.add(recording, OutputKind::recording, option);
-  paths.add(xdmf_path(file), OutputKind::frames, option);
-  return file;
-}
-
-void write_xdmf(const std::filesystem::path& recording, const RecordedFrames& frames) {
-  if (frames.time.empty()) {
-    std::error_code ignored;
-    std::filesystem::remove(xdmf_path(recording), ignored);
-    return;
-  }
-  const std::string file = escape(recording.filename().string());
-  const std::size_t S = frames.surface.nodes.size(), F = frames.time.size();
-  const int d = frames.surface.corners;
-  const std::size_t T = frames.surface.simplices.size() / static_cast<std::size_t>(d);
+void write_xdmf(const std::filesystem::path& hdf5, const RecordedSurface& surface,
+                std::span<const double> times) {
+  const std::string file = escape(hdf5.filename().string());
+  const std::size_t S = surface.nodes.size(), F = times.size();
+  const int d = surface.corners;
+  const std::size_t T = surface.simplices.size() / static_cast<std::size_t>(d);
   const std::string kind =
       d == 3 ? R"(TopologyType="Triangle")" : R"(TopologyType="Polyline" NodesPerElement="2")";
   std::string scalars;
-  for (const Scalar& scalar : scalars_of(frames)) {
+  for (const Scalar& scalar : nodal_scalars) {
     scalars += fmt::format(
         "<!ENTITY {} '<DataItem Dimensions=\"{} {}\" NumberType=\"Float\" Precision=\"4\" "
         "Format=\"HDF\">{}:/frames/{}</DataItem>'>\n",
         scalar.entity, F, S, file, scalar.dataset);
   }
-  std::string text = fmt::format(
+  FileWriter out(xdmf_path(hdf5));
+  out.write(fmt::format(
       "<?xml version=\"1.0\"?>\n<!-- palpate " PALPATE_VERSION
       " -->\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" [\n"
       "<!ENTITY t '<Topology {kind} NumberOfElements=\"{T}\"><DataItem Dimensions=\"{T} {d}\" "
@@ -94,7 +78,7 @@ void write_xdmf(const std::filesystem::path& recording, const RecordedFrames& fr
       "{scalars}"
       "]>\n<Xdmf Version=\"2.0\"><Domain><Grid GridType=\"Collection\" CollectionType=\"Temporal\">\n",
       fmt::arg("kind", kind), fmt::arg("T", T), fmt::arg("d", d), fmt::arg("S", S), fmt::arg("F", F),
-      fmt::arg("file", file), fmt::arg("scalars", scalars));
+      fmt::arg("file", file), fmt::arg("scalars", scalars)));
   for (std::size_t k = 0; k < F; ++k) {
     const std::string u = fmt::format(
         "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{0} 3\"><DataItem Dimensions=\"3 3\">{1} 0 0 1 1 1 1 "
@@ -102,22 +86,23 @@ void write_xdmf(const std::filesystem::path& recording, const RecordedFrames& fr
         S, k);
     // ParaView keeps the geometry of the frame before where the first text in it is the same: hence the
     // comment.
+    std::string text;
     fmt::format_to(std::back_inserter(text),
                    "<Grid><Time Value=\"{}\"/>&t;<Geometry><DataItem ItemType=\"Function\" "
                    "Function=\"$0 + $1\" Dimensions=\"{} 3\"><!--{}-->&x;{}</DataItem></Geometry>"
                    "<Attribute Name=\"displacement\" AttributeType=\"Vector\">{}</Attribute>",
-                   frames.time[k], S, k, u, u);
-    for (const Scalar& scalar : scalars_of(frames)) {
+                   times[k], S, k, u, u);
+    for (const Scalar& scalar : nodal_scalars) {
       fmt::format_to(std::back_inserter(text),
                      "<Attribute Name=\"{}\" AttributeType=\"Scalar\"><DataItem ItemType=\"HyperSlab\" "
                      "Dimensions=\"{}\"><DataItem Dimensions=\"3 2\">{} 0 1 1 1 {}</DataItem>&{};</DataItem>"
                      "</Attribute>",
                      scalar.name, S, k, S, scalar.entity);
     }
-    text += "</Grid>\n";
+    out.write(text + "</Grid>\n");
   }
-  text += "</Grid></Domain></Xdmf>\n";
-  write_file(xdmf_path(recording), text);
+  out.write("</Grid></Domain></Xdmf>\n");
+  out.finish();
 }
 
 }  // namespace palpate

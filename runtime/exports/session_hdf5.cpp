@@ -1,0 +1,146 @@
+#include "runtime/exports/session_hdf5.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "base/write_file.h"
+#include "formats/recording_messages.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t block = 8192;  // ticks that are written at once
+constexpr const char* units = "s, m, m/s, N, N m, N/m, Pa; names with _ns in ns";
+
+template <class T>
+void write(hdf5::File& file, const char* name, std::vector<std::int64_t> dims, const std::vector<T>& values) {
+  file.write(name, hdf5::element_type<T>(), dims, values.data());
+}
+
+void write_head(hdf5::File& file, const RecordingFile& recording) {
+  const SessionInfo& info = recording.info();
+  file.write_attribute("/", "format", "palpate-recording");
+  file.write_attribute("/", "generator", recording.generator());
+  file.write_attribute("/", "units", units);
+  file.write_attribute("/", "model", info.model_path);
+  file.write_attribute("/", "content_hash", info.content_hash);
+  file.write_attribute("/", "device", info.device);
+  file.write_attribute("/", "rate", std::array{info.rate});
+  file.write_attribute("/", "options", info.options);
+  const RecordedSurface& surface = recording.surface();
+  std::vector<double> nodes;
+  for (const Vec3& node : surface.nodes) nodes.insert(nodes.end(), node.begin(), node.end());
+  std::vector<std::uint8_t> held = surface.held;
+  held.resize(surface.nodes.size());
+  write(file, "/surface/nodes", {std::ssize(surface.nodes), 3}, nodes);
+  write(file, "/surface/simplices", {std::ssize(surface.simplices) / surface.corners, surface.corners},
+        surface.simplices);
+  write(file, "/surface/held", {std::ssize(held)}, held);
+}
+
+/// Notes where the fields of a tick lie.
+class ColumnFinder {
+ public:
+  explicit ColumnFinder(const TickRecord& tick) : begin_(reinterpret_cast<const std::byte*>(&tick)) {}
+
+  template <class T>
+  void number(const char*, const char* name, const T& member) {
+    add(name, &member, 1);
+  }
+  void vector(const char* name, const double (&member)[3]) { add(name, member, 3); }
+  void numbers(const char* name, const double (&member)[6]) { add(name, member, 6); }
+  void pose(const std::string& name, const double (&position)[3], const double (&orientation)[4]) {
+    add(name + "_position", position, 3);
+    add(name + "_orientation", orientation, 4);
+  }
+  void wrench(std::string_view name, const double (&force)[3], const double (&torque)[3]) {
+    const std::string before = name == "wrench" ? "" : std::string(name) + "_";
+    add(before + "force", force, 3);
+    add(before + "torque", torque, 3);
+  }
+
+  std::vector<TickColumn> columns;
+
+ private:
+  template <class T>
+  void add(const std::string& name, const T* member, std::int64_t components) {
+    const std::byte* at = reinterpret_cast<const std::byte*>(member);
+    columns.push_back({name, hdf5::element_type<T>(), components, static_cast<std::size_t>(at - begin_)});
+  }
+
+  const std::byte* begin_;
+};
+
+void write_ticks(hdf5::File& file, const RecordingFile& recording, TickRange ticks) {
+  const std::vector<TickColumn> columns = tick_columns();
+  for (const TickColumn& column : columns) {
+    std::vector<std::int64_t> dims = {ticks.end - ticks.begin};
+    if (column.components > 1) dims.push_back(column.components);
+    file.write("/ticks/" + column.name, column.type, dims, nullptr);
+  }
+  std::vector<TickRecord> some;
+  std::vector<std::byte> values;
+  for (std::int64_t row = ticks.begin; row < ticks.end; row += std::ssize(some)) {
+    some.clear();
+    for (std::int64_t k = row; k < std::min(row + block, ticks.end); ++k) some.push_back(recording.tick(k));
+    for (const TickColumn& column : columns) {
+      values.resize(some.size() * column.bytes());
+      for (std::size_t k = 0; k < some.size(); ++k)
+        std::memcpy(&values[k * column.bytes()], reinterpret_cast<const std::byte*>(&some[k]) + column.offset,
+                    column.bytes());
+      file.write_rows("/ticks/" + column.name, column.type, row - ticks.begin, std::ssize(some),
+                      values.data());
+    }
+  }
+}
+
+void write_frames(hdf5::File& file, const RecordingFile& recording, std::span<const std::int64_t> pictures,
+                  const std::function<SurfaceFrame(std::int64_t)>& frame) {
+  const std::int64_t F = std::ssize(pictures), S = std::ssize(recording.surface().nodes);
+  const hdf5::ElementType number = hdf5::element_type<float>();
+  std::vector<std::int64_t> ticks;
+  std::vector<double> times;
+  for (const std::int64_t k : pictures) {
+    const PictureTime& taken = recording.pictures()[static_cast<std::size_t>(k)];
+    ticks.push_back(taken.tick);
+    times.push_back(taken.time);
+  }
+  write(file, "/frames/tick", {F}, ticks);
+  write(file, "/frames/time", {F}, times);
+  file.write("/frames/displacement", number, std::array{F, S, std::int64_t{3}}, nullptr);
+  file.write("/frames/von_mises", number, std::array{F, S}, nullptr);
+  file.write("/frames/pressure", number, std::array{F, S}, nullptr);
+  for (std::int64_t row = 0; row < F; ++row) {
+    const SurfaceFrame shown = frame(pictures[static_cast<std::size_t>(row)]);
+    file.write_rows("/frames/displacement", number, row, 1, shown.displacement.data());
+    file.write_rows("/frames/von_mises", number, row, 1, shown.von_mises.data());
+    file.write_rows("/frames/pressure", number, row, 1, shown.pressure.data());
+  }
+}
+
+}  // namespace
+
+std::vector<TickColumn> tick_columns() {
+  const TickRecord tick;
+  ColumnFinder finder(tick);
+  for_each_tick_field(tick, finder);
+  return finder.columns;
+}
+
+void write_hdf5(const std::filesystem::path& file, const RecordingFile& recording, TickRange ticks,
+                std::span<const std::int64_t> pictures,
+                const std::function<SurfaceFrame(std::int64_t)>& frame) {
+  const hdf5::Quiet quiet;
+  TemporaryFile temporary(file);
+  hdf5::File out = hdf5::File::create(temporary.path());
+  write_head(out, recording);
+  write_ticks(out, recording, ticks);
+  write_frames(out, recording, pictures, frame);
+  out.close();
+  temporary.take_its_place();
+}
+
+}  // namespace palpate
