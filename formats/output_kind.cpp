@@ -100,12 +100,14 @@ std::string_view name_of(OutputKind kind) noexcept {
 }
 
 std::span<const std::string_view> endings_of(OutputKind kind) noexcept {
-  static constexpr std::string_view hdf5[] = {".hdf", ".h5", ".hdf5", ".vtkhdf"}, mcap[] = {".mcap"},
+  static constexpr std::string_view model[] = {".hdf", ".h5", ".hdf5", ".vtkhdf"},
+                                    hdf5[] = {".h5", ".hdf5", ".hdf"}, mcap[] = {".mcap"},
                                     xdmf[] = {".xdmf", ".xmf"}, json[] = {".json"}, csv[] = {".csv"},
                                     vtu[] = {".vtu"}, html[] = {".html", ".htm"}, glb[] = {".glb"},
                                     pvd[] = {".pvd"}, off[] = {".off"};
   switch (kind) {
     case OutputKind::model:
+      return model;
     case OutputKind::hdf5:
       return hdf5;
     case OutputKind::recording:

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
-#include <ranges>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -24,6 +23,7 @@
 #include "runtime/exports/session_hdf5.h"
 #include "runtime/exports/session_xdmf.h"
 #include "runtime/exports/ticks_table.h"
+#include "runtime/loop/session_check.h"
 #include "runtime/scene/seen_surface.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/viewer/run_words.h"
@@ -54,19 +54,22 @@ std::vector<std::int64_t> choose(const SessionPictures& pictures, const ExportOp
     if (time < options.from || (options.to && time > *options.to)) continue;
     if (chosen.empty() || time - pictures.time(chosen.back()) >= spacing) chosen.push_back(k);
   }
-  if (chosen.empty()) {
-    throw Error(
-        fmt::format("has no pictures from {:g} s on{}", options.from,
-                    options.to ? fmt::format(" to {:g} s", *options.to) : ""),
-        options.recording.string(),
-        fmt::format("it lasts from {:g} to {:g} s", pictures.time(0), pictures.time(pictures.frames() - 1)));
-  }
   return chosen;
+}
+
+void expect_some(const std::vector<std::int64_t>& chosen, const SessionPictures& pictures,
+                 const ExportOptions& options) {
+  if (!chosen.empty()) return;
+  throw Error(
+      fmt::format("has no pictures from {:g} s on{}", options.from,
+                  options.to ? fmt::format(" to {:g} s", *options.to) : ""),
+      options.recording.string(),
+      fmt::format("it lasts from {:g} to {:g} s", pictures.time(0), pictures.time(pictures.frames() - 1)));
 }
 
 /// A recording's pictures that are written.
 struct Chosen {
-  const SessionPictures& pictures;
+  SessionPictures& pictures;
   std::vector<std::int64_t> frames;
 
   [[nodiscard]] double seconds() const {
@@ -170,15 +173,21 @@ std::size_t write_series(const std::filesystem::path& pvd, const Chosen& chosen)
 
 /// The ticks from options.from to options.to; there are some.
 TickRange choose_ticks(const RecordingFile& recording, const ExportOptions& options) {
-  const auto rows = std::views::iota(std::int64_t{0}, recording.ticks());
-  const auto count_until = [&](auto&& is_before) {
-    return std::ranges::partition_point(
-               rows, [&](std::int64_t row) { return is_before(recording.tick(row).time); }) -
-           rows.begin();
+  const auto first_from = [&](auto&& is_before) {  // by halves
+    std::int64_t low = 0, high = recording.ticks();
+    while (low < high) {
+      const std::int64_t middle = low + (high - low) / 2;
+      if (is_before(recording.tick(middle).time)) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    return low;
   };
   const TickRange chosen{
-      count_until([&](double time) { return time < options.from; }),
-      options.to ? count_until([&](double time) { return time <= *options.to; }) : recording.ticks()};
+      first_from([&](double time) { return time < options.from; }),
+      options.to ? first_from([&](double time) { return time <= *options.to; }) : recording.ticks()};
   if (chosen.begin >= chosen.end)
     throw Error("has no ticks in that time", options.recording.string(),
                 "palpate-runtime session tells how long it is");
@@ -215,8 +224,8 @@ void write_scene(const Chosen& chosen, const ExportOptions& options, const std::
 }
 
 /// Ticks and, where there are any, pictures, with their description.
-void write_numbers(const RecordingFile& recording, const SessionPictures* pictures,
-                   const ExportOptions& options, const std::filesystem::path& hdf5) {
+void write_numbers(const RecordingFile& recording, SessionPictures* pictures, const ExportOptions& options,
+                   const std::filesystem::path& hdf5) {
   const TickRange ticks = choose_ticks(recording, options);
   std::vector<std::int64_t> frames;
   if (pictures != nullptr)
@@ -249,7 +258,7 @@ int export_session(const ExportOptions& options) {
   if (!hdf5.empty()) paths.add(xdmf_path(hdf5), OutputKind::frames, "--hdf5");
   if (!vtu.empty()) expect_only_frames(frames_folder(vtu), options.force);
 
-  const RecordingFile recording(options.recording);
+  const RecordingFile recording = open_session(options.recording);
   if (!csv.empty()) write_table(recording, options, csv);
   const bool shows = !html.empty() || !gltf.empty() || !vtu.empty();
   std::optional<SessionPictures> pictures;
@@ -257,6 +266,7 @@ int export_session(const ExportOptions& options) {
   if (!hdf5.empty()) write_numbers(recording, pictures ? &*pictures : nullptr, options, hdf5);
   if (!shows) return exit_ok;
   const Chosen chosen{*pictures, choose(*pictures, options, options.fps.value_or(usual_fps))};
+  expect_some(chosen.frames, *pictures, options);
   if (!html.empty()) {
     const std::string page = html_page(chosen, options);
     write_file(html, page);

@@ -375,7 +375,7 @@ int palpate_record(palpate_session* session, const char* file, const palpate_rec
                    char* error, size_t error_size) noexcept {
   constexpr const char* place = "palpate_record";
   return tell_failure(place, "close other programs", error, error_size, [&](int& code) {
-    if (file == nullptr) throw Error("there is no file name", place, "name the recording, OUT.h5");
+    if (file == nullptr) throw Error("there is no file name", place, "name the recording, OUT.mcap");
     if (options == nullptr)
       throw Error("there are no options", place, "begin with PALPATE_RECORD_OPTIONS_INIT");
     const palpate_record_options wanted = read_or_throw(options, 0, default_record_options, "the options",

@@ -280,7 +280,7 @@ class Endings(OutputTest):
 
     RIGHT = {"--record": ".mcap", "--report": ".json", "--surface": ".vtu", "--contacts": ".csv", "--field": ".vtu", "--html": ".html", "--gltf": ".glb",
              "--vtu": ".pvd", "--csv": ".csv", "--hdf5": ".h5", "-o": ".hdf"}
-    ALSO = {"--hdf5": (".hdf5", ".hdf", ".vtkhdf"), "--html": (".htm",), "-o": (".h5", ".hdf5", ".vtkhdf"), "--field": (".csv",)}
+    ALSO = {"--hdf5": (".hdf5", ".hdf"), "--html": (".htm",), "-o": (".h5", ".hdf5", ".vtkhdf"), "--field": (".csv",)}
     OTHERS = (".toml", ".txt", ".png", ".stl", ".obj", ".vtk", ".vtp", ".xdmf", ".gltf", ".off", ".gz", ".partial", ".xlsx", ".mcap2")
 
     def attempt(self, option, name):
