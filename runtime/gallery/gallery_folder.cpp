@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <set>
 #include <system_error>
 #include <tuple>
 #include <utility>
@@ -92,14 +93,12 @@ std::vector<GalleryItem> list_gallery(const fs::path& folder) {
   std::vector<GalleryItem> items;
   for (const fs::directory_entry& entry : entries)
     if (std::optional<GalleryItem> item = item_of(entry)) items.push_back(std::move(*item));
-  const auto has_body = [&](const GalleryItem& source) {
-    return std::any_of(items.begin(), items.end(), [&](const GalleryItem& other) {
-      return other.kind == GalleryKind::body && stem_of(other.name) == stem_of(source.name);
-    });
-  };
+  std::set<std::string_view> bodies;
+  for (const GalleryItem& item : items)
+    if (item.kind == GalleryKind::body) bodies.insert(stem_of(item.name));
   std::vector<GalleryItem> shown;
   for (const GalleryItem& item : items)
-    if (item.kind != GalleryKind::source || (!has_body(item) && !is_picture(item.name)))
+    if (item.kind != GalleryKind::source || (!bodies.contains(stem_of(item.name)) && !is_picture(item.name)))
       shown.push_back(item);
   std::sort(shown.begin(), shown.end(), [](const GalleryItem& a, const GalleryItem& b) {
     return std::tie(a.kind, a.name) < std::tie(b.kind, b.name);

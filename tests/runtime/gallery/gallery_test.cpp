@@ -35,12 +35,12 @@ RequestHeader get(const std::string& target) {
 
 TEST(GalleryFolder, KindsAreThoseOfTheEnding) {
   EXPECT_EQ(gallery_kind("a.palpate.hdf"), GalleryKind::body);
-  EXPECT_EQ(gallery_kind("a.h5"), GalleryKind::recording);
+  EXPECT_EQ(gallery_kind("a.mcap"), GalleryKind::recording);
   for (const char* const name : {"a.stl", "a.obj", "a.ply", "a.off", "a.inr", "a.inr.gz", "a.nii", "a.nii.gz",
                                  "a.nrrd", "a.png", "a.pbm", "model.toml", "a.model.toml"})
     EXPECT_EQ(gallery_kind(name), GalleryKind::source) << name;
   const std::string no_name(300, 'a');
-  for (const std::string& name : std::vector<std::string>{"", "a", "a.hdf", "a.gz", ".h5", ".a.stl",
+  for (const std::string& name : std::vector<std::string>{"", "a", "a.hdf", "a.gz", ".mcap", ".a.stl",
                                                           "a/b.stl", "../a.stl", "a\n.stl", no_name + ".stl"})
     EXPECT_EQ(gallery_kind(name), std::nullopt) << name;
 }
@@ -48,7 +48,7 @@ TEST(GalleryFolder, KindsAreThoseOfTheEnding) {
 TEST(GalleryFolder, BodiesComeBeforeRecordingsAndWhatNoBodyWasMadeOf) {
   const ScratchFolder folder;
   for (const char* const name :
-       {"b.palpate.hdf", "a.palpate.hdf", "z.h5", "b.stl", "c.stl", "plot.png", "notes.txt", ".a.stl"})
+       {"b.palpate.hdf", "a.palpate.hdf", "z.mcap", "b.stl", "c.stl", "plot.png", "notes.txt", ".a.stl"})
     static_cast<void>(folder.write(name, "12345"));
   std::filesystem::create_directory(folder.path() / "d.palpate.hdf");
   std::vector<std::string> names;
@@ -56,11 +56,22 @@ TEST(GalleryFolder, BodiesComeBeforeRecordingsAndWhatNoBodyWasMadeOf) {
     names.push_back(item.name);
     EXPECT_EQ(item.bytes, 5);
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"a.palpate.hdf", "b.palpate.hdf", "z.h5", "c.stl"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"a.palpate.hdf", "b.palpate.hdf", "z.mcap", "c.stl"}));
   EXPECT_EQ(free_name(folder.path(), "new.stl"), "new.stl");
   EXPECT_EQ(free_name(folder.path(), "a.palpate.hdf"), "a-2.palpate.hdf");
   static_cast<void>(folder.write("a-2.palpate.hdf", ""));
   EXPECT_EQ(free_name(folder.path(), "a.palpate.hdf"), "a-3.palpate.hdf");
+}
+
+TEST(GalleryFolder, ThousandsOfFilesAreListed) {
+  const test::Folder folder;
+  constexpr int bodies = 4000;
+  for (int k = 0; k < bodies; ++k) {
+    test::write_bytes(folder / (std::to_string(k) + ".palpate.hdf"), "");
+    test::write_bytes(folder / (std::to_string(k) + ".stl"), "");
+    test::write_bytes(folder / (std::to_string(k) + "-other.stl"), "");
+  }
+  EXPECT_EQ(list_gallery(folder.path()).size(), 2U * bodies);
 }
 
 TEST(GalleryFolder, OneThatIsNotThereIsTold) {
@@ -119,12 +130,12 @@ TEST(GalleryAnswers, FilesOfOtherFoldersAreNotThere) {
 
 TEST(GalleryAnswers, TheFolderIsTold) {
   const ScratchFolder folder;
-  static_cast<void>(folder.write("a.h5", "123"));
+  static_cast<void>(folder.write("a.mcap", "123"));
   GalleryAnswers answers(folder.path(), {});
   const auto told = nlohmann::json::parse(answers.answer(get("/items"), served).body());
   EXPECT_EQ(told["folder"], folder.path().string());
   ASSERT_EQ(told["items"].size(), 1U);
-  EXPECT_EQ(told["items"][0]["name"], "a.h5");
+  EXPECT_EQ(told["items"][0]["name"], "a.mcap");
   EXPECT_EQ(told["items"][0]["kind"], "recording");
   EXPECT_EQ(told["items"][0]["bytes"], 3);
   EXPECT_EQ(answers.answer(get("/opened"), served).body(), "null");
