@@ -64,12 +64,11 @@ TEST(GalleryFolder, BodiesComeBeforeRecordingsAndWhatNoBodyWasMadeOf) {
 }
 
 TEST(GalleryFolder, ThousandsOfFilesAreListed) {
-  const test::Folder folder;
+  const ScratchFolder folder;
   constexpr int bodies = 4000;
   for (int k = 0; k < bodies; ++k) {
-    test::write_bytes(folder / (std::to_string(k) + ".palpate.hdf"), "");
-    test::write_bytes(folder / (std::to_string(k) + ".stl"), "");
-    test::write_bytes(folder / (std::to_string(k) + "-other.stl"), "");
+    for (const char* const ending : {".palpate.hdf", ".stl", "-other.stl"})
+      static_cast<void>(folder.write(std::to_string(k) + ending, ""));
   }
   EXPECT_EQ(list_gallery(folder.path()).size(), 2U * bodies);
 }
