@@ -69,7 +69,7 @@ CHAPTERS = {
         "packages",
         "errors",
     ],
-    "Reference": ["file-format", "reference/*"],
+    "Reference": ["file-format", "recording-format", "reference/*"],
     "Background": [
         "how-it-works",
         "measurements/index",
