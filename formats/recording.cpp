@@ -17,9 +17,33 @@
 #include "formats/recording_messages.h"
 
 namespace palpate {
+
+/// Says what is wrong with a number of a message.
+class RecordingChecker {
+ public:
+  explicit RecordingChecker(std::string where) : where_(std::move(where)) {}
+
+  template <class T>
+  void expect(bool possible, const char* topic, std::size_t row, const char* name, T value,
+              const char* needed) const {
+    if (possible) return;
+    throw Error(std::string(topic) + ", row " + std::to_string(row) + ": " + name + " is " +
+                    std::to_string(value) + ", which is not " + needed,
+                where_, again_);
+  }
+  void expect_whole(bool whole, const char* topic, std::size_t row) const {
+    if (!whole)
+      throw Error(std::string(topic) + ", row " + std::to_string(row) + ": is no whole message", where_,
+                  hint);
+  }
+
+ private:
+  static constexpr const char* again_ = "Copy the file again, or record the session again";
+  std::string where_;
+};
+
 namespace {
 
-constexpr const char* hint = "Copy the file again, or record the session again";
 constexpr const char* give_another = "Give a recording that palpate-runtime has written";
 constexpr const char* record_again = "Record the session again";
 constexpr double longest_time = 1e9;                                          // s
@@ -71,35 +95,10 @@ SessionInfo info_of(const mcap::Layout& layout, const std::string& path, std::st
   return info;
 }
 
-// ---- what can be ----
-
-/// Says what is wrong with a number of a message.
-class Checker {
- public:
-  explicit Checker(std::string where) : where_(std::move(where)) {}
-
-  template <class T>
-  void expect(bool possible, const char* topic, std::size_t row, const char* name, T value,
-              const char* needed) const {
-    if (possible) return;
-    throw Error(std::string(topic) + ", row " + std::to_string(row) + ": " + name + " is " +
-                    std::to_string(value) + ", which is not " + needed,
-                where_, hint);
-  }
-  void expect_whole(bool whole, const char* topic, std::size_t row) const {
-    if (!whole)
-      throw Error(std::string(topic) + ", row " + std::to_string(row) + ": is no whole message", where_,
-                  hint);
-  }
-
- private:
-  std::string where_;
-};
-
 constexpr const char* on_surface = "/surface";
 constexpr const char* on_tick = "/tool/0/tick";
 
-void check_surface(const RecordedSurface& surface, const Checker& check) {
+void check_surface(const RecordedSurface& surface, const RecordingChecker& check) {
   const auto nodes = std::ssize(surface.nodes);
   check.expect(surface.corners == 2 || surface.corners == 3, on_surface, 0, "corners", surface.corners,
                "2 or 3");
@@ -129,7 +128,7 @@ bool is_error(float value) {
   return std::isfinite(value) && value >= 0.0F;
 }
 
-void check_tick(const TickRecord& tick, double before, std::size_t row, const Checker& check) {
+void check_tick(const TickRecord& tick, double before, std::size_t row, const RecordingChecker& check) {
   const auto expect = [&](bool possible, const char* name, auto value, const char* needed) {
     check.expect(possible, on_tick, row, name, value, needed);
   };
@@ -144,7 +143,8 @@ void check_tick(const TickRecord& tick, double before, std::size_t row, const Ch
   expect(is_moment(tick.begun_ns), "begun_ns", tick.begun_ns, "a time of this session");
 }
 
-void check_loads(const ContactLoads& loads, std::size_t nodes, std::size_t row, const Checker& check) {
+void check_loads(const ContactLoads& loads, std::size_t nodes, std::size_t row,
+                 const RecordingChecker& check) {
   constexpr const char* topic = "/contacts";
   check.expect(loads.force.size() == 3 * loads.node.size(), topic, row, "force", loads.force.size(),
                "three for each node");
@@ -289,7 +289,7 @@ struct RecordingFile::Impl {
 
   FileDescriptor file;
   mcap::Layout layout;
-  Checker check;
+  RecordingChecker check;
   SessionInfo info;
   std::string generator;
   std::vector<std::pair<std::uint16_t, RecordedChannel>> kinds;

@@ -79,7 +79,7 @@ std::optional<TickRecord> SessionPictures::tick(std::int64_t number) const {
   return file_.tick(row);
 }
 
-SurfacePicture SessionPictures::picture(std::int64_t frame) {
+SurfacePicture SessionPictures::picture(std::int64_t frame) const {
   SurfacePicture picture;
   picture.frame = pictures_.frame(frame);
   if (const std::optional<TickRecord> then = tick(picture.frame.tick)) {

@@ -42,7 +42,7 @@ class SessionPictures {
   [[nodiscard]] Tool tool() const;         ///< that touched it at the start
   /// The picture of frame 0 .. frames() - 1, with the tool as it was in its tick. Throws Error when it cannot
   /// be read.
-  [[nodiscard]] SurfacePicture picture(std::int64_t frame);
+  [[nodiscard]] SurfacePicture picture(std::int64_t frame) const;
   /// The members of the message `state` that are the run's, for frames at these times, the first of which is
   /// shown.
   [[nodiscard]] nlohmann::json state(const std::vector<double>& times) const;
@@ -53,7 +53,7 @@ class SessionPictures {
   [[nodiscard]] std::optional<TickRecord> tick(std::int64_t number) const;
 
   RecordingFile file_;
-  RecordedPictures pictures_;
+  mutable RecordedPictures pictures_;  // its workspace changes
 };
 
 }  // namespace palpate

@@ -20,7 +20,7 @@ class SessionView : public ViewedRun {
   /// As SessionPictures.
   explicit SessionView(const std::filesystem::path& recording);
 
-  [[nodiscard]] SessionPictures& pictures() noexcept { return pictures_; }
+  [[nodiscard]] const SessionPictures& pictures() const noexcept { return pictures_; }
   /// Shows it as this run of a server, which must live as long as pages are served.
   void show(ViewerServer& server, std::size_t run);
 

@@ -24,7 +24,7 @@ int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptio
   ViewerServer server(ViewerPort(options), runs);
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     sessions[k].show(server, k);
-    SessionPictures& pictures = sessions[k].pictures();
+    const SessionPictures& pictures = sessions[k].pictures();
     fmt::print(stderr, "{}: {} pictures, {:.3f} s\n", recordings[k].string(), pictures.frames(),
                pictures.time(pictures.frames() - 1));
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -19,7 +20,12 @@ constexpr std::size_t ring_seconds = 16;   // ticks for which there is room
 constexpr std::size_t picture_ring = 256;  // four seconds at 60 Hz
 constexpr auto recorder_pause = std::chrono::milliseconds(1);
 constexpr auto interval = std::chrono::milliseconds(500);  // between checkpoints
-constexpr int at_once = 1000;                              // ticks, and pictures, between looks at the clock
+
+constexpr int at_once = 1000;  // ticks between looks at the clock
+
+constexpr double seconds(std::chrono::milliseconds time) {
+  return 1e-3 * static_cast<double>(time.count());
+}
 
 constexpr std::array<std::pair<DeviceEvent, const char*>, 6> event_texts = {{
     {DeviceEvent::opened_again, "the device is back"},
@@ -76,6 +82,7 @@ void Recorder::push_picture(RecordedPicture picture) noexcept {
 }
 
 void Recorder::push_waiting(const TickRecord& tick) noexcept {
+  waits_ = true;
   while (!try_push(tick)) {
     if (failed_) return push(tick);
     std::this_thread::sleep_for(recorder_pause);
@@ -106,18 +113,38 @@ void Recorder::note_events(const TickRecord& tick) {
   last_ = tick;
 }
 
-/// Whether anything was in the rings.
-bool Recorder::take_all() {
-  TickRecord tick;
-  int ticks = 0, pictures = 0;
-  for (; ticks < at_once && ticks_.pop(tick); ++ticks) {
-    note_events(tick);
-    writer_.append(tick);
+/// Those of times before this one; whether there were any.
+bool Recorder::take_pictures(double before) {
+  const auto time_of = [](const auto& picture) { return picture.time; };
+  for (bool any = false;; any = true) {
+    RecordedPicture popped;
+    if (!next_ && pictures_.pop(popped)) next_ = std::move(popped);
+    if (!next_ || !(std::visit(time_of, *next_) < before)) return any;
+    std::visit([&](const auto& picture) { writer_.append(picture); }, *next_);
+    next_.reset();
   }
-  RecordedPicture picture;
-  for (; pictures < at_once && pictures_.pop(picture); ++pictures)
-    std::visit([&](const auto& shown) { writer_.append(shown); }, picture);
-  return ticks > 0 || pictures > 0;
+}
+
+void Recorder::take(const TickRecord& tick) {
+  take_pictures(tick.time);
+  if (waits_ && tick.time - kept_until_ >= seconds(interval)) {
+    writer_.checkpoint();
+    kept_until_ = tick.time;
+  }
+  note_events(tick);
+  writer_.append(tick);
+  last_time_ = tick.time;
+}
+
+/// Each picture comes after its tick and before the next, where it is there by then. Whether anything was in
+/// the rings.
+bool Recorder::take_all(bool closing) {
+  TickRecord tick;
+  int ticks = 0;
+  for (; ticks < at_once && ticks_.pop(tick); ++ticks) take(tick);
+  constexpr double end = std::numeric_limits<double>::infinity();
+  const bool pictures = take_pictures(closing && ticks == 0 ? end : std::nextafter(last_time_, end));
+  return ticks > 0 || pictures;
 }
 
 void Recorder::write() noexcept {
@@ -125,10 +152,10 @@ void Recorder::write() noexcept {
     auto last = std::chrono::steady_clock::now();
     for (;;) {
       const bool closing = closing_;  // read before the rings: nothing is pushed after closing
-      const bool taken = take_all();
+      const bool taken = take_all(closing);
       if (closing && !taken) break;
       const auto now = std::chrono::steady_clock::now();
-      if (now - last >= interval) {
+      if (!waits_ && now - last >= interval) {
         writer_.checkpoint();
         last = now;
       }

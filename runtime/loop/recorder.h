@@ -6,6 +6,7 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 #include <variant>
@@ -24,7 +25,8 @@ using RecordedPicture = std::variant<ContactLoads, SurfaceFrame>;
 
 /// A thread that writes a session to a recording, fed through bounded lock-free rings: of ticks by one other
 /// thread, of pictures by one too. Every half second all of it is put into the recording, so that no more
-/// is lost however the program ends. Where that fails (a full disk) nothing is kept any more, the reason is
+/// is lost however the program ends; where ticks are waited for, every half second of their own time, so that
+/// equal runs make equal files. Where that fails (a full disk) nothing is kept any more, the reason is
 /// told at once, and the run goes on.
 class Recorder {
  public:
@@ -62,7 +64,9 @@ class Recorder {
   bool try_push(RecordedPicture& picture) noexcept;
   void write() noexcept;
   void fail(const std::exception& reason) noexcept;
-  bool take_all();
+  bool take_all(bool closing);
+  void take(const TickRecord& tick);
+  bool take_pictures(double before);
   void note_events(const TickRecord& tick);
 
   OnFailure on_failure_;
@@ -74,7 +78,12 @@ class Recorder {
   std::exception_ptr failure_;
   std::atomic<std::int64_t> dropped_ = 0;
   std::atomic<std::int64_t> dropped_pictures_ = 0;
-  TickRecord last_;  // that was written
+  std::atomic<bool> waits_ = false;  // what is pushed
+  // Of the thread:
+  TickRecord last_;                      // that was written
+  double last_time_ = -1.0;              // and its time, -1 before the first
+  double kept_until_ = 0.0;              // time of the last checkpoint, where ticks are waited for
+  std::optional<RecordedPicture> next_;  // picture that is not written yet
   std::thread thread_;
 };
 
