@@ -34,7 +34,7 @@ class RecordingChecker {
   void expect_whole(bool whole, const char* topic, std::size_t row) const {
     if (!whole)
       throw Error(std::string(topic) + ", row " + std::to_string(row) + ": is no whole message", where_,
-                  hint);
+                  again_);
   }
 
  private:

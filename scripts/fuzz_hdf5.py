@@ -1,5 +1,5 @@
-"""Kinds of scripts/fuzz-programs: model files and recordings whose HDF5 metadata is damaged with checksums that are right again, so that the HDF5
-library meets the damage behind its door."""
+"""Kinds of scripts/fuzz-programs: model files whose HDF5 metadata is damaged, and recordings, both with checksums that are right again, so that
+what is behind them is met."""
 
 import functools
 import os
@@ -9,6 +9,7 @@ import struct
 import subprocess
 import tempfile
 import time
+import zlib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = pathlib.Path(os.environ.get("PALPATE_BINARY_DIR", ROOT / "build" / "release"))
@@ -194,17 +195,18 @@ def say(*command, cwd):
 
 @functools.lru_cache(maxsize=None)
 def whole_files():
-    """Bytes of a model, of a recording, and of one that was killed with its parts."""
+    """Bytes of a model, of a recording, and of one that was killed."""
     with tempfile.TemporaryDirectory(prefix="palpate-fuzz-") as scratch:
         folder = pathlib.Path(scratch)
         (folder / "model.toml").write_text(MODEL)
         (folder / "touch.csv").write_text(SCRIPT % "0.2")
         say(PRECOMPUTE, "model.toml", "-o", "cube.palpate.hdf", cwd=folder)
         touch = [RUNTIME, "play", "cube.palpate.hdf", *TOOL, "--device", "script:touch.csv"]
-        say(*touch, "--overlay", "r=2,rings=1", "--fast", "--record", "touch.h5", cwd=folder)
+        say(*touch, "--overlay", "r=2,rings=1", "--fast", "--record", "touch.mcap", cwd=folder)
         (folder / "touch.csv").write_text(SCRIPT % "1000")
-        process = subprocess.Popen([*touch, "--record", "killed.h5"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while len(list(folder.glob("killed.h5.parts/?.h5"))) < 2 and process.poll() is None:
+        process = subprocess.Popen([*touch, "--record", "killed.mcap"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        killed = folder / "killed.mcap"
+        while process.poll() is None and (not killed.exists() or killed.stat().st_size < 1_000_000):
             time.sleep(0.05)
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -246,14 +248,41 @@ class Model(Kind):
                 [RUNTIME, "play", "cube.palpate.hdf", *TOOL, "--device", "script:touch.csv", "--fast", "--report", "report.json"]]
 
 
+def seal_chunks(data):
+    """Makes the CRC of each chunk of an MCAP file right again."""
+    at = 8
+    while at + 9 <= len(data):
+        size = struct.unpack_from("<Q", data, at + 1)[0]
+        if size > len(data) - at - 9:
+            return
+        if data[at] == 6 and size >= 40:
+            struct.pack_into("<I", data, at + 9 + 24, zlib.crc32(data[at + 49:at + 9 + size]))
+        at += 9 + size
+
+
 class Recording(Kind):
     @staticmethod
     def files():
-        return ["touch.h5", "killed.h5"] + sorted(name for name in whole_files() if name.startswith("killed.h5.parts/") and name.endswith(".h5"))
+        return ["touch.mcap", "killed.mcap"]
+
+    def damage(self, rng, seed):
+        data = bytearray(whole_files()[seed])
+        for _ in range(rng.randrange(1, 5)):
+            at = rng.randrange(len(data) - 8)
+            if rng.random() < 0.5:
+                data[at] ^= 1 << rng.randrange(8)
+            elif rng.random() < 0.7:
+                size = rng.choice([1, 2, 4, 8])
+                data[at:at + size] = (rng.choice(NUMBERS) % (1 << 8 * size)).to_bytes(size, "little")
+            else:
+                del data[at:at + rng.randrange(64)]
+        if rng.random() < 0.7:
+            seal_chunks(data)
+        return seed, bytes(data)
 
     def write(self, folder, rng, data):
         super().write(folder, rng, data)
-        (folder / "which").write_text("touch.h5" if data[0] == "touch.h5" else "killed.h5")
+        (folder / "which").write_text(data[0])
 
     def command(self, folder):
         which = (folder / "which").read_text()
@@ -261,8 +290,8 @@ class Recording(Kind):
 
     @staticmethod
     def commands():
-        return [[RUNTIME, "session", "WHICH"], [RUNTIME, "session", "WHICH", "--json"], [RUNTIME, "export", "WHICH", "--html", "page.html"],
+        return [[RUNTIME, "session", "WHICH"], [RUNTIME, "session", "WHICH", "--json", "--finish"], [RUNTIME, "export", "WHICH", "--html", "page.html"],
                 [RUNTIME, "play", "cube.palpate.hdf", "--device", "replay:WHICH", "--fast", "--report", "report.json"]]
 
 
-KINDS = {"hdf5-model": Model(), "hdf5-recording": Recording()}
+KINDS = {"hdf5-model": Model(), "recording": Recording()}

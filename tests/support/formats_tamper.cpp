@@ -58,27 +58,8 @@ std::string attribute_text(hid_t attribute) {
   return text;
 }
 
-/// Rows that are compressed, as they are stored; nothing where they are not.
-std::vector<std::byte> compressed_rows(hid_t dataset) {
-  std::vector<std::byte> bytes;
-  const Id creation(H5Dget_create_plist(dataset), H5Pclose);
-  if (H5Pget_layout(creation.get()) != H5D_CHUNKED || H5Pget_nfilters(creation.get()) == 0) return bytes;
-  const Id space(H5Dget_space(dataset), H5Sclose);
-  hsize_t rows[H5S_MAX_RANK] = {}, start[H5S_MAX_RANK] = {}, size = 0;
-  H5Sget_simple_extent_dims(space.get(), rows, nullptr);
-  for (; start[0] < rows[0]; ++start[0]) {
-    H5Dget_chunk_storage_size(dataset, start, &size);
-    const std::size_t before = bytes.size();
-    bytes.resize(before + size);
-    std::uint32_t skipped = 0;
-    H5Dread_chunk(dataset, H5P_DEFAULT, start, &skipped, bytes.data() + before);
-  }
-  return bytes;
-}
-
 /// docs/file-format.md, "Checksums", for arrays of one chunk.
 std::string dataset_checksum(hid_t dataset) {
-  if (const std::vector<std::byte> rows = compressed_rows(dataset); !rows.empty()) return checksum(rows);
   std::vector<std::byte> bytes;
   const Id type(H5Dget_type(dataset), H5Tclose);
   const Id space(H5Dget_space(dataset), H5Sclose);

@@ -80,14 +80,14 @@ TEST(OutputKind, WhatOthersWriteIsNotOurs) {
 TEST(OutputKind, HdfFilesSayWhatTheyAre) {
   const Folder folder;
   write_sample(folder / "a.hdf");
-  RecordingWriter(folder / "a.h5", {}).finish();
+  RecordingWriter(folder / "a.mcap", {}).finish();
   EXPECT_TRUE(is_ours(folder / "a.hdf", OutputKind::model));
-  EXPECT_TRUE(is_ours(folder / "a.h5", OutputKind::recording));
+  EXPECT_TRUE(is_ours(folder / "a.mcap", OutputKind::recording));
   EXPECT_FALSE(is_ours(folder / "a.hdf", OutputKind::recording));
-  EXPECT_FALSE(is_ours(folder / "a.h5", OutputKind::model));
-  RecordingWriter killed(folder / "killed.h5", {});
+  EXPECT_FALSE(is_ours(folder / "a.mcap", OutputKind::model));
+  RecordingWriter killed(folder / "killed.mcap", {});
   killed.checkpoint();
-  EXPECT_TRUE(is_ours(folder / "killed.h5", OutputKind::recording));
+  EXPECT_TRUE(is_ours(folder / "killed.mcap", OutputKind::recording));
 }
 
 TEST(OutputPaths, InputsMayComeLater) {
@@ -115,7 +115,7 @@ TEST(OutputPaths, LeaveNothingBehind) {
   const Folder folder;
   OutputPaths paths(false);
   paths.add(folder / "a.hdf", OutputKind::model, "-o");
-  paths.add(folder / "b.h5", OutputKind::recording, "--record");
+  paths.add(folder / "b.mcap", OutputKind::recording, "--record");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 

@@ -181,7 +181,7 @@ TEST_F(PointedCube, FeelsNothingOnceItIsLiftedAfterAPress) {
 
 TEST_F(PointedCube, IsReplayedToTheSameBits) {
   const std::filesystem::path path =
-      std::filesystem::path(testing::TempDir()) / ("palpate_pointed." + std::to_string(getpid()) + ".h5");
+      std::filesystem::path(testing::TempDir()) / ("palpate_pointed." + std::to_string(getpid()) + ".mcap");
   {
     Pointed device(press_twice);
     Recorder recorder(path, {"box.palpate.hdf", "0123", "mouse", 1000, ""});
@@ -189,7 +189,7 @@ TEST_F(PointedCube, IsReplayedToTheSameBits) {
     EXPECT_GT(report.ticks_in_contact, 500);
     recorder.finish();
   }
-  Recording session = read_recording(path);
+  Recording session = read_recording(RecordingFile(path));
   std::filesystem::remove(path);
   ASSERT_EQ(session.ticks.size(), 900U);
   ReplayDevice device(session);

@@ -2,12 +2,14 @@
 #include "runtime/app/viewed_play.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -134,7 +136,7 @@ TEST_F(ViewedPlayTest, RecordsAnActThatIsReplayedToTheSameBits) {
 
   PlayOptions options;
   options.device.kind = DeviceChoice::Kind::replay;
-  options.session = std::make_shared<const Recording>(read_recording(file));
+  options.session = std::make_shared<const Recording>(read_recording(RecordingFile(file)));
   options.settings = read_settings(split_settings(options.session->info.options));
   options.fast = true;
   const Body body = load_body(cube, "", options.settings.body());
@@ -443,11 +445,18 @@ TEST_F(ViewedPlayTest, TellsAtOnceOfARecordingThatFailsAndGoesOn) {
   ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording && state.ticks > 0; }));
   const std::filesystem::path file = *play_->state().recording;
   EXPECT_FALSE(play_->state().recording_failed);
-  std::filesystem::remove_all(file.string() + ".parts");
-  ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording_failed.has_value(); }));
+  rlimit before = {};  // on the size of files: stands for a full disk
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit full = {std::filesystem::file_size(file) + 1000, before.rlim_max};
+  auto* const action = std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &full);
+  const bool failed_then = wait_for([](const RunState& state) { return state.recording_failed.has_value(); });
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, action);
+  ASSERT_TRUE(failed_then);
   EXPECT_EQ(play_->state().recording, file) << "the page says of which";
   const nlohmann::json failed = to_json(play_->state()).at("recording_failed");
-  EXPECT_NE(failed.at("what").get<std::string>().find("No such file"), std::string::npos) << failed;
+  EXPECT_NE(failed.at("what").get<std::string>().find("File too large"), std::string::npos) << failed;
   EXPECT_TRUE(wait_for_ticks(50)) << "the loop goes on";
   play_->record(false);
   ASSERT_TRUE(wait_for([](const RunState& state) { return !state.recording && state.ticks > 0; }));
@@ -462,10 +471,10 @@ TEST_F(ViewedPlayTest, TellsAtOnceOfARecordingThatFailsAndGoesOn) {
 TEST(RunState, IsJsonWhateverAFileIsCalled) {
   RunState state;
   state.device = "a \"hand\"\n";
-  state.recording = "caf\xe9.h5";  // of a file system that knows no UTF-8
+  state.recording = "caf\xe9.mcap";  // of a file system that knows no UTF-8
   const nlohmann::json json = nlohmann::json::parse(json_text(to_json(state)));
   EXPECT_EQ(json.at("device"), state.device);
-  EXPECT_EQ(json.at("recording"), "caf\xef\xbf\xbd.h5");
+  EXPECT_EQ(json.at("recording"), "caf\xef\xbf\xbd.mcap");
   EXPECT_TRUE(json.at("settings").is_object());
   EXPECT_TRUE(json.at("fault").is_null());
   state.fault = Fault::too_fast;

@@ -411,7 +411,7 @@ palpate_pose pressing(int tick) {
 }
 
 TEST(CInterfaceRecording, HoldsWhatWasWantedAndFelt) {
-  const auto file = std::filesystem::temp_directory_path() / "palpate_c_interface_recording.h5";
+  const auto file = std::filesystem::temp_directory_path() / "palpate_c_interface_recording.mcap";
   const Session session = open("cube2", {sphere(0.1), sphere(0.05)});
   const palpate_pose far{sizeof(palpate_pose), {5.0, 5.0, 5.0}, {1.0, 0.0, 0.0, 0.0}, 0};
   for (int tick = 0; tick < 100; ++tick)  // what was before is not in it
@@ -481,11 +481,10 @@ TEST(CInterfaceRecording, HoldsWhatWasWantedAndFelt) {
       palpate_recording_picture(read.get(), counts.pictures, picture.data(), &time, error, sizeof error),
       PALPATE_ERROR_ARGUMENT);
   std::filesystem::remove(file);
-  std::filesystem::remove(std::filesystem::path(file).replace_extension(".xdmf"));
 }
 
 TEST(CInterfaceRecording, WhatCannotBeIsRefused) {
-  const auto file = std::filesystem::temp_directory_path() / "palpate_c_interface_refused.h5";
+  const auto file = std::filesystem::temp_directory_path() / "palpate_c_interface_refused.mcap";
   const Session session = open("cube2", {sphere(0.1)});
   palpate_record_options good = PALPATE_RECORD_OPTIONS_INIT;
   EXPECT_EQ(end_recording(session.get()), PALPATE_ERROR_STATE);
@@ -504,7 +503,7 @@ TEST(CInterfaceRecording, WhatCannotBeIsRefused) {
   palpate_record_options unset = good;
   unset.size = 0;
   EXPECT_EQ(record(session.get(), file.c_str(), &unset), PALPATE_ERROR_ARGUMENT);
-  EXPECT_EQ(record(session.get(), "/no/such/folder/a.h5", &good), PALPATE_ERROR_FILE);
+  EXPECT_EQ(record(session.get(), "/no/such/folder/a.mcap", &good), PALPATE_ERROR_FILE);
   EXPECT_FALSE(std::filesystem::exists(file));
   palpate_record_options rare = good;
   rare.pictures = 1e-300;  // none but the first
@@ -521,7 +520,7 @@ TEST(CInterfaceRecording, WhatCannotBeIsRefused) {
   ASSERT_NE(odd, nullptr) << error;
   EXPECT_EQ(record(odd.get(), file.c_str(), &good), PALPATE_ERROR_ARGUMENT);
 
-  palpate_recording* none = palpate_recording_open("/no/such.h5", error, sizeof error);
+  palpate_recording* none = palpate_recording_open("/no/such.mcap", error, sizeof error);
   EXPECT_EQ(none, nullptr);
   EXPECT_EQ(palpate_last_code(), PALPATE_ERROR_FILE);
   none = palpate_recording_open(golden("cube2").c_str(), error, sizeof error);
@@ -540,14 +539,14 @@ TEST(CInterfaceRecording, ReplacesNothingButARecording) {
   fs::copy_file(golden("cube2"), model);
   std::ofstream(text) << "of a stranger";
   fs::copy_file(text, folder.path() / "source.csv");
-  fs::create_symlink("mine.palpate.hdf", folder.path() / "soft.h5");
-  fs::create_symlink("soft.h5", folder.path() / "twice.h5");
-  fs::create_symlink("nothing", folder.path() / "dangling.h5");
-  fs::create_symlink("loop.h5", folder.path() / "loop.h5");
-  fs::create_hard_link(model, folder.path() / "hard.h5");
-  fs::create_directory(folder.path() / "folder.h5");
-  fs::create_symlink("/dev/null", folder.path() / "null.h5");
-  ASSERT_EQ(::mkfifo((folder.path() / "pipe.h5").c_str(), 0600), 0);
+  fs::create_symlink("mine.palpate.hdf", folder.path() / "soft.mcap");
+  fs::create_symlink("soft.mcap", folder.path() / "twice.mcap");
+  fs::create_symlink("nothing", folder.path() / "dangling.mcap");
+  fs::create_symlink("loop.mcap", folder.path() / "loop.mcap");
+  fs::create_hard_link(model, folder.path() / "hard.mcap");
+  fs::create_directory(folder.path() / "folder.mcap");
+  fs::create_symlink("/dev/null", folder.path() / "null.mcap");
+  ASSERT_EQ(::mkfifo((folder.path() / "pipe.mcap").c_str(), 0600), 0);
   const auto bytes = [](const fs::path& file) {
     std::ifstream in(file, std::ios::binary);
     return std::string(std::istreambuf_iterator<char>(in), {});
@@ -559,8 +558,8 @@ TEST(CInterfaceRecording, ReplacesNothingButARecording) {
   ASSERT_NE(session, nullptr) << error;
   const palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
   for (const char* name :
-       {"mine.palpate.hdf", "soft.h5", "twice.h5", "hard.h5", "folder.h5/../mine.palpate.hdf", "notes.txt",
-        "dangling.h5", "loop.h5", "folder.h5", "null.h5", "pipe.h5", ""}) {
+       {"mine.palpate.hdf", "soft.mcap", "twice.mcap", "hard.mcap", "folder.mcap/../mine.palpate.hdf", "notes.txt",
+        "dangling.mcap", "loop.mcap", "folder.mcap", "null.mcap", "pipe.mcap", ""}) {
     const std::string file = *name == '\0' ? "" : (folder.path() / name).string();
     EXPECT_EQ(palpate_record(session.get(), file.c_str(), &options, error, sizeof error), PALPATE_ERROR_FILE)
         << name;
@@ -571,12 +570,12 @@ TEST(CInterfaceRecording, ReplacesNothingButARecording) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   EXPECT_EQ(bytes(model), whole);
   EXPECT_EQ(bytes(text), "of a stranger");
-  EXPECT_TRUE(fs::is_symlink(folder.path() / "soft.h5"));
-  EXPECT_TRUE(fs::is_fifo(folder.path() / "pipe.h5"));
+  EXPECT_TRUE(fs::is_symlink(folder.path() / "soft.mcap"));
+  EXPECT_TRUE(fs::is_fifo(folder.path() / "pipe.mcap"));
 
   const palpate_pose pose = PALPATE_POSE_INIT;
-  std::ofstream(folder.path() / "empty.h5").flush();
-  for (const char* name : {"empty.h5", "empty.h5"}) {  // the second time it is a recording
+  std::ofstream(folder.path() / "empty.mcap").flush();
+  for (const char* name : {"empty.mcap", "empty.mcap"}) {  // the second time it is a recording
     ASSERT_EQ(palpate_record(session.get(), (folder.path() / name).c_str(), &options, error, sizeof error),
               PALPATE_OK)
         << error;

@@ -529,13 +529,12 @@ TEST(OwnLoop, MakesNoHeapCall) {
   };
   count();
   EXPECT_GT(touching, 500);
-  const std::string recording = testing::TempDir() + "palpate_heap_own_loop.h5";
+  const std::string recording = testing::TempDir() + "palpate_heap_own_loop.mcap";
   const palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
   ASSERT_EQ(palpate_record(session, recording.c_str(), &options, nullptr, 0), PALPATE_OK);
   count();
   palpate_destroy(session);
   std::filesystem::remove(recording);
-  std::filesystem::remove_all(recording + ".parts");
 }
 
 static_assert(noexcept(step(std::declval<const Body&>(), std::declval<State&>(),

@@ -177,11 +177,11 @@ class Replay : public DeviceLoop {
 
   Recording record(Device& device, Safety& safety, std::int64_t ticks, bool fast) {
     State state(body_, {.tools = {ball}});
-    Recorder recorder(folder_ / "a.h5", {"box.palpate.hdf", "0123", "made up", 1000, "tool=sphere:0.01\n"});
+    Recorder recorder(folder_ / "a.mcap", {"box.palpate.hdf", "0123", "made up", 1000, "tool=sphere:0.01\n"});
     run_loop({.body = body_, .state = state, .device = device, .safety = &safety, .recorder = &recorder},
              {.ticks = ticks, .fast = fast}, stop_);
     recorder.finish();
-    return read_recording(folder_ / "a.h5");
+    return read_recording(RecordingFile(folder_ / "a.mcap"));
   }
 
   ReplayDifference replay(const Recording& session, const SafetyOptions& options, const Tool& tool = ball) {

@@ -178,10 +178,10 @@ TEST(LoopTick, MakesNoHeapCall) {
     patient.silence.most = 1e9;
     patient.max_speed = 1e9;  // of a hand that is seen seldom
     Safety safety(patient);
-    Recorder recorder(folder / "a.h5", {"box.palpate.hdf", "0123", "quiet", 1000, ""},
+    Recorder recorder(folder / "a.mcap", {"box.palpate.hdf", "0123", "quiet", 1000, ""},
                       recorded_surface(body));
     SurfaceFrames frames(body, state, {},
-                         [&](SurfacePicture picture) { recorder.push_frame(std::move(picture.frame)); });
+                         [&](SurfacePicture picture) { recorder.push_picture(std::move(picture.frame)); });
     Monitor monitor({});
     LoopControl control;
     TickFeed feed([](std::span<const TickNote>) {});

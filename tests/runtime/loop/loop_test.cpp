@@ -276,12 +276,12 @@ TEST_F(RecordedLoop, RecordsWhereItWentOn) {
     while (!control.paused || control.single_ticks > 0) std::this_thread::yield();
     control.paused = false;
   });
-  Recorder recorder(folder_ / "paused.h5", session_info);
+  Recorder recorder(folder_ / "paused.mcap", session_info);
   run_loop({.body = body_, .state = state_, .device = device, .recorder = &recorder, .control = &control},
            {.ticks = 101}, stop_);
   person.join();
   recorder.finish();
-  const Recording recording = read_recording(folder_ / "paused.h5");
+  const Recording recording = read_recording(RecordingFile(folder_ / "paused.mcap"));
   ASSERT_EQ(recording.ticks.size(), 101U);
   for (std::size_t k = 0; k < 101; ++k) {
     const auto event = static_cast<DeviceEvent>(recording.ticks[k].event);
@@ -293,16 +293,16 @@ TEST_F(RecordedLoop, RecordsWhereItWentOn) {
 // 70 s: more ticks than the recorder's ring holds.
 TEST_F(RecordedLoop, FastRunsLeaveTheSameRecordingToTheLastBit) {
   ScriptDevice device = ScriptDevice::parse("t,x,y,z,grab\n0,0.5,0.5,1,1\n70,0.5,0.4,0.9,1\n", "long.csv");
-  for (const char* name : {"one.h5", "two.h5"}) {
+  for (const char* name : {"one.mcap", "two.mcap"}) {
     State state(body_, {.tools = {{.reach = 0.01}}});
     Recorder recorder(folder_ / name, session_info);
     EXPECT_EQ(run(body_, state, device, true, stop_, &recorder).ticks, 70001);
     recorder.finish();
     EXPECT_EQ(recorder.dropped(), 0);
   }
-  const std::string one = bytes_of(folder_ / "one.h5");
+  const std::string one = bytes_of(folder_ / "one.mcap");
   EXPECT_GT(one.size(), 70001U * 220U);
-  EXPECT_TRUE(one == bytes_of(folder_ / "two.h5"));
+  EXPECT_TRUE(one == bytes_of(folder_ / "two.mcap"));
   std::size_t files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder_))
     files += entry.is_regular_file() ? 1 : 0;
@@ -314,11 +314,11 @@ TEST_F(RecordedLoop, KeepsWhatEachTickGave) {
   State state(body_, {.tools = {finger}});
   State again = state;
   {
-    Recorder recorder(folder_ / "slide.h5", session_info);
+    Recorder recorder(folder_ / "slide.mcap", session_info);
     run(body_, state, device, true, stop_, &recorder);
     recorder.finish();
   }
-  const Recording recording = read_recording(folder_ / "slide.h5");
+  const Recording recording = read_recording(RecordingFile(folder_ / "slide.mcap"));
   ASSERT_EQ(recording.ticks.size(), 401U);
   const auto vector = [](const double(&v)[3]) { return Vec3(v[0], v[1], v[2]); };
   const auto rotation = [](const double(&q)[4]) {

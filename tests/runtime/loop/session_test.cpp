@@ -14,10 +14,14 @@
 #include <vector>
 
 #include "base/error.h"
+#include "formats/mcap.h"
 #include "formats/recording.h"
+#include "formats/recording_messages.h"
+#include "runtime/background/picture_maker.h"
 #include "runtime/background/surface_frames.h"
 #include "runtime/loop/recorder.h"
-#include "runtime/loop/session_xdmf.h"
+#include "runtime/safety/device.h"
+#include "runtime/safety/fault.h"
 #include "runtime/tick/step.h"
 #include "tests/support/runtime_model.h"
 
@@ -169,6 +173,58 @@ TEST_F(RecordedFrames, ShowWhatTouchesAndWhatThatDoes) {
   EXPECT_GT(most_pressure, 0.01);
 }
 
+/// As what a picture has when it is computed from contact forces in single precision.
+void expect_same_picture(const SurfaceFrame& later, const SurfaceFrame& then) {
+  ASSERT_EQ(later.tick, then.tick);
+  ASSERT_EQ(later.time, then.time);
+  const auto expect_near = [](const std::vector<float>& a, const std::vector<float>& b) {
+    ASSERT_EQ(a.size(), b.size());
+    float largest = 0.0F;
+    for (const float x : b) largest = std::max(largest, std::isnan(x) ? 0.0F : std::abs(x));
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      ASSERT_EQ(std::isnan(a[k]), std::isnan(b[k]));
+      if (!std::isnan(b[k])) ASSERT_NEAR(a[k], b[k], 2e-6F * largest) << k;
+    }
+  };
+  expect_near(later.displacement, then.displacement);
+  expect_near(later.von_mises, then.von_mises);
+  expect_near(later.pressure, then.pressure);
+}
+
+// What a recording keeps where Green's functions move the body.
+TEST_F(RecordedFrames, FollowFromContactForcesAlone) {
+  ASSERT_TRUE(pictures_follow_from_contacts(body_));
+  PictureMaker maker(body_);
+  for (const double radius : {0.02, 0.15, 0.6}) {  // a point, a ball, a palm with groups of nodes
+    State state(body_, {.tools = {Tool{.radius = radius}}});
+    std::vector<ContactLoads> loads;
+    std::vector<SurfaceFrame> frames;
+    SurfaceFrames short_ones(body_, state,
+                             {.ticks_per_frame = 7, .in_background = false, .contacts_only = true},
+                             [&](SurfacePicture picture) { loads.push_back(std::move(picture.loads)); });
+    SurfaceFrames whole(body_, state, {.ticks_per_frame = 7, .in_background = false},
+                        [&](SurfacePicture picture) { frames.push_back(std::move(picture.frame)); });
+    std::size_t most = 0;
+    for (int tick = 0; tick < 100; ++tick) {
+      ToolPose at = pose(tick);
+      at.position.z() += radius - 0.15;
+      at.grab = tick > 60;
+      step(body_, state, at);
+      short_ones.post(state, tick, 1e-3 * tick);
+      whole.post(state, tick, 1e-3 * tick);
+    }
+    ASSERT_EQ(loads.size(), frames.size());
+    for (std::size_t k = 0; k < loads.size(); ++k) {
+      ASSERT_TRUE(std::is_sorted(loads[k].node.begin(), loads[k].node.end()));
+      most = std::max(most, loads[k].node.size());
+      expect_same_picture(maker.picture(loads[k]), frames[k]);
+    }
+    EXPECT_GT(most, radius > 0.5 ? 4U : 0U) << radius;
+  }
+  EXPECT_THROW((void)maker.picture({.node = {98}, .force = {1, 2, 3}, .press = {1}}), Error);
+  EXPECT_THROW((void)maker.picture({.node = {-1}, .force = {1, 2, 3}, .press = {1}}), Error);
+}
+
 // In the plane, where all nodes are stored: the interior too.
 TEST(FramesInThePlane, ShowTheInterior) {
   for (const Scope scope : {Scope::full, Scope::surface}) {
@@ -229,7 +285,7 @@ class RecorderTest : public testing::Test {
 
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) / ("palpate_recorder." + std::to_string(getpid()));
-  const std::filesystem::path file_ = folder_ / "a.h5";
+  const std::filesystem::path file_ = folder_ / "a.mcap";
   const RecordedSurface triangle_ = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, 3, {0, 1, 2}};
 };
 
@@ -239,10 +295,10 @@ SurfaceFrame frame(std::int64_t tick) {
 
 TEST_F(RecorderTest, SaysWhereItCannotWrite) {
   try {
-    const Recorder recorder("no/such/folder/out.h5", {});
+    const Recorder recorder("no/such/folder/out.mcap", {});
     FAIL();
   } catch (const Error& error) {
-    EXPECT_NE(error.where().find("out.h5"), std::string::npos) << error.where();
+    EXPECT_NE(error.where().find("out.mcap"), std::string::npos) << error.where();
   }
 }
 
@@ -251,7 +307,7 @@ TEST_F(RecorderTest, KeepsTicksAndFrames) {
   constexpr int ticks = 40'000;  // more than there is room for
   Recorder recorder(file_, {}, triangle_);
   std::thread beside([&] {
-    for (int k = 0; k < 1000; ++k) recorder.push_frame_waiting(frame(std::int64_t{40} * k));
+    for (int k = 0; k < 1000; ++k) recorder.push_picture_waiting(frame(std::int64_t{40} * k));
   });
   for (int k = 0; k < ticks; ++k) {
     recorder.push_waiting({.time = 1e-3 * k});
@@ -260,40 +316,92 @@ TEST_F(RecorderTest, KeepsTicksAndFrames) {
   beside.join();
   recorder.finish();
   EXPECT_EQ(recorder.dropped(), 0);
-  EXPECT_EQ(recorder.dropped_frames(), 0);
-  const Recording recording = read_recording(file_);
-  ASSERT_EQ(recording.ticks.size(), static_cast<std::size_t>(ticks));
-  for (int k = 0; k < ticks; ++k) ASSERT_EQ(recording.ticks[static_cast<std::size_t>(k)].time, 1e-3 * k);
-  ASSERT_EQ(recording.frames.tick.size(), 1000U);
-  const std::vector<float> u = RecordingFile(file_).displacement(0, 1000);
+  EXPECT_EQ(recorder.dropped_pictures(), 0);
+  const RecordingFile recording(file_);
+  ASSERT_EQ(recording.ticks(), ticks);
+  for (int k = 0; k < ticks; ++k) ASSERT_EQ(recording.tick(k).time, 1e-3 * k);
+  ASSERT_EQ(recording.pictures().size(), 1000U);
   for (int k = 0; k < 1000; ++k) {
-    ASSERT_EQ(recording.frames.tick[static_cast<std::size_t>(k)], 40 * k);
-    ASSERT_EQ(u[9 * static_cast<std::size_t>(k) + 8], static_cast<float>(40 * k));
+    ASSERT_EQ(recording.pictures()[static_cast<std::size_t>(k)].tick, 40 * k);
+    ASSERT_EQ(recording.frame(k).displacement[8], static_cast<float>(40 * k));
   }
-  EXPECT_TRUE(std::filesystem::exists(xdmf_path(file_)));
 }
 
 TEST_F(RecorderTest, WithoutFinishIsLeftAsIfItWereKilled) {
   {
     Recorder recorder(file_, {}, triangle_);
     for (int k = 0; k < 100; ++k) recorder.push({.time = 1e-3 * k});
-    recorder.push_frame(frame(0));
+    recorder.push_picture(frame(0));
   }
-  EXPECT_FALSE(read_recording(file_).finished);
+  EXPECT_FALSE(RecordingFile(file_).finished());
   EXPECT_EQ(session(file_, true, false), exit_ok);
-  const Recording recording = read_recording(file_);
-  EXPECT_TRUE(recording.finished);
-  EXPECT_EQ(recording.ticks.size(), 100U);
-  EXPECT_EQ(recording.frames.tick.size(), 1U);
-  EXPECT_TRUE(std::filesystem::exists(xdmf_path(file_)));
+  EXPECT_FALSE(RecordingFile(file_).finished()) << "nobody asked for that";
+  EXPECT_EQ(session(file_, true, true), exit_ok);
+  const RecordingFile recording(file_);
+  EXPECT_TRUE(recording.finished());
+  EXPECT_EQ(recording.ticks(), 100);
+  EXPECT_EQ(recording.pictures().size(), 1U);
 }
 
-TEST_F(RecorderTest, WithoutFramesLeavesNoDescriptionOfThem) {
-  std::ofstream(xdmf_path(file_)) << "of the session before";
-  Recorder recorder(file_, {}, triangle_);
-  recorder.push({});
+/// The texts of the events in a recording, in their order.
+std::vector<std::string> events_of(const std::filesystem::path& path) {
+  const FileDescriptor file = open_file(path, OpenMode::read);
+  std::vector<std::string> texts;
+  for (const mcap::ChunkPlace& chunk : mcap::read_layout(file).chunks) {
+    const std::string records = mcap::read_chunk(file, chunk);
+    for (const mcap::Message& message : mcap::messages_of(path, records)) {
+      if (message.channel != static_cast<std::uint16_t>(RecordedChannel::events)) continue;
+      CdrReader reader(message.data);
+      (void)reader.number<std::int32_t>();  // seconds
+      (void)reader.number<std::uint32_t>();
+      (void)reader.number<std::uint8_t>();  // level
+      for (int k = 0; k < 2; ++k) {         // who says it, and what
+        const std::vector<char> text = reader.numbers<char>();
+        if (k == 1) texts.emplace_back(text.data());
+      }
+    }
+  }
+  return texts;
+}
+
+TEST_F(RecorderTest, SaysInWordsWhatHappened) {
+  Recorder recorder(file_, {});
+  const auto push = [&, k = 0](SafetyPhase phase, Fault fault, DeviceEvent event) mutable {
+    recorder.push({.time = 1e-3 * k++,
+                   .phase = static_cast<std::uint8_t>(phase),
+                   .fault = static_cast<std::uint8_t>(fault),
+                   .event = static_cast<std::uint8_t>(event)});
+  };
+  push(SafetyPhase::waiting, Fault::none, DeviceEvent::none);
+  push(SafetyPhase::active, Fault::none, DeviceEvent::lifted);
+  push(SafetyPhase::active, Fault::none, DeviceEvent::lifted);  // goes on
+  push(SafetyPhase::faulted, Fault::device_lost, DeviceEvent::lost);
+  push(SafetyPhase::active, Fault::none, DeviceEvent::opened_again);
   recorder.finish();
-  EXPECT_FALSE(std::filesystem::exists(xdmf_path(file_)));
+  EXPECT_EQ(events_of(file_),
+            (std::vector<std::string>{"phase: active", "the tool was lifted", "the device is lost",
+                                      "phase: faulted", "fault: device_lost", "the device is back",
+                                      "phase: active", "fault: none"}));
+}
+
+// Each picture follows its tick: equal runs make equal files, however their threads met.
+TEST_F(RecorderTest, OfTicksThatAreWaitedForIsTheSameEachTime) {
+  std::vector<std::string> files;
+  for (int run = 0; run < 3; ++run) {
+    Recorder recorder(file_, {}, triangle_);
+    for (int k = 0; k < 20'000; ++k) {
+      recorder.push_waiting({.time = 1e-3 * k});
+      if (k % 10 == 0)
+        recorder.push_picture_waiting(
+            ContactLoads{.tick = k, .time = 1e-3 * k, .node = {1}, .force = {1, 2, 3}, .press = {4}});
+      if (run == 1 && k % 1000 == 0) std::this_thread::yield();
+    }
+    recorder.finish();
+    std::ifstream in(file_, std::ios::binary);
+    files.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+  }
+  EXPECT_GT(files[0].size(), 20'000U * 420U);
+  EXPECT_TRUE(files[0] == files[1] && files[0] == files[2]);
 }
 
 // A limit on the size of files stands for a full disk.
@@ -308,23 +416,23 @@ TEST_F(RecorderTest, LetsTheRunGoOnWhereTheDiskIsFull) {
   const auto begin = std::chrono::steady_clock::now();
   while (recorder.dropped() < 100 && std::chrono::steady_clock::now() - begin < std::chrono::seconds(60)) {
     recorder.push({.time = 1e-3 * static_cast<double>(pushed)});
-    if (recorder.dropped() > 0) recorder.push_frame(frame(pushed));
+    if (recorder.dropped() > 0) recorder.push_picture(frame(pushed));
     if (++pushed % 10 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   recorder.push_waiting({});  // does not wait for ever
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, action);
   EXPECT_EQ(recorder.dropped(), 101);
-  EXPECT_EQ(recorder.dropped_frames(), 100);
+  EXPECT_EQ(recorder.dropped_pictures(), 100);
   EXPECT_THROW(recorder.finish(), Error);
-  EXPECT_TRUE(read_recording(file_).ticks.empty());
+  EXPECT_EQ(RecordingFile(file_).ticks(), 0);
 }
 
 TEST(SessionSummary, CountsWhatTheTicksSay) {
-  Recording recording;
-  recording.info.rate = 500;  // 2 ms
+  std::vector<TickRecord> ticks;
+  ticks.reserve(8);
   const auto add = [&](int k) -> TickRecord& {
-    return recording.ticks.emplace_back(TickRecord{.time = k / 500.0, .begun_ns = 2'000'000L * k});
+    return ticks.emplace_back(TickRecord{.time = k / 500.0, .begun_ns = 2'000'000L * k});
   };
   add(10).compute_ns = 2'000'000;  // in time, just
   add(11).compute_ns = 2'000'001;
@@ -335,11 +443,14 @@ TEST(SessionSummary, CountsWhatTheTicksSay) {
   late.force[2] = -4;
   late.contacts = 2;
   add(14).shown_force[1] = -2;  // 13 is missing
-  recording.ticks.back().fault = static_cast<std::uint8_t>(Fault::too_fast);
+  ticks.back().fault = static_cast<std::uint8_t>(Fault::too_fast);
   add(15).fault = static_cast<std::uint8_t>(Fault::too_fast);
   add(16);
   add(17).fault = static_cast<std::uint8_t>(Fault::device_lost);
-  const SessionSummary summary = summarise(recording);
+  Summarising sums(500);  // 2 ms
+  EXPECT_EQ(sums.summary().ticks, 0);
+  for (const TickRecord& tick : ticks) sums.add(tick);
+  const SessionSummary& summary = sums.summary();
   EXPECT_EQ(summary.ticks, 7);
   EXPECT_EQ(summary.missing, 1);
   EXPECT_DOUBLE_EQ(summary.seconds, 0.016);
@@ -356,7 +467,6 @@ TEST(SessionSummary, CountsWhatTheTicksSay) {
   EXPECT_DOUBLE_EQ(summary.faults[0].time, 0.028);
   EXPECT_EQ(summary.faults[1].fault, Fault::device_lost);
   EXPECT_DOUBLE_EQ(summary.faults[1].time, 0.034);
-  EXPECT_EQ(summarise({}).ticks, 0);
 }
 
 }  // namespace

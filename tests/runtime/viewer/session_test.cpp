@@ -140,7 +140,7 @@ class Recorded : public testing::Test {
   void SetUp() override {
     std::string name = testing::TempDir() + "palpate_session.XXXXXX";
     folder_ = mkdtemp(name.data());
-    file_ = folder_ / "touch.h5";
+    file_ = folder_ / "touch.mcap";
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
@@ -152,10 +152,7 @@ class Recorded : public testing::Test {
          .device = "a hand",
          .options = "tool=sphere:0.005\nfriction=0.5\n"},
         {.nodes = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, .simplices = {0, 1, 2}, .held = {7, 0, 0}});
-    std::vector<TickRecord> records;
-    records.reserve(ticks.size());
-    for (const std::int64_t number : ticks) records.push_back(tick_record(number));
-    writer.append(records);
+    for (const std::int64_t number : ticks) writer.append(tick_record(number));
     for (const std::int64_t tick : frames) {
       SurfaceFrame frame;
       frame.tick = tick;
@@ -271,7 +268,7 @@ TEST_F(Recorded, WithoutPicturesItIsNotShown) {
   record(numbers(0, 5), {});
   EXPECT_NE(hint_of([&] { const SessionPictures pictures(file_); }).find("--record-frames"),
             std::string::npos);
-  EXPECT_NE(hint_of([&] { const SessionPictures pictures(folder_ / "none.h5"); }), "");
+  EXPECT_NE(hint_of([&] { const SessionPictures pictures(folder_ / "none.mcap"); }), "");
 }
 
 // ---- Its page

@@ -193,7 +193,7 @@ class PlayedDevice : public ::testing::Test {
     fs::remove(session());
   }
 
-  [[nodiscard]] static fs::path session() { return folder / "session.h5"; }
+  [[nodiscard]] static fs::path session() { return folder / "session.mcap"; }
 
   /// palpate-runtime with the only device.
   [[nodiscard]] static std::unique_ptr<Program> play(std::vector<std::string> arguments,
@@ -201,7 +201,7 @@ class PlayedDevice : public ::testing::Test {
     const std::string program = palpate::test::built_file("runtime/palpate-runtime");
     std::vector<std::string> line = {program, "play",     "cube.palpate.hdf", "--device",
                                      "hid",   "--tool",   "sphere:0.01",      "--safety",
-                                     safety,  "--record", "session.h5",       "--record-frames",
+                                     safety,  "--record", "session.mcap",       "--record-frames",
                                      "0",     "--report", "report.json"};
     if (std::ranges::find(arguments, "--origin") == arguments.end()) {
       arguments.emplace_back("--origin");
@@ -213,7 +213,7 @@ class PlayedDevice : public ::testing::Test {
 
   /// What was recorded up to now, which a checkpoint each half second makes more.
   [[nodiscard]] static std::vector<TickRecord> ticks_until_now() {
-    return fs::exists(session()) ? read_recording(session()).ticks : std::vector<TickRecord>();
+    return fs::exists(session()) ? read_recording(RecordingFile(session())).ticks : std::vector<TickRecord>();
   }
 
   static void wait_for_the_loop(const Program& runtime) {
@@ -267,7 +267,7 @@ TEST_F(PlayedDevice, ABoardIsFeltAsTheSessionSays) {
   EXPECT_TRUE(says(runtime->messages(), "Home-made board, CAFE:4001 Board (/dev/hidraw0)"));
   EXPECT_TRUE(says(runtime->messages(), "at most 0.5 N and, by the coupling, 600 N/m"));
 
-  const Recording recording = read_recording(session());
+  const Recording recording = read_recording(RecordingFile(session()));
   EXPECT_TRUE(says(recording.info.options, "\ncoupling=600\n"));
   EXPECT_TRUE(says(recording.info.options, "max_force=0.5,"));
   const auto& ticks = recording.ticks;
@@ -316,7 +316,7 @@ TEST_F(PlayedDevice, WoodenHapticsIsFeltAsTheSessionSays) {
   EXPECT_TRUE(comes_true([&] { return last_force(*firmware) > 0.4; })) << runtime->messages();
   runtime->signal(SIGINT);
   ASSERT_EQ(runtime->wait(), 130) << runtime->messages();
-  const Recording recording = read_recording(session());
+  const Recording recording = read_recording(RecordingFile(session()));
   std::set<std::string> computed;
   std::set<std::uint32_t> heard;
   double largest = 0.0;
@@ -374,7 +374,7 @@ TEST_F(PlayedDevice, UnpluggedInContactAndPluggedInAgain) {
     }
     EXPECT_LE(shown.force.norm(), max_force + quantum);
   }
-  const Recording recording = read_recording(session());
+  const Recording recording = read_recording(RecordingFile(session()));
   bool was_lost = false;
   bool may_feel = true;
   Vec3 last = Vec3::Zero();
@@ -450,7 +450,7 @@ TEST_F(PlayedDevice, ASpaceMouseMovesTheToolAndShowsNothing) {
   runtime->signal(SIGINT);
   ASSERT_EQ(runtime->wait(), 130) << runtime->messages();
   EXPECT_TRUE(says(runtime->messages(), "at most 0 N"));
-  const Recording recording = read_recording(session());
+  const Recording recording = read_recording(RecordingFile(session()));
   for (const TickRecord& tick : recording.ticks) {
     EXPECT_EQ(tick.fault, 0) << tick.time;
     EXPECT_EQ(vector(tick.shown_force), Vec3::Zero());
@@ -488,7 +488,7 @@ TEST_F(PlayedDevice, AJoystickIsFeltAlsoWhileItRests) {
   const Vec3 felt = firmware->forces().back().force;
   runtime->signal(SIGINT);
   ASSERT_EQ(runtime->wait(), 130) << runtime->messages();
-  const Recording recording = read_recording(session());
+  const Recording recording = read_recording(RecordingFile(session()));
   EXPECT_EQ(recording.ticks.back().fault, 0);
   const Vec3 shown = vector(recording.ticks.back().shown_force);
   EXPECT_GT(shown.y(), 0.3);
