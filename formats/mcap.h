@@ -113,7 +113,7 @@ Message message_at(const std::filesystem::path& file, std::string_view records, 
 /// The messages of a chunk's records, in their order. Throws Error (where = `file`) where these are broken.
 std::vector<Message> messages_of(const std::filesystem::path& file, std::string_view records);
 
-/// The same with the first bytes of their data only, read from the file one by one, without a look at the
+/// These with the first bytes of their data only, read from the file one by one, without a look at the
 /// CRC: of a chunk of few large messages.
 struct MessageStart {
   Message message;         ///< data: none

@@ -81,7 +81,8 @@ SessionInfo info_of(const mcap::Layout& layout, const std::string& path, std::st
   };
   if (said == layout.metadata.end() || value("format") != "palpate-recording")
     throw Error("is an MCAP file, but not a recording of Palpate's", path, give_another);
-  if (!value("version").starts_with("5."))
+  const std::string version = value("version");
+  if (version.substr(0, version.find('.')) != "5")
     throw Error("is a recording of another version", path, record_again);
   generator = value("generator");
   SessionInfo info{.model_path = value("model"),
@@ -221,7 +222,7 @@ struct RecordingFile::Impl {
     }
   }
 
-  /// Of a message with a picture.
+  /// Length of a message with a picture.
   [[nodiscard]] std::uint64_t picture_bytes() const {
     const std::size_t numbers = surface->nodes.size();
     return to_message(SurfaceFrame{}).size() + 5 * sizeof(float) * numbers;

@@ -13,7 +13,7 @@ namespace {
 class Definition {
  public:
   std::string text =
-      "# One tick of a tool. SI units, in the body's frame; handle and shown in the device's own.\n";
+      "# One tick of a tool. SI units, in the body's frame; handle and shown in the device's own\n";
 
   template <class T>
   void number(const char* type, const char* name, const T&) {
@@ -110,7 +110,7 @@ struct TickWriter {
   }
 };
 
-/// And reads it.
+/// Reads a tick.
 struct TickReader {
   CdrReader& from;
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "formats/cdr.h"
+#include "base/cdr.h"
 #include "formats/recording.h"
 
 namespace palpate {
