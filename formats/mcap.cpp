@@ -522,7 +522,7 @@ void Writer::append(std::string_view bytes) {
   try {
     write_exactly(file_, std::as_bytes(std::span(bytes)), static_cast<std::int64_t>(layout_.end));
   } catch (const Error&) {
-    (void)::ftruncate(file_.get(), static_cast<off_t>(layout_.end));
+    [[maybe_unused]] const int ignored = ::ftruncate(file_.get(), static_cast<off_t>(layout_.end));
     throw;
   }
   layout_.end += bytes.size();
