@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { createServer } from 'node:http';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { close, folder, open, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
+import { close, drawn, folder, open, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
 import { barriers, faults_of_layout, layouts, rest } from './looks.mjs';
 import { choose, part, recorded, settled, top } from './steps.mjs';
 
@@ -77,7 +77,7 @@ test('two recordings have one camera, one range of colours and one playhead', as
     return drawn;
   };
   const rested = await pictures();
-  await page.waitForTimeout(1000);
+  for (const pane of [first, second]) await drawn(pane, 30);
   assert.deepEqual(await pictures(), rested, 'both come to rest, though their ranges differ');
 
   await part(first, 'replay-play').click();

@@ -175,7 +175,10 @@ test('how a model is looked at is kept, and an address opens it', async (t) => {
     const now = (await told(one, 'eye')).towards;
     assert.ok(Math.hypot(...now.map((value, k) => value - towards[k])) < 1e-3, `from ${now}, wanted ${towards}`);
   };
-  await page.waitForTimeout(700); // until it is kept
+  await until(page, (wanted) => Object.values(localStorage).some((text) => {
+    const place = text.startsWith('{') ? JSON.parse(text).place : null; // the last of all that is kept
+    return place && Math.hypot(...place.towards.map((value, k) => value - wanted[k])) < 1e-3;
+  }), towards);
   await page.goto(served.url);
   await ready(page);
   await until(page, () => document.querySelector('[data-testid="field"]').value === 'von-mises');
@@ -232,7 +235,7 @@ test('a recording is filmed, its playhead is where the picture is, and watchers 
   await until(watcher, () => !window.palpate.state.alone && window.palpate.lastFrame.force[2] < 0);
   assert.ok(await part(watcher, 'follow').isHidden());
   await part(page, 'replay-play').click();
-  await page.waitForTimeout(400);
+  await until(page, (time) => window.palpate.time !== time, await told(page, 'time'));
   await part(page, 'replay-play').click();
   await until(page, () => window.palpate.playhead !== null && Math.abs(window.palpate.playhead - window.palpate.time) < 1e-9);
   const shown = await part(page, 'replay-time').innerText();

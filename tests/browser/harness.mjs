@@ -161,6 +161,13 @@ export const told = (page, name) => page.evaluate((key) => window.palpate[key], 
 /// Waits until `condition`, evaluated in the page with `argument`, holds.
 export const until = (page, condition, argument) => page.waitForFunction(condition, argument, { polling: 50 });
 
+/// The browser has drawn so many times.
+export const drawn = (page, times) =>
+  page.evaluate((count) => new Promise((done) => {
+    const next = (left) => (left === 0 ? done() : requestAnimationFrame(() => next(left - 1)));
+    next(count);
+  }), times);
+
 /// Where a point of the body is on the screen [px].
 export async function project(page, point) {
   return page.evaluate(([x, y, z]) => window.palpate.project(x, y, z), point);

@@ -2,6 +2,7 @@
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import path from 'node:path';
+import { drawn } from './harness.mjs';
 
 const axe = readFileSync(createRequire(path.join(process.env.PALPATE_BROWSER_MODULES, 'package.json')).resolve('axe-core/axe.min.js'), 'utf8');
 
@@ -21,7 +22,7 @@ export async function bare(page) {
 
 /// The picture came to rest: it is drawn whole, and nothing changes it.
 export async function rest(page) {
-  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))); // what was asked for is drawn
+  await drawn(page, 2); // what was asked for
   await page.waitForFunction(() => {
     const now = window.palpate.picture;
     const same = window.rested?.pictures === now.pictures && now.rests;

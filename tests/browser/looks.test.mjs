@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { bake, close, folder, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
+import { bake, close, drawn, folder, project, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
 import { bare, barriers, contrast, difference, faults_of_layout, keep_ground, keep_pixels, layouts, rest } from './looks.mjs';
 import { choose, part, recorded, settled } from './steps.mjs';
 
@@ -204,7 +204,7 @@ test('no text is cut off or covered, and every target is large enough, at five s
   const html = path.join(at, 'out.html');
   await run(runtime, ['export', await recorded(t, at), '--html', html]);
   const check = async (page, what) => {
-    await page.waitForTimeout(120);
+    await drawn(page, 3); // what follows the size of a part
     const { width, height, hasTouch } = page.window;
     assert.deepEqual(await faults_of_layout(page, hasTouch ? 44 : 24), [], `${width} × ${height}, ${what}`);
   };

@@ -20,7 +20,7 @@ test('one steers, any number watch, and control goes on', async (t) => {
   const { x, y } = await project(page, top);
   await watcher.mouse.move(x, y); // does nothing
   await watcher.mouse.down();
-  await page.waitForTimeout(500);
+  await until(page, (ticks) => window.palpate.state.ticks > ticks + 500, (await told(page, 'state')).ticks);
   assert.equal((await told(page, 'lastFrame')).contacts, 0);
   await watcher.mouse.up();
   await page.mouse.move(x, y);

@@ -74,6 +74,26 @@ test('fingers press too', async (t) => {
   await until(page, () => window.palpate.lastFrame.contacts === 0);
 });
 
+test('a press lasts as long as the finger did, however slowly the page draws', async (t) => {
+  const { at, served, page } = await open_cube(t, { args: ['--tool', 'point', '--report', 'report.json'] });
+  await choose(page, 'press', 0.02);
+  const { x, y } = await project(page, top);
+  await page.mouse.move(x, y);
+  // The page is busy from here on; the finger comes down and is lifted again before it looks.
+  const busy = page.evaluate(() => {
+    const end = performance.now() + 1500;
+    while (performance.now() < end);
+  });
+  const browser = await page.context().newCDPSession(page);
+  const now = Date.now() / 1000;
+  const finger = (type, timestamp) => browser.send('Input.dispatchMouseEvent', { type, x, y, button: 'left', clickCount: 1, timestamp });
+  await Promise.all([busy, finger('mousePressed', now), finger('mouseReleased', now + 0.4)]);
+  await until(page, (ticks) => window.palpate.state.ticks > ticks + 2000, (await told(page, 'state')).ticks);
+  await served.stop();
+  const { ticks_in_contact: ticks } = JSON.parse(await readFile(path.join(at, 'report.json'), 'utf8'));
+  assert.ok(ticks > 200, `pressed for ${ticks} ticks`); // of 400
+});
+
 test('plots and numbers follow', async (t) => {
   const { page } = await open_cube(t);
   const drawn = () => [...document.querySelectorAll('[data-testid="plot-force"] canvas')].map((canvas) => canvas.toDataURL()).join();

@@ -29,15 +29,16 @@ export async function choose(page, mode, depth) {
   }
 }
 
-/// The force once it no longer changes from picture to picture.
+/// The force once it no longer changes in 20 ticks, of which the tool needs some to follow the pointer.
 export async function settled(page) {
+  await page.evaluate(() => (window.settling = null));
   await until(page, () => {
     const now = window.palpate.lastFrame;
     const then = window.settling;
-    window.settling = now;
     if (!now) return false;
+    if (!then || now.tick < then.tick || now.tick >= then.tick + 20) window.settling = now;
     const size = Math.hypot(...now.force);
-    return then && now.contacts > 0 && now.tick > then.tick && Math.hypot(...now.force.map((f, k) => f - then.force[k])) < 1e-4 * size;
+    return then && now.contacts > 0 && now.tick >= then.tick + 20 && Math.hypot(...now.force.map((f, k) => f - then.force[k])) < 1e-4 * size;
   });
   return told(page, 'lastFrame');
 }

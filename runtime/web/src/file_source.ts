@@ -43,6 +43,7 @@ export class FileSource implements Source {
   }
 
   more(): void {} // it gives what is sought
+  point(): void {}
 
   send(word: Word): void {
     if (word.type === 'seek') this.seek(word.frame);

@@ -2,7 +2,7 @@
 import type { Asked, News } from './run_socket';
 import RunSocket from './run_socket?worker&inline';
 import type { Listener, Source } from './source';
-import type { Word } from './words';
+import type { Point, Word } from './words';
 
 const first_wait = 0.25; // [s]
 const longest_wait = 5;
@@ -24,7 +24,11 @@ export class LiveSource implements Source {
   }
 
   send(word: Word): void {
-    this.ask({ about: 'word', text: JSON.stringify(word), may_be_lost: word.type === 'point' });
+    this.ask({ about: 'word', text: JSON.stringify(word) });
+  }
+
+  point(word: Point | null): void {
+    this.ask({ about: 'point', word });
   }
 
   /** The page has drawn what came last. */

@@ -101,7 +101,7 @@ class Page implements Listener {
       view,
       this.picture_.body,
       () => this.hand_settings(),
-      (word) => this.send(word),
+      (word) => this.source_.point(word),
       (depth) => this.show_hand_depth(depth),
       (text) => toast(text, '', 'note'),
     );
@@ -520,19 +520,20 @@ class Page implements Listener {
 
   private felt(): Felt {
     const { frame } = this.picture_;
-    const sample = frame ? Math.max(0, Math.min(this.history_.count - 1, this.history_.from(frame.tick))) : 0;
+    if (!frame) return { force: [0, 0, 0], depth: 0, contacts: 0, tick: 0 };
+    const history = this.history_;
+    const is_live = this.mode_ === 'live';
+    const drawn = frame.contact.length / floats_of_contact;
+    const [x, y, z] = frame.force;
+    if (history.count === 0) return { force: [x!, y!, z!], depth: holds(frame) ? NaN : 0, contacts: drawn, tick: frame.tick };
+    // Live, ticks and pictures come apart: the numbers are those of the last tick that is not newer than the picture.
+    const sample = is_live ? Math.max(0, history.from(frame.tick + 1) - 1) : Math.min(history.count - 1, history.from(frame.tick));
     return {
-      force: frame ? [frame.force[0]!, frame.force[1]!, frame.force[2]!] : [0, 0, 0],
-      depth: holds(frame) ? NaN : this.history_.count > 0 ? this.history_.value('depth', sample) : 0,
-      contacts: this.felt_contacts(frame, sample),
-      tick: frame?.tick ?? 0,
+      force: is_live ? [history.value('x', sample), history.value('y', sample), history.value('z', sample)] : [x!, y!, z!],
+      depth: holds(frame) ? NaN : history.value('depth', sample),
+      contacts: is_live ? drawn : history.value('contacts', sample), // recordings have no contact points, but how many there were
+      tick: is_live ? history.tick(sample) : frame.tick,
     };
-  }
-
-  /** Recordings have no contact points, but how many there were. */
-  private felt_contacts(frame: Frame | null, sample: number): number {
-    const drawn = frame ? frame.contact.length / floats_of_contact : 0;
-    return this.mode_ === 'live' || this.history_.count === 0 ? drawn : this.history_.value('contacts', sample);
   }
 
   private show_numbers(): void {

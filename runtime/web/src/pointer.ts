@@ -9,7 +9,6 @@ export const pointer_modes = ['press', 'push', 'grab'] as const;
 export type PointerMode = (typeof pointer_modes)[number];
 
 const least_wait = 8; // [ms] from one word to the next
-const longest_wait = 250; // while pressed: the runtime gives up a pointer that is silent for a second
 const key_id = -1; // in the place of a pointer's
 const reach_in_plane = 24; // pixels from the boundary that still touch it
 
@@ -33,6 +32,9 @@ interface Press {
   depth: number;
   pushed: number; // [m] of the wheel, into the picture
   client: { x: number; y: number };
+  begun_at: number; // [ms] when it was said, and when ...
+  down_at: number; // ... the pointer was let down
+  is_over: boolean; // it was lifted, and the tool is still to follow
   plane_start: Vec3; // where the ray met the screen's plane at the start
   pinch: { id: number; x: number; y: number; distance: number; depth: number; pushed: number } | null;
 }
@@ -44,17 +46,17 @@ export class Hand {
   private word_: Point | null = null; // what is wanted and was not said
   private last_: Point | null = null;
   private last_at_ = -Infinity;
-  private beats_ = false; // a beat is under way
+  private beats_ = false; // a beat is to come
 
   /**
    * `settings` gives null where the pointer is no hand now, or a sentence that says what keeps it from being one. `send` says a
-   * word to the runtime, `changed` tells of depth and press.
+   * word to the runtime (null: the pointer is no hand any more), `changed` tells of depth and press.
    */
   constructor(
     private readonly view_: View,
     private readonly body_: Body,
     private readonly settings_: () => HandSettings | string | null,
-    private readonly send_: (word: Point) => void,
+    private readonly send_: (word: Point | null) => void,
     private readonly changed_: (depth: number | null) => void,
     private readonly hint_: (text: string) => void,
   ) {
@@ -69,18 +71,17 @@ export class Hand {
     area.addEventListener('wheel', (event) => this.wheel(event), { capture: true, passive: false });
     area.addEventListener('contextmenu', (event) => event.preventDefault());
     window.addEventListener('blur', () => this.release());
-    setInterval(() => this.beat(performance.now()), longest_wait / 2); // pictures may take longer than the runtime waits
   }
 
-  /** Says what is wanted with the next picture; a page that nobody touches has none. */
+  /** Says what is wanted soon, and not with the next picture, which may be slow. */
   private want_beat(): void {
     if (this.beats_) return;
     this.beats_ = true;
-    requestAnimationFrame(() => {
+    setTimeout(() => {
+      if (!this.press_) this.follow_hover();
+      this.say();
       this.beats_ = false;
-      this.beat(performance.now());
-      if (this.word_) this.want_beat();
-    });
+    }, Math.max(0, this.last_at_ + least_wait - performance.now()));
   }
 
   get is_pressed(): boolean {
@@ -100,17 +101,27 @@ export class Hand {
     this.view_.pad.style.cursor = '';
     const settings = this.settings_();
     if (settings && typeof settings !== 'string') this.want_hover(settings, press.now, press.orientation, settings.clearance);
+    else this.send_((this.word_ = null));
+  }
+
+  /** The pointer was lifted: the tool is pressed for as long as it was down, also where the page came late to both. */
+  private let_go(press: Press, lifted_at: number): void {
+    press.is_over = true;
+    const left = press.begun_at + Math.max(lifted_at - press.down_at, least_wait) - performance.now();
+    if (left <= 0) this.release();
+    else setTimeout(() => this.press_ === press && this.release(), left);
   }
 
   private down(event: PointerEvent): void {
     if (event.target !== this.view_.pad) return;
+    if (this.press_?.is_over) this.release();
     if (this.press_) {
       this.begin_pinch(event);
       event.stopPropagation();
       return;
     }
     if (event.button !== 0 || !event.isPrimary) return;
-    if (!this.begin(event.clientX, event.clientY, event.pointerId)) return;
+    if (!this.begin(event.clientX, event.clientY, event.pointerId, event.timeStamp)) return;
     event.stopPropagation();
     event.preventDefault();
     this.view_.pad.setPointerCapture(event.pointerId);
@@ -119,7 +130,7 @@ export class Hand {
   }
 
   /** Presses what is there in the window; gives whether that is a body that may be touched. */
-  private begin(x: number, y: number, id: number): boolean {
+  private begin(x: number, y: number, id: number, down_at: number): boolean {
     const settings = this.settings_();
     if (settings === null) return false;
     const hit = this.hit(x, y, this.body_.surface);
@@ -138,6 +149,9 @@ export class Hand {
       depth: Math.min(settings.depth, settings.share_of_thickness * this.thickness(hit)),
       pushed: 0,
       client: { x, y },
+      begun_at: performance.now(),
+      down_at,
+      is_over: false,
       plane_start: this.on_screen_plane(x, y, hit.point) ?? hit.point,
       pinch: null,
     };
@@ -145,6 +159,7 @@ export class Hand {
     this.want_hover(settings, hit, this.press_.orientation, settings.mode === 'grab' ? settings.contact : settings.clearance);
     this.say();
     this.want_press(settings);
+    this.say(); // it may be lifted before the page comes to say more
     return true;
   }
 
@@ -168,7 +183,7 @@ export class Hand {
       return;
     }
     const at = (this.key_place_ ??= this.middle());
-    this.begin(at.x, at.y, key_id);
+    this.begin(at.x, at.y, key_id, performance.now());
   }
 
   /** Lets go of what keys press. */
@@ -196,6 +211,7 @@ export class Hand {
       return;
     }
     event.stopPropagation();
+    if (press.is_over) return;
     const settings = this.settings_();
     if (!settings || typeof settings === 'string') {
       this.release();
@@ -221,7 +237,7 @@ export class Hand {
     const press = this.press_;
     if (!press) return;
     if (press.pinch?.id === event.pointerId) press.pinch = null;
-    else if (press.id === event.pointerId) this.release();
+    else if (press.id === event.pointerId) this.let_go(press, event.timeStamp);
     else return;
     event.stopPropagation();
   }
@@ -320,12 +336,6 @@ export class Hand {
     this.hovering_ = hit !== null;
     this.view_.pad.style.cursor = this.hovering_ ? 'pointer' : '';
     if (hit && settings && typeof settings !== 'string') this.want_hover(settings, hit, turn_onto(hit.normal, this.dimension()), settings.clearance);
-  }
-
-  private beat(now: number): void {
-    if (!this.press_) this.follow_hover();
-    if (this.press_ && !this.word_ && now - this.last_at_ > longest_wait) this.word_ = this.last_;
-    if (now - this.last_at_ >= least_wait) this.say();
   }
 
   private say(): void {

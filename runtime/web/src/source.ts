@@ -1,5 +1,5 @@
 // Where messages come from.
-import type { Said, Word } from './words';
+import type { Point, Said, Word } from './words';
 import type { Picture } from './wire';
 
 export interface Listener {
@@ -13,6 +13,8 @@ export interface Listener {
 /** A run at the other end of a socket, or a session that stands in the page. */
 export interface Source {
   send(word: Word): void;
+  /** Where the pointer wants the tool; null: it is no hand any more. */
+  point(word: Point | null): void;
   /** A picture was drawn: the source may give the next one. */
   more(): void;
 }

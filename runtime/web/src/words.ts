@@ -86,7 +86,6 @@ export interface Point {
 }
 
 export type Word =
-  | Point
   | { type: 'pause'; paused: boolean }
   | { type: 'step' }
   | { type: 'reset' }
