@@ -1,59 +1,66 @@
 #include "runtime/loop/histogram.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace palpate {
 namespace {
 
-constexpr std::int64_t fine_end = 1'000'000;        // ns
-constexpr std::int64_t coarse_step = 1000;          // ns
-constexpr std::int64_t coarse_end = 1'000'000'000;  // ns
+// Octave k, of durations in [500, 1000) 2^k ns, has 500 steps of 2^k ns; before the first one there are 500
+// of 1 ns.
+constexpr std::int64_t octave_steps = 500;
+constexpr std::int64_t octaves = 21;
+constexpr std::int64_t counted_end = octave_steps << octaves;  // ns
+
+std::int64_t step_of(std::int64_t duration) noexcept {
+  if (duration < octave_steps) return duration;
+  const auto octave = std::bit_width(static_cast<std::uint64_t>(duration / octave_steps)) - 1;
+  return octave_steps * octave + (duration >> octave);
+}
+
+/// The longest duration that it counts [ns].
+std::int64_t last_of(std::int64_t step) noexcept {
+  if (step < octave_steps) return step;
+  const std::int64_t octave = step / octave_steps - 1;
+  return ((step - octave_steps * octave + 1) << octave) - 1;
+}
 
 }  // namespace
 
-TimeHistogram::TimeHistogram() : fine_(fine_end), coarse_((coarse_end - fine_end) / coarse_step) {}
+TimeHistogram::TimeHistogram() : counts_(octave_steps * (octaves + 1)) {}
 
 void TimeHistogram::add(std::int64_t nanoseconds) noexcept {
   const std::int64_t duration = std::max<std::int64_t>(nanoseconds, 0);
   ++total_;
   worst_ = std::max(worst_, duration);
-  if (duration < fine_end) {
-    ++fine_[static_cast<std::size_t>(duration)];
-  } else if (duration < coarse_end) {
-    ++coarse_[static_cast<std::size_t>((duration - fine_end) / coarse_step)];
+  if (duration < counted_end) {
+    ++counts_[static_cast<std::size_t>(step_of(duration))];
   } else {
     ++longer_;
   }
 }
 
 void TimeHistogram::clear() noexcept {
-  std::fill(fine_.begin(), fine_.end(), 0U);
-  std::fill(coarse_.begin(), coarse_.end(), 0U);
+  std::fill(counts_.begin(), counts_.end(), 0U);
   longer_ = total_ = worst_ = 0;
 }
 
 std::int64_t TimeHistogram::percentile(double fraction) const noexcept {
   const auto wanted = static_cast<std::int64_t>(std::ceil(fraction * static_cast<double>(total_)));
   std::int64_t seen = 0;
-  for (std::size_t ns = 0; ns < fine_.size(); ++ns) {
-    seen += fine_[ns];
-    if (seen >= wanted) return static_cast<std::int64_t>(ns);
-  }
-  for (std::size_t us = 0; us < coarse_.size(); ++us) {
-    seen += coarse_[us];
-    if (seen >= wanted) return std::min(worst_, fine_end + static_cast<std::int64_t>(us + 1) * coarse_step);
+  for (std::size_t step = 0; step < counts_.size(); ++step) {
+    seen += counts_[step];
+    if (seen >= wanted) return std::min(worst_, last_of(static_cast<std::int64_t>(step)));
   }
   return worst_;
 }
 
 std::int64_t TimeHistogram::total_between(std::int64_t from, std::int64_t to) const noexcept {
   std::int64_t total = to > worst_ ? longer_ : 0;
-  for (std::int64_t ns = std::max<std::int64_t>(from, 0); ns < std::min(to, fine_end); ++ns)
-    total += fine_[static_cast<std::size_t>(ns)];
-  const std::int64_t first = (std::clamp(from, fine_end, coarse_end) - fine_end) / coarse_step;
-  const std::int64_t end = (std::clamp(to, fine_end, coarse_end) - fine_end) / coarse_step;
-  for (std::int64_t us = first; us < end; ++us) total += coarse_[static_cast<std::size_t>(us)];
+  const std::int64_t first = step_of(std::clamp<std::int64_t>(from, 0, counted_end));
+  const std::int64_t past = step_of(std::clamp<std::int64_t>(to, 0, counted_end));
+  for (std::int64_t step = first; step < past; ++step) total += counts_[static_cast<std::size_t>(step)];
   return total;
 }
 

@@ -377,6 +377,23 @@ TEST(CountTicks, CountsTheLastRow) {
   EXPECT_EQ(ticks("4.35"), 4351);
 }
 
+TEST(TimeHistogram, IsOffByAFiveHundredthAtMost) {
+  for (const std::int64_t ns :
+       {0LL, 1LL, 499LL, 500LL, 999LL, 1000LL, 1001LL, 123'456LL, 1'023'999LL, 1'024'000LL, 999'999'999LL}) {
+    TimeHistogram histogram;
+    histogram.add(ns);
+    histogram.add(2'000'000'000);
+    EXPECT_GE(histogram.percentile(0.5), ns);
+    EXPECT_LE(histogram.percentile(0.5), ns + ns / 500);
+  }
+  // Classes that begin and end with powers of 2 have what lies between.
+  for (std::int64_t to = 1000; to < 1'000'000'000; to *= 2) {
+    TimeHistogram histogram;
+    for (const std::int64_t ns : {to / 2 - 1, to / 2, to - 1, to}) histogram.add(ns);
+    EXPECT_EQ(histogram.total_between(to / 2, to), 2) << to;
+  }
+}
+
 TEST(TimeHistogram, GivesPercentilesOfWhatItCounted) {
   TimeHistogram histogram;
   EXPECT_EQ(histogram.percentile(0.5), 0);
@@ -386,13 +403,13 @@ TEST(TimeHistogram, GivesPercentilesOfWhatItCounted) {
   EXPECT_EQ(histogram.worst(), 1000);
   histogram.add(5'000'300);
   EXPECT_EQ(histogram.percentile(1.0), 5'000'300);
-  EXPECT_EQ(histogram.percentile(0.999), 1000);
+  EXPECT_EQ(histogram.percentile(0.999), 1001) << "in steps of 2 ns";
   histogram.add(7'000'000'000);
-  EXPECT_EQ(histogram.percentile(0.9985), 5'001'000) << "in steps of 1 us";
+  EXPECT_EQ(histogram.percentile(0.9985), 5'005'311) << "in steps of 2^13 ns";
   EXPECT_EQ(histogram.percentile(1.0), 7'000'000'000);
   EXPECT_EQ(histogram.total_between(0, 501), 500);
-  EXPECT_EQ(histogram.total_between(501, 5'001'000), 501);
-  EXPECT_EQ(histogram.total_between(5'001'000, INT64_MAX), 1);
+  EXPECT_EQ(histogram.total_between(501, 8'192'000), 501);
+  EXPECT_EQ(histogram.total_between(8'192'000, INT64_MAX), 1);
   histogram.clear();
   EXPECT_EQ(histogram.total_between(0, INT64_MAX), 0);
   EXPECT_EQ(histogram.percentile(1.0), 0);
