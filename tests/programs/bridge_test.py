@@ -7,7 +7,7 @@ import time
 import unittest
 
 from bridge_key import key_file, seal, write_key
-from programs import BINARY, ProgramTest
+from programs import BINARY, PATIENCE, ProgramTest
 
 EXAMPLE = BINARY / "runtime" / "palpate-bridge-example"
 STATE = struct.Struct("<4sHHQIIQ3d3d4f f 5f 8x")
@@ -146,7 +146,7 @@ class Alone(ProgramTest):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as deaf:
             deaf.bind(("127.0.0.1", 0))
             port = deaf.getsockname()[1]
-            done = subprocess.run([EXAMPLE, "--port", str(port), "--seconds", "0.5"], stdout=subprocess.PIPE, text=True, timeout=60, check=False)
+            done = subprocess.run([EXAMPLE, "--port", str(port), "--seconds", "0.5"], stdout=subprocess.PIPE, text=True, timeout=PATIENCE, check=False)
         self.assertEqual(done.returncode, 0)
         self.assertIn(f"no runtime answered: is one there (palpate-runtime play MODEL --device bridge), of the same user, on port {port}?",
                       done.stdout)

@@ -7,13 +7,15 @@ import signal
 import socket
 import struct
 import subprocess
+import tempfile
+import threading
 import time
 import unittest
 
 import numpy
 
 from bridge_key import key_file, read_key, seal
-from programs import BINARY, RUNTIME, ProgramTest, cube_toml, palpate, recorded, run
+from programs import BINARY, PATIENCE, RUNTIME, ProgramTest, cube_toml, done, palpate, recorded, run
 
 BRIDGE = BINARY / "runtime" / "palpate-bridge-example"
 SPRING = 300.0  # of the example's hand [N/m]
@@ -30,6 +32,55 @@ def free_port():
         return probe.getsockname()[1]
 
 
+class Hand(threading.Thread):
+    """A device of the test's own behind the bridge. Its way is by what it hears, not by a clock: `move(hand)` gives the height [m] that it says next."""
+
+    STATE = struct.Struct("<4sHHQIIQ3d3d4f f 5f 8x")
+
+    def __init__(self, port, move):
+        super().__init__(daemon=True)
+        self.port = port
+        self.move = move
+        self.height = 0.0
+        self.force = 0.0  # along z, of the last word [N]
+        self.heard = 0  # words
+        self.last = b""
+        self.is_over = False
+        self.start()
+
+    def run(self):
+        while not key_file(self.port).exists() and not self.is_over:
+            time.sleep(0.01)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
+            wire.settimeout(0.05)
+            said = nonce = 0
+            while not self.is_over:
+                self.height = self.move(self)
+                said += 1
+                tremor = 1e-6 * (said % 5)
+                with contextlib.suppress(OSError):  # the runtime has ended, or is silent; a key that is just written has not all its letters
+                    state = self.STATE.pack(b"PLPS", 2, 128, nonce, said, 1 << 16, time.monotonic_ns(), 0, 0, self.height + tremor, 0, 0, 0,
+                                            1, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+                    wire.sendto(seal(read_key(self.port), state), ("127.0.0.1", self.port))
+                    self.last = wire.recv(256)
+                    nonce = struct.unpack_from("<Q", self.last, 8)[0]
+                    self.force = struct.unpack_from("<d", self.last, 56)[0]
+                    self.heard += 1
+            wire.setblocking(False)
+            with contextlib.suppress(OSError):
+                while True:
+                    self.last = wire.recv(256)
+
+    def end(self):
+        self.is_over = True
+        self.join()
+
+
+def down_to(height):
+    """From 1 cm above touch, where it stays for as long as force may need to begin, down by 0.02 mm a word."""
+    return lambda hand: max(height, 0.01 - 2e-5 * max(0, hand.heard - 300))
+
+
 class Felt(ProgramTest):
     """The bridge's example is the hand: it presses on the cube from above."""
 
@@ -39,10 +90,12 @@ class Felt(ProgramTest):
         self.port = free_port()
 
     def start(self, program, *arguments):
+        messages = tempfile.NamedTemporaryFile("w+", dir=self.folder, suffix=".txt")
+        self.addCleanup(messages.close)
         process = subprocess.Popen([str(program), *map(str, arguments)], cwd=self.folder, stdin=subprocess.PIPE,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                   stdout=subprocess.PIPE, stderr=messages, text=True)
+        process.messages = pathlib.Path(messages.name)  # what it has said
         self.addCleanup(process.stdout.close)
-        self.addCleanup(process.stderr.close)
         self.addCleanup(process.stdin.close)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
@@ -56,6 +109,11 @@ class Felt(ProgramTest):
         return self.start(BRIDGE, "--port", self.port, "--seconds", seconds, "--rate", 1000, "--from", f"0,0,{start}", "--to",
                           f"0,0,{-depth}", "--period", period)
 
+    def own_hand(self, move):
+        hand = Hand(self.port, move)
+        self.addCleanup(hand.end)
+        return hand
+
     def recorded(self, field):
         return recorded(self.folder / "session.mcap", field)
 
@@ -64,35 +122,41 @@ class Felt(ProgramTest):
         return numpy.linalg.norm(numpy.reshape(self.recorded("shown_force"), (-1, 3)), axis=1)
 
     def finish(self, process, code=0):
-        _, messages = process.communicate(timeout=120)
+        process.communicate(timeout=PATIENCE)
+        messages = process.messages.read_text()
         self.assertEqual(process.returncode, code, messages)
         return messages
 
     def test_the_hand_rests_where_its_spring_and_the_body_balance(self):
-        """Half a period of 8 s in: the target is 20 mm below touch. Hand and body share it by their stiffnesses."""
-        runtime = self.play("--duration", "4")
-        self.hand(60, 0.03, 8)
-        messages = self.finish(runtime)
+        """The hand's spring is drawn to 20 mm below touch. Hand and body share it by their stiffnesses."""
+        def drawn(hand):
+            if hand.heard < 300:
+                return 0.01  # force begins out of contact
+            wanted = -0.02 + hand.force / SPRING
+            hand.still = hand.still + 1 if abs(wanted - hand.height) < 5e-6 else 0
+            return hand.height + 0.05 * (wanted - hand.height)
+        Hand.still = 0
+        runtime = self.play()
+        hand = self.own_hand(drawn)
+        self.wait_for(lambda: hand.still > 500, runtime)
+        runtime.send_signal(signal.SIGINT)
+        messages = self.finish(runtime, 130)
         self.assertIn(f"device: bridge:127.0.0.1:{self.port}", messages)
         report = json.loads((self.folder / "report.json").read_text())
-        self.assertEqual(report["ticks"], 4000)
-        self.assertGreater(report["ticks_in_contact"], 1000)
+        self.assertGreater(report["ticks_in_contact"], 500)
         self.assertEqual(sum(report["safety"]["faults"].values()), 0)
-        session = palpate.read(self.folder / "session.mcap")
-        ticks = session
-        end = slice(3800, 4000)
-        z, force = ticks["handle_position"][end, 2], ticks["shown_force"][end, 2]
-        shown, computed = ticks["shown_force"][end], ticks["force"][end]
-        t = ticks["arrived_ns"][end] * 1e-9
+        ticks = palpate.read(self.folder / "session.mcap")
+        z = ticks["handle_position"][-100:, 2]
+        shown, computed = ticks["shown_force"][-100:], ticks["force"][-100:]
         numpy.testing.assert_allclose(shown, -computed, rtol=1e-9, atol=1e-9)
-        self.assertGreater(force.min(), 0.3)
-        # The target of the hand began its way when the bridge was started, a little before the loop: its spring's force
-        # is the shown one, but for damper and mass, which a slow hand hardly feels.
-        def target(t, offset):
-            return -0.03 * (0.5 - 0.5 * numpy.cos(2 * numpy.pi * (t + offset) / 8))
-        offsets = numpy.linspace(-1, 4, 5001)
-        errors = [numpy.abs(SPRING * (target(t, offset) - z) + force).max() for offset in offsets]
-        self.assertLess(min(errors), 0.05 * force.max())
+        numpy.testing.assert_allclose(shown[:, 2], SPRING * (z + 0.02), atol=4e-3)  # of 1.3 N; 1.2e-3 N by the tremor
+        self.assertGreater(shown[:, 2].min(), 0.3)
+        # The same place by a script, in another run without a hand.
+        height = 0.12 + z.mean()
+        script = self.write("there.csv", f"t,x,y,z\n0,0.05,0.05,0.13\n0.5,0.05,0.05,{height}\n1.5,0.05,0.05,{height}\n")
+        done(RUNTIME, "play", self.file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--coupling", "2000", "--fast", "--record", "there.mcap", cwd=self.folder)
+        there = palpate.read(self.folder / "there.mcap")
+        self.assertAlmostEqual(shown[:, 2].mean(), -there["force"][-1, 2], delta=2e-3)
 
     def test_a_killed_session_opens_and_its_replay_is_the_same_bit_by_bit(self):
         runtime = self.play("--overlay", "r=2,rings=1")
@@ -156,13 +220,13 @@ class Felt(ProgramTest):
     def fault_is_acknowledged(self, acknowledge):
         runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--origin", "0.05,0.05,0.12", "--safety",
                              CALM + ",max_speed=0.1", "--record", "session.mcap", "--report", "report.json")
-        self.hand(600, 0.0, 3.5, 0.15)  # 0.13 m/s at most, at 0.9 s: free space all the way, slow for half of the time
+        # In free space to and fro by 5 cm, until that was too fast; then it rests.
+        hand = self.own_hand(lambda hand: 0.15 + 0.05 * (hand.heard % 2))
         self.wait_for(lambda: numpy.any(self.recorded("fault")), runtime)
+        hand.move = lambda hand: 0.15
 
         def acknowledged_for_long():
-            """It must come while the hand is slow."""
             acknowledge(runtime)
-            time.sleep(0.3)
             fault, event = self.recorded("fault"), self.recorded("event")
             return any(len(fault) >= k + 400 and not fault[k : k + 400].any() for k in numpy.flatnonzero(numpy.bitwise_and(event, 4)))
 
@@ -182,66 +246,43 @@ class Felt(ProgramTest):
 
     def test_datagrams_that_are_not_taken_are_told(self):
         runtime = self.play("--duration", "0.2")
+        self.wait_for(lambda: "waiting for bridge:" in runtime.messages.read_text(), runtime)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hand:
             for _ in range(5):
                 hand.sendto(b"nonsense", ("127.0.0.1", self.port))
-                time.sleep(0.2)
-        self.hand(60, 0.0, 0.0, 0.1)
+        self.own_hand(down_to(0.01))
         messages = self.finish(runtime)
-        self.assertIn("waiting for bridge:", messages)
-        self.assertRegex(messages, "refused: [1-5] datagrams by magic")
+        self.assertIn("refused of the device: 5 datagrams by magic", messages)
         report = json.loads((self.folder / "report.json").read_text())
-        self.assertRegex(report["device"]["refused"], "^[1-5] datagrams by magic$")
+        self.assertRegex(report["device"]["refused"], "^5 datagrams by magic")  # on a busy machine some by their age, too
 
     def test_signals_leave_no_force_and_a_whole_session(self):
         for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hand:
-                hand.settimeout(20)
+            with self.subTest(stop=stop):
                 runtime = self.play()
-                state = struct.Struct("<4sHHQIIQ3d3d4f f 5f 8x")
-                nonce, last = 0, b""
-                for k in range(1, 100000):
-                    z = -min(0.02, 2e-5 * k)
-                    said = state.pack(b"PLPS", 2, 128, nonce, k, 1 << 16, time.monotonic_ns(), 0, 0, z + 1e-6 * (k % 5), 0, 0, 0,
-                                      1, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-                    if key_file(self.port).exists():
-                        hand.sendto(seal(read_key(self.port), said), ("127.0.0.1", self.port))
-                    time.sleep(0.001)
-                    hand.setblocking(False)
-                    try:
-                        while True:
-                            last = hand.recv(256)
-                    except OSError:
-                        pass
-                    if last:
-                        nonce = struct.unpack_from("<Q", last, 8)[0]
-                        if struct.unpack_from("<d", last, 56)[0] > 0.2:
-                            break
-                self.assertGreater(struct.unpack_from("<d", last, 56)[0], 0.2, "it was felt")
+                hand = self.own_hand(down_to(-0.02))
+                self.wait_for(lambda: hand.force > 0.2, runtime)
                 runtime.send_signal(stop)
                 self.finish(runtime, 130)
-                try:
-                    while True:
-                        last = hand.recv(256)
-                except OSError:
-                    pass
-                self.assertEqual(struct.unpack_from("<I", last, 32)[0], 0, "the last word is no force")
-            session = palpate.read(self.folder / "session.mcap")
-            self.assertGreater(len(session["time"]), 100)
+                hand.end()
+                self.assertEqual(struct.unpack_from("<I", hand.last, 32)[0], 0, "the last word is no force")
+                self.assertGreater(len(palpate.read(self.folder / "session.mcap")["time"]), 100)
 
     def test_the_example_finds_the_body_by_itself(self):
         """docs/devices.md's two commands: without --to the hand goes down until it feels something."""
-        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--safety", PATIENT, "--duration", "6",
+        runtime = self.start(RUNTIME, "play", self.file, "--device", f"bridge:{self.port}", "--safety", PATIENT, "--record", "session.mcap",
                              "--report", "report.json")
-        hand = self.start(BRIDGE, "--port", self.port, "--rate", 2000, "--seconds", 60)
-        messages = self.finish(runtime)
+        hand = self.start(BRIDGE, "--port", self.port, "--rate", 2000, "--seconds", 600)
+        self.wait_for(lambda: (self.shown() > 0.3).sum() > 100, runtime)
+        runtime.send_signal(signal.SIGINT)
+        messages = self.finish(runtime, 130)
         self.assertNotIn("never touched", messages)
         report = json.loads((self.folder / "report.json").read_text())
         self.assertGreater(report["ticks_in_contact"], 100)
         self.assertGreater(report["largest_force_N"], 0.3)
         self.assertGreater(report["tool"]["radius_m"], 0, "a ball that suits the body")
         hand.terminate()
-        said, _ = hand.communicate(timeout=60)
+        said, _ = hand.communicate(timeout=PATIENCE)
         self.assertNotIn("no force was ever felt", said)
 
     def test_who_never_touches_is_told(self):
@@ -251,7 +292,7 @@ class Felt(ProgramTest):
         messages = self.finish(runtime)
         self.assertRegex(messages, r"the tool never touched the body: move the device on.*the tool ended at \(.*\) m; the body rests in \(0, 0, 0\)")
         hand.terminate()
-        self.assertIn("no force was ever felt", hand.communicate(timeout=60)[0])
+        self.assertIn("no force was ever felt", hand.communicate(timeout=PATIENCE)[0])
 
     def test_a_stranger_is_told_where_the_key_is(self):
         runtime = self.play("--duration", "0.2")

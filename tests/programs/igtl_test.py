@@ -11,7 +11,7 @@ import time
 
 import numpy
 
-from programs import RUNTIME, SOURCE, ProgramTest, palpate, pictures, run
+from programs import PATIENCE, RUNTIME, SOURCE, ProgramTest, palpate, pictures, run
 
 CUBE = SOURCE / "tests" / "golden" / "cube2" / "cube2.palpate.hdf"
 TOUCH = "t,x,y,z,qw,qx,qy,qz\n0,0.5,0.5,1.3,1,0,0,0\n0.5,0.52,0.47,1.05,0.8,0,0.6,0\n1.5,0.52,0.47,1.0,0.6,0,0.8,0\n"
@@ -145,7 +145,7 @@ class Messages(IgtlTest):
         with self.playing("--device", "script:touch.csv", "--friction", "0.3", "--record", "out.mcap", script=TOUCH) as (process, connect):
             client = connect()
             messages = list(iter(client.next, None))
-            process.communicate(timeout=60)
+            process.communicate(timeout=PATIENCE)
             self.assertEqual(process.returncode, 0)
         self.assertEqual({(message.kind, message.name) for message in messages},
                          {("POLYDATA", "Palpate surface"), ("TRANSFORM", "Palpate tool"), ("STRING", "Palpate force")})
@@ -201,7 +201,7 @@ class Messages(IgtlTest):
                 self.assertTrue(numpy.isfinite(nodes).all())
                 self.assertLess(nodes.max(), 1500)
             process.send_signal(signal.SIGTERM)
-            process.communicate(timeout=60)
+            process.communicate(timeout=PATIENCE)
             self.assertEqual(process.returncode, 130)
             self.assertIsNone([*iter(client.next, None), None][-1])
 
@@ -222,7 +222,7 @@ class Clients(IgtlTest):
                 steady.surfaces(2)
             self.assertIsNone(process.poll())
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=60)
+            process.communicate(timeout=PATIENCE)
             self.assertEqual(process.returncode, 130)
 
     def test_one_that_reads_nothing_costs_the_others_nothing(self):
@@ -232,7 +232,7 @@ class Clients(IgtlTest):
             for reader in readers:
                 reader.surfaces(30)
             self.assertIsNotNone(stalled)
-            process.communicate(timeout=60)
+            process.communicate(timeout=PATIENCE)
             self.assertEqual(process.returncode, 0)
         self.assertEqual(json.loads((self.folder / "report.json").read_text())["ticks"], 3000)
 

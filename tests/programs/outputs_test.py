@@ -12,7 +12,7 @@ import threading
 import time
 import unittest
 
-from programs import PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
+from programs import PATIENCE, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, run
 
 CUBE = SOURCE / "tests" / "golden" / "cube2" / "cube2.palpate.hdf"
 TOUCH = "t,x,y,z\n0,0.5,0.5,1.3\n0.2,0.5,0.5,1.05\n"
@@ -547,7 +547,7 @@ class FullDisk(OutputTest):
     def assert_told(self, program, *arguments):
         with open("/dev/full", "w") as full:
             result = subprocess.run([str(program), *map(str, arguments)], cwd=self.folder, stdout=full, stderr=subprocess.PIPE, text=True,
-                                    timeout=240, check=False)
+                                    timeout=PATIENCE, check=False)
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn("error: standard output: cannot be written", result.stderr)
         self.assertNotIn("should not happen", result.stderr)
@@ -621,7 +621,7 @@ class FailedRecording(OutputTest):
         time.sleep(0.3)  # the loop goes on without it
         process.send_signal(signal.SIGINT)
         messages = process.stderr.read()
-        self.assertEqual(process.wait(timeout=60), 1, messages)
+        self.assertEqual(process.wait(timeout=PATIENCE), 1, messages)
         report = json.loads((self.folder / "r.json").read_text())
         for piece in pieces:
             self.assertIn(piece, report["recording_failed"])

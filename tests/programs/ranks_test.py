@@ -13,7 +13,7 @@ import unittest
 import h5py
 import numpy
 
-from programs import BINARY, MODELS, PRECOMPUTE, ProgramTest, cube_toml, run
+from programs import BINARY, MODELS, PATIENCE, PRECOMPUTE, ProgramTest, cube_toml, run
 
 RANKS = BINARY / "precompute" / "cluster" / "palpate-precompute-mpi"
 MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1"]
@@ -210,7 +210,7 @@ class Distributed(RanksTest):
             time.sleep(0.1)
         self.assertIsNone(job.poll(), "it has ended")
         os.kill(self.pids(job)[-1], signal.SIGTERM)
-        self.assertEqual(job.wait(timeout=200), 130)
+        self.assertEqual(job.wait(timeout=PATIENCE), 130)
         self.assertIn("interrupted: the columns that are done are kept", job.stderr.read())
         again = run(PRECOMPUTE, model, "-o", output, cwd=self.folder)
         self.assertRegex(again.stderr, r"[1-9]\d* of \d+ columns were kept")
@@ -258,7 +258,7 @@ class Dying(RanksTest):
             victims = self.pids(job)
             if victims:
                 os.kill(choose.choice(victims), signal.SIGKILL)
-            if job.wait(timeout=200) != 0:
+            if job.wait(timeout=PATIENCE) != 0:
                 self.assertRegex(job.stderr.read(), "exited on signal 9")
             if output.exists():  # it was at its end
                 self.assertEqual(output.read_bytes(), data)
@@ -280,7 +280,7 @@ class Dying(RanksTest):
                 self.assertNotEqual(line, "", f"it has ended before it told of {stage}")
             os.kill(self.pids(job)[victim], signal.SIGKILL)
             rest = job.stderr.read()
-            self.assertNotEqual(job.wait(timeout=200), 0, rest)
+            self.assertNotEqual(job.wait(timeout=PATIENCE), 0, rest)
             self.assertFalse(output.exists())
         self.own_factors(2, model, "-o", output)
         self.assertEqual(output.read_bytes(), data)
@@ -349,7 +349,7 @@ class Dying(RanksTest):
             job = self.start(2, model, output)
             for pid in self.pids(job):  # as srun does, to every rank
                 os.kill(pid, stop)
-            self.assertEqual(job.wait(timeout=100), 130)
+            self.assertEqual(job.wait(timeout=PATIENCE), 130)
             self.assertIn("interrupted: the columns that are done are kept", job.stderr.read())
         self.assertRegex(self.own_factors(2, model, "-o", output), r"[1-9]\d* of \d+ columns were kept")
         self.assertEqual(output.read_bytes(), data)
@@ -359,7 +359,7 @@ class Dying(RanksTest):
         output = self.folder / "x.palpate.hdf"
         job = self.start(3, model, output)
         os.kill(self.pids(job)[-1], signal.SIGTERM)
-        self.assertEqual(job.wait(timeout=100), 130)
+        self.assertEqual(job.wait(timeout=PATIENCE), 130)
         self.assertTrue(output.with_name("x.palpate.hdf.partial").exists())
 
 

@@ -12,7 +12,7 @@ import numpy
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-from programs import PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, palpate, recorded, run
+from programs import PATIENCE, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, palpate, recorded, run
 
 TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
 HANDING_OVER = 1 << 10  # runtime/tick/status.h
@@ -399,7 +399,7 @@ class Play(ProgramTest):
                                        cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             self.wait_for(lambda: len(recorded(self.folder / "out.mcap", "time")) > 0, process)
             process.send_signal(stop)
-            output, messages = process.communicate(timeout=60)
+            output, messages = process.communicate(timeout=PATIENCE)
             self.assertEqual(process.returncode, 130, messages)
             report = json.loads(output)
             self.assertTrue(report["interrupted"])

@@ -10,7 +10,7 @@ import numpy
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-from programs import RUNTIME, SOURCE, ProgramTest, cube_toml, palpate, recorded, run, set_tick
+from programs import PATIENCE, RUNTIME, SOURCE, ProgramTest, cube_toml, palpate, recorded, run, set_tick
 
 TOUCH = "t,x,y,z,grab\n0,0.4,0.5,1.3,0\n0.1,0.4,0.5,1.15,0\n0.4,0.6,0.5,1.15,1\n0.5,0.6,0.5,1.3,1\n"
 
@@ -104,7 +104,7 @@ class Session(ProgramTest):
             self.assert_refused(run(*play, cwd=self.folder), "out.mcap", "is being recorded by another program")
         finally:
             process.send_signal(signal.SIGTERM)
-            output, _ = process.communicate(timeout=60)
+            output, _ = process.communicate(timeout=PATIENCE)
         self.assertFalse(json.loads(self.session("out.mcap", "--json"))["was_killed"])
         self.assertEqual(self.check_killed(self.folder / "out.mcap")[0], json.loads(output)["ticks"])
 

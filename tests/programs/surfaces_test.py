@@ -8,7 +8,7 @@ import subprocess
 import unittest
 
 import numpy as np
-from programs import PRECOMPUTE, RUNTIME, ProgramTest, run
+from programs import PATIENCE, PRECOMPUTE, RUNTIME, ProgramTest, run
 
 # Box of 100 x 100 x 100; the lid is the last two triangles.
 CORNERS = [(100 * (k & 1), 100 * (k >> 1 & 1), 100 * (k >> 2 & 1)) for k in range(8)]
@@ -199,7 +199,7 @@ class Push(ProgramTest):
                 self.assertTrue(line, told)
                 told += line
             os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C does
-            process.communicate(timeout=120)
+            process.communicate(timeout=PATIENCE)
         self.assertEqual(process.returncode, 130)
 
 

@@ -9,7 +9,7 @@ import subprocess
 import urllib.error
 import urllib.request
 
-from programs import RUNTIME, SOURCE, ProgramTest, run
+from programs import PATIENCE, RUNTIME, SOURCE, ProgramTest, run
 
 CUBE = SOURCE / "tests" / "golden" / "cube2" / "cube2.palpate.hdf"
 TOUCH = "t,x,y,z\n0,0.5,0.5,1.3\n0.2,0.5,0.5,1.05\n"
@@ -55,7 +55,7 @@ class ViewTest(ProgramTest):
 
     def end(self, process, number):
         process.send_signal(number)
-        output, _ = process.communicate(timeout=60)
+        output, _ = process.communicate(timeout=PATIENCE)
         return process.returncode, output
 
     def assert_taken(self, *arguments):
@@ -129,7 +129,7 @@ class PlayView(ViewTest):
 
     def test_a_duration_ends_it(self):
         with self.started(*self.PLAY, "--view-address", "0", "--duration", "0.2", "--report", "-") as (process, _):
-            output, _ = process.communicate(timeout=60)
+            output, _ = process.communicate(timeout=PATIENCE)
             self.assertEqual((process.returncode, json.loads(output)["ticks"]), (0, 200))
 
     def test_address(self):

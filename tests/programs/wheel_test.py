@@ -8,7 +8,7 @@ import tempfile
 import unittest
 import zipfile
 
-from programs import BINARY, HAS_SANITIZERS, SOURCE, cube_toml, run
+from programs import BINARY, HAS_SANITIZERS, PATIENCE, SOURCE, cube_toml, run
 
 PUSH = """
 import palpate
@@ -46,18 +46,18 @@ class Wheel(unittest.TestCase):
         (self.folder / "cube.toml").write_text(cube_toml(4))
         subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", self.folder / "venv"], check=True)
         python = self.folder / "venv" / "bin" / "python"
-        subprocess.run([python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", self.wheel], check=True, timeout=240)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", self.wheel], check=True, timeout=PATIENCE)
         bare = {"PATH": "/usr/bin:/bin", "HOME": str(self.folder)}
-        done = subprocess.run([python, "-c", PUSH], cwd=self.folder, env=bare, capture_output=True, text=True, check=False, timeout=240)
+        done = subprocess.run([python, "-c", PUSH], cwd=self.folder, env=bare, capture_output=True, text=True, check=False, timeout=PATIENCE)
         self.assertEqual(done.returncode, 0, done.stderr)
         package, program, force = done.stdout.splitlines()
         self.assertIn(str(self.folder / "venv"), package)
         self.assertEqual(program, str(self.folder / "venv" / "bin" / "palpate-runtime"))
         built = {**bare, "PYTHONPATH": str(SOURCE / "runtime" / "python"), "PATH": f"{BINARY / 'precompute'}:{BINARY / 'runtime'}:/usr/bin:/bin"}
-        again = subprocess.run([sys.executable, "-c", PUSH], cwd=self.folder, env=built, capture_output=True, text=True, check=True, timeout=240)
+        again = subprocess.run([sys.executable, "-c", PUSH], cwd=self.folder, env=built, capture_output=True, text=True, check=True, timeout=PATIENCE)
         self.assertEqual(force, again.stdout.splitlines()[2])
         self.assertGreater(float.fromhex(force.split()[2]), 0)
-        subprocess.run([python, "-m", "pip", "uninstall", "--quiet", "--yes", "palpate"], check=True, timeout=240)
+        subprocess.run([python, "-m", "pip", "uninstall", "--quiet", "--yes", "palpate"], check=True, timeout=PATIENCE)
         left = [file for file in (self.folder / "venv").rglob("*palpate*")]
         self.assertEqual(left, [])
 
