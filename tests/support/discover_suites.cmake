@@ -1,6 +1,7 @@
 # Run after a GoogleTest program is linked: writes a ctest file with an entry for each of its test suites. What tests of a suite share, a baked
-# body, is then made once a suite and not once a test.
+# body, is then made once a suite and not once a test. Dear suites (tiers.cmake) run at night, and a case of theirs with each change.
 #   cmake -D program=PATH -D file=PATH -D label=LABEL -D environment=LIST -P discover_suites.cmake
+include(${CMAKE_CURRENT_LIST_DIR}/../tiers.cmake)
 execute_process(COMMAND ${program} --gtest_list_tests OUTPUT_VARIABLE list RESULT_VARIABLE status)
 if(NOT status EQUAL 0)
   message(FATAL_ERROR "${program} --gtest_list_tests ends with ${status}:\n${list}")
@@ -8,10 +9,20 @@ endif()
 string(REGEX MATCHALL "\n[^ \n]+\\." suites "\n${list}")
 get_filename_component(name ${program} NAME)
 set(entries "")
+function(add_entry entry filter labels)
+  string(APPEND entries "add_test([=[${entry}]=] [=[${program}]=] [=[--gtest_filter=${filter}]=])\n"
+                        "set_tests_properties([=[${entry}]=] PROPERTIES TIMEOUT 1200 LABELS [=[${labels}]=] ENVIRONMENT [=[${environment}]=])\n")
+  set(entries "${entries}" PARENT_SCOPE)
+endfunction()
 foreach(suite IN LISTS suites)
   string(REGEX REPLACE "^\n(.*)\\.$" "\\1" suite "${suite}")
-  string(APPEND entries "add_test([=[${name}.${suite}]=] [=[${program}]=] [=[--gtest_filter=${suite}.*]=])\n"
-                        "set_tests_properties([=[${name}.${suite}]=] PROPERTIES TIMEOUT 1200 LABELS [=[${label}]=] ENVIRONMENT [=[${environment}]=])\n")
+  palpate_tier("${name}.${suite}" cases tier)
+  add_entry("${name}.${suite}" "${suite}.*" "${label}${tier}")
+  if(cases)
+    list(TRANSFORM cases PREPEND "${suite}.")
+    list(JOIN cases ":" filter)
+    add_entry("${name}.${suite}.cases" "${filter}" "${label}")
+  endif()
 endforeach()
 if(entries STREQUAL "")
   message(FATAL_ERROR "${program} has no tests")

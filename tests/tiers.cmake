@@ -1,0 +1,55 @@
+# Dear suites, by the name of their ctest entry, each with the cases of it that run with every change (a,b; -: none; of a browser's a part of their titles). The whole suite has the label `night`:
+# scripts/test --night=tests runs it. docs/contributing.md says why they are dear.
+set(palpate_dear
+  # Ranks of MPI wait for each other in a loop, and are killed.
+  programs_ranks_test.Bytes                      test_ranks_of_a_node_share_a_factor
+  programs_ranks_test.Distributed                test_held_axes_have_no_columns
+  programs_ranks_test.Dying                      test_a_signal_to_one_rank_stops_all
+  programs_ranks_test.Misfits                    test_what_all_ranks_find_is_told_once
+  programs_ranks_test.Plans                      test_blocks_of_columns_depend_on_the_model_alone
+  programs_parts_test.Parts                      test_parts_divide_the_work
+  # A browser draws without a graphics card.
+  viewer_browser_looks                           "axes have names"
+  viewer_browser_hands                           "how a model is looked at is kept"
+  viewer_browser_beside                          "a recording stands beside a body"
+  viewer_browser_pages                           "one steers"
+  viewer_browser_gallery                         "what cannot be opened"
+  # Bodies that are baked or pressed for long.
+  programs_bake_test.Models                      test_the_nodule_is_made_of_two_materials
+  programs_bake_test.Stopped                     test_interrupt_keeps_what_is_done_and_the_old_file_whole
+  programs_live_test.Live                        test_equal_runs_are_equal_and_replay_to_the_bit
+  programs_hertz_test.Hertz                      test_a_shallow_press_is_not_held_out_by_edges
+  programs_warp_test.Warp                        test_runs_are_equal_and_replay
+  programs_session_test.Session                  test_says_what_is_in_it
+  programs_cube_test.CubeFigures                 test_m6
+  programs_cube_test.Overlay                     test_figures
+  programs_dynamics_test.Swing                   test_both_ways_swing_at_the_first_frequency
+  programs_physics_test.Locking                  -
+  programs_inputs_test.Surfaces                  test_remeshing_that_spoils_the_surface_falls_back_to_cgal
+  programs_files_test.Truncated                  test_while_it_is_in_use_does_nothing
+  compressed_test.Compressed                     ForcesOfTouchesAreWithinTheTolerance
+  compressed_test.AlteredFile                    AKilledRunGoesOn
+  precompute_test.Assembly                       RigidMotionsTakeNoForce,ClampingThreeNodesMakesItPositiveDefinite,PartlyHeldNodesAreLeftOutDofByDof
+  live_test.Walls                                ABlockBeginsToSlideAtTheFrictionAngle
+  live_test.LiveTruth                            SmallStrainEndsWhereThePageSays
+  runtime_contact_test.Tools/RandomWalk          NothingBreaksAndTheStateRecovers/ThreeTools
+  runtime_contact_test.Spheres/ComesToRest       WhereverItIsHeld/Radius10Friction5,WhereverItIsHeld/Radius2Friction1InThePlane
+  dynamics_motion_test.Elements/NewmarkSteps     PackedIsTheSparseSolveOverAThousandSteps/quad4,ModalWithAllModesIsThePackedOne/quad4
+)
+# palpate_tier(ENTRY CASES TIER): of a dear suite the cases for every change, empty where there are none, and `;night`, to go behind its labels; otherwise
+# both are empty
+function(palpate_tier entry cases tier)
+  set(${cases} "" PARENT_SCOPE)
+  set(${tier} "" PARENT_SCOPE)
+  list(FIND palpate_dear "${entry}" at)
+  if(at EQUAL -1)
+    return()
+  endif()
+  set(${tier} ";night" PARENT_SCOPE)
+  math(EXPR at "${at} + 1")
+  list(GET palpate_dear ${at} found)
+  if(NOT found STREQUAL "-")
+    string(REPLACE "," ";" found "${found}")
+    set(${cases} "${found}" PARENT_SCOPE)
+  endif()
+endfunction()
