@@ -59,7 +59,7 @@ class Outputs(LongTest):
         self.assertEqual(numpy.count_nonzero(ticks["contacts"]), report["ticks_in_contact"])
 
         told = json.loads(self.run_in(200, RUNTIME, "session", "touch.mcap", "--json"))
-        self.assertEqual((told["ticks"], told["frames"]), (ROWS, len(ticks.messages("/contacts"))))
+        self.assertEqual((told["ticks"], told["pictures"]), (ROWS, len(ticks.messages("/contacts"))))
         self.assertAlmostEqual(told["largest_force_N"], size.max(), delta=1e-12 * size.max())
 
         self.run_in(200, RUNTIME, "export", "touch.mcap", "--csv", "ticks.csv")
@@ -71,7 +71,7 @@ class Outputs(LongTest):
         with h5py.File(self.folder / "touch.h5") as hdf:
             for name in ticks:
                 numpy.testing.assert_array_equal(hdf["ticks"][name], ticks[name], name)
-            self.assertEqual(len(hdf["frames/time"]), told["frames"])
+            self.assertEqual(len(hdf["frames/time"]), told["pictures"])
             self.assertGreater(numpy.abs(hdf["frames/displacement"][-200:]).max(), 0.005)
 
         self.run_in(250, RUNTIME, "export", "touch.mcap", "--vtu", "touch.pvd", "--fps", "2")

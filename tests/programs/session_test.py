@@ -35,19 +35,19 @@ class Session(ProgramTest):
             self.assertEqual(told[name], report[name], name)
         self.assertEqual((told["missing_ticks"], told["rate"], told["seconds"]), (0, 1000, 0.501))
         self.assertEqual((told["deadline_misses"], told["worst_lateness_ns"], told["faults"]), (0, 0, []))
-        self.assertEqual((told["device"], told["was_killed"], told["frames"]), ("script:touch.csv", False, 30))
+        self.assertEqual((told["device"], told["was_killed"], told["pictures"]), ("script:touch.csv", False, 30))
         self.assertIn("\noverlay=r=2,rings=1\n", told["options"])
         lines = self.session("out.mcap").splitlines()
         self.assertLess(len(lines), 15)
         for piece in ("finished, by palpate", "501 at 1000 a second: 0.501 s, 0 missing", "script:touch.csv",
                       f"{report['largest_force_N']:.6g} N at {report['largest_force_time_s']:.3f} s", "faults           none",
-                      "30 of 386 surface nodes; for ParaView: out.xdmf"):
+                      "30 of 386 surface nodes, stored"):
             self.assertIn(piece, "\n".join(lines))
 
     def test_frames_can_be_left_out(self):
         file = self.bake(cube_toml(3))
         self.play(file, "--fast", "--record", "out.mcap", "--record-frames", "0")
-        self.assertIn("frames           none", self.session("out.mcap"))
+        self.assertIn("pictures         none", self.session("out.mcap"))
         result = run(RUNTIME, "play", file, "--device", "script:touch.csv", "--record-frames", "-1", cwd=self.folder)
         self.assertEqual(result.returncode, 2)
         self.assertIn("--record-frames: '-1' is not a number from 0 on", result.stderr)
@@ -82,7 +82,7 @@ class Session(ProgramTest):
             rows, frames = self.check_killed(out)
             most = max(most, rows)
             told = json.loads(self.session("out.mcap", "--json"))
-            self.assertEqual((told["ticks"], told["frames"]), (rows, frames))
+            self.assertEqual((told["ticks"], told["pictures"]), (rows, frames))
             self.assertFalse(palpate.read(out).finished)
             self.session("out.mcap", "--finish")
             self.assertTrue(palpate.read(out).finished)
