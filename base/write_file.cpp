@@ -84,8 +84,8 @@ class TemporaryFile {
     if (const int error = write_all(fd_, bytes)) fail(target_, error);
   }
 
-  void take_its_place() {
-    rename_durably(path_, target_);
+  void take_its_place(bool keeps = false) {
+    rename_durably(path_, target_, keeps);
     ::close(std::exchange(fd_, -1));
   }
 
@@ -155,6 +155,12 @@ void write_file(const std::filesystem::path& file, std::string_view bytes) {
   const int error = write_all(fd, bytes);
   ::close(fd);
   if (error != 0) fail(file, error);
+}
+
+void write_new_file(const std::filesystem::path& file, std::string_view bytes) {
+  TemporaryFile temporary(file);
+  temporary.write(bytes);
+  temporary.take_its_place(true);
 }
 
 void replace_file(const std::filesystem::path& file, std::string_view bytes, mode_t mode) {

@@ -14,6 +14,10 @@ namespace palpate {
 /// Throws Error with the system's reason; then a regular file is as it was.
 void write_file(const std::filesystem::path& file, std::string_view bytes);
 
+/// Writes a new regular file, whole or not at all: what has the name already, a link to nothing too, stays,
+/// and an Error is thrown.
+void write_new_file(const std::filesystem::path& file, std::string_view bytes);
+
 /// Writes a regular file under a fresh temporary name beside it, with the rights `mode` (less the umask), and
 /// renames it, in the place of what was there, a symbolic link too. Throws Error with the system's reason;
 /// then what was there is as it was.
