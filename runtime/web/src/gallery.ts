@@ -3,6 +3,7 @@ import { by_id, element } from './dom';
 import { Drawing } from './drawing';
 import { format_bytes } from './format';
 import { kept_theme } from './kept';
+import { gallery_of, is_token, page_of, type Place } from './place';
 import { SmallPictures } from './small_picture';
 import { ThemeChoice, themes, type Theme } from './theme';
 import { decode } from './wire';
@@ -27,12 +28,6 @@ interface Opened {
   ended: boolean;
 }
 
-/** Where on this page's host another page is, and what opens it. */
-interface Place {
-  port: number;
-  token: string;
-}
-
 const kinds: Record<Kind, { title: string; does: string }> = {
   body: { title: 'Bodies', does: 'push it' },
   recording: { title: 'Recordings', does: 'look through it' },
@@ -40,9 +35,6 @@ const kinds: Record<Kind, { title: string; does: string }> = {
 };
 
 const endings = /\.(palpate\.hdf|h5|stl|obj|ply|off|inr|inr\.gz|nii|nii\.gz|nrrd|png|pbm)$/i;
-
-const is_token = (text: unknown): text is string => typeof text === 'string' && /^[0-9a-f]{32}$/.test(text);
-const is_port = (port: unknown): port is number => Number.isInteger(port) && Number(port) > 0 && Number(port) < 65536;
 
 /** The token of this page's address, which the tab keeps: the way back from what is opened has none. */
 function own_token(): string {
@@ -62,18 +54,6 @@ async function ask(path: string, options: RequestInit = {}, name = ''): Promise<
   const response = await fetch(address(path, name), options);
   if (!response.ok) throw new Error((await response.text()).trim());
   return response;
-}
-
-/** The page of what is opened, on this page's host. It is told the way back, but not the token of this page: who is sent its address may push that body, and no more. */
-export function page_of(place: Place, here: { hostname: string; port: string }): string {
-  if (!is_port(place.port) || !is_token(place.token)) throw new Error('the program told no address');
-  return `http://${here.hostname}:${place.port}/?token=${place.token}&gallery=${here.port || 80}`;
-}
-
-/** The address of the gallery that a page was opened from; nothing where it was opened by itself. */
-export function gallery_of({ search, hostname }: { search: string; hostname: string }): string | null {
-  const port = Number(new URLSearchParams(search).get('gallery'));
-  return is_port(port) ? `http://${hostname}:${port}/gallery` : null;
 }
 
 export class Gallery {

@@ -1,7 +1,7 @@
-// Where the gallery leads.
+// Where the gallery leads, and back.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { gallery_of, page_of } from '../src/gallery';
+import { gallery_of, page_of } from '../src/place';
 
 const token = 'a'.repeat(32);
 
