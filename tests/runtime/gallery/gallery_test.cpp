@@ -175,20 +175,22 @@ TEST(GalleryAnswers, TheFolderIsTold) {
   EXPECT_EQ(answers.answer(get("/opened"), served).body(), "null");
 }
 
+std::string told(const std::string& port, const std::string& token) {
+  return "{\"url\": \"javascript:alert(1)\", \"port\": " + port + ", \"token\": \"" + token + "\"}";
+}
+
 TEST(GalleryPage, IsToldAsJsonAndNothingElse) {
   const std::string token(32, 'a');
-  const auto page = page_told(R"({"url": "javascript:alert(1)", "port" : 8018, "token" : ")" + token + "\"}");
+  const auto page = page_told(told("8018", token));
   ASSERT_TRUE(page);
   EXPECT_EQ(page->port, 8018);
   EXPECT_EQ(page->token, token);
-  for (const std::string& line : std::vector<std::string>{
-           "", "open http://127.0.0.1:8018/?token=" + token + " in a browser", "null", "[]", "{}",
-           R"({"port": 0, "token": ")" + token + "\"}", R"({"port": 65536, "token": ")" + token + "\"}",
-           R"({"port": -1, "token": ")" + token + "\"}", R"({"port": "8018", "token": ")" + token + "\"}",
-           R"({"port": 8018.5, "token": ")" + token + "\"}", R"({"port": 8018})",
-           R"({"port": 8018, "token": 1})", R"({"port": 8018, "token": ")" + token + "a\"}",
-           R"({"port": 8018, "token": "A)" + token.substr(1) + "\"}",
-           R"({"port": 8018, "token": "@evil.example/?)" + token.substr(15) + "\"}"})
+  for (const std::string& line :
+       {std::string(), "open http://127.0.0.1:8018/?token=" + token + " in a browser", std::string("null"),
+        std::string("[]"), std::string("{}"), std::string("{\"port\": 8018}"), told("0", token),
+        told("65536", token), told("-1", token), told("8018.5", token), told("\"8018\"", token),
+        told("8018", ""), told("8018", token + "a"), told("8018", "A" + token.substr(1)),
+        told("8018", "@evil.example/?" + token.substr(15))})
     EXPECT_FALSE(page_told(line)) << line;
 }
 
