@@ -71,6 +71,7 @@ std::array<int, 2> make_pipe(const std::filesystem::path& program) {
   dup2(output, start.read == OtherProgram::Stream::output ? STDOUT_FILENO : STDERR_FILENO);
   if (told == told_descriptor) fcntl(told, F_SETFD, 0);
   if (told >= 0) dup2(told, told_descriptor);
+  if (told >= 0) ::close_range(told_descriptor + 1, ~0U, 0);  // sockets of a server too
   if (!start.has_terminal) {
     setpgid(0, 0);
     const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);

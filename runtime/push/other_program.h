@@ -29,7 +29,8 @@ class OtherProgram {
     Stream read = Stream::output;
     std::filesystem::path folder{};  ///< that it works in; empty: this program's
     bool has_terminal = true;        ///< else it hears no keys of a person, nor signals that they send
-    bool tells = false;              ///< it has `told_descriptor` to write to
+    bool tells =
+        false;  ///< it has `told_descriptor` to write to, and beside it no descriptor of this program
   };
 
   /// Throws Error where there is no room for another program.
