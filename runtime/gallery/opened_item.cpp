@@ -183,7 +183,7 @@ void OpenedItem::listen(Running& running) {
   if (::poll(heard.data(), heard.size(), wait) <= 0) return;
   if (heard[0].revents != 0) {
     std::array<std::byte, sizeof(std::uint64_t)> count{};
-    static_cast<void>(::read(wake_.get(), count.data(), count.size()));
+    [[maybe_unused]] const ssize_t seen = ::read(wake_.get(), count.data(), count.size());
   }
   if (heard[1].revents != 0) hear_printed(running);
   if (heard[2].revents != 0) hear_told(running);
