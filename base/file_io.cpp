@@ -247,13 +247,25 @@ void rename_file(const std::filesystem::path& from, const std::filesystem::path&
   if (std::rename(from.c_str(), to.c_str()) != 0) fail("rename " + from.string(), to, errno);
 }
 
+bool rename_new(const std::filesystem::path& from, const std::filesystem::path& to) {
+  int result = ::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE);
+  if (result != 0 && (errno == EINVAL || errno == ENOSYS)) {  // a file system without that has links
+    result = ::link(from.c_str(), to.c_str());
+    if (result == 0) ::unlink(from.c_str());
+  }
+  if (result != 0 && errno != EEXIST) fail("rename " + from.string(), to, errno);
+  return result == 0;
+}
+
 void flush(const FileDescriptor& file) {
   if (::fsync(file.get()) != 0) fail("write the file to the disk", file.path(), errno);
 }
 
-void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to) {
+void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to, bool keeps) {
   flush(open_file(from, OpenMode::write));
-  rename_file(from, to);
+  if (!keeps) rename_file(from, to);
+  if (keeps && !rename_new(from, to))
+    throw Error("is there already, and is kept", to.string(), "Write to another file");
   const int folder = ::open(folder_of(to).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder < 0) return;  // the file is complete; only the rename's place on the disk is left to the system
   ::fsync(folder);

@@ -94,12 +94,17 @@ void make_anew(const std::filesystem::path& temporary);
 /// Renames. Throws Error with the system's reason.
 void rename_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
+/// Renames; where something has the name `to` already, a link to nothing too, it stays and false is returned.
+/// Throws Error with the system's reason.
+[[nodiscard]] bool rename_new(const std::filesystem::path& from, const std::filesystem::path& to);
+
 /// Flushes what was written to the disk, on a file system of several machines to where all see it. Throws
 /// Error.
 void flush(const FileDescriptor& file);
 
-/// Flushes `from` to the disk, then renames it. Throws Error.
-void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to);
+/// Flushes `from` to the disk, then renames it; `keeps`: not in the place of what has the name already, for
+/// which it throws Error. Throws Error.
+void rename_durably(const std::filesystem::path& from, const std::filesystem::path& to, bool keeps = false);
 
 /// "liver.palpate.hdf" + ".partial"
 std::filesystem::path with_suffix(const std::filesystem::path& path, const char* suffix);

@@ -128,8 +128,8 @@ void TemporaryFile::write(std::string_view bytes) {
   if (const int error = write_all(fd_, bytes)) fail(target_, error);
 }
 
-void TemporaryFile::take_its_place() {
-  rename_durably(path_, target_);
+void TemporaryFile::take_its_place(bool keeps) {
+  rename_durably(path_, target_, keeps);
   ::close(std::exchange(fd_, -1));
 }
 
@@ -162,6 +162,12 @@ void write_file(const std::filesystem::path& file, std::string_view bytes) {
   FileWriter writer(file);
   writer.write(bytes);
   writer.finish();
+}
+
+void write_new_file(const std::filesystem::path& file, std::string_view bytes) {
+  TemporaryFile temporary(file);
+  temporary.write(bytes);
+  temporary.take_its_place(true);
 }
 
 void replace_file(const std::filesystem::path& file, std::string_view bytes, mode_t mode) {

@@ -24,7 +24,8 @@ class TemporaryFile {
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   void write(std::string_view bytes);
-  void take_its_place();  ///< of the target, once
+  /// Of the target, once. With `keeps` Error where a file is there.
+  void take_its_place(bool keeps = false);
 
  private:
   std::filesystem::path target_, path_;
@@ -52,6 +53,10 @@ class FileWriter {
 /// other character devices are written to directly, also `/dev/stdout` when it is redirected to a file.
 /// Throws Error with the system's reason; then a regular file is as it was.
 void write_file(const std::filesystem::path& file, std::string_view bytes);
+
+/// Writes a new regular file, whole or not at all: what has the name already, a link to nothing too, stays,
+/// and an Error is thrown.
+void write_new_file(const std::filesystem::path& file, std::string_view bytes);
 
 /// Writes a regular file under a fresh temporary name beside it, with the rights `mode` (less the umask), and
 /// renames it, in the place of what was there, a symbolic link too. Throws Error with the system's reason;

@@ -97,9 +97,10 @@ class ModelWriter {
   void note(const std::string& line);
 
   /// Adds the probes, and of a compressed model ranks, certificate, bases and couplings, seals and renames.
-  /// All columns of all matrices, and all near pairs, must have been written.
+  /// All columns of all matrices, and all near pairs, must have been written. `keeps`: what has the name PATH
+  /// by now stays, and an Error is thrown.
   void finish(const std::vector<Probe>& probes,
-              std::shared_ptr<const HierarchicalMatrix> compressed = nullptr);
+              std::shared_ptr<const HierarchicalMatrix> compressed = nullptr, bool keeps = false);
 
   /// Removes PATH.partial and PATH.progress, except where another process began them.
   void discard() noexcept;

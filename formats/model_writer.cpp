@@ -182,7 +182,8 @@ struct ModelWriter::Impl {
   void expect_piece(std::size_t matrix, std::int64_t first, std::int64_t count, std::int64_t entries) const;
   template <class T, class From>
   void store(std::size_t matrix, std::int64_t first, std::int64_t count, std::span<const From> values);
-  void seal(const std::vector<Probe>& probes, const std::shared_ptr<const HierarchicalMatrix>& compressed);
+  void seal(const std::vector<Probe>& probes, const std::shared_ptr<const HierarchicalMatrix>& compressed,
+            bool keeps);
   void write_compressed(hdf5::File& file, const Model& extra);
   [[nodiscard]] std::int64_t streamed_bytes() const;
   [[nodiscard]] std::int64_t place(std::size_t matrix, std::int64_t piece) const;
@@ -573,7 +574,7 @@ void ModelWriter::Impl::write_compressed(hdf5::File& file, const Model& extra) {
 }
 
 void ModelWriter::Impl::seal(const std::vector<Probe>& probes,
-                             const std::shared_ptr<const HierarchicalMatrix>& compressed) {
+                             const std::shared_ptr<const HierarchicalMatrix>& compressed, bool keeps) {
   Model extra;
   extra.compressed = compressed;
   extra.mesh.element = element;
@@ -603,7 +604,7 @@ void ModelWriter::Impl::seal(const std::vector<Probe>& probes,
   if (compressed != nullptr) write_compressed(file, extra);
   file.write_attribute("/", "content_hash", content.digits());
   file.close();
-  rename_durably(partial, path);
+  rename_durably(partial, path, keeps);
   journal->remove();
 }
 
@@ -725,7 +726,7 @@ void ModelWriter::write_near(Index leaf, std::span<const float> entries) {
 }
 
 void ModelWriter::finish(const std::vector<Probe>& probes,
-                         std::shared_ptr<const HierarchicalMatrix> compressed) {
+                         std::shared_ptr<const HierarchicalMatrix> compressed, bool keeps) {
   for (const Impl::Streamed& matrix : impl_->matrices) {
     const auto missing = std::find(matrix.done.begin(), matrix.done.end(), false);
     if (missing != matrix.done.end()) {
@@ -735,7 +736,7 @@ void ModelWriter::finish(const std::vector<Probe>& probes,
     }
   }
   try {
-    impl_->seal(probes, compressed);
+    impl_->seal(probes, compressed, keeps);
   } catch (...) {
     discard();
     throw;

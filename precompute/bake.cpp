@@ -486,7 +486,7 @@ void check_touchable(const Surface& surface, const Model& model, const Descripti
 
 /// Where the model may be written; before any work.
 std::filesystem::path check_output(const Description& description, const BakeOptions& options) {
-  OutputPaths paths(options.force);
+  OutputPaths paths(options.force, options.keep);
   if (!options.report.empty() && options.report != "-")
     paths.add(options.report, OutputKind::report, "--report");
   paths.add_input(description.file, "the description");
@@ -628,7 +628,7 @@ BakeResult Bake::write_without_greens() {
   if (options_.dry_run) return BakeResult::planned;
   if (!team_.leads()) return BakeResult::done;
   progress_.begin(write_stage);
-  ModelWriter(options_.output, model_, precision_, Leftovers::discard).finish({}, nullptr);
+  ModelWriter(options_.output, model_, precision_, Leftovers::discard).finish({}, nullptr, options_.keep);
   progress_.line(fmt::format("{} written", options_.output.string()));
   if (!warning_.empty()) progress_.warn(warning_);
   return BakeResult::done;
@@ -745,7 +745,7 @@ BakeResult Bake::solve_and_write() {
   }
   if (!team_.leads()) return BakeResult::done;
   progress_.begin(write_stage);
-  writer->finish(solved->probes, solved->compressed);
+  writer->finish(solved->probes, solved->compressed, options_.keep);
   progress_.line(fmt::format("{} written", options_.output.string()));
   if (!options_.keep_parts) remove_parts(options_.parts);
   if (!warning_.empty()) progress_.warn(warning_);

@@ -26,6 +26,7 @@ struct BakeOptions {
   bool dry_run = false;              ///< stop after the plan is printed
   bool discard = false;              ///< begin anew where an earlier run was interrupted
   bool force = false;                ///< the output may take the place of any file that is not read
+  bool keep = false;                 ///< it may take that of none
   std::optional<PartNumber> part{};  ///< solve for these columns alone, into a file beside the output
   bool join = false;                 ///< take the columns from parts
   std::vector<std::filesystem::path> parts{};  ///< those, or their folders; none: those beside the output

@@ -71,6 +71,8 @@ void add_bake_options(CLI::App& app, BakeOptions& options) {
   app.add_flag("--dry-run", options.dry_run,
                "print what it would need (degrees of freedom, bytes, time) and stop");
   app.add_flag("--force", options.force, "overwrite the output even if it is not an earlier model");
+  app.add_flag("--keep", options.keep, "write no file that is there already, whatever it is")
+      ->excludes("--force");
   app.add_flag(
       "--discard", options.discard,
       "start over; by default a run that was interrupted or killed resumes with the columns it has finished");
@@ -178,6 +180,7 @@ void add_bake(CLI::App& app, Arguments& arguments) {
         return read_part_number(text) ? "" : "'" + text + "' is not K/N with 1 <= K <= N <= 100000";
       });
   add_draft_options(app, arguments.draft);
+  app.get_option("--renew")->excludes("--keep");
   app.footer(
       "Examples:\n"
       "  palpate-precompute meshes/models/cube/model.toml    writes cube.palpate.hdf\n"

@@ -111,7 +111,9 @@ std::filesystem::path OutputPaths::add(const std::filesystem::path& path, Output
   Known output = known(file, what);
   refuse_inputs(output);
   refuse_outputs(output);
-  outputs_.push_back(std::move(output));
+  outputs_.push_back(output);
+  if (keep_ && output.status)
+    throw Error("is there already, and is kept", path.string(), "write to another file");
   check_existing(file, kind, force_);
   expect_ending(path, kind, what);
   expect_ending(file, kind, what);

@@ -24,8 +24,8 @@ void expect_ending(const std::filesystem::path& file, OutputKind kind, const std
 class OutputPaths {
  public:
   /// `force`: whether --force was given, with which existing files may be replaced whatever they are, unless
-  /// the run reads them; nothing where there is no such option.
-  explicit OutputPaths(std::optional<bool> force = {}) : force_(force) {}
+  /// the run reads them; nothing where there is no such option. `keep`: none is replaced.
+  explicit OutputPaths(std::optional<bool> force = {}, bool keep = false) : force_(force), keep_(keep) {}
 
   /// A file or folder that the run reads, and what it is, "the script". One that is not there is nobody's
   /// loss. Throws Error where an output would destroy it.
@@ -49,6 +49,7 @@ class OutputPaths {
   void add_beside(const std::filesystem::path& path, const std::string& what);
 
   std::optional<bool> force_;
+  bool keep_;
   std::vector<Known> inputs_;
   std::vector<Known> outputs_;
   std::vector<FileDescriptor> pipes_;

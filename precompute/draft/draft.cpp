@@ -206,7 +206,8 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
       tell("wrote " + printable(surface.string()) + ", the surface as it was repaired");
     }
   }
-  write_file(description, draft_text(file, repaired, shape, unit, options));
+  const auto write = is_there ? write_file : write_new_file;
+  write(description, draft_text(file, repaired, shape, unit, options));
   tell(fmt::format("wrote {}{}: change it and run palpate-precompute {}", printable(description.string()),
                    is_there ? " anew" : "", shell_word(description.string())));
   return description;

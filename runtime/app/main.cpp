@@ -47,8 +47,7 @@ struct Arguments {
   DevicesOptions devices;
   ExportOptions exported;
   std::vector<std::filesystem::path> recordings;
-  std::string view_address = "127.0.0.1:8017";
-  bool view_framed = false;
+  ViewerArguments viewer;
   HelpArguments help;
 };
 
@@ -131,10 +130,7 @@ CLI::App* add_view(CLI::App& app, Arguments& arguments) {
                    "bodies and recordings are shown to choose from")
       ->expected(1, 2)
       ->type_name("");
-  view->add_option("--view-address", arguments.view_address, "address at which the page is served")
-      ->type_name("[ADDRESS:]PORT")
-      ->capture_default_str();
-  view->add_flag("--view-framed", arguments.view_framed, view_framed_help);
+  add_viewer_options(*view, arguments.viewer);
   view->footer(
       "To touch a model itself: palpate-runtime play FILE --view\n"
       "Examples:\n"
@@ -257,8 +253,7 @@ int push(const PushArguments& arguments) {
   PlayArguments play_arguments;
   play_arguments.file = arguments.file;
   play_arguments.view = true;
-  play_arguments.view_address = arguments.view_address;
-  play_arguments.view_framed = arguments.view_framed;
+  play_arguments.viewer = arguments.viewer;
   play_arguments.duration = arguments.duration;
   PlayOptions options = read_play(play_arguments);
   if (!is_baked(arguments)) {
@@ -298,7 +293,7 @@ int run(int argc, char** argv) {
       "Exit status: 0 done, 1 bad input or file, 2 wrong arguments, 3 a replay differed, 130 interrupted.");
   Arguments arguments;
   CLI::App* push_command = add_push(app, arguments.push);
-  push_command->add_flag("--view-framed", arguments.push.view_framed, view_framed_help);
+  add_viewer_options(*push_command, arguments.push.viewer);
   const CLI::App* play_command = add_play(app, arguments.play);
   const CLI::App* view_command = add_view(app, arguments);
   const CLI::App* probe_command = add_probe(app, arguments);
@@ -320,7 +315,7 @@ int run(int argc, char** argv) {
     if (devices_command->parsed()) return devices(arguments.devices);
     if (session_command->parsed()) return session(arguments.file, arguments.json, arguments.finish);
     if (view_command->parsed()) {
-      return view_files(arguments.recordings, read_viewer(arguments.view_address, arguments.view_framed));
+      return view_files(arguments.recordings, read_viewer(arguments.viewer));
     }
     if (export_command->parsed()) return export_session(arguments.exported);
     if (push_command->parsed()) return push(arguments.push);

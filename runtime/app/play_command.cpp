@@ -1,6 +1,8 @@
 #include "runtime/app/play_command.h"
 
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstdint>
@@ -53,11 +55,7 @@ void add_viewer(CLI::App& play, PlayArguments& arguments) {
   play.add_flag("--view", arguments.view,
                 "show the body in a browser; without --device the browser's pointer moves the tool")
       ->group(viewer_group);
-  play.add_option("--view-address", arguments.view_address,
-                  "address at which --view serves the page; default: 127.0.0.1:8017; port 0: any free one")
-      ->type_name("[ADDRESS:]PORT")
-      ->group(viewer_group);
-  play.add_flag("--view-framed", arguments.view_framed, view_framed_help)->group(viewer_group);
+  add_viewer_options(play, arguments.viewer, viewer_group);
   play.add_option("--beside", arguments.beside, "with --view: a recording that is shown beside the body")
       ->type_name("SESSION.mcap")
       ->group(viewer_group);
@@ -165,14 +163,15 @@ DeviceChoice read_device(const std::string& text, const std::string& profile) {
 
 /// What shows it, and what moves the tool then.
 void read_view(PlayArguments& arguments, PlayOptions& options) {
-  if (arguments.view)
-    options.view = read_viewer(arguments.view_address.value_or("8017"), arguments.view_framed);
-  if (arguments.view_address && !arguments.view)
-    throw CLI::ValidationError("--view-address", "it is for --view, which is not given");
-  if (arguments.view_framed && !arguments.view)
-    throw CLI::ValidationError("--view-framed", "it is for --view, which is not given");
-  if (!arguments.beside.empty() && !arguments.view)
-    throw CLI::ValidationError("--beside", "it is for --view, which is not given");
+  if (arguments.view) options.view = read_viewer(arguments.viewer);
+  const auto expect_view = [&](bool is_given, const char* option) {
+    if (is_given && !arguments.view)
+      throw CLI::ValidationError(option, "it is for --view, which is not given");
+  };
+  expect_view(arguments.viewer.address.has_value(), "--view-address");
+  expect_view(arguments.viewer.framed, "--view-framed");
+  expect_view(arguments.viewer.told.has_value(), "--view-fd");
+  expect_view(!arguments.beside.empty(), "--beside");
   options.beside = arguments.beside;
   if (arguments.device.empty() && !arguments.view) {
     throw CLI::RequiredError(
@@ -219,12 +218,37 @@ ListenAddress read_address(const std::string& text, const char* option) {
   return address;
 }
 
-ViewerOptions read_viewer(const std::string& address, bool framed) {
-  const ListenAddress place = read_address(address, "--view-address");
+void add_viewer_options(CLI::App& command, ViewerArguments& arguments, const char* group) {
+  const std::array<CLI::Option*, 3> options = {
+      command
+          .add_option("--view-address", arguments.address,
+                      "address at which the page is served; default: 127.0.0.1:8017; port 0: any free one")
+          ->type_name("[ADDRESS:]PORT"),
+      command.add_flag("--view-framed", arguments.framed,
+                       "let other pages of this machine, as a notebook's, show the viewer in a frame"),
+      command
+          .add_option(
+              "--view-fd", arguments.told,
+              "for programs: the page's address is written to this open file descriptor, as a line of "
+              "JSON, and not told to a person")
+          ->type_name("N")};
+  for (CLI::Option* option : options)
+    if (group != nullptr) option->group(group);
+}
+
+ViewerOptions read_viewer(const ViewerArguments& arguments) {
   ViewerOptions viewer;
-  viewer.address = place.address;
-  viewer.port = place.port;
-  viewer.framed = framed;
+  if (arguments.address) {
+    const ListenAddress place = read_address(*arguments.address, "--view-address");
+    viewer.address = place.address;
+    viewer.port = place.port;
+  }
+  viewer.framed = arguments.framed;
+  if (!arguments.told) return viewer;
+  viewer.told = *arguments.told;
+  if (viewer.told <= STDERR_FILENO || ::fcntl(viewer.told, F_SETFD, FD_CLOEXEC) != 0)
+    throw CLI::ValidationError("--view-fd",
+                               fmt::format("{} is not an open file descriptor from 3 on", viewer.told));
   return viewer;
 }
 

@@ -20,8 +20,7 @@ struct PlayArguments {
   std::optional<std::string> cpu;
   bool fast = false;
   bool view = false;
-  std::optional<std::string> view_address;
-  bool view_framed = false;
+  ViewerArguments viewer;
   std::string beside;
   std::optional<std::string> igtl;
   std::string record;
@@ -45,11 +44,11 @@ PlayOptions read_play(PlayArguments arguments);
 /// The place to listen at of an option, "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
 ListenAddress read_address(const std::string& text, const char* option);
 
-/// The viewer of `play` and `view` at "PORT" or "ADDRESS:PORT". Throws CLI::ParseError.
-ViewerOptions read_viewer(const std::string& address, bool framed);
+/// Adds the options of a viewer's page to `push`, `play` or `view`.
+void add_viewer_options(CLI::App& command, ViewerArguments& arguments, const char* group = nullptr);
 
-constexpr const char* view_framed_help =
-    "let other pages of this machine, as a notebook's, show the viewer in a frame";
+/// What they mean. Throws CLI::ParseError.
+ViewerOptions read_viewer(const ViewerArguments& arguments);
 
 /// Overlay options of `play` and `probe`: "r=3,rings=2". Throws CLI::ParseError.
 OverlayOptions read_overlay(const std::string& text);

@@ -390,6 +390,26 @@ Json json_device(const PlayedRun& run) {
   return json;
 }
 
+Json json_parts(const PlayedParts& parts) {
+  Json rows = Json::array();
+  for (const auto& row : parts.rows()) {
+    const std::string recording = row.part.recording.string();
+    rows.push_back({{"because", row.part.because},
+                    {"begun_s", row.begun},
+                    {"sessions", row.sessions},
+                    {"settings", row.part.settings},
+                    {"recording", recording.empty() ? Json() : Json(recording)},
+                    {"dropped_ticks", row.part.dropped},
+                    {"ticks", row.ticks},
+                    {"ticks_in_contact", row.ticks_in_contact},
+                    {"deadline_misses", row.misses},
+                    {"faults", row.faults},
+                    {"largest_force_N", row.largest_force},
+                    {"largest_shown_N", row.largest_shown}});
+  }
+  return rows;
+}
+
 Json json_replay(const ReplayDifference& replay) {
   const bool differs = replay.first_tick >= 0;
   return {{"ticks", replay.ticks},
@@ -464,6 +484,7 @@ std::string json_report(const PlayedRun& run) {
     json["recording_failed"] = run.recording_failure ? Json(in_one_line(*run.recording_failure)) : Json();
   }
   json["dropped_ticks"] = run.dropped;
+  if (run.parts != nullptr) json["parts"] = json_parts(*run.parts);
   return json_text(json, 2);
 }
 

@@ -8,6 +8,7 @@
 #include "runtime/app/play.h"
 #include "runtime/loop/device_link.h"
 #include "runtime/loop/loop.h"
+#include "runtime/loop/played_parts.h"
 
 namespace palpate {
 
@@ -17,8 +18,9 @@ struct PlayedRun {
   const Settings& settings;  ///< as they were in the end
   const Body& body;
   const Tool& tool;
-  const State& state;  ///< after the last tick
-  const LoopReport& report;
+  const State& state;                  ///< after the last tick
+  const LoopReport& report;            ///< of all of it
+  const PlayedParts* parts = nullptr;  ///< where it may have been begun anew; the state is the last one's
   const PatchSource* overlays = nullptr;
   const MotionSource* motion = nullptr;
   const DeviceLink* link = nullptr;

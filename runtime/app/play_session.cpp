@@ -145,17 +145,18 @@ LoopReport PlaySession::run_with_rights(const std::atomic<bool>& stop) {
   return run_loop(parts, loop, stop);
 }
 
-void PlaySession::tell() const {
+void PlaySession::tell(const PlayedParts* parts) const {
   const PlayedRun played{.options = options_,
                          .settings = options_.settings,
                          .body = body_,
                          .tool = tool_,
                          .state = state_,
-                         .report = report_,
+                         .report = parts != nullptr ? parts->report() : report_,
+                         .parts = parts,
                          .overlays = overlays_ ? &*overlays_ : nullptr,
                          .motion = motion_ ? &*motion_ : nullptr,
                          .link = input_.link,
-                         .dropped = recorder_ ? recorder_->dropped() : 0,
+                         .dropped = parts != nullptr ? parts->dropped() : dropped(),
                          .dropped_frames = recorder_ ? recorder_->dropped_pictures() : 0,
                          .recording_failure = recording_failure_};
   print_report(played);

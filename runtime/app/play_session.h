@@ -12,6 +12,7 @@
 #include "runtime/app/play.h"
 #include "runtime/body/body.h"
 #include "runtime/loop/loop.h"
+#include "runtime/loop/played_parts.h"
 
 namespace palpate {
 
@@ -50,9 +51,12 @@ class PlaySession {
   /// Why the recording of the run that is over is not whole; nothing where it is, or there is none.
   [[nodiscard]] const std::optional<Error>& recording_failure() const noexcept { return recording_failure_; }
 
-  /// The report, and the files that the options ask for. Throws Error for the first that cannot be written,
-  /// after all others are.
-  void tell() const;
+  /// Ticks that the recording lacks.
+  [[nodiscard]] std::int64_t dropped() const { return recorder_ ? recorder_->dropped() : 0; }
+
+  /// The report, and the files that the options ask for. `parts`: of the run that this session was the last
+  /// one of. Throws Error for the first that cannot be written, after all others are.
+  void tell(const PlayedParts* parts = nullptr) const;
 
  private:
   LoopReport run_with_rights(const std::atomic<bool>& stop);

@@ -4,8 +4,10 @@
 #include <signal.h>
 
 #include <deque>
+#include <utility>
 
 #include "base/error.h"
+#include "base/printable.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/app/session_view.h"
 #include "runtime/viewer/viewer_server.h"
@@ -21,14 +23,16 @@ int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptio
   std::vector<RunToShow> runs;
   for (const std::filesystem::path& recording : recordings)
     runs.push_back({sessions.emplace_back(recording), true});
-  ViewerServer server(ViewerPort(options), runs);
+  ViewerPort port(options);
+  const ServedAddress served = port.served();
+  ViewerServer server(std::move(port), runs);
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     sessions[k].show(server, k);
     const SessionPictures& pictures = sessions[k].pictures();
-    fmt::print(stderr, "{}: {} pictures, {:.3f} s\n", recordings[k].string(), pictures.frames(),
+    fmt::print(stderr, "{}: {} pictures, {:.3f} s\n", printable(recordings[k].string()), pictures.frames(),
                pictures.time(pictures.frames() - 1));
   }
-  fmt::print(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
+  tell_address(served, server.url(), "; Ctrl-C ends");
   int signal = 0;
   sigwait(&ends, &signal);
   return exit_ok;

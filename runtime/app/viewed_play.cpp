@@ -71,12 +71,14 @@ ViewedPlay::ViewedPlay(PlayOptions options, InputSource& input, std::unique_ptr<
 LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
   std::vector<RunToShow> runs = {{*this, false}};
   if (beside_ != nullptr) runs.push_back({*beside_, true});
+  const ServedAddress served = port_.served();
   ViewerServer server(std::move(port_), runs);
   server_ = &server;
   if (beside_ != nullptr) beside_->show(server, 1);
   show_body();
   const std::jthread teller([this](const std::stop_token& over) { tell_states(over); });
 
+  PlayedParts parts;
   std::optional<Plan> good;  // that could be met
   for (;;) {
     const Plan plan = next_plan();
@@ -84,9 +86,11 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
     LoopReport report;
     try {
       session = begin_act(plan);
-      if (!good) fmt::print(stderr, "open {} in a browser\n", server.url());
+      if (!good) tell_address(served, server.url(), "");
+      const std::string because = why_begun(plan, good);
       good = plan;
       report = run_act(*session, stop);
+      parts.add({because, plan.text, plan.record, session->dropped()}, report);
       if (has_hand()) latched_ = session->fault();
     } catch (const std::exception& error) {
       if (!good || !take_back(plan, *good, as_error(error))) throw;
@@ -94,10 +98,16 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
     }
     const bool over = options_.duration && report.ticks >= input_.ticks;
     if (stop || over || !wait_for_wish(stop)) {
-      session->tell();
-      return report;
+      session->tell(&parts);
+      return parts.report();
     }
   }
+}
+
+std::string ViewedPlay::why_begun(const Plan& plan, const std::optional<Plan>& before) {
+  if (!before) return "start";
+  if (plan.record != before->record) return plan.record.empty() ? "recording ended" : "recording begun";
+  return plan.text != before->text ? "settings" : "reset";
 }
 
 ViewedPlay::Plan ViewedPlay::next_plan() {

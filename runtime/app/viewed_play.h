@@ -34,8 +34,8 @@ class ViewedPlay : public ViewedRun {
              SessionView* beside = nullptr, IgtlServer* igtl = nullptr);
 
   /// Serves the pages, says where once the first session could begin, and goes on until `stop` or the end of
-  /// a duration that the options give. Tells of the last session, whose report it returns. Throws Error. To
-  /// be called once.
+  /// a duration that the options give. Tells of all sessions together, whose report it returns. Throws Error.
+  /// To be called once.
   LoopReport run(const std::atomic<bool>& stop);
 
   /// Whether a recording of the run is not whole.
@@ -68,6 +68,7 @@ class ViewedPlay : public ViewedRun {
   LoopReport run_act(PlaySession& session, const std::atomic<bool>& stop);
   bool wait_for_wish(const std::atomic<bool>& stop) const;
   Plan next_plan();
+  static std::string why_begun(const Plan& plan, const std::optional<Plan>& before);
   bool take_back(const Plan& failed, const Plan& good, const Error& why);
 
   [[nodiscard]] bool has_hand() const noexcept { return input_.link != nullptr; }

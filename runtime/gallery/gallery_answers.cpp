@@ -42,20 +42,6 @@ bool is_deed(std::string_view path) {
   return path == "/open" || path == "/close" || path == "/drop";
 }
 
-/// One of the next ports, so that pages find again what they keep by their address; else any that is free.
-std::uint16_t port_beside(ViewerOptions options, std::uint16_t port) {
-  constexpr int tries = 10;
-  for (int k = 0; k < tries && port < UINT16_MAX; ++k) {
-    options.port = ++port;
-    try {
-      const ViewerPort free(options);
-      return port;
-    } catch (const Error&) {  // somebody has it
-    }
-  }
-  return 0;
-}
-
 Response json_answer(const json& value) {
   Response response;
   response.set(http::field::content_type, "application/json");
@@ -98,7 +84,20 @@ std::optional<Response> GalleryAnswers::refusal(const RequestHeader& request, co
   if (std::optional<Response> refused = foreign_refusal(request, served)) return refused;
   const char* const allowed = is_deed(path_of(request)) ? "POST" : "GET";
   if (request.method() != http::string_to_verb(allowed)) return method_refusal(allowed);
+  if (wants_page(request)) return std::nullopt;
   return token_refusal(request, served);
+}
+
+bool GalleryAnswers::wants_page(const RequestHeader& request) {
+  return path_of(request) == "/gallery";
+}
+
+Response GalleryAnswers::page(const RequestHeader& request, const ServedAddress& served) {
+  return guarded(page_answer(text_view(request[http::field::host]), ancestors(served, false), false));
+}
+
+bool GalleryAnswers::wants_scene(const RequestHeader& request) {
+  return path_of(request) == "/scene";
 }
 
 bool GalleryAnswers::brings_file(const RequestHeader& request) {
@@ -114,18 +113,15 @@ std::optional<Response> GalleryAnswers::drop_refusal(const RequestHeader& reques
 
 Response GalleryAnswers::keep_file(const RequestHeader& request,
                                    const std::filesystem::path& temporary) const {
-  const std::string name = free_name(folder_, name_in(request));
-  rename_file(temporary, folder_ / name);
+  std::string name = free_name(folder_, name_in(request));
+  while (!rename_new(temporary, folder_ / name)) name = free_name(folder_, name_in(request));
   return json_answer({{"name", name}});
 }
 
 Response GalleryAnswers::answer(const RequestHeader& request, const ServedAddress& served) {
   const std::string_view path = path_of(request);
-  if (path == "/gallery")
-    return guarded(page_answer(text_view(request[http::field::host]), ancestors(served, false), false));
   try {
     if (path == "/items") return items();
-    if (path == "/scene") return scene(name_in(request));
     if (path == "/open") return open(name_in(request), served.port);
     if (path == "/close") return close();
     if (path == "/opened") return opened();
@@ -151,34 +147,40 @@ bool GalleryAnswers::has(const std::string& name) const {
   return gallery_kind(name).has_value() && std::filesystem::is_regular_file(folder_ / name, problem);
 }
 
-Response GalleryAnswers::scene(const std::string& name) const {
+Response GalleryAnswers::scene(const RequestHeader& request) const {
+  const std::string name = name_in(request);
   if (!has(name)) return no_such("file in the folder");
-  Response response;
-  response.set(http::field::content_type, "application/octet-stream");
-  response.body() = gallery_scene(folder_ / name);
-  return guarded(std::move(response));
+  try {
+    Response response;
+    response.set(http::field::content_type, "application/octet-stream");
+    response.body() = gallery_scene(folder_ / name);
+    return guarded(std::move(response));
+  } catch (...) {
+    return guarded(plain(http::status::not_found, to_text(handled_error(name, "close other programs"))));
+  }
 }
 
-/// What was shown before ends first: two large bodies at once are too much.
 Response GalleryAnswers::open(const std::string& name, std::uint16_t port) {
   if (!has(name)) return no_such("file in the folder");
-  opened_.reset();
-  ViewerOptions beside = options_;
-  beside.port = port_beside(options_, port);
-  opened_ = std::make_unique<OpenedItem>(folder_, name, beside);
+  ViewerOptions options = options_;
+  options.port = port;
+  opened_.open({.folder = folder_, .name = name, .gallery = options});
   return opened();
 }
 
 Response GalleryAnswers::close() {
-  opened_.reset();
+  opened_.close();
   return opened();
 }
 
 Response GalleryAnswers::opened() const {
-  if (!opened_) return json_answer(nullptr);
-  const OpenedItem::State state = opened_->state();
-  return json_answer(
-      {{"name", state.name}, {"said", state.said}, {"url", state.url}, {"ended", state.has_ended}});
+  const std::optional<OpenedItem::State> state = opened_.state();
+  if (!state) return json_answer(nullptr);
+  const std::optional<OpenedItem::Page>& page = state->page;
+  return json_answer({{"name", state->name},
+                      {"said", state->said},
+                      {"page", page ? json{{"port", page->port}, {"token", page->token}} : json()},
+                      {"ended", state->has_ended}});
 }
 
 }  // namespace palpate

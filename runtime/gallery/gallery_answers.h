@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -29,9 +28,15 @@ class GalleryAnswers {
 
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
 
-  /// Why a request is not answered.
+  /// Why a request is not answered. The page, which is the same for everybody, needs no token.
   [[nodiscard]] static std::optional<Response> refusal(const RequestHeader& request,
                                                        const ServedAddress& served);
+  [[nodiscard]] static bool wants_page(const RequestHeader& request);
+  [[nodiscard]] static Response page(const RequestHeader& request, const ServedAddress& served);
+  /// Whether it asks for what takes a look into a file.
+  [[nodiscard]] static bool wants_scene(const RequestHeader& request);
+  /// To that. Waits for the look; any thread may.
+  [[nodiscard]] Response scene(const RequestHeader& request) const;
   /// Whether it brings a file, whose bytes are to be read.
   [[nodiscard]] static bool brings_file(const RequestHeader& request);
   /// Why the file that it brings is not taken.
@@ -45,7 +50,6 @@ class GalleryAnswers {
 
  private:
   [[nodiscard]] Response items() const;
-  [[nodiscard]] Response scene(const std::string& name) const;
   [[nodiscard]] Response open(const std::string& name, std::uint16_t port);
   [[nodiscard]] Response close();
   [[nodiscard]] Response opened() const;
@@ -53,7 +57,7 @@ class GalleryAnswers {
 
   std::filesystem::path folder_;
   ViewerOptions options_;
-  std::unique_ptr<OpenedItem> opened_;
+  OpenedItem opened_;
 };
 
 }  // namespace palpate

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/file_io.h"
+#include "runtime/gallery/gallery_server.h"
 
 namespace palpate {
 namespace {
@@ -40,17 +41,26 @@ void GalleryConnection::start() {
   http::async_read_header(
       stream_, buffer_, *parser_, [self = shared_from_this()](const ErrorCode& problem, std::size_t) {
         if (!problem) return self->answer_request();
-        if (problem == http::error::body_limit)
-          self->respond(
-              guarded(plain(http::status::payload_too_large, "A file that is dropped has at most 8 GiB.")));
+        if (problem != http::error::body_limit) return self->server_.reception().leave(*self);
+        self->respond(
+            guarded(plain(http::status::payload_too_large, "A file that is dropped has at most 8 GiB.")));
       });
 }
 
 void GalleryConnection::answer_request() {
   const RequestHeader& request = parser_->get();
-  if (std::optional<Response> refused = GalleryAnswers::refusal(request, served_))
+  GalleryAnswers& answers = server_.answers();
+  if (std::optional<Response> refused = GalleryAnswers::refusal(request, server_.served()))
     return respond(std::move(*refused));
-  if (!GalleryAnswers::brings_file(request)) return respond(answers_.answer(request, served_));
+  if (GalleryAnswers::wants_page(request)) return respond(GalleryAnswers::page(request, server_.served()));
+  if (!server_.reception().has_room()) return respond(full_house());
+  is_admitted_ = true;
+  if (GalleryAnswers::wants_scene(request)) {
+    server_.look_then([header = RequestHeader(request), &answers] { return answers.scene(header); },
+                      [self = shared_from_this()](Response seen) { self->respond(std::move(seen)); });
+    return;
+  }
+  if (!GalleryAnswers::brings_file(request)) return respond(answers.answer(request, server_.served()));
   if (std::optional<Response> refused = GalleryAnswers::drop_refusal(request))
     return respond(std::move(*refused));
   try {
@@ -62,7 +72,7 @@ void GalleryConnection::answer_request() {
 
 void GalleryConnection::take_file() {
   static int number = 0;
-  temporary_ = answers_.folder() / fmt::format(".dropped-{}-{}", ::getpid(), ++number);
+  temporary_ = server_.answers().folder() / fmt::format(".dropped-{}-{}", ::getpid(), ++number);
   check_free_space(temporary_, static_cast<std::int64_t>(parser_->content_length().value_or(0)));
   make_anew(temporary_);
   file_.emplace(std::move(*parser_));
@@ -80,7 +90,7 @@ void GalleryConnection::keep_file(const ErrorCode& problem) {
   try {
     if (problem)
       throw Error("it has not come whole: " + problem.message(), temporary_.string(), "drop it again");
-    Response kept = answers_.keep_file(file_->get(), temporary_);
+    Response kept = server_.answers().keep_file(file_->get(), temporary_);
     temporary_.clear();
     respond(std::move(kept));
   } catch (const Error& error) {
@@ -95,6 +105,7 @@ void GalleryConnection::respond(Response response) {
   http::async_write(stream_, *response_, [self = shared_from_this()](const ErrorCode&, std::size_t) {
     ErrorCode ignored;
     self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    self->server_.reception().leave(*self);
   });
 }
 

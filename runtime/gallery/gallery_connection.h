@@ -9,20 +9,24 @@
 #include <optional>
 
 #include "runtime/gallery/gallery_answers.h"
+#include "runtime/serving/reception.h"
 
 namespace palpate {
 
+class GalleryServer;
+
 /// Reads it, has it answered, and is gone. For the server's thread.
-class GalleryConnection : public std::enable_shared_from_this<GalleryConnection> {
+class GalleryConnection : public Received, public std::enable_shared_from_this<GalleryConnection> {
  public:
-  /// `answers` and `served` must live as long.
-  GalleryConnection(boost::asio::ip::tcp::socket socket, GalleryAnswers& answers, const ServedAddress& served)
-      : stream_(std::move(socket)), answers_(answers), served_(served) {}
-  ~GalleryConnection();  ///< a file that has not come whole is removed
+  /// `server` must live as long.
+  GalleryConnection(boost::asio::ip::tcp::socket socket, GalleryServer& server)
+      : stream_(std::move(socket)), server_(server) {}
+  ~GalleryConnection() override;  ///< a file that has not come whole is removed
   GalleryConnection(const GalleryConnection&) = delete;
   GalleryConnection& operator=(const GalleryConnection&) = delete;
 
-  void start();
+  void start() override;
+  void cut() override { stream_.close(); }
 
  private:
   using ErrorCode = boost::system::error_code;
@@ -34,8 +38,7 @@ class GalleryConnection : public std::enable_shared_from_this<GalleryConnection>
   void respond(Response response);
 
   boost::beast::tcp_stream stream_;
-  GalleryAnswers& answers_;
-  const ServedAddress& served_;
+  GalleryServer& server_;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
   std::optional<FileParser> file_;

@@ -49,8 +49,18 @@ bool is_picture(std::string_view name) {
   return ending_of(name) == ".png" || ending_of(name) == ".pbm";
 }
 
+/// NAME of NAME.palpate.hdf, NAME.stl, NAME.model.toml; "model" of "model.toml".
 std::string_view stem_of(std::string_view name) {
-  return name.substr(0, name.size() - ending_of(name).size());
+  const std::string_view ending = ending_of(name) == "model.toml" ? ".toml" : ending_of(name);
+  return name.substr(0, name.size() - ending.size());
+}
+
+/// What is made of a file, or goes on beside it, begins with its stem and a dot.
+bool has_any_of(const fs::path& folder, const std::string& stem) {
+  std::error_code problem;
+  for (fs::directory_iterator at(folder, problem), end; !problem && at != end; at.increment(problem))
+    if (at->path().filename().string().starts_with(stem + ".")) return true;
+  return false;
 }
 
 double seconds_since_1970(fs::file_time_type time) {
@@ -106,12 +116,17 @@ std::vector<GalleryItem> list_gallery(const fs::path& folder) {
   return shown;
 }
 
+std::string baked_name(std::string_view source) {
+  return std::string(stem_of(source)) + ".palpate.hdf";
+}
+
 std::string free_name(const fs::path& folder, const std::string& wanted) {
-  std::string name = wanted;
-  const std::string stem(stem_of(wanted)), ending(ending_of(wanted));
-  for (int k = 2; fs::exists(fs::symlink_status(folder / name)); ++k)
-    name = fmt::format("{}-{}{}", stem, k, ending);
-  return name;
+  if (!has_any_of(folder, std::string(stem_of(wanted)))) return wanted;
+  const std::string_view ending = ending_of(wanted) == "model.toml" ? ".model.toml" : ending_of(wanted);
+  std::string stem;
+  for (int k = 2; stem.empty() || has_any_of(folder, stem); ++k)
+    stem = fmt::format("{}-{}", stem_of(wanted), k);
+  return stem + std::string(ending);
 }
 
 }  // namespace palpate

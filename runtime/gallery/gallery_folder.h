@@ -32,7 +32,13 @@ struct GalleryItem {
 /// name. Throws Error where the folder cannot be read.
 [[nodiscard]] std::vector<GalleryItem> list_gallery(const std::filesystem::path& folder);
 
-/// A name like `wanted` that no file of the folder has: `wanted` itself, or with a number before its ending.
+/// The body that is made of a source of this name: NAME.palpate.hdf for NAME.stl and for NAME.model.toml,
+/// whatever name that gives itself.
+[[nodiscard]] std::string baked_name(std::string_view source);
+
+/// A name like `wanted` for a new file of the folder: `wanted` itself, or with a number before its ending.
+/// Nothing there begins with what is before the ending and a dot, so that neither the file nor what is made
+/// of it and lands beside it (NAME.model.toml, NAME.palpate.hdf, ...) meets another one.
 [[nodiscard]] std::string free_name(const std::filesystem::path& folder, const std::string& wanted);
 
 }  // namespace palpate

@@ -1,26 +1,14 @@
 #include "runtime/gallery/gallery_server.h"
 
 #include <boost/asio/post.hpp>
-#include <chrono>
 #include <memory>
 #include <utility>
 
 #include "runtime/gallery/gallery_connection.h"
 
 namespace palpate {
-namespace {
 
 namespace asio = boost::asio;
-using asio::ip::tcp;
-using boost::system::error_code;
-
-constexpr auto retry_time = std::chrono::milliseconds(500);
-
-tcp protocol_of(const std::string& address) {
-  return asio::ip::make_address(address).is_v6() ? tcp::v6() : tcp::v4();
-}
-
-}  // namespace
 
 GalleryServer::GalleryServer(const std::filesystem::path& folder, const ViewerOptions& options)
     : GalleryServer(ViewerPort(options), folder, options) {}
@@ -30,26 +18,23 @@ GalleryServer::GalleryServer(ViewerPort port, const std::filesystem::path& folde
     : served_(port.served()),
       url_(port.url("gallery")),
       answers_(folder, options),
-      acceptor_(context_, protocol_of(served_.address), port.release()),
-      retry_(context_) {
-  accept();
+      reception_(context_, served_.address, port.release(), [this](asio::ip::tcp::socket socket) {
+        return std::make_shared<GalleryConnection>(std::move(socket), *this);
+      }) {
   thread_ = std::thread([this] { context_.run(); });
 }
 
 GalleryServer::~GalleryServer() {
   context_.stop();
   thread_.join();
+  looker_.stop();
+  looker_.join();
 }
 
-void GalleryServer::accept() {
-  acceptor_.async_accept([this](const error_code& problem, tcp::socket socket) {
-    if (problem) {  // no file is left for a connection: later there may be
-      retry_.expires_after(retry_time);
-      retry_.async_wait([this](const error_code&) { accept(); });
-      return;
-    }
-    std::make_shared<GalleryConnection>(std::move(socket), answers_, served_)->start();
-    accept();
+void GalleryServer::look_then(std::function<Response()> look, std::function<void(Response)> answer) {
+  asio::post(looker_, [this, look = std::move(look), answer = std::move(answer)] {
+    auto seen = std::make_shared<Response>(look());
+    asio::post(context_, [answer, seen] { answer(std::move(*seen)); });
   });
 }
 

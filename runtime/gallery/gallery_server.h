@@ -2,18 +2,19 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <thread>
 
 #include "runtime/gallery/gallery_answers.h"
+#include "runtime/serving/reception.h"
 #include "runtime/serving/viewer_port.h"
 
 namespace palpate {
 
-/// HTTP in a thread of its own.
+/// HTTP in a thread of its own, which waits for nothing; files are looked at in another one.
 class GalleryServer {
  public:
   /// Serves `folder` at the port that `options` ask for. Throws Error (port in use, address unknown).
@@ -22,18 +23,24 @@ class GalleryServer {
   GalleryServer(const GalleryServer&) = delete;
   GalleryServer& operator=(const GalleryServer&) = delete;
 
+  [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
   [[nodiscard]] const std::string& url() const noexcept { return url_; }
+
+  // What follows is for connections, on the thread.
+  [[nodiscard]] GalleryAnswers& answers() noexcept { return answers_; }
+  [[nodiscard]] Reception& reception() noexcept { return reception_; }
+  /// Has the other thread look, one file after the other, and answers on this one.
+  void look_then(std::function<Response()> look, std::function<void(Response)> answer);
 
  private:
   GalleryServer(ViewerPort port, const std::filesystem::path& folder, const ViewerOptions& options);
-  void accept();
 
   ServedAddress served_;
   std::string url_;
   GalleryAnswers answers_;
   boost::asio::io_context context_{1};
-  boost::asio::ip::tcp::acceptor acceptor_;
-  boost::asio::steady_timer retry_;
+  Reception reception_;
+  boost::asio::thread_pool looker_{1};
   std::thread thread_;
 };
 

@@ -1,111 +1,243 @@
 #include "runtime/gallery/opened_item.h"
 
 #include <fmt/core.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
-#include <string_view>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
+#include "base/printable.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::size_t kept_lines = 12;
-constexpr std::string_view before_url = "open ";
-constexpr std::string_view after_url = " in a browser";
+using Clock = std::chrono::steady_clock;
 
-std::vector<std::string> arguments_for(const std::filesystem::path& folder, const std::string& name,
-                                       const ViewerOptions& options) {
-  const std::string file = (folder / name).string();  // whole: pages keep their looks by it
-  std::vector<std::string> words;
-  switch (*gallery_kind(name)) {
-    case GalleryKind::body:
-    case GalleryKind::source:
-      words = {"push", file};
-      break;
-    case GalleryKind::recording:
-      words = {"view", file};
-      break;
+constexpr std::size_t kept_lines = 12;
+constexpr std::size_t longest_line = 1 << 16;  // [bytes]
+constexpr int last_reads = 64;                 // of what a program that has ended printed
+constexpr std::size_t token_digits = 32;
+
+/// One of the next ports, so that pages find again what they keep by their address; else any that is free.
+std::uint16_t port_beside(ViewerOptions options) {
+  constexpr int tries = 10;
+  for (int k = 0; k < tries && options.port < UINT16_MAX; ++k) {
+    ++options.port;
+    try {
+      const ViewerPort free(options);
+      return options.port;
+    } catch (const Error&) {  // another program has it
+    }
   }
-  words.insert(words.end(), {"--view-address", fmt::format("{}:{}", options.address, options.port)});
-  if (options.framed) words.emplace_back("--view-framed");
-  return words;
+  return 0;
 }
 
-/// The address in "open URL in a browser; …"; empty in every other line.
-std::string url_in(std::string_view line) {
-  const std::size_t end = line.find(after_url);
-  if (!line.starts_with(before_url) || end == std::string_view::npos) return "";
-  return std::string(line.substr(before_url.size(), end - before_url.size()));
+bool is_token(const std::string& text) {
+  return text.size() == token_digits && std::all_of(text.begin(), text.end(), [](char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+         });
+}
+
+bool is_readable(int descriptor) {
+  pollfd one = {.fd = descriptor, .events = POLLIN, .revents = 0};
+  return ::poll(&one, 1, 0) > 0;
 }
 
 }  // namespace
 
-OpenedItem::OpenedItem(const std::filesystem::path& folder, std::string name, const ViewerOptions& options) {
-  OtherProgram::Start start{.program = std::filesystem::read_symlink("/proc/self/exe"),
-                            .arguments = arguments_for(folder, name, options),
-                            .read = OtherProgram::Stream::errors,
-                            .folder = folder,
-                            .has_terminal = false};
-  state_.name = std::move(name);
-  watcher_ = std::thread([this, start = std::move(start)] { watch(start); });
+std::optional<OpenedItem::Page> page_told(const std::string& line) {
+  const nlohmann::json json = nlohmann::json::parse(line, nullptr, false);
+  if (!json.is_object() || !json.contains("port") || !json["port"].is_number_unsigned() ||
+      !json.contains("token") || !json["token"].is_string())
+    return std::nullopt;
+  const auto port = json["port"].get<std::uint64_t>();
+  const auto token = json["token"].get<std::string>();
+  if (port < 1 || port > UINT16_MAX || !is_token(token)) return std::nullopt;
+  return OpenedItem::Page{static_cast<std::uint16_t>(port), token};
+}
+
+/// The program, and what the thread knows of it.
+struct OpenedItem::Running {
+  std::unique_ptr<OtherProgram> program;
+  std::int64_t order = 0;  // that it follows
+  std::optional<Clock::time_point> kill_at;
+  bool prints = false;
+  std::string printed, told;  // of a line that has not come whole
+};
+
+OpenedItem::OpenedItem(std::filesystem::path program, std::chrono::milliseconds time_to_end)
+    : program_(std::move(program)),
+      time_to_end_(time_to_end),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "eventfd") {
+  if (wake_.get() < 0)
+    throw Error("no file descriptor is left", "gallery", "close other programs and try again");
+  thread_ = std::thread([this] { work(); });
 }
 
 OpenedItem::~OpenedItem() {
   {
     const std::lock_guard lock(mutex_);
     is_over_ = true;
-    if (program_) program_->end();
   }
-  watcher_.join();
+  close();
+  thread_.join();
 }
 
-OpenedItem::State OpenedItem::state() const {
+void OpenedItem::open(Wanted wanted) {
+  order(std::move(wanted));
+}
+
+void OpenedItem::close() {
+  order({});
+}
+
+OtherProgram::Start OpenedItem::start_of(const Wanted& wanted) const {
+  const auto& [folder, name, gallery] = wanted;
+  const std::string file = (folder / name).string();  // whole: pages keep their looks by it
+  const GalleryKind kind = *gallery_kind(name);
+  std::vector<std::string> words = {kind == GalleryKind::recording ? "view" : "push", file};
+  if (kind == GalleryKind::source)
+    words.insert(words.end(), {"--output", (folder / baked_name(name)).string(), "--keep"});
+  words.insert(words.end(), {"--view-address", fmt::format("{}:{}", gallery.address, port_beside(gallery)),
+                             "--view-fd", std::to_string(told_descriptor)});
+  if (gallery.framed) words.emplace_back("--view-framed");
+  return {.program = program_.empty() ? std::filesystem::read_symlink("/proc/self/exe") : program_,
+          .arguments = words,
+          .read = OtherProgram::Stream::errors,
+          .folder = folder,
+          .has_terminal = false,
+          .tells = true};
+}
+
+void OpenedItem::order(std::optional<Wanted> wanted) {
+  const std::lock_guard lock(mutex_);
+  ++ordered_;
+  state_.reset();
+  if (wanted) state_ = State{.name = wanted->name, .said = {}, .page = {}};
+  wanted_ = std::move(wanted);
+  const std::uint64_t one = 1;
+  static_cast<void>(write_all(wake_.get(), {reinterpret_cast<const char*>(&one), sizeof one}));
+}
+
+std::optional<OpenedItem::State> OpenedItem::state() const {
   const std::lock_guard lock(mutex_);
   return state_;
 }
 
-bool OpenedItem::begin(std::unique_ptr<OtherProgram> program) {
-  const std::lock_guard lock(mutex_);
-  program_ = std::move(program);
-  return !is_over_;
+/// The thread, with which the program ends.
+void OpenedItem::work() {
+  Running running;
+  while (take_order(running)) listen(running);
 }
 
-/// The watcher's thread, with which the program ends.
-void OpenedItem::watch(const OtherProgram::Start& start) {
-  try {
-    if (begin(std::make_unique<OtherProgram>(start))) {
-      std::string rest;
-      for (std::string text = program_->read(); !text.empty(); text = program_->read()) {
-        rest += text;
-        for (std::size_t end = rest.find('\n'); end != std::string::npos; end = rest.find('\n')) {
-          hear(rest.substr(0, end));
-          rest.erase(0, end + 1);
-        }
-      }
-      if (!rest.empty()) hear(rest);
-    } else {
-      program_->end();
+/// Ends what is not wanted any more, and starts what is. False when all is over.
+bool OpenedItem::take_order(Running& running) {
+  std::optional<Wanted> wanted;
+  {
+    const std::lock_guard lock(mutex_);
+    const bool is_wanted = running.order == ordered_;
+    if (running.program && is_wanted) return true;
+    if (running.program) {
+      if (!running.kill_at) running.program->send(SIGTERM);
+      if (!running.kill_at) running.kill_at = Clock::now() + time_to_end_;
+      return true;
     }
-    static_cast<void>(program_->wait());
-  } catch (const Error& error) {
-    hear(to_text(error));
+    if (is_over_) return false;
+    running = {};
+    running.order = ordered_;
+    wanted = std::exchange(wanted_, std::nullopt);
   }
-  const std::lock_guard lock(mutex_);
-  state_.has_ended = true;
+  if (!wanted) return true;
+  try {
+    running.program = std::make_unique<OtherProgram>(start_of(*wanted));
+    running.prints = true;
+  } catch (...) {
+    hear(running, to_text(handled_error("gallery", "close other programs")));
+    end(running);
+  }
+  return true;
 }
 
-void OpenedItem::hear(const std::string& line) {
-  const std::string url = url_in(line);
-  if (url.empty()) fmt::print(stderr, "{}\n", line);
-  const std::lock_guard lock(mutex_);
-  if (!url.empty()) {
-    state_.url = url;
-    return;
+/// Waits for an order, or for what the program has to say or its end.
+void OpenedItem::listen(Running& running) {
+  const OtherProgram* const program = running.program.get();
+  std::array<pollfd, 3> heard = {
+      {{.fd = wake_.get(), .events = POLLIN, .revents = 0},
+       {.fd = running.prints ? program->printed() : -1, .events = POLLIN, .revents = 0},
+       {.fd = program ? program->told() : -1, .events = POLLIN, .revents = 0}}};
+  int wait = -1;  // [ms]
+  if (running.kill_at) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(*running.kill_at - Clock::now());
+    wait = static_cast<int>(std::max<std::int64_t>(left.count(), 0));
+    if (wait == 0) running.program->send(SIGKILL);
+    if (wait == 0) wait = -1;  // its end comes now
   }
-  state_.said.push_back(line);
-  if (state_.said.size() > kept_lines) state_.said.pop_front();
+  if (::poll(heard.data(), heard.size(), wait) <= 0) return;
+  if (heard[0].revents != 0) {
+    std::array<std::byte, sizeof(std::uint64_t)> count{};
+    [[maybe_unused]] const ssize_t seen = ::read(wake_.get(), count.data(), count.size());
+  }
+  if (heard[1].revents != 0) hear_printed(running);
+  if (heard[2].revents != 0) hear_told(running);
+}
+
+void OpenedItem::hear_printed(Running& running) {
+  const std::string text = running.program->read();
+  running.prints = !text.empty();
+  running.printed += text;
+  for (std::size_t end = running.printed.find('\n'); end != std::string::npos;
+       end = running.printed.find('\n')) {
+    hear(running, running.printed.substr(0, end));
+    running.printed.erase(0, end + 1);
+  }
+  const bool is_rest = !running.prints || running.printed.size() > longest_line;
+  if (is_rest && !running.printed.empty()) hear(running, std::exchange(running.printed, {}));
+}
+
+/// The program keeps this pipe to itself and open: where it ends, the program has ended.
+void OpenedItem::hear_told(Running& running) {
+  const std::string text = running.program->read_told();
+  running.told += text;
+  if (text.empty()) return end(running);
+  if (running.told.size() > longest_line) running.told.clear();
+  const std::size_t line = running.told.find('\n');
+  if (line == std::string::npos) return;
+  const std::lock_guard lock(mutex_);
+  if (running.order == ordered_) state_->page = page_told(running.told.substr(0, line));
+  running.told.erase(0, line + 1);
+}
+
+/// Lines of another order's program are for the terminal alone.
+void OpenedItem::hear(const Running& running, const std::string& line) {
+  std::string shown = printable(line);
+  fmt::print(stderr, "{}\n", shown);
+  const std::lock_guard lock(mutex_);
+  if (running.order != ordered_) return;
+  state_->said.push_back(std::move(shown));
+  if (state_->said.size() > kept_lines) state_->said.pop_front();
+}
+
+void OpenedItem::end(Running& running) {
+  for (int k = 0; k < last_reads && running.prints && is_readable(running.program->printed()); ++k)
+    hear_printed(running);
+  try {
+    if (running.program) static_cast<void>(running.program->wait());
+  } catch (const Error& error) {
+    hear(running, to_text(error));
+  }
+  running.program.reset();
+  running.prints = false;
+  running.kill_at.reset();
+  const std::lock_guard lock(mutex_);
+  if (running.order == ordered_) state_->has_ended = true;
 }
 
 }  // namespace palpate

@@ -1,5 +1,8 @@
 #include "runtime/igtl/igtl_client.h"
 
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
+
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/write.hpp>
 #include <utility>
@@ -10,7 +13,8 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-constexpr auto longest_silence = std::chrono::seconds(5);
+constexpr auto pace_time = std::chrono::seconds(5);
+constexpr std::int64_t least_in_that = 80'000;  // [bytes]
 constexpr int send_room = 256 << 10;            // what waits in it is seen late [bytes]
 constexpr std::size_t most_at_once = 64 << 10;  // between two looks whether the client takes anything [bytes]
 
@@ -18,10 +22,16 @@ asio::const_buffer buffer_of(const IgtlBroadcast::Bytes& bytes) {
   return bytes ? asio::buffer(*bytes) : asio::const_buffer();
 }
 
+/// What the system still has of what it was handed, as the other machine has not taken it [bytes].
+std::int64_t left_in_system(int socket) {
+  int bytes = 0;
+  return ::ioctl(socket, SIOCOUTQ, &bytes) == 0 ? bytes : 0;
+}
+
 }  // namespace
 
 IgtlClient::IgtlClient(asio::ip::tcp::socket socket, IgtlBroadcast& broadcast)
-    : socket_(std::move(socket)), broadcast_(broadcast) {
+    : socket_(std::move(socket)), broadcast_(broadcast), way_{0, Clock::now()}, pace_(way_) {
   error_code ignored;  // it does without
   socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
   socket_.set_option(asio::socket_base::send_buffer_size(send_room), ignored);
@@ -35,12 +45,13 @@ void IgtlClient::send_news() {
   surfaces_ = broadcast_.surfaces();
   pictures_ = broadcast_.pictures();
   is_sending_ = true;
-  progress_ = Clock::now();
   const std::array<asio::const_buffer, 2> buffers = {buffer_of(sending_[0]), buffer_of(sending_[1])};
+  const std::int64_t before = begun_;
+  begun_ += static_cast<std::int64_t>(asio::buffer_size(buffers));
   asio::async_write(
       socket_, buffers,
-      [self = shared_from_this()](const error_code& problem, std::size_t) {
-        self->progress_ = Clock::now();
+      [self = shared_from_this(), before](const error_code& problem, std::size_t handed) {
+        self->handed_ = before + static_cast<std::int64_t>(handed);
         return problem ? 0 : most_at_once;
       },
       [self = shared_from_this()](const error_code& problem, std::size_t) { self->take_sent(problem); });
@@ -65,8 +76,18 @@ void IgtlClient::read_some() {
                           });
 }
 
-bool IgtlClient::is_lost(Clock::time_point now) const {
-  return is_gone_ || (is_sending_ && now - progress_ > longest_silence);
+void IgtlClient::look(Clock::time_point now) {
+  if (is_gone_) return;
+  taken_ = handed_ - left_in_system(socket_.native_handle());
+  if (taken_ >= way_.bytes) way_ = {begun_, now};
+  if (taken_ == begun_) pace_ = {taken_, now};
+  if (now - pace_.since < pace_time) return;
+  if (taken_ - pace_.bytes < least_in_that) is_gone_ = true;
+  pace_ = {taken_, now};
+}
+
+IgtlClient::Clock::duration IgtlClient::lag(Clock::time_point now) const {
+  return taken_ == begun_ ? Clock::duration::zero() : now - way_.since;
 }
 
 bool IgtlClient::is_served() const {

@@ -25,8 +25,12 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   void send_news();
   /// Throws away some of what the client has said. To be called again and again: how often bounds how much.
   void read_some();
-  /// It has closed the connection, or has taken nothing for seconds.
-  [[nodiscard]] bool is_lost(Clock::time_point now) const;
+  /// Looks how far it has come. To be called again and again.
+  void look(Clock::time_point now);
+  /// It has closed the connection, or took less than 16 kB/s in five seconds in which there was more for it.
+  [[nodiscard]] bool is_lost() const noexcept { return is_gone_; }
+  /// How long something that it was sent has been on its way, at least.
+  [[nodiscard]] Clock::duration lag(Clock::time_point now) const;
   /// It has been sent all there is.
   [[nodiscard]] bool is_served() const;
   /// No call comes back to it afterwards.
@@ -43,7 +47,14 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   bool is_sending_ = false;
   bool is_reading_ = false;
   bool is_gone_ = false;
-  Clock::time_point progress_;  // when it took something last
+  // Of all bytes for it: sent or being sent, handed to the system, and taken by its machine.
+  std::int64_t begun_ = 0, handed_ = 0, taken_ = 0;
+  struct Place {
+    std::int64_t bytes = 0;
+    Clock::time_point since;
+  };
+  Place way_;   // where it is to come, and since when that has been on its way
+  Place pace_;  // how far it was when its rate was looked at last
   std::array<char, 4096> said_{};
 };
 

@@ -28,6 +28,7 @@ using boost::system::error_code;
 using Clock = IgtlBroadcast::Clock;
 
 constexpr auto tick_period = std::chrono::milliseconds(20);
+constexpr auto long_lag = std::chrono::milliseconds(500);  // for which a client gives way to another one
 constexpr auto farewell = std::chrono::milliseconds(500);
 constexpr int niceness = 5;
 
@@ -50,6 +51,7 @@ struct IgtlServer::Impl {
   void work();
   void take_mail();
   void drop_lost(Clock::time_point now);
+  bool make_room(Clock::time_point now);
   [[nodiscard]] bool is_over(Clock::time_point now) const;
 
   // What is shown, by any thread.
@@ -72,7 +74,7 @@ void IgtlServer::Impl::accept() {
   acceptor.async_accept([this](const error_code& problem, tcp::socket socket) {
     accept_failed = problem.failed();  // no file is left for a connection: at the next tick there may be
     if (problem) return;
-    if (clients.size() < most_igtl_clients) {
+    if (clients.size() < most_igtl_clients || make_room(Clock::now())) {
       clients.push_back(std::make_shared<IgtlClient>(std::move(socket), broadcast));
       clients.back()->send_news();
     }
@@ -103,10 +105,21 @@ void IgtlServer::Impl::tick() {
 
 void IgtlServer::Impl::drop_lost(Clock::time_point now) {
   std::erase_if(clients, [now](const auto& client) {
-    if (!client->is_lost(now)) return false;
+    client->look(now);
+    if (!client->is_lost()) return false;
     client->cut();
     return true;
   });
+}
+
+/// Cuts the client that is slowest to take what it is sent. False where none is slow.
+bool IgtlServer::Impl::make_room(Clock::time_point now) {
+  const auto slowest =
+      std::ranges::max_element(clients, {}, [now](const auto& client) { return client->lag(now); });
+  if ((*slowest)->lag(now) < long_lag) return false;
+  (*slowest)->cut();
+  clients.erase(slowest);
+  return true;
 }
 
 bool IgtlServer::Impl::is_over(Clock::time_point now) const {

@@ -11,9 +11,10 @@ namespace palpate {
 /// Clients that may be connected at once.
 constexpr std::size_t most_igtl_clients = 8;
 
-/// Sends surface, tool and force to all clients, from a thread of its own; more than `most_igtl_clients` are
-/// turned away. Asks nothing and obeys nothing. The `show` functions may be called by any thread; they never
-/// wait for a client.
+/// Sends surface, tool and force to all clients, from a thread of its own. For one more than
+/// `most_igtl_clients` that which is slowest to take what it is sent is cut; where none is slow, the new one
+/// is turned away. Asks nothing and obeys nothing. The `show` functions may be called by any thread; they
+/// never wait for a client.
 class IgtlServer {
  public:
   /// Serves who waits at the socket and who comes later.

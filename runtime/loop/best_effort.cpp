@@ -12,6 +12,11 @@ void DecadeHistogram::add(double value) noexcept {
   ++total_;
 }
 
+void DecadeHistogram::add(const DecadeHistogram& other) noexcept {
+  for (std::size_t k = 0; k < classes_.size(); ++k) classes_[k] += other.classes_[k];
+  total_ += other.total_;
+}
+
 double DecadeHistogram::median() const noexcept {
   std::int64_t before = 0;
   for (std::size_t k = 0; k < classes_.size(); ++k) {
@@ -36,6 +41,20 @@ void BestEffort::add(StepStatus status, double force, double force_error, std::i
   if (force_error <= largest_error) return;
   largest_error = force_error;
   largest_error_time = time;
+}
+
+void BestEffort::add(const BestEffort& later, double time_before) noexcept {
+  if (later.largest_error > largest_error) {
+    largest_error = later.largest_error;
+    largest_error_time = time_before + later.largest_error_time;
+  }
+  ticks += later.ticks;
+  not_converged_ticks += later.not_converged_ticks;
+  left_out_ticks += later.left_out_ticks;
+  most_left_out = std::max(most_left_out, later.most_left_out);
+  largest_share = std::max(largest_share, later.largest_share);
+  errors.add(later.errors);
+  shares.add(later.shares);
 }
 
 }  // namespace palpate

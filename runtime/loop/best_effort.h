@@ -13,6 +13,7 @@ namespace palpate {
 class DecadeHistogram {
  public:
   void add(double value) noexcept;
+  void add(const DecadeHistogram& other) noexcept;
   /// About the middle one, at the upper end of its class; 0 when empty.
   [[nodiscard]] double median() const noexcept;
 
@@ -34,6 +35,9 @@ class DecadeHistogram {
 struct BestEffort {
   /// Takes in a tick, which is one or not: the force that is felt and how far it may be off [N].
   void add(StepStatus status, double force, double force_error, std::int64_t left_out, double time) noexcept;
+
+  /// Takes in those of a run that began `time_before` [s] after this one.
+  void add(const BestEffort& later, double time_before) noexcept;
 
   [[nodiscard]] double median_error() const noexcept { return std::min(errors.median(), largest_error); }
   [[nodiscard]] double median_share() const noexcept { return std::min(shares.median(), largest_share); }

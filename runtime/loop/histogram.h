@@ -14,6 +14,7 @@ class TimeHistogram {
   TimeHistogram();
 
   void add(std::int64_t nanoseconds) noexcept;  ///< negative ones count as 0
+  void add(const TimeHistogram& other) noexcept;
   void clear() noexcept;
 
   /// The smallest duration [ns] that at least the fraction 0..1 of all does not exceed, rounded up to the

@@ -32,6 +32,7 @@ class Loop {
   Loop(const LoopParts& parts, const LoopOptions& options)
       : parts_(parts), options_(options), start_(options.fast ? 0 : monotonic_now() + second / options.rate) {
     report_.rate = options.rate;
+    if (parts.safety != nullptr) fault_ = parts.safety->fault();  // counted when it came
   }
 
   LoopReport run(const std::atomic<bool>& stop) {

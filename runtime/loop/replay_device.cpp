@@ -35,6 +35,18 @@ const char* first_different_field(const TickRecord& now, const TickRecord& then)
 
 }  // namespace
 
+void ReplayDifference::add(const ReplayDifference& later, std::int64_t ticks_before, double time_before) {
+  ticks += later.ticks;
+  different += later.different;
+  if (later.largest > largest) {
+    largest = later.largest;
+    largest_time = time_before + later.largest_time;
+  }
+  if (first_tick >= 0 || later.first_tick < 0) return;
+  first_tick = ticks_before + later.first_tick;
+  first_field = later.first_field;
+}
+
 DeviceNews ReplayDevice::poll(const TickTime& tick) noexcept {
   const TickRecord& then = session_.ticks[static_cast<std::size_t>(tick.number)];
   const double* q = then.handle_orientation;

@@ -17,6 +17,9 @@ struct ReplayDifference {
   double largest_time = 0.0;     ///< [s]
   std::int64_t first_tick = -1;  ///< in which anything that a tick computes is not the same; -1: none
   const char* first_field = "";  ///< what it is, as a recording names it: of several what is computed first
+
+  /// Takes in that of a run which began `ticks_before` and `time_before` [s] after this one.
+  void add(const ReplayDifference& later, std::int64_t ticks_before, double time_before);
 };
 
 /// Says in each tick what the device said in the session, with its times, so that the loop does all of it

@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <sstream>
+#include <utility>
 
 #include "base/error.h"
 
@@ -56,10 +57,21 @@ void let_all_signals() {
   sigprocmask(SIG_SETMASK, &none, nullptr);
 }
 
-/// No file descriptor of this program is its own, as they are closed on exec.
-[[noreturn]] void be_program(int output, const OtherProgram::Start& start) {
+/// A pipe, closed on exec.
+std::array<int, 2> make_pipe(const std::filesystem::path& program) {
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_CLOEXEC) == 0) return pipe;
+  throw Error(std::string("cannot make a pipe: ") + std::strerror(errno), program.string(),
+              "close other programs and try again");
+}
+
+/// No other file descriptor of this program is its own, as they are closed on exec.
+[[noreturn]] void be_program(int output, int told, const OtherProgram::Start& start) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   dup2(output, start.read == OtherProgram::Stream::output ? STDOUT_FILENO : STDERR_FILENO);
+  if (told == told_descriptor) fcntl(told, F_SETFD, 0);
+  if (told >= 0) dup2(told, told_descriptor);
+  if (told >= 0) ::close_range(told_descriptor + 1, ~0U, 0);  // sockets of a server too
   if (!start.has_terminal) {
     setpgid(0, 0);
     const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
@@ -73,6 +85,15 @@ void let_all_signals() {
   pointers.push_back(nullptr);
   ::execv(name.c_str(), pointers.data());
   _exit(cannot_be_started);
+}
+
+std::string read_from(int descriptor) {
+  std::array<char, 4096> chunk{};
+  for (;;) {
+    const ssize_t size = ::read(descriptor, chunk.data(), chunk.size());
+    if (size < 0 && errno == EINTR) continue;
+    return {chunk.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+  }
 }
 
 int wait_for(pid_t child) {
@@ -99,42 +120,38 @@ std::filesystem::path find_program(const std::string& name) {
 }
 
 OtherProgram::OtherProgram(const Start& start) : program_(start.program), leads_(!start.has_terminal) {
-  std::array<int, 2> pipe{};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0)
-    throw Error(std::string("cannot make a pipe: ") + std::strerror(errno), program_.string(),
-                "close other programs and try again");
-  const pid_t child = ::fork();
-  if (child == 0) {
+  const std::array<int, 2> output = make_pipe(program_);
+  const FileDescriptor written(output[1], program_);
+  FileDescriptor read(output[0], program_);
+  const std::array<int, 2> told = start.tells ? make_pipe(program_) : std::array{-1, -1};
+  const FileDescriptor written_told(told[1], program_);
+  FileDescriptor read_told(told[0], program_);
+  process_ = ::fork();
+  if (process_ == 0) {
     let_all_signals();
-    be_program(pipe[1], start);
+    be_program(output[1], told[1], start);
   }
-  ::close(pipe[1]);
-  if (child > 0 && leads_) setpgid(child, child);  // as it does itself: whoever comes first
-  output_ = pipe[0];
-  process_ = child;
-  if (child >= 0) return;
-  ::close(output_);
-  throw Error("cannot be started", program_.string(), "close other programs and try again");
+  if (process_ < 0) throw Error("cannot be started", program_.string(), "close other programs and try again");
+  if (leads_) setpgid(process_, process_);  // as it does itself: whichever comes first
+  output_ = std::move(read);
+  told_ = std::move(read_told);
 }
 
 OtherProgram::~OtherProgram() {
-  end();
+  send(SIGTERM);
   if (process_ > 0) wait_for(process_);
-  ::close(output_);
 }
 
 std::string OtherProgram::read() {
-  std::array<char, 4096> chunk{};
-  for (;;) {
-    const ssize_t size = ::read(output_, chunk.data(), chunk.size());
-    if (size < 0 && errno == EINTR) continue;
-    return {chunk.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
-  }
+  return read_from(output_.get());
 }
 
-void OtherProgram::end() noexcept {
-  const int process = process_;
-  if (process > 0) ::kill(leads_ ? -process : process, SIGTERM);
+std::string OtherProgram::read_told() {
+  return read_from(told_.get());
+}
+
+void OtherProgram::send(int signal) noexcept {
+  if (process_ > 0) ::kill(leads_ ? -process_ : process_, signal);
 }
 
 int OtherProgram::wait() {

@@ -1,10 +1,11 @@
 // Programs beside this one.
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <string>
 #include <vector>
+
+#include "base/file_io.h"
 
 namespace palpate {
 
@@ -12,9 +13,12 @@ namespace palpate {
 /// tree), or on the PATH. Throws Error where there is none.
 [[nodiscard]] std::filesystem::path find_program(const std::string& name);
 
+/// The descriptor on which a program tells the one that started it something that no file's text can imitate.
+inline constexpr int told_descriptor = 3;
+
 /// A program that runs beside this one, in a folder of its own if it is given one. Of what it prints one
 /// stream is read here, the other one goes where this program's does. It ends with the thread that started
-/// it.
+/// it. For one thread.
 class OtherProgram {
  public:
   enum class Stream { output, errors };
@@ -25,6 +29,8 @@ class OtherProgram {
     Stream read = Stream::output;
     std::filesystem::path folder{};  ///< that it works in; empty: this program's
     bool has_terminal = true;        ///< else it hears no keys of a person, nor signals that they send
+    bool tells =
+        false;  ///< it has `told_descriptor` to write to, and beside it no descriptor of this program
   };
 
   /// Throws Error where there is no room for another program.
@@ -35,8 +41,14 @@ class OtherProgram {
 
   /// What it prints next, at most some kilobytes; empty once it prints nothing more.
   [[nodiscard]] std::string read();
-  /// Asks it to end, and without a terminal all that it has started. Any thread may.
-  void end() noexcept;
+  /// What it tells next, likewise. A program that keeps the descriptor to itself tells nothing more once it
+  /// has ended.
+  [[nodiscard]] std::string read_told();
+  /// To wait for what it prints, and for what it tells (-1 where it does not).
+  [[nodiscard]] int printed() const noexcept { return output_.get(); }
+  [[nodiscard]] int told() const noexcept { return told_.get(); }
+  /// Sends it a signal, without a terminal to all that it has started too.
+  void send(int signal) noexcept;
   /// Its exit status, once it has ended; 128 + the signal that ended it. Throws Error where it could not be
   /// started at all.
   int wait();
@@ -44,8 +56,8 @@ class OtherProgram {
  private:
   std::filesystem::path program_;
   bool leads_ = false;  // a process group
-  int output_ = -1;
-  std::atomic<int> process_ = -1;
+  FileDescriptor output_, told_;
+  int process_ = -1;
 };
 
 /// How another program ended.

@@ -60,9 +60,7 @@ CLI::App* add_push(CLI::App& app, PushArguments& arguments) {
   add_handed_on(*push, arguments, "parts", "largest|all", "which of several parts are the body");
   add_handed_on(*push, arguments, "strict", "", "refuse a surface that needs a repair");
   add_handed_on(*push, arguments, "renew", "", "write NAME.model.toml anew");
-  push->add_option("--view-address", arguments.view_address,
-                   "address at which the page is served; default: 127.0.0.1:8017; port 0: any free one")
-      ->type_name("[ADDRESS:]PORT");
+  add_handed_on(*push, arguments, "keep", "", "write no file that is there already");
   push->add_option("--duration", arguments.duration, "stop after this time [s]")->type_name("S");
   push->footer(
       "Runs palpate-precompute where the model is not there or its sources have changed, then plays it as\n"

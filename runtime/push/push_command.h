@@ -6,15 +6,16 @@
 #include <string>
 #include <vector>
 
+#include "runtime/serving/viewer_port.h"
+
 namespace palpate {
 
 /// As they were written.
 struct PushArguments {
   std::string file;
   std::vector<std::string> for_precompute;  ///< options that are handed on, with their values
-  std::optional<std::string> view_address;
   std::optional<std::string> duration;
-  bool view_framed = false;
+  ViewerArguments viewer;  ///< of options that the caller adds
 };
 
 /// Adds the subcommand.

@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <optional>
+#include <system_error>
 
 #include "base/random_bytes.h"
 
@@ -20,6 +23,20 @@ bool is_ipv4(const std::string& text) {
 bool is_ipv6(const std::string& text) {
   in6_addr address{};
   return inet_pton(AF_INET6, text.c_str(), &address) == 1;
+}
+
+/// As a browser writes them.
+bool is_this_machine(const std::string& name) {
+  return name == "localhost" || name == "[::1]" || (name.starts_with("127") && is_ipv4(name));
+}
+
+/// Nothing for what is no port from 1 on, in digits.
+std::optional<std::uint16_t> port_of(const std::string& text) {
+  std::uint16_t port = 0;
+  const char* const end = text.data() + text.size();
+  const auto [last, bad] = std::from_chars(text.data(), end, port);
+  if (bad != std::errc() || last != end || port == 0) return std::nullopt;
+  return port;
 }
 
 std::string lower_case(std::string_view text) {
@@ -43,11 +60,14 @@ bool is_served(std::string_view host, const std::string& address, std::uint16_t 
   const std::size_t bracket = host.rfind(']');  // colons before it are of an IPv6 address
   const std::size_t colon = host.find(':', bracket == std::string_view::npos ? 0 : bracket);
   const std::string name = lower_case(host.substr(0, colon));
-  const std::string_view number = colon == std::string_view::npos ? http_port : host.substr(colon + 1);
-  if (number != std::to_string(port)) return false;
-  if (name == "127.0.0.1" || name == "localhost" || name == "[::1]" || name == url_host(address)) return true;
+  const std::string number(colon == std::string_view::npos ? http_port : host.substr(colon + 1));
+  const std::optional<std::uint16_t> asked = port_of(number);
+  if (!asked) return false;
+  if (is_this_machine(name)) return true;
+  if (*asked != port) return false;
   const bool in_brackets = name.size() > 2 && name.front() == '[' && name.back() == ']';
-  return is_any_address(address) && (in_brackets ? is_ipv6(name.substr(1, name.size() - 2)) : is_ipv4(name));
+  const bool is_address = in_brackets ? is_ipv6(name.substr(1, name.size() - 2)) : is_ipv4(name);
+  return name == url_host(address) || (is_any_address(address) && is_address);
 }
 
 bool is_own_page(std::string_view origin, std::string_view host) {

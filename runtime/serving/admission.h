@@ -11,9 +11,9 @@ bool is_any_address(const std::string& address);  ///< 0.0.0.0 or ::
 /// As in a URL: IPv6 in brackets.
 std::string url_host(const std::string& address);
 
-/// Whether a request's `Host` names the address served, or this machine, with the port; where all addresses
-/// are served, any IP address does. No other name, even one that leads here: a foreign page could have made
-/// it do so.
+/// Whether a request's `Host` names this machine (localhost, 127.0.0.0/8, [::1]) with whatever port, as that
+/// of a tunnel is another one; or the address served, with its port; where all addresses are served, any IP
+/// address with that port. No other name, even one that leads here: a foreign page could have made it do so.
 bool is_served(std::string_view host, const std::string& address, std::uint16_t port);
 
 /// Whether `Origin` is the page that `Host` serves.

@@ -25,6 +25,10 @@ using RequestHeader = boost::beast::http::request_header<>;
 /// stays here.
 [[nodiscard]] Response guarded(Response response);
 
+/// What the viewer's page may load and run, wherever it stands: its own scripts and styles and nothing else
+/// that could be written into it. Its thread for the socket begins as a blob; pictures are made by the page.
+[[nodiscard]] std::string page_policy();
+
 /// Whose pages may have one in a frame. `by_own`: those of this server. Notebooks are served by this machine.
 [[nodiscard]] std::string ancestors(const ServedAddress& served, bool by_own);
 
@@ -38,6 +42,9 @@ using RequestHeader = boost::beast::http::request_header<>;
 /// Why a request is not answered whose token is not the server's.
 [[nodiscard]] std::optional<Response> token_refusal(const RequestHeader& request,
                                                     const ServedAddress& served);
+
+/// What is said to a request that may be answered, but there are too many of them.
+[[nodiscard]] Response full_house();
 
 /// Only `allowed` ("GET, HEAD") are answered.
 [[nodiscard]] Response method_refusal(const std::string& allowed);

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <cstdio>
+
+#include "base/file_io.h"
 #include "runtime/serving/admission.h"
 
 namespace palpate {
@@ -21,11 +24,22 @@ ViewerPort::ViewerPort(const ViewerOptions& options)
               .token = random_token(),
               .book = options.book,
               .runs = 1,
-              .framed = options.framed} {}
+              .framed = options.framed,
+              .told = options.told} {}
 
 std::string ViewerPort::url(const std::string& page) const {
   return fmt::format("http://{}:{}/{}?token={}", seen_from_here(served_.address), served_.port, page,
                      served_.token);
+}
+
+void tell_address(const ServedAddress& served, const std::string& url, std::string_view more) {
+  if (served.told < 0) {
+    fmt::print(stderr, "open {} in a browser{}\n", url, more);
+    return;
+  }
+  const std::string line =
+      fmt::format("{{\"url\": \"{}\", \"port\": {}, \"token\": \"{}\"}}\n", url, served.port, served.token);
+  static_cast<void>(write_all(served.told, line));  // a program that is gone needs no address
 }
 
 }  // namespace palpate

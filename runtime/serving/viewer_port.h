@@ -4,12 +4,21 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "runtime/serving/book_files.h"
 #include "runtime/serving/listening_socket.h"
 
 namespace palpate {
+
+/// The options of a viewer, as they were written.
+struct ViewerArguments {
+  std::optional<std::string> address;
+  bool framed = false;
+  std::optional<int> told;
+};
 
 /// Where a viewer is to be served.
 struct ViewerOptions {
@@ -17,6 +26,7 @@ struct ViewerOptions {
   std::uint16_t port = 8017;                 ///< 0: any that is free
   std::filesystem::path book = find_book();  ///< folder of the book's site; empty: none is served
   bool framed = false;  ///< pages of this machine's other servers, as notebooks, may have it in a frame
+  int told = -1;        ///< descriptor of the program that is told the address; -1: a person is
 };
 
 /// Where it is served, the secret that each request must show, and the book beside it.
@@ -27,6 +37,7 @@ struct ServedAddress {
   std::filesystem::path book;  ///< empty: there is none
   std::size_t runs = 1;        ///< that are shown, one or two
   bool framed = false;         ///< as in ViewerOptions
+  int told = -1;               ///< as in ViewerOptions
 };
 
 /// An address that is taken, so that what comes next cannot fail for it: who connects waits until a
@@ -46,5 +57,9 @@ class ViewerPort {
   ListeningSocket socket_;
   ServedAddress served_;
 };
+
+/// Tells where the page is: a person in a line that ends with `more`, or the program that asked for it as one
+/// line of JSON, {"url", "port", "token"}, on a descriptor that no file's text reaches.
+void tell_address(const ServedAddress& served, const std::string& url, std::string_view more);
 
 }  // namespace palpate

@@ -74,20 +74,15 @@ std::optional<Response> refusal(const Request& request, const ServedAddress& ser
   return std::nullopt;
 }
 
-Response full_house() {
-  return guarded(plain(http::status::service_unavailable,
-                       "Too many pages are open: close one, then load this one anew."));
-}
-
 Response book_answer(const Request& request, const std::filesystem::path& book) {
   std::optional<BookFile> file = read_book_file(book, target_of(request).path.substr(book_path.size()));
   if (!file) return guarded(plain(http::status::not_found, "There is no such page in the book."));
   Response response;
   response.set(http::field::content_type, file->content_type);
-  response.set("Content-Security-Policy",
-               "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
-               "img-src 'self' data:; font-src 'self'; base-uri 'none'; form-action 'self'; "
-               "frame-ancestors 'none'");
+  response.set(
+      "Content-Security-Policy",
+      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; font-src 'self'; "
+      "base-uri 'none'; form-action 'self'; frame-ancestors 'none'");
   response.body() = std::move(file->bytes);
   return guarded(std::move(response));
 }

@@ -21,9 +21,6 @@ inline constexpr const char* subprotocol = "palpate.2";
 /// Why a request is not answered at all: its host, page, method, token or subprotocol.
 std::optional<Response> refusal(const Request& request, const ServedAddress& served);
 
-/// What is said to a request that may be answered, but there are too many of them.
-Response full_house();
-
 /// Which of the runs it is about: the second one's addresses begin with /2/, all others are the first one's.
 std::size_t run_of(const Request& request, const ServedAddress& served);
 

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <new>
 
+#include "runtime/serving/http_guard.h"
+
 namespace palpate {
 namespace {
 
@@ -53,8 +55,9 @@ std::string PageArchive::page(std::string_view page) const {
   std::string whole(page);
   constexpr std::string_view head = "<head>";
   if (const std::size_t at = whole.find(head); at != std::string::npos)
-    whole.insert(at + head.size(),
-                 "\n<meta name=\"generator\" content=\"palpate-runtime " PALPATE_VERSION "\">");
+    whole.insert(at + head.size(), "\n<meta name=\"generator\" content=\"palpate-runtime " PALPATE_VERSION
+                                   "\">\n<meta http-equiv=\"Content-Security-Policy\" content=\"" +
+                                       page_policy() + "\">");
   const std::size_t end = whole.rfind("</body>");
   whole.insert(end == std::string::npos ? whole.size() : end, data);
   return whole;

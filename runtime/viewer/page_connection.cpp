@@ -133,13 +133,14 @@ void PageConnection::close(websocket::close_code code, std::string reason) {
                        [self = shared_from_this()](const ErrorCode&) {});
 }
 
-void PageConnection::cut() noexcept {
+void PageConnection::cut() {
   is_open_ = false;
   if (socket_) {
     beast::get_lowest_layer(*socket_).close();
   } else {
     stream_.close();
   }
+  if (run_ != nullptr) run_->leave(*this);
 }
 
 bool PageConnection::is_stalled() const {

@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 
+#include "runtime/serving/reception.h"
 #include "runtime/viewer/broadcast.h"
 #include "runtime/viewer/http_answers.h"
 
@@ -22,15 +23,14 @@ class PageServer;
 class ShownRun;
 
 /// One request, and where that asks for it a socket from then on: a page. For the server's thread.
-class PageConnection : public std::enable_shared_from_this<PageConnection> {
+class PageConnection : public Received, public std::enable_shared_from_this<PageConnection> {
  public:
   /// `server` must live as long.
   PageConnection(boost::asio::ip::tcp::socket socket, PageServer& server)
       : stream_(std::move(socket)), server_(server), picture_timer_(stream_.get_executor()) {}
 
-  void start();
-  /// Without a word.
-  void cut() noexcept;
+  void start() override;
+  void cut() override;
   /// Sends what there is that the page has not been sent, one message after the other.
   void send_news();
   /// A text that it must not miss.
@@ -41,12 +41,9 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   void follow();
   /// The frame that it sees alone.
   [[nodiscard]] std::optional<std::int64_t> own_frame() const noexcept;
-  /// It has shown the token, and there is room for it.
-  [[nodiscard]] bool is_admitted() const noexcept { return is_admitted_; }
   /// The run that it asks for; null before it has shown the token.
   [[nodiscard]] ShownRun* run() const noexcept { return run_; }
-  /// It does not read.
-  [[nodiscard]] bool is_stalled() const;
+  [[nodiscard]] bool is_stalled() const override;
 
  private:
   using ErrorCode = boost::system::error_code;
@@ -72,7 +69,6 @@ class PageConnection : public std::enable_shared_from_this<PageConnection> {
   std::optional<Response> response_;
   std::optional<boost::beast::http::response<boost::beast::http::empty_body>> header_;
 
-  bool is_admitted_ = false;
   bool is_open_ = false;
   std::deque<std::string> said_;
   std::size_t said_bytes_ = 0;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cstddef>
@@ -12,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/serving/reception.h"
 #include "runtime/viewer/http_answers.h"
 #include "runtime/viewer/shown_run.h"
 #include "runtime/viewer/viewer_server.h"
@@ -20,11 +20,7 @@ namespace palpate {
 
 class PageConnection;
 
-/// Accepts connections, knows all of them, and has each run take what is posted to its pages.
-///
-/// Connections that have not shown the token are few, and give way: when there is no room for another one,
-/// the oldest of them is cut. So nobody without the token keeps out who has it, and all who have it are this
-/// user's: they are told when there are too many of them.
+/// Answers connections, and has each run take what is posted to its pages.
 class PageServer {
  public:
   /// As ViewerServer.
@@ -45,27 +41,22 @@ class PageServer {
   [[nodiscard]] const ServedAddress& served() const noexcept { return served_; }
   [[nodiscard]] ShownRun& run(std::size_t number) { return *runs_[number]; }
   /// Whether another connection that has shown the token may be answered.
-  [[nodiscard]] bool has_room() const;
+  [[nodiscard]] bool has_room() const { return reception_.has_room(); }
   /// It is gone, and its control with it.
   void leave(PageConnection& page);
 
  private:
-  void accept();
-  void make_room();
   void tick();
   void work();
   void stop();
-  void cut(PageConnection& page);
   void take_mail();
 
   ServedAddress served_;
   std::string url_;
   boost::asio::io_context context_{1};
-  boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer timer_;
-  boost::asio::steady_timer retry_;
   std::vector<std::unique_ptr<ShownRun>> runs_;
-  std::vector<std::shared_ptr<PageConnection>> connections_;  // as they came
+  Reception reception_;
   std::thread thread_;
 };
 

@@ -4,7 +4,7 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { copyFile, readdir, readFile, rm, writeFile } from 'node:fs/promises';
 import path from 'node:path';
 import { after, test } from 'node:test';
-import { bake, close, cube, folder, near, ready, serve, told, until, visit } from './harness.mjs';
+import { bake, close, cube, folder, near, open, ready, run, runtime, serve, told, until, visit } from './harness.mjs';
 import { barriers, faults_of_layout } from './looks.mjs';
 import { part, recorded } from './steps.mjs';
 
@@ -53,7 +53,10 @@ test('a body is chosen, left, and a recording chosen', async (t) => {
   assert.equal(rest, same);
   assert.notEqual(rest, pressed); // where it felt most
   const colours = await page.evaluate(async (url) => {
-    const bitmap = await createImageBitmap(await (await fetch(url)).blob());
+    const image = new Image();
+    image.src = url;
+    await image.decode();
+    const bitmap = await createImageBitmap(image);
     const pen = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
     pen.drawImage(bitmap, 0, 0);
     return [[0.5, 0.5], [0.02, 0.02]].map(([x, y]) => [...pen.getImageData(x * bitmap.width, y * bitmap.height, 1, 1).data]);
@@ -77,6 +80,85 @@ test('a body is chosen, left, and a recording chosen', async (t) => {
   assert.equal(new URL(page.url()).port, port); // so that the page finds what it keeps
   await served.stop();
   await assert.rejects(fetch(page.url()));
+});
+
+/// Tries to run a script in a page, by each way that a text could bring one; returns those that did.
+async function scripts_that_ran(page) {
+  await page.evaluate(() => {
+    window.ran = [];
+    const put = (kind, values) => document.body.append(Object.assign(document.createElement(kind), values));
+    put('script', { textContent: 'window.ran.push("inline")' });
+    put('script', { src: 'data:text/javascript,window.ran.push("data")' });
+    put('script', { src: URL.createObjectURL(new Blob(['window.ran.push("blob")'])) });
+    put('div', { innerHTML: '<img src="nothing:" onerror="window.ran.push(\'event\')"><b style="color: rgb(1, 2, 3)"></b>' });
+    put('iframe', { srcdoc: '<script>parent.ran.push("frame")<' + '/script>' });
+    put('a', { href: 'javascript:window.ran.push("link")' });
+    document.querySelector('a[href^="javascript"]').click();
+    setTimeout('window.ran.push("text")', 0);
+    if (getComputedStyle(document.querySelector('div > b[style]')).color === 'rgb(1, 2, 3)') window.ran.push('style');
+  });
+  await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 500))); // what would run does so by then
+  return page.evaluate(() => window.ran);
+}
+
+test('what files say is text in the gallery, the page and what is exported', async (t) => {
+  const at = await folder(t);
+  const evil = '<img src=x: onerror=window.ran.push(1)>';
+  const address = 'open javascript:window.ran.push(2) in a browser';
+  const plain = await bake(at, cube(2), 'plain');
+  for (const [file, name] of [[evil, evil], ['b', address], ["c' onclick=window.ran.push(3) '", `"'>&lt;${evil}`]])
+    await copyFile(await bake(at, cube(2).replace('"cube"', JSON.stringify(name)), 'baked'), path.join(at, `${file}.palpate.hdf`));
+  await rm(path.join(at, 'baked.palpate.hdf'));
+  await rm(path.join(at, 'baked.toml'), { force: true });
+  await writeFile(path.join(at, `${evil}.h5`), 'no recording');
+  await writeFile(path.join(at, `${evil}.obj`), `this is no surface ${evil}\n`);
+  const served = await serve(t, ['view', '--view-address', '127.0.0.1:0'], at);
+  const note_scripts = () => (window.ran ??= []);
+  const page = await visit(t, served.url, {}, note_scripts);
+  const none_ran = async (what) => {
+    assert.deepEqual(await page.evaluate(() => window.ran), [], what);
+    assert.equal(await page.locator('img[src^="x:"]').count(), 0, what);
+    assert.deepEqual(page.complaints, [], what);
+  };
+  await page.locator('[data-testid="item"]').first().waitFor();
+  assert.ok((await shown(page)).includes(`${evil}.palpate.hdf`));
+  await page.locator('.problem').first().waitFor();
+  await none_ran('the gallery');
+  for (const [file, name] of [[evil, evil], ['b', address], ["c' onclick=window.ran.push(3) '", `"'>&lt;${evil}`]]) {
+    await page.locator('[data-testid="item"]').and(page.locator(`[title^=${JSON.stringify(`${file}.palpate.hdf`)}]`)).click();
+    await ready(page);
+    assert.match(page.url(), /^http:\/\/127\.0\.0\.1:\d+\/\?token=[0-9a-f]{32}&gallery=\d+$/);
+    assert.ok(!page.url().includes(new URL(served.url).searchParams.get('token')), 'the link opens that body alone');
+    assert.equal((await told(page, 'state')).model.name, name);
+    await page.evaluate((text) => window.palpate.send?.({ type: 'change', settings: { [text]: text } }), evil);
+    await none_ran(`the page of ${name}`);
+    await part(page, 'to-gallery').click();
+    await page.locator('[data-testid="item"]').first().waitFor();
+    assert.equal(new URL(page.url()).search, '', 'the tab knows the token');
+  }
+  await page.locator(`[data-testid="item"][title^=${JSON.stringify(`${evil}.obj`)}]`).click();
+  await until(page, () => /cannot be shown/.test(document.querySelector('[data-testid="opening"] h2')?.textContent));
+  await none_ran('an error');
+  await page.keyboard.press('Escape');
+  assert.deepEqual(await scripts_that_ran(page), []);
+  assert.ok(page.complaints.length > 0, 'the policy refused them');
+
+  const other = await (await open()).newContext();
+  t.after(() => other.close());
+  const stranger = await other.newPage(); // has the address without the token
+  await stranger.goto(served.url.replace(/\?.*/, ''));
+  await stranger.getByText('Open the whole address that the runtime printed').waitFor();
+
+  await writeFile(path.join(at, 'touch.csv'), 't,x,y,z\n0,0.5,0.5,1.3\n0.1,0.5,0.5,1.05\n');
+  await copyFile(plain, path.join(at, 'x.palpate.hdf'));
+  await run(runtime, ['play', path.join(at, `${evil}.palpate.hdf`), '--device', 'script:touch.csv', '--tool', 'sphere:0.1', '--fast', '--record', 'touch.h5'], { cwd: at });
+  await run(runtime, ['export', 'touch.h5', '--html', 'touch.html'], { cwd: at });
+  const written = await visit(t, `file://${path.join(at, 'touch.html')}`, {}, note_scripts);
+  await ready(written);
+  assert.deepEqual(written.complaints, []);
+  assert.deepEqual(await written.evaluate(() => window.ran), []);
+  assert.deepEqual(await scripts_that_ran(written), []);
+  assert.ok(written.complaints.length > 0);
 });
 
 test('what cannot be opened is told with its reason', async (t) => {

@@ -126,9 +126,11 @@ export async function close() {
 /// Leaves the body's canvas empty and out of sight: a browser without a graphics card spends most of its time on what tests of buttons and numbers do not look at.
 function draw_nothing() {
   for (const name of ['clear', 'drawArrays', 'drawElements', 'drawElementsInstanced']) WebGL2RenderingContext.prototype[name] = () => undefined;
-  const style = document.createElement('style');
-  style.textContent = '.stage > canvas { visibility: hidden; }';
-  document.addEventListener('DOMContentLoaded', () => document.head.append(style));
+  document.addEventListener('DOMContentLoaded', () => {
+    const style = new CSSStyleSheet(); // as the page lets no other style in
+    style.replaceSync('.stage > canvas { visibility: hidden; }');
+    document.adoptedStyleSheets.push(style);
+  });
 }
 
 /// A page of its own context, which notes what goes wrong in it: errors of scripts, and requests to anywhere but the runtime. Its body is seen only if it `is_drawn`.
@@ -139,6 +141,7 @@ export async function visit(t, url, { is_drawn = false, ...options } = {}, befor
   page.setDefaultTimeout(120_000); // guards against what never comes, not against a busy machine
   page.complaints = [];
   page.on('pageerror', (error) => page.complaints.push(String(error)));
+  page.on('console', (message) => /Content Security Policy/.test(message.text()) && page.complaints.push(message.text()));
   page.on('request', (request) => {
     const to = new URL(request.url());
     if (['http:', 'https:', 'ws:', 'wss:'].includes(to.protocol) && to.host !== new URL(url).host) page.complaints.push(`asks ${to}`);

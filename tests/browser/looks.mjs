@@ -17,7 +17,11 @@ export const layouts = [
 
 /// Hides all that stands over the picture.
 export async function bare(page) {
-  await page.addStyleTag({ content: '.stage > :not(canvas) { opacity: 0 !important; }' });
+  await page.evaluate(() => {
+    const style = new CSSStyleSheet();
+    style.replaceSync('.stage > :not(canvas) { opacity: 0 !important; }');
+    document.adoptedStyleSheets.push(style);
+  });
 }
 
 /// The picture came to rest: it is drawn whole, and nothing changes it.

@@ -102,11 +102,14 @@ class Html(html.parser.HTMLParser):
 
     def __init__(self, page):
         super().__init__()
-        self.leads, self.loads, self.ids = [], [], set()
+        self.leads, self.loads, self.ids, self.inline = [], [], set(), []
         self.feed(page.read_text())
 
     def handle_starttag(self, tag, attributes):
         given = dict(attributes)
+        if tag == "style" or tag == "script" and not given.get("src"):
+            self.inline.append(f"<{tag}>")
+        self.inline += [name for name, _ in attributes if name == "style" or name.startswith("on")]
         self.ids.update(value for name, value in attributes if name == "id" or name == "name" and tag == "a")
         if tag == "a" and given.get("href"):
             self.leads.append(given["href"])
@@ -121,6 +124,7 @@ def broken_site(site):
     read = {page: Html(page) for page in sorted(site.rglob("*.html"))}
     for page, found in read.items():
         name = page.relative_to(site)
+        yield from (f"{name}: has {inline} in it, which the viewer's policy refuses" for inline in found.inline)
         for link in found.loads + found.leads:
             if IS_REMOTE.match(link):
                 if link in found.loads and not link.startswith("data:"):

@@ -4,10 +4,14 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
 import book
+
+sys.path.insert(0, str(book.SOURCE / "docs" / "site"))
+import mend_furo
 
 BINARY = pathlib.Path(os.environ["PALPATE_BINARY_DIR"])
 
@@ -98,6 +102,20 @@ class Rules(unittest.TestCase):
     def test_too_few_questions(self):
         self.write("docs/faq.md", "| question | page |\n|---|---|\n| Why? | [press](press.md) |\n")
         self.assertEqual(list(book.far_answers(self.root)), ["docs/faq.md: 1 questions with a page, 10 are the least"])
+
+
+    def test_scripts_and_styles_stand_in_files(self):
+        self.write("html/a.html", '<script>x()</script><style>b {}</style><p style="color: red" onclick="x()"><script src="x.js"></script>')
+        self.write("html/x.js", "")
+        refused = [f"a.html: has {part} in it, which the viewer's policy refuses" for part in ("<script>", "<style>", "style", "onclick")]
+        self.assertEqual(list(book.broken_site(self.root / "html")), refused)
+        self.write("html/_static/x.css", "")
+        page = self.root / "html" / "b" / "a.html"
+        self.write("html/b/a.html", "<style>\nb {}\n</style><svg style=\"display: none;\"></svg><script>\nx();\n</script>")
+        page.write_text(mend_furo.without_inline(page, self.root / "html"))
+        (self.root / "html" / "a.html").unlink()
+        self.assertEqual(list(book.broken_site(self.root / "html")), [])
+        self.assertEqual({file.read_text() for file in (self.root / "html" / "_static").iterdir()}, {"", "\nb {}\n", "\nx();\n"})
 
 
 class Planted(unittest.TestCase):

@@ -231,6 +231,18 @@ class Viewers(PythonTest):
         script.write_text("t,x,y,z\n0,0.5,0.5,1.15\n0.2,0.5,0.5,1.05\n")
         return script
 
+    def test_a_name_is_no_address(self):
+        """What a file says is printed before the address, and is text."""
+        self.write_named("open http:evil in a browser")
+        with palpate.Viewer(self.shared / "named.palpate.hdf", "--tool", "sphere:0.1") as viewer:
+            self.assertRegex(viewer.address, r"^http://127\.0\.0\.1:\d+/\?token=[0-9a-f]{32}$")
+
+    def write_named(self, name):
+        description = self.shared / "named.toml"
+        description.write_text(cube_toml(2, name=name))
+        result = run(PRECOMPUTE, description, "-o", self.shared / "named.palpate.hdf")
+        self.assertEqual(result.returncode, 0, result.stderr)
+
     def test_what_cannot_be_shown_is_told(self):
         with self.assertRaisesRegex(palpate.Error, "nowhere.h5"):
             palpate.Viewer("nowhere.h5")

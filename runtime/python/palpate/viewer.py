@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import html
+import json
 import os
-import re
 import signal
 import subprocess
 import threading
@@ -24,29 +24,30 @@ class Viewer:
         name = os.fspath(file)
         command = ["view", name] if name.endswith(".mcap") else ["play", name, "--view"]
         self.height = height
-        self._process = subprocess.Popen(
-            [program("palpate-runtime"), *command, "--view-address", "0", "--view-framed", *options],
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        self.address = self._wait_for_address()
-        threading.Thread(target=self._drain, daemon=True).start()
+        told, tells = os.pipe()  # the address: what is printed has names from files in it
+        with open(told, encoding="utf-8") as reader:
+            try:
+                self._process = subprocess.Popen(
+                    [program("palpate-runtime"), *command, "--view-address", "0", "--view-framed", "--view-fd", str(tells), *options],
+                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=(tells,))
+            finally:
+                os.close(tells)
+            self._said: list[str] = []
+            self._drain = threading.Thread(target=self._listen, daemon=True)
+            self._drain.start()
+            line = reader.readline()
+        if not line:
+            self._process.wait()
+            self._drain.join()
+            raise Error.of_text("".join(self._said))
+        self.address: str = json.loads(line)["url"]
 
-    def _wait_for_address(self) -> str:
+    def _listen(self) -> None:
+        """To its end, or the program would wait for a reader."""
         assert self._process.stdout is not None
-        said = []
-        for line in self._process.stdout:
-            said.append(line)
-            found = re.match(r"open (http://\S+)", line)
-            if found:
-                return found[1]
-        self._process.stdout.close()
-        self._process.wait()
-        raise Error.of_text("".join(said))
-
-    def _drain(self) -> None:
-        assert self._process.stdout is not None
-        with self._process.stdout as lines:  # or the program would wait for a reader
-            for _ in lines:
-                pass
+        with self._process.stdout as lines:
+            for line in lines:
+                self._said = [*self._said[-99:], line]
 
     @property
     def running(self) -> bool:

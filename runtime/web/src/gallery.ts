@@ -3,6 +3,7 @@ import { by_id, element } from './dom';
 import { Drawing } from './drawing';
 import { format_bytes } from './format';
 import { kept_theme } from './kept';
+import { gallery_of, is_token, page_of, type Place } from './place';
 import { SmallPictures } from './small_picture';
 import { ThemeChoice, themes, type Theme } from './theme';
 import { decode } from './wire';
@@ -23,7 +24,7 @@ interface Item {
 interface Opened {
   name: string;
   said: string[];
-  url: string; // empty: not yet
+  page: Place | null; // not yet
   ended: boolean;
 }
 
@@ -35,27 +36,24 @@ const kinds: Record<Kind, { title: string; does: string }> = {
 
 const endings = /\.(palpate\.hdf|mcap|stl|obj|ply|off|inr|inr\.gz|nii|nii\.gz|nrrd|png|pbm)$/i;
 
-/** This server's, with the token of this page. */
-const address = (path: string, name = '') => `./${path}${location.search}${name && `&name=${encodeURIComponent(name)}`}`;
+/** The token of this page's address, which the tab keeps: the way back from what is opened has none. */
+function own_token(): string {
+  const given = new URLSearchParams(location.search).get('token');
+  try {
+    if (is_token(given)) sessionStorage.setItem('token', given);
+    return given ?? sessionStorage.getItem('token') ?? '';
+  } catch {
+    return given ?? ''; // this browser keeps nothing
+  }
+}
+
+/** This server's, with the token. */
+const address = (path: string, name = '') => `./${path}?token=${encodeURIComponent(own_token())}${name && `&name=${encodeURIComponent(name)}`}`;
 
 async function ask(path: string, options: RequestInit = {}, name = ''): Promise<Response> {
   const response = await fetch(address(path, name), options);
   if (!response.ok) throw new Error((await response.text()).trim());
   return response;
-}
-
-/** The page of what is opened, as this page's host knows it, with the way back. */
-function page_of(opened: Opened): string {
-  const url = new URL(opened.url);
-  url.hostname = location.hostname;
-  url.searchParams.set('gallery', `${location.port}.${new URLSearchParams(location.search).get('token') ?? ''}`);
-  return url.href;
-}
-
-/** The address of the gallery that a page was opened from; nothing where it was opened by itself. */
-export function gallery_of(search: string): string | null {
-  const [, port, token] = /^(\d{1,5})\.([0-9a-f]{32})$/.exec(new URLSearchParams(search).get('gallery') ?? '') ?? [];
-  return port && token ? `http://${location.hostname}:${port}/gallery?token=${token}` : null;
 }
 
 export class Gallery {
@@ -175,12 +173,12 @@ export class Gallery {
   }
 
   private async open(name: string): Promise<void> {
-    this.show_opening({ name, said: [], url: '', ended: false });
+    this.show_opening({ name, said: [], page: null, ended: false });
     try {
       await ask('open', { method: 'POST' }, name);
       await this.look();
     } catch (error) {
-      this.show_opening({ name, said: [(error as Error).message], url: '', ended: true });
+      this.show_opening({ name, said: [(error as Error).message], page: null, ended: true });
     }
   }
 
@@ -188,8 +186,8 @@ export class Gallery {
   private async look(): Promise<void> {
     const opened = (await (await ask('opened')).json()) as Opened | null;
     if (!opened || !this.opening_.open) return;
-    if (opened.url && !opened.ended) {
-      location.href = page_of(opened);
+    if (opened.page && !opened.ended) {
+      location.assign(page_of(opened.page, location));
       return;
     }
     this.show_opening(opened);
@@ -227,13 +225,13 @@ export class Gallery {
   /** Puts files into the folder; a single one is opened. */
   private async take(files: File[]): Promise<void> {
     for (const file of files) {
-      this.show_opening({ name: file.name, said: ['It is being copied into the folder.'], url: '', ended: false });
+      this.show_opening({ name: file.name, said: ['It is being copied into the folder.'], page: null, ended: false });
       try {
         if (!endings.test(file.name)) throw new Error('This is no body (.palpate.hdf), recording (.mcap), surface (.stl, .obj, .ply, .off), labelled image (.nrrd, .nii, .inr) or picture (.png, .pbm).');
         const { name } = (await (await ask('drop', { method: 'POST', body: file }, file.name)).json()) as { name: string };
         if (files.length === 1) await this.open(name);
       } catch (error) {
-        this.show_opening({ name: file.name, said: [(error as Error).message], url: '', ended: true });
+        this.show_opening({ name: file.name, said: [(error as Error).message], page: null, ended: true });
         return;
       }
     }
@@ -243,7 +241,7 @@ export class Gallery {
 
 /** Where a page was opened from a gallery, the way back is shown. */
 export function show_way_back(): void {
-  const gallery = gallery_of(location.search);
+  const gallery = gallery_of(location);
   const link = by_id('to-gallery', HTMLAnchorElement);
   link.hidden = gallery === null;
   if (gallery) link.href = gallery;

@@ -20,6 +20,7 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
+#include "base/regular_file.h"
 #include "formats/model_file.h"
 #include "formats/recording.h"
 #include "runtime/app/fitting_tool.h"
@@ -184,6 +185,64 @@ TEST_F(ViewedPlayTest, BeginsAnewWithOtherSettings) {
   EXPECT_TRUE(finish().interrupted);
 }
 
+/// What a report says of all its rows together.
+template <class Number>
+Number sum_of(const nlohmann::json& rows, const char* name) {
+  Number sum = 0;
+  for (const nlohmann::json& row : rows) sum += row.at(name).get<Number>();
+  return sum;
+}
+
+nlohmann::json written_report() {
+  return nlohmann::json::parse(read_all("report.json"));
+}
+
+TEST_F(ViewedPlayTest, TheReportIsOfTheWholeRun) {
+  start(options_of(cube));
+  point(0.5, 1.2, true);
+  ASSERT_TRUE(wait_for_ticks(50));
+  point(0.5, 1.05, false);
+  ASSERT_TRUE(wait_for_ticks(300));  // all that is felt
+  point(0.5, 3.0, true);
+  play_->reset();
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.ticks < 250; }));
+  ASSERT_TRUE(wait_for_ticks(20));
+  play_->change({{"friction", "0.25"}});
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.settings.contains("friction"); }));
+  ASSERT_TRUE(wait_for_ticks(20));
+  play_->change({{"stiffness-scale", "2"}});
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.settings.contains("stiffness-scale"); }));
+  ASSERT_TRUE(wait_for_ticks(20));
+  play_->record(true);
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.recording && state.ticks > 20; }));
+  play_->record(false);
+  ASSERT_TRUE(wait_for([](const RunState& state) { return !state.recording && state.ticks > 20; }));
+  const LoopReport report = finish();
+  EXPECT_GT(report.ticks, 430);
+  EXPECT_GT(report.ticks_in_contact, 100);
+  EXPECT_GT(report.largest_force, 0.01);
+  EXPECT_GT(report.largest_shown, 0.01);
+  EXPECT_LT(report.largest_force_time, 0.001 * static_cast<double>(report.ticks));
+  EXPECT_EQ(report.compute.total(), report.ticks);
+  EXPECT_EQ(report.lateness.total(), report.ticks);
+  const nlohmann::json json = written_report(), rows = json.at("parts");
+  std::vector<std::string> because;
+  for (const nlohmann::json& row : rows) because.push_back(row.at("because"));
+  EXPECT_EQ(because, (std::vector<std::string>{"start", "reset", "settings", "settings", "recording begun",
+                                               "recording ended"}));
+  for (const char* name : {"ticks", "ticks_in_contact", "deadline_misses"})
+    EXPECT_EQ(sum_of<std::int64_t>(rows, name), json.at(name)) << name;
+  EXPECT_EQ(json.at("ticks"), report.ticks);
+  EXPECT_EQ(json.at("largest_force_N"), rows[0].at("largest_force_N"));
+  EXPECT_EQ(rows[1].at("largest_force_N"), 0.0);
+  EXPECT_FALSE(rows[1].at("settings").contains("friction"));
+  EXPECT_EQ(rows[2].at("settings").at("friction"), "0.25");
+  EXPECT_EQ(rows[3].at("settings").at("stiffness-scale"), "2");
+  EXPECT_TRUE(rows[4].at("recording").get<std::string>().starts_with("cube2-20"));
+  EXPECT_TRUE(rows[5].at("recording").is_null());
+  EXPECT_EQ(rows[1].at("begun_s"), 0.001 * rows[0].at("ticks").get<double>());
+}
+
 /// A device that a hand holds: where it is said to be, each millisecond.
 class HeldPort : public DevicePort {
  public:
@@ -290,6 +349,80 @@ TEST_F(HeldDevice, AFaultOutlivesWhatAPageBegins) {
   }));
   EXPECT_TRUE(wait_for(is_latched));
   EXPECT_FALSE(play_->state().recording);
+}
+
+TEST_F(HeldDevice, TheReportKeepsWhatTheHandWasShownAndItsFaults) {
+  start_held();
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.phase == SafetyPhase::active; }));
+  height_ = 0.5;
+  ASSERT_TRUE(wait_for([](const RunState& state) { return state.fault == Fault::too_fast; }));
+  for (int k = 0; k < 3; ++k) {
+    const std::string friction = std::to_string(0.1 * (k + 1));
+    play_->change({{"friction", friction}});
+    ASSERT_TRUE(wait_for([&](const RunState& state) {
+      const auto set = state.settings.find("friction");
+      return set != state.settings.end() && set->second == friction && state.ticks > 20;
+    }));
+  }
+  const LoopReport report = finish();
+  EXPECT_EQ(report.faults[static_cast<std::size_t>(Fault::too_fast)], 1) << "it came once, and stayed";
+  const nlohmann::json json = written_report(), rows = json.at("parts");
+  ASSERT_EQ(rows.size(), 4U);
+  EXPECT_EQ(rows[0].at("faults"), 1);
+  for (std::size_t k = 1; k < rows.size(); ++k) EXPECT_EQ(rows[k].at("faults"), 0) << k;
+  EXPECT_EQ(json.at("safety").at("faults").at("too_fast"), 1) << json.at("safety");
+}
+
+TEST(LoopReport, AddsWhatCameLater) {
+  LoopReport first, later;
+  first.ticks = 2000;
+  first.largest_force = 1.0;
+  first.largest_force_time = 0.5;
+  first.largest_shown = 1.12;
+  first.faults[2] = 1;
+  first.status_ticks[1] = 4;
+  first.most_contacts = 7;
+  first.deadline_misses = 3;
+  first.compute.add(100);
+  first.lateness.add(2'000'000'000);
+  first.best_effort.add(StepStatus::not_converged, 1.0, 0.1, 0, 0.25);
+  first.replay.first_tick = -1;
+  later.ticks = 1000;
+  later.largest_force = 2.0;
+  later.largest_force_time = 0.25;
+  later.largest_jump = 0.5;
+  later.largest_jump_time = 0.125;
+  later.largest_shown = 0.3;
+  later.faults[2] = 1;
+  later.status_ticks[1] = 2;
+  later.most_contacts = 5;
+  later.deadline_misses = 1;
+  later.compute.add(5'000'000);
+  later.best_effort.add(StepStatus::not_converged, 1.0, 0.4, 2, 0.5);
+  later.replay.first_tick = 10;
+  later.replay.first_field = "force";
+  later.interrupted = true;
+  first.add(later);
+  EXPECT_EQ(first.ticks, 3000);
+  EXPECT_EQ(first.largest_force, 2.0);
+  EXPECT_EQ(first.largest_force_time, 2.25) << "of the run";
+  EXPECT_EQ(first.largest_jump_time, 2.125);
+  EXPECT_EQ(first.largest_shown, 1.12);
+  EXPECT_EQ(first.faults[2], 2);
+  EXPECT_EQ(first.status_ticks[1], 6);
+  EXPECT_EQ(first.most_contacts, 7);
+  EXPECT_EQ(first.deadline_misses, 4);
+  EXPECT_EQ(first.compute.total(), 2);
+  EXPECT_EQ(first.compute.worst(), 5'000'000);
+  EXPECT_EQ(first.compute.total_between(0, 200), 1);
+  EXPECT_EQ(first.lateness.worst(), 2'000'000'000);
+  EXPECT_EQ(first.best_effort.ticks, 2);
+  EXPECT_EQ(first.best_effort.most_left_out, 2);
+  EXPECT_EQ(first.best_effort.largest_error_time, 2.5);
+  EXPECT_NEAR(first.best_effort.median_error(), 0.1, 0.01);
+  EXPECT_EQ(first.replay.first_tick, 2010);
+  EXPECT_STREQ(first.replay.first_field, "force");
+  EXPECT_TRUE(first.interrupted);
 }
 
 TEST_F(ViewedPlayTest, NobodyIsInAPointer) {

@@ -2,9 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "base/error.h"
+#include "base/regular_file.h"
 #include "formats/model_file.h"
 #include "runtime/gallery/gallery_answers.h"
 #include "runtime/gallery/gallery_folder.h"
@@ -57,10 +60,47 @@ TEST(GalleryFolder, BodiesComeBeforeRecordingsAndWhatNoBodyWasMadeOf) {
     EXPECT_EQ(item.bytes, 5);
   }
   EXPECT_EQ(names, (std::vector<std::string>{"a.palpate.hdf", "b.palpate.hdf", "z.mcap", "c.stl"}));
-  EXPECT_EQ(free_name(folder.path(), "new.stl"), "new.stl");
-  EXPECT_EQ(free_name(folder.path(), "a.palpate.hdf"), "a-2.palpate.hdf");
-  static_cast<void>(folder.write("a-2.palpate.hdf", ""));
-  EXPECT_EQ(free_name(folder.path(), "a.palpate.hdf"), "a-3.palpate.hdf");
+}
+
+TEST(GalleryFolder, ANewNameMeetsNothingThatIsMadeOfIt) {
+  const ScratchFolder folder;
+  for (const char* const name : {"a.palpate.hdf", "a-2.model.toml", "b.model.toml", "c.palpate.hdf.partial",
+                                 "d.repaired.off", "e.mcap", "f.palpate.hdf", "model.palpate.hdf"})
+    static_cast<void>(folder.write(name, "12345"));
+  std::filesystem::create_symlink("nowhere", folder.path() / "f-2.stl");
+  for (const auto& [wanted, free] : {std::pair("new.stl", "new.stl"),
+                                     {"a.palpate.hdf", "a-3.palpate.hdf"},
+                                     {"a.stl", "a-3.stl"},
+                                     {"b.png", "b-2.png"},
+                                     {"c.nii.gz", "c-2.nii.gz"},
+                                     {"d.stl", "d-2.stl"},
+                                     {"e.mcap", "e-2.mcap"},
+                                     {"f.model.toml", "f-3.model.toml"},
+                                     {"model.toml", "model-2.model.toml"},
+                                     {"mymodel.toml", "mymodel.toml"}}) {
+    EXPECT_EQ(free_name(folder.path(), wanted), free) << wanted;
+    EXPECT_EQ(gallery_kind(free), gallery_kind(wanted)) << free;
+  }
+  EXPECT_EQ(baked_name("a.stl"), "a.palpate.hdf");
+  EXPECT_EQ(baked_name("a.b.nii.gz"), "a.b.palpate.hdf");
+  EXPECT_EQ(baked_name("a.model.toml"), "a.palpate.hdf");
+  EXPECT_EQ(baked_name("model.toml"), "model.palpate.hdf");
+}
+
+TEST(GalleryAnswers, ADropReplacesNothing) {
+  const ScratchFolder folder;
+  const auto theirs = folder.write("kidney.palpate.hdf", "theirs");
+  GalleryAnswers answers(folder.path(), {});
+  for (const auto& [dropped, kept] : {std::pair("kidney.palpate.hdf", "kidney-2.palpate.hdf"),
+                                      {"kidney.stl", "kidney-3.stl"},
+                                      {"kidney.model.toml", "kidney-4.model.toml"}}) {
+    const auto temporary = folder.write(".dropped", "new");
+    const RequestHeader header = request(http::verb::post, std::string("/drop?name=") + dropped);
+    EXPECT_EQ(nlohmann::json::parse(answers.keep_file(header, temporary).body())["name"], kept);
+    EXPECT_EQ(read_all(folder.path() / kept), "new");
+    EXPECT_FALSE(std::filesystem::exists(temporary));
+  }
+  EXPECT_EQ(read_all(theirs), "theirs");
 }
 
 TEST(GalleryFolder, ThousandsOfFilesAreListed) {
@@ -96,7 +136,10 @@ unsigned status_of_refusal(const RequestHeader& header) {
 TEST(GalleryAnswers, OnlyItsOwnPageIsAnswered) {
   EXPECT_EQ(status_of_refusal(get("/items?token=secret")), 0U);
   EXPECT_EQ(status_of_refusal(get("/items?token=other")), 403U);
-  EXPECT_EQ(status_of_refusal(get("/gallery")), 403U);
+  EXPECT_EQ(status_of_refusal(get("/gallery")), 0U) << "the page is the same for everybody";
+  EXPECT_EQ(status_of_refusal(request(http::verb::post, "/gallery?token=secret")), 405U);
+  for (const char* const path : {"/items", "/scene", "/opened", "/", "/galleryx", "/gallery/"})
+    EXPECT_EQ(status_of_refusal(get(path)), 403U) << path;
   EXPECT_EQ(status_of_refusal(request(http::verb::post, "/items?token=secret")), 405U);
   for (const char* const deed : {"/open", "/close", "/drop"}) {
     EXPECT_EQ(status_of_refusal(request(http::verb::post, std::string(deed) + "?token=secret")), 0U);
@@ -119,8 +162,9 @@ TEST(GalleryAnswers, FilesOfOtherFoldersAreNotThere) {
   static_cast<void>(folder.write("secret.palpate.hdf", "x"));
   GalleryAnswers answers(folder.path() / "shown", {});
   for (const char* const name : {"..%2Fsecret.palpate.hdf", "secret.palpate.hdf", "%2Fetc%2Fpasswd"})
-    for (const std::string path : {"/scene", "/open"})
-      EXPECT_EQ(answers.answer(get(path + "?name=" + name), served).result_int(), 404U) << name;
+    EXPECT_EQ(answers.answer(get(std::string("/open?name=") + name), served).result_int(), 404U) << name;
+  for (const char* const name : {"..%2Fsecret.palpate.hdf", "secret.palpate.hdf", "%2Fetc%2Fpasswd"})
+    EXPECT_EQ(answers.scene(get(std::string("/scene?name=") + name)).result_int(), 404U) << name;
   for (const char* const name : {"..%2Fa.stl", ".a.stl", "a.txt", ""})
     EXPECT_TRUE(GalleryAnswers::drop_refusal(request(http::verb::post, std::string("/drop?name=") + name)))
         << name;
@@ -138,6 +182,103 @@ TEST(GalleryAnswers, TheFolderIsTold) {
   EXPECT_EQ(told["items"][0]["kind"], "recording");
   EXPECT_EQ(told["items"][0]["bytes"], 3);
   EXPECT_EQ(answers.answer(get("/opened"), served).body(), "null");
+}
+
+std::string told(const std::string& port, const std::string& token) {
+  return "{\"url\": \"javascript:alert(1)\", \"port\": " + port + ", \"token\": \"" + token + "\"}";
+}
+
+TEST(GalleryPage, IsToldAsJsonAndNothingElse) {
+  const std::string token(32, 'a');
+  const auto page = page_told(told("8018", token));
+  ASSERT_TRUE(page);
+  EXPECT_EQ(page->port, 8018);
+  EXPECT_EQ(page->token, token);
+  for (const std::string& line :
+       {std::string(), "open http://127.0.0.1:8018/?token=" + token + " in a browser", std::string("null"),
+        std::string("[]"), std::string("{}"), std::string("{\"port\": 8018}"), told("0", token),
+        told("65536", token), told("-1", token), told("8018.5", token), told("\"8018\"", token),
+        told("8018", ""), told("8018", token + "a"), told("8018", "A" + token.substr(1)),
+        told("8018", "@evil.example/?" + token.substr(15))})
+    EXPECT_FALSE(page_told(line)) << line;
+}
+
+/// A program in the place of palpate-runtime: a shell script that is given what the gallery gives.
+class GalleryChild : public testing::Test {
+ protected:
+  std::filesystem::path script(const std::string& text) const {
+    const auto file = folder_.write("program", "#!/bin/sh\n" + text);
+    std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+    return file;
+  }
+  [[nodiscard]] OpenedItem::Wanted wanted(const std::string& name) const {
+    return {.folder = folder_.path(), .name = name, .gallery = {.port = 0}};
+  }
+  template <class Condition>
+  static OpenedItem::State wait_for(const OpenedItem& item, Condition&& is_so) {
+    for (;;) {
+      const std::optional<OpenedItem::State> state = item.state();
+      if (state && is_so(*state)) return *state;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+  void wait_for_file(const char* name) const {
+    while (!std::filesystem::exists(folder_.path() / name))
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(GalleryChild, WhatAFileSaysIsTextAndNoAddress) {
+  const std::string token(32, 'b');
+  OpenedItem item(
+      script("printf 'open javascript:alert(1) in a browser\\n\\033[31mred\\n' >&2\n"
+             "printf '{\"port\": 1, \"token\": \"' >&2; echo\n"
+             "echo '{\"port\": 8018, \"token\": \"" +
+             token + "\"}' >&3\nsleep 1000\n"));
+  item.open(wanted("a.palpate.hdf"));
+  const auto state = wait_for(item, [](const auto& one) { return one.page && one.said.size() > 1; });
+  EXPECT_EQ(state.page->port, 8018);
+  EXPECT_EQ(state.page->token, token);
+  EXPECT_EQ(state.said[0], "open javascript:alert(1) in a browser") << "a line like any other";
+  EXPECT_EQ(state.said[1], "\\x1b[31mred");
+  EXPECT_FALSE(state.has_ended);
+}
+
+TEST_F(GalleryChild, ThatHeedsNoSignalIsKilledAndNobodyWaitsForIt) {
+  OpenedItem item(script("case $2 in *stubborn*) trap '' TERM; echo > begun; kill -STOP $$;; esac\n"
+                         "echo \"here is $2\" >&2; exec sleep 1000\n"),
+                  std::chrono::milliseconds(200));
+  item.open(wanted("stubborn.palpate.hdf"));
+  wait_for_file("begun");
+  item.close();  // returns at once, as all that follows
+  EXPECT_FALSE(item.state());
+  item.open(wanted("never.palpate.hdf"));
+  item.open(wanted("next.palpate.hdf"));
+  EXPECT_EQ(item.state()->name, "next.palpate.hdf");
+  const auto state = wait_for(item, [](const auto& one) { return !one.said.empty(); });
+  EXPECT_EQ(state.said.front(), "here is " + (folder_.path() / "next.palpate.hdf").string());
+}
+
+TEST_F(GalleryChild, ThatEndsOrCannotBeStartedIsTold) {
+  OpenedItem item(script("echo 'error: no' >&2; exit 1\n"));
+  item.open(wanted("a.palpate.hdf"));
+  EXPECT_EQ(wait_for(item, [](const auto& one) { return one.has_ended; }).said.front(), "error: no");
+  OpenedItem none(folder_.path() / "nothing");
+  none.open(wanted("a.palpate.hdf"));
+  EXPECT_TRUE(test::contains(wait_for(none, [](const auto& one) { return one.has_ended; }).said.front(),
+                             "cannot be started"));
+}
+
+TEST_F(GalleryChild, ASourceMayWriteNoFileThatIsThere) {
+  OpenedItem item(script("echo \"$*\" >&2\n"));
+  item.open(wanted("foreign.model.toml"));
+  const auto state = wait_for(item, [](const auto& one) { return one.has_ended; });
+  const std::string folder = folder_.path().string() + "/";
+  EXPECT_TRUE(state.said.front().starts_with("push " + folder + "foreign.model.toml --output " + folder +
+                                             "foreign.palpate.hdf --keep --view-address 127.0.0.1:"))
+      << state.said.front();
 }
 
 TEST(GalleryScene, IsTheSurfaceAtRest) {

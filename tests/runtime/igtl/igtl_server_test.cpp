@@ -165,6 +165,29 @@ TEST_F(IgtlServing, WhoReadsNothingHoldsUpNobodyAndIsCut) {
   expect_served(other);
 }
 
+/// Each reads a little whenever the honest one tries, and so makes some progress all the time.
+TEST_F(IgtlServing, EightThatReadSlowlyGiveWay) {
+  namespace asio = boost::asio;
+  asio::io_context context;
+  std::vector<asio::ip::tcp::socket> slow;
+  for (std::size_t k = 0; k < most_igtl_clients; ++k) {
+    asio::ip::tcp::socket& one = slow.emplace_back(context);
+    one.open(asio::ip::tcp::v4());
+    one.set_option(asio::socket_base::receive_buffer_size(4096));
+    one.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(port_)});
+  }
+  std::array<char, 30> little{};
+  for (int attempt = 0; attempt < 500; ++attempt) {
+    show();
+    for (asio::ip::tcp::socket& one : slow)
+      static_cast<void>(recv(one.native_handle(), little.data(), little.size(), MSG_DONTWAIT));
+    IgtlReader honest(port_);
+    if (!honest.read().empty()) return expect_served(honest);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  FAIL() << "slow readers keep all others out";
+}
+
 TEST(IgtlSocket, RefusesWhatItCannotHave) {
   const ListeningSocket first({}, "--igtl");
   try {

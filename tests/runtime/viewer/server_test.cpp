@@ -125,7 +125,12 @@ TEST_F(Viewer, ServesItsPageAndNothingElse) {
   EXPECT_EQ(page["Referrer-Policy"], "no-referrer");
   EXPECT_EQ(page["Cross-Origin-Resource-Policy"], "same-origin");
   EXPECT_EQ(page.count("Access-Control-Allow-Origin"), 0U);
-  EXPECT_TRUE(page["Content-Security-Policy"].starts_with("default-src 'none';"));
+  const std::string policy(page["Content-Security-Policy"]);
+  EXPECT_TRUE(policy.starts_with("default-src 'none'; script-src ")) << policy;
+  EXPECT_EQ(policy.find("unsafe"), std::string::npos) << policy;
+  EXPECT_NE(policy.find("connect-src 'self' ws://127.0.0.1:" + std::to_string(port()) + ";"),
+            std::string::npos)
+      << policy;
 
   const test::Answer header = test::ask(served(), {.target = "/"}, http::verb::head);
   EXPECT_EQ(header.result_int(), 200U);
@@ -144,7 +149,13 @@ TEST_F(Viewer, RefusesForeignHostsAndPages) {
   const std::string own = "127.0.0.1:" + std::to_string(port());
   const std::string foreign = "evil.example:" + std::to_string(port());
   EXPECT_EQ(test::ask(served(), {.target = "/", .host = foreign}).result_int(), 403U);
-  EXPECT_EQ(test::ask(served(), {.target = "/", .host = "127.0.0.1"}).result_int(), 403U);
+  EXPECT_EQ(test::ask(served(), {.target = "/", .host = "192.168.1.5:9000"}).result_int(), 403U);
+  EXPECT_TRUE(test::ask(served(), {.target = "/", .host = foreign}).body().find("lead here") !=
+              std::string::npos);
+  for (const char* tunnel : {"localhost:9000", "127.0.0.1", "[::1]:1"})
+    EXPECT_EQ(Client(served(), {.host = tunnel, .origin = std::string("http://") + tunnel}).status, 101U)
+        << tunnel;
+  EXPECT_EQ(Client(served(), {.host = "localhost:9000", .origin = "http://localhost:9001"}).status, 403U);
   EXPECT_EQ(test::ask(served(), {.target = "/", .origin = "http://evil.example"}).result_int(), 403U);
   EXPECT_EQ(Client(served(), {.host = foreign, .origin = "http://" + foreign}).status, 403U);
   EXPECT_EQ(Client(served(), {.origin = "http://evil.example"}).status, 403U);
@@ -173,7 +184,8 @@ TEST_F(Viewer, ServesTheBookToEveryPageOfThisAddress) {
   EXPECT_EQ(page[http::field::content_type], "text/html; charset=utf-8");
   EXPECT_EQ(page["X-Content-Type-Options"], "nosniff");
   EXPECT_EQ(page["Cross-Origin-Resource-Policy"], "same-origin");
-  EXPECT_TRUE(page["Content-Security-Policy"].starts_with("default-src 'none';"));
+  EXPECT_TRUE(page["Content-Security-Policy"].starts_with(
+      "default-src 'none'; script-src 'self'; style-src 'self';"));
   EXPECT_EQ(ask({.target = "/book/index.html?q=tool"}).body(), "the book");
   EXPECT_EQ(ask({.target = "/book/page.css"})[http::field::content_type], "text/css; charset=utf-8");
   EXPECT_EQ(ask({.target = "/book/index.html"}, http::verb::head)[http::field::content_length], "8");

@@ -172,14 +172,48 @@ TEST(RunWords, StateIsTheRunsAndThePages) {
 }
 
 TEST(Admission, HostIsTheAddressServed) {
-  for (const char* host : {"127.0.0.1:8017", "localhost:8017", "LocalHost:8017", "[::1]:8017"})
+  for (const char* host : {"127.0.0.1:8017", "localhost:8017", "LocalHost:8017", "[::1]:8017",
+                           "localhost:9000", "127.0.0.1:8018", "127.0.0.1:1", "127.255.3.4:65535",
+                           "[::1]:9000", "localhost", "127.0.0.1"})  // a tunnel's port is any
     EXPECT_TRUE(is_served(host, "127.0.0.1", 8017)) << host;
-  for (const char* host : {"", "127.0.0.1", "127.0.0.1:8018", "127.0.0.1:80170", "127.0.0.1:8017:8017",
-                           "evil.example:8017", "localhost.evil.example:8017", "192.168.1.5:8017",
-                           "[::1:8017", "::1:8017", ":8017", "[]:8017", "[fe80::1]:8017"})
+  for (const char* host : {"",
+                           "127.0.0.1:80170",
+                           "127.0.0.1:8017:8017",
+                           "127.0.0.1:0",
+                           "127.0.0.1:-1",
+                           "127.0.0.1:",
+                           "localhost:80x",
+                           "localhost: 80",
+                           "localhost.:8017",
+                           "a.localhost:8017",
+                           "127.0.0.1.evil.example:8017",
+                           "127.1:8017",
+                           "127.0.0.256:8017",
+                           "127.0.0.01:8017",
+                           "128.0.0.1:8017",
+                           "0x7f.0.0.1:8017",
+                           "2130706433:8017",
+                           "[::1%lo]:8017",
+                           "[::2]:8017",
+                           "[::ffff:127.0.0.1]:8017",
+                           "localhost@evil.example:8017",
+                           "evil.example@localhost:8017",
+                           "evil.example",
+                           "evil.example:9000",
+                           "192.168.1.5",
+                           "evil.example:8017",
+                           "localhost.evil.example:8017",
+                           "192.168.1.5:8017",
+                           "[::1:8017",
+                           "::1:8017",
+                           ":8017",
+                           "[]:8017",
+                           "[fe80::1]:8017"})
     EXPECT_FALSE(is_served(host, "127.0.0.1", 8017)) << host;
   EXPECT_TRUE(is_served("192.168.1.5:8017", "192.168.1.5", 8017));
   EXPECT_FALSE(is_served("192.168.1.6:8017", "192.168.1.5", 8017));
+  EXPECT_FALSE(is_served("192.168.1.5:9000", "192.168.1.5", 8017));
+  EXPECT_FALSE(is_served("192.168.1.5:9000", "0.0.0.0", 8017));
   EXPECT_TRUE(is_served("192.168.1.6:8017", "0.0.0.0", 8017));
   EXPECT_TRUE(is_served("[fe80::1]:8017", "::", 8017));
   EXPECT_TRUE(is_served("localhost", "127.0.0.1", 80));
@@ -189,6 +223,8 @@ TEST(Admission, HostIsTheAddressServed) {
 
 TEST(Admission, OriginIsThePageServed) {
   EXPECT_TRUE(is_own_page("http://127.0.0.1:8017", "127.0.0.1:8017"));
+  EXPECT_TRUE(is_own_page("http://localhost:9000", "localhost:9000"));
+  EXPECT_FALSE(is_own_page("http://localhost:9000", "localhost:8017")) << "another program of this machine";
   for (const char* origin : {"https://127.0.0.1:8017", "http://127.0.0.1:8018", "http://evil.example", "null",
                              "http://127.0.0.1:8017/", "http://localhost:8017", ""})
     EXPECT_FALSE(is_own_page(origin, "127.0.0.1:8017")) << origin;
