@@ -8,6 +8,8 @@
 namespace palpate {
 namespace {
 
+constexpr int most_rounds = 400;  // of the solver: no tick waits for it
+
 /// A normal and d - 1 tangents, in the plane within it. Columns.
 Mat3 frame_of(const Vec3& normal, int d) noexcept {
   Mat3 frame;
@@ -26,6 +28,7 @@ WallContacts::WallContacts(const LiveBody& body, std::vector<Wall> walls, Index 
       active_set_(body.dimension() * most_),
       cone_solver_(most_, body.dimension() * most_) {
   check_walls(walls_);
+  cone_solver_.take_time(most_rounds);
   const int d = body.dimension();
   for (Index node = 0; node < std::ssize(body.mesh().nodes); ++node) {
     const auto free =
@@ -119,15 +122,22 @@ void WallContacts::gather(const Eigen::MatrixXd& moved_by, const Eigen::MatrixXd
 }
 
 bool WallContacts::solve(const TangentSolver& A, double ahead, Eigen::VectorXd& x) {
-  if (contacts_.empty()) return true;
+  bool solved = true;
+  while (!contacts_.empty()) {
+    solved = solve_found(A, ahead, x);
+    if (!find(from_ + ahead * (x - from_))) break;
+  }
+  return solved;
+}
+
+/// As `solve`, with the contacts that are known.
+bool WallContacts::solve_found(const TangentSolver& A, double ahead, Eigen::VectorXd& x) {
   const int d = body_.dimension();
   const Eigen::MatrixXd J = directions();
   const Eigen::MatrixXd moved_by = A.by_factor(J);
   gather(moved_by, J, ahead, x);
   const std::vector<double> before(problem_.lambda.begin(), problem_.lambda.begin() + problem_.rows);
-  bool solved = false;
-  for (int round = 0; round < 8 && !solved; ++round)
-    solved = problem_.frictionless ? active_set_.solve(problem_) : cone_solver_.solve(problem_);
+  const bool solved = problem_.frictionless ? active_set_.solve(problem_) : cone_solver_.solve(problem_);
   Eigen::VectorXd change(problem_.rows);
   for (Index row = 0; row < problem_.rows; ++row)
     change[row] = problem_.lambda[static_cast<std::size_t>(row)] - before[static_cast<std::size_t>(row)];

@@ -31,8 +31,9 @@ class WallContacts {
   bool find(const Eigen::VectorXd& x);
 
   /// Given x [d N] as it is by the forces so far, finds the forces with which it is to be, and moves x by
-  /// what they change, dx = A^-1 J^T dlambda. `ahead`: x at the end of the step is as many times as far from
-  /// its beginning as x is. False where the contact solver did not get there.
+  /// what they change, dx = A^-1 J^T dlambda; again where nodes are in a wall then that were not before.
+  /// `ahead`: x at the end of the step is as many times as far from its beginning as x is. False where the
+  /// contact solver did not get there.
   bool solve(const TangentSolver& A, double ahead, Eigen::VectorXd& x);
 
   /// Adds the forces [d N] to f [N].
@@ -48,6 +49,7 @@ class WallContacts {
   [[nodiscard]] const std::vector<Contact>& contacts() const noexcept { return contacts_; }
 
  private:
+  bool solve_found(const TangentSolver& A, double ahead, Eigen::VectorXd& x);
   void gather(const Eigen::MatrixXd& moved_by, const Eigen::MatrixXd& J, double ahead,
               const Eigen::VectorXd& x);
   [[nodiscard]] Eigen::MatrixXd directions() const;

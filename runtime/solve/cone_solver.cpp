@@ -370,8 +370,7 @@ bool ConeSolver::solve(ContactProblem& problem) noexcept {
 }
 
 bool ConeSolver::budget_spent() const noexcept {
-  return rounds_ >= tuning.cone.most_rounds ||
-         (rounds_ >= tuning.cone.fewest_rounds && work_ >= tuning.cone.most_work);
+  return rounds_ >= most_rounds_ || (rounds_ >= tuning.cone.fewest_rounds && work_ >= most_work_);
 }
 
 void ConeSolver::derivative(const ContactProblem& problem, std::span<const double> db,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -19,10 +20,17 @@ namespace palpate {
 /// forces to where they are, and are made weaker from step to step (Rockafellar 1976). Residual: the largest
 /// difference of the two sides. Solved are the contacts that the guess closes (without a guess: those that
 /// are closed without friction); those left out that are then penetrated are taken in. The budget is
-/// ConeTuning's `most_rounds` rounds, and beyond the fourth `most_work`. All memory is taken at construction.
+/// ConeTuning's `most_rounds` rounds, and beyond the fourth `most_work`, or what `take_time` says. All memory
+/// is taken at construction.
 class ConeSolver {
  public:
   ConeSolver(Index max_contacts, Index max_rows);
+
+  /// From now on no tick waits: the budget is so many rounds, whatever they cost.
+  void take_time(int most_rounds) noexcept {
+    most_rounds_ = most_rounds;
+    most_work_ = std::numeric_limits<double>::infinity();
+  }
 
   /// Fills problem.lambda from the guess in it, to `tolerance` where the budget suffices. False when the
   /// residual is over `accepted`, or a contact left out is penetrated: lambda is then the best that was
@@ -83,8 +91,8 @@ class ConeSolver {
   std::vector<double> guess_;     // [rows]
   std::vector<double> diagonal_;  // [rows] of W
   std::vector<double> b_;         // [rows]
-  double work_ = 0.0;
-  int rounds_ = 0;
+  double work_ = 0.0, most_work_ = tuning.cone.most_work;
+  int rounds_ = 0, most_rounds_ = tuning.cone.most_rounds;
 };
 
 }  // namespace palpate

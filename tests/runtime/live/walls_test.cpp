@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -57,6 +58,51 @@ TEST(Walls, ABlockBeginsToSlideAtTheFrictionAngle) {
       EXPECT_NEAR(speed / 0.005, 1.0, 0.1) << mu;  // v = g (sin - mu cos) t
     }
   }
+}
+
+/// How fast a free cube of 40 x 40 x 30 mm still moves along an incline of friction 0.5 after a second [m/s].
+double creep(const std::array<int, 3>& cells, double youngs_modulus, Integrator integrator, double h,
+             double degrees) {
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const Material material{.youngs_modulus = youngs_modulus, .poissons_ratio = 0.3, .density = 1000.0};
+  const LiveBody body(
+      test::live_input_of(generate(BoxShape{Vec3::Zero(), Vec3(0.04, 0.04, 0.03), cells}, ElementType::hex8),
+                          material),
+      {.law = LiveLaw::corotational,
+       .damping = {.stiffness = 1e-3},
+       .gravity = g * Vec3(std::sin(angle), 0.0, -std::cos(angle))});
+  LiveStepper stepper(body, {.time_step = h,
+                             .scheme = {.integrator = integrator, .tolerance = 1e-5},
+                             .walls = {{.normal = Vec3::UnitZ(), .offset = 0.0, .friction = 0.5}}});
+  LiveState state(body);
+  const auto along = [&] {
+    double moment = 0.0, mass = 0.0;
+    for (Eigen::Index k = 0; k < body.dofs(); k += 3) {
+      moment += body.mass()[k] * state.x[k];
+      mass += body.mass()[k];
+    }
+    return moment / mass;
+  };
+  const auto go = [&](double time) {
+    for (int k = 0; k < std::lround(time / h); ++k) EXPECT_TRUE(stepper.step(state).whole);
+  };
+  go(1.0);
+  const double before = along();
+  go(0.2);
+  return std::abs(along() - before) / 0.2;
+}
+
+TEST(Walls, ABlockRestsBelowTheFrictionAngle) {
+  constexpr double still = 1e-5;  // [m/s]
+  constexpr std::array<int, 3> coarse = {4, 4, 3}, fine = {6, 6, 4};
+  for (const double degrees : {18.0, 22.0, 26.0}) {
+    EXPECT_LT(creep(coarse, 5e4, Integrator::implicit_euler, 5e-3, degrees), still) << degrees;
+    EXPECT_LT(creep(coarse, 5e4, Integrator::implicit_euler, 1e-2, degrees), still) << degrees;
+  }
+  EXPECT_LT(creep(coarse, 1e6, Integrator::implicit_euler, 5e-3, 20.0), still);
+  EXPECT_LT(creep(coarse, 5e4, Integrator::midpoint, 5e-3, 22.0), still);
+  EXPECT_LT(creep(coarse, 5e4, Integrator::newmark, 5e-3, 22.0), still);
+  EXPECT_LT(creep(fine, 5e4, Integrator::implicit_euler, 1e-2, 20.0), still);
 }
 
 // Each node for itself. (A whole elastic block slides with some percent less: it shivers, as steady sliding
