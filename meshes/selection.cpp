@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "meshes/edge_middles.h"
 #include "meshes/element.h"
 
 namespace palpate {
@@ -68,6 +69,7 @@ struct SelectMeshNodes : SelectPoints {
       }
       marks[static_cast<std::size_t>(node)] = 1;
     }
+    for (const Index middle : middles_between(mesh, s.nodes)) marks[static_cast<std::size_t>(middle)] = 1;
     return marks;
   }
   Marks operator()(const SelectTag& s) const {

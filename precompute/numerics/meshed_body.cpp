@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "meshes/check.h"
+#include "meshes/edge_middles.h"
 #include "meshes/readers/volume_mesh.h"
 #include "precompute/geometry/cgal_surface_mesh.h"
 #include "precompute/geometry/image_mesh.h"
@@ -149,6 +150,31 @@ void check_dimension(const Mesh& mesh, const Description& description, const std
   }
 }
 
+/// Tells of lists of nodes that select middles of edges too.
+void note_middles(const Description& description, MeshedBody& body) {
+  const auto note = [&](const std::string& entry, const Selection& where) {
+    const auto* const listed = std::get_if<SelectNodes>(&where);
+    const std::size_t middles = listed == nullptr ? 0 : middles_between(body.mesh, listed->nodes).size();
+    if (middles == 0) return;
+    body.notes.push_back(
+        fmt::format("{}: with the {} listed nodes count the middles of the edges between them, {}", entry,
+                    listed->nodes.size(), middles));
+  };
+  for (std::size_t k = 0; k < description.fixed.size(); ++k)
+    note(fmt::format("[[fixed]] number {}", k + 1), description.fixed[k].where);
+  for (std::size_t k = 0; k < description.loads.size(); ++k) {
+    std::visit(
+        [&](const auto& load) {
+          if constexpr (requires { load.where; }) note(fmt::format("[[load]] number {}", k + 1), load.where);
+        },
+        description.loads[k]);
+  }
+  if (description.overlay) {
+    for (const Selection& where : description.overlay->regions) note("[[overlay.region]]", where);
+  }
+  if (description.warp && description.warp->where) note("[warp]", *description.warp->where);
+}
+
 }  // namespace
 
 MeshedBody mesh_body(const Description& description, const ProgressText& progress) {
@@ -175,6 +201,7 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   }
   check_connected(body.mesh, where);
   body.surface = extract_surface(body.mesh);
+  note_middles(description, body);
 
   body.material_of_element = materials_of_elements(body.mesh, description.materials, toml);
   FixedNodes held = hold_nodes(body.mesh, description.fixed, toml);

@@ -1,6 +1,7 @@
 // Selections of nodes and elements.
 #include <gtest/gtest.h>
 
+#include "meshes/edge_middles.h"
 #include "meshes/element.h"
 #include "meshes/selection.h"
 #include "tests/support/meshes_bodies.h"
@@ -41,6 +42,23 @@ TEST(Select, EachKindOfSelection) {
   EXPECT_EQ(select(SelectNodes{{7, 3, 7}}), (std::vector<std::size_t>{3, 7}));
   EXPECT_EQ(select(SelectLowest{2, 1.0 / 3.0}), where([](const Vec3& g) { return g.z() <= 1; }));
   EXPECT_EQ(select(SelectLowest{0, 0.0}), where([](const Vec3& g) { return g.x() == 0; }));
+}
+
+TEST(Select, MiddlesOfEdgesBetweenListedNodes) {
+  const Mesh corners = block(ElementType::tet4), mesh = with_elements(corners, ElementType::tet10, "");
+  const auto on_face = [](const Vec3& x) { return x.z() < 1e-9; };
+  SelectNodes listed;
+  std::vector<std::size_t> face;  // of all nodes, middles too
+  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
+    if (!on_face(mesh.nodes[node])) continue;
+    face.push_back(node);
+    if (node < corners.nodes.size()) listed.nodes.push_back(static_cast<Index>(node));
+  }
+  EXPECT_EQ(marked(select_nodes(mesh, listed, "")), face);
+  EXPECT_EQ(middles_between(mesh, listed.nodes).size(), face.size() - listed.nodes.size());
+  EXPECT_EQ(marked(select_nodes(corners, listed, "")).size(), listed.nodes.size());
+  EXPECT_TRUE(middles_between(mesh, std::vector<Index>(face.begin(), face.end())).empty());
+  EXPECT_EQ(marked(select_nodes(mesh, SelectNodes{{listed.nodes[0]}}, "")).size(), 1U);
 }
 
 TEST(Select, NodesByTagOfAnyKindOfFacet) {

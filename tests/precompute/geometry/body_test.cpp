@@ -306,6 +306,11 @@ TEST(Body, ElementsOfFiles) {
   };
   EXPECT_EQ(body("tet4").mesh.nodes.size(), 5U);
   EXPECT_EQ(body("tet10").mesh.nodes.size(), 14U);  // nine edges
+  EXPECT_EQ(count_fixed(body("tet4")), 3U);
+  EXPECT_TRUE(body("tet4").notes.empty());
+  EXPECT_EQ(count_fixed(body("tet10")), 6U);  // middles of the three edges of the side
+  ASSERT_EQ(body("tet10").notes.size(), 1U);
+  expect_mentions(body("tet10").notes.front(), {"[[fixed]] number 1", "3 listed nodes", "middles"});
   EXPECT_EQ(body("tet10").mesh.regions, (Elements{5, 9}));
   expect_mentions(error_of([&] { body("hex8"); }), {"two.msh", "tet4", "hex8"});
 }
