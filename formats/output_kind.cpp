@@ -159,7 +159,8 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
     case OutputKind::contacts:
       return text.starts_with("x,y,z,nx,ny,nz,fx,fy,fz,gap,");
     case OutputKind::field:
-      return text.starts_with("node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n");
+      return text.starts_with("node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n") ||
+             text.starts_with("node,x,y,z,u0x,u0y,u0z,ux,uy,uz,sxx,syy,szz,sxy,syz,szx,von_mises\n");
     case OutputKind::grid:
       return is_our_xml(text,
                         "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "

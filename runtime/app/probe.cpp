@@ -234,7 +234,9 @@ int probe(const ProbeOptions& options) {
   if (!options.field.empty()) {
     std::vector<double> u(static_cast<std::size_t>(body.greens().order()));
     contact.displace(body, u);
-    write_field(field, body, overlay ? &*overlay : nullptr, u);
+    std::vector<double> force(u.size());
+    for (const Answer& answer : answers) set_vector(force, body.dimension(), answer.stored, answer.force);
+    write_field(field, body, overlay ? &*overlay : nullptr, u, force);
   }
   if (options.json) {
     print_json(answers, warnings, options);

@@ -1,9 +1,12 @@
 #include "runtime/app/probe_field.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <limits>
+#include <map>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -11,6 +14,7 @@
 #include "base/write_file.h"
 #include "meshes/node_vectors.h"
 #include "meshes/readers/vtu_writer.h"
+#include "runtime/background/surface_stress.h"
 #include "runtime/body/surface_numbering.h"
 
 namespace palpate {
@@ -22,15 +26,40 @@ struct FieldNode {
   Vec3 x;      // in the mesh [m]
   Vec3 u0;     // displacement at rest [m]
   Vec3 u;      // by the probe, from rest [m]
+  Stress stress = Stress::Constant(std::numeric_limits<double>::quiet_NaN());
 };
 
-FieldNode body_node(const Body& body, Index node, std::span<const double> u) {
-  const Model& model = body.model();
-  const auto at = static_cast<std::size_t>(node);
-  const Index stored = body.stored_node(node);
-  return {node, model.mesh.nodes[at], model.rest_displacement[at],
-          stored < 0 ? Vec3(Vec3::Zero()) : vector_at(u, body.dimension(), stored)};
-}
+/// What a probe has found of the body.
+struct Probed {
+  const Body& body;
+  std::span<const double> u;            // [n]
+  std::map<Index, Stress> stress = {};  // by node of the mesh
+
+  [[nodiscard]] FieldNode node(Index node) const {
+    const Model& model = body.model();
+    const auto at = static_cast<std::size_t>(node);
+    const Index stored = body.stored_node(node);
+    FieldNode result{node, model.mesh.nodes[at], model.rest_displacement[at],
+                     stored < 0 ? Vec3(Vec3::Zero()) : vector_at(u, body.dimension(), stored)};
+    if (const auto found = stress.find(node); found != stress.end()) result.stress = found->second;
+    return result;
+  }
+
+  /// Finds the stress on the surface by its displacement and the forces [n] on it [N].
+  void find_stress(std::span<const double> force) {
+    const std::span<const Index> nodes = body.surface_mesh_nodes();
+    std::vector<Vec3> moved, pushed;
+    for (const Index node : nodes) {
+      const FieldNode at = this->node(node);
+      const Index stored = body.stored_node(node);
+      moved.push_back(at.u0 + at.u);
+      pushed.push_back(stored < 0 ? Vec3(Vec3::Zero()) : vector_at(force, body.dimension(), stored));
+    }
+    std::vector<Stress> found(nodes.size());
+    SurfaceStress(body).evaluate(moved, pushed, nullptr, found);
+    for (std::size_t k = 0; k < nodes.size(); ++k) stress.emplace(nodes[k], found[k]);
+  }
+};
 
 /// The nodes of the fine mesh, those that the body has too among them: u = u_G + u_L.
 std::vector<FieldNode> fine_nodes(const Body& body, const Overlay& overlay, std::span<const double> u) {
@@ -58,17 +87,17 @@ std::vector<FieldNode> fine_nodes(const Body& body, const Overlay& overlay, std:
 }
 
 /// A row a stored node, and then a row a node that only the fine mesh has.
-void write_csv(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
-               std::span<const double> u) {
-  std::string csv = "node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n";
+void write_csv(const std::filesystem::path& file, const Probed& probed, const Overlay* overlay) {
+  const Body& body = probed.body;
+  std::string csv = "node,x,y,z,u0x,u0y,u0z,ux,uy,uz,sxx,syy,szz,sxy,syz,szx,von_mises\n";
   const auto add = [&csv](const FieldNode& at) {
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", at.node, at.x.x(), at.x.y(), at.x.z(), at.u0.x(),
-                       at.u0.y(), at.u0.z(), at.u.x(), at.u.y(), at.u.z());
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", at.node, at.x.x(), at.x.y(), at.x.z(),
+                       at.u0.x(), at.u0.y(), at.u0.z(), at.u.x(), at.u.y(), at.u.z(),
+                       fmt::join(at.stress, ","), von_mises(at.stress));
   };
-  for (Index stored = 0; stored < body.greens().nodes(); ++stored)
-    add(body_node(body, body.mesh_node(stored), u));
+  for (Index stored = 0; stored < body.greens().nodes(); ++stored) add(probed.node(body.mesh_node(stored)));
   if (overlay != nullptr) {
-    for (const FieldNode& node : fine_nodes(body, *overlay, u)) {
+    for (const FieldNode& node : fine_nodes(body, *overlay, probed.u)) {
       if (node.node < 0) add(node);
     }
   }
@@ -130,38 +159,45 @@ std::vector<std::size_t> keep_used_nodes(Cells& cells, std::size_t nodes) {
 
 /// A grid of the undeformed body with u0 and u0 + u, which is what is seen. Nodes that are not stored are
 /// held along every axis and shown at rest.
-void write_grid(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
-                std::span<const double> u) {
+void write_grid(const std::filesystem::path& file, const Probed& probed, const Overlay* overlay) {
+  const Body& body = probed.body;
   const auto body_nodes = static_cast<Index>(body.model().mesh.nodes.size());
   std::vector<FieldNode> all;
   all.reserve(body.model().mesh.nodes.size());
-  for (Index node = 0; node < body_nodes; ++node) all.push_back(body_node(body, node, u));
+  for (Index node = 0; node < body_nodes; ++node) all.push_back(probed.node(node));
   Cells cells = shown_cells(body);
   if (overlay != nullptr) {
     lay_over(cells, body, overlay->patch());
-    const std::vector<FieldNode> fine = fine_nodes(body, *overlay, u);
+    const std::vector<FieldNode> fine = fine_nodes(body, *overlay, probed.u);
     all.insert(all.end(), fine.begin(), fine.end());
   }
   std::vector<Vec3> nodes;
-  std::vector<double> rest, total;
+  std::vector<double> rest, total, stress, equivalent;
   for (const std::size_t k : keep_used_nodes(cells, all.size())) {
     nodes.push_back(all[k].x);
     const Vec3 seen = all[k].u0 + all[k].u;
     rest.insert(rest.end(), all[k].u0.begin(), all[k].u0.end());
     total.insert(total.end(), seen.begin(), seen.end());
+    stress.insert(stress.end(), all[k].stress.begin(), all[k].stress.end());
+    equivalent.push_back(von_mises(all[k].stress));
   }
-  const std::vector<NodalField> fields = {{"displacement", 3, total}, {"rest_displacement", 3, rest}};
+  const std::vector<NodalField> fields = {{"displacement", 3, total},
+                                          {"rest_displacement", 3, rest},
+                                          {"stress", 6, stress},
+                                          {"von_mises", 1, equivalent}};
   write_vtu(file, nodes, cells.element, cells.connectivity, fields);
 }
 
 }  // namespace
 
 void write_field(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
-                 std::span<const double> u) {
+                 std::span<const double> u, std::span<const double> force) {
+  Probed probed{body, u};
+  if (overlay == nullptr) probed.find_stress(force);
   if (file.extension() == ".csv") {
-    write_csv(file, body, overlay, u);
+    write_csv(file, probed, overlay);
   } else {
-    write_grid(file, body, overlay, u);
+    write_grid(file, probed, overlay);
   }
 }
 

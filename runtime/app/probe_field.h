@@ -10,9 +10,10 @@
 namespace palpate {
 
 /// Writes u [n], the displacement of all stored nodes from rest [m], beside u0, that at rest: a table where
-/// `file` ends in .csv, else a grid for ParaView (.vtu). An overlay, which may be null, adds its fine mesh.
-/// Throws Error when the file cannot be written.
+/// `file` ends in .csv, else a grid for ParaView (.vtu). With it the stress by u0 + u at nodes of the surface
+/// that feel `force` [n] [N]; not a number inside, where the surface is held, and with an overlay, which may
+/// be null and adds its fine mesh. Throws Error when the file cannot be written.
 void write_field(const std::filesystem::path& file, const Body& body, const Overlay* overlay,
-                 std::span<const double> u);
+                 std::span<const double> u, std::span<const double> force);
 
 }  // namespace palpate

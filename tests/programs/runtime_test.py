@@ -16,7 +16,8 @@ from programs import PATIENCE, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, palp
 
 TOUCH = "t,x,y,z,grab\n0,0.5,0.5,1.2,1\n0.1,0.5,0.5,1,1\n0.2,0.5,0.5,0.95,1\n0.3,0.5,0.5,1.0,0\n"
 HANDING_OVER = 1 << 10  # runtime/tick/status.h
-FIELD_COLUMNS = ("node", "x", "y", "z", "u0x", "u0y", "u0z", "ux", "uy", "uz")
+STRESS_COLUMNS = ("sxx", "syy", "szz", "sxy", "syz", "szx")
+FIELD_COLUMNS = ("node", "x", "y", "z", "u0x", "u0y", "u0z", "ux", "uy", "uz", *STRESS_COLUMNS, "von_mises")
 
 
 def square_toml(element="quad4", scope="full", name="square"):
@@ -286,6 +287,22 @@ class Rest(ProgramTest):
             numpy.testing.assert_array_equal(arrays["displacement"][on_rollers[:, axis], axis], u0[on_rollers[:, axis], axis])
             rolling = on_rollers[:, axis] & (on_rollers.sum(axis=1) == 1)
             self.assertGreater(numpy.abs(moved[rolling]).max(), 1e-4)
+
+    def test_stress_at_rest_is_the_traction(self):
+        for plane in (True, False):
+            loaded = self.bake(rollers_toml(plane, self.STRESS), name="loaded.toml")
+            csv, vtu = self.folder / "out.csv", self.folder / "out.vtu"
+            for field in (csv, vtu):
+                self.probe(loaded, "--node", 24 if plane else 124, "--displace", "0,0" if plane else "0,0,0", "--field", field)
+            expected = numpy.zeros(6)
+            expected[1 if plane else 2] = self.STRESS
+            rows = numpy.genfromtxt(csv, delimiter=",", names=True)
+            stress = numpy.column_stack([rows[c] for c in STRESS_COLUMNS])
+            self.assertGreater(len(stress), 10)
+            numpy.testing.assert_allclose(stress, numpy.tile(expected, (len(stress), 1)), atol=1e-12)
+            numpy.testing.assert_allclose(rows["von_mises"], self.STRESS, atol=1e-12)
+            array = read_grid(vtu).GetPointData().GetArray("stress")
+            numpy.testing.assert_allclose(array.GetTuple(array.GetNumberOfTuples() - 1), expected, atol=1e-12)
 
     def test_in_the_plane(self):
         self.check(plane=True)

@@ -26,6 +26,7 @@ const std::vector<Example> examples = {
      "{\n  \"file\": \"a.hdf\",\n  \"model\": \"a\",\n  \"fast\": true,\n  \"tool\": {}\n"},
     {OutputKind::contacts, "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held\n"},
     {OutputKind::field, "node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n"},
+    {OutputKind::field, "node,x,y,z,u0x,u0y,u0z,ux,uy,uz,sxx,syy,szz,sxy,syz,szx,von_mises\n"},
     {OutputKind::grid, "<?xml version=\"1.0\"?>\n<!-- palpate 0.1.0 -->\n<VTKFile type=\"UnstructuredGrid\""},
     {OutputKind::grid,
      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
