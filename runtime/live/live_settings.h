@@ -30,7 +30,7 @@ struct LiveSettings {
   Integrator integrator = Integrator::implicit_euler;      ///< not explicit Euler
   SolverKind step_solver = SolverKind::factor;             ///< of the equations of an implicit step
   Vec3 gravity = Vec3::Zero();                             ///< [m/s^2]
-  double mass_damping = 1.0;                               ///< [1/s]
+  double mass_damping = 0.0;                               ///< [1/s]
   double stiffness_damping = 0.001;                        ///< [s]
   double yield = std::numeric_limits<double>::infinity();  ///< as in Plasticity
   double creep = 10.0;                                     ///< as in Plasticity [1/s]

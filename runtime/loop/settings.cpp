@@ -320,8 +320,9 @@ void for_each_live_setting(SomeSettings& live, Visitor&& visit) {
   visit(Setting{"gravity", group, "X,Y,Z", "m/s^2", "0,0,0", "acceleration of gravity on a live body",
                 any_number, is_told},
         gravity);
-  visit(Setting{"mass-damping", group, "A", "1/s", "1", "part of the damping that is A times the mass",
-                number_from_zero, is_told},
+  visit(Setting{"mass-damping", group, "A", "1/s", "0",
+                "part of the damping that is A times the mass: it slows a falling body too", number_from_zero,
+                is_told},
         mass_damping);
   visit(Setting{"stiffness-damping", group, "B", "s", "0.001",
                 "part of the damping that is B times the stiffness", number_from_zero, is_told},

@@ -123,6 +123,37 @@ class Live(ProgramTest):
         self.assertLess(time[5], 0.09)
         self.assertAlmostEqual(u[5, :, 2].mean(), -0.5 * 9.81 * (time[5] + 0.0025) ** 2, delta=0.001)  # implicit Euler is half a step ahead
 
+    def test_a_block_is_pushed_over_a_floor_and_stays(self):
+        """A ball pushes it at 10 mm/s for 12 mm and goes back: the block is never ahead of the ball, and rests where it was left."""
+        block = BLOCK.replace("5.0e3", "5.0e4").replace("cells = [4, 4, 3] }", "cells = [4, 4, 3] }\n[mesh]\nelement = \"hex8\"")
+        file = self.bake(block.replace('precision = "double"', 'scope = "none"'))
+        push = "t,x,y,z\n0,-0.02,0.02,0.008\n0.2,-0.0065,0.02,0.008\n1.4,0.0055,0.02,0.008\n1.5,-0.02,0.02,0.008\n2.2,-0.02,0.02,0.008\n"
+        for options in ((), ("--live-step", "0.01"), ("--integrator", "midpoint")):
+            self.play(file, push, "--record", "push.h5", "--solver", "corotational", "--free", "yes", "--floor", "0", "--gravity", "0,0,-9.81",
+                      "--wall-friction", "0.5", *options)
+            with h5py.File(self.folder / "push.h5") as recording:
+                moved, time = recording["frames/displacement"][:, :, 0].mean(axis=1), recording["frames/time"][:]
+            (self.folder / "push.h5").unlink()
+            front = numpy.interp(time, [0.2, 1.4], [-0.0005, 0.0115])  # of the ball
+            self.assertGreater(moved[-1], 0.009, options)
+            self.assertLess((moved - front).max(), 1e-4, options)
+            late = time > 1.8
+            self.assertLess(numpy.ptp(moved[late]), 1e-5 * numpy.ptp(time[late]), options)
+
+    def test_a_free_body_falls_as_gravity_says(self):
+        file = self.bake(BLOCK)
+        away = "t,x,y,z\n0,0.02,0.02,0.5\n1,0.02,0.02,0.5\n"
+        for integrator, late in (("implicit-euler", 0.005), ("midpoint", 0.0), ("newmark", 0.0)):
+            self.play(file, away, "--record", "fall.h5", "--solver", "corotational", "--free", "yes", "--gravity", "0,0,-9.81", "--integrator", integrator)
+            with h5py.File(self.folder / "fall.h5") as recording:
+                u, time = recording["frames/displacement"][:, :, 2].mean(axis=1), recording["frames/time"][:]
+            (self.folder / "fall.h5").unlink()
+            fallen = 0.5 * 9.81 * time * (time + late)
+            self.assertGreater(time[-1], 0.9)
+            # Pictures are between steps of 5 ms.
+            self.assertLess(numpy.abs(-u - fallen).max(), 9.81 * 0.0051, integrator)
+            self.assertAlmostEqual(-u[-1] / fallen[-1], 1.0, delta=0.011, msg=integrator)
+
     def test_a_file_without_greens_functions_is_enough(self):
         whole = self.bake(BLOCK)
         file = self.bake(BLOCK.replace('precision = "double"', 'scope = "none"').replace('"block"', '"bare"'))

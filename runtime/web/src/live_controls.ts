@@ -9,7 +9,7 @@ const near_limit_bit = 1 << 14; // StepStatus::near_step_limit
 const numbers: Record<string, string> = {
   'poissons-ratio': '',
   'live-step': '0.005',
-  'mass-damping': '1',
+  'mass-damping': '0',
   'stiffness-damping': '0.001',
   yield: 'inf',
   creep: '10',
