@@ -12,6 +12,7 @@ namespace palpate {
 struct BegunModel {
   Model model;
   Precision precision = Precision::double_precision;
+  bool is_packed = false;  ///< its Green's functions are not compressed
 };
 
 /// Reads PATH.partial, which a run has begun; nothing where there is none, or it is damaged.

@@ -110,7 +110,7 @@ Model Reader::read() {
 BegunModel Reader::read_begun() {
   read_version(file_);
   read_known();
-  return {std::move(model_), header_.precision};
+  return {std::move(model_), header_.precision, file_.has(greens_path)};
 }
 
 Model Reader::read_outline() {

@@ -2,12 +2,14 @@
 
 #include <cblas.h>
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include "base/error.h"
 #include "base/interrupt.h"
@@ -19,6 +21,8 @@
 #include "meshes/quality.h"
 #include "precompute/columns.h"
 #include "precompute/compressed_greens.h"
+#include "precompute/compression/out_of_reach.h"
+#include "precompute/machine/blas_kernels.h"
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/factor.h"
 #include "precompute/numerics/greens_solver.h"
@@ -41,8 +45,8 @@ constexpr int probe_count = 4;
 constexpr std::int64_t large_file =
     4'000'000'000;  // [byte] more than many computers can load beside all else
 
-void print_plan(const Plan& plan, const Model& model, const Description& description,
-                const BakeOptions& options, bool compressed, Progress& progress) {
+void print_plan(const Plan& plan, const Model& model, const Description& description, bool compressed,
+                Progress& progress) {
   const QualityReport& quality = model.quality;
   progress.line(fmt::format("{} nodes, {} elements ({}), {} free dofs, {} stored dofs", plan.nodes,
                             plan.elements, traits(model.mesh.element).name, plan.free_dofs,
@@ -58,9 +62,6 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
         static_cast<double>(plan.factor_entries) * 1e-6, static_cast<double>(plan.file_bytes) * 1e-6,
         2e-6 * static_cast<double>(plan.stored_dofs) * static_cast<double>(plan.stored_dofs),
         description.tolerance));
-    progress.line(fmt::format("memory: {:.2f} GB; about {} with {} job{}",
-                              static_cast<double>(plan.memory_bytes) * 1e-9, duration_text(plan.seconds),
-                              options.jobs, options.jobs == 1 ? "" : "s"));
     return;
   }
   const std::string precision =
@@ -71,8 +72,14 @@ void print_plan(const Plan& plan, const Model& model, const Description& descrip
   progress.line(fmt::format("factor: {:.1f} million entries; Green's functions: {:.1f} MB, {}",
                             static_cast<double>(plan.factor_entries) * 1e-6,
                             static_cast<double>(plan.file_bytes) * 1e-6, precision));
-  progress.line(fmt::format("memory: {:.2f} GB; column solves: {:.3g} GFlop, about {} with {} job{}",
-                            static_cast<double>(plan.memory_bytes) * 1e-9, plan.flops * 1e-9,
+}
+
+/// Once all parts of the plan are known.
+void print_memory(const Plan& plan, const BakeOptions& options, bool compressed, Progress& progress) {
+  const std::string solves =
+      compressed ? "" : fmt::format("column solves: {:.3g} GFlop, ", plan.flops * 1e-9);
+  progress.line(fmt::format("memory: {:.2f} GB; {}about {} with {} job{}",
+                            static_cast<double>(expected_memory(plan)) * 1e-9, solves,
                             duration_text(plan.seconds), options.jobs, options.jobs == 1 ? "" : "s"));
 }
 
@@ -88,6 +95,7 @@ constexpr const char* write_stage = "writing the file";
 
 struct Plans {
   Plan plan;
+  Plan packed;  // of every entry, where it is to be compressed
   std::optional<CompressionPlan> compression;
   OverlayPlan overlays;
   DynamicsPlan dynamics;
@@ -105,7 +113,7 @@ struct Shared {
 
 /// What follows the plan, by so many ranks.
 std::vector<Stage> stages_of(const Plans& plans, int jobs, int ranks) {
-  const auto& [plan, compression, overlays, dynamics, warp_levels] = plans;
+  const auto& [plan, packed_plan, compression, overlays, dynamics, warp_levels] = plans;
   std::vector<Stage> stages = {{factor_stage, plan.factor_seconds}};
   if (!overlays.centres.empty())
     stages.push_back({overlay_stage, overlay_seconds(overlays.file_bytes, jobs) / ranks});
@@ -135,8 +143,7 @@ std::string ranks_text(const Plans& plans, const std::vector<Tile>& tiles, int j
   const Plan& plan = plans.plan;
   double seconds = 0.0;
   for (const Stage& stage : stages_of(plans, jobs, ranks)) seconds += stage.seconds;
-  const auto memory =
-      static_cast<double>(plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes) * 1e-9;
+  const auto memory = static_cast<double>(expected_memory(plan)) * 1e-9;
   const auto threads = std::int64_t{jobs} * ranks;
   std::string text = fmt::format(
       "{} ranks of {} job{}: {:.2f} GB of memory each, {:.1f} GB in all; about {} from the factor to the "
@@ -308,33 +315,39 @@ DynamicsPlan announce_dynamics(const Description& description, const Plan& plan,
 void take_over(const CompressionPlan& compression, Plan& plan) {
   const std::int64_t near_bytes = compression.frame.bytes();
   plan.file_bytes = near_bytes + compression.far_bytes;
-  plan.memory_bytes =
-      plan.factor_entries * static_cast<std::int64_t>(sizeof(double)) + compression.memory_bytes;
+  plan.workspace_bytes = compression.memory_bytes;
   plan.seconds = 0.0;
   for (const Stage& stage : compression_stages(compression)) plan.seconds += stage.seconds;
+}
+
+/// Says what the Green's functions will take.
+void announce_greens(const Plans& plans, const Model& model, const Description& description,
+                     Progress& progress) {
+  const Plan& plan = plans.plan;
+  print_plan(plan, model, description, plans.compression.has_value(), progress);
+  if (plan.file_bytes <= large_file) return;
+  progress.line(fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with{}: {}",
+                            static_cast<double>(plan.file_bytes) * 1e-9,
+                            plans.compression ? "" : ", and grow with the square of the stored dofs",
+                            plans.compression ? size_advice(description)
+                                              : "leave out precision and compression in [storage], or " +
+                                                    size_advice(description)));
 }
 
 /// Plans all stages and says what they will take.
 Plans announce_plans(const Description& description, const BakeOptions& options, const Model& model,
                      const Stiffness& stiffness, const Factor& factor, const GreensSolver& solver,
                      Progress& progress) {
-  Plans plans{make_plan(model.mesh, factor, solver, description.precision, options.jobs), {}, {}, {}};
+  Plans plans{make_plan(model.mesh, factor, solver, description.precision, options.jobs), {}, {}, {}, {}};
   if (description.warp) plans.warp_levels = description.warp->levels;
   Plan& plan = plans.plan;
   if (wants_compression(description, plan.stored_dofs / model.dimension())) {
     const StoredNumbering stored = number_stored(solver, stiffness, model.dimension());
+    plans.packed = plan;
     plans.compression = plan_compression(description, model, stored, factor, plan, options.jobs);
     take_over(*plans.compression, plan);
   }
-  print_plan(plan, model, description, options, plans.compression.has_value(), progress);
-  if (plan.file_bytes > large_file) {
-    progress.line(fmt::format("note: Green's functions of {:.1f} GB take as much memory to feel with{}: {}",
-                              static_cast<double>(plan.file_bytes) * 1e-9,
-                              plans.compression ? "" : ", and grow with the square of the stored dofs",
-                              plans.compression ? size_advice(description)
-                                                : "leave out precision and compression in [storage], or " +
-                                                      size_advice(description)));
-  }
+  announce_greens(plans, model, description, progress);
   if (description.overlay) {
     plans.overlays = announce_overlays(description, model, progress);
     plan.overlay_bytes = plans.overlays.memory_bytes;
@@ -346,6 +359,7 @@ Plans announce_plans(const Description& description, const BakeOptions& options,
     if (plans.dynamics.method == DynamicsMethod::packed)  // that of K_bar beside that of K
       plan.dynamics_bytes += plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
   }
+  print_memory(plan, options, plans.compression.has_value(), progress);
   return plans;
 }
 
@@ -414,18 +428,25 @@ std::optional<Solved> solve_matrices(const Description& description, const Elast
 std::optional<Solved> solve_compressed_alone(const CompressionPlan& plan, const Factor& factor,
                                              SpreadNumbers& spread, const Shared& run, ModelWriter& writer) {
   Solved solved;
+  std::string refused;  // why it is out of reach
   if (!run.team.leads()) {
     spread.serve();
-    return solved;
+  } else {
+    constexpr int one_thread = 1;  // only one solves with all ranks
+    Team alone;
+    try {
+      GreensCompressor compressor(plan, factor, alone, one_thread, run.progress, run.interrupted);
+      if (compressor.solve_near({0, plan.frame.tree.leaves()}, writer, run.tiles))
+        solved.compressed = compressor.compress(writer);
+      if (solved.compressed != nullptr) solved.probes = make_probes(factor, plan.stored.dofs);
+    } catch (const OutOfReach& error) {
+      refused = to_text(error);
+    }
+    spread.release();
   }
-  constexpr int one_thread = 1;  // only one solves with all ranks
-  Team alone;
-  GreensCompressor compressor(plan, factor, alone, one_thread, run.progress, run.interrupted);
-  if (compressor.solve_near({0, plan.frame.tree.leaves()}, writer, run.tiles))
-    solved.compressed = compressor.compress(writer);
-  if (solved.compressed != nullptr) solved.probes = make_probes(factor, plan.stored.dofs);
-  spread.release();
-  if (solved.compressed == nullptr) return {};
+  refused = run.team.share(refused);
+  if (!refused.empty()) throw OutOfReach(refused, "", "");
+  if (run.team.leads() && solved.compressed == nullptr) return {};
   return solved;
 }
 
@@ -523,14 +544,15 @@ std::optional<BakePart> planned_part(const BakeOptions& options, const Plans& pl
 
 /// Begins the file, or goes on with it: a part's own, the leader's, or that which the leader has begun.
 std::unique_ptr<ModelWriter> open_writer(const BakeOptions& options, const std::optional<BakePart>& part,
-                                         const Model& model, Precision precision, Team& team) {
+                                         const Model& model, Precision precision, bool of_parts, Team& team) {
   const Leftovers leftovers = options.discard ? Leftovers::discard : Leftovers::resume;
   if (part) return std::make_unique<ModelWriter>(options.output, model, precision, leftovers, *part);
   if (!team.leads())
     return std::make_unique<ModelWriter>(options.output, model, precision, team.share(""),
                                          [&team](const std::string& line) { team.tell(line); });
   auto writer = std::make_unique<ModelWriter>(options.output, model, precision, leftovers);
-  for (const auto& path : options.parts) writer->add_part(path);
+  if (of_parts)
+    for (const auto& path : options.parts) writer->add_part(path);
   team.share(writer->journal_text());
   team.listen([&to = *writer](const std::string& line) { to.note(line); });
   return writer;
@@ -560,25 +582,32 @@ class Bake {
                                  team_.size(), text_of(*spread_, true), spread_->room));
     }
     interrupt_.note_from_now_on();
-    if (!describe()) {
-      progress_.line("interrupted: nothing was written");
-      return BakeResult::interrupted;
+    if (has_fallen_back()) fall_back("as an earlier run has found, they cannot be compressed this exactly");
+    try {
+      return describe_and_solve();
+    } catch (const OutOfReach& error) {
+      if (description_.form != StorageForm::automatic) throw;
+      fall_back(error.what());
     }
-    return solve_and_write();
+    return describe_and_solve();
   }
 
   [[nodiscard]] const Plan& plan() const { return plans_.plan; }
   [[nodiscard]] const TileCounts& tiles() const { return tiles_; }
   [[nodiscard]] const std::optional<SpreadMemory>& spread() const { return spread_; }
+  [[nodiscard]] bool compressed() const { return plans_.compression.has_value(); }
+  [[nodiscard]] const std::string& fell_back() const { return fell_back_; }
 
  private:
   BakeResult write_without_greens();
   MeshedBody mesh();
   void assemble();
   void spread_where_needed(int ranks);
+  [[nodiscard]] bool has_fallen_back();
+  void fall_back(const std::string& why);
+  BakeResult describe_and_solve();
   bool describe();
   bool take_up();
-  BakeResult solve_and_write();
   std::optional<Solved> solve(ModelWriter& writer);
 
   const Description& description_;
@@ -601,6 +630,7 @@ class Bake {
   Precision precision_ = Precision::single_precision;
   TileCounts tiles_;
   std::optional<SpreadMemory> spread_;  // of a factor over several processes
+  std::string fell_back_;               // why not compressed
 };
 
 MeshedBody Bake::mesh() {
@@ -677,6 +707,42 @@ void Bake::spread_where_needed(int ranks) {
                              text_of(*spread_, false)));
 }
 
+/// Whether a run of the same description was interrupted once it had fallen back.
+bool Bake::has_fallen_back() {
+  if (!plans_.compression || description_.form != StorageForm::automatic || options_.part || options_.discard)
+    return false;
+  bool has = false;
+  if (team_.leads()) {
+    const auto begun = read_begun_model(options_.output.string() + ".partial");
+    const auto same = [](const SourceFile& a, const SourceFile& b) {
+      return a.path == b.path && a.checksum == b.checksum;
+    };
+    has = begun && begun->is_packed &&
+          std::equal(begun->model.sources.begin(), begun->model.sources.end(), model_.sources.begin(),
+                     model_.sources.end(), same);
+  }
+  return !team_.share(has ? "packed" : "").empty();
+}
+
+/// Goes on with every entry, where "auto" has found that compression is out of reach.
+void Bake::fall_back(const std::string& why) {
+  fell_back_ = why;
+  progress_.line("note: compression = \"auto\" stores every entry of these Green's functions: " + why +
+                 (options_.parts.empty() ? "" : "; the parts have compressed ones and are of no use here"));
+  plans_.compression.reset();
+  model_.compressed.reset();
+  const Plan compressed = std::exchange(plans_.plan, plans_.packed);
+  plans_.plan.overlay_bytes = compressed.overlay_bytes;
+  plans_.plan.dynamics_bytes = compressed.dynamics_bytes;
+  if (spread_) spread_plan(*spread_, stiffness_.K.nonZeros(), team_.size(), options_.jobs, plans_.plan);
+  announce_greens(plans_, model_, description_, progress_);
+  print_memory(plans_.plan, options_, false, progress_);
+  check_memory(plans_.plan, team_.size_here());
+  std::vector<Stage> stages = stages_of(plans_, options_.jobs, team_.size());
+  stages.erase(stages.begin());  // there is a factor
+  progress_.plan(std::move(stages));
+}
+
 /// All of the model that is known before the columns. False when interrupted.
 bool Bake::describe() {
   stored_as_ = plans_.compression ? plans_.compression->stored
@@ -729,11 +795,23 @@ std::optional<Solved> Bake::solve(ModelWriter& writer) {
   return solved;
 }
 
-BakeResult Bake::solve_and_write() {
-  const std::unique_ptr<ModelWriter> writer = open_writer(options_, part_, model_, precision_, team_);
+BakeResult Bake::describe_and_solve() {
+  if (!describe()) {
+    progress_.line("interrupted: nothing was written");
+    return BakeResult::interrupted;
+  }
+  const std::unique_ptr<ModelWriter> writer =
+      open_writer(options_, part_, model_, precision_, fell_back_.empty(), team_);
   model_.overlay = {};  // written by now
   model_.dynamics = {};
-  const std::optional<Solved> solved = solve(*writer);
+  ::malloc_trim(0);  // workspaces are too large for what is left free by small things
+  std::optional<Solved> solved;
+  try {
+    solved = solve(*writer);
+  } catch (const OutOfReach&) {
+    writer->discard();
+    throw;
+  }
   if (!solved) {
     progress_.line(interruption_text(options_));
     return BakeResult::interrupted;
@@ -763,6 +841,7 @@ BakeSummary bake(const Description& description, const BakeOptions& asked, Team&
   InterruptGuard interrupt;
   const BakeOptions options = with_paths(description, asked, team);
   Progress progress(team.prints());
+  if (const std::string note = kernels_in_use().note; !note.empty()) progress.line("note: " + note);
   Bake bake(description, options, team, progress, interrupt);
   BakeSummary summary{.model = description.file.string(),
                       .output = options.output,
@@ -774,6 +853,8 @@ BakeSummary bake(const Description& description, const BakeOptions& asked, Team&
   summary.tiles = bake.tiles();
   summary.spread = bake.spread();
   summary.stages = progress.stages();
+  summary.compressed = bake.compressed();
+  summary.fell_back = bake.fell_back();
   return summary;
 }
 

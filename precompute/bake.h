@@ -55,6 +55,8 @@ struct BakeSummary {
   TileCounts tiles{};                    ///< of all processes
   std::optional<SpreadMemory> spread{};  ///< of a factor over several processes
   std::vector<Stage> stages{};           ///< with the seconds that they took
+  bool compressed = false;
+  std::string fell_back{};  ///< why compression = "auto" ended with every entry; empty: it did not
 };
 
 /// Runs it with other processes, which call this too: they share columns, compression and overlays, each

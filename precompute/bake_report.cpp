@@ -8,6 +8,7 @@
 
 #include "base/json_text.h"
 #include "base/write_file.h"
+#include "precompute/machine/blas_kernels.h"
 
 namespace palpate {
 namespace {
@@ -26,9 +27,11 @@ Json json_of(const BakeSummary& bake) {
                {"factor_entries", plan.factor_entries},
                {"block_columns", plan.block_columns},
                {"greens_bytes", plan.file_bytes},
-               {"expected_memory_bytes", plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes},
+               {"expected_memory_bytes", expected_memory(plan)},
                {"tiles_solved", bake.tiles.solved},
-               {"tiles_kept", bake.tiles.kept}};
+               {"tiles_kept", bake.tiles.kept},
+               {"compression", bake.compressed ? "h2" : "none"}};
+  if (!bake.fell_back.empty()) json["compression_out_of_reach"] = bake.fell_back;
   if (bake.spread) {
     json["factor_over_ranks"] = {{"expected_bytes", bake.spread->expected},
                                  {"expected_bytes_of_all", bake.spread->expected_all},
@@ -71,7 +74,9 @@ void write_report(const std::filesystem::path& file, const std::vector<std::stri
                {"seconds", run.seconds},
                {"peak_memory_bytes", *std::max_element(run.peak_memory.begin(), run.peak_memory.end())},
                {"rank_memory_bytes", run.peak_memory},
+               {"blas_kernels", kernels_in_use().name},
                {"models", Json::array()}};
+  if (const std::string note = kernels_in_use().note; !note.empty()) json["blas_note"] = note;
   for (const std::string& bake : bakes) json["models"].push_back(Json::parse(bake));
   const std::string text = json_text(json, 2);
   if (file == "-") {

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "precompute/compression/certificate.h"
+#include "precompute/compression/out_of_reach.h"
 
 namespace palpate {
 namespace {
@@ -101,8 +102,9 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
       4.0 * typical_rank *
       (order + typical_rank * static_cast<double>(plan.frame.far_pair.size() +
                                                   std::size_t(plan.frame.tree.clusters()))));
-  plan.memory_bytes = jobs * compression_workspace(factor, plan.frame) + plan.frame.bytes() +
-                      recompression_copies * plan.far_bytes +
+  const std::int64_t touched = std::int64_t{model.dimension()} * certified_nodes.back();
+  plan.memory_bytes = jobs * compression_workspace(factor, plan.frame, touched) + thread_bytes(jobs) +
+                      plan.frame.bytes() + recompression_copies * plan.far_bytes +
                       static_cast<std::int64_t>(4.0 * 8.0 * random_loads * order);
   const double seconds_per_flop = dense.flops > 0.0 ? dense.seconds / dense.flops : 0.0;
   plan.near_seconds = seconds_per_flop * near_flops(factor, plan.stored.dofs, plan.frame);
@@ -203,12 +205,10 @@ std::shared_ptr<const HierarchicalMatrix> GreensCompressor::compress(ModelWriter
       return matrix;
     }
     if (attempt == most_cuts) {
-      writer.discard();
-      throw Error(
-          fmt::format(
-              "forces of random touches are off by up to {:.2g} of the largest, the tolerance is {:.2g}",
-              worst, plan_.frame.tolerance),
-          "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
+      throw OutOfReach(fmt::format("compressed, forces of random touches are off by up to {:.2g} of the "
+                                   "largest, the tolerance is {:.2g}",
+                                   worst, plan_.frame.tolerance),
+                       "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
     }
     progress_.line(
         fmt::format("force errors up to {:.1e} at a cut of {:.1e}: again with more terms", worst, cut));

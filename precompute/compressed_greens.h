@@ -66,7 +66,7 @@ class GreensCompressor {
 
   /// Makes the matrix, in all processes, with the near pairs of the file, which has all, and measures random
   /// touches; where their forces are off by more than the tolerance, again with more terms. Null when
-  /// interrupted. Throws Error where the tolerance is out of reach.
+  /// interrupted. Throws OutOfReach, in all processes, where the tolerance is.
   std::shared_ptr<const HierarchicalMatrix> compress(ModelWriter& writer);
 
  private:

@@ -2,10 +2,12 @@
 
 #include <cblas.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -34,7 +36,8 @@ constexpr double solves_for_precision = 900;  // of eight places of 30 nodes, an
 constexpr double solves_at_the_end = 4;       // of the probes
 constexpr double solves_per_mode = 5;  // of block Lanczos, its products of vectors among them (measured)
 constexpr double modes_alone = 0.4;    // share of that which each process does (measured)
-constexpr double overlay_seconds_per_byte = 1e-8;  // of patches of two rings (measured)
+constexpr double overlay_seconds_per_byte = 1e-8;    // of patches of two rings (measured)
+constexpr std::int64_t bytes_of_thread = 1'600'000;  // (measured)
 
 /// Multiply-adds a second of one thread in products shaped as the sweeps are.
 double measured_flops_per_second() {
@@ -109,7 +112,9 @@ Plan make_plan(const Mesh& mesh, const Factor& factor, const GreensSolver& solve
     plan.flops = column_flops(solver, plan);
   }
   plan.factor_bytes = plan.factor_entries * static_cast<std::int64_t>(sizeof(double));
-  plan.memory_bytes = plan.factor_bytes + jobs * solver.workspace_bytes(plan.block_columns);
+  plan.resident_bytes = resident_memory();
+  const auto threads = std::min<std::int64_t>(jobs, std::ssize(column_blocks(plan)));
+  plan.workspace_bytes = threads * solver.workspace_bytes(plan.block_columns) + thread_bytes(threads);
   const double rate = measured_flops_per_second();
   plan.seconds = plan.flops / (sweep_efficiency * rate * working(jobs));
   plan.factor_seconds = factor.flops() / (factor_efficiency * rate);
@@ -130,9 +135,25 @@ double modes_seconds(const Plan& plan, std::int64_t modes, int threads) {
   return share * solves * 4.0 * static_cast<double>(plan.factor_entries) / solve_rate;
 }
 
+std::int64_t expected_memory(const Plan& plan) {
+  return plan.resident_bytes + plan.factor_bytes +
+         std::max(plan.workspace_bytes, plan.overlay_bytes + plan.dynamics_bytes);
+}
+
+std::int64_t thread_bytes(std::int64_t threads) {
+  return threads * bytes_of_thread;
+}
+
+std::int64_t resident_memory() {
+  std::ifstream statm("/proc/self/statm");
+  std::int64_t all = 0, resident = 0;
+  statm >> all >> resident;
+  return resident * ::sysconf(_SC_PAGESIZE);
+}
+
 void check_memory(const Plan& plan, int ranks) {
   const std::int64_t available = allotted_memory() / ranks;
-  const std::int64_t needed = plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes;
+  const std::int64_t needed = expected_memory(plan) - resident_memory();
   if (available == 0 || needed <= available) return;  // 0: the kernel does not say
   const std::string overlays =
       plan.overlay_bytes == 0

@@ -15,21 +15,22 @@ namespace palpate {
 /// Known after meshing and symbolic analysis.
 struct Plan {
   std::int64_t nodes = 0, elements = 0;
-  std::int64_t free_dofs = 0;       ///< order of K
-  std::int64_t stored_dofs = 0;     ///< order n of the stored block of Xi
-  std::int64_t factor_entries = 0;  ///< stored entries of L
-  std::int64_t file_bytes = 0;      ///< of the packed matrix, the bulk of the file
-  std::int64_t factor_bytes = 0;    ///< of memory, of this process's part of it where it is spread
-  std::int64_t memory_bytes = 0;    ///< largest demand: factor and workspaces of all jobs
-  std::int64_t overlay_bytes = 0;   ///< of memory, for overlays until they are written
-  std::int64_t dynamics_bytes = 0;  ///< of memory, for mass, damping, K_bar and modes
-  std::int64_t block_columns = 0;   ///< right-hand sides solved at a time, at most
-  bool for_many = false;            ///< blocks are cut for many threads
-  double flops = 0.0;               ///< of the column solves
-  double seconds = 0.0;             ///< estimate of the column solves with all jobs, from a measured rate
-  double factor_seconds = 0.0;      ///< of the factorisation, which one thread does
-  double precision_seconds = 0.0;   ///< of the touches from which the precision is chosen
-  double write_seconds = 0.0;       ///< of checksums and probes once the columns are there
+  std::int64_t free_dofs = 0;        ///< order of K
+  std::int64_t stored_dofs = 0;      ///< order n of the stored block of Xi
+  std::int64_t factor_entries = 0;   ///< stored entries of L
+  std::int64_t file_bytes = 0;       ///< of the packed matrix, the bulk of the file
+  std::int64_t factor_bytes = 0;     ///< of memory, of this process's part of it where it is spread
+  std::int64_t resident_bytes = 0;   ///< of memory, that the process has as the plan is made: mesh and K
+  std::int64_t workspace_bytes = 0;  ///< of memory, of all jobs while they solve, beside the factor
+  std::int64_t overlay_bytes = 0;    ///< of memory, for overlays until they are written
+  std::int64_t dynamics_bytes = 0;   ///< of memory, for mass, damping, K_bar and modes
+  std::int64_t block_columns = 0;    ///< right-hand sides solved at a time, at most
+  bool for_many = false;             ///< blocks are cut for many threads
+  double flops = 0.0;                ///< of the column solves
+  double seconds = 0.0;              ///< estimate of the column solves with all jobs, from a measured rate
+  double factor_seconds = 0.0;       ///< of the factorisation, which one thread does
+  double precision_seconds = 0.0;    ///< of the touches from which the precision is chosen
+  double write_seconds = 0.0;        ///< of checksums and probes once the columns are there
 };
 
 /// The columns that are solved together, in the order in which they are begun: by the model alone, whoever
@@ -45,8 +46,18 @@ double overlay_seconds(std::int64_t bytes, int jobs);
 /// What block Lanczos takes for so many modes, by so many threads [s].
 double modes_seconds(const Plan& plan, std::int64_t modes, int threads);
 
-/// Throws Error with the numbers when the plan needs more memory than is free, for so many ranks on this
-/// machine.
+/// Most memory that the process will have [byte]: what it has as the plan is made, the factor, and the larger
+/// of workspaces and of what is written before they are taken.
+std::int64_t expected_memory(const Plan& plan);
+
+/// Memory of so many threads beside their workspaces: stacks, and buffers of OpenBLAS [byte].
+std::int64_t thread_bytes(std::int64_t threads);
+
+/// Memory that the process has now [byte]; 0 where the kernel does not say.
+std::int64_t resident_memory();
+
+/// Throws Error with the numbers when the plan needs more memory than is free beside what the process has by
+/// now, for so many ranks on this machine.
 void check_memory(const Plan& plan, int ranks = 1);
 
 }  // namespace palpate

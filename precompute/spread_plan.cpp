@@ -36,7 +36,7 @@ void spread_plan(const SpreadMemory& memory, std::int64_t entries, int ranks, in
   const std::int64_t blocks = 2 * plan.block_columns * (plan.free_dofs + plan.stored_dofs) / ranks * scalar;
   const std::int64_t touches = touched_columns * touched_copies * plan.free_dofs * scalar;
   plan.factor_bytes = memory.expected;
-  plan.memory_bytes = memory.expected + K_bytes + std::max(blocks, touches);
+  plan.workspace_bytes = K_bytes + std::max(blocks, touches);
   const double all = plan.flops;
   plan.flops = paths * 2.0 * static_cast<double>(plan.factor_entries) * static_cast<double>(plan.stored_dofs);
   plan.seconds *= plan.flops / std::max(all, 1.0) / solve_efficiency;  // of one process
@@ -53,7 +53,7 @@ std::string text_of(const SpreadMemory& memory, bool used) {
 
 bool needs_more_memory(const Plan& plan, int ranks_here) {
   const std::int64_t available = allotted_memory() / ranks_here;
-  return available > 0 && plan.memory_bytes + plan.overlay_bytes + plan.dynamics_bytes > available;
+  return available > 0 && expected_memory(plan) - resident_memory() > available;
 }
 
 void spread_likewise(const Factor& first, const SparseMatrix& K, Team& team, int jobs, Factor& factor) {

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
 #include "base/parallel.h"
 #include "matrices/hierarchical_product.h"
 #include "precompute/compression/float_entries.h"
+#include "precompute/compression/out_of_reach.h"
 #include "precompute/compression/recompression.h"
 #include "precompute/compression/selected_solver.h"
 
@@ -144,6 +144,7 @@ struct Compression::Impl {
   Front leaf_front(Index leaf) const;
   Front joined_front(Index c);
   void thin_out(Index c, double cut, Front& front) const;
+  void check_rank(Index c) const;
   [[nodiscard]] std::vector<Index> groups_of(Index first, Index clusters) const;
   [[nodiscard]] std::vector<Index> needed_of_level(int level) const;
   bool make_fronts(int level, double cut, const std::function<bool(double)>& done);
@@ -300,13 +301,6 @@ void Compression::Impl::thin_out(Index c, double cut, Front& front) const {
   const Interpolation chosen = interpolate(
       front.response, front.W, cut * std::sqrt(double(samples) * double(end_dof(c) - first_dof(c))));
   const auto rank = std::ssize(chosen.skeleton);
-  // Where all are in it nothing is cut off, whatever the samples say.
-  if (rank > samples - spare_samples && rank < front.response.rows()) {
-    throw Error("a cluster of " + std::to_string(matrix_.tree.end(c) - matrix_.tree.begin(c)) +
-                    " stored nodes needs more than " + std::to_string(rank - 1) +
-                    " terms, so the Green's functions cannot be compressed this exactly",
-                "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
-  }
   Front thin;
   thin.V = chosen.follow;  // of rows over the root of D
   for (Eigen::Index i = 0; i < thin.V.rows(); ++i) thin.V.row(i) *= root_[front.skeleton[at(i)]];
@@ -408,7 +402,20 @@ bool Compression::Impl::make_fronts(int level, double cut, const std::function<b
     for (Eigen::MatrixXd* matrix : {&front.W, &front.V}) results.carry(*matrix);
   };
   fronts.done = done;
-  return sharing_.for_each(fronts);
+  if (!sharing_.for_each(fronts)) return false;
+  for (const Index c : clusters) check_rank(c);
+  return true;
+}
+
+/// Here, where all processes have the front, so that all throw. Where all dofs are in the skeleton nothing is
+/// cut off, whatever the samples say.
+void Compression::Impl::check_rank(Index c) const {
+  const auto rank = std::ssize(fronts_[at(c)].skeleton);
+  if (rank <= samples - spare_samples || rank == fronts_[at(c)].V.rows()) return;
+  throw OutOfReach("a cluster of " + std::to_string(matrix_.tree.end(c) - matrix_.tree.begin(c)) +
+                       " stored nodes needs more than " + std::to_string(samples - spare_samples) +
+                       " terms, so the Green's functions cannot be compressed this exactly",
+                   "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
 }
 
 /// The couplings of the far pairs of a level.
@@ -588,9 +595,11 @@ double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dof
   return flops * static_cast<double>(tree.leaves()) / static_cast<double>(counted);
 }
 
-std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame) {
+std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame,
+                                   std::int64_t columns) {
   const std::int64_t leaf = frame.tree.nodes / frame.tree.leaves() + 1;
-  return SelectedSolver(factor).workspace_bytes(frame.dimension * leaf);
+  columns = std::max({columns, frame.dimension * leaf, static_cast<std::int64_t>(columns_at_once)});
+  return SelectedSolver(factor).workspace_bytes(columns);
 }
 
 }  // namespace palpate

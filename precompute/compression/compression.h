@@ -51,12 +51,12 @@ class Compression {
   void solve_near(Index leaf, int worker, std::vector<float>& entries);
 
   /// Takes the near pairs from `fetch`, or solves for them, and for random loads. False when `progress` said
-  /// stop.
+  /// stop. Throws OutOfReach where near pairs are indefinite in single precision.
   bool prepare(const FetchNear& fetch = {});
 
   /// The matrix, cut off where rows of L^-1 Xi L^-T, L the roots of the leaves, are moved by at most `cut` by
   /// random loads of +-1 on all that is far (see `recompressed`). Once prepared, for any number of cuts. Null
-  /// when `progress` said stop. Throws Error where a rank would be above what the random loads can tell.
+  /// when `progress` said stop. Throws OutOfReach where a rank would be above what the random loads can tell.
   std::shared_ptr<HierarchicalMatrix> compress(double cut);
 
  private:
@@ -71,7 +71,8 @@ HierarchicalMatrix compression_frame(const ClusteredNodes& nodes, int dimension)
 double near_flops(const Factor& factor, std::span<const std::int64_t> stored_dofs,
                   const HierarchicalMatrix& frame);
 
-/// Bytes of one thread's workspace.
-std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame);
+/// Bytes that one thread takes, with solves of at least so many columns beside its own.
+std::int64_t compression_workspace(const Factor& factor, const HierarchicalMatrix& frame,
+                                   std::int64_t columns);
 
 }  // namespace palpate

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <string>
 
-#include "base/error.h"
 #include "base/parallel.h"
 #include "precompute/compression/float_entries.h"
+#include "precompute/compression/out_of_reach.h"
 
 namespace palpate {
 namespace {
@@ -118,6 +118,7 @@ class Recompression {
       if (!for_level(
               level, [&](Index c) { truncate(c); }, carry))
         return false;
+      for (const Index c : clusters_of(level)) check_rank(c);
       if (level == from_.tree.levels) continue;
       for (const Index below : clusters_of(level + 1)) rows_[at(below)].resize(0, 0);
     }
@@ -176,13 +177,17 @@ class Recompression {
       tail += std::max(eigen.eigenvalues()[dropped], 0.0) * V.col(dropped).array().square();
       if (tail.maxCoeff() > cut_ * cut_) break;
     }
-    if (const Eigen::Index kept = k - dropped; kept > most_rank) {
-      throw Error("a cluster of " + std::to_string(from_.tree.end(c) - from_.tree.begin(c)) +
-                      " stored nodes needs " + std::to_string(kept) + " terms, " + std::to_string(most_rank) +
-                      " are possible",
-                  "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
-    }
     U_[at(c)] = eigen.eigenvectors().rightCols(k - dropped).rowwise().reverse();
+  }
+
+  /// Here, where all processes have the rank, so that all throw.
+  void check_rank(Index c) const {
+    const Eigen::Index kept = U_[at(c)].cols();
+    if (kept <= most_rank) return;
+    throw OutOfReach("a cluster of " + std::to_string(from_.tree.end(c) - from_.tree.begin(c)) +
+                         " stored nodes needs " + std::to_string(kept) + " terms, " +
+                         std::to_string(most_rank) + " are possible",
+                     "[storage] tolerance", "Set a larger tolerance, or compression = \"none\"");
   }
 
   /// The orthonormal basis of a cluster, a row for each of its dofs.
@@ -330,9 +335,10 @@ Matrix root_of_leaf(const HierarchicalMatrix& matrix, Index leaf) {
     if (own == 0.0) own = 1.0;  // held
   const Eigen::LLT<Matrix> factor(Xi);
   if (factor.info() != Eigen::Success) {
-    throw Error("the compliance of " + std::to_string(Xi.rows()) +
-                    " dofs of the surface that are side by side is not positive definite in single precision",
-                "[storage] compression", "Set compression = \"none\"");
+    throw OutOfReach(
+        "the compliance of " + std::to_string(Xi.rows()) +
+            " dofs of the surface that are side by side is not positive definite in single precision",
+        "[storage] compression", "Set compression = \"none\"");
   }
   return factor.matrixL();
 }

@@ -135,7 +135,8 @@ KeyTable selection() {
        {"half_space", "m", "",
         "`{point = [x, y, z], normal = [x, y, z]}`: nodes with (x − point) · normal ≥ 0", alternative},
        {"sphere", "m", "", "`{center = [x, y, z], radius = r}`: nodes inside", alternative},
-       {"nodes", "", "", "list of node numbers, from 0", alternative},
+       {"nodes", "", "",
+        "list of node numbers, from 0; with them count the middles of the edges between them", alternative},
        {"tag", "", "", "nodes of the boundary facets with this tag in the volume mesh", alternative},
        {"lowest", "", "",
         "`{axis = \"x\", \"y\" or \"z\", percent = p}`: nodes in the lowest p per cent of the body's extent "
@@ -190,7 +191,7 @@ KeyTable storage() {
        {"precision", "", "`\"auto\"`", "`\"auto\"`, `\"single\"`, `\"split\"` or `\"double\"`"},
        {"compression", "", "`\"auto\"`",
         "`\"none\"`: every entry; `\"h2\"`: in nested low-rank form; `\"auto\"`: that from 5 000 stored "
-        "nodes on, where neither precision nor packed dynamics are asked for"},
+        "nodes on, where neither precision nor packed dynamics are asked for and the tolerance can be kept"},
        {"tolerance", "", shown(Description{}.tolerance),
         "compressed: largest relative error that forces may have, 1e-4 to 1"}}};
 }

@@ -46,8 +46,13 @@ std::span<const std::int64_t> SupernodalSweeps::rows(const Supernode& s) const n
 }
 
 void SupernodalSweeps::prepare(Workspace& workspace, std::int64_t width) const {
-  workspace.X.resize(static_cast<std::size_t>(factor_.order() * width));
-  workspace.below.resize(static_cast<std::size_t>(max_below_ * width));
+  const auto fit = [width](std::vector<double>& values, std::int64_t rows) {
+    const auto size = static_cast<std::size_t>(rows * width);
+    if (size > values.capacity()) values = {};  // not two of them at a time
+    values.resize(size);
+  };
+  fit(workspace.X, factor_.order());
+  fit(workspace.below, max_below_);
 }
 
 std::int64_t SupernodalSweeps::workspace_bytes(std::int64_t width) const {

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pathlib
 import re
 import resource
 import shutil
@@ -11,7 +12,7 @@ import time
 import tomllib
 import unittest
 
-from programs import MODELS, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, run
+from programs import HAS_SANITIZERS, MODELS, PRECOMPUTE, RUNTIME, ProgramTest, cube_toml, done, run
 
 
 class Bake(ProgramTest):
@@ -332,6 +333,50 @@ class Waiting(ProgramTest):
             os.close(master)
             self.assertEqual(process.wait(), 1)
         self.assertIn(b"\nerror: ", said)
+
+
+@unittest.skipIf(HAS_SANITIZERS, "they must be loaded first")
+class Kernels(ProgramTest):
+    """OpenBLAS that takes this processor for one of 2004, until it is told otherwise."""
+
+    def setUp(self):
+        super().setUp()
+        source = self.write("old.c", '#include <stdlib.h>\nchar* openblas_get_corename(void) { char* asked = getenv("OPENBLAS_CORETYPE"); '
+                                     'return asked ? asked : "Prescott"; }\n')
+        done("cc", "-shared", "-fPIC", "-o", self.folder / "old.so", source)
+        flags = pathlib.Path("/proc/cpuinfo").read_text().split("flags", 1)[1].split("\n", 1)[0].split()
+        self.fast = {"avx2", "fma"} <= set(flags)
+        self.right = "SkylakeX" if {"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"} <= set(flags) else "Haswell"
+        self.model = self.write("model.toml", cube_toml(3))
+
+    def bake_with(self, asked=None):
+        environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"} | {"LD_PRELOAD": str(self.folder / "old.so")}
+        if asked:
+            environment["OPENBLAS_CORETYPE"] = asked
+        result = run(PRECOMPUTE, self.model, "--report", self.folder / "report.json", cwd=self.folder, env=environment)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads((self.folder / "report.json").read_text()), result.stderr
+
+    def test_the_program_starts_anew_with_the_right_ones(self):
+        if not self.fast:
+            self.skipTest("the processor is as old")
+        report, said = self.bake_with()
+        self.assertEqual(report["blas_kernels"], self.right)
+        for text in (said, report["blas_note"]):
+            self.assertIn("Prescott", text)
+            self.assertIn("started anew with OPENBLAS_CORETYPE=" + self.right, text)
+        self.assertEqual(said.count("started anew"), 1)
+
+    def test_what_was_asked_for_stays(self):
+        if not self.fast:
+            self.skipTest("the processor is as old")
+        report, said = self.bake_with("Nehalem")
+        self.assertEqual(report["blas_kernels"], "Nehalem")
+        self.assertIn("Nehalem, which OPENBLAS_CORETYPE asks for", said)
+        report, said = self.bake_with("Zen")
+        self.assertEqual(report["blas_kernels"], "Zen")
+        self.assertNotIn("blas_note", report)
+        self.assertNotIn("OPENBLAS", said)
 
 
 class Stale(ProgramTest):
