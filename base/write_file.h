@@ -24,7 +24,7 @@ class TemporaryFile {
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   void write(std::string_view bytes);
-  /// Of the target, once. With `keeps` Error where a file is there.
+  /// Renames it to the target, once. With `keeps` Error where a file is there.
   void take_its_place(bool keeps = false);
 
  private:
