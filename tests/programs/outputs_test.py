@@ -299,7 +299,7 @@ class Endings(OutputTest):
             others = sorted({*self.RIGHT.values(), *self.OTHERS} - {right, *self.ALSO.get(option, ())})
             for name in (f"out{others[0].upper()}", *(f"out{ending}" for ending in others)):
                 with self.subTest(option=option, name=name):
-                    told = ("neither a .csv nor a .vtu",) if option == "--field" else (f"ends in {name[3:].lower()}", f"name it out{right}")
+                    told = ("neither a .csv nor a .vtu",) if option == "--field" else (f"ends in {name[3:].lower()}", f"Name it out{right}")
                     self.assert_kept(files, self.attempt(option, name), name, *told)
 
     def test_of_the_format_are_taken(self):
@@ -329,7 +329,7 @@ class Endings(OutputTest):
             self.assert_done(self.play("--report", "pipe.txt"))
         files = self.contents()
         result = run(PRECOMPUTE, "model.toml", "-o", "out.csv", "--part", "1/2", cwd=self.folder)
-        self.assert_kept(files, result, "out.csv: ends in .csv", "name it out.hdf")
+        self.assert_kept(files, result, "out.csv: ends in .csv", "Name it out.hdf")
 
 
 class Devices(OutputTest):
