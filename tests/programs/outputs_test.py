@@ -101,10 +101,10 @@ class Inputs(OutputTest):
             self.assert_kept(files, self.play(*arguments), "model.toml", "the model's description")
 
     def test_what_the_model_was_made_from(self):
-        made = self.bake(cube_toml(2), name="made.toml")
+        made = self.bake(cube_toml(2), name="made")
         files = self.contents()
-        result = self.runtime("play", made, "--device", "script:touch.csv", "--fast", "--report", "made.toml", "--force")
-        self.assert_refused(result, "made.toml", "what the model was made from")
+        result = self.runtime("play", made, "--device", "script:touch.csv", "--fast", "--report", "made", "--force")
+        self.assert_refused(result, "made", "what the model was made from")
         self.assertEqual(self.contents(), files)
 
     def test_the_description_that_is_precomputed(self):
@@ -148,11 +148,11 @@ class Twice(OutputTest):
     """No two outputs of a run are one file, or in each other's way."""
 
     def test_one_name(self):
-        (self.folder / "link.json").symlink_to("real.json")
-        self.write("real.json", "")
+        (self.folder / "link").symlink_to("real")
+        self.write("real", "")
         files = self.contents()
         for arguments in (("--report", "a", "--contacts", "a"), ("--record", "a", "--report", "./a"), ("--surface", "a", "--contacts", "a"),
-                          ("--report", "link.json", "--contacts", "real.json")):
+                          ("--report", "link", "--contacts", "real")):
             with self.subTest(arguments=arguments):
                 self.assert_kept(files, self.play(*arguments, "--force"), "is both", arguments[0], arguments[2])
 
