@@ -12,6 +12,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <random>
 
 #include "base/error.h"
@@ -296,11 +297,12 @@ TEST(Recording, ThatIsNotFinishedHoldsEachCheckpoint) {
 TEST(Recording, IsWhatItWasForWhoHasOpenedIt) {
   const Folder folder;
   const std::filesystem::path path = folder / "a.mcap";
-  RecordingWriter writer(path, info, surface);
-  append(writer, 100, 10);
+  auto writer = std::make_unique<RecordingWriter>(path, info, surface);
+  append(*writer, 100, 10);
   const RecordingFile read(path);
-  for (std::size_t i = 100; i < 200; ++i) writer.append(some_tick(i));
-  writer.finish();
+  for (std::size_t i = 100; i < 200; ++i) writer->append(some_tick(i));
+  writer->finish();
+  writer.reset();
   expect_contents(read, 100, 10);
   const RecordingFile whole(path);
   record(path, 3, 3);  // in its place
@@ -461,7 +463,7 @@ void reseal(std::string& bytes) {
 TEST(Recording, CutOffAnywhereHasItsWholeChunks) {
   const Folder folder;
   const std::filesystem::path path = folder / "a.mcap", cut = folder / "cut.mcap";
-  record(path, 30, 10);
+  record(path, 6, 2);
   const std::string bytes = read_bytes(path);
   std::vector<std::size_t> chunk_ends;
   std::size_t data_end = 0;
@@ -469,7 +471,7 @@ TEST(Recording, CutOffAnywhereHasItsWholeChunks) {
     if (place.opcode == chunk_code) chunk_ends.push_back(place.offset + 9 + place.length);
     if (place.opcode == data_end_code) data_end = place.offset;
   }
-  ASSERT_EQ(chunk_ends.size(), 5U) << "surface, three times ten ticks, an event";
+  ASSERT_EQ(chunk_ends.size(), 5U) << "surface, three times two ticks, an event";
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     write_bytes(cut, bytes.substr(0, size));
     const auto whole = static_cast<std::size_t>(
@@ -478,17 +480,17 @@ TEST(Recording, CutOffAnywhereHasItsWholeChunks) {
       ASSERT_NE(refusal_of(cut), "") << size;
       continue;
     }
-    const std::size_t tens = std::min<std::size_t>(whole - 1, 3);
+    const std::size_t pairs = std::min<std::size_t>(whole - 1, 3);
     {
       const RecordingFile read(cut);
       ASSERT_FALSE(read.finished()) << size;
-      expect_contents(read, 10 * tens, tens);
+      expect_contents(read, 2 * pairs, pairs);
     }
-    if (size % 7 != 0 && size < data_end) continue;
+    if (size % 97 != 0 && size != data_end) continue;  // it waits for the disk each time
     ASSERT_TRUE(finish_recording(cut));
     const RecordingFile read(cut);
     ASSERT_TRUE(read.finished()) << size;
-    expect_contents(read, 10 * tens, tens);
+    expect_contents(read, 2 * pairs, pairs);
     if (whole == chunk_ends.size()) {
       ASSERT_EQ(read_bytes(cut), bytes) << size;
     }
@@ -499,7 +501,7 @@ TEST(Recording, IsRefusedWhereABitOfAChunkIsFlipped) {
   const Folder folder;
   const std::filesystem::path path = folder / "a.mcap";
   for (const Shown shown : {Shown::loads, Shown::frames}) {
-    record(path, 30, 10, shown);
+    record(path, 6, 2, shown);
     const std::string bytes = read_bytes(path);
     for (const Place& place : places_in(bytes)) {
       if (place.opcode != chunk_code) continue;
@@ -769,7 +771,7 @@ TEST(Recording, ThousandsOfDamagedFilesDoNoHarm) {
   for (const Shown shown : {Shown::loads, Shown::frames}) {
     record(path, 12, 4, shown);
     const std::string good = read_bytes(path);
-    for (int k = 0; k < 3000; ++k) {
+    for (int k = 0; k < 2000; ++k) {
       std::string bytes = damaged(good, random);
       if (k % 2 == 0) reseal(bytes);
       write_bytes(path, bytes);
@@ -778,12 +780,12 @@ TEST(Recording, ThousandsOfDamagedFilesDoNoHarm) {
       } else {
         ++refused;
       }
-      if (k % 10 == 0 && refusal([&] { (void)finish_recording(path); }).empty()) ++finished;
+      if (k % 100 == 0 && refusal([&] { (void)finish_recording(path); }).empty()) ++finished;
     }
   }
   EXPECT_GT(whole, 100U) << "damage that leaves a prefix, or where nobody looks";
-  EXPECT_GT(refused, 2000U);
-  EXPECT_GT(finished, 10U);
+  EXPECT_GT(refused, 1000U);
+  EXPECT_GT(finished, 5U);
 }
 
 // ---- other files ----

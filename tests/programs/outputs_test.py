@@ -101,10 +101,10 @@ class Inputs(OutputTest):
             self.assert_kept(files, self.play(*arguments), "model.toml", "the model's description")
 
     def test_what_the_model_was_made_from(self):
-        made = self.bake(cube_toml(2), name="made.toml")
+        made = self.bake(cube_toml(2), name="made")
         files = self.contents()
-        result = self.runtime("play", made, "--device", "script:touch.csv", "--fast", "--report", "made.toml", "--force")
-        self.assert_refused(result, "made.toml", "what the model was made from")
+        result = self.runtime("play", made, "--device", "script:touch.csv", "--fast", "--report", "made", "--force")
+        self.assert_refused(result, "made", "what the model was made from")
         self.assertEqual(self.contents(), files)
 
     def test_the_description_that_is_precomputed(self):
@@ -148,11 +148,11 @@ class Twice(OutputTest):
     """No two outputs of a run are one file, or in each other's way."""
 
     def test_one_name(self):
-        (self.folder / "link.json").symlink_to("real.json")
-        self.write("real.json", "")
+        (self.folder / "link").symlink_to("real")
+        self.write("real", "")
         files = self.contents()
         for arguments in (("--report", "a", "--contacts", "a"), ("--record", "a", "--report", "./a"), ("--surface", "a", "--contacts", "a"),
-                          ("--report", "link.json", "--contacts", "real.json")):
+                          ("--report", "link", "--contacts", "real")):
             with self.subTest(arguments=arguments):
                 self.assert_kept(files, self.play(*arguments, "--force"), "is both", arguments[0], arguments[2])
 
@@ -299,7 +299,7 @@ class Endings(OutputTest):
             others = sorted({*self.RIGHT.values(), *self.OTHERS} - {right, *self.ALSO.get(option, ())})
             for name in (f"out{others[0].upper()}", *(f"out{ending}" for ending in others)):
                 with self.subTest(option=option, name=name):
-                    told = ("neither a .csv nor a .vtu",) if option == "--field" else (f"ends in {name[3:].lower()}", f"name it out{right}")
+                    told = ("neither a .csv nor a .vtu",) if option == "--field" else (f"ends in {name[3:].lower()}", f"Name it out{right}")
                     self.assert_kept(files, self.attempt(option, name), name, *told)
 
     def test_of_the_format_are_taken(self):
@@ -329,7 +329,7 @@ class Endings(OutputTest):
             self.assert_done(self.play("--report", "pipe.txt"))
         files = self.contents()
         result = run(PRECOMPUTE, "model.toml", "-o", "out.csv", "--part", "1/2", cwd=self.folder)
-        self.assert_kept(files, result, "out.csv: ends in .csv", "name it out.hdf")
+        self.assert_kept(files, result, "out.csv: ends in .csv", "Name it out.hdf")
 
 
 class Devices(OutputTest):
