@@ -9,7 +9,7 @@ import signal
 import subprocess
 import threading
 
-from .library import Error, program
+from .library import Error, path_text, program
 
 Path = str | os.PathLike[str]
 
@@ -21,12 +21,12 @@ class Viewer:
     Throws Error with what palpate-runtime says."""
 
     def __init__(self, file: Path, *options: str, height: int = 560):
-        name = os.fspath(file)
+        name = path_text(file)
         command = ["view", name] if name.endswith(".mcap") else ["play", name, "--view"]
         self.height = height
         self._process = subprocess.Popen(
             [program("palpate-runtime"), *command, "--view-address", "0", "--view-framed", *options],
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
         self.address = self._wait_for_address()
         threading.Thread(target=self._drain, daemon=True).start()
 
