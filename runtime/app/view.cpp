@@ -6,6 +6,7 @@
 #include <deque>
 
 #include "base/error.h"
+#include "base/program.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/app/session_view.h"
 #include "runtime/viewer/viewer_server.h"
@@ -25,10 +26,10 @@ int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptio
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     sessions[k].show(server, k);
     const SessionPictures& pictures = sessions[k].pictures();
-    fmt::print(stderr, "{}: {} pictures, {:.3f} s\n", recordings[k].string(), pictures.frames(),
-               pictures.time(pictures.frames() - 1));
+    say(stderr, "{}: {} pictures, {:.3f} s\n", recordings[k], pictures.frames(),
+        pictures.time(pictures.frames() - 1));
   }
-  fmt::print(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
+  say(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
   int signal = 0;
   sigwait(&ends, &signal);
   return exit_ok;

@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
+#include "base/program.h"
 #include "base/regular_file.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/body/overlay_rings.h"
@@ -84,7 +85,7 @@ LoopReport ViewedPlay::run(const std::atomic<bool>& stop) {
     LoopReport report;
     try {
       session = begin_act(plan);
-      if (!good) fmt::print(stderr, "open {} in a browser\n", server.url());
+      if (!good) say(stderr, "open {} in a browser\n", server.url());
       good = plan;
       report = run_act(*session, stop);
       if (has_hand()) latched_ = session->fault();

@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include "base/error.h"
+#include "base/program.h"
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/gallery/gallery_server.h"
 
@@ -17,8 +18,8 @@ int show_gallery(const std::filesystem::path& folder, const ViewerOptions& optio
   const std::size_t items = list_gallery(folder).size();
   const std::filesystem::path place = std::filesystem::canonical(folder);
   const GalleryServer server(place, options);
-  fmt::print(stderr, "{}: {} to choose from\n", place.string(), items);
-  fmt::print(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
+  say(stderr, "{}: {} to choose from\n", place, items);
+  say(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
   int signal = 0;
   sigwait(&ends, &signal);
   return exit_ok;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/program.h"
 
 namespace palpate {
 namespace {
@@ -98,7 +99,7 @@ void OpenedItem::watch(const OtherProgram::Start& start) {
 
 void OpenedItem::hear(const std::string& line) {
   const std::string url = url_in(line);
-  if (url.empty()) fmt::print(stderr, "{}\n", line);
+  if (url.empty()) say(stderr, "{}\n", line);
   const std::lock_guard lock(mutex_);
   if (!url.empty()) {
     state_.url = url;
