@@ -206,6 +206,8 @@ StateOptions with_room(StateOptions options, const Body& body, const palpate_ove
   return options;
 }
 
+}  // namespace
+
 /// What a tick left, for the eye.
 struct Shown {
   SurfaceLoad load;
@@ -280,7 +282,6 @@ struct OwnLoop {
   std::size_t recorded_tool = 0;
 };
 
-}  // namespace
 }  // namespace palpate
 
 using namespace palpate;

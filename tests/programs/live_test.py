@@ -170,7 +170,7 @@ class Live(ProgramTest):
         """2 197 nodes: a step takes some hundred milliseconds on any machine of today, and a body of 64 nodes some tenth of one."""
         slow = self.bake(BLOCK.replace("cells = [4, 4, 3]", "cells = [12, 12, 12]"), name="slow.toml")
         path = self.write("touch.csv", press(0.003))
-        result = run(RUNTIME, "play", slow, "--device", f"script:{path}", "--tool", "sphere:0.006", "--solver", "corotational", "--record", "slow.h5",
+        result = run(RUNTIME, "play", slow, "--device", f"script:{path}", "--tool", "sphere:0.006", "--solver", "corotational", "--record", "slow.mcap",
                      "--report", "slow.json", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stderr, r"warning: a step of 5 ms takes \d+ ms here: the body moves [0-9.e+]+ times slower than real time")
@@ -182,7 +182,7 @@ class Live(ProgramTest):
         told = report["live"]["largest_force_error_N"]
         self.assertGreaterEqual(told, 0.5 * (report["largest_force_N"] - right))
         self.assertEqual(told, report["best_effort"]["force_error_N"]["largest"])
-        session = run(RUNTIME, "session", "slow.h5", cwd=self.folder)
+        session = run(RUNTIME, "session", "slow.mcap", cwd=self.folder)
         self.assertIn("the body stood still in", session.stdout)
 
     def test_what_does_not_fit_is_refused(self):

@@ -273,7 +273,7 @@ class Misuse(PythonTest):
         for run in range(8):
             session = palpate.Session(self.cube, palpate.Tool(radius=0.1), stress_ticks=4)
             if run % 2 == 0:
-                session.record(self.folder / f"{run}.h5")
+                session.record(self.folder / f"{run}.mcap")
             stepped, failures = threading.Event(), []
 
             def step(session=session, stepped=stepped, failures=failures):
@@ -331,7 +331,7 @@ class Misuse(PythonTest):
         session.close()
         session.close()
         for use in (lambda: session.step((0, 0, 2)), lambda: session.felt(0), lambda: session.set_tool(0, palpate.Tool()), session.reset,
-                    lambda: session.record(self.folder / "a.h5"), session.end_recording, lambda: session.rest, lambda: session.simplices,
+                    lambda: session.record(self.folder / "a.mcap"), session.end_recording, lambda: session.rest, lambda: session.simplices,
                     session.displacement, session.stress):
             with self.assertRaisesRegex(palpate.Error, "the session is closed"):
                 use()
@@ -360,10 +360,10 @@ class Misuse(PythonTest):
                 with self.assertRaises(IndexError):
                     use()
             with self.assertRaises(palpate.Error):
-                session.record(self.folder / "a.h5", tool=number)
+                session.record(self.folder / "a.mcap", tool=number)
         with self.assertRaises(TypeError):
             palpate.probe(self.cube, [(0, 0, -0.01)], node=[1.5])
-        self.assertFalse((self.folder / "a.h5").exists())
+        self.assertFalse((self.folder / "a.mcap").exists())
 
     def test_poses_are_whole(self):
         session = self.session()
@@ -377,7 +377,7 @@ class Misuse(PythonTest):
 
     def test_a_name_ends_at_its_end(self):
         session = self.session()
-        for use in (lambda: palpate.Session(f"{self.cube}\0b", palpate.Tool()), lambda: session.record(f"{self.folder}/a.h5\0b"),
+        for use in (lambda: palpate.Session(f"{self.cube}\0b", palpate.Tool()), lambda: session.record(f"{self.folder}/a.mcap\0b"),
                     lambda: palpate.Body(f"{self.cube}\0b"), lambda: palpate.bake(f"{self.shared}/cube.toml\0", self.folder / "b.hdf"),
                     lambda: palpate.probe(f"{self.cube}\0", [(0, 0, 1)], at=[(0, 0, 1)]), lambda: palpate.Viewer(f"{self.cube}\0")):
             with self.assertRaisesRegex(palpate.Error, "zero byte"):

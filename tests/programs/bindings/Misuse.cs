@@ -77,7 +77,7 @@ static class Misuse
         var uses = new List<Action>
         {
             () => session.Step(Pressing), () => session.Step(new[] { Pressing }), () => session.Felt(), () => session.SetTool(0, Tool.Sphere(0.1)),
-            session.Reset, () => session.Record("a.h5"), session.EndRecording, () => session.Rest(new double[3 * nodes]),
+            session.Reset, () => session.Record("a.mcap"), session.EndRecording, () => session.Rest(new double[3 * nodes]),
             () => session.Surface(new int[session.Corners * session.Simplices]), () => session.Displacement(new double[3 * nodes]),
             () => session.Stress(new float[nodes], new float[nodes]),
         };
@@ -89,7 +89,7 @@ static class Misuse
         Throws<ArgumentException>(() => new Session(file + "\0b", Tool.Sphere(0.1)).Dispose());
         using (var session = new Session(file, Tool.Sphere(0.1)))
         {
-            Throws<ArgumentException>(() => session.Record("a.h5\0b"));
+            Throws<ArgumentException>(() => session.Record("a.mcap\0b"));
             Throws<PalpateException>(() => session.Record(file));
             foreach (int tool in new[] { -1, 1, int.MaxValue }) Throws<ArgumentOutOfRangeException>(() => session.Felt(tool));
             Throws<ArgumentException>(() => session.Rest(new double[1]));

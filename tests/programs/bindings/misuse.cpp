@@ -34,8 +34,8 @@ int main(int, char** words) {
   const palpate_pose pose = palpate::make_pose(0.5, 0.5, 1.2);
   palpate::Session session(file, tool);
   throws([&] { palpate::Session(file + std::string("\0b", 2), tool); }, PALPATE_ERROR_ARGUMENT);
-  throws([&] { session.record(std::string("a.h5\0b", 6)); }, PALPATE_ERROR_ARGUMENT);
-  throws([&] { palpate::Recording(std::string("a.h5\0b", 6)); }, PALPATE_ERROR_ARGUMENT);
+  throws([&] { session.record(std::string("a.mcap\0b", 8)); }, PALPATE_ERROR_ARGUMENT);
+  throws([&] { palpate::Recording(std::string("a.mcap\0b", 8)); }, PALPATE_ERROR_ARGUMENT);
   throws([&] { session.record(file); }, PALPATE_ERROR_FILE);
   throws([&] { session.end_recording(); }, PALPATE_ERROR_STATE);
 
@@ -53,7 +53,7 @@ int main(int, char** words) {
   palpate::Session moved = std::move(session);
   expect((session.step(pose) & PALPATE_NOT_STEPPED) != 0, "nothing is left of it");  // NOLINT: that is tried
   expect(session.rest().empty() && session.stress().tick == -1 && !session.set_tool(0, tool), "nor seen");
-  throws([&] { session.record("a.h5"); }, PALPATE_ERROR_ARGUMENT);
+  throws([&] { session.record("a.mcap"); }, PALPATE_ERROR_ARGUMENT);
   expect(moved.step(pose) == 0, "it goes on");
   std::puts("ok");
 }

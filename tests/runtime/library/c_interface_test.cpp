@@ -1029,8 +1029,8 @@ class CInterfaceMisuse : public testing::Test {
  protected:
   CInterfaceMisuse() {
     std::fill_n(room.pose.position, 3, 5.0);
-    room.recorded = (folder.path() / "recorded.h5").string();
-    room.record = (folder.path() / "other.h5").string();
+    room.recorded = (folder.path() / "recorded.mcap").string();
+    room.record = (folder.path() / "other.mcap").string();
     session = open("cube2", {room.tool}).release();
     EXPECT_EQ(record(session, room.recorded.c_str(), &room.record_options), PALPATE_OK);
     palpate_step(session, &room.pose);
@@ -1100,7 +1100,7 @@ TEST(CInterfaceThreads, EndsWhileOthersAreInIt) {
     palpate_session* session =
         palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 24, &options, error, sizeof error);
     ASSERT_NE(session, nullptr) << error;
-    const std::string file = (folder.path() / (std::to_string(run) + ".h5")).string();
+    const std::string file = (folder.path() / (std::to_string(run) + ".mcap")).string();
     ASSERT_TRUE(run % 2 == 0 || record(session, file.c_str(), &record_options) == PALPATE_OK);
     std::vector<double> xyz(3 * static_cast<std::size_t>(counts_of(session).nodes));
     std::atomic<int> ticks = 0, pictures = 0;
