@@ -82,6 +82,22 @@ class HelpFormatter : public CLI::Formatter {
   }
 };
 
+/// Refuses an empty word in place of any value: nothing is a name, a path or a number that has no letter.
+inline void refuse_empty_values(CLI::App& app) {
+  for (CLI::Option* option :
+       app.get_options([](const CLI::Option* each) { return each->get_expected_max() > 0; })) {
+    option->check(
+        [](const std::string& value) { return value.empty() ? "an empty word is no value" : std::string(); });
+  }
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) refuse_empty_values(*command);
+}
+
+/// Reads the command line. Throws CLI::ParseError.
+inline void parse(CLI::App& app, int argc, char** argv) {
+  refuse_empty_values(app);
+  app.parse(argc, argv);
+}
+
 /// The command of this name, or null.
 inline const CLI::App* find_command(const CLI::App& app, const std::string& name) {
   const auto commands =

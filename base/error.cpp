@@ -1,6 +1,7 @@
 #include "base/error.h"
 
 #include <cctype>
+#include <filesystem>
 #include <new>
 
 #include "base/printable.h"
@@ -25,6 +26,9 @@ Error handled_error(const std::string& where, const std::string& if_no_memory) {
     return error;
   } catch (const std::bad_alloc&) {
     return {"no more memory could be had", where, if_no_memory};
+  } catch (const std::filesystem::filesystem_error& error) {
+    return {"cannot be used: " + error.code().message(), error.path1().string(),
+            "check the file, the links that lead to it and the rights of its folder"};
   } catch (const std::exception& error) {
     return {error.what(), where, "this is a defect of Palpate; please report it"};
   }

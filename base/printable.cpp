@@ -88,7 +88,8 @@ std::string printable(std::string_view text, std::size_t longest) {
   return clean.substr(0, begins[head]) + "…" + clean.substr(begins[begins.size() - tail]);
 }
 
-std::string shell_word(std::string_view text) {
+std::string shell_word(std::string_view path) {
+  const std::string text = (path.starts_with('-') ? "./" : "") + std::string(path);  // or it is an option
   const auto is_plain = [](unsigned char c) {
     return c >= 0x80 || std::isalnum(c) != 0 ||
            std::string_view("%+,-./:=@_").find(static_cast<char>(c)) != std::string_view::npos;

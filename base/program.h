@@ -1,8 +1,17 @@
-// What the `main` of every program has in common.
+// What the programs have in common: how they begin, end and print.
 #pragma once
 
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+#include "base/printable.h"
 
 namespace palpate {
 
@@ -22,5 +31,35 @@ namespace palpate {
 /// failed, ends the program with an error line that names the file, and exit_input_error, in place of a
 /// crash. A device's guardian then takes its force to zero. For programs, not for libraries.
 void end_with_an_error_on_shrunk_files();
+
+/// A text or a path, which may come from a file, a device or a person, as `printable` makes it; all else as
+/// it is.
+template <typename T>
+decltype(auto) as_printed(const T& value) {
+  if constexpr (std::is_same_v<T, std::filesystem::path>) {
+    return printable(value.native());
+  } else if constexpr (std::is_convertible_v<const T&, std::string_view>) {
+    return printable(value);
+  } else {
+    return (value);
+  }
+}
+
+template <typename T>
+using AsPrinted = std::remove_cvref_t<decltype(as_printed(std::declval<const T&>()))>;
+
+/// As fmt::print, with each argument `as_printed`: a name cannot do anything to a terminal, nor begin a line.
+template <typename... Args>
+void say(std::FILE* stream, fmt::format_string<AsPrinted<Args>...> format, const Args&... args) {
+  const auto print = [&](const auto&... printed) {
+    fmt::vprint(stream, format, fmt::make_format_args(printed...));
+  };
+  print(as_printed(args)...);
+}
+
+/// Prints a text of several lines, each as `printable` makes it, those after the first behind `indent`.
+inline void say_lines(std::FILE* stream, std::string_view text, std::string_view indent = "") {
+  std::fputs(printable_lines(text, indent).c_str(), stream);
+}
 
 }  // namespace palpate

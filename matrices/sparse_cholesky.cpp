@@ -324,6 +324,7 @@ Columns SparseCholesky::solve_columns(const Columns& b) const {
   for (const Supernode& supernode : supernodes_) {
     const int* rows = rows_.data() + supernode.rows_at + supernode.columns;
     auto own = y.middleRows(supernode.first, supernode.columns);
+    if ((own.array() == 0.0).all()) continue;  // few columns of b reach all of L
     diagonal(supernode).template triangularView<Eigen::Lower>().solveInPlace(own);
     part.noalias() = lower(supernode) * own;
     for (int i = 0; i < supernode.below(); ++i) y.row(rows[i]) -= part.row(i);

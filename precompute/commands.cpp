@@ -118,8 +118,7 @@ BakeSummary bake_or_keep(const std::string& model, const BakeOptions& options, b
     const std::filesystem::path output =
         options.output.empty() ? std::filesystem::path(description.name + ".palpate.hdf") : options.output;
     if (is_done(description, output)) {
-      std::fprintf(stderr, "%s is there, and nothing that it was made from has changed\n",
-                   printable(output.string()).c_str());
+      say(stderr, "{} is there, and nothing that it was made from has changed\n", output);
       return {.model = model, .output = output, .result = BakeResult::done};
     }
   }
@@ -133,22 +132,22 @@ int run_bake(const std::string& model, const BakeOptions& options, bool unless_d
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!options.report.empty())
     write_report(options.report, {json_text_of(summary)}, {1, summary.jobs, seconds, {peak_memory()}});
-  std::fputs(next_steps(summary).c_str(), stderr);
+  say_lines(stderr, next_steps(summary));
   return summary.result == BakeResult::interrupted ? exit_interrupted : exit_ok;
 }
 
 int run_verify(const std::string& file) {
   const Model model = load_model(file);
   const VerifyReport report = verify(model, file);
-  std::fputs(to_text(report).c_str(), stdout);
+  say_lines(stdout, to_text(report));
   if (!report.passed()) return exit_differs;
-  std::fprintf(stderr, "next: %s\n", to_touch(file, model.scope != Scope::none).c_str());
+  say(stderr, "next: {}\n", to_touch(file, model.scope != Scope::none));
   return exit_ok;
 }
 
 int run_compare(const std::string& a, const std::string& b, const CompareOptions& options) {
   const Comparison comparison = compare(load_model(a), load_model(b), options);
-  std::fputs(to_text(comparison).c_str(), stdout);
+  say_lines(stdout, to_text(comparison));
   return exit_ok;
 }
 
@@ -306,7 +305,7 @@ int run_commands(int argc, char** argv) {
   const CLI::App* compare_command = add_compare(app, arguments);
   const CLI::App* help_command = add_help_command(app, arguments.help);
   try {
-    app.parse(argc, argv);
+    parse(app, argc, argv);
     if (help_command->parsed()) {
       std::fputs(help_page(app, arguments.help).c_str(), stdout);
       return exit_ok;
@@ -324,7 +323,7 @@ int run_commands(int argc, char** argv) {
     return tell_usage(error.what(), usage_hint(app, argc > 1 ? argv[1] : ""));
   }
   if (inspect_command->parsed()) {
-    std::fputs(inspect(load_model(arguments.file)).c_str(), stdout);
+    say_lines(stdout, inspect(load_model(arguments.file)));
     return exit_ok;
   }
   if (compare_command->parsed()) return run_compare(arguments.file, arguments.other_file, arguments.compare);

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "base/program.h"
 #include "precompute/draft/questions.h"
 
 namespace palpate {
@@ -15,7 +16,7 @@ namespace {
 constexpr const char* group = "A surface, an image or a picture";
 
 void tell(const std::string& line) {
-  std::fputs((line + "\n").c_str(), stderr);
+  say(stderr, "{}\n", line);
 }
 
 DraftOptions options_of(const DraftArguments& arguments) {

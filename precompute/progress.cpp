@@ -8,6 +8,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "base/printable.h"
+
 namespace palpate {
 namespace {
 
@@ -75,7 +77,7 @@ void Progress::line(const std::string& text) {
 void Progress::warn(const std::string& text) {
   const std::scoped_lock lock(mutex_);
   end_stage();
-  print("\nwarning: " + text + "\n\n");
+  print("\nwarning: " + printable_lines(text) + "\n\n");
 }
 
 void Progress::plan(std::vector<Stage> stages) {
@@ -123,7 +125,7 @@ std::string Progress::stage_text() const {
 
 void Progress::write_line(const std::string& text) {
   shown_ = now();
-  print(fmt::format("{}[{:7.1f} s] {}\n", line_open_ ? "\r\033[K" : "", shown_, text));
+  print(fmt::format("{}[{:7.1f} s] {}\n", line_open_ ? "\r\033[K" : "", shown_, printable_lines(text)));
   line_open_ = false;
 }
 
@@ -133,7 +135,7 @@ void Progress::show(const std::string& text) {
     return;
   }
   shown_ = now();
-  print(fmt::format("\r\033[K[{:7.1f} s] {}", shown_, text));
+  print(fmt::format("\r\033[K[{:7.1f} s] {}", shown_, printable(text)));
   line_open_ = true;
 }
 

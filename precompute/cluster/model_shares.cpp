@@ -8,6 +8,8 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/printable.h"
+#include "base/program.h"
 #include "precompute/bake_report.h"
 #include "precompute/commands.h"
 
@@ -94,12 +96,10 @@ SideBySide bake_side_by_side(const ModelShares& shares, const BakeOptions& optio
       const BakeSummary bake = bake_model(model, options, alone);
       entries += json_text_of(bake) + '\n';
       if (bake.result == BakeResult::interrupted) status = exit_interrupted;
-      std::fputs(
-          fmt::format("{}: {} by rank {}\n", bake.output.string(), name_of(bake.result), team.rank()).c_str(),
-          stderr);
+      say(stderr, "{}: {} by rank {}\n", bake.output, name_of(bake.result), team.rank());
     } catch (const Error& error) {
       status = std::max<int>(status, exit_input_error);
-      std::fputs((model + ":\n" + to_text(error)).c_str(), stderr);
+      say_lines(stderr, printable(model) + ":\n" + to_text(error));
     }
   }
   SideBySide result;

@@ -10,6 +10,7 @@
 
 #include "base/command_line.h"
 #include "base/error.h"
+#include "base/printable.h"
 #include "base/program.h"
 #include "precompute/bake_report.h"
 #include "precompute/cluster/model_shares.h"
@@ -79,7 +80,7 @@ int run_bakes(const Arguments& arguments, Team& team) {
     const BakeSummary bake = bake_model(model, arguments.bake, team);
     if (!team.leads()) continue;
     entries.push_back(json_text_of(bake));
-    std::fputs(next_steps(bake).c_str(), stderr);
+    say_lines(stderr, next_steps(bake));
     if (bake.result == BakeResult::interrupted) status = exit_interrupted;
   }
   const SideBySide others = bake_side_by_side(shares, arguments.bake, team);
@@ -110,7 +111,7 @@ int run_rank_commands(int argc, char** argv, Team& team) {
   add_options(app, arguments);
   const CLI::App* help_command = add_help_command(app, arguments.help);
   try {
-    app.parse(argc, argv);
+    parse(app, argc, argv);
     if (help_command->parsed()) {
       std::fputs(help_page(app, arguments.help).c_str(), stdout);
       return exit_ok;

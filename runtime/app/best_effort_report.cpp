@@ -2,6 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <string>
+#include <vector>
+
 namespace palpate {
 namespace {
 
@@ -19,6 +22,7 @@ nlohmann::ordered_json to_json(const BestEffort& best_effort) {
   return {{"ticks", best_effort.ticks},
           {"not_converged_ticks", best_effort.not_converged_ticks},
           {"left_out_ticks", best_effort.left_out_ticks},
+          {"late_ticks", best_effort.late_ticks},
           {"most_left_out", best_effort.most_left_out},
           {"force_error_N",
            {{"median", best_effort.median_error()},
@@ -36,15 +40,17 @@ std::string in_words(const BestEffort& best_effort, std::int64_t ticks) {
       best_effort.ticks, 100.0 * static_cast<double>(best_effort.ticks) / static_cast<double>(ticks),
       percent(best_effort.median_share()), percent(best_effort.largest_share), best_effort.largest_error,
       best_effort.largest_error_time);
+  std::vector<std::string> reasons;
   if (best_effort.not_converged_ticks > 0)
-    text += fmt::format(": the solver was cut short in {} of them", best_effort.not_converged_ticks);
-  if (best_effort.left_out_ticks > 0) {
-    text += fmt::format(
-        "{} up to {} contact points found no room in {} of them; give it more "
-        "--max-contacts, or a smaller tool",
-        best_effort.not_converged_ticks > 0 ? "," : ":", best_effort.most_left_out,
-        best_effort.left_out_ticks);
-  }
+    reasons.push_back(fmt::format("the solver was cut short in {} of them", best_effort.not_converged_ticks));
+  if (best_effort.late_ticks > 0)
+    reasons.push_back(fmt::format("the body stood still in {} of them", best_effort.late_ticks));
+  if (best_effort.left_out_ticks > 0)
+    reasons.push_back(
+        fmt::format("up to {} contact points found no room in {} of them; give it more "
+                    "--max-contacts, or a smaller tool",
+                    best_effort.most_left_out, best_effort.left_out_ticks));
+  for (std::size_t k = 0; k < reasons.size(); ++k) text += (k == 0 ? ": " : ", ") + reasons[k];
   return text;
 }
 

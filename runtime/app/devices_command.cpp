@@ -6,46 +6,39 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
-#include "base/printable.h"
+#include "base/program.h"
 #include "runtime/devices/hid/builtin_profiles.h"
 #include "runtime/devices/hid/hid_choice.h"
 
 namespace palpate {
 namespace {
 
-std::string indented(std::string text) {
-  for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) {
-    text.insert(at + 1, "  ");
-  }
-  return text;
-}
-
 void print_device(const AttachedDevice& device, const std::vector<NamedProfile>& profiles) {
-  fmt::print("{}\n", device.name());
-  if (!device.maker.empty()) fmt::print("  maker    {}\n", printable(device.maker));
-  if (!device.serial.empty()) fmt::print("  serial   {}\n", printable(device.serial));
+  say(stdout, "{}\n", device.name());
+  if (!device.maker.empty()) say(stdout, "  maker    {}\n", device.maker);
+  if (!device.serial.empty()) say(stdout, "  serial   {}\n", device.serial);
   const auto fitting = fitting_profiles(device, profiles);
   if (fitting.empty()) {
-    fmt::print("  profile  none fits{}\n",
-               device.descriptor_problem.empty() ? "" : ": " + printable(device.descriptor_problem));
+    say(stdout, "  profile  none fits{}\n",
+        device.descriptor_problem.empty() ? "" : ": " + device.descriptor_problem);
   }
   for (const NamedProfile* profile : fitting) {
-    fmt::print("  profile  {}: {}\n", printable(profile->key), printable(profile->profile.name));
+    say(stdout, "  profile  {}: {}\n", profile->key, profile->profile.name);
   }
   // Nobody wants rules for the keyboard.
   if (fitting.empty()) return;
   if (device.access == 0) {
-    fmt::print("  access   yes\n");
+    say(stdout, "  access   yes\n");
   } else {
     const AccessProblem problem = access_problem(device);
-    fmt::print("  access   {}; {}\n", problem.what, indented(problem.hint));
+    say_lines(stdout, "  access   " + problem.what + "; " + problem.hint + "\n", "  ");
   }
-  if (fitting.size() > 1) fmt::print("  choose   with --profile NAME\n");
+  if (fitting.size() > 1) say(stdout, "  choose   with --profile NAME\n");
 }
 
 void print_text(const std::vector<AttachedDevice>& attached, const std::vector<NamedProfile>& profiles) {
   if (attached.empty()) {
-    fmt::print(
+    say(stdout,
         "No HID device is attached (none in /sys/class/hidraw).\n"
         "A container sees only the devices that it is given. Without a device a script moves the tool:\n"
         "palpate-runtime play FILE --device script:TOUCH.csv\n");
@@ -82,14 +75,14 @@ nlohmann::ordered_json json_of(const AttachedDevice& device, const std::vector<N
 void print_json(const std::vector<AttachedDevice>& attached, const std::vector<NamedProfile>& profiles) {
   nlohmann::ordered_json json = {{"devices", nlohmann::ordered_json::array()}};
   for (const AttachedDevice& device : attached) json["devices"].push_back(json_of(device, profiles));
-  fmt::print("{}", json_text(json, 2));
+  std::fputs(json_text(json, 2).c_str(), stdout);
 }
 
 int print_profile(const std::string& name) {
   std::string names;
   for (const BuiltinProfile& profile : builtin_profiles()) {
     if (profile.name == name) {
-      fmt::print("{}", profile.text);
+      std::fwrite(profile.text.data(), 1, profile.text.size(), stdout);
       return exit_ok;
     }
     names += (names.empty() ? "" : ", ") + std::string(profile.name);

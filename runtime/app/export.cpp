@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
+#include "base/program.h"
 #include "base/words.h"
 #include "base/write_file.h"
 #include "formats/outputs/output_paths.h"
@@ -113,8 +114,8 @@ std::string html_page(const Chosen& chosen, const ExportOptions& options) {
 }
 
 void tell(const std::filesystem::path& file, const Chosen& chosen, std::size_t bytes) {
-  fmt::print(stderr, "{}: {} pictures, {:.1f} s, {:.1f} MB\n", file.string(), chosen.frames.size(),
-             chosen.seconds(), 1e-6 * static_cast<double>(bytes));
+  say(stderr, "{}: {} pictures, {:.1f} s, {:.1f} MB\n", file, chosen.frames.size(), chosen.seconds(),
+      1e-6 * static_cast<double>(bytes));
 }
 
 /// "00042.vtu"
@@ -206,7 +207,7 @@ void write_table(const RecordingFile& recording, const ExportOptions& options,
     text.clear();
   }
   table.finish();
-  fmt::print(stderr, "{}: {} ticks\n", options.csv.string(), ticks.end - ticks.begin);
+  say(stderr, "{}: {} ticks\n", options.csv, ticks.end - ticks.begin);
 }
 
 void write_scene(const Chosen& chosen, const ExportOptions& options, const std::filesystem::path& gltf) {
@@ -238,8 +239,7 @@ void write_numbers(const RecordingFile& recording, SessionPictures* pictures, co
   } else {
     write_xdmf(hdf5, recording.surface(), times);
   }
-  fmt::print(stderr, "{}: {} ticks, {} pictures\n", options.hdf5.string(), ticks.end - ticks.begin,
-             frames.size());
+  say(stderr, "{}: {} ticks, {} pictures\n", options.hdf5, ticks.end - ticks.begin, frames.size());
 }
 
 }  // namespace

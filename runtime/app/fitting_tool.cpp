@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string>
 
+#include "base/program.h"
 #include "runtime/loop/output.h"
 
 namespace palpate {
@@ -36,7 +37,7 @@ void settle_tool(PlayOptions& options, const Body& body) {
     const std::string tool = fmt::format("sphere:{}", fitting_radius(body));
     options.settings_text["tool"] = tool;
     options.settings.tool.radius = fitting_radius(body);
-    fmt::print(stderr, "tool: {}, which suits the body; --tool takes another one\n", tool);
+    say(stderr, "tool: {}, which suits the body; --tool takes another one\n", tool);
   }
   const std::string problem = too_large(options.settings.tool, diagonal(body));
   if (!problem.empty())

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/program.h"
 #include "runtime/app/script_device.h"
 #include "runtime/devices/bridge/bridge_port.h"
 #include "runtime/devices/hid/hid_choice.h"
@@ -141,7 +142,7 @@ void wait_for(const DeviceLink& link, bool is_bridge, const std::atomic<bool>& s
   while (!link.has_reported() && !stop) {
     const auto waited = std::chrono::steady_clock::now() - start;
     if (!told && waited > 300ms) {
-      fmt::print(stderr, "waiting for {}\n", link.name());
+      say(stderr, "waiting for {}\n", link.name());
       told = true;
     }
     // Something speaks, but not as it should.
@@ -162,12 +163,11 @@ Settings apply_defaults(Settings settings, const InputSource& input, const Body&
 
 void print_device(const InputSource& input, const Settings& settings) {
   if (input.mouse != nullptr)
-    fmt::print(stderr, "device: the viewer's pointer; the coupling is {:.4g} N/m\n",
-               settings.tool.coupling_stiffness);
+    say(stderr, "device: the viewer's pointer; the coupling is {:.4g} N/m\n",
+        settings.tool.coupling_stiffness);
   if (input.link == nullptr) return;
   const Vec3& at = *settings.origin;
-  fmt::print(
-      stderr,
+  say(stderr,
       "device: {}; its origin lies at ({:.4g}, {:.4g}, {:.4g}) m, axes along {}; motion x {:g}, force x "
       "{:g}; at most {:g} N and, by the coupling, {:g} N/m on the body's side\n",
       input.link->name(), at.x(), at.y(), at.z(), settings.axes, settings.motion_scale, settings.force_scale,

@@ -243,8 +243,8 @@ int play_and_name_next(const PlayOptions& options) {
   const int status = play(options);
   const bool has_pictures = options.record_frames > 0.0;
   if (!options.record.empty())
-    fmt::print(stderr, "next: palpate-runtime {} {}\n", has_pictures ? "view" : "session",
-               shell_word(options.record.string()));
+    say(stderr, "next: palpate-runtime {} {}\n", has_pictures ? "view" : "session",
+        shell_word(options.record.string()));
   return status;
 }
 
@@ -264,8 +264,8 @@ int push(const PushArguments& arguments) {
   options.settings_text = solved_settings(load_outline(options.file));
   options.settings = read_settings(options.settings_text);
   if (!options.settings_text.empty())
-    fmt::print(stderr, "solved while you touch it: palpate-runtime play {} --view {}\n",
-               shell_word(options.file.string()), option_text(options.settings_text));
+    say(stderr, "solved while you touch it: palpate-runtime play {} --view {}\n",
+        shell_word(options.file.string()), option_text(options.settings_text));
   return play(options);
 }
 
@@ -306,7 +306,7 @@ int run(int argc, char** argv) {
     return tell_usage("'" + first_word + "' is no command", hint);
   }
   try {
-    app.parse(argc, argv);
+    parse(app, argc, argv);
     if (app.get_subcommands().empty()) throw CLI::RequiredError(std::string(commands));
     if (help_command->parsed()) {
       std::fputs(help_page(app, arguments.help).c_str(), stdout);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/program.h"
 #include "formats/outputs/output_paths.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/app/input_source.h"
@@ -62,7 +63,7 @@ OutputPaths check_outputs(PlayOptions& options) {
 
 std::unique_ptr<IgtlServer> serve_igtl(ListeningSocket socket) {
   const ListenAddress& address = socket.address();
-  fmt::print(stderr, "OpenIGTLink clients find the run at {}, port {}\n", address.address, address.port);
+  say(stderr, "OpenIGTLink clients find the run at {}, port {}\n", address.address, address.port);
   return std::make_unique<IgtlServer>(std::move(socket));
 }
 

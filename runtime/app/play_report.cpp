@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/json_text.h"
+#include "base/program.h"
 #include "runtime/app/best_effort_report.h"
 #include "runtime/background/live_motion.h"
 #include "runtime/background/warped_motion.h"
@@ -32,9 +33,8 @@ double microseconds(std::int64_t nanoseconds) {
 constexpr double most_patch_residual = 1e-3;  // that needs no word
 
 void print_tangents(const PatchTangentTelling& telling) {
-  fmt::print(stderr,
-             "overlay, neo-hookean: {} patches linearised (longest {:.1f} ms), steps cut in half {} times\n",
-             telling.made, 1e3 * telling.longest, telling.cuts);
+  say(stderr, "overlay, neo-hookean: {} patches linearised (longest {:.1f} ms), steps cut in half {} times\n",
+      telling.made, 1e3 * telling.longest, telling.cuts);
   if (telling.with_inverted > 0) {
     print_warning(
         fmt::format("in {} patches the tool turned elements inside out, {} points at most: the "
@@ -58,8 +58,7 @@ void print_tangents(const PatchTangentTelling& telling) {
 void print_overlays(const PatchSource& overlays) {
   const PatchCounts& counts = overlays.counts();
   const auto in_contact = static_cast<double>(std::max<std::int64_t>(counts.in_contact, 1));
-  fmt::print(
-      stderr,
+  say(stderr,
       "overlay: {} patches built (longest {:.1f} ms, {:.0f} MB kept), {} switches, {:.2f} % of the ticks in "
       "contact on an older patch or none\n",
       overlays.built(), 1e3 * overlays.longest_build(), 1e-6 * static_cast<double>(overlays.bytes()),
@@ -73,27 +72,27 @@ void print_overlays(const PatchSource& overlays) {
 }
 
 void print_loop(const LoopReport& report, bool fast) {
-  fmt::print(stderr, "{} ticks{}, {} of them in contact, at most {} contact points\n", report.ticks,
-             report.interrupted ? " until interrupted" : "", report.ticks_in_contact, report.most_contacts);
+  say(stderr, "{} ticks{}, {} of them in contact, at most {} contact points\n", report.ticks,
+      report.interrupted ? " until interrupted" : "", report.ticks_in_contact, report.most_contacts);
   const auto times = [](const char* what, const TimeHistogram& histogram) {
-    fmt::print(stderr, "{}: median {:.2f} us, 99.9 % {:.2f} us, 99.99 % {:.2f} us, worst {:.2f} us\n", what,
-               microseconds(histogram.percentile(0.5)), microseconds(histogram.percentile(0.999)),
-               microseconds(histogram.percentile(0.9999)), microseconds(histogram.worst()));
+    say(stderr, "{}: median {:.2f} us, 99.9 % {:.2f} us, 99.99 % {:.2f} us, worst {:.2f} us\n", what,
+        microseconds(histogram.percentile(0.5)), microseconds(histogram.percentile(0.999)),
+        microseconds(histogram.percentile(0.9999)), microseconds(histogram.worst()));
   };
   times("step", report.compute);
   if (!fast) {
     times("late", report.lateness);
-    fmt::print(stderr, "{} deadline misses at {} Hz\n", report.deadline_misses, report.rate);
+    say(stderr, "{} deadline misses at {} Hz\n", report.deadline_misses, report.rate);
   }
-  fmt::print(stderr, "largest force {:.6g} N at {:.3f} s, largest jump between ticks {:.6g} N at {:.3f} s\n",
-             report.largest_force, report.largest_force_time, report.largest_jump, report.largest_jump_time);
+  say(stderr, "largest force {:.6g} N at {:.3f} s, largest jump between ticks {:.6g} N at {:.3f} s\n",
+      report.largest_force, report.largest_force_time, report.largest_jump, report.largest_jump_time);
   if (report.largest_greens_error > 0.0) {
-    fmt::print(stderr, "compressed Green's functions: forces are off by at most {:.2g} N, at {:.3f} s\n",
-               report.largest_greens_error, report.largest_greens_error_time);
+    say(stderr, "compressed Green's functions: forces are off by at most {:.2g} N, at {:.3f} s\n",
+        report.largest_greens_error, report.largest_greens_error_time);
   }
   for (std::size_t k = 0; k < status_names.size(); ++k) {
     if (report.status_ticks[k] > 0)
-      fmt::print(stderr, "{}: {} ticks\n", status_names[k].second, report.status_ticks[k]);
+      say(stderr, "{}: {} ticks\n", status_names[k].second, report.status_ticks[k]);
   }
 }
 
@@ -116,26 +115,25 @@ void tell_best_effort(const LoopReport& report) {
   if (is_grave(report.best_effort, report.ticks)) {
     print_warning(words);
   } else if (!words.empty()) {
-    fmt::print(stderr, "{}\n", words);
+    say(stderr, "{}\n", words);
   }
 }
 
 void print_device(const PlayedRun& run) {
   const LoopReport& report = run.report;
   if (run.settings.safety) {
-    fmt::print(stderr, "the hand was shown at most {:.6g} N", report.largest_shown);
+    say(stderr, "the hand was shown at most {:.6g} N", report.largest_shown);
     for (std::size_t k = 1; k < fault_names.size(); ++k) {
-      if (report.faults[k] > 0)
-        fmt::print(stderr, "; {} faults: {}", report.faults[k], fault_names[k].second);
+      if (report.faults[k] > 0) say(stderr, "; {} faults: {}", report.faults[k], fault_names[k].second);
     }
-    fmt::print(stderr, "\n");
+    say(stderr, "\n");
   }
   if (run.link != nullptr) {
-    fmt::print(stderr,
-               "device: {} reports heard, {} commands written (longest {:.2f} ms, {} without the loop), "
-               "opened again {} times\n",
-               run.link->reports(), run.link->writes(), 1e-6 * static_cast<double>(run.link->worst_write()),
-               run.link->extrapolated(), report.opened_again);
+    say(stderr,
+        "device: {} reports heard, {} commands written (longest {:.2f} ms, {} without the loop), "
+        "opened again {} times\n",
+        run.link->reports(), run.link->writes(), 1e-6 * static_cast<double>(run.link->worst_write()),
+        run.link->extrapolated(), report.opened_again);
     const std::string refusals = run.link->refusals();
     if (!refusals.empty()) print_warning("refused of the device: " + refusals);
   }
@@ -143,13 +141,13 @@ void print_device(const PlayedRun& run) {
 
 void print_replay(const ReplayDifference& replay) {
   if (replay.different == 0) {
-    fmt::print(stderr, "replay: all forces of {} ticks are those of the session, bit by bit\n", replay.ticks);
+    say(stderr, "replay: all forces of {} ticks are those of the session, bit by bit\n", replay.ticks);
   } else {
-    fmt::print(stderr,
-               "replay: {} of {} ticks differ from the session, most by {:.6g} N at {:.3f} s; the first is "
-               "tick {}, in its {}\n",
-               replay.different, replay.ticks, replay.largest, replay.largest_time, replay.first_tick,
-               replay.first_field);
+    say(stderr,
+        "replay: {} of {} ticks differ from the session, most by {:.6g} N at {:.3f} s; the first is "
+        "tick {}, in its {}\n",
+        replay.different, replay.ticks, replay.largest, replay.largest_time, replay.first_tick,
+        replay.first_field);
   }
 }
 
@@ -246,8 +244,8 @@ constexpr double degrees_a_radian = 180.0 / std::numbers::pi;
 constexpr double most_warp_residual = 1e-3;  // that needs no word
 
 void print_warp(const WarpTelling& warp) {
-  fmt::print(stderr, "warp: the surface turned by up to {:.3g} degrees, its compliance {} times\n",
-             degrees_a_radian * warp.largest_rotation, warp.turns);
+  say(stderr, "warp: the surface turned by up to {:.3g} degrees, its compliance {} times\n",
+      degrees_a_radian * warp.largest_rotation, warp.turns);
   if (warp.last_residual > most_warp_residual)
     print_warning(
         fmt::format("at the end the warped body was not in balance: its next step would have changed "
@@ -264,19 +262,22 @@ Json json_warp(const WarpTelling& warp) {
           {"last_residual", warp.last_residual}};
 }
 
-void print_live(const Body& body, const LiveTelling& live) {
+/// How far the tool's force was off at most, while the body moved or stood still [N].
+double largest_force_error(const LiveTelling& live, const LoopReport& report) {
+  return std::max(live.largest_force_error, report.best_effort.largest_late_error);
+}
+
+void print_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
   const LiveCounts& counts = live.counts;
-  fmt::print(
-      stderr,
+  say(stderr,
       "solver: {}, {} steps by {}; {} were cut as they diverged, {} could not be made, {} had inverted "
       "elements (at most {})\n",
       name_of(body.live()->body.options().law), counts.steps, name_of(body.live()->stepper.scheme.integrator),
       counts.halved, counts.stopped, counts.inverted, counts.most_inverted);
-  fmt::print(
-      stderr,
+  say(stderr,
       "the tool met the compliance of {:.3g} s ago, renewed {} times and turned {} times; against the solver "
       "it was off by {:.2g} m and {:.2g} N at most, of forces up to {:.3g} N\n",
-      live.compliance_age, live.renewals, live.turns, live.largest_error, live.largest_force_error,
+      live.compliance_age, live.renewals, live.turns, live.largest_error, largest_force_error(live, report),
       live.largest_force);
   if (counts.near_limit > 0)
     print_warning(fmt::format(
@@ -292,7 +293,7 @@ void print_live(const Body& body, const LiveTelling& live) {
                     counts.stopped));
 }
 
-Json json_live(const Body& body, const LiveTelling& live) {
+Json json_live(const Body& body, const LiveTelling& live, const LoopReport& report) {
   const LiveCounts& counts = live.counts;
   return {{"solver", name_of(body.live()->body.options().law)},
           {"integrator", name_of(body.live()->stepper.scheme.integrator)},
@@ -310,7 +311,7 @@ Json json_live(const Body& body, const LiveTelling& live) {
           {"compliance_turns", live.turns},
           {"largest_error_m", live.largest_error},
           {"last_error_m", live.last_error},
-          {"largest_force_error_N", live.largest_force_error},
+          {"largest_force_error_N", largest_force_error(live, report)},
           {"last_force_error_N", live.last_force_error},
           {"largest_force_N", live.largest_force}};
 }
@@ -427,15 +428,15 @@ void print_report(const PlayedRun& run) {
   tell_best_effort(run.report);
   print_device(run);
   if (!run.options.record.empty())
-    fmt::print(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record.string(),
-               run.dropped, run.dropped_frames);
+    say(stderr, "recording {}: {} ticks and {} frames dropped\n", run.options.record, run.dropped,
+        run.dropped_frames);
   if (run.recording_failure) print_warning("the recording failed: " + in_one_line(*run.recording_failure));
   if (run.overlays != nullptr) print_overlays(*run.overlays);
   if (run.motion != nullptr) {
-    fmt::print(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
-               1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
+    say(stderr, "motion: {} steps of {:.3g} ms, longest {:.2f} ms\n", run.motion->steps(),
+        1e3 * run.body.model().dynamics.newmark.time_step, 1e3 * run.motion->longest_step());
   }
-  if (const LiveMotion* live = live_motion(run)) print_live(run.body, live->telling());
+  if (const LiveMotion* live = live_motion(run)) print_live(run.body, live->telling(), run.report);
   if (const WarpedMotion* warped = warped_motion(run)) print_warp(warped->telling());
   if (run.options.device.kind == DeviceChoice::Kind::replay) print_replay(run.report.replay);
   if (run.options.device.kind == DeviceChoice::Kind::script || run.link != nullptr) warn_of_places(run);
@@ -477,7 +478,8 @@ std::string json_report(const PlayedRun& run) {
   if (run.options.device.kind == DeviceChoice::Kind::replay) json["replay"] = json_replay(report.replay);
   if (run.overlays != nullptr) json["overlay"] = json_overlays(*run.overlays, run.settings.overlay.value());
   json["dynamics"] = json_dynamics(run.body, run.motion);
-  if (const LiveMotion* live = live_motion(run)) json["live"] = json_live(run.body, live->telling());
+  if (const LiveMotion* live = live_motion(run))
+    json["live"] = json_live(run.body, live->telling(), run.report);
   if (const WarpedMotion* warped = warped_motion(run)) json["warp"] = json_warp(warped->telling());
   if (!run.options.record.empty()) {
     json["recording"] = run.options.record.string();

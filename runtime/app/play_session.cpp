@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/write_file.h"
 #include "runtime/app/play_report.h"
+#include "runtime/background/live_motion.h"
 #include "runtime/loop/last_tick.h"
 #include "runtime/loop/output.h"
 #include "runtime/loop/real_time.h"
@@ -31,6 +32,16 @@ State state_of(const Settings& settings, const Body& body, const Tool& tool) {
                       .max_contacts = settings.max_contacts,
                       .patch_nodes = settings.overlay ? patch_room(body, settings.overlay->rings, 1) : 0,
                       .tick = 1.0 / static_cast<double>(settings.rate)});
+}
+
+void warn_of_slow_steps(const Body& body) {
+  const double step = body.live()->stepper.time_step, taken = measured_step(body);
+  if (taken <= step) return;
+  print_warning(fmt::format(
+      "a step of {:.3g} ms takes {:.0f} ms here: the body moves {:.2g} times slower than real time and feels "
+      "stiffer than it is; give it a larger edge_length, a longer --live-step or --step-solver cg, leave out "
+      "--solver (or take --warp yes), or let it take its time by --fast",
+      1e3 * step, 1e3 * taken, taken / step));
 }
 
 }  // namespace
@@ -59,6 +70,7 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
   }
   if (body.model().dynamics.method == DynamicsMethod::packed)
     motion_.emplace(body, state_, MotionSourceOptions{.in_background = in_background});
+  if (body.live() != nullptr && in_background) warn_of_slow_steps(body);
   if (!options_.record.empty()) {
     recorder_.emplace(
         options_.record,

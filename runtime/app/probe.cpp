@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
+#include "base/program.h"
 #include "meshes/node_vectors.h"
 #include "runtime/app/probe_field.h"
 #include "runtime/body/prescribed_nodes.h"
@@ -176,13 +177,13 @@ std::string text_vector(const Vec3& v) {
 
 void print_text(const std::vector<Answer>& answers) {
   for (const Answer& answer : answers) {
-    fmt::print("node {} at {} m", answer.node, text_vector(answer.position));
-    if (answer.distance) fmt::print(", {:.4g} m from the point asked for", *answer.distance);
-    fmt::print("\n  displacement      {} m\n", text_vector(answer.displacement));
-    fmt::print("  force on the body {} N, {:.10g} N in all\n", text_vector(answer.force),
-               answer.force.stableNorm());
+    say(stdout, "node {} at {} m", answer.node, text_vector(answer.position));
+    if (answer.distance) say(stdout, ", {:.4g} m from the point asked for", *answer.distance);
+    say(stdout, "\n  displacement      {} m\n", text_vector(answer.displacement));
+    say(stdout, "  force on the body {} N, {:.10g} N in all\n", text_vector(answer.force),
+        answer.force.stableNorm());
   }
-  fmt::print("total force on the body {} N\n", text_vector(total_force(answers)));
+  say(stdout, "total force on the body {} N\n", text_vector(total_force(answers)));
 }
 
 nlohmann::ordered_json json_vector(const Vec3& v) {
@@ -203,7 +204,7 @@ void print_json(const std::vector<Answer>& answers, const std::vector<std::strin
                                        {"nodes", nodes},
                                        {"total_force", json_vector(total_force(answers))},
                                        {"warnings", warnings}};
-  fmt::print("{}", json_text(json, 2));
+  std::fputs(json_text(json, 2).c_str(), stdout);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
-#include "base/printable.h"
+#include "base/program.h"
 #include "base/write_file.h"
 #include "runtime/app/best_effort_report.h"
 #include "runtime/loop/output.h"
@@ -77,30 +77,30 @@ void print_text(const RecordingFile& recording, const SessionSummary& s, Ending 
   const auto microseconds = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-3; };
   const SessionInfo& info = recording.info();
   const std::size_t pictures = recording.pictures().size();
-  fmt::print("{}: {}, by {}\n", printable(recording.path().string()), ending_names[static_cast<int>(ending)],
-             printable(recording.generator()));
-  fmt::print("model            {} ({})\n", printable(info.model_path), printable(info.content_hash));
-  fmt::print("device           {}\n", info.device.empty() ? "unknown" : printable(info.device));
-  fmt::print("options          {}\n", printable(in_one_line(info.options)));
-  fmt::print("ticks            {} at {} a second: {:.3f} s, {} missing\n", s.ticks, info.rate, s.seconds,
-             s.missing);
-  fmt::print("in contact       {} ticks, {:.3f} s\n", s.in_contact,
-             static_cast<double>(s.in_contact) / static_cast<double>(info.rate));
-  fmt::print("largest force    {:.6g} N at {:.3f} s\n", s.largest_force, s.largest_force_time);
-  fmt::print("largest shown    {:.6g} N at {:.3f} s\n", s.largest_shown, s.largest_shown_time);
-  fmt::print("step             median {:.2f} us, 99.9 % {:.2f} us, worst {:.2f} us\n",
-             microseconds(s.compute.percentile(0.5)), microseconds(s.compute.percentile(0.999)),
-             microseconds(s.compute.worst()));
-  fmt::print("deadline misses  {}, at most {:.1f} us late\n", s.deadline_misses,
-             microseconds(s.worst_lateness));
-  fmt::print("faults           {}\n", faults_text(s));
-  fmt::print("status           {}\n", status_text(s));
-  if (s.best_effort.ticks > 0) fmt::print("best effort      {}\n", in_words(s.best_effort, s.ticks));
+  say(stdout, "{}: {}, by {}\n", recording.path(), ending_names[static_cast<int>(ending)],
+      recording.generator());
+  say(stdout, "model            {} ({})\n", info.model_path, info.content_hash);
+  say(stdout, "device           {}\n", info.device.empty() ? "unknown" : info.device);
+  say(stdout, "options          {}\n", in_one_line(info.options));
+  say(stdout, "ticks            {} at {} a second: {:.3f} s, {} missing\n", s.ticks, info.rate, s.seconds,
+      s.missing);
+  say(stdout, "in contact       {} ticks, {:.3f} s\n", s.in_contact,
+      static_cast<double>(s.in_contact) / static_cast<double>(info.rate));
+  say(stdout, "largest force    {:.6g} N at {:.3f} s\n", s.largest_force, s.largest_force_time);
+  say(stdout, "largest shown    {:.6g} N at {:.3f} s\n", s.largest_shown, s.largest_shown_time);
+  say(stdout, "step             median {:.2f} us, 99.9 % {:.2f} us, worst {:.2f} us\n",
+      microseconds(s.compute.percentile(0.5)), microseconds(s.compute.percentile(0.999)),
+      microseconds(s.compute.worst()));
+  say(stdout, "deadline misses  {}, at most {:.1f} us late\n", s.deadline_misses,
+      microseconds(s.worst_lateness));
+  say(stdout, "faults           {}\n", faults_text(s));
+  say(stdout, "status           {}\n", status_text(s));
+  if (s.best_effort.ticks > 0) say(stdout, "best effort      {}\n", in_words(s.best_effort, s.ticks));
   if (pictures == 0) {
-    fmt::print("pictures         none\n");
+    say(stdout, "pictures         none\n");
   } else {
-    fmt::print("pictures         {} of {} surface nodes, {}\n", pictures, recording.surface().nodes.size(),
-               recording.stores_pictures() ? "stored" : "computed by the model");
+    say(stdout, "pictures         {} of {} surface nodes, {}\n", pictures, recording.surface().nodes.size(),
+        recording.stores_pictures() ? "stored" : "computed by the model");
   }
 }
 
@@ -141,7 +141,7 @@ void print_json(const RecordingFile& recording, const SessionSummary& s, Ending 
                                        {"pictures", recording.pictures().size()},
                                        {"stores_pictures", recording.stores_pictures()},
                                        {"surface_nodes", recording.surface().nodes.size()}};
-  fmt::print("{}", json_text(json, 2));
+  std::fputs(json_text(json, 2).c_str(), stdout);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "base/printable.h"
+#include "base/program.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/app/session_view.h"
 #include "runtime/viewer/viewer_server.h"
@@ -29,8 +29,8 @@ int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptio
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     sessions[k].show(server, k);
     const SessionPictures& pictures = sessions[k].pictures();
-    fmt::print(stderr, "{}: {} pictures, {:.3f} s\n", printable(recordings[k].string()), pictures.frames(),
-               pictures.time(pictures.frames() - 1));
+    say(stderr, "{}: {} pictures, {:.3f} s\n", recordings[k], pictures.frames(),
+        pictures.time(pictures.frames() - 1));
   }
   tell_address(served, server.url(), "; Ctrl-C ends");
   int signal = 0;

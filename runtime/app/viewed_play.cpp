@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "base/json_text.h"
+#include "base/program.h"
 #include "base/regular_file.h"
 #include "runtime/app/fitting_tool.h"
 #include "runtime/body/overlay_rings.h"

@@ -1,12 +1,32 @@
 #include "runtime/background/live_motion.h"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
+#include <span>
 
 #include "meshes/node_vectors.h"
 #include "runtime/live/live_model.h"
 
 namespace palpate {
+
+double measured_step(const Body& body) {
+  const LiveBody& live = body.live()->body;
+  LiveStepper stepper(live, body.live()->stepper);
+  LiveState state = state_at_rest(body);
+  const int d = live.dimension();
+  const Index node = body.greens().nodes() / 2;
+  std::array<double, 9> block{};
+  body.greens().gather(node, {&node, 1}, std::span(block).first(static_cast<std::size_t>(d * d)));
+  Eigen::VectorXd push = Eigen::VectorXd::Zero(live.dofs());
+  push[Eigen::Index{d} * body.mesh_node(node)] = 0.01 * body.mean_surface_edge() / block[0];
+  stepper.step(state, push);  // finds the order of elimination too
+  const auto begin = std::chrono::steady_clock::now();
+  stepper.step(state, push);  // with the forces that the tick found
+  stepper.step(state, push);  // and the one to come
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
 
 LiveMotion::LiveMotion(const Body& body, bool renews_compliance)
     : body_(body),

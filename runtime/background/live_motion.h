@@ -31,6 +31,9 @@ struct LiveTelling {
   double largest_force = 0.0;  ///< sum of the forces on the body at the end of a step [N]
 };
 
+/// Time that the body of a live model takes for a step beside the tick, by a trial under a small push [s].
+double measured_step(const Body& body);
+
 /// Steps a live body. The tick meets x = x_p + W (f - f_p): x_p is the step with the forces f_p of the last
 /// one held, W the compliance of one step, which is renewed as the body changes (LiveCompliance). The forces
 /// f that the tick ends with do the step anew, without W; how far the two are apart is the error of the local

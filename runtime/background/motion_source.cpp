@@ -33,7 +33,8 @@ MotionSource::MotionSource(const Body& body, const State& state, const MotionSou
       stepper_(make_stepper(body, options.jobs > 0 ? options.jobs : processors_beside_the_tick())),
       in_background_(options.in_background),
       jobs_(state.surface.motion.job()),
-      samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.greens().order()))}) {
+      samples_(MotionSample{.u = std::vector<double>(static_cast<std::size_t>(body.greens().order()))}),
+      timely_(state.tools.size(), Vec3::Zero()) {
   if (in_background_) worker_ = std::thread([this] { work(); });
 }
 
@@ -62,7 +63,22 @@ void MotionSource::take(State& state) noexcept {
   if (state.surface.motion.receive(sample)) change_compliance(body_, state.surface, sample.compliance);
 }
 
-void MotionSource::post(const State& state) noexcept {
+void MotionSource::note_standing_still(State& state) noexcept {
+  const ContactModel contact = body_.contact_model();
+  if (contact != ContactModel::live && contact != ContactModel::dynamic) return;
+  const bool is_late = has(state.status, StepStatus::late_motion);
+  for (std::size_t k = 0; k < timely_.size(); ++k) {
+    ToolState& tool = state.tools[k];
+    if (!is_late) {
+      timely_[k] = tool.contact_wrench.force;
+    } else if (tool.contacts > 0) {
+      tool.force_error += (tool.contact_wrench.force - timely_[k]).norm();
+    }
+  }
+}
+
+void MotionSource::post(State& state) noexcept {
+  note_standing_still(state);
   if (!state.surface.motion.active()) return;
   if (!in_background_) {
     const MotionJob& job = state.surface.motion.job();

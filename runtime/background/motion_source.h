@@ -34,7 +34,9 @@ class MotionSource {
   void receive(State& state) noexcept;
   /// For a replay of a tick whose last sample was of `step`, of jobs up to 64 ago; not in the background.
   void receive(State& state, std::int64_t step) noexcept;
-  void post(const State& state) noexcept;
+  /// Adds to the tools' force_error what their forces have come to be against a body that is to give way with
+  /// time (a live one, dynamic contact) and stood still.
+  void post(State& state) noexcept;
 
   [[nodiscard]] std::int64_t steps() const noexcept { return steps_; }     ///< done so far
   [[nodiscard]] double longest_step() const noexcept { return longest_; }  ///< [s]
@@ -43,6 +45,7 @@ class MotionSource {
  private:
   void work() noexcept;
   void take(State& state) noexcept;
+  void note_standing_still(State& state) noexcept;
   void do_job(const MotionJob& job) noexcept;
 
   const Body& body_;
@@ -51,6 +54,7 @@ class MotionSource {
   Latest<MotionJob> jobs_;
   Latest<MotionSample> samples_;
   std::deque<MotionJob> posted_;  // the last ones; not in the background
+  std::vector<Vec3> timely_;      // [tools] force when the body was last in time [N]
   std::int64_t done_ = 0;         // the last job
   std::int64_t let_go_done_ = 0;  // of the body
   std::atomic<std::int64_t> steps_ = 0;

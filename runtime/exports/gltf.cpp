@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "base/json_text.h"
 #include "runtime/exports/tool_mesh.h"
 
 namespace palpate {
@@ -226,7 +227,7 @@ void write_glb(FileWriter& file, const std::string& name, const RecordedSurface&
   scene["accessors"] = buffer.accessors;
   scene["buffers"] = json::array({{{"byteLength", buffer.bytes.size()}}});
 
-  std::string text = scene.dump();
+  std::string text = json_text(scene);
   fill_up(text, ' ');
   fill_up(buffer.bytes, '\0');
   constexpr std::size_t head_bytes = 8;  // of a chunk

@@ -4,7 +4,7 @@
 #include <signal.h>
 
 #include "base/error.h"
-#include "base/printable.h"
+#include "base/program.h"
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/gallery/gallery_server.h"
 
@@ -18,7 +18,7 @@ int show_gallery(const std::filesystem::path& folder, const ViewerOptions& optio
   const std::size_t items = list_gallery(folder).size();
   const std::filesystem::path place = std::filesystem::canonical(folder);
   const GalleryServer server(place, options);
-  fmt::print(stderr, "{}: {} to choose from\n", printable(place.string()), items);
+  say(stderr, "{}: {} to choose from\n", place, items);
   tell_address(server.served(), server.url(), "; Ctrl-C ends");
   int signal = 0;
   sigwait(&ends, &signal);

@@ -15,6 +15,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "base/program.h"
 
 namespace palpate {
 namespace {

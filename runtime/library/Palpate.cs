@@ -5,6 +5,7 @@ using System;
 using System.Collections.Generic;
 using System.Runtime.InteropServices;
 using System.Text;
+using System.Threading;
 
 namespace Palpate
 {
@@ -122,21 +123,21 @@ namespace Palpate
         public double GreensError;
     }
 
-    /// <summary>One body and the tools that touch it. One thread steps; one other may draw at the same time.</summary>
+    /// <summary>One body and the tools that touch it. One thread steps (Step, Felt, SetTool, Reset, Record, EndRecording); others may draw
+    /// at the same time (Rest, Surface, Displacement, Stress) and dispose. What comes after that throws ObjectDisposedException, and what
+    /// a second thread that steps asks for InvalidOperationException.</summary>
     public sealed class Session : IDisposable
     {
         readonly IntPtr session;
         readonly int tools;
         readonly Native.Counts counts;
-        readonly Pose[] poses;
-        bool ended;
+        int ended;
 
         /// <summary>Loads a baked file (NAME.palpate.hdf). Throws PalpateException.</summary>
         public Session(string file, Tool[] tools, Options options = null)
         {
             options = options ?? new Options();
             this.tools = tools.Length;
-            poses = new Pose[tools.Length];
             var error = new byte[4096];
             var c = new Native.Options
             {
@@ -149,8 +150,7 @@ namespace Palpate
             try
             {
                 if (options.Overlay.HasValue) c.overlay = overlay.AddrOfPinnedObject();
-                var name = Encoding.UTF8.GetBytes(file + "\0");
-                session = Native.palpate_create_with_options(name, tools, tools.Length, options.MaxContacts, ref c, error, (UIntPtr)error.Length);
+                session = Native.palpate_create_with_options(Name(file), tools, tools.Length, options.MaxContacts, ref c, error, (UIntPtr)error.Length);
             }
             finally
             {
@@ -171,36 +171,36 @@ namespace Palpate
         public uint Step(Pose pose)
         {
             if (tools != 1) throw new ArgumentException("the session has " + tools + " tools: give a pose for each");
-            poses[0] = pose;
-            return Native.palpate_step(Open(), poses);
+            return Stepped(Native.palpate_step(Open(), ref pose));
         }
 
         /// <summary>One tick, a pose for each tool; status bits. Takes no memory.</summary>
         public uint Step(Pose[] poses)
         {
             if (poses.Length != tools) throw new ArgumentException("the session has " + tools + " tools: give a pose for each");
-            return Native.palpate_step(Open(), poses);
+            return Stepped(Native.palpate_step(Open(), poses));
         }
 
         /// <summary>What a tool feels since the last tick.</summary>
         public Felt Felt(int tool = 0)
         {
             var felt = new Felt { size = (UIntPtr)Marshal.SizeOf(typeof(Felt)) };
-            if (Native.palpate_get(Open(), tool, ref felt) != 0) throw new ArgumentOutOfRangeException("tool");
+            if (Done(Native.palpate_get(Open(), tool, ref felt)) != 0) throw new ArgumentOutOfRangeException("tool");
             return felt;
         }
 
         /// <summary>What a tool is from the next tick on; false where its shape is another, or a value makes no sense.</summary>
-        public bool SetTool(int number, Tool tool) { return Native.palpate_set_tool(Open(), number, ref tool) == 0; }
+        public bool SetTool(int number, Tool tool) { return Done(Native.palpate_set_tool(Open(), number, ref tool)) == 0; }
 
-        public void Reset() { Native.palpate_reset(Open()); }
+        /// <summary>To a body that nobody has touched; not while it is recorded.</summary>
+        public void Reset() { Done(Native.palpate_reset(Open())); }
 
         /// <summary>Records each tick of a tool from now on, from the untouched body, with so many pictures of the surface a second. Throws PalpateException.</summary>
         public void Record(string file, double pictures = 60, int tool = 0)
         {
             var options = new Native.RecordOptions { size = (UIntPtr)Marshal.SizeOf(typeof(Native.RecordOptions)), tool = tool, pictures = pictures };
             var error = new byte[4096];
-            int code = Native.palpate_record(Open(), Encoding.UTF8.GetBytes(file + "\0"), ref options, error, (UIntPtr)error.Length);
+            int code = Native.palpate_record(Open(), Name(file), ref options, error, (UIntPtr)error.Length);
             if (code != 0) throw Failure(error, code);
         }
 
@@ -213,13 +213,13 @@ namespace Palpate
         }
 
         /// <summary>Fills positions at rest, 3 Nodes numbers [m].</summary>
-        public void Rest(double[] xyz) { Native.palpate_surface_rest(Open(), Room(xyz, 3 * Nodes)); }
+        public void Rest(double[] xyz) { Done(Native.palpate_surface_rest(Open(), Room(xyz, 3 * Nodes))); }
 
         /// <summary>Fills corners of the simplices, Corners * Simplices numbers.</summary>
-        public void Surface(int[] corners) { Native.palpate_surface_simplices(Open(), Room(corners, Corners * Simplices)); }
+        public void Surface(int[] corners) { Done(Native.palpate_surface_simplices(Open(), Room(corners, Corners * Simplices))); }
 
         /// <summary>Fills displacements in the last tick, 3 Nodes numbers [m].</summary>
-        public void Displacement(double[] xyz) { Native.palpate_surface_displacement(Open(), Room(xyz, 3 * Nodes)); }
+        public void Displacement(double[] xyz) { Done(Native.palpate_surface_displacement(Open(), Room(xyz, 3 * Nodes))); }
 
         /// <summary>Fills von Mises stress and pressure, Nodes numbers each [Pa], and returns the tick that they belong to; -1: none yet.</summary>
         public long Stress(float[] vonMises, float[] pressure)
@@ -240,10 +240,10 @@ namespace Palpate
             return names;
         }
 
+        /// <summary>Ends the session, after the step under way in another thread.</summary>
         public void Dispose()
         {
-            if (!ended && session != IntPtr.Zero) Native.palpate_destroy(session);
-            ended = true;
+            if (Interlocked.Exchange(ref ended, 1) == 0 && session != IntPtr.Zero) Native.palpate_destroy(session);
             GC.SuppressFinalize(this);
         }
 
@@ -251,8 +251,27 @@ namespace Palpate
 
         IntPtr Open()
         {
-            if (ended) throw new ObjectDisposedException("Session");
+            if (ended != 0) throw new ObjectDisposedException("Session");
             return session;
+        }
+
+        uint Stepped(uint status)
+        {
+            if ((status & Native.NotStepped) != 0) Done(Native.ErrorState);
+            return status;
+        }
+
+        int Done(int code)
+        {
+            if (code != Native.ErrorState) return code;
+            Open();
+            throw new InvalidOperationException("another thread steps the session, or it is recorded");
+        }
+
+        static byte[] Name(string file)
+        {
+            if (file.IndexOf('\0') >= 0) throw new ArgumentException("a file's name has no zero character", "file");
+            return Encoding.UTF8.GetBytes(file + "\0");
         }
 
         static T[] Room<T>(T[] numbers, int count)
@@ -280,6 +299,8 @@ namespace Palpate
     static class Native
     {
         const string Library = "palpate";
+        internal const uint NotStepped = 1 << 15;
+        internal const int ErrorState = 4;
 
         [StructLayout(LayoutKind.Sequential)]
         internal struct Options
@@ -316,11 +337,13 @@ namespace Palpate
         [DllImport(Library)]
         internal static extern uint palpate_step(IntPtr session, Pose[] poses);
         [DllImport(Library)]
+        internal static extern uint palpate_step(IntPtr session, ref Pose pose);
+        [DllImport(Library)]
         internal static extern int palpate_get(IntPtr session, int tool, ref Felt result);
         [DllImport(Library)]
         internal static extern int palpate_set_tool(IntPtr session, int number, ref Tool tool);
         [DllImport(Library)]
-        internal static extern void palpate_reset(IntPtr session);
+        internal static extern int palpate_reset(IntPtr session);
         [DllImport(Library)]
         internal static extern int palpate_last_code();
         [DllImport(Library)]
@@ -332,11 +355,11 @@ namespace Palpate
         [DllImport(Library)]
         internal static extern int palpate_surface_counts(IntPtr session, ref Counts counts);
         [DllImport(Library)]
-        internal static extern void palpate_surface_rest(IntPtr session, double[] xyz);
+        internal static extern int palpate_surface_rest(IntPtr session, double[] xyz);
         [DllImport(Library)]
-        internal static extern void palpate_surface_simplices(IntPtr session, int[] corners);
+        internal static extern int palpate_surface_simplices(IntPtr session, int[] corners);
         [DllImport(Library)]
-        internal static extern void palpate_surface_displacement(IntPtr session, double[] xyz);
+        internal static extern int palpate_surface_displacement(IntPtr session, double[] xyz);
         [DllImport(Library)]
         internal static extern long palpate_surface_stress(IntPtr session, float[] vonMises, float[] pressure);
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <new>
 #include <string_view>
 
@@ -33,6 +34,8 @@ int tell_failure(const char* place, const char* if_no_memory, char* error, std::
     } catch (const std::bad_alloc&) {
       code = PALPATE_ERROR_MEMORY;
     } catch (const Error&) {  // as `work` has it
+    } catch (const std::filesystem::filesystem_error&) {
+      code = PALPATE_ERROR_FILE;
     } catch (...) {
       code = PALPATE_ERROR_INTERNAL;
     }

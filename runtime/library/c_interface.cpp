@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,6 +22,7 @@
 #include "runtime/background/surface_frames.h"
 #include "runtime/body/body.h"
 #include "runtime/library/c_error.h"
+#include "runtime/library/guarded.h"
 #include "runtime/library/palpate.h"
 #include "runtime/library/session_recording.h"
 #include "runtime/library/sized_struct.h"
@@ -205,9 +207,6 @@ StateOptions with_room(StateOptions options, const Body& body, const palpate_ove
 }
 
 }  // namespace
-}  // namespace palpate
-
-using namespace palpate;
 
 /// What a tick left, for the eye.
 struct Shown {
@@ -221,9 +220,10 @@ struct FoundStress {
   std::vector<float> von_mises, pressure;  // [S] [Pa]
 };
 
-struct palpate_session {
-  palpate_session(std::string name, Model model, const StateOptions& options, const palpate_overlay& overlay,
-                  ContactModel contact, std::int64_t stress_ticks)
+/// What a palpate_session leads to.
+struct OwnLoop {
+  OwnLoop(std::string name, Model model, const StateOptions& options, const palpate_overlay& overlay,
+          ContactModel contact, std::int64_t stress_ticks)
       : file(std::move(name)),
         state_options(options),
         overlay_options(overlay),
@@ -270,7 +270,8 @@ struct palpate_session {
   State state;
   std::vector<ToolPose> poses;
   Latest<Shown> shown;
-  std::vector<double> stored_displacement;  // scratch of the thread that draws
+  std::mutex drawing;                       // one thread at a time
+  std::vector<double> stored_displacement;  // its scratch
   std::vector<Vec3> displacement;
   std::optional<PatchSource> overlays;
   std::optional<MotionSource> motion;
@@ -281,9 +282,41 @@ struct palpate_session {
   std::size_t recorded_tool = 0;
 };
 
+}  // namespace palpate
+
+using namespace palpate;
+
+struct palpate_session : Guarded<OwnLoop> {
+  using Guarded::Guarded;
+};
+
+namespace {
+
+/// As one of the threads that only look.
+Inside<OwnLoop> look(const palpate_session* session) noexcept {
+  return {const_cast<palpate_session*>(session), Use::shared};  // NOLINT: what it guards is not changed
+}
+
+/// Why a session could not be entered.
+int refused(const palpate_session* session) noexcept {
+  return session == nullptr ? -1 : PALPATE_ERROR_STATE;
+}
+
+/// The session of the thread that uses the functions of the loop. Throws Error where it is none.
+OwnLoop& expect(const Inside<OwnLoop>& loop, const palpate_session* session, const char* place, int& code) {
+  if (loop) return *loop;
+  if (session == nullptr) throw Error("there is no session", place, "make one by palpate_create");
+  code = PALPATE_ERROR_STATE;
+  throw Error("the session has ended, or another thread steps it", place,
+              "use the functions of the loop from one thread, and none after palpate_destroy");
+}
+
+}  // namespace
+
 extern "C" {
 
 const char* palpate_status_name(uint32_t bit) noexcept {
+  if (bit == PALPATE_NOT_STEPPED) return "not_stepped";
   for (const auto& [status, name] : status_names) {
     if (static_cast<std::uint32_t>(status) == bit) return name;
   }
@@ -299,7 +332,7 @@ palpate_session* palpate_create(const char* file, const palpate_tool* tools, int
 palpate_session* palpate_create_with_options(const char* file, const palpate_tool* tools, int tool_count,
                                              int max_contacts, const palpate_options* options, char* error,
                                              size_t error_size) noexcept {
-  std::unique_ptr<palpate_session> session;
+  palpate_session* session = nullptr;
   tell_failure("palpate_create", "close other programs, or precompute with fewer surface nodes", error,
                error_size, [&](int& code) {
                  if (file == nullptr)
@@ -318,69 +351,82 @@ palpate_session* palpate_create_with_options(const char* file, const palpate_too
                  code = PALPATE_ERROR_FILE;
                  Model model = load_model(file);
                  code = PALPATE_ERROR_ARGUMENT;
-                 session = std::make_unique<palpate_session>(file, std::move(model), state, overlay, contact,
-                                                             stress_ticks);
+                 session = new palpate_session(std::make_unique<OwnLoop>(file, std::move(model), state,
+                                                                         overlay, contact, stress_ticks));
                });
-  return session.release();
+  return session;
 }
 
 void palpate_destroy(palpate_session* session) noexcept {
-  const std::unique_ptr<palpate_session> ended(session);
+  if (session != nullptr) session->end();
 }
 
 uint32_t palpate_step(palpate_session* session, const palpate_pose* poses) noexcept {
+  const Inside<OwnLoop> loop(session, Use::alone);
+  if (!loop) return PALPATE_NOT_STEPPED;
   if (poses == nullptr) return PALPATE_POSE_NOT_FINITE;
-  for (std::size_t k = 0; k < session->poses.size(); ++k) {
+  for (std::size_t k = 0; k < loop->poses.size(); ++k) {
     const auto pose = read_struct(poses, k, default_pose);
     if (!pose) return PALPATE_POSE_NOT_FINITE;
-    session->poses[k] = to_pose(*pose);
+    loop->poses[k] = to_pose(*pose);
   }
-  const std::int64_t begun = session->recording ? monotonic_now() : 0;
-  if (session->overlays) session->overlays->serve(session->state);
-  if (session->motion) session->motion->receive(session->state);
-  const StepStatus status = step(session->body, session->state, session->poses);
-  if (session->motion) session->motion->post(session->state);
-  session->publish();
-  if (session->frames) session->frames->post(session->state, session->ticks, 0.0);
-  if (session->recording)
-    session->recording->note(session->poses[session->recorded_tool],
-                             session->overlays ? session->overlays->centre() : -1, monotonic_now() - begun);
-  ++session->ticks;
+  const std::int64_t begun = loop->recording ? monotonic_now() : 0;
+  if (loop->overlays) loop->overlays->serve(loop->state);
+  if (loop->motion) loop->motion->receive(loop->state);
+  const StepStatus status = step(loop->body, loop->state, loop->poses);
+  if (loop->motion) loop->motion->post(loop->state);
+  loop->publish();
+  if (loop->frames) loop->frames->post(loop->state, loop->ticks, 0.0);
+  if (loop->recording)
+    loop->recording->note(loop->poses[loop->recorded_tool], loop->overlays ? loop->overlays->centre() : -1,
+                          monotonic_now() - begun);
+  ++loop->ticks;
   return static_cast<uint32_t>(status);
 }
 
 int palpate_get(const palpate_session* session, int tool, palpate_result* result) noexcept {
+  const Inside<OwnLoop> loop(const_cast<palpate_session*>(session), Use::alone);  // NOLINT: as in look
   palpate_result felt{};
-  const bool exists = tool >= 0 && static_cast<std::size_t>(tool) < session->state.tools.size();
-  if (exists) felt = to_result(session->state.tools[static_cast<std::size_t>(tool)]);
-  return write_struct(felt, result) && exists ? 0 : -1;
+  const bool exists = loop && tool >= 0 && static_cast<std::size_t>(tool) < loop->state.tools.size();
+  if (exists) felt = to_result(loop->state.tools[static_cast<std::size_t>(tool)]);
+  if (!write_struct(felt, result)) return -1;
+  if (!loop) return refused(session);
+  return exists ? 0 : -1;
 }
 
 int palpate_set_tool(palpate_session* session, int number, const palpate_tool* tool) noexcept {
-  if (number < 0 || static_cast<std::size_t>(number) >= session->state.tools.size()) return -1;
+  const Inside<OwnLoop> loop(session, Use::alone);
+  if (!loop) return refused(session);
+  if (number < 0 || static_cast<std::size_t>(number) >= loop->state.tools.size()) return -1;
   const auto given = read_struct(tool, 0, default_tool);
   if (!given) return -1;
-  Tool& now = session->state.tools[static_cast<std::size_t>(number)].tool;
+  Tool& now = loop->state.tools[static_cast<std::size_t>(number)].tool;
   const Tool next = to_tool(*given);
   if (!can_become(now, next)) return -1;
   now = next;
   return 0;
 }
 
-void palpate_reset(palpate_session* session) noexcept {
-  if (!session->recording) session->reset();
+int palpate_reset(palpate_session* session) noexcept {
+  const Inside<OwnLoop> loop(session, Use::alone);
+  if (!loop) return refused(session);
+  if (loop->recording) return PALPATE_ERROR_STATE;
+  loop->reset();
+  return 0;
 }
 
 int palpate_record(palpate_session* session, const char* file, const palpate_record_options* options,
                    char* error, size_t error_size) noexcept {
   constexpr const char* place = "palpate_record";
   return tell_failure(place, "close other programs", error, error_size, [&](int& code) {
+    const Inside<OwnLoop> inside(session, Use::alone);
+    OwnLoop& loop = expect(inside, session, place, code);
     if (file == nullptr) throw Error("there is no file name", place, "name the recording, OUT.mcap");
     if (options == nullptr)
       throw Error("there are no options", place, "begin with PALPATE_RECORD_OPTIONS_INIT");
     const palpate_record_options wanted = read_or_throw(options, 0, default_record_options, "the options",
                                                         "PALPATE_RECORD_OPTIONS_INIT", place);
-    const std::size_t tools = session->state.tools.size();
+    const std::size_t tools = loop.state.tools.size();
     if (wanted.tool < 0 || static_cast<std::size_t>(wanted.tool) >= tools)
       throw Error("there is no tool " + std::to_string(wanted.tool), place,
                   "name one of 0 to " + std::to_string(tools - 1));
@@ -388,37 +434,38 @@ int palpate_record(palpate_session* session, const char* file, const palpate_rec
       throw Error(std::to_string(wanted.pictures) + " pictures a second were asked for", place,
                   "ask for 0 or more");
     const auto tool = static_cast<std::size_t>(wanted.tool);
-    const Settings settings = settings_of(session->state.tools[tool].tool, session->state_options,
-                                          session->overlay_options, session->body.contact_model());
+    const Settings settings = settings_of(loop.state.tools[tool].tool, loop.state_options,
+                                          loop.overlay_options, loop.body.contact_model());
     code = PALPATE_ERROR_STATE;
-    if (session->recording)
-      throw Error("a recording is being made", place, "end it by palpate_record_end first");
+    if (loop.recording) throw Error("a recording is being made", place, "end it by palpate_record_end first");
     code = PALPATE_ERROR_FILE;
-    const std::filesystem::path output = recording_output(session->body.model(), session->file, file);
-    session->reset();
-    session->recorded_tool = tool;
-    session->recording.emplace(session->body, session->state,
-                               SessionRecording::Options{.file = output,
-                                                         .model = session->file,
-                                                         .settings = settings,
-                                                         .tool = tool,
-                                                         .pictures = wanted.pictures});
+    const std::filesystem::path output = recording_output(loop.body.model(), loop.file, file);
+    loop.reset();
+    loop.recorded_tool = tool;
+    loop.recording.emplace(loop.body, loop.state,
+                           SessionRecording::Options{.file = output,
+                                                     .model = loop.file,
+                                                     .settings = settings,
+                                                     .tool = tool,
+                                                     .pictures = wanted.pictures});
   });
 }
 
 int palpate_record_end(palpate_session* session, char* error, size_t error_size) noexcept {
   constexpr const char* place = "palpate_record_end";
   return tell_failure(place, "close other programs", error, error_size, [&](int& code) {
+    const Inside<OwnLoop> inside(session, Use::alone);
+    OwnLoop& loop = expect(inside, session, place, code);
     code = PALPATE_ERROR_STATE;
-    if (!session->recording) throw Error("no recording is being made", place, "begin one by palpate_record");
+    if (!loop.recording) throw Error("no recording is being made", place, "begin one by palpate_record");
     code = PALPATE_ERROR_FILE;
     std::int64_t dropped = 0;
     try {
-      session->recording->finish();
-      dropped = session->recording->dropped();
-      session->recording.reset();
+      loop.recording->finish();
+      dropped = loop.recording->dropped();
+      loop.recording.reset();
     } catch (...) {
-      session->recording.reset();
+      loop.recording.reset();
       throw;
     }
     code = PALPATE_ERROR_INCOMPLETE;
@@ -429,38 +476,55 @@ int palpate_record_end(palpate_session* session, char* error, size_t error_size)
 }
 
 int palpate_surface_counts(const palpate_session* session, palpate_counts* counts) noexcept {
+  const Inside<OwnLoop> loop = look(session);
+  if (!loop) return refused(session);
   const palpate_counts all{.size = sizeof(palpate_counts),
-                           .nodes = static_cast<int32_t>(session->body.surface_rest_positions().size()),
-                           .simplices = static_cast<int32_t>(session->body.surface_friction().size()),
-                           .corners = session->body.dimension()};
+                           .nodes = static_cast<int32_t>(loop->body.surface_rest_positions().size()),
+                           .simplices = static_cast<int32_t>(loop->body.surface_friction().size()),
+                           .corners = loop->body.dimension()};
   return write_struct(all, counts) ? 0 : -1;
 }
 
-void palpate_surface_rest(const palpate_session* session, double* xyz) noexcept {
-  for (const Vec3& position : session->body.surface_rest_positions()) {
+int palpate_surface_rest(const palpate_session* session, double* xyz) noexcept {
+  const Inside<OwnLoop> loop = look(session);
+  if (!loop) return refused(session);
+  if (xyz == nullptr) return -1;
+  for (const Vec3& position : loop->body.surface_rest_positions()) {
     copy(position, xyz);
     xyz += 3;
   }
+  return 0;
 }
 
-void palpate_surface_simplices(const palpate_session* session, int32_t* corners) noexcept {
-  std::copy(session->body.simplices().begin(), session->body.simplices().end(), corners);
+int palpate_surface_simplices(const palpate_session* session, int32_t* corners) noexcept {
+  const Inside<OwnLoop> loop = look(session);
+  if (!loop) return refused(session);
+  if (corners == nullptr) return -1;
+  std::copy(loop->body.simplices().begin(), loop->body.simplices().end(), corners);
+  return 0;
 }
 
-void palpate_surface_displacement(palpate_session* session, double* xyz) noexcept {
-  const Shown& shown = session->shown.read();
-  surface_displacement(session->body, shown.load, session->stored_displacement, session->displacement,
-                       &shown.motion);
-  for (const Vec3& u : session->displacement) {
+int palpate_surface_displacement(palpate_session* session, double* xyz) noexcept {
+  const Inside<OwnLoop> loop = look(session);
+  if (!loop) return refused(session);
+  if (xyz == nullptr) return -1;
+  const std::lock_guard lock(loop->drawing);
+  const Shown& shown = loop->shown.read();
+  surface_displacement(loop->body, shown.load, loop->stored_displacement, loop->displacement, &shown.motion);
+  for (const Vec3& u : loop->displacement) {
     copy(u, xyz);
     xyz += 3;
   }
+  return 0;
 }
 
 int64_t palpate_surface_stress(palpate_session* session, float* von_mises, float* pressure) noexcept {
-  const FoundStress& found = session->stress.read();
+  const Inside<OwnLoop> loop = look(session);
+  if (!loop) return -1;
+  const std::lock_guard lock(loop->drawing);
+  const FoundStress& found = loop->stress.read();
   if (found.tick < 0) return -1;
-  const auto nodes = static_cast<std::ptrdiff_t>(session->displacement.size());
+  const auto nodes = static_cast<std::ptrdiff_t>(loop->displacement.size());
   if (von_mises != nullptr) std::copy_n(found.von_mises.begin(), nodes, von_mises);
   if (pressure != nullptr) std::copy_n(found.pressure.begin(), nodes, pressure);
   return found.tick;

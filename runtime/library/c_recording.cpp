@@ -1,12 +1,14 @@
 // The C functions that read recordings back.
 #include <algorithm>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "formats/recording.h"
 #include "runtime/library/c_error.h"
+#include "runtime/library/guarded.h"
 #include "runtime/library/palpate.h"
 #include "runtime/library/sized_struct.h"
 #include "runtime/loop/recorded_pictures.h"
@@ -44,35 +46,61 @@ palpate_recorded_tick tick_of(const TickRecord& record) noexcept {
 
 }  // namespace
 
-struct palpate_recording {
-  explicit palpate_recording(const char* name) : file(open_session(name)) {
+namespace palpate {
+
+/// What a palpate_recording leads to.
+struct ReadRecording {
+  explicit ReadRecording(const char* name) : file(open_session(name)) {
     for (std::int64_t row = 0; row < file.ticks(); ++row) ticks.push_back(tick_of(file.tick(row)));
   }
 
   RecordingFile file;
   std::vector<palpate_recorded_tick> ticks;
-  mutable std::optional<RecordedPictures> pictures;  // from the first that is asked for on
+  std::mutex reading;                        // of pictures
+  std::optional<RecordedPictures> pictures;  // from the first that is asked for on
 };
+
+}  // namespace palpate
+
+struct palpate_recording : Guarded<ReadRecording> {
+  using Guarded::Guarded;
+};
+
+namespace {
+
+/// Any number of threads look.
+Inside<ReadRecording> look(const palpate_recording* recording) noexcept {
+  return {const_cast<palpate_recording*>(recording), Use::shared};  // NOLINT: what it guards is not changed
+}
+
+/// Why a recording could not be entered.
+int refused(const palpate_recording* recording) noexcept {
+  return recording == nullptr ? -1 : PALPATE_ERROR_STATE;
+}
+
+}  // namespace
 
 extern "C" {
 
 palpate_recording* palpate_recording_open(const char* file, char* error, size_t error_size) noexcept {
-  std::unique_ptr<palpate_recording> recording;
+  palpate_recording* recording = nullptr;
   tell_failure("palpate_recording_open", "close other programs", error, error_size, [&](int& code) {
     if (file == nullptr)
       throw Error("there is no file name", "palpate_recording_open", "name a recording, OUT.mcap");
     code = PALPATE_ERROR_FILE;
-    recording = std::make_unique<palpate_recording>(file);
+    recording = new palpate_recording(std::make_unique<ReadRecording>(file));
   });
-  return recording.release();
+  return recording;
 }
 
 void palpate_recording_close(palpate_recording* recording) noexcept {
-  const std::unique_ptr<palpate_recording> closed(recording);
+  if (recording != nullptr) recording->end();
 }
 
 int palpate_recording_count(const palpate_recording* recording, palpate_recording_counts* counts) noexcept {
-  const RecordingFile& file = recording->file;
+  const Inside<ReadRecording> inside = look(recording);
+  if (!inside) return refused(recording);
+  const RecordingFile& file = inside->file;
   const RecordedSurface& surface = file.surface();
   const palpate_recording_counts all{
       .size = sizeof(palpate_recording_counts),
@@ -87,33 +115,51 @@ int palpate_recording_count(const palpate_recording* recording, palpate_recordin
 
 int palpate_recording_tick(const palpate_recording* recording, int64_t number,
                            palpate_recorded_tick* tick) noexcept {
-  const bool exists = number >= 0 && number < std::ssize(recording->ticks);
+  const Inside<ReadRecording> inside = look(recording);
+  const bool exists = inside && number >= 0 && number < std::ssize(inside->ticks);
   const palpate_recorded_tick told =
-      exists ? recording->ticks[static_cast<std::size_t>(number)] : palpate_recorded_tick{};
-  return write_struct(told, tick) && exists ? 0 : -1;
+      exists ? inside->ticks[static_cast<std::size_t>(number)] : palpate_recorded_tick{};
+  if (!write_struct(told, tick)) return -1;
+  if (!inside) return refused(recording);
+  return exists ? 0 : -1;
 }
 
-void palpate_recording_rest(const palpate_recording* recording, double* xyz) noexcept {
-  for (const Vec3& position : recording->file.surface().nodes) xyz = std::copy_n(position.data(), 3, xyz);
+int palpate_recording_rest(const palpate_recording* recording, double* xyz) noexcept {
+  const Inside<ReadRecording> inside = look(recording);
+  if (!inside) return refused(recording);
+  if (xyz == nullptr) return -1;
+  for (const Vec3& position : inside->file.surface().nodes) xyz = std::copy_n(position.data(), 3, xyz);
+  return 0;
 }
 
-void palpate_recording_simplices(const palpate_recording* recording, int32_t* corners) noexcept {
-  const std::vector<Index>& simplices = recording->file.surface().simplices;
+int palpate_recording_simplices(const palpate_recording* recording, int32_t* corners) noexcept {
+  const Inside<ReadRecording> inside = look(recording);
+  if (!inside) return refused(recording);
+  if (corners == nullptr) return -1;
+  const std::vector<Index>& simplices = inside->file.surface().simplices;
   std::copy(simplices.begin(), simplices.end(), corners);
+  return 0;
 }
 
 int palpate_recording_picture(const palpate_recording* recording, int64_t number, float* xyz, double* time,
                               char* error, size_t error_size) noexcept {
-  return tell_failure("palpate_recording_picture", "close other programs", error, error_size, [&](int& code) {
-    const int64_t pictures = std::ssize(recording->file.pictures());
+  constexpr const char* place = "palpate_recording_picture";
+  return tell_failure(place, "close other programs", error, error_size, [&](int& code) {
+    const Inside<ReadRecording> inside = look(recording);
+    if (recording == nullptr) throw Error("there is no recording", place, "open one");
+    code = PALPATE_ERROR_STATE;
+    if (!inside) throw Error("the recording is closed", place, "open it again");
+    code = PALPATE_ERROR_ARGUMENT;
+    const int64_t pictures = std::ssize(inside->file.pictures());
     if (number < 0 || number >= pictures) {
-      throw Error("there is no picture " + std::to_string(number), "palpate_recording_picture",
+      throw Error("there is no picture " + std::to_string(number), place,
                   "ask for 0 to " + std::to_string(pictures - 1) + ", of which there are " +
                       std::to_string(pictures));
     }
     code = PALPATE_ERROR_FILE;
-    if (!recording->pictures) recording->pictures.emplace(recording->file);
-    const SurfaceFrame frame = recording->pictures->frame(number);
+    const std::lock_guard lock(inside->reading);
+    if (!inside->pictures) inside->pictures.emplace(inside->file);
+    const SurfaceFrame frame = inside->pictures->frame(number);
     if (xyz != nullptr) std::copy(frame.displacement.begin(), frame.displacement.end(), xyz);
     if (time != nullptr) *time = frame.time;
   });

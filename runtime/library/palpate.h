@@ -4,10 +4,11 @@
  * in the plane, z of what you give is ignored and z of what you get is 0 (of a torque, only z is not).
  *
  * Nothing here throws, and nothing prints. Sessions are independent of each other. Of one session, one thread
- * at a time may use the functions of the loop, palpate_step, palpate_get, palpate_set_tool and palpate_reset;
- * while it does, one other thread at a time may use those of the surface. "Real-time safe" below means: no
- * memory is taken, no lock, no system call, and the time is bounded. A session must not be NULL but where
- * that is said.
+ * uses the functions of the loop (palpate_step, palpate_get, palpate_set_tool, palpate_reset, palpate_record
+ * and palpate_record_end), and any others may use those of the surface meanwhile. Where a second thread uses
+ * the loop at the same moment, or the session has ended, the call does nothing and says so: it returns
+ * PALPATE_NOT_STEPPED or PALPATE_ERROR_STATE. NULL for a session or an array is refused likewise, by -1.
+ * "Real-time safe" below means: no memory is taken, no lock, no system call, and the time is bounded.
  *
  * Each struct begins with its size, so that later versions can add members at its end: begin yours with its
  * PALPATE_..._INIT, which sets the size and the defaults, then change what is to differ. A program that was
@@ -82,7 +83,9 @@ enum palpate_status {
   PALPATE_OLDER_PATCH = 1 << 11,      /* the overlay for this place was not there yet */
   PALPATE_LATE_MOTION = 1 << 12,      /* the body's free motion was not there in time */
   PALPATE_RIGID_CONTACT = 1 << 13,    /* a tool presses on what cannot move: only its coupling gives way */
-  PALPATE_NEAR_STEP_LIMIT = 1 << 14   /* a live body's explicit step is close to the longest stable one */
+  PALPATE_NEAR_STEP_LIMIT = 1 << 14,  /* a live body's explicit step is close to the longest stable one */
+  PALPATE_NOT_STEPPED = 1 << 15       /* nothing happened: the session is NULL or has ended, or another thread
+                                       * is in its loop */
 };
 
 /* "capacity_full" and so on; NULL for what is not one bit of these. Real-time safe. */
@@ -119,8 +122,9 @@ enum palpate_code {
   PALPATE_OK = 0,
   PALPATE_ERROR_ARGUMENT = 1, /* what it was given makes no sense, or does not fit the body */
   PALPATE_ERROR_FILE = 2, /* a file is not there, is not what it should be, is damaged or cannot be written */
-  PALPATE_ERROR_MEMORY = 3,     /* there is not enough memory */
-  PALPATE_ERROR_STATE = 4,      /* not now: a recording is being made, or none is */
+  PALPATE_ERROR_MEMORY = 3, /* there is not enough memory */
+  PALPATE_ERROR_STATE = 4,  /* not now: a recording is being made, or none is; the session or recording has
+                             * ended; another thread is in the session's loop */
   PALPATE_ERROR_INCOMPLETE = 5, /* a recording lacks ticks or pictures for which there was no room or disk */
   PALPATE_ERROR_INTERNAL = 6    /* a mistake of the library's own */
 };
@@ -153,7 +157,8 @@ palpate_session* palpate_create_with_options(const char* file, const palpate_too
                                              int max_contacts, const palpate_options* options, char* error,
                                              size_t error_size) PALPATE_NOEXCEPT;
 
-/* Ends a session; NULL is ignored. */
+/* Ends a session; NULL and one that has ended are ignored. Waits for the calls of other threads that are
+ * under way; those that come later are refused. */
 void palpate_destroy(palpate_session* session) PALPATE_NOEXCEPT;
 
 /* --- The loop --- */
@@ -191,19 +196,20 @@ typedef struct palpate_result {
   }
 
 /* Fills the members that `result` has for tool 0, 1, ... Returns 0; -1 where the number is none, and all is
- * zero, or the size is refused, and nothing is written. Real-time safe. */
+ * zero, or the size is refused, and nothing is written; PALPATE_ERROR_STATE, and all is zero. Real-time safe.
+ */
 int palpate_get(const palpate_session* session, int tool, palpate_result* result) PALPATE_NOEXCEPT;
 
 /* What a tool is from the next tick on: its coupling, largest force, friction, reach and hand-over. Its shape
  * (radius, length, disc_radius) stays that of palpate_create: a surface cannot be pushed aside within a tick.
  * palpate_reset takes the change back.
  * Returns 0; -1, and nothing changes, where the number is none, the shape is another, a value makes no sense,
- * or the size is refused. Real-time safe; a function of the loop. */
+ * or the size is refused; PALPATE_ERROR_STATE. Real-time safe; a function of the loop. */
 int palpate_set_tool(palpate_session* session, int number, const palpate_tool* tool) PALPATE_NOEXCEPT;
 
 /* To the state after palpate_create: a body that nobody has touched. Takes no memory, but too long for a
- * tick. While a session is recorded nothing happens: a recording is of one run. */
-void palpate_reset(palpate_session* session) PALPATE_NOEXCEPT;
+ * tick. Returns 0; -1; PALPATE_ERROR_STATE, also while the session is recorded: a recording is of one run. */
+int palpate_reset(palpate_session* session) PALPATE_NOEXCEPT;
 
 /* --- Recordings, which palpate-runtime view, session and export read --- */
 
@@ -225,12 +231,11 @@ typedef struct palpate_record_options {
  * `palpate-runtime play BODY --device replay:OUT.mcap` repeats every tick to the last bit. options.tick must be
  * 1/rate of a whole rate from 1000 to 5000 ticks a second. Threads of the session write; palpate_step stays
  * real-time safe. The file is a valid recording at each instant. Returns PALPATE_OK, or a code with the
- * reason in `error` as palpate_create has it. Not while another thread uses a function of the loop. */
+ * reason in `error` as palpate_create has it. */
 int palpate_record(palpate_session* session, const char* file, const palpate_record_options* options,
                    char* error, size_t error_size) PALPATE_NOEXCEPT;
 
-/* Ends the recording, whose file is one plain file then. Returns as palpate_record. Takes some time. Not
- * while another thread uses a function of the loop. */
+/* Ends the recording, whose file is one plain file then. Returns as palpate_record. Takes some time. */
 int palpate_record_end(palpate_session* session, char* error, size_t error_size) PALPATE_NOEXCEPT;
 
 /* A recording that is read back: by palpate_record or by palpate-runtime play --record. */
@@ -240,7 +245,8 @@ typedef struct palpate_recording palpate_recording;
  * does. */
 palpate_recording* palpate_recording_open(const char* file, char* error, size_t error_size) PALPATE_NOEXCEPT;
 
-/* NULL is ignored. */
+/* As palpate_destroy. Any number of threads may use the other functions; each returns PALPATE_ERROR_STATE
+ * once the recording is closed. */
 void palpate_recording_close(palpate_recording* recording) PALPATE_NOEXCEPT;
 
 typedef struct palpate_recording_counts {
@@ -288,13 +294,13 @@ int palpate_recording_tick(const palpate_recording* recording, int64_t number,
                            palpate_recorded_tick* tick) PALPATE_NOEXCEPT;
 
 /* As palpate_surface_rest and palpate_surface_simplices, of the surface that was recorded. */
-void palpate_recording_rest(const palpate_recording* recording, double* xyz) PALPATE_NOEXCEPT;
-void palpate_recording_simplices(const palpate_recording* recording, int32_t* corners) PALPATE_NOEXCEPT;
+int palpate_recording_rest(const palpate_recording* recording, double* xyz) PALPATE_NOEXCEPT;
+int palpate_recording_simplices(const palpate_recording* recording, int32_t* corners) PALPATE_NOEXCEPT;
 
 /* Displacement of the surface nodes in picture 0, 1, ..., 3 `nodes` numbers [m], and its time since the first
  * tick [s]. Where the file holds only the forces of contacts (palpate_record with options.pictures, of a body
  * without dynamics), it is computed by the model, which is loaded with the first one and has to be where it
- * was or beside the recording. One thread at a time. Returns as palpate_record. */
+ * was or beside the recording. Threads wait for each other. Returns as palpate_record. */
 int palpate_recording_picture(const palpate_recording* recording, int64_t number, float* xyz, double* time,
                               char* error, size_t error_size) PALPATE_NOEXCEPT;
 
@@ -310,20 +316,21 @@ typedef struct palpate_counts {
 #define PALPATE_COUNTS_INIT \
   { sizeof(palpate_counts), 0, 0, 0 }
 
-/* Fills the members that `counts` has. Returns 0; -1 where the size is refused. */
+/* Fills the members that `counts` has. Returns 0; -1 where the size is refused; PALPATE_ERROR_STATE, as the
+ * functions below. */
 int palpate_surface_counts(const palpate_session* session, palpate_counts* counts) PALPATE_NOEXCEPT;
 
 /* Positions of the surface nodes on the body at rest, 3 `nodes` numbers x, y, z [m]. Never changes. */
-void palpate_surface_rest(const palpate_session* session, double* xyz) PALPATE_NOEXCEPT;
+int palpate_surface_rest(const palpate_session* session, double* xyz) PALPATE_NOEXCEPT;
 
 /* Nodes of the simplices, `corners` `simplices` numbers from 0: triangles counter-clockwise seen from
  * outside, lines with the body on their left. Never changes. */
-void palpate_surface_simplices(const palpate_session* session, int32_t* corners) PALPATE_NOEXCEPT;
+int palpate_surface_simplices(const palpate_session* session, int32_t* corners) PALPATE_NOEXCEPT;
 
 /* Displacement of the surface nodes from rest in the last tick that was finished, 3 `nodes` numbers [m];
  * exactly zero where the body is fixed. Never makes the loop wait, but takes some microseconds a contact
- * and thousand nodes, too long for a tick: call it where you draw. */
-void palpate_surface_displacement(palpate_session* session, double* xyz) PALPATE_NOEXCEPT;
+ * and thousand nodes, too long for a tick: call it where you draw. Threads that draw wait for each other. */
+int palpate_surface_displacement(palpate_session* session, double* xyz) PALPATE_NOEXCEPT;
 
 /* Von Mises stress and contact pressure at the surface nodes, `nodes` numbers each [Pa], as they were found
  * last; stress is not a number where it is not known (all around is held). Either may be NULL. Returns the

@@ -44,6 +44,12 @@ void check(Call&& call) {
   if (const int code = call(error.data(), error.size()); code != PALPATE_OK) throw Error(error.c_str(), code);
 }
 
+/// A file's name for C. Throws Error where it has a zero byte, at which C would cut it.
+inline const char* c_name(const std::string& file) {
+  if (file.find('\0') == std::string::npos) return file.c_str();
+  throw Error("error: a file's name has a zero byte\nhint: Leave it out\n", PALPATE_ERROR_ARGUMENT);
+}
+
 /// Names of the status bits of a tick.
 inline std::vector<std::string> status_names(std::uint32_t status) {
   std::vector<std::string> names;
@@ -82,7 +88,7 @@ struct SurfaceStress {
   std::vector<float> pressure;   ///< [nodes] [Pa]
 };
 
-/// One body and the tools that touch it. Threads as in palpate.h: one steps, one other may draw.
+/// One body and the tools that touch it. Threads as in palpate.h: one steps, others may draw.
 class Session {
  public:
   /// Loads a baked file. Throws Error.
@@ -90,7 +96,7 @@ class Session {
           const palpate_options& options = make_options())
       : tools_(tools.size()) {
     std::string error(4096, '\0');
-    session_.reset(palpate_create_with_options(file.c_str(), tools.data(), static_cast<int>(tools.size()),
+    session_.reset(palpate_create_with_options(c_name(file), tools.data(), static_cast<int>(tools.size()),
                                                max_contacts, &options, error.data(), error.size()));
     if (session_ == nullptr) throw Error(error.c_str());
   }
@@ -128,8 +134,8 @@ class Session {
     palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
     options.tool = tool;
     options.pictures = pictures;
-    check([&](char* error, std::size_t size) {
-      return palpate_record(session_.get(), file.c_str(), &options, error, size);
+    check([&, name = c_name(file)](char* error, std::size_t size) {
+      return palpate_record(session_.get(), name, &options, error, size);
     });
   }
   /// Ends the recording. Throws Error.
@@ -197,7 +203,7 @@ class Recording {
   /// Throws Error.
   explicit Recording(const std::string& file) {
     std::string error(4096, '\0');
-    recording_.reset(palpate_recording_open(file.c_str(), error.data(), error.size()));
+    recording_.reset(palpate_recording_open(c_name(file), error.data(), error.size()));
     if (recording_ == nullptr) throw Error(error.c_str());
   }
 

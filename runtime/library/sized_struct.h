@@ -18,10 +18,11 @@ constexpr bool is_size_of(std::size_t size) noexcept {
 }
 
 /// Element `k` of an array whose first element tells the size of them all. Members that it lacks are those of
-/// `defaults`. Nothing where the size cannot be, is another than the first one's, or a member that is not
-/// known here is set (the rule of Linux's copy_struct_from_user).
+/// `defaults`. Nothing where it is null, the size cannot be, is another than the first one's, or a member
+/// that is not known here is set (the rule of Linux's copy_struct_from_user).
 template <typename Struct>
 std::optional<Struct> read_struct(const Struct* first, std::size_t k, const Struct& defaults) noexcept {
+  if (first == nullptr) return std::nullopt;
   const std::size_t size = first->size;
   if (!is_size_of<Struct>(size)) return std::nullopt;
   const auto* given = reinterpret_cast<const std::byte*>(first) + k * size;
@@ -35,9 +36,10 @@ std::optional<Struct> read_struct(const Struct* first, std::size_t k, const Stru
 }
 
 /// Gives the caller the members that its struct has; those that are not known here become 0.
-/// False, with nothing written, where its size cannot be.
+/// False, with nothing written, where it is null or its size cannot be.
 template <typename Struct>
 bool write_struct(Struct from, Struct* to) noexcept {
+  if (to == nullptr) return false;
   const std::size_t size = to->size;
   if (!is_size_of<Struct>(size)) return false;
   from.size = size;

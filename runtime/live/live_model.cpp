@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "base/error.h"
@@ -14,7 +15,6 @@
 namespace palpate {
 namespace {
 
-constexpr Index columns_at_once = 64;
 constexpr Eigen::Index most_seen_dofs =
     3000;  // of a body in the plane whose inside is seen; a larger W is not renewed
 
@@ -50,8 +50,7 @@ PackedGreens compliance_at(const LiveParts& live, const Eigen::VectorXd& x, cons
     throw Error("the body's stiffness at rest is not positive definite", "live body",
                 "its loads may be too large for it: try --load-scale");
   }
-  while (!compliance.go_on(columns_at_once)) {
-  }
+  compliance.find_all(static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
   return compliance.take();
 }
 

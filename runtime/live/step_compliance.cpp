@@ -4,8 +4,12 @@
 #include <memory>
 #include <utility>
 
+#include "base/parallel.h"
+
 namespace palpate {
 namespace {
+
+constexpr Eigen::Index columns_at_once = 64;
 
 /// What the end of an explicit step moves by, of h^2 times the acceleration where it begins.
 double explicit_share(Integrator integrator) noexcept {
@@ -62,22 +66,38 @@ bool StepCompliance::begin(const Eigen::VectorXd& x, std::span<const Mat3> plast
   return solver_.set(A_);
 }
 
-bool StepCompliance::go_on(Index columns) {
+void StepCompliance::find(Eigen::Index first, Eigen::Index count) {
   const auto order = std::ssize(free_);
-  const Eigen::Index count = std::min<Eigen::Index>(columns, order - found_);
   Eigen::MatrixXd E = Eigen::MatrixXd::Zero(A_.rows(), count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    if (const Index dof = free_[static_cast<std::size_t>(found_ + k)]; dof >= 0) E(dof, k) = scale_;
+    if (const Index dof = free_[static_cast<std::size_t>(first + k)]; dof >= 0) E(dof, k) = scale_;
   }
   const Eigen::MatrixXd found = solver_.by_factor(E);
   for (Eigen::Index k = 0; k < count; ++k) {
-    for (Eigen::Index row = found_ + k; row < order; ++row) {
+    const double* const column = found.col(k).data();
+    double* into = packed_.get() + packed_index(first + k, first + k, order);
+    for (Eigen::Index row = first + k; row < order; ++row) {
       const Index dof = free_[static_cast<std::size_t>(row)];
-      packed_[packed_index(row, found_ + k, order)] = dof >= 0 ? found(dof, k) : 0.0;
+      *into++ = dof >= 0 ? column[dof] : 0.0;
     }
   }
+}
+
+bool StepCompliance::go_on(Index columns) {
+  const auto order = std::ssize(free_);
+  const Eigen::Index count = std::min<Eigen::Index>(columns, order - found_);
+  find(found_, count);
   found_ += count;
   return found_ == order;
+}
+
+void StepCompliance::find_all(int jobs) {
+  const Eigen::Index order = std::ssize(free_);
+  parallel_for((order + columns_at_once - 1) / columns_at_once, jobs, [&](std::int64_t piece, int) {
+    const Eigen::Index first = columns_at_once * piece;
+    find(first, std::min(columns_at_once, order - first));
+  });
+  found_ = order;
 }
 
 PackedGreens StepCompliance::take() noexcept {

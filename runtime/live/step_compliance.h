@@ -24,10 +24,14 @@ class StepCompliance {
   bool begin(const Eigen::VectorXd& x, std::span<const Mat3> plastic);
   /// Finds so many columns more. True where all are found.
   bool go_on(Index columns);
+  /// Finds all columns by so many threads, with the bits that `go_on` gives in pieces of 64.
+  void find_all(int jobs);
   /// W, once all columns are found.
   [[nodiscard]] PackedGreens take() noexcept;
 
  private:
+  void find(Eigen::Index first, Eigen::Index count);
+
   const LiveBody& body_;
   StepperOptions stepper_;
   std::vector<Index> free_;  // [n] free dof of each dof, -1 where it is held

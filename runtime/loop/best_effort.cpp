@@ -29,10 +29,14 @@ double DecadeHistogram::median() const noexcept {
 
 void BestEffort::add(StepStatus status, double force, double force_error, std::int64_t left_out,
                      double time) noexcept {
-  if (!is_best_effort(status, left_out)) return;
+  if (!is_best_effort(status, left_out, force_error)) return;
   ++ticks;
   if (has(status, StepStatus::not_converged)) ++not_converged_ticks;
   if (left_out > 0) ++left_out_ticks;
+  if (has(status, StepStatus::late_motion)) {
+    ++late_ticks;
+    largest_late_error = std::max(largest_late_error, force_error);
+  }
   most_left_out = std::max(most_left_out, left_out);
   const double share = force_error > 0.0 ? force_error / std::max(force, force_error) : 0.0;
   largest_share = std::max(largest_share, share);

@@ -25,10 +25,11 @@ class DecadeHistogram {
   std::int64_t total_ = 0;
 };
 
-/// Whether the force of a tick is a best effort: the solver was cut short, or contact points that the tool
-/// presses on found no room.
-[[nodiscard]] constexpr bool is_best_effort(StepStatus status, std::int64_t left_out) noexcept {
-  return has(status, StepStatus::not_converged) || left_out > 0;
+/// Whether the force of a tick is a best effort: the solver was cut short, contact points that the tool
+/// presses on found no room, or a body that gives way with time stood still.
+[[nodiscard]] constexpr bool is_best_effort(StepStatus status, std::int64_t left_out,
+                                            double force_error) noexcept {
+  return has(status, StepStatus::not_converged) || left_out > 0 || force_error > 0.0;
 }
 
 /// What is known of such ticks of a run.
@@ -45,6 +46,8 @@ struct BestEffort {
   std::int64_t ticks = 0;
   std::int64_t not_converged_ticks = 0;  ///< of them
   std::int64_t left_out_ticks = 0;       ///< of them
+  std::int64_t late_ticks = 0;           ///< of them, the body stood still
+  double largest_late_error = 0.0;       ///< in these [N]
   std::int64_t most_left_out = 0;        ///< contact points in one tick
   double largest_error = 0.0;            ///< [N]
   double largest_error_time = 0.0;       ///< [s]

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "base/program.h"
 #include "base/regular_file.h"
 #include "formats/model_file.h"
 #include "runtime/body/scaled_model.h"
@@ -25,9 +26,8 @@ void print_loaded(const Body& body, double seconds) {
                                  ? fmt::format("compressed to {:.1f} MB",
                                                1e-6 * static_cast<double>(body.greens().compressed_bytes()))
                                  : fmt::format("in {} precision", name_of(body.greens().precision()));
-  fmt::print(stderr, "{}: {} free surface nodes, {} dofs {}, loaded in {:.2f} s\n",
-             printable(body.model().name), body.free_surface_nodes().size(), body.greens().order(), stored,
-             seconds);
+  say(stderr, "{}: {} free surface nodes, {} dofs {}, loaded in {:.2f} s\n", body.model().name,
+      body.free_surface_nodes().size(), body.greens().order(), stored, seconds);
   if (!body.greens().unfolded() && !body.greens().compressed()) {
     print_warning(
         "the Green's functions do not fit into half of the free memory as a full square; used packed, which "

@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "base/program.h"
 #include "runtime/loop/best_effort.h"
 
 namespace palpate {
@@ -102,7 +103,7 @@ void Monitor::run() {
     if (last) break;
     std::this_thread::sleep_for(pause);
   }
-  if (drawn_) fmt::print(stderr, "\n");
+  if (drawn_) std::fputs("\n", stderr);
 }
 
 void Monitor::take(const TickNote& note) {
@@ -141,7 +142,8 @@ void Monitor::ask() {
 
 /// A line of its own, above the one that is renewed.
 void Monitor::say(const std::string& text) {
-  fmt::print(stderr, "{}{}\n", drawn_ ? "\r\x1b[K" : "", text);
+  if (drawn_) std::fputs("\r\x1b[K", stderr);
+  palpate::say(stderr, "{}\n", text);
   drawn_ = false;
 }
 
@@ -150,7 +152,7 @@ void Monitor::draw() {
   const double time = static_cast<double>(last_.number) / static_cast<double>(options_.rate);
   std::string line = fmt::format("{:7.1f} s  {:6.3f} N  {:2d} contacts{}", time, last_.force.norm(),
                                  last_.contacts, last_.rigid ? " on what is held" : "");
-  if (is_best_effort(last_.status, last_.left_out))
+  if (is_best_effort(last_.status, last_.left_out, last_.force_error))
     line += fmt::format("  best effort, within {:.2g} N", last_.force_error);
   if (options_.shows_safety) {
     line += fmt::format("  shown {:5.2f} N {}", last_.shown,
@@ -164,7 +166,7 @@ void Monitor::draw() {
   spread("late", lateness_);
   spread("step", compute_);
   line += fmt::format("  missed {}", misses_);
-  fmt::print(stderr, "\r{}\x1b[K", line);
+  palpate::say(stderr, "\r{}\x1b[K", line);
   std::fflush(stderr);
   drawn_ = true;
   lateness_.clear();

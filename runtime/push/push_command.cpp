@@ -81,8 +81,9 @@ bool is_baked(const PushArguments& arguments) {
 }
 
 Baked bake_first(const PushArguments& arguments) {
-  std::vector<std::string> words = {arguments.file, "--unless-done", "--report", "-"};
+  std::vector<std::string> words = {"--unless-done", "--report", "-"};
   words.insert(words.end(), arguments.for_precompute.begin(), arguments.for_precompute.end());
+  words.insert(words.end(), {"--", arguments.file});
   const ProgramEnd end = run_other_program(find_program("palpate-precompute"), words);
   if (end.status != exit_ok) return {.status = end.status, .file = ""};
   return {.status = exit_ok, .file = output_of(end.output)};

@@ -458,13 +458,6 @@ class BadDescriptions(ProgramTest):
 
 
 class Models(ProgramTest):
-    def test_sample_models_that_need_no_download(self):
-        for name in ("cube", "beam", "sphere", "plate", "cantilever"):
-            shutil.copytree(MODELS / name, self.folder / name)
-            result = run(PRECOMPUTE, self.folder / name / "model.toml", cwd=self.folder)
-            self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertEqual(run(PRECOMPUTE, "verify", self.folder / f"{name}.palpate.hdf").returncode, 0)
-
     def test_the_nodule_is_made_of_two_materials(self):
         planned = run(PRECOMPUTE, MODELS / "nodule" / "model.toml", "--dry-run", cwd=self.folder)
         self.assertEqual(planned.returncode, 0, planned.stderr)

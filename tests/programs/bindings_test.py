@@ -83,6 +83,18 @@ class Clients(unittest.TestCase):
                 felt.append(force)
         self.assertEqual(len(felt), 4)
 
+    def test_misuse_of_cpp_is_an_error(self):
+        runtime = RUNTIME.parent
+        done("c++", "-std=c++17", *WARNINGS, "-pthread", HERE / "misuse.cpp", f"-I{LIBRARY}", f"-L{runtime}", f"-Wl,-rpath,{runtime}", "-lpalpate",
+             "-o", self.folder / "misuse")
+        self.assertEqual(done(self.folder / "misuse", self.cube, env=environment(), cwd=self.folder), "ok\n")
+
+    def test_misuse_of_csharp_is_an_exception(self):
+        program = self.folder / "misuse.exe"
+        done("mcs", "-langversion:6", "-warnaserror", f"-out:{program}", HERE / "Misuse.cs", LIBRARY / "Palpate.cs")
+        said = done("mono", program, self.cube, self.folder / "misused", env=environment())
+        self.assertEqual(said, "ok\n")
+
     def test_a_recording_that_cannot_be_made_is_told(self):
         told = {}
         for language, client in self.clients.items():

@@ -1,5 +1,6 @@
 """Models, recordings, scripts and profiles that are damaged, crafted, or no files at all."""
 
+import json
 import os
 import re
 import resource
@@ -160,6 +161,70 @@ class CleanText(FilesTest):
         file = self.bake(cube_toml(2))
         self.write("touch.csv", "t,x,y,z\n0,0,0," + self.ESCAPE + 70_000 * "1x" + "\n")
         self.expect_refused(["'" + self.SHOWN + "1x", "…"], RUNTIME, "play", file, "--fast", "--device", "script:touch.csv", *TOOL)
+
+
+class CleanNames(FilesTest):
+    """A file's name does nothing to a terminal, whatever a program says of it."""
+
+    NAME = "a\x1b[2J open b in a browser; c\u202e"
+    SHOWN = "a\\x1b[2J open b in a browser; c\\u202e"
+
+    def said(self, *command, status=0, **options):
+        result = run(*command, cwd=self.folder, **options)
+        self.assertEqual(result.returncode, status, result.stderr)
+        self.assertNotRegex(result.stdout + result.stderr, "[\x1b\u202e]", command)
+        return result.stderr + result.stdout
+
+    def test_of_what_is_written_and_read(self):
+        body, recording, toml, script = (f"{self.NAME}.{end}" for end in ("palpate.hdf", "mcap", "toml", "csv"))
+        self.write(toml, cube_toml(2))
+        self.write(script, TOUCH)
+        self.assertIn(self.SHOWN, self.said(PRECOMPUTE, toml, "-o", body))
+        self.assertIn(self.SHOWN, self.said(PRECOMPUTE, toml, "-o", body, "--unless-done"))
+        for command in ("verify", "inspect"):
+            self.said(PRECOMPUTE, command, body)
+        self.said(PRECOMPUTE, "compare", body, body)
+        play = (RUNTIME, "play", body, "--fast", "--device", f"script:{script}", *TOOL)
+        self.assertIn(self.SHOWN, self.said(*play, "--record", recording, "--report", f"{self.NAME}.json"))
+        self.said(*play, "--contacts", f"{self.NAME}.contacts.csv", "--surface", f"{self.NAME}.vtu")
+        self.assertIn(self.SHOWN, self.said(RUNTIME, "session", recording))
+        for option, end in (("--html", "html"), ("--gltf", "glb"), ("--csv", "ticks.csv"), ("--vtu", "pvd")):
+            self.assertIn(self.SHOWN, self.said(RUNTIME, "export", recording, option, f"{self.NAME}.{end}"), option)
+        self.write(toml, cube_toml(2) + "# another\n")
+        self.said(RUNTIME, "probe", body, "--node", "20", "--displace", "0,0,0")  # warns that it is stale
+        for command in (("play", "no" + self.NAME, "--view"), ("push", "no" + self.NAME), ("session", body), ("view", body),
+                        ("devices", "--profile", "no" + self.NAME)):
+            self.assertIn(self.SHOWN, self.said(RUNTIME, *command, status=1), command)
+        self.assertIn(self.SHOWN, self.said(RUNTIME, self.NAME + ".mcap", status=2))
+
+    def test_that_are_not_utf_8(self):
+        model = self.write("m.toml", cube_toml(2))
+        body = b"\xff.palpate.hdf"
+        self.write("touch.csv", TOUCH)
+        self.said(PRECOMPUTE, model, "-o", os.fsdecode(body))
+        self.said(RUNTIME, "play", os.fsdecode(body), "--fast", "--device", "script:touch.csv", *TOOL, "--record", "r.mcap", "--report", "r.json")
+        for option, end in (("--html", "html"), ("--gltf", "glb"), ("--csv", "csv"), ("--vtu", "pvd")):
+            self.said(RUNTIME, "export", "r.mcap", option, f"r.{end}")
+        glb = (self.folder / "r.glb").read_bytes()
+        json.loads(glb[20:20 + int.from_bytes(glb[12:16], "little")].decode())
+        json.loads((self.folder / "r.json").read_text())
+        json.loads(run(RUNTIME, "session", "r.mcap", "--json", cwd=self.folder).stdout)
+
+    def test_of_a_link_to_itself(self):
+        (self.folder / "loop").symlink_to("loop")
+        (self.folder / "loop.toml").symlink_to("loop.toml")
+        body = self.bake(cube_toml(2))
+        for command in ((PRECOMPUTE, "loop"), (PRECOMPUTE, "loop.toml"), (PRECOMPUTE, "join", "loop"), (PRECOMPUTE, "loop.toml", "--unless-done"),
+                        (PRECOMPUTE, "join", "model.toml", "loop"), (PRECOMPUTE, "verify", "loop"), (PRECOMPUTE, "new", "loop.stl"),
+                        (PRECOMPUTE, "model.toml", "-o", "loop"), (PRECOMPUTE, "model.toml", "-o", "loop/x"), (PRECOMPUTE, "model.toml", "--unless-done", "-o", "loop"),
+                        (RUNTIME, "play", "loop", "--view"), (RUNTIME, "push", "loop"), (RUNTIME, "view", "loop"), (RUNTIME, "session", "loop"),
+                        (RUNTIME, "export", "loop", "--html", "a.html"), (RUNTIME, "probe", body, "--node", "20", "--displace", "0,0,0", "--field", "loop/x.csv"),
+                        (RUNTIME, "play", body, "--fast", "--device", "script:loop", *TOOL), (RUNTIME, "play", body, "--fast", "--device", "replay:loop"),
+                        (RUNTIME, "devices", "--profile", "loop")):
+            with self.subTest(command=command):
+                result = run(*command, cwd=self.folder)
+                self.assert_refused(result)
+                self.assertNotIn("defect", result.stderr)
 
 
 class Truncated(FilesTest):

@@ -72,6 +72,10 @@ class Rules(unittest.TestCase):
         self.write("base/words.cpp", "bool wide(int x) {\n  return x > widest;\n}\n")
         self.refused("base/words.cpp: uses widest, which base/ranges.cpp keeps to itself")
 
+    def test_what_prints_without_say_is_refused(self):
+        self.write("meshes/told.cpp", 'void tell(const std::string& name) {\n  fmt::print(stderr, "{}\\n", name);\n}\n')
+        self.refused("meshes/told.cpp:2: prints without say")
+
     def test_a_folder_on_no_floor_is_refused(self):
         self.write("runtime/attic/old.cpp", "")
         self.refused("runtime/attic/old.cpp: its folder is on no floor")

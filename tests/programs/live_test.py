@@ -197,6 +197,25 @@ class Live(ProgramTest):
             self.assertTrue(least <= down[-1] / down.max() <= most, (options, down[-1], down.max()))
             self.assertEqual(report["live"]["plastic_work_J"] > 0, bool(options))
 
+    def test_a_body_that_is_solved_too_slowly_is_told(self):
+        """2 197 nodes: a step takes some hundred milliseconds on any machine of today, and a body of 64 nodes some tenth of one."""
+        slow = self.bake(BLOCK.replace("cells = [4, 4, 3]", "cells = [12, 12, 12]"), name="slow.toml")
+        path = self.write("touch.csv", press(0.003))
+        result = run(RUNTIME, "play", slow, "--device", f"script:{path}", "--tool", "sphere:0.006", "--solver", "corotational", "--record", "slow.mcap",
+                     "--report", "slow.json", cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"warning: a step of 5 ms takes \d+ ms here: the body moves [0-9.e+]+ times slower than real time")
+        self.assertIn("--step-solver cg", result.stderr)
+        report = json.loads((self.folder / "slow.json").read_text())
+        self.assertIn("the body stood still in", result.stderr)
+        self.assertGreater(report["best_effort"]["late_ticks"], 100)
+        right, _ = self.force(slow, 0.003, "--solver", "corotational")
+        told = report["live"]["largest_force_error_N"]
+        self.assertGreaterEqual(told, 0.5 * (report["largest_force_N"] - right))
+        self.assertEqual(told, report["best_effort"]["force_error_N"]["largest"])
+        session = run(RUNTIME, "session", "slow.mcap", cwd=self.folder)
+        self.assertIn("the body stood still in", session.stdout)
+
     def test_what_does_not_fit_is_refused(self):
         file = self.bake(BLOCK)
         path = self.write("touch.csv", press(0.001))

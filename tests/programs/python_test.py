@@ -273,5 +273,141 @@ class Loops(PythonTest):
                 loop.stop()
 
 
+class Misuse(PythonTest):
+    """An error, and never a crash or a wait for ever, where a session is used as it may not be."""
+
+    def session(self, **options):
+        session = palpate.Session(self.cube, palpate.Tool(radius=0.1), **options)
+        self.addCleanup(session.close)
+        return session
+
+    def test_close_while_a_thread_steps(self):
+        for run in range(8):
+            session = palpate.Session(self.cube, palpate.Tool(radius=0.1), stress_ticks=4)
+            if run % 2 == 0:
+                session.record(self.folder / f"{run}.mcap")
+            stepped, failures = threading.Event(), []
+
+            def step(session=session, stepped=stepped, failures=failures):
+                try:
+                    while True:
+                        session.step((0.5, 0.5, 1.08))
+                        stepped.set()
+                except palpate.Error as error:
+                    failures.append(error)
+
+            threads = [threading.Thread(target=step)]
+            threads[0].start()
+            stepped.wait()
+            session.displacement()
+            closers = [threading.Thread(target=session.close) for _ in range(3)]
+            for thread in closers:
+                thread.start()
+            for thread in threads + closers:
+                thread.join()
+            self.assertEqual([(error.reason, error.code) for error in failures], [("the session is closed", "state")])
+
+    def test_close_while_a_loop_steps(self):
+        session = self.session()
+        stepped = threading.Event()
+        loop = palpate.Loop(session, lambda t: (0.5, 0.5, 1.08), lambda felt: stepped.set()).start()
+        stepped.wait()
+        session.close()
+        with self.assertRaisesRegex(palpate.Error, "the session is closed"):
+            loop.stop()
+
+    def test_two_threads_that_step(self):
+        session = self.session()
+        failures = []
+
+        def step():
+            try:
+                while not failures:
+                    session.step((0.5, 0.5, 1.05))
+            except palpate.Error as error:
+                failures.append(error)
+
+        threads = [threading.Thread(target=step) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertIn("another thread", failures[0].reason)
+        self.assertEqual(failures[0].code, "state")
+        session.reset()
+        positions = rubbed()
+        self.assertTrue(numpy.array_equal(session.play(positions), self.session().play(positions)))
+
+    def test_use_after_close(self):
+        session = palpate.Session(self.cube, palpate.Tool())
+        session.close()
+        session.close()
+        for use in (lambda: session.step((0, 0, 2)), lambda: session.felt(0), lambda: session.set_tool(0, palpate.Tool()), session.reset,
+                    lambda: session.record(self.folder / "a.mcap"), session.end_recording, lambda: session.rest, lambda: session.simplices,
+                    session.displacement, session.stress):
+            with self.assertRaisesRegex(palpate.Error, "the session is closed"):
+                use()
+
+    def test_a_process_that_forks_leaves_the_session_alone(self):
+        session = self.session(overlay=palpate.Overlay(2, 1), stress_ticks=1)
+        child = os.fork()
+        if child == 0:
+            session.close()  # whose threads are those of the parent
+            os._exit(0)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+        session.step((0.5, 0.5, 1.2))
+
+    def test_numbers_are_not_cut(self):
+        for make in (lambda: self.session(max_contacts=2**32 + 5), lambda: self.session(stress_ticks=2**64 + 1), lambda: self.session(stress_ticks=-1),
+                     lambda: self.session(overlay=palpate.Overlay(2**32 + 2, 1)), lambda: self.session(overlay=palpate.Overlay(2, 2**32 + 1)),
+                     lambda: self.session(overlay=palpate.Overlay(2, 1, -1))):
+            with self.assertRaises(palpate.Error) as failed:
+                make()
+            self.assertEqual(failed.exception.code, "argument")
+        with self.assertRaises(TypeError):
+            self.session(max_contacts=8.5)
+        session = self.session()
+        for number in (-1, 1, 2**32, 2**40, -2**32):
+            for use in (lambda: session.felt(number), lambda: session.put(number, (0, 0, 2)), lambda: session.set_tool(number, session.tools[0])):
+                with self.assertRaises(IndexError):
+                    use()
+            with self.assertRaises(palpate.Error):
+                session.record(self.folder / "a.mcap", tool=number)
+        with self.assertRaises(TypeError):
+            palpate.probe(self.cube, [(0, 0, -0.01)], node=[1.5])
+        self.assertFalse((self.folder / "a.mcap").exists())
+
+    def test_poses_are_whole(self):
+        session = self.session()
+        for position in (0.05, (0.5,), (0.5, 0.5), (1, 2, 3, 4), [(0.5, 0.5, 1.2)]):
+            with self.assertRaisesRegex(palpate.Error, "3 numbers"):
+                session.step(position)
+        with self.assertRaisesRegex(palpate.Error, "3 numbers"):
+            session.step((0, 0, 2), 1.0)
+        with self.assertRaisesRegex(palpate.Error, "3 numbers"):
+            session.play(numpy.linspace(1.2, 1.05, 10))
+
+    def test_a_name_ends_at_its_end(self):
+        session = self.session()
+        for use in (lambda: palpate.Session(f"{self.cube}\0b", palpate.Tool()), lambda: session.record(f"{self.folder}/a.mcap\0b"),
+                    lambda: palpate.Body(f"{self.cube}\0b"), lambda: palpate.bake(f"{self.shared}/cube.toml\0", self.folder / "b.hdf"),
+                    lambda: palpate.probe(f"{self.cube}\0", [(0, 0, 1)], at=[(0, 0, 1)]), lambda: palpate.Viewer(f"{self.cube}\0")):
+            with self.assertRaisesRegex(palpate.Error, "zero byte"):
+                use()
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_a_name_that_begins_with_a_dash_is_a_name(self):
+        before = os.getcwd()
+        os.chdir(self.folder)
+        self.addCleanup(os.chdir, before)
+        for name in ("--help", "-o", "--version"):
+            for use in (lambda: palpate.bake(name, "o.hdf"), lambda: palpate.probe(name, [(0, 0, 1)], at=[(0, 0, 1)]), lambda: palpate.Viewer(name)):
+                with self.assertRaisesRegex(palpate.Error, name):
+                    use()
+        pathlib.Path("--help").write_text(cube_toml(2))
+        palpate.bake("--help", "-o")
+        self.assertEqual(len(palpate.probe("-o", [(0, 0, -0.01)], at=[(0.5, 0.5, 1)])), 1)
+
+
 if __name__ == "__main__":
     unittest.main()

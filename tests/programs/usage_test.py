@@ -159,6 +159,46 @@ class Usage(ProgramTest):
             self.assertGreater(len(meaning.split()), 2, name)
 
 
+class EmptyWords(ProgramTest):
+    """An empty word is no name, path or number: it is refused wherever a value is asked for."""
+
+    def options(self, program, command):
+        """Options of a command that take a value, by its help page."""
+        page = run(program, *command, "--help").stdout
+        return sorted(set(re.findall(r"(--[a-z-]+)(?: [A-Z\[]|=)", "\n".join(re.findall(r"(?m)^  (?:-\w, *)?--.*", page)))))
+
+    def test_options(self):
+        file = self.bake(cube_toml(2))
+        tried = 0
+        for program, command, given in ((PRECOMPUTE, (), (self.folder / "model.toml",)), (PRECOMPUTE, ("join",), (self.folder / "model.toml",)),
+                                        (PRECOMPUTE, ("compare",), (file, file)), (RUNTIME, ("play",), (file,)), (RUNTIME, ("probe",), (file,)),
+                                        (RUNTIME, ("push",), (file,)), (RUNTIME, ("export",), ("a.h5",)), (RUNTIME, ("view",), ()),
+                                        (RUNTIME, ("devices",), ())):
+            for option in self.options(program, command):
+                with self.subTest(command=command, option=option):
+                    result = run(program, *command, *given, option, "", cwd=self.folder)
+                    self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
+                    self.assertIn(option, result.stderr)
+                    tried += 1
+        self.assertGreater(tried, 60)
+
+    def test_positional_arguments(self):
+        for program, *words in ((PRECOMPUTE, ""), (PRECOMPUTE, "join", ""), (PRECOMPUTE, "join", "model.toml", ""), (PRECOMPUTE, "inspect", ""),
+                                (PRECOMPUTE, "verify", ""), (PRECOMPUTE, "compare", "", "a"), (PRECOMPUTE, "compare", "a", ""), (PRECOMPUTE, "new", ""),
+                                (PRECOMPUTE, "help", ""), (RUNTIME, "play", "", "--view"), (RUNTIME, "probe", "", "--node", "1", "--displace", "0,0,0"),
+                                (RUNTIME, "push", ""), (RUNTIME, "view", ""), (RUNTIME, "session", ""), (RUNTIME, "export", "", "--csv", "a.csv"), (RUNTIME, "help", "")):
+            with self.subTest(words=words):
+                result = run(program, *words, cwd=self.folder)
+                self.assertEqual(result.returncode, 2, result.stdout + result.stderr)
+
+    def test_names_behind_a_word(self):
+        file = self.bake(cube_toml(2))
+        for device in ("script:", "replay:"):
+            result = run(RUNTIME, "play", file, "--fast", "--device", device, "--tool", "sphere:0.1", cwd=self.folder)
+            self.assertIn(result.returncode, (1, 2), result.stderr)
+            self.assertIn("hint: ", result.stderr)
+
+
 class NotADescription(ProgramTest):
     def starter(self, result, name, what):
         """The model.toml that the hint shows."""

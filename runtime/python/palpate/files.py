@@ -10,7 +10,7 @@ from typing import Any
 import numpy
 
 from .cdr import HEAD, BadMessage, Layout
-from .library import Error
+from .library import Error, path_bytes
 from .mcap import McapFile
 
 _BODY = "a file of palpate-precompute, NAME.palpate.hdf"
@@ -37,7 +37,7 @@ class Body:
         import h5py  # sessions and recordings do without
 
         try:
-            self.file = h5py.File(h5py.h5f.open(os.fsencode(path), h5py.h5f.ACC_RDONLY, as_library_opens(h5py)))
+            self.file = h5py.File(h5py.h5f.open(path_bytes(path), h5py.h5f.ACC_RDONLY, as_library_opens(h5py)))
         except OSError as reason:
             raise Error(f"{os.fspath(path)} cannot be read: {reason}", f"name {_BODY}") from reason
         if text_of(self.file.attrs.get("format", "")) != "palpate":

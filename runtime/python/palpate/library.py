@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import operator
 import os
 import pathlib
 import shutil
@@ -26,6 +27,28 @@ class Error(Exception):
         told = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
         hints = [line.removeprefix("hint: ") for line in lines if line.startswith("hint: ")]
         return cls("\n".join(told or lines), "\n".join(hints), code)
+
+
+def whole(value: int, what: str, least: int = -(1 << 31), most: int = (1 << 31) - 1) -> int:
+    """`value` where a C integer holds it, an int unless told: ctypes cuts others. Throws Error."""
+    number = operator.index(value)
+    if not least <= number <= most:
+        raise Error(f"{what} is {number}", f"give {least} to {most}", "argument")
+    return number
+
+
+def path_text(path: str | os.PathLike[str]) -> str:
+    """A path as a word of a command: one that begins with a dash is no option. Throws Error where it has a zero byte, at which
+    C would cut it."""
+    text = os.fsdecode(path)
+    if "\0" in text:
+        raise Error(f"{text!r} is not the name of a file", "leave out the zero byte", "argument")
+    return "./" + text if text.startswith("-") else text
+
+
+def path_bytes(path: str | os.PathLike[str]) -> bytes:
+    """A path for C. Throws Error as `path_text`."""
+    return os.fsencode(path_text(path))
 
 
 class CTool(Structure):
@@ -62,6 +85,9 @@ class CRecordOptions(Structure):
     _fields_ = [("size", c_size_t), ("tool", c_int), ("pictures", c_double)]
 
 
+NOT_STEPPED = 1 << 15
+ERROR_STATE = 4
+
 FUNCTIONS = {
     "palpate_code_name": (c_char_p, [c_int]),
     "palpate_last_code": (c_int, []),
@@ -73,11 +99,11 @@ FUNCTIONS = {
     "palpate_step": (c_uint32, [c_void_p, POINTER(CPose)]),
     "palpate_get": (c_int, [c_void_p, c_int, POINTER(CResult)]),
     "palpate_set_tool": (c_int, [c_void_p, c_int, POINTER(CTool)]),
-    "palpate_reset": (None, [c_void_p]),
+    "palpate_reset": (c_int, [c_void_p]),
     "palpate_surface_counts": (c_int, [c_void_p, POINTER(CCounts)]),
-    "palpate_surface_rest": (None, [c_void_p, POINTER(c_double)]),
-    "palpate_surface_simplices": (None, [c_void_p, POINTER(c_int32)]),
-    "palpate_surface_displacement": (None, [c_void_p, POINTER(c_double)]),
+    "palpate_surface_rest": (c_int, [c_void_p, POINTER(c_double)]),
+    "palpate_surface_simplices": (c_int, [c_void_p, POINTER(c_int32)]),
+    "palpate_surface_displacement": (c_int, [c_void_p, POINTER(c_double)]),
     "palpate_surface_stress": (c_int64, [c_void_p, POINTER(c_float), POINTER(c_float)]),
 }
 

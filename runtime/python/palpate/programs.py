@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
 import subprocess
 from collections.abc import Callable, Sequence
 
 import numpy
 
-from .library import Error, program
+from .library import Error, path_text, program
 
 Path = str | os.PathLike[str]
 
@@ -18,11 +19,11 @@ def bake(model: Path, output: Path, *, jobs: int | None = None, force: bool = Fa
          progress: Callable[[str], object] | None = None) -> None:
     """Makes `output` (NAME.palpate.hdf) of a model.toml by palpate-precompute. `progress` takes each line that it prints.
     Goes on with what an interrupted run has finished. Throws Error with what the program says."""
-    command = [program("palpate-precompute"), os.fspath(model), "-o", os.fspath(output)]
-    command += ["--jobs", str(jobs)] if jobs else []
+    command = [program("palpate-precompute"), path_text(model), "-o", path_text(output)]
+    command += ["--jobs", str(jobs)] if jobs is not None else []
     command += ["--force"] if force else []
     lines = []
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace") as process:
         assert process.stderr is not None
         for line in process.stderr:
             lines.append(line)
@@ -37,16 +38,16 @@ def probe(file: Path, displace: Sequence[Sequence[float]], *, at: Sequence[Seque
     """Forces on the body [N] that displace nodes by `displace` [K, d] [m], all other nodes being free: of the free surface
     nodes nearest to the points `at` [m], or of the mesh nodes `node`. `overlay`: refinement and rings of a finer mesh.
     Throws Error with what palpate-runtime says."""
-    command = [program("palpate-runtime"), "probe", os.fspath(file), "--json"]
+    command = [program("palpate-runtime"), "probe", path_text(file), "--json"]
     for point in at:
         command += ["--at", ",".join(repr(float(x)) for x in point)]
     for number in node:
-        command += ["--node", str(int(number))]
+        command += ["--node", str(operator.index(number))]
     for u in displace:
         command += ["--displace", ",".join(repr(float(x)) for x in u)]
     if overlay is not None:
         command += ["--overlay", f"r={overlay[0]},rings={overlay[1]}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0:
         raise Error.of_text(done.stderr)
     return numpy.array([node["force"] for node in json.loads(done.stdout)["nodes"]])

@@ -5,13 +5,15 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import math
+import operator
 import os
 from collections.abc import Sequence
 from typing import Any
 
 import numpy
 
-from .library import CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error, load
+from .library import (ERROR_STATE, NOT_STEPPED, CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error, load,
+                      path_bytes, whole)
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 FLOATS = ctypes.POINTER(ctypes.c_float)
@@ -77,8 +79,17 @@ def c_tool(tool: Tool) -> CTool:
     return CTool(ctypes.sizeof(CTool), *dataclasses.astuple(tool))
 
 
+def c_overlay(overlay: Overlay | None) -> Any:
+    if overlay is None:
+        return None
+    return ctypes.pointer(COverlay(ctypes.sizeof(COverlay), whole(overlay.refinement, "refinement"), whole(overlay.rings, "rings"),
+                                   whole(overlay.memory, "memory", 0, (1 << 63) - 1)))
+
+
 class Session:
-    """One body and the tools that touch it. One thread steps; one other may draw at the same time.
+    """One body and the tools that touch it. One thread steps (`put`, `step`, `play`, `felt`, `set_tool`, `reset`, `record`,
+    `end_recording`); others may draw at the same time (`rest`, `simplices`, `displacement`, `stress`) and close: what comes
+    later, or from a second thread that steps, is an Error.
 
     `file`: NAME.palpate.hdf; `tools`: one or several; `max_contacts`: room for contact points of all tools, 1 to 256;
     `overlay`: a finer mesh under the tools; `dynamic_contact`: the tools meet the body's inertia too (the file needs
@@ -94,26 +105,25 @@ class Session:
         self._library = load()
         self._session = None
         c_tools = (CTool * len(self.tools))(*[c_tool(tool) for tool in self.tools])
-        c_overlay = None if overlay is None else ctypes.pointer(COverlay(ctypes.sizeof(COverlay), *dataclasses.astuple(overlay)))
-        options = COptions(ctypes.sizeof(COptions), c_overlay, dynamic_contact, tick, stress_ticks)
+        options = COptions(ctypes.sizeof(COptions), c_overlay(overlay), bool(dynamic_contact), tick,
+                           whole(stress_ticks, "stress_ticks", -(1 << 63), (1 << 63) - 1))
         error = ctypes.create_string_buffer(4096)
         self._session = self._library.palpate_create_with_options(
-            os.fsencode(file), c_tools, len(self.tools), max_contacts, ctypes.byref(options), error, len(error))
+            path_bytes(file), c_tools, len(self.tools), whole(max_contacts, "max_contacts"), ctypes.byref(options), error, len(error))
         if self._session is None:
             raise self._failure(error, self._library.palpate_last_code())
         self._poses = (CPose * len(self.tools))()
         for pose in self._poses:
             pose.size, pose.orientation = ctypes.sizeof(CPose), (1.0, 0.0, 0.0, 0.0)
         self._view = numpy.frombuffer(self._poses, POSE)  # the same memory
-        self._result = CResult(ctypes.sizeof(CResult))
         self._names: dict[int, frozenset[str]] = {0: frozenset()}
         self._status = 0
 
     def close(self) -> None:
-        """Ends the session; what it gave stays."""
-        if self._session is not None:
-            self._library.palpate_destroy(self._session)
-            self._session = None
+        """Ends the session, after the step under way in another thread; what it gave stays."""
+        session, self._session = self._session, None
+        if session is not None:
+            self._library.palpate_destroy(session)
 
     def __enter__(self) -> Session:
         return self
@@ -127,14 +137,38 @@ class Session:
 
     def _open(self) -> int:
         if self._session is None:
-            raise Error("the session is closed", "make another one")
+            raise Error("the session is closed", "make another one", "state")
         return self._session
+
+    def _refused(self) -> Error:
+        """Why the library did nothing."""
+        try:
+            self._open()
+        except Error as closed:
+            return closed
+        return Error("another thread steps the session, or it is recorded", "let one thread step, and end a recording before a reset", "state")
+
+    def _call(self, function: str, *arguments: Any) -> int:
+        """0, or what is wrong with an argument. Throws Error where the session is closed or used by another thread."""
+        code = int(getattr(self._library, function)(self._open(), *arguments))
+        if code == ERROR_STATE:
+            raise self._refused()
+        return code
+
+    def _number(self, tool: int) -> int:
+        """Throws IndexError where there is no such tool."""
+        if not 0 <= operator.index(tool) < len(self.tools):
+            raise IndexError(f"tool {tool} of {len(self.tools)}")
+        return operator.index(tool)
 
     def put(self, tool: int, position: Sequence[float], orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
             grab: bool = False) -> None:
-        """Sets where the device wants a tool in the next ticks: position [m], quaternion w, x, y, z, grab."""
-        pose = self._view[tool]
-        pose["position"], pose["orientation"], pose["grab"] = position, orientation, grab
+        """Sets where the device wants a tool in the next ticks: position [m], quaternion w, x, y, z, grab. Throws Error where these are
+        not 3 and 4 numbers, and IndexError where there is no such tool."""
+        pose = self._view[self._number(tool)]
+        if numpy.shape(position) != (3,) or numpy.shape(orientation) != (4,):
+            raise Error(f"a pose is 3 numbers and 4, not {position!r} and {orientation!r}", "give x, y, z and w, x, y, z", "argument")
+        pose["position"], pose["orientation"], pose["grab"] = position, orientation, bool(grab)
 
     def step(self, position: Sequence[float] | None = None, orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
              grab: bool = False) -> Felt:
@@ -143,21 +177,23 @@ class Session:
         session = self._open()
         if position is not None:
             self.put(0, position, orientation, grab)
-        self._status = self._library.palpate_step(session, self._poses)
+        status = self._library.palpate_step(session, self._poses)
+        if status & NOT_STEPPED:
+            raise self._refused()
+        self._status = status
         return self.felt(0)
 
     def felt(self, tool: int) -> Felt:
         """What a tool feels since the last tick. Throws IndexError where there is no such tool."""
-        if self._library.palpate_get(self._open(), tool, ctypes.byref(self._result)) != 0:
-            raise IndexError(f"tool {tool} of {len(self.tools)}")
-        return felt_of(self._result, self.status)
+        result = CResult(ctypes.sizeof(CResult))
+        self._call("palpate_get", self._number(tool), ctypes.byref(result))
+        return felt_of(result, self.status)
 
     def set_tool(self, number: int, tool: Tool) -> None:
         """What a tool is from the next tick on; its shape stays. Throws Error where the shape is another, or a value makes no
         sense, and IndexError where there is no such tool."""
-        if not 0 <= number < len(self.tools):
-            raise IndexError(f"tool {number} of {len(self.tools)}")
-        if self._library.palpate_set_tool(self._open(), number, ctypes.byref(c_tool(tool))) != 0:
+        number = self._number(number)
+        if self._call("palpate_set_tool", number, ctypes.byref(c_tool(tool))) != 0:
             raise Error(f"tool {number} cannot become {tool}",
                         "keep radius, length and disc_radius; springs, largest force and hand-over are positive")
         self.tools[number] = tool
@@ -179,8 +215,9 @@ class Session:
         return forces
 
     def reset(self) -> None:
-        """Back to a body that nobody has touched, and to the tools that the session was made with."""
-        self._library.palpate_reset(self._open())
+        """Back to a body that nobody has touched, and to the tools that the session was made with. Throws Error while it is
+        recorded."""
+        self._call("palpate_reset")
         self.tools = list(self._created)
         self._status = 0
 
@@ -188,9 +225,9 @@ class Session:
         """Records each tick of a tool from now on, from the untouched body, with so many pictures of the surface a second. What
         stands at `file` is replaced only where it is empty or an earlier recording.
         `palpate.Recording` reads it, and `palpate-runtime play BODY --device replay:FILE` repeats it. Throws Error."""
-        options = CRecordOptions(ctypes.sizeof(CRecordOptions), tool, pictures)
+        options = CRecordOptions(ctypes.sizeof(CRecordOptions), whole(tool, "tool"), pictures)
         error = ctypes.create_string_buffer(4096)
-        code = self._library.palpate_record(self._open(), os.fsencode(file), ctypes.byref(options), error, len(error))
+        code = self._library.palpate_record(self._open(), path_bytes(file), ctypes.byref(options), error, len(error))
         if code != 0:
             raise self._failure(error, code)
 
@@ -208,7 +245,7 @@ class Session:
     def rest(self) -> numpy.ndarray:
         """Positions of the surface nodes on the body at rest [S, 3] [m]."""
         rest = numpy.empty((self._counts().nodes, 3))
-        self._library.palpate_surface_rest(self._open(), rest.ctypes.data_as(DOUBLES))
+        self._call("palpate_surface_rest", rest.ctypes.data_as(DOUBLES))
         return rest
 
     @property
@@ -216,13 +253,13 @@ class Session:
         """Surface nodes of the triangles, counter-clockwise seen from outside [F, 3]; in the plane of lines [F, 2]."""
         counts = self._counts()
         corners = numpy.empty((counts.simplices, counts.corners), numpy.int32)
-        self._library.palpate_surface_simplices(self._open(), corners.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)))
+        self._call("palpate_surface_simplices", corners.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)))
         return corners
 
     def displacement(self) -> numpy.ndarray:
         """Displacement of the surface nodes from rest in the last tick [S, 3] [m]; another thread may ask while one steps."""
         u = numpy.empty((self._counts().nodes, 3))
-        self._library.palpate_surface_displacement(self._open(), u.ctypes.data_as(DOUBLES))
+        self._call("palpate_surface_displacement", u.ctypes.data_as(DOUBLES))
         return u
 
     def stress(self) -> tuple[int, numpy.ndarray, numpy.ndarray]:
@@ -234,5 +271,5 @@ class Session:
 
     def _counts(self) -> CCounts:
         counts = CCounts(ctypes.sizeof(CCounts))
-        self._library.palpate_surface_counts(self._open(), ctypes.byref(counts))
+        self._call("palpate_surface_counts", ctypes.byref(counts))
         return counts

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import threading
 
-from .library import Error, program
+from .library import Error, path_text, program
 
 Path = str | os.PathLike[str]
 
@@ -21,7 +21,7 @@ class Viewer:
     Throws Error with what palpate-runtime says."""
 
     def __init__(self, file: Path, *options: str, height: int = 560):
-        name = os.fspath(file)
+        name = path_text(file)
         command = ["view", name] if name.endswith(".mcap") else ["play", name, "--view"]
         self.height = height
         told, tells = os.pipe()  # the address: what is printed has names from files in it

@@ -5,6 +5,7 @@ import type { Ticks } from '../src/wire';
 
 const not_converged = 1 << 8; // StepStatus::not_converged
 const pose_limited = 1 << 7;
+const late_motion = 1 << 12;
 
 /** Samples of a force of 2 N along y, each [status, error in N, contact points left out]. */
 function ticks(...samples: [number, number, number][]): Ticks {
@@ -38,6 +39,12 @@ test('the worst of the ticks is told, with its reasons', () => {
   assert.equal(said([0, 0, 0], [not_converged, 0.05, 0], [not_converged, 0.01, 0]), 'Best effort: force within about 2.5 % (not converged)');
   assert.equal(said([0, 0.3, 1]), 'Best effort: force within about 15 % (1 contact point left out)');
   assert.equal(said([not_converged, 0.3, 0], [0, 0.1, 12]), 'Best effort: force within about 15 % (not converged, 12 contact points left out)');
+});
+
+test('a body that stood still is told where that makes an error', () => {
+  assert.equal(said([late_motion, 0, 0]), '');
+  assert.equal(said([late_motion, 1.5, 0]), 'Best effort: force within about 75 % (the body stood still)');
+  assert.deepEqual([0, 1].map((i) => is_marked(ticks([late_motion, 0, 0], [late_motion, 1, 0]), i)), [false, true]);
 });
 
 test('errors that are next to nothing, or all there is', () => {

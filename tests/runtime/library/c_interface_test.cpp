@@ -11,11 +11,16 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
+#include <regex>
 #include <set>
 #include <string>
 #include <thread>
+#include <tuple>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "formats/model_file.h"
@@ -900,9 +905,242 @@ TEST(CInterfaceSizes, SizesThatCannotBeAreRefused) {
 TEST(CInterfaceStatus, HasANameForEachBitAndNoOther) {
   EXPECT_STREQ(palpate_status_name(PALPATE_NOTHING_IN_REACH), "nothing_in_reach");
   EXPECT_STREQ(palpate_status_name(PALPATE_FORCE_LIMITED), "force_limited");
+  EXPECT_STREQ(palpate_status_name(PALPATE_NOT_STEPPED), "not_stepped");
   EXPECT_EQ(palpate_status_name(0), nullptr);
   EXPECT_EQ(palpate_status_name(PALPATE_FORCE_LIMITED | PALPATE_CAPACITY_FULL), nullptr);
   EXPECT_EQ(palpate_status_name(1U << 31), nullptr);
+}
+
+/// A function of palpate.h with arguments that make sense.
+struct Call {
+  std::string name;
+  std::function<bool()> refused;             ///< with these arguments
+  std::vector<std::function<bool()>> nulls;  ///< likewise with each pointer NULL, one after the other
+  bool has_handle = false;                   ///< its first argument is a session or a recording
+};
+
+bool is_refusal(std::uint32_t status) {
+  return (status & PALPATE_NOT_STEPPED) != 0;
+}
+bool is_refusal(int code) {
+  return code != 0;
+}
+bool is_refusal(std::int64_t tick) {
+  return tick < 0;
+}
+bool is_refusal(const char* name) {
+  return name == nullptr;
+}
+bool is_refusal(palpate_session* session) {
+  palpate_destroy(session);
+  return session == nullptr;
+}
+bool is_refusal(palpate_recording* recording) {
+  palpate_recording_close(recording);
+  return recording == nullptr;
+}
+
+template <typename Result, typename... Arguments>
+Call call_of(const std::string& name, Result (*function)(Arguments...), std::tuple<Arguments...> arguments) {
+  using All = std::tuple<Arguments...>;
+  const auto outcome = [function](const All& given) {
+    if constexpr (std::is_void_v<Result>) {
+      std::apply(function, given);
+      return true;
+    } else {
+      return is_refusal(std::apply(function, given));
+    }
+  };
+  Call call{.name = name, .refused = [=] { return outcome(arguments); }, .nulls = {}};
+  [&]<std::size_t... k>(std::index_sequence<k...>) {
+    [[maybe_unused]] const auto add = [&]<std::size_t at>(std::integral_constant<std::size_t, at>) {
+      using Argument = std::tuple_element_t<at, All>;
+      if constexpr (std::is_pointer_v<Argument>) {
+        All given = arguments;
+        std::get<at>(given) = nullptr;
+        call.nulls.emplace_back([=] { return outcome(given); });
+        using Object = std::remove_const_t<std::remove_pointer_t<Argument>>;
+        call.has_handle |=
+            std::is_same_v<Object, palpate_session> || std::is_same_v<Object, palpate_recording>;
+      }
+    };
+    (add(std::integral_constant<std::size_t, k>()), ...);
+  }
+  (std::index_sequence_for<Arguments...>());
+  return call;
+}
+
+/// Room that functions write to.
+struct Room {
+  palpate_tool tool = PALPATE_TOOL_INIT;
+  palpate_pose pose = PALPATE_POSE_INIT;
+  palpate_options options = PALPATE_OPTIONS_INIT;
+  palpate_record_options record_options = PALPATE_RECORD_OPTIONS_INIT;
+  palpate_result result = PALPATE_RESULT_INIT;
+  palpate_counts counts = PALPATE_COUNTS_INIT;
+  palpate_recording_counts recording_counts = PALPATE_RECORDING_COUNTS_INIT;
+  palpate_recorded_tick tick = PALPATE_RECORDED_TICK_INIT;
+  std::vector<double> xyz = std::vector<double>(1000);
+  std::vector<float> floats = std::vector<float>(1000);
+  std::vector<std::int32_t> corners = std::vector<std::int32_t>(1000);
+  double time = 0.0;
+  std::array<char, 400> error{};
+  std::string model = golden("cube2"), record, recorded;
+};
+
+/// All functions of palpate.h; a test holds this to the header.
+std::vector<Call> calls(palpate_session* session, palpate_recording* recording, Room& room) {
+  char* const error = room.error.data();
+  const std::size_t size = room.error.size();
+  const char* const model = room.model.c_str();
+#define PALPATE_CALL(name, ...) call_of(#name, &(name), {__VA_ARGS__})
+  return {
+      PALPATE_CALL(palpate_status_name, 1U),
+      PALPATE_CALL(palpate_code_name, 1),
+      call_of("palpate_last_code", &palpate_last_code, {}),
+      PALPATE_CALL(palpate_create, model, &room.tool, 1, 8, error, size),
+      PALPATE_CALL(palpate_create_with_options, model, &room.tool, 1, 8, &room.options, error, size),
+      PALPATE_CALL(palpate_step, session, &room.pose),
+      PALPATE_CALL(palpate_get, session, 0, &room.result),
+      PALPATE_CALL(palpate_set_tool, session, 0, &room.tool),
+      PALPATE_CALL(palpate_reset, session),
+      PALPATE_CALL(palpate_record, session, room.record.c_str(), &room.record_options, error, size),
+      PALPATE_CALL(palpate_record_end, session, error, size),
+      PALPATE_CALL(palpate_surface_counts, session, &room.counts),
+      PALPATE_CALL(palpate_surface_rest, session, room.xyz.data()),
+      PALPATE_CALL(palpate_surface_simplices, session, room.corners.data()),
+      PALPATE_CALL(palpate_surface_displacement, session, room.xyz.data()),
+      PALPATE_CALL(palpate_surface_stress, session, room.floats.data(), room.floats.data()),
+      PALPATE_CALL(palpate_recording_open, room.recorded.c_str(), error, size),
+      PALPATE_CALL(palpate_recording_count, recording, &room.recording_counts),
+      PALPATE_CALL(palpate_recording_tick, recording, std::int64_t{0}, &room.tick),
+      PALPATE_CALL(palpate_recording_rest, recording, room.xyz.data()),
+      PALPATE_CALL(palpate_recording_simplices, recording, room.corners.data()),
+      PALPATE_CALL(palpate_recording_picture, recording, std::int64_t{0}, room.floats.data(), &room.time,
+                   error, size),
+      PALPATE_CALL(palpate_recording_close, recording),
+      PALPATE_CALL(palpate_destroy, session),
+  };
+#undef PALPATE_CALL
+}
+
+/// A session, a recording that was made with it, and room.
+class CInterfaceMisuse : public testing::Test {
+ protected:
+  CInterfaceMisuse() {
+    std::fill_n(room.pose.position, 3, 5.0);
+    room.recorded = (folder.path() / "recorded.mcap").string();
+    room.record = (folder.path() / "other.mcap").string();
+    session = open("cube2", {room.tool}).release();
+    EXPECT_EQ(record(session, room.recorded.c_str(), &room.record_options), PALPATE_OK);
+    palpate_step(session, &room.pose);
+    EXPECT_EQ(end_recording(session), PALPATE_OK);
+    recording = palpate_recording_open(room.recorded.c_str(), room.error.data(), room.error.size());
+    EXPECT_NE(recording, nullptr) << room.error.data();
+  }
+  ~CInterfaceMisuse() override {
+    palpate_destroy(session);
+    palpate_recording_close(recording);
+  }
+
+  test::ScratchFolder folder;
+  Room room;
+  palpate_session* session = nullptr;
+  palpate_recording* recording = nullptr;
+};
+
+TEST_F(CInterfaceMisuse, EveryFunctionIsTried) {
+  std::ifstream in(test::source_file("runtime/library/palpate.h"));
+  const std::string header(std::istreambuf_iterator<char>(in), {});
+  const std::regex function(R"((palpate_\w+)\()");
+  std::set<std::string> declared, tried;
+  for (std::sregex_iterator at(header.begin(), header.end(), function), end; at != end; ++at)
+    declared.insert((*at)[1]);
+  for (const Call& call : calls(session, recording, room)) tried.insert(call.name);
+  EXPECT_EQ(tried, declared) << "add what is new to calls()";
+}
+
+TEST_F(CInterfaceMisuse, NullIsRefusedOrHarmless) {
+  for (const Call& call : calls(session, recording, room)) {
+    for (std::size_t k = 0; k < call.nulls.size(); ++k) {
+      const bool refused = call.nulls[k]();
+      EXPECT_TRUE(refused || k > 0 || !call.has_handle) << call.name;
+      palpate_record_end(session, nullptr, 0);  // where only `error` was NULL
+      std::filesystem::remove(room.record);
+    }
+  }
+  EXPECT_EQ(palpate_step(session, &room.pose), 0U);
+}
+
+TEST_F(CInterfaceMisuse, WhatHasEndedIsRefused) {
+  for (int times = 0; times < 3; ++times) {
+    palpate_destroy(session);
+    palpate_recording_close(recording);
+  }
+  for (const Call& call : calls(session, recording, room)) {
+    EXPECT_TRUE(!call.has_handle || call.refused()) << call.name;
+  }
+  EXPECT_EQ(palpate_get(session, 0, &room.result), PALPATE_ERROR_STATE);
+  EXPECT_EQ(palpate_record_end(session, room.error.data(), room.error.size()), PALPATE_ERROR_STATE);
+  EXPECT_NE(std::string(room.error.data()).find("ended"), std::string::npos) << room.error.data();
+}
+
+/// With all threads that a session can have.
+TEST(CInterfaceThreads, EndsWhileOthersAreInIt) {
+  const test::ScratchFolder folder;
+  const palpate_tool tool = sphere(0.1);
+  palpate_overlay overlay = PALPATE_OVERLAY_INIT;
+  overlay.rings = 1;
+  palpate_options options = PALPATE_OPTIONS_INIT;
+  options.overlay = &overlay;
+  options.stress_ticks = 4;
+  const palpate_record_options record_options = PALPATE_RECORD_OPTIONS_INIT;
+  for (int run = 0; run < 12; ++run) {
+    char error[400];
+    palpate_session* session =
+        palpate_create_with_options(golden("cube2").c_str(), &tool, 1, 24, &options, error, sizeof error);
+    ASSERT_NE(session, nullptr) << error;
+    const std::string file = (folder.path() / (std::to_string(run) + ".mcap")).string();
+    ASSERT_TRUE(run % 2 == 0 || record(session, file.c_str(), &record_options) == PALPATE_OK);
+    std::vector<double> xyz(3 * static_cast<std::size_t>(counts_of(session).nodes));
+    std::atomic<int> ticks = 0, pictures = 0;
+    std::thread loop([&] {
+      palpate_result result = PALPATE_RESULT_INIT;
+      for (palpate_pose pose = pressing(0); (palpate_step(session, &pose) & PALPATE_NOT_STEPPED) == 0;
+           ++ticks) {
+        palpate_get(session, 0, &result);
+        pose = pressing(ticks);
+      }
+      EXPECT_EQ(palpate_get(session, 0, &result), PALPATE_ERROR_STATE);
+    });
+    std::thread eye([&] {
+      while (palpate_surface_displacement(session, xyz.data()) == 0) ++pictures;
+    });
+    while (ticks < 20 || pictures < 5) std::this_thread::yield();
+    palpate_destroy(session);
+    loop.join();
+    eye.join();
+  }
+}
+
+TEST(CInterfaceThreads, OfTwoThatStepOneIsRefused) {
+  const Session session = open("cube2", {sphere(0.1)}), other = open("cube2", {sphere(0.1)});
+  std::atomic<int> done = 0, refused = 0;
+  const auto step_until_refused = [&] {
+    const palpate_pose pose = pressing(200);
+    while (refused == 0) ++((palpate_step(session.get(), &pose) & PALPATE_NOT_STEPPED) != 0 ? refused : done);
+  };
+  std::thread first(step_until_refused), second(step_until_refused);
+  first.join();
+  second.join();
+  EXPECT_GT(done, 0);
+  EXPECT_EQ(palpate_reset(session.get()), 0);
+  for (int tick = 0; tick < 250; ++tick) {
+    const palpate_pose pose = pressing(tick);
+    EXPECT_EQ(palpate_step(session.get(), &pose), palpate_step(other.get(), &pose));
+  }
+  EXPECT_GT(result_of(other.get(), 0).force[2], 0.0);
+  EXPECT_EQ(vector(result_of(session.get(), 0).force), vector(result_of(other.get(), 0).force));
 }
 
 TEST(CInterfaceThreads, AnotherThreadSeesWholeTicksOnly) {

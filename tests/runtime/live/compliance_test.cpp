@@ -53,6 +53,46 @@ double error_of(const Greens& W, const Body& body, const LiveState& state) {
   return off / largest;
 }
 
+/// A press on a body whose solver never answers: all of the force is what standing still made.
+TEST(LiveLate, ABodyThatStandsStillIsAnErrorOfTheForce) {
+  const Body body = test::live_bar(3, {.solver = LiveLaw::corotational});
+  State moves(body, {.tools = {Tool{.radius = 0.005}}}), stands(moves);
+  MotionSource source(body, moves, {.in_background = false}), silent(body, stands, {.in_background = false});
+  const auto pose = [](int tick) {
+    return ToolPose{.position = Vec3(0.06, 0.01, 0.0255 - 2e-5 * std::min(tick, 100))};
+  };
+  for (int tick = 0; tick < 400; ++tick) {
+    source.receive(moves);
+    EXPECT_FALSE(has(step(body, moves, pose(tick)), StepStatus::late_motion));
+    source.post(moves);
+    EXPECT_EQ(moves.tools[0].force_error, 0.0);
+    step(body, stands, pose(tick));
+    silent.post(stands);
+  }
+  const ToolState& tool = stands.tools[0];
+  EXPECT_TRUE(has(stands.status, StepStatus::late_motion)) << "in each tick, not only where a step ends";
+  const double right = moves.tools[0].contact_wrench.force.norm(), felt = tool.contact_wrench.force.norm();
+  EXPECT_GT(felt, 2.0 * right) << "it is stiffer than the body";
+  EXPECT_GE(tool.force_error, felt - right);
+  EXPECT_LE(tool.force_error, felt);
+}
+
+TEST(LiveLoad, AllColumnsByThreadsAreThoseInTurn) {
+  const Body body = test::live_bar(3, {.solver = LiveLaw::corotational});
+  std::vector<Index> nodes;
+  for (const Index stored : all_nodes(body)) nodes.push_back(body.mesh_node(stored));
+  StepCompliance threads(body.live()->body, body.live()->stepper, nodes), turns = threads;
+  const Eigen::VectorXd x = body.live()->body.start();
+  ASSERT_TRUE(threads.begin(x, {}) && turns.begin(x, {}));
+  threads.find_all(3);
+  while (!turns.go_on(64)) {
+  }
+  const PackedGreens a = threads.take(), b = turns.take();
+  for (std::int64_t column = 0; column < a.order(); ++column) {
+    for (std::int64_t row = column; row < a.order(); ++row) ASSERT_EQ(a(row, column), b(row, column));
+  }
+}
+
 class LiveComplianceOf : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Dimension, LiveComplianceOf, testing::Values(2, 3));
 

@@ -20,11 +20,23 @@ TEST(BestEffort, CountsWhatWasCutShortAndWhatWasLeftOut) {
   EXPECT_EQ(found.not_converged_ticks, 2);
   EXPECT_EQ(found.left_out_ticks, 2);
   EXPECT_EQ(found.most_left_out, 7);
+  EXPECT_EQ(found.late_ticks, 0);
   EXPECT_EQ(found.largest_error, 0.5);
   EXPECT_EQ(found.largest_error_time, 0.5) << "the first";
   EXPECT_EQ(found.largest_share, 1.0) << "more than the whole force";
   EXPECT_NEAR(found.median_error(), 0.04, 0.06 * 0.04);
   EXPECT_NEAR(found.median_share(), 0.02, 0.06 * 0.02);
+}
+
+TEST(BestEffort, CountsABodyThatStoodStill) {
+  BestEffort found;
+  found.add(StepStatus::late_motion, 1.0, 0.0, 0, 0.1);  // the force does not depend on it
+  EXPECT_EQ(found.ticks, 0);
+  found.add(StepStatus::late_motion, 2.0, 1.5, 0, 0.2);
+  EXPECT_EQ(found.ticks, 1);
+  EXPECT_EQ(found.late_ticks, 1);
+  EXPECT_EQ(found.largest_error, 1.5);
+  EXPECT_NE(in_words(found, 1000).find(": the body stood still in 1 of them"), std::string::npos);
 }
 
 TEST(BestEffort, MediansOverManyDecades) {
