@@ -219,7 +219,7 @@ void OpenedItem::hear_told(Running& running) {
 /// Lines of another order's program are for the terminal alone.
 void OpenedItem::hear(const Running& running, const std::string& line) {
   std::string shown = printable(line);
-  fmt::print(stderr, "{}\n", shown);
+  say(stderr, "{}\n", shown);
   const std::lock_guard lock(mutex_);
   if (running.order != ordered_) return;
   state_->said.push_back(std::move(shown));

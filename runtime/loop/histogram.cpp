@@ -42,15 +42,14 @@ void TimeHistogram::add(std::int64_t nanoseconds) noexcept {
 }
 
 void TimeHistogram::add(const TimeHistogram& other) noexcept {
-  for (std::size_t ns = 0; ns < fine_.size(); ++ns) fine_[ns] += other.fine_[ns];
-  for (std::size_t us = 0; us < coarse_.size(); ++us) coarse_[us] += other.coarse_[us];
+  for (std::size_t step = 0; step < counts_.size(); ++step) counts_[step] += other.counts_[step];
   longer_ += other.longer_;
   total_ += other.total_;
   worst_ = std::max(worst_, other.worst_);
 }
 
 void TimeHistogram::clear() noexcept {
-  std::fill(counts_.begin(), counts_.end(), 0U);
+  std::fill(counts_.begin(), counts_.end(), 0);
   longer_ = total_ = worst_ = 0;
 }
 

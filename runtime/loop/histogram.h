@@ -8,7 +8,7 @@ namespace palpate {
 
 /// Counts durations in steps of 1 ns below 1 us and of at most 1/500 of them from there up to 1 s; longer
 /// ones only as "longer". Between 500 ns and 500 ns times a power of 2 there are whole steps. Fixed memory of
-/// 44 kB, taken at construction.
+/// 88 kB, taken at construction.
 class TimeHistogram {
  public:
   TimeHistogram();
@@ -27,7 +27,7 @@ class TimeHistogram {
   [[nodiscard]] std::int64_t worst() const noexcept { return worst_; }  ///< [ns]
 
  private:
-  std::vector<std::uint32_t> counts_;  // by steps
+  std::vector<std::int64_t> counts_;  // by steps
   std::int64_t longer_ = 0;
   std::int64_t total_ = 0;
   std::int64_t worst_ = 0;

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "base/file_io.h"
+#include "base/program.h"
 #include "runtime/serving/admission.h"
 
 namespace palpate {
@@ -34,7 +35,7 @@ std::string ViewerPort::url(const std::string& page) const {
 
 void tell_address(const ServedAddress& served, const std::string& url, std::string_view more) {
   if (served.told < 0) {
-    fmt::print(stderr, "open {} in a browser{}\n", url, more);
+    say(stderr, "open {} in a browser{}\n", url, more);
     return;
   }
   const std::string line =
