@@ -1,6 +1,7 @@
 """The Python package: the same forces as a C client and probe to the last bit, files as h5py sees them, a loop of its own."""
 
 import ctypes
+import os
 import pathlib
 import tempfile
 import threading
@@ -313,6 +314,7 @@ class Misuse(PythonTest):
         loop = palpate.Loop(session, lambda t: (0.5, 0.5, 1.08), lambda felt: stepped.set()).start()
         stepped.wait()
         session.close()
+        loop._thread.join()  # it ends by itself
         with self.assertRaisesRegex(palpate.Error, "the session is closed"):
             loop.stop()
 
@@ -349,7 +351,7 @@ class Misuse(PythonTest):
                 use()
 
     def test_a_process_that_forks_leaves_the_session_alone(self):
-        session = self.session(overlay=palpate.Overlay(2, 1), stress_ticks=1)
+        session = self.session(stress_ticks=1)
         child = os.fork()
         if child == 0:
             session.close()  # whose threads are those of the parent
