@@ -59,7 +59,7 @@ class Bake(ProgramTest):
 
     def test_more_memory_than_there_is(self):
         model = self.write("model.toml", cube_toml(24))
-        result = run(PRECOMPUTE, model, "--jobs", "1024", cwd=self.folder)
+        result = run(PRECOMPUTE, model, "--jobs", "1024", cwd=self.folder, env=os.environ | {"SLURM_MEM_PER_NODE": "2000"})  # [MB]
         self.assert_refused(result, "GB of memory are needed", "are free", "--jobs")
         self.assertEqual([p.name for p in self.folder.iterdir()], ["model.toml"])
 
