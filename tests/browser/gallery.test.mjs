@@ -110,7 +110,7 @@ test('what files say is text in the gallery, the page and what is exported', asy
     await copyFile(await bake(at, cube(2).replace('"cube"', JSON.stringify(name)), 'baked'), path.join(at, `${file}.palpate.hdf`));
   await rm(path.join(at, 'baked.palpate.hdf'));
   await rm(path.join(at, 'baked.toml'), { force: true });
-  await writeFile(path.join(at, `${evil}.h5`), 'no recording');
+  await writeFile(path.join(at, `${evil}.mcap`), 'no recording');
   await writeFile(path.join(at, `${evil}.obj`), `this is no surface ${evil}\n`);
   const served = await serve(t, ['view', '--view-address', '127.0.0.1:0'], at);
   const note_scripts = () => (window.ran ??= []);
@@ -151,8 +151,8 @@ test('what files say is text in the gallery, the page and what is exported', asy
 
   await writeFile(path.join(at, 'touch.csv'), 't,x,y,z\n0,0.5,0.5,1.3\n0.1,0.5,0.5,1.05\n');
   await copyFile(plain, path.join(at, 'x.palpate.hdf'));
-  await run(runtime, ['play', path.join(at, `${evil}.palpate.hdf`), '--device', 'script:touch.csv', '--tool', 'sphere:0.1', '--fast', '--record', 'touch.h5'], { cwd: at });
-  await run(runtime, ['export', 'touch.h5', '--html', 'touch.html'], { cwd: at });
+  await run(runtime, ['play', path.join(at, `${evil}.palpate.hdf`), '--device', 'script:touch.csv', '--tool', 'sphere:0.1', '--fast', '--record', 'touch.mcap'], { cwd: at });
+  await run(runtime, ['export', 'touch.mcap', '--html', 'touch.html'], { cwd: at });
   const written = await visit(t, `file://${path.join(at, 'touch.html')}`, {}, note_scripts);
   await ready(written);
   assert.deepEqual(written.complaints, []);

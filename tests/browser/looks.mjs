@@ -39,7 +39,7 @@ export async function rest(page) {
 export async function keep_pixels(page, name) {
   const png = await page.getByTestId('stage').screenshot({ animations: 'disabled' });
   await page.evaluate(async ([key, base64]) => {
-    const bitmap = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
+    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], { type: 'image/png' }));
     const surface = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
     surface.drawImage(bitmap, 0, 0);
     (window.kept_pixels ??= {})[key] = surface.getImageData(0, 0, bitmap.width, bitmap.height);

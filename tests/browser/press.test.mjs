@@ -240,7 +240,8 @@ test('the picture is the stored one', async (t) => {
   const share = await page.evaluate(
     async ([a, b]) => {
       const pixels = async (base64) => {
-        const bitmap = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
+        const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+        const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
         const surface = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
         surface.drawImage(bitmap, 0, 0);
         return surface.getImageData(0, 0, bitmap.width, bitmap.height);
