@@ -16,6 +16,7 @@
 #include "base/error.h"
 #include "runtime/app/export.h"
 #include "runtime/app/session_pictures.h"
+#include "runtime/serving/http_guard.h"
 #include "runtime/viewer/page_archive.h"
 #include "runtime/web/page.h"
 #include "tests/support/viewer_decoder.h"
@@ -295,7 +296,9 @@ class Export : public Recorded {
     const std::string head = "<head>";
     std::string page(viewer_page());
     page.insert(page.find(head) + head.size(),
-                "\n<meta name=\"generator\" content=\"palpate-runtime " PALPATE_VERSION "\">");
+                "\n<meta name=\"generator\" content=\"palpate-runtime " PALPATE_VERSION
+                "\">\n<meta http-equiv=\"Content-Security-Policy\" content=\"" +
+                    page_policy() + "\">");
     return page;
   }
   static Exported exported(const ExportOptions& options) {
