@@ -20,6 +20,7 @@ set(palpate_dear
   programs_live_test.Live                        test_equal_runs_are_equal_and_replay_to_the_bit
   programs_hertz_test.Hertz                      test_a_shallow_press_is_not_held_out_by_edges
   programs_warp_test.Warp                        test_runs_are_equal_and_replay
+  programs_long_test.Outputs                     -
   programs_session_test.Session                  test_says_what_is_in_it
   programs_cube_test.CubeFigures                 test_m6
   programs_cube_test.Overlay                     test_figures
