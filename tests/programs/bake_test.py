@@ -155,7 +155,7 @@ class Dynamics(ProgramTest):
 
     def test_memory_for_modes_is_counted(self):
         model = self.write("model.toml", cube_toml(24) + "[dynamics]\nmodes = 3000\n")
-        limited = run(PRECOMPUTE, model, "--jobs", "1024", cwd=self.folder)
+        limited = run(PRECOMPUTE, model, "--jobs", "1024", cwd=self.folder, env=os.environ | {"SLURM_MEM_PER_NODE": "2000"})  # [MB]
         self.assert_refused(limited, "GB of memory are needed", "GB for dynamics", "fewer modes")
 
 

@@ -127,7 +127,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}" """
                 ("palpate-runtime play --device s", ["script:"]), ("palpate-runtime play --device script:t", ["touch.csv"]),
                 ("palpate-runtime play --device=script:t", ["touch.csv"]), ("palpate-runtime play --device replay:", ["deep", "touch.mcap"]),
                 ("palpate-runtime play --device script:deep/", ["deep/other.csv"]), ("palpate-runtime play --device script:a", ["a file.csv"]),
-                ("palpate-runtime play --rate ", []), ("palpate-runtime play cube.palpate.hdf --vi", ["--view", "--view-address", "--view-framed"]),
+                ("palpate-runtime play --rate ", []), ("palpate-runtime play cube.palpate.hdf --vi", ["--view", "--view-address", "--view-fd", "--view-framed"]),
                 ("palpate-runtime export t", ["touch.mcap"]), ("palpate-precompute m", ["model.toml"]), ("palpate-precompute o", ["organ.stl"]), ("palpate-runtime push ", ["cube.palpate.hdf", "deep", "model.toml", "organ.stl"]), ("palpate-precompute ver", ["verify"]),
                 ("palpate-precompute verify c", ["cube.palpate.hdf"]), ("palpate-precompute compare cube.palpate.hdf c", ["cube.palpate.hdf"]),
                 ("palpate-precompute model.toml -o n", ["notes.txt"])):

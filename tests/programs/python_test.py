@@ -12,7 +12,7 @@ import urllib.request
 import h5py
 import numpy
 
-from programs import BINARY, HAS_SANITIZERS, RUNTIME, SOURCE, ProgramTest, cube_toml, palpate, run
+from programs import BINARY, HAS_SANITIZERS, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, palpate, run
 
 from palpate import library  # by way of programs
 

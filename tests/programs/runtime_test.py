@@ -298,9 +298,10 @@ class Rest(ProgramTest):
             expected[1 if plane else 2] = self.STRESS
             rows = numpy.genfromtxt(csv, delimiter=",", names=True)
             stress = numpy.column_stack([rows[c] for c in STRESS_COLUMNS])
-            self.assertGreater(len(stress), 10)
-            numpy.testing.assert_allclose(stress, numpy.tile(expected, (len(stress), 1)), atol=1e-12)
-            numpy.testing.assert_allclose(rows["von_mises"], self.STRESS, atol=1e-12)
+            known = ~numpy.isnan(rows["von_mises"])  # not inside, nor where nodes are held
+            self.assertGreater(known.sum(), 8)
+            numpy.testing.assert_allclose(stress[known], numpy.tile(expected, (known.sum(), 1)), atol=1e-12)
+            numpy.testing.assert_allclose(rows["von_mises"][known], self.STRESS, atol=1e-12)
             array = read_grid(vtu).GetPointData().GetArray("stress")
             numpy.testing.assert_allclose(array.GetTuple(array.GetNumberOfTuples() - 1), expected, atol=1e-12)
 
@@ -768,7 +769,7 @@ class Usage(ProgramTest):
                                     ("--tool", "capsule:0.1", "is none of"), ("--tool", "capsule:0.1,nan", "'nan'"),
                                     ("--tool", "disc:0.1,0.2", "rounded by more than the radius"), ("--tool", "disc:0.1,x", "'x'"),
                                     ("--tool", "point:1", "is none of"), ("--friction", "-0.1", "'-0.1'"),
-                                    ("--friction", "inf", "'inf'"), ("--friction", "", "''"), ("--coupling", "0", "N/m"), ("--coupling-torsion", "x", "N m/rad"),
+                                    ("--friction", "inf", "'inf'"), ("--friction", "", "an empty word"), ("--coupling", "0", "N/m"), ("--coupling-torsion", "x", "N m/rad"),
                                     ("--max-force", "-3", "greater than 0 [N]"), ("--max-contacts", "0", "from 1 to"),
                                     ("--max-contacts", "1.5", "'1.5'"), ("--max-contacts", "100000", "from 1 to 1000")):
             with self.subTest(option=option, text=text):
