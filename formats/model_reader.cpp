@@ -18,6 +18,7 @@
 #include "formats/dynamics_fields.h"
 #include "formats/hdf5_contents.h"
 #include "formats/hierarchical_fields.h"
+#include "formats/mcap.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"
@@ -36,9 +37,6 @@ constexpr const char* give_a_model = "Give a NAME.palpate.hdf that palpate-preco
 std::vector<std::int64_t> read_version(const hdf5::Contents& file) {
   const std::string where = file.path().string();
   const auto format = file.text_attribute("/", "format");
-  if (format == "palpate-recording")
-    throw Error("is a recording, not a model", where,
-                "palpate-runtime view " + shell_word(where) + " shows it; a model is a NAME.palpate.hdf");
   if (format != "palpate") throw Error("is an HDF5 file, but not a Palpate file", where, give_a_model);
   const auto version = file.integer_attribute("/", "version", 2);
   if (!version) refuse(where, "the attribute version is missing");
@@ -325,6 +323,12 @@ namespace {
 
 hdf5::Contents contents_of(const std::filesystem::path& path) {
   FileDescriptor bytes = open_file(path, OpenMode::read);
+  std::string start(mcap::magic.size(), '\0');
+  start.resize(read_some(bytes, std::as_writable_bytes(std::span(start)), 0));
+  if (start == mcap::magic)
+    throw Error(
+        "is a recording, not a model", path.string(),
+        "palpate-runtime view " + shell_word(path.string()) + " shows it; a model is a NAME.palpate.hdf");
   check_superblock(bytes, {"a Palpate file", give_a_model, precompute_again});
   return hdf5::Contents::read(std::move(bytes));
 }
