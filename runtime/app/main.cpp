@@ -223,7 +223,8 @@ constexpr std::string_view commands = "push, play, view, probe, session, export 
 std::string meant_by(const CLI::App& app, const std::string& word) {
   if (word.empty() || word.starts_with('-') || find_command(app, word) != nullptr) return "";
   const std::string see = "See palpate-runtime --help";
-  if (word.ends_with(".mcap")) return "palpate-runtime view " + shell_word(word) + " shows a recording. " + see;
+  if (word.ends_with(".mcap"))
+    return "palpate-runtime view " + shell_word(word) + " shows a recording. " + see;
   if (word.ends_with(".hdf"))
     return "palpate-runtime play " + shell_word(word) + " --view shows it and lets you push it. " + see;
   if (word.ends_with(".toml"))

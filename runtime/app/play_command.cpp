@@ -156,9 +156,10 @@ DeviceChoice read_device(const std::string& text, const std::string& profile) {
       throw CLI::ValidationError("--profile", "profiles are for --device hid");
     return {.kind = kind, .target = target, .profile = profile, .text = text};
   }
-  throw CLI::ValidationError("--device", "'" + text +
-                                             "' is none of script:FILE.csv, replay:SESSION.mcap, hid[:WHICH], "
-                                             "bridge[:[ADDRESS:]PORT] and, with --view, mouse");
+  throw CLI::ValidationError("--device",
+                             "'" + text +
+                                 "' is none of script:FILE.csv, replay:SESSION.mcap, hid[:WHICH], "
+                                 "bridge[:[ADDRESS:]PORT] and, with --view, mouse");
 }
 
 /// What shows it, and what moves the tool then.

@@ -282,7 +282,8 @@ class WrongKind(ProgramTest):
         recording = self.folder / "touch.mcap"
         self.assertEqual(run(RUNTIME, "play", file, "--device", f"script:{touch}", "--fast", "--record", recording).returncode, 0)
         whole = recording.read_bytes()
-        for broken, reason in ((b"", "empty"), (b"hello", "not"), (whole[: len(whole) // 2], "truncated"), (whole[:20], "truncated")):
+        for broken, reason in ((b"", "not a recording"), (b"hello", "not a recording"), (whole[:20], "is damaged: the record at byte 8"),
+                               (whole[:40] + b"\xff" * 40 + whole[80:], "is damaged")):
             recording.write_bytes(broken)
             for command in ("session", "view"):
                 result = run(RUNTIME, command, recording)

@@ -563,8 +563,8 @@ TEST(CInterfaceRecording, ReplacesNothingButARecording) {
   ASSERT_NE(session, nullptr) << error;
   const palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
   for (const char* name :
-       {"mine.palpate.hdf", "soft.mcap", "twice.mcap", "hard.mcap", "folder.mcap/../mine.palpate.hdf", "notes.txt",
-        "dangling.mcap", "loop.mcap", "folder.mcap", "null.mcap", "pipe.mcap", ""}) {
+       {"mine.palpate.hdf", "soft.mcap", "twice.mcap", "hard.mcap", "folder.mcap/../mine.palpate.hdf",
+        "notes.txt", "dangling.mcap", "loop.mcap", "folder.mcap", "null.mcap", "pipe.mcap", ""}) {
     const std::string file = *name == '\0' ? "" : (folder.path() / name).string();
     EXPECT_EQ(palpate_record(session.get(), file.c_str(), &options, error, sizeof error), PALPATE_ERROR_FILE)
         << name;

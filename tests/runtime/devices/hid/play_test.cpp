@@ -201,7 +201,7 @@ class PlayedDevice : public ::testing::Test {
     const std::string program = palpate::test::built_file("runtime/palpate-runtime");
     std::vector<std::string> line = {program, "play",     "cube.palpate.hdf", "--device",
                                      "hid",   "--tool",   "sphere:0.01",      "--safety",
-                                     safety,  "--record", "session.mcap",       "--record-frames",
+                                     safety,  "--record", "session.mcap",     "--record-frames",
                                      "0",     "--report", "report.json"};
     if (std::ranges::find(arguments, "--origin") == arguments.end()) {
       arguments.emplace_back("--origin");
