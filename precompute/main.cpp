@@ -1,9 +1,12 @@
 // palpate-precompute: from model.toml to NAME.palpate.hdf, once a model.
 #include "base/program.h"
+#include "precompute/blas_room.h"
 #include "precompute/commands.h"
 
 int main(int argc, char** argv) {
   palpate::end_with_an_error_on_shrunk_files();
-  return palpate::run_program("palpate-precompute", "try --dry-run, and fewer --jobs or a coarser mesh",
-                              [&] { return palpate::run_commands(argc, argv); });
+  return palpate::run_program("palpate-precompute", "try --dry-run, and fewer --jobs or a coarser mesh", [&] {
+    palpate::prepare_threads(argv);
+    return palpate::run_commands(argc, argv);
+  });
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "precompute/allotment.h"
+#include "precompute/room/allotment.h"
 
 namespace palpate {
 namespace {

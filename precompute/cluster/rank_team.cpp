@@ -15,7 +15,7 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "precompute/allotment.h"
+#include "precompute/room/allotment.h"
 #include "precompute/cluster/mumps_numbers.h"
 #include "precompute/cluster/rank_messages.h"
 #include "precompute/cluster/rank_threads.h"

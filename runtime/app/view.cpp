@@ -6,6 +6,7 @@
 #include <deque>
 
 #include "base/error.h"
+#include "base/interrupt.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/app/session_view.h"
 #include "runtime/viewer/viewer_server.h"
@@ -13,14 +14,14 @@
 namespace palpate {
 
 int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptions& options) {
-  sigset_t ends;  // blocked before the server's thread begins, which inherits that
-  sigemptyset(&ends);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
-  pthread_sigmask(SIG_BLOCK, &ends, nullptr);
   std::deque<SessionView> sessions;  // first: a broken file is told even where the port is taken
   std::vector<RunToShow> runs;
   for (const std::filesystem::path& recording : recordings)
     runs.push_back({sessions.emplace_back(recording), true});
+  sigset_t ends;  // blocked before the server's thread begins, which inherits that
+  sigemptyset(&ends);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, signal);
+  pthread_sigmask(SIG_BLOCK, &ends, nullptr);
   ViewerServer server(ViewerPort(options), runs);
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     sessions[k].show(server, k);
@@ -31,6 +32,7 @@ int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptio
   fmt::print(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
   int signal = 0;
   sigwait(&ends, &signal);
+  end_soon(nullptr);
   return exit_ok;
 }
 

@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include "base/error.h"
+#include "base/interrupt.h"
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/gallery/gallery_server.h"
 
@@ -21,6 +22,7 @@ int show_gallery(const std::filesystem::path& folder, const ViewerOptions& optio
   fmt::print(stderr, "open {} in a browser; Ctrl-C ends\n", server.url());
   int signal = 0;
   sigwait(&ends, &signal);
+  end_soon(nullptr);
   return exit_ok;
 }
 

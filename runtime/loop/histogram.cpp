@@ -28,8 +28,8 @@ void TimeHistogram::add(std::int64_t nanoseconds) noexcept {
 }
 
 void TimeHistogram::clear() noexcept {
-  std::fill(fine_.begin(), fine_.end(), 0U);
-  std::fill(coarse_.begin(), coarse_.end(), 0U);
+  std::fill(fine_.begin(), fine_.end(), 0);
+  std::fill(coarse_.begin(), coarse_.end(), 0);
   longer_ = total_ = worst_ = 0;
 }
 

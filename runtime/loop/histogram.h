@@ -25,8 +25,8 @@ class TimeHistogram {
   [[nodiscard]] std::int64_t worst() const noexcept { return worst_; }  ///< [ns]
 
  private:
-  std::vector<std::uint32_t> fine_;    // of 1 ns
-  std::vector<std::uint32_t> coarse_;  // of 1 us, from 1 ms on
+  std::vector<std::int64_t> fine_;    // of 1 ns
+  std::vector<std::int64_t> coarse_;  // of 1 us, from 1 ms on
   std::int64_t longer_ = 0;
   std::int64_t total_ = 0;
   std::int64_t worst_ = 0;
