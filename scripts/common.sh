@@ -74,7 +74,7 @@ empty_debian() {
   command -v debootstrap >/dev/null || fail "debootstrap is missing" "apt-get install debootstrap"
   mirror=$(sed -n 's/^deb \(\[[^]]*\] \)\?\(http[^ ]*\) .*/\2/p;s/^URIs: //p' /etc/apt/sources.list /etc/apt/sources.list.d/* 2>/dev/null | grep -m 1 '/debian/*$' || true)
   say "an empty Debian ($suite)"
-  debootstrap --variant=minbase "$suite" "$system" "${mirror:-http://deb.debian.org/debian}" >/dev/null
+  debootstrap --variant=minbase "$suite" "$system" ${mirror:+"$mirror"} >/dev/null
   echo force-unsafe-io >"$system/etc/dpkg/dpkg.cfg.d/quick"  # it is thrown away
   # As this machine reaches its registries.
   for file in /etc/apt/apt.conf.d /etc/apt/trusted.gpg.d /etc/ssl/certs /usr/local/share/ca-certificates /etc/npmrc /etc/pip.conf; do
