@@ -10,9 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cinttypes>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -21,6 +19,8 @@
 
 #include "base/error.h"
 #include "base/file_io.h"
+#include "base/limits/address_space.h"
+#include "base/limits/child_seal.h"
 
 namespace palpate {
 namespace {
@@ -75,16 +75,6 @@ void append_text(Bytes& bytes, const std::string& text) {
   append_array(bytes, std::span<const char>(text));
 }
 
-/// [byte] of address space that this process has; 0 where the kernel does not say.
-std::int64_t address_space() {
-  std::int64_t pages = 0;
-  if (std::FILE* file = std::fopen("/proc/self/statm", "re")) {
-    if (std::fscanf(file, "%" SCNd64, &pages) != 1) pages = 0;
-    std::fclose(file);
-  }
-  return pages * ::sysconf(_SC_PAGESIZE);
-}
-
 void lower_limit(decltype(RLIMIT_AS) resource, std::int64_t to) {
   rlimit limit{};
   getrlimit(resource, &limit);
@@ -100,8 +90,9 @@ void set_limits(const ChildLimits& limits) {
   }
 }
 
-/// The child's life: signals as a fresh program has them, no output, limits, death with its parent.
-[[noreturn]] void be_child(int pipe, pid_t parent, const ChildLimits& limits,
+/// The child's life: signals as a fresh program has them, neither input nor output, limits, the seal, death
+/// with its parent.
+[[noreturn]] void be_child(int pipe, pid_t parent, const ChildTask& task,
                            const std::function<ChildResult()>& work) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGABRT, SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGPIPE,
                            SIGXCPU, SIGALRM, SIGCHLD}) {
@@ -114,13 +105,15 @@ void set_limits(const ChildLimits& limits) {
   if (getppid() != parent) {
     _exit(EXIT_FAILURE);  // it went before prctl
   }
-  const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-  dup2(nowhere, STDOUT_FILENO);
-  dup2(nowhere, STDERR_FILENO);
-  if (chdir("/proc/self") != 0) {
-    _exit(EXIT_FAILURE);
+  const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (nowhere < 0 || dup2(nowhere, stream) < 0) close(stream);
   }
-  set_limits(limits);
+  [[maybe_unused]] const int moved = chdir("/proc/self");  // where no file can be made, even without a seal
+  set_limits(task.limits);
+  std::vector<int> kept = task.files;
+  kept.push_back(pipe);
+  seal_process(kept);
   using Kind = AnswerHeader::Kind;
   Bytes bytes;
   try {
@@ -251,7 +244,7 @@ ChildResult run_in_child(const ChildTask& task, const std::function<ChildResult(
                 "close other programs and try again");
   }
   if (child == 0) {
-    be_child(pipe.ends[1], parent, task.limits, work);
+    be_child(pipe.ends[1], parent, task, work);
   }
   pipe.close_end(1);
 

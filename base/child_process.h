@@ -44,15 +44,17 @@ struct ChildTask {
   std::string where;  ///< of the Error: the file
   ChildLimits limits;
   std::string hint = "simplify, repair or remesh the input";  ///< when it crashes or reaches a limit
+  std::vector<int> files{};  ///< descriptors, open for reading, that the work needs
   /// A signal such as Ctrl-C ends the wait and the child. Without, signals of a host program are none of
   /// ours.
   bool stop_at_signals = true;
 };
 
-/// Runs `work` in a forked child and returns its result; the child's output to the screen is dropped, and
-/// files that it makes in its working directory cannot be made. An Error that the work throws is thrown here.
-/// Throws Error (task.where, task.hint) when the child crashes, exits by itself, throws something else, or
-/// reaches a limit. `work` must not rely on other threads.
+/// Runs `work` in a forked child and returns its result. The child is sealed (seal_process) where the kernel
+/// can: it reads task.files and answers, and reaches no other file, no network and no other process. Its
+/// output to the screen is dropped. An Error that the work throws is thrown here. Throws Error (task.where,
+/// task.hint) when the child crashes, exits by itself, throws something else, or reaches a limit. `work` must
+/// not rely on other threads.
 ChildResult run_in_child(const ChildTask& task, const std::function<ChildResult()>& work);
 
 /// Appends the bytes of `values`.

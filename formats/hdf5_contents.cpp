@@ -1,16 +1,23 @@
 #include "formats/hdf5_contents.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <chrono>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <string_view>
 #include <utility>
 
 #include "base/child_process.h"
 #include "base/error.h"
+
+#if __has_include(<H5FDdevelop.h>)
+#include <H5FDdevelop.h>  // from HDF5 1.14 on
+#endif
 
 namespace palpate::hdf5 {
 namespace {
@@ -26,16 +33,118 @@ constexpr int deepest = 8;
 constexpr std::chrono::seconds longest_look{5};  // of the processor: whole files take milliseconds
 constexpr std::int64_t most_memory = std::int64_t{512} << 20;
 
+// ---- a driver of the library for descriptors: the child may open nothing ----
+
+/// What the library knows of an open file: it hands out the address of the first member.
+struct Opened {
+  H5FD_t base{};
+  int fd = -1;
+  haddr_t end = 0;        // of what is used
+  haddr_t file_size = 0;  // [byte]
+};
+
+Opened& opened(H5FD_t* file) {
+  return *reinterpret_cast<Opened*>(file);
+}
+
+const Opened& opened(const H5FD_t* file) {
+  return *reinterpret_cast<const Opened*>(file);
+}
+
+/// `name` is the descriptor's number: the library hands on nothing else.
+H5FD_t* open_number(const char* name, unsigned /*flags*/, hid_t /*access*/, haddr_t /*most*/) {
+  auto file = std::make_unique<Opened>();
+  file->fd = std::stoi(name);
+  const off_t size = ::lseek(file->fd, 0, SEEK_END);
+  if (size < 0) return nullptr;
+  file->file_size = static_cast<haddr_t>(size);
+  return &file.release()->base;
+}
+
+herr_t close_opened(H5FD_t* file) {
+  delete &opened(file);
+  return 0;
+}
+
+herr_t say_abilities(const H5FD_t* /*file*/, unsigned long* flags) {
+  if (flags != nullptr) *flags = H5FD_FEAT_ACCUMULATE_METADATA_READ | H5FD_FEAT_DATA_SIEVE;
+  return 0;
+}
+
+haddr_t end_of_use(const H5FD_t* file, H5FD_mem_t /*type*/) {
+  return opened(file).end;
+}
+
+herr_t set_end_of_use(H5FD_t* file, H5FD_mem_t /*type*/, haddr_t end) {
+  opened(file).end = end;
+  return 0;
+}
+
+haddr_t end_of_file(const H5FD_t* file, H5FD_mem_t /*type*/) {
+  return opened(file).file_size;
+}
+
+/// What lies behind the end is read as zeros, as the library's own drivers do.
+herr_t read_bytes(H5FD_t* file, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t at, std::size_t size,
+                  void* into) {
+  auto* bytes = static_cast<char*>(into);
+  while (size > 0) {
+    const ssize_t done = ::pread(opened(file).fd, bytes, size, static_cast<off_t>(at));
+    if (done < 0) return -1;
+    if (done == 0) break;
+    bytes += done;
+    at += static_cast<haddr_t>(done);
+    size -= static_cast<std::size_t>(done);
+  }
+  std::memset(bytes, 0, size);
+  return 0;
+}
+
+/// The library wants one.
+herr_t write_nothing(H5FD_t* /*file*/, H5FD_mem_t /*type*/, hid_t /*transfer*/, haddr_t /*at*/,
+                     std::size_t /*size*/, const void* /*bytes*/) {
+  return -1;
+}
+
+hid_t driver() {
+  static const H5FD_class_t functions = [] {
+    H5FD_class_t f{};
+#ifdef H5FD_CLASS_VERSION
+    f.version = H5FD_CLASS_VERSION;
+    f.value = 512;  // the library's own are below
+#endif
+    f.name = "descriptor";
+    f.maxaddr = static_cast<haddr_t>(std::numeric_limits<off_t>::max());
+    f.fc_degree = H5F_CLOSE_STRONG;
+    f.open = open_number;
+    f.close = close_opened;
+    f.query = say_abilities;
+    f.get_eoa = end_of_use;
+    f.set_eoa = set_end_of_use;
+    f.get_eof = end_of_file;
+    f.read = read_bytes;
+    f.write = write_nothing;
+    for (H5FD_mem_t& kind : f.fl_map) kind = H5FD_MEM_SUPER;  // no kinds of memory apart
+    return f;
+  }();
+  return H5FDregister(&functions);
+}
+
+/// Opens a file for the library to read. Not valid where the library refuses it.
+Id open_descriptor(const FileDescriptor& file) {
+  const Id access = access_properties();
+  const Id registered(driver(), H5FDunregister);
+  H5Pset_driver(access.get(), registered.get(), nullptr);
+  return {H5Fopen(std::to_string(file.get()).c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose};
+}
+
 // ---- what the child finds ----
 
 /// What the library sees in a file.
 class Walk {
  public:
   explicit Walk(const FileDescriptor& bytes) : where_(bytes.path().string()) {
-    // The file that is open already, whatever has its name by now.
-    const std::string path = "/proc/self/fd/" + std::to_string(bytes.get());
-    const Id access = access_properties();
-    const Id file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
+    const Id file = open_descriptor(bytes);
     if (!file.valid()) refuse(reason());
     const Id root(H5Oopen(file.get(), "/", H5P_DEFAULT), H5Oclose);
     if (!root.valid()) refuse(reason());
@@ -272,6 +381,7 @@ Contents Contents::read(FileDescriptor file) {
                           .where = file.path().string(),
                           .limits = child_limits(longest_look, most_memory),
                           .hint = altered_hint,
+                          .files = {file.get()},
                           .stop_at_signals = false};
   const ChildResult result = run_in_child(task, [&] { return look_at(file); });
   Objects objects = Unpacker(result.bytes).objects();

@@ -27,9 +27,12 @@ std::vector<std::string_view> words(std::string_view line) {
   return result;
 }
 
+/// Bytes, columns and rows are fewer than this, so that no sum of a journal's numbers overflows.
+constexpr std::int64_t beyond_all = std::int64_t{1} << 48;
+
 bool to_number(std::string_view text, std::int64_t& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && value >= 0;
+  return error == std::errc() && end == text.data() + text.size() && value >= 0 && value < beyond_all;
 }
 
 /// Complete lines only: what follows the last line end was cut off.
@@ -63,7 +66,7 @@ std::optional<BakePart> read_part(std::string_view line) {
   BakePart part;
   const auto w = words(line);
   if (w.size() < 5 || w.size() % 2 == 0 || w[0] != "part" || !to_number(w[1], part.number) ||
-      !to_number(w[2], part.parts) || part.number < 1 || part.number > part.parts)
+      !to_number(w[2], part.parts) || part.number < 1 || part.number > part.parts || part.parts > most_parts)
     return {};
   for (std::size_t i = 3; i < w.size(); i += 2) {
     PieceRange& pieces = part.pieces.emplace_back();

@@ -19,6 +19,9 @@ struct PieceRange {
   friend bool operator==(const PieceRange&, const PieceRange&) = default;
 };
 
+/// Parts that a bake may have.
+constexpr std::int64_t most_parts = 100'000;
+
 /// A part of a bake, with a file of its own: number `number` of `parts`, from 1.
 struct BakePart {
   std::int64_t number = 1;

@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "base/interrupt.h"
+#include "base/limits/child_seal.h"
 #include "base/parallel.h"
 #include "formats/begun_model.h"
 #include "formats/model_file.h"
@@ -23,6 +24,7 @@
 #include "precompute/compressed_greens.h"
 #include "precompute/compression/out_of_reach.h"
 #include "precompute/machine/blas_kernels.h"
+#include "precompute/machine/blas_room.h"
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/factor.h"
 #include "precompute/numerics/greens_solver.h"
@@ -581,7 +583,8 @@ class Bake {
       progress_.line(fmt::format("factor over {} ranks: {}; {} % of work space beyond the estimate",
                                  team_.size(), text_of(*spread_, true), spread_->room));
     }
-    interrupt_.note_from_now_on();
+    // ranks end together
+    interrupt_.note_from_now_on(team_.size() > 1 ? "" : interruption_text(options_));
     if (has_fallen_back()) fall_back("as an earlier run has found, they cannot be compressed this exactly");
     try {
       return describe_and_solve();
@@ -636,6 +639,10 @@ class Bake {
 MeshedBody Bake::mesh() {
   MeshedBody body = mesh_body(description_, [&](const std::string& text) { progress_.begin(text); });
   for (const std::string& note : body.notes) progress_.line("note: " + note);
+  if (!can_seal() && !input_files(description_).empty())
+    progress_.line(
+        "note: this system cannot seal processes (seccomp): those that read the geometry's file may do what "
+        "this program may");
   warning_ = body.warning;
   return body;
 }
@@ -675,6 +682,7 @@ void Bake::assemble() {
   elastic_.emplace(elastic_body(model_));
   elastic_->prescribed = prescribed_;
   stiffness_ = assemble_stiffness(*elastic_);
+  take_blas_room(options_.jobs);
   openblas_set_num_threads(1);  // blocks of columns are the parallel work: the bytes depend on no `jobs`
   progress_.begin("ordering K");
   factor_ = std::make_unique<Factor>(stiffness_.K, stiffness_.node_start);

@@ -20,12 +20,11 @@
 #include "precompute/description/not_a_description.h"
 #include "precompute/draft_command.h"
 #include "precompute/inspect.h"
+#include "precompute/machine/blas_room.h"
 #include "precompute/verify.h"
 
 namespace palpate {
 namespace {
-
-constexpr std::int64_t most_parts = 100'000;
 
 /// "3/16"; nothing when it is no part.
 std::optional<PartNumber> read_part_number(const std::string& text) {
@@ -83,7 +82,7 @@ BakeSummary bake_model(const std::string& model, BakeOptions options, Team& team
   check_is_description(model);
   const Description description = read_description(model);
   if (options.output.empty()) options.output = description.name + ".palpate.hdf";
-  if (options.jobs == 0) options.jobs = team.default_jobs();
+  if (options.jobs == 0) options.jobs = threads_with_room(team.default_jobs());
   return bake(description, options, team);
 }
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "precompute/allotment.h"
+#include "precompute/machine/allotment.h"
 
 namespace palpate {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/allotment.h"
+#include "precompute/machine/allotment.h"
 
 namespace palpate {
 namespace {

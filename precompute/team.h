@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "formats/journal.h"
-#include "precompute/allotment.h"
+#include "precompute/machine/allotment.h"
 #include "precompute/numerics/factor.h"
 
 namespace palpate {

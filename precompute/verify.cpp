@@ -10,6 +10,7 @@
 
 #include "base/printable.h"
 #include "formats/model_file.h"
+#include "precompute/machine/blas_room.h"
 #include "precompute/numerics/assembly.h"
 #include "precompute/numerics/dynamics.h"
 #include "precompute/numerics/factor.h"
@@ -223,6 +224,7 @@ VerifyReport verify(const Model& model, const std::filesystem::path& file, int s
     report.stale = stale_sources(model, file);
     return report;
   }
+  take_blas_room(1);
   const Stiffness stiffness = assemble_stiffness(elastic_body(model));
   Factor factor(stiffness.K, stiffness.node_start);
   factor.factorize();

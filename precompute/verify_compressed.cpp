@@ -8,6 +8,8 @@
 #include "matrices/hierarchical_product.h"
 #include "precompute/compression/certificate.h"
 #include "precompute/compression/selected_solver.h"
+#include "precompute/machine/allotment.h"
+#include "precompute/machine/blas_room.h"
 #include "precompute/verify_matrix.h"
 
 namespace palpate {
@@ -77,7 +79,9 @@ std::vector<Check> check_columns(const Model& model, const Factor& factor,
 
 Check check_touches(const Model& model, const Factor& factor, std::span<const std::int64_t> stored_dofs) {
   const auto [points, touchable] = touchable_points(model, model.stored_nodes);
-  ThreadSharing threads(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  const int jobs = threads_with_room(allotted_processors());
+  take_blas_room(jobs);
+  ThreadSharing threads(jobs);
   Check check{"touches", 0.0, model.compressed->tolerance};
   for (const TouchErrors& errors : certify(*model.compressed, factor, stored_dofs, points, touchable,
                                            verified_touches, seed, threads, [](double) { return true; }))

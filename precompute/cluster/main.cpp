@@ -13,7 +13,7 @@
 #include "base/program.h"
 #include "precompute/cluster/rank_commands.h"
 #include "precompute/cluster/rank_team.h"
-#include "precompute/machine/blas_kernels.h"
+#include "precompute/machine/blas_start.h"
 
 namespace palpate {
 namespace {
@@ -57,7 +57,7 @@ bool asks_for_help(int argc, char** argv) {
 }  // namespace palpate
 
 int main(int argc, char** argv) {
-  palpate::use_fitting_kernels(argv);
+  palpate::start_blas(argv);
   palpate::end_with_an_error_on_shrunk_files();
   if (palpate::asks_for_help(argc, argv)) {
     return palpate::run_program(palpate::program, "", [&] {

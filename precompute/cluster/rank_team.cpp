@@ -15,10 +15,10 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "precompute/allotment.h"
 #include "precompute/cluster/mumps_numbers.h"
 #include "precompute/cluster/rank_messages.h"
 #include "precompute/cluster/rank_threads.h"
+#include "precompute/machine/allotment.h"
 
 namespace palpate {
 namespace {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
 
 #include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
@@ -46,8 +47,10 @@ PolygonGeometry read_polygon(const TomlTable& polygon) {
   return result;
 }
 
-int read_cells_across(const TomlTable& shape) {
+/// Cells over a diameter, of a body that is `cells_along` long; as many where that is not given.
+int read_cells_across(const TomlTable& shape, std::optional<int> cells_along = {}) {
   const int cells = shape.count("cells_across");
+  check_cells(shape, "cells_across", double{1} * cells * cells * cells_along.value_or(cells));
   if (cells % 2 != 0) {
     shape.fail("cells_across", shape.name_of("cells_across") + " must be even, not " + std::to_string(cells),
                "use " + std::to_string(cells + 1));
@@ -56,18 +59,13 @@ int read_cells_across(const TomlTable& shape) {
 }
 
 CylinderShape read_cylinder(const TomlTable& cylinder) {
-  const CylinderShape shape{cylinder.positive("radius"), cylinder.positive("height"),
-                            read_cells_across(cylinder), cylinder.count("cells_along")};
-  check_cells(cylinder, "cells_across",
-              double{1} * shape.cells_across * shape.cells_across * shape.cells_along);
-  return shape;
+  const int along = cylinder.count("cells_along");
+  return {cylinder.positive("radius"), cylinder.positive("height"), read_cells_across(cylinder, along),
+          along};
 }
 
 SphereShape read_sphere(const TomlTable& sphere) {
-  const SphereShape shape{sphere.positive("radius"), read_cells_across(sphere)};
-  check_cells(sphere, "cells_across",
-              double{1} * shape.cells_across * shape.cells_across * shape.cells_across);
-  return shape;
+  return {sphere.positive("radius"), read_cells_across(sphere)};
 }
 
 }  // namespace

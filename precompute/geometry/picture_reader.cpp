@@ -12,11 +12,13 @@
 #include "base/child_process.h"
 #include "base/error.h"
 #include "base/regular_file.h"
+#include "precompute/machine/check_room.h"
 
 namespace palpate {
 namespace {
 
 constexpr std::uint64_t max_pixels = 100'000'000;
+constexpr double bytes_per_pixel = 16.0;  // of memory, until the outlines are traced
 constexpr unsigned char first_white = 128;
 constexpr std::string_view png_signature = "\x89PNG\r\n\x1a\n";
 const char* const save_again = "save the picture again as PNG, or as PBM (P1, P4)";
@@ -31,6 +33,8 @@ PixelBody blank(std::uint64_t width, std::uint64_t height, const std::string& wh
                             max_pixels / 1'000'000),
                 where, "scale it down; the mesh does not follow single pixels anyway");
   }
+  check_room(bytes_per_pixel * static_cast<double>(width * height),
+             fmt::format("a picture of {} x {} pixels", width, height), where, "scale it down");
   PixelBody body{static_cast<Index>(width), static_cast<Index>(height), {}};
   body.inside.resize(width * height);
   return body;
@@ -46,8 +50,8 @@ struct PngImage {
   ~PngImage() { png_image_free(&image); }
 };
 
-/// What is not black is body. Transparent pixels lie over `ground`.
-PixelBody read_png(const std::string& bytes, const png_color& ground, const std::string& where) {
+/// Transparent pixels lie over what is no body.
+PixelBody read_png(const std::string& bytes, bool dark, const std::string& where) {
   PngImage png;
   const auto check = [&](int is_good) {
     if (is_good == 0) {
@@ -58,22 +62,22 @@ PixelBody read_png(const std::string& bytes, const png_color& ground, const std:
   check(png_image_begin_read_from_memory(&png.image, bytes.data(), bytes.size()));
   PixelBody body = blank(png.image.width, png.image.height, where);
   png.image.format = PNG_FORMAT_GRAY;
-  std::vector<unsigned char> grey(body.inside.size());
+  const png_color black{0, 0, 0}, white{255, 255, 255};
   const auto upwards = -static_cast<png_int_32>(body.width);  // the first row in memory is the lowest
-  check(png_image_finish_read(&png.image, &ground, grey.data(), upwards, nullptr));
-  std::transform(grey.begin(), grey.end(), body.inside.begin(),
-                 [](unsigned char value) { return static_cast<std::uint8_t>(value >= first_white); });
+  check(png_image_finish_read(&png.image, dark ? &white : &black, body.inside.data(), upwards, nullptr));
+  for (std::uint8_t& pixel : body.inside) pixel = (pixel >= first_white) != dark ? 1 : 0;
+  if (std::ranges::find(body.inside, 1) == body.inside.end()) fail_on_no_body(where);
   return body;
 }
 
 /// Reads a PNG in a child, as libpng is foreign code.
-PixelBody read_png_in_child(const std::string& bytes, const png_color& ground, const std::string& where) {
+PixelBody read_png_in_child(const std::string& bytes, bool dark, const std::string& where) {
   const ChildTask task = {.name = "libpng",
                           .where = where,
                           .limits = reading_limits(static_cast<std::int64_t>(bytes.size())),
                           .hint = save_again};
   const ChildResult result = run_in_child(task, [&] {
-    const PixelBody body = read_png(bytes, ground, where);
+    const PixelBody body = read_png(bytes, dark, where);
     ChildResult answer;
     append_array(answer.bytes, std::span<const Index>(std::array{body.width, body.height}));
     append_array(answer.bytes, std::span(body.inside));
@@ -177,30 +181,28 @@ class PbmReader {
   const std::string& where_;
 };
 
-/// What is not black is body.
-PixelBody read_light(const PictureGeometry& picture) {
-  const std::string where = picture.file.string();
-  const std::string bytes = read_all(picture.file, "Check the path, or picture = \"...\" in [geometry]");
-  if (bytes.starts_with(png_signature)) {
-    const png_color black{0, 0, 0}, white{255, 255, 255};
-    return read_png_in_child(bytes, picture.dark ? white : black, where);
-  }
-  if (bytes.starts_with("P1")) {
-    return PbmReader(bytes, where).plain();
-  }
-  if (bytes.starts_with("P4")) {
-    return PbmReader(bytes, where).raw();
-  }
-  throw Error("this is neither a PNG nor a PBM picture", where, save_again);
+/// The body of a PBM, which is the paper, or the ink where that is meant.
+PixelBody with_ground(PixelBody body, bool dark) {
+  if (dark)
+    for (std::uint8_t& pixel : body.inside) pixel = pixel == 0 ? 1 : 0;
+  return body;
 }
 
 }  // namespace
 
 PixelBody read_picture(const PictureGeometry& picture) {
-  PixelBody body = read_light(picture);
-  if (!picture.dark) return body;
-  for (std::uint8_t& pixel : body.inside) pixel = pixel == 0 ? 1 : 0;
-  return body;
+  const std::string where = picture.file.string();
+  const std::string bytes = read_all(picture.file, "Check the path, or picture = \"...\" in [geometry]");
+  if (bytes.starts_with(png_signature)) {
+    return read_png_in_child(bytes, picture.dark, where);
+  }
+  if (bytes.starts_with("P1")) {
+    return with_ground(PbmReader(bytes, where).plain(), picture.dark);
+  }
+  if (bytes.starts_with("P4")) {
+    return with_ground(PbmReader(bytes, where).raw(), picture.dark);
+  }
+  throw Error("this is neither a PNG nor a PBM picture", where, save_again);
 }
 
 }  // namespace palpate

@@ -123,11 +123,7 @@ void drop_small_parts(PixelBody& body, const std::string& where, std::vector<std
   for (const Part& part : parts) {
     largest = std::max(largest, part.is_body ? part.pixels : 0);
   }
-  if (largest == 0) {
-    throw Error("the picture has no body: all its pixels are black, or white where dark is true", where,
-                "paint the body white on black, or black on white; a pixel is black when its grey value is "
-                "below 128");
-  }
+  if (largest == 0) fail_on_no_body(where);
   std::vector<Part> bodies;
   std::vector<bool> is_small(parts.size());
   for (std::size_t p = 0; p < parts.size(); ++p) {
@@ -206,6 +202,12 @@ std::vector<std::uint8_t> steps_along_outlines(const PixelBody& body) {
 }
 
 }  // namespace
+
+void fail_on_no_body(const std::string& where) {
+  throw Error("the picture has no body: all its pixels are black, or white where dark is true", where,
+              "paint the body white on black, or black on white; a pixel is black when its grey value is "
+              "below 128");
+}
 
 void keep_one_body(PixelBody& body, const std::string& where, std::vector<std::string>& notes) {
   drop_small_parts(body, where, notes);

@@ -26,6 +26,9 @@ struct PixelBody {
   }
 };
 
+/// Throws Error: there is no body.
+[[noreturn]] void fail_on_no_body(const std::string& where);
+
 /// Leaves one body that touches itself nowhere at a corner only: removes parts (pixels connected through
 /// sides) smaller than 1 % of the largest, fills pixels at such corners, and fills holes of a few pixels,
 /// each told in `notes`. Throws Error (where = `where`) when there is no body, when several large ones are

@@ -23,6 +23,7 @@
 #include "base/child_process.h"
 #include "base/error.h"
 #include "precompute/geometry/mesh_bytes.h"
+#include "precompute/geometry/mesh_size.h"
 #include "precompute/geometry/polygon_check.h"
 
 namespace palpate {
@@ -59,17 +60,22 @@ using FaceHandle = Triangulation::Face_handle;
 using Line = std::vector<Point>;  // closed
 
 constexpr std::size_t max_nodes = 2'000'000;
-constexpr double time_per_node = 1e-3;    // [s] meant to be far too much, smoothing included
-constexpr double memory_per_node = 4e3;   // [byte]
-constexpr double wanted_angle = 20.0;     // [degree] refinement ends for bounds up to 20.7 (Shewchuk)
-constexpr double radius_per_edge = 0.73;  // measured: the mean edge is then the one asked for
-constexpr int lloyd_iterations = 20;      // with many more, graded meshes drift away from their sizes
+constexpr double elements_per_node = 2.0;
+constexpr double unsure_of_grading = 3.0;  // the estimate is that of a strip
+constexpr double time_per_node = 1e-3;     // [s] meant to be far too much, smoothing included
+constexpr double memory_per_node = 4e3;    // [byte]
+constexpr double wanted_angle = 20.0;      // [degree] refinement ends for bounds up to 20.7 (Shewchuk)
+constexpr double radius_per_edge = 0.73;   // measured: the mean edge is then the one asked for
+constexpr int lloyd_iterations = 20;       // with many more, graded meshes drift away from their sizes
 
 enum MeshStatus : int { meshed = 0, no_mesh = 1, too_many_nodes = 2 };
 
-[[noreturn]] void throw_too_many(const std::string& where) {
-  throw Error(fmt::format("the mesh would have more than {} million nodes", max_nodes / 1'000'000), where,
-              "use a larger edge_length in [mesh]");
+/// Throws Error; `nodes` is 0 where their number is not known.
+[[noreturn]] void throw_too_many(double nodes, const std::string& where) {
+  throw Error(
+      (nodes == 0.0 ? "the mesh would have" : "the mesh would have " + shown_count(nodes) + " nodes,") +
+          fmt::format(" more than {} million{}", max_nodes / 1'000'000, nodes == 0.0 ? " nodes" : ""),
+      where, "use a larger edge_length in [mesh], or check scale in [geometry]");
 }
 
 /// Edge length wanted at a place: that at the lines, growing with the distance from them.
@@ -217,7 +223,7 @@ std::vector<Line> divided(const std::vector<Line>& lines, double edge_length, co
       const double parts = parts_of(edge);
       total += parts;
       if (total > max_nodes) {
-        throw_too_many(where);
+        throw_too_many(0.0, where);
       }
       for (double part = 0.0; part < parts; part += 1.0) {
         result.back().push_back(line[i] + part / parts * edge);
@@ -318,15 +324,21 @@ ChildResult make_mesh(const std::vector<Line>& lines, const MeshOptions& options
 }
 
 /// Limits for as many nodes as the lines and the area inside them ask for; refinement stops at max_nodes.
-ChildLimits refinement_limits(const std::vector<Line>& lines, double edge_length) {
-  double area = 0.0, given = 0.0;
+/// Throws Error (where = `where`) where they ask for many more.
+ChildLimits refinement_limits(const std::vector<Line>& lines, const MeshOptions& options,
+                              const std::string& where) {
+  double area = 0.0, length = 0.0, given = 0.0;
   for (const Line& line : lines) {
     area += CGAL::polygon_area_2(line.begin(), line.end(), Kernel());
+    for (std::size_t i = 0; i < line.size(); ++i)
+      length += std::sqrt(CGAL::squared_distance(line[i], line[(i + 1) % line.size()]));
     given += static_cast<double>(line.size());
   }
-  const double per_area = 2.0 / std::sqrt(3.0);  // nodes of regular triangles of edge 1
-  const double nodes =
-      std::min(10.0 * given + per_area * area / (edge_length * edge_length), static_cast<double>(max_nodes));
+  const double wanted = expected_plane_nodes(area, length, *options.edge_length, options.grading);
+  const double most = static_cast<double>(max_nodes);
+  if (!(wanted <= (options.grading == 0.0 ? 1.0 : unsure_of_grading) * most)) throw_too_many(wanted, where);
+  check_mesh_room(elements_per_node * std::min(wanted, most), ElementType::tri3, where);
+  const double nodes = std::min(10.0 * given + wanted, most);
   return child_limits(std::chrono::seconds(5 + static_cast<int>(nodes * time_per_node)),
                       (512LL << 20) + static_cast<std::int64_t>(nodes * memory_per_node));
 }
@@ -345,11 +357,11 @@ Mesh mesh_polygon(const PolygonGeometry& polygon, const MeshOptions& options, co
   lines = divided(lines, *options.edge_length, where);
   const ChildTask task = {.name = "CGAL's mesher",
                           .where = where,
-                          .limits = refinement_limits(lines, *options.edge_length),
+                          .limits = refinement_limits(lines, options, where),
                           .hint = "use a larger edge_length in [mesh], or simplify the polygon"};
   const ChildResult result = run_in_child(task, [&] { return make_mesh(lines, options); });
   if (result.status == too_many_nodes) {
-    throw_too_many(where);
+    throw_too_many(0.0, where);
   }
   if (result.status != meshed) {
     throw Error("CGAL found no mesh of the polygon with this edge length", where,

@@ -1,7 +1,6 @@
 #include "precompute/images/labelled_image.h"
 
-#define CGAL_USE_ZLIB 1  // .inr.gz
-#include <CGAL/Image_3.h>
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,9 +15,10 @@
 #include "base/regular_file.h"
 #include "base/words.h"
 #include "precompute/images/image_labels.h"
-#include "precompute/images/inr_header.h"
+#include "precompute/images/inr_image.h"
 #include "precompute/images/nifti_image.h"
 #include "precompute/images/nrrd_image.h"
+#include "precompute/images/unpacked_file.h"
 
 namespace palpate {
 namespace {
@@ -31,38 +31,11 @@ const char* const complete_file =
     "and positive VX, VY, VZ, pixdim or space directions";
 constexpr std::size_t smallest_speck = 8;  // [voxels] less would be smoothed away
 
-/// Reads an INR image and sends its header and its voxels as labels.
-ChildResult read_inr_labels(const std::string& file) {
-  CGAL::Image_3 image;
-  if (!image.read(file) || image.size() == 0) {
-    return {not_an_image, {}};
-  }
-  if (image.image()->vdim != 1) {
-    return {not_scalar, {}};
-  }
-  ImageHeader header;
-  header.size = {static_cast<Index>(image.xdim()), static_cast<Index>(image.ydim()),
-                 static_cast<Index>(image.zdim())};
-  header.spacing = {image.vx(), image.vy(), image.vz()};
-  header.origin = {static_cast<double>(image.tx()), static_cast<double>(image.ty()),
-                   static_cast<double>(image.tz())};
-  std::vector<std::int32_t> labels;
-  labels.reserve(image.size());
-  for (std::size_t k = 0; k < image.zdim(); ++k) {
-    for (std::size_t j = 0; j < image.ydim(); ++j) {
-      for (std::size_t i = 0; i < image.xdim(); ++i) {
-        labels.push_back(static_cast<std::int32_t>(std::lround(image.value(i, j, k))));
-      }
-    }
-  }
-  return image_labels(header, labels);
-}
-
 /// Files of a kind: which they are, their header's check, and their reader.
 struct ImageKind {
   bool (*is)(const std::filesystem::path& file);
-  std::int64_t (*check)(const std::filesystem::path& file);
-  ChildResult (*read)(const std::string& file);
+  std::optional<std::int64_t> (*check)(const FileDescriptor& file);  ///< nothing: it is of no such kind
+  ChildResult (*read)(const FileDescriptor& file);
 };
 
 const ImageKind& kind_of(const std::filesystem::path& file) {
@@ -144,9 +117,7 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
                   "its labels are " + occurring);
     }
   }
-  if (wanted.empty() && selected.size() == 1 && selected.contains(0)) {
-    throw Error("the image is empty: all its voxels are 0", where, "give a segmented image");
-  }
+  if (wanted.empty() && selected.size() == 1 && selected.contains(0)) fail_on_blank(where);
   return body;
 }
 
@@ -155,20 +126,20 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
 VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                               std::vector<std::string>& notes) {
   const std::string where = image.file.string();
-  check_regular_file(image.file, "Check image = \"...\" in [geometry]");
+  constexpr const char* if_missing = "Check image = \"...\" in [geometry]";
+  const FileDescriptor file(open_regular_file(image.file, O_RDONLY, if_missing), image.file);
   const ImageKind& kind = kind_of(image.file);
-  // in a child: readers print on the screen, and CGAL's crashes on some damaged files
-  const std::string path = std::filesystem::absolute(image.file).string();
+  const auto not_readable = [&] { return Error("this is not a readable image", where, complete_file); };
+  const std::optional<std::int64_t> held = kind.check(file);
+  if (!held) throw not_readable();
   const ChildTask task = {.name = "the image reader",
                           .where = where,
-                          .limits = reading_limits(kind.check(image.file)),
-                          .hint = complete_file};
-  const ChildResult read = run_in_child(task, [&] { return kind.read(path); });
-  if (read.status != read_ok) {
-    throw Error(
-        read.status == not_scalar ? "the image has several values a voxel" : "this is not a readable image",
-        where, complete_file);
-  }
+                          .limits = reading_limits(*held),
+                          .hint = complete_file,
+                          .files = {file.get()}};
+  const ChildResult read = run_in_child(task, [&] { return kind.read(file); });
+  if (read.status == not_scalar) throw Error("the image has several values a voxel", where, complete_file);
+  if (read.status != read_ok) throw not_readable();
   VoxelBody body = crop(select(read.bytes, image, notes), 2);
   if (edge_length * voxels_per_edge < body.spacing.minCoeff()) {
     throw Error(

@@ -8,9 +8,10 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
-#include <optional>
+#include <new>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,8 @@ namespace palpate {
 namespace {
 
 using Image = std::unique_ptr<nifti_image, void (*)(nifti_image*)>;
+
+constexpr std::int32_t size_1 = 348, size_2 = 540;  // of headers [byte]
 
 /// A number at an offset of a header of either byte order.
 template <class T>
@@ -38,10 +41,10 @@ struct Dimensions {
   std::array<std::int64_t, 8> dim{};  // their number, then each
   std::int64_t bits = 0;              // of a voxel
   double offset = 0.0;                // of the first voxel in the file [byte]
+  double shift = 0.0;                 // of values, to labels
 };
 
 std::optional<Dimensions> read_dimensions(std::span<const char> header) {
-  constexpr std::int32_t size_1 = 348, size_2 = 540;
   if (header.size() < size_1) return {};
   for (const bool swapped : {false, true}) {
     const auto size = number_at<std::int32_t>(header, 0, swapped);
@@ -51,6 +54,7 @@ std::optional<Dimensions> read_dimensions(std::span<const char> header) {
         result.dim.at(i) = number_at<std::int16_t>(header, 40 + 2 * i, swapped);
       result.bits = number_at<std::int16_t>(header, 72, swapped);
       result.offset = static_cast<double>(number_at<float>(header, 108, swapped));
+      result.shift = static_cast<double>(number_at<float>(header, 116, swapped));
       return result;
     }
     if (size == size_2 && header.size() >= size_2 && std::string_view(header.data() + 4, 3) == "n+2") {
@@ -58,26 +62,50 @@ std::optional<Dimensions> read_dimensions(std::span<const char> header) {
         result.dim.at(i) = number_at<std::int64_t>(header, 16 + 8 * i, swapped);
       result.bits = number_at<std::int16_t>(header, 14, swapped);
       result.offset = static_cast<double>(number_at<std::int64_t>(header, 168, swapped));
+      result.shift = number_at<double>(header, 184, swapped);
       return result;
     }
   }
   return {};
 }
 
+/// The first bytes of a file, as many as the longer of both headers has.
+std::string header_of(gzFile_s* stream) {
+  std::string header(size_2, '\0');
+  header.resize(read_unpacked(stream, header));
+  return header;
+}
+
+/// libnifti's image of a header that read_dimensions knows, without voxels; null where it refuses.
+nifti_image* image_of(const std::string& header) {
+  if (header.substr(4, 3) == "n+2") {
+    nifti_2_header second{};
+    std::memcpy(&second, header.data(), sizeof second);
+    return nifti_convert_n2hdr2nim(second, nullptr);
+  }
+  nifti_1_header first{};
+  std::memcpy(&first, header.data(), sizeof first);
+  return nifti_convert_n1hdr2nim(first, nullptr);
+}
+
+/// The voxels, which the image frees, in this machine's byte order.
+bool read_voxels(gzFile_s* stream, nifti_image& image) {
+  const auto bytes = static_cast<std::size_t>(image.nvox) * static_cast<std::size_t>(image.nbyper);
+  image.data = std::calloc(std::max<std::size_t>(bytes, 1), 1);
+  if (image.data == nullptr) throw std::bad_alloc();
+  if (gzseek(stream, static_cast<z_off_t>(image.iname_offset), SEEK_SET) < 0) return false;
+  if (read_unpacked(stream, {static_cast<char*>(image.data), bytes}) != bytes) return false;
+  if (image.swapsize > 1 && image.byteorder != nifti_short_order())
+    nifti_swap_Nbytes(image.nvox * image.nbyper / image.swapsize, image.swapsize, image.data);
+  return true;
+}
+
 template <class T>
 std::vector<std::int32_t> rounded(const nifti_image& image, std::size_t voxels) {
   const bool scaled =
       image.scl_slope != 0.0 && std::isfinite(image.scl_slope) && std::isfinite(image.scl_inter);
-  const double slope = scaled ? image.scl_slope : 1.0, shift = scaled ? image.scl_inter : 0.0;
-  constexpr double most = 2147483647.0;
-  std::vector<std::int32_t> labels;
-  labels.reserve(voxels);
-  for (const T value : std::span(static_cast<const T*>(image.data), voxels)) {
-    const double label = slope * static_cast<double>(value) + shift;
-    labels.push_back(
-        static_cast<std::int32_t>(std::lround(std::isnan(label) ? 0.0 : std::clamp(label, -most, most))));
-  }
-  return labels;
+  return rounded_labels(std::span(static_cast<const T*>(image.data), voxels), scaled ? image.scl_slope : 1.0,
+                        scaled ? image.scl_inter : 0.0);
 }
 
 /// The voxels as labels; none for colours and complex numbers.
@@ -121,16 +149,13 @@ bool is_nifti(const std::filesystem::path& file) {
   return name.ends_with(".nii") || name.ends_with(".nii.gz");
 }
 
-std::int64_t check_nifti_header(const std::filesystem::path& file) {
-  const std::string where = file.string();
-  const auto file_bytes = static_cast<std::int64_t>(std::filesystem::file_size(file));
+std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file) {
+  const std::string where = file.path().string();
   const GzFile stream = open_unpacked(file);
-  std::vector<char> header(540);
-  header.resize(static_cast<std::size_t>(
-      std::max(0, gzread(stream.get(), header.data(), static_cast<unsigned>(header.size())))));
+  const std::string header = header_of(stream.get());
   const std::optional<Dimensions> said = read_dimensions(header);
-  if (!said) return file_bytes;
-  const auto& [dim, bits, offset] = *said;
+  if (!said) return {};
+  const auto& [dim, bits, offset, shift] = *said;
   double voxels = 1.0;
   std::string product;
   for (std::size_t i = 1; i <= static_cast<std::size_t>(std::clamp<std::int64_t>(dim[0], 0, 7)); ++i) {
@@ -140,14 +165,16 @@ std::int64_t check_nifti_header(const std::filesystem::path& file) {
     voxels *= static_cast<double>(dim.at(i));
     product += fmt::format("{}{}", product.empty() ? "" : " x ", dim.at(i));
   }
-  check_voxels(product, voxels, where);
-  const double needed = offset + voxels * static_cast<double>(bits) / 8.0;
   if (!(bits >= 0 && bits <= 256 && offset >= 0.0 && offset < 1e9))
     throw Error(fmt::format("bitpix and vox_offset of the image's header are {} and {}", bits, offset), where,
                 "correct the header");
-  const auto bytes = static_cast<std::int64_t>(std::ceil(needed));
-  const auto read = std::ssize(header);
-  const std::int64_t present = read + count_bytes(stream.get(), bytes - read);
+  check_voxels(product, voxels, static_cast<double>(bits) / 8.0, where);
+  const auto bytes = static_cast<std::int64_t>(std::ceil(offset + voxels * static_cast<double>(bits) / 8.0));
+  // voxels follow the header and what belongs to it
+  const auto first = static_cast<std::int64_t>(std::max(offset, static_cast<double>(header.size())));
+  gzseek(stream.get(), static_cast<z_off_t>(first), SEEK_SET);
+  const Counted behind = count_bytes(stream.get(), bytes - first);
+  const std::int64_t present = first + behind.bytes;
   if (present < bytes) {
     throw Error(
         fmt::format("the image's header asks for {} voxels of {} bits, {} bytes, but the file has only {} "
@@ -155,13 +182,16 @@ std::int64_t check_nifti_header(const std::filesystem::path& file) {
                     product, bits, bytes, present),
         where, "get the whole file, or correct the header");
   }
-  return std::max(file_bytes, bytes);
+  if (behind.blank && shift == 0.0) fail_on_blank(where);
+  return std::max(file_size(file), bytes);
 }
 
-ChildResult read_nifti_labels(const std::string& file) {
+ChildResult read_nifti_labels(const FileDescriptor& file) {
   nifti_set_debug_level(0);
-  const Image image(nifti_image_read(file.c_str(), 1), nifti_image_free);
-  if (!image || image->data == nullptr) return {not_an_image, {}};
+  const GzFile stream = open_unpacked(file);
+  const std::string header = header_of(stream.get());
+  const Image image(image_of(header), nifti_image_free);
+  if (!image || !read_voxels(stream.get(), *image)) return {not_an_image, {}};
   std::array<std::size_t, 3> size{};
   std::size_t voxels = 1;
   for (int i = 0; i < 3; ++i) {

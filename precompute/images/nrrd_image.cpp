@@ -1,23 +1,22 @@
 #include "precompute/images/nrrd_image.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <teem/nrrd.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <memory>
-#include <optional>
 #include <sstream>
 #include <string_view>
 #include <vector>
 
 #include "base/error.h"
-#include "base/regular_file.h"
 #include "base/words.h"
 #include "precompute/images/image_axes.h"
 #include "precompute/images/unpacked_file.h"
@@ -28,13 +27,13 @@ namespace {
 constexpr std::size_t largest_nrrd_header = 1 << 20;  // Slicer's segments are described there
 const char* const complete_nrrd = "use a complete NRRD file (.nrrd) with one label a voxel";
 
-/// What a header says, by field.
+/// What a header says, by teem's numbers of the fields (nrrdField), which has several names for some.
 struct Header {
-  std::map<std::string, std::string> fields;
+  std::map<int, std::string> fields;
   std::size_t bytes = 0;  // up to the first voxel, where those follow
 
-  [[nodiscard]] std::string field(const std::string& name) const {
-    const auto found = fields.find(name);
+  [[nodiscard]] std::string field(int number) const {
+    const auto found = fields.find(number);
     return found == fields.end() ? "" : found->second;
   }
 };
@@ -48,11 +47,18 @@ std::optional<Header> parse(std::string_view text) {
     if (end == std::string_view::npos) return {};
     std::string_view line = text.substr(header.bytes, end - header.bytes);
     header.bytes = end + 1;
-    if (line.ends_with('\r')) line.remove_suffix(1);
+    while (line.ends_with('\r')) line.remove_suffix(1);
     if (line.empty()) return header;
-    const std::size_t colon = line.find(": ");
-    if (!line.starts_with('#') && colon != std::string_view::npos)
-      header.fields.emplace(line.substr(0, colon), line.substr(colon + 2));
+    const std::size_t colon = line.find(':');
+    if (line.starts_with('#') || colon == std::string_view::npos || line.substr(colon).starts_with(":="))
+      continue;
+    std::string name(line.substr(0, colon));
+    line.remove_prefix(std::min(line.find_first_not_of(" \t", colon + 1), line.size()));
+    const int number = airEnumVal(nrrdField, name.c_str());
+    std::erase_if(name, [](unsigned char c) { return std::isalpha(c) == 0; });
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+    // not teem's spellings alone: who writes so means another file
+    header.fields.emplace(name == "datafile" ? nrrdField_data_file : number, line);
   }
   return {};
 }
@@ -62,15 +68,6 @@ std::int64_t bytes_of(const std::string& type) {
   const int known = airEnumVal(nrrdType, type.c_str());
   return known == nrrdTypeUnknown || known == nrrdTypeBlock ? 0
                                                             : static_cast<std::int64_t>(nrrdTypeSize[known]);
-}
-
-/// Bytes from the header's end on, unpacked where they are gzipped, or `enough` where there are more.
-std::int64_t count_voxels(const std::filesystem::path& file, const Header& header, std::int64_t enough) {
-  const int fd = open_regular_file(file, O_RDONLY);
-  ::lseek(fd, static_cast<off_t>(header.bytes), SEEK_SET);
-  const GzFile stream(gzdopen(fd, "rb"), gzclose);
-  if (!stream) throw Error("there is no memory to read the file", file.string(), "close other programs");
-  return count_bytes(stream.get(), enough);
 }
 
 /// As NIfTI has them: to the right, to the front, to the head.
@@ -119,15 +116,10 @@ ImagePlace place_of(const Nrrd& image, const std::vector<unsigned>& axes) {
 }
 
 std::vector<std::int32_t> labels_of(const Nrrd& image, std::size_t voxels) {
-  constexpr double most = 2147483647.0;
   std::vector<std::int32_t> labels;
   labels.reserve(voxels);
   const auto value_at = nrrdDLookup[image.type];
-  for (std::size_t v = 0; v < voxels; ++v) {
-    const double value = value_at(image.data, v);
-    labels.push_back(
-        static_cast<std::int32_t>(std::lround(std::isnan(value) ? 0.0 : std::clamp(value, -most, most))));
-  }
+  for (std::size_t v = 0; v < voxels; ++v) labels.push_back(rounded_label(value_at(image.data, v)));
   return labels;
 }
 
@@ -139,20 +131,18 @@ bool is_nrrd(const std::filesystem::path& file) {
   return name.ends_with(".nrrd");
 }
 
-std::int64_t check_nrrd_header(const std::filesystem::path& file) {
-  const std::string where = file.string();
-  const auto file_bytes = static_cast<std::int64_t>(std::filesystem::file_size(file));
+std::optional<std::int64_t> check_nrrd_header(const FileDescriptor& file) {
+  const std::string where = file.path().string();
   std::string text(largest_nrrd_header, '\0');
-  text.resize(static_cast<std::size_t>(
-      std::max(0, gzread(open_unpacked(file).get(), text.data(), static_cast<unsigned>(text.size())))));
+  text.resize(read_unpacked(open_unpacked(file).get(), text));
   const std::optional<Header> header = parse(text);
-  if (!header) return file_bytes;
-  if (!header->field("data file").empty() || !header->field("datafile").empty())
+  if (!header) return {};
+  if (header->fields.contains(nrrdField_data_file))
     throw Error("the image's voxels are in another file", where,
                 "save header and voxels as one file (.nrrd)");
   double voxels = 1.0;
   std::string product;
-  std::istringstream sizes(header->field("sizes"));
+  std::istringstream sizes(header->field(nrrdField_sizes));
   for (std::string word; sizes >> word;) {
     std::int64_t size = 0;
     const auto [end, status] = std::from_chars(word.data(), word.data() + word.size(), size);
@@ -164,23 +154,32 @@ std::int64_t check_nrrd_header(const std::filesystem::path& file) {
     voxels *= static_cast<double>(size);
     product += fmt::format("{}{}", product.empty() ? "" : " x ", size);
   }
-  check_voxels(product, voxels, where);
-  const auto needed = static_cast<std::int64_t>(voxels) * bytes_of(header->field("type"));
-  const std::string encoding = header->field("encoding");
-  if (encoding == "raw" || encoding == "gzip" || encoding == "gz") {
-    const std::int64_t present = count_voxels(file, *header, needed);
-    if (present < needed) {
-      throw Error(fmt::format("the image's header asks for {} voxels, {} bytes, but only {} bytes follow it",
-                              product, needed, present),
-                  where, "get the whole file, or correct the header");
-    }
+  const std::int64_t voxel_bytes = bytes_of(header->field(nrrdField_type));
+  check_voxels(product, voxels, static_cast<double>(voxel_bytes), where);
+  const auto count = static_cast<std::int64_t>(voxels), needed = count * voxel_bytes;
+  const int encoding = airEnumVal(nrrdEncodingType, header->field(nrrdField_encoding).c_str());
+  std::int64_t least = needed;  // bytes behind the header, unpacked
+  if (encoding == nrrdEncodingTypeHex) least = 2 * needed;
+  if (encoding == nrrdEncodingTypeAscii) least = 2 * count - 1;  // a digit each, and a blank between
+  if (encoding == nrrdEncodingTypeBzip2) least = 1;
+  const auto from = static_cast<std::int64_t>(header->bytes);
+  const Counted present = count_bytes(open_unpacked(file, from).get(), least);
+  if (present.bytes < least) {
+    throw Error(fmt::format("the image's header asks for {} voxels, {} bytes, but only {} bytes follow it",
+                            product, least, present.bytes),
+                where, "get the whole file, or correct the header");
   }
-  return std::max(file_bytes, needed);
+  if (present.blank) fail_on_blank(where);
+  return std::max(file_size(file), needed);
 }
 
-ChildResult read_nrrd_labels(const std::string& file) {
+ChildResult read_nrrd_labels(const FileDescriptor& file) {
   const std::unique_ptr<Nrrd, Nrrd* (*)(Nrrd*)> image(nrrdNew(), nrrdNuke);
-  if (nrrdLoad(image.get(), file.c_str(), nullptr) != 0 || image->data == nullptr) return {not_an_image, {}};
+  ::lseek(file.get(), 0, SEEK_SET);
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(::fdopen(::dup(file.get()), "rb"),
+                                                               std::fclose);
+  if (!stream || nrrdRead(image.get(), stream.get(), nullptr) != 0 || image->data == nullptr)
+    return {not_an_image, {}};
   if (image->type <= nrrdTypeUnknown || image->type >= nrrdTypeBlock) return {not_scalar, {}};
   std::vector<unsigned> axes;  // that lie in space
   for (unsigned k = 0; k < image->dim; ++k) {

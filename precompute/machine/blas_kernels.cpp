@@ -1,19 +1,13 @@
 #include "precompute/machine/blas_kernels.h"
 
 #include <cblas.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
-#include <filesystem>
-#include <system_error>
 
 namespace palpate {
 namespace {
-
-constexpr const char* asked_kernels = "OPENBLAS_CORETYPE";
-constexpr const char* kernels_before = "PALPATE_KERNELS_BEFORE";  // a program that was started anew
 
 // Without AVX2 and FMA, as openblas_get_corename has them.
 constexpr std::array<std::string_view, 18> old_cores = {
@@ -46,18 +40,9 @@ std::string faster_kernels(std::string_view core, const Instructions& instructio
   return instructions.avx512 ? "SkylakeX" : "Haswell";
 }
 
-void use_fitting_kernels(char** argv) {
-  const std::string core = openblas_get_corename();
-  const std::string better = faster_kernels(core, instructions_here());
-  if (better.empty() || !value_of(asked_kernels).empty() || !value_of(kernels_before).empty()) return;
-  std::error_code unknown;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", unknown);
-  if (unknown || ::setenv(asked_kernels, better.c_str(), 1) != 0 ||
-      ::setenv(kernels_before, core.c_str(), 1) != 0)
-    return;
-  ::execv(program.c_str(), argv);
-  ::unsetenv(asked_kernels);  // goes on, if slowly
-  ::unsetenv(kernels_before);
+std::string kernels_to_ask_for() {
+  const bool decided = !value_of(asked_kernels).empty() || !value_of(kernels_before).empty();
+  return decided ? "" : faster_kernels(openblas_get_corename(), instructions_here());
 }
 
 KernelsInUse kernels_in_use() {

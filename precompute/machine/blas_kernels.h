@@ -20,10 +20,12 @@ Instructions instructions_here();
 /// after it for very old ones (its issue 4267).
 std::string faster_kernels(std::string_view core, const Instructions& instructions);
 
-/// Starts the program anew by `argv`, with OPENBLAS_CORETYPE set, where OpenBLAS has chosen kernels of
-/// another age. Not where that is set already, and not twice. For the first line of `main`: before MPI and
-/// threads.
-void use_fitting_kernels(char** argv);
+constexpr const char* asked_kernels = "OPENBLAS_CORETYPE";
+constexpr const char* kernels_before = "PALPATE_KERNELS_BEFORE";  ///< of a program that was started anew
+
+/// Kernels to ask for where OpenBLAS has chosen those of another age. Empty: its choice fits, or somebody has
+/// chosen, or the program was started anew for them already.
+std::string kernels_to_ask_for();
 
 /// The kernels in use, and what a person is to know of them: that the program was started anew for them, or
 /// that OPENBLAS_CORETYPE asks for slow ones. Empty: nothing.

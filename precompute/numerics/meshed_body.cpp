@@ -11,6 +11,7 @@
 #include "precompute/geometry/cgal_surface_mesh.h"
 #include "precompute/geometry/image_mesh.h"
 #include "precompute/geometry/material_parts.h"
+#include "precompute/geometry/mesh_size.h"
 #include "precompute/geometry/picture.h"
 #include "precompute/geometry/plane_mesh.h"
 #include "precompute/geometry/tetgen_mesh.h"
@@ -107,20 +108,33 @@ struct MeshGeometry {
     return mesh_picture(picture, options, notes);
   }
 
-  Mesh operator()(const RectangleShape& rectangle) const {
+  /// Says so, and throws Error where there is no memory for so many cells.
+  void begin_generating(ElementType usual, double cells) const {
     progress("generating the mesh");
+    const ElementType element = options.element.value_or(usual);
+    const bool is_cut = element == ElementType::tet4 || element == ElementType::tet10;
+    check_mesh_room(cells * (is_cut ? 6.0 : element == ElementType::tri3 ? 2.0 : 1.0), element, where);
+  }
+
+  Mesh operator()(const RectangleShape& rectangle) const {
+    begin_generating(ElementType::quad4, 1.0 * rectangle.cells[0] * rectangle.cells[1]);
     return generate(rectangle, options.element.value_or(ElementType::quad4));
   }
 
   Mesh operator()(const BoxShape& box) const {
-    progress("generating the mesh");
+    begin_generating(ElementType::tet4, 1.0 * box.cells[0] * box.cells[1] * box.cells[2]);
     return generate(box, options.element == ElementType::hex8 ? ElementType::hex8 : ElementType::tet4);
   }
 
-  template <typename Shape>
-  Mesh operator()(const Shape& shape) const {
-    progress("generating the mesh");
-    return generate(shape);
+  Mesh operator()(const CylinderShape& cylinder) const {
+    begin_generating(ElementType::tet4,
+                     1.0 * cylinder.cells_across * cylinder.cells_across * cylinder.cells_along);
+    return generate(cylinder);
+  }
+
+  Mesh operator()(const SphereShape& sphere) const {
+    begin_generating(ElementType::tet4, std::pow(sphere.cells_across, 3));
+    return generate(sphere);
   }
 };
 

@@ -23,10 +23,10 @@ struct PolygonSoup {
 /// "(1, 2, 3)"
 std::string shown(const PolygonSoup::Point& p);
 
-/// Reads OFF, OBJ, STL or PLY by the file's extension. Throws Error (where = `where`) when it cannot, when a
-/// coordinate is no finite number, and when a corner is none of the points. Foreign code: for child
-/// processes.
-PolygonSoup read_polygon_soup(const std::filesystem::path& file, const std::string& where);
+/// Reads the bytes of an OFF, OBJ, STL or PLY file, by its extension. Throws Error (where = `file`) when it
+/// cannot, when a coordinate is no finite number, and when a corner is none of the points. Foreign code: for
+/// child processes.
+PolygonSoup read_polygon_soup(const std::string& bytes, const std::filesystem::path& file);
 
 /// Merges points at the same place, drops what collapses to less than a triangle and points that no polygon
 /// has. Returns how many polygons were dropped.

@@ -284,9 +284,10 @@ Answer unpack(std::span<const std::byte> bytes) {
 }
 
 /// The surface of a file, whole and turned outwards; it may still intersect itself.
-SurfaceMesh read_mesh(const std::filesystem::path& file, const std::string& where,
+SurfaceMesh read_mesh(const std::string& bytes, const std::filesystem::path& file,
                       std::vector<std::string>& notes) {
-  PolygonSoup soup = read_polygon_soup(file, where);
+  const std::string where = file.string();
+  PolygonSoup soup = read_polygon_soup(bytes, file);
   weld(soup);
   check_edges(soup, where);
   SurfaceMesh mesh = connect(soup, where, notes);
@@ -296,15 +297,14 @@ SurfaceMesh read_mesh(const std::filesystem::path& file, const std::string& wher
   return mesh;
 }
 
-Answer read_in_child(const std::filesystem::path& file, const ChildLimits& limits, const char* hint,
-                     const std::function<void(SurfaceMesh&, Answer&)>& finish) {
+Answer read_in_child(const std::string& bytes, const std::filesystem::path& file, const ChildLimits& limits,
+                     const char* hint, const std::function<void(SurfaceMesh&, Answer&)>& finish) {
   const std::string where = file.string();
-  const std::filesystem::path path = std::filesystem::absolute(file);  // the child is elsewhere
   const ChildResult result =
       run_in_child({.name = "CGAL", .where = where, .limits = limits, .hint = hint}, [&] {
         Answer answer;
         try {
-          SurfaceMesh mesh = read_mesh(path, where, answer.notes);
+          SurfaceMesh mesh = read_mesh(bytes, file, answer.notes);
           finish(mesh, answer);
         } catch (const CGAL::Failure_exception&) {
           throw Error("CGAL cannot make a surface of what is in the file", where, hint);
@@ -314,15 +314,15 @@ Answer read_in_child(const std::filesystem::path& file, const ChildLimits& limit
   return unpack(result.bytes);
 }
 
-std::int64_t size_of(const std::filesystem::path& file) {
-  check_regular_file(file, "Check surface = \"...\" in [geometry]");
-  return static_cast<std::int64_t>(std::filesystem::file_size(file));
+std::string bytes_of(const std::filesystem::path& file) {
+  return read_all(file, "Check surface = \"...\" in [geometry]");
 }
 
 }  // namespace
 
 TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes) {
-  Answer answer = read_in_child(file, reading_limits(size_of(file)),
+  const std::string bytes = bytes_of(file);
+  Answer answer = read_in_child(bytes, file, reading_limits(std::ssize(bytes)),
                                 "repair the surface in a mesh editor, or export it again",
                                 [](SurfaceMesh& mesh, Answer& into) {
                                   into.crossings = find_self_intersections(mesh);
@@ -343,25 +343,28 @@ Remeshing remesh_surface(const std::filesystem::path& file, const TriangleSurfac
                          double edge_length) {
   const double triangles = area(surface) / (std::sqrt(0.1875) * edge_length * edge_length);
   if (!(triangles <= most_triangles)) {
-    throw Error(fmt::format("remeshed to this edge_length the surface has some {:.2g} triangles", triangles),
+    throw Error("remeshed to this edge_length the surface has " +
+                    (std::isfinite(triangles) ? fmt::format("some {:.2g}", triangles) : "countless") +
+                    " triangles",
                 file.string(), "use a larger edge_length in [mesh], or check scale in [geometry]");
   }
-  ChildLimits limits = reading_limits(size_of(file));
+  const std::string bytes = bytes_of(file);
+  ChildLimits limits = reading_limits(std::ssize(bytes));
   limits = child_limits(limits.processor + std::chrono::seconds(static_cast<int>(triangles * remesh_time)),
                         limits.memory + static_cast<std::int64_t>(triangles * remesh_memory));
-  Answer answer =
-      read_in_child(file, limits, R"(use another edge_length, or mesher = "cgal" without remesh in [mesh])",
-                    [&](SurfaceMesh& mesh, Answer& into) {
-                      remesh(mesh, edge_length);
-                      try {
-                        check_triangles(mesh, file.string());
-                      } catch (const Error& error) {
-                        into.crossings.problem = std::string("is degenerate: ") + error.what();
-                        return;
-                      }
-                      into.crossings = find_self_intersections(mesh);
-                      into.surface = surface_of(mesh);
-                    });
+  Answer answer = read_in_child(bytes, file, limits,
+                                R"(use another edge_length, or mesher = "cgal" without remesh in [mesh])",
+                                [&](SurfaceMesh& mesh, Answer& into) {
+                                  remesh(mesh, edge_length);
+                                  try {
+                                    check_triangles(mesh, file.string());
+                                  } catch (const Error& error) {
+                                    into.crossings.problem = std::string("is degenerate: ") + error.what();
+                                    return;
+                                  }
+                                  into.crossings = find_self_intersections(mesh);
+                                  into.surface = surface_of(mesh);
+                                });
   return {std::move(answer.surface), std::move(answer.crossings.problem)};
 }
 

@@ -169,9 +169,9 @@ Mended received(const ChildResult& result) {
 }
 
 /// Everything but self-intersections.
-Mended mend(const std::filesystem::path& file, const std::string& where, SurfaceParts parts) {
+Mended mend(const std::string& bytes, const std::filesystem::path& file, SurfaceParts parts) {
   Mended answer;
-  PolygonSoup soup = read_polygon_soup(file, where);
+  PolygonSoup soup = read_polygon_soup(bytes, file);
   SurfaceMesh mesh = clean(soup, answer.repairs);
   if (parts == SurfaceParts::largest) keep_largest(mesh, answer.repairs);
   fill_holes(mesh, answer.repairs);
@@ -218,16 +218,14 @@ ChildLimits repair_limits(std::int64_t bytes) {
 
 RepairedSurface repair_surface(const std::filesystem::path& file, SurfaceParts parts, int wrap_nodes) {
   const std::string where = file.string();
-  check_regular_file(file, "Check the name of the surface");
-  const std::filesystem::path path = std::filesystem::absolute(file);
-  const ChildTask task = {
-      .name = "CGAL",
-      .where = where,
-      .limits = repair_limits(static_cast<std::int64_t>(std::filesystem::file_size(file))),
-      .hint = "repair the surface in a mesh editor, or export it again"};
+  const std::string bytes = read_all(file, "Check the name of the surface");
+  const ChildTask task = {.name = "CGAL",
+                          .where = where,
+                          .limits = repair_limits(std::ssize(bytes)),
+                          .hint = "repair the surface in a mesh editor, or export it again"};
   Mended answer = received(run_in_child(task, [&] {
     try {
-      return sent(mend(path, where, parts));
+      return sent(mend(bytes, file, parts));
     } catch (const CGAL::Failure_exception&) {
       throw Error("CGAL cannot make a surface of what is in the file", where, task.hint);
     }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/interrupt.h"
 #include "base/program.h"
 #include "formats/outputs/output_paths.h"
 #include "runtime/app/fitting_tool.h"
@@ -30,7 +31,10 @@ static_assert(std::atomic<bool>::is_always_lock_free, "it is set by a signal han
 
 void stop_on_signals() {
   struct sigaction action {};
-  action.sa_handler = [](int) { stop_asked = true; };
+  action.sa_handler = [](int signal) {
+    stop_asked = true;
+    if (signal == SIGTERM) end_soon(nullptr);
+  };
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/interrupt.h"
 #include "base/program.h"
 #include "runtime/app/session_pictures.h"
 #include "runtime/app/session_view.h"
@@ -35,6 +36,7 @@ int view(const std::vector<std::filesystem::path>& recordings, const ViewerOptio
   tell_address(served, server.url(), "; Ctrl-C ends");
   int signal = 0;
   sigwait(&ends, &signal);
+  end_soon(nullptr);
   return exit_ok;
 }
 

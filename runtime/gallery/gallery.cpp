@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include "base/error.h"
+#include "base/interrupt.h"
 #include "base/program.h"
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/gallery/gallery_server.h"
@@ -22,6 +23,7 @@ int show_gallery(const std::filesystem::path& folder, const ViewerOptions& optio
   tell_address(server.served(), server.url(), "; Ctrl-C ends");
   int signal = 0;
   sigwait(&ends, &signal);
+  end_soon(nullptr);
   return exit_ok;
 }
 

@@ -1,16 +1,23 @@
 // Work in a child process: its answer, its end, its limits.
 #include "base/child_process.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <fstream>
 #include <stdexcept>
+#include <thread>
 
 #include "base/error.h"
+#include "base/limits/child_seal.h"
+#include "tests/support/forbidden_calls.h"
 
 namespace palpate::child_process_test {
 namespace {
@@ -132,21 +139,70 @@ TEST(ChildProcess, AHostThatReapsAllItsChildrenIsNoFault) {
   expect_mentions(text, {"TetGen crashed", "use less"});
 }
 
+/// Two descriptors of a pipe: [0] reads.
+struct Pipe {
+  std::array<int, 2> ends{};
+  Pipe() { EXPECT_EQ(pipe(ends.data()), 0); }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+  ~Pipe() {
+    for (const int end : ends) close(end);
+  }
+};
+
+/// A handler of SIGUSR1, as a program has that notes a signal and goes on, and a thread that sends it to the
+/// thread which made this, again and again from when `start` can be read on, so that one arrives in the wait.
+/// Each is told in `sent`.
+class Signals {
+ public:
+  Signals(int start, int sent) {
+    struct sigaction handler {};
+    handler.sa_handler = [](int) {};
+    handler.sa_flags = SA_RESTART;
+    sigaction(SIGUSR1, &handler, &before_);
+    sender_ = std::thread([this, start, sent, to = pthread_self()] {
+      char byte = 0;
+      EXPECT_EQ(read(start, &byte, 1), 1);
+      while (!done_) {
+        pthread_kill(to, SIGUSR1);
+        if (told_ < 100) told_ += static_cast<int>(write(sent, "s", 1));
+        std::this_thread::yield();
+      }
+    });
+  }
+  Signals(const Signals&) = delete;
+  Signals& operator=(const Signals&) = delete;
+  ~Signals() {
+    done_ = true;
+    sender_.join();
+    sigaction(SIGUSR1, &before_, nullptr);
+  }
+
+ private:
+  struct sigaction before_ {};
+  std::atomic<bool> done_ = false;
+  int told_ = 0;
+  std::thread sender_;
+};
+
+/// Says that the work has begun, and waits until so many signals were sent.
+void wait_for_signals(const Pipe& begun, const Pipe& sent, int count) {
+  char byte = 0;
+  if (write(begun.ends[1], "b", 1) != 1) _exit(1);
+  for (int k = 0; k < count; ++k)
+    if (read(sent.ends[0], &byte, 1) != 1) _exit(1);
+}
+
 TEST(ChildProcess, SignalsOfAHostProgramDoNotEndTheWait) {
-  const pid_t parent = getpid();
-  struct sigaction handler {
-  }, before{};
-  handler.sa_handler = [](int) {};
-  sigaction(SIGUSR1, &handler, &before);
+  const Pipe begun, sent;
+  const Signals signals(begun.ends[0], sent.ends[1]);
   ChildTask calm = task();
   calm.stop_at_signals = false;
-  const ChildResult result = run_in_child(calm, [parent] {
-    usleep(100'000);
-    kill(parent, SIGUSR1);
-    usleep(100'000);
+  calm.files = {begun.ends[1], sent.ends[0]};
+  const ChildResult result = run_in_child(calm, [&] {
+    wait_for_signals(begun, sent, 100);
     return ChildResult{5, {}};
   });
-  sigaction(SIGUSR1, &before, nullptr);
   EXPECT_EQ(result.status, 5);
 }
 
@@ -159,21 +215,55 @@ TEST(ChildProcess, TerminatedChildIsAnInterruption) {
 }
 
 TEST(ChildProcess, ASignalToTheParentKillsTheChild) {
+  const Pipe begun, sent;
+  const Signals signals(begun.ends[0], sent.ends[1]);
+  ChildTask stoppable = task();
+  stoppable.files = {begun.ends[1], sent.ends[0]};
+  expect_mentions(child_error(
+                      [&]() -> ChildResult {
+                        wait_for_signals(begun, sent, 1);
+                        for (;;) pause();
+                      },
+                      stoppable),
+                  {"interrupted"});
+}
+
+TEST(ChildProcess, ReachesNoFileNoNetworkAndNoProcess) {
+  if (!can_seal()) GTEST_SKIP() << "this kernel has no seccomp filters";
   const pid_t parent = getpid();
-  struct sigaction handler {
-  }, before{};
-  handler.sa_handler = [](int) {};  // as a program that notes Ctrl-C and goes on
-  handler.sa_flags = SA_RESTART;
-  sigaction(SIGUSR1, &handler, &before);
-  const std::string text = child_error([parent]() -> ChildResult {
-    usleep(100'000);
-    kill(parent, SIGUSR1);
-    for (;;) {
-      pause();
-    }
+  const ChildResult result = run_in_child(task(), [parent]() -> ChildResult {
+    const std::string calls = test::calls_that_are_not_refused(parent);
+    if (!calls.empty()) throw Error(calls, "", "");
+    return {4, {}};
   });
-  sigaction(SIGUSR1, &before, nullptr);
-  expect_mentions(text, {"interrupted"});
+  EXPECT_EQ(result.status, 4);
+  const pid_t unsealed = fork();
+  if (unsealed == 0) {
+    (void)test::calls_that_are_not_refused(parent);
+    _exit(1);
+  }
+  int status = 0;
+  waitpid(unsealed, &status, 0);
+  EXPECT_EQ(status, 0) << "the calls fail without a seal, too, and prove nothing";
+}
+
+TEST(ChildProcess, HasTheDescriptorsThatItWasGivenAndNoOthers) {
+  std::array<int, 7> open_ones{};
+  for (int& fd : open_ones) fd = open("/dev/zero", O_RDONLY);
+  ChildTask given = task();
+  given.files = {open_ones[4], open_ones[1]};  // in no order
+  const ChildResult result = run_in_child(given, [&] {
+    char byte = 1;
+    ChildResult read_ones;
+    for (const int fd : open_ones) read_ones.bytes.push_back(std::byte(read(fd, &byte, 1) == 1));
+    read_ones.bytes.push_back(std::byte(read(STDIN_FILENO, &byte, 1) == 1));
+    return read_ones;
+  });
+  for (const int fd : open_ones) close(fd);
+  const std::array expected = {0, 1, 0, 0, 1, 0, 0, 0};
+  ASSERT_EQ(result.bytes.size(), expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    EXPECT_EQ(static_cast<int>(result.bytes[k]), expected[k]) << k;
 }
 
 TEST(ChildProcess, CannotLeaveFiles) {

@@ -381,6 +381,22 @@ TEST(ModelFile, AnyCutOrFlippedJournalIsHarmless) {
   }
 }
 
+/// Their sums must not overflow, and nobody counts to them.
+TEST(ModelFile, AJournalWithNumbersBeyondAllIsNone) {
+  const std::string frame = "palpate-progress 2\nmodel key 4096 checksum 4096\n";
+  const auto parts_of = [&](const std::string& line) {
+    const auto journal = read_journal(frame + "part " + line + "\n");
+    return journal && journal->frame.part ? journal->frame.part->parts : 0;
+  };
+  EXPECT_EQ(parts_of("1 2 0 576"), 2);
+  EXPECT_EQ(parts_of("1 2 0 9223372036854775807"), 0);
+  EXPECT_EQ(parts_of("1 9223372036854775807 0 576"), 0);
+  EXPECT_EQ(parts_of("99999 100000 0 576"), 100'000);
+  EXPECT_EQ(parts_of("1 100001 0 576"), 0);
+  EXPECT_FALSE(read_range("columns 0 0 9223372036854775807 checksum"));
+  EXPECT_FALSE(read_journal("palpate-progress 2\nmodel key 9223372036854775807 checksum 4096\n"));
+}
+
 TEST(ModelFile, AJournalThatIsNoneIsAnothersFile) {
   for (std::size_t at = 0; at < first_word.size(); ++at) {
     const Folder folder;

@@ -7,7 +7,9 @@
 #include "precompute/geometry/mesh_bytes.h"
 #include "precompute/geometry/mesh_size.h"
 #include "precompute/geometry/picture_reader.h"
-#include "precompute/images/inr_header.h"
+#include "precompute/images/inr_image.h"
+#include "precompute/machine/allotment.h"
+#include "precompute/surfaces/surface_repair.h"
 #include "tests/support/geometry_shapes.h"
 
 namespace palpate::hostile_test {
@@ -184,8 +186,11 @@ TEST_F(HostileInput, GzippedImageIsMeasuredUnpacked) {
     gzclose(file);
     return path;
   };
-  EXPECT_EQ(check_inr_header(write("a.inr.gz", inr())), 216);
-  expect_mentions(error_of([&] { check_inr_header(write("b.inr.gz", inr("XDIM=6", "XDIM=7"))); }),
+  const auto check = [](const std::string& path) {
+    return check_inr_header(open_file(path, OpenMode::read));
+  };
+  EXPECT_EQ(check(write("a.inr.gz", inr())), 216);
+  expect_mentions(error_of([&] { check(write("b.inr.gz", inr("XDIM=6", "XDIM=7"))); }),
                   {"XDIM 7 x YDIM 6 x ZDIM 6", "only 216 bytes"});
 }
 
@@ -205,6 +210,45 @@ TEST(MeshSize, CountsRegularTetrahedra) {
   options.grading = 0.0;
   expect_mentions(error_of([&] { meshing_limits(expected_size(cube(), options), options, "a.off"); }),
                   {"a.off", "8e+12 elements", "edge_length"});
+  options.edge_length = 1e300;
+  EXPECT_EQ(expected_size(cube(), options).elements, 0.0);
+  options.edge_length = 1e-300;
+  expect_mentions(error_of([&] { meshing_limits(expected_size(cube(), options), options, "a.off"); }),
+                  {"a.off", "countless elements", "edge_length"});
+}
+
+TEST(MeshSize, CountsRegularTriangles) {
+  // The integral of 2 / sqrt(3) / (h + g d)^2 over a strip of length 10 and width 2 x 3, by the midpoint
+  // rule.
+  const double h = 0.2, g = 0.5;
+  double sum = 0.0;
+  for (int i = 0; i < 30'000; ++i)
+    sum += 2.0 / std::sqrt(3.0) / std::pow(h + g * (i + 0.5) * 1e-4, 2) * 2.0 * 10.0 * 1e-4;
+  EXPECT_NEAR(expected_plane_nodes(60.0, 20.0, h, g), sum, 1e-4 * sum);
+  EXPECT_NEAR(expected_plane_nodes(3.0, 8.0, 0.1, 0.0), 3.0 * 2.0 / std::sqrt(3.0) * 100.0, 1e-9);
+}
+
+TEST(MeshSize, MoreThanMemoryHoldsIsRefused) {
+  const auto bytes = static_cast<double>(allotted_memory());
+  ASSERT_GT(bytes, 0.0);
+  for (const ElementType element :
+       {ElementType::tet4, ElementType::tet10, ElementType::hex8, ElementType::tri3, ElementType::quad4}) {
+    EXPECT_NO_THROW(check_mesh_room(1e-6 * bytes, element, "a.off"));
+    expect_mentions(error_of([&] { check_mesh_room(bytes, element, "a.off"); }),
+                    {"a.off", "elements takes some", "GB are free", "edge_length"});
+  }
+}
+
+TEST_F(HostileInput, ObjNumbersThatNoReaderHolds) {
+  const std::string body = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n";
+  EXPECT_NO_THROW(read_surface(folder_.write("whole.obj", body + "f 1 4 3\n"), notes_));
+  for (const std::string number : {"99999999999", "-99999999999", "99999999999/1/1", "2147483648",
+                                   "340282366920938463463374607431768211456"}) {
+    expect_mentions(surface_error("a.obj", body + "  f\t1 4 " + number + "\n"),
+                    {"a.obj", "line 8", number.substr(0, 10)});
+    expect_mentions(error_of([&] { repair_surface(folder_.path() / "a.obj", SurfaceParts::largest, 500); }),
+                    {"line 8"});
+  }
 }
 
 TEST_F(HostileInput, RemeshingToNothingIsRefused) {

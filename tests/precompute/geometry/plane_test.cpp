@@ -187,6 +187,9 @@ TEST(PlaneMesh, RefusesWhatItCannotDo) {
   quads.element = ElementType::quad4;
   expect_mentions(error(quads), {"model.toml", "with quad4", "tri3"});
   expect_mentions(error(options(1e-9, 0.0)), {"2 million nodes", "larger edge_length"});
+  // the lines alone are few nodes, the area inside is not: told before it is meshed
+  expect_mentions(error(options(1e-5, 0.0)), {"nodes, more than 2 million", "larger edge_length"});
+  expect_mentions(error(options(1e-5, 1e-3)), {"nodes, more than 2 million", "larger edge_length"});
 }
 
 struct BadPolygon {

@@ -216,7 +216,7 @@ TEST_F(NiftiImage, GzippedIsTheSame) {
   const gzFile file = gzopen(path.c_str(), "wb");
   gzwrite(file, bytes.data(), static_cast<unsigned>(bytes.size()));
   gzclose(file);
-  EXPECT_EQ(check_nifti_header(path), std::ssize(bytes));
+  EXPECT_EQ(check_nifti_header(open_file(path, OpenMode::read)), std::ssize(bytes));
   expect_same(read_labelled_image({path, {}, true}, 10.0, notes_));
 }
 
@@ -255,6 +255,33 @@ TEST_F(NiftiImage, HeadersThatLieAreRefused) {
   std::string film = nifti(moving);
   film += film.substr(352);
   expect_mentions(error(film), {"several values"});
+}
+
+/// A header of the pair NAME.hdr, NAME.img (and of Analyze 7.5, which has no letters there) is none of one
+/// file, under whatever name; libnifti and other readers of INR take its own bytes, or those beside it.
+TEST_F(NiftiImage, PairsOfHeaderAndVoxelsAreRefused) {
+  std::string pair = nifti({});
+  const std::string image = pair.substr(352);
+  for (const std::string& letters : {std::string("ni1\0", 4), std::string(4, '\0')}) {
+    pair.replace(344, 4, letters);
+    for (const std::string name : {"x.hdr", "x.nii", "x.img", "x.inr", "x", "x.nhdr", "x.gz"}) {
+      SCOPED_TRACE(name);
+      folder_.write("x.img", image);
+      expect_mentions(error_of([&] { read(name, pair); }), {name, "not a readable image"});
+    }
+  }
+  expect_mentions(error_of([&] { read("x.img", image); }), {"not a readable image"});
+}
+
+TEST_F(NiftiImage, ThatIsBlankIsToldUnlessItsValuesAreShifted) {
+  std::string blank = nifti({}).substr(0, 352) + std::string(504, '\0');
+  expect_mentions(error(blank), {"a.nii", "the image is empty"});
+  EXPECT_THROW((void)check_nifti_header(open_file(folder_.path() / "a.nii", OpenMode::read)), Error);
+  const auto bytes = std::bit_cast<std::array<char, 4>>(1.0F);
+  for (const std::size_t offset : {112U, 116U})  // scl_slope, scl_inter
+    std::ranges::copy(bytes, blank.begin() + static_cast<std::ptrdiff_t>(offset));
+  const VoxelBody body = read("a.nii", blank);
+  EXPECT_EQ(body.labels[body.at(2, 2, 2)], 1);
 }
 
 }  // namespace

@@ -184,7 +184,7 @@ TEST_F(NrrdImage, GzippedVoxelsAreTheSame) {
   const std::string packed = gzipped(voxels(layout), folder_.path() / "packed");
   const std::string head = header(layout, "gzip");
   expect_same(read("a.nrrd", head + packed));
-  EXPECT_EQ(check_nrrd_header(folder_.path() / "a.nrrd"),
+  EXPECT_EQ(check_nrrd_header(open_file(folder_.path() / "a.nrrd", OpenMode::read)),
             std::max(std::ssize(voxels(layout)), std::ssize(head + packed)));
   expect_mentions(error(head + packed.substr(0, packed.size() / 2)), {"a.nrrd", "504", "bytes"});
 }
@@ -229,11 +229,54 @@ TEST_F(NrrdImage, HeadersThatLieAreRefused) {
   expect_mentions(with("sizes: 9 8 7", "sizes: 9 8 8"), {"576 bytes", "504 bytes"});
   expect_mentions(with("type: uint8", "type: block"), {"a.nrrd"});
   expect_mentions(with("(1,0,0)", "(0,0,0)"), {"sides"});
-  Layout detached;
-  detached.before = "data file: other.raw\n";
-  expect_mentions(error(header(detached)), {"another file", "one file"});
   expect_mentions(error(whole.substr(0, 60)), {"not a readable image"});
   expect_mentions(error("this is no image\n"), {"not a readable image"});
+}
+
+/// Whatever the field is called and however voxels are written: with enough bytes behind the header, so that
+/// a reader which overlooks the field would make a body of them or of the other file.
+TEST_F(NrrdImage, VoxelsInAnotherFileAreRefused) {
+  const std::string other = folder_.write("other.raw", voxels({})).string();
+  for (const std::string field :
+       {"data file: ", "Data File: ", "DATA FILE: ", "datafile: ", "DataFile: ", "DATAFILE: ", "data  file: ",
+        " data file: ", "data file : ", "data_file: ", "data-file: ", "data file:\t", "Data File:"})
+    for (const std::string file : {other, std::string("/etc/passwd"), std::string("LIST"),
+                                   std::string("LIST 3"), std::string("slice%03d.raw 1 9 1")})
+      for (const char* const encoding : {"raw", "gzip", "gz", "hex", "ascii", "txt", "bzip2"}) {
+        Layout detached;
+        detached.before = field + file + "\n" + (file == other ? "" : "byte skip: -1\n");
+        SCOPED_TRACE(detached.before + encoding);
+        expect_mentions(error(header(detached, encoding) + std::string(2000, '1')),
+                        {"another file", "one file"});
+      }
+}
+
+TEST_F(NrrdImage, WrittenInDigitsIsTheSameAndCountedBefore) {
+  std::string hex, ascii;
+  for (const char c : voxels({})) {
+    hex += fmt::format("{:02x}", static_cast<int>(c));
+    ascii += fmt::format("{} ", static_cast<int>(c));
+  }
+  expect_same(read("hex.nrrd", header({}, "hex") + hex));
+  expect_same(read("ascii.nrrd", header({}, "ascii") + ascii));
+  expect_mentions(error(header({}, "hex") + hex.substr(1)), {"only 1007 bytes"});
+  expect_mentions(error(header({}, "ascii") + ascii.substr(0, 1006)), {"only 1006 bytes"});
+}
+
+/// teem knows more formats than its own.
+TEST_F(NrrdImage, OtherFormatsUnderItsNameAreRefused) {
+  const std::string raster = "P5\n9 56\n255\n" + voxels({});
+  const std::string table = "0 1 0\n1 1 1\n0 1 0\n";
+  for (const std::string& bytes : {raster, table, std::string("# vtk DataFile Version 2.0\n"), test::inr()})
+    expect_mentions(error(bytes), {"not a readable image"});
+}
+
+TEST_F(NrrdImage, ThatIsBlankIsToldWithoutReadingIt) {
+  Layout layout;
+  const std::string head = header(layout, "gzip");
+  const std::string packed = gzipped(std::string(504, '\0'), folder_.path() / "packed");
+  expect_mentions(error(head + packed), {"a.nrrd", "the image is empty"});
+  EXPECT_THROW((void)check_nrrd_header(open_file(folder_.path() / "a.nrrd", OpenMode::read)), Error);
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 // Processors and memory within the limits of control groups and of Slurm.
-#include "precompute/allotment.h"
+#include "precompute/machine/allotment.h"
 
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
@@ -12,7 +14,7 @@
 #include <map>
 #include <thread>
 
-#include "base/memory.h"
+#include "base/limits/address_space.h"
 
 namespace palpate::allotment_test {
 namespace {
@@ -111,6 +113,24 @@ TEST_F(Allotment, MemoryOfTheFirstVersionOfGroups) {
   put("/sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712\n");
   put("/sys/fs/cgroup/memory/memory.usage_in_bytes", "1\n");
   EXPECT_EQ(memory(), 130'000);
+}
+
+TEST_F(Allotment, AddressSpaceIsALimit) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers take all address space";
+#endif
+  constexpr std::int64_t left = 300'000'000;
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const auto whole = static_cast<rlim_t>(address_space() + left);
+    const rlimit limit{whole, whole};
+    ::setrlimit(RLIMIT_AS, &limit);
+    const std::int64_t seen = memory();
+    ::_exit(seen > left / 2 && seen <= left ? 0 : 1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
 }
 
 }  // namespace

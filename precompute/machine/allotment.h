@@ -12,8 +12,7 @@ namespace palpate {
 int allotted_processors(const std::string& root = "");
 
 /// Memory that can be had without swapping and within the limits of the process's control groups, whose page
-/// cache counts as free, and no more than SLURM_MEM_PER_NODE, or SLURM_MEM_PER_CPU of all SLURM_CPUS_ON_NODE
-/// [byte]; 0 when the system does not say.
+/// cache counts as free, and no more than SLURM_MEM_PER_NODE, or SLURM_MEM_PER_CPU of all SLURM_CPUS_ON_NODE,
+/// and than RLIMIT_AS (ulimit -v) leaves [byte]; 0 when the system does not say.
 std::int64_t allotted_memory(const std::string& root = "");
-
 }  // namespace palpate

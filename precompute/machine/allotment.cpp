@@ -1,4 +1,4 @@
-#include "precompute/allotment.h"
+#include "precompute/machine/allotment.h"
 
 #include <sched.h>
 
@@ -12,6 +12,7 @@
 #include <sstream>
 #include <thread>
 
+#include "base/limits/address_space.h"
 #include "base/memory.h"
 
 namespace palpate {
@@ -107,6 +108,7 @@ std::int64_t allotted_memory(const std::string& root) {
     memory = std::min(memory, *given * megabyte);
   const auto each = of_slurm("SLURM_MEM_PER_CPU"), processors = of_slurm("SLURM_CPUS_ON_NODE");
   if (each && processors && *each > 0.0) memory = std::min(memory, *each * *processors * megabyte);
+  if (const auto left = address_room()) memory = std::min(memory, std::max(static_cast<double>(*left), 1.0));
   return static_cast<std::int64_t>(memory);
 }
 
