@@ -53,8 +53,8 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   await part(page, 'radius').press('Enter');
   await until(page, () => window.palpate.state.settings.tool === 'sphere:0.1');
   await choose(page, 'press', 0.02);
-  const push = async () => {
-    const felt = await pressed(page, top);
+  const push = async (is_refined) => {
+    const felt = await pressed(page, top, is_refined);
     await until(page, () => window.palpate.lastFrame.contacts === 0);
     return felt.force[2] / felt.depth;
   };
@@ -69,7 +69,7 @@ test('settings are taken, refused with a reason, and felt', async (t) => {
   await until(page, () => window.palpate.state.settings['stiffness-scale'] === '1' && !window.palpate.state.busy);
   await part(page, 'overlay').click(); // it is checked once the runtime has taken it
   await until(page, () => window.palpate.state.settings.overlay !== undefined && !window.palpate.state.busy);
-  const softer = await push();
+  const softer = await push(true);
   assert.ok(Math.abs(softer) < 0.97 * Math.abs(once), `with an overlay ${softer}, without ${once}`);
   await part(page, 'friction').fill('-1');
   await part(page, 'friction').press('Enter');

@@ -43,11 +43,12 @@ export async function settled(page) {
   return told(page, 'lastFrame');
 }
 
-/// Presses at a place of the body until it rests, and lifts: the frame before that.
-export async function pressed(page, place) {
+/// Presses at a place of the body until it rests, with the overlay's mesh under the tool where one `is_refined`, and lifts: the frame before that.
+export async function pressed(page, place, is_refined = false) {
   const { x, y } = await project(page, place);
   await page.mouse.move(x, y);
   await page.mouse.down();
+  if (is_refined) await until(page, () => window.palpate.lastFrame.patch > 0); // it is made beside the ticks, which go on without it
   const felt = await settled(page);
   await page.mouse.up();
   return felt;
