@@ -8,17 +8,43 @@ set(palpate_dear
   programs_ranks_test.Misfits                    test_what_all_ranks_find_is_told_once
   programs_ranks_test.Plans                      test_blocks_of_columns_depend_on_the_model_alone
   programs_parts_test.Parts                      test_parts_divide_the_work
+  programs_parts_test.Misfits                    test_parts_of_two_sizes,test_a_damaged_part,test_usage
+  programs_parts_test.Guest                      test_signals_before_the_columns_end_it_at_once
   # A browser draws without a graphics card.
   viewer_browser_looks                           "axes have names"
   viewer_browser_hands                           "how a model is looked at is kept"
   viewer_browser_beside                          "a recording stands beside a body"
   viewer_browser_pages                           "one steers"
   viewer_browser_gallery                         "what cannot be opened"
+  viewer_browser_run                             "a recording|the page comes whole"
+  viewer_browser_press                           "a click is felt|fingers press too"
+  # Thousands of damaged files, each of which is opened in a child.
+  formats_test.Seeds/FlippedBits                 AreRefusedOrInSlackSpace/1
+  formats_test.Recording                         IsReadInAnyOrder,ThatIsNotFinishedHoldsEachCheckpoint,IsRefusedWhereABitOfAChunkIsFlipped,SurvivesBeingKilledAtAnyMoment
+  formats_test.DynamicsFile                      AKilledRunIsContinuedInBothMatrices,OnlyPackedDynamicsHasAnInverse
+  programs_inputs_test.Fuzzed                    -
+  programs_files_test.Fuzzed                     -
+  programs_recording_test.Reader                 test_lengths_that_lie,test_messages_that_lie,test_no_recordings
+  programs_recording_test.SecondRoute            test_by_the_index
+  # Other programs: compilers, package managers, notebooks.
+  programs_build_flags_test.BuildFlags           test_presets_are_for_this_processor_and_those_of_tests_refuse_warnings
+  programs_bindings_test.Clients                 test_feel_the_same_to_the_last_bit
+  programs_library_test.Library                  test_found_by_cmake,test_header_is_c99_and_cpp
+  programs_wheel_test.Wheel                      test_a_folder_without_a_build_is_refused
+  # Devices that stall, by the clock.
+  devices_faults_test.All/Faults                 StayWithinTheClamps/read_error,StayWithinTheClamps/garbage
+  programs_device_test.Felt                      test_the_hand_rests_where_its_spring_and_the_body_balance,test_a_killed_session_opens_and_its_replay_is_the_same_bit_by_bit
   # Bodies that are baked or pressed for long.
   programs_bake_test.Models                      test_the_nodule_is_made_of_two_materials
   programs_bake_test.Stopped                     test_interrupt_keeps_what_is_done_and_the_old_file_whole
   programs_live_test.Live                        test_equal_runs_are_equal_and_replay_to_the_bit
   programs_hertz_test.Hertz                      test_a_shallow_press_is_not_held_out_by_edges
+  programs_gallery_test.Drops                    test_a_drop_replaces_no_body
+  programs_surfaces_test.Bodies                  test_open_box_has_the_force_of_a_closed_one,test_missing_and_damaged_files
+  programs_runtime_test.Tools                    test_a_sphere_is_pushed_out_where_it_touches,test_friction
+  programs_outputs_test.Existing                 test_precompute,test_links_keep_their_place
+  programs_cattaneo_test.Cattaneo                test_it_slips_in_a_ring
+  geometry_test.ImageMesh                        BallHasItsVolumeAndPlace,CavitiesStayEmpty,BadImages,UnreadableFiles
   programs_warp_test.Warp                        test_runs_are_equal_and_replay
   programs_long_test.Outputs                     -
   programs_session_test.Session                  test_says_what_is_in_it
@@ -33,6 +59,9 @@ set(palpate_dear
   precompute_test.Assembly                       RigidMotionsTakeNoForce,ClampingThreeNodesMakesItPositiveDefinite,PartlyHeldNodesAreLeftOutDofByDof
   live_test.Walls                                ABlockBeginsToSlideAtTheFrictionAngle
   live_test.LiveTruth                            SmallStrainEndsWhereThePageSays
+  runtime_contact_test.Radii/RollingContact      ToldStiffnessIsTheDerivativeAtRest/Radius6
+  runtime_contact_test.Contacts/LocalModelOfTool ModelIsTheDerivativeOfTheForce/Sticking
+  runtime_contact_test.Cases/WholeMeshContact    GivesTheSameForcesAndDisplacements/two_spheres,GivesTheSameForcesAndDisplacements/disc_in_the_plane
   runtime_contact_test.Tools/RandomWalk          NothingBreaksAndTheStateRecovers/ThreeTools
   runtime_contact_test.Spheres/ComesToRest       WhereverItIsHeld/Radius10Friction5,WhereverItIsHeld/Radius2Friction1InThePlane
   dynamics_motion_test.Elements/NewmarkSteps     PackedIsTheSparseSolveOverAThousandSteps/quad4,ModalWithAllModesIsThePackedOne/quad4

@@ -23,8 +23,8 @@ constexpr unsigned char first_white = 128;
 constexpr std::string_view png_signature = "\x89PNG\r\n\x1a\n";
 const char* const save_again = "save the picture again as PNG, or as PBM (P1, P4)";
 
-/// An all-empty body. Throws Error for a picture that is empty or too large.
-PixelBody blank(std::uint64_t width, std::uint64_t height, const std::string& where) {
+/// Throws Error for a picture that is empty or too large.
+void check_pixels(std::uint64_t width, std::uint64_t height, const std::string& where) {
   if (width == 0 || height == 0) {
     throw Error(fmt::format("the picture has {} x {} pixels", width, height), where, save_again);
   }
@@ -35,6 +35,10 @@ PixelBody blank(std::uint64_t width, std::uint64_t height, const std::string& wh
   }
   check_room(bytes_per_pixel * static_cast<double>(width * height),
              fmt::format("a picture of {} x {} pixels", width, height), where, "scale it down");
+}
+
+/// An all-empty body.
+PixelBody blank(std::uint64_t width, std::uint64_t height) {
   PixelBody body{static_cast<Index>(width), static_cast<Index>(height), {}};
   body.inside.resize(width * height);
   return body;
@@ -60,7 +64,7 @@ PixelBody read_png(const std::string& bytes, bool dark, const std::string& where
     }
   };
   check(png_image_begin_read_from_memory(&png.image, bytes.data(), bytes.size()));
-  PixelBody body = blank(png.image.width, png.image.height, where);
+  PixelBody body = blank(png.image.width, png.image.height);
   png.image.format = PNG_FORMAT_GRAY;
   const png_color black{0, 0, 0}, white{255, 255, 255};
   const auto upwards = -static_cast<png_int_32>(body.width);  // the first row in memory is the lowest
@@ -70,8 +74,19 @@ PixelBody read_png(const std::string& bytes, bool dark, const std::string& where
   return body;
 }
 
-/// Reads a PNG in a child, as libpng is foreign code.
+/// The number that stands in a PNG as its four bytes from `at` on; 0 behind its end.
+std::uint32_t png_number(const std::string& bytes, std::size_t at) {
+  std::uint32_t number = 0;
+  for (const char byte : bytes.substr(std::min(at, bytes.size()), 4))
+    number = number << 8 | static_cast<unsigned char>(byte);
+  return number;
+}
+
+/// Reads a PNG in a child, as libpng is foreign code. Its size is looked at before: a child is not told how
+/// much memory there is.
 PixelBody read_png_in_child(const std::string& bytes, bool dark, const std::string& where) {
+  constexpr std::size_t width_at = 16, height_at = 20;  // of the header, which comes first
+  check_pixels(png_number(bytes, width_at), png_number(bytes, height_at), where);
   const ChildTask task = {.name = "libpng",
                           .where = where,
                           .limits = reading_limits(static_cast<std::int64_t>(bytes.size())),
@@ -161,7 +176,9 @@ class PbmReader {
 
   PixelBody header() {
     const std::uint64_t width = number();
-    return blank(width, number(), where_);
+    const std::uint64_t height = number();
+    check_pixels(width, height, where_);
+    return blank(width, height);
   }
 
   template <typename ReadRow>

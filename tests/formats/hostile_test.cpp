@@ -673,13 +673,15 @@ TEST(TruncatedFile, IsCalledSoWhereverItEnds) {
   }
 }
 
-TEST(FlippedBits, AreRefusedOrInSlackSpace) {
+class FlippedBits : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(FlippedBits, AreRefusedOrInSlackSpace) {
   const Folder folder;
   const std::string whole = read_bytes(good_file());
   const Model good = load_model(good_file());
-  std::mt19937_64 random(7);
+  std::mt19937_64 random(GetParam());
   int refused = 0;
-  for (int i = 0; i < 400; ++i) {
+  for (int i = 0; i < 50; ++i) {
     std::string flipped = whole;
     // Half of them in the first page, where HDF5's own structures are dense.
     const std::size_t byte = random() % (i % 2 == 0 ? whole.size() : 4096);
@@ -689,8 +691,10 @@ TEST(FlippedBits, AreRefusedOrInSlackSpace) {
         refusal([&] { EXPECT_EQ(difference(good, load_model(folder / "x.hdf")), "") << "byte " << byte; });
     if (!text.empty()) ++refused;
   }
-  EXPECT_GT(refused, 200);
+  EXPECT_GT(refused, 25);
 }
+
+INSTANTIATE_TEST_SUITE_P(Seeds, FlippedBits, ::testing::Range(1U, 9U));
 
 }  // namespace
 }  // namespace palpate::test::hostile_test

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "formats/checksum.h"
 #include "formats/hdf5_contents.h"
+#include "formats/journal.h"
 #include "tests/support/formats_sample.h"
 #include "tests/support/formats_tamper.h"
 

@@ -96,7 +96,7 @@ class Room(ProgramTest):
         voxels = bytes(400 * 400) + bytes([1]) * (400 * 400) + bytes(398 * 400 * 400)
         for name, pack in (("a.nii.gz", nifti), ("a.nrrd", nrrd), ("a.inr.gz", inr)):
             (self.folder / name).write_bytes(pack(400, voxels))
-            self.assert_refused_early(self.plan(f'image = "{name}"', "[mesh]\nedge_length = 10\n", memory=1000), name, "400", "1.34 GB of memory", "GB are free", "crop")
+            self.assert_refused_early(self.plan(f'image = "{name}"', "[mesh]\nedge_length = 10\n", memory=1000), name, "400", "1.34 GB of memory", "GB are free", "Crop")
 
     def test_pictures(self):
         head, mesh = 'plane = "stress"\nthickness = 0.01\n', "[mesh]\nedge_length = 100\n"
