@@ -106,6 +106,7 @@ herr_t write_nothing(H5FD_t* /*file*/, H5FD_mem_t /*type*/, hid_t /*transfer*/, 
   return -1;
 }
 
+/// Stays registered: as a file closes, the library gives the driver up before it calls its `close`.
 hid_t driver() {
   static const H5FD_class_t functions = [] {
     H5FD_class_t f{};
@@ -127,14 +128,14 @@ hid_t driver() {
     for (H5FD_mem_t& kind : f.fl_map) kind = H5FD_MEM_SUPER;  // no kinds of memory apart
     return f;
   }();
-  return H5FDregister(&functions);
+  static const hid_t registered = H5FDregister(&functions);
+  return registered;
 }
 
 /// Opens a file for the library to read. Not valid where the library refuses it.
 Id open_descriptor(const FileDescriptor& file) {
   const Id access = access_properties();
-  const Id registered(driver(), H5FDunregister);
-  H5Pset_driver(access.get(), registered.get(), nullptr);
+  H5Pset_driver(access.get(), driver(), nullptr);
   return {H5Fopen(std::to_string(file.get()).c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose};
 }
 
