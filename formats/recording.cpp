@@ -370,13 +370,6 @@ ContactLoads RecordingFile::loads(std::int64_t number) const {
   return loads;
 }
 
-Recording read_recording(const RecordingFile& file) {
-  Recording recording{.info = file.info(), .generator = file.generator(), .ticks = {}};
-  recording.ticks.reserve(static_cast<std::size_t>(file.ticks()));
-  for (std::int64_t row = 0; row < file.ticks(); ++row) recording.ticks.push_back(file.tick(row));
-  return recording;
-}
-
 bool is_being_recorded(const std::filesystem::path& path) {
   return is_locked(open_file(path, OpenMode::read));
 }

@@ -177,16 +177,6 @@ class RecordingFile {
   std::unique_ptr<Impl> impl_;
 };
 
-/// All ticks of a session in memory, for a replay.
-struct Recording {
-  SessionInfo info;
-  std::string generator;  ///< program and version
-  std::vector<TickRecord> ticks;
-};
-
-/// Reads all ticks of a recording. Throws Error.
-Recording read_recording(const RecordingFile& file);
-
 /// Whether a program records to it now.
 bool is_being_recorded(const std::filesystem::path& path);
 

@@ -105,6 +105,7 @@ InputSource make_input_source(const PlayOptions& options, Guardian* guardian) {
   } else if (options.device.kind == Kind::replay) {
     auto replay = std::make_unique<ReplayDevice>(*options.session);
     input.ticks = replay->ticks();
+    input.replay = replay.get();
     input.device = std::move(replay);
   } else if (options.device.kind != Kind::mouse) {
     const SafetyOptions safety = options.settings.safety.value_or(SafetyOptions{});

@@ -11,14 +11,16 @@
 #include "runtime/body/body.h"
 #include "runtime/devices/hid/guardian.h"
 #include "runtime/loop/device_link.h"
+#include "runtime/loop/replay_device.h"
 
 namespace palpate {
 
 /// What moves the tool.
 struct InputSource {
   std::unique_ptr<Device> device;
-  DeviceLink* link = nullptr;    ///< the device, where a hand may be in it
-  MouseDevice* mouse = nullptr;  ///< the device, where it is a viewer's pointer
+  DeviceLink* link = nullptr;      ///< the device, where a hand may be in it
+  MouseDevice* mouse = nullptr;    ///< the device, where it is a viewer's pointer
+  ReplayDevice* replay = nullptr;  ///< the device, where a session is replayed
   std::int64_t ticks = std::numeric_limits<std::int32_t>::max();  ///< how long it goes on
 };
 

@@ -38,10 +38,10 @@ void stop_on_signals() {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
 }
 
-void warn_of_other_model(const Recording& session, const Body& body) {
-  if (session.info.content_hash == body.model().content_hash) return;
+void warn_of_other_model(const RecordingFile& session, const Body& body) {
+  if (session.info().content_hash == body.model().content_hash) return;
   print_warning("the session was recorded with another model or another precomputation of it (" +
-                session.info.model_path + "): forces will differ");
+                session.info().model_path + "): forces will differ");
 }
 
 /// Where the run may write, and puts that into the options, before anything else.

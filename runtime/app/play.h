@@ -37,9 +37,9 @@ struct PlayOptions {
   std::filesystem::path file;        ///< baked model
   std::filesystem::path model_toml;  ///< that it must have been made from; empty: not asked
   DeviceChoice device;
-  std::shared_ptr<const Recording> session;  ///< that is replayed
-  SettingsText settings_text;                ///< as they were written, or are in the session
-  Settings settings;                         ///< what they mean
+  std::shared_ptr<const RecordingFile> session;  ///< that is replayed
+  SettingsText settings_text;                    ///< as they were written, or are in the session
+  Settings settings;                             ///< what they mean
   std::optional<double> duration;  ///< [s]; else to the end of the script or session, or until interrupted
   std::optional<int> processor;    ///< that the loop is to have for itself
   bool fast = false;

@@ -301,9 +301,9 @@ PlayOptions read_play(PlayArguments arguments) {
   if (options.device.kind == DeviceChoice::Kind::replay) {
     if (arguments.settings.contains("rate"))
       throw CLI::ValidationError("--rate", "a session is replayed at its own rate");
-    options.session = std::make_shared<const Recording>(read_session(options.device.target));
-    arguments.settings.merge(split_settings(options.session->info.options));
-    arguments.settings["rate"] = std::to_string(options.session->info.rate);
+    options.session = std::make_shared<const RecordingFile>(open_session(options.device.target));
+    arguments.settings.merge(split_settings(options.session->info().options));
+    arguments.settings["rate"] = std::to_string(options.session->info().rate);
   }
   options.settings_text = arguments.settings;
   options.settings = argument([&] { return read_settings(arguments.settings); });

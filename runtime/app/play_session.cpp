@@ -61,7 +61,7 @@ PlaySession::PlaySession(PlayOptions options, const Body& body, const InputSourc
   }
   const bool in_background = !options_.fast && !options_.session;
   if (settings.overlay) {
-    if (options_.session) check_overlays(*options_.session, body, options_.device.target);
+    if (options_.session) check_overlays(*options_.session, body);
     overlays_.emplace(body, state_,
                       PatchSourceOptions{.rings = settings.overlay->rings,
                                          .law = settings.overlay_law,
@@ -119,6 +119,7 @@ const LoopReport& PlaySession::run(const std::atomic<bool>& stop) {
   viewed_.reset();
   frames_.reset();  // the last frame is in the recording
   if (recorder_) finish_recording();
+  if (input_.replay != nullptr) input_.replay->check();
   return report_;
 }
 
@@ -146,7 +147,7 @@ LoopReport PlaySession::run_with_rights(const std::atomic<bool>& stop) {
                            .control = control_,
                            .feed = pointer(feed_),
                            .viewed = pointer(viewed_),
-                           .replayed = options_.session.get()};
+                           .replayed = input_.replay};
   const LoopOptions loop = {.rate = options_.settings.rate,
                             .ticks = input_.ticks,
                             .fast = options_.fast,

@@ -50,13 +50,10 @@ namespace palpate {
 
 /// What a palpate_recording leads to.
 struct ReadRecording {
-  explicit ReadRecording(const char* name) : file(open_session(name)) {
-    for (std::int64_t row = 0; row < file.ticks(); ++row) ticks.push_back(tick_of(file.tick(row)));
-  }
+  explicit ReadRecording(const char* name) : file(open_session(name)) {}
 
   RecordingFile file;
-  std::vector<palpate_recorded_tick> ticks;
-  std::mutex reading;                        // of pictures
+  std::mutex reading;                        // of ticks and pictures
   std::optional<RecordedPictures> pictures;  // from the first that is asked for on
 };
 
@@ -116,12 +113,18 @@ int palpate_recording_count(const palpate_recording* recording, palpate_recordin
 int palpate_recording_tick(const palpate_recording* recording, int64_t number,
                            palpate_recorded_tick* tick) noexcept {
   const Inside<ReadRecording> inside = look(recording);
-  const bool exists = inside && number >= 0 && number < std::ssize(inside->ticks);
-  const palpate_recorded_tick told =
-      exists ? inside->ticks[static_cast<std::size_t>(number)] : palpate_recorded_tick{};
-  if (!write_struct(told, tick)) return -1;
-  if (!inside) return refused(recording);
-  return exists ? 0 : -1;
+  palpate_recorded_tick told{};
+  int code = inside ? -1 : refused(recording);
+  if (inside && number >= 0 && number < inside->file.ticks()) {
+    try {
+      const std::lock_guard lock(inside->reading);
+      told = tick_of(inside->file.tick(number));
+      code = 0;
+    } catch (...) {  // the file was cut, or there is no memory
+      code = PALPATE_ERROR_FILE;
+    }
+  }
+  return write_struct(told, tick) ? code : -1;
 }
 
 int palpate_recording_rest(const palpate_recording* recording, double* xyz) noexcept {

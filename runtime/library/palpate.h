@@ -289,7 +289,9 @@ typedef struct palpate_recorded_tick {
   }
 
 /* Fills the members that `tick` has for tick 0, 1, ... Returns 0; -1 where the number is none, and all is
- * zero, or the size is refused, and nothing is written. Real-time safe. */
+ * zero, or the size is refused, and nothing is written; PALPATE_ERROR_FILE, and all is zero, where the file
+ * cannot be read any more. Quick one after the other: now and then a stretch of ticks is read from the file.
+ * Threads wait for each other. */
 int palpate_recording_tick(const palpate_recording* recording, int64_t number,
                            palpate_recorded_tick* tick) PALPATE_NOEXCEPT;
 

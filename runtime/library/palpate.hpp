@@ -213,7 +213,7 @@ class Recording {
     return all;
   }
 
-  /// Tick 0, 1, ...; all zero where there is none. Real-time safe.
+  /// Tick 0, 1, ...; all zero where there is none. Reads the file.
   [[nodiscard]] palpate_recorded_tick tick(std::int64_t number) const noexcept {
     palpate_recorded_tick told = PALPATE_RECORDED_TICK_INIT;
     palpate_recording_tick(recording_.get(), number, &told);

@@ -53,7 +53,11 @@ class Loop {
 
  private:
   [[nodiscard]] bool ends(const std::atomic<bool>& stop) const noexcept {
-    return stop || (parts_.control != nullptr && parts_.control->leave);
+    return stop || (parts_.control != nullptr && parts_.control->leave) || replay_failed();
+  }
+
+  [[nodiscard]] bool replay_failed() const noexcept {
+    return parts_.replayed != nullptr && parts_.replayed->failed();
   }
 
   void set_due() noexcept { tick_.due = start_ + tick_.number * second / options_.rate; }
@@ -93,6 +97,7 @@ class Loop {
   void tick() noexcept {
     const std::int64_t next_due = start_ + (tick_.number + 1) * second / options_.rate;
     news_ = parts_.device.poll(tick_);
+    if (replay_failed()) return;
     if (news_.begun) tick_.begun = *news_.begun;
     poll_person();
     lift();
@@ -144,7 +149,7 @@ class Loop {
   /// The overlay and the free motion of this tick.
   void serve() noexcept {
     const TickRecord* then = nullptr;
-    if (parts_.replayed != nullptr) then = &parts_.replayed->ticks[static_cast<std::size_t>(tick_.number)];
+    if (parts_.replayed != nullptr) then = &parts_.replayed->then();
     if (parts_.overlays != nullptr) {
       if (then == nullptr) {
         parts_.overlays->serve(parts_.state);
@@ -243,8 +248,7 @@ class Loop {
     }
     if (parts_.recorder == nullptr && parts_.replayed == nullptr) return;
     const TickRecord tick = record();
-    if (parts_.replayed != nullptr)
-      compare(tick, parts_.replayed->ticks[static_cast<std::size_t>(tick_.number)], report_.replay);
+    if (parts_.replayed != nullptr) compare(tick, parts_.replayed->then(), report_.replay);
     if (parts_.recorder == nullptr) return;
     if (options_.fast) {
       parts_.recorder->push_waiting(tick);

@@ -10,6 +10,7 @@
 #include "runtime/loop/loop_report.h"
 #include "runtime/loop/monitor.h"
 #include "runtime/loop/recorder.h"
+#include "runtime/loop/replay_device.h"
 #include "runtime/loop/tick_feed.h"
 #include "runtime/safety/device.h"
 #include "runtime/safety/safety.h"
@@ -41,9 +42,9 @@ struct LoopParts {
   Monitor* monitor = nullptr;
   SurfaceFrames* frames = nullptr;
   LoopControl* control = nullptr;
-  TickFeed* feed = nullptr;             ///< of a viewer
-  SurfaceFrames* viewed = nullptr;      ///< and its pictures, of each tick that it is given
-  const Recording* replayed = nullptr;  ///< session whose overlays and motion come as they came then
+  TickFeed* feed = nullptr;                ///< of a viewer
+  SurfaceFrames* viewed = nullptr;         ///< and its pictures, of each tick that it is given
+  const ReplayDevice* replayed = nullptr;  ///< the device, where overlays and motion come as they came then
 };
 
 struct LoopOptions {
@@ -54,7 +55,8 @@ struct LoopOptions {
 };
 
 /// Steps at the rate of the options, or as fast as it goes without waiting (`fast`: deterministic). Ends
-/// early when `stop` becomes true or the control says `leave`; the device is shown no force then.
+/// early when `stop` becomes true, the control says `leave` or what is replayed failed; the device is shown
+/// no force then.
 LoopReport run_loop(const LoopParts& parts, const LoopOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace palpate

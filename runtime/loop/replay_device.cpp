@@ -47,17 +47,27 @@ void ReplayDifference::add(const ReplayDifference& later, std::int64_t ticks_bef
   first_field = later.first_field;
 }
 
+void ReplayDevice::check() const {
+  if (failure_) std::rethrow_exception(failure_);
+}
+
 DeviceNews ReplayDevice::poll(const TickTime& tick) noexcept {
-  const TickRecord& then = session_.ticks[static_cast<std::size_t>(tick.number)];
-  const double* q = then.handle_orientation;
   DeviceNews news;
+  try {
+    then_ = session_.tick(tick.number);
+  } catch (...) {
+    failure_ = std::current_exception();
+    return news;
+  }
+  const TickRecord& then = then_;
+  const double* q = then.handle_orientation;
   news.state.pose = {.orientation = {q[0], q[1], q[2], q[3]},
                      .position = Vec3(then.handle_position),
                      .grab = then.grab != 0};
   news.state.velocity = Vec3(then.handle_velocity);
   news.state.buttons = then.buttons;
   news.state.sequence = then.sequence;
-  const std::int64_t due = tick.number * 1'000'000'000 / session_.info.rate;  // since the start, as then
+  const std::int64_t due = tick.number * 1'000'000'000 / session_.info().rate;  // since the start, as then
   news.state.arrived = tick.due - due + then.arrived_ns;
   news.begun = tick.due - due + then.begun_ns;
   news.events = static_cast<DeviceEvent>(then.event);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <string>
 
 #include "formats/recording.h"
@@ -23,21 +24,28 @@ struct ReplayDifference {
 };
 
 /// Says in each tick what the device said in the session, with its times, so that the loop does all of it
-/// again.
+/// again. Ticks are read from the file as they are due: nobody feels a replay, and a session of hours takes
+/// no memory.
 class ReplayDevice : public Device {
  public:
-  /// `session` must live as long.
-  explicit ReplayDevice(const Recording& session) noexcept : session_(session) {}
+  /// `session` must live as long; nobody else uses it during a run.
+  explicit ReplayDevice(const RecordingFile& session) noexcept : session_(session) {}
 
-  [[nodiscard]] std::int64_t ticks() const noexcept {
-    return static_cast<std::int64_t>(session_.ticks.size());
-  }
+  [[nodiscard]] std::int64_t ticks() const noexcept { return session_.ticks(); }
+  /// The tick that was polled last, as it was then.
+  [[nodiscard]] const TickRecord& then() const noexcept { return then_; }
+  /// Whether a tick could not be read any more: the run is over.
+  [[nodiscard]] bool failed() const noexcept { return failure_ != nullptr; }
+  /// Throws the Error why.
+  void check() const;
 
   DeviceNews poll(const TickTime& tick) noexcept override;
   void display(const DeviceCommand&, const DeviceState&, std::int64_t) noexcept override {}
 
  private:
-  const Recording& session_;
+  const RecordingFile& session_;
+  TickRecord then_;
+  std::exception_ptr failure_;
 };
 
 /// Takes note of how a tick of the replay differs from the same one then.

@@ -57,14 +57,10 @@ RecordingFile open_session(const std::filesystem::path& path) {
   return session;
 }
 
-Recording read_session(const std::filesystem::path& path) {
-  return read_recording(open_session(path));
-}
-
-void check_overlays(const Recording& session, const Body& body, const std::filesystem::path& where) {
+void check_overlays(const RecordingFile& session, const Body& body) {
   const auto nodes = static_cast<std::int64_t>(body.model().mesh.nodes.size());
-  for (std::size_t k = 0; k < session.ticks.size(); ++k) {
-    const Index node = session.ticks[k].patch;
+  for (std::int64_t k = 0; k < session.ticks(); ++k) {
+    const Index node = session.tick(k).patch;
     if (node < 0) continue;
     const Index stored = node < nodes ? body.stored_node(node) : -1;
     if (stored >= 0 && body.surface_node_of_stored(stored) >= 0) continue;
@@ -72,7 +68,8 @@ void check_overlays(const Recording& session, const Body& body, const std::files
         fmt::format("/tool/0/tick, row {}: patch is {}, which is no node that an overlay can lie round: "
                     "the body has {} nodes",
                     k, node, nodes),
-        where.string(), "replay it with the model that it was recorded with: " + session.info.model_path);
+        session.path().string(),
+        "replay it with the model that it was recorded with: " + session.info().model_path);
   }
 }
 

@@ -15,10 +15,7 @@ void check_session(const RecordingFile& session);
 /// Opens a recording and checks it. Throws Error.
 RecordingFile open_session(const std::filesystem::path& path);
 
-/// Reads all ticks of one that is checked. Throws Error.
-Recording read_session(const std::filesystem::path& path);
-
 /// Proves that a replay on this body finds the nodes round which the session had its overlays. Throws Error.
-void check_overlays(const Recording& session, const Body& body, const std::filesystem::path& where);
+void check_overlays(const RecordingFile& session, const Body& body);
 
 }  // namespace palpate

@@ -202,9 +202,6 @@ TEST_P(Lengths, AreReadBack) {
     EXPECT_EQ(read.surface().simplices, surface.simplices);
     EXPECT_EQ(read.surface().held, surface.held);
     expect_contents(read, GetParam(), (GetParam() + 999) / 1000);
-    const Recording all = read_recording(read);
-    ASSERT_EQ(all.ticks.size(), GetParam());
-    for (std::size_t i = 0; i < GetParam(); ++i) ASSERT_TRUE(same(all.ticks[i], some_tick(i)));
     EXPECT_EQ(files_in(folder.path()), 1U);
   }
 }

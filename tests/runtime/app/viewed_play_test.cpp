@@ -137,8 +137,8 @@ TEST_F(ViewedPlayTest, RecordsAnActThatIsReplayedToTheSameBits) {
 
   PlayOptions options;
   options.device.kind = DeviceChoice::Kind::replay;
-  options.session = std::make_shared<const Recording>(read_recording(RecordingFile(file)));
-  options.settings = read_settings(split_settings(options.session->info.options));
+  options.session = std::make_shared<const RecordingFile>(file);
+  options.settings = read_settings(split_settings(options.session->info().options));
   options.fast = true;
   const Body body = load_body(cube, "", options.settings.body());
   const InputSource input = make_input_source(options, nullptr);

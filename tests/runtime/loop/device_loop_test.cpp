@@ -14,6 +14,7 @@
 #include "runtime/loop/loop.h"
 #include "runtime/loop/replay_device.h"
 #include "runtime/loop/settings.h"
+#include "tests/support/recorded_ticks.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::device_loop_test {
@@ -175,23 +176,25 @@ class Replay : public DeviceLoop {
   }
   ~Replay() override { std::filesystem::remove_all(folder_); }
 
-  Recording record(Device& device, Safety& safety, std::int64_t ticks, bool fast) {
+  std::vector<TickRecord> record(Device& device, Safety& safety, std::int64_t ticks, bool fast) {
     State state(body_, {.tools = {ball}});
     Recorder recorder(folder_ / "a.mcap", {"box.palpate.hdf", "0123", "made up", 1000, "tool=sphere:0.01\n"});
     run_loop({.body = body_, .state = state, .device = device, .safety = &safety, .recorder = &recorder},
              {.ticks = ticks, .fast = fast}, stop_);
     recorder.finish();
-    return read_recording(RecordingFile(folder_ / "a.mcap"));
+    return test::ticks_of(folder_ / "a.mcap");
   }
 
-  ReplayDifference replay(const Recording& session, const SafetyOptions& options, const Tool& tool = ball) {
+  LoopReport replay(ReplayDevice& device, const SafetyOptions& options, const Tool& tool = ball) {
     State state(body_, {.tools = {tool}});
     Safety safety(options);
+    return run_loop({.body = body_, .state = state, .device = device, .safety = &safety, .replayed = &device},
+                    {.ticks = device.ticks(), .fast = true}, stop_);
+  }
+  ReplayDifference replay(const SafetyOptions& options, const Tool& tool = ball) {
+    const RecordingFile session(folder_ / "a.mcap");
     ReplayDevice device(session);
-    return run_loop(
-               {.body = body_, .state = state, .device = device, .safety = &safety, .replayed = &session},
-               {.ticks = device.ticks(), .fast = true}, stop_)
-        .replay;
+    return replay(device, options, tool).replay;
   }
 
   const std::filesystem::path folder_ =
@@ -211,25 +214,42 @@ TEST_F(Replay, IsTheSessionBitByBit) {
   options.small_force = 1.0;
   options.deadline.most = 1e6;
   Safety safety(options);
-  const Recording session = record(device, safety, 450, false);
-  ASSERT_EQ(session.ticks.size(), 450U);
+  const std::vector<TickRecord> session = record(device, safety, 450, false);
+  ASSERT_EQ(session.size(), 450U);
   for (std::size_t k = 0; k < 450; ++k) {
-    ASSERT_EQ(Vec3(session.ticks[k].shown_force), device.shown[k].wrench.force);
-    ASSERT_GE(session.ticks[k].begun_ns, static_cast<std::int64_t>(k) * millisecond);
+    ASSERT_EQ(Vec3(session[k].shown_force), device.shown[k].wrench.force);
+    ASSERT_GE(session[k].begun_ns, static_cast<std::int64_t>(k) * millisecond);
   }
-  EXPECT_EQ(session.ticks[355].fault, static_cast<std::uint8_t>(Fault::device_lost));
-  const ReplayDifference same = replay(session, options);
+  EXPECT_EQ(session[355].fault, static_cast<std::uint8_t>(Fault::device_lost));
+  const ReplayDifference same = replay(options);
   EXPECT_EQ(same.ticks, 450);
   EXPECT_EQ(same.different, 0);
   EXPECT_EQ(same.largest, 0.0);
   EXPECT_EQ(same.first_tick, -1);
 
   options.ramp = 0.1;
-  const ReplayDifference other_ramp = replay(session, options);
+  const ReplayDifference other_ramp = replay(options);
   EXPECT_GT(other_ramp.different, 20);
   EXPECT_GT(other_ramp.largest, 0.0);
   options.ramp = 0.05;
-  EXPECT_GT(replay(session, options, {.radius = 0.012}).different, 100);
+  EXPECT_GT(replay(options, {.radius = 0.012}).different, 100);
+}
+
+// What was proved may be cut off later, or its disk may fail.
+TEST_F(Replay, IsOverWhereTheSessionCannotBeReadAnyMore) {
+  MadeUpDevice device([](const TickTime& tick) { return DeviceNews{.state = pressing(tick)}; });
+  const SafetyOptions options;
+  Safety safety(options);
+  record(device, safety, 2000, true);  // a chunk each 500
+  const RecordingFile session(folder_ / "a.mcap");
+  ReplayDevice cut(session);
+  std::filesystem::resize_file(session.path(), std::filesystem::file_size(session.path()) / 2);
+  const LoopReport report = replay(cut, options);
+  EXPECT_GE(report.ticks, 500);
+  EXPECT_LT(report.ticks, 1500);
+  EXPECT_EQ(report.replay.different, 0);
+  EXPECT_TRUE(cut.failed());
+  EXPECT_THROW(cut.check(), Error);
 }
 
 // Without the clock, so that the ramp ends before the tool touches however busy the machine is.
@@ -240,15 +260,15 @@ TEST_F(Replay, NamesTheFirstTickAndFieldThatDiffer) {
   options.small_force = 1.0;
   options.deadline.most = 1e6;
   Safety safety(options);
-  const Recording session = record(device, safety, 450, true);
+  const std::vector<TickRecord> session = record(device, safety, 450, true);
   options.ramp = 0.1;
-  const ReplayDifference other_ramp = replay(session, options);
+  const ReplayDifference other_ramp = replay(options);
   EXPECT_STREQ(other_ramp.first_field, "phase");  // where the session's ramp ended
   ASSERT_GT(other_ramp.first_tick, 0);
   const auto first = static_cast<std::size_t>(other_ramp.first_tick);
-  EXPECT_NE(session.ticks[first].phase, session.ticks[first - 1].phase);
+  EXPECT_NE(session[first].phase, session[first - 1].phase);
   options.ramp = 0.05;
-  const ReplayDifference other_tool = replay(session, options, {.radius = 0.012});
+  const ReplayDifference other_tool = replay(options, {.radius = 0.012});
   EXPECT_STREQ(other_tool.first_field, "contacts")
       << "a larger tool touches earlier, and is where the device is";
 }

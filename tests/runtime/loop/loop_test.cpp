@@ -20,6 +20,7 @@
 #include "base/error.h"
 #include "formats/recording.h"
 #include "runtime/app/script_device.h"
+#include "tests/support/recorded_ticks.h"
 #include "tests/support/runtime_model.h"
 
 namespace palpate::loop_test {
@@ -281,10 +282,10 @@ TEST_F(RecordedLoop, RecordsWhereItWentOn) {
            {.ticks = 101}, stop_);
   person.join();
   recorder.finish();
-  const Recording recording = read_recording(RecordingFile(folder_ / "paused.mcap"));
-  ASSERT_EQ(recording.ticks.size(), 101U);
+  const auto ticks = test::ticks_of(folder_ / "paused.mcap");
+  ASSERT_EQ(ticks.size(), 101U);
   for (std::size_t k = 0; k < 101; ++k) {
-    const auto event = static_cast<DeviceEvent>(recording.ticks[k].event);
+    const auto event = static_cast<DeviceEvent>(ticks[k].event);
     if (k == 53) continue;  // the pause may end before or after tick 52
     EXPECT_EQ(event, k == 51 || k == 52 ? DeviceEvent::resumed : DeviceEvent::none) << k;
   }
@@ -318,8 +319,8 @@ TEST_F(RecordedLoop, KeepsWhatEachTickGave) {
     run(body_, state, device, true, stop_, &recorder);
     recorder.finish();
   }
-  const Recording recording = read_recording(RecordingFile(folder_ / "slide.mcap"));
-  ASSERT_EQ(recording.ticks.size(), 401U);
+  const auto ticks = test::ticks_of(folder_ / "slide.mcap");
+  ASSERT_EQ(ticks.size(), 401U);
   const auto vector = [](const double(&v)[3]) { return Vec3(v[0], v[1], v[2]); };
   const auto rotation = [](const double(&q)[4]) {
     return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
@@ -329,7 +330,7 @@ TEST_F(RecordedLoop, KeepsWhatEachTickGave) {
     const ToolPose pose = device.pose(k / 1000.0);
     const StepStatus status = step(body_, again, pose);
     const ToolState& tool = again.tools[0];
-    const TickRecord& tick = recording.ticks[static_cast<std::size_t>(k)];
+    const TickRecord& tick = ticks[static_cast<std::size_t>(k)];
     ASSERT_EQ(tick.time, k / 1000.0);
     ASSERT_EQ(vector(tick.device_position), pose.position);
     ASSERT_EQ(rotation(tick.device_orientation), pose.orientation.toRotationMatrix());

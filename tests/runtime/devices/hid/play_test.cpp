@@ -26,6 +26,7 @@
 #include "runtime/safety/safety.h"
 #include "tests/support/devices/emulated_bus.h"
 #include "tests/support/folders.h"
+#include "tests/support/recorded_ticks.h"
 
 namespace palpate::play_test {
 namespace {
@@ -213,7 +214,7 @@ class PlayedDevice : public ::testing::Test {
 
   /// What was recorded up to now, which a checkpoint each half second makes more.
   [[nodiscard]] static std::vector<TickRecord> ticks_until_now() {
-    return fs::exists(session()) ? read_recording(RecordingFile(session())).ticks : std::vector<TickRecord>();
+    return fs::exists(session()) ? palpate::test::ticks_of(session()) : std::vector<TickRecord>();
   }
 
   static void wait_for_the_loop(const Program& runtime) {
@@ -267,10 +268,10 @@ TEST_F(PlayedDevice, ABoardIsFeltAsTheSessionSays) {
   EXPECT_TRUE(says(runtime->messages(), "Home-made board, CAFE:4001 Board (/dev/hidraw0)"));
   EXPECT_TRUE(says(runtime->messages(), "at most 0.5 N and, by the coupling, 600 N/m"));
 
-  const Recording recording = read_recording(RecordingFile(session()));
-  EXPECT_TRUE(says(recording.info.options, "\ncoupling=600\n"));
-  EXPECT_TRUE(says(recording.info.options, "max_force=0.5,"));
-  const auto& ticks = recording.ticks;
+  const std::string options = RecordingFile(session()).info().options;
+  EXPECT_TRUE(says(options, "\ncoupling=600\n"));
+  EXPECT_TRUE(says(options, "max_force=0.5,"));
+  const auto ticks = palpate::test::ticks_of(session());
   ASSERT_GT(ticks.size(), 2500U);
   std::set<std::string> computed;
   std::set<std::uint32_t> heard;
@@ -316,11 +317,11 @@ TEST_F(PlayedDevice, WoodenHapticsIsFeltAsTheSessionSays) {
   EXPECT_TRUE(comes_true([&] { return last_force(*firmware) > 0.4; })) << runtime->messages();
   runtime->signal(SIGINT);
   ASSERT_EQ(runtime->wait(), 130) << runtime->messages();
-  const Recording recording = read_recording(RecordingFile(session()));
+  const auto ticks = palpate::test::ticks_of(session());
   std::set<std::string> computed;
   std::set<std::uint32_t> heard;
   double largest = 0.0;
-  for (const TickRecord& tick : recording.ticks) {
+  for (const TickRecord& tick : ticks) {
     heard.insert(tick.sequence);
     const Vec3 place = vector(tick.handle_position);
     const Vec3 force = vector(tick.shown_force);
@@ -374,13 +375,13 @@ TEST_F(PlayedDevice, UnpluggedInContactAndPluggedInAgain) {
     }
     EXPECT_LE(shown.force.norm(), max_force + quantum);
   }
-  const Recording recording = read_recording(RecordingFile(session()));
+  const auto ticks = palpate::test::ticks_of(session());
   bool was_lost = false;
   bool may_feel = true;
   Vec3 last = Vec3::Zero();
-  std::int64_t begun = recording.ticks.front().begun_ns;
+  std::int64_t begun = ticks.front().begun_ns;
   std::size_t bounded = 0;
-  for (const TickRecord& tick : recording.ticks) {
+  for (const TickRecord& tick : ticks) {
     const Vec3 shown = vector(tick.shown_force);
     const auto events = static_cast<DeviceEvent>(tick.event);
     was_lost = was_lost || has(events, DeviceEvent::lost);
@@ -400,10 +401,10 @@ TEST_F(PlayedDevice, UnpluggedInContactAndPluggedInAgain) {
     last = shown;
   }
   EXPECT_TRUE(was_lost);
-  EXPECT_GT(bounded, recording.ticks.size() / 4);
+  EXPECT_GT(bounded, ticks.size() / 4);
   const auto faulted =
-      std::ranges::find(recording.ticks, static_cast<std::uint8_t>(Fault::device_lost), &TickRecord::fault);
-  EXPECT_NE(faulted, recording.ticks.end());
+      std::ranges::find(ticks, static_cast<std::uint8_t>(Fault::device_lost), &TickRecord::fault);
+  EXPECT_NE(faulted, ticks.end());
 }
 
 TEST_F(PlayedDevice, KilledInContactItLeavesNoForce) {
@@ -450,13 +451,13 @@ TEST_F(PlayedDevice, ASpaceMouseMovesTheToolAndShowsNothing) {
   runtime->signal(SIGINT);
   ASSERT_EQ(runtime->wait(), 130) << runtime->messages();
   EXPECT_TRUE(says(runtime->messages(), "at most 0 N"));
-  const Recording recording = read_recording(RecordingFile(session()));
-  for (const TickRecord& tick : recording.ticks) {
+  const auto ticks = palpate::test::ticks_of(session());
+  for (const TickRecord& tick : ticks) {
     EXPECT_EQ(tick.fault, 0) << tick.time;
     EXPECT_EQ(vector(tick.shown_force), Vec3::Zero());
   }
-  const TickRecord& end = recording.ticks.back();
-  EXPECT_NEAR(recording.ticks.front().device_position[2], 0.13, 1e-12);
+  const TickRecord& end = ticks.back();
+  EXPECT_NEAR(ticks.front().device_position[2], 0.13, 1e-12);
   EXPECT_LT(end.device_position[2], 0.11);
   EXPECT_GT(end.contacts, 0);
   EXPECT_LT(end.force[2], -0.1) << "the tool rests in contact";
@@ -488,9 +489,9 @@ TEST_F(PlayedDevice, AJoystickIsFeltAlsoWhileItRests) {
   const Vec3 felt = firmware->forces().back().force;
   runtime->signal(SIGINT);
   ASSERT_EQ(runtime->wait(), 130) << runtime->messages();
-  const Recording recording = read_recording(RecordingFile(session()));
-  EXPECT_EQ(recording.ticks.back().fault, 0);
-  const Vec3 shown = vector(recording.ticks.back().shown_force);
+  const auto ticks = palpate::test::ticks_of(session());
+  EXPECT_EQ(ticks.back().fault, 0);
+  const Vec3 shown = vector(ticks.back().shown_force);
   EXPECT_GT(shown.y(), 0.3);
   EXPECT_NEAR(felt.y(), shown.y(), 0.05);  // a count is 10 N / 255
   EXPECT_NEAR(felt.x(), shown.x(), 0.05);
