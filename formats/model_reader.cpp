@@ -18,7 +18,7 @@
 #include "formats/dynamics_fields.h"
 #include "formats/hdf5_contents.h"
 #include "formats/hierarchical_fields.h"
-#include "formats/mcap.h"
+#include "formats/mcap/records.h"
 #include "formats/model_check.h"
 #include "formats/model_fields.h"
 #include "formats/model_file.h"

@@ -63,76 +63,58 @@ bool is_loose_triangles(const std::string& text) {
   return words >> head >> corners >> triangles && head == "OFF" && triangles > 0 && corners == 3 * triangles;
 }
 
+struct About {
+  std::string_view name;
+  std::span<const std::string_view> endings;
+};
+
+constexpr std::string_view model_endings[] = {".hdf", ".h5", ".hdf5", ".vtkhdf"},
+                           hdf5_endings[] = {".h5", ".hdf5", ".hdf"}, mcap[] = {".mcap"},
+                           xdmf[] = {".xdmf", ".xmf"}, json[] = {".json"}, csv[] = {".csv"}, vtu[] = {".vtu"},
+                           html[] = {".html", ".htm"}, glb[] = {".glb"}, pvd[] = {".pvd"}, off[] = {".off"};
+
+About about(OutputKind kind) noexcept {
+  switch (kind) {
+    case OutputKind::model:
+      return {"model", model_endings};
+    case OutputKind::recording:
+      return {"recording", mcap};
+    case OutputKind::hdf5:
+      return {"recording as HDF5", hdf5_endings};
+    case OutputKind::frames:
+      return {"description of pictures for ParaView", xdmf};
+    case OutputKind::report:
+      return {"report", json};
+    case OutputKind::contacts:
+      return {"table of contact points", csv};
+    case OutputKind::field:
+      return {"table of displacements", csv};
+    case OutputKind::grid:
+      return {"grid for ParaView", vtu};
+    case OutputKind::page:
+      return {"page", html};
+    case OutputKind::scene:
+      return {"glTF scene", glb};
+    case OutputKind::series:
+      return {"collection for ParaView", pvd};
+    case OutputKind::ticks:
+      return {"table of ticks", csv};
+    case OutputKind::faces:
+      return {"list of triangles", off};
+    case OutputKind::surface:
+      return {"repaired surface", off};
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string_view name_of(OutputKind kind) noexcept {
-  switch (kind) {
-    case OutputKind::model:
-      return "model";
-    case OutputKind::recording:
-      return "recording";
-    case OutputKind::hdf5:
-      return "recording as HDF5";
-    case OutputKind::frames:
-      return "description of pictures for ParaView";
-    case OutputKind::report:
-      return "report";
-    case OutputKind::contacts:
-      return "table of contact points";
-    case OutputKind::field:
-      return "table of displacements";
-    case OutputKind::grid:
-      return "grid for ParaView";
-    case OutputKind::page:
-      return "page";
-    case OutputKind::scene:
-      return "glTF scene";
-    case OutputKind::series:
-      return "collection for ParaView";
-    case OutputKind::ticks:
-      return "table of ticks";
-    case OutputKind::faces:
-      return "list of triangles";
-    case OutputKind::surface:
-      return "repaired surface";
-  }
-  return "";
+  return about(kind).name;
 }
 
 std::span<const std::string_view> endings_of(OutputKind kind) noexcept {
-  static constexpr std::string_view model[] = {".hdf", ".h5", ".hdf5", ".vtkhdf"},
-                                    hdf5[] = {".h5", ".hdf5", ".hdf"}, mcap[] = {".mcap"},
-                                    xdmf[] = {".xdmf", ".xmf"}, json[] = {".json"}, csv[] = {".csv"},
-                                    vtu[] = {".vtu"}, html[] = {".html", ".htm"}, glb[] = {".glb"},
-                                    pvd[] = {".pvd"}, off[] = {".off"};
-  switch (kind) {
-    case OutputKind::model:
-      return model;
-    case OutputKind::hdf5:
-      return hdf5;
-    case OutputKind::recording:
-      return mcap;
-    case OutputKind::frames:
-      return xdmf;
-    case OutputKind::report:
-      return json;
-    case OutputKind::contacts:
-    case OutputKind::field:
-    case OutputKind::ticks:
-      return csv;
-    case OutputKind::grid:
-      return vtu;
-    case OutputKind::page:
-      return html;
-    case OutputKind::scene:
-      return glb;
-    case OutputKind::series:
-      return pvd;
-    case OutputKind::faces:
-    case OutputKind::surface:
-      return off;
-  }
-  return {};
+  return about(kind).endings;
 }
 
 bool needs_regular_file(OutputKind kind) noexcept {

@@ -13,7 +13,8 @@
 #include "base/printable.h"
 #include "base/write_file.h"
 #include "formats/hdf5_contents.h"
-#include "formats/mcap.h"
+#include "formats/mcap/reader.h"
+#include "formats/mcap/writer.h"
 #include "formats/recording_messages.h"
 
 namespace palpate {

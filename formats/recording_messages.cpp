@@ -133,6 +133,21 @@ struct TickReader {
   }
 };
 
+/// A message of these, one after another.
+std::string message_of(const auto&... values) {
+  std::string message;
+  CdrWriter to(message);
+  (to.put(values), ...);
+  return message;
+}
+
+/// Whether a message is these, and nothing else; they are read from it.
+bool is_read(std::string_view message, auto&... values) {
+  CdrReader from(message);
+  (from.get(values), ...);
+  return from.is_whole();
+}
+
 }  // namespace
 
 const std::array<ChannelKind, 6>& channel_kinds() {
@@ -155,14 +170,7 @@ std::string to_message(const TickRecord& tick) {
 }
 
 std::string to_message(const ContactLoads& loads) {
-  std::string message;
-  CdrWriter to(message);
-  to.number(loads.tick);
-  to.number(loads.time);
-  to.numbers<Index>(loads.node);
-  to.numbers<float>(loads.force);
-  to.numbers<float>(loads.press);
-  return message;
+  return message_of(loads.tick, loads.time, loads.node, loads.force, loads.press);
 }
 
 std::string to_message(const SurfaceFrame& frame) {
@@ -170,29 +178,17 @@ std::string to_message(const SurfaceFrame& frame) {
   const auto or_absent = [nodes](const std::vector<float>& values, float absent) {
     return values.empty() ? std::vector<float>(nodes, absent) : values;
   };
-  std::string message;
-  CdrWriter to(message);
-  to.number(frame.tick);
-  to.number(frame.time);
-  to.numbers<float>(frame.displacement);
-  to.numbers<float>(or_absent(frame.von_mises, std::numeric_limits<float>::quiet_NaN()));
-  to.numbers<float>(or_absent(frame.pressure, 0.0F));
-  return message;
+  return message_of(frame.tick, frame.time, frame.displacement,
+                    or_absent(frame.von_mises, std::numeric_limits<float>::quiet_NaN()),
+                    or_absent(frame.pressure, 0.0F));
 }
 
 std::string to_message(const RecordedEvent& event) {
-  std::string message;
-  CdrWriter to(message);
   const double seconds = std::floor(event.time);
-  to.number(static_cast<std::int32_t>(seconds));
-  to.number(static_cast<std::uint32_t>(1e9 * (event.time - seconds)));
-  to.number(log_info);
-  to.text("palpate");
-  to.text(event.text);
-  to.text("");
-  to.text("");
-  to.number(std::uint32_t{0});
-  return message;
+  const std::string nowhere;
+  return message_of(static_cast<std::int32_t>(seconds),
+                    static_cast<std::uint32_t>(1e9 * (event.time - seconds)), log_info,
+                    std::string("palpate"), event.text, nowhere, nowhere, std::uint32_t{0});
 }
 
 std::string to_message(const RecordedSurface& surface) {
@@ -201,13 +197,7 @@ std::string to_message(const RecordedSurface& surface) {
   for (const Vec3& node : surface.nodes) nodes.insert(nodes.end(), node.begin(), node.end());
   std::vector<std::uint8_t> held = surface.held;
   held.resize(surface.nodes.size());
-  std::string message;
-  CdrWriter to(message);
-  to.number(std::int32_t{surface.corners});
-  to.numbers<double>(nodes);
-  to.numbers<Index>(surface.simplices);
-  to.numbers<std::uint8_t>(held);
-  return message;
+  return message_of(std::int32_t{surface.corners}, nodes, surface.simplices, held);
 }
 
 std::string settings_message(std::string_view options) {
@@ -219,11 +209,7 @@ std::string settings_message(std::string_view options) {
     names.emplace_back(line.substr(0, sign));
     values.emplace_back(line.substr(std::min(sign + 1, line.size())));
   }
-  std::string message;
-  CdrWriter to(message);
-  to.texts(names);
-  to.texts(values);
-  return message;
+  return message_of(names, values);
 }
 
 bool from_message(std::string_view message, TickRecord& tick) {
@@ -233,43 +219,27 @@ bool from_message(std::string_view message, TickRecord& tick) {
 }
 
 bool from_message(std::string_view message, ContactLoads& loads) {
-  CdrReader from(message);
-  loads.tick = from.number<std::int64_t>();
-  loads.time = from.number<double>();
-  loads.node = from.numbers<Index>();
-  loads.force = from.numbers<float>();
-  loads.press = from.numbers<float>();
-  return from.is_whole();
+  return is_read(message, loads.tick, loads.time, loads.node, loads.force, loads.press);
 }
 
 bool from_message(std::string_view message, SurfaceFrame& frame) {
-  CdrReader from(message);
-  frame.tick = from.number<std::int64_t>();
-  frame.time = from.number<double>();
-  frame.displacement = from.numbers<float>();
-  frame.von_mises = from.numbers<float>();
-  frame.pressure = from.numbers<float>();
-  return from.is_whole();
+  return is_read(message, frame.tick, frame.time, frame.displacement, frame.von_mises, frame.pressure);
 }
 
 bool from_message(std::string_view message, RecordedSurface& surface) {
-  CdrReader from(message);
-  surface.corners = from.number<std::int32_t>();
-  const std::vector<double> nodes = from.numbers<double>();
-  surface.simplices = from.numbers<Index>();
-  surface.held = from.numbers<std::uint8_t>();
+  std::int32_t corners = 0;
+  std::vector<double> nodes;
+  const bool whole = is_read(message, corners, nodes, surface.simplices, surface.held);
+  surface.corners = corners;
   surface.nodes.clear();
   for (std::size_t k = 0; k + 3 <= nodes.size(); k += 3)
     surface.nodes.emplace_back(nodes[k], nodes[k + 1], nodes[k + 2]);
-  return from.is_whole() && nodes.size() % 3 == 0;
+  return whole && nodes.size() % 3 == 0;
 }
 
 bool from_start(std::string_view start, PictureTime& time) {
   constexpr std::size_t bytes = cdr_head.size() + sizeof time.tick + sizeof time.time;
-  CdrReader from(start.substr(0, bytes));
-  time.tick = from.number<std::int64_t>();
-  time.time = from.number<double>();
-  return from.is_whole();
+  return is_read(start.substr(0, bytes), time.tick, time.time);
 }
 
 }  // namespace palpate

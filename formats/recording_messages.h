@@ -11,6 +11,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "formats/recording.h"
@@ -35,19 +36,23 @@ class CdrWriter {
     text_.append(reinterpret_cast<const char*>(&value), sizeof value);
   }
   template <class T>
-  void numbers(std::span<const T> values) {  ///< with their count
+  requires std::is_arithmetic_v<T>
+  void put(const T& value) { number(value); }
+  template <class T>
+  requires std::is_arithmetic_v<T>
+  void put(const std::vector<T>& values) {  ///< with their count
     number(static_cast<std::uint32_t>(values.size()));
     if (values.empty()) return;
     align(sizeof(T));
-    text_.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+    text_.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
   }
-  void text(std::string_view value) {
-    number(static_cast<std::uint32_t>(value.size() + 1));
-    text_.append(value).push_back('\0');
+  void put(std::string_view text) {
+    number(static_cast<std::uint32_t>(text.size() + 1));
+    text_.append(text).push_back('\0');
   }
-  void texts(std::span<const std::string> values) {
-    number(static_cast<std::uint32_t>(values.size()));
-    for (const std::string& value : values) text(value);
+  void put(const std::vector<std::string>& texts) {
+    number(static_cast<std::uint32_t>(texts.size()));
+    for (const std::string& text : texts) put(text);
   }
 
  private:
@@ -75,14 +80,18 @@ class CdrReader {
     return value;
   }
   template <class T>
-  [[nodiscard]] std::vector<T> numbers() {  ///< with their count
+  void get(T& value) {
+    value = number<T>();
+  }
+  template <class T>
+  void get(std::vector<T>& values) {  ///< with their count
+    values.clear();
     const std::size_t count = number<std::uint32_t>();
-    if (count == 0) return {};
+    if (count == 0) return;
     align(sizeof(T));
     const std::string_view bytes = take(count * sizeof(T));
-    std::vector<T> values(bytes.size() / sizeof(T));
+    values.resize(bytes.size() / sizeof(T));
     if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
-    return values;
   }
 
   /// Whether all that was asked for was there, and nothing else is.

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/write_file.h"
-#include "formats/mcap.h"
+#include "formats/mcap/writer.h"
 #include "formats/recording.h"
 #include "formats/recording_messages.h"
 

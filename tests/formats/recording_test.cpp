@@ -17,7 +17,8 @@
 
 #include "base/error.h"
 #include "formats/hdf5.h"
-#include "formats/mcap.h"
+#include "formats/mcap/reader.h"
+#include "formats/mcap/writer.h"
 #include "formats/recording_messages.h"
 #include "tests/support/formats_sample.h"
 

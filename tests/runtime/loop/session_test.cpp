@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "formats/mcap.h"
+#include "formats/mcap/reader.h"
 #include "formats/recording.h"
 #include "formats/recording_messages.h"
 #include "runtime/background/picture_maker.h"
@@ -357,7 +357,8 @@ std::vector<std::string> events_of(const std::filesystem::path& path) {
       (void)reader.number<std::uint32_t>();
       (void)reader.number<std::uint8_t>();  // level
       for (int k = 0; k < 2; ++k) {         // who says it, and what
-        const std::vector<char> text = reader.numbers<char>();
+        std::vector<char> text;
+        reader.get(text);
         if (k == 1) texts.emplace_back(text.data());
       }
     }
