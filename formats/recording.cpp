@@ -52,7 +52,7 @@ constexpr std::int64_t longest_ns = std::int64_t{1'000'000'000'000'000'000};  //
 constexpr std::int64_t highest_rate = 1'000'000;                              // ticks a second
 constexpr std::uint64_t no_chunk = ~std::uint64_t{0};
 
-/// Says what an HDF5 file is, which recordings were once and models are.
+/// Says what an HDF5 file is: models are, and what is exported of recordings.
 [[noreturn]] void refuse_hdf5(const std::filesystem::path& path) {
   const std::string format = hdf5::Contents::read(path).text_attribute("/", "format").value_or("");
   if (format == "palpate")
@@ -60,9 +60,9 @@ constexpr std::uint64_t no_chunk = ~std::uint64_t{0};
         "is a model, not a recording", path.string(),
         "palpate-runtime play " + shell_word(path.string()) + " --view shows it and lets you push it");
   if (format == "palpate-recording")
-    throw Error("is a recording in HDF5, as versions before the first release made them", path.string(),
-                record_again);
-  throw Error("is not a recording", path.string(), give_another);
+    throw Error("is HDF5, which palpate-runtime export --hdf5 makes of a recording", path.string(),
+                "Give the recording that it was made of, SESSION.mcap");
+  throw Error("is HDF5, and not a recording", path.string(), give_another);
 }
 
 mcap::Layout layout_of(const FileDescriptor& file) {

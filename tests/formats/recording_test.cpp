@@ -822,13 +822,16 @@ TEST(Recording, OtherFilesAreRefused) {
   EXPECT_NE(refusal_of(folder / "none"), "");
   EXPECT_NE(refusal_of(folder.path()), "");
   {
-    hdf5::File old = hdf5::File::create(folder / "old.h5");
-    old.write_attribute("/", "format", "palpate-recording");
-    old.close();
+    hdf5::File exported = hdf5::File::create(folder / "touch.h5");
+    exported.write_attribute("/", "format", "palpate-recording");
+    exported.close();
+    hdf5::File::create(folder / "any.h5").close();
   }
-  const std::string text = refusal_of(folder / "old.h5");
-  EXPECT_NE(text.find("is a recording in HDF5"), std::string::npos) << text;
-  EXPECT_NE(text.find("Record the session again"), std::string::npos) << text;
+  const std::string text = refusal_of(folder / "touch.h5");
+  EXPECT_NE(text.find("is HDF5, which palpate-runtime export --hdf5 makes of a recording"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("Give the recording that it was made of"), std::string::npos) << text;
+  EXPECT_NE(refusal_of(folder / "any.h5").find("is HDF5, and not a recording"), std::string::npos);
   write_bytes(folder / "foreign.mcap", "");
   mcap::Writer foreign(open_file(folder / "foreign.mcap", OpenMode::write), "another program");
   foreign.add(mcap::Metadata{.name = "camera", .values = {{"lens", "35 mm"}}});

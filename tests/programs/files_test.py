@@ -86,7 +86,7 @@ class Recordings(FilesTest):
         old = self.folder / "touch.h5"  # an export says the same of itself
         self.assertEqual(run(RUNTIME, "export", recording, "--hdf5", old).returncode, 0)
         for command in readers(model, old):
-            self.expect_refused(["touch.h5", "is a recording in HDF5"], *command)
+            self.expect_refused(["touch.h5", "is HDF5, which palpate-runtime export --hdf5 makes of a recording", "Give the recording that it was made of"], *command)
 
 
 class NoFiles(FilesTest):
