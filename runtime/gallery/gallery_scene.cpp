@@ -8,6 +8,7 @@
 #include "formats/recording.h"
 #include "meshes/surface.h"
 #include "runtime/gallery/gallery_folder.h"
+#include "runtime/loop/recorded_pictures.h"
 #include "runtime/scene/scene.h"
 #include "runtime/viewer/wire.h"
 
@@ -47,13 +48,18 @@ std::int64_t telling_picture(const RecordingFile& recording) {
   return std::min(after - pictures.begin(), std::ssize(pictures) - 1);
 }
 
-/// Where pictures are computed, at rest: that needs no model.
+/// In the telling picture. At rest where that cannot be computed: its model may be gone.
 RecordedSurface surface_as_pressed(const RecordingFile& file) {
   RecordedSurface surface = file.surface();
   if (file.pictures().empty() || surface.nodes.empty())
     throw Error("has no pictures of the surface", "recording", "record it without --record-frames 0");
-  if (!file.stores_pictures()) return surface;
-  const SurfaceFrame frame = file.frame(telling_picture(file));
+  SurfaceFrame frame;
+  try {
+    frame = RecordedPictures(file).frame(telling_picture(file));
+  } catch (const Error&) {
+    if (file.stores_pictures()) throw;
+    return surface;
+  }
   for (std::size_t i = 0; i < surface.nodes.size(); ++i)
     surface.nodes[i] += Eigen::Map<const Eigen::Vector3f>(frame.displacement.data() + 3 * i).cast<double>();
   return surface;

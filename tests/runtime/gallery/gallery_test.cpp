@@ -3,15 +3,21 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "base/error.h"
 #include "base/regular_file.h"
 #include "formats/model_file.h"
+#include "formats/recording.h"
+#include "runtime/background/picture_maker.h"
+#include "runtime/background/surface_frames.h"
 #include "runtime/gallery/gallery_answers.h"
 #include "runtime/gallery/gallery_folder.h"
 #include "runtime/gallery/gallery_scene.h"
+#include "runtime/loop/loading.h"
+#include "tests/support/folders.h"
 #include "tests/support/formats_sample.h"
 #include "tests/support/meshes_files.h"
 #include "tests/support/viewer_decoder.h"
@@ -297,6 +303,60 @@ TEST(GalleryScene, IsTheSurfaceAtRest) {
         {static_cast<float>(place.x()), static_cast<float>(place.y()), static_cast<float>(place.z())});
   }
   EXPECT_EQ(seen, wanted);
+}
+
+/// Where its picture has the corners of triangles, one after the other.
+std::vector<float> corners_in(const std::filesystem::path& file) {
+  const test::DecodedScene scene = test::decode_scene(gallery_scene(file));
+  std::vector<float> corners;
+  for (const std::uint32_t node : scene.triangle)
+    for (const std::size_t axis : {0U, 1U, 2U}) corners.push_back(scene.position[3 * node + axis]);
+  return corners;
+}
+
+/// The same of a surface that is displaced by so much [S x 3].
+std::vector<float> corners_of(const RecordedSurface& surface, const std::vector<float>& displacement) {
+  std::vector<float> corners;
+  for (const Index node : surface.simplices) {
+    const auto at = static_cast<std::size_t>(node);
+    for (const std::size_t axis : {0U, 1U, 2U})
+      corners.push_back(static_cast<float>(surface.nodes[at][static_cast<Eigen::Index>(axis)] +
+                                           static_cast<double>(displacement[3 * at + axis])));
+  }
+  return corners;
+}
+
+// Pictures are computed, of which the second was felt most.
+TEST(GalleryScene, OfARecordingIsAsItWasPressedMost) {
+  const ScratchFolder folder;
+  const std::filesystem::path model = folder.path() / "cube2.palpate.hdf";
+  std::filesystem::copy_file(test::source_file("tests/golden/cube2/cube2.palpate.hdf"), model);
+  const Body body = load_body(model, "", {});
+  const RecordedSurface surface = recorded_surface(body);
+  const Index node = body.surface_node_of_stored(body.free_surface_nodes().front());
+  const auto pressed = [&](std::int64_t tick, float force) {
+    return ContactLoads{.tick = tick,
+                        .time = 1e-3 * static_cast<double>(tick),
+                        .node = {node},
+                        .force = {0.0F, 0.0F, -force},
+                        .press = {force}};
+  };
+  const std::filesystem::path file = folder.path() / "a.mcap";
+  RecordingWriter writer(
+      file, {model.string(), body.model().content_hash, "script", 1000, "tool=sphere:0.1\n"}, surface);
+  for (const std::int64_t tick : {0, 1, 2}) {
+    const float force = tick == 1 ? 0.02F : 0.01F;
+    writer.append(TickRecord{.time = 1e-3 * static_cast<double>(tick), .force = {0, 0, -force}});
+    writer.append(pressed(tick, force));
+  }
+  writer.finish();
+
+  const SurfaceFrame picture = PictureMaker(body).picture(pressed(1, 0.02F));
+  EXPECT_LT(std::ranges::min(picture.displacement), -1e-4F);
+  EXPECT_EQ(corners_in(file), corners_of(surface, picture.displacement));
+
+  std::filesystem::remove(model);
+  EXPECT_EQ(corners_in(file), corners_of(surface, std::vector<float>(picture.displacement.size())));
 }
 
 TEST(GalleryScene, OfASourceThereIsNone) {
