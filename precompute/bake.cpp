@@ -637,7 +637,8 @@ class Bake {
 };
 
 MeshedBody Bake::mesh() {
-  MeshedBody body = mesh_body(description_, [&](const std::string& text) { progress_.begin(text); });
+  MeshedBody body = mesh_body(
+      description_, [&](const std::string& text) { progress_.begin(text); }, options_.keep);
   for (const std::string& note : body.notes) progress_.line("note: " + note);
   if (!can_seal() && !input_files(description_).empty())
     progress_.line(

@@ -81,9 +81,11 @@ void check_draft_options(const std::string& model, const DraftArguments& argumen
       "they are for a surface, an image or a picture, and '" + model + "' is none by its name");
 }
 
-std::string described(const std::string& model, const DraftArguments& arguments) {
+std::string described(const std::string& model, const DraftArguments& arguments, bool keep) {
   if (!shape_kind(model)) return model;
-  return draft(model, options_of(arguments), arguments.given(), tell).string();
+  DraftOptions options = options_of(arguments);
+  options.keep = keep;
+  return draft(model, options, arguments.given(), tell).string();
 }
 
 int run_new(const std::string& file, const DraftArguments& arguments) {

@@ -29,8 +29,8 @@ CLI::App* add_new(CLI::App& app, std::string& file, DraftArguments& arguments);
 void check_draft_options(const std::string& model, const DraftArguments& arguments);
 
 /// A description of `model`: itself, or where it is a surface or an image the one that is drafted beside it,
-/// with each decision told on the error stream. Throws Error.
-std::string described(const std::string& model, const DraftArguments& arguments);
+/// with each decision told on the error stream; with `keep` no file that is there is replaced. Throws Error.
+std::string described(const std::string& model, const DraftArguments& arguments, bool keep);
 
 /// `new`: asks on the terminal or takes answers from a pipe, and names the next step. Returns the exit
 /// status; throws Error.

@@ -53,23 +53,42 @@ void use_existing(const std::filesystem::path& file, const std::filesystem::path
     tell("note: " + printable(file.string()) + " is newer: --renew takes it into account");
 }
 
-/// Writes the surface that a shape has been repaired to beside it, where it was.
-std::filesystem::path write_repaired(const std::filesystem::path& file, const Shape& shape) {
-  if (shape.repaired.triangles.empty()) return file;
-  OutputPaths outputs;
-  outputs.add_input(file, "the surface");
-  const std::filesystem::path path = outputs.add(file.parent_path() / (shape_name(file) + ".repaired.off"),
-                                                 OutputKind::surface, "the repaired surface");
-  std::string text = off_text(shape.repaired);
-  text.insert(text.find('\n') + 1, std::string(repaired_mark));
-  write_file(path, text);
-  return path;
-}
+/// The surface that a shape has been repaired to, in a file beside it.
+class RepairedFile {
+ public:
+  RepairedFile(std::filesystem::path file, bool keep) : file_(std::move(file)), keep_(keep) {}
+
+  /// Returns where it is: in the shape's own file where nothing was repaired.
+  std::filesystem::path write(const Shape& shape) {
+    if (shape.repaired.triangles.empty()) return file_;
+    std::string text = off_text(shape.repaired);
+    text.insert(text.find('\n') + 1, std::string(repaired_mark));
+    const auto write = path_.empty() && keep_ ? write_new_file : write_file;
+    if (path_.empty()) path_ = free_path();
+    write(path_, text);
+    return path_;
+  }
+
+ private:
+  [[nodiscard]] std::filesystem::path free_path() const {
+    const std::string stem = (file_.parent_path() / (shape_name(file_) + ".repaired")).string();
+    std::filesystem::path path = stem + ".off";
+    for (int k = 2; keep_ && std::filesystem::exists(std::filesystem::symlink_status(path)); ++k)
+      path = fmt::format("{}-{}.off", stem, k);
+    OutputPaths outputs({}, keep_);
+    outputs.add_input(file_, "the surface");
+    return outputs.add(path, OutputKind::surface, "the repaired surface");
+  }
+
+  std::filesystem::path file_, path_;
+  bool keep_;
+};
 
 /// Some surfaces intersect themselves once they have the edge length of the mesh, where they are thinner than
 /// that. These are wrapped, ever more thickly, until they do not; the last wrapping is taken as it is.
-std::filesystem::path make_meshable(const std::filesystem::path& file, double edge, Shape& shape) {
-  std::filesystem::path path = write_repaired(file, shape);
+std::filesystem::path make_meshable(const std::filesystem::path& file, double edge, bool keep, Shape& shape) {
+  RepairedFile repaired(file, keep);
+  std::filesystem::path path = repaired.write(shape);
   std::vector<std::string> notes;
   const TriangleSurface surface = read_surface(path, notes);
   std::string problem = remesh_surface(path, surface, edge).problem;
@@ -77,7 +96,7 @@ std::filesystem::path make_meshable(const std::filesystem::path& file, double ed
   const std::string why = "with the edge length of the mesh it " + problem.substr(0, problem.find(':'));
   for (const double offset : wrap_offsets) {
     shape.repaired = wrapped_surface(surface, edge, offset, file.string());
-    path = write_repaired(file, shape);
+    path = repaired.write(shape);
     problem = remesh_surface(path, shape.repaired, edge).problem;
     if (!problem.empty() && offset != wrap_offsets.back()) continue;
     shape.remesh = problem.empty();
@@ -199,7 +218,8 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
   if (shape.kind == ShapeKind::surface) {
     const std::size_t told = shape.repairs.size();
     const double edge = edge_for_nodes(shape.boundary, options.shape.nodes_of(shape.kind));
-    const std::filesystem::path surface = options.shape.strict ? file : make_meshable(file, edge, shape);
+    const std::filesystem::path surface =
+        options.shape.strict ? file : make_meshable(file, edge, options.keep, shape);
     for (std::size_t i = told; i < shape.repairs.size(); ++i) tell("repaired: " + shape.repairs[i]);
     if (surface != file) {
       repaired = surface.filename().string();

@@ -29,6 +29,7 @@ struct DraftOptions {
   ShapeOptions shape{};
   std::optional<LengthUnit> unit{};     ///< empty: guessed
   bool renew = false;                   ///< a description that is there is written anew
+  bool keep = false;                    ///< else no file that is there is replaced
   std::optional<DraftValues> values{};  ///< empty: the usual ones of the kind
 };
 
@@ -47,9 +48,10 @@ std::string draft_text(const std::filesystem::path& file, const std::string& rep
                        const UnitGuess& unit, const DraftOptions& options);
 
 /// Writes the description of a shape beside it, and a surface that was repaired as
-/// NAME.repaired.off, and returns the description's file. A description that is there already is used as it
-/// is; each decision is told. Throws Error for a file that cannot be used, for options that would change a
-/// description that is there, unless `renew`, and where it cannot be written.
+/// NAME.repaired.off (with `keep` NAME.repaired-2.off where that is there, and so on), and returns the
+/// description's file. A description that is there already is used as it is; each decision is told. Throws
+/// Error for a file that cannot be used, for options that would change a description that is there, unless
+/// `renew`, and where it cannot be written.
 std::filesystem::path draft(const std::filesystem::path& file, const DraftOptions& options, bool has_options,
                             const Tell& tell);
 

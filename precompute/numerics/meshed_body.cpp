@@ -39,12 +39,13 @@ struct MeshGeometry {
   const std::string& where;
   const ProgressText& progress;
   std::vector<std::string>& notes;
+  bool keep;  ///< files that are there
 
   [[nodiscard]] const char* mesher() const { return options.mesher == Mesher::cgal ? "CGAL" : "TetGen"; }
 
   Mesh operator()(const SurfaceGeometry& surface) const {
     progress("reading the surface " + surface.file.filename().string());
-    TriangleSurface triangles = read_surface(surface.file, notes);
+    TriangleSurface triangles = read_surface(surface.file, notes, keep);
     if (options.mesher == Mesher::cgal || (options.remesh && !remesh(surface.file, triangles))) {
       progress("meshing with CGAL");
       return mesh_surface_with_cgal(triangles, options, where);
@@ -191,14 +192,14 @@ void note_middles(const Description& description, MeshedBody& body) {
 
 }  // namespace
 
-MeshedBody mesh_body(const Description& description, const ProgressText& progress) {
+MeshedBody mesh_body(const Description& description, const ProgressText& progress, bool keep) {
   MeshedBody body;
   const std::string toml = description.file.string();
   const std::filesystem::path file = geometry_file(description.geometry);
   const std::string where = file.empty() ? toml : file.string();
   const MeshOptions options = in_file_units(description.mesh, description.scale);
-  body.mesh =
-      std::visit(MeshGeometry{options, description.scale, where, progress, body.notes}, description.geometry);
+  body.mesh = std::visit(MeshGeometry{options, description.scale, where, progress, body.notes, keep},
+                         description.geometry);
   for (Vec3& x : body.mesh.nodes) {
     x *= description.scale;
   }

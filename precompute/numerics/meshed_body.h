@@ -28,8 +28,8 @@ struct MeshedBody {
 using ProgressText = std::function<void(const std::string&)>;
 
 /// Reads or generates the geometry, meshes it, scales to metres and checks it. Throws Error for every kind of
-/// bad input.
-MeshedBody mesh_body(const Description& description, const ProgressText& progress);
+/// bad input; with `keep` triangles that intersect are not written over a file that is there.
+MeshedBody mesh_body(const Description& description, const ProgressText& progress, bool keep = false);
 
 /// The files besides model.toml that the body is made from (two for a TetGen mesh, none for a generated
 /// body), for noticing that a baked model is stale.

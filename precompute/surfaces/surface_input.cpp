@@ -189,7 +189,7 @@ std::vector<Corners> corners_of(const SurfaceMesh& mesh, const std::vector<FaceP
 }
 
 /// Nothing where they may not or cannot be written: the mistake is told all the same.
-std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const std::string& stem) {
+std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const std::string& stem, bool keep) {
   std::ostringstream out;
   out.imbue(std::locale::classic());
   out.precision(17);
@@ -204,8 +204,8 @@ std::filesystem::path write_bad_faces(const std::vector<Corners>& faces, const s
   }
   try {
     const std::filesystem::path file =
-        OutputPaths().add(stem + ".bad-faces.off", OutputKind::faces, "self-intersections");
-    write_file(file, out.str());
+        OutputPaths({}, keep).add(stem + ".bad-faces.off", OutputKind::faces, "self-intersections");
+    (keep ? write_new_file : write_file)(file, out.str());
     return file;
   } catch (const Error&) {
     return {};
@@ -320,7 +320,7 @@ std::string bytes_of(const std::filesystem::path& file) {
 
 }  // namespace
 
-TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes) {
+TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes, bool keep) {
   const std::string bytes = bytes_of(file);
   Answer answer = read_in_child(bytes, file, reading_limits(std::ssize(bytes)),
                                 "repair the surface in a mesh editor, or export it again",
@@ -329,7 +329,8 @@ TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std:
                                   into.surface = surface_of(mesh);
                                 });
   if (!answer.crossings.problem.empty()) {
-    const std::filesystem::path bad_faces = write_bad_faces(answer.crossings.triangles, file.stem().string());
+    const std::filesystem::path bad_faces =
+        write_bad_faces(answer.crossings.triangles, file.stem().string(), keep);
     throw Error("the surface " + answer.crossings.problem, file.string(),
                 bad_faces.empty()
                     ? "repair it in a mesh editor"

@@ -21,9 +21,10 @@ struct TriangleSurface {
 /// Reads OFF, OBJ, STL (ASCII and binary) or PLY by the file's extension, splits polygons into triangles and
 /// turns triangles outwards. Repairs are told in `notes`. Throws Error with the coordinates when the surface
 /// is open, not manifold, flat, in several parts, or intersects itself; the intersecting triangles are then
-/// written to NAME.bad-faces.off in the working directory. File and surface are read by foreign code in a
-/// child process, which has the limits of reading_limits.
-TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes);
+/// written to NAME.bad-faces.off in the working directory, with `keep` only where nothing has that name.
+/// File and surface are read by foreign code in a child process, which has the limits of reading_limits.
+TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes,
+                             bool keep = false);
 
 /// A remeshed surface, or what is wrong with it.
 struct Remeshing {

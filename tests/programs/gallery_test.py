@@ -147,6 +147,22 @@ class Drops(GalleryTest):
         self.assertIn("foreign.palpate.hdf: is there already, and is kept", "\n".join(state["said"]))
         self.assertEqual((self.at / "foreign.palpate.hdf").read_bytes(), theirs)
 
+    def test_what_is_made_beside_a_source_replaces_nothing(self):
+        (self.at / "open.off").write_text(BOX.replace("8 12 0", "8 11 0").replace("3 0 7 3\n", ""))
+        crossed = BOX.replace("100 60 40", "-50 -50 20")
+        (self.at / "cross.off").write_text(crossed)
+        model = cube_toml(2, name="cross")
+        (self.at / "cross.model.toml").write_text(re.sub(r"(?m)^box = .*$", 'surface = "cross.off"', model))
+        earlier = {"open.repaired.off": "OFF\n# repaired by palpate-precompute\n" + BOX[4:],
+                   "cross.bad-faces.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"}
+        for name, text in earlier.items():
+            (self.at / name).write_text(text)
+        self.assertIsNotNone(self.opened("open.off")["page"])
+        self.assertIn("intersects itself", "\n".join(self.opened("cross.model.toml")["said"]))
+        for name, text in earlier.items():
+            self.assertEqual((self.at / name).read_text(), text, name)
+        self.assertIn('"open.repaired-2.off"', (self.at / "open.model.toml").read_text())
+
     def test_what_comes_while_a_body_is_made_is_kept(self):
         """The name is free when the bake begins, and taken when it writes."""
         (self.at / "slow.model.toml").write_text(cube_toml(9, name="slow"))

@@ -83,6 +83,22 @@ TEST_F(DraftTest, SaysWhatItDecided) {
   EXPECT_EQ(description.fixed.size(), 1U);
 }
 
+TEST_F(DraftTest, KeptFilesAreNotReplacedByARepairedSurface) {
+  DraftOptions options = {.shape = {.nodes = 300}};
+  const std::filesystem::path surface = open_ball("organ.off");
+  const std::filesystem::path first = folder_.path() / "organ.repaired.off";
+  draft(surface, options, false, tell());
+  const std::string earlier = text_of(first) + "\n";
+  std::ofstream(first) << earlier;  // of Palpate's, by its mark
+  std::filesystem::remove(draft_file(surface));
+  options.keep = true;
+  const std::filesystem::path second = folder_.path() / "organ.repaired-2.off";
+  EXPECT_EQ(std::get<SurfaceGeometry>(read_description(draft(surface, options, false, tell())).geometry).file,
+            second);
+  EXPECT_TRUE(std::filesystem::exists(second));
+  EXPECT_EQ(text_of(first), earlier);
+}
+
 TEST_F(DraftTest, WholeSurfaceIsUsedItself) {
   const std::filesystem::path file =
       draft(folder_.write("box.off", off(cube(100.0))), {.shape = {.nodes = 300}}, false, tell());

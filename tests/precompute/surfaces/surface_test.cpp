@@ -183,7 +183,12 @@ TEST_F(SurfaceInput, SelfIntersection) {
   EXPECT_EQ(mine, "mine");
   std::filesystem::remove("bad.bad-faces.off");
   expect_mentions(error(surface), {"bad.bad-faces.off"});
+  std::ofstream("bad.bad-faces.off", std::ios::app) << "\n";
+  const auto kept = std::filesystem::file_size("bad.bad-faces.off");
+  error_of([&] { read_surface("bad.off", notes_, true); });
+  EXPECT_EQ(std::filesystem::file_size("bad.bad-faces.off"), kept);
   const std::string text = error(surface);  // over its own
+  EXPECT_LT(std::filesystem::file_size("bad.bad-faces.off"), kept);
   std::filesystem::current_path(before);
   expect_mentions(text, {"intersects itself", "pair(s) of triangles", "near (", "bad.bad-faces.off"});
 
