@@ -33,6 +33,7 @@ std::int64_t left_in_system(int socket) {
 IgtlClient::IgtlClient(asio::ip::tcp::socket socket, IgtlBroadcast& broadcast)
     : socket_(std::move(socket)), broadcast_(broadcast), way_{0, Clock::now()}, pace_(way_) {
   error_code ignored;  // it does without
+  address_ = socket_.remote_endpoint(ignored).address();
   socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
   socket_.set_option(asio::socket_base::send_buffer_size(send_room), ignored);
 }

@@ -31,6 +31,8 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   [[nodiscard]] bool is_lost() const noexcept { return is_gone_; }
   /// How long something that it was sent has been on its way, at least.
   [[nodiscard]] Clock::duration lag(Clock::time_point now) const;
+  /// Where it is.
+  [[nodiscard]] const boost::asio::ip::address& address() const noexcept { return address_; }
   /// It has been sent all there is.
   [[nodiscard]] bool is_served() const;
   /// No call comes back to it afterwards.
@@ -40,6 +42,7 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   void take_sent(const boost::system::error_code& problem);
 
   boost::asio::ip::tcp::socket socket_;
+  boost::asio::ip::address address_;
   IgtlBroadcast& broadcast_;
   std::int64_t pictures_ = 0;  // sent, of those of the broadcast
   std::int64_t surfaces_ = 0;

@@ -10,8 +10,10 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <iterator>
 #include <mutex>
 #include <optional>
+#include <ranges>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -51,7 +53,7 @@ struct IgtlServer::Impl {
   void work();
   void take_mail();
   void drop_lost(Clock::time_point now);
-  bool make_room(Clock::time_point now);
+  void make_room(Clock::time_point now);
   [[nodiscard]] bool is_over(Clock::time_point now) const;
 
   // What is shown, by any thread.
@@ -74,10 +76,9 @@ void IgtlServer::Impl::accept() {
   acceptor.async_accept([this](const error_code& problem, tcp::socket socket) {
     accept_failed = problem.failed();  // no file is left for a connection: at the next tick there may be
     if (problem) return;
-    if (clients.size() < most_igtl_clients || make_room(Clock::now())) {
-      clients.push_back(std::make_shared<IgtlClient>(std::move(socket), broadcast));
-      clients.back()->send_news();
-    }
+    clients.push_back(std::make_shared<IgtlClient>(std::move(socket), broadcast));
+    if (clients.size() > most_igtl_clients) make_room(Clock::now());
+    clients.back()->send_news();
     accept();
   });
 }
@@ -112,14 +113,23 @@ void IgtlServer::Impl::drop_lost(Clock::time_point now) {
   });
 }
 
-/// Cuts the client that is slowest to take what it is sent. False where none is slow.
-bool IgtlServer::Impl::make_room(Clock::time_point now) {
-  const auto slowest =
-      std::ranges::max_element(clients, {}, [now](const auto& client) { return client->lag(now); });
-  if ((*slowest)->lag(now) < long_lag) return false;
-  (*slowest)->cut();
-  clients.erase(slowest);
-  return true;
+/// Cuts the client that is slowest to take what it is sent. Where none is slow, it is the newest before the
+/// last of the address that has most, so that nobody keeps the others out, and who has watched long stays.
+void IgtlServer::Impl::make_room(Clock::time_point now) {
+  auto out = std::ranges::max_element(clients, {}, [now](const auto& client) { return client->lag(now); });
+  if ((*out)->lag(now) < long_lag) {
+    const auto places = [this](const auto& client) {
+      return std::ranges::count(clients, client->address(), &IgtlClient::address);
+    };
+    const auto newest_first = std::views::reverse(clients);
+    const auto& most =
+        (*std::ranges::max_element(newest_first, {}, places))->address();  // a tie: the last one's
+    const auto newest =
+        std::ranges::find(newest_first.begin() + 1, newest_first.end(), most, &IgtlClient::address);
+    out = newest == newest_first.end() ? std::prev(clients.end()) : std::prev(newest.base());
+  }
+  (*out)->cut();
+  clients.erase(out);
 }
 
 bool IgtlServer::Impl::is_over(Clock::time_point now) const {

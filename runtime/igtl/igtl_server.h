@@ -12,9 +12,10 @@ namespace palpate {
 constexpr std::size_t most_igtl_clients = 8;
 
 /// Sends surface, tool and force to all clients, from a thread of its own. For one more than
-/// `most_igtl_clients` that which is slowest to take what it is sent is cut; where none is slow, the new one
-/// is turned away. Asks nothing and obeys nothing. The `show` functions may be called by any thread; they
-/// never wait for a client.
+/// `most_igtl_clients` that which is slowest to take what it is sent is cut; where none is slow, the newest
+/// of the address with the most connections, the new one counted, gives way to it: where each has only one,
+/// the new one is turned away. Asks nothing and obeys nothing. The `show` functions may be called by any
+/// thread; they never wait for a client.
 class IgtlServer {
  public:
   /// Serves who waits at the socket and who comes later.

@@ -2,6 +2,7 @@
 #include "runtime/igtl/igtl_server.h"
 
 #include <gtest/gtest.h>
+#include <igtlImageMessage.h>
 #include <igtlPolyDataMessage.h>
 #include <igtlStringMessage.h>
 #include <igtlTransformMessage.h>
@@ -24,6 +25,29 @@ namespace palpate::igtl_server_test {
 namespace {
 
 using test::IgtlReader;
+
+/// A client at an address of its own of the loopback's.
+class MachineReader {
+ public:
+  MachineReader(int port, const std::string& address) {
+    namespace asio = boost::asio;
+    socket_.open(asio::ip::tcp::v4());
+    socket_.bind({asio::ip::make_address(address), 0});
+    socket_.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(port)});
+  }
+
+  /// It is sent something.
+  bool is_served() {
+    std::array<char, 58> header{};
+    boost::system::error_code problem;
+    boost::asio::read(socket_, boost::asio::buffer(header), problem);
+    return !problem;
+  }
+
+ private:
+  boost::asio::io_context context_;
+  boost::asio::ip::tcp::socket socket_{context_};
+};
 
 /// A server of a small body, and pictures of which each is a second later.
 class IgtlServing : public testing::Test {
@@ -97,18 +121,35 @@ TEST_F(IgtlServing, ThePictureOfTheEndIsSent) {
   EXPECT_NEAR(time, 1.001, 1e-9);
 }
 
-TEST_F(IgtlServing, EightClientsAtOnceAndNoMore) {
+TEST_F(IgtlServing, OfEightOfOneMachineTheNewestGivesWay) {
   static_assert(most_igtl_clients == 8);
   std::vector<std::unique_ptr<IgtlReader>> clients;
   for (std::size_t k = 0; k < most_igtl_clients; ++k) {
     clients.push_back(std::make_unique<IgtlReader>(port_));
     expect_served(*clients.back());
   }
-  IgtlReader another(port_);
+  IgtlReader own(port_);
+  expect_served(own);
+  MachineReader other(port_, "127.0.0.2");
   show();
-  EXPECT_EQ(another.read(), "") << "it is turned away";
-  for (const auto& client : clients) expect_served(*client);
+  EXPECT_TRUE(other.is_served());
+  for (IgtlReader* const gone : {clients.back().get(), &own})
+    EXPECT_FALSE(gone->next<igtl::ImageMessage>()) << "it ends";
   clients.pop_back();
+  for (const auto& client : clients) expect_served(*client);
+  EXPECT_TRUE(other.is_served());
+}
+
+TEST_F(IgtlServing, EachOfEightMachinesKeepsItsPlace) {
+  show();
+  std::vector<std::unique_ptr<MachineReader>> machines;
+  for (std::size_t k = 0; k < most_igtl_clients; ++k) {
+    machines.push_back(std::make_unique<MachineReader>(port_, "127.0.0." + std::to_string(k + 2)));
+    EXPECT_TRUE(machines.back()->is_served());
+  }
+  IgtlReader another(port_);
+  EXPECT_EQ(another.read(), "") << "it is turned away";
+  machines.pop_back();
   for (int attempt = 0; attempt < 500;
        ++attempt) {  // one is gone, which the server sees with nothing to send
     IgtlReader later(port_);
