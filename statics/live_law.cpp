@@ -185,7 +185,8 @@ void condense_across(PointTangent& C) noexcept {
 
 void make_positive(const LawConstants& c, PointTangent& C) noexcept {
   const PointTangent shifted = C + 1e-9 * c.mu * PointTangent::Identity();
-  if (Eigen::LLT<PointTangent>(shifted).info() == Eigen::Success) return;
+  // of the upper half: GCC 14 sees the lower one's norm read past its end
+  if (Eigen::LLT<PointTangent, Eigen::Upper>(shifted).info() == Eigen::Success) return;
   const Eigen::SelfAdjointEigenSolver<PointTangent> eigen(C);
   C = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
       eigen.eigenvectors().transpose();

@@ -16,8 +16,8 @@ set(palpate_dear
   viewer_browser_beside                          "a recording stands beside a body"
   viewer_browser_pages                           "one steers"
   viewer_browser_gallery                         "what cannot be opened"
-  viewer_browser_run                             "a recording|the page comes whole"
-  viewer_browser_press                           "a click is felt|fingers press too"
+  viewer_browser_run                             "a recording begins|the page comes whole"
+  viewer_browser_press                           "a click is felt"
   # Thousands of damaged files, each of which is opened in a child.
   formats_test.Seeds/FlippedBits                 AreRefusedOrInSlackSpace/1
   formats_test.Recording                         IsReadInAnyOrder,ThatIsNotFinishedHoldsEachCheckpoint,IsRefusedWhereABitOfAChunkIsFlipped,SurvivesBeingKilledAtAnyMoment
@@ -30,15 +30,18 @@ set(palpate_dear
   programs_build_flags_test.BuildFlags           test_presets_are_for_this_processor_and_those_of_tests_refuse_warnings
   programs_bindings_test.Clients                 test_feel_the_same_to_the_last_bit
   programs_library_test.Library                  test_found_by_cmake,test_header_is_c99_and_cpp
+  book_run_notebooks_test.Kernel                 -
   programs_wheel_test.Wheel                      test_a_folder_without_a_build_is_refused
   # Devices that stall, by the clock.
   devices_faults_test.All/Faults                 StayWithinTheClamps/read_error,StayWithinTheClamps/garbage
+  devices_play_test                              ABoardIsFeltAsTheSessionSays,KilledInContactItLeavesNoForce
   programs_device_test.Felt                      test_the_hand_rests_where_its_spring_and_the_body_balance,test_a_killed_session_opens_and_its_replay_is_the_same_bit_by_bit
   # Bodies that are baked or pressed for long.
   programs_bake_test.Models                      test_the_nodule_is_made_of_two_materials
   programs_bake_test.Stopped                     test_interrupt_keeps_what_is_done_and_the_old_file_whole
   programs_live_test.Live                        test_equal_runs_are_equal_and_replay_to_the_bit
   programs_hertz_test.Hertz                      test_a_shallow_press_is_not_held_out_by_edges
+  programs_limits_test.Starved                   test_runtime_in_little_address_space,test_stacks_of_openmp
   programs_gallery_test.Drops                    test_a_drop_replaces_no_body
   programs_surfaces_test.Bodies                  test_open_box_has_the_force_of_a_closed_one,test_missing_and_damaged_files
   programs_runtime_test.Tools                    test_a_sphere_is_pushed_out_where_it_touches,test_friction

@@ -103,7 +103,7 @@ class Room(ProgramTest):
         (self.folder / "black.png").write_bytes(png(9000, bytes(1125)))
         self.assert_refused_early(self.plan('picture = "black.png"\nscale = 1', mesh, head), "the picture has no body")
         (self.folder / "half.png").write_bytes(png(9000, bytes(500) + bytes([255]) * 200 + bytes(425)))
-        self.assert_refused_early(self.plan('picture = "half.png"\nscale = 1', mesh, head, memory=1000), "9000 x 9000 pixels", "1.3 GB", "scale it down")
+        self.assert_refused_early(self.plan('picture = "half.png"\nscale = 1', mesh, head, memory=1000), "9000 x 9000 pixels", "1.3 GB", "Scale it down")
 
 
 class Starved(ProgramTest):

@@ -129,9 +129,8 @@ TEST_F(Picture, DarkIsTheOtherSide) {
     const std::filesystem::path path = folder_.write("drawn", drawn);
     EXPECT_EQ(read_picture({path, true}).inside, (std::vector<std::uint8_t>{1, 0, 0, 1, 0, 0}));
   }
-  EXPECT_EQ(pixels(read_picture(
-                {folder_.write("nothing", file(PNG_FORMAT_GA, Bytes("\0\xff", 2), Bytes("\0\0", 2)))})),
-            0);
+  const Bytes nothing = file(PNG_FORMAT_GA, Bytes("\0\xff", 2), Bytes("\0\0", 2));
+  EXPECT_THROW((void)read_picture({folder_.write("nothing", nothing)}), Error);
 }
 
 TEST_F(Picture, CornersStay) {
