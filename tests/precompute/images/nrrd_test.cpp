@@ -241,7 +241,7 @@ TEST_F(NrrdImage, VoxelsInAnotherFileAreRefused) {
        {"data file: ", "Data File: ", "DATA FILE: ", "datafile: ", "DataFile: ", "DATAFILE: ", "data  file: ",
         " data file: ", "data file : ", "data_file: ", "data-file: ", "data file:\t", "Data File:"})
     for (const std::string& file : {other, std::string("/etc/passwd"), std::string("LIST"),
-                                   std::string("LIST 3"), std::string("slice%03d.raw 1 9 1")})
+                                    std::string("LIST 3"), std::string("slice%03d.raw 1 9 1")})
       for (const char* const encoding : {"raw", "gzip", "gz", "hex", "ascii", "txt", "bzip2"}) {
         Layout detached;
         detached.before = field + file + "\n" + (file == other ? "" : "byte skip: -1\n");
