@@ -79,10 +79,10 @@ void take_blas_room(int threads) {
   if (!free) return;
   if (*free < needed(threads))
     throw Error(
-        fmt::format("{} thread{} of linear algebra need{} {:.2f} GB of address space, {:.2f} GB are left "
+        fmt::format("{} thread{} of linear algebra need{} {:.0f} MB of address space, {:.0f} MB are left "
                     "by its limit",
                     threads, threads == 1 ? "" : "s", threads == 1 ? "s" : "",
-                    static_cast<double>(needed(threads)) / 1e9, static_cast<double>(*free) / 1e9),
+                    static_cast<double>(needed(threads)) / 1e6, static_cast<double>(*free) / 1e6),
         "memory", std::string("Raise the limit (ulimit -v)") + (threads > 1 ? ", or use fewer --jobs" : ""));
   // OpenBLAS's own, which keeps for later what is given back; other libraries of BLAS have none
   const auto take = reinterpret_cast<void* (*)(int)>(::dlsym(RTLD_DEFAULT, "blas_memory_alloc"));
