@@ -4,9 +4,11 @@
 
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "base/error.h"
+#include "base/json_text.h"
 #include "base/printable.h"
 #include "base/toml_text.h"
 #include "base/write_file.h"
@@ -51,6 +53,14 @@ void use_existing(const std::filesystem::path& file, const std::filesystem::path
   const auto shape_time = std::filesystem::last_write_time(file, failed);
   if (!failed && shape_time > std::filesystem::last_write_time(description, failed) && !failed)
     tell("note: " + printable(file.string()) + " is newer: --renew takes it into account");
+}
+
+/// The description names it.
+void expect_utf8_name(const std::filesystem::path& file) {
+  const nlohmann::json name = file.filename().string();
+  if (nlohmann::json::parse(json_text(name)) != name)
+    throw Error("its name is not UTF-8, and a description in TOML cannot have it", file.string(),
+                "rename the file");
 }
 
 /// The surface that a shape has been repaired to, in a file beside it.
@@ -209,6 +219,7 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
     use_existing(file, description, has_options, tell);
     return description;
   }
+  expect_utf8_name(file);
   expect_writable_folder(description);
   Shape shape = read_shape(file, options.shape);
   for (const std::string& repair : shape.repairs) tell("repaired: " + repair);

@@ -144,6 +144,13 @@ TEST_F(DraftTest, NamesAreWrittenAsTomlWantsThem) {
   EXPECT_EQ(read_description(file).name, "an \"organ\" of\\mine");
 }
 
+TEST_F(DraftTest, NamesThatAreNotUtf8AreRefused) {
+  const std::filesystem::path file = folder_.write("K\xF6rper.off", off(cube(100.0)));
+  expect_mentions(error_of([&] { draft(file, {.shape = {.nodes = 300}}, false, tell()); }),
+                  {"is not UTF-8", "rename the file"});
+  EXPECT_FALSE(std::filesystem::exists(draft_file(file)));
+}
+
 /// A disc of radius 40 in a picture of 100 x 120 pixels, as a plain PBM: '1' is black.
 std::string disc(bool is_dark) {
   std::string text = "P1\n100 120\n";
