@@ -3,6 +3,7 @@
 #include <linux/sockios.h>
 #include <sys/ioctl.h>
 
+#include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/write.hpp>
 #include <utility>
@@ -14,9 +15,9 @@ namespace asio = boost::asio;
 using boost::system::error_code;
 
 constexpr auto pace_time = std::chrono::seconds(5);
-constexpr std::int64_t least_in_that = 80'000;  // [bytes]
-constexpr int send_room = 256 << 10;            // what waits in it is seen late [bytes]
-constexpr std::size_t most_at_once = 64 << 10;  // between two looks whether the client takes anything [bytes]
+constexpr std::int64_t least_in_that = 80'000;   // [bytes]
+constexpr int send_room = 256 << 10;             // what waits in it is seen late [bytes]
+constexpr std::int64_t most_at_once = 64 << 10;  // handed to the system before that is counted [bytes]
 
 asio::const_buffer buffer_of(const IgtlBroadcast::Bytes& bytes) {
   return bytes ? asio::buffer(*bytes) : asio::const_buffer();
@@ -47,13 +48,12 @@ void IgtlClient::send_news() {
   pictures_ = broadcast_.pictures();
   is_sending_ = true;
   const std::array<asio::const_buffer, 2> buffers = {buffer_of(sending_[0]), buffer_of(sending_[1])};
-  const std::int64_t before = begun_;
-  begun_ += static_cast<std::int64_t>(asio::buffer_size(buffers));
+  begun_ = handed_ + static_cast<std::int64_t>(asio::buffer_size(buffers));
   asio::async_write(
       socket_, buffers,
-      [self = shared_from_this(), before](const error_code& problem, std::size_t handed) {
+      [self = shared_from_this(), before = handed_](const error_code& problem, std::size_t handed) {
         self->handed_ = before + static_cast<std::int64_t>(handed);
-        return problem ? 0 : most_at_once;
+        return problem ? 0 : static_cast<std::size_t>(most_at_once);
       },
       [self = shared_from_this()](const error_code& problem, std::size_t) { self->take_sent(problem); });
 }
@@ -79,16 +79,15 @@ void IgtlClient::read_some() {
 
 void IgtlClient::look(Clock::time_point now) {
   if (is_gone_) return;
-  taken_ = handed_ - left_in_system(socket_.native_handle());
-  if (taken_ >= way_.bytes) way_ = {begun_, now};
-  if (taken_ == begun_) pace_ = {taken_, now};
+  const std::int64_t most = std::min(begun_, handed_ + most_at_once);  // that the system has been handed
+  const std::int64_t taken = most - left_in_system(socket_.native_handle());
+  if (taken >= way_.bytes) {
+    way_ = {handed_, now};
+    pace_ = {taken, now};
+  }
   if (now - pace_.since < pace_time) return;
-  if (taken_ - pace_.bytes < least_in_that) is_gone_ = true;
-  pace_ = {taken_, now};
-}
-
-IgtlClient::Clock::duration IgtlClient::lag(Clock::time_point now) const {
-  return taken_ == begun_ ? Clock::duration::zero() : now - way_.since;
+  if (taken - pace_.bytes < least_in_that) is_gone_ = true;
+  pace_ = {taken, now};
 }
 
 bool IgtlClient::is_served() const {

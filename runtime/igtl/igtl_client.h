@@ -25,12 +25,13 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   void send_news();
   /// Throws away some of what the client has said. To be called again and again: how often bounds how much.
   void read_some();
-  /// Looks how far it has come. To be called again and again.
+  /// Looks how far it has come. To be called again and again, and before `is_lost` and `lag`: what it took
+  /// while this server did not run is seen only here.
   void look(Clock::time_point now);
   /// It has closed the connection, or took less than 16 kB/s in five seconds in which there was more for it.
   [[nodiscard]] bool is_lost() const noexcept { return is_gone_; }
-  /// How long something that it was sent has been on its way, at least.
-  [[nodiscard]] Clock::duration lag(Clock::time_point now) const;
+  /// How long something that the system was handed for it has been on its way, at least.
+  [[nodiscard]] Clock::duration lag(Clock::time_point now) const noexcept { return now - way_.since; }
   /// Where it is.
   [[nodiscard]] const boost::asio::ip::address& address() const noexcept { return address_; }
   /// It has been sent all there is.
@@ -50,14 +51,14 @@ class IgtlClient : public std::enable_shared_from_this<IgtlClient> {
   bool is_sending_ = false;
   bool is_reading_ = false;
   bool is_gone_ = false;
-  // Of all bytes for it: sent or being sent, handed to the system, and taken by its machine.
-  std::int64_t begun_ = 0, handed_ = 0, taken_ = 0;
+  // Of all bytes for it: sent or being sent, and handed to the system, as far as that has been told.
+  std::int64_t begun_ = 0, handed_ = 0;
   struct Place {
     std::int64_t bytes = 0;
     Clock::time_point since;
   };
-  Place way_;   // where it is to come, and since when that has been on its way
-  Place pace_;  // how far it was when its rate was looked at last
+  Place way_;   // what it is to take, and since when the system has had that
+  Place pace_;  // how far it was when its rate was looked at last, or when it had come so far
   std::array<char, 4096> said_{};
 };
 

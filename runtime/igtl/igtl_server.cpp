@@ -76,8 +76,10 @@ void IgtlServer::Impl::accept() {
   acceptor.async_accept([this](const error_code& problem, tcp::socket socket) {
     accept_failed = problem.failed();  // no file is left for a connection: at the next tick there may be
     if (problem) return;
+    const Clock::time_point now = Clock::now();
+    drop_lost(now);  // the tick may be late
     clients.push_back(std::make_shared<IgtlClient>(std::move(socket), broadcast));
-    if (clients.size() > most_igtl_clients) make_room(Clock::now());
+    if (clients.size() > most_igtl_clients) make_room(now);
     clients.back()->send_news();
     accept();
   });

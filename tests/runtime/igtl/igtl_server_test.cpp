@@ -6,12 +6,18 @@
 #include <igtlPolyDataMessage.h>
 #include <igtlStringMessage.h>
 #include <igtlTransformMessage.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read.hpp>
 #include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <optional>
 #include <random>
 #include <thread>
@@ -47,6 +53,35 @@ class MachineReader {
  private:
   boost::asio::io_context context_;
   boost::asio::ip::tcp::socket socket_{context_};
+};
+
+/// Holds up the server's thread, as a busy machine does, for as long as it lives.
+class Stall {
+ public:
+  Stall() {
+    struct sigaction handler {};
+    handler.sa_handler = [](int) {
+      is_held_ = true;
+      while (is_held_) usleep(1000);
+    };
+    sigaction(SIGUSR1, &handler, &before_);
+    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+      std::string name;
+      std::getline(std::ifstream(task.path() / "comm"), name);
+      if (name == "igtl") syscall(SYS_tgkill, getpid(), std::stoi(task.path().filename()), SIGUSR1);
+    }
+    while (!is_held_) std::this_thread::yield();
+  }
+  Stall(const Stall&) = delete;
+  Stall& operator=(const Stall&) = delete;
+  ~Stall() {
+    is_held_ = false;
+    sigaction(SIGUSR1, &before_, nullptr);
+  }
+
+ private:
+  static inline std::atomic<bool> is_held_ = false;
+  struct sigaction before_ {};
 };
 
 /// A server of a small body, and pictures of which each is a second later.
@@ -204,6 +239,23 @@ TEST_F(IgtlServing, WhoReadsNothingHoldsUpNobodyAndIsCut) {
   EXPECT_TRUE(got == 0 || errno == ECONNRESET) << errno;
   EXPECT_LT(received, 4U << 20U);
   expect_served(other);
+}
+
+TEST_F(IgtlServing, TimeInWhichTheServerIsHeldUpIsNoClients) {
+  IgtlReader first(port_);
+  expect_served(first);
+  std::vector<std::unique_ptr<MachineReader>> others;
+  for (std::size_t k = 1; k < most_igtl_clients; ++k) {
+    others.push_back(std::make_unique<MachineReader>(port_, "127.0.0.2"));
+    EXPECT_TRUE(others.back()->is_served());
+  }
+  std::optional<Stall> stall(std::in_place);
+  show();
+  others.push_back(std::make_unique<MachineReader>(port_, "127.0.0.2"));
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  stall.reset();
+  EXPECT_TRUE(others.back()->is_served());
+  expect_served(first);
 }
 
 /// Each reads a little whenever the honest one tries, and so makes some progress all the time.
