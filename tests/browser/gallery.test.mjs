@@ -105,13 +105,15 @@ test('what files say is text in the gallery, the page and what is exported', asy
   const at = await folder(t);
   const evil = '<img src=x: onerror=window.ran.push(1)>';
   const address = 'open javascript:window.ran.push(2) in a browser';
-  const plain = await bake(at, cube(2), 'plain');
   for (const [file, name] of [[evil, evil], ['b', address], ["c' onclick=window.ran.push(3) '", `"'>&lt;${evil}`]])
     await copyFile(await bake(at, cube(2).replace('"cube"', JSON.stringify(name)), 'baked'), path.join(at, `${file}.palpate.hdf`));
   await rm(path.join(at, 'baked.palpate.hdf'));
   await rm(path.join(at, 'baked.toml'), { force: true });
+  const recording = `run ${evil}.mcap`;
+  await writeFile(path.join(at, `${evil}.csv`), 't,x,y,z\n0,0.5,0.5,1.3\n0.1,0.5,0.5,1.05\n');
+  await run(runtime, ['play', `${evil}.palpate.hdf`, '--device', `script:${evil}.csv`, '--tool', 'sphere:0.1', '--fast', '--record', recording], { cwd: at });
   await writeFile(path.join(at, `${evil}.mcap`), 'no recording');
-  await writeFile(path.join(at, `${evil}.obj`), `this is no surface ${evil}\n`);
+  await writeFile(path.join(at, `lump ${evil}.obj`), `this is no surface ${evil}\n`);
   const served = await serve(t, ['view', '--view-address', '127.0.0.1:0'], at);
   const note_scripts = () => (window.ran ??= []);
   const page = await visit(t, served.url, {}, note_scripts);
@@ -136,7 +138,13 @@ test('what files say is text in the gallery, the page and what is exported', asy
     await page.locator('[data-testid="item"]').first().waitFor();
     assert.equal(new URL(page.url()).search, '', 'the tab knows the token');
   }
-  await page.locator(`[data-testid="item"][title^=${JSON.stringify(`${evil}.obj`)}]`).click();
+  await page.locator(`[data-testid="item"][title^=${JSON.stringify(recording)}]`).click();
+  await ready(page);
+  assert.equal(await part(page, 'model').textContent(), `${evil}: ${recording}`);
+  assert.ok((await page.locator('body').textContent()).includes(`script:${evil}.csv`), 'what moved the tool');
+  await none_ran('the page of a recording');
+  await part(page, 'to-gallery').click();
+  await page.locator(`[data-testid="item"][title^=${JSON.stringify(`lump ${evil}.obj`)}]`).click();
   await until(page, () => /cannot be shown/.test(document.querySelector('[data-testid="opening"] h2')?.textContent));
   await none_ran('an error');
   await page.keyboard.press('Escape');
@@ -149,10 +157,7 @@ test('what files say is text in the gallery, the page and what is exported', asy
   await stranger.goto(served.url.replace(/\?.*/, ''));
   await stranger.getByText('Open the whole address that the runtime printed').waitFor();
 
-  await writeFile(path.join(at, 'touch.csv'), 't,x,y,z\n0,0.5,0.5,1.3\n0.1,0.5,0.5,1.05\n');
-  await copyFile(plain, path.join(at, 'x.palpate.hdf'));
-  await run(runtime, ['play', path.join(at, `${evil}.palpate.hdf`), '--device', 'script:touch.csv', '--tool', 'sphere:0.1', '--fast', '--record', 'touch.mcap'], { cwd: at });
-  await run(runtime, ['export', 'touch.mcap', '--html', 'touch.html'], { cwd: at });
+  await run(runtime, ['export', recording, '--html', 'touch.html'], { cwd: at });
   const written = await visit(t, `file://${path.join(at, 'touch.html')}`, {}, note_scripts);
   await ready(written);
   assert.deepEqual(written.complaints, []);

@@ -144,7 +144,7 @@ export async function visit(t, url, { is_drawn = false, ...options } = {}, befor
   page.on('console', (message) => /Content Security Policy/.test(message.text()) && page.complaints.push(message.text()));
   page.on('request', (request) => {
     const to = new URL(request.url());
-    if (['http:', 'https:', 'ws:', 'wss:'].includes(to.protocol) && to.host !== new URL(url).host) page.complaints.push(`asks ${to}`);
+    if (['http:', 'https:', 'ws:', 'wss:'].includes(to.protocol) && to.hostname !== new URL(url).hostname) page.complaints.push(`asks ${to}`);
   });
   if (!is_drawn) await page.addInitScript(draw_nothing);
   if (before) await page.addInitScript(before);
