@@ -142,18 +142,22 @@ Response GalleryAnswers::items() const {
   return json_answer({{"folder", folder_.string()}, {"version", PALPATE_VERSION}, {"items", items}});
 }
 
-bool GalleryAnswers::has(const std::string& name) const {
+std::optional<std::string> GalleryAnswers::find(const std::string& name) const {
   std::error_code problem;
-  return gallery_kind(name).has_value() && std::filesystem::is_regular_file(folder_ / name, problem);
+  if (gallery_kind(name) && std::filesystem::is_regular_file(folder_ / name, problem)) return name;
+  for (const GalleryItem& item : list_gallery(folder_))
+    if (json_text(json(item.name)) == json_text(json(name))) return item.name;  // is not UTF-8
+  return std::nullopt;
 }
 
 Response GalleryAnswers::scene(const RequestHeader& request) const {
   const std::string name = name_in(request);
-  if (!has(name)) return no_such("file in the folder");
   try {
+    const std::optional<std::string> file = find(name);
+    if (!file) return no_such("file in the folder");
     Response response;
     response.set(http::field::content_type, "application/octet-stream");
-    response.body() = gallery_scene(folder_ / name);
+    response.body() = gallery_scene(folder_ / *file);
     return guarded(std::move(response));
   } catch (...) {
     return guarded(plain(http::status::not_found, to_text(handled_error(name, "close other programs"))));
@@ -161,10 +165,11 @@ Response GalleryAnswers::scene(const RequestHeader& request) const {
 }
 
 Response GalleryAnswers::open(const std::string& name, std::uint16_t port) {
-  if (!has(name)) return no_such("file in the folder");
+  const std::optional<std::string> file = find(name);
+  if (!file) return no_such("file in the folder");
   ViewerOptions options = options_;
   options.port = port;
-  opened_.open({.folder = folder_, .name = name, .gallery = options});
+  opened_.open({.folder = folder_, .name = *file, .gallery = options});
   return opened();
 }
 

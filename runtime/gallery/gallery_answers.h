@@ -53,7 +53,8 @@ class GalleryAnswers {
   [[nodiscard]] Response open(const std::string& name, std::uint16_t port);
   [[nodiscard]] Response close();
   [[nodiscard]] Response opened() const;
-  [[nodiscard]] bool has(const std::string& name) const;
+  /// The file of this name, as the list has it; nothing where there is none.
+  [[nodiscard]] std::optional<std::string> find(const std::string& name) const;
 
   std::filesystem::path folder_;
   ViewerOptions options_;

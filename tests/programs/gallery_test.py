@@ -113,6 +113,14 @@ class Names(GalleryTest):
             self.assertEqual(status, 200)
             self.assertIn(name, "\n".join(state["said"]))
 
+    def test_a_name_that_is_not_utf8_is_opened(self):
+        file = os.path.join(os.fsencode(self.at), b"K\xf6rper.palpate.hdf")
+        self.baked(pathlib.Path(os.fsdecode(file)))
+        name, = (item["name"] for item in self.told("GET", "items")["items"])
+        self.assertEqual(name, "K\ufffdrper.palpate.hdf")
+        self.assertEqual(self.ask("GET", "scene", name)[0], 200)
+        self.assertIsNotNone(self.opened(name)["page"])
+
     def test_the_token_of_a_body_opens_nothing_else(self):
         self.baked(self.at / "cube.palpate.hdf")
         page = self.opened("cube.palpate.hdf")["page"]
