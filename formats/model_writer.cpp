@@ -28,8 +28,6 @@ constexpr std::int64_t metadata_allowance = 1 << 20;  // more than HDF5 needs ar
 constexpr std::int64_t aligned_from = 1 << 16;  // of those that come last: smaller ones begin anywhere [byte]
 constexpr std::size_t near_matrix = 0;          // in Impl::matrices, where there is one
 constexpr std::size_t values_at_once = 1 << 15;  // converted and written together
-constexpr std::int64_t window =
-    16 * std::int64_t{ChunkedChecksum::chunk};  // of the file, looked at together [byte]
 
 template <class T>
 std::span<const std::byte> bytes_of(const std::vector<T>& values) {
@@ -537,15 +535,11 @@ void ModelWriter::Impl::take_over(const FileDescriptor& file, std::int64_t origi
   record(range);
 }
 
-/// Window by window, so that the file does not fill the memory.
+/// Read and not mapped, so that the file does not count as memory.
 std::string ModelWriter::Impl::streamed_checksum(std::size_t matrix) const {
   ChunkedChecksum running;
-  const std::int64_t end = place(matrix, matrices[matrix].pieces());
-  for (std::int64_t at = frame.packed_at[matrix]; at < end; at += window) {
-    const std::int64_t bytes = std::min(window, end - at);
-    const std::shared_ptr<const void> mapped = map_file(data, at, bytes);
-    running.append({static_cast<const std::byte*>(mapped.get()), static_cast<std::size_t>(bytes)});
-  }
+  const std::int64_t begin = frame.packed_at[matrix], end = place(matrix, matrices[matrix].pieces());
+  running.append_file(data, begin, end - begin, nullptr);
   return running.digits();
 }
 
