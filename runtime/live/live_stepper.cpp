@@ -131,10 +131,14 @@ bool LiveStepper::advance_once(LiveState& state, double h, const Eigen::VectorXd
 
 bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::VectorXd& push,
                                      LiveReport& report) {
-  const int d = body_.dimension();
   const Eigen::VectorXd from = state.x;
   double energy_before = -1.0, energy = 0.0;
-  const auto accelerate = [&](const Eigen::VectorXd& x, const Eigen::VectorXd& v) {
+  // Forces are those of the body as walls let it be and move: within them, stiffness and damping throw back
+  // nodes that only come to rest there, and friction has nothing to hold them by.
+  const auto accelerate = [&](Eigen::VectorXd x, Eigen::VectorXd v) {
+    Eigen::VectorXd any = v, end = from + h * v;
+    meet_walls(from, h, x, any);
+    meet_walls(from, h, end, v);
     const ForceSums sums = internal_forces(body_, x, state.plastic, forces_);
     energy = sums.energy;
     report.inverted = std::max(report.inverted, sums.inverted);
@@ -155,19 +159,25 @@ bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::Ve
       (body_.load() + push).cwiseAbs().dot((state.x - from).cwiseAbs() + h * state.v.cwiseAbs());
   const double most = 4.0 * (kinetic_before + energy_before + work);
   if (!(kinetic() <= most + 1e-30)) return false;
-  report.contacts = 0;
-  if (options_.walls.empty()) {
-    return true;
-  }
+  report.contacts = meet_walls(from, h, state.x, state.v);
+  return true;
+}
+
+/// What walls do to all nodes in a step from `from`: how many they stop.
+Index LiveStepper::meet_walls(const Eigen::VectorXd& from, double h, Eigen::VectorXd& x,
+                              Eigen::VectorXd& v) const {
+  if (options_.walls.empty()) return 0;
+  const int d = body_.dimension();
+  Index stopped = 0;
   for (Index node = 0; node < std::ssize(body_.mesh().nodes); ++node) {
     if (body_.free_of_dof()[static_cast<std::size_t>(d * node)] < 0) continue;
-    Vec3 x = node_part(state.x, d, node), v = node_part(state.v, d, node);
-    if (!stop_at_walls(options_.walls, node_part(from, d, node), h, x, v)) continue;
-    ++report.contacts;
-    state.x.segment(Eigen::Index{d} * node, d) = x.head(d);
-    state.v.segment(Eigen::Index{d} * node, d) = v.head(d);
+    Vec3 at = node_part(x, d, node), velocity = node_part(v, d, node);
+    if (!stop_at_walls(options_.walls, node_part(from, d, node), h, at, velocity)) continue;
+    ++stopped;
+    x.segment(Eigen::Index{d} * node, d) = at.head(d);
+    v.segment(Eigen::Index{d} * node, d) = velocity.head(d);
   }
-  return true;
+  return stopped;
 }
 
 void add_damping_forces(const LiveBody& body, const Eigen::VectorXd& x, const Eigen::VectorXd& v,

@@ -67,6 +67,7 @@ class LiveStepper {
   bool advance(LiveState& state, double h, const Eigen::VectorXd& push, int depth, LiveReport& report);
   bool advance_once(LiveState& state, double h, const Eigen::VectorXd& push, LiveReport& report);
   bool advance_explicitly(LiveState& state, double h, const Eigen::VectorXd& push, LiveReport& report);
+  Index meet_walls(const Eigen::VectorXd& from, double h, Eigen::VectorXd& x, Eigen::VectorXd& v) const;
   void find_acceleration(LiveState& state, const Eigen::VectorXd& push);
   void watch_limit(const LiveState& state, LiveReport& report);
 

@@ -105,6 +105,18 @@ TEST(Walls, ABlockRestsBelowTheFrictionAngle) {
   EXPECT_LT(creep(fine, 5e4, Integrator::implicit_euler, 1e-2, 20.0), still);
 }
 
+// They slid at up to 1.3 m/s where their forces were those of a body within the floor.
+TEST(Walls, ABlockRestsInExplicitStepsNearTheirLimitToo) {
+  constexpr double still = 1e-5;  // [m/s]
+  constexpr std::array<int, 3> cells = {4, 4, 3};
+  EXPECT_LT(creep(cells, 5e4, Integrator::verlet, 1e-3, 22.0), still);
+  EXPECT_LT(creep(cells, 5e4, Integrator::verlet, 1.25e-3, 22.0), still);
+  EXPECT_LT(creep(cells, 5e4, Integrator::rk2, 1e-3, 22.0), still);
+  EXPECT_LT(creep(cells, 5e4, Integrator::rk2, 1.25e-3, 22.0), still);
+  EXPECT_LT(creep(cells, 5e4, Integrator::rk4, 1.5625e-3, 22.0), still);
+  EXPECT_LT(creep(cells, 5e4, Integrator::semi_implicit_euler, 5e-4, 22.0), still);
+}
+
 // Each node for itself. (A whole elastic block slides with some percent less: it shivers, as steady sliding
 // with Coulomb's friction is unstable where nothing damps it, Adams 1995.)
 TEST(Walls, NodesOfExplicitStepsHaveTheSameFriction) {
