@@ -590,12 +590,15 @@ class Bake {
       return describe_and_solve();
     } catch (const OutOfReach& error) {
       if (description_.form != StorageForm::automatic) throw;
+      foretold_ = expected_memory(plans_.plan);
       fall_back(error.what());
     }
     return describe_and_solve();
   }
 
   [[nodiscard]] const Plan& plan() const { return plans_.plan; }
+  /// Memory of all that was begun, one after the other.
+  [[nodiscard]] std::int64_t foretold() const { return std::max(foretold_, expected_memory(plans_.plan)); }
   [[nodiscard]] const TileCounts& tiles() const { return tiles_; }
   [[nodiscard]] const std::optional<SpreadMemory>& spread() const { return spread_; }
   [[nodiscard]] bool compressed() const { return plans_.compression.has_value(); }
@@ -634,6 +637,7 @@ class Bake {
   TileCounts tiles_;
   std::optional<SpreadMemory> spread_;  // of a factor over several processes
   std::string fell_back_;               // why not compressed
+  std::int64_t foretold_ = 0;           // of the compression that was out of reach
 };
 
 MeshedBody Bake::mesh() {
@@ -859,6 +863,7 @@ BakeSummary bake(const Description& description, const BakeOptions& asked, Team&
   summary.result = bake.run();
   progress.end();
   summary.plan = bake.plan();
+  summary.foretold = bake.foretold();
   summary.tiles = bake.tiles();
   summary.spread = bake.spread();
   summary.stages = progress.stages();

@@ -52,6 +52,7 @@ struct BakeSummary {
   BakeResult result = BakeResult::planned;
   int jobs = 1;
   Plan plan{};
+  std::int64_t foretold = 0;             ///< memory of it, and of a compression that was given up
   TileCounts tiles{};                    ///< of all processes
   std::optional<SpreadMemory> spread{};  ///< of a factor over several processes
   std::vector<Stage> stages{};           ///< with the seconds that they took

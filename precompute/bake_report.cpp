@@ -27,7 +27,7 @@ Json json_of(const BakeSummary& bake) {
                {"factor_entries", plan.factor_entries},
                {"block_columns", plan.block_columns},
                {"greens_bytes", plan.file_bytes},
-               {"expected_memory_bytes", expected_memory(plan)},
+               {"expected_memory_bytes", bake.foretold},
                {"tiles_solved", bake.tiles.solved},
                {"tiles_kept", bake.tiles.kept},
                {"compression", bake.compressed ? "h2" : "none"}};

@@ -189,6 +189,41 @@ class Stopped(ProgramTest):
         self.assertEqual(sorted(p.name for p in self.folder.iterdir()),
                          ["killed.palpate.hdf", "model.toml", "straight.palpate.hdf"])
 
+    def test_compression_falls_back_and_a_killed_run_of_it_is_resumed(self):
+        """A strip 250 times as long as high: pieces of it bend too easily for single precision."""
+        model = self.write("model.toml", """name = "strip"
+plane = "stress"
+[geometry]
+rectangle = { size = [0.25, 0.001], cells = [2600, 1] }
+[mesh]
+element = "quad4"
+[material]
+youngs_modulus = 1e5
+poissons_ratio = 0.3
+[[fixed]]
+lowest = { axis = "x", percent = 0.1 }
+""")
+        output = self.folder / "strip.palpate.hdf"
+        journal = self.folder / "strip.palpate.hdf.progress"
+        with subprocess.Popen([PRECOMPUTE, model, "--jobs", "1"], cwd=self.folder, stderr=subprocess.PIPE, text=True) as process:
+            self.assertTrue(any("] Green's functions, " in line for line in process.stderr))  # has fallen back
+            self.wait_for(lambda: "\ncolumns 0 " in journal.read_text(), process)
+            process.kill()
+        resumed = run(PRECOMPUTE, model, cwd=self.folder)
+        self.assertEqual(resumed.returncode, 0, resumed.stderr)
+        self.assertIn("stores every entry of these Green's functions: as an earlier run has found", resumed.stderr)
+        self.assertRegex(resumed.stderr, r"[1-9]\d* of \d+ columns were kept")
+        kept = output.read_bytes()
+        anew = run(PRECOMPUTE, model, "--force", "--report", "report.json", cwd=self.folder)
+        report = json.loads((self.folder / "report.json").read_text())
+        [strip] = report["models"]
+        self.assertEqual(strip["compression"], "none")
+        self.assertIn("not positive definite in single precision", strip["compression_out_of_reach"])
+        self.assertIn(strip["compression_out_of_reach"], anew.stderr)
+        if not HAS_SANITIZERS:
+            self.assertGreater(strip["expected_memory_bytes"], 0.85 * report["peak_memory_bytes"])
+        self.assertEqual(output.read_bytes(), kept)
+
     def test_run_killed_in_the_inverse_of_dynamics_is_resumed(self):
         model = self.write("model.toml", cube_toml(11, scope="full") + '[dynamics]\nmethod = "packed"\n')
         output = self.folder / "killed.palpate.hdf"
