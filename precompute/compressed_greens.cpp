@@ -18,9 +18,10 @@ constexpr double finer = 0.6;        // the next cut, where touches are off by m
 constexpr double bound_share = 0.5;  // most that measured errors may have of the bound of a tick
 constexpr int most_cuts = 5;
 constexpr std::uint64_t certificate_seed = 41;
-constexpr std::int64_t touches = 64;              // of each number of nodes
-constexpr double typical_rank = 45.0;             // of the default tolerance (measured)
-constexpr std::int64_t recompression_copies = 9;  // of the far part: skeletons are larger (measured)
+constexpr std::int64_t touches = 64;        // of each number of nodes
+constexpr std::int64_t touch_matrices = 9;  // that each thread has of a touch, three of them twice as wide
+constexpr double typical_rank = 45.0;       // of the default tolerance (measured)
+constexpr std::int64_t recompression_copies = 6;  // of the far part: skeletons are larger (measured)
 constexpr double far_share = 1.7;                 // of the time of near pairs (measured)
 constexpr double touch_share = 0.2;               // likewise
 
@@ -103,8 +104,9 @@ CompressionPlan plan_compression(const Description& description, const Model& mo
       (order + typical_rank * static_cast<double>(plan.frame.far_pair.size() +
                                                   std::size_t(plan.frame.tree.clusters()))));
   const std::int64_t touched = std::int64_t{model.dimension()} * certified_nodes.back();
-  plan.memory_bytes = jobs * compression_workspace(factor, plan.frame, touched) + thread_bytes(jobs) +
-                      plan.frame.bytes() + recompression_copies * plan.far_bytes +
+  plan.memory_bytes = jobs * (compression_workspace(factor, plan.frame, touched) +
+                              touch_matrices * touched * touched * std::int64_t{sizeof(double)}) +
+                      thread_bytes(jobs) + plan.frame.bytes() + recompression_copies * plan.far_bytes +
                       static_cast<std::int64_t>(4.0 * 8.0 * random_loads * order);
   const double seconds_per_flop = dense.flops > 0.0 ? dense.seconds / dense.flops : 0.0;
   plan.near_seconds = seconds_per_flop * near_flops(factor, plan.stored.dofs, plan.frame);

@@ -463,6 +463,8 @@ bool Compression::Impl::climb(double cut) {
       fronts_[at(c)].W = {};
     }
   }
+  // Touches have workspaces of their own, and come next.
+  workspaces_ = std::vector<SelectedSolver::Workspace>(at(jobs_));
   return true;
 }
 

@@ -3,6 +3,7 @@
 #include <cblas.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -37,9 +38,19 @@ void start_blas(char** argv) {
   std::error_code unknown;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", unknown);
   if (settings.empty() || unknown) return;
-  for (const auto& [name, value] : settings) ::setenv(name, value.c_str(), 1);
-  ::execv(program.c_str(), argv);
-  for (const auto& [name, value] : settings) ::unsetenv(name);
+  std::vector<std::string> ours;
+  for (const auto& [name, value] : settings) ours.push_back(std::string(name) + '=' + value);
+  std::vector<char*> environment;
+  for (std::string& setting : ours) environment.push_back(setting.data());
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    const std::string_view of_caller = *entry;
+    const auto is_set = [&](const auto& setting) {
+      return of_caller.substr(0, of_caller.find('=')) == setting.first;
+    };
+    if (std::none_of(settings.begin(), settings.end(), is_set)) environment.push_back(*entry);
+  }
+  environment.push_back(nullptr);
+  ::execve(program.c_str(), argv, environment.data());
 }
 
 }  // namespace palpate

@@ -136,9 +136,11 @@ bool LiveStepper::advance_explicitly(LiveState& state, double h, const Eigen::Ve
   // Forces are those of the body as walls let it be and move: within them, stiffness and damping throw back
   // nodes that only come to rest there, and friction has nothing to hold them by.
   const auto accelerate = [&](Eigen::VectorXd x, Eigen::VectorXd v) {
-    Eigen::VectorXd any = v, end = from + h * v;
-    meet_walls(from, h, x, any);
-    meet_walls(from, h, end, v);
+    if (!options_.walls.empty()) {
+      Eigen::VectorXd any = v, end = from + h * v;
+      meet_walls(from, h, x, any);
+      meet_walls(from, h, end, v);
+    }
     const ForceSums sums = internal_forces(body_, x, state.plastic, forces_);
     energy = sums.energy;
     report.inverted = std::max(report.inverted, sums.inverted);
