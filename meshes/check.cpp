@@ -56,10 +56,11 @@ double smallest_volume(const ElementNodes& x, int dimension) {
   return 1e-12 * std::pow(longest, dimension);
 }
 
-/// How many elements have negative volume. Throws where one has none, or where only some are negative.
-std::size_t count_inverted(const Mesh& mesh, const std::string& where) {
+/// Turns elements of negative volume and returns how many. Throws where one has none.
+std::size_t turn_inverted(Mesh& mesh, const std::string& where) {
   const int d = mesh.dimension();
-  Index inverted = 0, an_inverted_one = 0;
+  const std::span<const std::uint8_t> order = reversed_nodes(mesh.element);
+  std::size_t inverted = 0;
   for (Index e = 0; e < mesh.elements(); ++e) {
     const ElementNodes x = element_nodes(mesh, e);
     const double volume = element_volume(mesh.element, x);
@@ -70,24 +71,12 @@ std::size_t count_inverted(const Mesh& mesh, const std::string& where) {
     }
     if (volume > 0.0) continue;
     ++inverted;
-    an_inverted_one = e;
+    const std::span<const Index> nodes = mesh.element_nodes(e);
+    const std::vector<Index> before(nodes.begin(), nodes.end());
+    Index* const after = mesh.connectivity.data() + (nodes.data() - mesh.connectivity.data());
+    for (std::size_t i = 0; i < order.size(); ++i) after[i] = before[order[i]];
   }
-  if (inverted != 0 && inverted != mesh.elements()) {
-    throw Error(fmt::format("{} of {} elements are inverted, e.g. element {} near {}", inverted,
-                            mesh.elements(), an_inverted_one, text(centre_of(mesh, an_inverted_one), d)),
-                where, "The mesh is folded there; remake it");
-  }
-  return static_cast<std::size_t>(inverted);
-}
-
-void reverse_elements(Mesh& mesh) {
-  const std::span<const std::uint8_t> order = reversed_nodes(mesh.element);
-  std::vector<Index> reversed;
-  reversed.reserve(mesh.connectivity.size());
-  for (Index e = 0; e < mesh.elements(); ++e) {
-    for (const std::uint8_t i : order) reversed.push_back(mesh.element_nodes(e)[i]);
-  }
-  mesh.connectivity = std::move(reversed);
+  return inverted;
 }
 
 /// A positive volume does not keep quad4, tet10 and hex8 from folding over at a corner.
@@ -192,8 +181,7 @@ std::string turning_text(const RigidMotions& motions, const Eigen::MatrixXd& lef
 
 std::size_t orient_elements(Mesh& mesh, const std::string& where) {
   check_numbers(mesh, where);
-  const std::size_t inverted = count_inverted(mesh, where);
-  if (inverted != 0) reverse_elements(mesh);
+  const std::size_t inverted = turn_inverted(mesh, where);
   check_not_folded(mesh, where);
   return inverted;
 }

@@ -9,10 +9,10 @@
 
 namespace palpate {
 
-/// Reverses elements that are negatively oriented and returns how many there were (mesh files disagree on the
-/// sign). Throws Error (where = `where`) for a mesh without elements, node numbers out of range, a coordinate
-/// that is not finite, an element with zero volume (number, coordinates), one whose map folds over at a
-/// corner or quadrature point, or where some elements are inverted and others not.
+/// Reverses elements that are negatively oriented and returns how many (files disagree on the sign). Throws
+/// Error (where = `where`) for a mesh without elements, node numbers out of range, a coordinate that is not
+/// finite, an element with zero volume, and one whose map folds over at a corner or quadrature point. Where a
+/// mesh is folded, neighbours are on the same side of a facet then: extract_surface refuses that.
 std::size_t orient_elements(Mesh& mesh, const std::string& where);
 
 /// Removes nodes that no element uses, and tagged facets with such nodes, renumbering the rest in order;

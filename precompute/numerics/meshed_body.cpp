@@ -206,7 +206,10 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
 
   progress("checking the mesh");
   check_dimension(body.mesh, description, where);
-  orient_elements(body.mesh, where);
+  const std::size_t turned = orient_elements(body.mesh, where);
+  if (turned != 0 && turned != static_cast<std::size_t>(body.mesh.elements()))
+    body.notes.push_back(fmt::format("{} of {} elements list their nodes the other way round and were turned",
+                                     turned, body.mesh.elements()));
   if (options.element) {
     body.mesh = with_elements(std::move(body.mesh), *options.element, where);
   }

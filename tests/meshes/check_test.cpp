@@ -10,6 +10,8 @@
 #include <random>
 
 #include "meshes/element.h"
+#include "meshes/surface.h"
+#include "meshes/topology.h"
 #include "tests/support/dense_algebra.h"
 #include "tests/support/meshes_bodies.h"
 #include "tests/support/meshes_files.h"
@@ -79,6 +81,31 @@ TEST(MeshCheck, AMeshOfTheOtherSignIsTurnedRound) {
   }
 }
 
+/// The order of nodes is the file's affair; that elements lie on both sides of what they share is not.
+TEST(MeshCheck, SingleElementsAreTurnedAndFoldsRefused) {
+  for (const ElementType type : body_elements) {
+    SCOPED_TRACE(traits(type).name);
+    Mesh mesh = block(type);
+    const Surface before = extract_surface(mesh);
+    const std::span<const std::uint8_t> order = reversed_nodes(type);
+    std::size_t reversed = 0;
+    for (Index e = 0; e < mesh.elements(); e += 2, ++reversed) {
+      const std::vector<Index> nodes(mesh.element_nodes(e).begin(), mesh.element_nodes(e).end());
+      for (std::size_t i = 0; i < order.size(); ++i)
+        mesh.connectivity[static_cast<std::size_t>(e) * order.size() + i] = nodes[order[i]];
+    }
+    EXPECT_EQ(orient_elements(mesh, ""), reversed);
+    EXPECT_EQ(orient_elements(mesh, ""), 0u);
+    EXPECT_EQ(extract_surface(mesh).nodes, before.nodes);
+  }
+  Mesh folded;
+  folded.nodes = {
+      {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.2, 0.2, 0.5}};  // the last belongs below z = 0
+  folded.connectivity = {0, 1, 2, 3, 0, 2, 1, 4};
+  EXPECT_EQ(orient_elements(folded, ""), 1u);
+  EXPECT_TRUE(contains(error_of([&] { extract_surface(folded); }).what(), "two elements overlap"));
+}
+
 TEST(MeshCheck, BadElementsAreNamedWithTheirPlace) {
   const struct {
     void (*spoil)(Mesh&);
@@ -89,9 +116,8 @@ TEST(MeshCheck, BadElementsAreNamedWithTheirPlace) {
       {[](Mesh& m) { m.connectivity[5 * 4 + 2] = -1; }, {"element 5", "node -1"}},
       {[](Mesh& m) { m.nodes[3].y() = std::numeric_limits<double>::quiet_NaN(); }, {"node 3", "finite"}},
       {[](Mesh& m) { m.nodes[3].y() = std::numeric_limits<double>::infinity(); }, {"node 3", "finite"}},
-      {[](Mesh& m) { m.connectivity[7 * 4 + 1] = m.connectivity[7 * 4]; }, {"element 7", "zero volume", "("}},
-      {[](Mesh& m) { std::swap(m.connectivity[9 * 4], m.connectivity[9 * 4 + 1]); },
-       {"1 of 96", "inverted", "element 9", "(0.1"}}};
+      {[](Mesh& m) { m.connectivity[7 * 4 + 1] = m.connectivity[7 * 4]; },
+       {"element 7", "zero volume", "("}}};
   for (const auto& bad : cases) {
     Mesh mesh = block(ElementType::tet4);
     bad.spoil(mesh);
