@@ -22,7 +22,9 @@ void tell(const std::string& line) {
 DraftOptions options_of(const DraftArguments& arguments) {
   DraftOptions options;
   if (!arguments.unit.empty()) options.unit = read_unit(arguments.unit);
-  options.shape = {.parts = arguments.parts == "all" ? SurfaceParts::all : SurfaceParts::largest,
+  options.shape = {.parts = arguments.parts == "all"       ? SurfaceParts::all
+                            : arguments.parts == "largest" ? SurfaceParts::largest
+                                                           : SurfaceParts::most,
                    .strict = arguments.strict,
                    .nodes = arguments.nodes};
   options.renew = arguments.renew;
@@ -52,7 +54,7 @@ void add_draft_options(CLI::App& app, DraftArguments& arguments) {
       ->group(group);
   app.add_option("--parts", arguments.parts,
                  "which of several parts of a surface are the body: the largest, or all, united into one; "
-                 "default: largest")
+                 "default: the largest, where it is nine tenths of them")
       ->option_text("largest|all")
       ->check(CLI::IsMember({"largest", "all"}))
       ->group(group);

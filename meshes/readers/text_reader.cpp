@@ -38,11 +38,32 @@ std::string shown(std::string_view word) {
   return word.size() > 40 ? result + "..." : result;
 }
 
+/// Lines that end with \n alone, without UTF-8's byte order mark.
+std::string plain(std::string text) {
+  if (text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '\r' && i + 1 < text.size() && text[i + 1] == '\n') continue;
+    text[size++] = text[i] == '\r' ? '\n' : text[i];
+  }
+  text.resize(size);
+  return text;
+}
+
 }  // namespace
 
 TextReader::TextReader(std::filesystem::path file, char comment)
-    : file_(std::move(file)), text_(read_all(file_)), comment_(comment) {
+    : TextReader(file, read_all(file), comment) {}
+
+TextReader::TextReader(std::filesystem::path file, std::string text, char comment)
+    : file_(std::move(file)), text_(plain(std::move(text))), comment_(comment) {
+  if (text_.starts_with("\xff\xfe") || text_.starts_with("\xfe\xff"))
+    fail("the file is text in UTF-16", "Save it as UTF-8 or ASCII");
   if (at_end()) fail("the file is empty");
+}
+
+bool TextReader::continues(std::size_t i) const {
+  return text_[i] == '\\' && i + 1 < text_.size() && text_[i + 1] == '\n';
 }
 
 void TextReader::skip_space() {
@@ -50,7 +71,7 @@ void TextReader::skip_space() {
     const char c = text_[position_];
     if (comment_ != '\0' && c == comment_) {
       position_ = std::min(text_.find('\n', position_), text_.size());
-    } else if (space.find(c) != std::string_view::npos) {
+    } else if (space.find(c) != std::string_view::npos || continues(position_)) {
       if (c == '\n') ++line_;
       ++position_;
     } else {
@@ -68,7 +89,7 @@ std::string_view TextReader::peek() {
   skip_space();
   std::size_t end = position_;
   while (end < text_.size() && space.find(text_[end]) == std::string_view::npos &&
-         (comment_ == '\0' || text_[end] != comment_)) {
+         (comment_ == '\0' || text_[end] != comment_) && !continues(end)) {
     ++end;
   }
   return std::string_view(text_).substr(position_, end - position_);
@@ -138,6 +159,26 @@ Vec3 TextReader::plane_point() {
 
 void TextReader::skip_words(std::int64_t count, const char* what) {
   for (std::int64_t i = 0; i < count; ++i) word(what);
+}
+
+void TextReader::skip_letters(std::size_t count) {
+  skip_space();
+  position_ += count;
+}
+
+bool TextReader::on_line() {
+  for (; position_ < text_.size(); ++position_) {
+    const char c = text_[position_];
+    if (continues(position_)) {
+      ++position_;
+      ++line_;
+    } else if (c == '\n' || (comment_ != '\0' && c == comment_)) {
+      return false;
+    } else if (space.find(c) == std::string_view::npos) {
+      return true;
+    }
+  }
+  return false;
 }
 
 std::int64_t TextReader::words_on_line() const {

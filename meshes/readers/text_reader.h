@@ -10,13 +10,16 @@
 
 namespace palpate {
 
-/// Reads a text file word by word. Every function that reads throws Error (where = "file:line") when what is
-/// there is not what was asked for; `what` says in the message what that was, e.g. "a node number".
+/// Reads a text file word by word, whatever ends its lines and with or without a byte order mark. Every
+/// function that reads throws Error (where = "file:line") when what is there is not what was asked for;
+/// `what` says in the message what that was, e.g. "a node number".
 class TextReader {
  public:
   /// Text from `comment` to the end of its line is skipped ('\0': there are no comments).
   /// Throws Error when the file cannot be read or holds nothing.
   explicit TextReader(std::filesystem::path file, char comment = '\0');
+  /// Reads `text`, which is in `file`.
+  TextReader(std::filesystem::path file, std::string text, char comment);
 
   /// No word is left.
   [[nodiscard]] bool at_end();
@@ -36,6 +39,11 @@ class TextReader {
   Vec3 point();
   Vec3 plane_point();  ///< two coordinates, z = 0
   void skip_words(std::int64_t count, const char* what);
+  /// Skips letters of the next word, which then begins behind them.
+  void skip_letters(std::size_t count);
+
+  /// A word is left on the line, which a backslash at its end continues.
+  [[nodiscard]] bool on_line();
 
   /// How many words are left on the line; they stay next.
   [[nodiscard]] std::int64_t words_on_line() const;
@@ -50,6 +58,8 @@ class TextReader {
 
  private:
   void skip_space();
+  /// A backslash stands there, at the end of a line.
+  [[nodiscard]] bool continues(std::size_t i) const;
 
   std::filesystem::path file_;
   std::string text_;

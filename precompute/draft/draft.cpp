@@ -222,6 +222,7 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
   expect_utf8_name(file);
   expect_writable_folder(description);
   Shape shape = read_shape(file, options.shape);
+  for (const std::string& remark : shape.remarks) tell("note: " + remark);
   for (const std::string& repair : shape.repairs) tell("repaired: " + repair);
   const UnitGuess unit = unit_of(shape, options);
   tell_decisions(shape, unit, options, tell);

@@ -65,6 +65,7 @@ Shape read_repaired_surface(const std::filesystem::path& file, const ShapeOption
   Shape shape;
   measure(repaired.surface, shape);
   shape.repairs = std::move(repaired.repairs);
+  shape.remarks = std::move(repaired.remarks);
   if (!shape.repairs.empty()) shape.repaired = std::move(repaired.surface);
   return shape;
 }

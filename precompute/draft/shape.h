@@ -28,6 +28,7 @@ std::string shape_name(const std::filesystem::path& file);
 struct Shape {
   ShapeKind kind = ShapeKind::surface;
   std::vector<std::string> repairs;  ///< surfaces: what was repaired, a sentence each
+  std::vector<std::string> remarks;  ///< surfaces: what of the file is not used, likewise
   TriangleSurface repaired;          ///< the surface then; empty where the file is whole
   Vec3 size = Vec3::Zero();          ///< of the box around it [file units]
   double boundary = 0.0;             ///< its area; of pictures its length [file units^2, file units]
@@ -37,7 +38,7 @@ struct Shape {
 
 /// How a shape is taken.
 struct ShapeOptions {
-  SurfaceParts parts = SurfaceParts::largest;
+  SurfaceParts parts = SurfaceParts::most;
   bool strict = false;         ///< repair nothing
   std::optional<int> nodes{};  ///< on the surface of the mesh that is to come; of pictures the outline
 

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "meshes/check.h"
 #include "precompute/geometry/mesh_bytes.h"
+#include "precompute/surfaces/shells.h"
 
 /// Takes the place of TetGen's own function of this name: that of 1.5.0 frees its memory, throws, and frees
 /// it again, so that every error becomes a crash.
@@ -65,6 +66,15 @@ void copy_regions(const std::vector<RegionPoint>& points, tetgenio& io) {
   }
 }
 
+/// TetGen empties what it can reach from a hole's point.
+void copy_holes(const TriangleSurface& surface, tetgenio& io) {
+  const std::vector<TriangleSurface> cavities = cavities_of(surface);
+  io.numberofholes = static_cast<int>(cavities.size());
+  io.holelist = new REAL[3 * cavities.size()];
+  for (std::size_t i = 0; i < cavities.size(); ++i)
+    Eigen::Map<Vec3>(io.holelist + 3 * i) = point_inside(cavities[i]);
+}
+
 Mesh copy_mesh(const tetgenio& io, const std::vector<RegionPoint>& points) {
   Mesh mesh;
   for (int i = 0; i < io.numberofpoints; ++i) {
@@ -92,7 +102,10 @@ ChildResult tetrahedralise(const TriangleSurface& surface, const std::vector<Reg
                            const MeshOptions& options, const std::function<double(const Vec3&)>& edge_at) {
   tetgenio in, out;
   copy_surface(surface, in);
-  copy_regions(points, in);
+  if (points.empty())
+    copy_holes(surface, in);
+  else
+    copy_regions(points, in);
   target_edge = &edge_at;
   in.tetunsuitable = too_large;
 

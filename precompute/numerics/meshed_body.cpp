@@ -16,6 +16,7 @@
 #include "precompute/geometry/plane_mesh.h"
 #include "precompute/geometry/tetgen_mesh.h"
 #include "precompute/numerics/fixed_nodes.h"
+#include "precompute/surfaces/shells.h"
 #include "precompute/surfaces/surface_input.h"
 
 namespace palpate {
@@ -46,6 +47,7 @@ struct MeshGeometry {
   Mesh operator()(const SurfaceGeometry& surface) const {
     progress("reading the surface " + surface.file.filename().string());
     TriangleSurface triangles = read_surface(surface.file, notes, keep);
+    note_cavities(triangles);
     if (options.mesher == Mesher::cgal || (options.remesh && !remesh(surface.file, triangles))) {
       progress("meshing with CGAL");
       return mesh_surface_with_cgal(triangles, options, where);
@@ -64,14 +66,33 @@ struct MeshGeometry {
       return true;
     }
     const std::string what = "remeshed to edge_length, the surface " + remeshed.problem;
-    if (options.mesher_chosen) {
+    const bool is_hollow = !cavities_of(triangles).empty();
+    if (options.mesher_chosen || is_hollow) {
       throw Error(
           what, where,
-          "set mesher = \"cgal\" in [mesh] and remove remesh: CGAL's mesher makes a boundary of its own; "
-          "or use another edge_length");
+          is_hollow
+              ? "use another edge_length, or remove remesh from [mesh], so that the file's triangles are kept"
+              : "set mesher = \"cgal\" in [mesh] and remove remesh: CGAL's mesher makes a boundary of its "
+                "own; "
+                "or use another edge_length");
     }
     notes.push_back(what + "; CGAL's mesher was used on the surface as it is (mesher = \"cgal\")");
     return false;
+  }
+
+  /// Tells what stays empty, which CGAL's mesher could miss: it finds what it happens to hit.
+  void note_cavities(const TriangleSurface& triangles) const {
+    const std::vector<TriangleSurface> cavities = cavities_of(triangles);
+    if (cavities.empty()) return;
+    double volume = 0.0;
+    for (const TriangleSurface& cavity : cavities) volume -= enclosed_volume(cavity);
+    notes.push_back(fmt::format("{} in the body {}, of {:.4g} cm3: nothing is in there",
+                                cavities.size() == 1 ? "a shell" : fmt::format("{} shells", cavities.size()),
+                                cavities.size() == 1 ? "is a cavity" : "are cavities",
+                                volume * std::pow(100.0 * scale, 3)));
+    if (options.mesher == Mesher::cgal)
+      throw Error("the surface has cavities, which CGAL's mesher may miss", where,
+                  R"(set mesher = "tetgen" in [mesh], or remove the inner shells from the surface)");
   }
 
   /// Tells whom an edge_length does not do what it seems to.

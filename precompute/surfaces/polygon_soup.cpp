@@ -1,96 +1,68 @@
 #include "precompute/surfaces/polygon_soup.h"
 
-#include <CGAL/IO/OBJ.h>
-#include <CGAL/IO/OFF.h>
-#include <CGAL/IO/PLY.h>
-#include <CGAL/IO/STL.h>
 #include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
+#include <CGAL/bounding_box.h>
+#include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
-#include <charconv>
 #include <cmath>
+#include <locale>
+#include <numeric>
 #include <sstream>
-#include <string_view>
-
-#include "base/error.h"
+#include <utility>
 
 namespace palpate {
 namespace {
 
 namespace PMP = CGAL::Polygon_mesh_processing;
 using Point = PolygonSoup::Point;
+using Kernel = PolygonSoup::Kernel;
 using Polygon = PolygonSoup::Polygon;
 
-constexpr double largest_coordinate = 1e30;
-
-/// What CGAL's readers leave to others.
-void check_soup(const PolygonSoup& soup, const std::string& where) {
-  for (const Point& p : soup.points) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!(std::abs(p[axis]) <= largest_coordinate)) {
-        throw Error("a coordinate is not a finite number or beyond all measure: " + shown(p), where,
-                    "export the surface again");
-      }
-    }
+/// Drops corners that follow on themselves, and then polygons of less than three. Returns how many.
+std::size_t collapse(PolygonSoup& soup) {
+  for (Polygon& polygon : soup.polygons) {
+    polygon.erase(std::unique(polygon.begin(), polygon.end()), polygon.end());
+    while (polygon.size() > 1 && polygon.front() == polygon.back()) polygon.pop_back();
   }
-  for (std::size_t i = 0; i < soup.polygons.size(); ++i) {
-    for (const std::size_t corner : soup.polygons[i]) {
-      if (corner >= soup.points.size()) {
-        throw Error("polygon " + std::to_string(i + 1) + " of " + std::to_string(soup.polygons.size()) +
-                        " has a corner that is none of the file's " + std::to_string(soup.points.size()) +
-                        " points",
-                    where, "the file is damaged: export the surface again");
-      }
-    }
-  }
+  return std::erase_if(soup.polygons, [](const Polygon& polygon) { return polygon.size() < 3; });
 }
 
-/// CGAL's reader of OBJ stops at a number that it cannot hold, and takes the corners before it for all.
-void check_obj_numbers(std::string_view text, const std::string& where) {
-  constexpr std::string_view blanks = " \t\r\v\f";
-  for (std::size_t line_number = 1; !text.empty(); ++line_number) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    std::string_view line = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    line.remove_prefix(std::min(line.find_first_not_of(blanks), line.size()));
-    if (!line.starts_with('f') || line.find_first_of(blanks) != 1) continue;
-    while (!line.empty()) {
-      line.remove_prefix(std::min(line.find_first_of(blanks), line.size()));
-      line.remove_prefix(std::min(line.find_first_not_of(blanks), line.size()));
-      int corner = 0;
-      if (std::from_chars(line.data(), line.data() + line.size(), corner).ec ==
-          std::errc::result_out_of_range)
-        throw Error("line " + std::to_string(line_number) + ": a face has the corner " +
-                        std::string(line.substr(0, std::min<std::size_t>(line.find_first_of(blanks), 24))) +
-                        ", which is none of the file's points",
-                    where, "the file is damaged: export the surface again");
-    }
+/// Points of edges that one polygon alone has, each as often as it is in one; how many such edges there are
+/// is half.
+std::vector<std::size_t> open_points(const PolygonSoup& soup) {
+  const std::vector<SoupEdge> edges = sorted_edges(soup);
+  std::vector<std::size_t> points;
+  for (auto edge = edges.begin(); edge != edges.end();) {
+    const auto end = std::find_if(edge, edges.end(), [&](const SoupEdge& other) { return other != *edge; });
+    if (end - edge == 1) points.insert(points.end(), edge->begin(), edge->end());
+    edge = end;
   }
+  return points;
 }
 
-/// As the file's name ends, in small letters.
-std::string extension_of(const std::filesystem::path& file) {
-  std::string text = file.extension().string();
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
-/// False where CGAL's reader says so.
-bool read_by_cgal(const std::string& bytes, const std::string& extension, PolygonSoup& soup) {
-  namespace io = CGAL::IO;
-  const auto quietly = CGAL::parameters::verbose(false);
-  const auto attempt = [&](io::Mode mode) {
-    soup = {};
-    std::istringstream in(bytes);
-    io::set_mode(in, mode);
-    if (extension == ".obj") return io::read_OBJ(in, soup.points, soup.polygons, quietly);
-    if (extension == ".off") return io::read_OFF(in, soup.points, soup.polygons, quietly);
-    if (extension == ".ply") return io::read_PLY(in, soup.points, soup.polygons, quietly);
-    return extension == ".stl" && io::read_STL(in, soup.points, soup.polygons, quietly);
+/// Joins those of `points` that are within `distance`, directly or by others between. False where there are
+/// none.
+bool join(PolygonSoup& soup, std::vector<std::size_t> points, double distance) {
+  const Kernel::Vector_3 across(0.61, 0.53, 0.59);  // along no grid or face that a program makes
+  const auto place = [&](std::size_t i) { return (soup.points[i] - CGAL::ORIGIN) * across; };
+  std::ranges::sort(
+      points, [&](std::size_t a, std::size_t b) { return std::pair(place(a), a) < std::pair(place(b), b); });
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  std::vector<std::size_t> to(soup.points.size());
+  std::iota(to.begin(), to.end(), std::size_t{0});
+  const auto root = [&](std::size_t i) {
+    while (to[i] != i) i = to[i] = to[to[i]];
+    return i;
   };
-  const bool may_be_binary = extension == ".ply" || extension == ".stl";
-  return attempt(may_be_binary ? io::BINARY : io::ASCII) || (extension == ".stl" && attempt(io::ASCII));
+  for (auto a = points.begin(); a != points.end(); ++a) {
+    for (auto b = a + 1; b != points.end() && place(*b) - place(*a) <= distance; ++b) {
+      if (CGAL::squared_distance(soup.points[*a], soup.points[*b]) <= distance * distance)
+        to[root(*b)] = root(*a);
+    }
+  }
+  for (Polygon& polygon : soup.polygons) std::ranges::transform(polygon, polygon.begin(), root);
+  return std::ranges::any_of(points, [&](std::size_t i) { return root(i) != i; });
 }
 
 }  // namespace
@@ -102,36 +74,48 @@ std::string shown(const Point& p) {
   return text.str();
 }
 
-PolygonSoup read_polygon_soup(const std::string& bytes, const std::filesystem::path& file) {
-  const std::string where = file.string(), extension = extension_of(file);
-  if (extension == ".obj") check_obj_numbers(bytes, where);
-  PolygonSoup soup;
-  bool read = false;
-  try {
-    read = read_by_cgal(bytes, extension, soup);
-  } catch (const std::exception&) {
-    read = false;
-  }
-  if (!read || soup.polygons.empty()) {
-    throw Error("cannot read a surface from this file", where,
-                "it must be a complete .off, .obj, .stl or .ply with triangles or polygons");
-  }
-  check_soup(soup, where);
-  return soup;
-}
-
 std::size_t weld(PolygonSoup& soup) {
   PMP::merge_duplicate_points_in_polygon_soup(soup.points, soup.polygons);
-  for (Polygon& polygon : soup.polygons) {
-    polygon.erase(std::unique(polygon.begin(), polygon.end()), polygon.end());
-    while (polygon.size() > 1 && polygon.front() == polygon.back()) {
-      polygon.pop_back();
-    }
-  }
-  const std::size_t dropped =
-      std::erase_if(soup.polygons, [](const Polygon& polygon) { return polygon.size() < 3; });
+  const std::size_t dropped = collapse(soup);
   PMP::remove_isolated_points_in_polygon_soup(soup.points, soup.polygons);
   return dropped;
+}
+
+std::vector<SoupEdge> sorted_edges(const PolygonSoup& soup) {
+  std::vector<SoupEdge> edges;
+  for (const Polygon& polygon : soup.polygons) {
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const auto [a, b] = std::minmax(polygon[i], polygon[(i + 1) % polygon.size()]);
+      edges.push_back({a, b});
+    }
+  }
+  std::ranges::sort(edges);
+  return edges;
+}
+
+std::string join_seams(PolygonSoup& soup) {
+  const std::vector<std::size_t> loose = open_points(soup);
+  if (loose.empty()) return {};
+  const CGAL::Bbox_3 box = CGAL::bbox_3(soup.points.begin(), soup.points.end());
+  const double diagonal =
+      std::hypot(box.xmax() - box.xmin(), box.ymax() - box.ymin(), box.zmax() - box.zmin());
+  std::size_t open = loose.size();
+  double within = 0.0;
+  for (const double share : {1e-6, 1e-5, 1e-4}) {
+    PolygonSoup joined = soup;
+    if (open == 0 || !join(joined, loose, share * diagonal)) continue;
+    const std::size_t dropped = collapse(joined), left = open_points(joined).size();
+    if (share > 1e-6 && (dropped != 0 || left >= open)) continue;
+    soup = std::move(joined);
+    open = left;
+    within = share * diagonal;
+  }
+  const std::size_t points = PMP::remove_isolated_points_in_polygon_soup(soup.points, soup.polygons);
+  return points == 0
+             ? ""
+             : fmt::format(
+                   "{} points were joined to others within {:.1g} units, as a seam was open by rounding",
+                   points, within);
 }
 
 }  // namespace palpate

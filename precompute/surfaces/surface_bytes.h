@@ -20,4 +20,26 @@ inline TriangleSurface take_surface(std::span<const std::byte>& bytes) {
   return surface;
 }
 
+inline void append_text(Bytes& bytes, const std::string& text) {
+  append_array(bytes, std::span<const char>(text));
+}
+
+inline std::string take_text(std::span<const std::byte>& bytes) {
+  const std::vector<char> text = take_array<char>(bytes);
+  return {text.begin(), text.end()};
+}
+
+/// Appends texts with their number, for take_lines.
+inline void append_lines(Bytes& bytes, const std::vector<std::string>& lines) {
+  const std::size_t count = lines.size();
+  append_array(bytes, std::span(&count, 1));
+  for (const std::string& line : lines) append_text(bytes, line);
+}
+
+inline std::vector<std::string> take_lines(std::span<const std::byte>& bytes) {
+  std::vector<std::string> lines(take_array<std::size_t>(bytes).at(0));
+  for (std::string& line : lines) line = take_text(bytes);
+  return lines;
+}
+
 }  // namespace palpate

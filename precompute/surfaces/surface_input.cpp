@@ -3,7 +3,6 @@
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
 #include <CGAL/AABB_triangle_primitive.h>
-#include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/detect_features.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
@@ -18,7 +17,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <numeric>
 #include <set>
@@ -30,7 +28,9 @@
 #include "base/write_file.h"
 #include "formats/outputs/output_paths.h"
 #include "precompute/surfaces/polygon_soup.h"
+#include "precompute/surfaces/shells.h"
 #include "precompute/surfaces/surface_bytes.h"
+#include "precompute/surfaces/surface_file.h"
 #include "precompute/surfaces/surface_mend.h"
 
 namespace palpate {
@@ -49,21 +49,8 @@ constexpr double remesh_time = 1e-3;    // [s] for a triangle, meant to be far t
 constexpr double remesh_memory = 4e3;   // [byte] for a triangle, likewise
 constexpr double most_triangles = 2e7;  // after remeshing; a body's boundary has some 1e5 at most
 
-using Edge = std::pair<std::size_t, std::size_t>;
-
-/// How many polygons meet in each edge.
-std::map<Edge, int> count_edges(const PolygonSoup& soup) {
-  std::map<Edge, int> count;
-  for (const Polygon& polygon : soup.polygons) {
-    for (std::size_t i = 0; i < polygon.size(); ++i) {
-      ++count[std::minmax(polygon[i], polygon[(i + 1) % polygon.size()])];
-    }
-  }
-  return count;
-}
-
 /// Number of connected groups of open edges.
-std::size_t count_holes(const std::vector<Edge>& open_edges, std::size_t points) {
+std::size_t count_holes(const std::vector<SoupEdge>& open_edges, std::size_t points) {
   std::vector<std::size_t> group(points);
   std::iota(group.begin(), group.end(), std::size_t{0});
   const auto root = [&](std::size_t i) {
@@ -77,24 +64,24 @@ std::size_t count_holes(const std::vector<Edge>& open_edges, std::size_t points)
   }
   std::set<std::size_t> holes;
   for (const auto& edge : open_edges) {
-    holes.insert(root(edge.first));
+    holes.insert(root(edge[0]));
   }
   return holes.size();
 }
 
 void check_edges(const PolygonSoup& soup, const std::string& where) {
-  std::vector<Edge> open_edges;
-  for (const auto& [edge, count] : count_edges(soup)) {
-    const std::string place =
-        "from " + shown(soup.points[edge.first]) + " to " + shown(soup.points[edge.second]) + " (file units)";
-    if (count > 2) {
+  const std::vector<SoupEdge> edges = sorted_edges(soup);
+  std::vector<SoupEdge> open_edges;
+  for (auto edge = edges.begin(); edge != edges.end();) {
+    const auto end = std::find_if(edge, edges.end(), [&](const SoupEdge& other) { return other != *edge; });
+    if (end - edge > 2) {
       throw Error(
-          "the surface is not manifold: " + std::to_string(count) + " triangles meet in the edge " + place,
+          fmt::format("the surface is not manifold: {} triangles meet in the edge from {} to {} (file units)",
+                      end - edge, shown(soup.points[(*edge)[0]]), shown(soup.points[(*edge)[1]])),
           where, "remove inner walls and doubled triangles in a mesh editor");
     }
-    if (count == 1) {
-      open_edges.push_back(edge);
-    }
+    if (end - edge == 1) open_edges.push_back(*edge);
+    edge = end;
   }
   if (open_edges.empty()) {
     return;
@@ -143,27 +130,29 @@ void check_triangles(const SurfaceMesh& mesh, const std::string& where) {
   }
 }
 
-void check_one_part(SurfaceMesh& mesh, const std::string& where) {
-  auto part = mesh.add_property_map<Face, std::size_t>("f:part").first;
-  const std::size_t parts = PMP::connected_components(mesh, part);
-  if (parts == 1) {
-    return;
+/// Turns the surface of a body outwards, and those of its cavities inwards. Throws where something else is
+/// there.
+void orient_outwards(SurfaceMesh& mesh, const std::string& where, std::vector<std::string>& notes) {
+  std::vector<TriangleSurface> shells = shells_of(surface_of(mesh));
+  bool turned = false;
+  if (shells.size() == 1) {
+    turned = !PMP::is_outward_oriented(mesh);
+    if (turned) PMP::reverse_face_orientations(mesh);
+  } else {
+    const BodyShells body = body_shells(std::move(shells));
+    if (!body.others.empty()) {
+      std::string places = shown(body.kept.front().nodes.front());
+      for (std::size_t i = 0; i < std::min<std::size_t>(body.others.size(), 2); ++i)
+        places += ", " + shown(body.others[i].nodes.front());
+      throw Error(
+          fmt::format("the surface has {} disconnected parts, at {} (file units)", body.others.size() + 1,
+                      places),
+          where, "a body is one closed shell, and others in it around cavities: keep one part, or join them");
+    }
+    mesh = mesh_of(together(body.kept));
+    turned = body.turned;
   }
-  std::string places;
-  for (std::size_t i = 0; i < std::min<std::size_t>(parts, 3); ++i) {
-    const auto face =
-        std::find_if(mesh.faces().begin(), mesh.faces().end(), [&](Face f) { return part[f] == i; });
-    places += (i == 0 ? " at " : ", ") + shown(first_corner(mesh, *face));
-  }
-  throw Error("the surface has " + std::to_string(parts) + " disconnected parts," + places + " (file units)",
-              where, "a body is one closed shell: keep one part, or join them");
-}
-
-void orient_outwards(SurfaceMesh& mesh, std::vector<std::string>& notes) {
-  if (!PMP::is_outward_oriented(mesh)) {
-    PMP::reverse_face_orientations(mesh);
-    notes.emplace_back("the surface was oriented inwards and has been turned");
-  }
+  if (turned) notes.emplace_back("the surface was oriented inwards and has been turned");
 }
 
 using FacePair = std::pair<Face, Face>;
@@ -252,23 +241,12 @@ struct Answer {
   SelfIntersections crossings;
 };
 
-void append_text(Bytes& bytes, const std::string& text) {
-  append_array(bytes, std::span<const char>(text));
-}
-
-std::string take_text(std::span<const std::byte>& bytes) {
-  const std::vector<char> text = take_array<char>(bytes);
-  return {text.begin(), text.end()};
-}
-
 Bytes pack(const Answer& answer) {
   Bytes bytes;
   append_surface(bytes, answer.surface);
   append_text(bytes, answer.crossings.problem);
   append_array(bytes, std::span(answer.crossings.triangles));
-  for (const std::string& note : answer.notes) {
-    append_text(bytes, note);
-  }
+  append_lines(bytes, answer.notes);
   return bytes;
 }
 
@@ -277,9 +255,7 @@ Answer unpack(std::span<const std::byte> bytes) {
   answer.surface = take_surface(bytes);
   answer.crossings.problem = take_text(bytes);
   answer.crossings.triangles = take_array<Corners>(bytes);
-  while (!bytes.empty()) {
-    answer.notes.push_back(take_text(bytes));
-  }
+  answer.notes = take_lines(bytes);
   return answer;
 }
 
@@ -289,11 +265,11 @@ SurfaceMesh read_mesh(const std::string& bytes, const std::filesystem::path& fil
   const std::string where = file.string();
   PolygonSoup soup = read_polygon_soup(bytes, file);
   weld(soup);
+  if (std::string seam = join_seams(soup); !seam.empty()) notes.push_back(std::move(seam));
   check_edges(soup, where);
   SurfaceMesh mesh = connect(soup, where, notes);
   check_triangles(mesh, where);
-  check_one_part(mesh, where);
-  orient_outwards(mesh, notes);
+  orient_outwards(mesh, where, notes);
   return mesh;
 }
 

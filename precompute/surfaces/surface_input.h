@@ -11,8 +11,8 @@
 
 namespace palpate {
 
-/// Closed, manifold, connected surface without self-intersections, oriented outwards, in the file's length
-/// unit.
+/// Closed, manifold surface of one body without self-intersections, oriented outwards, in the file's length
+/// unit: one shell, and others in it around cavities (shells.h).
 struct TriangleSurface {
   std::vector<Vec3> nodes;
   std::vector<Triangle> triangles;
@@ -20,8 +20,8 @@ struct TriangleSurface {
 
 /// Reads OFF, OBJ, STL (ASCII and binary) or PLY by the file's extension, splits polygons into triangles and
 /// turns triangles outwards. Repairs are told in `notes`. Throws Error with the coordinates when the surface
-/// is open, not manifold, flat, in several parts, or intersects itself; the intersecting triangles are then
-/// written to NAME.bad-faces.off in the working directory, with `keep` only where nothing has that name.
+/// is open, not manifold, flat, of several bodies, or intersects itself; the triangles that intersect are
+/// then written to NAME.bad-faces.off in the working directory, with `keep` only where nothing has that name.
 /// File and surface are read by foreign code in a child process, which has the limits of reading_limits.
 TriangleSurface read_surface(const std::filesystem::path& file, std::vector<std::string>& notes,
                              bool keep = false);

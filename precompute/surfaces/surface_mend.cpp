@@ -1,6 +1,5 @@
 #include "precompute/surfaces/surface_mend.h"
 
-#include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Polygon_mesh_processing/repair_self_intersections.h>
@@ -9,6 +8,8 @@
 #include <CGAL/alpha_wrap_3.h>
 
 #include <algorithm>
+
+#include "precompute/surfaces/shells.h"
 
 namespace palpate {
 namespace {
@@ -26,13 +27,14 @@ PolygonSoup soup_of(const TriangleSurface& surface) {
   return soup;
 }
 
-SurfaceMesh mesh_of(const PolygonSoup& soup) {
+}  // namespace
+
+SurfaceMesh mesh_of(const TriangleSurface& surface) {
+  const PolygonSoup soup = soup_of(surface);
   SurfaceMesh mesh;
   PMP::polygon_soup_to_polygon_mesh(soup.points, soup.polygons, mesh);
   return mesh;
 }
-
-}  // namespace
 
 TriangleSurface surface_of(const SurfaceMesh& mesh) {
   TriangleSurface surface;
@@ -58,14 +60,16 @@ std::string problem_of(const TriangleSurface& surface) {
   const std::size_t points = soup.points.size();
   if (!PMP::orient_polygon_soup(soup.points, soup.polygons) || soup.points.size() != points)
     return "is not manifold";
-  SurfaceMesh mesh = mesh_of(soup);
+  SurfaceMesh mesh;
+  PMP::polygon_soup_to_polygon_mesh(soup.points, soup.polygons, mesh);
   if (!CGAL::is_closed(mesh)) return "is open";
   if (std::ranges::any_of(mesh.faces(),
                           [&](auto face) { return PMP::is_degenerate_triangle_face(face, mesh); }))
     return "has triangles without area";
-  auto part = mesh.add_property_map<SurfaceMesh::Face_index, std::size_t>("f:part").first;
-  const std::size_t parts = PMP::connected_components(mesh, part);
-  if (parts != 1) return "has " + std::to_string(parts) + " parts";
+  if (std::vector<TriangleSurface> shells = shells_of(surface); shells.size() > 1) {
+    const std::size_t apart = body_shells(std::move(shells)).others.size();
+    if (apart != 0) return "has " + std::to_string(apart + 1) + " parts";
+  }
   std::vector<std::pair<SurfaceMesh::Face_index, SurfaceMesh::Face_index>> pairs;
   PMP::self_intersections(mesh, std::back_inserter(pairs));
   if (pairs.empty()) return "";
@@ -74,18 +78,27 @@ std::string problem_of(const TriangleSurface& surface) {
 }
 
 TriangleSurface without_self_intersections(const TriangleSurface& surface) {
-  SurfaceMesh mesh = mesh_of(soup_of(surface));
+  SurfaceMesh mesh = mesh_of(surface);
   PMP::experimental::remove_self_intersections(mesh, CGAL::parameters::preserve_genus(false));
   mesh.collect_garbage();
   return surface_of(mesh);
 }
 
 TriangleSurface wrap_surface(const TriangleSurface& surface, double alpha, double offset) {
-  const PolygonSoup soup = soup_of(surface);
-  SurfaceMesh wrap;
-  CGAL::alpha_wrap_3(soup.points, soup.polygons, alpha, offset, wrap);
-  wrap.collect_garbage();
-  return surface_of(wrap);
+  const auto wrapped = [&](const TriangleSurface& shell) {
+    const PolygonSoup soup = soup_of(shell);
+    SurfaceMesh wrap;
+    CGAL::alpha_wrap_3(soup.points, soup.polygons, alpha, offset, wrap);
+    wrap.collect_garbage();
+    return surface_of(wrap);
+  };
+  const std::vector<TriangleSurface> cavities = cavities_of(surface);
+  std::vector<TriangleSurface> shells = shells_of(surface);
+  if (cavities.empty() || cavities.size() == shells.size()) return wrapped(surface);
+  std::erase_if(shells, [](const TriangleSurface& shell) { return enclosed_volume(shell) < 0.0; });
+  shells = {wrapped(together(shells))};
+  for (const TriangleSurface& cavity : cavities) turn(shells.emplace_back(wrapped(cavity)), false);
+  return together(shells);
 }
 
 }  // namespace palpate

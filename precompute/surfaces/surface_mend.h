@@ -13,17 +13,20 @@ namespace palpate {
 /// Nodes and triangles of a mesh without removed elements.
 TriangleSurface surface_of(const CGAL::Surface_mesh<PolygonSoup::Point>& mesh);
 
-/// What keeps a surface from being closed, manifold, connected and free of self-intersections: the rest of
-/// "the surface ...". Empty where nothing does.
+/// A manifold surface as a mesh.
+CGAL::Surface_mesh<PolygonSoup::Point> mesh_of(const TriangleSurface& surface);
+
+/// What keeps a surface from being closed, manifold, around one body and free of self-intersections: the rest
+/// of "the surface ...". Empty where nothing does.
 std::string problem_of(const TriangleSurface& surface);
 
 /// Cuts out triangles that intersect and fills the holes anew; the genus may change. The result may still
 /// intersect itself.
 TriangleSurface without_self_intersections(const TriangleSurface& surface);
 
-/// A closed surface around the triangles, at the distance `offset` from them; gaps narrower than `alpha` are
-/// bridged (Portaneri et al., Alpha wrapping with an offset, ACM Trans. Graph. 41, 2022). Lengths are in the
-/// surface's unit.
+/// A closed surface around the triangles, at the distance `offset` from them, and one around each of their
+/// cavities; gaps narrower than `alpha` are bridged (Portaneri et al., Alpha wrapping with an offset, ACM
+/// Trans. Graph. 41, 2022). Lengths are in the surface's unit.
 TriangleSurface wrap_surface(const TriangleSurface& surface, double alpha, double offset);
 
 }  // namespace palpate

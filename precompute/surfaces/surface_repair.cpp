@@ -1,8 +1,6 @@
 #include "precompute/surfaces/surface_repair.h"
 
 #include <CGAL/Polygon_mesh_processing/border.h>
-#include <CGAL/Polygon_mesh_processing/connected_components.h>
-#include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
@@ -18,12 +16,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "base/child_process.h"
 #include "base/error.h"
 #include "base/regular_file.h"
 #include "precompute/surfaces/polygon_soup.h"
+#include "precompute/surfaces/shells.h"
 #include "precompute/surfaces/surface_bytes.h"
+#include "precompute/surfaces/surface_file.h"
 #include "precompute/surfaces/surface_mend.h"
 
 namespace palpate {
@@ -35,11 +36,11 @@ using Face = SurfaceMesh::Face_index;
 using Halfedge = SurfaceMesh::Halfedge_index;
 
 constexpr std::size_t most_edges_without_delaunay = 300;  // CGAL takes the cube of that in time
-constexpr double least_filling =
-    1e-5;                            // volume / area^1.5: 0.094 of a ball, 7e-4 of a pipe's wall of 1 : 400
 constexpr double most_change = 0.1;  // of the volume: replacing triangles where a surface intersects itself
 constexpr double wrap_alpha = 0.5;   // of the edge
 constexpr std::size_t bytes_per_triangle = 100;  // of a file
+constexpr double least_share = 0.9;  // of area and volume: what is less of a file than that is not the body
+constexpr const char* inside_out = "the surface was inside out and was turned";
 
 std::string counted(std::size_t count, const char* one, const char* many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
@@ -52,6 +53,7 @@ SurfaceMesh clean(PolygonSoup& soup, std::vector<std::string>& repairs) {
     if (count != 0) repairs.push_back(counted(count, one, many));
   };
   tell(weld(soup), "polygon without area was removed", "polygons without area were removed");
+  if (std::string seam = join_seams(soup); !seam.empty()) repairs.push_back(std::move(seam));
   const std::size_t polygons = soup.polygons.size();
   PMP::merge_duplicate_polygons_in_polygon_soup(
       soup.points, soup.polygons,
@@ -79,25 +81,6 @@ SurfaceMesh clean(PolygonSoup& soup, std::vector<std::string>& repairs) {
     tell(faces - mesh.number_of_faces(), "triangle without area was removed",
          "triangles without area were removed");
   return mesh;
-}
-
-/// Drops all parts but the one with the largest area.
-void keep_largest(SurfaceMesh& mesh, std::vector<std::string>& repairs) {
-  auto part = mesh.add_property_map<Face, std::size_t>("f:part").first;
-  const std::size_t parts = PMP::connected_components(mesh, part);
-  if (parts < 2) return;
-  std::vector<double> areas(parts, 0.0);
-  double all = 0.0;
-  for (const Face face : mesh.faces()) {
-    const double area = CGAL::to_double(PMP::face_area(face, mesh));
-    areas[part[face]] += area;
-    all += area;
-  }
-  const auto largest = static_cast<std::size_t>(std::ranges::max_element(areas) - areas.begin());
-  PMP::keep_connected_components(mesh, std::vector<std::size_t>{largest}, part);
-  repairs.push_back(
-      fmt::format("of {} parts the largest was kept, {:.3g} % of the area (--parts all unites them)", parts,
-                  100.0 * areas[largest] / all));
 }
 
 /// Edges around a hole, and how far it reaches.
@@ -143,43 +126,78 @@ void fill_holes(SurfaceMesh& mesh, std::vector<std::string>& repairs) {
 /// What a child sends: a surface, and what was done or is still wrong.
 struct Mended {
   TriangleSurface surface;
-  std::vector<std::string> repairs;
+  std::vector<std::string> repairs, remarks;
   std::string problem;
 };
 
 ChildResult sent(const Mended& answer) {
   Bytes bytes;
   append_surface(bytes, answer.surface);
-  append_array(bytes, std::span<const char>(answer.problem));
-  for (const std::string& repair : answer.repairs) append_array(bytes, std::span<const char>(repair));
+  append_text(bytes, answer.problem);
+  append_lines(bytes, answer.repairs);
+  append_lines(bytes, answer.remarks);
   return {0, std::move(bytes)};
 }
 
 Mended received(const ChildResult& result) {
   std::span<const std::byte> bytes = result.bytes;
-  const auto text = [&] {
-    const std::vector<char> letters = take_array<char>(bytes);
-    return std::string(letters.begin(), letters.end());
-  };
   Mended answer;
   answer.surface = take_surface(bytes);
-  answer.problem = text();
-  while (!bytes.empty()) answer.repairs.push_back(text());
+  answer.problem = take_text(bytes);
+  answer.repairs = take_lines(bytes);
+  answer.remarks = take_lines(bytes);
   return answer;
+}
+
+/// The body among the parts, with its holes filled.
+TriangleSurface body_of(std::vector<TriangleSurface> shells, SurfaceParts parts, const std::string& where,
+                        std::vector<std::string>& repairs) {
+  const std::size_t count = shells.size();
+  std::vector<std::string> filled;
+  BodyShells found = body_shells(std::move(shells), [&](const TriangleSurface& outer) {
+    SurfaceMesh mesh = mesh_of(outer);
+    fill_holes(mesh, filled);
+    mesh.collect_garbage();
+    return surface_of(mesh);
+  });
+  const TriangleSurface others = together(found.others);
+  if (parts == SurfaceParts::all) std::ranges::move(found.others, std::back_inserter(found.kept));
+  TriangleSurface body = together(found.kept);
+  if (parts != SurfaceParts::all && !others.triangles.empty()) {
+    const double surface = area(body) / (area(body) + area(others)), volume = std::abs(enclosed_volume(body)),
+                 inside = volume / (volume + enclosed_volume(others));
+    const std::string share =
+        fmt::format("{:.3g} % of the area and {:.3g} % of the volume", 100.0 * surface, 100.0 * inside);
+    if (parts == SurfaceParts::most && std::min(surface, inside) < least_share)
+      throw Error(
+          fmt::format("of {} parts the largest has only {}", count, share), where,
+          "give palpate-precompute --parts all, which unites parts that overlap or nearly touch, or --parts "
+          "largest for that part alone; or join them in a mesh editor");
+    repairs.push_back(fmt::format("of {} parts the largest was kept, {}", count, share));
+  }
+  repairs.insert(repairs.end(), filled.begin(), filled.end());
+  if (found.turned) repairs.emplace_back(inside_out);
+  return body;
 }
 
 /// Everything but self-intersections.
 Mended mend(const std::string& bytes, const std::filesystem::path& file, SurfaceParts parts) {
   Mended answer;
   PolygonSoup soup = read_polygon_soup(bytes, file);
+  answer.remarks = soup.remarks;
   SurfaceMesh mesh = clean(soup, answer.repairs);
-  if (parts == SurfaceParts::largest) keep_largest(mesh, answer.repairs);
-  fill_holes(mesh, answer.repairs);
-  if (CGAL::is_closed(mesh) && !PMP::is_outward_oriented(mesh)) {
-    PMP::reverse_face_orientations(mesh);
-    answer.repairs.emplace_back("the surface was inside out and was turned");
-  }
   mesh.collect_garbage();
+  if (std::vector<TriangleSurface> shells = shells_of(surface_of(mesh)); shells.size() > 1) {
+    mesh = mesh_of(body_of(std::move(shells), parts, file.string(), answer.repairs));
+    if (parts == SurfaceParts::all) fill_holes(mesh, answer.repairs);
+  } else {
+    fill_holes(mesh, answer.repairs);
+    if (CGAL::is_closed(mesh) && !PMP::is_outward_oriented(mesh)) {
+      PMP::reverse_face_orientations(mesh);
+      answer.repairs.emplace_back(inside_out);
+    }
+    mesh.collect_garbage();
+  }
   answer.surface = surface_of(mesh);
   answer.problem = problem_of(answer.surface);
   return answer;
@@ -252,7 +270,7 @@ RepairedSurface repair_surface(const std::filesystem::path& file, SurfaceParts p
                     usual_wrap_offset * edge));
     answer.surface = wrapped_surface(answer.surface, edge, usual_wrap_offset, where);
   }
-  return {std::move(answer.surface), std::move(answer.repairs)};
+  return {std::move(answer.surface), std::move(answer.repairs), std::move(answer.remarks)};
 }
 
 TriangleSurface wrapped_surface(const TriangleSurface& surface, double edge, double offset,

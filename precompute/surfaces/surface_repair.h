@@ -12,7 +12,8 @@ namespace palpate {
 
 /// Which of a surface's disconnected parts become the body.
 enum class SurfaceParts : std::uint8_t {
-  largest,  ///< that with the largest area; the others are dropped
+  most,     ///< as largest, where that is nine tenths of the area and of what all enclose; else none
+  largest,  ///< that with the largest area, and its cavities; the others are dropped
   all,      ///< all of them, united into one: parts must overlap or nearly touch
 };
 
@@ -20,13 +21,15 @@ enum class SurfaceParts : std::uint8_t {
 struct RepairedSurface {
   TriangleSurface surface;
   std::vector<std::string> repairs;  ///< a sentence each, without a full stop; empty: the file was whole
+  std::vector<std::string> remarks;  ///< what of the file is not used, likewise
 };
 
 /// Reads a surface and repairs what is wrong with it, by CGAL's Polygon Mesh Processing, in child processes:
 /// doubled and degenerate polygons, more than two triangles in an edge, flipped triangles, open seams, other
-/// parts, holes, self-intersections. What is still not closed, manifold and free of self-intersections then
-/// is wrapped (wrapped_surface), for a mesh of `wrap_nodes` surface nodes. Throws Error when the file cannot
-/// be read, when nothing is enclosed, and when parts to unite are apart.
+/// parts, holes, self-intersections. Closed shells in the body are its cavities. What is still not closed,
+/// manifold and free of self-intersections then is wrapped (wrapped_surface), for a mesh of `wrap_nodes`
+/// surface nodes. Throws Error when the file cannot be read, when nothing is enclosed, when parts to unite
+/// are apart, and when too much would be dropped.
 RepairedSurface repair_surface(const std::filesystem::path& file, SurfaceParts parts, int wrap_nodes);
 
 /// Part of the edge that a wrapping keeps from the surface, unless it has a reason for another.

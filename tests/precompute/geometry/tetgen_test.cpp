@@ -4,6 +4,7 @@
 #include "meshes/check.h"
 #include "meshes/surface.h"
 #include "precompute/geometry/tetgen_mesh.h"
+#include "precompute/surfaces/shells.h"
 #include "tests/support/geometry_shapes.h"
 
 namespace palpate::tetgen_test {
@@ -48,6 +49,15 @@ TEST(TetGen, FillsTheSurfaceAndKeepsIt) {
       EXPECT_EQ(mesh.nodes[i], surface.nodes[i]);
     }
   }
+}
+
+TEST(TetGen, CavitiesStayEmpty) {
+  TriangleSurface cavity = ball(1), surface = testing::fine_cube(2, 8.0);
+  turn(cavity, false);
+  for (const Vec3& place : {Vec3(2, 2, 2), Vec3(6, 5, 4)}) surface = testing::joined(surface, cavity, place);
+  const Mesh mesh = mesh_surface(surface, {}, "hollow");
+  EXPECT_NEAR(volume(mesh), 512.0 + 2.0 * volume(cavity), 1e-9);
+  EXPECT_EQ(at(extract_surface(mesh).count()), surface.triangles.size());
 }
 
 TEST(TetGen, GradesTheInterior) {

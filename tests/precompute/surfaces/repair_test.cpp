@@ -99,8 +99,74 @@ TEST_F(Repair, DoubledAndFlatTriangles) {
 
 TEST_F(Repair, LargestOfSeveralParts) {
   const RepairedSurface repaired = repair(joined(cube(0.5), cube(1.0), {3, 0, 0}));
-  expect_mentions(told(repaired), {"of 2 parts the largest was kept, 80 % of the area"});  // 6 of 6 + 6/4
+  expect_mentions(told(repaired),  // 6 of 6 + 6/4, 1 of 1 + 1/8
+                  {"of 2 parts the largest was kept, 80 % of the area and 88.9 % of the volume"});
   EXPECT_NEAR(volume(expect_whole(repaired)), 1.0, 1e-12);
+}
+
+TEST_F(Repair, LosingATenthHasToBeAskedFor) {
+  const TriangleSurface two = joined(cube(0.5), cube(1.0), {3, 0, 0});
+  expect_mentions(error_of([&] { repair(two, SurfaceParts::most); }),
+                  {"80 % of the area", "--parts all", "--parts largest"});
+  const RepairedSurface crumb = repair(joined(cube(0.1), cube(1.0), {3, 0, 0}), SurfaceParts::most);
+  expect_mentions(told(crumb),
+                  {"of 2 parts the largest was kept, 99 % of the area and 99.9 % of the volume"});
+}
+
+TEST_F(Repair, ClosedShellsInsideAreCavities) {
+  const TriangleSurface inner = ball(2), two = joined(cube(4.0), inner, {2, 2, 2});
+  TriangleSurface inwards = inner;
+  for (Triangle& t : inwards.triangles) std::swap(t[0], t[1]);
+  for (const TriangleSurface& hollow :
+       {two, joined(cube(4.0), inwards, {2, 2, 2}), joined(inner, cube(4.0), {-2, -2, -2})}) {
+    const RepairedSurface repaired = repair(hollow, SurfaceParts::most);
+    EXPECT_EQ(told(repaired), "");
+    EXPECT_NEAR(volume(expect_whole(repaired)), 64.0 - volume(inner), 1e-4);
+  }
+  const RepairedSurface nested = repair(joined(two, cube(0.2), {1.9, 1.9, 1.9}), SurfaceParts::most);
+  expect_mentions(told(nested), {"of 3 parts the largest was kept"});  // what is in the cavity is not
+  EXPECT_NEAR(volume(expect_whole(nested)), 64.0 - volume(inner), 1e-4);
+  TriangleSurface open = two;
+  open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 2);
+  const RepairedSurface closed = repair(open, SurfaceParts::most);
+  expect_mentions(told(closed), {"a hole was filled"});
+  EXPECT_NEAR(volume(expect_whole(closed)), 64.0 - volume(inner), 1e-4);
+}
+
+/// A surface whose triangles have corners of their own, each moved by up to `jitter` along each axis.
+TriangleSurface torn(const TriangleSurface& whole, double jitter) {
+  TriangleSurface loose;
+  int turn = 0;
+  for (const Triangle& t : whole.triangles) {
+    const auto first = static_cast<Index>(loose.nodes.size());
+    for (const Index node : t) {
+      const Vec3 move(turn % 3 - 1, turn % 5 / 2.0 - 1, turn % 7 / 3.0 - 1);
+      loose.nodes.push_back(whole.nodes[testing::at(node)] + jitter * move);
+      turn += 2;
+    }
+    loose.triangles.push_back({first, first + 1, first + 2});
+  }
+  return loose;
+}
+
+TEST_F(Repair, SeamsThatRoundingOpened) {
+  const TriangleSurface whole = ball(3);
+  for (const double jitter : {1e-9, 1e-7, 1e-6, 1e-5}) {
+    const RepairedSurface repaired =
+        repair_surface(folder_.write("torn.off", off_text(torn(whole, jitter))), SurfaceParts::most, 500);
+    EXPECT_EQ(repaired.surface.nodes.size(), whole.nodes.size()) << jitter;
+    expect_mentions(told(repaired), {"points were joined", "rounding"});
+    EXPECT_NEAR(volume(expect_whole(repaired)), volume(whole), 1e-3);
+  }
+}
+
+TEST_F(Repair, NearPointsOfAWholeSurfaceAreNotJoined) {
+  TriangleSurface thin = fine_cube(2);
+  for (Vec3& x : thin.nodes) x[2] *= 1e-4;
+  const RepairedSurface repaired =
+      repair_surface(folder_.write("thin.off", off_text(thin)), SurfaceParts::most, 500);
+  EXPECT_EQ(told(repaired), "");
+  EXPECT_EQ(repaired.surface.nodes.size(), thin.nodes.size());
 }
 
 TEST_F(Repair, AllPartsThatOverlap) {
