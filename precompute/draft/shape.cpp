@@ -12,33 +12,14 @@
 #include <utility>
 
 #include "base/error.h"
+#include "formats/file_kinds.h"
 #include "precompute/geometry/picture_reader.h"
 #include "precompute/images/labelled_image.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, ShapeKind>, 11> endings = {{{".stl", ShapeKind::surface},
-                                                                             {".obj", ShapeKind::surface},
-                                                                             {".ply", ShapeKind::surface},
-                                                                             {".off", ShapeKind::surface},
-                                                                             {".inr", ShapeKind::image},
-                                                                             {".inr.gz", ShapeKind::image},
-                                                                             {".nii", ShapeKind::image},
-                                                                             {".nii.gz", ShapeKind::image},
-                                                                             {".nrrd", ShapeKind::image},
-                                                                             {".png", ShapeKind::picture},
-                                                                             {".pbm", ShapeKind::picture}}};
 constexpr double staircase = 1.5, plane_staircase = 4.0 / std::numbers::pi;
-
-/// The ending in small letters that a name has, or null.
-const std::pair<std::string_view, ShapeKind>* ending_of(const std::filesystem::path& file) {
-  std::string name = file.filename().string();
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
-  const auto* const found =
-      std::ranges::find_if(endings, [&](const auto& ending) { return name.ends_with(ending.first); });
-  return found == endings.end() ? nullptr : found;
-}
 
 void measure(const TriangleSurface& surface, Shape& shape) {
   Vec3 low = surface.nodes.front(), high = low;
@@ -132,18 +113,20 @@ Shape read_picture_shape(const std::filesystem::path& file) {
 }  // namespace
 
 std::optional<ShapeKind> shape_kind(const std::filesystem::path& file) {
-  const auto* const ending = ending_of(file);
-  return ending == nullptr ? std::nullopt : std::optional(ending->second);
+  const FileKind* const kind = kind_by_name(file);
+  if (kind == nullptr) return std::nullopt;
+  if (kind->geometry == "surface") return ShapeKind::surface;
+  if (kind->geometry == "image") return ShapeKind::image;
+  return kind->geometry == "picture" ? std::optional(ShapeKind::picture) : std::nullopt;
 }
 
 std::string shape_name(const std::filesystem::path& file) {
-  const std::string name = file.filename().string();
-  const auto* const ending = ending_of(file);
-  return ending == nullptr ? file.stem().string() : name.substr(0, name.size() - ending->first.size());
+  return name_without_ending(file);
 }
 
 Shape read_shape(const std::filesystem::path& file, const ShapeOptions& options) {
   const std::optional<ShapeKind> kind = shape_kind(file);
+  check_is_read(file);
   if (kind == ShapeKind::image) return read_image(file);
   if (kind == ShapeKind::picture) return read_picture_shape(file);
   return options.strict ? read_whole_surface(file) : read_repaired_surface(file, options);

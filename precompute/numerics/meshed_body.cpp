@@ -8,6 +8,8 @@
 #include "meshes/check.h"
 #include "meshes/edge_middles.h"
 #include "meshes/readers/volume_mesh.h"
+#include "base/printable.h"
+#include "formats/file_kinds.h"
 #include "precompute/geometry/cgal_surface_mesh.h"
 #include "precompute/geometry/image_mesh.h"
 #include "precompute/geometry/material_parts.h"
@@ -51,6 +53,7 @@ struct MeshGeometry {
     if (options.mesher == Mesher::cgal || (options.remesh && !remesh(surface.file, triangles))) {
       progress("meshing with CGAL");
       return mesh_surface_with_cgal(triangles, options, where);
+    check_is_read(surface.file, "surface");
     }
     note_kept_boundary(triangles);
     progress("meshing with TetGen");
@@ -116,11 +119,13 @@ struct MeshGeometry {
   }
 
   Mesh operator()(const VolumeGeometry& volume) const {
+    check_is_read(image.file, "image");
     progress("reading the mesh " + volume.file.filename().string());
     return read_volume_mesh(volume.file);
   }
 
   Mesh operator()(const PolygonGeometry& polygon) const {
+    check_is_read(volume.file, "volume");
     progress("meshing the polygon with CGAL");
     return mesh_polygon(polygon, options, where, notes);
   }
@@ -131,6 +136,7 @@ struct MeshGeometry {
   }
 
   /// Says so, and throws Error where there is no memory for so many cells.
+    check_is_read(picture.file, "picture");
   void begin_generating(ElementType usual, double cells) const {
     progress("generating the mesh");
     const ElementType element = options.element.value_or(usual);

@@ -209,7 +209,7 @@ class NotADescription(ProgramTest):
 
     def test_geometry_gets_a_model_toml_that_works(self):
         # A picture by itself becomes a body; whose parts are to be joined it is none.
-        for command, name, content, what in (([], "Two Tets.mesh", MEDIT.encode(), "a volume mesh"), (["join"], "sheet.png", png(40, 20), "a picture")):
+        for command, name, content, what in (([], "Two Tets.mesh", MEDIT.encode(), "a volume mesh of Medit"), (["join"], "sheet.png", png(40, 20), "a picture")):
             with self.subTest(name=name):
                 (self.folder / name).write_bytes(content)
                 model = self.write("model.toml", self.starter(run(PRECOMPUTE, *command, name, cwd=self.folder), name, what))
@@ -226,6 +226,35 @@ class NotADescription(ProgramTest):
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertTrue((self.folder / (name.split(".")[0] + ".model.toml")).exists())
                 self.assertTrue((self.folder / (name.split(".")[0] + ".palpate.hdf")).exists())
+
+    def test_kinds_that_are_not_read_are_named_with_what_converts_them(self):
+        cases = (("m.mha", b"ObjectType = Image\nNDims = 3\n", "MetaImage", "m.nrrd"), ("a.nhdr", b"NRRD0004\ndata file: a.raw\n\n", "NRRD", "unu save"),
+                 ("b.hdr", b"\x5c\x01\0\0" + bytes(400), "two files", "nibabel"), ("a.vtu", b'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid">', "VTK in XML", "meshio convert"),
+                 ("a.vtp", b'<VTKFile type="PolyData">', "surface of VTK", "pyvista"), ("a.mgz", b"\x1f\x8b", "FreeSurfer", "mri_convert"), ("a.inp", b"*HEADING\n", "Abaqus", "meshio"),
+                 ("a.glb", b"glTF\2\0\0\0", "glTF", "assimp"), ("a.gltf", b"{}", "glTF", "assimp"), ("a.step", b"ISO-10303-21;", "STEP", "gmsh"), ("a.iges", b"", "IGES", "gmsh"),
+                 ("a.3mf", b"PK\3\4", "3MF", "assimp"), ("a.dcm", bytes(128) + b"DICM", "DICOM", "dcm2niix"), ("a.JPG", b"\xff\xd8\xff\xe0", "JPEG", "a.png"),
+                 ("touch.csv", b"t,x,y,z\n", "a table", "script:"),
+                 # by contents, whatever the name
+                 ("body", b'<?xml version="1.0"?><VTKFile type="UnstructuredGrid">', "VTK in XML by its contents", "meshio"), ("scan.nii", bytes(128) + b"DICM" + bytes(400), "DICOM by its contents", "dcm2niix"),
+                 ("organ.toml", b"ObjectType = Image\nNDims = 3\n", "MetaImage by its contents", "organ.nrrd"), ("tube.txt", b"solid tube\n facet normal 0 0 1\n", "STL by its contents", "tube.stl"),
+                 ("tube.obj", b"ply\nformat ascii 1.0\n", "PLY by its contents", "tube.ply"), ("cube.stl", OFF.encode(), "OFF by its contents", "cube.off"))
+        for name, content, what, helps in cases:
+            with self.subTest(name=name):
+                (self.folder / name).write_bytes(content)
+                self.assert_refused(run(PRECOMPUTE, name, cwd=self.folder), name, what, helps)
+        self.assert_refused(run(PRECOMPUTE, self.write("README.md", "# Mine\n"), cwd=self.folder), "README.md", "neither a description")
+        for name, what in (("a.vtu", "VTK in XML"), ("README.md", "neither a description"), ("scan.nii", "DICOM")):
+            pushed = run(RUNTIME, "push", name, cwd=self.folder)
+            self.assertEqual(pushed.returncode, 1)
+            self.assertIn(what, pushed.stderr)
+
+    def test_a_file_under_another_key_is_told_its_own(self):
+        for key, name, right in (("mesh", "x.vtk", "volume"), ("file", "y.stl", "surface"), ("img", "z.nii.gz", "image")):
+            model = self.write("model.toml", f'name = "a"\n[geometry]\n{key} = "{name}"\n')
+            self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), f"no key '{key}'", f'write {right} = "{name}"')
+        self.write("a.off", OFF)
+        model = self.write("model.toml", cube_toml(2).replace("box = ", 'volume = "a.off" # '))
+        self.assert_refused(run(PRECOMPUTE, model, cwd=self.folder), "a.off", "a surface in OFF", "write surface =")
 
     def test_files_of_ours_and_folders(self):
         file = self.bake(cube_toml(2), name="cube.toml")
