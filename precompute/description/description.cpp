@@ -7,6 +7,8 @@
 #include "base/error.h"
 #include "base/regular_file.h"
 #include "base/toml_text.h"
+#include "base/words.h"
+#include "formats/file_kinds.h"
 #include "precompute/description/description_keys.h"
 #include "precompute/description/description_parts.h"
 
@@ -123,10 +125,28 @@ std::string read_name(const TomlTable& root) {
 }
 
 /// The image's labels stay apart in the mesh where materials need them.
-void keep_regions(Geometry& geometry, const std::vector<MaterialPart>& materials) {
+void keep_regions(const TomlTable& table, Geometry& geometry, const std::vector<MaterialPart>& materials) {
   if (auto* image = std::get_if<ImageGeometry>(&geometry)) {
     image->regions = std::any_of(materials.begin(), materials.end(),
                                  [](const MaterialPart& part) { return !part.regions.empty(); });
+    if (image->regions && image->range)
+      table.fail("range", "[geometry] range makes a single tissue, but a [[material]] has regions",
+                 "remove range or regions; tissues of their own need a segmented image");
+  }
+}
+
+/// mesh = "part.vtk": the file says what the key should be, better than the nearest word does.
+void refuse_files_under_other_keys(const toml::table& table, const TomlTable& root) {
+  const toml::table* const geometry = table["geometry"].as_table();
+  if (geometry == nullptr) return;
+  const Keys known = keys_of("[geometry]");
+  for (const auto& [key, value] : *geometry) {
+    const auto name = value.value_exact<std::string>();
+    if (!name || std::ranges::find(known, key.str()) != known.end()) continue;
+    const FileKind* const kind = kind_by_name(*name);
+    if (kind == nullptr || kind->geometry.empty()) continue;
+    root.fail("geometry", fmt::format("[geometry] has no key '{}'", shortened(key.str())),
+              fmt::format("write {} = {}: it is {}", kind->geometry, toml_string(*name), kind->what));
   }
 }
 
@@ -149,6 +169,7 @@ Description parse_description(const std::string& text, const std::filesystem::pa
                          : TomlTable(empty, std::string("[").append(key).append("]"), file, keys);
   };
 
+  refuse_files_under_other_keys(table, root);
   const TomlTable geometry = root.table("geometry", keys_of("[geometry]"));
   const TomlTable mesh = optional_table("mesh", keys_of("[mesh]"));
   const TomlTable storage = optional_table("storage", keys_of("[storage]"));
@@ -162,7 +183,7 @@ Description parse_description(const std::string& text, const std::filesystem::pa
   result.mesh = read_mesh_options(mesh, kind);
   const int dimension = result.analysis == Analysis::solid ? 3 : 2;
   result.materials = read_materials(root, dimension);
-  keep_regions(result.geometry, result.materials);
+  keep_regions(geometry, result.geometry, result.materials);
   result.scope = read_scope(storage, dimension);
   if (result.scope == Scope::none) check_without_greens(root, storage);
   if (root.has("fixed") || result.scope != Scope::none) result.fixed = read_fixed(root, dimension);

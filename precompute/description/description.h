@@ -19,16 +19,22 @@ struct SurfaceGeometry {
   std::filesystem::path file;
 };
 
-/// Labelled image (INR and what else CGAL's image reader takes). Every non-zero label is body unless `labels`
-/// lists those that are. With `regions` the elements keep their label as region and the mesh follows the
-/// interfaces between labels.
-struct ImageGeometry {
-  std::filesystem::path file;
-  std::vector<int> labels;  ///< empty: all non-zero ones
-  bool regions = false;     ///< labels are materials: some [[material]] has regions
+/// Values of an image from `low` to `high`.
+struct ValueRange {
+  double low, high;
 };
 
-/// Mesh made elsewhere (.msh, .mesh, .node/.ele, .vtk).
+/// Labelled image (INR, NIfTI, NRRD). Every non-zero label is body unless `labels` lists those that are, or
+/// of a grey image `range` says which values are. With `regions` the elements keep their label as region and
+/// the mesh follows the interfaces between labels.
+struct ImageGeometry {
+  std::filesystem::path file;
+  std::vector<int> labels;            ///< empty: all non-zero ones
+  bool regions = false;               ///< labels are materials: some [[material]] has regions
+  std::optional<ValueRange> range{};  ///< these values are the body, a single tissue
+};
+
+/// Mesh made elsewhere (.msh, .mesh, .node/.ele, .vtk), in any case of letters.
 struct VolumeGeometry {
   std::filesystem::path file;
 };
@@ -83,12 +89,13 @@ struct Fixing {
   Vec3 displacement = Vec3::Zero();  ///< along the held axes [m]
 };
 
-/// A material and the elements that are made of it: those of its regions, those that its selection holds, or
-/// (neither given) those that no other material claims.
+/// A material and the elements that are made of it: those of its regions, by number or by the names that the
+/// mesh file gives them, those that its selection holds, or (none given) those that no other material claims.
 struct MaterialPart {
   Material material;
   std::vector<Index> regions;
   std::optional<Selection> where;
+  std::vector<std::string> region_names{};
 };
 
 /// Force on each of some nodes [N].

@@ -68,6 +68,15 @@ SphereShape read_sphere(const TomlTable& sphere) {
   return {sphere.positive("radius"), read_cells_across(sphere)};
 }
 
+ValueRange read_range(const TomlTable& geometry) {
+  if (geometry.has("labels"))
+    geometry.fail("range", "[geometry] has labels and range", "remove one of them: each says what is body");
+  const std::vector<double> ends = geometry.numbers("range", 2);
+  if (ends[0] > ends[1])
+    geometry.fail("range", "[geometry] range goes down", "write the lower value first: [LOW, HIGH]");
+  return {ends[0], ends[1]};
+}
+
 }  // namespace
 
 bool is_plane(std::string_view geometry_kind) {
@@ -88,6 +97,10 @@ Geometry read_geometry(const TomlTable& geometry, std::string_view kind,
     geometry.fail("labels", "[geometry] labels apply to images only, this geometry is a " + std::string(kind),
                   "remove labels");
   }
+  if (kind != "image" && geometry.has("range")) {
+    geometry.fail("range", "[geometry] range applies to images only, this geometry is a " + std::string(kind),
+                  "remove range");
+  }
   if (kind != "picture" && geometry.has("dark")) {
     geometry.fail("dark", "[geometry] dark applies to pictures only, this geometry is a " + std::string(kind),
                   "remove dark");
@@ -100,6 +113,7 @@ Geometry read_geometry(const TomlTable& geometry, std::string_view kind,
     if (geometry.has("labels")) {
       image.labels = geometry.integers("labels");
     }
+    if (geometry.has("range")) image.range = read_range(geometry);
     return image;
   }
   if (kind == "volume") {

@@ -32,29 +32,32 @@ KeyTable top_level() {
 }
 
 KeyTable geometry() {
-  return {"[geometry]",
-          {{"surface", "", "", "closed triangle surface: a file .off, .obj, .stl (ASCII or binary) or .ply",
-            alternative},
-           {"image", "", "",
-            "labelled image: a file .inr, .nii, one of these with .gz, or .nrrd, with one label per voxel",
-            alternative},
-           {"volume", "", "",
-            "mesh of one kind of element, in space or in the plane: a file .msh (Gmsh 2.2 or 4.1, ASCII), "
-            ".mesh (Medit), .node/.ele (TetGen) or .vtk (legacy ASCII)",
-            alternative},
-           {"box", "file units", "", "table; six tetrahedra or one hexahedron per cell", alternative},
-           {"cylinder", "file units", "", "table; along z from 0", alternative},
-           {"sphere", "file units", "", "table; about the origin", alternative},
-           {"rectangle", "file units", "", "table; plane bodies", alternative},
-           {"polygon", "file units", "", "table; plane bodies", alternative},
-           {"picture", "pixels", "",
-            "plane bodies: a file .png or .pbm; every pixel that is not black is body, the lower left corner "
-            "of the picture is the origin",
-            alternative},
-           {"labels", "", "all but 0", "`image` only: list of the labels that are body"},
-           {"dark", "", "false", "`picture` only: what is black is body, as in a drawing on white paper"},
-           {"scale", "m", shown(Description{}.scale),
-            "metres per unit of the geometry: 0.001 for millimetres; for a picture, metres per pixel"}}};
+  return {
+      "[geometry]",
+      {{"surface", "", "", "closed triangle surface: a file .off, .obj, .stl (ASCII or binary) or .ply",
+        alternative},
+       {"image", "", "",
+        "labelled image: a file .inr, .nii, one of these with .gz, or .nrrd, with one label per voxel",
+        alternative},
+       {"volume", "", "",
+        "mesh of one kind of element, in space or in the plane: a file .msh (Gmsh 2.2 or 4.1, ASCII), "
+        ".mesh (Medit), .node/.ele (TetGen) or .vtk (legacy ASCII)",
+        alternative},
+       {"box", "file units", "", "table; six tetrahedra or one hexahedron per cell", alternative},
+       {"cylinder", "file units", "", "table; along z from 0", alternative},
+       {"sphere", "file units", "", "table; about the origin", alternative},
+       {"rectangle", "file units", "", "table; plane bodies", alternative},
+       {"polygon", "file units", "", "table; plane bodies", alternative},
+       {"picture", "pixels", "",
+        "plane bodies: a file .png or .pbm; every pixel that is not black is body, the lower left corner "
+        "of the picture is the origin",
+        alternative},
+       {"labels", "", "all but 0", "`image` only: list of the labels that are body"},
+       {"range", "", "none",
+        "`image` only: `[LOW, HIGH]`, the values that are body, for a grey image (CT, MR) instead of labels"},
+       {"dark", "", "false", "`picture` only: what is black is body, as in a drawing on white paper"},
+       {"scale", "m", shown(Description{}.scale),
+        "metres per unit of the geometry: 0.001 for millimetres; for a picture, metres per pixel"}}};
 }
 
 // Tables of a shape.
@@ -119,13 +122,15 @@ KeyTable mesh() {
 
 /// What the constants of a material apply to.
 KeyTable material() {
-  return {"[material]",
-          {{"regions", "", "", "elements with these labels of the image, or regions of the mesh file",
-            alternative},
-           {"box", "m", "", "elements whose centroid is inside", alternative},
-           {"half_space", "m", "", "elements whose centroid is inside", alternative},
-           {"sphere", "m", "", "elements whose centroid is inside", alternative},
-           {"lowest", "", "", "elements whose centroid is inside", alternative}}};
+  return {
+      "[material]",
+      {{"regions", "", "",
+        "elements with these labels of the image, or in these regions of the mesh file, by number or by name",
+        alternative},
+       {"box", "m", "", "elements whose centroid is inside", alternative},
+       {"half_space", "m", "", "elements whose centroid is inside", alternative},
+       {"sphere", "m", "", "elements whose centroid is inside", alternative},
+       {"lowest", "", "", "elements whose centroid is inside", alternative}}};
 }
 
 KeyTable selection() {

@@ -37,12 +37,18 @@ UnitGuess unit_of_pixels(double longest_side) {
 }
 
 UnitGuess unit_of(const Shape& shape, const DraftOptions& options) {
-  if (options.unit) return {*options.unit, "it was given"};
+  if (options.unit) {
+    LengthUnit given = *options.unit;
+    if (shape.unit > 0.0) given.metres /= shape.unit;
+    return {given, "it was given"};
+  }
+  if (shape.unit > 0.0) return {*read_unit("mm"), "the image's header says its unit"};
   if (shape.kind == ShapeKind::picture) return unit_of_pixels(shape.size.maxCoeff());
   return guess_unit(shape.size.maxCoeff());
 }
 
 /// A description that is there is a person's: it is used, not written over.
+/// Of the lengths as they are read: images in millimetres where the header says its unit.
 void use_existing(const std::filesystem::path& file, const std::filesystem::path& description,
                   bool has_options, const Tell& tell) {
   if (has_options)
@@ -227,6 +233,9 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
   const UnitGuess unit = unit_of(shape, options);
   tell_decisions(shape, unit, options, tell);
   std::string repaired;
+  if (options.shape.range)
+    text += fmt::format("range = [{}, {}]  # these values of the image are the body\n",
+                        options.shape.range->low, options.shape.range->high);
   if (shape.kind == ShapeKind::surface) {
     const std::size_t told = shape.repairs.size();
     const double edge = edge_for_nodes(shape.boundary, options.shape.nodes_of(shape.kind));

@@ -64,11 +64,12 @@ double boundary_area(const VoxelBody& body) {
   return sum / staircase;
 }
 
-Shape read_image(const std::filesystem::path& file) {
+Shape read_image(const std::filesystem::path& file, const std::optional<ValueRange>& range) {
   Shape shape;
   shape.kind = ShapeKind::image;
   const VoxelBody body =
-      read_labelled_image({file, {}, false}, std::numeric_limits<double>::max(), shape.repairs);
+      read_labelled_image({file, {}, false, range}, std::numeric_limits<double>::max(), shape.repairs);
+  shape.unit = body.file_unit;
   for (int axis = 0; axis < 3; ++axis)  // less the empty rim of two voxels on each side
     shape.size[axis] = body.spacing[axis] * (body.size.at(static_cast<std::size_t>(axis)) - 4);
   shape.boundary = boundary_area(body);
@@ -125,9 +126,9 @@ std::string shape_name(const std::filesystem::path& file) {
 }
 
 Shape read_shape(const std::filesystem::path& file, const ShapeOptions& options) {
-  const std::optional<ShapeKind> kind = shape_kind(file);
   check_is_read(file);
-  if (kind == ShapeKind::image) return read_image(file);
+  const std::optional<ShapeKind> kind = shape_kind(file);
+  if (kind == ShapeKind::image) return read_image(file, options.range);
   if (kind == ShapeKind::picture) return read_picture_shape(file);
   return options.strict ? read_whole_surface(file) : read_repaired_surface(file, options);
 }

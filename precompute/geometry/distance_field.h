@@ -39,6 +39,8 @@ class LabelField {
   explicit LabelField(const VoxelBody& body);
 
   [[nodiscard]] Place operator()(const Vec3& x) const noexcept;
+  /// Whether a point is in the body.
+  [[nodiscard]] bool holds(const Vec3& x) const noexcept { return body_(x) > 0.0; }
   /// Those that occur, ascending.
   [[nodiscard]] const std::vector<Index>& labels() const noexcept { return labels_; }
 

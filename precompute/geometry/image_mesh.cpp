@@ -164,6 +164,51 @@ Mesh fill_with_tetgen(const Mesh& hollow, const MeshOptions& options, const Mesh
   return mesh_regions(walls, region_points(hollow), options, size, where);
 }
 
+constexpr double most_lost = 0.1;         // of the voxels
+constexpr std::size_t told_part = 8;      // [voxels] of one that is lost
+constexpr double told_difference = 0.05;  // of the volume
+const char* const finer_voxels =
+    "resample the segmentation to voxels a third as large, without interpolation (3D Slicer: Resample Scalar "
+    "Volume, nearest neighbour; unu resample -k box -s x3 x3 x3), or make the part thicker there";
+
+/// Smoothing takes what is one voxel thick. Throws Error where that is much of the body, as no mesher finds
+/// the rest in any time; tells of less.
+void check_thickness(const VoxelBody& body, const LabelField& field, const std::string& where,
+                     std::vector<std::string>& notes) {
+  std::vector<std::uint8_t> lost(body.inside.size(), 0);
+  double voxels = 0.0, lost_voxels = 0.0;
+  for (std::size_t v = 0; v < body.inside.size(); ++v) {
+    if (body.inside[v] == 0) continue;
+    voxels += 1.0;
+    lost[v] = field.holds(body.center(v)) ? 0 : 1;
+    lost_voxels += lost[v];
+  }
+  if (lost_voxels > most_lost * voxels)
+    throw Error(
+        fmt::format("the image's body is too thin for a mesh: {:.0f} of its {:.0f} voxels are in parts that "
+                    "are one voxel thick",
+                    lost_voxels, voxels),
+        where, finer_voxels);
+  if (const std::size_t part = largest_part(body, lost); part >= told_part)
+    notes.push_back(
+        fmt::format("a thin part of the image, {} voxels and one voxel thick, is lost; to keep it, {}", part,
+                    finer_voxels));
+}
+
+/// Tells where the mesh is not the image's body.
+void note_volume(const Mesh& mesh, const VoxelBody& body, std::vector<std::string>& notes) {
+  double voxels = 0.0, elements = 0.0;
+  for (const std::uint8_t inside : body.inside) voxels += inside;
+  for (Index e = 0; e < mesh.elements(); ++e)
+    elements += std::abs(element_volume(mesh.element, element_nodes(mesh, e)));
+  const double difference = elements / (voxels * body.spacing.prod()) - 1.0;
+  if (std::abs(difference) > told_difference)
+    notes.push_back(
+        fmt::format("the mesh has {:.1f} % {} volume than the image's body: use a smaller edge_length "
+                    "or facet_distance in [mesh]; where the body is few voxels thick, {}",
+                    100.0 * std::abs(difference), difference < 0.0 ? "less" : "more", finer_voxels));
+}
+
 /// What became of each label.
 void report_volumes(const Mesh& mesh, const VoxelBody& body, std::vector<std::string>& notes) {
   std::map<Index, std::array<double, 2>> volumes;
@@ -188,6 +233,7 @@ Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vec
   const std::string where = image.file.string();
   const VoxelBody body = read_labelled_image(image, *options.edge_length, notes);
   const LabelField field(body);
+  check_thickness(body, field, where, notes);
   const bool by_tetgen = options.mesher == Mesher::tetgen;
   Mesh mesh = run_mesh3(body, field, options, where, by_tetgen);
   if (by_tetgen) {
@@ -199,6 +245,7 @@ Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vec
     notes.push_back(
         fmt::format("removed {} element(s) that hung on the body by an edge or a corner", crumbs));
   }
+  note_volume(mesh, body, notes);
   if (image.regions) {
     report_volumes(mesh, body, notes);
   }

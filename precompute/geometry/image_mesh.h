@@ -14,8 +14,9 @@ namespace palpate {
 /// regions are the labels, and `notes` tells each label's volume in the mesh and in the image; otherwise all
 /// regions are 0. The target edge length at depth d below boundary and interfaces is edge_length + grading d.
 /// Lengths of `options` are in the image's unit, edge_length is required. The same input gives the same mesh.
-/// Throws Error for a file that is not an image, labels that it does not hold, a body in several large parts,
-/// and when the mesher fails.
+/// `notes` also tells of parts that are lost as they are one voxel thick, and of volume that is. Throws Error
+/// for a file that is not an image, labels that it does not hold, a body in several large parts or of such
+/// thin ones, and when the mesher fails.
 Mesh mesh_image(const ImageGeometry& image, const MeshOptions& options, std::vector<std::string>& notes);
 
 }  // namespace palpate

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "precompute/images/image_labels.h"
@@ -16,12 +17,14 @@ struct ImagePlace {
   /// From a voxel's three numbers, and 1, to its centre: x to the patient's right, y to the front, z to the
   /// head.
   Eigen::Matrix<double, 3, 4> to_space = Eigen::Matrix<double, 3, 4>::Identity();
-  double unit = 1.0;  ///< of lengths there [mm]
+  double unit = 0.0;  ///< of lengths there [mm]; 0: the file does not say, which is taken for millimetres
 };
 
 /// The image along the axes of space: its own are exchanged and turned round so that they come as near to
-/// those as they can; in mm. `labels` has `size` voxels, the first axis running fastest.
-ChildResult along_space(const ImagePlace& place, const std::array<std::size_t, 3>& size,
-                        const std::vector<std::int32_t>& labels);
+/// those as they can; in mm. Where they are not at right angles, as with a tilted gantry, rows and slices of
+/// voxels move along the others to where they are in space. `labels` has `size` voxels, the first axis
+/// running fastest. Throws Error where that takes too many voxels.
+ChildResult along_space(ImagePlace place, std::array<std::size_t, 3> size, Labels labels,
+                        const std::string& where);
 
 }  // namespace palpate

@@ -5,11 +5,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
 #include "base/child_process.h"
 #include "meshes/mesh.h"
+#include "precompute/description/description.h"
 
 namespace palpate {
 
@@ -20,28 +22,47 @@ struct ImageHeader {
   std::array<double, 3> spacing{};
   std::array<double, 3> origin{};
   double turned = 0.0;  ///< largest angle between an axis of the image and the nearest of space [degrees]
+  double sheared =
+      0.0;            ///< largest angle by which two axes miss a right one, where voxels were moved [degrees]
+  double unit = 0.0;  ///< that the file counts in [mm]; 0: it does not say
+  double lowest = 0.0, highest = 0.0;  ///< of the values
+  bool whole = true;                   ///< all of them are whole numbers
 };
 
-/// A value as a label: rounded, what is not a number as 0.
-inline std::int32_t rounded_label(double value) {
-  constexpr double most = 2147483647.0;
-  return static_cast<std::int32_t>(std::lround(std::isnan(value) ? 0.0 : std::clamp(value, -most, most)));
-}
+/// Voxels as labels.
+struct Labels {
+  std::vector<std::int32_t> of_voxels;
+  double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;  ///< of the image's values
+  bool whole = true;                                                           ///< all are whole numbers
+};
 
-/// Values as labels, each shift + slope * value.
-template <class T>
-std::vector<std::int32_t> rounded_labels(std::span<const T> values, double slope = 1.0, double shift = 0.0) {
-  std::vector<std::int32_t> labels;
-  labels.reserve(values.size());
-  for (const T value : values) labels.push_back(rounded_label(slope * static_cast<double>(value) + shift));
+/// The values rounded, what is not a number as 0; with a range 1 for those in it, 0 for the others.
+template <class ValueAt>
+Labels labels_from(std::size_t voxels, const std::optional<ValueRange>& range, const ValueAt& value_at) {
+  constexpr double most = 2147483647.0, unnoticed = 1e-3;  // slopes of headers are no exact numbers
+  Labels labels;
+  labels.of_voxels.reserve(voxels);
+  for (std::size_t v = 0; v < voxels; ++v) {
+    const double value = value_at(v);
+    const double rounded = std::isnan(value) ? 0.0 : std::round(std::clamp(value, -most, most));
+    labels.of_voxels.push_back(range ? static_cast<std::int32_t>(value >= range->low && value <= range->high)
+                                     : static_cast<std::int32_t>(rounded));
+    if (std::isnan(value)) continue;
+    labels.lowest = std::min(labels.lowest, value);
+    labels.highest = std::max(labels.highest, value);
+    labels.whole = labels.whole && !(std::abs(value - rounded) > unnoticed && std::abs(value) < most);
+  }
   return labels;
 }
 
 /// Labels with x running fastest, after their header.
-inline ChildResult image_labels(const ImageHeader& header, const std::vector<std::int32_t>& labels) {
+inline ChildResult image_labels(ImageHeader header, const Labels& labels) {
+  header.lowest = labels.lowest;
+  header.highest = labels.highest;
+  header.whole = labels.whole;
   ChildResult result;
   append_array(result.bytes, std::span<const ImageHeader>(&header, 1));
-  append_array(result.bytes, std::span<const std::int32_t>(labels));
+  append_array(result.bytes, std::span<const std::int32_t>(labels.of_voxels));
   return result;
 }
 

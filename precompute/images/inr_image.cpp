@@ -118,7 +118,7 @@ std::optional<InrHeader> read_header(gzFile_s* stream, const std::string& where)
 }
 
 template <class T>
-std::vector<std::int32_t> labels_as(std::vector<char>& bytes, bool swapped) {
+Labels labels_as(std::vector<char>& bytes, bool swapped, const std::optional<ValueRange>& range) {
   std::vector<T> values(bytes.size() / sizeof(T));
   if (swapped)
     for (std::size_t at = 0; at < bytes.size(); at += sizeof(T))
@@ -126,15 +126,16 @@ std::vector<std::int32_t> labels_as(std::vector<char>& bytes, bool swapped) {
                    bytes.begin() + static_cast<std::ptrdiff_t>(at + sizeof(T)));
   std::memcpy(values.data(), bytes.data(), bytes.size());
   bytes = {};
-  return rounded_labels(std::span<const T>(values));
+  return labels_from(values.size(), range, [&](std::size_t v) { return static_cast<double>(values[v]); });
 }
 
-std::vector<std::int32_t> labels_of(const InrHeader& header, std::vector<char>& bytes) {
+Labels labels_of(const InrHeader& header, std::vector<char>& bytes, const std::optional<ValueRange>& range) {
   const bool swapped = header.is_big_endian;
-  if (header.is_float && header.bits == 32) return labels_as<float>(bytes, swapped);
-  if (header.is_float) return labels_as<double>(bytes, swapped);
+  if (header.is_float && header.bits == 32) return labels_as<float>(bytes, swapped, range);
+  if (header.is_float) return labels_as<double>(bytes, swapped, range);
   const auto whole_numbers = [&]<class Signed, class Unsigned>(Signed, Unsigned) {
-    return header.is_signed ? labels_as<Signed>(bytes, swapped) : labels_as<Unsigned>(bytes, swapped);
+    return header.is_signed ? labels_as<Signed>(bytes, swapped, range)
+                            : labels_as<Unsigned>(bytes, swapped, range);
   };
   if (header.bits == 8) return whole_numbers(std::int8_t{}, std::uint8_t{});
   if (header.bits == 16) return whole_numbers(std::int16_t{}, std::uint16_t{});
@@ -162,7 +163,7 @@ std::optional<std::int64_t> check_inr_header(const FileDescriptor& file) {
   return std::max(file_size(file), needed);
 }
 
-ChildResult read_inr_labels(const FileDescriptor& file) {
+ChildResult read_inr_labels(const FileDescriptor& file, const std::optional<ValueRange>& range) {
   const std::optional<InrHeader> header = read_header(open_unpacked(file).get(), file.path().string());
   if (!header) return {not_an_image, {}};
   if (header->size[3] != 1) return {not_scalar, {}};
@@ -174,7 +175,7 @@ ChildResult read_inr_labels(const FileDescriptor& file) {
   said.spacing = header->spacing;
   said.origin = header->origin;
   for (std::size_t axis = 0; axis < 3; ++axis) said.size.at(axis) = static_cast<Index>(header->size.at(axis));
-  return image_labels(said, labels_of(*header, bytes));
+  return image_labels(said, labels_of(*header, bytes, range));
 }
 
 }  // namespace palpate

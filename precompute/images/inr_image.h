@@ -15,6 +15,6 @@ namespace palpate {
 std::optional<std::int64_t> check_inr_header(const FileDescriptor& file);
 
 /// Reads an image that check_inr_header has taken. Whole numbers of 8 to 64 bits, and floats and doubles.
-ChildResult read_inr_labels(const FileDescriptor& file);
+ChildResult read_inr_labels(const FileDescriptor& file, const std::optional<ValueRange>& range);
 
 }  // namespace palpate

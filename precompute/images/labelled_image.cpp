@@ -30,12 +30,13 @@ const char* const complete_file =
     "use a complete INR, NIfTI or NRRD file (.inr, .inr.gz, .nii, .nii.gz, .nrrd) with one label per voxel "
     "and positive VX, VY, VZ, pixdim or space directions";
 constexpr std::size_t smallest_speck = 8;  // [voxels] less would be smoothed away
+constexpr std::size_t most_labels = 100;   // that are body unless a person says so: grey images have more
 
 /// Files of a kind: which they are, their header's check, and their reader.
 struct ImageKind {
   bool (*is)(const std::filesystem::path& file);
   std::optional<std::int64_t> (*check)(const FileDescriptor& file);  ///< nothing: it is of no such kind
-  ChildResult (*read)(const FileDescriptor& file);
+  ChildResult (*read)(const FileDescriptor& file, const std::optional<ValueRange>& range);
 };
 
 const ImageKind& kind_of(const std::filesystem::path& file) {
@@ -63,6 +64,35 @@ void check_geometry(const VoxelGrid& grid, const std::string& where) {
   }
 }
 
+/// Refuses a grey image, of whose values nobody knows which are the body. `kinds`: how many labels there are.
+void check_labels(const ImageHeader& header, std::size_t kinds, const std::string& occurring,
+                  const ImageGeometry& image) {
+  if (image.range) return;
+  const bool chosen = !image.labels.empty(), is_negative = header.lowest<0.0, are_many = kinds> most_labels;
+  if (header.whole && (chosen || (!is_negative && !are_many))) return;
+  std::string what = fmt::format("the image is grey and no segmentation: its values go from {} to {}",
+                                 shown(header.lowest), shown(header.highest));
+  if (!header.whole)
+    what += ", and not all are whole numbers";
+  else if (are_many)
+    what += fmt::format(", {} different ones", kinds);
+  std::string hint =
+      "say which values are the body by --range LOW:HIGH, in a description by range = [LOW, HIGH] under "
+      "[geometry] (of a CT, 0:100 is about soft tissue); better, segment the image first, with 3D Slicer or "
+      "TotalSegmentator for instance";
+  if (header.whole && !are_many)
+    hint += "; where these are labels (" + occurring + "), choose by labels = [...] under [geometry]";
+  throw Error(what, image.file.string(), hint);
+}
+
+/// "1", "1 and 2", "1, 2 and 7".
+std::string and_list(const std::vector<std::int32_t>& labels) {
+  std::string text = fmt::format("{}", labels.front());
+  for (std::size_t k = 1; k < labels.size(); ++k)
+    text += fmt::format("{}{}", k + 1 == labels.size() ? " and " : ", ", labels[k]);
+  return text;
+}
+
 /// Marks the voxels that carry one of the labels (all but 0 where none are listed).
 VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std::string>& notes) {
   const std::string where = image.file.string();
@@ -85,6 +115,13 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
   if (header.turned > least_turn)
     notes.push_back(fmt::format(
         "the image is turned by {:.1f} degrees in space; the body has the image's axes", header.turned));
+  if (header.sheared > 0.0)
+    notes.push_back(
+        fmt::format("the image is sheared by {:.1f} degrees, as with a tilted gantry: its voxels were moved "
+                    "to where they "
+                    "are in space",
+                    header.sheared));
+  body.file_unit = header.unit;
 
   std::map<std::int32_t, std::uint8_t> selected;  // of the labels that occur
   body.inside.reserve(labels.size());
@@ -108,16 +145,30 @@ VoxelBody select(const Bytes& bytes, const ImageGeometry& image, std::vector<std
     }
   }
   std::string occurring;
+  std::vector<std::int32_t> merged;
   for (const auto& [label, is_body] : selected) {
     occurring += (occurring.empty() ? "" : ", ") + std::to_string(label);
+    if (is_body != 0) merged.push_back(label);
   }
+  check_labels(header, selected.size(), occurring, image);
   for (const int label : wanted) {
     if (!selected.contains(label)) {
       throw Error("no voxel of the image has label " + std::to_string(label), where,
                   "its labels are " + occurring);
     }
   }
-  if (wanted.empty() && selected.size() == 1 && selected.contains(0)) fail_on_blank(where);
+  if (merged.empty() && image.range)
+    throw Error(fmt::format("no voxel of the image has a value from {} to {}", shown(image.range->low),
+                            shown(image.range->high)),
+                where,
+                fmt::format("its values go from {} to {}", shown(header.lowest), shown(header.highest)));
+  if (wanted.empty() && merged.empty()) fail_on_blank(where);
+  if (wanted.empty() && !image.regions && merged.size() > 1)
+    notes.push_back(
+        fmt::format("the labels {} are one tissue; for a tissue each write a [[material]] with "
+                    "regions = [{}] and so on, to take some of them alone labels = [{}] under "
+                    "[geometry]",
+                    and_list(merged), merged.front(), merged.front()));
   return body;
 }
 
@@ -137,10 +188,12 @@ VoxelBody read_labelled_image(const ImageGeometry& image, double edge_length,
                           .limits = reading_limits(*held),
                           .hint = complete_file,
                           .files = {file.get()}};
-  const ChildResult read = run_in_child(task, [&] { return kind.read(file); });
+  const ChildResult read = run_in_child(task, [&] { return kind.read(file, image.range); });
   if (read.status == not_scalar) throw Error("the image has several values a voxel", where, complete_file);
   if (read.status != read_ok) throw not_readable();
-  VoxelBody body = crop(select(read.bytes, image, notes), 2);
+  const VoxelBody whole = select(read.bytes, image, notes);
+  VoxelBody body = crop(whole, 2);
+  body.file_unit = whole.file_unit;
   if (edge_length * voxels_per_edge < body.spacing.minCoeff()) {
     throw Error(
         fmt::format("edge_length is {} of the image's units, its voxels are {} x {} x {}", shown(edge_length),

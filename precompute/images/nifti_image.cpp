@@ -42,6 +42,8 @@ struct Dimensions {
   std::int64_t bits = 0;              // of a voxel
   double offset = 0.0;                // of the first voxel in the file [byte]
   double shift = 0.0;                 // of values, to labels
+  std::array<double, 3> sides{};      // of a voxel, where no matrix says them
+  bool has_matrix = false;
 };
 
 std::optional<Dimensions> read_dimensions(std::span<const char> header) {
@@ -55,6 +57,9 @@ std::optional<Dimensions> read_dimensions(std::span<const char> header) {
       result.bits = number_at<std::int16_t>(header, 72, swapped);
       result.offset = static_cast<double>(number_at<float>(header, 108, swapped));
       result.shift = static_cast<double>(number_at<float>(header, 116, swapped));
+      for (std::size_t i = 0; i < 3; ++i)
+        result.sides.at(i) = static_cast<double>(number_at<float>(header, 80 + 4 * i, swapped));
+      result.has_matrix = number_at<std::int16_t>(header, 254, swapped) > 0;
       return result;
     }
     if (size == size_2 && header.size() >= size_2 && std::string_view(header.data() + 4, 3) == "n+2") {
@@ -63,6 +68,9 @@ std::optional<Dimensions> read_dimensions(std::span<const char> header) {
       result.bits = number_at<std::int16_t>(header, 14, swapped);
       result.offset = static_cast<double>(number_at<std::int64_t>(header, 168, swapped));
       result.shift = number_at<double>(header, 184, swapped);
+      for (std::size_t i = 0; i < 3; ++i)
+        result.sides.at(i) = number_at<double>(header, 112 + 8 * i, swapped);
+      result.has_matrix = number_at<std::int32_t>(header, 348, swapped) > 0;
       return result;
     }
   }
@@ -101,44 +109,62 @@ bool read_voxels(gzFile_s* stream, nifti_image& image) {
 }
 
 template <class T>
-std::vector<std::int32_t> rounded(const nifti_image& image, std::size_t voxels) {
+Labels rounded(const nifti_image& image, std::size_t voxels, const std::optional<ValueRange>& range) {
   const bool scaled =
       image.scl_slope != 0.0 && std::isfinite(image.scl_slope) && std::isfinite(image.scl_inter);
-  return rounded_labels(std::span(static_cast<const T*>(image.data), voxels), scaled ? image.scl_slope : 1.0,
-                        scaled ? image.scl_inter : 0.0);
+  const double slope = scaled ? image.scl_slope : 1.0, shift = scaled ? image.scl_inter : 0.0;
+  const T* const values = static_cast<const T*>(image.data);
+  return labels_from(voxels, range,
+                     [&](std::size_t v) { return slope * static_cast<double>(values[v]) + shift; });
 }
 
 /// The voxels as labels; none for colours and complex numbers.
-std::vector<std::int32_t> labels_of(const nifti_image& image, std::size_t voxels) {
+Labels labels_of(const nifti_image& image, std::size_t voxels, const std::optional<ValueRange>& range) {
   switch (image.datatype) {
     case NIFTI_TYPE_UINT8:
-      return rounded<std::uint8_t>(image, voxels);
+      return rounded<std::uint8_t>(image, voxels, range);
     case NIFTI_TYPE_INT8:
-      return rounded<std::int8_t>(image, voxels);
+      return rounded<std::int8_t>(image, voxels, range);
     case NIFTI_TYPE_UINT16:
-      return rounded<std::uint16_t>(image, voxels);
+      return rounded<std::uint16_t>(image, voxels, range);
     case NIFTI_TYPE_INT16:
-      return rounded<std::int16_t>(image, voxels);
+      return rounded<std::int16_t>(image, voxels, range);
     case NIFTI_TYPE_UINT32:
-      return rounded<std::uint32_t>(image, voxels);
+      return rounded<std::uint32_t>(image, voxels, range);
     case NIFTI_TYPE_INT32:
-      return rounded<std::int32_t>(image, voxels);
+      return rounded<std::int32_t>(image, voxels, range);
     case NIFTI_TYPE_UINT64:
-      return rounded<std::uint64_t>(image, voxels);
+      return rounded<std::uint64_t>(image, voxels, range);
     case NIFTI_TYPE_INT64:
-      return rounded<std::int64_t>(image, voxels);
+      return rounded<std::int64_t>(image, voxels, range);
     case NIFTI_TYPE_FLOAT32:
-      return rounded<float>(image, voxels);
+      return rounded<float>(image, voxels, range);
     case NIFTI_TYPE_FLOAT64:
-      return rounded<double>(image, voxels);
+      return rounded<double>(image, voxels, range);
     default:
       return {};
   }
 }
 
+/// 0 where the header does not say.
 double millimetres(int unit) {
   if (unit == NIFTI_UNITS_METER) return 1e3;
-  return unit == NIFTI_UNITS_MICRON ? 1e-3 : 1.0;
+  if (unit == NIFTI_UNITS_MICRON) return 1e-3;
+  return unit == NIFTI_UNITS_MM ? 1.0 : 0.0;
+}
+
+/// libnifti would take 1 for such sides, and a negative one may mean a mirror image or nothing.
+void check_sides(const Dimensions& said, const std::string& where) {
+  if (said.has_matrix) return;
+  for (std::size_t i = 0; i < 3 && static_cast<std::int64_t>(i) < said.dim[0]; ++i) {
+    if (said.sides.at(i) > 0.0) continue;
+    throw Error(
+        fmt::format("pixdim[{}] of the image's header is {}, and the side of a voxel must be positive", i + 1,
+                    said.sides.at(i)),
+        where,
+        "correct the header; where a negative number meant that the image is mirrored, turn its voxels "
+        "round too, or give it an sform");
+  }
 }
 
 }  // namespace
@@ -155,7 +181,7 @@ std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file) {
   const std::string header = header_of(stream.get());
   const std::optional<Dimensions> said = read_dimensions(header);
   if (!said) return {};
-  const auto& [dim, bits, offset, shift] = *said;
+  const auto& [dim, bits, offset, shift, sides, has_matrix] = *said;
   double voxels = 1.0;
   std::string product;
   for (std::size_t i = 1; i <= static_cast<std::size_t>(std::clamp<std::int64_t>(dim[0], 0, 7)); ++i) {
@@ -165,6 +191,7 @@ std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file) {
     voxels *= static_cast<double>(dim.at(i));
     product += fmt::format("{}{}", product.empty() ? "" : " x ", dim.at(i));
   }
+  check_sides(*said, where);
   if (!(bits >= 0 && bits <= 256 && offset >= 0.0 && offset < 1e9))
     throw Error(fmt::format("bitpix and vox_offset of the image's header are {} and {}", bits, offset), where,
                 "correct the header");
@@ -186,7 +213,7 @@ std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file) {
   return std::max(file_size(file), bytes);
 }
 
-ChildResult read_nifti_labels(const FileDescriptor& file) {
+ChildResult read_nifti_labels(const FileDescriptor& file, const std::optional<ValueRange>& range) {
   nifti_set_debug_level(0);
   const GzFile stream = open_unpacked(file);
   const std::string header = header_of(stream.get());
@@ -199,14 +226,14 @@ ChildResult read_nifti_labels(const FileDescriptor& file) {
     voxels *= size.at(static_cast<std::size_t>(i));
   }
   if (voxels != static_cast<std::size_t>(image->nvox)) return {not_scalar, {}};
-  const std::vector<std::int32_t> labels = labels_of(*image, voxels);
-  if (labels.empty()) return {not_scalar, {}};
+  Labels labels = labels_of(*image, voxels, range);
+  if (labels.of_voxels.empty()) return {not_scalar, {}};
   const nifti_dmat44& to_space = image->sform_code > 0 ? image->sto_xyz : image->qto_xyz;
   ImagePlace place;
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column) place.to_space(row, column) = to_space.m[row][column];
   place.unit = millimetres(image->xyz_units);
-  return along_space(place, size, labels);
+  return along_space(place, size, std::move(labels), file.path().string());
 }
 
 }  // namespace palpate

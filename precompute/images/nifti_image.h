@@ -21,6 +21,6 @@ std::optional<std::int64_t> check_nifti_header(const FileDescriptor& file);
 /// Reads an image that check_nifti_header has taken; libnifti makes sense of its header. Axes are exchanged
 /// and turned round so that x points to the patient's right, y to the front and z to the head, as near as
 /// they come; lengths are millimetres.
-ChildResult read_nifti_labels(const FileDescriptor& file);
+ChildResult read_nifti_labels(const FileDescriptor& file, const std::optional<ValueRange>& range);
 
 }  // namespace palpate

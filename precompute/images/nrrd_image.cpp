@@ -83,16 +83,58 @@ std::array<double, 3> signs_of(int space) {
   }
 }
 
-double millimetres(const char* unit) {
-  const std::string name = unit == nullptr ? "mm" : unit;
-  if (name == "m") return 1e3;
-  if (name == "cm") return 10.0;
-  return name == "um" || name == "µm" || name == "microns" ? 1e-3 : 1.0;
+/// Whether lengths are millimetres where nothing else is said, as 3D Slicer and ITK have it.
+bool is_of_a_patient(int space) {
+  switch (space) {
+    case nrrdSpaceRightAnteriorSuperior:
+    case nrrdSpaceLeftAnteriorSuperior:
+    case nrrdSpaceLeftPosteriorSuperior:
+    case nrrdSpaceScannerXYZ:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// The unit of `space units`, without a space of `units` [mm]; 0 where there is none. Throws Error for one
+/// that is not known, and where there are several.
+double unit_of(const Nrrd& image, const std::vector<unsigned>& axes, const std::string& where) {
+  static const std::map<std::string, double> units = {
+      {"m", 1e3},   {"meter", 1e3},      {"cm", 10.0},         {"centimeter", 10.0},
+      {"mm", 1.0},  {"millimeter", 1.0}, {"um", 1e-3},         {"µm", 1e-3},
+      {"μm", 1e-3}, {"micron", 1e-3},    {"micrometer", 1e-3}, {"nm", 1e-6},
+      {"in", 25.4}, {"inch", 25.4},      {"inche", 25.4},      {"nanometer", 1e-6}};
+  double unit = 0.0;
+  std::string first;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const char* const said = image.spaceDim == 3 ? image.spaceUnits[k] : image.axis[axes.at(k)].units;
+    std::string name = said == nullptr ? "" : said;
+    if (name.empty()) continue;
+    const std::string written = shortened(name);
+    if (name.size() > 2) {  // "Millimetres" is "millimeter"
+      std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+      if (name.ends_with('s')) name.pop_back();
+      if (name.ends_with("metre")) name.replace(name.size() - 2, 2, "er");
+    }
+    const auto known = units.find(name);
+    if (known == units.end())
+      throw Error(fmt::format("the image counts in \"{}\", a unit that is not known", written), where,
+                  "say mm, cm, m, um, nm or in under space units of the header");
+    if (unit != 0.0 && unit != known->second)
+      throw Error(fmt::format("the image counts in \"{}\" along one axis and in \"{}\" along another", first,
+                              written),
+                  where, "write space directions and space origin of the header in one unit");
+    unit = known->second;
+    first = written;
+  }
+  if (unit == 0.0 && image.spaceDim == 3 && is_of_a_patient(image.space)) return 1.0;
+  return unit;
 }
 
 /// The columns of space that are known; else the spacing along the file's own axes.
-ImagePlace place_of(const Nrrd& image, const std::vector<unsigned>& axes) {
+ImagePlace place_of(const Nrrd& image, const std::vector<unsigned>& axes, const std::string& where) {
   ImagePlace place;
+  place.unit = unit_of(image, axes, where);
   const bool in_space = image.spaceDim == 3;
   const std::array<double, 3> signs = signs_of(in_space ? image.space : nrrdSpaceUnknown);
   for (int column = 0; column < 3; ++column) {
@@ -111,16 +153,7 @@ ImagePlace place_of(const Nrrd& image, const std::vector<unsigned>& axes) {
     const double origin = image.spaceOrigin[row];
     place.to_space(row, 3) = std::isfinite(origin) ? signs.at(static_cast<std::size_t>(row)) * origin : 0.0;
   }
-  place.unit = millimetres(image.spaceUnits[0]);
   return place;
-}
-
-std::vector<std::int32_t> labels_of(const Nrrd& image, std::size_t voxels) {
-  std::vector<std::int32_t> labels;
-  labels.reserve(voxels);
-  const auto value_at = nrrdDLookup[image.type];
-  for (std::size_t v = 0; v < voxels; ++v) labels.push_back(rounded_label(value_at(image.data, v)));
-  return labels;
 }
 
 }  // namespace
@@ -173,7 +206,7 @@ std::optional<std::int64_t> check_nrrd_header(const FileDescriptor& file) {
   return std::max(file_size(file), needed);
 }
 
-ChildResult read_nrrd_labels(const FileDescriptor& file) {
+ChildResult read_nrrd_labels(const FileDescriptor& file, const std::optional<ValueRange>& range) {
   const std::unique_ptr<Nrrd, Nrrd* (*)(Nrrd*)> image(nrrdNew(), nrrdNuke);
   ::lseek(file.get(), 0, SEEK_SET);
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(::fdopen(::dup(file.get()), "rb"),
@@ -192,8 +225,12 @@ ChildResult read_nrrd_labels(const FileDescriptor& file) {
   }
   std::array<std::size_t, 3> size = {1, 1, 1};
   for (std::size_t k = 0; k < axes.size(); ++k) size.at(k) = image->axis[axes.at(k)].size;
-  const std::vector<std::int32_t> labels = labels_of(*image, size[0] * size[1] * size[2]);
-  return along_space(place_of(*image, axes), size, labels);
+  const auto value_at = nrrdDLookup[image->type];
+  const std::string where = file.path().string();
+  return along_space(place_of(*image, axes, where), size,
+                     labels_from(size[0] * size[1] * size[2], range,
+                                 [&](std::size_t v) { return value_at(image->data, v); }),
+                     where);
 }
 
 }  // namespace palpate

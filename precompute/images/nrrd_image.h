@@ -20,6 +20,6 @@ std::optional<std::int64_t> check_nrrd_header(const FileDescriptor& file);
 
 /// Reads an image that check_nrrd_header has taken, by teem, for a child process. Axes are exchanged and
 /// turned round as those of NIfTI; lengths are millimetres unless `space units` says otherwise.
-ChildResult read_nrrd_labels(const FileDescriptor& file);
+ChildResult read_nrrd_labels(const FileDescriptor& file, const std::optional<ValueRange>& range);
 
 }  // namespace palpate

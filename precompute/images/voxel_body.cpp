@@ -227,6 +227,14 @@ VoxelBody crop(const VoxelBody& body, Index margin) {
   return result;
 }
 
+std::size_t largest_part(const VoxelGrid& grid, const std::vector<std::uint8_t>& marks) {
+  std::vector<Index> part_of;
+  std::size_t largest = 0;
+  for (const auto& part : find_parts(grid, marks, part_of))
+    if (part.value != 0) largest = std::max(largest, part.voxels);
+  return largest;
+}
+
 void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::string>& notes) {
   std::vector<Index> part_of;
   const auto parts = find_parts(body, body.inside, part_of);
@@ -242,10 +250,13 @@ void keep_one_part(VoxelBody& body, const std::string& where, std::vector<std::s
     const Part<std::uint8_t>& part = parts[p];
     const bool is_small = static_cast<double>(part.voxels) < limit;
     if (part.value != 0 && &part != &*largest && !is_small) {
-      throw Error("the image holds disconnected parts: one of " + std::to_string(largest->voxels) +
-                      " voxels at " + shown(body, largest->first) + " and one of " +
-                      std::to_string(part.voxels) + " at " + shown(body, part.first) + " (image units)",
-                  where, "choose the labels of one organ by labels = [...] in [geometry]");
+      throw Error(
+          "the image holds disconnected parts: one of " + std::to_string(largest->voxels) + " voxels at " +
+              shown(body, largest->first) + " and one of " + std::to_string(part.voxels) + " at " +
+              shown(body, part.first) + " (image units)",
+          where,
+          "choose the labels of one organ by labels = [...] in [geometry]; of a grey image a range whose "
+          "voxels hang together, or segment it");
     }
     if (is_small && static_cast<Index>(p) != outside) {
       turned[p] = 1;

@@ -31,6 +31,8 @@ struct VoxelGrid {
 struct VoxelBody : VoxelGrid {
   static constexpr Index no_label = std::numeric_limits<Index>::min();
 
+  double file_unit = 0.0;  ///< that the image's file counts in [mm]; 0: it does not say
+
   std::vector<std::uint8_t> inside;  ///< [voxels] 1 where body
   std::vector<Index> labels;  ///< [voxels] of the body, no_label elsewhere; empty: labels do not matter
 };
@@ -38,6 +40,9 @@ struct VoxelBody : VoxelGrid {
 /// The voxels copied to the smallest grid that holds them and `margin` empty voxels on every side. Needs one
 /// voxel of body.
 VoxelBody crop(const VoxelBody& body, Index margin);
+
+/// Voxels of the largest part (connected through faces) of those that are marked by 1; 0 where none is.
+std::size_t largest_part(const VoxelGrid& grid, const std::vector<std::uint8_t>& marks);
 
 /// Keeps the largest part (voxels connected through faces): removes parts smaller than 1 % of it and fills
 /// cavities smaller than that, each told in `notes`. Throws Error (where = `where`) when another large part

@@ -151,6 +151,50 @@ TEST_F(DraftTest, NamesThatAreNotUtf8AreRefused) {
   EXPECT_FALSE(std::filesystem::exists(draft_file(file)));
 }
 
+/// A block of 8 x 6 x 5 voxels of 1 unit, with `more` lines in the header.
+std::string small_nrrd(const std::string& more) {
+  std::string text = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 6 5\nencoding: raw\n" + more + "\n";
+  return text + std::string(8UL * 6 * 5, '\x01');
+}
+
+TEST_F(DraftTest, UnitOfAnImageIsThatOfItsHeader) {
+  const auto drafted = [&](const std::string& more, const char* unit) {
+    told_.clear();
+    const std::filesystem::path image = folder_.write("organ.nrrd", small_nrrd(more));
+    DraftOptions options = {.shape = {.nodes = 300}, .renew = true};
+    if (unit != nullptr) options.unit = read_unit(unit);
+    return read_description(draft(image, options, true, tell())).scale;
+  };
+  const std::string directions = "space directions: (1,0,0) (0,1,0) (0,0,1)\n";
+  const std::string patient = "space: left-posterior-superior\n" + directions;
+  EXPECT_EQ(drafted("spacings: 1 1 1\n", nullptr), 0.01);  // 8 cm, as nothing is said
+  EXPECT_EQ(drafted("spacings: 1 1 1\nunits: \"mm\" \"mm\" \"mm\"\n", nullptr), 0.001);
+  EXPECT_EQ(drafted(patient, nullptr), 0.001);  // as 3D Slicer means it
+  expect_mentions(told_, {"unit: mm", "the image's header says its unit"});
+  for (const char* unit : {"mm", "cm", "m", "um", "\xC2\xB5m", "Micrometres", "inches"}) {
+    const std::string units =
+        "space units: \"" + std::string(unit) + "\" \"" + unit + "\" \"" + unit + "\"\n";
+    EXPECT_EQ(drafted(patient + units, nullptr), 0.001) << unit;  // read as millimetres
+  }
+  EXPECT_NEAR(drafted(patient + "space units: \"um\" \"um\" \"um\"\n", "mm"), 1.0, 1e-12);  // who says so
+  expect_mentions(error_of([&] { drafted(patient + "space units: \"ell\" \"ell\" \"ell\"\n", nullptr); }),
+                  {"organ.nrrd", "\"ell\"", "not known"});
+  expect_mentions(error_of([&] { drafted(patient + "space units: \"mm\" \"mm\" \"cm\"\n", nullptr); }),
+                  {"\"mm\" along one axis", "\"cm\""});
+}
+
+TEST_F(DraftTest, RangeOfAGreyImageIsWritten) {
+  std::string image = small_nrrd("spacings: 10 10 10\n");
+  image.back() = '\xC8';
+  const std::filesystem::path file = folder_.write("scan.nrrd", image);
+  DraftOptions options = {.shape = {.range = ValueRange{0.5, 10.0}, .nodes = 300}};
+  const Description description = read_description(draft(file, options, true, tell()));
+  const auto& geometry = std::get<ImageGeometry>(description.geometry);
+  ASSERT_TRUE(geometry.range);
+  EXPECT_EQ(geometry.range->low, 0.5);
+  EXPECT_EQ(geometry.range->high, 10.0);
+}
+
 /// A disc of radius 40 in a picture of 100 x 120 pixels, as a plain PBM: '1' is black.
 std::string disc(bool is_dark) {
   std::string text = "P1\n100 120\n";

@@ -94,9 +94,10 @@ TEST_F(ImageMesh, BallHasItsVolumeAndPlace) {
   image(60, 60, 38) = 5;
   image(30, 30, 20) = 0;  // and a cavity
   Mesh ball = mesh(image, edges(3.0));
-  EXPECT_EQ(notes_.size(), 2U);
-  expect_mentions(notes_.at(0), {"dropped 2 stray part(s)", "2 voxel(s)"});
-  expect_mentions(notes_.at(1), {"filled 1 cavity(ies)"});
+  EXPECT_EQ(notes_.size(), 3U);
+  expect_mentions(notes_.at(0), {"labels 2, 5 and 9 are one tissue"});
+  expect_mentions(notes_.at(1), {"dropped 2 stray part(s)", "2 voxel(s)"});
+  expect_mentions(notes_.at(2), {"filled 1 cavity(ies)"});
 
   const double exact = ball_volume(ball_radius);
   EXPECT_NEAR(volume(ball), exact, 0.03 * exact);
@@ -261,6 +262,43 @@ TEST_F(ImageMesh, CavitiesStayEmpty) {
   for (const Mesher mesher : {Mesher::cgal, Mesher::tetgen}) {
     EXPECT_NEAR(volume(mesh(image, edges(4.0, mesher))), shell, 0.05 * shell);
   }
+}
+
+/// A block of 10 x 10 x 6 voxels with a plate of one voxel on it, so long.
+TestImage block_with_fin(int length) {
+  TestImage image({40, 20, 20}, {1, 1, 1});
+  for (int k = 0; k < 20; ++k)
+    for (int j = 4; j < 14; ++j)
+      for (int i = 4; i < 4 + length; ++i)
+        if ((k >= 4 && k < 10 && i < 14) || k == 4) image(i, j, k) = 1;
+  return image;
+}
+
+TEST_F(ImageMesh, BodyOneVoxelThickIsRefusedAtOnce) {
+  TestImage plate({40, 30, 14}, {4, 4, 4});
+  for (int j = 4; j < 26; ++j)
+    for (int i = 4; i < 36; ++i) plate(i, j, 6) = 1;
+  TestImage slice({20, 20, 1}, {1, 1, 3});
+  std::fill(slice.labels.begin(), slice.labels.end(), static_cast<unsigned char>(1));
+  for (const TestImage& image : {plate, slice, block_with_fin(30)})
+    expect_mentions(error_of([&] { mesh(image, edges(8.0)); }),
+                    {"scan.inr", "too thin", "one voxel thick", "voxels a third as large"});
+}
+
+TEST_F(ImageMesh, ThinPartsAndVolumeThatAreLostAreTold) {
+  mesh(block_with_fin(18), edges(2.0));
+  ASSERT_FALSE(notes_.empty());
+  expect_mentions(notes_.front(), {"a thin part", "one voxel thick, is lost"});
+  notes_.clear();
+  TestImage plate({40, 30, 14}, {1, 1, 1});
+  for (int k = 6; k < 8; ++k)
+    for (int j = 4; j < 26; ++j)
+      for (int i = 4; i < 36; ++i) plate(i, j, k) = 1;
+  MeshOptions options = edges(2.0);
+  options.perturb = options.exude = false;
+  const double lost = 1.0 - volume(mesh(plate, options)) / (32.0 * 22.0 * 2.0);
+  ASSERT_GT(lost, 0.05);
+  expect_mentions(notes_.back(), {"less volume than the image's body"});
 }
 
 TEST_F(ImageMesh, BodyThatTouchesTheRim) {

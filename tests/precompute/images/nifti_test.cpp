@@ -37,6 +37,7 @@ struct Layout {
   int units = 2;                           // 1 metres, 2 millimetres, 3 micrometres
   double unit = 1.0;                       // of the file's lengths [mm]
   double turn = 0.0;                       // of the whole about z [rad]
+  double shear = 0.0;                      // steps along z also move so much along y [mm]
   std::array<int, 4> more = {1, 1, 1, 1};  // dimensions beyond three
 };
 
@@ -77,6 +78,7 @@ std::array<std::array<double, 4>, 3> matrix_of(const Layout& layout) {
       corner[axis] += (size.at(static_cast<std::size_t>(axis)) - 1) * spacing[axis];
   }
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(layout.turn, Vec3::UnitZ()).toRotationMatrix();
+  columns(1, 2) += layout.shear;
   columns = turn * columns / layout.unit;
   corner = turn * corner / layout.unit;
   std::array<std::array<double, 4>, 3> rows{};
@@ -209,6 +211,102 @@ TEST_F(NiftiImage, HasLengthsInMillimetresAndScaledValues) {
   layout.units = 3;
   layout.unit = 1e-3;
   expect_same(read("micrometres.nii", nifti(layout)));
+}
+
+TEST_F(NiftiImage, SaysItsUnitWhereTheHeaderDoes) {
+  Layout layout;
+  for (const auto& [units, unit] : {std::pair{0, 0.0}, {1, 1e3}, {2, 1.0}, {3, 1e-3}}) {
+    layout.units = units;
+    layout.unit = unit > 0.0 ? unit : 1.0;
+    layout.datatype = 16;
+    const VoxelBody body = read("a.nii", nifti(layout));
+    EXPECT_EQ(body.file_unit, unit);
+    EXPECT_LT((body.spacing - expected_.spacing).norm(), 1e-5);
+  }
+}
+
+/// Slices that lie each further along y, as of a scanner whose gantry was tilted: each voxel is within half a
+/// voxel of where the matrix says.
+TEST_F(NiftiImage, ShearedSlicesAreMovedToWhereTheyAre) {
+  for (const double shear : {1.5, -1.5, 0.7}) {
+    Layout layout;
+    layout.shear = shear;
+    notes_.clear();
+    const VoxelBody body = read("a.nii", nifti(layout));
+    expect_mentions(notes_.at(0), {"sheared by", "moved to where they are"});
+    EXPECT_LT((body.spacing - expected_.spacing).norm(), 1e-5);
+    for (int k = 0; k < size[2]; ++k)
+      for (int j = 0; j < size[1]; ++j)
+        for (int i = 0; i < size[0]; ++i) {
+          if (label_at(i, j, k) == 0) continue;
+          const double moved = std::round(shear * k / spacing[1]);
+          const Vec3 x = origin + spacing.cwiseProduct(Vec3(i, j + moved, k));
+          const Vec3 at = (x - body.origin).cwiseQuotient(body.spacing).array().round();
+          const std::size_t v =
+              body.at(static_cast<Index>(at[0]), static_cast<Index>(at[1]), static_cast<Index>(at[2]));
+          EXPECT_LT((body.center(v) - x).norm(), 1e-4);
+          EXPECT_EQ(body.labels.at(v), label_at(i, j, k));
+        }
+  }
+}
+
+/// libnifti would take 1 for them.
+TEST_F(NiftiImage, SidesThatAreNotPositiveAreRefused) {
+  for (const int version : {1, 2}) {
+    Layout layout;
+    layout.version = version;
+    std::string bytes = nifti(layout);
+    const auto put = [&]<class T>(std::size_t offset, T value) {
+      const auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
+      std::ranges::copy(raw, bytes.begin() + static_cast<std::ptrdiff_t>(offset));
+    };
+    const auto set_side = [&](double side) {
+      version == 1 ? put(84, static_cast<float>(side)) : put(120, side);
+    };
+    set_side(-1.5);
+    read("a.nii", bytes);  // the matrix counts
+    version == 1 ? put(254, std::int16_t{0}) : put(348, std::int32_t{0});
+    for (const double side : {-1.5, 0.0, std::numeric_limits<double>::quiet_NaN()}) {
+      set_side(side);
+      expect_mentions(error(bytes), {"a.nii", "pixdim[2]", "must be positive"});
+    }
+  }
+}
+
+/// A scan in the place of a segmentation.
+TEST_F(NiftiImage, GreyImageIsNoneOfLabelsUntilARangeIsSaid) {
+  Layout layout;
+  layout.datatype = 16;
+  std::string bytes = nifti(layout);
+  const std::size_t voxels = 352;
+  const auto set = [&](std::size_t v, float value) {
+    const auto raw = std::bit_cast<std::array<char, 4>>(value);
+    std::ranges::copy(raw, bytes.begin() + static_cast<std::ptrdiff_t>(voxels + 4 * v));
+  };
+  const auto with_range = [&](ValueRange range) {
+    return read_labelled_image({folder_.write("grey.nii", bytes), {}, false, range}, 10.0, notes_);
+  };
+  set(0, -1.0F);  // outside, as some programs mark it
+  expect_mentions(error(bytes), {"a.nii", "grey", "-1 to 4", "--range", "labels (-1, 0, 1, 2, 3, 4)"});
+  EXPECT_EQ(with_range({1.0, 4.0}).inside, expected_.inside);
+  EXPECT_EQ(read_labelled_image({folder_.write("a.nii", bytes), {1, 2, 3, 4}, true}, 10.0, notes_).labels,
+            expected_.labels);
+  set(0, 0.25F);
+  expect_mentions(error(bytes), {"grey", "0 to 4", "not all are whole numbers", "range = [LOW, HIGH]"});
+  EXPECT_EQ(with_range({0.5, 4.0}).inside, expected_.inside);
+  expect_mentions(error_of([&] { with_range({5.0, 9.0}); }), {"no voxel", "from 5 to 9", "go from 0 to 4"});
+  for (std::size_t v = 0; v < 150; ++v) set(v, static_cast<float>(v));
+  expect_mentions(error(bytes), {"grey", "0 to 149", "150 different ones"});
+}
+
+TEST_F(NiftiImage, LabelsThatAreMergedAreTold) {
+  notes_.clear();
+  read_labelled_image({folder_.write("a.nii", nifti({})), {}, false}, 10.0, notes_);
+  ASSERT_FALSE(notes_.empty());
+  expect_mentions(notes_[0], {"labels 1, 2, 3 and 4 are one tissue", "regions"});
+  notes_.clear();
+  read_labelled_image({folder_.write("a.nii", nifti({})), {1, 2, 3, 4}, false}, 10.0, notes_);
+  for (const std::string& note : notes_) EXPECT_EQ(note.find("one tissue"), std::string::npos) << note;
 }
 
 TEST_F(NiftiImage, GzippedIsTheSame) {
