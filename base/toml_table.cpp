@@ -202,6 +202,21 @@ std::vector<std::int32_t> TomlTable::integers(std::string_view key) const {
   return result;
 }
 
+std::pair<std::vector<std::int32_t>, std::vector<std::string>> TomlTable::integers_and_texts(
+    std::string_view key) const {
+  std::pair<std::vector<std::int32_t>, std::vector<std::string>> result;
+  for (const toml::node& value : array(key, "a list of whole numbers and texts")) {
+    if (const auto text = value.value_exact<std::string>()) {
+      result.second.push_back(*text);
+    } else {
+      result.first.push_back(as_integer(value, key, least_integer, largest_integer));
+    }
+  }
+  if (result.first.empty() && result.second.empty())
+    fail(key, name_of(key) + " is empty", "list at least one number or name");
+  return result;
+}
+
 std::vector<bool> TomlTable::booleans(std::string_view key, std::size_t size) const {
   const std::string expected = some(size, "of true or false");
   std::vector<bool> result;

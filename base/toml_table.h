@@ -72,6 +72,9 @@ class TomlTable {
                                                    std::int32_t high = largest_integer) const;
   /// A list of at least one whole number.
   [[nodiscard]] std::vector<std::int32_t> integers(std::string_view key) const;
+  /// A list of at least one whole number or text.
+  [[nodiscard]] std::pair<std::vector<std::int32_t>, std::vector<std::string>> integers_and_texts(
+      std::string_view key) const;
   /// `size` truth values, 1 to 6.
   [[nodiscard]] std::vector<bool> booleans(std::string_view key, std::size_t size) const;
 

@@ -274,23 +274,21 @@ void check_held(const Mesh& mesh, const std::vector<std::uint8_t>& fixed, const 
 }
 
 std::string scale_warning(const Mesh& mesh, double scale) {
+  constexpr double smallest = 1e-3, largest = 10.0;  // [m] that are no surprise
   Eigen::AlignedBox3d box;
   for (const Vec3& x : mesh.nodes) box.extend(x);
   const double size = box.sizes().maxCoeff();
-  if (size > 10.0) {
-    return fmt::format(
-        "the body is {:.4g} m long: if its numbers are millimetres, write scale = {:.3g} under [geometry], "
-        "which makes it {:.4g} m",
-        size, 0.001 * scale, 0.001 * size);
-  }
-  if (size < 1e-3) {
-    return fmt::format(
-        "the body is {:.4g} m long: if its numbers are metres, write scale = 1 under [geometry] (now "
-        "{:.3g}), "
-        "which makes it {:.4g} m",
-        size, scale, size / scale);
-  }
-  return {};
+  if (size >= smallest && size <= largest) return {};
+  const std::string told = fmt::format("the body is {:.4g} m long: ", size);
+  const bool is_large = size > largest;
+  const double other = is_large ? 0.001 * scale : 1.0, then = size / scale * other;
+  if (then < smallest || then > largest || other == scale)
+    return told + fmt::format("check scale under [geometry], the metres per unit of its numbers (now {:.3g})",
+                              scale);
+  return told + fmt::format(
+                    "if its numbers are {}, write scale = {:.3g} under [geometry] (now {:.3g}), which makes "
+                    "it {:.4g} m",
+                    is_large ? "millimetres" : "metres", other, scale, then);
 }
 
 }  // namespace palpate

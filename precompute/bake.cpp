@@ -644,6 +644,7 @@ MeshedBody Bake::mesh() {
   MeshedBody body = mesh_body(
       description_, [&](const std::string& text) { progress_.begin(text); }, options_.keep);
   for (const std::string& note : body.notes) progress_.line("note: " + note);
+  for (const std::string& doubt : body.doubts) progress_.line("warning: " + doubt);
   if (!can_seal() && !input_files(description_).empty())
     progress_.line(
         "note: this system cannot seal processes (seccomp): those that read the geometry's file may do what "

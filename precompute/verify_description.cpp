@@ -93,7 +93,7 @@ class DescriptionComparison {
                                 compare(fmt::format("{}, row {}, {}", field.dataset, m, field.key),
                                         fmt::format("{}", fmt::join(values, " ")), asked[k++]);
                               });
-      tags = tags || (part.where && by_tag(*part.where));
+      tags = tags || (part.where && by_tag(*part.where)) || !part.region_names.empty();
     }
     if (!tags)
       same_rows("/material/of_element", model_.material_of_element,

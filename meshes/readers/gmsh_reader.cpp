@@ -1,7 +1,9 @@
 // Gmsh .msh 2.2 and 4.1 (ASCII). Format: Gmsh reference manual, "MSH file format".
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <map>
 #include <string>
 #include <unordered_map>
@@ -30,8 +32,9 @@ enum SkippedElement : std::int64_t { quadratic_line = 8, point = 15 };
 /// What is gathered while the sections go by.
 struct GmshMesh {
   MeshFile mesh;
-  std::unordered_map<std::int64_t, Index> node_of_tag;                        // node tags have gaps
-  std::map<std::pair<std::int64_t, std::int64_t>, Index> physical_of_entity;  // 4.1: (dimension, entity tag)
+  std::unordered_map<std::int64_t, Index> node_of_tag;  // node tags have gaps
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<Index>>
+      physicals_of_entity;  // 4.1: (dimension, entity tag)
 };
 
 void add_node(TextReader& reader, GmshMesh& gmsh, std::int64_t tag, const Vec3& x) {
@@ -56,7 +59,7 @@ void check_type(const TextReader& reader, std::int64_t type) {
 }
 
 /// The node list of an element of a type that check_type let through.
-void read_element(TextReader& reader, GmshMesh& gmsh, std::int64_t type, Index physical) {
+void read_element(TextReader& reader, GmshMesh& gmsh, std::int64_t type, std::span<const Index> physicals) {
   const FileElement* element = find_element(type);
   if (element == nullptr) {
     reader.skip_words(type == point ? 1 : 3, "a node number");
@@ -65,14 +68,19 @@ void read_element(TextReader& reader, GmshMesh& gmsh, std::int64_t type, Index p
   std::array<Index, max_element_nodes> nodes{};
   const std::span<Index> used(nodes.data(), static_cast<std::size_t>(traits(element->type).nodes));
   for (Index& node : used) node = read_node_by_tag(reader, gmsh);
-  gmsh.mesh.add(*element, used, physical);
+  if (physicals.empty()) {
+    gmsh.mesh.add(*element, used, 0);
+  } else {
+    gmsh.mesh.add(*element, used, physicals.front(), physicals.subspan(1));
+  }
 }
 
-void read_nodes_2(TextReader& reader, GmshMesh& gmsh) {
+void read_nodes_2(TextReader& reader, GmshMesh& gmsh, bool parametric) {
   const std::int64_t count = reader.count("the number of nodes", 4);
   for (std::int64_t i = 0; i < count; ++i) {
     const std::int64_t tag = reader.integer("a node number");
     add_node(reader, gmsh, tag, reader.point());
+    if (parametric) reader.rest_of_line();  // the entity, and where on it
   }
 }
 
@@ -85,22 +93,62 @@ void read_elements_2(TextReader& reader, GmshMesh& gmsh) {
     const std::int64_t tags = reader.count("the number of tags", 1);
     const Index physical = tags > 0 ? reader.tag() : 0;  // the first tag is the physical group
     if (tags > 1) reader.skip_words(tags - 1, "a tag");
-    read_element(reader, gmsh, type, physical);
+    read_element(reader, gmsh, type, {&physical, 1});
   }
 }
 
-/// Which physical group each curve, surface and volume is in (the first, where it is in several).
-void read_entities(TextReader& reader, GmshMesh& gmsh) {
+/// In 2.2 an element stands there once for each group that it is in.
+void unite_groups(FileElements& elements, std::size_t width) {
+  if (std::ranges::adjacent_find(elements.tags, std::not_equal_to<>()) == elements.tags.end()) return;
+  std::map<std::vector<Index>, std::size_t> first;  // of those with the same nodes
+  FileElements united;
+  for (std::size_t e = 0; e < elements.tags.size(); ++e) {
+    const std::span<const Index> nodes(elements.nodes.data() + width * e, width);
+    const auto [known, is_new] = first.try_emplace({nodes.begin(), nodes.end()}, united.tags.size());
+    const Index tag = elements.tags[e];
+    if (!is_new && tag != 0 && tag != united.tags[known->second]) {
+      united.more_tags.emplace_back(known->second, tag);
+      continue;
+    }
+    united.nodes.insert(united.nodes.end(), nodes.begin(), nodes.end());
+    united.tags.push_back(tag);
+  }
+  elements = std::move(united);
+}
+
+/// Names of groups: dimension, number and name in quotes.
+void read_names(TextReader& reader, GmshMesh& gmsh) {
+  const std::int64_t count = reader.count("the number of names", 3);
+  for (std::int64_t i = 0; i < count; ++i) {
+    const auto dimension = static_cast<int>(reader.integer("a dimension", 0, 3));
+    const Index number = reader.tag();
+    std::string_view name = reader.rest_of_line();
+    name.remove_prefix(std::min(name.find('"') + 1, name.size()));
+    gmsh.mesh.names.emplace(std::pair(dimension, std::string(name.substr(0, name.rfind('"')))), number);
+  }
+}
+
+/// Which physical groups each curve, surface and volume is in; of those that have been cut into partitions,
+/// each part.
+void read_entities(TextReader& reader, GmshMesh& gmsh, bool parts) {
   std::array<std::int64_t, 4> counts{};
+  if (parts) {
+    reader.integer("the number of partitions");
+    reader.skip_words(2 * reader.count("the number of ghost entities", 2), "a ghost entity");
+  }
   for (std::int64_t& count : counts) count = reader.count("the number of entities", 5);
   for (std::size_t dimension = 0; dimension < 4; ++dimension) {
     for (std::int64_t i = 0; i < counts[dimension]; ++i) {
       const std::int64_t tag = reader.integer("an entity number");
+      if (parts) {
+        reader.skip_words(2, "the entity that it is part of");
+        reader.skip_words(reader.count("the number of its partitions", 1), "a partition");
+      }
       reader.skip_words(dimension == 0 ? 3 : 6, "a bound");
       const std::int64_t physicals = reader.count("the number of physical groups", 1);
       for (std::int64_t p = 0; p < physicals; ++p) {
-        const Index physical = std::abs(reader.tag());  // the sign is an orientation
-        gmsh.physical_of_entity.try_emplace({static_cast<std::int64_t>(dimension), tag}, physical);
+        gmsh.physicals_of_entity[{static_cast<std::int64_t>(dimension), tag}].push_back(
+            std::abs(reader.tag()));  // the sign is an orientation
       }
       if (dimension > 0)
         reader.skip_words(reader.count("the number of bounding entities", 1), "an entity number");
@@ -137,14 +185,13 @@ void read_elements_4(TextReader& reader, GmshMesh& gmsh) {
   for (std::int64_t block = 0; block < blocks; ++block) {
     const std::int64_t dimension = reader.integer("a dimension", 0, 3),
                        entity = reader.integer("an entity number");
-    const auto group = gmsh.physical_of_entity.find({dimension, entity});
-    const Index physical = group == gmsh.physical_of_entity.end() ? 0 : group->second;
+    const std::vector<Index>& physicals = gmsh.physicals_of_entity[{dimension, entity}];
     const std::int64_t type = reader.integer("an element type");
     check_type(reader, type);
     const std::int64_t in_block = reader.count("the number of elements in the block", 2);
     for (std::int64_t i = 0; i < in_block; ++i) {
       reader.integer("an element number");
-      read_element(reader, gmsh, type, physical);
+      read_element(reader, gmsh, type, physicals);
     }
     read += in_block;
   }
@@ -174,7 +221,7 @@ void skip_section(TextReader& reader, const std::string& end) {
 
 }  // namespace
 
-Mesh read_gmsh(const std::filesystem::path& file) {
+std::pair<Mesh, MeshGroups> read_gmsh(const std::filesystem::path& file) {
   TextReader reader(file);
   const int version = read_format(reader);
   GmshMesh gmsh;
@@ -182,17 +229,25 @@ Mesh read_gmsh(const std::filesystem::path& file) {
     const std::string name(reader.word("a section"));
     if (name.front() != '$') reader.fail_on(name, "a section");
     const std::string end = fmt::format("$End{}", name.substr(1));
-    if (name == "$Nodes") {
-      (version == 4 ? read_nodes_4 : read_nodes_2)(reader, gmsh);
+    if (name == "$Nodes" && version == 4) {
+      read_nodes_4(reader, gmsh);
+    } else if (name == "$Nodes" || name == "$ParametricNodes") {
+      read_nodes_2(reader, gmsh, name == "$ParametricNodes");
     } else if (name == "$Elements") {
       (version == 4 ? read_elements_4 : read_elements_2)(reader, gmsh);
-    } else if (name == "$Entities" && version == 4) {
-      read_entities(reader, gmsh);
+    } else if ((name == "$Entities" || name == "$PartitionedEntities") && version == 4) {
+      read_entities(reader, gmsh, name == "$PartitionedEntities");
+    } else if (name == "$PhysicalNames") {
+      read_names(reader, gmsh);
     } else {
       skip_section(reader, end);
     }
     reader.expect(end);
   }
+  if (version == 2)
+    for (const ElementTraits& kind : element_traits)
+      unite_groups(gmsh.mesh.elements[static_cast<std::size_t>(kind.type)],
+                   static_cast<std::size_t>(kind.nodes));
   return to_body(std::move(gmsh.mesh), reader);
 }
 

@@ -50,7 +50,7 @@ void skip_section(TextReader& reader) {
 
 }  // namespace
 
-Mesh read_medit(const std::filesystem::path& file) {
+std::pair<Mesh, MeshGroups> read_medit(const std::filesystem::path& file) {
   static const std::set<std::string, std::less<>> other_elements = {
       "Prisms", "Pyramids", "Wedges", "TrianglesP2", "QuadrilateralsQ2", "TetrahedraP2", "HexahedraQ2"};
   TextReader reader(file, '#');

@@ -97,15 +97,18 @@ std::vector<Index> find_middles(const Mesh& mesh, const std::vector<Index>& corn
   return facets;
 }
 
+/// Those with a tag, once for each.
 void drop_untagged(FileElements& facets, ElementType kind) {
   const auto width = static_cast<std::size_t>(traits(kind).nodes);
   FileElements tagged;
-  for (std::size_t f = 0; f < facets.tags.size(); ++f) {
-    if (facets.tags[f] == 0) continue;
+  const auto add = [&](std::size_t f, Index tag) {
     const auto first = facets.nodes.begin() + static_cast<std::ptrdiff_t>(width * f);
     tagged.nodes.insert(tagged.nodes.end(), first, first + static_cast<std::ptrdiff_t>(width));
-    tagged.tags.push_back(facets.tags[f]);
-  }
+    tagged.tags.push_back(tag);
+  };
+  for (std::size_t f = 0; f < facets.tags.size(); ++f)
+    if (facets.tags[f] != 0) add(f, facets.tags[f]);
+  for (const auto& [f, tag] : facets.more_tags) add(f, tag);
   facets = std::move(tagged);
 }
 
@@ -130,22 +133,29 @@ void take_facets(MeshFile& file, Mesh& mesh, const TextReader& reader) {
 
 }  // namespace
 
-void MeshFile::add(const FileElement& element, std::span<const Index> in_file, Index tag) {
+void MeshFile::add(const FileElement& element, std::span<const Index> in_file, Index tag,
+                   std::span<const Index> more_tags) {
   FileElements& kind = elements[static_cast<std::size_t>(element.type)];
+  for (const Index more : more_tags) kind.more_tags.emplace_back(kind.tags.size(), more);
   for (std::size_t i = 0; i < in_file.size(); ++i) kind.nodes.push_back(in_file[element.place[i]]);
   kind.tags.push_back(tag);
 }
 
-Mesh to_body(MeshFile file, const TextReader& reader) {
+std::pair<Mesh, MeshGroups> to_body(MeshFile file, const TextReader& reader) {
   if (file.nodes.empty()) reader.fail("the file has no nodes");
-  Mesh mesh;
+  std::pair<Mesh, MeshGroups> body;
+  auto& [mesh, groups] = body;
   mesh.element = body_kind(file, reader);
   mesh.nodes = std::move(file.nodes);
   mesh.connectivity = std::move(of_kind(file, mesh.element).nodes);
   mesh.regions = std::move(of_kind(file, mesh.element).tags);
+  groups.more = std::move(of_kind(file, mesh.element).more_tags);
+  for (const auto& [name, number] : file.names)
+    if (name.first == mesh.dimension()) groups.number_of.emplace(name.second, number);
+  groups.hint = std::move(file.hint);
   if (mesh.dimension() == 2) flatten(mesh, reader);
   take_facets(file, mesh, reader);
-  return mesh;
+  return body;
 }
 
 void fail_unknown_element(const TextReader& reader, const std::string& kind) {

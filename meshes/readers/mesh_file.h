@@ -2,8 +2,10 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "meshes/mesh.h"
@@ -22,15 +24,27 @@ struct FileElement {
 struct FileElements {
   std::vector<Index> nodes;  ///< [elements * nodes an element]
   std::vector<Index> tags;   ///< [elements] 0 where untagged
+  /// Groups that an element is in besides: its number and their tags.
+  std::vector<std::pair<std::size_t, Index>> more_tags{};
+};
+
+/// The groups of a body's elements in its file.
+struct MeshGroups {
+  std::vector<std::pair<std::size_t, Index>> more;  ///< element, and a group that it is in besides its region
+  std::map<std::string, Index> number_of;           ///< by name
+  std::string hint;                                 ///< why there are none, where that is not plain
 };
 
 /// Nodes and elements of all kinds, the body's and others.
 struct MeshFile {
   std::vector<Vec3> nodes;
   std::array<FileElements, element_traits.size()> elements;  ///< by kind
+  std::map<std::pair<int, std::string>, Index> names;        ///< of groups, by dimension and name
+  std::string hint;                                          ///< as of MeshGroups
 
   /// `in_file`: the node numbers in the file's order.
-  void add(const FileElement& element, std::span<const Index> in_file, Index tag);
+  void add(const FileElement& element, std::span<const Index> in_file, Index tag,
+           std::span<const Index> more_tags = {});
 };
 
 /// The body: the elements of the highest dimension, with the tagged elements of one dimension less as tagged
@@ -38,7 +52,7 @@ struct MeshFile {
 /// = 0. Throws Error at the reader's place when there are no nodes or no elements, elements of several kinds,
 /// triangles or quadrilaterals that do not lie in a plane of equal z, or tagged facets that are not sides of
 /// the elements.
-Mesh to_body(MeshFile file, const TextReader& reader);
+std::pair<Mesh, MeshGroups> to_body(MeshFile file, const TextReader& reader);
 
 /// Throws Error at the reader's place: an element of a kind that no body is made of.
 [[noreturn]] void fail_unknown_element(const TextReader& reader, const std::string& kind);

@@ -1,6 +1,8 @@
 // TetGen .node, .ele and .face. Format: Si, TetGen manual 1.5, section 5.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 
@@ -8,8 +10,14 @@
 
 namespace palpate {
 
-std::filesystem::path with_ending(std::filesystem::path stem, const char* ending) {
-  return stem += ending;
+std::filesystem::path with_ending(const std::filesystem::path& stem, const char* ending) {
+  std::filesystem::path usual = stem, capitals = stem;
+  usual += ending;
+  std::string letters = ending;
+  std::ranges::transform(letters, letters.begin(), [](unsigned char c) { return std::toupper(c); });
+  capitals += letters;
+  std::error_code none;
+  return !std::filesystem::exists(usual, none) && std::filesystem::exists(capitals, none) ? capitals : usual;
 }
 
 namespace {
@@ -23,7 +31,7 @@ Index read_region(TextReader& reader) {
   return static_cast<Index>(value);
 }
 
-/// Reads the nodes and returns the number of the first, 0 or 1.
+/// Reads the nodes and returns the number of the first.
 std::int64_t read_nodes(const std::filesystem::path& file, MeshFile& mesh) {
   TextReader reader(file, '#');
   const std::int64_t count = reader.count("the number of nodes", 4);
@@ -33,7 +41,7 @@ std::int64_t read_nodes(const std::filesystem::path& file, MeshFile& mesh) {
   std::int64_t first = 0;
   mesh.nodes.reserve(static_cast<std::size_t>(count));
   for (std::int64_t i = 0; i < count; ++i) {
-    if (i == 0) first = reader.integer("the first node number", 0, 1);
+    if (i == 0) first = reader.integer("the first node number", 0, std::numeric_limits<Index>::max());
     if (i > 0) reader.integer("the next node number", first + i, first + i);
     mesh.nodes.push_back(reader.point());
     reader.rest_of_line();  // attributes and marker
@@ -60,14 +68,19 @@ void read_faces(const std::filesystem::path& file, std::int64_t first, MeshFile&
 }
 
 /// Elements of first order, or of second order with TetGen's middles 23 03 01 12 13 02.
-Mesh read_elements(const std::filesystem::path& file, std::int64_t first, MeshFile mesh) {
+std::pair<Mesh, MeshGroups> read_elements(const std::filesystem::path& file, std::int64_t first,
+                                          MeshFile mesh) {
   constexpr FileElement linear = {ElementType::tet4};
   constexpr FileElement quadratic = {ElementType::tet10, {0, 1, 2, 3, 6, 7, 9, 5, 8, 4}};
   TextReader reader(file, '#');
   const std::int64_t count = reader.count("the number of tetrahedra", 5);
   const std::int64_t nodes = reader.integer("the number of nodes of an element");
   if (nodes != 4 && nodes != 10) fail_unknown_element(reader, fmt::format("elements of {} nodes", nodes));
-  const bool has_region = reader.integer("the number of region attributes", 0, 1) == 1;
+  const std::int64_t attributes = reader.count("the number of region attributes", 0);
+  if (attributes > 1)
+    reader.fail(fmt::format("the tetrahedra have {} attributes, and one is their region", attributes),
+                "Keep the one that is the region, or none");
+  const bool has_region = attributes == 1;
   for (std::int64_t i = 0; i < count; ++i) {
     reader.integer("an element number");
     read_element(reader, mesh, nodes == 10 ? quadratic : linear, first,
@@ -78,7 +91,7 @@ Mesh read_elements(const std::filesystem::path& file, std::int64_t first, MeshFi
 
 }  // namespace
 
-Mesh read_tetgen(const std::filesystem::path& stem) {
+std::pair<Mesh, MeshGroups> read_tetgen(const std::filesystem::path& stem) {
   MeshFile mesh;
   const std::int64_t first = read_nodes(with_ending(stem, ".node"), mesh);
   const std::filesystem::path faces = with_ending(stem, ".face");

@@ -8,13 +8,16 @@
 namespace palpate {
 
 /// Each throws Error with file and line. Facets and elements without a tag, or with tag 0, count as untagged.
-Mesh read_gmsh(const std::filesystem::path& file);        ///< .msh, 2.2 and 4.1 ASCII
-Mesh read_medit(const std::filesystem::path& file);       ///< .mesh, ASCII
-Mesh read_tetgen(const std::filesystem::path& stem);      ///< stem.node, stem.ele and, if there, stem.face
-Mesh read_vtk_legacy(const std::filesystem::path& file);  ///< .vtk, ASCII unstructured grid
+std::pair<Mesh, MeshGroups> read_gmsh(const std::filesystem::path& file);   ///< .msh, 2.2 and 4.1 ASCII
+std::pair<Mesh, MeshGroups> read_medit(const std::filesystem::path& file);  ///< .mesh, ASCII
+std::pair<Mesh, MeshGroups> read_tetgen(
+    const std::filesystem::path& stem);  ///< stem.node, stem.ele and, if there, stem.face
+std::pair<Mesh, MeshGroups> read_vtk_legacy(
+    const std::filesystem::path& file);  ///< .vtk, ASCII unstructured grid
 
 /// A set of files is named by what their names have in common: "liver" for liver.node and liver.ele.
-std::filesystem::path with_ending(std::filesystem::path stem, const char* ending);
+/// The ending is in capitals where only a file of that name is there.
+std::filesystem::path with_ending(const std::filesystem::path& stem, const char* ending);
 
 /// Adds an element whose node numbers, counted from `first`, come next in the file; `read_tag` reads its tag.
 template <class ReadTag>

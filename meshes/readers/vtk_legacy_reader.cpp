@@ -3,7 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "meshes/readers/volume_mesh_readers.h"
@@ -17,6 +22,13 @@ enum SkippedCell : std::int64_t { vertex = 1, poly_vertex = 2, poly_line = 4, qu
 struct Cells {
   std::vector<Index> nodes;
   std::vector<std::size_t> offsets = {0};  // [cells + 1] into nodes
+  std::vector<Index*> tags;                // [cells] of the elements that they have become; null: none
+};
+
+/// A value of each cell.
+struct CellArray {
+  std::string name;
+  std::vector<Index> values;
 };
 
 void read_header(TextReader& reader) {
@@ -98,11 +110,12 @@ std::size_t node_count(const TextReader& reader, std::int64_t type) {
 
 /// Takes the elements among the cells while reading their types. The sizes are compared for all of them, so
 /// that a type cut short (1 of 10) at the end of the file is noticed.
-void read_types(TextReader& reader, const Cells& cells, MeshFile& mesh) {
+void read_types(TextReader& reader, Cells& cells, MeshFile& mesh) {
   const std::int64_t count = reader.count("the number of cell types", 1);
   if (count != static_cast<std::int64_t>(cells.offsets.size()) - 1) {
     reader.fail(fmt::format("there are {} cell types for {} cells", count, cells.offsets.size() - 1));
   }
+  std::vector<const ElementTraits*> kinds;
   for (std::size_t cell = 0; cell + 1 < cells.offsets.size(); ++cell) {
     const std::int64_t type = reader.integer("a cell type");
     const std::size_t first = cells.offsets[cell], nodes = cells.offsets[cell + 1] - first;
@@ -111,22 +124,15 @@ void read_types(TextReader& reader, const Cells& cells, MeshFile& mesh) {
       reader.fail(
           fmt::format("cell {} has {} nodes, but its type is {}, which has {}", cell, nodes, type, expected));
     }
-    if (const ElementTraits* element = find_cell_type(type)) {
-      mesh.add({element->type}, {cells.nodes.data() + first, nodes}, 0);
-    }
+    const ElementTraits* const element = find_cell_type(type);
+    kinds.push_back(element);
+    if (element != nullptr) mesh.add({element->type}, {cells.nodes.data() + first, nodes}, 0);
   }
-}
-
-/// Arrays that belong to the whole file (time, cycle).
-void skip_field(TextReader& reader) {
-  reader.word("the field's name");
-  const std::int64_t arrays = reader.count("the number of arrays", 1);
-  for (std::int64_t i = 0; i < arrays; ++i) {
-    reader.word("an array's name");
-    const std::int64_t components = reader.count("the number of components", 1);
-    const std::int64_t tuples = reader.count("the number of tuples", components);
-    reader.word("an array's type");
-    reader.skip_words(components * tuples, "a field value");
+  cells.tags.clear();
+  std::array<std::size_t, element_traits.size()> next{};
+  for (const ElementTraits* const element : kinds) {
+    const auto kind = element == nullptr ? 0 : static_cast<std::size_t>(element->type);
+    cells.tags.push_back(element == nullptr ? nullptr : &mesh.elements.at(kind).tags[next.at(kind)++]);
   }
 }
 
@@ -137,9 +143,112 @@ void skip_metadata(TextReader& reader) {
   }
 }
 
+std::string in_small_letters(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+bool is_whole(const std::string& type) {
+  static const std::set<std::string> types = {
+      "bit",          "char",          "short",     "int",         "long", "unsigned_char", "unsigned_short",
+      "unsigned_int", "unsigned_long", "vtkidtype", "vtktypeint64"};
+  return types.contains(in_small_letters(type));
+}
+
+/// Whether other programs call the array of regions so.
+bool is_of_regions(const std::string& name) {
+  static const std::set<std::string> names = {
+      "region",    "regions",       "regionid",      "region_id",   "material",
+      "materials", "materialid",    "material_id",   "materialids", "matid",
+      "mat",       "tag",           "tags",          "cell_tags",   "label",
+      "labels",    "part",          "partid",        "subdomain",   "attribute",
+      "physical",  "gmsh:physical", "cellentityids", "medit:ref",   "elementblockids"};
+  return names.contains(in_small_letters(name));
+}
+
+/// Reads an array of one whole number a tuple, where `arrays` wants it; passes over others.
+void read_values(TextReader& reader, const std::string& name, const std::string& type,
+                 std::int64_t components, std::int64_t tuples, std::vector<CellArray>* arrays) {
+  if (arrays == nullptr || components != 1 || (!is_whole(type) && !is_of_regions(name))) {
+    for (std::int64_t i = 0; i < components * tuples && !reader.at_end(); ++i) reader.word("a value");
+    return;
+  }
+  constexpr double most = std::numeric_limits<Index>::max();
+  CellArray array{name, {}};
+  for (std::int64_t i = 0; i < tuples; ++i) {
+    const double value = reader.number("a value");
+    if (value == std::round(value) && std::abs(value) <= most)
+      array.values.push_back(static_cast<Index>(value));
+  }
+  if (std::ssize(array.values) == tuples) arrays->push_back(std::move(array));
+}
+
+/// Arrays of the whole file (time, cycle), of points or cells.
+void read_field(TextReader& reader, std::vector<CellArray>* arrays) {
+  reader.word("the field's name");
+  const std::int64_t count = reader.count("the number of arrays", 1);
+  for (std::int64_t i = 0; i < count; ++i) {
+    if (reader.peek() == "METADATA") skip_metadata(reader);
+    const std::string name(reader.word("an array's name"));
+    const std::int64_t components = reader.count("the number of components", 1);
+    const std::int64_t tuples = reader.count("the number of tuples", components);
+    const std::string type(reader.word("an array's type"));
+    read_values(reader, name, type, components, tuples, arrays);
+  }
+}
+
+/// An attribute of `tuples` points or cells; false for one that is not known, after which nothing is read.
+bool read_attribute(TextReader& reader, const std::string& keyword, std::int64_t tuples,
+                    std::vector<CellArray>* arrays) {
+  static const std::map<std::string, std::int64_t> components = {{"VECTORS", 3},    {"NORMALS", 3},
+                                                                 {"TENSORS", 9},    {"TENSORS6", 6},
+                                                                 {"GLOBAL_IDS", 1}, {"PEDIGREE_IDS", 1}};
+  if (keyword == "METADATA") {
+    skip_metadata(reader);
+    return true;
+  }
+  if (keyword == "FIELD") {
+    read_field(reader, arrays);
+    return true;
+  }
+  const std::string name(reader.word("an array's name"));
+  if (keyword == "LOOKUP_TABLE") {
+    reader.skip_words(4 * reader.count("the size of the table", 4), "a colour");
+  } else if (keyword == "SCALARS") {
+    const std::string type(reader.word("an array's type"));
+    std::int64_t width = 1;
+    if (reader.peek() != "LOOKUP_TABLE" && reader.words_on_line() == 1)
+      width = reader.integer("their number", 1, 4);
+    if (reader.peek() == "LOOKUP_TABLE") reader.skip_words(2, "the table's name");
+    read_values(reader, name, type, width, tuples, arrays);
+  } else if (const auto known = components.find(keyword); known != components.end()) {
+    reader.word("an array's type");
+    reader.skip_words(known->second * tuples, "a value");
+  } else {
+    return false;
+  }
+  return true;
+}
+
+/// The array that says the regions: of the names that other programs write, else the only one.
+void take_regions(std::vector<CellArray> arrays, const Cells& cells, MeshFile& mesh) {
+  std::erase_if(arrays, [&](const CellArray& array) { return array.values.size() != cells.tags.size(); });
+  if (arrays.empty()) return;
+  auto regions =
+      std::ranges::find_if(arrays, [](const CellArray& array) { return is_of_regions(array.name); });
+  if (regions == arrays.end() && arrays.size() > 1) {
+    mesh.hint =
+        "the file's CELL_DATA has several arrays of whole numbers: call the one of the regions 'region'";
+    return;
+  }
+  if (regions == arrays.end()) regions = arrays.begin();
+  for (std::size_t cell = 0; cell < cells.tags.size(); ++cell)
+    if (cells.tags[cell] != nullptr) *cells.tags[cell] = regions->values[cell];
+}
+
 }  // namespace
 
-Mesh read_vtk_legacy(const std::filesystem::path& file) {
+std::pair<Mesh, MeshGroups> read_vtk_legacy(const std::filesystem::path& file) {
   TextReader reader(file);
   read_header(reader);
   reader.expect("DATASET");
@@ -149,7 +258,9 @@ Mesh read_vtk_legacy(const std::filesystem::path& file) {
   }
   MeshFile mesh;
   std::optional<Cells> cells;
-  while (!reader.at_end() && reader.peek() != "POINT_DATA" && reader.peek() != "CELL_DATA") {
+  std::vector<CellArray> arrays;
+  std::optional<std::int64_t> points, of_cells;  // whose data follow
+  while (!reader.at_end()) {
     const std::string keyword(reader.word("a keyword"));
     if (keyword == "POINTS") {
       // The cells were checked against the first list.
@@ -160,14 +271,24 @@ Mesh read_vtk_legacy(const std::filesystem::path& file) {
     } else if (keyword == "CELL_TYPES") {
       if (!cells) reader.fail("CELL_TYPES stands before CELLS");
       read_types(reader, *cells, mesh);
+    } else if (keyword == "CELL_DATA" && cells) {
+      of_cells = reader.integer("the number of cells", std::ssize(cells->offsets) - 1,
+                                std::ssize(cells->offsets) - 1);
+    } else if (keyword == "POINT_DATA") {
+      points = reader.integer("the number of points", std::ssize(mesh.nodes), std::ssize(mesh.nodes));
+      of_cells.reset();
+    } else if (of_cells || points) {
+      if (!read_attribute(reader, keyword, of_cells ? *of_cells : *points, of_cells ? &arrays : nullptr))
+        break;
     } else if (keyword == "FIELD") {
-      skip_field(reader);
+      read_field(reader, nullptr);
     } else if (keyword == "METADATA") {
       skip_metadata(reader);
     } else {
       reader.fail_on(keyword, "POINTS, CELLS or CELL_TYPES");
     }
   }
+  if (cells) take_regions(std::move(arrays), *cells, mesh);
   return to_body(std::move(mesh), reader);
 }
 

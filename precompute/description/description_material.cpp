@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <tuple>
 
 #include "meshes/material_fields.h"
 #include "precompute/description/description_keys.h"
@@ -36,7 +37,7 @@ MaterialPart read_material(const TomlTable& material, int dimension) {
   });
   const std::string_view claim = material.at_most_one_of(claim_kinds);
   if (claim == "regions") {
-    part.regions = material.integers(claim);
+    std::tie(part.regions, part.region_names) = material.integers_and_texts(claim);
   } else if (!claim.empty()) {
     part.where = read_selection(material, claim, dimension);
   }
@@ -44,7 +45,7 @@ MaterialPart read_material(const TomlTable& material, int dimension) {
 }
 
 bool is_rest(const MaterialPart& part) {
-  return part.regions.empty() && !part.where;
+  return part.regions.empty() && part.region_names.empty() && !part.where;
 }
 
 }  // namespace

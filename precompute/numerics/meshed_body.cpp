@@ -2,14 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "base/error.h"
-#include "meshes/check.h"
-#include "meshes/edge_middles.h"
-#include "meshes/readers/volume_mesh.h"
 #include "base/printable.h"
 #include "formats/file_kinds.h"
+#include "meshes/check.h"
+#include "meshes/edge_middles.h"
+#include "meshes/quality.h"
+#include "meshes/readers/volume_mesh.h"
 #include "precompute/geometry/cgal_surface_mesh.h"
 #include "precompute/geometry/image_mesh.h"
 #include "precompute/geometry/material_parts.h"
@@ -42,18 +46,19 @@ struct MeshGeometry {
   const std::string& where;
   const ProgressText& progress;
   std::vector<std::string>& notes;
+  MeshGroups& groups;
   bool keep;  ///< files that are there
 
   [[nodiscard]] const char* mesher() const { return options.mesher == Mesher::cgal ? "CGAL" : "TetGen"; }
 
   Mesh operator()(const SurfaceGeometry& surface) const {
+    check_is_read(surface.file, "surface");
     progress("reading the surface " + surface.file.filename().string());
     TriangleSurface triangles = read_surface(surface.file, notes, keep);
     note_cavities(triangles);
     if (options.mesher == Mesher::cgal || (options.remesh && !remesh(surface.file, triangles))) {
       progress("meshing with CGAL");
       return mesh_surface_with_cgal(triangles, options, where);
-    check_is_read(surface.file, "surface");
     }
     note_kept_boundary(triangles);
     progress("meshing with TetGen");
@@ -114,29 +119,29 @@ struct MeshGeometry {
   }
 
   Mesh operator()(const ImageGeometry& image) const {
+    check_is_read(image.file, "image");
     progress("meshing the image " + image.file.filename().string() + " with " + mesher());
     return mesh_image(image, options, notes);
   }
 
   Mesh operator()(const VolumeGeometry& volume) const {
-    check_is_read(image.file, "image");
+    check_is_read(volume.file, "volume");
     progress("reading the mesh " + volume.file.filename().string());
-    return read_volume_mesh(volume.file);
+    return read_volume_mesh(volume.file, &groups);
   }
 
   Mesh operator()(const PolygonGeometry& polygon) const {
-    check_is_read(volume.file, "volume");
     progress("meshing the polygon with CGAL");
     return mesh_polygon(polygon, options, where, notes);
   }
 
   Mesh operator()(const PictureGeometry& picture) const {
+    check_is_read(picture.file, "picture");
     progress("meshing the picture " + picture.file.filename().string() + " with CGAL");
     return mesh_picture(picture, options, notes);
   }
 
   /// Says so, and throws Error where there is no memory for so many cells.
-    check_is_read(picture.file, "picture");
   void begin_generating(ElementType usual, double cells) const {
     progress("generating the mesh");
     const ElementType element = options.element.value_or(usual);
@@ -192,15 +197,11 @@ void check_dimension(const Mesh& mesh, const Description& description, const std
   }
 }
 
-/// Tells of lists of nodes that select middles of edges too.
-void note_middles(const Description& description, MeshedBody& body) {
+/// Calls work(entry, listed) for each list of nodes in a description.
+template <class Work>
+void for_node_lists(const Description& description, const Work& work) {
   const auto note = [&](const std::string& entry, const Selection& where) {
-    const auto* const listed = std::get_if<SelectNodes>(&where);
-    const std::size_t middles = listed == nullptr ? 0 : middles_between(body.mesh, listed->nodes).size();
-    if (middles == 0) return;
-    body.notes.push_back(
-        fmt::format("{}: with the {} listed nodes count the middles of the edges between them, {}", entry,
-                    listed->nodes.size(), middles));
+    if (const auto* const listed = std::get_if<SelectNodes>(&where)) work(entry, *listed);
   };
   for (std::size_t k = 0; k < description.fixed.size(); ++k)
     note(fmt::format("[[fixed]] number {}", k + 1), description.fixed[k].where);
@@ -217,6 +218,134 @@ void note_middles(const Description& description, MeshedBody& body) {
   if (description.warp && description.warp->where) note("[warp]", *description.warp->where);
 }
 
+/// Tells of lists of nodes that select middles of edges too.
+void note_middles(const Description& description, MeshedBody& body) {
+  for_node_lists(description, [&](const std::string& entry, const SelectNodes& listed) {
+    const std::size_t middles = middles_between(body.mesh, listed.nodes).size();
+    if (middles == 0) return;
+    body.notes.push_back(
+        fmt::format("{}: with the {} listed nodes count the middles of the edges between them, {}", entry,
+                    listed.nodes.size(), middles));
+  });
+}
+
+/// -1 where there are no lists of nodes.
+Index largest_listed_node(const Description& description) {
+  Index largest = -1;
+  for_node_lists(description, [&](const std::string&, const SelectNodes& listed) {
+    for (const Index node : listed.nodes) largest = std::max(largest, node);
+  });
+  return largest;
+}
+
+/// The number of the first node of no element; of all nodes where there is none.
+Index first_unused_node(const Mesh& mesh) {
+  std::vector<std::uint8_t> used(mesh.nodes.size(), 0);
+  for (const Index node : mesh.connectivity) used[static_cast<std::size_t>(node)] = 1;
+  return static_cast<Index>(std::ranges::find(used, 0) - used.begin());
+}
+
+/// All groups that elements are in, with their names: "1 (liver), 2".
+std::string region_list(const MeshGroups& groups, const Mesh& mesh) {
+  std::set<Index> present(mesh.regions.begin(), mesh.regions.end());
+  for (const auto& [element, region] : groups.more) present.insert(region);
+  std::string text;
+  for (const Index region : present) {
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", region);
+    for (const auto& [name, number] : groups.number_of)
+      if (number == region) text += " (" + name + ")";
+  }
+  return text + (groups.hint.empty() ? "" : "; " + groups.hint);
+}
+
+/// The materials with numbers for names of regions. Of the groups that an element is in, its region becomes
+/// the one that a material asks for. Throws Error for regions that are not there, and for an element that two
+/// materials ask for.
+std::vector<MaterialPart> in_numbers(std::vector<MaterialPart> parts, const MeshGroups& groups, Mesh& mesh,
+                                     const std::string& toml) {
+  std::map<Index, std::size_t> part_of;  // a region
+  std::set<Index> present(mesh.regions.begin(), mesh.regions.end());
+  for (const auto& [element, region] : groups.more) present.insert(region);
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    MaterialPart& part = parts[k];
+    const auto fail = [&](const std::string& region) {
+      throw Error("no element has the region " + region,
+                  fmt::format("{}: [[material]] number {}", toml, k + 1),
+                  "the body has the regions " + region_list(groups, mesh));
+    };
+    for (const std::string& name : part.region_names) {
+      const auto found = groups.number_of.find(name);
+      if (found == groups.number_of.end()) fail("\"" + printable(name) + "\"");
+      part.regions.push_back(found->second);
+    }
+    part.region_names.clear();
+    for (const Index region : part.regions) {
+      if (!present.contains(region)) fail(std::to_string(region));
+      part_of.emplace(region, k);
+    }
+  }
+  for (const auto& [element, region] : groups.more) {
+    Index& first = mesh.regions[element];
+    const auto wanted = part_of.find(region), has = part_of.find(first);
+    if (wanted == part_of.end()) continue;
+    if (has == part_of.end()) {
+      first = region;
+    } else if (has->second != wanted->second) {
+      throw Error(
+          fmt::format("overlapping regions: an element is in the regions {} and {}, which [[material]] "
+                      "number {} and number {} claim",
+                      first, region, has->second + 1, wanted->second + 1),
+          toml, "give the regions that overlap one material, or make groups that do not overlap");
+    }
+  }
+  present = {mesh.regions.begin(), mesh.regions.end()};
+  for (MaterialPart& part : parts)
+    std::erase_if(part.regions, [&](Index region) { return !present.contains(region); });
+  return parts;
+}
+
+constexpr double most_held = 1.0 / 3.0;  // of the nodes
+constexpr double most_across = 0.9;      // of the elements that reach from surface to surface
+constexpr double least_shape = 0.01;     // of an element
+
+/// What makes a body feel unlike the one that was meant, most often by mistake.
+std::vector<std::string> doubts_of(const MeshedBody& body) {
+  std::vector<std::string> doubts;
+  const Mesh& mesh = body.mesh;
+  const auto nodes = static_cast<double>(mesh.nodes.size()), elements = static_cast<double>(mesh.elements());
+  const auto held =
+      static_cast<double>(std::ranges::count_if(body.fixed, [](std::uint8_t axes) { return axes != 0; }));
+  if (held > most_held * nodes)
+    doubts.push_back(
+        fmt::format("{:.0f} % of the nodes are held ({} of {}): the body can hardly give way; hold "
+                    "less of it, along another axis or by percent = 1, under [[fixed]]",
+                    100.0 * held / nodes, held, nodes));
+  std::vector<std::uint8_t> outside(mesh.nodes.size(), 0);
+  for (const Index node : body.surface.nodes) outside[static_cast<std::size_t>(node)] = 1;
+  const auto corners = static_cast<std::size_t>(traits(mesh.element).corners);
+  double across = 0.0;
+  for (Index e = 0; e < mesh.elements(); ++e)
+    across += std::ranges::all_of(mesh.element_nodes(e).first(corners),
+                                  [&](Index node) { return outside[static_cast<std::size_t>(node)] != 0; })
+                  ? 1.0
+                  : 0.0;
+  if (across > most_across * elements && mesh.element != ElementType::tet10)
+    doubts.push_back(
+        fmt::format("the body is one element thick ({:.0f} % of its elements have all corners on its "
+                    "surface) and bends too stiffly: use element = \"tet10\" or a smaller "
+                    "edge_length in [mesh]",
+                    100.0 * across / elements));
+  const QualityReport quality = measure_quality(mesh);
+  if (quality.min_shape < least_shape)
+    doubts.push_back(
+        fmt::format("an element is all but flat (shape {:.3f}, angles {:.1f} to {:.1f} degrees, at "
+                    "({:.4g}, {:.4g}, {:.4g}) m): forces near it are wrong; use another edge_length "
+                    "in [mesh], or remesh",
+                    quality.min_shape, quality.min_angle, quality.max_angle, quality.worst_centroid.x(),
+                    quality.worst_centroid.y(), quality.worst_centroid.z()));
+  return doubts;
+}
+
 }  // namespace
 
 MeshedBody mesh_body(const Description& description, const ProgressText& progress, bool keep) {
@@ -225,7 +354,8 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   const std::filesystem::path file = geometry_file(description.geometry);
   const std::string where = file.empty() ? toml : file.string();
   const MeshOptions options = in_file_units(description.mesh, description.scale);
-  body.mesh = std::visit(MeshGeometry{options, description.scale, where, progress, body.notes, keep},
+  MeshGroups groups;
+  body.mesh = std::visit(MeshGeometry{options, description.scale, where, progress, body.notes, groups, keep},
                          description.geometry);
   for (Vec3& x : body.mesh.nodes) {
     x *= description.scale;
@@ -240,20 +370,30 @@ MeshedBody mesh_body(const Description& description, const ProgressText& progres
   if (options.element) {
     body.mesh = with_elements(std::move(body.mesh), *options.element, where);
   }
+  const Index first_unused = first_unused_node(body.mesh);
   if (const std::size_t unused = remove_unused_nodes(body.mesh); unused != 0) {
-    body.notes.push_back("removed " + std::to_string(unused) +
-                         " nodes that no element uses; node numbers count the remaining ones");
+    if (largest_listed_node(description) > first_unused)
+      throw Error(
+          fmt::format("the file has {} nodes that no element uses, and without them the numbers under "
+                      "nodes would mean others",
+                      unused),
+          where,
+          "remove these nodes in the program that wrote the file, and count anew; or select by box, "
+          "half_space, sphere, lowest or tag");
+    body.notes.push_back(fmt::format("removed {} nodes that no element uses", unused));
   }
   check_connected(body.mesh, where);
   body.surface = extract_surface(body.mesh);
   note_middles(description, body);
 
-  body.material_of_element = materials_of_elements(body.mesh, description.materials, toml);
+  body.material_of_element =
+      materials_of_elements(body.mesh, in_numbers(description.materials, groups, body.mesh, toml), toml);
   FixedNodes held = hold_nodes(body.mesh, description.fixed, toml);
   body.fixed = std::move(held.axes);
   body.prescribed = std::move(held.displacement);
   if (description.scope != Scope::none) check_held(body.mesh, body.fixed, toml);
   body.warning = scale_warning(body.mesh, description.scale);
+  body.doubts = doubts_of(body);
   return body;
 }
 
@@ -262,13 +402,9 @@ std::vector<std::filesystem::path> input_files(const Description& description) {
   if (file.empty()) {
     return {};
   }
-  const std::string extension = file.extension().string();
-  const bool is_volume = std::holds_alternative<VolumeGeometry>(description.geometry);
-  if (is_volume && (extension.empty() || extension == ".node" || extension == ".ele")) {
-    std::filesystem::path node = file, ele = file;
-    return {node.replace_extension(".node"), ele.replace_extension(".ele")};
-  }
-  return {file};
+  return std::holds_alternative<VolumeGeometry>(description.geometry)
+             ? volume_mesh_files(file)
+             : std::vector<std::filesystem::path>{file};
 }
 
 }  // namespace palpate

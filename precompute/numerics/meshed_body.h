@@ -22,6 +22,7 @@ struct MeshedBody {
   std::vector<Vec3> prescribed;            ///< [N] displacement along the held axes [m]; zero along others
   std::vector<std::string> notes;          ///< what a person should know: repairs, dropped voxels
   std::string warning;                     ///< what is probably a mistake (the scale), empty: nothing
+  std::vector<std::string> doubts;         ///< what a person would hardly have wanted of it
 };
 
 /// Reports what is being done ("reading liver.inr.gz", "meshing", ...).

@@ -376,10 +376,14 @@ TEST(MeshCheck, ScaleWarning) {
   EXPECT_TRUE(warning(10.0).empty());
   EXPECT_TRUE(warning(1e-3).empty());
   EXPECT_TRUE(contains(warning(200.0), "is 200 m long"));
-  EXPECT_TRUE(contains(warning(200.0), "scale = 0.001 under [geometry], which makes it 0.2 m"));
+  EXPECT_TRUE(contains(warning(200.0), "scale = 0.001 under [geometry] (now 1), which makes it 0.2 m"));
   EXPECT_TRUE(contains(warning(20.0, 0.01), "scale = 1e-05"));
   EXPECT_TRUE(contains(warning(2e-4, 0.001), "is 0.0002 m long"));
   EXPECT_TRUE(contains(warning(2e-4, 0.001), "scale = 1 under [geometry] (now 0.001), which makes it 0.2 m"));
+  for (const double size : {1e-5, 1e5}) {  // no scale is likely
+    EXPECT_TRUE(contains(warning(size), "check scale under [geometry]"));
+    EXPECT_FALSE(contains(warning(size), "write scale"));
+  }
 }
 
 }  // namespace

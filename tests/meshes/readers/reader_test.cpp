@@ -214,6 +214,85 @@ TEST(VolumeMesh, TetgenCountsFromZeroToo) {
       false, false);
 }
 
+TEST(VolumeMesh, TetgenCountsFromWhereItBegins) {
+  const test::ScratchFolder folder;
+  const auto nodes = folder.write("a.NODE", "5 3 0 0\n10 0 0 0\n11 1.5 0 0\n12 0 1 0\n13 0 0 1\n14 1 1 1\n");
+  (void)folder.write("a.ELE", "2 4 1\n1 10 11 12 13 7\n2 11 12 13 14 8\n");
+  expect_two_tetrahedra(read_volume_mesh(nodes), true, false);
+  (void)folder.write("a.ELE", "2 4 2\n1 10 11 12 13 7 1\n2 11 12 13 14 8 2\n");
+  const Error several = error_of([&] { read_volume_mesh(nodes); });
+  EXPECT_TRUE(contains(several.what(), "2 attributes"));
+}
+
+TEST(VolumeMesh, EndingsMayBeCapitals) {
+  const test::ScratchFolder folder;
+  expect_two_tetrahedra(read_volume_mesh(folder.write("A.MSH", gmsh2)), true, true);
+  expect_two_tetrahedra(read_volume_mesh(folder.write("A.Vtk", vtk)), false, false);
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+TEST(VolumeMesh, GmshsParametersOfNodesArePassedOver) {
+  const test::ScratchFolder folder;
+  std::string text = replaced(gmsh2, "$Nodes", "$ParametricNodes");
+  text = replaced(text, "$EndNodes", "$EndParametricNodes");
+  text = replaced(text, "9 1.5 0 0", "9 1.5 0 0 1 4 0.25");
+  expect_two_tetrahedra(read_volume_mesh(folder.write("a.msh", text)), true, true);
+}
+
+TEST(VolumeMesh, RegionsOfVtkAreInItsCellData) {
+  const test::ScratchFolder folder;
+  const auto regions = [&](const std::string& data) {
+    return read_volume_mesh(folder.write("a.vtk", replaced(vtk, "CELL_DATA 3\nSCALARS x float\n", data)))
+        .regions;
+  };
+  const std::vector<Index> given = {7, 8}, none = {0, 0};
+  EXPECT_EQ(regions("CELL_DATA 3\nSCALARS anything int 1\nLOOKUP_TABLE default\n7 0 8\n"), given);
+  EXPECT_EQ(regions("CELL_DATA 3\nSCALARS anything int\n7\n0\n8\n"), given);
+  EXPECT_EQ(regions("CELL_DATA 3\nSCALARS Region double 1\nLOOKUP_TABLE default\n7.0 0 8\n"), given);
+  EXPECT_EQ(
+      regions(
+          "POINT_DATA 5\nVECTORS u double\n1 2 3 4 5 6 7 8 9 10 11 12 13 14 15\nSCALARS n int\n1 2 3 4 5\n"
+          "CELL_DATA 3\nFIELD FieldData 2\ngmsh:physical 1 3 int\n7 0 8\ngmsh:geometrical 1 3 int\n"
+          "1 2 3\n"),
+      given);
+  EXPECT_EQ(regions("CELL_DATA 3\nSCALARS x double\nLOOKUP_TABLE default\n7 0 8\n"), none);
+  EXPECT_EQ(regions("CELL_DATA 3\nFIELD FieldData 2\na 1 3 int\n7 0 8\nb 1 3 int\n1 2 3\n"), none);
+  EXPECT_EQ(regions("CELL_DATA 3\nFIELD FieldData 1\na 1 2 int\n7 0\n"), none);
+  MeshGroups groups;
+  read_volume_mesh(
+      folder.write("b.vtk", replaced(vtk, "CELL_DATA 3\nSCALARS x float\n",
+                                     "CELL_DATA 3\nFIELD FieldData 2\na 1 3 int\n7 0 8\nb 1 3 int\n"
+                                     "1 2 3\n")),
+      &groups);
+  EXPECT_TRUE(contains(groups.hint, "several arrays"));
+}
+
+TEST(VolumeMesh, AllGroupsOfGmshAreKept) {
+  const test::ScratchFolder folder;
+  for (const bool parts : {false, true}) {
+    MeshGroups groups;
+    const std::string entities =
+        parts ? "$PartitionedEntities\n2\n1 5 1\n0 0 0 2\n1 3 9 1 1 0 0 0 1 1 1 2 3 4 0\n"
+                "2 3 9 2 1 2 0 0 0 1 1 1 1 4 0\n$EndPartitionedEntities\n"
+              : "$Entities\n0 0 0 2\n1 0 0 0 1 1 1 2 3 4 0\n2 0 0 0 1 1 1 1 -4 0\n$EndEntities\n";
+    const Mesh mesh = read_volume_mesh(
+        folder.write("a.msh",
+                     "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 4 \"a b\"\n"
+                     "$EndPhysicalNames\n" +
+                         entities +
+                         "$Nodes\n1 5 1 5\n3 1 0 5\n1\n2\n3\n4\n5\n0 0 0\n1.5 0 0\n0 1 0\n0 0 1\n1 1 1\n"
+                         "$EndNodes\n$Elements\n2 2 1 2\n3 1 4 1\n1 1 2 3 4\n3 2 4 1\n2 2 3 4 5\n"
+                         "$EndElements\n"),
+        &groups);
+    EXPECT_EQ(mesh.regions, (std::vector<Index>{3, 4}));
+    EXPECT_EQ(groups.more, (std::vector<std::pair<std::size_t, Index>>{{0, 4}}));
+    EXPECT_EQ(groups.number_of, (std::map<std::string, Index>{{"a b", 4}}));
+  }
+}
+
 /// 1.234,5: what a German desktop sets.
 struct DecimalComma : std::numpunct<char> {
   [[nodiscard]] char do_decimal_point() const override { return ','; }
@@ -337,7 +416,7 @@ TEST(VolumeMesh, SpoiledTetgenFilesAreRefusedWithTheirLine) {
       {&node, "5  3  1  1", "5  2  1  1", "a.node:2", "not three-dimensional"},
       {&node, "5  3  1  1", "6  3  1  1", "a.node:8", "file ends"},
       {&node, "5  3  1  1", "0  3  1  1", "a.node:2", "no nodes"},
-      {&node, "1  0 0 0", "2  0 0 0", "a.node:3", "first node number is 2"},
+      {&node, "1  0 0 0", "2  0 0 0", "a.node:4", "next node number is 2"},
       {&node, "3  0 1 0", "4  0 1 0", "a.node:5", "next node number is 4"},
       {&node, "3  0 1 0", "3  0 inf 0", "a.node:5", "finite"},
       {&ele, "2  4  1", "2  8  1", "a.ele:1", "elements of 8 nodes"},

@@ -206,6 +206,81 @@ TEST(Body, VolumeMeshIsTaken) {
             (std::vector<std::filesystem::path>{folder.path() / "one.node", folder.path() / "one.ele"}));
 }
 
+TEST(Body, NumbersOfNodesThatWouldShiftAreRefused) {
+  const TempFolder folder;
+  folder.write("one.node", "5 3 0 0\n0 9 9 9\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n");
+  folder.write("one.ele", "1 4 0\n0 1 2 3 4\n");
+  expect_mentions(error_of([&] {
+                    body_of(folder.write("model.toml", model("volume = \"one.ele\"", "nodes = [1, 2, 3]")));
+                  }),
+                  {"one.ele", "1 nodes that no element uses", "select by box"});
+  body_of(folder.write("model.toml", model("volume = \"one.ele\"")));
+}
+
+/// Two tetrahedra, the first in two groups, with names.
+const char* const grouped_msh = R"($MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+3
+3 1 "all of it"
+3 2 "lesion"
+2 2 "skin"
+$EndPhysicalNames
+$Nodes
+5
+1 0 0 0
+2 1 0 0
+3 0 1 0
+4 0 0 1
+5 1 1 1
+$EndNodes
+$Elements
+3
+1 4 2 1 1 1 2 3 4
+2 4 2 1 1 2 3 4 5
+3 4 2 2 1 2 3 4 5
+$EndElements
+)";
+
+TEST(Body, GroupsAreRegionsByNumberAndByName) {
+  const TempFolder folder;
+  folder.write("a.msh", grouped_msh);
+  const auto body = [&](const std::string& first, const std::string& second) {
+    return body_of(
+        folder.write("model.toml",
+                     "name = \"a\"\n[geometry]\nvolume = \"a.msh\"\n[[material]]\nyoungs_modulus = 1\n"
+                     "poissons_ratio = 0.3\n" +
+                         first + "\n[[material]]\nyoungs_modulus = 2\npoissons_ratio = 0.3\n" + second +
+                         "\n[[fixed]]\nlowest = {axis = \"z\", percent = 1}\n"));
+  };
+  for (const char* const lesion : {"regions = [2]", "regions = [\"lesion\"]"})
+    EXPECT_EQ(body("", lesion).material_of_element, (std::vector<Index>{0, 1})) << lesion;
+  expect_mentions(error_of([&] { body("", "regions = [3]"); }),
+                  {"no element has the region 3", "1 (all of it), 2 (lesion)"});
+  expect_mentions(error_of([&] { body("", "regions = [\"skin\"]"); }),
+                  {"no element has the region \"skin\""});
+  expect_mentions(error_of([&] { body("regions = [1]", "regions = [2]"); }),
+                  {"overlapping regions", "1 and 2", "[[material]] number 1 and number 2"});
+}
+
+TEST(Body, WhatAPersonWouldHardlyHaveWantedIsTold) {
+  const TempFolder folder;
+  const auto doubts = [&](const std::string& geometry, const std::string& fixed) {
+    return body_of(folder.write("model.toml", model(geometry, fixed))).doubts;
+  };
+  const std::string low = "lowest = {axis = \"z\", percent = 10}";
+  EXPECT_TRUE(doubts("box = {size = [1, 1, 1], cells = [5, 5, 5]}", low).empty());
+  const std::vector<std::string> plate = doubts("box = {size = [20, 20, 1], cells = [10, 10, 1]}", low);
+  ASSERT_EQ(plate.size(), 2U);
+  expect_mentions(plate[0], {"50 % of the nodes are held (121 of 242)", "[[fixed]]"});
+  expect_mentions(plate[1], {"one element thick", "100 %"});
+  const std::vector<std::string> flat =
+      doubts("box = {size = [1000, 1, 1], cells = [2, 3, 3]}", "lowest = {axis = \"x\", percent = 1}");
+  ASSERT_FALSE(flat.empty());
+  expect_mentions(flat.back(), {"all but flat", "shape 0.00"});
+}
+
 TEST(Body, InputFiles) {
   const TempFolder folder;
   const auto files = [&](const std::string& geometry) {
