@@ -330,9 +330,10 @@ int run_commands(int argc, char** argv) {
   if (new_command->parsed()) return run_new(arguments.file, arguments.draft);
   arguments.bake.part = read_part_number(arguments.part);
   arguments.bake.join = join_command->parsed();
-  return run_bake(
-      arguments.bake.join ? arguments.file : described(arguments.model, arguments.draft, arguments.bake.keep),
-      arguments.bake, arguments.unless_done);
+  return run_bake(arguments.bake.join ? arguments.file
+                                      : described(arguments.model, arguments.draft, arguments.bake.keep,
+                                                  arguments.bake.output),
+                  arguments.bake, arguments.unless_done);
 }
 
 }  // namespace palpate

@@ -2,12 +2,14 @@
 
 #include <unistd.h>
 
+#include <charconv>
 #include <cstdio>
 #include <iostream>
 
 #include "base/error.h"
 #include "base/printable.h"
 #include "base/program.h"
+#include "precompute/description/not_a_description.h"
 #include "precompute/draft/questions.h"
 
 namespace palpate {
@@ -19,6 +21,17 @@ void tell(const std::string& line) {
   say(stderr, "{}\n", line);
 }
 
+/// "-100:200"; nothing where it is no range.
+std::optional<ValueRange> read_range(const std::string& text) {
+  ValueRange range{};
+  const char* const end = text.data() + text.size();
+  const auto [colon, bad] = std::from_chars(text.data(), end, range.low);
+  if (bad != std::errc() || colon == end || *colon != ':') return {};
+  const auto [last, bad_too] = std::from_chars(colon + 1, end, range.high);
+  if (bad_too != std::errc() || last != end || !(range.low <= range.high)) return {};
+  return range;
+}
+
 DraftOptions options_of(const DraftArguments& arguments) {
   DraftOptions options;
   if (!arguments.unit.empty()) options.unit = read_unit(arguments.unit);
@@ -26,15 +39,17 @@ DraftOptions options_of(const DraftArguments& arguments) {
                             : arguments.parts == "largest" ? SurfaceParts::largest
                                                            : SurfaceParts::most,
                    .strict = arguments.strict,
+                   .range = read_range(arguments.range),
                    .nodes = arguments.nodes};
   options.renew = arguments.renew;
+  options.tet10 = arguments.element == "tet10";
   return options;
 }
 
 }  // namespace
 
 bool DraftArguments::given() const {
-  return !unit.empty() || !parts.empty() || strict || renew || nodes;
+  return !unit.empty() || !parts.empty() || !range.empty() || strict || renew || nodes;
 }
 
 void add_draft_options(CLI::App& app, DraftArguments& arguments) {
@@ -58,6 +73,18 @@ void add_draft_options(CLI::App& app, DraftArguments& arguments) {
       ->option_text("largest|all")
       ->check(CLI::IsMember({"largest", "all"}))
       ->group(group);
+  app.add_option("--element", arguments.element,
+                 "elements of a description that is written, for a surface or an image; default: tet4")
+      ->option_text("tet4|tet10")
+      ->check(CLI::IsMember({"tet4", "tet10"}))
+      ->group(group);
+  app.add_option("--range", arguments.range,
+                 "values of an image that are body, for a grey image (CT, MR) in place of labels")
+      ->option_text("LOW:HIGH")
+      ->check([](const std::string& text) {
+        return read_range(text) ? "" : "'" + text + "' is not LOW:HIGH with LOW <= HIGH";
+      })
+      ->group(group);
   app.add_flag("--strict", arguments.strict, "refuse a surface that needs a repair")->group(group);
   app.add_flag("--renew", arguments.renew, "write NAME.model.toml anew where it is there already")
       ->group(group);
@@ -77,16 +104,22 @@ CLI::App* add_new(CLI::App& app, std::string& file, DraftArguments& arguments) {
 }
 
 void check_draft_options(const std::string& model, const DraftArguments& arguments) {
-  if (!arguments.given() || shape_kind(model)) return;
+  const bool any = arguments.given() || !arguments.element.empty();
+  if (any && !shape_kind(model)) check_is_description(model);  // says what it is
+  if (!arguments.range.empty() && shape_kind(model) != ShapeKind::image)
+    throw CLI::ValidationError("--range", "it is for an image, and '" + model + "' is none by its name");
+  if (!any || shape_kind(model) || (!arguments.given() && !std::filesystem::exists(model))) return;
   throw CLI::ValidationError(
-      "--unit, --surface-nodes, --parts, --strict and --renew",
+      "--unit, --surface-nodes, --parts, --range, --element, --strict and --renew",
       "they are for a surface, an image or a picture, and '" + model + "' is none by its name");
 }
 
-std::string described(const std::string& model, const DraftArguments& arguments, bool keep) {
+std::string described(const std::string& model, const DraftArguments& arguments, bool keep,
+                      const std::filesystem::path& output) {
   if (!shape_kind(model)) return model;
   DraftOptions options = options_of(arguments);
   options.keep = keep;
+  options.elsewhere = output.parent_path();
   return draft(model, options, arguments.given(), tell).string();
 }
 

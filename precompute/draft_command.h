@@ -12,11 +12,13 @@ namespace palpate {
 struct DraftArguments {
   std::string unit;
   std::string parts;
+  std::string range;
+  std::string element;
   bool strict = false;
   bool renew = false;
   std::optional<int> nodes{};
 
-  [[nodiscard]] bool given() const;  ///< any that only a surface or an image has a use for
+  [[nodiscard]] bool given() const;  ///< any that is for a new description alone
 };
 
 /// Adds the options of a draft.
@@ -29,8 +31,10 @@ CLI::App* add_new(CLI::App& app, std::string& file, DraftArguments& arguments);
 void check_draft_options(const std::string& model, const DraftArguments& arguments);
 
 /// A description of `model`: itself, or where it is a surface or an image the one that is drafted beside it,
-/// with each decision told on the error stream; with `keep` no file that is there is replaced. Throws Error.
-std::string described(const std::string& model, const DraftArguments& arguments, bool keep);
+/// with each decision told on the error stream; with `keep` no file that is there is replaced. Where the
+/// folder of `model` may only be read, it is drafted beside the `output`. Throws Error.
+std::string described(const std::string& model, const DraftArguments& arguments, bool keep,
+                      const std::filesystem::path& output);
 
 /// `new`: asks on the terminal or takes answers from a pipe, and names the next step. Returns the exit
 /// status; throws Error.

@@ -1,6 +1,7 @@
 #include "precompute/draft/draft.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -18,12 +19,18 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view repaired_mark = "# repaired by palpate-precompute\n";  // OutputKind::surface
+constexpr double picture_thickness = 0.01;                                        // [m]
 constexpr std::array<double, 3> wrap_offsets = {usual_wrap_offset, 0.15, 0.3};    // of the edge
 
-double edge_length(const Shape& shape, const UnitGuess& unit, const DraftOptions& options) {
+/// In the shape's unit. Of the surface nodes of tet10 three in four are middles of edges.
+double edge_in_file(const Shape& shape, const DraftOptions& options) {
   const int nodes = options.shape.nodes_of(shape.kind);
-  return (shape.kind == ShapeKind::picture ? shape.boundary / nodes : edge_for_nodes(shape.boundary, nodes)) *
-         unit.unit.metres;
+  if (shape.kind == ShapeKind::picture) return shape.boundary / nodes;
+  return edge_for_nodes(shape.boundary, options.tet10 ? nodes / 4 : nodes);
+}
+
+double edge_length(const Shape& shape, const UnitGuess& unit, const DraftOptions& options) {
+  return edge_in_file(shape, options) * unit.unit.metres;
 }
 
 DraftValues values_of(const Shape& shape, const DraftOptions& options) {
@@ -36,6 +43,7 @@ UnitGuess unit_of_pixels(double longest_side) {
   return {*read_unit(metres), fmt::format("the body is {} pixels long, and so 10 cm", longest_side)};
 }
 
+/// Of the lengths as they are read: images in millimetres where the header says its unit.
 UnitGuess unit_of(const Shape& shape, const DraftOptions& options) {
   if (options.unit) {
     LengthUnit given = *options.unit;
@@ -47,13 +55,38 @@ UnitGuess unit_of(const Shape& shape, const DraftOptions& options) {
   return guess_unit(shape.size.maxCoeff());
 }
 
-/// A description that is there is a person's: it is used, not written over.
-/// Of the lengths as they are read: images in millimetres where the header says its unit.
+constexpr std::string_view drafted_mark = "# Drafted by palpate-precompute from ";
+
+/// Whether a description was made from this shape, or from the surface that it was repaired to.
+bool is_made_from(const Description& description, const std::filesystem::path& file) {
+  const std::filesystem::path source = std::visit(
+      [](const auto& geometry) -> std::filesystem::path {
+        if constexpr (requires { geometry.file; }) return geometry.file;
+        return {};
+      },
+      description.geometry);
+  std::error_code failed;
+  const auto plain = [](const std::filesystem::path& path) {
+    return std::filesystem::absolute(path).lexically_normal();
+  };
+  if (source.empty()) return false;
+  if (plain(source) == plain(file) || std::filesystem::equivalent(source, file, failed)) return true;
+  const std::string name = source.filename().string();
+  return name.starts_with(shape_name(file) + ".repaired") && name.ends_with(".off") &&
+         description.text.starts_with(std::string(drafted_mark) + printable(file.filename().string()) + ".");
+}
+
+/// A description that is there is a person's: it is used, not written over. Throws Error for one of another
+/// file, which has the same name but for its ending.
 void use_existing(const std::filesystem::path& file, const std::filesystem::path& description,
                   bool has_options, const Tell& tell) {
   if (has_options)
     throw Error("is there already, and these options are for a new one", description.string(),
                 "give --renew to write it anew, or change it in an editor and give it to palpate-precompute");
+  if (!is_made_from(read_description(description), file))
+    throw Error("was not made from " + printable(file.filename().string()), description.string(),
+                "to use it as it is, palpate-precompute " + shell_word(description.string()) +
+                    "; --renew writes it anew from " + shell_word(file.string()));
   tell(printable(description.string()) + " is there and is used as it is (--renew writes it anew)");
   std::error_code failed;
   const auto shape_time = std::filesystem::last_write_time(file, failed);
@@ -72,7 +105,8 @@ void expect_utf8_name(const std::filesystem::path& file) {
 /// The surface that a shape has been repaired to, in a file beside it.
 class RepairedFile {
  public:
-  RepairedFile(std::filesystem::path file, bool keep) : file_(std::move(file)), keep_(keep) {}
+  RepairedFile(std::filesystem::path file, std::filesystem::path folder, bool keep)
+      : file_(std::move(file)), folder_(std::move(folder)), keep_(keep) {}
 
   /// Returns where it is: in the shape's own file where nothing was repaired.
   std::filesystem::path write(const Shape& shape) {
@@ -87,7 +121,7 @@ class RepairedFile {
 
  private:
   [[nodiscard]] std::filesystem::path free_path() const {
-    const std::string stem = (file_.parent_path() / (shape_name(file_) + ".repaired")).string();
+    const std::string stem = (folder_ / (shape_name(file_) + ".repaired")).string();
     std::filesystem::path path = stem + ".off";
     for (int k = 2; keep_ && std::filesystem::exists(std::filesystem::symlink_status(path)); ++k)
       path = fmt::format("{}-{}.off", stem, k);
@@ -96,14 +130,15 @@ class RepairedFile {
     return outputs.add(path, OutputKind::surface, "the repaired surface");
   }
 
-  std::filesystem::path file_, path_;
+  std::filesystem::path file_, folder_, path_;
   bool keep_;
 };
 
 /// Some surfaces intersect themselves once they have the edge length of the mesh, where they are thinner than
 /// that. These are wrapped, ever more thickly, until they do not; the last wrapping is taken as it is.
-std::filesystem::path make_meshable(const std::filesystem::path& file, double edge, bool keep, Shape& shape) {
-  RepairedFile repaired(file, keep);
+std::filesystem::path make_meshable(const std::filesystem::path& file, const std::filesystem::path& folder,
+                                    double edge, bool keep, Shape& shape) {
+  RepairedFile repaired(file, folder, keep);
   std::filesystem::path path = repaired.write(shape);
   std::vector<std::string> notes;
   const TriangleSurface surface = read_surface(path, notes);
@@ -132,7 +167,8 @@ void tell_decisions(const Shape& shape, const UnitGuess& unit, const DraftOption
   tell(fmt::format("edge length: {}, for about {} {}nodes", length_text(edge),
                    options.shape.nodes_of(shape.kind), is_picture ? "outline " : "surface "));
   if (is_picture) {
-    tell(fmt::format("body: what is {} in the picture, which nothing holds", shape.dark ? "dark" : "light"));
+    tell(fmt::format("body: what is {} in the picture, {} thick, which nothing holds",
+                     shape.dark ? "dark" : "light", length_text(picture_thickness)));
     tell(fmt::format("jelly: E = {} Pa, nu = {}", values.youngs_modulus, values.poissons_ratio));
     return;
   }
@@ -163,29 +199,42 @@ DraftValues usual_values(ShapeKind kind) {
   return values;
 }
 
-std::filesystem::path draft_file(const std::filesystem::path& shape) {
-  return shape.parent_path() / (shape_name(shape) + ".model.toml");
+std::filesystem::path draft_file(const std::filesystem::path& shape, const std::filesystem::path& elsewhere) {
+  const std::string name = shape_name(shape) + ".model.toml";
+  const std::filesystem::path folder = shape.parent_path(), beside = folder / name;
+  const bool is_writable = ::access(folder.empty() ? "." : folder.c_str(), W_OK) == 0;
+  return is_writable || std::filesystem::exists(beside) ? beside : elsewhere / name;
 }
 
-std::string draft_text(const std::filesystem::path& file, const std::string& repaired, const Shape& shape,
-                       const UnitGuess& unit, const DraftOptions& options) {
+std::string draft_text(const std::filesystem::path& description, const std::filesystem::path& file,
+                       const std::string& repaired, const Shape& shape, const UnitGuess& unit,
+                       const DraftOptions& options) {
   const DraftValues values = values_of(shape, options);
   const std::string name = file.filename().string();
   const bool is_surface = shape.kind == ShapeKind::surface, is_picture = shape.kind == ShapeKind::picture;
   const int nodes = options.shape.nodes_of(shape.kind);
   std::string text = fmt::format(
-      "# Drafted by palpate-precompute from {}. It is yours: change what is wrong, then run\n"
+      "{}{}. It is yours: change what is wrong, then run\n"
       "#   palpate-precompute {}\n"
       "name = {}\n{}\n[geometry]\n",
-      printable(name), shell_word(draft_file(file).filename().string()),
+      drafted_mark, printable(name), shell_word(description.filename().string()),
       toml_string(values.name.empty() ? shape_name(file) : values.name),
-      is_picture ? "plane = \"strain\"  # \"stress\" for a thin sheet\n" : "");
+      is_picture ? fmt::format("plane = \"strain\"  # \"stress\" for a thin sheet\n"
+                               "thickness = {}  # metres: forces grow with it\n",
+                               picture_thickness)
+                 : "");
+  const bool is_beside = description.parent_path() == file.parent_path();
   text += fmt::format("{} = {}\n",
                       is_surface   ? "surface"
                       : is_picture ? "picture"
                                    : "image",
-                      toml_string(repaired.empty() ? name : repaired));
+                      toml_string(!repaired.empty() ? repaired
+                                  : is_beside       ? name
+                                                    : std::filesystem::absolute(file).string()));
   for (const std::string& repair : shape.repairs) text += "# repaired: " + repair + "\n";
+  if (options.shape.range)
+    text += fmt::format("range = [{}, {}]  # these values of the image are the body\n",
+                        options.shape.range->low, options.shape.range->high);
   if (is_picture) {
     text += fmt::format("dark = {}  # whether what is dark is the body, or what is light\n", shape.dark);
     text += fmt::format("scale = {}  # metres per pixel: {}\n", unit.unit.metres, unit.why);
@@ -198,15 +247,18 @@ std::string draft_text(const std::filesystem::path& file, const std::string& rep
       "many\n",
       edge_length(shape, unit, options), nodes, is_picture ? "outline" : "surface",
       is_picture ? "two" : "four");
+  if (options.tet10 && !is_picture) text += "element = \"tet10\"  # of second order: it does not lock\n";
   if (is_surface)
     text += shape.remesh ? "remesh = true\n"
                          : "remesh = false  # the triangles of the surface are of that size\n";
   if (is_picture) return text + picture_text(values);
   text += fmt::format(
       "\n[material]\nyoungs_modulus = {}  # pascals: soft tissue, about that of healthy liver\n"
-      "poissons_ratio = {}  # below 0.5; from 0.47 on add element = \"tet10\" to [mesh]\n"
+      "poissons_ratio = {}  # below 0.5{}\n"
       "density = {}  # kg/m^3\nfriction = {}  # between the surface and a tool: wet tissue\n",
-      values.youngs_modulus, values.poissons_ratio, values.density, values.friction);
+      values.youngs_modulus, values.poissons_ratio,
+      options.tet10 ? "" : "; from 0.47 on add element = \"tet10\" to [mesh]", values.density,
+      values.friction);
   text += fmt::format(
       "\n[[fixed]]  # what is held: as if the body lay on a table\nlowest = {{axis = \"{}\", percent = "
       "{}}}\n",
@@ -219,7 +271,7 @@ std::string draft_text(const std::filesystem::path& file, const std::string& rep
 
 std::filesystem::path draft(const std::filesystem::path& file, const DraftOptions& options, bool has_options,
                             const Tell& tell) {
-  const std::filesystem::path description = draft_file(file);
+  const std::filesystem::path description = draft_file(file, options.elsewhere);
   const bool is_there = std::filesystem::exists(description);
   if (is_there && !options.renew) {
     use_existing(file, description, has_options, tell);
@@ -233,14 +285,12 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
   const UnitGuess unit = unit_of(shape, options);
   tell_decisions(shape, unit, options, tell);
   std::string repaired;
-  if (options.shape.range)
-    text += fmt::format("range = [{}, {}]  # these values of the image are the body\n",
-                        options.shape.range->low, options.shape.range->high);
   if (shape.kind == ShapeKind::surface) {
     const std::size_t told = shape.repairs.size();
-    const double edge = edge_for_nodes(shape.boundary, options.shape.nodes_of(shape.kind));
     const std::filesystem::path surface =
-        options.shape.strict ? file : make_meshable(file, edge, options.keep, shape);
+        options.shape.strict ? file
+                             : make_meshable(file, description.parent_path(), edge_in_file(shape, options),
+                                             options.keep, shape);
     for (std::size_t i = told; i < shape.repairs.size(); ++i) tell("repaired: " + shape.repairs[i]);
     if (surface != file) {
       repaired = surface.filename().string();
@@ -248,7 +298,7 @@ std::filesystem::path draft(const std::filesystem::path& file, const DraftOption
     }
   }
   const auto write = is_there ? write_file : write_new_file;
-  write(description, draft_text(file, repaired, shape, unit, options));
+  write(description, draft_text(description, file, repaired, shape, unit, options));
   tell(fmt::format("wrote {}{}: change it and run palpate-precompute {}", printable(description.string()),
                    is_there ? " anew" : "", shell_word(description.string())));
   return description;

@@ -3,6 +3,7 @@
 import math
 import os
 import re
+import shutil
 import signal
 import subprocess
 import unittest
@@ -75,6 +76,50 @@ scope = "surface"
         self.assertIn("box.model.toml is there and is used as it is", result.stderr)
         self.assertIn("E = 9000 Pa", run(PRECOMPUTE, "inspect", "box.palpate.hdf", cwd=self.folder).stdout)
         self.assert_refused(run(PRECOMPUTE, "box.off", "--unit", "mm", cwd=self.folder), "is there already", "--renew")
+
+    def test_a_description_of_another_file_is_not_used_for_this_one(self):
+        self.write("box.off", off())
+        self.baked("box.off")
+        before = (self.folder / "box.model.toml").read_bytes()
+        self.write("box.obj", "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS) + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in TRIANGLES))
+        self.assert_refused(run(PRECOMPUTE, "box.obj", cwd=self.folder), "box.model.toml", "was not made from box.obj", "--renew writes it anew from box.obj")
+        pushed = run(RUNTIME, "push", "box.obj", cwd=self.folder)
+        self.assertEqual(pushed.returncode, 1)
+        self.assertIn("was not made from box.obj", pushed.stderr)
+        self.assertEqual((self.folder / "box.model.toml").read_bytes(), before)
+        self.baked("box.obj", "--renew")
+        self.assertIn('surface = "box.obj"', (self.folder / "box.model.toml").read_text())
+        # a surface that was repaired is the same one
+        self.write("open.off", off(triangles=TRIANGLES[:10]))
+        self.baked("open.off")
+        self.assertEqual(run(PRECOMPUTE, "open.off", "--dry-run", cwd=self.folder).returncode, 0)
+
+    def test_a_folder_that_may_only_be_read_has_its_description_beside_the_output(self):
+        if os.geteuid() == 0 and not shutil.which("setpriv"):
+            self.skipTest("setpriv is not installed")
+        there, here = self.folder / "there", self.folder / "here"
+        there.mkdir()
+        here.mkdir()
+        (there / "open.off").write_text(off(triangles=TRIANGLES[:10]))
+        there.chmod(0o555)
+        self.addCleanup(there.chmod, 0o755)
+        for folder in (self.folder, here):
+            folder.chmod(0o777)
+        command = [PRECOMPUTE, "../there/open.off", "--surface-nodes", "300", "-o", "out.hdf"]
+        if os.geteuid() == 0:
+            command = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups", *command]
+        result = run(*command, cwd=here)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual({file.name for file in here.iterdir()}, {"open.model.toml", "open.repaired.off", "out.hdf"})
+
+    def test_elements_are_those_that_are_asked_for(self):
+        self.write("box.off", off())
+        counts = []
+        for element in ("tet4", "tet10"):
+            told = self.baked("box.off", "--element", element, "--renew", "--dry-run")
+            self.assertIn(f"elements ({element})", told)
+            counts.append(int(re.search(r"(\d+) stored dofs", told)[1]))
+        self.assertTrue(0.5 < counts[1] / counts[0] < 2.0, counts)  # not four times as many
 
     def test_done_is_not_done_again(self):
         self.write("box.off", off())
