@@ -39,6 +39,8 @@ void PackedMotion::let_go(const LetGo& release) noexcept {
     f_[d * static_cast<std::size_t>(release.force.nodes()[k / d]) + k % d] += forces[k];
   body_.greens().displacement(release.force.nodes(), release.force.forces(), u_);
   body_.greens().displacement(release.rate.nodes(), release.rate.forces(), v_);
+  const double share = velocity_share(newmark_.kinetic_energy(v_), release.energy);
+  for (double& v : v_) v *= share;
   newmark_.let_go(f_, u_, v_);
 }
 

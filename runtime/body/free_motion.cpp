@@ -50,8 +50,23 @@ LetGo make_let_go(int dimension, Index most_loads) {
   return {.force = NodalLoad(dimension, 4 * most_loads), .rate = NodalLoad(dimension, 4 * most_loads)};
 }
 
+void clear(LetGo& release) noexcept {
+  release.force.clear();
+  release.rate.clear();
+  release.energy = 0.0;
+}
+
 void add(std::span<const double> x, double factor, std::span<double> y) noexcept {
   palpate::add(x.data(), factor, y.data(), std::ssize(y));
+}
+
+/// Strain energy of a body that the load displaces by u [n].
+double strain_energy(const NodalLoad& load, int dimension, std::span<const double> u) noexcept {
+  const auto d = static_cast<std::size_t>(dimension);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < load.forces().size(); ++k)
+    sum += load.forces()[k] * u[d * static_cast<std::size_t>(load.nodes()[k / d]) + k % d];
+  return 0.5 * sum;
 }
 
 void set_zero(std::span<double> x) noexcept {
@@ -59,6 +74,10 @@ void set_zero(std::span<double> x) noexcept {
 }
 
 }  // namespace
+
+double velocity_share(double kinetic_energy, double bound) noexcept {
+  return kinetic_energy > bound ? std::sqrt(bound / kinetic_energy) : 1.0;
+}
 
 MotionSnapshot::MotionSnapshot(const Body& body)
     : q(body.modes() != nullptr ? static_cast<std::size_t>(body.modes()->count()) : 0),
@@ -91,6 +110,7 @@ FreeMotion::FreeMotion(const Body& body, double tick, Index most_loads)
   const bool packed = dynamics.method == DynamicsMethod::packed;
   const std::int64_t n = body.greens().order();
   if (swings) loads_.assign(tuning.body.history, NodalLoad(dimension_, most_loads));
+  strains_.resize(loads_.size());
   held_.resize(size_if(swings, n));
   pending_held_.resize(held_.size());
   u_before_.resize(size_if(packed, n));
@@ -138,14 +158,18 @@ void FreeMotion::begin_modal_step(const Body& body) noexcept {
     set_zero(rate_);
     body.modes()->add_projection(pending_.force.nodes(), pending_.force.forces(), 1.0, g_);
     body.modes()->add_projection(pending_.rate.nodes(), pending_.rate.forces(), 1.0, rate_);
-    modal_->let_go(g_, rate_);
     const std::span<const double> omega = body.modes()->omega();
+    double kinetic = 0.0;
+    for (std::size_t i = 0; i < rate_.size(); ++i)
+      kinetic += 0.5 * std::pow(rate_[i] / (omega[i] * omega[i]), 2);
+    const double share = velocity_share(kinetic, pending_.energy);
+    for (double& rate : rate_) rate *= share;
+    modal_->let_go(g_, rate_);
     for (std::size_t i = 0; i < g_.size(); ++i)
       q_held_[i] = fade_ * q_held_[i] + g_[i] / (omega[i] * omega[i]);
     for (std::size_t i = 0; i < held_.size(); ++i) held_[i] = fade_ * held_[i] + pending_held_[i];
     set_zero(pending_held_);
-    pending_.force.clear();
-    pending_.rate.clear();
+    clear(pending_);
     fade_ = 1.0;
     since_let_go_ = 0.0;
   }
@@ -206,8 +230,7 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
   if (dynamic_contact_) job_.load.add(now.nodes(), now.forces(), 1.0);
   if (pending_.force.empty() || held_in_flight_) return;
   std::swap(job_.release, pending_);
-  pending_.force.clear();
-  pending_.rate.clear();
+  clear(pending_);
   ++job_.let_go;
   std::swap(held_, pending_held_);
   set_zero(pending_held_);
@@ -216,20 +239,37 @@ void FreeMotion::end_tick(const Body& body, const SurfaceLoad& load) noexcept {
 }
 
 /// How fast the forces of the last ticks changed while there was contact: not as it began, when they come
-/// from nothing at once.
-void FreeMotion::add_rate(const NodalLoad& last) noexcept {
+/// from nothing at once. Where the body came back meanwhile, a tool that lifts left it the strain energy that
+/// it gave back of late and no more, however fast it was: it cannot pull.
+void FreeMotion::add_rate(const NodalLoad& last, bool grabs) noexcept {
   const auto before = [&](std::size_t ticks) -> const NodalLoad& {
     return loads_[(static_cast<std::size_t>(ticks_) + tuning.body.history - ticks) % tuning.body.history];
   };
   std::size_t count = 1;
   while (count < tuning.body.history && !before(count + 1).empty()) ++count;
   if (count < tuning.body.least_history) return;
+  const auto strain = [&](std::size_t ticks) {
+    return strains_[(static_cast<std::size_t>(ticks_) + tuning.body.history - ticks) % tuning.body.history];
+  };
+  pending_.energy +=
+      !grabs && strain(1) < strain(count) ? returned_ : std::numeric_limits<double>::infinity();
   const double per_second = 1.0 / (static_cast<double>(count - 1) * tick_);
   if (pending_.rate.add(last.nodes(), last.forces(), per_second))
     pending_.rate.add(before(count).nodes(), before(count).forces(), -per_second);
 }
 
-void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<double> displacement) noexcept {
+void FreeMotion::note_strain(std::span<const double> displacement) noexcept {
+  if (loads_.empty() || dynamic_contact_) return;
+  const std::size_t last = static_cast<std::size_t>(ticks_ - 1) % tuning.body.history;
+  const double before =
+      strains_[static_cast<std::size_t>(ticks_ - 2 + std::ssize(loads_)) % tuning.body.history];
+  strains_[last] = strain_energy(loads_[last], dimension_, displacement);
+  // Motion under a contact is stilled, that of the return too.
+  returned_ = std::max(0.0, std::exp(-tick_ / tuning.body.settling) * returned_ + before - strains_[last]);
+}
+
+void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<double> displacement,
+                        bool grabs) noexcept {
   if (loads_.empty() || (dynamic_contact_ && !modal_)) return;
   const NodalLoad& last = loads_[static_cast<std::size_t>(ticks_ - 1) % tuning.body.history];
   if (last.empty()) return;
@@ -247,13 +287,15 @@ void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<dou
     // Without room for another: its energy is lost.
     if (!pending_.force.add(last.nodes(), last.forces(), 1.0)) return;
     pending_.force.add(load.nodes(), load.forces(), -1.0);
-    add_rate(last);
+    add_rate(last, grabs);
     add(displacement, 1.0, pending_held_);
   }
   for (NodalLoad& before : loads_) {  // what is gone has no past for the next release
     before.clear();
     before.add(load.nodes(), load.forces(), 1.0);
   }
+  returned_ = 0.0;
+  set_zero(strains_);
   active_ = true;
   std::fill(stamp_.begin(), stamp_.end(), -2);  // what `at` gave holds no longer
   if (load.count == 0) {
@@ -262,6 +304,7 @@ void FreeMotion::let_go(const Body& body, const SurfaceLoad& load, std::span<dou
   }
   body.greens().displacement(load.nodes(), load.forces(), displacement);
   add(displacement, -1.0, dynamic_contact_ ? held_ : pending_held_);
+  std::fill(strains_.begin(), strains_.end(), strain_energy(loads_.front(), dimension_, displacement));
 }
 
 bool FreeMotion::receive(const MotionSample& sample) noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -15,11 +16,16 @@
 namespace palpate {
 
 /// What the body is told when it is let go: forces that end [N], and how fast they were changing [N/s]. Its
-/// static displacement by them, at that velocity, is added to its motion.
+/// static displacement by them, at that velocity, is added to its motion. The velocity's kinetic energy is
+/// bounded [J]: a tool that lifts faster than the body comes back by itself leaves it behind.
 struct LetGo {
   NodalLoad force;
   NodalLoad rate;
+  double energy = 0.0;
 };
+
+/// The factor that leaves a velocity of this kinetic energy [J] no more than the bound.
+double velocity_share(double kinetic_energy, double bound) noexcept;
 
 /// What is asked of the packed step of all dofs, which runs beside the tick.
 struct MotionJob {
@@ -87,8 +93,12 @@ class FreeMotion {
 
   /// Some of the forces of the tick before are gone: those now are `load`. What they did, which is
   /// `displacement` [n] of the stored nodes, becomes free motion, and `displacement` what `load` does.
-  /// Between begin_tick and end_tick.
-  void let_go(const Body& body, const SurfaceLoad& load, std::span<double> displacement) noexcept;
+  /// Between begin_tick and end_tick. A hand that `grabs` the body pulls it along as fast as it moves, a tool
+  /// that lifts does not.
+  void let_go(const Body& body, const SurfaceLoad& load, std::span<double> displacement, bool grabs) noexcept;
+
+  /// What the forces of the tick before did, which is `displacement` [n]. Before let_go.
+  void note_strain(std::span<const double> displacement) noexcept;
 
   /// For MotionSource: what is to be done next; the sample that it made.
   [[nodiscard]] const MotionJob& job() const noexcept { return job_; }
@@ -107,7 +117,7 @@ class FreeMotion {
   [[nodiscard]] Vec3 find_at(const Body& body, Index surface_node) noexcept;
   void begin_modal_step(const Body& body) noexcept;
   void fade_held(double omega) noexcept;
-  void add_rate(const NodalLoad& last) noexcept;
+  void add_rate(const NodalLoad& last, bool grabs) noexcept;
   [[nodiscard]] bool ends_step() const noexcept { return phase_ == ticks_per_step_; }
 
   int dimension_;
@@ -119,6 +129,8 @@ class FreeMotion {
   std::int64_t ticks_ = 0;
   std::int64_t phase_ = 1;        // of the present step's ticks, the last one ends it
   std::vector<NodalLoad> loads_;  // [history] of the last ticks, in turn
+  std::vector<double> strains_;   // [history] the body's energy under them [J]
+  double returned_ = 0.0;         // of it, what the body gave back of late [J]
   LetGo pending_;                 // not yet in the motion
 
   // What stays where it was: until it is in the motion, and of modal dynamics what the modes do not carry.

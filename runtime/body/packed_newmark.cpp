@@ -67,6 +67,12 @@ void PackedNewmark::damp(double share) noexcept {
   }
 }
 
+double PackedNewmark::kinetic_energy(std::span<const double> v) noexcept {
+  std::fill(with_M_.begin(), with_M_.end(), 0.0);
+  add_product(dynamics_.matrices, dynamics_.matrices.mass, v, with_M_);
+  return 0.5 * dot(v.data(), with_M_.data(), std::ssize(v));
+}
+
 void PackedNewmark::let_go(std::span<const double> f, std::span<const double> u,
                            std::span<const double> v) noexcept {
   std::fill(f_bar_.begin(), f_bar_.end(), 0.0);

@@ -23,6 +23,9 @@ class PackedNewmark {
   /// Leaves a share of the motion.
   void damp(double share) noexcept;
 
+  /// 1/2 v^T M v of a velocity v [n] of the dofs [J].
+  [[nodiscard]] double kinetic_energy(std::span<const double> v) noexcept;
+
   /// By superposition, from now on: the body let go in its static displacement u [n] by forces f [n], at
   /// velocity v [n]; with the consistent acceleration M a = -f - C_d v.
   void let_go(std::span<const double> f, std::span<const double> u, std::span<const double> v) noexcept;

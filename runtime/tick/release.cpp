@@ -5,6 +5,14 @@
 #include "runtime/tick/surface_motion.h"
 
 namespace palpate {
+namespace {
+
+bool opens_grab(const State& state) noexcept {
+  return std::any_of(state.tools.begin(), state.tools.end(),
+                     [](const ToolState& tool) { return tool.held_last_tick && !tool.holding; });
+}
+
+}  // namespace
 
 bool is_released(const Body& body, const State& state) noexcept {
   if (body.model().dynamics.method == DynamicsMethod::none) return false;
@@ -14,8 +22,10 @@ bool is_released(const Body& body, const State& state) noexcept {
 }
 
 void release(const Body& body, State& state) noexcept {
+  state.surface.motion.note_strain(state.surface.stored_displacement);
   if (is_released(body, state)) {
-    state.surface.motion.let_go(body, state.surface.near.load(), state.surface.stored_displacement);
+    state.surface.motion.let_go(body, state.surface.near.load(), state.surface.stored_displacement,
+                                opens_grab(state));
     move_near_surface(body, state.surface);
   }
   state.surface.motion.end_tick(body, state.surface.near.load());

@@ -121,6 +121,23 @@ class Swing(ProgramTest):
             self.assertGreater(force["dynamic"][:160].max(), 2.0 * static.max())
             self.assertAlmostEqual(force["dynamic"][-1], static[-1], delta=0.05 * static[-1])
 
+    def test_a_lifted_tool_leaves_the_body_its_own_return(self):
+        """A soft beam of 0.34 Hz, pressed 5 mm down: its energy is that of the press, however fast the tool is gone."""
+        x, y, z = TIP[0] - 0.01, TIP[1], 2 * TIP[2]
+        for method in ('method = "packed"', 'method = "modal"\nmodes = 20'):
+            file = self.bake(beam_toml(method).replace("1.0e6", "1.0e5"))
+            highest = {}
+            for speed, contact in ((0.02, "quasi-static"), (0.5, "quasi-static"), (0.5, "dynamic")):
+                rows = ((0, z + 0.006), (0.5, z), (1.5, z), (1.5 + 0.1 / speed, z + 0.1), (8, z + 0.1))
+                script = "t,x,y,z\n" + "".join(f"{t},{x},{y},{height}\n" for t, height in rows)
+                self.play(file, script, "--contact", contact, "--tool", "sphere:0.005", "--record", "lift.mcap", "--record-frames", "100", "--force")
+                recording = palpate.read(self.folder / "lift.mcap")
+                node = numpy.argmin(numpy.linalg.norm(recording.surface["nodes"] - (x, y, z), axis=1))
+                up = recording.frames["displacement"][:][:, node, 2]
+                highest[speed, contact] = up.max()
+            self.assertLess(max(highest.values()), 0.005)
+            self.assertGreater(highest[0.5, "quasi-static"], 0.8 * highest[0.5, "dynamic"])
+
     def test_bad_input(self):
         def play(file, *arguments):
             script = self.write("touch.csv", pull_and_let_go(0.1))

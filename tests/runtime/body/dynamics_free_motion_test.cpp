@@ -141,7 +141,7 @@ TEST_P(ReleaseInEachTick, ForgetsTheTouchBefore) {
     const auto tick = [&](const SurfaceLoad& with, bool let_go) {
       if (loop.source) loop.source->receive(loop.state);
       motion.begin_tick(loop.body);
-      if (let_go) motion.let_go(loop.body, with, u);
+      if (let_go) motion.let_go(loop.body, with, u, false);
       motion.end_tick(loop.body, with);
     };
     if (before) {
@@ -167,7 +167,7 @@ TEST_P(ReleaseInEachTick, ForgetsTheTouchBefore) {
     for (int k = 0; k < 30; ++k) {
       if (loop.source) loop.source->receive(loop.state);
       motion.begin_tick(loop.body);
-      if (k == 20) motion.let_go(loop.body, none, u);
+      if (k == 20) motion.let_go(loop.body, none, u, false);
       motion.end_tick(loop.body, k < 20 ? far : none);
     }
     VectorXd shown(loop.body.greens().order());
@@ -208,7 +208,7 @@ TEST_P(Release, AddsToWhatMoves) {
     }
     if (loop.source) loop.source->receive(loop.state);
     motion.begin_tick(loop.body);
-    motion.let_go(loop.body, none, u);
+    motion.let_go(loop.body, none, u, false);
     EXPECT_EQ(Eigen::Map<const VectorXd>(u.data(), greens.order()).norm(), 0.0);
     motion.end_tick(loop.body, none);
     for (int k = 1; k < m && alone[0]; ++k) {  // to the end of the step, which the first one begins
@@ -267,7 +267,7 @@ TEST_P(Release, MovesTheSurfaceThatTheTickHasAskedFor) {
     for (Index node = 0; node < nodes; ++node) before.push_back(motion.at(body, node));
     body.greens().displacement(load.nodes(), load.forces(), u);
     const std::vector<double> gone = u;
-    motion.let_go(body, none, u);
+    motion.let_go(body, none, u, false);
     double moved = 0.0;
     for (Index node = 0; node < nodes; ++node) {
       const SurfaceParts parts = body.surface_parts(node);
