@@ -100,6 +100,8 @@ InputSource make_input_source(const PlayOptions& options, Guardian* guardian) {
   if (options.device.kind == Kind::script) {
     auto script = std::make_unique<ScriptDevice>(ScriptDevice::read(options.device.target));
     script->set_rate(options.settings.rate);
+    for (const std::string& column : script->unread())
+      say(stderr, "{}: the column {} is not read\n", options.device.target, column);
     input.ticks = script->ticks();
     input.device = std::move(script);
   } else if (options.device.kind == Kind::replay) {

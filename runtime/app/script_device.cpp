@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -17,48 +19,101 @@ namespace {
 
 constexpr double longest_script = 24.0 * 3600.0;  // s
 const std::string header_hint =
-    "write the columns t,x,y,z[,qw,qx,qy,qz][,grab] (seconds, metres, a quaternion, 0 or 1)";
+    "name the columns t,x,y,z[,qw,qx,qy,qz][,grab] in the first line (seconds, metres, a quaternion, 0 or 1)";
 
-/// The columns of a script: t, x, y, z and those that may follow.
+constexpr std::array<std::string_view, 9> script_columns = {"t",  "x",  "y",  "z",   "qw",
+                                                            "qx", "qy", "qz", "grab"};
+constexpr std::size_t place_columns = 4, first_turn_column = 4,
+                      grab_column = 8;  // how many, and where others begin
+
+/// Where a table has the columns that are known; else nothing.
 struct Columns {
-  bool orientation = false;
-  bool grab = false;
+  char separator = ',';
+  std::array<std::optional<std::size_t>, script_columns.size()> places{};
   std::size_t count = 0;
+  std::vector<std::string> unread{};
+  std::string twice{};  // a name, else empty
 };
 
 /// Takes the next line off the front of `text`.
 std::string_view next_line(std::string_view& text) {
-  const std::size_t end = std::min(text.find('\n'), text.size());
+  const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
   const std::string_view line = text.substr(0, end);
-  text.remove_prefix(std::min(end + 1, text.size()));
+  text.remove_prefix(std::min(end + (text.substr(end).starts_with("\r\n") ? 2 : 1), text.size()));
   return line;
 }
 
-bool is_blank(std::string_view line) {
-  return line.find_first_not_of(" \t\r") == std::string_view::npos;
-}
-
-Columns read_header(std::string_view line, const std::string& where) {
-  const std::vector<std::string_view> names = split_commas(line);
-  for (const bool orientation : {false, true}) {
-    for (const bool grab : {false, true}) {
-      std::vector<std::string_view> expected = {"t", "x", "y", "z"};
-      if (orientation) expected.insert(expected.end(), {"qw", "qx", "qy", "qz"});
-      if (grab) expected.emplace_back("grab");
-      if (names == expected) return {orientation, grab, names.size()};
+/// The fields of a line, without spaces and quotes round them; a separator ' ' is any number of blanks.
+std::vector<std::string> split_fields(std::string_view line, char separator) {
+  std::vector<std::string> fields(1);
+  char quote = '\0';
+  bool was_quoted = false;
+  for (const char c : line) {
+    if (quote != '\0') {
+      if (c == quote) {
+        quote = '\0';
+      } else {
+        fields.back() += c;
+      }
+    } else if ((c == '"' || c == '\'') && fields.back().empty() && !was_quoted) {
+      quote = c;
+      was_quoted = true;
+    } else if (c == separator || (separator == ' ' && c == '\t')) {
+      if (separator != ' ' || !fields.back().empty()) fields.emplace_back();
+      was_quoted = false;
+    } else if (c != ' ' || !fields.back().empty()) {
+      fields.back() += c;
     }
   }
-  throw Error("is not a header of a script", where, header_hint);
+  for (std::string& field : fields) field.erase(field.find_last_not_of(" \t") + 1);
+  if (separator == ' ' && fields.back().empty()) fields.pop_back();
+  return fields;
 }
 
-std::vector<double> read_numbers(const std::vector<std::string_view>& fields, const std::string& where) {
-  std::vector<double> numbers;
-  for (const std::string_view field : fields) {
-    const std::optional<double> number = parse_number(field);
-    if (!number) throw Error("'" + std::string(field) + "' is not a finite number", where, header_hint);
-    numbers.push_back(*number);
+char separator_of(std::string_view header) {
+  for (const char separator : {';', '\t', ','})
+    if (header.find(separator) != std::string_view::npos) return separator;
+  return ' ';
+}
+
+/// The columns by their names, in any order and case.
+Columns read_header(std::string_view line) {
+  Columns columns{.separator = separator_of(line)};
+  for (std::string& name : split_fields(line, columns.separator)) {
+    std::string small = name;
+    for (char& c : small) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const auto place = static_cast<std::size_t>(
+        std::find(script_columns.begin(), script_columns.end(), small) - script_columns.begin());
+    if (place == script_columns.size()) {
+      if (!name.empty()) columns.unread.push_back(std::move(name));
+    } else if (columns.places[place]) {
+      columns.twice = small;
+    } else {
+      columns.places[place] = columns.count;
+    }
+    ++columns.count;
   }
-  return numbers;
+  return columns;
+}
+
+/// Columns that are missing: of those that a script always has and, where one of them is there, of a
+/// quaternion.
+std::string missing_columns(const Columns& columns) {
+  const auto there = [&](std::size_t place) { return columns.places[place].has_value(); };
+  const bool turns = there(4) || there(5) || there(6) || there(7);
+  std::string names;
+  for (std::size_t place = 0; place < (turns ? grab_column : place_columns); ++place)
+    if (!there(place)) names += (names.empty() ? "" : ", ") + std::string(script_columns[place]);
+  return names;
+}
+
+/// A number with a decimal point or, where no commas separate fields, a decimal comma.
+double read_number(std::string text, const std::string& where) {
+  std::string with_point = text;
+  if (with_point.find('.') == std::string::npos) std::replace(with_point.begin(), with_point.end(), ',', '.');
+  const std::optional<double> number = parse_number(with_point);
+  if (!number) throw Error("'" + text + "' is not a finite number", where, header_hint);
+  return *number;
 }
 
 /// The rotation by a quaternion w, x, y, z of any length but 0.
@@ -73,17 +128,40 @@ Eigen::Quaterniond read_orientation(std::span<const double, 4> q, const std::str
   return orientation.normalized();
 }
 
-ToolPose read_pose(std::span<const double> values, const Columns& columns, const std::string& where) {
+/// What a row has in the columns that are known; 0 where they are not there.
+std::array<double, script_columns.size()> read_row(std::string_view line, const Columns& columns,
+                                                   const std::string& where) {
+  std::vector<std::string> fields = split_fields(line, columns.separator);
+  while (fields.size() > columns.count && fields.back().empty()) fields.pop_back();
+  if (fields.size() != columns.count) {
+    throw Error(fmt::format("has {} fields where the header has {}", fields.size(), columns.count), where,
+                "give each row a value for each column; decimal commas need semicolons between the columns");
+  }
+  std::array<double, script_columns.size()> values{};
+  for (std::size_t k = 0; k < script_columns.size(); ++k)
+    if (columns.places[k]) values[k] = read_number(fields[*columns.places[k]], where);
+  return values;
+}
+
+ToolPose read_pose(std::span<const double, script_columns.size()> values, const Columns& columns,
+                   const std::string& where) {
   ToolPose pose;
   pose.position = Vec3(values[1], values[2], values[3]);
-  if (columns.orientation) pose.orientation = read_orientation(values.subspan<4, 4>(), where);
-  if (columns.grab) {
-    const double grab = values.back();
-    if (grab != 0.0 && grab != 1.0)
-      throw Error(fmt::format("grab is {}", grab), where, "write 1 while the tool holds, else 0");
-    pose.grab = grab == 1.0;
-  }
+  if (columns.places[first_turn_column])
+    pose.orientation = read_orientation(values.subspan<first_turn_column, 4>(), where);
+  if (values[grab_column] != 0.0 && values[grab_column] != 1.0)
+    throw Error(fmt::format("grab is {}", values[grab_column]), where,
+                "write 1 while the tool holds, else 0");
+  pose.grab = values[grab_column] == 1.0;
   return pose;
+}
+
+/// Lines that loggers and spreadsheets write beside the table. A comment that names the columns is its
+/// header.
+bool is_comment(std::string_view line, bool has_header) {
+  if (line.starts_with("sep=")) return true;
+  if (line.front() != '#') return false;
+  return has_header || !missing_columns(read_header(line.substr(1))).empty();
 }
 
 }  // namespace
@@ -96,35 +174,34 @@ ScriptDevice ScriptDevice::parse(std::string_view text, const std::string& name)
   constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
 
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+    throw Error("is text of UTF-16", name, "save it as CSV in UTF-8");
+
   ScriptDevice device;
-  Columns columns;
+  std::optional<Columns> columns;
   for (int line_number = 1; !text.empty(); ++line_number) {
-    const std::string_view line = next_line(text);
+    std::string_view line = next_line(text);
     const std::string where = name + ":" + std::to_string(line_number);
-    if (is_blank(line)) continue;
-    if (columns.count == 0) {
-      columns = read_header(line, where);
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    if (line.empty() || is_comment(line, columns.has_value())) continue;
+    if (!columns) {
+      columns = read_header(line.substr(line.front() == '#' ? 1 : 0));
+      if (!columns->twice.empty())
+        throw Error(fmt::format("the header names the column {} twice", columns->twice), where, header_hint);
+      if (const std::string names = missing_columns(*columns); !names.empty())
+        throw Error("the header names no column " + names, where, header_hint);
+      device.unread_ = columns->unread;
       continue;
     }
-
-    const std::vector<std::string_view> fields = split_commas(line);
-    if (fields.size() != columns.count) {
-      throw Error("has " + std::to_string(fields.size()) + " fields where the header has " +
-                      std::to_string(columns.count),
-                  where, "give each row a value for each column");
-    }
-    const std::vector<double> values = read_numbers(fields, where);
+    const std::array<double, script_columns.size()> values = read_row(line, *columns, where);
     const double t = values[0];
-    const double before = device.rows_.empty() ? 0.0 : device.rows_.back().t;
-    if (t < before || (t == before && !device.rows_.empty())) {
-      throw Error("the time " + std::string(fields[0]) + " s is not after the one before it", where,
+    if (t < 0.0 || (!device.rows_.empty() && t <= device.rows_.back().t)) {
+      throw Error(fmt::format("the time {} s is not after the one before it", t), where,
                   "order the rows by time, from 0 on, each time once");
     }
-    if (t > longest_script) {
-      throw Error("the time " + std::string(fields[0]) + " s is more than a day", where,
-                  "give times in seconds");
-    }
-    device.rows_.push_back({t, read_pose(values, columns, where)});
+    if (t > longest_script)
+      throw Error(fmt::format("the time {} s is more than a day", t), where, "give times in seconds");
+    device.rows_.push_back({t, read_pose(values, *columns, where)});
   }
   if (device.rows_.empty()) throw Error("has no rows", name, header_hint);
   return device;

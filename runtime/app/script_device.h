@@ -11,9 +11,10 @@
 namespace palpate {
 
 /// Plays rows of t, x, y, z [, qw, qx, qy, qz] [, grab] (seconds, metres, a quaternion of any length but 0, 0
-/// or 1). Between rows the tool moves in straight lines and turns about a fixed axis at constant speed
-/// (slerp, the shorter way), and the grab button is that of the row before. Without the quaternion the tool
-/// is not turned; without grab it never is set.
+/// or 1), found by the names of their columns, as spreadsheets and loggers write them. Between rows the tool
+/// moves in straight lines and turns about a fixed axis at constant speed (slerp, the shorter way), and the
+/// grab button is that of the row before. Without the quaternion the tool is not turned; without grab it
+/// never is set.
 class ScriptDevice : public Device {
  public:
   /// Reads `file`. Throws Error naming file and line.
@@ -21,6 +22,9 @@ class ScriptDevice : public Device {
 
   /// Reads `text`; `name` stands for the file in messages.
   static ScriptDevice parse(std::string_view text, const std::string& name);
+
+  /// Names of columns that mean nothing here.
+  [[nodiscard]] const std::vector<std::string>& unread() const noexcept { return unread_; }
 
   /// The pose at time t [s]: before the first row the tool is at its place without grabbing, after the last
   /// it stays.
@@ -44,6 +48,7 @@ class ScriptDevice : public Device {
     ToolPose pose;
   };
   std::vector<Row> rows_;  // at least one, ascending in t
+  std::vector<std::string> unread_;
   std::int64_t rate_ = 1000;
 };
 

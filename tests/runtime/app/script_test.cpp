@@ -56,6 +56,31 @@ TEST(Script, TakesWhatSpreadsheetsWrite) {
   EXPECT_EQ(device.pose(0.5).position.z(), 3.5);
 }
 
+class Tables : public testing::TestWithParam<const char*> {};
+
+TEST_P(Tables, AreReadByTheNamesOfTheirColumns) {
+  const ScriptDevice device = ScriptDevice::parse(GetParam(), "touch.csv");
+  EXPECT_EQ(device.end_time(), 1.5);
+  EXPECT_EQ(device.pose(0.0).position, Vec3(0.25, 1.0, -2.0));
+  EXPECT_EQ(device.pose(1.5).position, Vec3(0.5, 1.0, -2.0));
+  EXPECT_EQ(device.pose(1.5).grab, std::string_view(GetParam()).find("rab") != std::string_view::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, Tables,
+    testing::Values(
+        "x,y,z,t\n.25,1,-2,0\n.5,1,-2,1.5\n", "t;x;y;z\n0;0.25;1;-2\n1.5;0.5;1;-2\n",
+        "t;x;y;z;Grab\n0;0,25;1;-2;0\n1,5;0,5;1;-2;1\n", "t\tx\ty\tz\n0\t0,25\t1\t-2\n1.5\t.5\t1\t-2\n",
+        "  t   x  y  z \n 0  .25  1  -2 \n1.5 .5   1 -2\n",
+        "\"T\",\"X\",\"Y\",\"Z\"\r\n\"0\",\"0,25\",\"1\",\"-2\"\r\n1.5,0.5,1,-2\r\n",
+        "\xEF\xBB\xBF# it's mine, x and x\nsep=;\nT;X;Y;Z;;\n0;.25;1;-2;;\n# then\n1.5;.5;1;-2;;\n",
+        "# t x y z\n0 .25 1 -2\n1.5 .5 1 -2\n", "t,who,x,y,z\r0,\"me, too\",.25,1,-2\r1.5,,.5,1,-2\r"));
+
+TEST(Script, TellsColumnsThatItDoesNotRead) {
+  EXPECT_EQ(ScriptDevice::parse("t,x,y,z,Foo,,grab,force\n0,0,0,0,a,,1,2\n", "touch.csv").unread(),
+            (std::vector<std::string>{"Foo", "force"}));
+}
+
 // Slerp by hand: half of a quarter turn about z is an eighth turn, from whatever length it is given in.
 TEST(Script, TurnsAtConstantSpeedTheShorterWay) {
   const ScriptDevice device = ScriptDevice::parse(
@@ -97,23 +122,28 @@ TEST_P(BadScripts, AreRefusedWithTheirLine) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, BadScripts,
-    testing::Values(BadScript{"empty", "", "touch.csv", "no rows"},
-                    BadScript{"only_header", "t,x,y,z\n", "touch.csv", "no rows"},
-                    BadScript{"no_header", "0,1,2,3\n", "touch.csv:1", "header"},
-                    BadScript{"wrong_header", "t,x,y,z,button\n0,0,0,0,1\n", "touch.csv:1", "header"},
-                    BadScript{"short_row", "t,x,y,z\n0,0,0,0\n1,0,0\n", "touch.csv:3", "3 fields"},
-                    BadScript{"long_row", "t,x,y,z\n0,0,0,0,1\n", "touch.csv:2", "5 fields"},
-                    BadScript{"word", "t,x,y,z\n0,0,oops,0\n", "touch.csv:2", "'oops'"},
-                    BadScript{"nan", "t,x,y,z\n0,0,nan,0\n", "touch.csv:2", "'nan'"},
-                    BadScript{"back_in_time", "t,x,y,z\n1,0,0,0\n0.5,0,0,0\n", "touch.csv:3", "0.5"},
-                    BadScript{"same_time", "t,x,y,z\n1,0,0,0\n\n1,0,0,0\n", "touch.csv:4", "not after"},
-                    BadScript{"negative_time", "t,x,y,z\n-1,0,0,0\n", "touch.csv:2", "-1"},
-                    BadScript{"milliseconds", "t,x,y,z\n0,0,0,0\n1e6,0,0,0\n", "touch.csv:3",
-                              "more than a day"},
-                    BadScript{"no_orientation", "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0,0,0,0,0,0\n",
-                              "touch.csv:3", "quaternion is zero"},
-                    BadScript{"half_an_orientation", "t,x,y,z,qw,qx\n0,0,0,0,1,0\n", "touch.csv:1", "header"},
-                    BadScript{"half_a_grab", "t,x,y,z,grab\n0,0,0,0,0.5\n", "touch.csv:2", "0.5"}),
+    testing::Values(
+        BadScript{"empty", "", "touch.csv", "no rows"},
+        BadScript{"only_header", "t,x,y,z\n", "touch.csv", "no rows"},
+        BadScript{"no_header", "0,1,2,3\n", "touch.csv:1", "header"},
+        BadScript{"no_y", "# mine\nt,x,z\n0,0,0\n", "touch.csv:2", "no column y"},
+        BadScript{"twice", "t,x,y,z,X\n0,0,0,0,1\n", "touch.csv:1", "column x twice"},
+        BadScript{"decimal_commas", "t,x,y,z\n0,5,0,5,0,5,0,5\n", "touch.csv:2", "8 fields"},
+        BadScript{"thousands", "t;x;y;z\n0;0;1.000,5;0\n", "touch.csv:2", "'1.000,5'"},
+        BadScript{"open_quote", "t,x,y,z\n0,\"0,0,0\n", "touch.csv:2", "2 fields"},
+        BadScript{"utf16", "\xFF\xFEt", "touch.csv", "UTF-16"},
+        BadScript{"short_row", "t,x,y,z\n0,0,0,0\n1,0,0\n", "touch.csv:3", "3 fields"},
+        BadScript{"long_row", "t,x,y,z\n0,0,0,0,1\n", "touch.csv:2", "5 fields"},
+        BadScript{"word", "t,x,y,z\n0,0,oops,0\n", "touch.csv:2", "'oops'"},
+        BadScript{"nan", "t,x,y,z\n0,0,nan,0\n", "touch.csv:2", "'nan'"},
+        BadScript{"back_in_time", "t,x,y,z\n1,0,0,0\n0.5,0,0,0\n", "touch.csv:3", "0.5"},
+        BadScript{"same_time", "t,x,y,z\n1,0,0,0\n\n1,0,0,0\n", "touch.csv:4", "not after"},
+        BadScript{"negative_time", "t,x,y,z\n-1,0,0,0\n", "touch.csv:2", "-1"},
+        BadScript{"milliseconds", "t,x,y,z\n0,0,0,0\n1e6,0,0,0\n", "touch.csv:3", "more than a day"},
+        BadScript{"no_orientation", "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0,0,0,0,0,0,0\n", "touch.csv:3",
+                  "quaternion is zero"},
+        BadScript{"half_an_orientation", "t,x,y,z,qw,qx\n0,0,0,0,1,0\n", "touch.csv:1", "no column qy, qz"},
+        BadScript{"half_a_grab", "t,x,y,z,grab\n0,0,0,0,0.5\n", "touch.csv:2", "0.5"}),
     [](const testing::TestParamInfo<BadScript>& bad) { return bad.param.name; });
 
 TEST(Script, AMissingFileIsNamed) {
