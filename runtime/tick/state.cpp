@@ -1,5 +1,7 @@
 #include "runtime/tick/state.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,9 +17,7 @@ namespace {
 void check(const Tool& tool, std::size_t number) {
   const auto check = [&](const char* what, double value, bool valid, const char* hint) {
     if (valid) return;
-    throw Error(
-        "the " + std::string(what) + " of tool " + std::to_string(number) + " is " + std::to_string(value),
-        "State", hint);
+    throw Error(fmt::format("the {} of tool {} is {}", what, number, value), "tools", hint);
   };
   const auto size = [&](const char* what, double value) {
     check(what, value, std::isfinite(value) && value >= 0.0, "give a finite number that is not negative");
@@ -40,13 +40,13 @@ void check(const Tool& tool, std::size_t number) {
 }
 
 std::vector<ToolState> make_tools(const StateOptions& options) {
-  if (options.tools.empty()) throw Error("there is no tool", "State", "give at least one");
+  if (options.tools.empty()) throw Error("there is no tool", "tools", "give at least one");
   if (options.max_contacts < 1) {
-    throw Error("room for " + std::to_string(options.max_contacts) + " contacts was asked for", "State",
+    throw Error("room for " + std::to_string(options.max_contacts) + " contacts was asked for", "tools",
                 "ask for room for at least one");
   }
   if (!(options.tick > 0.0 && std::isfinite(options.tick))) {
-    throw Error("a tick of " + std::to_string(options.tick) + " s was asked for", "State",
+    throw Error(fmt::format("a tick of {} s was asked for", options.tick), "tools",
                 "ask for one that is positive");
   }
   std::vector<ToolState> tools;

@@ -6,11 +6,13 @@ import pathlib
 import tempfile
 import threading
 import time
+import typing
 import unittest
 import urllib.request
 
 import h5py
 import numpy
+from numpy.typing import ArrayLike, NDArray
 
 from programs import BINARY, HAS_SANITIZERS, PRECOMPUTE, RUNTIME, SOURCE, ProgramTest, cube_toml, palpate, run
 
@@ -30,6 +32,45 @@ def compiled(folder, source):
     if result.returncode != 0:
         raise AssertionError(result.stderr)
     return folder / "client"
+
+
+SMALL_STACK = r'''
+#include <palpate.h>
+#include <pthread.h>
+#include <stdio.h>
+
+static char** words;
+
+static void* press(void* unused) {
+  static char error[4096];
+  palpate_tool tool = PALPATE_TOOL_INIT;
+  palpate_pose pose = PALPATE_POSE_INIT;
+  palpate_record_options options = PALPATE_RECORD_OPTIONS_INIT;
+  tool.radius = 0.1;
+  palpate_session* session = palpate_create(words[1], &tool, 1, 32, error, sizeof error);
+  if (session == NULL || palpate_record(session, words[2], &options, error, sizeof error) != PALPATE_OK) return error;
+  for (int k = 0; k < 200; ++k) {
+    pose.position[0] = pose.position[1] = 0.5;
+    pose.position[2] = 1.2 - 0.001 * k;
+    palpate_step(session, &pose);
+  }
+  if (palpate_record_end(session, error, sizeof error) != PALPATE_OK) return error;
+  palpate_destroy(session);
+  return unused;
+}
+
+int main(int count, char** given) {
+  pthread_attr_t small;
+  pthread_t thread;
+  void* failed = given;
+  words = given;
+  pthread_attr_init(&small);
+  pthread_attr_setstacksize(&small, 64 * 1024);
+  if (pthread_create(&thread, &small, press, NULL) != 0 || pthread_join(thread, &failed) != 0) return 2;
+  if (failed != NULL) puts(failed);
+  return failed != NULL;
+}
+'''
 
 
 def rubbed():
@@ -388,6 +429,37 @@ class Misuse(PythonTest):
             session.step((0, 0, 2), 1.0)
         with self.assertRaisesRegex(palpate.Error, "3 numbers"):
             session.play(numpy.linspace(1.2, 1.05, 10))
+        with self.assertRaisesRegex(palpate.Error, "2 or 3 numbers"):
+            palpate.probe(self.cube, [0, 0, -0.01], at=[(0.5, 0.5, 1)])
+
+    def test_in_the_plane_two_numbers_are_enough(self):
+        plate = SOURCE / "tests" / "golden" / "plate2" / "plate2.palpate.hdf"
+        with palpate.Session(plate, palpate.Tool(radius=0.1)) as session, palpate.Session(plate, palpate.Tool(radius=0.1)) as other:
+            path = numpy.column_stack([numpy.full(200, 0.5), numpy.linspace(1.25, 1.05, 200)])
+            forces = session.play(path)
+            numpy.testing.assert_array_equal(forces, other.play(numpy.column_stack([path, numpy.zeros(200)])))
+        self.assertGreater(forces[-1][1], 0)
+
+    def test_types_are_those_of_arrays(self):
+        self.assertEqual(typing.get_type_hints(palpate.Session.put)["position"], ArrayLike)
+        self.assertEqual(typing.get_type_hints(palpate.Session.step)["position"], typing.Optional[ArrayLike])
+        hints = typing.get_type_hints(palpate.Session.play)
+        self.assertEqual((hints["positions"], hints["return"]), (ArrayLike, NDArray[numpy.float64]))
+        self.assertEqual(typing.get_type_hints(palpate.Felt)["force"], NDArray[numpy.float64])
+        self.assertEqual(typing.get_type_hints(palpate.probe)["return"], NDArray[numpy.float64])
+        self.assertIn(palpate.__version__, run(RUNTIME, "--version").stdout)
+
+    def test_a_small_stack_is_enough(self):
+        client = compiled(self.folder, SMALL_STACK)
+        result = run(client, self.cube, self.folder / "small.mcap")
+        self.assertEqual((result.returncode, result.stdout), (0, ""))
+        self.assertEqual(len(palpate.read(self.folder / "small.mcap")), 200)
+
+    def test_errors_name_nothing_of_c(self):
+        for tools in ([], palpate.Tool(radius=-1.0)):
+            with self.assertRaises(palpate.Error) as failed:
+                palpate.Session(self.cube, tools)
+            self.assertNotRegex(failed.exception.reason, r"palpate_|State|1\.0000")
 
     def test_a_name_ends_at_its_end(self):
         session = self.session()

@@ -17,3 +17,4 @@ from .viewer import Viewer
 
 __all__ = ["Body", "Error", "Felt", "Loop", "Overlay", "Recording", "Session", "Tool", "Viewer", "bake", "probe",
            "read"]
+__version__ = "0.1.0"

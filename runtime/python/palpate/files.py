@@ -8,9 +8,10 @@ from types import TracebackType
 from typing import Any
 
 import numpy
+from numpy.typing import NDArray
 
 from .cdr import HEAD, BadMessage, Layout
-from .library import Error, path_bytes
+from .library import Array, Error, path_bytes
 from .mcap import McapFile
 
 _BODY = "a file of palpate-precompute, NAME.palpate.hdf"
@@ -63,32 +64,32 @@ class Body:
         return int(self.file.attrs["dimension"])
 
     @property
-    def nodes(self) -> numpy.ndarray:
+    def nodes(self) -> Array:
         """Positions [N, 3] [m]."""
         return self.file["/mesh/nodes"][:]
 
     @property
-    def elements(self) -> numpy.ndarray:
+    def elements(self) -> NDArray[Any]:
         """Nodes of the elements [E, k], numbered as VTK does."""
         width = int(self.file["/mesh/offsets"][1])
         return self.file["/mesh/connectivity"][:].reshape(-1, width)
 
     @property
-    def surface(self) -> numpy.ndarray:
+    def surface(self) -> NDArray[Any]:
         """Nodes of the surface's triangles, counter-clockwise seen from outside [F, 3]; in the plane of lines [F, 2]."""
         return self.file["/mesh/surface"][:]
 
     @property
-    def held(self) -> numpy.ndarray:
+    def held(self) -> NDArray[Any]:
         """Whether each node is held along each axis [N, 3]."""
         return (self.file["/dofs/fixed"][:][:, None] >> numpy.arange(3) & 1).astype(bool)
 
     @property
-    def stored_nodes(self) -> numpy.ndarray:
+    def stored_nodes(self) -> NDArray[Any]:
         """Mesh node of each stored node [S]: those that Green's functions are there for."""
         return self.file["/dofs/stored_nodes"][:]
 
-    def greens(self, nodes: Sequence[int]) -> numpy.ndarray:
+    def greens(self, nodes: Sequence[int]) -> Array:
         """Block of the Green's functions at mesh nodes, [d K, d K] [m/N]: column j is the displacement of these nodes under a
         unit force on dof j of them, where all else is free. Read from the file as far as it is asked for. Throws Error where
         a node is not stored, or the file is compressed."""
@@ -131,7 +132,7 @@ class Messages(Sequence):
         return Error(f"{self._file.path}, {self.topic}: {what}", "copy the file again, or record again")
 
     @property
-    def times(self) -> numpy.ndarray:
+    def times(self) -> NDArray[Any]:
         return self._channel.times * 1e-9
 
     def __len__(self) -> int:
@@ -159,7 +160,7 @@ class Messages(Sequence):
             raise self.error("a message does not begin as little-endian CDR")
         return _columns("", kind, len(HEAD))
 
-    def column(self, at: int, kind: numpy.dtype) -> numpy.ndarray:
+    def column(self, at: int, kind: numpy.dtype) -> NDArray[Any]:
         return self._file.gather(self._channel.places + at, kind)
 
 
@@ -204,7 +205,7 @@ class FrameField(Sequence):
         value = self._messages[number][self._field]
         return value.reshape(-1, 3) if self._field == "displacement" else value
 
-    def __array__(self, dtype: Any = None, copy: Any = None) -> numpy.ndarray:
+    def __array__(self, dtype: Any = None, copy: Any = None) -> NDArray[Any]:
         return numpy.asarray(self[:], dtype)
 
 
@@ -233,7 +234,7 @@ class Recording:
         self._ticks = Messages(file, tools[0])
         self._columns = {name.removeprefix("wrench_"): place for name, place in self._ticks.columns().items()}
 
-    def __getitem__(self, field: str) -> numpy.ndarray:
+    def __getitem__(self, field: str) -> NDArray[Any]:
         if field not in self._columns:
             raise KeyError(f"{field}: the recording has {', '.join(self)}")
         values = self._ticks.column(*self._columns[field])
@@ -267,7 +268,7 @@ class Recording:
         return Messages(self._file, topic)
 
     @property
-    def surface(self) -> dict[str, numpy.ndarray]:
+    def surface(self) -> dict[str, NDArray[Any]]:
         """`nodes` [S, 3] without loads [m], `simplices` [F, d], `held` [S]: bit 0, 1, 2 where held along x, y, z."""
         told = self.messages("/surface")
         if not len(told):

@@ -6,9 +6,15 @@ import ctypes
 import operator
 import os
 import pathlib
+import re
 import shutil
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_float, c_int32, c_int64, c_size_t, c_uint32, c_void_p
 
+import numpy
+from numpy.typing import NDArray
+
+Array = NDArray[numpy.float64]
+Numbers = NDArray[numpy.int32]
 
 class Error(Exception):
     """What could not be done, and why. `hint`: what to do about it, empty where nothing is known. `code`: of an error of
@@ -24,7 +30,7 @@ class Error(Exception):
     def of_text(cls, text: str, code: str = "") -> Error:
         """By what a program or the library says: lines `error: ...` and `hint: ...`."""
         lines = text.strip().splitlines()
-        told = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
+        told = [re.sub(r"^error: (palpate_\w+: )?", "", line) for line in lines if line.startswith("error: ")]  # without functions of C
         hints = [line.removeprefix("hint: ") for line in lines if line.startswith("hint: ")]
         return cls("\n".join(told or lines), "\n".join(hints), code)
 

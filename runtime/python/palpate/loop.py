@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy
+from numpy.typing import ArrayLike
 
+from .library import Array
 from .session import Felt, Session
 
 
@@ -18,7 +20,7 @@ class Loop:
     must be quick. `shown(felt)`: takes what the first tool feels, as a device would; may be left out. What either of them
     throws ends the loop, and `stop` throws it again. Python's pauses come through: `late` says by how much."""
 
-    def __init__(self, session: Session, pose: Callable[[float], Sequence[float] | None],
+    def __init__(self, session: Session, pose: Callable[[float], ArrayLike | None],
                  shown: Callable[[Felt], object] | None = None):
         self._session = session
         self._pose = pose
@@ -47,7 +49,7 @@ class Loop:
         self.stop()
 
     @property
-    def late(self) -> numpy.ndarray:
+    def late(self) -> Array:
         """How much later than due each tick began [s]."""
         return numpy.array(self._late)
 

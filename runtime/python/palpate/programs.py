@@ -6,11 +6,12 @@ import json
 import operator
 import os
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 
 import numpy
+from numpy.typing import ArrayLike
 
-from .library import Error, path_text, program
+from .library import Array, Error, path_text, program
 
 Path = str | os.PathLike[str]
 
@@ -33,18 +34,26 @@ def bake(model: Path, output: Path, *, jobs: int | None = None, force: bool = Fa
         raise Error.of_text("".join(lines))
 
 
-def probe(file: Path, displace: Sequence[Sequence[float]], *, at: Sequence[Sequence[float]] = (),
-          node: Sequence[int] = (), overlay: tuple[int, int] | None = None) -> numpy.ndarray:
+def _vectors(option: str, rows: ArrayLike) -> list[str]:
+    """An option for each of the rows [K, d]."""
+    words = []
+    for row in numpy.atleast_1d(rows):
+        if numpy.shape(row) not in ((2,), (3,)):
+            raise Error(f"a vector is 2 or 3 numbers, not {row}", "give an array of a row for each node", "argument")
+        words += [option, ",".join(repr(float(x)) for x in row)]
+    return words
+
+
+def probe(file: Path, displace: ArrayLike, *, at: ArrayLike = (), node: Iterable[int] = (),
+          overlay: tuple[int, int] | None = None) -> Array:
     """Forces on the body [N] that displace nodes by `displace` [K, d] [m], all other nodes being free: of the free surface
     nodes nearest to the points `at` [m], or of the mesh nodes `node`. `overlay`: refinement and rings of a finer mesh.
     Throws Error with what palpate-runtime says."""
     command = [program("palpate-runtime"), "probe", path_text(file), "--json"]
-    for point in at:
-        command += ["--at", ",".join(repr(float(x)) for x in point)]
+    command += _vectors("--at", at)
     for number in node:
         command += ["--node", str(operator.index(number))]
-    for u in displace:
-        command += ["--displace", ",".join(repr(float(x)) for x in u)]
+    command += _vectors("--displace", displace)
     if overlay is not None:
         command += ["--overlay", f"r={overlay[0]},rings={overlay[1]}"]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy
+from numpy.typing import ArrayLike, NDArray
 
-from .library import (ERROR_STATE, NOT_STEPPED, CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error, load,
-                      path_bytes, whole)
+from .library import (ERROR_STATE, NOT_STEPPED, Array, CCounts, COptions, COverlay, CPose, CRecordOptions, CResult, CTool, Error, Numbers,
+                      load, path_bytes, whole)
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 FLOATS = ctypes.POINTER(ctypes.c_float)
@@ -52,13 +53,13 @@ class Overlay:
 class Felt:
     """What a tool feels since the last tick; SI units, arrays of numpy."""
 
-    force: numpy.ndarray  # [3] on the hand
-    torque: numpy.ndarray  # [3] on the hand, about the tool's origin
-    tool_position: numpy.ndarray  # [3] of the tool itself, which the surface keeps outside
-    tool_orientation: numpy.ndarray  # [4] w, x, y, z
+    force: Array  # [3] on the hand
+    torque: Array  # [3] on the hand, about the tool's origin
+    tool_position: Array  # [3] of the tool itself, which the surface keeps outside
+    tool_orientation: Array  # [4] w, x, y, z
     contacts: int  # places where tool and surface press on each other
-    local_stiffness: numpy.ndarray  # [3, 3] of the force between ticks: force - local_stiffness (x - local_point)
-    local_point: numpy.ndarray  # [3]
+    local_stiffness: Array  # [3, 3] of the force between ticks: force - local_stiffness (x - local_point)
+    local_point: Array  # [3]
     local_radius: float  # of local_point, within which that holds
     force_error: float  # how far the force may be off, about, where the tick was a best effort; else 0
     left_out: int  # contact points that the tool presses on and that found no room
@@ -161,16 +162,22 @@ class Session:
             raise IndexError(f"tool {tool} of {len(self.tools)}")
         return operator.index(tool)
 
-    def put(self, tool: int, position: Sequence[float], orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    def put(self, tool: int, position: ArrayLike, orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0),
             grab: bool = False) -> None:
         """Sets where the device wants a tool in the next ticks: position [m], quaternion w, x, y, z, grab. Throws Error where these are
-        not 3 and 4 numbers, and IndexError where there is no such tool."""
+        not 3 (of a body in the plane also 2) and 4 numbers, and IndexError where there is no such tool."""
         pose = self._view[self._number(tool)]
+        position = self._in_space(position)
         if numpy.shape(position) != (3,) or numpy.shape(orientation) != (4,):
             raise Error(f"a pose is 3 numbers and 4, not {position!r} and {orientation!r}", "give x, y, z and w, x, y, z", "argument")
         pose["position"], pose["orientation"], pose["grab"] = position, orientation, bool(grab)
 
-    def step(self, position: Sequence[float] | None = None, orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    def _in_space(self, position: ArrayLike) -> ArrayLike:
+        if numpy.shape(position) == (2,) and self._counts().corners == 2:
+            return numpy.append(position, 0.0)
+        return position
+
+    def step(self, position: ArrayLike | None = None, orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0),
              grab: bool = False) -> Felt:
         """One tick, with the poses that `put` set; of the first tool, the one given here. What the first tool feels.
         Neither waits nor allocates in the library, and other threads of Python run meanwhile."""
@@ -207,12 +214,10 @@ class Session:
             self._names[bits] = frozenset(name.decode() for name in names if name)
         return self._names[bits]
 
-    def play(self, positions: numpy.ndarray) -> numpy.ndarray:
-        """One tick for each row of `positions` [T, 3] of the first tool [m]; the forces on the hand [T, 3] [N]."""
-        forces = numpy.empty((len(positions), 3))
-        for k, position in enumerate(positions):
-            forces[k] = self.step(position).force
-        return forces
+    def play(self, positions: ArrayLike) -> Array:
+        """One tick for each row of `positions` [T, 3] (in the plane also [T, 2]) of the first tool [m]; the forces on the hand
+        [T, 3] [N]."""
+        return numpy.array([self.step(position).force for position in numpy.atleast_1d(positions)]).reshape(-1, 3)
 
     def reset(self) -> None:
         """Back to a body that nobody has touched, and to the tools that the session was made with. Throws Error while it is
@@ -223,7 +228,7 @@ class Session:
 
     def record(self, file: str | os.PathLike[str], *, pictures: float = 60.0, tool: int = 0) -> None:
         """Records each tick of a tool from now on, from the untouched body, with so many pictures of the surface a second. What
-        stands at `file` is replaced only where it is empty or an earlier recording.
+        stands at `file` is replaced only where it is empty or an earlier recording without a tick.
         `palpate.Recording` reads it, and `palpate-runtime play BODY --device replay:FILE` repeats it. Throws Error."""
         options = CRecordOptions(ctypes.sizeof(CRecordOptions), whole(tool, "tool"), pictures)
         error = ctypes.create_string_buffer(4096)
@@ -242,27 +247,27 @@ class Session:
         return Error.of_text(error.value.decode(errors="replace"), self._library.palpate_code_name(code).decode())
 
     @property
-    def rest(self) -> numpy.ndarray:
+    def rest(self) -> Array:
         """Positions of the surface nodes on the body at rest [S, 3] [m]."""
         rest = numpy.empty((self._counts().nodes, 3))
         self._call("palpate_surface_rest", rest.ctypes.data_as(DOUBLES))
         return rest
 
     @property
-    def simplices(self) -> numpy.ndarray:
+    def simplices(self) -> Numbers:
         """Surface nodes of the triangles, counter-clockwise seen from outside [F, 3]; in the plane of lines [F, 2]."""
         counts = self._counts()
         corners = numpy.empty((counts.simplices, counts.corners), numpy.int32)
         self._call("palpate_surface_simplices", corners.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)))
         return corners
 
-    def displacement(self) -> numpy.ndarray:
+    def displacement(self) -> Array:
         """Displacement of the surface nodes from rest in the last tick [S, 3] [m]; another thread may ask while one steps."""
         u = numpy.empty((self._counts().nodes, 3))
         self._call("palpate_surface_displacement", u.ctypes.data_as(DOUBLES))
         return u
 
-    def stress(self) -> tuple[int, numpy.ndarray, numpy.ndarray]:
+    def stress(self) -> tuple[int, NDArray[numpy.float32], NDArray[numpy.float32]]:
         """Tick, von Mises stress and contact pressure of the surface nodes [S] [Pa] as they were found last; the tick is -1,
         and all is NaN, where there are none yet. Stress is NaN where it is not known."""
         found = [numpy.full(self._counts().nodes, numpy.nan, numpy.float32) for _ in range(2)]

@@ -23,12 +23,14 @@ class Viewer:
     def __init__(self, file: Path, *options: str, height: int = 560):
         name = path_text(file)
         command = ["view", name] if name.endswith(".mcap") else ["play", name, "--view"]
+        chosen = any(option.split("=")[0] == "--view-address" for option in options)
+        address = [] if chosen else ["--view-address", "0"]
         self.height = height
         told, tells = os.pipe()  # the address: what is printed has names from files in it
         with open(told, encoding="utf-8") as reader:
             try:
                 self._process = subprocess.Popen(
-                    [program("palpate-runtime"), *command, "--view-address", "0", "--view-framed", "--view-fd", str(tells), *options],
+                    [program("palpate-runtime"), *command, *address, "--view-framed", "--view-fd", str(tells), *options],
                     stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", pass_fds=(tells,))
             finally:
                 os.close(tells)
