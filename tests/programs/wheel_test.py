@@ -2,13 +2,14 @@
 
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
 import zipfile
 
-from programs import BINARY, HAS_SANITIZERS, PATIENCE, SOURCE, cube_toml, run
+from programs import BINARY, HAS_SANITIZERS, PATIENCE, SOURCE, cube_toml, palpate, run
 
 PUSH = """
 import palpate
@@ -16,6 +17,7 @@ palpate.bake("cube.toml", "cube.palpate.hdf")
 with palpate.Session("cube.palpate.hdf", palpate.Tool(radius=0.1)) as session:
     for tick in range(300):
         felt = session.step((0.5, 0.5, max(1.05, 1.2 - 0.001 * tick)))
+palpate.Body("cube.palpate.hdf").close()
 print(palpate.__file__)
 print(palpate.library.program("palpate-runtime"))
 print(*[force.hex() for force in felt.force.tolist()])
@@ -44,10 +46,12 @@ class Wheel(unittest.TestCase):
 
     def test_is_installed_and_felt(self):
         (self.folder / "cube.toml").write_text(cube_toml(4))
-        subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", self.folder / "venv"], check=True)
-        python = self.folder / "venv" / "bin" / "python"
-        subprocess.run([python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", self.wheel], check=True, timeout=PATIENCE)
+        (self.folder / "build" / "wheels").mkdir(parents=True)
+        shutil.copy(self.wheel, self.folder / "build" / "wheels")
+        recipe = re.search(r"```sh\nscripts/wheel\n(.*?)```", (SOURCE / "docs" / "python.md").read_text(), re.DOTALL)[1]
         bare = {"PATH": "/usr/bin:/bin", "HOME": str(self.folder)}
+        subprocess.run(["bash", "-euc", recipe], cwd=self.folder, env={**bare, "PIP_NO_INDEX": "1"}, check=True, timeout=PATIENCE)
+        python = self.folder / "venv" / "bin" / "python"
         done = subprocess.run([python, "-c", PUSH], cwd=self.folder, env=bare, capture_output=True, text=True, check=False, timeout=PATIENCE)
         self.assertEqual(done.returncode, 0, done.stderr)
         package, program, force = done.stdout.splitlines()
@@ -69,6 +73,7 @@ class Wheel(unittest.TestCase):
         self.assertIn("libhdf5-103-1", needed)
         self.assertIn("libopenblas0-pthread", needed)
         self.assertEqual(run("dpkg-query", "-W", *needed).returncode, 0)
+        self.assertIn(f"Version: {palpate.__version__}\n", said)
 
     def test_a_folder_without_a_build_is_refused(self):
         done = run(SOURCE / "scripts" / "wheel", "--build", self.folder, "--output", self.folder)
