@@ -140,7 +140,7 @@ enum class WaitEnd { closed, late, interrupted };
 
 /// Reads until the child closes its end of the pipe.
 WaitEnd read_until_closed(int pipe, Clock::time_point deadline, bool stop_at_signals, Bytes& bytes) {
-  std::array<std::byte, 65536> chunk{};
+  Bytes chunk(65536);  // not on the stack, which may be as small
   for (;;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
     if (left <= 0) {

@@ -4,9 +4,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <system_error>
+#include <vector>
 
 #include "base/error.h"
 
@@ -91,7 +91,7 @@ std::string read_all(const std::filesystem::path& file, const char* if_missing) 
   if (::fstat(descriptor.fd, &status) != 0) fail("read", file, errno, if_missing);
   std::string text;
   text.reserve(static_cast<std::size_t>(status.st_size));
-  std::array<char, 65536> chunk{};
+  std::vector<char> chunk(65536);  // not on the stack, which may be as small
   for (;;) {
     const ssize_t size = ::read(descriptor.fd, chunk.data(), chunk.size());
     if (size == 0) return text;
