@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <sstream>
@@ -10,6 +11,8 @@
 
 #include "base/error.h"
 #include "formats/hdf5_contents.h"
+#include "formats/mcap/reader.h"
+#include "formats/recording_messages.h"
 
 namespace palpate {
 namespace {
@@ -139,7 +142,7 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
     case OutputKind::report:
       return is_our_report(text);
     case OutputKind::contacts:
-      return text.starts_with("x,y,z,nx,ny,nz,fx,fy,fz,gap,");
+      return text.starts_with(contacts_header);
     case OutputKind::field:
       return text.starts_with("node,x,y,z,u0x,u0y,u0z,ux,uy,uz\n") ||
              text.starts_with("node,x,y,z,u0x,u0y,u0z,ux,uy,uz,sxx,syy,szz,sxy,syz,szx,von_mises\n");
@@ -156,13 +159,26 @@ bool is_ours(const std::filesystem::path& file, OutputKind kind) {
     case OutputKind::series:
       return is_our_xml(text, "<!-- palpate ");
     case OutputKind::ticks:
-      return text.starts_with("time,device_x,device_y,device_z,");
+      return text.starts_with(ticks_header);
     case OutputKind::faces:
       return is_loose_triangles(*bytes);
     case OutputKind::surface:
       return text.starts_with("OFF\n# repaired by palpate-precompute\n");
   }
   return false;
+}
+
+bool holds_ticks(const std::filesystem::path& recording) {
+  try {
+    const mcap::Layout layout = mcap::read_layout(open_file(recording, OpenMode::read));
+    return std::ranges::any_of(layout.chunks, [](const mcap::ChunkPlace& chunk) {
+      return std::ranges::any_of(chunk.index, [](const mcap::MessageIndex& index) {
+        return index.channel == static_cast<std::uint16_t>(RecordedChannel::tick) && index.count > 0;
+      });
+    });
+  } catch (const Error&) {
+    return true;
+  }
 }
 
 }  // namespace palpate

@@ -25,6 +25,14 @@ enum class OutputKind : std::uint8_t {
   surface,    ///< that was repaired, .off
 };
 
+/// The first lines of our tables.
+inline constexpr std::string_view contacts_header = "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held\n";
+inline constexpr std::string_view ticks_header =
+    "time,device_x,device_y,device_z,device_qw,device_qx,device_qy,device_qz,"
+    "tool_x,tool_y,tool_z,tool_qw,tool_qx,tool_qy,tool_qz,"
+    "force_x,force_y,force_z,torque_x,torque_y,torque_z,shown_force_x,shown_force_y,shown_force_z,"
+    "contacts,grab,status,compute_ns,force_error,left_out\n";
+
 /// "table of contact points"
 [[nodiscard]] std::string_view name_of(OutputKind kind) noexcept;
 
@@ -38,5 +46,8 @@ enum class OutputKind : std::uint8_t {
 /// empty one is. By its content; HDF5 reads it in a child process, which it cannot take down with it. False
 /// for what cannot be read.
 [[nodiscard]] bool is_ours(const std::filesystem::path& file, OutputKind kind);
+
+/// Whether a recording of ours holds ticks, which no other run makes again. True for one that is damaged.
+[[nodiscard]] bool holds_ticks(const std::filesystem::path& recording);
 
 }  // namespace palpate

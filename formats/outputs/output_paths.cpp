@@ -34,6 +34,8 @@ void check_existing(const std::filesystem::path& file, OutputKind kind, std::opt
   if (!is_ours(file, kind))
     throw Error("is there already and is not a " + std::string(name_of(kind)) + " of Palpate's",
                 file.string(), elsewhere);
+  if (kind == OutputKind::recording && holds_ticks(file))
+    throw Error("is a recording already, which could not be made again", file.string(), elsewhere);
 }
 
 /// What follows the last dot of a name, with it, in small letters; empty where that is no word.

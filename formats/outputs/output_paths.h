@@ -19,7 +19,8 @@ void expect_ending(const std::filesystem::path& file, OutputKind kind, const std
 
 /// Decides which paths a run may write, before its work begins. An output never takes the place of what the
 /// run reads, nor of another of its outputs, under whatever name (links). It takes the place of an existing
-/// file only where that is empty or an earlier output of the same kind, or where that is forced. Lives as
+/// file only where that is empty or an earlier output of the same kind (no recording that holds ticks), or
+/// where that is forced. Lives as
 /// long as the run: it holds pipes open, so that their readers wait.
 class OutputPaths {
  public:

@@ -199,7 +199,7 @@ void write_table(const RecordingFile& recording, const ExportOptions& options,
                  const std::filesystem::path& csv) {
   const TickRange ticks = choose_ticks(recording, options);
   FileWriter table(csv);
-  std::string text(ticks_names());
+  std::string text(ticks_header);
   for (std::int64_t row = ticks.begin; row < ticks.end; ++row) {
     text += ticks_line(recording.tick(row));
     if (text.size() < table_block && row + 1 < ticks.end) continue;

@@ -4,14 +4,6 @@
 
 namespace palpate {
 
-std::string_view ticks_names() noexcept {
-  return "time,device_x,device_y,device_z,device_qw,device_qx,device_qy,device_qz,tool_x,tool_y,tool_z,tool_"
-         "qw,"
-         "tool_qx,tool_qy,tool_qz,force_x,force_y,force_z,torque_x,torque_y,torque_z,shown_force_x,shown_"
-         "force_y,"
-         "shown_force_z,contacts,grab,status,compute_ns,force_error,left_out\n";
-}
-
 std::string ticks_line(const TickRecord& tick) {
   std::string text = fmt::format("{}", tick.time);
   const auto add = [&](const auto& numbers) { text += fmt::format(",{}", fmt::join(numbers, ",")); };

@@ -225,9 +225,9 @@ typedef struct palpate_record_options {
   { sizeof(palpate_record_options), 0, 60.0 }
 
 /* Records each tick from now on to `file` (OUT.mcap), until palpate_record_end or palpate_destroy. By the
- * rules of the programs: what stands there is replaced only where it is empty or an earlier recording, and
- * never the model, its sources or anything but a regular file, under whatever name. Begins with the untouched
- * body (palpate_reset), as a replay does: of a session with one tool that nobody changes meanwhile,
+ * rules of the programs: what stands there is replaced only where it is empty or a recording without ticks,
+ * and never the model, its sources or anything but a regular file, under whatever name. Begins with the
+ * untouched body (palpate_reset), as a replay does: of a session with one tool that nobody changes meanwhile,
  * `palpate-runtime play BODY --device replay:OUT.mcap` repeats every tick to the last bit. options.tick must
  * be 1/rate of a whole rate from 1000 to 5000 ticks a second. Threads of the session write; palpate_step
  * stays real-time safe. The file is a valid recording at each instant. Returns PALPATE_OK, or a code with the

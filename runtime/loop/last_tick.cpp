@@ -5,12 +5,13 @@
 #include <span>
 #include <vector>
 
+#include "formats/output_kind.h"
 #include "meshes/readers/vtu_writer.h"
 #include "runtime/background/surface_frames.h"
 
 namespace palpate {
 std::string contact_table(const Body& body, const State& state) {
-  std::string table = "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held\n";
+  std::string table(contacts_header);
   const std::span<const ContactPoint> contacts = state.contacts();
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const ContactPoint& contact = contacts[k];

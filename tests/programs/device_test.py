@@ -386,7 +386,7 @@ class Scripted(ProgramTest):
     def test_safety_where_it_is_asked_for(self):
         file = self.bake(SMALL_CUBE)
         script = self.write("press.csv", "t,x,y,z\n0,0.05,0.05,0.12\n0.3,0.05,0.05,0.1\n0.8,0.05,0.05,0.1001\n")
-        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.mcap", "--report", "-")
+        common = (RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.01", "--fast", "--record", "a.mcap", "--force", "--report", "-")
         plain = run(*common, cwd=self.folder)
         self.assertEqual(plain.returncode, 0, plain.stderr)
         self.assertNotIn("safety", json.loads(plain.stdout))

@@ -111,7 +111,7 @@ class Swing(ProgramTest):
             file = self.bake(beam_toml(method, ratio=0.4))
             force = {}
             for contact in ("quasi-static", "dynamic"):
-                report, _ = self.play(file, push, "--contact", contact, "--tool", "sphere:0.005", "--coupling", "300", "--record", "push.mcap")
+                report, _ = self.play(file, push, "--contact", contact, "--tool", "sphere:0.005", "--coupling", "300", "--record", "push.mcap", "--force")
                 self.assertEqual(report["dynamics"]["contact"], contact)
                 recording = palpate.read(self.folder / "push.mcap")
                 force[contact] = -recording["force"][:, 1]  # on the body, downwards

@@ -207,7 +207,9 @@ class Existing(OutputTest):
         everything = [word for option in options for word in (option, f"own{option}")]
         self.assert_done(self.play(*everything))
         before = (self.folder / "own--record").read_bytes()
-        self.assert_done(self.play(*everything))  # over themselves
+        self.assert_done(self.play(*everything[2:]))  # over themselves
+        self.assert_kept(self.contents(), self.play(*everything), "own--record: is a recording already", "--force")
+        self.assert_done(self.play(*everything, "--force"))
         self.assertEqual((self.folder / "own--record").read_bytes(), before)
         files = self.contents()
         for option in options:  # but not over one another
@@ -257,7 +259,7 @@ class Existing(OutputTest):
             (self.folder / name).symlink_to(target)
         self.write("m.toml", cube_toml(2))
         for _ in range(2):
-            self.assert_done(self.play("--record", "r.mcap", "--report", "r.json"))
+            self.assert_done(self.play("--record", "r.mcap", "--report", "r.json", "--force"))
             self.assert_done(run(PRECOMPUTE, "m.toml", "-o", "m.hdf", cwd=self.folder))
         self.assertEqual(sorted(p.name for p in (self.folder / "elsewhere").iterdir()), ["m.palpate.hdf", "out.json", "out.mcap"])
         for name in ("r.mcap", "r.json", "m.hdf"):

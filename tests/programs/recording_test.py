@@ -58,7 +58,7 @@ class SecondRoute(ProgramTest):
     def record(self, body, *arguments, name="touch.mcap"):
         self.write("touch.csv", TOUCH)
         result = run(RUNTIME, "play", BODIES / body / f"{body}.palpate.hdf", "--device", "script:touch.csv", "--tool", "sphere:0.15", "--fast",
-                     "--record", name, *arguments, cwd=self.folder)
+                     "--record", name, "--force", *arguments, cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         return self.folder / name
 

@@ -468,7 +468,7 @@ class PlayOverlay(ProgramTest):
     def ticks(self, file, overlay):
         script = self.write("slide.csv", self.SCRIPT)
         result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--overlay", overlay,
-                     "--record", "out.mcap", cwd=self.folder)
+                     "--record", "out.mcap", "--force", cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         recording = palpate.read(self.folder / "out.mcap")
         return {name: recording[name] for name in recording}
@@ -517,7 +517,7 @@ class PlayOverlay(ProgramTest):
         forces, surfaces = [], []
         for file, overlay in ((coarse, ("--overlay", "r=2,rings=4")), (fine, ())):
             result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--tool", "sphere:0.2", "--fast", "--record", "out.mcap",
-                         "--surface", "out.vtu", "--report", "report.json", *overlay, cwd=self.folder)
+                         "--surface", "out.vtu", "--report", "report.json", "--force", *overlay, cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
             report = json.loads((self.folder / "report.json").read_text())
             recording = palpate.read(self.folder / "out.mcap")
@@ -558,7 +558,7 @@ class Tools(ProgramTest):
     def play(self, file, script, *arguments):
         script = self.write("script.csv", script)
         result = run(RUNTIME, "play", file, "--device", f"script:{script}", "--fast", "--record", "out.mcap", "--contacts", "out.csv", "--report", "-",
-                     *arguments, cwd=self.folder)
+                     "--force", *arguments, cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         recording = palpate.read(self.folder / "out.mcap")
         ticks = {name: recording[name] for name in recording}

@@ -92,7 +92,7 @@ class Session(ProgramTest):
     def test_while_it_is_recorded(self):
         file = self.bake(cube_toml(4))
         script = self.write("long.csv", "t,x,y,z\n0,0.5,0.5,1.3\n600,0.5,0.5,1.18\n")
-        play = [RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.mcap", "--report", "-"]
+        play = [RUNTIME, "play", file, "--device", f"script:{script}", "--record", "out.mcap", "--force", "--report", "-"]
         process = subprocess.Popen(play, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
             for _ in range(600):

@@ -66,7 +66,8 @@ TEST(OutputKind, WhatOthersWriteIsNotOurs) {
   const Folder folder;
   for (const std::string text :
        {"{\n  \"file\": \"a.hdf\"\n}\n", "x,y,z\n0,0,0\n", "node,x,y,z\n", "notes\n", "\n",
-        "\x89HDF\r\n\x1a\n",
+        "\x89HDF\r\n\x1a\n", "x,y,z,nx,ny,nz,fx,fy,fz,gap,simplex,held,remark\n",
+        "time,device_x,device_y,device_z,mine\n",
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
         "byte_order=\"LittleEndian\" "
         "header_type=\"UInt64\">\n  <UnstructuredGrid>\n    <Piece NumberOfPoints=\"8\"",
@@ -89,6 +90,26 @@ TEST(OutputKind, HdfFilesSayWhatTheyAre) {
   RecordingWriter killed(folder / "killed.mcap", {});
   killed.checkpoint();
   EXPECT_TRUE(is_ours(folder / "killed.mcap", OutputKind::recording));
+}
+
+// It cannot be made again.
+TEST(OutputPaths, ARecordingThatHoldsTicksIsNotReplaced) {
+  const Folder folder;
+  RecordingWriter(folder / "empty.mcap", {}).finish();
+  RecordingWriter done(folder / "done.mcap", {}), killed(folder / "killed.mcap", {});
+  done.append(TickRecord{});
+  done.finish();
+  killed.append(TickRecord{});
+  killed.checkpoint();
+  for (const char* name : {"empty.mcap", "done.mcap", "killed.mcap"}) {
+    const auto add = [&](OutputPaths paths) {
+      return refusal([&] { paths.add(folder / name, OutputKind::recording, "--record"); });
+    };
+    EXPECT_EQ(add(OutputPaths(false)).find("is a recording already") != std::string::npos,
+              std::string(name) != "empty.mcap")
+        << name;
+    EXPECT_EQ(add(OutputPaths(true)), "") << name;
+  }
 }
 
 TEST(OutputPaths, InputsMayComeLater) {

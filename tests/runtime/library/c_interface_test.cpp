@@ -580,13 +580,12 @@ TEST(CInterfaceRecording, ReplacesNothingButARecording) {
 
   const palpate_pose pose = PALPATE_POSE_INIT;
   std::ofstream(folder.path() / "empty.mcap").flush();
-  for (const char* name : {"empty.mcap", "empty.mcap"}) {  // the second time it is a recording
-    ASSERT_EQ(palpate_record(session.get(), (folder.path() / name).c_str(), &options, error, sizeof error),
-              PALPATE_OK)
-        << error;
-    palpate_step(session.get(), &pose);
-    ASSERT_EQ(end_recording(session.get()), PALPATE_OK);
-  }
+  const std::string file = folder.path() / "empty.mcap";
+  ASSERT_EQ(palpate_record(session.get(), file.c_str(), &options, error, sizeof error), PALPATE_OK) << error;
+  palpate_step(session.get(), &pose);
+  ASSERT_EQ(end_recording(session.get()), PALPATE_OK);
+  EXPECT_EQ(palpate_record(session.get(), file.c_str(), &options, error, sizeof error), PALPATE_ERROR_FILE);
+  EXPECT_NE(std::string(error).find("is a recording already"), std::string::npos) << error;
 }
 
 TEST(CInterfaceErrors, AFileThatIsNoModelIsNamed) {

@@ -209,6 +209,7 @@ class PlayedDevice : public ::testing::Test {
       arguments.emplace_back(at_touch);
     }
     line.insert(line.end(), arguments.begin(), arguments.end());
+    line.emplace_back("--force");  // over the recording of the run before
     return std::make_unique<Program>(line, folder);
   }
 
