@@ -103,8 +103,8 @@ struct NodalForce {
   Vec3 force;
   Selection where;
 };
-/// Force per area [N/m^2] on the boundary facets all of whose nodes are selected; in the plane it acts over
-/// the thickness.
+/// Force per area [N/m^2] on the boundary facets that have the tag, or all of whose nodes are selected; in
+/// the plane it acts over the thickness.
 struct Traction {
   Vec3 traction;
   Selection where;

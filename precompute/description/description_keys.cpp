@@ -173,16 +173,15 @@ KeyTable fixed() {
 }
 
 KeyTable load() {
-  return {
-      "[[load]]",
-      {{"nodal_force", "N", "", "force on each selected node", alternative},
-       {"traction", "N/m²", "",
-        "force per area on the boundary facets all of whose nodes are selected; in the plane it acts over "
-        "the thickness",
-        alternative},
-       {"gravity", "m/s²", "",
-        "acceleration of the whole body, multiplied by the density of each material; takes no selection",
-        alternative}}};
+  return {"[[load]]",
+          {{"nodal_force", "N", "", "force on each selected node", alternative},
+           {"traction", "N/m²", "",
+            "force per area on the boundary facets that have the tag, or all of whose nodes are selected; in "
+            "the plane it acts over the thickness",
+            alternative},
+           {"gravity", "m/s²", "",
+            "acceleration of the whole body, multiplied by the density of each material; takes no selection",
+            alternative}}};
 }
 
 KeyTable storage() {

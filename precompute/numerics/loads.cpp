@@ -1,6 +1,7 @@
 #include "precompute/numerics/loads.h"
 
 #include <algorithm>
+#include <set>
 #include <variant>
 
 #include "base/error.h"
@@ -44,13 +45,16 @@ class Loader {
 
   void add(const Traction& load, const std::string& where) const {
     const std::vector<std::uint8_t> selected = select_nodes(mesh_, load.where, where);
+    const auto* tag = std::get_if<SelectTag>(&load.where);
+    std::set<std::vector<Index>> tagged;
+    if (tag != nullptr) tagged = tagged_facets(tag->tag);
     bool found = false;
     for (Index facet = 0; facet < body_.surface.count(); ++facet) {
       const std::span<const Index> nodes = body_.surface.facet_nodes(facet);
       const bool loaded = std::all_of(nodes.begin(), nodes.end(), [&](Index node) {
         return selected[static_cast<std::size_t>(node)] != 0;
       });
-      if (!loaded) continue;
+      if (!loaded || (tag != nullptr && !tagged.contains(in_order(nodes)))) continue;
       found = true;
       add_shares(nodes, load.traction,
                  facet_shape_integrals(body_.surface.facet, positions(mesh_, nodes), description_.thickness));
@@ -68,6 +72,21 @@ class Loader {
         add_shares(nodes, weight, element_shape_integrals(mesh_.element, x, description_.thickness));
       });
     }
+  }
+
+  static std::vector<Index> in_order(std::span<const Index> nodes) {
+    std::vector<Index> result(nodes.begin(), nodes.end());
+    std::sort(result.begin(), result.end());
+    return result;
+  }
+
+  /// Nodes of each facet that has the tag. Where a body is one element thick, nodes do not tell: a side
+  /// between two tagged ones has all its nodes on them.
+  [[nodiscard]] std::set<std::vector<Index>> tagged_facets(Index tag) const {
+    std::set<std::vector<Index>> facets;
+    for (std::size_t t = 0; t < mesh_.facet_tags.size(); ++t)
+      if (mesh_.facet_tags[t] == tag) facets.insert(in_order(mesh_.tagged_facet(static_cast<Index>(t))));
+    return facets;
   }
 
   template <class F>

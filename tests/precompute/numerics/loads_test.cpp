@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "meshes/element.h"
@@ -244,6 +245,29 @@ TEST_P(LoadedKind, NodalForcesAreAddedAsTheyAre) {
   EXPECT_NEAR((model.total_load() - Vec3(0.2, 0.1, 0.0)).norm(), 0.0, 1e-15);
   EXPECT_NEAR(model.reaction(0), -0.2, 1e-11);
   EXPECT_NEAR(model.reaction(1), -0.1, 1e-11);
+}
+
+// One element thick: the sides between two tagged faces have all their nodes on them, and are loaded all the
+// same only where they are tagged.
+TEST_P(LoadedKind, ATagLoadsItsFacetsAlone) {
+  Loaded model(GetParam(), test::block(GetParam().element, size, {4, 1, 3}), tissue);
+  Mesh& mesh = model.body.mesh;
+  for (Index facet = 0; facet < model.body.surface.count(); ++facet) {
+    const std::span<const Index> nodes = model.body.surface.facet_nodes(facet);
+    const auto lies_at = [&](double y) {
+      return std::all_of(nodes.begin(), nodes.end(), [&](Index node) {
+        return std::abs(mesh.nodes[static_cast<std::size_t>(node)].y() - y) < 1e-9;
+      });
+    };
+    if (!lies_at(0.0) && !lies_at(size.y())) continue;
+    mesh.tagged_facets.insert(mesh.tagged_facets.end(), nodes.rbegin(), nodes.rend());
+    mesh.facet_tags.push_back(5);
+  }
+  model.description.loads = {Traction{{100.0, 0.0, 0.0}, SelectTag{5}}};
+  Vec3 total = Vec3::Zero();
+  for (const Vec3& f : nodal_loads(model.description, model.body)) total += f;
+  const double force = 2.0 * 100.0 * model.area(1);
+  EXPECT_NEAR(total.x(), force, 1e-12 * force);
 }
 
 TEST(Traction, SelectionWithoutAWholeFacetIsRefused) {
