@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -20,6 +22,14 @@
 
 namespace palpate {
 namespace {
+
+/// A page loads the body again where its settings change.
+void warn_once(const std::string& text) {
+  static std::mutex mutex;
+  static std::set<std::string> told;
+  const std::lock_guard lock(mutex);
+  if (told.insert(text).second) print_warning(text);
+}
 
 void print_loaded(const Body& body, double seconds) {
   const std::string stored = body.greens().compressed()
@@ -77,10 +87,10 @@ Body load_body(const std::filesystem::path& file, const std::filesystem::path& m
                 file.string(), "precompute it again: palpate-precompute " + shell_word(model_toml.string()));
   }
   for (const std::string& stale : stale_sources(model, file)) {
-    print_warning(file.string() + ": " + stale + " (precompute it again)");
+    warn_once(file.string() + ": " + stale);
   }
   if (const std::string warning = precision_warning(model, model.greens.precision()); !warning.empty())
-    print_warning(file.string() + ": " + warning);
+    warn_once(file.string() + ": " + warning);
   scale_loads(model, options.load_scale);
   scale_stiffness(model, options.stiffness_scale);
   if (options.warp) check_warp(options);

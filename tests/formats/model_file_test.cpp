@@ -590,8 +590,14 @@ TEST(Staleness, ChangedAndMissingSourcesAreNamed) {
   std::filesystem::remove(folder / "in" / "box.off");
   stale = stale_sources(model, baked);
   ASSERT_EQ(stale.size(), 2U);
-  EXPECT_NE(stale[0].find("had 8 bytes, now it has 9"), std::string::npos) << stale[0];
-  EXPECT_NE(stale[1].find("box.off (geometry) is gone"), std::string::npos) << stale[1];
+  EXPECT_NE(stale[0].find("had 8 bytes, now it has 9; precompute it again"), std::string::npos) << stale[0];
+  EXPECT_NE(stale[1].find("is not there"), std::string::npos) << stale[1];
+  EXPECT_NE(stale[1].find("box.off (geometry)"), std::string::npos) << stale[1];
+
+  std::filesystem::remove(folder / "in" / "model.toml");  // the file alone was moved: one sentence
+  stale = stale_sources(model, baked);
+  ASSERT_EQ(stale.size(), 1U);
+  EXPECT_EQ(stale[0].find("precompute it again"), std::string::npos) << stale[0];
 }
 
 TEST(Staleness, TheTwoFilesMayMoveTogether) {
